@@ -8,7 +8,7 @@ from dataclasses import asdict, dataclass, fields
 from typing import Any
 
 LEVELS = (1e-3, 1e-6, 1e-9)  # rad, rad/s: until when data agree to each
-DEFAULT_TOLERANCE = 1e-6  # rad per unit of error growth
+DEFAULT_TOLERANCE = 1e-6  # rad, of an interval's defect
 
 
 @dataclass(frozen=True)
@@ -16,8 +16,9 @@ class ChannelErrors:
     """A channel of data, such as "pitch 1" in "rad", against the reference.
 
     error_max, error_whole : the largest error up to the horizon, and at all.
-    error_per_growth : the largest error up to the horizon, of the largest angle so far (at least 1 rad), per unit of
-        growth: how many times larger than an error of the initial state that of this channel may be.
+    defect : rad, the largest over all intervals (of a rate times the interval), less what the rounding of the data
+        explains; None where it cannot be known.
+    floor : rad, the largest that rounding explains.
     agrees_until : s, for each of `LEVELS`, of the last row before the error is larger; NaN where the first row is.
     lag_s, scale, offset : least squares of data = scale * reference(t - lag) + offset up to the horizon.
     """
@@ -26,7 +27,8 @@ class ChannelErrors:
     unit: str
     error_max: float
     error_whole: float
-    error_per_growth: float
+    defect: float | None
+    floor: float | None
     agrees_until: tuple[float, ...]
     lag_s: float
     scale: float
@@ -39,8 +41,10 @@ class DataVerdict:
 
     source : name of the file.
     status, message : as of a run: "ok", or another one and why in a line.
-    tolerance : per unit of error growth.
+    tolerance : rad, of an interval's defect.
     rows, compared_until, horizon_s : rows compared, time of the last one (s), horizon of the scene (s).
+    defect_time, predicted : s, end of the interval of the largest defect; rad, the error up to the horizon that the
+        defects add up to; None where they are not known.
     energy_drift : largest change of the energy of the data, of its scale; None where it cannot be known.
     read, unused, notes : how columns were read; columns that were not; what else there is to know.
     likely : what the difference looks like, of what was tried; empty where nothing fits, or nothing was tried.
@@ -55,6 +59,8 @@ class DataVerdict:
     rows: int
     compared_until: float
     horizon_s: float
+    defect_time: float | None = None
+    predicted: float | None = None
     energy_drift: float | None = None
     read: tuple[str, ...] = ()
     unused: tuple[str, ...] = ()

@@ -30,6 +30,7 @@ Array = NDArray[np.float64]
 
 TIME = "time"
 _FEW_DIGITS, _ALL_DIGITS = 9, 17
+_FEW_VALUES = 10
 _FEWEST = 3  # rows: fewer have no motion to be compared
 # Names without digits, blanks and marks; a name of a rate is one of an angle with a word of _RATE_WORDS behind it.
 _TIME_NAMES = {"time", "t", "times"}
@@ -143,15 +144,19 @@ _GROUP = Kind(keys.read_text, "the path of a group in the file")
 
 def read_mapping(
     columns: str | os.PathLike[str] | Mapping[str, Any] | None, scene: Scene
-) -> tuple[dict[str, Entry], str]:
-    """An entry by the key of a channel, and the group of an HDF5 file: {} and "" where no mapping is given.
+) -> tuple[dict[str, Entry], str, tuple[str, ...]]:
+    """An entry by the key of a channel, the group of an HDF5 file, and the names of channels that are not to be missed:
+    {}, "" and () where no mapping is given.
 
     columns: a TOML file, or a mapping of the same keys. Raises InputError with every fault, a line each.
     """
     if columns is None:
-        return {}, ""
+        return {}, "", ()
     declared = {channel.key: file_key(channel.key, _ENTRY, default=None).metadata for channel in channels(scene)}
+    names = {channel.key: channel.name for channel in channels(scene) if channel.kind == "angle"}
+    omit = keys.list_of(keys.choice(tuple(names)), f"a list of {', '.join(names)}")
     declared["group"] = file_key("group", _GROUP, default="").metadata
+    declared["omit"] = file_key("omit", omit, default=()).metadata
     text: str | None = None
     name, tables = "columns", columns
     if not isinstance(columns, Mapping):
@@ -163,10 +168,11 @@ def read_mapping(
     if problems:
         raise InputError(f"columns: {problem.message}" for problem in problems)
     group = found.pop("group")
+    omitted = tuple(names[key] for key in found.pop("omit"))
     entries = {key: entry for key, entry in found.items() if entry is not None}
-    if entries.keys() == {TIME} or not (entries or group):
+    if entries.keys() == {TIME} or not (entries or group or omitted):
         raise InputError(f"{name}: no channel to compare; allowed: {', '.join(declared)}")
-    return entries, group
+    return entries, group, omitted
 
 
 def find_channels(
@@ -223,18 +229,22 @@ class ForeignData:
 
     time, values : (n,) s, increasing from 0 or later; (n, channels) rad or rad/s, what `channels` says.
     read, unused : a line for each channel: column, unit, and what was assumed; names of the other columns.
+    rounding : (n, channels) half a unit in the last digit of each number, as it was written.
     wrapped : for each channel, whether whole turns are missing from it.
     digits : how many significant digits the numbers have, at most; 17 where they have all.
+    omitted : names of channels that are not to be missed.
     """
 
     source: str
     time: Array
     values: Array
     channels: tuple[Channel, ...]
+    rounding: Array
     read: tuple[str, ...] = ()
     unused: tuple[str, ...] = ()
     wrapped: tuple[bool, ...] = ()
     digits: int = _ALL_DIGITS
+    omitted: tuple[str, ...] = ()
 
     @property
     def columns(self) -> list[int]:
@@ -248,7 +258,7 @@ def load_data(
     columns: str | os.PathLike[str] | Mapping[str, Any] | None = None,
 ) -> ForeignData:
     """Data from a file or from arrays by name, by a mapping or by guesses. Raises InputError, StoreError."""
-    entries, group = read_mapping(columns, scene)
+    entries, group, omitted = read_mapping(columns, scene)
     table = table_of("data", data) if isinstance(data, Mapping) else read_table(data, group, scene.name)
     chosen, lines = find_channels(table, scene, entries)
     lengths = {entry.column: len(table[entry.column].values) for entry in chosen.values()}
@@ -256,6 +266,7 @@ def load_data(
         shown = ", ".join(f"{name} has {length} rows" for name, length in lengths.items())
         raise InputError(f"{table.source}: columns of different lengths: {shown}; allowed: a row for every time")
     arrays: list[Array] = []
+    last_digits: list[Array] = []
     for channel, entry in chosen.items():
         values = table[entry.column].values
         bad = np.flatnonzero(~np.isfinite(values))
@@ -264,7 +275,9 @@ def load_data(
                 f"{table.source}: column {entry.column!r} is {values[bad[0]]} in row {bad[0] + 1} of "
                 f"{len(values)}; allowed: finite numbers"
             )
-        si_values: Array = entry.sign * (values + entry.offset) * UNITS[channel.kind][entry.unit.lower()]
+        factor = UNITS[channel.kind][entry.unit.lower()]
+        last_digits.append(half_last_digits(values) * abs(factor))
+        si_values: Array = entry.sign * (values + entry.offset) * factor
         arrays.append(np.unwrap(si_values) if entry.wrapped else si_values)
     _refuse_wrong_times(table.source, arrays[0])
     return ForeignData(
@@ -272,11 +285,34 @@ def load_data(
         arrays[0],
         np.stack(arrays[1:], axis=1),
         tuple(chosen)[1:],
+        np.stack(last_digits[1:], axis=1),
         lines,
         tuple(name for name in table.columns if name not in lengths),
         tuple(entry.wrapped for entry in chosen.values())[1:],
         max(_digits(table[entry.column].values) for channel, entry in chosen.items() if channel.name != TIME),
+        omitted,
     )
+
+
+def half_last_digits(values: Array) -> Array:
+    """(n,) half a unit in the last place of numbers as they were written: decimals, digits, single or double precision.
+
+    Of the ways that all of them fit, the coarsest.
+    """
+    sizes = np.abs(values)
+    largest = float(sizes.max(initial=0.0))
+    if len(np.unique(values)) < _FEW_VALUES:  # which say nothing of digits
+        return np.asarray(sizes * 2.0**-53)
+    for decimals in range(_FEW_DIGITS + 1):
+        unit = 10.0**-decimals
+        if unit < largest and np.allclose(values, np.round(values / unit) * unit, rtol=0.0, atol=1e-12 * largest):
+            return np.full(len(values), 0.5 * unit)
+    digits = _digits(values)
+    if digits <= _FEW_DIGITS:
+        exponents = np.floor(np.log10(np.where(sizes > 0.0, sizes, 1.0)))
+        return np.asarray(0.5 * 10.0 ** (exponents + 1 - digits))
+    single = np.asarray(values, np.float32).astype(float)
+    return np.asarray(sizes * (2.0**-24 if np.array_equal(single, values) else 2.0**-53))
 
 
 def _digits(values: Array) -> int:

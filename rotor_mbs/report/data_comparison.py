@@ -48,7 +48,7 @@ def compare(
         each, such as `rotor`, `pitch_1_deg`; any of them may be missing.
     columns : a mapping file, or a mapping with the same keys: column, unit, sign, offset of each channel, and whether
         it is wrapped. Without it they are guessed from the names; `verdict.read` says how.
-    tolerance : rad per unit of error growth (error amplification) that still agree.
+    tolerance : rad that the defect of an interval may have beyond the rounding of the data.
 
     Raises
     ------
@@ -99,14 +99,14 @@ class DataComparison:
         return channel_table(self.verdict)
 
     def plot(self) -> Panels:
-        """The error of each channel per unit of error growth over time, and the tolerance."""
-        return error_panels(self.study.record(), per_growth=True)
+        """The defects of each coordinate over time, and the tolerance; errors where there are no defects."""
+        return defect_panels(self.study.record()) or error_panels(self.study.record())
 
     def to_xarray(self) -> Any:
         """What `save` stores as an xarray.Dataset over time.
 
         Variables by channel, with units: data `pitch_1`, then `pitch_1_reference`, `pitch_1_error`, and
-        `pitch_1_growth`, what an error of 1 at the start may have become. Raises InputError where xarray is missing.
+        `pitch_1_defect` of the interval before each row (rad). Raises InputError where xarray is missing.
         """
         record = self.study.record()
         variables = {
@@ -162,7 +162,7 @@ def comparison_page(record: Record) -> dict[str, object]:
         ("Channels compared", ", ".join(channel.name for channel in verdict.channels)),
         ("Rows", f"{verdict.rows}, until {with_unit(verdict.compared_until, 's', 4)}"),
         ("Judged up to the horizon", with_unit(verdict.horizon_s, "s", 4)),
-        ("Tolerance", f"{number(verdict.tolerance)} rad per unit of error growth"),
+        ("Tolerance", f"{number(verdict.tolerance)} rad in an interval, beyond rounding"),
     ]
     if verdict.unused:
         facts.append(("Columns not used", ", ".join(verdict.unused)))
@@ -173,9 +173,9 @@ def comparison_page(record: Record) -> dict[str, object]:
     facts += [("The difference looks like", cause) for cause in verdict.likely]
     table = channel_table(verdict)
     rows: list[Row] = []
-    for channel, (name, error, growth, *others) in zip(verdict.channels, table.rows, strict=True):
-        tone = "good" if channel.error_per_growth <= verdict.tolerance else "bad"
-        rows.append([name, error, TableCell(typeset(growth), tone), *others])
+    for channel, (name, error, defect, *others) in zip(verdict.channels, table.rows, strict=True):
+        tone = "" if channel.defect is None else "good" if channel.defect <= verdict.tolerance else "bad"
+        rows.append([name, error, TableCell(typeset(defect), tone), *others])
     return {
         "verdict": verdict,
         "title": record.attributes["title"],
@@ -187,10 +187,10 @@ def comparison_page(record: Record) -> dict[str, object]:
 
 
 def channel_table(verdict: DataVerdict) -> TextTable:
-    head = ("channel", "largest error", "per growth", *(f"to {level:g} until" for level in LEVELS))
+    head = ("channel", "largest error", "largest defect", *(f"to {level:g} until" for level in LEVELS))
     rows = []
     for channel in verdict.channels:
-        errors = (f"{channel.error_max:.1e} {channel.unit}", f"{channel.error_per_growth:.1e}")
+        errors = (f"{channel.error_max:.1e} {channel.unit}", _defect(channel))
         until = ("never" if np.isnan(time) else f"{time:.6g} s" for time in channel.agrees_until)
         fit = (f"{channel.lag_s:.1e}", f"{channel.scale - 1.0:.1e}", f"{channel.offset:.1e}")
         rows.append((channel.name, *errors, *until, *fit))
@@ -202,19 +202,31 @@ def verdict_of(record: Record) -> DataVerdict:
     return from_dictionary(json.loads(record.attributes["verdict"]))
 
 
-def error_panels(record: Record, *, per_growth: bool = False) -> Panels:
-    """The error of each channel over time, on a logarithmic axis: in rad, or per unit of growth with the tolerance."""
+def error_panels(record: Record) -> Panels:
+    """The error of each channel over time, on a logarithmic axis."""
+    verdict, channels = verdict_of(record), _drawn(verdict_of(record))
+    time = record.arrays["time"]
+    series = [Series(time, np.abs(_array(record, channel, "_error")), _look(channel)) for channel in channels]
+    return plots.errors(series, f"error ({channels[0].unit})", verdict.horizon_s)
+
+
+def defect_panels(record: Record) -> Panels | None:
+    """The defects of each coordinate over time, the larger of angle and rate, with the tolerance; None without any."""
     verdict, time = verdict_of(record), record.arrays["time"]
-    channels = _drawn(verdict)
-    series = []
-    for channel in channels:
-        errors = np.abs(_array(record, channel, "_error"))
-        scale = _array(record, channel, "_growth") if per_growth else 1.0
-        series.append(Series(time, errors / scale, _look(channel)))
-    if not per_growth:
-        return plots.errors(series, f"error ({channels[0].unit})", verdict.horizon_s)
-    series.append(Series(time, np.full(len(time), verdict.tolerance), Look(GREY, ":", "")))
-    return plots.errors(series, "error per unit of growth", verdict.horizon_s)
+    sizes: dict[Look, Any] = {}
+    for channel in verdict.channels:
+        if channel.defect is not None:
+            values, look = _array(record, channel, "_defect")[1:], _look(channel)
+            sizes[look] = np.fmax(sizes[look], values) if look in sizes else values
+    if not sizes:
+        return None
+    series = [Series(time[1:], np.nan_to_num(values), look) for look, values in sizes.items()]
+    series.append(Series(time[1:], np.full(len(time) - 1, verdict.tolerance), Look(GREY, ":", "")))
+    return plots.errors(series, "defect of an interval (rad)")
+
+
+def _defect(channel: ChannelErrors) -> str:
+    return "" if channel.defect is None else f"{channel.defect:.1e} rad"
 
 
 def _array(record: Record, channel: ChannelErrors, ending: str = "") -> Any:
@@ -233,7 +245,7 @@ def _look(channel: ChannelErrors) -> Look:
 
 
 def _pictures(record: Record, verdict: DataVerdict) -> list[Picture]:
-    """Angles of the data upon those of the reference; errors; errors per unit of growth."""
+    """Angles of the data upon those of the reference; errors; defects."""
     pictures = []
     channels, time = [channel for channel in verdict.channels if channel.unit == "rad"], record.arrays["time"]
     if channels:
@@ -250,6 +262,8 @@ def _pictures(record: Record, verdict: DataVerdict) -> list[Picture]:
         pictures.append(picture(panels, "motion", "Angles of the data, upon those of the reference"))
     caption = "Error against the reference; vertical line: horizon"
     pictures.append(picture(error_panels(record), "errors-0", caption))
-    caption = "Error per unit of error growth, with the tolerance"
-    pictures.append(picture(error_panels(record, per_growth=True), "errors-1", caption))
+    defects = defect_panels(record)
+    if defects is not None:
+        caption = "Interval defects, with the tolerance; the rounding of the data is in them"
+        pictures.append(picture(defects, "defects", caption))
     return pictures

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import functools
 import math
-import operator
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, fields, replace
 from functools import cached_property, partial
@@ -22,6 +21,7 @@ from scipy.optimize import linear_sum_assignment
 from rotor_mbs.errors import RotorError
 from rotor_mbs.foreign.channels import ForeignData
 from rotor_mbs.methods.time_limit import OutOfTimeError, time_limit
+from rotor_mbs.models.lagrange import closed_form
 from rotor_mbs.models.lagrange.ode_solvers import Accelerations
 from rotor_mbs.models.lagrange.reference import LEFT_OUT, TimedReference, at_azimuths, motion_at
 from rotor_mbs.models.ode45 import Ode45Settings
@@ -29,8 +29,9 @@ from rotor_mbs.models.printed.derivation import Errata
 from rotor_mbs.models.printed.methods import PrintedModel
 from rotor_mbs.scenario.catalogue import find_scenes, list_scenes
 from rotor_mbs.scenario.scene import Blade, Scene, scene_fields
-from rotor_mbs.solution.metrics import HORIZON_GROWTH, horizon, running_growth
+from rotor_mbs.solution.metrics import horizon, running_growth
 from rotor_mbs.solution.trajectory import Array, Trajectory
+from rotor_mbs.studies.defect_causes import MAX_LEFT, Change, DefectCauses, Parameter, fault_lines
 
 # A cause fits where what is left is within the tolerance, or a thousandth of what there was and at most this.
 _LEFT = 1e-3
@@ -52,10 +53,6 @@ _GRAVITIES = (9.8, 9.80665, 9.81, 9.82, 10.0, 0.0)
 _EARLY = 10.0  # growth up to which a cause is tried first: most are refuted there
 _STEP = 1.25e-3  # s, of what is interpolated: of the printed equations' own run, its error is some 1e-9
 _EARLY_ROWS = 40  # so many rows are tried first at most
-# Growth, and rows, up to which a parameter is fitted, one after another: a start too far off is useless once errors
-# have grown, and most parameters are refuted by the first rows.
-_LEVELS = ((3.0, _EARLY_ROWS), (1e1, 200), (1e2, 1000), (1e3, 10**4), (1e4, 10**5), (HORIZON_GROWTH, 10**9))
-_LARGEST_CHANGE = 0.3
 _SAME_START = 1e-3  # rad, rad/s: a scene that starts farther off cannot be the one
 MAX_PARAMETERS = 6  # parameters that are named
 _QUARTERS = {90: math.pi / 2.0, 180: math.pi, 270: -math.pi / 2.0}  # zeros that people choose, by degrees
@@ -295,40 +292,94 @@ def _scatter(search: CauseSearch, time: Array, values: Array) -> list[str]:
     return [f"scatter from row to row, standard deviation {math.sqrt(float(sizes.max())):.1e}"]
 
 
-def likely_causes(search: CauseSearch) -> tuple[list[str], str]:
-    """What fits, in words: mistakes in the data, else other scenes and equations, else one parameter that is off.
+def likely_causes(search: CauseSearch, defects: DefectCauses | None) -> tuple[list[str], str]:
+    """What fits, in words: mistakes in the columns and times, faults at a time, other scenes and equations, one
+    parameter that is off; else both another scene and a mistake in the columns.
 
     Beside it what a reader must know where the time of the search was over before all had been tried, else "".
     """
-    motions, parameters = list(_motions(search)), list(_parameters(search.scene))
-    found, both, fitted, tried = list[str](), list[str](), list[tuple[float, str]](), 0
+    is_different = defects is not None and not defects.is_rounding
+    if search.worst <= search.tolerance and not is_different:
+        # The rows that were compared agree, but many may have come after the scene's end.
+        return _other_time(search) if search.data.time[-1] > 2.0 * search.scene.duration else [], ""
+    inside = search.rows(search.data.time)
+    time, values = search.data.time[inside], search.data.values[inside]
+    motions, tried = list(_motions(search)), 0
     try:
-        if search.worst <= search.tolerance:  # the rows that were compared agree, but many came after the scene's end
-            return _other_time(search) if search.data.time[-1] > 2.0 * search.scene.duration else [], ""
-        inside = search.rows(search.data.time)
-        time, values = search.data.time[inside], search.data.values[inside]
         found = mistakes_in_columns(search, time, values, search.expected(time))
-        found = found or _other_time(search) or _lag(search, time, values) or _scatter(search, time, values)
+        found = found or _other_time(search) or _lag(search, time, values)
+        if not found and defects is not None:
+            found = list(fault_lines(defects.faults()))
+        found = found or _scatter(search, time, values)
+        if not found and defects is not None:
+            found = causes_of_defects(search, defects)
         if found:
             return found, ""
+        both: list[str] = []
         for text, motion in motions:
             beside = _fits(search, motion)
             if beside is not None:
                 (both if beside else found).append("; and ".join([text, *beside]))
             tried += 1
-        for key, unit, changed in [] if found or both else parameters:
-            change, left = _fitted(search, changed)
-            if left <= search.fitting:
-                size = f"{change:+.4g} {unit}" if unit else f"{100.0 * change:+.4g} %"
-                fitted.append((left, f"{key} off by {size}"))
-            tried += 1
     except OutOfTimeError:
-        count = len(motions) + len(parameters)
-        return found or both, f"the search for causes was ended by its time limit: {tried} of {count} scenes tried"
-    # Parameters that leave least; several may be one to the motion.
-    least = max(min(fitted)[0], 1e-3 * search.tolerance) if fitted else 0.0
-    best = [text for left, text in fitted if left <= 10.0 * least][:MAX_PARAMETERS]
-    return found or both or [*best, *factors(search)], ""
+        return [], f"the search for causes was ended by its time limit: {tried} of {len(motions)} scenes tried"
+    # A scene that seems to fit, by errors up to the horizon alone, is none where the defects say no.
+    return both or ([] if is_different else found) or factors(search), ""
+
+
+def hidden_causes(scene: Scene, defects: DefectCauses) -> list[str]:
+    """A parameter whose change the defects follow beyond chance, though none is larger than rounding."""
+    shares = defects.parameters(list(_parameters(scene)))
+    return [text for share, text in shares if share <= 1.01 * shares[0][0]][:MAX_PARAMETERS]
+
+
+def causes_of_defects(search: CauseSearch, defects: DefectCauses) -> list[str]:
+    """Scenes and equations that explain the defects, else parameters; those that leave least, as some are alike."""
+    shares: list[tuple[float, str]] = []
+    for text, scene, equations in _explanations(search):
+        if monotonic() > search.ends:
+            raise OutOfTimeError
+        try:
+            share = defects.left(scene, equations)
+        except RotorError:
+            continue
+        if share <= MAX_LEFT:
+            shares.append((share, text))
+    shares = shares or defects.parameters(list(_parameters(search.scene)))
+    shares = [(share, text) for share, text in shares if share <= MAX_LEFT]
+    least = max(min(shares)[0], 1e-9) if shares else 0.0
+    return [text for share, text in sorted(shares) if share <= 3.0 * least][:MAX_PARAMETERS]
+
+
+def _explanations(search: CauseSearch) -> Iterator[tuple[str, Scene, Accelerations | None]]:
+    """What people mistake a scene or its equations for: a text, the scene, other equations."""
+    scene = search.scene
+    for text, other in _scenes(search):
+        yield text, other, None
+    for text, azimuths in _azimuths(scene):
+        yield text, scene, at_azimuths(scene, azimuths)
+    for terms, equations in LEFT_OUT.items():
+        yield f"without the {terms}", scene, equations
+    yield "angles taken as small: sin x = x, cos x = 1", scene, _small_angles
+    # E3 is the power of a term that is zero without E2.
+    for names in ("E1", "E2", "E1 and E2", "E2 and E3", "E1 and E2 and E3"):
+        errata = Errata(*(name in names for name in ("E1", "E2", "E3")))
+        try:
+            accelerations = PrintedModel("printed", errata).accelerations(scene)
+        except RotorError:
+            continue
+
+        def printed(
+            angles: Any, rates: Any, _form: Any, loads: Any, *_: Any, accelerations: Any = accelerations
+        ) -> list[float]:
+            torques = [loads.rotor, *(loads.pitches or (0.0,) * (len(angles) - 1))]
+            return list(accelerations(torques, [*angles, *rates]))
+
+        yield f"erratum {names} of the paper's equations", scene, printed
+
+
+def _small_angles(angles: Any, rates: Any, form: Any, loads: Any, *_: Any) -> list[Any]:
+    return closed_form.accelerations(angles, rates, form, loads, lambda x: x, lambda x: 1.0 + 0.0 * x)
 
 
 def _fits(search: CauseSearch, motion: Motion) -> list[str] | None:
@@ -374,6 +425,33 @@ def _scenes(search: CauseSearch) -> Iterator[tuple[str, Scene]]:
         blade.has_pitch_inertia or not rate for blade, rate in zip(on_axis, scene.initial_rates[1:], strict=True)
     ):
         yield "blade mass on the pitch axis", replace(scene, blades=on_axis)
+    blades = scene.blades
+    for text, others in {
+        "blades without inertia, as point masses": [replace(b, inertia=(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)) for b in blades],
+        "products of inertia with the other sign": [
+            replace(b, inertia=_inertia([*b.inertia[:3], *(-x for x in b.inertia[3:])])) for b in blades
+        ],
+        "the tip in place of the centre of mass": [replace(b, centre_of_mass=b.tip) for b in blades],
+        "inertia about the root taken as about the centre of mass": [_with_steiner(b) for b in blades],
+        **{
+            f"numbers of blades {i + 1} and {j + 1} exchanged": [
+                blades[{i: j, j: i}.get(k, k)] for k in range(len(blades))
+            ]
+            for i in range(len(blades))
+            for j in range(i)
+        },
+    }.items():
+        if tuple(others) != blades:
+            yield text, replace(scene, blades=tuple(others))
+    for name, text in (
+        ("rotor_torque", "the torque of the rotor"), ("bearing_stiffness", "the springs"),
+        ("bearing_damping", "the dampers of the bearings"), ("shaft_damping", "the damper of the shaft"),
+        ("hub_inertia", "the hub's inertia"),
+    ):  # fmt: skip
+        value = getattr(scene, name)
+        without = _changed(scene, [(name,)], lambda value, _: _scaled(value, -1.0), 0.0)
+        if value != getattr(without, name):
+            yield f"without {text}", without
     for degrees, angle in _QUARTERS.items():
         turned = _pitch_turned(scene, range(len(scene.blades)), angle)
         yield f"pitch angles from another zero: {degrees} degrees where they are 0", turned
@@ -383,6 +461,18 @@ def _scenes(search: CauseSearch) -> Iterator[tuple[str, Scene]]:
         is_other = other.name != scene.name and len(other.blades) == len(scene.blades)
         if is_other and np.abs(states[search.data.columns] - first).max() < _SAME_START:
             yield f"the scene {other.name}", other
+
+
+def _with_steiner(blade: Blade) -> Blade:
+    """As if its inertia, which is about the root, were about the centre of mass: Steiner's share twice."""
+    m, (x, y, z) = blade.mass, blade.centre_of_mass
+    share = (m * (y * y + z * z), m * (x * x + z * z), m * (x * x + y * y), -m * x * y, -m * x * z, -m * y * z)
+    return replace(blade, inertia=_inertia([a + b for a, b in zip(blade.inertia, share, strict=True)]))
+
+
+def _inertia(values: Sequence[float]) -> tuple[float, float, float, float, float, float]:
+    xx, yy, zz, xy, xz, yz = values
+    return xx, yy, zz, xy, xz, yz
 
 
 @functools.cache
@@ -426,54 +516,12 @@ def _printed(scene: Scene, errata: Errata, time: Array) -> Array | None:
     return np.hstack([spline(time), spline(time, 1)])
 
 
-def _fitted(search: CauseSearch, changed: Callable[[float], Motion]) -> tuple[float, float]:
-    """(change, error per unit of growth that is left) by Gauss and Newton's iteration over ever longer times."""
-    change, left, before, rows = 0.0, math.inf, math.inf, 0
-    for level, most in _LEVELS:
-        inside = np.flatnonzero(search.rows(search.data.time, level))[:most]
-        if len(inside) < max(FEWEST, rows + 1):
-            continue
-        rows = len(inside)
-        time, values = search.data.time[inside], search.data.values[inside]
-        weights = 1.0 / search.carried(time)[:, search.data.columns]
-
-        def errors(size: float, time: Array = time, values: Array = values, weights: Array = weights) -> Array | None:
-            states = search.states(changed(size), time)
-            return None if states is None else (values - states[:, search.data.columns]) * weights
-
-        step = 1e-3 / level
-        for _ in range(3):
-            here, beside = errors(change), errors(change + step)
-            if here is None or beside is None:
-                return change, math.inf
-            left = float(np.abs(here).max())
-            before = left if before == math.inf else before
-            if left <= 0.01 * search.tolerance:
-                break
-            slope = (beside - here) / step
-            size = float((slope**2).sum())
-            if size == 0.0:
-                return change, math.inf
-            change -= float(np.clip((slope * here).sum() / size, -_LARGEST_CHANGE, _LARGEST_CHANGE))
-        final = errors(change)
-        left = math.inf if final is None else float(np.abs(final).max())
-        if not left <= max(0.2 * before, 0.01 * search.fitting):
-            return change, math.inf
-    return change, left
-
-
-def _parameters(scene: Scene) -> Iterator[tuple[str, str, Callable[[float], Motion]]]:
-    """Every number, or list of numbers, that is not zero, and the zeros of the angles.
-
-    Of each the key, the unit or "" for a share, and the motion by its change.
-    """
-    for item in scene_fields("rotor", "start"):
+def _parameters(scene: Scene) -> Iterator[Parameter]:
+    """Every number, or list of numbers, that is not zero, and the zeros of the angles."""
+    for item in scene_fields("rotor"):
         key, value = item.metadata["key"], getattr(scene, item.name)
-        if item.metadata["part"] == "start":
-            for i in scene.moving_coordinates:
-                yield f"{key}[{i}]", item.metadata["unit"], _runs(_changed, scene, [(item.name, i)], operator.add)
-        elif item.name != "blades" and _scaled(value, 1.0) != value:
-            yield key, "", _runs(_changed, scene, [(item.name,)], _scaled)
+        if item.name != "blades" and _scaled(value, 1.0) != value:
+            yield Parameter(key, "", _changes(_changed, scene, [(item.name,)], _scaled))
     blades = range(len(scene.blades))
     for chosen in [list(blades), *([i] for i in blades if len(blades) > 1)]:
         alone = len(chosen) == 1 < len(blades)
@@ -483,20 +531,20 @@ def _parameters(scene: Scene) -> Iterator[tuple[str, str, Callable[[float], Moti
             for entry in entries if field.name != "tip" else []:
                 paths = [("blades", b, field.name, *entry) for b in chosen]
                 key = f"blade{chosen * alone or ''}.{field.name}{list(entry) or ''}"
-                yield key, "", _runs(_changed, scene, paths, _scaled)
+                yield Parameter(key, "", _changes(_changed, scene, paths, _scaled))
         which = f"blade {chosen[0] + 1}" if len(chosen) == 1 else "all blades"
-        yield f"azimuth of {which}", "rad", partial(_azimuth_moved, scene, chosen)
-        yield f"zero of the pitch of {which}", "rad", _runs(_pitch_turned, scene, chosen)
+        yield Parameter(f"azimuth of {which}", "rad", partial(_azimuth_moved, scene, chosen))
+        yield Parameter(f"zero of the pitch of {which}", "rad", _changes(_pitch_turned, scene, chosen))
 
 
-def _runs(changed: Callable[..., Scene], *chosen: Any) -> Callable[[float], Motion]:
-    """The motion of a scene by the change of its parameter, the last argument of `changed`."""
-    return lambda change: partial(states_at, changed(*chosen, change))
+def _changes(changed: Callable[..., Scene], *chosen: Any) -> Change:
+    """The scene by the change of its parameter, the last argument of `changed`."""
+    return lambda change: (changed(*chosen, change), None)
 
 
-def _azimuth_moved(scene: Scene, chosen: Sequence[int], change: float) -> Motion:
+def _azimuth_moved(scene: Scene, chosen: Sequence[int], change: float) -> tuple[Scene, Accelerations]:
     azimuths = [phase + change * (i in chosen) for i, phase in enumerate(scene.phases)]
-    return partial(states_at, scene, equations=at_azimuths(scene, azimuths))
+    return scene, at_azimuths(scene, azimuths)
 
 
 def _pitch_turned(scene: Scene, chosen: Sequence[int], angle: float) -> Scene:

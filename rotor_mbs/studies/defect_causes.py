@@ -18,7 +18,7 @@ from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.defects import Defects
 from rotor_mbs.solution.trajectory import Array
 
-_LEFT = 0.02  # of the defects' root mean square
+MAX_LEFT = 0.02  # of the defects' root mean square
 _AT_FLOOR = 3.0  # times the rounding
 _SIGNIFICANT = 8.0  # standard deviations of an estimate
 _PROJECTED = 0.5  # what a projection must leave at most for its parameter to be tried
@@ -58,7 +58,7 @@ class DefectCauses:
         self._scene, self._defects = scene, defects
         moving = list(defects.moving)
         self._values = np.hstack([defects.angles[:, moving], defects.rates[:, moving]])
-        units = np.concatenate([np.ones(len(moving)), defects.rate_units[moving]])
+        units = self._units = np.concatenate([np.ones(len(moving)), defects.rate_units[moving]])
         floors = np.maximum(defects.floors, 1e-3 * defects.floors.max(axis=0) + 1e-18) * units
         self._judged = np.flatnonzero(defects.is_judged & np.isfinite(self._values).all(axis=1))
         # In these a defect of what rounding makes is 1 at most.
@@ -81,7 +81,7 @@ class DefectCauses:
             return np.inf
         for intervals in (self._chosen, self._judged):
             share = self._share(self._residual(scene, equations, intervals), intervals)
-            if share > _LEFT:
+            if share > MAX_LEFT:
                 break
         return share
 
@@ -119,7 +119,7 @@ class DefectCauses:
                 continue
             scene, equations = parameter.change(change)
             share = self._share(self._residual(scene, equations, self._judged), self._judged)
-            if share <= _LEFT or is_hidden:
+            if share <= MAX_LEFT or is_hidden:
                 amount = f"{change:+.4g} {parameter.unit}" if parameter.unit else f"{100.0 * change:+.4g} %"
                 explained.append((rest / total if is_hidden else share, f"{parameter.key} off by {amount}"))
         return sorted(explained)
@@ -176,8 +176,7 @@ class DefectCauses:
         return np.concatenate([states[row + 1, half:], change])
 
     def _cosine(self, first: Array, second: Array) -> float:
-        units = self._defects._units
-        a, b = first / units, second / units
+        a, b = first / self._units, second / self._units
         size = float(np.linalg.norm(a) * np.linalg.norm(b))
         return float(a @ b) / size if size else 0.0
 

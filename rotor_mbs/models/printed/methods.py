@@ -110,6 +110,10 @@ class PrintedModel:
         rotor = self._rotor(scene)
         return PrintedSolver(scene, rotor, self._accelerations(rotor), settings, keeps_refined=not self._errata)
 
+    def accelerations(self, scene: Scene) -> Accelerations:
+        """From torques (rotor, pitches) and the state (angles, rates) to accelerations. Raises MethodRefusal."""
+        return self._accelerations(self._rotor(scene))
+
     def _rotor(self, scene: Scene) -> PointMassRotor:
         """Raises MethodRefusal, in one sentence, where the printed equations have no place for what the scene has."""
         from rotor_mbs.models.printed.observables import PointMassRotor
