@@ -198,7 +198,8 @@ def test_growth_is_known_as_far_as_the_variational_equations_went(
     pytest.importorskip("heyoka")
     matrices = np.full((known, 4, 4), 3.0)  # rows of norm 6, columns in units of 1
     monkeypatch.setattr(reference_module, "_transition_matrices", lambda _scene, _times: matrices)
-    result = reference_at(paper("fig03", duration=0.1, samples=3), np.linspace(0.0, 0.1, 3))
+    scene = paper("fig03", duration=0.1, samples=3, initial_angles=(0.5, 0.1))  # of which no pitch is at rest
+    result = reference_at(scene, np.linspace(0.0, 0.1, 3))
     assert result.growth.tolist() == [[6.0 if is_finite else np.inf] * 4 for is_finite in finite]
     assert result.trajectory.error_growth is not None
     assert np.isfinite(result.trajectory.error_growth).tolist() == finite

@@ -39,7 +39,7 @@ BOUNDS = {
     "exudyn_tree/rk67": (3e-9, 1e-10),
     "exudyn_tree/dopri5": (5e-11, 1e-9),
     "exudyn_tree/generalized_alpha": (1e-5, 1e-5),
-    "exudyn_chain/extrapolated": (4e-4, 1e-5),
+    "exudyn_chain/extrapolated": (3e-7, 1e-5),
     "exudyn_chain/generalized_alpha": (4e-4, 1e-5),
     "exudyn_chain/newmark_index2": (4e-3, 1e-5),
     "mujoco/rk4": (3e-9, 1e-8),

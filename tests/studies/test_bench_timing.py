@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from support.scenes import paper
 
+from rotor_mbs.analysis import judgement
 from rotor_mbs.methods.base import BuiltItem, Settings
 from rotor_mbs.scenario.accuracy_bounds import Bound
 from rotor_mbs.scenario.scene import Scene
@@ -73,6 +74,7 @@ def point(curve: str = "a", rung: int = 0) -> Point:
 
 def timing_process(fake: FakeMethod, monkeypatch: pytest.MonkeyPatch) -> PointTimer:
     monkeypatch.setattr(bench_worker, "find_method", lambda _name: fake)
+    monkeypatch.setattr(judgement, "defects_of", lambda *_: None)  # of a motion that is none
     return PointTimer(defaultdict(lambda: (SCENE, still())), fake.clock)
 
 
