@@ -18,17 +18,13 @@ from rotor_mbs.errors import StoreError
 from rotor_mbs.methods.catalogue import errata_methods
 from rotor_mbs.report.core import files
 from rotor_mbs.report.core.files import Site, page_names, render
-from rotor_mbs.report.data_comparison import stored_comparison_page
-from rotor_mbs.report.mode_study import stored_modes_page
 from rotor_mbs.report.pages import Context
 from rotor_mbs.report.pages.bench import bench_pages
-from rotor_mbs.report.pages.check import check_page
 from rotor_mbs.report.pages.errata import errata_page
 from rotor_mbs.report.pages.figures import available, walk_figure
 from rotor_mbs.report.pages.index import index_page
 from rotor_mbs.report.pages.scene import scene_page
 from rotor_mbs.report.pages.stability import is_stability_suite, stability_page
-from rotor_mbs.report.pages.sweep import sweep_page
 from rotor_mbs.runs.pool import Workers, pool_of, run_in
 from rotor_mbs.runs.read import OpenResults, is_sweep, open_results
 from rotor_mbs.runs.records import Record, read_records
@@ -59,6 +55,8 @@ def write_report(
         Where the file cannot be read or has nothing to report, or the folder cannot be written.
     """
     if is_sweep(results):
+        from rotor_mbs.report.pages.sweep import sweep_page  # late: workers load what most files need
+
         return files.write_page(output, "sweep", sweep_page(StoredSweep(results)))
     with open_results(results) as opened:
         pages = _pages(opened, jobs, on_page, checked)
@@ -110,10 +108,16 @@ def _pages(opened: OpenResults, jobs: Workers, on_page: OnPage, checked: bool) -
     if bench:
         tasks.append(partial(bench_pages, names[files.BENCH], site))
     if modes:
+        from rotor_mbs.report.mode_study import stored_modes_page  # late, as above
+
         tasks.append(partial(_page, "modes", names[files.MODES], site, stored_modes_page))
     for place, file in enumerate(data_files):
+        from rotor_mbs.report.data_comparison import stored_comparison_page
+
         tasks.append(partial(_page, "data_comparison", names[file], site, partial(stored_comparison_page, place)))
     if files.CHECK in labels:
+        from rotor_mbs.report.pages.check import check_page
+
         tasks.append(partial(_page, "check", files.CHECK, site, check_page))
     made = _made(opened.path, tasks, jobs, on_page)
     pages: dict[str, str] = {}

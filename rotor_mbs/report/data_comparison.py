@@ -171,6 +171,7 @@ def comparison_page(record: Record) -> dict[str, object]:
     if verdict.energy_drift is not None:
         facts.append(("Energy balance of the data", f"{number(verdict.energy_drift)} of the energy scale"))
     facts += [("The difference looks like", cause) for cause in verdict.likely]
+    facts += [("Note", note) for note in verdict.notes]
     table = channel_table(verdict)
     rows: list[Row] = []
     for channel, (name, error, defect, *others) in zip(verdict.channels, table.rows, strict=True):

@@ -55,7 +55,7 @@ EQUIVALENT = {
     r"derivation\.blade_terms .*[sc]3 -> [sc]3": (
         "the matrix's last column, which is all that a point mass in the frame's origin takes of it, does not have it"
     ),
-    r"derivation\.blade_terms .*trace\(u23, m, u3\) \+ trace\(u32, m, u3\)": (
+    r"derivation\.blade_terms .*trace\(by_23, m, by_3\) \+ trace\(by_32, m, by_3\)": (
         "U33,2 and U33 of a point mass are perpendicular: the second trace is zero identically"
     ),
     r"derivation\.forces .*left side of terms\.h_2_22": (

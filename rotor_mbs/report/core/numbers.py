@@ -14,7 +14,7 @@ _PREFIXES = (
     (1e-12, "p"),
 )  # fmt: skip
 SPACE = "\N{NO-BREAK SPACE}"
-_COMPUTED = re.compile(r"(?<![\w./-])(\d+(?:\.\d+)?)e([+-]?\d+)\b")
+_COMPUTED = re.compile(r"(?<![\w./-])(-?\d+(?:\.\d+)?)e([+-]?\d+)\b")
 # A symbol with its index: c, q̇2, U33,3. In prose those with an index alone: "a" may be a word there.
 _SYMBOL = re.compile(r"(?<![A-Za-z&#])(q̇|[A-Za-zα-ω])(\d+(?:,\d)?)?(?![A-Za-z])")
 _SYMBOL_IN_PROSE = re.compile(r"(?<![A-Za-z&#])(q̇|[A-Za-zα-ω])(\d+(?:,\d)?)(?![A-Za-z])")
@@ -85,7 +85,11 @@ def typeset(text: str) -> str:
 
     def shortest(computed: re.Match[str]) -> str:
         mantissa, exponent = computed.groups()
-        return power(int(exponent)) if mantissa == "1" else number(float(computed[0]), len(mantissa.replace(".", "")))
+        return (
+            power(int(exponent))
+            if mantissa == "1"
+            else number(float(computed[0]), len(mantissa.strip("-").replace(".", "")))
+        )
 
     return text if isinstance(text, Markup) else _COMPUTED.sub(shortest, text)
 
