@@ -137,10 +137,8 @@ def compare_with_reference(data: ForeignData, scene: Scene, tolerance: float = D
     if energy_note:
         notes.append(energy_note)
     likely: list[str] = []
-    within = ""
-    is_whole = defects is not None and not missing
-    search_defects = DefectCauses(scene, defects) if is_whole and defects is not None else None
-    if status != "ok" or (search_defects is not None and not search_defects.is_rounding):
+    search_defects = DefectCauses(scene, defects) if defects is not None and not missing else None
+    if status != "ok":
         whole = replace(data, values=data.values + (cut.values[0] - data.values[0]))  # the turns that `cut` has
         worst = float((np.abs(compared.values - expected) / carried)[:until].max())
         search = CauseSearch(scene, whole, exact, tolerance, worst, monotonic() + _SEARCH_S)
@@ -148,13 +146,8 @@ def compare_with_reference(data: ForeignData, scene: Scene, tolerance: float = D
             likely, note = likely_causes(search, search_defects)
         start = "" if likely else _other_start(scene, cut, expected[0])
         notes += [line for line in (note, start) if line]
-        if status == "ok":
-            within = f"within {tolerance:g} rad an interval, but not rounding"
-    elif search_defects is not None:
-        likely = hidden_causes(scene, search_defects)
-        within = "within the rounding of the data, but not random" if likely else ""
-    if within:
-        notes.append(f"{within}: looks like {'; '.join(likely)}" if likely else f"{within}: no cause was found")
+    elif search_defects is not None and (likely := hidden_causes(scene, search_defects)):
+        notes.append(f"within {tolerance:g} rad an interval, but not random")
     verdict = DataVerdict(
         scene.name, data.source, status, message, tolerance, errors, rows, float(at_rows.time[-1]), horizon_s,
         defect_time, predicted, energy_drift, data.read, data.unused, tuple(notes), tuple(likely),

@@ -298,7 +298,7 @@ def likely_causes(search: CauseSearch, defects: DefectCauses | None) -> tuple[li
 
     Beside it what a reader must know where the time of the search was over before all had been tried, else "".
     """
-    is_different = defects is not None and not defects.is_rounding
+    is_different = defects is not None and not defects.within(search.tolerance)
     if search.worst <= search.tolerance and not is_different:
         # The rows that were compared agree, but many may have come after the scene's end.
         return _other_time(search) if search.data.time[-1] > 2.0 * search.scene.duration else [], ""
@@ -308,11 +308,9 @@ def likely_causes(search: CauseSearch, defects: DefectCauses | None) -> tuple[li
     try:
         found = mistakes_in_columns(search, time, values, search.expected(time))
         found = found or _other_time(search) or _lag(search, time, values)
-        if not found and defects is not None:
-            found = list(fault_lines(defects.faults()))
+        if not found and is_different and defects is not None:
+            found = list(fault_lines(defects.faults())) or causes_of_defects(search, defects)
         found = found or _scatter(search, time, values)
-        if not found and defects is not None:
-            found = causes_of_defects(search, defects)
         if found:
             return found, ""
         both: list[str] = []

@@ -12,7 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from rotor_mbs.models.lagrange.defects import interval_ends
+from rotor_mbs.models.lagrange import closed_form
+from rotor_mbs.models.lagrange.defects import change_of_ends, interval_ends
 from rotor_mbs.models.lagrange.ode_solvers import Accelerations
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.defects import Defects
@@ -59,7 +60,8 @@ class DefectCauses:
         moving = list(defects.moving)
         self._values = np.hstack([defects.angles[:, moving], defects.rates[:, moving]])
         units = self._units = np.concatenate([np.ones(len(moving)), defects.rate_units[moving]])
-        floors = np.maximum(defects.floors, 1e-3 * defects.floors.max(axis=0) + 1e-18) * units
+        # Where a number is next to nothing its rounding is no measure.
+        floors = np.maximum(defects.floors, 0.3 * np.median(defects.floors, axis=0) + 1e-18) * units
         self._judged = np.flatnonzero(defects.is_judged & np.isfinite(self._values).all(axis=1))
         # In these a defect of what rounding makes is 1 at most.
         self._weights = 1.0 / floors
@@ -74,16 +76,23 @@ class DefectCauses:
         """Whether no defect is larger than what rounding explains."""
         return not len(self._judged) or float(np.abs(self._normal[self._judged]).max()) <= _AT_FLOOR
 
+    def within(self, size: float) -> bool:
+        """Whether no defect is larger than this (rad) beyond what rounding explains."""
+        excess = self._defects.channel_sizes[self._judged] - _AT_FLOOR * self._defects.floors[self._judged]
+        return not excess.size or float(excess.max()) <= size
+
     def left(self, scene: Scene, equations: Accelerations | None = None) -> float:
         """Share of the defects' root mean square that another scene or other equations leave; 0 where all that is left
-        is rounding. First on some intervals, then on all."""
-        if not len(self._judged):
+        is rounding. A scene is tried by small steps first, which need no code to be compiled."""
+        if not len(self._judged) or scene.moving_coordinates != list(self._defects.moving):
             return np.inf
-        for intervals in (self._chosen, self._judged):
-            share = self._share(self._residual(scene, equations, intervals), intervals)
-            if share > MAX_LEFT:
-                break
-        return share
+        if equations is None:
+            change = change_of_ends(self._scene, scene, self._defects.time, self._defects.states)
+            if change is not None:
+                share = self._share(self._normal[self._chosen] + (change * self._weights)[self._chosen], self._chosen)
+                if share > 2.0 * MAX_LEFT:
+                    return share
+        return self._share(self._residual(scene, equations, self._chosen), self._chosen)
 
     def parameters(self, parameters: Sequence[Parameter]) -> list[tuple[float, str]]:
         """Of those that explain the defects by themselves: (share that is left, key and change)."""
@@ -93,7 +102,7 @@ class DefectCauses:
         before = self._normal[chosen]
         total = float(np.linalg.norm(before))
         for parameter in parameters:
-            slope = self._slope(parameter, 0.0, chosen)
+            slope = self._slope(parameter, chosen)
             size = float((slope**2).sum())
             if not np.isfinite(size) or size == 0.0:
                 continue
@@ -104,21 +113,19 @@ class DefectCauses:
             is_hidden = self.is_rounding and abs(estimate) >= _SIGNIFICANT * deviation
             if not is_hidden and rest > _PROJECTED * total:
                 continue
-            residual, slope_here = before, slope
             change = estimate
             for _ in range(_ROUNDS):
                 scene, equations = parameter.change(change)
                 residual = self._residual(scene, equations, chosen)
                 if not np.isfinite(residual).all():
                     break
-                correction = -float((residual * slope_here).sum()) / size
+                correction = -float((residual * slope).sum()) / size
                 change += correction
                 if abs(correction) <= 1e-9 + 1e-3 * deviation:
                     break
             if not np.isfinite(residual).all() or abs(change) < _SIGNIFICANT * deviation:
                 continue
-            scene, equations = parameter.change(change)
-            share = self._share(self._residual(scene, equations, self._judged), self._judged)
+            share = self._share(self._residual(*parameter.change(change), chosen), chosen)
             if share <= MAX_LEFT or is_hidden:
                 amount = f"{change:+.4g} {parameter.unit}" if parameter.unit else f"{100.0 * change:+.4g} %"
                 explained.append((rest / total if is_hidden else share, f"{parameter.key} off by {amount}"))
@@ -130,7 +137,8 @@ class DefectCauses:
         size[~np.isin(np.arange(len(size)), self._judged)] = 0.0
         usual = float(np.median(size[self._judged])) if len(self._judged) else 0.0
         wrong = np.flatnonzero(size > max(_AT_FLOOR, _STANDS_OUT * usual))
-        if not len(wrong) or len(wrong) > 0.6 * len(size):
+        # What is wrong everywhere is no fault at a time, though it shows in some places more than in others.
+        if not len(wrong) or len(wrong) > 0.6 * len(size) or _is_smooth(size, wrong):
             return []
         groups = np.split(wrong, np.flatnonzero(np.diff(wrong) > 1) + 1)
         return [self._fault(group) for group in groups]
@@ -183,12 +191,23 @@ class DefectCauses:
     def _residual(self, scene: Scene, equations: Accelerations | None, intervals: NDArray[np.int64]) -> Array:
         """(intervals, m) defects by another scene or other equations, in units of rounding."""
         states = self._defects.states
+        equations = equations or closed_form.accelerations  # by SciPy: a scene of another structure is not compiled
         ends = interval_ends(scene, self._defects.time, states, intervals.tolist(), equations)
         return np.asarray((ends - states[intervals + 1]) * self._weights[intervals])
 
-    def _slope(self, parameter: Parameter, at: float, intervals: NDArray[np.int64]) -> Array:
-        above, below = (self._residual(*parameter.change(at + step), intervals) for step in (_DIFFERENCE, -_DIFFERENCE))
-        return (above - below) / (2.0 * _DIFFERENCE)
+    def _slope(self, parameter: Parameter, intervals: NDArray[np.int64]) -> Array:
+        """By the parameter's share, or per rad."""
+        sides = []
+        for step in (_DIFFERENCE, -_DIFFERENCE):
+            scene, equations = parameter.change(step)
+            change = None
+            if equations is None:
+                change = change_of_ends(self._scene, scene, self._defects.time, self._defects.states)
+            if change is not None:
+                sides.append((change * self._weights)[intervals])
+            else:
+                sides.append(self._residual(scene, equations, intervals))
+        return np.asarray((sides[0] - sides[1]) / (2.0 * _DIFFERENCE))
 
     def _share(self, residual: Array, intervals: NDArray[np.int64]) -> float:
         if not np.isfinite(residual).all():
@@ -196,6 +215,12 @@ class DefectCauses:
         if float(np.abs(residual).max()) <= _AT_FLOOR:
             return 0.0
         return float(np.linalg.norm(residual) / (np.linalg.norm(self._normal[intervals]) or 1.0))
+
+
+def _is_smooth(size: Array, wrong: NDArray[np.int64]) -> bool:
+    """Whether the sizes come down gradually beside what stands out: a fault at a time has edges."""
+    edges = [i for i in (*(wrong - 1), *(wrong + 1)) if 0 <= i < len(size) and i not in set(wrong.tolist())]
+    return bool(edges) and float(np.median(size[edges])) > 0.1 * float(np.median(size[wrong]))
 
 
 def fault_lines(faults: Sequence[Fault]) -> Iterator[str]:

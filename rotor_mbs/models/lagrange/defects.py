@@ -222,39 +222,63 @@ def _growth_rate(scene: Scene, states: Array) -> float:
 def _transitions(scene: Scene, time: Array, states: Array) -> Array | None:
     """(n - 1, m, m) state transition matrices of the intervals, all at once; None where the motion is too stiff for
     explicit steps."""
-    if len(time) < 2:
-        return np.empty((0, states.shape[1], states.shape[1]))
-    interval = np.diff(time)
-    form, half = rotor_form(scene), states.shape[1] // 2
-    fastest = float(np.nanmax(np.where(np.isfinite(states[:, half:]), np.abs(states[:, half:]), 0.0)))
-    for blade in form.blades:
-        moment = blade.stiffness + math.hypot(blade.weight_x, blade.weight_y)
-        fastest = max(fastest, math.sqrt(moment / blade.pitch_inertia), blade.damping / blade.pitch_inertia)
-    steps = math.ceil(fastest * float(interval.max()) / _RADIANS_PER_STEP) if math.isfinite(fastest) else math.inf
-    if steps > _MAX_RUNGE_KUTTA_STEPS:
-        return None
-    steps = max(int(steps), 1)
-    units = np.concatenate([np.ones(half), rate_units(scene)])
+    half = states.shape[1] // 2
     count = 2 * half
+    if len(time) < 2:
+        return np.empty((0, count, count))
+    steps = _explicit_steps(scene, time, states)
+    if steps is None:
+        return None
+    units = np.concatenate([np.ones(half), rate_units(scene)])
     # (m, directions, n - 1): the state of every interval, moved by a difference either way in every direction.
     moved = np.repeat(states[:-1].T[:, None, :], 2 * count, axis=1)
     for i in range(count):
         moved[i, i] += _DIFFERENCE * units[i]
         moved[i, count + i] -= _DIFFERENCE * units[i]
+    moved = _runge_kutta(scene, time, moved, steps)
+    with np.errstate(all="ignore"):
+        columns = (moved[:, :count] - moved[:, count:]) / (2.0 * _DIFFERENCE * units[None, :, None])
+    return np.ascontiguousarray(columns.transpose(2, 0, 1))
+
+
+def change_of_ends(scene: Scene, other: Scene, time: Array, states: Array) -> Array | None:
+    """(n - 1, m) how much further another scene with the same coordinates gets from each row of states by the time of
+    the next one, to a share of some 1e-5; None where the motion is too stiff for explicit steps."""
+    steps = _explicit_steps(scene, time, states)
+    if steps is None or other.moving_coordinates != scene.moving_coordinates:
+        return None
+    start = states[:-1].T[:, None, :]
+    ends = [_runge_kutta(rotor, time, start, steps)[:, 0].T for rotor in (other, scene)]
+    return np.asarray(ends[0] - ends[1])
+
+
+def _explicit_steps(scene: Scene, time: Array, states: Array) -> int | None:
+    """How many steps of Runge and Kutta an interval takes; None where they are too many."""
+    half = states.shape[1] // 2
+    fastest = float(np.max(np.where(np.isfinite(states[:, half:]), np.abs(states[:, half:]), 0.0)))
+    for blade in rotor_form(scene).blades:
+        moment = blade.stiffness + math.hypot(blade.weight_x, blade.weight_y)
+        fastest = max(fastest, math.sqrt(moment / blade.pitch_inertia), blade.damping / blade.pitch_inertia)
+    steps = fastest * float(np.diff(time).max()) / _RADIANS_PER_STEP
+    return max(math.ceil(steps), 1) if steps <= _MAX_RUNGE_KUTTA_STEPS else None
+
+
+def _runge_kutta(scene: Scene, time: Array, states: Array, steps: int) -> Array:
+    """The ends of all n - 1 intervals from (m, k, n - 1) states, k of each, in steps of order 4."""
+    form, half = rotor_form(scene), len(states) // 2
 
     def derivative(at: Array, state: Array) -> Array:
         angles, rates = list(state[:half]), list(state[half:])
         accelerations = closed_form.accelerations(angles, rates, form, loads_at(scene, at), np.sin, np.cos)
         return np.concatenate([state[half:], np.stack([np.broadcast_to(row, rates[0].shape) for row in accelerations])])
 
-    h = interval / steps
+    h = np.diff(time) / steps
     with np.errstate(all="ignore"):
         for step in range(steps):
             at = time[:-1] + step * h
-            k1 = derivative(at, moved)
-            k2 = derivative(at + 0.5 * h, moved + 0.5 * h * k1)
-            k3 = derivative(at + 0.5 * h, moved + 0.5 * h * k2)
-            k4 = derivative(at + h, moved + h * k3)
-            moved = moved + h / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + k4)
-        columns = (moved[:, :count] - moved[:, count:]) / (2.0 * _DIFFERENCE * units[None, :, None])
-    return np.ascontiguousarray(columns.transpose(2, 0, 1))
+            k1 = derivative(at, states)
+            k2 = derivative(at + 0.5 * h, states + 0.5 * h * k1)
+            k3 = derivative(at + 0.5 * h, states + 0.5 * h * k2)
+            k4 = derivative(at + h, states + h * k3)
+            states = states + h / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + k4)
+    return states
