@@ -69,8 +69,6 @@ def steps_off(scene: Scene, run: StoredRun, name: str) -> tuple[float, str] | No
     method, steps = look_up(run.method), run.attributes.get("steps")
     if method is None or steps is None or len(run.array("time")) < scene.samples:
         return None
-    if run.settings.get("extrapolation", "none") != "none":  # several runs, each with its own step
-        return None
     if method.fixed_step and "step" in run.settings:
         interval = scene.duration / (scene.samples - 1)
         expected = (scene.samples - 1) * math.ceil(interval / float(run.settings["step"]) - 1e-9)

@@ -82,7 +82,6 @@ def test_steps_are_those_that_fit_between_samples() -> None:
         off("exudyn_tree/rk44", None, step=0.03),
         off("exudyn_tree/rk44", 50, step=0.03, rows=10),  # it stopped early
         off("of/another", 50, step=0.03),
-        off("exudyn_chain/generalized_alpha", 50, extrapolation="richardson"),
         off("lagrange/taylor", 50),  # of no shipped scene
         off("exudyn_tree/dopri5", 10, step=0.03),  # no setting of a method that chooses its own
         off("lagrange/taylor", 50, "paper/none"),

@@ -35,7 +35,7 @@ def angle_error(trajectory, motion):
 
 
 @pytest.mark.parametrize("count", [1, 2, 4, 7])
-@pytest.mark.parametrize("name", ["exudyn_tree/rk67", "exudyn_chain/generalized_alpha"])
+@pytest.mark.parametrize("name", ["exudyn_tree/rk67", "exudyn_chain/generalized_alpha", "exudyn_chain/extrapolated"])
 def test_any_number_of_blades(name, count) -> None:
     scene = make_scene(
         [0.4, *np.linspace(-0.5, 0.6, count)],
@@ -121,13 +121,17 @@ def test_order_of_dopri5_in_its_tolerance(short_motion) -> None:
 @pytest.mark.parametrize("name", CHAIN)
 def test_joints_hold(name) -> None:
     got = run(name, SHORT)
-    # index 3 holds positions to Newton's tolerance; index 2 holds velocities, positions drift with the step squared
-    assert got.constraint_error.max() < (1e-7 if name.endswith("alpha") else 1e-4)
+    # index 3 holds positions to Newton's tolerance; index 2 holds velocities, positions drift with the step squared,
+    # extrapolated by what is left of the error: 100 intervals of 3e-8 rad at an arm of 15 m are 5e-5 m at most
+    assert (
+        got.constraint_error.max()
+        < {"generalized_alpha": 1e-7, "newmark_index2": 1e-4, "extrapolated": 5e-5}[name.partition("/")[2]]
+    )
     assert got.constraint_error.max() > 0.0
     assert run("exudyn_tree/rk67", SHORT).constraint_error is None
 
 
-@pytest.mark.parametrize("name", CHAIN)
+@pytest.mark.parametrize("name", ["exudyn_chain/generalized_alpha", "exudyn_chain/newmark_index2"])
 def test_rotation_vector_nodes_move_the_same(name) -> None:
     got = run(name, SHORT, node="rotation_vector")
     assert angle_error(got, run("exudyn_tree/rk67", SHORT).angles) < 1e-3

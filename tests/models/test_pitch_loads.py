@@ -30,6 +30,7 @@ TO_ROUND_OFF: dict[str, dict[str, object]] = {
     "exudyn_tree/rk44": {},
     "exudyn_tree/rk67": {},
     "exudyn_tree/dopri5": {},
+    "exudyn_chain/extrapolated": {"tolerance": 1e-12},
     "mujoco/rk4": {},
 }
 # Methods of low order: the powers of the step that their error consists of, and settings at which it does.
@@ -173,7 +174,7 @@ EVERYTHING = replace(
     pitch_torque=(((0.0, 40.0),), ((0.2, 0.0), (0.55, 90.0), (0.55, -60.0)), ()),
     bearing_rest=(((0.0, 0.2),), ((0.4, 0.0), (0.9, 0.3)), ((0.777, 0.1), (0.777, -0.5), (1.3, 0.4))),
 )
-BOUND = {"mujoco/rk4": 1e-9, "exudyn_tree/dopri5": 1e-9, "exudyn_tree/rk44": 1e-9}
+BOUND = {"mujoco/rk4": 1e-9, "exudyn_tree/dopri5": 1e-9, "exudyn_tree/rk44": 1e-9, "exudyn_chain/extrapolated": 1e-9}
 BOUND |= dict.fromkeys(
     ("exudyn_tree/generalized_alpha", "exudyn_chain/generalized_alpha", "exudyn_chain/newmark_index2"), 5e-5
 )
@@ -188,6 +189,7 @@ BOUND |= dict.fromkeys(
         "exudyn_tree/dopri5",
         "exudyn_tree/generalized_alpha",
         "mujoco/rk4",
+        "exudyn_chain/extrapolated",
         "exudyn_chain/generalized_alpha",
         *(
             pytest.param(slow, marks=pytest.mark.full)

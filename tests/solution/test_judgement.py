@@ -35,6 +35,7 @@ BOUNDS = {
     "exudyn_tree/rk67": (1e-11, 1e-10),
     "exudyn_tree/dopri5": (1e-10, 1e-9),
     "exudyn_tree/generalized_alpha": (1e-5, 1e-5),
+    "exudyn_chain/extrapolated": (5e-6, 1e-5),
     "exudyn_chain/generalized_alpha": (5e-6, 1e-5),
     "exudyn_chain/newmark_index2": (5e-6, 1e-5),
     "mujoco/rk4": (1e-8, 1e-8),

@@ -150,7 +150,7 @@ class System:
             span = (interval.end - interval.start) / interval.sample_intervals
             steps, rows = (1, 1) if scheme.step is None else steps_and_rows(span, scheme.step, rows_between)
             integration.startTime, integration.endTime = interval.start, interval.end
-            integration.numberOfSteps = steps * scheme.refinement * interval.sample_intervals
+            integration.numberOfSteps = steps * interval.sample_intervals
             every_step = scheme.step is None and rows_between
             # The engine adds up periods: shortened by a tenth of a step over the whole interval, rounding makes none
             # come late.
@@ -175,6 +175,97 @@ class System:
             # The engine would cut a longer step itself, with another rounding.
             integration.initialStepSize = min(it.currentStepSize, interval.end - interval.start)
         return total
+
+    # For extrapolation: integrations of one interval from a state that the caller sets, without rows of the sensors.
+
+    @property
+    def sensors(self) -> list[str]:
+        return [ref.name for ref in self._numbers if ref.kind == "sensor"]
+
+    @property
+    def reference(self) -> Array:
+        """What the coordinates are displacements from."""
+        return np.array(self._mbs.systemData.GetODE2Coordinates(_engine.ConfigurationType.Reference))
+
+    def begin(self, scheme: Scheme) -> None:
+        """Go back to the initial state, to be integrated by an implicit scheme."""
+        data = self._mbs.systemData
+        data.SetSystemState(self._initial_state, _engine.ConfigurationType.Initial)
+        self._settings = _settings(scheme, data.ODE2Size(), data.AEsize())
+        self._settings.solution.sensors.active = False
+        self._solver = _engine.MainSolverImplicitSecondOrder()
+
+    def initial_values(self, time: float) -> tuple[Array, Array]:
+        """Coordinates, rates, accelerations and multipliers at the state that an integration starts from, and its data
+        coordinates. The engine differentiates the constraints' velocities by one-sided differences of polynomials of
+        third degree in the coordinates, so that three steps, extrapolated to zero, leave rounding errors."""
+        integration = self._settings.timeIntegration
+        integration.startTime, integration.endTime, integration.numberOfSteps = time, time + 1.0, 1
+        integration.generalizedAlpha.computeInitialAccelerations = True
+        differences = integration.newton.numericalDifferentiation
+        differences.minimumCoordinateSize = 1.0
+        row: list[Array] = []
+        for k in range(3):
+            differences.relativeEpsilon = 0.01 * 0.5**k
+            with contextlib.suppress(_engine.ExudynError, RuntimeError):
+                self._solver.InitializeSolver(self._mbs, self._settings)
+                self._solver.FinalizeSolver(self._mbs, self._settings)
+            new = [self.values()]
+            for column, before in enumerate(row):
+                new.append(new[column] + (new[column] - before) / (2.0 ** (column + 1) - 1.0))
+            row = new
+        integration.generalizedAlpha.computeInitialAccelerations = False
+        return row[-1], self.turns()
+
+    def advance(self, start: float, end: float, steps: int, total: Integration) -> str:
+        """Integrate from the state set last in equal steps, counted in `total`; why it failed, or ""."""
+        integration = self._settings.timeIntegration
+        integration.startTime, integration.endTime, integration.numberOfSteps = start, end, steps
+        integration.initialStepSize = (end - start) / steps
+        failure = self._solve(self._solver, self._settings)
+        it = self._solver.it
+        taken = max(0, it.currentStepIndex - (2 if failure else 1))
+        total.steps = (total.steps or 0) + taken
+        total.rhs_evaluations = (total.rhs_evaluations or 0) + it.newtonStepsCount + taken
+        return failure
+
+    def values(self) -> Array:
+        """Coordinates, rates, accelerations, multipliers where the last integration ended."""
+        data, current = self._mbs.systemData, _engine.ConfigurationType.Current
+        return np.concatenate(
+            [
+                data.GetODE2Coordinates(current),
+                data.GetODE2Coordinates_t(current),
+                data.GetODE2Coordinates_tt(current),
+                data.GetAECoordinates(current),
+            ]
+        )
+
+    def turns(self) -> Array:
+        return np.array(self._mbs.systemData.GetDataCoordinates(_engine.ConfigurationType.Current))
+
+    def start_from(self, values: Array, turns: Array) -> None:
+        self._set(values, turns, _engine.ConfigurationType.Initial)
+
+    def _set(self, values: Array, turns: Array, where: Any) -> None:
+        data = self._mbs.systemData
+        n = data.ODE2Size()
+        data.SetODE2Coordinates(values[:n], where)
+        data.SetODE2Coordinates_t(values[n : 2 * n], where)
+        data.SetODE2Coordinates_tt(values[2 * n : 3 * n], where)
+        if len(turns):
+            data.SetDataCoordinates(turns, where)
+
+    def read(self, time: float, values: Array, turns: Array) -> dict[str, Array]:
+        """By sensor, what it reads of a state."""
+        data, current = self._mbs.systemData, _engine.ConfigurationType.Current
+        data.SetTime(time, current)
+        self._set(values, turns, current)
+        data.SetAECoordinates(values[3 * data.ODE2Size() :], current)
+        return {
+            name: np.array(self._mbs.GetSensorValues(self._numbers[Ref("sensor", name)]), dtype=float, ndmin=1)
+            for name in self.sensors
+        }
 
     def _solve(self, solver: Any, settings: Any) -> str:
         try:

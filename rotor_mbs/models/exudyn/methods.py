@@ -15,36 +15,28 @@ _LINEARIZATION = "rotor_mbs.models.exudyn.linearization"
 _SOLVERS = "rotor_mbs.models.exudyn.solvers"
 
 _NODE = choice("euler_parameters", ("euler_parameters", "rotation_vector"), doc="coordinates of a body's rotation")
-_EXTRAPOLATION = choice("none", ("none", "richardson"), doc="richardson: three runs, with step, step/2 and step/4")
 
 
 @dataclass(frozen=True)
 class ChainAlphaSettings(schemes.AlphaSettings):
     step: float = step(5e-4)
     node: str = _NODE
-    extrapolation: str = _EXTRAPOLATION
 
 
 @dataclass(frozen=True)
 class ChainNewmarkSettings(schemes.NewtonSettings):
     node: str = _NODE
-    extrapolation: str = _EXTRAPOLATION
 
 
-def _chain_arrays(settings: ChainAlphaSettings | ChainNewmarkSettings) -> tuple[str, ...]:
-    own = ("angle_uncertainty",) if settings.extrapolation == "richardson" else ()
-    return ("constraint_error", *own)
-
-
-def _method(model: str, integrator: str, label: str, **facts: Any) -> Method:
+def _method(model: str, integrator: str, label: str, builder: str = "", **facts: Any) -> Method:
     in_tree = model == "exudyn_tree"
     kind = "tree" if in_tree else "chain"
     return Method(
         name=f"{model}/{integrator}",
         label=f"Exudyn {kind}, {label}",
-        build=late(f"{_SOLVERS}:build_{kind}"),
+        build=late(f"{_SOLVERS}:build_{builder or kind}"),
         items=late(f"{_SOLVERS}:{kind}_items"),
-        arrays=(lambda _: ()) if in_tree else _chain_arrays,
+        arrays=lambda _: () if in_tree else ("constraint_error",),
         distributions=("exudyn",),
         relative_cost=10.0 if in_tree else 100.0,
         load=lambda: import_module("rotor_mbs.models.exudyn.adapter"),
@@ -105,10 +97,15 @@ METHODS = (
         ladders=_TREE_ALPHA_LADDERS,
     ),
     _method(
-        "exudyn_chain", "generalized_alpha", "generalized-α",
-        settings=ChainAlphaSettings, order=2, fixed_step=True, is_default=True,
-        ladders=_CHAIN_ALPHA_LADDERS,
+        "exudyn_chain", "extrapolated", "extrapolated", builder="extrapolated",
+        settings=schemes.ExtrapolatedSettings, is_default=True,
+        ladders=(tolerance_ladder(lambda tol: {"tolerance": tol}, *(10.0**-k for k in range(3, 12))),),
         linearize=late(f"{_LINEARIZATION}:linearize_chain"),
+    ),
+    _method(
+        "exudyn_chain", "generalized_alpha", "generalized-α",
+        settings=ChainAlphaSettings, order=2, fixed_step=True,
+        ladders=_CHAIN_ALPHA_LADDERS,
     ),
     _method(
         "exudyn_chain", "newmark_index2", "Newmark index 2",

@@ -20,7 +20,6 @@ class Scheme:
     # of a scheme that chooses its step: trials within one integration interval after which the run is given up (the
     # engine itself repeats a rejected smallest step for ever)
     trial_steps: int = 0
-    refinement: int = 1  # how many equal steps take the place of each step that fits the sample interval
 
     def with_accelerations(self) -> Scheme:
         """This scheme with accelerations at the end of every step; an implicit one has them anyway."""
@@ -106,6 +105,32 @@ class AlphaSettings(NewtonSettings):
 
     def scheme(self) -> Scheme:
         return self._implicit({"generalizedAlpha.spectralRadius": self.spectral_radius})
+
+
+# Newton's method stops at this share of the tolerance; below the least, rounding stops it.
+_NEWTON_SHARE, _LEAST_NEWTON_TOLERANCE = 0.1, 1e-12
+
+
+@dataclass(frozen=True)
+class ExtrapolatedSettings(Settings):
+    """The trapezoidal rule, constraints at velocity level (index 2), extrapolated within every sample interval."""
+
+    tolerance: float = number(3e-8, above=0.0, at_most=1e-2, unit="rad", doc="of the estimated error of each interval")
+
+    def scheme(self) -> Scheme:
+        """The engine's Jacobian leaves out how the constraints' directions turn, so that Newton's method converges
+        linearly with a new Jacobian as with an old one: one for each step, and no other while the residual falls."""
+        options = {
+            "generalizedAlpha.useNewmark": True,
+            "generalizedAlpha.useIndex2Constraints": True,
+            "newton.relativeTolerance": max(_NEWTON_SHARE * self.tolerance, _LEAST_NEWTON_TOLERANCE),
+            "newton.absoluteTolerance": 1e-10,
+            "newton.modifiedNewtonJacUpdatePerStep": True,
+            "newton.maxModifiedNewtonIterations": 40,
+            "newton.maxIterations": 40,
+            "newton.modifiedNewtonContractivity": 2.0,
+        }
+        return Scheme("GeneralizedAlpha", 0, options)
 
 
 SchemeSettings = Rk44Settings | Rk67Settings | Dopri5Settings | NewtonSettings

@@ -58,14 +58,17 @@ def tree_trajectory(scene: Scene, segments: Sequence[Segment], recorded: Callabl
     return finite_samples(scene, fields)
 
 
-def chain_trajectory(scene: Scene, segments: Sequence[Segment], recorded: Callable[[str], Array]) -> Trajectory:
-    """Joint angles from the bodies' rotation matrices, rates from their angular velocities, and the joints' gaps."""
+def chain_trajectory(
+    scene: Scene, segments: Sequence[Segment], recorded: Callable[[str], Array], between_rows: bool = False
+) -> Trajectory:
+    """Joint angles from the bodies' rotation matrices, rates from their angular velocities, and the joints' gaps;
+    `between_rows`: see `work`."""
     placed = chain.placed_bodies(scene)
     bodies = [(part.name, part.body) for part in placed]
     state = [f"{name} {what}" for name, _ in bodies for what in ("position", "rotation", "spin")]
     read = _Reader(scene, recorded, state)
     angles, rates = _joint_motion(scene, read)
-    fields = _fields(scene, segments, read, angles, rates, bodies)
+    fields = _fields(scene, segments, read, angles, rates, bodies, between_rows)
     # Every body's hub centre, which the joints keep together with the ground's and the hub's.
     hub, *blades = (
         read.sampled(f"{name} position") - matrices(read.sampled(f"{name} rotation")) @ body.com
@@ -106,6 +109,7 @@ def _fields(
     angles: Array,
     rates: Array,
     bodies: Sequence[tuple[str, Body]],
+    between_rows: bool = False,
 ) -> dict[str, Array]:
     """What the scene asks for, at the samples. angles and rates are (rows, 1 + blades)."""
     fields = {"angles": angles[read.samples], "rates": rates[read.samples]}
@@ -113,7 +117,7 @@ def _fields(
         tips = [read.sampled(f"tip {i + 1}") for i in range(len(scene.blades))]
         fields["tip"] = np.stack(tips, axis=1)
     if scene.wants("energy"):
-        fields["work"] = work(scene, segments, read.time, angles, rates)[read.samples]
+        fields["work"] = work(scene, segments, read.time, angles, rates, between_rows)[read.samples]
         fields["potential_energy"], of_rests = springs(scene, fields["angles"])
         if any(scene.bearing_rest):
             fields["work"] += of_rests
@@ -155,16 +159,30 @@ def springs(scene: Scene, angles: Array) -> tuple[Array, Array]:
     return energy, of_rests
 
 
-def work(scene: Scene, segments: Sequence[Segment], time: Array, angles: Array, rates: Array) -> Array:
+def work(
+    scene: Scene,
+    segments: Sequence[Segment],
+    time: Array,
+    angles: Array,
+    rates: Array,
+    between_rows: bool = False,
+) -> Array:
     """(n,) J of the torques less what the dampers took, from all rows, samples among them: s, rad, rad/s. A spring
-    whose rest angle r changes counts as one that is unloaded at 0 and a torque k r; see `springs`."""
+    whose rest angle r changes counts as one that is unloaded at 0 and a torque k r; see `springs`. Between rows the
+    power is interpolated; with `between_rows`, for rows far apart, it is calculated from interpolated rates."""
     if not scene.work_needs_path:
         turned, torques = angles - angles[:1], segments[0].values
         exact: Array = torques[ROTOR] * turned[:, 0]
         for column, load, _ in drives(scene):
             exact = exact + torques[load] * turned[:, column] if column else exact
         return exact
-    losses = rates**2 @ np.array(scene.dampings)
+
+    def power(segment: Segment, time: Array, rates: Array) -> Array:
+        drawn: Array = -(rates**2) @ np.array(scene.dampings)
+        for column, load, factor in drives(scene):
+            drawn = drawn + factor * segment.at(load, time) * rates[..., column]
+        return drawn
+
     out, done = np.zeros(len(time)), 0.0
     slack = 1e-9 * scene.duration / (scene.samples - 1)
     for segment in segments:
@@ -172,10 +190,14 @@ def work(scene: Scene, segments: Sequence[Segment], time: Array, angles: Array, 
         if last - first < 2:
             break
         inside = slice(first, last)
-        power = -losses[inside]
-        for column, load, factor in drives(scene):
-            power = power + factor * segment.at(load, time[inside]) * rates[inside, column]
-        out[inside] = done + cumulative_integral(time[inside], power)
+        if between_rows:
+            at, weights = _gauss_points(time[inside], _POINTS)
+            gained = (power(segment, at, _rates_at(at, time[inside], angles[inside], rates[inside])) * weights).sum(
+                axis=1
+            )
+            out[inside] = done + np.concatenate([[0.0], np.cumsum(gained)])
+        else:
+            out[inside] = done + cumulative_integral(time[inside], power(segment, time[inside], rates[inside]))
         done = out[last - 1]
     return out
 
@@ -183,13 +205,10 @@ def work(scene: Scene, segments: Sequence[Segment], time: Array, angles: Array, 
 def cumulative_integral(time: Array, values: Array) -> Array:
     """(n,) integral from the first row to each row, by a local polynomial through the eight nearest rows, which need
     not be equally spaced; exact by Gauss-Legendre points."""
-    points = min(_POINTS, len(time))
-    first = np.clip(np.arange(len(time) - 1) - (points // 2 - 1), 0, len(time) - points)
-    window = first[:, None] + np.arange(points)
+    window = _windows(time)
     nodes, known = time[window], values[window]
-    abscissae, weights = np.polynomial.legendre.leggauss((points + 1) // 2)
-    half = 0.5 * np.diff(time)
-    at = (time[:-1] + half)[:, None] + half[:, None] * abscissae
+    points = window.shape[1]
+    at, weights = _gauss_points(time, (points + 1) // 2)
     polynomial = np.zeros_like(at)
     for j in range(points):
         basis = np.ones_like(at)
@@ -197,4 +216,40 @@ def cumulative_integral(time: Array, values: Array) -> Array:
             if k != j:
                 basis *= (at - nodes[:, k, None]) / (nodes[:, j] - nodes[:, k])[:, None]
         polynomial += basis * known[:, j, None]
-    return np.concatenate([[0.0], np.cumsum(half * (polynomial @ weights))])
+    return np.concatenate([[0.0], np.cumsum((polynomial * weights).sum(axis=1))])
+
+
+def _windows(time: Array) -> NDArray[np.intp]:
+    """(n - 1, points) the rows nearest to each interval between rows."""
+    points = min(_POINTS, len(time))
+    first = np.clip(np.arange(len(time) - 1) - (points // 2 - 1), 0, len(time) - points)
+    return np.asarray(first[:, None] + np.arange(points))
+
+
+def _gauss_points(time: Array, count: int) -> tuple[Array, Array]:
+    """(n - 1, count) points in s between rows, and their weights."""
+    abscissae, weights = np.polynomial.legendre.leggauss(count)
+    half = 0.5 * np.diff(time)
+    return (time[:-1] + half)[:, None] + half[:, None] * abscissae, half[:, None] * weights
+
+
+def _rates_at(at: Array, time: Array, angles: Array, rates: Array) -> Array:
+    """(n - 1, k, coordinates) rates at (n - 1, k) points between rows: from Hermite's polynomial, which has
+    the angles and rates of the eight nearest rows."""
+    window = _windows(time)
+    nodes = time[window]
+    out = np.zeros((*at.shape, angles.shape[1]))
+    to_nodes = at[:, :, None] - nodes[:, None, :]
+    for j in range(window.shape[1]):
+        others = np.delete(nodes, j, axis=1)
+        from_node = nodes[:, j, None] - others
+        basis = np.prod(np.delete(to_nodes, j, axis=2) / from_node[:, None, :], axis=2)
+        slope = basis * np.sum(1.0 / np.delete(to_nodes, j, axis=2), axis=2)
+        slope_at_node = np.sum(1.0 / from_node, axis=1)[:, None]
+        distance = to_nodes[:, :, j]
+        of_angle = 2.0 * basis * (slope * (1.0 - 2.0 * distance * slope_at_node) - basis * slope_at_node)
+        of_rate = basis * (basis + 2.0 * distance * slope)
+        # Angles less that of the interval's first row: their weights add up to zero.
+        turned = angles[window[:, j]] - angles[:-1]
+        out += of_angle[:, :, None] * turned[:, None, :] + of_rate[:, :, None] * rates[window[:, j]][:, None, :]
+    return out

@@ -59,6 +59,7 @@ _LOOKS = {
     "exudyn_tree/generalized_alpha": Look(ORANGE, "-", "^"),
     "exudyn_tree/generalized_alpha_rho0.7": Look(ORANGE, "--", "^"),
     "exudyn_tree/generalized_alpha_rho1.0": Look(ORANGE, ":", "^"),
+    "exudyn_chain/extrapolated": Look(GREEN, "-", "o"),
     "exudyn_chain/generalized_alpha": Look(GREEN, "-.", "^"),
     "exudyn_chain/generalized_alpha_rho0.7": Look(GREEN, "--", "^"),
     "exudyn_chain/generalized_alpha_rho1.0": Look(GREEN, ":", "^"),
