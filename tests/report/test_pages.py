@@ -383,7 +383,14 @@ def test_loads_are_drawn_once_with_the_errors_of_the_others_and_their_extremes(t
 
 
 @pytest.mark.full
-def test_the_uncertainty_that_a_method_gives_of_its_run_is_drawn_and_stated(tmp_path: Path) -> None:
+def test_the_uncertainty_that_a_method_gives_of_its_run_is_drawn_and_stated(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """No built-in method stores one; a plug-in may."""
+    storing = replace(find_method("exudyn_chain/newmark_index2"), arrays=lambda _: ("angle_uncertainty",))
+    monkeypatch.setattr(
+        "rotor_mbs.runs.results.find_method", lambda name: storing if name == storing.name else find_method(name)
+    )
     path, (scene,) = results_file(tmp_path / "r.h5", ["check/held"], []), find_scenes(["check/held"])
     run = solve("exudyn_chain/newmark_index2", scene, {"step": 5e-3})
     run.trajectory.angle_uncertainty = 1e-6 * run.trajectory.time
