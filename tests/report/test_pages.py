@@ -332,8 +332,8 @@ def test_formulas_are_typeset_and_the_faulty_entry_of_a_matrix_is_marked_and_cor
 
 
 def test_formulas_in_prose_leave_words_and_ranges_alone() -> None:
-    text = "a 3 in (42)-(46), -c2 c3 of U33,3 <b>"
-    wanted = "a 3 in (42)-(46), −<i>c</i><sub>2</sub> <i>c</i><sub>3</sub> of <i>U</i><sub>33,3</sub> &lt;b&gt;"
+    text = "with E1 a 3 in (42)-(46), -c2 c3 of U33,3 <b>"
+    wanted = "with E1 a 3 in (42)-(46), −<i>c</i><sub>2</sub> <i>c</i><sub>3</sub> of <i>U</i><sub>33,3</sub> &lt;b&gt;"
     assert numbers.formula(text, in_prose=True) == wanted
 
 

@@ -316,12 +316,12 @@ def test_dead_processes_leave_no_open_files() -> None:
     assert [end.failure for end in ended] == ["worker_died"] * 4
 
 
-_BUSY_PROGRAM = """
-import os, sys, time
+_BUSY_PROGRAM = r"""
+import os, time
 from rotor_mbs.runs.pool import WorkerPool
 
 def busy(_):
-    print(os.getpid(), file=sys.stderr, flush=True)
+    os.write(2, b"%d\n" % os.getpid())  # in one piece: both workers write here
     end = time.monotonic() + 60
     while time.monotonic() < end:
         pass

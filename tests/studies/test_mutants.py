@@ -203,9 +203,9 @@ def wrong_scenes(scene: Scene, share: float) -> Iterator[tuple[str, Scene]]:
         ("lagrange/dop853", 1e-6, 31),
         pytest.param("lagrange/dop853", 1e-6, 1, marks=pytest.mark.full),
         pytest.param("exudyn_tree/rk67", 1e-6, 1, marks=pytest.mark.full),
-        pytest.param("mujoco/rk4", 1e-3, 1, marks=pytest.mark.full),
+        pytest.param("mujoco/rk4", 1e-3, 1, marks=pytest.mark.nightly),
         # Of second order: a product of inertia of 25 beside 4000 kg m² shows from 3 % on.
-        pytest.param("exudyn_chain/generalized_alpha", 5e-2, 1, marks=pytest.mark.full),
+        pytest.param("exudyn_chain/generalized_alpha", 5e-2, 1, marks=pytest.mark.nightly),
     ],
 )
 def test_every_number_of_a_scene_counts(method: str, share: float, every: int, tmp_path: Path) -> None:

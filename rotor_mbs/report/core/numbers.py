@@ -15,9 +15,10 @@ _PREFIXES = (
 )  # fmt: skip
 SPACE = "\N{NO-BREAK SPACE}"
 _COMPUTED = re.compile(r"(?<![\w./-])(-?\d+(?:\.\d+)?)e([+-]?\d+)\b")
-# A symbol with its index: c, q̇2, U33,3. In prose those with an index alone: "a" may be a word there.
+# A symbol with its index: c, q̇2, U33,3. In prose those with an index alone, "a" may be a word there,
+# and E1 is an erratum.
 _SYMBOL = re.compile(r"(?<![A-Za-z&#])(q̇|[A-Za-zα-ω])(\d+(?:,\d)?)?(?![A-Za-z])")
-_SYMBOL_IN_PROSE = re.compile(r"(?<![A-Za-z&#])(q̇|[A-Za-zα-ω])(\d+(?:,\d)?)(?![A-Za-z])")
+_SYMBOL_IN_PROSE = re.compile(r"(?<![A-Za-z&#])(q̇|[cdmqsUα-ω])(\d+(?:,\d)?)(?![A-Za-z])")
 _SIGN = re.compile(r"(?<![\w)])-(?=\S)|(?<= )-(?= )")
 
 
