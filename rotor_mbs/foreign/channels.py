@@ -31,6 +31,7 @@ Array = NDArray[np.float64]
 TIME = "time"
 _FEW_DIGITS, _ALL_DIGITS = 9, 17
 _FEW_VALUES = 10
+_EQUAL = 1e-6  # of an interval between rows
 _FEWEST = 3  # rows: fewer have no motion to be compared
 # Names without digits, blanks and marks; a name of a rate is one of an angle with a word of _RATE_WORDS behind it.
 _TIME_NAMES = {"time", "t", "times"}
@@ -229,7 +230,7 @@ class ForeignData:
 
     time, values : (n,) s, increasing from 0 or later; (n, channels) rad or rad/s, what `channels` says.
     read, unused : a line for each channel: column, unit, and what was assumed; names of the other columns.
-    rounding : (n, channels) half a unit in the last digit of each number, as it was written.
+    rounding, time_rounding : (n, channels), (n,) half a unit in the last digit of each number, as it was written.
     wrapped : for each channel, whether whole turns are missing from it.
     digits : how many significant digits the numbers have, at most; 17 where they have all.
     omitted : names of channels that are not to be missed.
@@ -240,6 +241,7 @@ class ForeignData:
     values: Array
     channels: tuple[Channel, ...]
     rounding: Array
+    time_rounding: Array
     read: tuple[str, ...] = ()
     unused: tuple[str, ...] = ()
     wrapped: tuple[bool, ...] = ()
@@ -286,12 +288,21 @@ def load_data(
         np.stack(arrays[1:], axis=1),
         tuple(chosen)[1:],
         np.stack(last_digits[1:], axis=1),
+        _time_rounding(arrays[0], last_digits[0]),
         lines,
         tuple(name for name in table.columns if name not in lengths),
         tuple(entry.wrapped for entry in chosen.values())[1:],
         max(_digits(table[entry.column].values) for channel, entry in chosen.items() if channel.name != TIME),
         omitted,
     )
+
+
+def _time_rounding(time: Array, last_digits: Array) -> Array:
+    """(n,) s: equal intervals are meant as they are written, though the times have few digits."""
+    intervals = np.diff(time)
+    if np.ptp(intervals) <= _EQUAL * float(intervals.mean()):
+        return np.asarray(np.abs(time) * 2.0**-53)
+    return last_digits
 
 
 def half_last_digits(values: Array) -> Array:

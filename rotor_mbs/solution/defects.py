@@ -38,7 +38,7 @@ class Defects:
     growth_rate : 1/s, in which an error grows e-fold at most, roughly: falling blades, and centrifugal forces.
     growth_units : (m,) in which the error growth of the scene counts angles, then rates.
     states : (n, m) angles, then rates, of the run, in the coordinates that move.
-    rounding : (n, m) half a unit in the last place of each of these numbers.
+    rounding, time_rounding : (n, m), (n,) half a unit in the last place of each of these numbers, and of the times.
     start : (m,) the scene's own start in these coordinates.
     """
 
@@ -51,6 +51,7 @@ class Defects:
     resting: tuple[int, ...]
     states: Array
     rounding: Array
+    time_rounding: Array
     start: Array
     growth_rate: float
     growth_units: Array
@@ -75,11 +76,11 @@ class Defects:
     @functools.cached_property
     def floors(self) -> Array:
         """(n - 1, m) rad: what the rounding of the run's own numbers may add up to in an interval, of each number."""
-        eps = 0.5 * float(np.finfo(float).eps)
         units = self._units
         half = self.states.shape[1] // 2
         # The sample times are rounded, too: by as much the state goes on.
-        slip = eps * np.abs(self.time[1:, None]) * np.abs(self.states[1:, half:])
+        late = (self.time_rounding[1:] + self.time_rounding[:-1])[:, None]
+        slip = late * np.abs(self.states[1:, half:])
         carried = self.rounding[:-1]
         if self.transitions is not None:
             known = np.where(np.isfinite(self.transitions), np.abs(self.transitions), 0.0)
@@ -88,7 +89,7 @@ class Defects:
         total[:, :half] += slip
         # and the rates by their change
         change = np.abs(np.diff(self.states[:, half:], axis=0)) / np.diff(self.time)[:, None]
-        total[:, half:] += eps * np.abs(self.time[1:, None]) * change
+        total[:, half:] += late * change
         return np.asarray(total / units)
 
     @property
@@ -173,6 +174,32 @@ class Defects:
     def _units(self) -> Array:
         columns = list(self.moving)
         return np.concatenate([np.ones(len(columns)), self.rate_units[columns]])
+
+    def over_rows(self, rows: int) -> tuple[Array, Array]:
+        """Defects over longer stretches, of so many rows each, and what rounding may make of them; both (k, m) rad.
+
+        A drift of one sign hides in every interval and shows over a hundred. Stretches over which an error may grow by
+        more than `MAX_INTERVAL_GROWTH` are left out; without transition matrices there is none.
+        """
+        empty = np.empty((0, len(self.start)))
+        if self.transitions is None or len(self.time) <= rows:
+            return empty, empty
+        half = len(self.moving)
+        columns = list(self.moving)
+        defects = np.hstack([self.angles[:, columns], self.rates[:, columns]])
+        units, sizes, floors = self._units, [], []
+        with np.errstate(all="ignore"):
+            for first in range(0, len(self.transitions) - rows + 1, rows):
+                error, product = np.zeros(2 * half), np.eye(2 * half)
+                for k in range(first, first + rows):
+                    error = self.transitions[k] @ error - defects[k]
+                    product = self.transitions[k] @ product
+                scaled = np.abs(product) * units / units[:, None]
+                if not scaled.max() <= MAX_INTERVAL_GROWTH:
+                    continue
+                sizes.append(np.abs(error) / units)
+                floors.append((np.abs(product) @ self.rounding[first] + self.rounding[first + rows]) / units)
+        return (np.array(sizes), np.array(floors)) if sizes else (empty, empty)
 
     def horizon_samples(self, limit: float) -> int:
         """How many samples lie before the error growth along the run reaches `limit`."""

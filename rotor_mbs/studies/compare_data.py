@@ -35,6 +35,7 @@ _ROUNDING = 1e-9  # of the duration: times that are sums of steps may end so far
 _FEWEST = 3
 _START = 1e-3  # rad, rad/s: starts that differ by more are another start
 _FULL_DIGITS = 8  # as many as single precision has
+_STRETCHES = (10, 100)  # rows over which defects are added up, too
 _MOST_NAMES = 100  # of columns that were not used
 _SEARCH_S = 60.0  # of the search for causes: scenes that are stiff or have many blades would take many minutes
 
@@ -98,6 +99,7 @@ def compare_with_reference(data: ForeignData, scene: Scene, tolerance: float = D
         raise InputError(f"tolerance: {tolerance!r}; allowed: a number more than 0, rad")
     inside = data.time <= scene.duration * (1.0 + _ROUNDING)
     cut = replace(data, time=data.time[inside], values=data.values[inside], rounding=data.rounding[inside])
+    cut = replace(cut, time_rounding=data.time_rounding[inside])
     # At the times of the data and at the scene's samples, which make growth and horizon the same for all data.
     end = max(scene.duration, float(cut.time[-1])) if len(cut.time) else scene.duration
     times = np.union1d(np.append(cut.time, end), np.linspace(0.0, scene.duration, scene.samples))
@@ -117,6 +119,7 @@ def compare_with_reference(data: ForeignData, scene: Scene, tolerance: float = D
     if horizon_samples(run) < len(run.time):
         until = max(int(np.searchsorted(at_rows.time, horizon_s, side="right")), 1)
     compared = replace(cut, time=cut.time[:rows], values=cut.values[:rows], rounding=cut.rounding[:rows])
+    compared = replace(compared, time_rounding=cut.time_rounding[:rows])
     defects, note = _defects(scene, compared, at_rows, until)
     errors = _channel_errors(scene, compared, at_rows, run, until, defects)
     missing = [label for i, label in enumerate(scene.coordinate_labels) if i not in data.columns]
@@ -130,7 +133,12 @@ def compare_with_reference(data: ForeignData, scene: Scene, tolerance: float = D
         path = defects.predicted
         if path is not None:
             predicted = float(np.abs(path[:until]).max())
-    status, message = _status(compared, at_rows, errors, until, tolerance, defect_time, missing, energy_drift)
+    drift = 0.0
+    if defects is not None:
+        for stretch in _STRETCHES:
+            sizes, floors = defects.over_rows(stretch)
+            drift = max(drift, float((sizes - FLOOR_SAFETY * floors).max(initial=0.0)))
+    status, message = _status(compared, at_rows, errors, drift, until, tolerance, defect_time, missing, energy_drift)
     if status in ("ok", "unchecked"):
         status, message = _uncovered(scene, compared, exact, until) or (status, message)
     notes += _notes(scene, data, cut, missing)
@@ -184,11 +192,14 @@ def _defects(scene: Scene, data: ForeignData, reference: Trajectory, until: int)
     if not np.isfinite(states).all():
         return None, ""
     with np.errstate(all="ignore"):
-        return interval_defects(scene, time, states[:, :count], states[:, count:], rounding), note
+        defects = interval_defects(
+            scene, time, states[:, :count], states[:, count:], rounding, data.time_rounding[:rows]
+        )
+        return defects, note
 
 
 def _status(
-    data: ForeignData, reference: Trajectory, errors: Sequence[ChannelErrors], until: int,
+    data: ForeignData, reference: Trajectory, errors: Sequence[ChannelErrors], drift: float, until: int,
     tolerance: float, defect_time: float | None, missing: Sequence[str], energy_drift: float | None,
 ) -> tuple[str, str]:  # fmt: skip
     """The first of these: another start, defects, errors up to the horizon, energy, a channel that is missed."""
@@ -209,6 +220,9 @@ def _status(
             f"{worst_defect.name}: defect of {worst_defect.defect:.1e} rad beyond rounding, in the interval up to "
             f"t = {defect_time:.6g} s, allowed {tolerance:.0e}"
         )
+    if not drift <= tolerance:
+        rows = f"{_STRETCHES[0]} or {_STRETCHES[1]} rows"
+        return "inaccurate", f"defect of {drift:.1e} rad beyond rounding over {rows}, allowed {tolerance:.0e}"
     angles = [channel for channel in errors if channel.unit == "rad"] or list(errors)
     largest = max(angles, key=lambda channel: channel.error_max)
     rounding = FLOOR_SAFETY * float(data.rounding.max(initial=0.0))

@@ -305,30 +305,36 @@ def likely_causes(search: CauseSearch, defects: DefectCauses | None) -> tuple[li
     inside = search.rows(search.data.time)
     time, values = search.data.time[inside], search.data.values[inside]
     motions, tried = list(_motions(search)), 0
+    first = np.abs(search.data.values[0] - search.expected(time[:1])[0, search.data.columns]) if len(time) else 0.0
+    is_elsewhere = bool(np.max(first) > _SAME_START)
+    found: list[str] = []
+    both: list[str] = []
     try:
         found = mistakes_in_columns(search, time, values, search.expected(time))
         found = found or _other_time(search) or _lag(search, time, values)
-        if not found and is_different and defects is not None:
-            found = list(fault_lines(defects.faults())) or causes_of_defects(search, defects)
-        found = found or _scatter(search, time, values)
         if found:
             return found, ""
-        both: list[str] = []
+        if is_different and defects is not None and not is_elsewhere:
+            found = list(fault_lines(defects.faults())) or causes_of_defects(search, defects)
+        if found := found or _scatter(search, time, values):
+            return found, ""
         for text, motion in motions:
             beside = _fits(search, motion)
             if beside is not None:
                 (both if beside else found).append("; and ".join([text, *beside]))
             tried += 1
+        if is_elsewhere and is_different and defects is not None and not (both or found):
+            found = list(fault_lines(defects.faults())) or causes_of_defects(search, defects)
     except OutOfTimeError:
-        return [], f"the search for causes was ended by its time limit: {tried} of {len(motions)} scenes tried"
-    # A scene that seems to fit, by errors up to the horizon alone, is none where the defects say no.
-    return both or ([] if is_different else found) or factors(search), ""
+        note = f"the search for causes was ended by its time limit: {tried} of {len(motions)} scenes tried"
+        return found or both, note
+    return found or both or factors(search), ""
 
 
 def hidden_causes(scene: Scene, defects: DefectCauses) -> list[str]:
     """A parameter whose change the defects follow beyond chance, though none is larger than rounding."""
     shares = defects.parameters(list(_parameters(scene)))
-    return [text for share, text in shares if share <= 1.01 * shares[0][0]][:MAX_PARAMETERS]
+    return [text for share, text in shares if share <= 1.05 * shares[0][0]][:MAX_PARAMETERS]
 
 
 def causes_of_defects(search: CauseSearch, defects: DefectCauses) -> list[str]:

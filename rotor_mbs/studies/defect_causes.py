@@ -22,10 +22,11 @@ from rotor_mbs.solution.trajectory import Array
 MAX_LEFT = 0.02  # of the defects' root mean square
 _AT_FLOOR = 3.0  # times the rounding
 _SIGNIFICANT = 8.0  # standard deviations of an estimate
-_PROJECTED = 0.5  # what a projection must leave at most for its parameter to be tried
+_TRIED = 8  # parameters, those whose projections leave least
+_LARGEST_CHANGE = 0.6  # a share, or rad: what is further off is another scene
 _INTERVALS = 120  # that an explanation is tried on first
 _DIFFERENCE = 1e-4  # share or rad, for the derivative by a parameter
-_ROUNDS = 3
+_ROUNDS = 8
 _PARALLEL = 0.995  # cosine
 _STANDS_OUT = 30.0  # times the median of the defects
 _MAX_FAULTS = 6  # that are named one by one
@@ -101,34 +102,38 @@ class DefectCauses:
             return []
         before = self._normal[chosen]
         total = float(np.linalg.norm(before))
+        projections = []
         for parameter in parameters:
-            slope = self._slope(parameter, chosen)
+            slope = self._slope(parameter, 0.0, chosen)
             size = float((slope**2).sum())
-            if not np.isfinite(size) or size == 0.0:
-                continue
-            estimate = -float((before * slope).sum()) / size
-            residual = before + estimate * slope
-            rest = float(np.linalg.norm(residual))
-            deviation = max(rest / np.sqrt(residual.size), 0.3) / np.sqrt(size)
-            is_hidden = self.is_rounding and abs(estimate) >= _SIGNIFICANT * deviation
-            if not is_hidden and rest > _PROJECTED * total:
+            if np.isfinite(size) and size > 0.0:
+                estimate = -float((before * slope).sum()) / size
+                residual = before + estimate * slope
+                rest = float(np.linalg.norm(residual))
+                deviation = max(rest / np.sqrt(residual.size), 0.3) / np.sqrt(size)
+                projections.append((rest, estimate, deviation, parameter))
+        projections.sort(key=lambda projection: projection[0])
+        for rest, estimate, deviation, parameter in projections[:_TRIED]:
+            # Below the rounding of the data a parameter shows by the sum over all rows alone.
+            if self.is_rounding:
+                if abs(estimate) >= _SIGNIFICANT * deviation and abs(estimate) <= _LARGEST_CHANGE:
+                    explained.append((rest / total, _text(parameter, estimate)))
                 continue
             change = estimate
             for _ in range(_ROUNDS):
-                scene, equations = parameter.change(change)
-                residual = self._residual(scene, equations, chosen)
-                if not np.isfinite(residual).all():
+                residual = self._residual(*parameter.change(change), chosen)
+                slope = self._slope(parameter, change, chosen)
+                size = float((slope**2).sum())
+                if not (np.isfinite(residual).all() and 0.0 < size < np.inf) or abs(change) > _LARGEST_CHANGE:
                     break
                 correction = -float((residual * slope).sum()) / size
                 change += correction
-                if abs(correction) <= 1e-9 + 1e-3 * deviation:
+                if abs(correction) <= 1e-9 + 1e-6 * abs(change):
                     break
-            if not np.isfinite(residual).all() or abs(change) < _SIGNIFICANT * deviation:
-                continue
-            share = self._share(self._residual(*parameter.change(change), chosen), chosen)
-            if share <= MAX_LEFT or is_hidden:
-                amount = f"{change:+.4g} {parameter.unit}" if parameter.unit else f"{100.0 * change:+.4g} %"
-                explained.append((rest / total if is_hidden else share, f"{parameter.key} off by {amount}"))
+            if _SIGNIFICANT * deviation <= abs(change) <= _LARGEST_CHANGE:
+                share = self._share(self._residual(*parameter.change(change), chosen), chosen)
+                if share <= MAX_LEFT:
+                    explained.append((share, _text(parameter, change)))
         return sorted(explained)
 
     def faults(self) -> list[Fault]:
@@ -195,11 +200,11 @@ class DefectCauses:
         ends = interval_ends(scene, self._defects.time, states, intervals.tolist(), equations)
         return np.asarray((ends - states[intervals + 1]) * self._weights[intervals])
 
-    def _slope(self, parameter: Parameter, intervals: NDArray[np.int64]) -> Array:
-        """By the parameter's share, or per rad."""
+    def _slope(self, parameter: Parameter, at: float, intervals: NDArray[np.int64]) -> Array:
+        """By the parameter's share, or per rad, at a change of it."""
         sides = []
         for step in (_DIFFERENCE, -_DIFFERENCE):
-            scene, equations = parameter.change(step)
+            scene, equations = parameter.change(at + step)
             change = None
             if equations is None:
                 change = change_of_ends(self._scene, scene, self._defects.time, self._defects.states)
@@ -215,6 +220,11 @@ class DefectCauses:
         if float(np.abs(residual).max()) <= _AT_FLOOR:
             return 0.0
         return float(np.linalg.norm(residual) / (np.linalg.norm(self._normal[intervals]) or 1.0))
+
+
+def _text(parameter: Parameter, change: float) -> str:
+    amount = f"{change:+.4g} {parameter.unit}" if parameter.unit else f"{100.0 * change:+.4g} %"
+    return f"{parameter.key} off by {amount}"
 
 
 def _is_smooth(size: Array, wrong: NDArray[np.int64]) -> bool:

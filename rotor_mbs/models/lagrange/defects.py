@@ -32,7 +32,14 @@ _FIT_ROUNDS = 4
 _DIFFERENCE = 1e-6  # rad and rate units: cube root of the rounding, for central differences
 
 
-def interval_defects(scene: Scene, time: Array, angles: Array, rates: Array, rounding: Array | None = None) -> Defects:
+def interval_defects(
+    scene: Scene,
+    time: Array,
+    angles: Array,
+    rates: Array,
+    rounding: Array | None = None,
+    time_rounding: Array | None = None,
+) -> Defects:
     """The defects of a run's samples, or of anybody's.
 
     Parameters
@@ -41,6 +48,7 @@ def interval_defects(scene: Scene, time: Array, angles: Array, rates: Array, rou
     angles, rates : (n, 1 + blades) rad and rad/s.
     rounding : (2 + 2 blades,), or for each row: half a unit in the last digit of angles, then rates; that of doubles
         where left out.
+    time_rounding : (n,) s, likewise.
 
     Returns
     -------
@@ -74,6 +82,7 @@ def interval_defects(scene: Scene, time: Array, angles: Array, rates: Array, rou
         resting=resting_pitches(scene),
         states=states,
         rounding=last_digits,
+        time_rounding=0.5 * float(np.finfo(float).eps) * np.abs(time) if time_rounding is None else time_rounding,
         start=start,
         growth_rate=_growth_rate(scene, states),
         growth_units=np.concatenate([np.ones(half), rate_units(scene)]),
