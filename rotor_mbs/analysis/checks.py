@@ -166,7 +166,7 @@ def _of_run(run: StoredRun, bounds: Bounds, stored: Rehydrated, motion_ends: boo
         return
     judgement = judge(stored.scene, stored.run, stored.reference)
     yield _status(run, bounds, judgement)
-    channel, worst, hint = _changed_metric(run, judgement.metrics, stored.run.trajectory)
+    channel, worst, hint = _changed_metric(run, judgement.metrics, stored.run)
     yield _of(run, "metrics", channel, worst, bounds, "relative", hint)
     yield from _of_settings(run, bounds, stored.scene)
     if len(stored.run.trajectory.time):
@@ -191,8 +191,9 @@ def _status(run: StoredRun, bounds: Bounds, judgement: Judgement) -> Check:
     return _of(run, "status", "status", float(faults), bounds, "faults", hint)
 
 
-def _changed_metric(run: StoredRun, metrics: Metrics, trajectory: Trajectory) -> tuple[str, float, str]:
+def _changed_metric(run: StoredRun, metrics: Metrics, solution: Solution) -> tuple[str, float, str]:
     """Channel, value and hint of the stored number that is furthest from what the samples give."""
+    trajectory = solution.trajectory
     worst, hint, channel = 0.0, "each stored number is that of the samples", "stored numbers"
     if "frozen_with" in run.attributes:
         return channel, worst, hint  # a shipped file keeps none
@@ -211,7 +212,13 @@ def _changed_metric(run: StoredRun, metrics: Metrics, trajectory: Trajectory) ->
         angles, rates = trajectory.angles[:, 0], trajectory.rates[:, 0]
         bend = {"rotor_angle_min": angles, "rotor_angle_max": angles, "rotor_rate_max": rates}
         allowances |= {name: float(np.abs(np.diff(values, 2)).max(initial=0.0)) for name, values in bend.items()}
+    # Angles and rates that are not stored are zeros here.
+    lacking = set() if solution.scene.wants("rates") else {"rotor_rate_max"}
+    if not solution.scene.wants("angles"):
+        lacking |= {"rotor_angle_min", "rotor_angle_max"}
     for name, value in metrics.items():
+        if name in lacking:
+            continue
         if name == "defect_time" and metrics["defect_max"] <= floor:
             continue
         stored = float(run.attributes.get(name, np.nan))

@@ -52,9 +52,10 @@ _TEXT_LENGTH = 600  # characters of a message
 _RUN_COLUMNS = (
     "status", "message", "samples", "time_reached", "time_limit_s", "steps", "rhs_evaluations", "setup_time_s",
     "run_time_s", "run_time_min_s", "output_time_s", "repeats", "engine_success", "engine_message", "false_success",
-    "energy_scale_J", "energy_drift_max", "energy_gain_J", "defect_max", "defect_median", "defect_time",
-    "defect_mean", "defect_drift", "defect_floor", "defects_not_judged", "angle_error_max", "angle_error_predicted",
-    "angle_error_whole", "angle_error_end", "horizon_s", "angular_impulse_error_max", "linear_impulse_error_max",
+    "energy_scale_J", "energy_drift_max", "energy_gain_J", "angle_error_max", "angle_error_predicted",
+    "angle_error_whole", "angle_error_end", "horizon_s", "defect_max", "defect_median", "defect_time",
+    "defect_mean", "defect_drift", "defect_floor", "defects_not_judged",
+    "angular_impulse_error_max", "linear_impulse_error_max",
     "zero_pitch_max", "zero_pitch_left_s", "zero_pitch_growth_per_s", "rotor_angle_min", "rotor_angle_max",
     "rotor_rate_max",
 )  # fmt: skip

@@ -304,7 +304,6 @@ def likely_causes(search: CauseSearch, defects: DefectCauses | None) -> tuple[li
         return _other_time(search) if search.data.time[-1] > 2.0 * search.scene.duration else [], ""
     inside = search.rows(search.data.time)
     time, values = search.data.time[inside], search.data.values[inside]
-    motions, tried = list(_motions(search)), 0
     first = np.abs(search.data.values[0] - search.expected(time[:1])[0, search.data.columns]) if len(time) else 0.0
     is_elsewhere = bool(np.max(first) > _SAME_START)
     found: list[str] = []
@@ -318,15 +317,14 @@ def likely_causes(search: CauseSearch, defects: DefectCauses | None) -> tuple[li
             found = list(fault_lines(defects.faults())) or causes_of_defects(search, defects)
         if found := found or _scatter(search, time, values):
             return found, ""
-        for text, motion in motions:
+        for text, motion in _motions(search):
             beside = _fits(search, motion)
             if beside is not None:
                 (both if beside else found).append("; and ".join([text, *beside]))
-            tried += 1
         if is_elsewhere and is_different and defects is not None and not (both or found):
             found = list(fault_lines(defects.faults())) or causes_of_defects(search, defects)
     except OutOfTimeError:
-        note = f"the search for causes was ended by its time limit: {tried} of {len(motions)} scenes tried"
+        note = "the search for causes was ended by its time limit"
         return found or both, note
     return found or both or factors(search), ""
 

@@ -51,7 +51,7 @@ class Chunk(Task):
     settings: Mapping[str, object]
     time_limit_s: float
     code: int
-    with_defects: bool
+    with_defects: bool = False
 
     @property
     def first(self) -> int:

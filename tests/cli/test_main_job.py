@@ -17,7 +17,7 @@ from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.studies import reproduce
 
 SCENES = ["paper/fig08", reproduce.BENCHED]
-METHODS = {"printed/ode45", "lagrange/taylor", "exudyn_tree/rk67", "exudyn_chain/generalized_alpha"}
+METHODS = {"printed/ode45", "lagrange/taylor", "exudyn_tree/rk67", "exudyn_chain/extrapolated"}
 
 
 @pytest.fixture(scope="module")

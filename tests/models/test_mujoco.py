@@ -17,6 +17,7 @@ from rotor_mbs.analysis.judgement import judge
 from rotor_mbs.errors import InputError, MethodRefusal
 from rotor_mbs.methods.catalogue import find_method
 from rotor_mbs.methods.solve import solve
+from rotor_mbs.models.lagrange.defects import interval_defects
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.metrics import metrics_of
 from rotor_mbs.solution.trajectory import Trajectory
@@ -115,8 +116,10 @@ def test_point_masses_have_no_inertia_that_the_scene_does_not_give() -> None:
     assert not solver.engine.moments.any()
     assert solver.engine.masses.tolist() == [0.0, 15000.0, 15000.0, 15000.0]
     scene = references.scene("extreme/toy")
-    metrics = metrics_of(scene, run(scene, step=1e-4), references.reference("extreme/toy"))
-    assert metrics["angle_error_max"] < 1e-9
+    result, exact = run(scene, step=1e-4), references.reference("extreme/toy")
+    defects = interval_defects(scene, result.time, result.angles, result.rates)
+    metrics = metrics_of(scene, result, exact, defects)
+    assert metrics["angle_error_predicted"] == pytest.approx(metrics["angle_error_max"], rel=0.2)  # of its step alone
 
 
 def test_an_inertia_at_the_limit_of_the_triangle_inequality() -> None:

@@ -135,7 +135,7 @@ def test_the_order_of_taylors_series_is_that_of_its_tolerance(tolerance: float |
         paper("fig03"), method.settings.of(method.name, {"tolerance": tolerance} if tolerance else {})
     )
     expected = math.ceil(1.0 - 0.5 * math.log(tolerance or np.finfo(float).eps))
-    assert solver._integrator.order == expected
+    assert solver.integrator.order == expected
 
 
 @pytest.mark.parametrize(

@@ -58,7 +58,7 @@ def accepted(name: str, kind: str, duration: float, folder: Path) -> None:
     found = rm.compare(folder / kind, scene, columns=columns)
     assert (found.status, found.message) == ("ok", "")
     # SciPy at 1e-11 makes errors of some 1e-11 a step; a wrong digit in the equations, at least 1e-4.
-    assert max(one.error_per_growth for one in found.verdict.channels) < 1e-8
+    assert max(channel.defect or 0.0 for channel in found.verdict.channels) < 1e-8
     assert found.likely == ()
 
 
@@ -128,7 +128,7 @@ def test_a_script_for_pinocchio_agrees(tmp_path: Path, name: str) -> None:
     found = rm.compare(tmp_path / "pinocchio.csv", scene)
     assert (found.status, found.message) == ("ok", "")
     # As of the other code: SciPy at 1e-11; a wrong number in the model makes 1e-4 at least.
-    assert max(one.error_per_growth for one in found.verdict.channels) < 1e-8
+    assert max(channel.defect or 0.0 for channel in found.verdict.channels) < 1e-8
     assert len(found.verdict.channels) == 2 * len(scene.initial_angles)
 
 
@@ -208,7 +208,8 @@ def test_the_stored_comparison_has_data_reference_and_errors_in_si(tmp_path: Pat
         np.testing.assert_allclose(data.pitch_1, run.angles[late, 1] + np.radians(1e-3), atol=1e-15)
         np.testing.assert_allclose(data.pitch_1_reference, run.reference.angles[late, 1], atol=1e-12)
         np.testing.assert_array_equal(data.pitch_1_error, data.pitch_1 - data.pitch_1_reference)
-        np.testing.assert_array_equal(data.pitch_1_growth, found.study.carried[:, 0])
+        assert np.isnan(data.pitch_1_defect[0])
+        assert np.nanmax(data.pitch_1_defect) < 1e-6  # a zero that is elsewhere has next to none
         assert {one.attrs["units"] for one in data.data_vars.values()} == {"rad"}
         assert (data.time.attrs["units"], data.attrs["status"], data.attrs["tolerance"]) == ("s", "inaccurate", 1e-6)
         xarray.testing.assert_equal(data, found.to_xarray())
@@ -230,7 +231,7 @@ def test_a_test_of_another_project() -> None:
     scene = rm.scene("paper/fig03")
     run = rm.run(scene, "lagrange/dop853")
     assert assert_agrees(run.time, run.angles, scene="paper/fig03", rates=run.rates).agrees
-    with pytest.raises(AssertionError, match="rotor: error"):
+    with pytest.raises(AssertionError, match="first row"):
         assert_agrees(run.time, run.angles + 1e-4, scene=scene)
     with pytest.raises(rm.InputError, match="different lengths"):
         assert_agrees(run.time[1:], run.angles, scene=scene)
@@ -262,11 +263,14 @@ def test_numbers_without_sense_are_inaccurate() -> None:
 def test_channels_may_be_missing_and_rates_alone_are_judged() -> None:
     run = rm.run(rm.scene("paper/fig03"), "lagrange/dop853")
     alone = rm.compare({"t": run.time, "pitch_1": run.angles[:, 1]}, run.scene)
-    assert (alone.status, len(alone.verdict.channels)) == ("ok", 1)
+    assert (alone.status, len(alone.verdict.channels)) == ("unchecked", 1)
+    assert alone.message == 'no column for rotor; a mapping with omit = ["rotor"] does without'
     assert "no angle of: rotor" in alone.verdict.notes
-    assert rm.compare({"t": run.time, "rotor_rate": run.rates[:, 0]}, run.scene).agrees
-    wrong = rm.compare({"t": run.time, "rotor_rate": 1.001 * run.rates[:, 0]}, run.scene)
-    assert wrong.message.startswith("rotor rate")
+    assert rm.compare({"t": run.time, "pitch_1": run.angles[:, 1]}, run.scene, columns={"omit": ["rotor"]}).agrees
+    without = {"omit": ["rotor", "pitch_1"]}
+    assert rm.compare({"t": run.time, "rotor_rate": run.rates[:, 0]}, run.scene, columns=without).agrees
+    wrong = rm.compare({"t": run.time, "rotor_rate": 1.001 * run.rates[:, 0]}, run.scene, columns=without)
+    assert "rotor rate" in wrong.message
     assert wrong.verdict.channels[0].scale == pytest.approx(1.001, abs=1e-9)
 
 
@@ -284,25 +288,27 @@ def test_data_without_a_likely_cause_are_told_where_they_start() -> None:
 
 
 def test_numbers_of_few_digits_are_noticed(tmp_path: Path) -> None:
-    """OpenFAST's usual four digits: a right run is not within the tolerance, and the page says why; 1e-3 it is."""
+    """OpenFAST's usual four digits: a right run is ok as far as they tell, which the page says; a wrong one is not."""
     run = rm.run(rm.scene("paper/fig03"), "lagrange/dop853")
     head = "\n".join(["", "OpenFAST", "", "", "", "", "Time Azimuth BldPitch1", "(s) (deg) (deg)"])
     rows = np.column_stack([run.time, np.degrees(run.angles)])
     np.savetxt(tmp_path / "low.out", rows, header=head, comments="", fmt="%10.3E")
     found = rm.compare(tmp_path / "low.out", run.scene)
-    assert found.status == "inaccurate"
+    assert found.status == "ok"
     assert "numbers of 4 digits: their rounding alone is 5e-04 of their size" in found.verdict.notes
-    assert rm.compare(tmp_path / "low.out", run.scene, tolerance=1e-3).agrees
+    heavier = run.scene.replace(gravity=9.0)
+    assert not rm.compare(tmp_path / "low.out", heavier).agrees
 
 
 def test_the_comparison_as_a_dataset_has_units() -> None:
     pytest.importorskip("xarray")
     run = rm.run(rm.scene("paper/fig03"), "lagrange/dop853")
-    data = rm.compare({"t": run.time, "rotor_rate": run.rates[:, 0]}, run.scene).to_xarray()
+    without = {"omit": ["rotor", "pitch_1"]}
+    data = rm.compare({"t": run.time, "rotor_rate": run.rates[:, 0]}, run.scene, columns=without).to_xarray()
     np.testing.assert_array_equal(data.rotor_rate, run.rates[:, 0])
     assert data.rotor_rate_reference.attrs["units"] == "rad/s"
     assert (data.attrs["status"], data.time.attrs["units"]) == ("ok", "s")
-    assert (data.rotor_rate_growth >= 1.0).all()
+    assert data.rotor_rate_defect.attrs["units"] == "rad"
 
 
 def test_lag_scale_and_offset_are_those_that_were_put_in() -> None:
@@ -315,13 +321,3 @@ def test_lag_scale_and_offset_are_those_that_were_put_in() -> None:
     assert channel.lag_s == pytest.approx(-0.001, rel=0.01)
     assert channel.scale == pytest.approx(0.999, abs=1e-5)
     assert channel.offset == pytest.approx(0.25, abs=1e-4)
-
-
-def test_the_energy_of_data_is_examined_beyond_the_horizon() -> None:
-    """Fig. 11 after its horizon at 5.4 s: angles are not judged any more, a rotor that slows down by itself is."""
-    scene = rm.scene("paper/fig11")
-    run = rm.run(scene, "lagrange/dop853")
-    rates = run.rates * np.where(run.time < 8.0, 1.0, 0.9)[:, None]
-    found = rm.compare({"time": run.time, "angles": run.angles, "rates": rates}, scene)
-    assert found.status == "inaccurate"
-    assert found.message.startswith("energy drift")

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import functools
 import itertools
-import re
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
@@ -155,7 +154,6 @@ PLANTS = {
     ),
     "gravity": Plant("gravity of 9.81 m/s^2", changed=with_gravity(9.81)),
     "no gravity": Plant("gravity of 0 m/s^2", changed=with_gravity(0.0)),
-    "mass 1 % off, driven": Plant("blade.mass off by +1 %", "paper/fig15-10kNm", changed=lighter),
     "mass 1 % off, springs": Plant("blade.mass off by +1 %", "check/general", changed=lighter),
     "c 1 % off": Plant("blade.centre_of_mass[0] off by +1 %", changed=longer_offset),
     "missing Coriolis": Plant("without the Coriolis terms", mistakes=Mistakes(coriolis=0.0)),
@@ -226,6 +224,14 @@ def test_a_mistake_is_named(name: str) -> None:
     assert any(plant.says in text for text in (comparison.message, *comparison.likely)), comparison.likely
 
 
+def test_what_is_within_the_tolerance_but_not_random_is_named() -> None:
+    """A mass that the motion cannot tell from a torque: both are named."""
+    comparison = rm.compare(Plant("", "paper/fig15-10kNm", changed=lighter).data(), short("paper/fig15-10kNm"))
+    assert comparison.status == "ok"
+    assert {"blade.mass off by +1 %", "torque.rotor off by -0.9901 %"} <= set(comparison.likely)
+    assert any("not random" in note for note in comparison.verdict.notes)
+
+
 @pytest.mark.parametrize("name", REFUSED)
 def test_what_cannot_be_compared_is_refused(name: str) -> None:
     with pytest.raises(rm.InputError, match=REFUSED[name].says):
@@ -262,7 +268,5 @@ def test_a_search_for_causes_ends_by_its_time_limit_and_says_so(monkeypatch: pyt
     monkeypatch.setattr(compare_data, "monotonic", lambda: 0.0)
     monkeypatch.setattr(data_causes, "monotonic", lambda: float(next(seconds)))
     comparison = rm.compare(UNKNOWN.data(), short("paper/fig11"))
-    (note,) = comparison.verdict.notes
-    tried, of = map(int, re.findall(r"(\d+) of (\d+) scenes tried", note)[0])
-    assert 0 < tried <= 60 < of
+    assert comparison.verdict.notes == ("the search for causes was ended by its time limit",)
     assert (comparison.status, comparison.likely) == ("inaccurate", ())

@@ -19,6 +19,7 @@ from rotor_mbs.models.lagrange.taylor import Propagation, is_compact
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.scenario.time_table import Segment
 from rotor_mbs.solution.defects import Defects
+from rotor_mbs.solution.metrics import ANGLE_LIMIT
 from rotor_mbs.solution.trajectory import Array, Trajectory
 
 # Of one interval: a stiff bearing of 1e12 N m/rad takes some 600; a run far from any motion would take for ever.
@@ -108,6 +109,8 @@ def fitted_rates(scene: Scene, time: Array, angles: Array) -> Array:
     count = len(time)
     if count < FIT_ROWS:
         raise InputError(f"{count} rows; allowed: at least {FIT_ROWS} where the rates are to be found from the angles")
+    if not np.abs(angles).max() <= ANGLE_LIMIT:
+        raise InputError(f"angles over {ANGLE_LIMIT:g} rad have no digits to find rates from")
     moving = scene.moving_coordinates
     half = len(moving)
     rates = np.zeros_like(angles)
@@ -133,6 +136,8 @@ def fitted_rates(scene: Scene, time: Array, angles: Array) -> Array:
             offsets.append(np.einsum("kij,kj->ki", step, offsets[-1]) + jumps[firsts + row])
         design = np.concatenate([matrix[:, :half] * scale for matrix in matrices], axis=1)
         residual = np.concatenate([offset[:, :half] for offset in offsets], axis=1)
+        if not (np.isfinite(design).all() and np.isfinite(residual).all()):
+            raise InputError("the rates cannot be found from the angles: errors grow without limit between the rows")
         at_first = -np.einsum("kij,kj->ki", np.linalg.pinv(design), residual) * scale
         all_rows = np.stack(
             [np.einsum("kij,kj->ki", m, at_first) + offset for m, offset in zip(matrices, offsets, strict=True)]
