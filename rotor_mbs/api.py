@@ -26,7 +26,7 @@ from rotor_mbs.analysis.rehydrate import rehydrate
 from rotor_mbs.analysis.run_tables import RUN_HEAD, run_row
 from rotor_mbs.errors import InputError, MethodRefusal, PlausibilityWarning, StoreError
 from rotor_mbs.methods.catalogue import REFERENCE, check_names
-from rotor_mbs.runs.files import replace_file
+from rotor_mbs.runs.files import HDF5, replace_file
 from rotor_mbs.runs.read import StoredRun, StoredScene, is_sweep, open_results
 from rotor_mbs.runs.results import RUNS
 from rotor_mbs.runs.sweeps import StoredSweep, parameter_name
@@ -440,9 +440,10 @@ class Runs(Mapping[Any, Any]):
         return data.assign(status=("run", [status for _, _, status, _ in self._rows()]))
 
     def save(self, path: str | os.PathLike[str]) -> Path:
-        """The file under another name, which `rotor-mbs report` and `rotor_mbs.open` read. Replaces the file."""
+        """The file under another name, which `rotor-mbs report` and `rotor_mbs.open` read. Replaces a file of this
+        program; raises InputError for another one."""
         target = Path(path)
-        replace_file(target, self.path.read_bytes())
+        replace_file(target, self.path.read_bytes(), HDF5)
         return target
 
     def to_html(self, folder: str | os.PathLike[str]) -> Path:

@@ -362,6 +362,6 @@ def _parser() -> tuple[_Parser, dict[str, _Parser]]:
     own.add_argument("scene", metavar="SCENE", help="a name (paper/fig05) or a TOML file")
     text = "mjcf: a MuJoCo model; exudyn: a script without this package; csv: the reference trajectory"
     own.add_argument("--to", required=True, choices=EXPORT_FORMATS, metavar="FORMAT", help=text)
-    own.output(path, "FILE", help="output file (default: the scene's name with an ending)")
+    own.output(file, "FILE", help="output file (default: the scene's name with an ending)")
 
     return parser, dict(commands.choices)

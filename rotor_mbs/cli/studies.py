@@ -6,6 +6,7 @@ Each loads what it computes with, and not the others'; no model is loaded for pa
 from __future__ import annotations
 
 import argparse
+import errno
 import json
 import os
 import sys
@@ -15,7 +16,7 @@ from collections import Counter
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rotor_mbs.cli import show
+from rotor_mbs.cli import EXIT_BAD_INPUT, EXIT_FAILED, show
 from rotor_mbs.cli.arguments import pages_beside
 from rotor_mbs.cli.terminal import ProgressLine, SweepProgress, print_doubts, print_not_computed, print_table, span
 from rotor_mbs.errors import InputError, StoreError
@@ -105,11 +106,15 @@ def modes(arguments: argparse.Namespace) -> int:
 def check(arguments: argparse.Namespace) -> int:
     """Prints every verdict that fails (with --verbose all), then a count; status 1 where one fails."""
     from rotor_mbs.report.pages import check as formats
-    from rotor_mbs.runs.files import replace_file
+    from rotor_mbs.runs.files import refuse_foreign, replace_file
     from rotor_mbs.runs.read import is_sweep
     from rotor_mbs.scenario.accuracy_bounds import load_bounds
     from rotor_mbs.studies import check as study
 
+    if arguments.junit is not None:
+        refuse_foreign(arguments.junit, formats.JUNIT)
+    if arguments.json is not None and arguments.json != Path("-"):
+        refuse_foreign(arguments.json, formats.JSON)
     bounds = load_bounds(arguments.bounds)
     required = check_names(arguments.require or ())
     earlier = None if arguments.against is None else study.check_file(arguments.against, bounds)
@@ -124,13 +129,13 @@ def check(arguments: argparse.Namespace) -> int:
         verdicts += study.regressions(verdicts, earlier, arguments.shrink)
 
     if arguments.junit is not None:
-        replace_file(arguments.junit, formats.junit(verdicts))
+        replace_file(arguments.junit, formats.junit(verdicts), formats.JUNIT)
     stream = sys.stdout
     if arguments.json == Path("-"):
         print(formats.as_json(verdicts))
         stream = sys.stderr  # standard output is the JSON's alone
     elif arguments.json is not None:
-        replace_file(arguments.json, formats.as_json(verdicts).encode())
+        replace_file(arguments.json, formats.as_json(verdicts).encode(), formats.JSON)
 
     failures = [verdict for verdict in verdicts if not verdict.passed]
     for verdict in verdicts if arguments.verbose else failures:
@@ -219,9 +224,15 @@ def sweep(arguments: argparse.Namespace) -> int:
         try:
             with SweepProgress(as_json=arguments.json) as progress:
                 result = run_sweep(plan, output, pool, progress, fresh=arguments.fresh)
-        except StoreError as exc:  # the disk, not the input: what is stored stays, the same command continues
+        except StoreError as exc:
             show(str(exc), sys.stderr)
-            return 1
+            is_full = isinstance(exc.__cause__, OSError) and exc.__cause__.errno in (
+                errno.ENOSPC,
+                errno.EDQUOT,
+                errno.EFBIG,
+            )
+            # What is stored stays, the same command continues; else nothing was begun.
+            return EXIT_FAILED if is_full or progress.has_made_runs else EXIT_BAD_INPUT
         _summarize_sweep(result, as_json=arguments.json)
         if result.older:
             show(f"{result.older} runs were computed by other versions; --fresh computes them again", sys.stderr)

@@ -165,6 +165,10 @@ class SweepProgress(_RenewedLine):
         self._shown = self._start
         self._made: Counter[str] = Counter()
 
+    @property
+    def has_made_runs(self) -> bool:
+        return bool(self._made)
+
     def __call__(self, done: int, total: int, statuses: Counter[str]) -> None:
         self._made += statuses
         now = time.monotonic()

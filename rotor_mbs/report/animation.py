@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import shutil
 import subprocess
 from collections.abc import Iterator, Mapping
@@ -20,12 +21,14 @@ from rotor_mbs.report.core.canvas import FONT_FILE
 from rotor_mbs.report.core.looks import GREY, coordinate_look, label_of
 from rotor_mbs.report.pages.viewer import magnification
 from rotor_mbs.report.plots import projected
+from rotor_mbs.runs.files import refuse_foreign, replace_file, replacing
 from rotor_mbs.runs.read import StoredScene, open_results
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.trajectory import Array
 
 SUFFIXES = (".webp", ".gif", ".mp4")
 RATE = 20  # frames a second, in real time
+_MARK = b"rotor_mbs animation"  # in the metadata of every file
 _MAX_FRAMES = 600  # a longer scene is shown faster
 _SIDE, _TOP, _FINE = 420, 40, 2  # pixels of a square, of the line of text above; drawn at twice the size, then reduced
 _PATH_POINTS = 4  # along a path, from one frame to the next
@@ -55,20 +58,21 @@ def write_animation(results: Path, name: str, output: Path, magnified: float | N
         raise InputError(
             f"{output}: MP4 needs ffmpeg, which is not found here; allowed: .webp, .gif, or install ffmpeg"
         )
+    refuse_foreign(output, _MARK)  # before anything is drawn
     name = Path(name).stem if name.endswith(".toml") else name  # a scene of one's own is stored by the stem of its file
     with open_results(results) as opened:
         if name not in opened.scenes:
             raise InputError(f"{results}: {name!r}: no such scene in it; allowed: {', '.join(opened.scenes) or 'none'}")
         pictures = frames(opened.scenes[name], magnified)
-    try:
-        output.parent.mkdir(parents=True, exist_ok=True)
-        if kind == ".mp4":
-            _film(pictures, output)
-        else:
-            options = {"quality": 50, "method": 0} if kind == ".webp" else {"optimize": False}
-            next(pictures).save(output, save_all=True, append_images=pictures, duration=1000 // RATE, loop=0, **options)
-    except OSError as exc:
-        raise StoreError(f"{output}: cannot be written: {exc.strerror or exc}") from exc
+    if kind == ".mp4":
+        with replacing(output) as temporary:
+            _film(pictures, temporary)
+        return output
+    options = {"quality": 50, "method": 0, "xmp": _MARK} if kind == ".webp" else {"optimize": False, "comment": _MARK}
+    stream = io.BytesIO()
+    first, name_of_kind = next(pictures), kind.removeprefix(".")
+    first.save(stream, name_of_kind, save_all=True, append_images=pictures, duration=1000 // RATE, loop=0, **options)
+    replace_file(output, stream.getvalue(), _MARK)
     return output
 
 
@@ -150,7 +154,8 @@ def _film(pictures: Iterator[Image.Image], output: Path) -> None:
     size = f"{first.width}x{first.height}"
     command = [
         "ffmpeg", "-y", "-loglevel", "error", "-f", "rawvideo", "-pix_fmt", "rgb24", "-s", size, "-r", str(RATE),
-        "-i", "-", "-c:v", "libx264", "-pix_fmt", "yuv420p", "-movflags", "+faststart", str(output.absolute()),
+        "-i", "-", "-c:v", "libx264", "-pix_fmt", "yuv420p", "-movflags", "+faststart",
+        "-metadata", f"comment={_MARK.decode()}", "-f", "mp4", str(output.absolute()),
     ]  # fmt: skip
     with subprocess.Popen(command, stdin=subprocess.PIPE, stderr=subprocess.PIPE) as ffmpeg:
         assert ffmpeg.stdin is not None

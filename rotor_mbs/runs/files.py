@@ -7,6 +7,7 @@ import hashlib
 import json
 import os
 import re
+import secrets
 import socket
 import threading
 from collections.abc import Collection, Iterator, Mapping, Sequence
@@ -29,6 +30,8 @@ FORMAT_VERSION = 2
 CONVENTIONS = "CF-1.11, ACDD-1.3"
 # What every file is about: the attribute `keywords` of the ACDD conventions.
 KEYWORDS = "multibody dynamics, wind turbine rotor, Euler-Lagrange equations, model verification"
+HDF5 = b"\x89HDF"  # what a file begins with
+_LARGEST_REPLACED = 1 << 28  # bytes, of an output that is not HDF5
 DIGESTS = "digests"  # the attribute with the digests of a group
 CHARACTERS = "characters"  # the dimension of texts that are filled in later
 # The netCDF-4 library's name for the scale of a dimension without values.
@@ -65,7 +68,7 @@ def new_file(path: Path) -> Iterator[Any]:
         yield file
         file.flush()
         image = file.id.get_file_image()
-    replace_file(path, image)
+    replace_file(path, image, HDF5)
 
 
 def begin_file(place: Path | str, **driver: object) -> Any:
@@ -77,11 +80,13 @@ def begin_file(place: Path | str, **driver: object) -> Any:
     return file
 
 
-def replace_file(path: Path, content: Buffer) -> None:
-    """`content` under a temporary name beside `path`, forced to the disk, then renamed. Raises StoreError.
+def replace_file(path: Path, content: Buffer, mark: bytes) -> None:
+    """`content` under a temporary name beside `path`, forced to the disk, then renamed.
 
-    Of a symbolic link the file that it points to is replaced; a device or a pipe is written to.
+    Of a symbolic link the file that it points to is replaced; a device or a pipe is written to. mark: see
+    `refuse_foreign`. Raises InputError where `path` is a file of another kind, StoreError where it cannot be written.
     """
+    refuse_foreign(path, mark)
     if path.exists() and not path.is_file() and not path.is_dir():
         with saving(path):
             path.write_bytes(content)
@@ -92,13 +97,38 @@ def replace_file(path: Path, content: Buffer) -> None:
         os.fsync(file.fileno())
 
 
+def refuse_foreign(path: Path, mark: bytes) -> None:
+    """Raises InputError where `path` is a file that this program did not write as an output of the same kind.
+
+    mark: a regular expression that is found in every output of the kind; HDF5: the attribute of the format instead. An
+    empty file may be replaced.
+    """
+    if not path.is_file():
+        return
+    with saving(path):
+        size = path.stat().st_size
+        if mark == HDF5:
+            is_own = size == 0 or is_of_this_program(path)
+        else:
+            is_own = size == 0 or (size <= _LARGEST_REPLACED and re.search(mark, path.read_bytes()) is not None)
+    if not is_own:
+        raise InputError(
+            f"{path}: is another file than the output of this command, and is not replaced; allowed: another name, or "
+            "remove that file"
+        )
+
+
 @contextmanager
 def replacing(path: Path) -> Iterator[Path]:
-    """The name of a file to be written in the block, which then takes the place of `path`. Raises StoreError."""
-    temporary = path.with_name(f".{path.name}.{os.getpid()}.tmp")
+    """The name of a new, empty file beside `path`, which takes its place after the block. Raises StoreError.
+
+    The name cannot be guessed, and a file or link of that name is not opened.
+    """
+    temporary = path.with_name(f".{path.name}.{secrets.randbits(60)}.tmp")
     with saving(path):
+        path.parent.mkdir(parents=True, exist_ok=True)
+        temporary.open("xb").close()
         try:
-            path.parent.mkdir(parents=True, exist_ok=True)
             yield temporary
             temporary.replace(path)
         finally:

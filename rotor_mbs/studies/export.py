@@ -14,7 +14,7 @@ from rotor_mbs.methods.catalogue import REFERENCE
 from rotor_mbs.methods.solve import solve
 from rotor_mbs.models.exudyn.script import exudyn_script
 from rotor_mbs.models.mujoco.mjcf import mjcf_file
-from rotor_mbs.runs.files import replace_file
+from rotor_mbs.runs.files import refuse_foreign, replace_file
 from rotor_mbs.scenario.catalogue import scene_of
 from rotor_mbs.scenario.scene import Scene, scene_hash
 from rotor_mbs.solution import quantities
@@ -27,7 +27,7 @@ def export(scene: Scene | str, to: str, output: str | os.PathLike[str]) -> list[
     Parameters
     ----------
     to : "mjcf", "exudyn" or "csv" (the reference trajectory, with units).
-    output : the file; one that is there is replaced.
+    output : the file; an earlier one of the same format is replaced.
 
     Returns
     -------
@@ -36,7 +36,7 @@ def export(scene: Scene | str, to: str, output: str | os.PathLike[str]) -> list[
     Raises
     ------
     InputError
-        For an unknown format.
+        For an unknown format, or where `output` is another file.
     StoreError
         Where a file cannot be written, or a reference is needed that the scene does not have.
 
@@ -52,8 +52,9 @@ def export(scene: Scene | str, to: str, output: str | os.PathLike[str]) -> list[
     scene, output = scene_of(scene), Path(output)
     if to not in FORMATS:
         raise InputError(f"no format {to!r}; allowed: {', '.join(FORMATS)}")
-    _, text_of = FORMATS[to]
-    replace_file(output, text_of(scene).encode())
+    _, text_of, mark = FORMATS[to]
+    refuse_foreign(output, mark)  # before a reference is computed
+    replace_file(output, text_of(scene).encode(), mark)
     return [output]
 
 
@@ -88,9 +89,13 @@ def reference_csv(scene: Scene) -> str:
     return text.getvalue()
 
 
-# By format: the ending of the file's name; its text.
-FORMATS: dict[str, tuple[str, Callable[[Scene], str]]] = {
-    "mjcf": (".xml", mjcf_file),
-    "exudyn": ("-exudyn.py", exudyn_script),
-    "csv": (".csv", reference_csv),
+# By format: the ending of the file's name; its text; what is found in every such text.
+FORMATS: dict[str, tuple[str, Callable[[Scene], str], bytes]] = {
+    "mjcf": (".xml", mjcf_file, rb"\A<mujoco model=[^\0]*Start from the keyframe: mj_resetDataKeyframe"),
+    "exudyn": (
+        "-exudyn.py",
+        exudyn_script,
+        rb"\A\"\"\"[^\0]*A rotor as a kinematic tree in Exudyn: the hub turns about y",
+    ),
+    "csv": (".csv", reference_csv, rb"\Atime \[s\],.*,error growth \[1\]\n"),
 }

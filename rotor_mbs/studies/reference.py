@@ -72,7 +72,7 @@ def _freeze(scenes: Sequence[Scene], results: OpenResults, target: Path) -> None
         place.write(place.first, row)
     with open_results(target) as frozen:
         lines = [f"{digest}  {scene} {name}\n" for (scene, name), digest in _digests(frozen).items()]
-    replace_file(target.with_suffix(".sha256"), "".join(lines).encode())
+    replace_file(target.with_suffix(".sha256"), "".join(lines).encode(), rb"\A[0-9a-f]{64}  \S+ \w+\n")
 
 
 def changed_arrays(results: OpenResults) -> dict[str, list[str]]:

@@ -23,6 +23,9 @@ from rotor_mbs.scenario.sweep import SPLITS
 from rotor_mbs.solution.status import code_of
 
 _PIECE = 1 << 24  # bytes of a variable that are read at once
+# What is found in every file of a kind.
+_CROISSANT = rb'"conformsTo": "http://mlcommons.org/croissant/1.0"[^\0]*"Euler-Lagrange equations"'
+_STATISTICS = rb'\A\{\n "runs": \d+,\n "split": "train",\n "variables": '
 _CONTEXT = Path(__file__).parent / "templates" / "croissant-context.json"
 
 
@@ -30,13 +33,13 @@ def describe(path: Path | str) -> list[Path]:
     """Write the two files beside the dataset at `path`; their paths. Raises StoreError where it is no sweep's."""
     path = Path(path)
     stored = StoredSweep(path)
-    files = {
-        path.with_suffix(".croissant.json"): _croissant(path, stored),
-        path.with_suffix(".statistics.json"): statistics(stored),
-    }
-    for place, text in files.items():
-        replace_file(place, (json.dumps(text, indent=1) + "\n").encode())
-    return list(files)
+    files = [
+        (path.with_suffix(".croissant.json"), _croissant(path, stored), _CROISSANT),
+        (path.with_suffix(".statistics.json"), statistics(stored), _STATISTICS),
+    ]
+    for place, text, mark in files:
+        replace_file(place, (json.dumps(text, indent=1) + "\n").encode(), mark)
+    return [place for place, _, _ in files]
 
 
 def statistics(stored: StoredSweep) -> dict[str, Any]:

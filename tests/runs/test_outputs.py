@@ -7,10 +7,12 @@ from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
+import h5py
 import pytest
 from support.commands import rotor_mbs
-from support.sweeps import THREE_RUNS, made_sweep
+from support.sweeps import MAP, THREE_RUNS, made_sweep
 
+import rotor_mbs as rm
 from rotor_mbs.errors import InputError
 from rotor_mbs.runs.files import replace_file, writing
 from rotor_mbs.runs.read import open_results
@@ -111,7 +113,7 @@ def test_a_pipe_is_written_to(tmp_path: Path) -> None:
     os.mkfifo(pipe)
     far_end = os.open(pipe, os.O_RDONLY | os.O_NONBLOCK)
     try:
-        replace_file(pipe, b"verdicts")
+        replace_file(pipe, b"verdicts", b"verdicts")
         assert os.read(far_end, 100) == b"verdicts"
     finally:
         os.close(far_end)
@@ -144,3 +146,137 @@ def test_a_file_is_no_folder_for_pages(command: list[str], place: str, tmp_path:
     assert ended.status == 2
     (line,) = ended.err.splitlines()
     assert "allowed: a folder that can be written" in line
+
+
+# Every option that names an output, and what its earlier output is called in `kinds`; "" where it is no file beside it.
+OUTPUTS = {
+    "export mjcf": (["export", "check/held", "--to", "mjcf", "-o"], "mjcf"),
+    "export exudyn": (["export", "check/held", "--to", "exudyn", "-o"], "exudyn"),
+    "export csv": (["export", "check/held", "--to", "csv", "-o"], "csv"),
+    "check junit": (["check", "{results}", "--junit"], "junit"),
+    "check json": (["check", "{results}", "--json"], "json"),
+    "animate": (["animate", "check/held", "{results}", "-o"], "webp"),
+    "run": (["run", "check/held", "-m", "lagrange/dop853", "-j", "1", "-o"], "results"),
+    "bench": (["bench", "check/held", "-m", "lagrange/dop853", "--budget", "1", "-o"], "results"),
+    "modes": (["modes", "check/held", "-j", "1", "-o"], ""),
+    "stability": (["stability", "check/held", "-m", "lagrange/dop853", "-j", "1", "-o"], "results"),
+    "reference": (["reference", "check/held", "-j", "1", "-o"], ""),
+    "sweep": (["sweep", "{sweep}", "-j", "1", "-o"], "sweep"),
+}
+
+
+@pytest.fixture(scope="module")
+def kinds(dataset: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
+    """A file of every kind: all outputs, inputs, and what this program never wrote."""
+    folder = tmp_path_factory.mktemp("kinds")
+    results = folder / "results.h5"
+    assert rotor_mbs("run", "check/held", "-m", "lagrange/dop853", "-j", "1", "-o", results).status == 0
+    for to in ("mjcf", "exudyn", "csv"):
+        assert rotor_mbs("export", "check/held", "--to", to, "-o", folder / to).status == 0
+    assert rotor_mbs("check", results, "--junit", folder / "junit", "--json", folder / "json").status == 0
+    assert rotor_mbs("animate", "check/held", results, "-o", folder / "film.webp").status == 0
+    (folder / "film.webp").rename(folder / "webp")
+    (folder / "sweep").write_bytes(dataset.read_bytes())
+    results.rename(folder / "results")
+    assert rotor_mbs("new", folder / "scene.toml").status == 0
+    (folder / "data").write_text("time [s],rotor [rad],pitch 1 [rad]\n0.0,0.5,0.1\n0.1,0.5,0.1\n")
+    (folder / "page").write_text("<!DOCTYPE html>\n<title>mine</title>\n")
+    (folder / "numbers").write_text('[\n {\n  "mine": 1\n }\n]')
+    (folder / "suite").write_text("<?xml version='1.0' encoding='utf-8'?>\n<testsuites name=\"mine\"/>\n")
+    with h5py.File(folder / "foreign", "w") as file:
+        file["time"] = [0.0, 1.0]
+    (folder / "note").write_bytes(b"rotor_mbs: \xff\x00 mine\n")
+    return {path.name: path for path in folder.iterdir() if path.is_file()}
+
+
+@pytest.mark.parametrize("output", OUTPUTS)
+def test_an_output_replaces_nothing_but_its_own_earlier_output(
+    output: str, kinds: dict[str, Path], dataset: Path, tmp_path: Path
+) -> None:
+    words, own = OUTPUTS[output]
+    suffix = ".webp" if output == "animate" else ".file"
+    words = [word.format(results=kinds["results"], sweep=dataset.with_name("s.toml")) for word in words]
+    for kind, path in kinds.items():
+        there = tmp_path / f"{kind}{suffix}"
+        there.write_bytes(path.read_bytes())
+        ended = rotor_mbs(*words, there)
+        if kind == own:
+            assert ended.status == 0, ended.err
+        else:
+            assert ended.status == 2, (kind, ended)
+            assert ended.err.splitlines()[-1].startswith(f"{there}: ")
+            assert there.read_bytes() == path.read_bytes(), kind
+
+
+@pytest.mark.parametrize("output", ["export csv", "check junit", "animate"])
+def test_a_link_under_a_temporary_name_is_not_followed(
+    output: str, kinds: dict[str, Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    words, _ = OUTPUTS[output]
+    place, kept = tmp_path / "new.webp", tmp_path / "kept"
+    kept.write_text("kept")
+    monkeypatch.setattr("secrets.randbits", lambda _: os.getpid())  # a name that can be guessed
+    (tmp_path / f".new.webp.{os.getpid()}.tmp").symlink_to(kept)
+    ended = rotor_mbs(*(word.format(results=kinds["results"]) for word in words), place)
+    assert ended.status == 2
+    assert kept.read_text() == "kept"
+    assert not place.exists()
+
+
+@pytest.mark.parametrize("name", ["x.svg", "x.croissant.json", "x.statistics.json"])
+def test_what_a_sweep_writes_beside_its_dataset_replaces_no_other_file(name: str, tmp_path: Path) -> None:
+    made_sweep(tmp_path, MAP)
+    (tmp_path / name).write_text("mine")
+    ended = rotor_mbs("sweep", tmp_path / "s.toml", "-j", "1", "--metadata", "-o", tmp_path / "x.h5")
+    assert ended.status == 2
+    assert (tmp_path / name).read_text() == "mine"
+    (tmp_path / name).unlink()
+    for _ in range(2):
+        ended = rotor_mbs("sweep", tmp_path / "s.toml", "-j", "1", "--metadata", "-o", tmp_path / "x.h5")
+        assert ended.status == 0, ended.err
+
+
+def test_pages_and_figures_replace_no_other_file(results: Path, tmp_path: Path) -> None:
+    for command, names in {"report": ["paper-fig08.html", "index.html"], "figures": ["fig08.pdf"]}.items():
+        for name in names:
+            folder = tmp_path / f"{command}-{name}"
+            folder.mkdir()
+            (folder / name).write_text("<title>mine</title>")
+            ended = rotor_mbs(command, results, "-o", folder)
+            assert ended.status == 2
+            assert (folder / name).read_text() == "<title>mine</title>"
+            assert [path.name for path in folder.iterdir()] == [name]
+            (folder / name).unlink()
+            for _ in range(2):
+                assert rotor_mbs(command, results, "-o", folder).status == 0
+
+
+def test_a_file_is_saved_over_none_of_another_program(dataset: Path, tmp_path: Path) -> None:
+    (tmp_path / "mine.h5").write_text("mine")
+    with pytest.raises(InputError, match="is another file"):
+        rm.open(dataset).save(tmp_path / "mine.h5")
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["export", "check/held", "--to", "csv", "-o", "/"],
+        ["sweep", "{sweep}", "-o", "{sweep}"],
+        ["sweep", "{sweep}", "-o", "/proc/none/x.h5"],
+        ["export", "check/held", "--to", "csv", "-o", "/proc/none/x.csv"],
+        ["check", "{results}", "--junit", "/proc/none/x.xml"],
+        ["animate", "..", "{results}"],
+        ["animate", "..", "{results}", "-o", "/proc/none/x.webp"],
+        ["run", "check/held", "-m", "lagrange/ode45", "-o", "/proc/none/x.h5"],
+        ["new", "/proc/none/x.toml"],
+        ["figures", "{results}", "-o", "/proc/none/x"],
+        ["report", "{results}", "-o", "/proc/none/x"],
+    ],
+    ids=lambda words: " ".join(words),
+)
+def test_an_output_that_cannot_be_written_is_a_line(words: list[str], results: Path, dataset: Path) -> None:
+    sweep = dataset.with_name("s.toml")
+    ended = rotor_mbs(*(word.format(results=results, sweep=sweep) for word in words))
+    assert ended.status == 2, ended
+    assert len(ended.err.splitlines()) == 1, ended.err
+    assert "[[axis]]" in sweep.read_text()

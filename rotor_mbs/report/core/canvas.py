@@ -30,6 +30,7 @@ TIME_AXIS = "time (s)"
 hex_colour = to_hex  # of any colour of matplotlib's: "#0072b2"
 PRINT_WIDTH = 174.0 / 25.4  # in; two columns of a journal
 FONT_FILE = Path(matplotlib.get_data_path()) / "fonts" / "ttf" / "DejaVuSans.ttf"
+MARK = b"rotor_mbs pictures"  # in the metadata of every picture that is a file
 KINDS = ("pdf", "svg", "png")
 _PAGE_STYLE, _PRINT_STYLE = (  # without matplotlib's defaults
     matplotlib.rc_params_from_file(Path(__file__).with_name(f"{name}.mplstyle"), use_default_template=False)
@@ -52,7 +53,7 @@ class Panels:
         kind = Path(path).suffix.removeprefix(".")
         if kind not in KINDS:
             raise InputError(f"{path}: no such kind of picture; allowed: a name that ends in .{', .'.join(KINDS)}")
-        replace_file(Path(path), encoded(self.figure, kind))
+        replace_file(Path(path), encoded(self.figure, kind), MARK)
 
 
 def panels(heights: tuple[float, ...], x_label: str) -> Panels:
@@ -109,6 +110,8 @@ def legend(target: Any, labelled: Sequence[tuple[str, Look]], *, for_print: bool
 def encoded(figure: Figure, kind: str, *, for_print: bool = True) -> bytes:
     """The figure as a file of one of KINDS; the same bytes every time."""
     metadata: dict[str, Any] = {"pdf": {"CreationDate": None}, "svg": {"Date": None}, "png": {"Software": None}}[kind]
+    if for_print:
+        metadata["Software" if kind == "png" else "Creator"] = MARK.decode()
     with style(for_print=for_print):
         stream = io.BytesIO()
         figure.savefig(stream, format=kind, metadata=metadata)

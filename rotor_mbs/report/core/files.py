@@ -17,9 +17,10 @@ from rotor_mbs.errors import StoreError
 from rotor_mbs.report.core import numbers
 from rotor_mbs.report.core.elements import DASHES, MARKS
 from rotor_mbs.report.core.looks import GREY, class_of, palette_css, with_light_palette
-from rotor_mbs.runs.files import replace_file
+from rotor_mbs.runs.files import refuse_foreign, replace_file
 
 GENERATOR = "rotor_mbs report"
+_MARK = f'<meta name="generator" content="{GENERATOR}">'.encode()  # of every page
 INDEX, ERRATA, FIGURES = "index.html", "errata.html", "figures.html"
 BENCH, MODES, COMPARISON, CHECK = "bench.html", "modes.html", "comparison.html", "check.html"
 Site = Sequence[tuple[str, str]]  # (file, label) of the main pages of a report, in order
@@ -56,26 +57,19 @@ def page_names(scenes: Iterable[str]) -> dict[str, str]:
 def write_pages(folder: Path, pages: Mapping[str, str]) -> None:
     """Each page whole or not at all; then removes pages of an earlier report that are no longer made.
 
-    Raises StoreError where the folder cannot be written, or has an index that is not of this program.
+    Raises StoreError where the folder cannot be written, InputError where it has other pages of these names.
     """
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        index = folder / INDEX
-        if index.is_file() and not _is_ours(index):
-            raise StoreError(f"{index}: not a page of rotor_mbs; allowed: another folder for the pages")
+        for name in pages:  # all of them before the first is written
+            refuse_foreign(folder / name, _MARK)
         for name, text in pages.items():
-            replace_file(folder / name, _UNPRINTABLE.sub("\N{REPLACEMENT CHARACTER}", text).encode("utf-8"))
+            replace_file(folder / name, _UNPRINTABLE.sub("\N{REPLACEMENT CHARACTER}", text).encode("utf-8"), _MARK)
         for old in folder.glob("*.html"):
-            if old.name not in pages and _is_ours(old):
+            if old.name not in pages and old.is_file() and re.search(_MARK, old.read_bytes()[:2000]):
                 old.unlink()
     except OSError as exc:
         raise StoreError(f"{folder}: the report cannot be written: {exc.strerror or exc}") from exc
-
-
-def _is_ours(path: Path) -> bool:
-    """Whether the page names this program as its generator."""
-    with path.open(encoding="utf-8", errors="replace") as file:
-        return f'<meta name="generator" content="{GENERATOR}">' in file.read(2000)
 
 
 def render(template: str, page: Mapping[str, object], site: Site = (), here: str = "") -> str:

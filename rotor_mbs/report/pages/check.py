@@ -19,6 +19,11 @@ from rotor_mbs.studies.check import judge_file
 WORST = 10  # annotations: GitHub shows as many of a step and drops the others silently
 
 
+# What is found in every output of a kind.
+JUNIT = rb'<testsuites name="rotor-mbs check"'
+JSON = rb'\A\[\]\Z|\A\[\n \{\n  "check": "'
+
+
 def line(check: Check) -> str:
     """One line: outcome, what was checked where, the value, the bound, the margin; of a failure what to look at."""
     outcome = "pass" if check.passed else "FAIL"

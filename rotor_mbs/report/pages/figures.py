@@ -153,7 +153,7 @@ def write_figures(results: Path, folder: Path, kind: str, numbers: Iterable[str]
             raise InputError(f"{results}: figure {', '.join(unknown) or 'of the paper'}: not in it; allowed: {allowed}")
         made = {f"fig{int(n):02d}.{kind}": canvas.encoded(composed(have[n], opened.scenes).figure, kind) for n in asked}
     for name, content in made.items():
-        replace_file(folder / name, content)
+        replace_file(folder / name, content, canvas.MARK)
     return [folder / name for name in made]
 
 
