@@ -23,6 +23,7 @@ def made_defects(sizes: Sequence[float], **changes: Any) -> Defects:
         "resting": (),
         "states": np.zeros((count + 1, 2)),
         "rounding": np.zeros((count + 1, 2)),
+        "time_rounding": np.zeros(count + 1),
         "start": np.zeros(2),
         "growth_rate": 0.0,
         "growth_units": np.ones(2),
