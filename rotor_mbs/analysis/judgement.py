@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 
 import numpy as np
@@ -64,11 +64,13 @@ class Judgement:
     defects: Defects | None  # see `defects_of`
 
 
-def defects_of(scene: Scene, run: Trajectory) -> Defects | None:
-    """The defects of a run's intervals; None where angles or rates are not asked for, or there is one sample."""
+def defects_of(scene: Scene, run: Trajectory, *, is_corrected: bool = True) -> Defects | None:
+    """The defects of a run's intervals; None where angles or rates are not asked for, or there is one sample. Of other
+    equations without transition matrices: their defects add up to no error that could be predicted."""
     if len(run.time) < 2 or not (scene.wants("angles") and scene.wants("rates")):
         return None
-    return interval_defects(scene, run.time, run.angles, run.rates)
+    defects = interval_defects(scene, run.time, run.angles, run.rates)
+    return defects if is_corrected else replace(defects, find_transitions=lambda: None)
 
 
 def quantity_bound(rule: QuantityMetric, bounds: Bounds, method: str) -> float | None:
@@ -79,7 +81,7 @@ def quantity_bound(rule: QuantityMetric, bounds: Bounds, method: str) -> float |
 @np.errstate(over="ignore", invalid="ignore", divide="ignore")  # of a runaway: what is not finite is judged
 def judge(scene: Scene, run: Solution, reference: Trajectory | None) -> Judgement:
     """Finite? End reached? Through a singularity? Energy, quantities, defects, error? The first no names the status."""
-    defects = defects_of(scene, run.trajectory)
+    defects = defects_of(scene, run.trajectory, is_corrected=run.is_corrected)
     metrics = metrics_of(scene, run.trajectory, reference, defects)
     status, message = _broken_off(scene, run)
     if not status and not run.is_corrected:

@@ -46,7 +46,7 @@ QUARTER = 0.5 * math.pi
 @pytest.fixture(autouse=True)
 def _without_defects(monkeypatch: pytest.MonkeyPatch) -> None:
     """The motions made here are none that the scene could have: what is tested are the other rules."""
-    monkeypatch.setattr(judgement_module, "defects_of", lambda *_: None)
+    monkeypatch.setattr(judgement_module, "defects_of", lambda *_, **__: None)
 
 
 def status(
@@ -117,7 +117,7 @@ def test_the_largest_defect_has_a_bound(method: str, monkeypatch: pytest.MonkeyP
     for side, expected in (*SIDES, (math.nan, "inaccurate")):
         # The second undoes the first: they add up to no more than one.
         defects = made_defects((side * bound, -side * bound), transitions=None)
-        monkeypatch.setattr(judgement_module, "defects_of", lambda *_, defects=defects: defects)
+        monkeypatch.setattr(judgement_module, "defects_of", lambda *_, defects=defects, **__: defects)
         assert status(moving(), method=method)[0] == expected
 
 
@@ -220,7 +220,7 @@ def test_what_defects_add_up_to_is_the_error_where_there_is_no_reference(monkeyp
     """Ten of a tenth of what is called ok, each within the bound of newmark_index2."""
     for side, expected in SIDES:
         defects = made_defects([side * 0.1 * OK_ERROR] * 10)
-        monkeypatch.setattr(judgement_module, "defects_of", lambda *_, defects=defects: defects)
+        monkeypatch.setattr(judgement_module, "defects_of", lambda *_, defects=defects, **__: defects)
         assert status(moving(), method="exudyn_chain/newmark_index2")[0] == expected
         assert status(moving(), reference=moving(), method="exudyn_chain/newmark_index2")[0] == "ok"
 

@@ -69,7 +69,7 @@ def defect(monkeypatch: pytest.MonkeyPatch) -> Callable[[float], None]:
 
     def plant(size: float) -> None:
         defects = made_defects((0.0, size, -size, 0.0))
-        monkeypatch.setattr(judgement, "defects_of", lambda *_: defects)
+        monkeypatch.setattr(judgement, "defects_of", lambda *_, **__: defects)
 
     plant(0.0)
     return plant

@@ -74,7 +74,7 @@ def point(curve: str = "a", rung: int = 0) -> Point:
 
 def timing_process(fake: FakeMethod, monkeypatch: pytest.MonkeyPatch) -> PointTimer:
     monkeypatch.setattr(bench_worker, "find_method", lambda _name: fake)
-    monkeypatch.setattr(judgement, "defects_of", lambda *_: None)  # of a motion that is none
+    monkeypatch.setattr(judgement, "defects_of", lambda *_, **__: None)  # of a motion that is none
     return PointTimer(defaultdict(lambda: (SCENE, still())), fake.clock)
 
 

@@ -30,7 +30,7 @@ _MAX_RUNGE_KUTTA_STEPS = 32
 # Rows of a window in which rates are found from angles: two leave no residual, and noise as it is.
 FIT_ROWS = 5
 _FIT_ROUNDS = 4
-_DIFFERENCE = 1e-6  # rad and rate units: cube root of the rounding, for central differences
+_DIFFERENCE = 1e-7  # rad and rate units: rounding and curvature are a share of 1e-8 or so of a matrix's entries
 
 
 def interval_defects(
@@ -244,14 +244,13 @@ def _transitions(scene: Scene, time: Array, states: Array) -> Array | None:
     if steps is None:
         return None
     units = np.concatenate([np.ones(half), rate_units(scene)])
-    # (m, directions, n - 1): the state of every interval, moved by a difference either way in every direction.
-    moved = np.repeat(states[:-1].T[:, None, :], 2 * count, axis=1)
+    # (m, 1 + directions, n - 1): the state of every interval, as it is and moved by a difference in every direction.
+    moved = np.repeat(states[:-1].T[:, None, :], 1 + count, axis=1)
     for i in range(count):
-        moved[i, i] += _DIFFERENCE * units[i]
-        moved[i, count + i] -= _DIFFERENCE * units[i]
+        moved[i, 1 + i] += _DIFFERENCE * units[i]
     moved = _runge_kutta(scene, time, moved, steps)
     with np.errstate(all="ignore"):
-        columns = (moved[:, :count] - moved[:, count:]) / (2.0 * _DIFFERENCE * units[None, :, None])
+        columns = (moved[:, 1:] - moved[:, :1]) / (_DIFFERENCE * units[None, :, None])
     return np.ascontiguousarray(columns.transpose(2, 0, 1))
 
 
