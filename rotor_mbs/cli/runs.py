@@ -64,7 +64,7 @@ def reproduce(arguments: argparse.Namespace) -> int:
         print(f"{results}: nothing to do, every run is already stored")
     else:
         status, text = _reproduce(arguments, results, pages)
-        replace_file(summary, text.encode(), rb"\Aresult +as printed +corrected model")
+        replace_file(summary, text.encode(), rb"\A\s*(result|method) ")
         if status == 0:
             replace_file(stamp, made_from(results, arguments.timeout).encode(), rb"\A[0-9a-f]{64}\Z")
     print_text(summary.read_text(encoding="utf-8"))

@@ -24,13 +24,13 @@ def call(folder: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., bool]:
         (pages / "index.html").touch()
         if not results.exists():
             results.write_bytes(bytes(1000))
-        return int(Path("fails").exists()), "what came out\n"
+        return int(Path("fails").exists()), "result as printed: what came out\n"
 
     def called(*options: str) -> bool:
         done.clear()
         ended = rotor_mbs("reproduce", "-o", folder, *options)
         assert ended.status == int(bool(done) and Path("fails").exists())
-        assert "what came out" in ended.out
+        assert "result as printed: what came out" in ended.out
         assert ("nothing to do" in ended.out) == (not done)
         return bool(done)
 

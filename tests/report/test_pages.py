@@ -20,7 +20,7 @@ from rotor_mbs.analysis.claim_study import ClaimShare, ClaimShares, claim_study
 from rotor_mbs.analysis.claims import Claim, ClaimResult
 from rotor_mbs.analysis.published import CheckedEntry, errata, published
 from rotor_mbs.cli import main
-from rotor_mbs.errors import StoreError
+from rotor_mbs.errors import InputError, StoreError
 from rotor_mbs.methods.catalogue import find_method, look_up
 from rotor_mbs.methods.solve import solve
 from rotor_mbs.report.build import write_report
@@ -475,7 +475,7 @@ def test_own_old_pages_go_and_foreign_files_stay(tmp_path: Path) -> None:
     write_report(store(tmp_path / "b.h5", [Made(replace(PLAIN, name="other"), TAYLOR, SWING)]), out)
     assert sorted(path.name for path in out.iterdir()) == ["data.csv", "index.html", "notes.html", "other.html"]
     (out / "index.html").write_text("mine")
-    with pytest.raises(StoreError, match=r"index\.html: not a page of rotor_mbs.*another folder"):
+    with pytest.raises(InputError, match=r"index\.html: is another file.*not replaced"):
         write_report(tmp_path / "a.h5", out)
     assert (out / "index.html").read_text() == "mine"
 
