@@ -314,14 +314,19 @@ def half_last_digits(values: Array) -> Array:
     largest = float(sizes.max(initial=0.0))
     if len(np.unique(values)) < _FEW_VALUES:  # which say nothing of digits
         return np.asarray(sizes * 2.0**-53)
+    # Numbers of so many decimals may seem to have so many digits, and the other way round: of both the coarser.
+    last = np.zeros(len(values))
     for decimals in range(_FEW_DIGITS + 1):
         unit = 10.0**-decimals
         if unit < largest and np.allclose(values, np.round(values / unit) * unit, rtol=0.0, atol=1e-12 * largest):
-            return np.full(len(values), 0.5 * unit)
+            last[:] = 0.5 * unit
+            break
     digits = _digits(values)
     if digits <= _FEW_DIGITS:
         exponents = np.floor(np.log10(np.where(sizes > 0.0, sizes, 1.0)))
-        return np.asarray(0.5 * 10.0 ** (exponents + 1 - digits))
+        last = np.maximum(last, np.where(sizes > 0.0, 0.5 * 10.0 ** (exponents + 1 - digits), 0.0))
+    if last.any():
+        return last
     single = np.asarray(values, np.float32).astype(float)
     return np.asarray(sizes * (2.0**-24 if np.array_equal(single, values) else 2.0**-53))
 

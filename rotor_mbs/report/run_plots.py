@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 
@@ -119,7 +120,13 @@ class ComparisonPlots:
     def _with_legend(self, panels: Panels) -> Panels:
         looks = {label_of(run.method): look_of(run.method) for run in self._runs}
         # Above the axes: curves over decades leave no room.
-        above = {"loc": "lower left", "bbox_to_anchor": (0.0, 1.0), "ncols": 2, "frameon": False, "fontsize": 8.0}
+        above: dict[str, Any] = {
+            "loc": "lower left",
+            "bbox_to_anchor": (0.0, 1.0),
+            "ncols": 2,
+            "frameon": False,
+            "fontsize": 8.0,
+        }
         canvas.legend(panels.axes[0], list(looks.items()), **above)
         panels.figure.subplots_adjust(top=0.95 - 0.07 * math.ceil(len(looks) / 2))
         return panels

@@ -156,7 +156,7 @@ def compare_with_reference(data: ForeignData, scene: Scene, tolerance: float = D
         search = CauseSearch(scene, whole, exact, tolerance, largest, monotonic() + _SEARCH_S)
         with np.errstate(all="ignore"):  # data may be of any size
             likely, note = likely_causes(search, search_defects)
-        start = "" if likely else _other_start(scene, cut, expected[0])
+        start = "" if likely else _other_start(scene, cut, expected[0], run)
         notes += [line for line in (note, start) if line]
     elif search_defects is not None and (likely := hidden_causes(scene, search_defects)):
         notes.append(f"within {tolerance:g} rad an interval, but not random")
@@ -321,13 +321,18 @@ def _uncovered(scene: Scene, data: ForeignData, exact: TimedReference, until: in
     return None
 
 
-def _other_start(scene: Scene, data: ForeignData, expected: Array) -> str:
-    """What of the first row is not the scene's start, "" where all is, or the data begin later."""
+def _other_start(scene: Scene, data: ForeignData, expected: Array, run: Trajectory) -> str:
+    """What of the first row is not the scene's start, "" where all is, or the data begin later; run: the reference."""
     names = [channel.name for channel in channels(scene)[1:]]
     rows = zip(data.columns, data.values[0].tolist(), expected.tolist(), strict=True)
     apart = [f"{names[i]} {value:.4g} (scene: {start:.4g})" for i, value, start in rows if abs(value - start) > _START]
     if data.time[0] > 0.0 or not apart:
         return ""
+    away = np.abs(states_of(run)[:, data.columns] - data.values[0]).max(axis=1)
+    nearest = int(away.argmin())
+    if away[nearest] <= _START:
+        at = float(run.time[nearest])
+        return f"the first row is the scene's state at t = {at:.6g} s: `offset = {at:.6g}` of the time?"
     return f"the data start elsewhere, in rad and rad/s: {', '.join(apart)}; another scene, start or unit?"
 
 

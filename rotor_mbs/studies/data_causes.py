@@ -298,7 +298,7 @@ def likely_causes(search: CauseSearch, defects: DefectCauses | None) -> tuple[li
 
     Beside it what a reader must know where the time of the search was over before all had been tried, else "".
     """
-    is_different = defects is not None and not defects.within(search.tolerance)
+    is_different = defects is not None and not defects.is_rounding
     if search.worst <= search.tolerance and not is_different:
         # The rows that were compared agree, but many may have come after the scene's end.
         return _other_time(search) if search.data.time[-1] > 2.0 * search.scene.duration else [], ""
@@ -314,7 +314,7 @@ def likely_causes(search: CauseSearch, defects: DefectCauses | None) -> tuple[li
         if found:
             return found, ""
         if is_different and defects is not None and not is_elsewhere:
-            found = list(fault_lines(defects.faults())) or causes_of_defects(search, defects)
+            found = causes_of_defects(search, defects) or list(fault_lines(defects.faults()))
         if found := found or _scatter(search, time, values):
             return found, ""
         for text, motion in _motions(search):
@@ -322,11 +322,12 @@ def likely_causes(search: CauseSearch, defects: DefectCauses | None) -> tuple[li
             if beside is not None:
                 (both if beside else found).append("; and ".join([text, *beside]))
         if is_elsewhere and is_different and defects is not None and not (both or found):
-            found = list(fault_lines(defects.faults())) or causes_of_defects(search, defects)
+            found = causes_of_defects(search, defects) or list(fault_lines(defects.faults()))
     except OutOfTimeError:
         note = "the search for causes was ended by its time limit"
         return found or both, note
-    return found or both or factors(search), ""
+    # A motion that fits by its errors up to the horizon alone is none where the defects say no.
+    return ([] if is_different else found) or both or factors(search), ""
 
 
 def hidden_causes(scene: Scene, defects: DefectCauses) -> list[str]:
@@ -345,12 +346,13 @@ def causes_of_defects(search: CauseSearch, defects: DefectCauses) -> list[str]:
             share = defects.left(scene, equations)
         except RotorError:
             continue
-        if share <= MAX_LEFT:
+        if share < math.inf:
             shares.append((share, text))
     shares = shares or defects.parameters(list(_parameters(search.scene)))
-    shares = [(share, text) for share, text in shares if share <= MAX_LEFT]
     least = max(min(shares)[0], 1e-9) if shares else 0.0
-    return [text for share, text in sorted(shares) if share <= 3.0 * least][:MAX_PARAMETERS]
+    # What rounding leaves is of one size whatever the cause: there the least is nearly that of the right one.
+    factor = 3.0 if least <= MAX_LEFT else 1.02
+    return [text for share, text in sorted(shares) if share <= factor * least][:MAX_PARAMETERS]
 
 
 def _explanations(search: CauseSearch) -> Iterator[tuple[str, Scene, Accelerations | None]]:

@@ -6,6 +6,7 @@ where it explains the defects to what the rounding of the data leaves, or but fo
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
@@ -13,8 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor_mbs.models.lagrange import closed_form
+from rotor_mbs.models.lagrange.closed_form import load_values
 from rotor_mbs.models.lagrange.defects import change_of_ends, interval_ends
 from rotor_mbs.models.lagrange.ode_solvers import Accelerations
+from rotor_mbs.models.lagrange.parameters import rotor_form
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.defects import Defects
 from rotor_mbs.solution.trajectory import Array
@@ -28,7 +31,11 @@ _INTERVALS = 120  # that an explanation is tried on first
 _DIFFERENCE = 1e-4  # share or rad, for the derivative by a parameter
 _ROUNDS = 8
 _PARALLEL = 0.995  # cosine
+_ALONG = 0.9  # of a load while the rotor turns on
 _STANDS_OUT = 30.0  # times the median of the defects
+_FAINT = 0.02  # of the largest defect: fainter ones are not told beside it
+_GAP = 6  # intervals: faults that are nearer are one
+_MOST_DIRECTIONS = 20  # rows of a fault at which loads are looked for
 _MAX_FAULTS = 6  # that are named one by one
 
 # The scene with its parameter changed by a share (or rad), or the same scene with other equations.
@@ -83,16 +90,16 @@ class DefectCauses:
         return not excess.size or float(excess.max()) <= size
 
     def left(self, scene: Scene, equations: Accelerations | None = None) -> float:
-        """Share of the defects' root mean square that another scene or other equations leave; 0 where all that is left
-        is rounding. A scene is tried by small steps first, which need no code to be compiled."""
+        """Share of the defects' root mean square that another scene or other equations leave; infinite where they do
+        not explain them. A scene is tried by small steps first, which need no code to be compiled."""
         if not len(self._judged) or scene.moving_coordinates != list(self._defects.moving):
             return np.inf
         if equations is None:
             change = change_of_ends(self._scene, scene, self._defects.time, self._defects.states)
             if change is not None:
-                share = self._share(self._normal[self._chosen] + (change * self._weights)[self._chosen], self._chosen)
-                if share > 2.0 * MAX_LEFT:
-                    return share
+                residual = self._normal[self._chosen] + (change * self._weights)[self._chosen]
+                if not self._share(residual, self._chosen) < np.inf:
+                    return np.inf
         return self._share(self._residual(scene, equations, self._chosen), self._chosen)
 
     def parameters(self, parameters: Sequence[Parameter]) -> list[tuple[float, str]]:
@@ -132,20 +139,20 @@ class DefectCauses:
                     break
             if _SIGNIFICANT * deviation <= abs(change) <= _LARGEST_CHANGE:
                 share = self._share(self._residual(*parameter.change(change), chosen), chosen)
-                if share <= MAX_LEFT:
+                if share < np.inf:
                     explained.append((share, _text(parameter, change)))
         return sorted(explained)
 
     def faults(self) -> list[Fault]:
         """What stands out of the other intervals, by its pattern in time; none where most intervals are wrong."""
-        size = np.abs(self._normal).max(axis=1)
-        size[~np.isin(np.arange(len(size)), self._judged)] = 0.0
-        usual = float(np.median(size[self._judged])) if len(self._judged) else 0.0
-        wrong = np.flatnonzero(size > max(_AT_FLOOR, _STANDS_OUT * usual))
+        excess = np.maximum(self._defects.channel_sizes - _AT_FLOOR * self._defects.floors, 0.0).max(axis=1)
+        excess[~np.isin(np.arange(len(excess)), self._judged)] = 0.0
+        usual = float(np.median(excess[self._judged])) if len(self._judged) else 0.0
+        wrong = np.flatnonzero(excess > max(_STANDS_OUT * usual, _FAINT * float(excess.max(initial=0.0))))
         # What is wrong everywhere is no fault at a time, though it shows in some places more than in others.
-        if not len(wrong) or len(wrong) > 0.6 * len(size) or _is_smooth(size, wrong):
+        if not len(wrong) or len(wrong) > 0.6 * len(excess) or _is_smooth(excess, wrong):
             return []
-        groups = np.split(wrong, np.flatnonzero(np.diff(wrong) > 1) + 1)
+        groups = np.split(wrong, np.flatnonzero(np.diff(wrong) > _GAP) + 1)
         return [self._fault(group) for group in groups]
 
     def _fault(self, group: NDArray[np.int64]) -> Fault:
@@ -174,11 +181,34 @@ class DefectCauses:
                 if abs(along) >= _PARALLEL:
                     return Fault(start, end, f"a stuck row, or one at a wrong time: {row}")
                 return Fault(start, end, f"a single wrong row: {row}")
-        channel = int(np.abs(self._normal[group]).sum(axis=0)[half:].argmax())
-        label = self._scene.coordinate_labels[self._defects.moving[channel]]
-        signs = np.sign(values[:, half + channel])
-        kind = "a load on the {} that is wrong or missing" if abs(signs.sum()) == len(signs) else "a fault of the {}"
+        # The coordinate on which a load makes such changes of the rates.
+        chosen = group[:: max(1, len(group) // _MOST_DIRECTIONS)]
+        directions = np.stack([self._directions(row) for row in chosen], axis=1)
+        cosines = [self._cosine_of_rates(self._values[chosen, half:], direction) for direction in directions]
+        place = int(np.argmax(cosines))
+        label = self._scene.coordinate_labels[self._defects.moving[place]]
+        kind = "a load on the {} that is wrong or missing" if cosines[place] >= _ALONG else "a fault of the {}"
         return Fault(start, end, f"{kind.format(label)} from t = {start:.6g} to {end:.6g} s")
+
+    def _directions(self, row: int) -> Array:
+        """(coordinates, coordinates) rad/s² that 1 N m on each coordinate that moves makes of all."""
+        state, half = self._defects.states[row], len(self._defects.moving)
+        form = rotor_form(self._scene)
+
+        def accelerations(torques: Array) -> Array:
+            loads = load_values([*torques, *np.zeros(half - 1)])
+            found = closed_form.accelerations(
+                state[:half].tolist(), state[half:].tolist(), form, loads, math.sin, math.cos
+            )
+            return np.array(found)
+
+        free = accelerations(np.zeros(half))
+        return np.array([accelerations(1e6 * unit) - free for unit in np.eye(half)])
+
+    def _cosine_of_rates(self, values: Array, directions: Array) -> float:
+        """Of the defects of rates of several intervals, on the average, each with its direction."""
+        sizes = np.linalg.norm(values, axis=1) * np.linalg.norm(directions, axis=1)
+        return float(np.abs((values * directions).sum(axis=1)).sum() / (sizes.sum() or 1.0))
 
     def _flow(self, row: int) -> Array:
         """How the state goes on at a row, per s."""
@@ -215,11 +245,11 @@ class DefectCauses:
         return np.asarray((sides[0] - sides[1]) / (2.0 * _DIFFERENCE))
 
     def _share(self, residual: Array, intervals: NDArray[np.int64]) -> float:
+        """What is left of the defects' root mean square; infinite where that is neither little nor rounding."""
         if not np.isfinite(residual).all():
             return np.inf
-        if float(np.abs(residual).max()) <= _AT_FLOOR:
-            return 0.0
-        return float(np.linalg.norm(residual) / (np.linalg.norm(self._normal[intervals]) or 1.0))
+        share = float(np.linalg.norm(residual) / (np.linalg.norm(self._normal[intervals]) or 1.0))
+        return share if share <= MAX_LEFT or float(np.abs(residual).max()) <= _AT_FLOOR else np.inf
 
 
 def _text(parameter: Parameter, change: float) -> str:
