@@ -13,7 +13,7 @@ from typing import Any, NoReturn
 
 import rotor_mbs
 from rotor_mbs.errors import nearest
-from rotor_mbs.runs import cores
+from rotor_mbs.runs import MAX_WORKERS, cores
 
 REPRODUCED = Path("rotor-mbs-out")  # where `reproduce` writes
 EXPORT_FORMATS = ("mjcf", "exudyn", "csv")
@@ -105,13 +105,13 @@ def setting(text: str) -> tuple[str, object]:
     return name, value
 
 
-def _positive(kind: type[int] | type[float], allowed: str) -> Callable[[str], float]:
+def _positive(kind: type[int] | type[float], allowed: str, largest: float = _MAX_NUMBER) -> Callable[[str], float]:
     def read(text: str) -> float:
         try:
             value = kind(text)
         except ValueError:
             value = kind(0)
-        if not 0 < value <= _MAX_NUMBER:
+        if not 0 < value <= largest:
             raise argparse.ArgumentTypeError(f"{text!r} given, allowed: {allowed}")
         return value
 
@@ -119,6 +119,7 @@ def _positive(kind: type[int] | type[float], allowed: str) -> Callable[[str], fl
 
 
 COUNT = _positive(int, "a whole number from 1 to 1e9")
+JOBS = _positive(int, f"a whole number from 1 to {MAX_WORKERS}", MAX_WORKERS)
 SECONDS = _positive(float, "seconds, more than 0, at most 1e9")
 POSITIVE = _positive(float, "a number more than 0, at most 1e9")
 
@@ -159,7 +160,7 @@ class _Parser(argparse.ArgumentParser):
 
     def jobs(self) -> None:
         text = "parallel processes (default: the cores, %(default)s)"
-        self.add_argument("-j", "--jobs", type=COUNT, default=cores(), metavar="N", help=text)
+        self.add_argument("-j", "--jobs", type=JOBS, default=cores(), metavar="N", help=text)
 
     def timeout(self, seconds: float = 60.0) -> None:
         text = "longer runs are stopped and recorded as timed_out (default: %(default)g)"
