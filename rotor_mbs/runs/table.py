@@ -420,7 +420,7 @@ def stored_table(file: Any, group: str = "") -> StoredTable:
     """A table in an open file. Raises StoreError where what was laid out has changed since."""
     path, item = Path(file.filename), file[group] if group else file
     _refuse_changes(item, group)
-    computed_names = files.computed_in(files.stored_digests(item.attrs))
+    computed_names = files.computed_in(files.stored_digests(item))
     attributes = files.attributes_of(item)
     of_reference = attributes.pop(_OF_REFERENCE, [])
     known: dict[str, NDArray[Any]] = {}
@@ -439,7 +439,7 @@ def stored_table(file: Any, group: str = "") -> StoredTable:
         elif name != CHARACTERS:
             known[name] = files.texts_of(dataset) if files.is_text(dataset) else files.values_of(dataset)
             if "labels" in dataset.attrs:
-                labels[name] = files.plain(dataset.attrs["labels"])
+                labels[name] = files.attribute(dataset, "labels")
     runs = known.pop("run")
     return StoredTable(path, path.stat().st_ino, group, runs, known, labels, computed, attributes)
 
@@ -479,7 +479,7 @@ def columns_of(group: Any) -> dict[str, Column]:
     for name, dataset in group.items():
         if not files.is_group(dataset) and not files.is_dimension_only(dataset):
             dimensions = tuple(dimension or name for dimension in files.dimensions_of(dataset))
-            units, long_name = str(dataset.attrs["units"]), str(dataset.attrs["long_name"])
+            units, long_name = (str(files.attribute(dataset, name)) for name in ("units", "long_name"))
             columns[name] = Column(dimensions, units, long_name, dataset.dtype.str)
     return columns
 
