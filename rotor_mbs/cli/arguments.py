@@ -18,6 +18,7 @@ from rotor_mbs.runs import MAX_WORKERS, cores
 REPRODUCED = Path("rotor-mbs-out")  # where `reproduce` writes
 EXPORT_FORMATS = ("mjcf", "exudyn", "csv")
 
+_MAX_SPEED = 1e25  # rad/s or N m/rad, as of numbers in a scene
 _MAX_SPAN = 10_000  # numbers of FROM:TO:COUNT
 _MAX_NAME_BYTES = 200  # of a file's name; file systems allow 255, and temporary names are longer
 _MAX_NUMBER = 1e9  # of a count; of seconds: thirty years
@@ -75,12 +76,12 @@ def span(text: str) -> tuple[float, ...]:
     try:
         start, end, number = text.split(":")
         first, last, count = float(start), float(end), int(number)
-        if 0.0 <= first < last < float("inf") and 2 <= count <= _MAX_SPAN:
+        if 0.0 <= first < last <= _MAX_SPEED and 2 <= count <= _MAX_SPAN:
             return tuple(first + (last - first) * i / (count - 1) for i in range(count))
     except ValueError:
         pass
     raise argparse.ArgumentTypeError(
-        f"{text!r} given, allowed: FROM:TO:COUNT with 0 <= FROM < TO and COUNT from 2 to {_MAX_SPAN}"
+        f"{text!r} given, allowed: FROM:TO:COUNT with 0 <= FROM < TO <= {_MAX_SPEED:g} and COUNT from 2 to {_MAX_SPAN}"
     )
 
 

@@ -167,8 +167,8 @@ class SerialPool(TaskPool):
         future: Future[R] = Future()
         try:
             future.set_result(work(task))
-        except Exception as exc:
-            future.set_exception(exc)
+        except (Exception, SystemExit) as exc:  # also of another package's method
+            future.set_exception(RuntimeError(one_line(exc)) if isinstance(exc, SystemExit) else exc)
         return future
 
 
