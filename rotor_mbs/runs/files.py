@@ -143,6 +143,10 @@ def open_file(path: Path) -> Iterator[Any]:
         found = "is a folder" if path.is_dir() else "no such file"
         raise StoreError(f"{path}: {found}; allowed: a results file, as rotor-mbs run or reproduce writes it")
     try:
+        path.open("rb").close()
+    except OSError as exc:
+        raise StoreError(f"{path}: cannot be read: {exc.strerror}") from exc
+    try:
         file = h5py.File(path, "r")
     except OSError as exc:
         raise StoreError(

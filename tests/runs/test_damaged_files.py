@@ -11,7 +11,9 @@ import h5py
 import numpy as np
 import pytest
 from support.commands import PROGRAM, rotor_mbs
+from support.sweeps import THREE_RUNS, made_sweep
 
+from rotor_mbs.errors import StoreError
 from rotor_mbs.runs import files
 
 # One bit of a MAT file of SciPy's, at which its reader ends the process.
@@ -88,6 +90,33 @@ def test_a_column_of_another_shape_is_a_line(name: str, shape: tuple[int, ...], 
     for command in (["check", copy], ["report", copy, "-o", tmp_path / "pages"]):
         ended = rotor_mbs(*command)
         assert ended.status in (1, 2), ended
+
+
+@pytest.mark.parametrize(("name", "shape"), [("status", (0,)), ("steps", (2,)), ("angles", (0, 3)), ("crc32", ())])
+def test_a_sweeps_column_of_another_shape_is_a_line(name: str, shape: tuple[int, ...], tmp_path: Path) -> None:
+    path = made_sweep(tmp_path, THREE_RUNS)
+    with h5py.File(path, "r+") as file:
+        facts, kind = {key: file[name].attrs[key] for key in ("units", "long_name")}, file[name].dtype
+        later = files.computed_in(files.stored_digests(file))
+        del file[name], file.attrs[files.DIGESTS]
+        dataset = file.create_dataset(name, data=np.zeros(shape, kind))
+        for key, value in facts.items():
+            dataset.attrs[key] = value
+        files.seal(file, later=later)
+    before = path.read_bytes()
+    ended = rotor_mbs("sweep", tmp_path / "s.toml", "-o", path, "-j", "1")
+    assert ended.status == 2, ended
+    assert len(ended.err.splitlines()) == 1
+    assert path.read_bytes() == before
+
+
+def test_a_file_that_may_not_be_read_says_so(copy: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuse(*_: object) -> None:
+        raise PermissionError(13, "Permission denied")
+
+    monkeypatch.setattr(Path, "open", refuse)
+    with pytest.raises(StoreError, match="cannot be read: Permission denied"), files.open_file(copy):
+        pass
 
 
 def test_a_dataset_without_values_is_no_column_of_data(tmp_path: Path) -> None:
