@@ -13,9 +13,10 @@ import tempfile
 import warnings
 import weakref
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from html import escape
+from numbers import Real
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, overload
 
@@ -24,7 +25,7 @@ import numpy as np
 from rotor_mbs.analysis.judgement import defects_of
 from rotor_mbs.analysis.rehydrate import rehydrate
 from rotor_mbs.analysis.run_tables import RUN_HEAD, run_row
-from rotor_mbs.errors import InputError, MethodRefusal, PlausibilityWarning, StoreError
+from rotor_mbs.errors import InputError, MethodRefusal, PlausibilityWarning, ResourceError, StoreError
 from rotor_mbs.methods.catalogue import REFERENCE, check_names
 from rotor_mbs.runs.files import HDF5, replace_file
 from rotor_mbs.runs.read import StoredRun, StoredScene, is_sweep, open_results
@@ -45,6 +46,7 @@ if TYPE_CHECKING:
     from rotor_mbs.report.run_plots import ComparisonPlots, RunPlots
 
 _NO_LIMIT_S = 1e9
+_SHOWN = 5  # lines of lost runs
 
 
 def scenes(folder: str = "") -> list[str]:
@@ -123,7 +125,8 @@ def run(
         "model/integrator"; `rotor-mbs show` lists those that can represent a scene. Of several, an empty list stands
         for those that the selection rule takes for such a scene.
     timeout : float
-        s, after which an integration ends itself; its status is then "timed_out".
+        s, for the run, the reference and the judging together, of several methods for each; what was reached by then
+        has the status "timed_out". Loading an engine and compiling come on top, and a second to judge what was reached.
     reference : bool
         Whether to compute the quad-precision reference of a scene that has no shipped one (up to some seconds), as is
         always done for several methods. Without any, the status rests on the samples and the energy balance.
@@ -145,6 +148,8 @@ def run(
         that cannot represent the scene.
     MethodRefusal
         Where one method cannot represent the scene, or is not installed.
+    ResourceError
+        Where a worker process died, or the machine has no room for it.
 
     Examples
     --------
@@ -162,16 +167,17 @@ def run(
     >>> float(abs(data.angles - data.angles.sel(run="reference")).max()) < 1e-9   # rad
     True
     """
-    scene = scene_of(scene)
+    scene, timeout = scene_of(scene), checked_seconds(timeout)
     if isinstance(method, str):
         solution, exact = solve_judged(scene, method, settings, compute_reference=reference, time_limit_s=timeout)
         return Run(**vars(solution), reference=exact)
-    chosen, reasons = selected_methods([scene], tuple(method))
+    chosen, reasons = selected_methods([scene], listed("method", method))
     if not chosen[scene.name]:
         raise MethodRefusal("; ".join(reasons))
     folder = _TemporaryFolder()
     path = folder.path / "runs.h5"
-    run_scenes([scene], chosen, path, workers=workers, timeout_s=min(timeout, _NO_LIMIT_S), settings=settings)
+    report = run_scenes([scene], chosen, path, workers=workers, timeout_s=min(timeout, _NO_LIMIT_S), settings=settings)
+    refuse_losses([f"{run.label}: {run.message}" for run in report.not_computed])
     return Runs(path, scene.name, _folder=folder)
 
 
@@ -244,6 +250,8 @@ def sweep(
     ------
     InputError
         For a key, value or option that is not allowed, or an output that holds something else.
+    ResourceError
+        Where worker processes died, or the machine has no room for them; the other runs are in `output`.
 
     Examples
     --------
@@ -261,12 +269,15 @@ def sweep(
     from rotor_mbs.scenario.sweep import sweep_of
     from rotor_mbs.studies.sweep import plan_sweep, run_sweep
 
-    study = sweep_of(scene_of(scene), parameters, methods=list(check_names(methods)), **options)
+    timeout = min(checked_seconds(timeout), _NO_LIMIT_S)
+    names = list(check_names(methods if isinstance(methods, str) else listed("methods", methods)))
+    study = sweep_of(scene_of(scene), parameters, methods=names, **options)
     folder = _TemporaryFolder() if output is None else None
     path = folder.path / "sweep.h5" if folder is not None else Path(str(output))
     plan = plan_sweep(study, time_limit_s=timeout)
     with open_task_pool("local", workers) as pool:
-        run_sweep(plan, path, pool, fresh=fresh)
+        result = run_sweep(plan, path, pool, fresh=fresh)
+    refuse_losses(result.lost)
     return Runs(path, _folder=folder)
 
 
@@ -285,6 +296,28 @@ def open(path: str | os.PathLike[str]) -> Runs:
     if not is_sweep(file) and RUNS not in table_groups(file):
         raise StoreError(f"{file}: has no runs; allowed: a file that `rotor-mbs run`, `reproduce` or `sweep` wrote")
     return Runs(file)
+
+
+def checked_seconds(timeout: float) -> float:
+    """A time limit in s. Raises InputError for what is none."""
+    if isinstance(timeout, bool) or not isinstance(timeout, Real) or not timeout > 0.0:
+        raise InputError(f"timeout: {timeout!r}; allowed: seconds, more than 0")
+    return float(timeout)
+
+
+def listed(name: str, values: object) -> list[str]:
+    """Texts of a list, or of anything that can be gone through once. Raises InputError."""
+    texts: list[Any] = list(values) if isinstance(values, Iterable) else [values]
+    if isinstance(values, str) or not all(isinstance(text, str) for text in texts):
+        raise InputError(f"{name}: {values!r}; allowed: a name, or a list of names")
+    return texts
+
+
+def refuse_losses(lost: Sequence[str]) -> None:
+    """Raises ResourceError where runs were asked for and could not be computed; a line each, of the first ones."""
+    if lost:
+        more = [f"... ({len(lost)} in all)"] if len(lost) > _SHOWN else []
+        raise ResourceError("\n".join([*lost[:_SHOWN], *more]))
 
 
 class _TemporaryFolder:
@@ -318,6 +351,10 @@ class Runs(Mapping[Any, Any]):
         self.path, self.scene, self._folder = path, scene, _folder
         self._is_sweep = is_sweep(path)
         self._labels = self._stored_labels()
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """A copy, or what another process unpickles, has a file of its own in place of a temporary one."""
+        return _restored, (self.path, self.scene, self.path.read_bytes() if self._folder is not None else None)
 
     def _stored_labels(self) -> list[Any]:
         if self._is_sweep:
@@ -489,6 +526,15 @@ class Runs(Mapping[Any, Any]):
     def _repr_html_(self) -> str:
         drawn = self.plot.error()._repr_svg_() if self.scene and REFERENCE in self else ""
         return f"<p>{escape(self.scene or str(self.path))}</p>{self.table()._repr_html_()}{drawn}"
+
+
+def _restored(path: Path, scene: str, content: bytes | None) -> Runs:
+    if content is None:
+        return Runs(path, scene)
+    folder = _TemporaryFolder()
+    own = folder.path / path.name
+    own.write_bytes(content)
+    return Runs(own, scene, _folder=folder)
 
 
 def _labelled(data: Any) -> Any:

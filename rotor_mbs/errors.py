@@ -54,7 +54,7 @@ def saving(path: object) -> Iterator[None]:
     try:
         yield
     except OSError as exc:
-        raise StoreError(f"{path}: cannot be written: {exc.strerror}; nothing stored before is lost") from exc
+        raise StoreError(f"{path}: cannot be written: {exc.strerror or exc}; nothing stored before is lost") from exc
 
 
 def nearest(name: str, known: Iterable[str]) -> str:

@@ -13,11 +13,12 @@ from typing import Any, NoReturn
 
 import rotor_mbs
 from rotor_mbs.errors import nearest
-from rotor_mbs.runs import cores
+from rotor_mbs.runs import MAX_WORKERS, cores
 
 REPRODUCED = Path("rotor-mbs-out")  # where `reproduce` writes
 EXPORT_FORMATS = ("mjcf", "exudyn", "csv")
 
+_MAX_SPEED = 1e25  # rad/s or N m/rad, as of numbers in a scene
 _MAX_SPAN = 10_000  # numbers of FROM:TO:COUNT
 _MAX_NAME_BYTES = 200  # of a file's name; file systems allow 255, and temporary names are longer
 _MAX_NUMBER = 1e9  # of a count; of seconds: thirty years
@@ -75,12 +76,12 @@ def span(text: str) -> tuple[float, ...]:
     try:
         start, end, number = text.split(":")
         first, last, count = float(start), float(end), int(number)
-        if 0.0 <= first < last < float("inf") and 2 <= count <= _MAX_SPAN:
+        if 0.0 <= first < last <= _MAX_SPEED and 2 <= count <= _MAX_SPAN:
             return tuple(first + (last - first) * i / (count - 1) for i in range(count))
     except ValueError:
         pass
     raise argparse.ArgumentTypeError(
-        f"{text!r} given, allowed: FROM:TO:COUNT with 0 <= FROM < TO and COUNT from 2 to {_MAX_SPAN}"
+        f"{text!r} given, allowed: FROM:TO:COUNT with 0 <= FROM < TO <= {_MAX_SPEED:g} and COUNT from 2 to {_MAX_SPAN}"
     )
 
 
@@ -105,13 +106,13 @@ def setting(text: str) -> tuple[str, object]:
     return name, value
 
 
-def _positive(kind: type[int] | type[float], allowed: str) -> Callable[[str], float]:
+def _positive(kind: type[int] | type[float], allowed: str, largest: float = _MAX_NUMBER) -> Callable[[str], float]:
     def read(text: str) -> float:
         try:
             value = kind(text)
         except ValueError:
             value = kind(0)
-        if not 0 < value <= _MAX_NUMBER:
+        if not 0 < value <= largest:
             raise argparse.ArgumentTypeError(f"{text!r} given, allowed: {allowed}")
         return value
 
@@ -119,6 +120,7 @@ def _positive(kind: type[int] | type[float], allowed: str) -> Callable[[str], fl
 
 
 COUNT = _positive(int, "a whole number from 1 to 1e9")
+JOBS = _positive(int, f"a whole number from 1 to {MAX_WORKERS}", MAX_WORKERS)
 SECONDS = _positive(float, "seconds, more than 0, at most 1e9")
 POSITIVE = _positive(float, "a number more than 0, at most 1e9")
 
@@ -159,7 +161,7 @@ class _Parser(argparse.ArgumentParser):
 
     def jobs(self) -> None:
         text = "parallel processes (default: the cores, %(default)s)"
-        self.add_argument("-j", "--jobs", type=COUNT, default=cores(), metavar="N", help=text)
+        self.add_argument("-j", "--jobs", type=JOBS, default=cores(), metavar="N", help=text)
 
     def timeout(self, seconds: float = 60.0) -> None:
         text = "longer runs are stopped and recorded as timed_out (default: %(default)g)"

@@ -159,7 +159,7 @@ def _plug_ins() -> dict[str, Method]:
     for point in metadata.entry_points(group=GROUP):
         try:
             loaded = _as_methods(point.load())
-        except Exception as exc:  # whatever another package raises must not stop this one
+        except (Exception, SystemExit) as exc:  # whatever another package raises must not stop this one
             _warn("plug-in %s of %s left out: %s: %s", point.name, point.value, type(exc).__name__, exc)
             continue
         package = (point.dist.name,) if point.dist else ()

@@ -14,6 +14,8 @@ from rotor_mbs.methods.time_limit import time_limit
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.solution import Solution
 
+_OBSERVING_S = 1.0  # in any case, of what was reached by the time limit
+
 
 def solve(
     method: Method | str,
@@ -36,6 +38,7 @@ def solve(
     gc_was_on = gc.isenabled()
     gc.disable()
     try:
+        begun = time.monotonic()
         with time_limit(time_limit_s):
             while not run_times or (len(run_times) < repeats and sum(run_times) + run_times[-1] < budget_s):
                 start = time.perf_counter()
@@ -47,7 +50,11 @@ def solve(
         if gc_was_on:
             gc.enable()
     start = time.perf_counter()
-    with np.errstate(over="ignore", invalid="ignore"):  # of a runaway: the judgement sees what is not finite
+    left = max(begun + time_limit_s - time.monotonic(), _OBSERVING_S)
+    with (
+        time_limit(left),
+        np.errstate(over="ignore", invalid="ignore"),
+    ):  # of a runaway: the judgement sees what is not finite
         trajectory = solver.observe()
     output = time.perf_counter() - start
     return Solution(

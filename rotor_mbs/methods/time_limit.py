@@ -12,17 +12,23 @@ from contextlib import contextmanager
 
 MESSAGE = "ended by its time limit"  # of a run that was
 _MAX_LIMIT_S = 1e9  # the system's timers take no more than the seconds of its clock
+_SHORTEST_S = 1e-6  # 0 would switch the timer off
 
 
 class OutOfTimeError(Exception):
     """A run is over its time limit."""
 
 
-class _State:
+class _State(threading.local):
+    """Of each thread: a limit of one must not end, or lift, that of another."""
+
     end = math.inf
     polled = False
     is_over = False  # as the signal, or a question to `is_over`, has set it
     has_signal = False
+
+
+_state = _State()
 
 
 @contextmanager
@@ -32,46 +38,52 @@ def time_limit(seconds: float) -> Iterator[None]:
         yield
         return
     has_signal = hasattr(signal, "SIGALRM") and threading.current_thread() is threading.main_thread()
-    _State.end, _State.is_over, _State.has_signal = time.monotonic() + seconds, False, has_signal
+    _state.end, _state.is_over, _state.has_signal = time.monotonic() + seconds, False, has_signal
     if has_signal:
         before = signal.signal(signal.SIGALRM, _interrupt)
-        signal.setitimer(signal.ITIMER_REAL, seconds)
+        signal.setitimer(signal.ITIMER_REAL, max(seconds, _SHORTEST_S))
     try:
         yield
     finally:
         if has_signal:
             signal.setitimer(signal.ITIMER_REAL, 0.0)
             signal.signal(signal.SIGALRM, before)
-        _State.end, _State.is_over = math.inf, False
+        _state.end, _state.is_over = math.inf, False
 
 
 def _interrupt(_number: int, _frame: object) -> None:
-    was_known, _State.is_over = _State.is_over, True
-    if not (_State.polled or was_known):
+    was_known, _state.is_over = _state.is_over, True
+    if not (_state.polled or was_known):
+        raise OutOfTimeError(MESSAGE)
+
+
+def stop_in_time() -> None:
+    """Raises OutOfTimeError where the limit is reached: between parts of long work, for threads without the signal."""
+    if is_over():
         raise OutOfTimeError(MESSAGE)
 
 
 @contextmanager
 def polled() -> Iterator[None]:
     """Inside, nothing is raised: the code asks `is_over` itself and keeps its samples."""
-    _State.polled = True
+    _state.polled = True
     try:
         yield
     finally:
-        _State.polled = False
+        _state.polled = False
 
 
 def step_callback() -> Callable[[object], bool] | None:
     """Called with anything after every step, it returns whether to go on; None where there is no limit; for use inside
     `polled`."""
-    if math.isinf(_State.end):
+    if math.isinf(_state.end):
         return None
-    if _State.has_signal:
-        return lambda _: not _State.is_over
+    if _state.has_signal:
+        return lambda _: not _state.is_over
     return lambda _: not is_over()
 
 
 def is_over() -> bool:
     """Whether the limit is reached; once that is known, a late signal interrupts no more."""
-    _State.is_over = _State.is_over or time.monotonic() > _State.end
-    return _State.is_over
+    _state.is_over = _state.is_over or time.monotonic() > _state.end
+    return _state.is_over

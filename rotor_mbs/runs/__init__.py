@@ -2,6 +2,8 @@
 
 import os
 
+MAX_WORKERS = 1024  # processes
+
 
 def cores() -> int:
     """The cores that this process may use."""

@@ -143,6 +143,10 @@ def open_file(path: Path) -> Iterator[Any]:
         found = "is a folder" if path.is_dir() else "no such file"
         raise StoreError(f"{path}: {found}; allowed: a results file, as rotor-mbs run or reproduce writes it")
     try:
+        path.open("rb").close()
+    except OSError as exc:
+        raise StoreError(f"{path}: cannot be read: {exc.strerror}") from exc
+    try:
         file = h5py.File(path, "r")
     except OSError as exc:
         raise StoreError(
@@ -150,7 +154,7 @@ def open_file(path: Path) -> Iterator[Any]:
         ) from exc
     with file:
         with reading(path):
-            written_by, version = (plain(file.attrs.get(name)) for name in ("format", "format_version"))
+            written_by, version = (attribute(file, name) for name in ("format", "format_version"))
         if written_by != FORMAT:
             raise StoreError(f"{path}: its attribute format is {written_by!r}; allowed: a file that rotor-mbs wrote")
         if version != FORMAT_VERSION:
@@ -246,7 +250,7 @@ def put_dimension(group: Any, name: str, length: int) -> None:
 
 def is_dimension_only(dataset: Any) -> bool:
     """Whether a dataset is a dimension without values."""
-    return str(plain(dataset.attrs.get("NAME", ""))).startswith(_WITHOUT_VALUES)
+    return str(attribute(dataset, "NAME", "")).startswith(_WITHOUT_VALUES)
 
 
 def put_attributes(target: Any, values: Mapping[str, object]) -> None:
@@ -271,7 +275,19 @@ def plain(value: Any) -> Any:
 
 def attributes_of(target: Any) -> dict[str, Any]:
     """As plain Python values."""
-    return {name: plain(value) for name, value in target.attrs.items() if name not in ("REFERENCE_LIST", DIGESTS)}
+    return {name: attribute(target, name) for name in target.attrs if name not in ("REFERENCE_LIST", DIGESTS)}
+
+
+def attribute(target: Any, name: str, default: Any = None) -> Any:
+    """As a plain Python value; the default where there is none. Raises ValueError for a type that no attribute has.
+
+    In a damaged file a text may have become a list of any type: reading it ends the process.
+    """
+    if name not in target.attrs:
+        return default
+    if isinstance(h5py.h5a.open(target.id, name.encode()).get_type(), h5py.h5t.TypeVlenID):
+        raise ValueError(f"attribute {name} is neither a number nor a text")
+    return plain(target.attrs[name])
 
 
 def _refuse_outside(dataset: Any) -> None:
@@ -289,7 +305,7 @@ def dimensions_of(dataset: Any) -> list[str]:
     By the attribute of the scale: the library would look for its path through the whole file, and its own way to the
     name ends the process where that is damaged.
     """
-    names = [str(plain(dimension[0].attrs["NAME"])) if len(dimension) else "" for dimension in dataset.dims]
+    names = [str(attribute(dimension[0], "NAME")) if len(dimension) else "" for dimension in dataset.dims]
     return [CHARACTERS if name.startswith(_WITHOUT_VALUES) else name for name in names]
 
 
@@ -343,8 +359,8 @@ def sync_folder(folder: Path) -> None:
 def is_of_this_program(path: Path) -> bool:
     try:
         with h5py.File(path, "r") as file:
-            return bool(plain(file.attrs.get("format")) == FORMAT)
-    except OSError:
+            return bool(attribute(file, "format") == FORMAT)
+    except (OSError, RuntimeError, ValueError):
         return False
 
 
@@ -360,8 +376,8 @@ def read_arrays(path: Path, group: str = "", scene: str = "") -> tuple[dict[str,
             name = chosen_group(path, list(places), group.strip("/"), scene)
             chosen = file[name or "/"]
             arrays = {name: chosen[name][()] for name in places[name]}
-            units = {name: str(plain(chosen[name].attrs.get("units", ""))) for name in arrays}
-    except (OSError, RuntimeError, KeyError) as exc:
+            units = {name: str(attribute(chosen[name], "units", "")) for name in arrays}
+    except (OSError, RuntimeError, KeyError, ValueError, TypeError) as exc:
         raise StoreError(f"{path}: not a readable HDF5 file ({str(exc).splitlines()[0]})") from exc
     return arrays, {name: unit for name, unit in units.items() if unit}
 
@@ -388,7 +404,12 @@ def _array_places(file: Any) -> dict[str, list[str]]:
     places: dict[str, list[str]] = {}
 
     def note(path: str, item: Any) -> None:
-        if isinstance(item, h5py.Dataset) and item.dtype.kind in "fiu" and 0 < len(item.shape) <= 2 and item.size > 1:
+        if (
+            isinstance(item, h5py.Dataset)
+            and item.dtype.kind in "fiu"
+            and 0 < len(item.shape or ()) <= 2
+            and item.size > 1
+        ):
             folder, _, name = path.rpartition("/")
             places.setdefault(folder, []).append(name)
 
@@ -420,18 +441,18 @@ def _of_array(values: NDArray[Any]) -> Any:
     return digest
 
 
-def attributes_digest(attributes: Mapping[str, Any]) -> str:
+def attributes_digest(target: Any) -> str:
     """Over names and values, in any order."""
-    covered = {name: plain(attributes[name]) for name in attributes if name not in _NOT_COVERED}
+    covered = {name: attribute(target, name) for name in target.attrs if name not in _NOT_COVERED}
     return hashlib.sha256(json.dumps(covered, sort_keys=True).encode()).hexdigest()
 
 
 def seal(group: Any, later: Collection[str] = ()) -> None:
     """Store the digests of a group; of the datasets `later`, which are computed later, those of their attributes."""
-    sums = {ATTRIBUTES: attributes_digest(group.attrs)}
+    sums = {ATTRIBUTES: attributes_digest(group)}
     for name, item in group.items():
         if name in later:
-            sums[f"{_COMPUTED}{name}"] = attributes_digest(item.attrs)
+            sums[f"{_COMPUTED}{name}"] = attributes_digest(item)
         elif not is_group(item) and not is_dimension_only(item):
             sums[name] = _digest_of(item)
     group.attrs[DIGESTS] = json.dumps(sums)
@@ -441,7 +462,7 @@ def _digest_of(dataset: Any) -> str:
     """Over values, units, long name and further attributes."""
     values = texts_of(dataset) if is_text(dataset) else values_of(dataset)
     digest = _of_array(values)
-    digest.update(attributes_digest(dataset.attrs).encode())
+    digest.update(attributes_digest(dataset).encode())
     return str(digest.hexdigest())
 
 
@@ -461,12 +482,12 @@ def damages_of(group: Any, *, with_columns: bool = True) -> list[str]:
     datasets that are computed, too, which takes most of the time.
     """
     try:
-        known = stored_digests(group.attrs)
+        known = stored_digests(group)
     except ValueError:
         known = {}
     if not known:
         return [DIGESTS]
-    sums = {ATTRIBUTES: attributes_digest(group.attrs)}
+    sums = {ATTRIBUTES: attributes_digest(group)}
     for name in group:
         is_computed = f"{_COMPUTED}{name}" in known
         label = f"{_COMPUTED}{name}" if is_computed else name
@@ -479,13 +500,13 @@ def damages_of(group: Any, *, with_columns: bool = True) -> list[str]:
             if is_group(item) or is_dimension_only(item):
                 del sums[label]
             else:
-                sums[label] = attributes_digest(item.attrs) if is_computed else _digest_of(item)
+                sums[label] = attributes_digest(item) if is_computed else _digest_of(item)
     return [name for name in {**known, **sums} if known.get(name) != sums.get(name)]
 
 
-def stored_digests(attributes: Mapping[str, Any]) -> dict[str, str]:
+def stored_digests(group: Any) -> dict[str, str]:
     """By name; {} where there are none. Raises ValueError where they cannot be read."""
-    found = json.loads(str(attributes.get(DIGESTS, "{}")))
+    found = json.loads(str(attribute(group, DIGESTS, "{}")))
     if not isinstance(found, dict):
         raise ValueError("no object of digests")
     return found

@@ -19,11 +19,12 @@ from concurrent.futures import FIRST_COMPLETED, CancelledError, Future, ThreadPo
 from contextlib import AbstractContextManager, contextmanager, nullcontext, suppress
 from dataclasses import dataclass, replace
 from multiprocessing import resource_tracker
+from numbers import Integral
 from queue import LifoQueue
 from typing import TYPE_CHECKING, Any, Generic, Self, TypeAlias, TypeVar
 
-from rotor_mbs.errors import OF_THE_MACHINE, ResourceError, RotorError, one_line
-from rotor_mbs.runs import cores
+from rotor_mbs.errors import OF_THE_MACHINE, InputError, ResourceError, RotorError, one_line
+from rotor_mbs.runs import MAX_WORKERS, cores
 
 if TYPE_CHECKING:  # loaded with the first process
     from pebble import ProcessPool
@@ -37,15 +38,17 @@ ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 _ENDING = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)]
 _PER_WORKER = 2  # tasks submitted per worker: one to work on, one waiting
 _RETRY_START_S = 1.0  # after the system had no room for a process
+_MAX_LACKS = 10  # in a row, before all is given up
 _POLL_S = 1.0  # how often a waiting thread looks whether its pool still works
 
 
 class TaskLostError(RotorError):
-    """A task left no result. failure: "timed_out" where it was over its limit, "worker_died" where its process died."""
+    """A task left no result. failure: "timed_out" where it was over its limit, "worker_died" where its process died.
+    at_start: before it began with the task."""
 
-    def __init__(self, message: str, failure: str) -> None:
+    def __init__(self, message: str, failure: str, *, at_start: bool = False) -> None:
         super().__init__(message)
-        self.failure = failure
+        self.failure, self.at_start = failure, at_start
 
 
 @dataclass(frozen=True, slots=True)
@@ -164,13 +167,25 @@ class SerialPool(TaskPool):
         future: Future[R] = Future()
         try:
             future.set_result(work(task))
-        except Exception as exc:
-            future.set_exception(exc)
+        except (Exception, SystemExit) as exc:  # also of another package's method
+            future.set_exception(RuntimeError(one_line(exc)) if isinstance(exc, SystemExit) else exc)
         return future
 
 
 def local_pool(workers: int, initializer: Callable[[], object] | None = None) -> TaskPool:
-    """So many worker processes of this machine; 0: none, tasks run in this process, without a time limit."""
+    """So many worker processes of this machine; 0: none, tasks run in this process, without a time limit.
+
+    Raises InputError for another number, and where this process may not start processes.
+    """
+    if isinstance(workers, bool) or not isinstance(workers, Integral) or not 0 <= workers <= MAX_WORKERS:
+        raise InputError(f"workers: {workers!r}; allowed: a whole number from 0 to {MAX_WORKERS}")
+    if workers and getattr(multiprocessing.current_process(), "_inheriting", False):
+        raise InputError(
+            'workers: a worker process runs the script itself; allowed: the call under `if __name__ == "__main__":`, '
+            "or workers=0"
+        )
+    if workers and multiprocessing.current_process().daemon:
+        raise InputError("workers: a daemonic process cannot start processes; allowed: workers=0")
     return WorkerPool(workers, initializer) if workers else SerialPool()
 
 
@@ -192,7 +207,8 @@ def run_in(
     split       the parts of a task that stands for many runs; an empty sequence for one that cannot be split
 
     A task whose worker died is tried once more at the end, alone. One that can be split is split first, also where it
-    was over its time limit.
+    was over its time limit. Raises ResourceError where several tasks in a row find no room on the machine, or no
+    process that starts.
     """
     again: dict[str, list[T]] = {"timed_out": [], "worker_died": []}
 
@@ -201,9 +217,20 @@ def run_in(
         for task in tasks:
             waiting[pool.submit(work, task, timeout_s(task) if callable(timeout_s) else timeout_s)] = task
             if len(waiting) >= at_once:
-                yield from _ended(pool, waiting)
+                yield from ended(waiting)
         while waiting:
-            yield from _ended(pool, waiting)
+            yield from ended(waiting)
+
+    lacks = 0
+
+    def ended(waiting: dict[Future[R], T]) -> Iterator[Finished[T, R]]:
+        nonlocal lacks
+        for end in _ended(pool, waiting):
+            is_lack = end.failure == "worker_died" and end.error is not None
+            lacks = lacks + 1 if is_lack else 0
+            if lacks >= _MAX_LACKS:
+                raise ResourceError(f"given up after {lacks} failures in a row: {end.message}; what is stored stays")
+            yield end
 
     for source in (tasks, again["timed_out"]):
         for end in completed(source, _PER_WORKER * pool.workers):
@@ -226,11 +253,11 @@ def _ended(pool: TaskPool, waiting: dict[Future[R], T]) -> Iterator[Finished[T, 
             yield Finished(task, future.result())
         elif isinstance(error, OF_THE_MACHINE):
             lack = "code" if isinstance(error, ImportError) else "memory, files or processes"
-            yield Finished(task, None, "worker_died", f"not enough {lack}: {one_line(error)}")
+            yield Finished(task, None, "worker_died", f"not enough {lack}: {one_line(error)}", error)
         elif (failure := pool.failure(error)) == "error":
             yield Finished(task, None, failure, one_line(error), error)
         else:
-            yield Finished(task, None, failure, str(error))
+            yield Finished(task, None, failure, str(error), error if getattr(error, "at_start", False) else None)
 
 
 @contextmanager
@@ -279,12 +306,15 @@ class _Process:
             return _result(future, pool)
         except TimeoutError:
             raise _ended_at(timeout_s) from None
-        except (OSError, RuntimeError, CancelledError) as exc:
+        except Exception as exc:  # none is the task's own: those come back as answers
             self.close()
             code = getattr(exc, "exitcode", None)
             text = " ".join(str(exc).split())[:200] or "ended by this process"
+            if isinstance(exc, RuntimeError) and code is None:
+                text += '; in a script, the call belongs under `if __name__ == "__main__":`'
             reason = f"exit code {code}" if code is not None else text
-            raise TaskLostError(f"its process died ({reason})", "worker_died") from None
+            at_start = code is None and not isinstance(exc, CancelledError)
+            raise TaskLostError(f"its process died ({reason})", "worker_died", at_start=at_start) from None
 
     def cancel(self) -> None:
         """Ends what the process does; from any thread."""

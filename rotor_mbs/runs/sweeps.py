@@ -115,7 +115,7 @@ def open_sweep(
         if is_new:
             lay_out(path, [table], attributes)
         with files.open_file(path) as file, files.reading(path):
-            if files.plain(file.attrs.get(IDENTITY)) != attributes[IDENTITY]:
+            if files.attribute(file, IDENTITY) != attributes[IDENTITY]:
                 raise InputError(
                     f"{path}: holds something else than this sweep; allowed: another output file, or remove that one"
                 )

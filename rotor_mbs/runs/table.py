@@ -17,6 +17,7 @@ written by the HDF5 library after the layout.
 from __future__ import annotations
 
 import errno
+import math
 import os
 import zlib
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
@@ -420,7 +421,7 @@ def stored_table(file: Any, group: str = "") -> StoredTable:
     """A table in an open file. Raises StoreError where what was laid out has changed since."""
     path, item = Path(file.filename), file[group] if group else file
     _refuse_changes(item, group)
-    computed_names = files.computed_in(files.stored_digests(item.attrs))
+    computed_names = files.computed_in(files.stored_digests(item))
     attributes = files.attributes_of(item)
     of_reference = attributes.pop(_OF_REFERENCE, [])
     known: dict[str, NDArray[Any]] = {}
@@ -439,9 +440,38 @@ def stored_table(file: Any, group: str = "") -> StoredTable:
         elif name != CHARACTERS:
             known[name] = files.texts_of(dataset) if files.is_text(dataset) else files.values_of(dataset)
             if "labels" in dataset.attrs:
-                labels[name] = files.plain(dataset.attrs["labels"])
+                labels[name] = files.attribute(dataset, "labels")
     runs = known.pop("run")
+    _refuse_shapes(path, runs, known, computed, str(item.name))
     return StoredTable(path, path.stat().st_ino, group, runs, known, labels, computed, attributes)
+
+
+def _refuse_shapes(
+    path: Path,
+    runs: NDArray[Any],
+    known: Mapping[str, NDArray[Any]],
+    computed: Mapping[str, StoredColumn],
+    place: str,
+) -> None:
+    """Raises StoreError where a column has not the shape of its dimensions, which its digest does not cover, or not the
+    type of its name, or reaches beyond the file."""
+    size = path.stat().st_size
+    for name, column in computed.items():
+        head: tuple[int, ...] = (len(runs),) if column.is_of_runs else ()
+        is_scalar = column.is_of_runs and name in COLUMNS and CHARACTERS not in COLUMNS[name].dimensions
+        is_wrong = column.shape[: len(head)] != head or (is_scalar and column.shape != head)
+        if is_scalar and column.kind != np.dtype(COLUMNS[name].kind):
+            is_wrong = True
+        lengths = {len(known[scale]) for scale in known if known[scale].ndim} | {3}
+        if name not in COLUMNS and not set(column.shape[len(head) :]) <= lengths:
+            is_wrong = True
+        if column.offset + math.prod(column.shape) * column.kind.itemsize > size:
+            is_wrong = True
+        if is_wrong:
+            raise StoreError(f"{path}: {place.rstrip('/')}/{name} has shape {column.shape} of {column.kind}; damaged")
+    for name, values in known.items():
+        if values.ndim == 0:
+            raise StoreError(f"{path}: {place.rstrip('/')}/{name} is a single value; damaged")
 
 
 def refuse_changed_layout(path: Path) -> None:
@@ -479,7 +509,7 @@ def columns_of(group: Any) -> dict[str, Column]:
     for name, dataset in group.items():
         if not files.is_group(dataset) and not files.is_dimension_only(dataset):
             dimensions = tuple(dimension or name for dimension in files.dimensions_of(dataset))
-            units, long_name = str(dataset.attrs["units"]), str(dataset.attrs["long_name"])
+            units, long_name = (str(files.attribute(dataset, name)) for name in ("units", "long_name"))
             columns[name] = Column(dimensions, units, long_name, dataset.dtype.str)
     return columns
 

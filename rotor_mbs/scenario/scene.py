@@ -44,7 +44,7 @@ DEFAULT_OUTPUTS = ("angles", "rates", "tip", "energy")
 OUTPUTS = (*DEFAULT_OUTPUTS, "loads")  # built in
 ENTRY_POINT_GROUP = "rotor_mbs.quantities"  # a package adds the output that its entry point in this group is called
 
-MAX_BLADES = 10_000
+MAX_BLADES = 1000  # the names of some 4,000 coordinates have no room in an attribute of an HDF5 file
 MAX_SAMPLES = 10_000_000
 MAX_SAMPLE_BYTES = 2 << 30
 # Principal moments may break the triangle inequality by this share of their sum: numbers typed with ten digits do so

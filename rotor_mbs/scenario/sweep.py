@@ -7,7 +7,7 @@ import dataclasses
 import functools
 import math
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -372,14 +372,30 @@ def sweep_of(scene: Scene, axes: Mapping[str, object], **options: object) -> Swe
     """A sweep made without a file. By key of a number of the scene, `axes` have a list of values or a table as an
     [[axis]] has it; `options` are the other keys of a sweep file. Raises InputError; line numbers are those of the
     sweep's `text`."""
-    tables: dict[str, object] = {"title": scene.title, "scene": scene.name, **options}
+    if not isinstance(axes, Mapping):
+        raise InputError(f"parameters: {axes!r}; allowed: a dictionary from keys to lists of values")
+    plain_options = {key: _plain(value) for key, value in options.items()}
+    tables: dict[str, object] = {"title": scene.title, "scene": scene.name, **plain_options}
     listed: list[dict[str, object]] = []
     for key, values in axes.items():
-        plain = values.tolist() if isinstance(values, np.ndarray) else values
-        listed.append({"key": key, **(plain if isinstance(plain, Mapping) else {"values": plain})})
+        plain = _plain(values)
+        listed.append({"key": key, **(plain if isinstance(plain, dict) else {"values": plain})})
     text = "".join([toml_lines(tables), *("\n[[axis]]\n" + toml_lines(axis) for axis in listed)])
     tables["axis"] = listed
     return _sweep(Path("sweep"), text, tables, scene)
+
+
+def _plain(values: object) -> object:
+    """As a TOML file has it: arrays, ranges, generators as lists. Raises InputError for what it cannot have."""
+    if isinstance(values, np.ndarray | np.generic):
+        values = values.tolist()
+    if isinstance(values, Mapping):
+        return {str(key): _plain(value) for key, value in values.items()}
+    if isinstance(values, str | bool | int | float):
+        return values
+    if isinstance(values, Iterable):
+        return [_plain(value) for value in values]
+    raise InputError(f"{values!r}: not a value of a sweep; allowed: numbers, texts, and lists of them")
 
 
 def _sweep(path: Path, text: str, tables: Mapping[str, object], base: Scene | None = None) -> Sweep:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -23,7 +24,7 @@ from rotor_mbs.methods.catalogue import (
     settings_for,
 )
 from rotor_mbs.methods.solve import solve
-from rotor_mbs.methods.time_limit import OutOfTimeError
+from rotor_mbs.methods.time_limit import OutOfTimeError, time_limit
 from rotor_mbs.runs.files import writing
 from rotor_mbs.runs.pool import Finished, TaskPool, Workers, pool_of
 from rotor_mbs.runs.results import Asked, TableFile, extend_file, results_tables, row_of_run
@@ -40,6 +41,7 @@ from rotor_mbs.studies.stored_references import digest, frozen_solution, read_re
 # Short runs are repeated, so that the stored time is not that of a cold cache; long ones are not.
 _REPEATS = 5
 _REPEAT_BUDGET_S = 0.05
+_JUDGING_S = 1.0
 _FIXED_WORK = 3.0  # building, judging, storing
 
 
@@ -243,24 +245,41 @@ def solve_judged(
 ) -> tuple[Solution, Trajectory | None]:
     """One run in this process, with status, message and metrics, and the reference it was judged by; stores nothing.
 
+    The time limit is for the run, then the reference, then the judging.
+
     Arguments, errors raised and an example: `rotor_mbs.run`.
     """
-    reference = None
+    end = time.monotonic() + time_limit_s
+    reference, is_short = None, False
     if shipped_reference(scene_hash(scene)) is not None:
         reference = frozen_solution(scene).trajectory
-    elif compute_reference:
-        reference = solve(REFERENCE, scene, {}).trajectory
     own = own_settings(scene, method) | dict(settings or {})
     try:
-        run, _ = _judged(solve(method, scene, own, _REPEATS, _REPEAT_BUDGET_S, time_limit_s), reference)
+        run = solve(method, scene, own, _REPEATS, _REPEAT_BUDGET_S, time_limit_s)
     except OutOfTimeError as exc:
-        run = without_samples(scene, method, own, "timed_out", str(exc))
+        return without_samples(scene, method, own, "timed_out", str(exc)), reference
+    if reference is None and compute_reference:
+        try:
+            solution = solve(REFERENCE, scene, {}, time_limit_s=max(end - time.monotonic(), 0.0))
+            reference, is_short = solution.trajectory, solution.integration.out_of_time
+        except OutOfTimeError:
+            is_short = True
+    run, _ = _judged(run, reference, end)
+    if is_short and run.status != "timed_out":
+        run = replace(run, status="timed_out", message="the reference that was asked for is over the time limit")
     return run, reference
 
 
-def _judged(run: Solution, reference: Trajectory | None) -> tuple[Solution, bool]:
-    """The run with status, message and metrics; and whether its engine claims a success that it is not."""
-    judgement = judge(run.scene, run, reference)
+def _judged(run: Solution, reference: Trajectory | None, end: float) -> tuple[Solution, bool]:
+    """The run with status, message and metrics; and whether its engine claims a success that it is not.
+
+    What was reached by the time limit, which is at `end` of the monotonic clock, is judged in a second more.
+    """
+    try:
+        with time_limit(max(end - time.monotonic(), _JUDGING_S)):
+            judgement = judge(run.scene, run, reference)
+    except OutOfTimeError as exc:
+        return replace(run, status="timed_out", message=f"{exc}, while its samples were judged"), False
     message = judgement.message + next_to_try(run.scene, run.method, run.settings, judgement.status)
     judged = replace(run, status=judgement.status, message=message, metrics=judgement.metrics)
     return judged, judgement.false_success
@@ -299,6 +318,7 @@ def perform_run(task: RunTask) -> Rows:
     """Solve and judge one run, in a worker process; its row."""
     asked = task.asked
     facts: dict[str, object] = {}
+    end = time.monotonic() + task.time_limit_s
     if asked.is_shipped:
         run = frozen_solution(asked.scene)
     else:
@@ -314,7 +334,7 @@ def perform_run(task: RunTask) -> Rows:
         reference: Trajectory | None = run.trajectory
     else:
         reference = read_reference(task.reference, asked.scene) if task.reference is not None else None
-    run, false_success = _judged(run, reference)
+    run, false_success = _judged(run, reference, end)
     facts["false_success"] = int(false_success)
     if run.status == "timed_out" and not asked.is_shipped:
         facts["time_limit_s"] = task.time_limit_s

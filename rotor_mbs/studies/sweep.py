@@ -18,7 +18,7 @@ from rotor_mbs.errors import InputError
 from rotor_mbs.methods.base import Method
 from rotor_mbs.methods.catalogue import check_names, find_method, is_corrected, settings_for
 from rotor_mbs.methods.solve import solve
-from rotor_mbs.methods.time_limit import OutOfTimeError
+from rotor_mbs.methods.time_limit import OutOfTimeError, time_limit
 from rotor_mbs.models.lagrange.reference import error_growth
 from rotor_mbs.runs.files import KEYWORDS
 from rotor_mbs.runs.pool import TaskPool
@@ -97,11 +97,10 @@ def rows_of(chunk: Chunk) -> Rows:
         for i, scene in enumerate(scenes):
             try:
                 run = solve(chunk.method, scene, chunk.settings, time_limit_s=chunk.time_limit_s)
+                _put_run(rows, i, scene, run, chunk.time_limit_s)
             except OutOfTimeError as exc:
                 put_end(rows, i, "timed_out", str(exc))
                 rows["time_reached"][i] = 0.0
-            else:
-                _put_run(rows, i, scene, run)
     if "error_growth" in rows:
         for i, scene in enumerate(scenes):
             _put_amplification(rows, i, scene)
@@ -134,8 +133,8 @@ def _scenes(chunk: Chunk) -> list[Scene]:
         raise InputError(f"runs {chunk.first} to {last}: {keys}: {error}") from error
 
 
-def _put_run(rows: Rows, i: int, scene: Scene, run: Solution) -> None:
-    _put_verdict(rows, i, scene, run)
+def _put_run(rows: Rows, i: int, scene: Scene, run: Solution, time_limit_s: float) -> None:
+    _put_verdict(rows, i, scene, run, time_limit_s)
     trajectory = run.trajectory
     n = len(trajectory.time)
     for name, values in run.quantities.items():
@@ -145,8 +144,10 @@ def _put_run(rows: Rows, i: int, scene: Scene, run: Solution) -> None:
     _put_effort(rows, i, run.integration, float(trajectory.time[-1]) if n else 0.0)
 
 
-def _put_verdict(rows: Rows, i: int, scene: Scene, run: Solution) -> None:
-    verdict = judge(scene, run, None)
+def _put_verdict(rows: Rows, i: int, scene: Scene, run: Solution, time_limit_s: float) -> None:
+    """Raises OutOfTimeError where it takes longer."""
+    with time_limit(time_limit_s):
+        verdict = judge(scene, run, None)
     put_end(rows, i, verdict.status, verdict.message)
     for name in ("energy_drift_max", *_OF_DEFECTS):
         rows[name][i] = verdict.metrics.get(name, np.nan)
@@ -192,7 +193,10 @@ def _side_by_side(chunk: Chunk, scenes: Sequence[Scene]) -> Rows:
     for i in np.flatnonzero(~ok).tolist():
         run = Solution(scenes[i], method.name, block.trajectory(i), block.integrations[i], settings.as_dict())
         run.is_corrected, run.bounds = method.is_corrected, method.bounds
-        _put_verdict(rows, i, scenes[i], run)
+        try:
+            _put_verdict(rows, i, scenes[i], run, chunk.time_limit_s)
+        except OutOfTimeError as exc:
+            put_end(rows, i, "timed_out", f"{exc}, while its samples were judged")
     return rows
 
 

@@ -126,3 +126,28 @@ def test_a_scene_names_its_methods_and_settings(folder: Path) -> None:
     refused = rotor_mbs("run", path, "-o", "r.h5")
     assert refused.status == 2
     assert "mine:38: settings: no setting 'stp', perhaps step" in refused.err
+
+
+@pytest.mark.parametrize("span", ["0:1e300:3", "0:inf:3", "nan:1:3", "1:0:3"])
+@pytest.mark.parametrize("option", ["--speeds", "--stiffness"])
+def test_numbers_that_no_rotor_has_are_a_line(option: str, span: str) -> None:
+    ended = rotor_mbs("modes", "check/held", option, span)
+    assert ended.status == 2
+    assert "0 <= FROM < TO <= 1e+25" in ended.err
+    assert len(ended.err.splitlines()) == 1
+
+
+@pytest.mark.parametrize("jobs", ["999999999", "1025", "0", "-1", "1.5"])
+def test_more_processes_than_a_machine_has_are_a_line(jobs: str) -> None:
+    ended = rotor_mbs("run", "check/held", "-j", jobs)
+    assert ended.status == 2
+    assert "allowed: a whole number from 1 to 1024" in ended.err
+
+
+def test_files_of_the_other_kind_name_their_command(tmp_path: Path) -> None:
+    (tmp_path / "scene.toml").write_text(new_scene_text())
+    (tmp_path / "sweep.toml").write_text(
+        'title = "a"\nscene = "paper/fig11"\n[[axis]]\nkey = "gravity"\nvalues = [1]\n'
+    )
+    assert f"rotor-mbs sweep {tmp_path / 'sweep.toml'}" in rotor_mbs("run", tmp_path / "sweep.toml").err
+    assert f"rotor-mbs run {tmp_path / 'scene.toml'}" in rotor_mbs("sweep", tmp_path / "scene.toml").err

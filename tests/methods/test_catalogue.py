@@ -101,3 +101,9 @@ def test_the_next_finer_rung_is_not_the_one_that_was_told_in_three_digits() -> N
     told = float(f"{method.finer({'step': 6.7e-4}, interval)['step']:.3g}")
     assert told == 4.17e-4
     assert method.finer({"step": told}, interval) == {"step": pytest.approx(interval / 32.0)}
+
+
+def test_a_plug_in_that_exits_is_left_out(site: Path, caplog: pytest.LogCaptureFixture) -> None:
+    install(site, "leaving", {"x": "leaving:X"}, "raise SystemExit(3)\n")
+    assert methods()
+    assert "left out: SystemExit: 3" in caplog.text

@@ -20,7 +20,7 @@ from typing import Any
 import pytest
 
 from rotor_mbs.errors import ResourceError
-from rotor_mbs.runs.pool import Finished, TaskLostError, WorkerPool, run_in
+from rotor_mbs.runs.pool import Finished, SerialPool, TaskLostError, WorkerPool, run_in
 
 # Beyond any start of a process on a busy machine.
 _LONG_S = 60.0
@@ -358,3 +358,25 @@ def test_workers_end_with_their_parent(tmp_path: Path, signals: list[signal.Sign
     while any(Path(f"/proc/{pid}").exists() for pid in pids) and time.monotonic() < end:
         time.sleep(0.05)
     assert not any(Path(f"/proc/{pid}").exists() for pid in pids)
+
+
+def _lost(_: int) -> int:
+    raise OSError(24, "Too many open files")
+
+
+def test_a_machine_without_room_is_given_up_after_some_tasks_in_a_row() -> None:
+    """Thousands of tasks would each be tried alone, a second each."""
+    tasks = iter(range(10_000))
+    with pytest.raises(ResourceError, match="given up after 10 failures in a row: not enough memory, files"):
+        list(run_in(SerialPool(), _lost, tasks, _LONG_S))
+    assert next(tasks) < 20
+
+
+def _exit(_: int) -> int:
+    raise SystemExit(3)
+
+
+def test_a_task_that_exits_ends_no_process() -> None:
+    (end,) = run_in(SerialPool(), _exit, [1], _LONG_S)
+    assert end.failure == "error"
+    assert "SystemExit: 3" in end.message

@@ -51,3 +51,9 @@ def test_every_shipped_bound_names_a_known_fault_above_it() -> None:
     for bound in shipped_bounds().entries:
         assert bound.known_fault
         assert bound.value < bound.fault < math.inf
+
+
+@pytest.mark.parametrize("check", ["complete", "status", "metrics", "settings", "defect", "energy"])
+def test_a_method_without_bounds_has_those_of_any_method(check: str) -> None:
+    """In `run` and in `check` alike: both ask here, and none is refused."""
+    assert load_bounds().of(check, "outside/any") == shipped_bounds().of(check, "outside/any")

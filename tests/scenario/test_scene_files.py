@@ -160,11 +160,11 @@ def test_what_follows_from_extreme_sizes_is_a_normal_double(paper: dict[str, Sce
         assert 1e-110 < abs(number) < 1e110
 
 
-def test_ten_thousand_blades_and_twenty_thousand_rows_fit(tmp_path: Path) -> None:
+def test_a_thousand_blades_and_twenty_thousand_rows_fit(tmp_path: Path) -> None:
     rows = [[k / 20_000, k % 7] for k in range(20_000)]
-    text = SCENE.replace("blades = 2", "blades = 10000").replace("[0, 0, 0]", str([0] * 10_001))
+    text = SCENE.replace("blades = 2", "blades = 1000").replace("[0, 0, 0]", str([0] * 1001))
     scene = _load(tmp_path, f"{text}[torque]\nrotor = {rows}\n")
-    assert len(scene.blades) == len(scene.phases) == 10_000
+    assert len(scene.blades) == len(scene.phases) == 1000
     assert len(segments([scene.rotor_torque], scene.duration)) == 20_000
 
 

@@ -10,6 +10,7 @@ from dataclasses import replace
 import numpy as np
 
 from rotor_mbs.errors import InputError
+from rotor_mbs.methods.time_limit import stop_in_time
 from rotor_mbs.models.lagrange import closed_form
 from rotor_mbs.models.lagrange.heyoka_adapter import failure, is_available
 from rotor_mbs.models.lagrange.ode_solvers import Accelerations, OdeSolver, scipy_integrator
@@ -175,6 +176,7 @@ def interval_ends(
     ends = np.full((len(chosen), states.shape[1]), np.nan)
     place = 0
     for row, k in enumerate(chosen):
+        stop_in_time()
         state, reached = states[k], float(time[k])
         while place + 1 < len(segments) and segments[place].end <= reached:
             place += 1
