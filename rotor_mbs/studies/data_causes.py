@@ -53,6 +53,7 @@ _GRAVITIES = (9.8, 9.80665, 9.81, 9.82, 10.0, 0.0)
 _EARLY = 10.0  # growth up to which a cause is tried first: most are refuted there
 _STEP = 1.25e-3  # s, of what is interpolated: of the printed equations' own run, its error is some 1e-9
 _EARLY_ROWS = 40  # so many rows are tried first at most
+_LEAST_LAG = 1e-4  # of an interval between rows: less is rounding
 _SAME_START = 1e-3  # rad, rad/s: a scene that starts farther off cannot be the one
 MAX_PARAMETERS = 6  # parameters that are named
 _QUARTERS = {90: math.pi / 2.0, 180: math.pi, 270: -math.pi / 2.0}  # zeros that people choose, by degrees
@@ -266,7 +267,7 @@ def _lag(search: CauseSearch, time: Array, values: Array) -> list[str]:
             errors = (values[inside] - states[:, columns]) * weights
             size = float(((slopes * weights) ** 2).sum())
             change = -float((errors * slopes * weights).sum()) / size if size else 0.0
-            if left <= search.fitting and abs(change) <= 1e-6 * abs(lag):
+            if left <= search.fitting and abs(change) <= 1e-6 * abs(lag) and abs(lag) >= _LEAST_LAG * step:
                 rows = lag / step
                 whole = f", {abs(round(rows))} rows" if abs(rows - round(rows)) < 1e-3 and round(rows) else ""
                 return [f"a constant lag of {lag:.6g} s{whole} ({'late' if lag > 0.0 else 'early'})"]
