@@ -101,6 +101,7 @@ scene = rm.scene("paper/fig08").replace(duration=0.2, samples=11)
 """
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(
     "call",
     [
@@ -131,8 +132,18 @@ def _stiff(change: dict[str, Any]) -> Scene:
     return scene.replace(**changes)
 
 
-@pytest.mark.parametrize("change", [DAMPED, FAST, SHAFT], ids=["damper", "fast", "shaft"])
-@pytest.mark.parametrize("in_thread", [False, True], ids=["main", "thread"])
+@pytest.mark.parametrize(
+    ("change", "in_thread"),
+    [
+        pytest.param(DAMPED, False, id="damper-main"),
+        *(
+            pytest.param(change, in_thread, id=f"{name}-{'thread' if in_thread else 'main'}", marks=pytest.mark.full)
+            for name, change in (("damper", DAMPED), ("fast", FAST), ("shaft", SHAFT))
+            for in_thread in (False, True)
+            if in_thread or name != "damper"
+        ),
+    ],
+)
 def test_a_time_limit_bounds_reference_and_judging(change: dict[str, Any], in_thread: bool) -> None:
     """Of the limit of 2 s: as long again for the engine's compilation, and a second for observing and for judging."""
     scene = _stiff(change)

@@ -13,7 +13,6 @@ from rotor_mbs.runs.records import Record
 from rotor_mbs.solution.text_table import TextTable
 
 RUN_HEAD = ("method", "status", "largest defect (rad)", "error (rad), ok to 0.01", "energy drift", "time (s)")
-_VERBS = {"holds": "hold", "fails": "fail"}
 _MOST_ROWS = 40  # of a table with a row for each run
 
 

@@ -189,7 +189,13 @@ def kinds(dataset: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[str, 
     return {path.name: path for path in folder.iterdir() if path.is_file()}
 
 
-@pytest.mark.parametrize("output", OUTPUTS)
+# One of each kind of file; the others, with the mark full, go the same way.
+_QUICK_OUTPUTS = {"export csv", "check json", "run", "sweep"}
+
+
+@pytest.mark.parametrize(
+    "output", [pytest.param(name, marks=() if name in _QUICK_OUTPUTS else pytest.mark.full) for name in OUTPUTS]
+)
 def test_an_output_replaces_nothing_but_its_own_earlier_output(
     output: str, kinds: dict[str, Path], dataset: Path, tmp_path: Path
 ) -> None:

@@ -211,7 +211,7 @@ REFUSED = {
 
 
 # One of each kind: in the columns, in time, in the scene, in the equations. The others carry the mark full.
-FAST = {"degrees", "blade order", "sign of pitch", "truncated", "one sample late", "rates as angles", "gravity", "E1"}
+FAST = {"degrees", "blade order", "truncated", "one sample late", "gravity"}
 
 
 @pytest.mark.parametrize(
