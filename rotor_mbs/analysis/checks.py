@@ -43,6 +43,8 @@ from rotor_mbs.solution.solution import Solution
 from rotor_mbs.solution.status import COMPLETE
 from rotor_mbs.solution.trajectory import Array, Trajectory
 
+# Samples between two of the integrator's own points, at most: it steps by up to a tenth of a second.
+_POINTS_APART = 10
 # |ln| of the ratio: the transition matrices of a run's intervals are good to 1e-5 each.
 _OWN_GROWTH = 0.05
 
@@ -211,7 +213,9 @@ def _changed_metric(run: StoredRun, metrics: Metrics, solution: Solution) -> tup
         # Over the integrator's own points, four in a step, which are others than the samples: as much as a curve bends.
         angles, rates = trajectory.angles[:, 0], trajectory.rates[:, 0]
         bend = {"rotor_angle_min": angles, "rotor_angle_max": angles, "rotor_rate_max": rates}
-        allowances |= {name: float(np.abs(np.diff(values, 2)).max(initial=0.0)) for name, values in bend.items()}
+        allowances |= {
+            name: _POINTS_APART**2 * float(np.abs(np.diff(values, 2)).max(initial=0.0)) for name, values in bend.items()
+        }
     # Angles and rates that are not stored are zeros here.
     lacking = set() if solution.scene.wants("rates") else {"rotor_rate_max"}
     if not solution.scene.wants("angles"):

@@ -328,7 +328,7 @@ def likely_causes(search: CauseSearch, defects: DefectCauses | None) -> tuple[li
         note = "the search for causes was ended by its time limit"
         return found or both, note
     # A motion that fits by its errors up to the horizon alone is none where the defects say no.
-    return ([] if is_different else found) or both or factors(search), ""
+    return ([] if is_different and not is_elsewhere else found) or both or factors(search), ""
 
 
 def hidden_causes(scene: Scene, defects: DefectCauses) -> list[str]:

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from rotor_mbs.runs.files import KEYWORDS, replace_file
 from rotor_mbs.runs.sweeps import StoredSweep
 from rotor_mbs.scenario.sweep import SPLITS
-from rotor_mbs.solution.status import code_of
+from rotor_mbs.solution.status import GOOD, code_of
 
 _PIECE = 1 << 24  # bytes of a variable that are read at once
 # What is found in every file of a kind.
@@ -48,7 +48,7 @@ def statistics(stored: StoredSweep) -> dict[str, Any]:
     Over the runs that are ok and, where runs are marked, marked for training, and over their samples in time: one
     number for each remaining entry (a coordinate, a blade and axis), as nested lists.
     """
-    chosen = stored.column("status") == code_of("ok")
+    chosen = np.isin(stored.column("status"), [code_of(status) for status in GOOD])
     if "split" in stored.columns:
         chosen &= stored.column("split") == SPLITS.index("train")
     variables = {}

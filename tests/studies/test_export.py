@@ -82,7 +82,7 @@ def test_the_mujoco_file_in_plain_mujoco(name: str, tmp_path: Path) -> None:
     samples = horizon_samples(exact)
     steps = round(scene.duration / (scene.samples - 1) / 2.5e-4)
     found = run_exported(tmp_path, PLAIN_MUJOCO, path, samples, steps, "OUT")
-    assert error(scene, found, exact) < 1e-8
+    assert error(scene, found, exact) < 1e-7  # rad, at a horizon of 1e5 times an error of the start
     ours = solve("mujoco/rk4", scene, {}).trajectory.angles[:, moving(scene)]
     assert np.abs(found[:200] - ours[: len(found)][:200]).max() < 1e-9
 

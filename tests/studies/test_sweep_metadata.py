@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 
 from rotor_mbs.cli import main
+from rotor_mbs.solution.status import code_of
 from rotor_mbs.studies.sweep_metadata import describe
 
 ROOT = Path(__file__).parents[2]
@@ -75,7 +76,7 @@ def test_a_run_that_broke_off_does_not_count(tmp_path: Path) -> None:
     describe(path)
     described = _json(path.with_suffix(".statistics.json"))
     with h5py.File(path) as file:
-        ok = file["status"][()] == 0
+        ok = file["status"][()] == code_of("completed")
         assert ok.tolist() == [False, True]
         assert np.isnan(file["angles"][0]).any()
         exact = file["angles"][1].mean(axis=0)

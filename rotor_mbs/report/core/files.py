@@ -62,14 +62,20 @@ def write_pages(folder: Path, pages: Mapping[str, str]) -> None:
     try:
         folder.mkdir(parents=True, exist_ok=True)
         for name in pages:  # all of them before the first is written
-            refuse_foreign(folder / name, _MARK)
+            refuse_foreign(folder / name, _mark_of(name))
         for name, text in pages.items():
-            replace_file(folder / name, _UNPRINTABLE.sub("\N{REPLACEMENT CHARACTER}", text).encode("utf-8"), _MARK)
+            content = _UNPRINTABLE.sub("\N{REPLACEMENT CHARACTER}", text).encode("utf-8")
+            replace_file(folder / name, content, _mark_of(name))
         for old in folder.glob("*.html"):
             if old.name not in pages and old.is_file() and re.search(_MARK, old.read_bytes()[:2000]):
                 old.unlink()
     except OSError as exc:
         raise StoreError(f"{folder}: the report cannot be written: {exc.strerror or exc}") from exc
+
+
+def _mark_of(name: str) -> bytes:
+    """What a page, or a table of numbers beside it, begins with."""
+    return rb"\Ascene,method," if name.endswith(".csv") else _MARK
 
 
 def render(template: str, page: Mapping[str, object], site: Site = (), here: str = "") -> str:
