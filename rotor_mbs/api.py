@@ -154,7 +154,7 @@ def run(
     Examples
     --------
     >>> import rotor_mbs as rm
-    >>> run = rm.run(rm.scene("paper/fig08"), "lagrange/dop853", relative_tolerance=1e-12)
+    >>> run = rm.run(rm.scene("paper/fig08"), "lagrange/dop853", relative_tolerance=5e-14)
     >>> run.status
     'ok'
     >>> run.metrics["angle_error_max"] < 1e-9   # rad, against the reference, up to the scene's horizon

@@ -61,7 +61,8 @@ def compare(
     >>> import rotor_mbs as rm
     >>> scene = rm.scene("paper/fig03")
     >>> run = rm.run(scene, "lagrange/dop853")
-    >>> comparison = rm.compare({"t": run.time, "rotor_deg": np.degrees(run.angles[:, 0])}, scene)
+    >>> data = {"t": run.time, "rotor_deg": np.degrees(run.angles[:, 0])}
+    >>> comparison = rm.compare(data, scene, columns={"omit": ["pitch_1"]})
     >>> comparison.status, comparison.verdict.read[1]
     ('ok', "rotor = 'rotor_deg' [deg]")
     >>> rm.compare({"t": run.time, "rotor": np.degrees(run.angles[:, 0])}, scene).likely
