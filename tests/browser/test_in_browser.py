@@ -185,7 +185,7 @@ def test_a_line_in_the_time_plots_follows_the_viewer(page: Page, pages: list[Pat
     found = page.run(_LINES)  # at 6 s, where the tick of 6 s is
     assert {seen for seen, _ in found} == {"visible"}
     gaps = [gap for _, gap in found if gap is not None]
-    assert len(gaps) == 5  # angles of both, motion of each, energy, difference
+    assert len(gaps) == 6  # angles of both, motion of each, energy, defects, difference
     assert max(map(abs, gaps)) < 1.0  # px
     page.key("End", number=35)
     time.sleep(0.3)
