@@ -8,6 +8,7 @@ intervals, predicts the error of the whole run without a reference. `models.lagr
 from __future__ import annotations
 
 import functools
+import itertools
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -18,6 +19,15 @@ from rotor_mbs.solution.trajectory import Array, Trajectory
 
 # An interval over which an error may grow this many times says little of the numbers at its start: it is not judged.
 MAX_INTERVAL_GROWTH = 1e5
+# What the rounding of a run's own numbers makes of a defect, as it is estimated, may be this many times larger.
+FLOOR_SAFETY = 3.0
+# Bounds on defects are for intervals as the paper's scenes have: 0.01 s, in which an error grows fivefold at most.
+_BOUND_INTERVAL, _BOUND_GROWTH = 0.01, 5.0
+# rad: a pitch that should stay zero has left it when it is past this: ten million times above round-off of a radian,
+# far below what a plot shows.
+LEFT_ZERO = 1e-9
+# Of a pitch that has left zero: a larger defect in an interval is not of a step or of rounding.
+_MOVED_SHARE = 1e-4
 # Rows over which defects are added up, to show a drift that every one of them hides.
 DRIFT_ROWS = 100
 
@@ -121,12 +131,28 @@ class Defects:
         return np.asarray(judged)
 
     @functools.cached_property
+    def judged_size(self) -> float:
+        """rad: what a method's bound is for: the largest defect beyond rounding, in a longer interval or one with more
+        growth as many times smaller as a method's own errors add up to more there; 0 where none is judged."""
+        longer = np.maximum(np.diff(self.time) / _BOUND_INTERVAL, 1.0) * np.maximum(self.growth / _BOUND_GROWTH, 1.0)
+        judged = self.is_judged
+        sizes = self.sizes[judged]
+        with np.errstate(invalid="ignore"):
+            beyond = np.maximum(sizes - FLOOR_SAFETY * self.floor[judged].max(initial=0.0), 0.0) / longer[judged]
+        return float(np.where(np.isfinite(sizes), beyond, np.inf).max(initial=0.0))
+
+    @functools.cached_property
     def predicted(self) -> Array | None:
         """(n, 1 + blades) rad: the error of the angles that the start and the defects add up to; None where the
         transition matrices are not known. Good while the error is small against a radian."""
-        errors = self._accumulated(len(self.time))
-        if errors is None:
+        if self._errors_over_rows is None:
             return None
+        products, sums = self._errors_over_rows
+        rows = [self.states[0] - self.start]
+        with np.errstate(all="ignore"):
+            for product, own in zip(products, sums, strict=True):
+                rows.extend(product[1:] @ rows[-1] + own[1:])
+        errors = np.array(rows[: len(self.time)])
         half = len(self.moving)
         angles = np.zeros((len(self.time), self.angles.shape[1]))
         angles[:, list(self.moving)] = errors[:, :half]
@@ -142,12 +168,12 @@ class Defects:
         free = [i for i, coordinate in enumerate(self.moving) if coordinate not in self.resting]
         rows = np.array([*free, *(half + i for i in free)])
         units = self.growth_units[rows]
-        product, matrices = np.eye(len(rows)), [np.eye(len(rows))]
+        scaled = self.transitions[:, rows[:, None], rows] * units / units[:, None]
         with np.errstate(all="ignore"):
-            for matrix in self.transitions[:, rows[:, None], rows] * units / units[:, None]:
-                product = matrix @ product
-                matrices.append(product)
-        stack = np.array(matrices)
+            products, _ = _carried(scaled, np.zeros((len(scaled), len(rows))), DRIFT_ROWS)
+            for before, block in itertools.pairwise(products):
+                block[:] = block @ before[-1]
+        stack = np.concatenate([products[:1, 0], products[:, 1:].reshape(-1, len(rows), len(rows))])[: len(self.time)]
         growth = np.full(len(stack), np.inf)
         finite = np.isfinite(stack).all(axis=(1, 2))
         growth[finite] = np.linalg.norm(stack[finite], ord=2, axis=(1, 2))
@@ -165,10 +191,9 @@ class Defects:
     @property
     def drift(self) -> float:
         """rad: the largest sum of defects over `DRIFT_ROWS` rows, each carried to their end; NaN where not known."""
-        errors = self._accumulated(DRIFT_ROWS)
-        if errors is None:
+        if self._errors_over_rows is None:
             return float("nan")
-        return float((np.abs(errors[1:]) / self._units).max(initial=0.0))
+        return float((np.abs(self._errors_over_rows[1]) / self._units).max(initial=0.0))
 
     @property
     def _units(self) -> Array:
@@ -184,22 +209,16 @@ class Defects:
         empty = np.empty((0, len(self.start)))
         if self.transitions is None or len(self.time) <= rows:
             return empty, empty
-        half = len(self.moving)
-        columns = list(self.moving)
-        defects = np.hstack([self.angles[:, columns], self.rates[:, columns]])
-        units, sizes, floors = self._units, [], []
+        count = len(self.transitions) // rows * rows
+        units = self._units
         with np.errstate(all="ignore"):
-            for first in range(0, len(self.transitions) - rows + 1, rows):
-                error, product = np.zeros(2 * half), np.eye(2 * half)
-                for k in range(first, first + rows):
-                    error = self.transitions[k] @ error - defects[k]
-                    product = self.transitions[k] @ product
-                scaled = np.abs(product) * units / units[:, None]
-                if not scaled.max() <= MAX_INTERVAL_GROWTH:
-                    continue
-                sizes.append(np.abs(error) / units)
-                floors.append((np.abs(product) @ self.rounding[first] + self.rounding[first + rows]) / units)
-        return (np.array(sizes), np.array(floors)) if sizes else (empty, empty)
+            products, errors = _carried(self.transitions[:count], -self._vectors[:count], rows)
+            product, error = np.abs(products[:, -1]), np.abs(errors[:, -1])
+            kept = (product * units / units[:, None]).max(axis=(1, 2)) <= MAX_INTERVAL_GROWTH
+            floors = (
+                np.einsum("kij,kj->ki", product, self.rounding[:count:rows]) + self.rounding[rows : count + 1 : rows]
+            )
+        return error[kept] / units, floors[kept] / units
 
     def horizon_samples(self, limit: float) -> int:
         """How many samples lie before the error growth along the run reaches `limit`."""
@@ -209,22 +228,65 @@ class Defects:
         beyond = np.flatnonzero(~(growth < limit))
         return int(beyond[0]) if len(beyond) else len(growth)
 
-    def _accumulated(self, rows: int) -> Array | None:
-        """(n, m) errors of the state, from zero again after so many rows; over all rows from the start's own error."""
+    def samples_at_rest(self, limit: float) -> int:
+        """How many samples lie before the pitches that rest by symmetry are `limit` times as large as when they left
+        zero; all, where they rest, or where they are moved by other equations.
+
+        The error growth is that of motions which keep them at zero; what rounding has moved them by grows faster. That
+        excuses no other equations: by these the pitches have defects of a share of what they are.
+        """
+        places = [i for i, coordinate in enumerate(self.moving) if coordinate in self.resting]
+        away = np.abs(self.states[:, places]).max(axis=1, initial=0.0)
+        beyond = np.flatnonzero(away > LEFT_ZERO * limit)
+        if not len(beyond):
+            return len(self.time)
+        first, resting = int(beyond[0]), list(self.resting)
+        moved = np.abs(self.rates[:first, resting] / self.rate_units[resting]).max(axis=1, initial=0.0)
+        by_rounding = (moved <= LEFT_ZERO + _MOVED_SHARE * away[1 : first + 1]).all()
+        return first if by_rounding else len(self.time)
+
+    @property
+    def _vectors(self) -> Array:
+        """(n - 1, m) defects of the angles, then rates, of the coordinates that move."""
+        columns = list(self.moving)
+        return np.hstack([self.angles[:, columns], self.rates[:, columns]])
+
+    @functools.cached_property
+    def _errors_over_rows(self) -> tuple[Array, Array] | None:
+        """`_carried` over `DRIFT_ROWS` rows; None where the transition matrices are not known."""
         if self.transitions is None:
             return None
+        matrices, offsets = self.transitions.copy(), -self._vectors
         half = len(self.moving)
-        columns = list(self.moving)
-        defects = np.hstack([self.angles[:, columns], self.rates[:, columns]])
-        places = [i for i, coordinate in enumerate(self.moving) if coordinate in self.resting]
-        places += [half + i for i in places]
-        error = self.states[0] - self.start if rows >= len(self.time) else np.zeros(len(self.start))
-        errors = [error]
+        resting = [i for i, coordinate in enumerate(self.moving) if coordinate in self.resting]
+        for place in (*resting, *(half + i for i in resting)):
+            matrices[:, place], offsets[:, place] = 0.0, self.states[1:, place]
         with np.errstate(all="ignore"):
-            for k, matrix in enumerate(self.transitions):
-                if rows < len(self.time) and k % rows == 0:
-                    error = np.zeros(len(self.start))
-                error = matrix @ error - defects[k]
-                error[places] = self.states[k + 1, places]
-                errors.append(error)
-        return np.array(errors)
+            return _carried(matrices, offsets, DRIFT_ROWS)
+
+
+def _carried(matrices: Array, offsets: Array, rows: int) -> tuple[Array, Array]:
+    """Errors e that go on as matrix @ e + offset, in stretches of so many rows, all stretches at once.
+
+    Parameters
+    ----------
+    matrices, offsets : (k, m, m) and (k, m) of every interval.
+
+    Returns
+    -------
+    products, errors : (stretches, 1 + rows, m, m) and (stretches, 1 + rows, m)
+        The product of the matrices since the start of the stretch, and what the offsets since then add up to. The last
+        stretch is filled with rows that change nothing.
+    """
+    k, m = offsets.shape
+    stretches = max(-(-k // rows), 1)
+    steps = np.broadcast_to(np.eye(m), (stretches * rows, m, m)).copy()
+    added = np.zeros((stretches * rows, m))
+    steps[:k], added[:k] = matrices, offsets
+    steps, added = steps.reshape(stretches, rows, m, m), added.reshape(stretches, rows, m)
+    products, errors = np.empty((stretches, 1 + rows, m, m)), np.zeros((stretches, 1 + rows, m))
+    products[:, 0] = np.eye(m)
+    for row in range(rows):
+        products[:, row + 1] = steps[:, row] @ products[:, row]
+        errors[:, row + 1] = np.einsum("kij,kj->ki", steps[:, row], errors[:, row]) + added[:, row]
+    return products, errors

@@ -8,7 +8,7 @@ import numpy as np
 
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.scenario.time_table import value_at
-from rotor_mbs.solution.defects import Defects
+from rotor_mbs.solution.defects import LEFT_ZERO, Defects
 from rotor_mbs.solution.impulse import angular_balance, linear_balance
 from rotor_mbs.solution.quantities import Array, array_of, deviation, energy_error, known_quantities, sizes
 from rotor_mbs.solution.trajectory import Trajectory
@@ -20,11 +20,6 @@ Metrics = dict[str, float]
 # rad: beyond it a double's last digit is above 1e-10 rad, and neither its sine nor an error of 1e-9 rad means anything.
 ANGLE_LIMIT = 1e6
 
-# rad: a pitch that should stay zero has left it when it is past this: ten million times above round-off of a radian,
-# far below what a plot shows.
-_LEFT_ZERO = 1e-9
-# Of a pitch that has left zero: a larger defect in an interval is not of a step or of rounding.
-_MOVED_SHARE = 1e-4
 # rad: between these the departure grows exponentially; below is round-off, above the motion is no longer linear.
 _LINEAR_FROM, _LINEAR_TO = 1e-12, 1e-2
 
@@ -77,7 +72,7 @@ def metrics_of(scene: Scene, run: Trajectory, reference: Trajectory | None, defe
         metrics["energy_scale_J"] = scale
         metrics["energy_drift_max"] = float(np.abs(energy).max()) / scale if scale else float(np.abs(energy).max())
         metrics["energy_gain_J"] = float(energy.max())
-    if reference is not None and scene.wants("angles"):
+    if reference is not None and len(reference.time) and scene.wants("angles"):
         metrics |= _angle_errors(run, reference, defects)
     if defects is not None:
         metrics |= defect_metrics(defects, metrics.get("horizon_s"))
@@ -130,13 +125,15 @@ def defect_metrics(defects: Defects, horizon_s: float | None) -> Metrics:
             "defect_median": float(np.median(defects.sizes[judged])),
             "defect_time": float(defects.time[1 + largest]),
             "defect_mean": defects.mean,
+            "defect_judged": defects.judged_size,
             "defect_floor": float(defects.floor[judged].max()),
         }
     predicted = defects.predicted
     if predicted is not None:
         metrics["defect_drift"] = defects.drift
         if horizon_s is None:
-            metrics["horizon_s"] = horizon_s = float(defects.time[max(defects.horizon_samples(HORIZON_GROWTH) - 1, 0)])
+            until = min(defects.horizon_samples(HORIZON_GROWTH), defects.samples_at_rest(HORIZON_GROWTH))
+            metrics["horizon_s"] = horizon_s = float(defects.time[max(until - 1, 0)])
         metrics["angle_error_predicted"] = float(np.abs(predicted[defects.time <= horizon_s]).max())
     return {name: value for name, value in metrics.items() if not np.isnan(value)}
 
@@ -151,22 +148,16 @@ def _angle_errors(run: Trajectory, reference: Trajectory, defects: Defects | Non
     if zero:
         away = np.abs(run.angles[:, zero]).max(axis=1)
         metrics["zero_pitch_max"] = float(away.max())
-        if (away > _LEFT_ZERO).any():
-            metrics["zero_pitch_left_s"] = float(run.time[int(np.argmax(away > _LEFT_ZERO))])
+        if (away > LEFT_ZERO).any():
+            metrics["zero_pitch_left_s"] = float(run.time[int(np.argmax(away > LEFT_ZERO))])
             large = away >= _LINEAR_TO
             linear_until = int(np.argmax(large)) if large.any() else len(away)
             linear = (away > _LINEAR_FROM) & (np.arange(len(away)) < linear_until)
             if linear.sum() >= 10:
                 slope = np.polyfit(run.time[linear], np.log(away[linear]), 1)[0]
                 metrics["zero_pitch_growth_per_s"] = float(slope)
-        # The reference's horizon is that of motions which keep these pitches at zero. What a run has left them by grows
-        # faster, to the horizon once it is as many times larger. That is no excuse where the equations are others: then
-        # these pitches have defects of a share of what they are.
-        beyond = np.flatnonzero(away[:until] > _LEFT_ZERO * HORIZON_GROWTH)
-        if len(beyond) and defects is not None:
-            moved = np.abs(defects.rates[: beyond[0], zero] / defects.rate_units[zero]).max(axis=1)
-            if (moved <= _LEFT_ZERO + _MOVED_SHARE * away[1 : beyond[0] + 1]).all():
-                until = int(beyond[0])
+    if defects is not None:
+        until = min(until, defects.samples_at_rest(HORIZON_GROWTH))
     metrics["horizon_s"] = float(reference.time[max(until - 1, 0)])
     if until > 1:
         metrics["angle_error_max"] = float(error[:until].max())

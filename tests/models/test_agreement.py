@@ -10,7 +10,6 @@ import pytest
 from support import references
 from support.scenes import PAPER, paper
 
-from rotor_mbs.analysis.exact import exact_rotor_angle
 from rotor_mbs.analysis.judgement import defects_of, judge
 from rotor_mbs.methods.catalogue import find_method
 from rotor_mbs.methods.solve import solve
@@ -64,12 +63,6 @@ def test_up_to_the_horizon(name: str, method: str) -> None:
     assert np.abs(solution.energy_error[:rows]).max() <= energy * metrics["energy_scale_J"]
 
 
-@pytest.mark.parametrize("method", BEST[:2])
-def test_the_whole_of_fig08(method: str) -> None:
-    """Smooth as long as two blades stay at exactly zero pitch: nothing grows but round-off itself."""
-    assert angle_error(run(paper("fig08"), method).trajectory, reference("fig08")).max() <= 1e-12
-
-
 def test_the_chain_on_fig08_up_to_its_horizon() -> None:
     scene, exact = cut("fig08", 1e5)
     assert angle_error(run(scene, CHAIN).trajectory, exact).max() <= 1e-6
@@ -93,29 +86,3 @@ def test_blades_that_start_at_zero_pitch_stay_there(name: str, method: str) -> N
     metrics = judge(scene, run(scene, method), reference(name)).metrics
     assert metrics["zero_pitch_max"] == 0.0
     assert "zero_pitch_left_s" not in metrics
-
-
-def test_a_run_that_leaves_zero_pitch_is_told_with_its_rate() -> None:
-    """Blade 2 of fig05, pushed by 1e-12 rad: below the shaft it is an inverted pendulum of rate √(g/c · sin φ)."""
-    pytest.importorskip("heyoka")
-    scene = paper("fig05")
-    pushed = replace(scene, initial_angles=(*scene.initial_angles[:2], 0.0, 1e-12))
-    metrics = judge(scene, run(pushed, "lagrange/taylor"), reference("fig05")).metrics
-    azimuth = scene.initial_angles[0] + scene.phases[2]
-    rate = np.sqrt(scene.gravity / scene.blades[0].centre_of_mass[0] * -np.sin(azimuth))
-    assert metrics["zero_pitch_growth_per_s"] == pytest.approx(rate, rel=0.02)  # cosh, not exp, in the first samples
-    assert metrics["zero_pitch_left_s"] == pytest.approx(np.arccosh(1e-9 / 1e-12) / rate, abs=0.02)  # two samples
-
-
-@pytest.mark.parametrize(
-    "name",
-    ["fig03", *(pytest.param(name, marks=pytest.mark.full) for name in ("fig04b", "fig05", "fig06", "fig15-100kNm"))],
-)
-def test_the_extrapolated_chain_follows_the_exact_solution(name: str) -> None:
-    """To 1e-10 rad at a tolerance that leaves rounding, and no pitch moves."""
-    scene = paper(name, outputs=("angles", "rates"))
-    fine = solve("exudyn_chain/extrapolated", scene, {"tolerance": 1e-10}).trajectory
-    exact = exact_rotor_angle(scene, fine.time)
-    assert exact is not None
-    assert np.abs(fine.angles[:, 0] - exact[1]).max() <= 1e-10
-    assert not fine.angles[:, 1:].any()

@@ -12,14 +12,16 @@ from support.references import reference
 from support.references import scene as shipped
 from support.scenes import PAPER, paper
 
-from rotor_mbs.analysis.judgement import FLOOR_SAFETY, judge
+from rotor_mbs.analysis.judgement import judge
+from rotor_mbs.errors import InputError
+from rotor_mbs.methods.catalogue import find_method
 from rotor_mbs.methods.solve import solve
 from rotor_mbs.models.lagrange import defects as defects_module
-from rotor_mbs.models.lagrange.defects import interval_defects
+from rotor_mbs.models.lagrange.defects import fitted_rates, interval_defects
 from rotor_mbs.models.lagrange.parameters import rate_units, resting_pitches
 from rotor_mbs.models.lagrange.reference import _variational_matrices
 from rotor_mbs.scenario.scene import Scene
-from rotor_mbs.solution.defects import MAX_INTERVAL_GROWTH, Defects
+from rotor_mbs.solution.defects import FLOOR_SAFETY, MAX_INTERVAL_GROWTH, Defects
 from rotor_mbs.solution.metrics import defect_metrics, horizon_samples, running_growth
 from rotor_mbs.solution.trajectory import Array, Trajectory
 
@@ -248,9 +250,21 @@ SIZES = (1e-9, 3e-9, 2e-9)
 
 def test_numbers_of_defects() -> None:
     metrics = defect_metrics(made_defects(SIZES), None)
-    assert (metrics["defect_max"], metrics["defect_median"], metrics["defect_time"]) == (3e-9, 2e-9, 2.0)
+    assert (metrics["defect_max"], metrics["defect_median"], metrics["defect_time"]) == (3e-9, 2e-9, 0.02)
     assert (metrics["defect_mean"], metrics["angle_error_predicted"]) == pytest.approx((2e-9, 6e-9))
     assert metrics["defects_not_judged"] == 0
+
+
+def test_the_bound_is_for_a_hundredth_of_a_second_without_growth() -> None:
+    """Ten times as much in ten times as long, twice as much where errors grow tenfold; rounding beside it."""
+    assert made_defects(SIZES).judged_size == 3e-9
+    assert made_defects(SIZES, time=0.1 * np.arange(4.0)).judged_size == pytest.approx(3e-10)
+    assert made_defects(SIZES, time=1e-3 * np.arange(4.0)).judged_size == 3e-9
+    transitions = np.tile(10.0 * np.eye(2), (3, 1, 1))
+    assert made_defects(SIZES, transitions=transitions).judged_size == pytest.approx(1.5e-9)
+    rounded = made_defects(SIZES, rounding=np.full((4, 2), 1e-10))
+    assert rounded.judged_size == pytest.approx(3e-9 - 3.0 * 2e-10)
+    assert made_defects((1e-9, np.nan, 2e-9)).judged_size == np.inf
 
 
 @pytest.mark.parametrize(("growth", "left_out"), [(0.9 * MAX_INTERVAL_GROWTH, 0), (1.1 * MAX_INTERVAL_GROWTH, 1)])
@@ -281,3 +295,99 @@ def test_a_row_that_is_no_motion_is_inaccurate(rate: float) -> None:
         judgement = judge(FIG11, wrong, None)
     assert judgement.status == "inaccurate"
     assert not judgement.metrics["defect_max"] < 1.0
+
+
+@pytest.mark.parametrize(
+    "method",
+    [
+        "lagrange/taylor", "exudyn_tree/rk67",
+        *(pytest.param(name, marks=pytest.mark.full) for name in (
+            "lagrange/dop853", "lagrange/ode45", "lagrange/radau", "exudyn_tree/dopri5", "exudyn_chain/extrapolated",
+            "exudyn_chain/generalized_alpha", "mujoco/rk4",
+        )),
+    ],
+)  # fmt: skip
+@pytest.mark.parametrize("samples", [101, 11])
+def test_how_far_apart_samples_are_decides_no_status(method: str, samples: int) -> None:
+    """Over a second errors grow up to 200 times, and a method's own ones add up: the run is the same."""
+    if not find_method(method).is_installed:
+        pytest.skip(f"{method} is not installed")
+    scene = replace(paper("fig11"), samples=samples, outputs=("angles", "rates"))
+    judgement = judge(scene, solve(method, scene, {}), None)
+    assert (judgement.status, judgement.message) == ("ok", "")
+
+
+def test_a_torque_of_half_a_second_is_seen_in_coarse_samples() -> None:
+    scene = replace(paper("fig11"), samples=21, outputs=("angles", "rates"))
+    pushed = replace(scene, rotor_torque=((0.0, 0.0), (5.65, 0.0), (5.65, 2e3), (6.15, 2e3), (6.15, 0.0)))
+    judgement = judge(scene, solve("lagrange/taylor", pushed, {}), None)
+    assert judgement.status == "inaccurate"
+    assert judgement.message.startswith("defect ")
+    assert 6.0 <= judgement.metrics["defect_time"] <= 6.5
+
+
+def test_a_run_that_left_the_symmetry_has_one_horizon_with_and_without_a_reference() -> None:
+    pytest.importorskip("mujoco")
+    scene = replace(paper("fig08"), samples=101, outputs=("angles", "rates"))
+    run = solve("mujoco/rk4", scene, {})
+    horizons = [
+        judge(scene, run, exact).metrics["horizon_s"]
+        for exact in (None, solve("lagrange/taylor", scene, {}).trajectory)
+    ]
+    assert horizons[0] == horizons[1] < 0.5 * scene.duration
+
+
+# ---- Rates from angles; sums over rows
+
+
+@pytest.mark.parametrize("name", ["fig03", "fig04b", "fig11"])
+def test_rates_are_found_from_the_angles(name: str) -> None:
+    """To the rounding of five angles: a slope through five rows has some 0.3 of their errors an interval."""
+    scene = paper(name, duration=1.0, samples=101, outputs=("angles", "rates"))
+    run = solve(DOP853, scene, {}).trajectory
+    np.testing.assert_allclose(fitted_rates(scene, run.time, run.angles), run.rates, rtol=0, atol=1e-10)
+    noise = 1e-6 * np.random.default_rng(3).standard_normal(run.angles.shape)
+    noise[:, [i for i in range(run.angles.shape[1]) if i not in scene.moving_coordinates]] = 0.0
+    off = fitted_rates(scene, run.time, run.angles + noise) - run.rates
+    assert 0.1e-4 < off[2:-2].std() < 0.5e-4  # 1e-6 / sqrt(10) an interval of 0.01 s, of all coordinates alike
+
+
+@pytest.mark.parametrize(
+    ("rows", "factor", "message"),
+    [
+        (slice(4), 1.0, "4 rows"),
+        (slice(10), 1e300, "not resolved finely enough"),
+        (slice(0, 101, 20), 1.0, "too far apart"),
+    ],
+)
+def test_rates_that_cannot_be_found_are_refused(rows: slice, factor: float, message: str) -> None:
+    run = fig11_run()
+    time = 1e4 * run.time[rows] if message == "too far apart" else run.time[rows]
+    with pytest.raises(InputError, match=message):
+        fitted_rates(FIG11, time, factor * run.angles[rows])
+
+
+def test_defects_over_rows_are_those_of_every_tenth_row() -> None:
+    """A wrong gravity: ten defects, each carried on, are what the closed form finds from row to tenth row."""
+    run = solve(DOP853, replace(FIG11, gravity=1.001 * FIG11.gravity), {}).trajectory
+    every = slice(None, None, 10)
+    sizes, floors = defects_of(FIG11, run).over_rows(10)
+    strides = interval_defects(FIG11, run.time[every], run.angles[every], run.rates[every])
+    half = len(FIG11.moving_coordinates)
+    raw = np.abs(np.hstack([strides.angles, strides.rates]))
+    units = np.concatenate([np.ones(half), defects_of(FIG11, run).rate_units])
+    np.testing.assert_allclose(sizes * units, raw, rtol=2e-2, atol=1e-3 * raw.max())
+    assert sizes.shape == floors.shape == (10, 2 * half)
+    assert (sizes.max(axis=1) > 5.0 * defects_of(FIG11, run).channel_sizes.max()).any()  # a drift adds up
+
+
+def test_rounding_over_rows_is_within_its_floor() -> None:
+    """Angles of six decimals: what is rounded at both ends of a stretch, and nothing between."""
+    run = fig11_run()
+    angles, rates = np.round(run.angles, 6), np.round(run.rates, 6)
+    defects = interval_defects(FIG11, run.time, angles, rates, np.full(8, 0.5e-6))
+    for rows in (10, 100):
+        sizes, floors = defects.over_rows(rows)
+        assert (sizes <= FLOOR_SAFETY * floors).all()
+        assert (sizes > 0.03 * floors).any()
+    assert defects.over_rows(101)[0].shape == (0, 8)

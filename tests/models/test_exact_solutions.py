@@ -7,7 +7,6 @@ from math import hypot, pi
 
 import numpy as np
 import pytest
-from scipy.special import ellipk
 from support.exudyn_runs import CHAIN, EXPLICIT, METHODS, energy_error
 from support.exudyn_runs import run as solved
 from support.rotors import AXIAL, MIXED, PAPER, SLIM, STOUT, C, D, make_scene, pendulum
@@ -60,13 +59,6 @@ def test_three_equal_blades_at_zero_pitch_turn_uniformly_or_rest(name) -> None:
         got = run(name, make_scene([pi / 6, 0, 0, 0], [0] * 4))
         # the three weights cancel but for round-off in cos(q + phase): 1e-16 g/d t²
         assert np.abs(got.angles - [pi / 6, 0, 0, 0]).max() < 1e-14
-
-
-@every_method
-def test_constant_torque_gives_a_parabola(name) -> None:
-    got = run(name, make_scene([0] * 4, [0] * 4, rotor_torque=((0.0, 1e5),)))
-    assert np.abs(got.angles[:, 0] - 1e5 * got.time**2 / (2 * INERTIA)).max() < BOUND[name]
-    assert np.allclose(got.work, 1e5 * got.angles[:, 0], rtol=0, atol=1e-9)
 
 
 RAMP = ((0.1234, 0.0), (0.5, 4e6), (0.5, -2e6), (0.777, -2e6))
@@ -168,12 +160,3 @@ def test_repeats_are_bit_identical(name) -> None:
     assert first_report == second_report
     for quantity in ("angles", "rates", "tip", "kinetic_energy", "potential_energy", "work"):
         assert np.array_equal(first.get(quantity), second.get(quantity)), quantity
-
-
-# The pendulum that they are compared with
-
-
-def test_pendulum_comes_back_after_its_period() -> None:
-    k = np.sin(0.5 * (11 * pi / 12 - pi))
-    period = 4.0 * ellipk(k * k) / np.sqrt(9.8 / D)
-    assert pendulum(11 * pi / 12, D, 0.0, 9.8, period) == pytest.approx(11 * pi / 12, abs=1e-13)

@@ -34,32 +34,28 @@ def angle_error(trajectory, motion):
     return np.abs(trajectory.angles - motion[: len(trajectory.time), :n]).max()
 
 
-@pytest.mark.parametrize("count", [1, 2, 4, 7])
-@pytest.mark.parametrize("name", ["exudyn_tree/rk67", "exudyn_chain/generalized_alpha", "exudyn_chain/extrapolated"])
-def test_any_number_of_blades(name, count) -> None:
-    scene = make_scene(
+def unlike_blades(count, duration, samples):
+    return make_scene(
         [0.4, *np.linspace(-0.5, 0.6, count)],
         [0.3, *np.linspace(0.2, -0.4, count)],
         tuple((STOUT, SLIM)[i % 2] for i in range(count)),
-        duration=0.5,
-        samples=51,
+        duration=duration,
+        samples=samples,
         hub_inertia=20.0,
     )
+
+
+@pytest.mark.parametrize("count", [1, 2, 4, 7])
+@pytest.mark.parametrize("name", ["exudyn_tree/rk67", "exudyn_chain/generalized_alpha", "exudyn_chain/extrapolated"])
+def test_any_number_of_blades(name, count) -> None:
+    scene = unlike_blades(count, duration=0.5, samples=51)
     assert angle_error(run(name, scene), closed_form(scene)) < (1e-11 if name in TREE else 1e-5)
 
 
 @pytest.mark.parametrize("name", ["exudyn_tree/generalized_alpha", "exudyn_chain/generalized_alpha"])
 def test_sixteen_blades_take_another_path_through_the_engine_to_the_same_motion(name) -> None:
     """The chain a sparse factorization, the tree an old Jacobian; a second order error as with few blades."""
-    count = 16
-    scene = make_scene(
-        [0.4, *np.linspace(-0.5, 0.6, count)],
-        [0.3, *np.linspace(0.2, -0.4, count)],
-        tuple((STOUT, SLIM)[i % 2] for i in range(count)),
-        duration=0.2,
-        samples=21,
-        hub_inertia=20.0,
-    )
+    scene = unlike_blades(16, duration=0.2, samples=21)
     error = angle_error(run(name, scene, step=5e-4), closed_form(scene))
     finer = angle_error(run(name, scene, step=2.5e-4), closed_form(scene))
     assert error < 1e-5

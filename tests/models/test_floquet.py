@@ -114,18 +114,6 @@ def test_the_motion_repeats_itself_after_a_turn_also_by_other_equations(scene: S
         assert turn.torque == pytest.approx(50.0 * 1.2, rel=0.05)
 
 
-def test_the_product_of_the_multipliers_is_the_exponential_of_the_integrated_trace():
-    turn = periodic_turn(DAMPED, 1.2)
-    multipliers, _ = floquet(turn.transition, turn.flow, turn.gradient, 1.2)
-    # The trace along the motion is periodic: the mean of equally spaced samples converges faster than any power.
-    times = 2.0 * math.pi / 1.2 * np.arange(256) / 256.0
-    states = oracle(DAMPED, turn).sol(times).T
-    traces = [-np.trace(linearize(DAMPED, state[:4], state[4:], turn.torque).damping) for state in states]
-    integral = float(np.mean(traces)) * 2.0 * math.pi / 1.2
-    assert np.prod(multipliers) == pytest.approx(math.exp(integral), rel=1e-9)
-    assert turn.trace_integral == pytest.approx(integral, rel=1e-9)
-
-
 def test_without_gravity_the_multipliers_are_those_of_the_eigenvalues():
     scene = replace(DAMPED, gravity=0.0)
     turn = periodic_turn(scene, 2.0)

@@ -9,7 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from support.scenes import ARM, MASS, OFFSET, general, paper
+from support.scenes import general, paper
 
 from rotor_mbs.analysis.judgement import judge
 from rotor_mbs.methods.solve import solve
@@ -96,26 +96,6 @@ def test_equals_lagranges_equations_derived_by_machine(scene: Scene) -> None:
         share = schur / sum(b.mass * float(np.dot(b.centre_of_mass, b.centre_of_mass)) for b in scene.blades)
         right = derived(np.concatenate([q, w]))
         assert np.abs(computed - right).max() <= 1e-13 / share * (np.abs(right).max() + cancelling)
-
-
-def test_a_torque_that_rises_over_the_whole_run() -> None:
-    """A table without a row inside the run is one segment: zero pitch, no gravity, I q̈ = τ' t, a cubic."""
-    slope = 5e4
-    scene = paper("fig05", gravity=0.0, rotor_torque=((0.0, 0.0), (20.0, 20.0 * slope)))
-    inertia = 3 * MASS * (OFFSET**2 + ARM**2)
-    for method in (*METHODS, "reference"):
-        computed = run(scene, method)
-        turned = slope * computed.time**3 / (6 * inertia)
-        assert np.abs(computed.angles[:, 0] - math.pi / 6 - turned).max() <= 1e-12
-        assert np.abs(computed.work - slope**2 * computed.time**4 / (8 * inertia)).max() <= 1e-12 * computed.work.max()
-
-
-def test_time_runs_back() -> None:
-    """Forward, rates reversed, forward again: back at the start, to what round-off grows to."""
-    scene = paper("fig09", duration=2.0, samples=3)
-    there = run(scene)
-    back = run(replace(scene, initial_angles=tuple(there.angles[-1]), initial_rates=tuple(-there.rates[-1])))
-    assert np.abs(back.angles[-1] - scene.initial_angles).max() <= 1e-12
 
 
 def test_error_growth_is_that_of_neighbouring_runs() -> None:

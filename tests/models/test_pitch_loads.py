@@ -126,7 +126,7 @@ def damper_work(time):
 CASES = {"constant torque": (FREE, constant_torque), "step of the command": (COMMAND, step_response)}
 
 
-@pytest.mark.parametrize("case", CASES)
+@pytest.mark.parametrize("case", [pytest.param("constant torque", marks=pytest.mark.full), "step of the command"])
 @pytest.mark.parametrize("method", CORRECTED)
 def test_exact_solutions_by_every_corrected_method(method: str, case: str) -> None:
     """Seen: 1.4e-11 rad of the extrapolated chain (generalized-α), 3e-12 of the others of low order."""
@@ -239,10 +239,3 @@ def test_the_printed_equations_take_the_torques_of_the_pitches(pitches: int) -> 
     mean = [0.5 * (value_at(table, 0.0) + value_at(table, 1e-2)) for table in tables]
     assert result.work[-1] == pytest.approx(np.dot([1e5, *mean], result.angles[-1] - result.angles[0]), rel=1e-3)
     assert "pitch torque" in [item.name for item in PRINTED[0].items(scene)]
-
-
-def test_a_pitch_torque_changes_nothing_where_it_is_zero() -> None:
-    scene = make_scene([0.3, 0.4, -0.2, 0.7], [0.1, 0, 0, 0], duration=0.2, samples=21)
-    zero = replace(scene, pitch_torque=(((0.0, 0.0),),) * 3, bearing_rest=(((0.0, 0.0),),) * 3)
-    for method in ("lagrange/taylor", "exudyn_tree/rk67", "printed/ode45"):
-        assert np.array_equal(run(scene, method).angles, run(zero, method).angles)

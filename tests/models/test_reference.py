@@ -21,35 +21,8 @@ from rotor_mbs.models.lagrange.reference import ReferenceSolver, build, referenc
 from rotor_mbs.models.lagrange.samples import quad_loads, sampled_loads
 from rotor_mbs.models.lagrange.taylor import Propagation
 from rotor_mbs.runs.pool import WorkerPool, run_in
-from rotor_mbs.runs.read import open_results
-from rotor_mbs.scenario.catalogue import reference_folder
-from rotor_mbs.scenario.scene import Scene, parse_scene, scene_hash
+from rotor_mbs.scenario.scene import Scene, parse_scene
 from rotor_mbs.solution.trajectory import Integration
-
-FROZEN = reference_folder() / "paper.h5"
-
-
-def test_every_scene_of_the_paper_is_frozen_with_its_numbers() -> None:
-    with open_results(FROZEN) as results:
-        hashes = {name: scene.attributes["scene_hash"] for name, scene in results.scenes.items()}
-    assert hashes == {f"paper/{name}": scene_hash(paper(name)) for name in PAPER}
-
-
-@pytest.mark.parametrize("name", ["fig08", pytest.param("fig11", marks=pytest.mark.full)])
-def test_recomputed_is_frozen(name: str) -> None:
-    """Quad precision leaves nothing to the machine in a double's digits: equal but for the last bit."""
-    pytest.importorskip("heyoka")
-    scene = paper(name)
-    result = solve("reference", scene, {}).trajectory
-    assert result.error_growth is not None
-    with open_results(FROZEN) as results:
-        reference = results.scenes[scene.name].reference
-        assert reference is not None
-        np.testing.assert_allclose(result.angles, reference.array("angles"), rtol=3e-16, atol=0)
-        np.testing.assert_allclose(result.rates, reference.array("rates"), rtol=3e-16, atol=0)
-        assert reference.array("angle_uncertainty").max() >= result.angle_uncertainty.max() * 0.1
-        # The growth is in double precision and grows its own errors: a hundredth decides no horizon.
-        np.testing.assert_allclose(result.error_growth, reference.array("error_growth"), rtol=1e-2)
 
 
 def _propagated(name: str, tolerance: float) -> Any:
@@ -76,15 +49,6 @@ def test_uncertainty_bounds_the_true_error_at_every_sample(name: str) -> None:
     uncertainty, rounding = frozen.angle_uncertainty, 0.5 * np.spacing(np.abs(stored)).max(axis=1)
     assert (multiprecision.distance(_propagated(name, 1e-33)[:rows], exact[:rows]) <= uncertainty).all()
     assert (multiprecision.distance(stored, exact[:rows]) <= uncertainty + rounding).all()
-
-
-@pytest.mark.full
-@pytest.mark.parametrize(("name", "tolerance"), [("paper/fig09", 1e-32), ("paper/fig12", 1e-31)])
-def test_a_third_tolerance_lies_within_the_uncertainty(name: str, tolerance: float) -> None:
-    """Tighter than the check's own tolerance: the two tolerances that the bound follows from were not a lucky pair."""
-    pytest.importorskip("heyoka")
-    off = np.abs(_propagated(name, tolerance) - _propagated(name, 1e-33)).astype(float).max(axis=1)
-    assert (off <= frozen_reference(name).angle_uncertainty).all()
 
 
 def _limited(duration: float) -> tuple[bool, list[float]]:

@@ -24,8 +24,13 @@ SCENES = {
 }
 
 
-@pytest.mark.parametrize("method", ["lagrange/taylor", "exudyn_tree/rk67"])
-@pytest.mark.parametrize("name", SCENES)
+@pytest.mark.parametrize(
+    ("name", "method"),
+    [
+        *((name, "exudyn_tree/rk67") for name in SCENES),
+        *(pytest.param(name, "lagrange/taylor", marks=() if name == "fig11" else pytest.mark.full) for name in SCENES),
+    ],
+)
 def test_tree_and_taylor_balance_to_a_billionth(name: str, method: str) -> None:
     """Angular for all; linear, with the bearing's force, where no torque jumps. Seen: 3e-11 after jumps, else 1e-13."""
     pytest.importorskip("heyoka")

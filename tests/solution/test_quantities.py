@@ -58,13 +58,6 @@ def moved(scene: Scene, pitch: float) -> Trajectory:
 
 
 @pytest.mark.usefixtures("plug_in")
-@pytest.mark.parametrize("method", ["lagrange/dop853", "exudyn_tree/rk44", "printed/ode45"])
-def test_a_quantity_of_another_package_is_computed_for_every_method(method: str) -> None:
-    run = solve(method, ASKED, {})
-    np.testing.assert_array_equal(run["pitch_squares"], run.angles[:, 1:] ** 2)
-
-
-@pytest.mark.usefixtures("plug_in")
 @pytest.mark.parametrize(("error", "status"), [(1e-8, "ok"), (1e-5, "inaccurate"), (math.nan, "inaccurate")])
 def test_it_is_judged_against_the_same_producer_applied_to_the_reference(error: float, status: str) -> None:
     exact, run = moved(ASKED, 1.0), moved(ASKED, 1.0)

@@ -62,7 +62,7 @@ class System:
                 self._numbers[Ref(part.kind, part.name)] = add(item)
             self._mbs.Assemble()
         except _engine.ExudynError as exc:
-            raise MethodRefusal(f"Exudyn does not take this model: {_one_line(str(exc))}") from exc
+            raise MethodRefusal(f"Exudyn rejected this model: {_one_line(str(exc))}") from exc
         self._initial_state = self._mbs.systemData.GetSystemState(_engine.ConfigurationType.Initial)
 
     def _argument(self, key: str, value: Any) -> object:

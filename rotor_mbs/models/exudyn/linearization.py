@@ -1,6 +1,6 @@
 """The engine's models linearized by it, its one-sided quotients extrapolated. For joints it leaves out the geometric
 stiffness, by which constraint forces turn with the bodies: that is added from its constraint Jacobian beside the state.
-(Without it the chain's frequencies under gravity are wrong by percents.)"""
+(Without it the chain's frequencies under gravity are wrong by several percent.)"""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def linearize_chain(scene: Scene, angles: Sequence[float] | Array, speed: float,
     """The chain at rest at `angles`: with N a basis of what the joints allow and λ their forces, its stiffness is Nᵀ (K
     + ∂(C λ)/∂q) N. Raises MethodRefusal, also where the state is not at rest."""
     if speed or torque:
-        raise MethodRefusal("exudyn_chain: linearized at rest alone")
+        raise MethodRefusal("exudyn_chain: can be linearized at rest only")
     state = scene_at(scene, angles, 0.0, 0.0)
     system = System(chain.parts(state, Loads(state), "euler_parameters"))
     linear = _extrapolated(system.linearized)
@@ -43,7 +43,7 @@ def linearize_chain(scene: Scene, angles: Sequence[float] | Array, speed: float,
     multipliers = np.asarray(np.linalg.lstsq(linear.C, force, rcond=None)[0], dtype=np.float64)
     residual = np.abs(force - linear.C @ multipliers).max()
     if residual > 1e-7 * np.abs(force).max(initial=0.0) + 1e-12 * np.abs(linear.K).max():
-        raise MethodRefusal(f"exudyn_chain: not at rest: {residual:g} N of the forces are not taken by the joints")
+        raise MethodRefusal(f"exudyn_chain: not at rest: {residual:g} N of the forces are not balanced by the joints")
     # Orthonormal basis of the velocities with Cᵀ q̇ = 0.
     vectors, singular_values, _ = np.linalg.svd(linear.C)
     rank = int(np.count_nonzero(singular_values > 1e-10 * singular_values[0]))

@@ -7,7 +7,7 @@ from importlib import import_module
 from itertools import product
 from typing import Any
 
-from rotor_mbs.methods.base import Method, late, stability_polynomial, step_ladder, tolerance_ladder
+from rotor_mbs.methods.base import Method, late, step_ladder, tolerance_ladder
 from rotor_mbs.methods.settings import choice, step
 from rotor_mbs.models.exudyn import schemes
 
@@ -69,15 +69,11 @@ METHODS = (
     _method(
         "exudyn_tree", "rk44", "RK44",
         settings=schemes.Rk44Settings, order=4, fixed_step=True,
-        stability_function=stability_polynomial(1, 1, 1 / 2, 1 / 6, 1 / 24),
         ladders=(step_ladder(10),),
     ),
     _method(
         "exudyn_tree", "rk67", "RK67",
         settings=schemes.Rk67Settings, order=6, fixed_step=True, is_default=True,
-        # To order 6 the exponential's; of the seventh stage b7 a76 a65 a54 a43 a32 a21 = -1/2160
-        # (J. C. Butcher, J. Austral. Math. Soc. 4 (1964), 179-194).
-        stability_function=stability_polynomial(1, 1, 1 / 2, 1 / 6, 1 / 24, 1 / 120, 1 / 720, -1 / 2160),
         ladders=(step_ladder(8),), linearize=late(f"{_LINEARIZATION}:linearize_tree"),
     ),
     _method(

@@ -62,7 +62,7 @@ class Dopri5Settings(Settings):
 
     relative_tolerance: float = number(0.0, at_least=0.0, doc="of the local error")
     absolute_tolerance: float = number(1e-11, above=0.0, doc="of the local error, rad and rad/s")
-    trial_steps: int = number(10_000, at_least=1, doc="trial steps between two samples after which a run is given up")
+    trial_steps: int = number(10_000, at_least=1, doc="largest number of trial steps between two samples")
 
     def scheme(self) -> Scheme:
         options = {

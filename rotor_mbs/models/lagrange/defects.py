@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import functools
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -12,7 +12,7 @@ import numpy as np
 from rotor_mbs.errors import InputError
 from rotor_mbs.methods.time_limit import stop_in_time
 from rotor_mbs.models.lagrange import closed_form
-from rotor_mbs.models.lagrange.heyoka_adapter import failure, is_available
+from rotor_mbs.models.lagrange.heyoka_adapter import is_available
 from rotor_mbs.models.lagrange.ode_solvers import Accelerations, OdeSolver, scipy_integrator
 from rotor_mbs.models.lagrange.parameters import load_segments, rate_units, resting_pitches, rotor_form
 from rotor_mbs.models.lagrange.samples import loads_at, sampled_loads
@@ -27,10 +27,12 @@ from rotor_mbs.solution.trajectory import Array, Trajectory
 _MAX_STEPS = 5_000
 # The transition matrices are wanted to a share of about 1e-5: Runge-Kutta steps of order 4 over a quarter of a radian.
 _RADIANS_PER_STEP = 0.25
+# Of an interval; where there are less than a thousand intervals, up to 16 times as many.
 _MAX_RUNGE_KUTTA_STEPS = 32
 # Rows of a window in which rates are found from angles: two leave no residual, and noise as it is.
 FIT_ROWS = 5
 _FIT_ROUNDS = 4
+_SIDE = 1e-9  # of a step
 _DIFFERENCE = 1e-7  # rad and rate units: rounding and curvature are a share of 1e-8 or so of a matrix's entries
 
 
@@ -60,7 +62,7 @@ def interval_defects(
     moving = scene.moving_coordinates
     states = np.hstack([angles[:, moving], rates[:, moving]])
     half = len(moving)
-    ends = interval_ends(scene, time, states)
+    ends = interval_ends(scene, time[:-1], time[1:], states[:-1])
     angle_defects, rate_defects = angles[:-1] - angles[1:], rates[:-1] - rates[1:]  # of pitches that are fixed
     angle_defects[:, moving] = ends[:, :half] - states[1:, :half]
     rate_defects[:, moving] = ends[:, half:] - states[1:, half:]
@@ -111,7 +113,7 @@ def fitted_rates(scene: Scene, time: Array, angles: Array) -> Array:
     if count < FIT_ROWS:
         raise InputError(f"{count} rows; allowed: at least {FIT_ROWS} where the rates are to be found from the angles")
     if not np.abs(angles).max() <= ANGLE_LIMIT:
-        raise InputError(f"angles over {ANGLE_LIMIT:g} rad have no digits to find rates from")
+        raise InputError(f"angles over {ANGLE_LIMIT:g} rad are not resolved finely enough to find rates from")
     moving = scene.moving_coordinates
     half = len(moving)
     rates = np.zeros_like(angles)
@@ -127,7 +129,7 @@ def fitted_rates(scene: Scene, time: Array, angles: Array) -> Array:
         transitions = _transitions(scene, time, states)
         if transitions is None:
             raise InputError("the rates cannot be found from the angles: the rows are too far apart for this motion")
-        jumps = interval_ends(scene, time, states) - states[1:]
+        jumps = interval_ends(scene, time[:-1], time[1:], states[:-1]) - states[1:]
         # Away from the data's own states: row by row matrix @ (at the first row) + offset.
         matrices = [np.broadcast_to(np.eye(2 * half), (len(firsts), 2 * half, 2 * half))]
         offsets = [np.zeros((len(firsts), 2 * half))]
@@ -138,7 +140,7 @@ def fitted_rates(scene: Scene, time: Array, angles: Array) -> Array:
         design = np.concatenate([matrix[:, :half] * scale for matrix in matrices], axis=1)
         residual = np.concatenate([offset[:, :half] for offset in offsets], axis=1)
         if not (np.isfinite(design).all() and np.isfinite(residual).all()):
-            raise InputError("the rates cannot be found from the angles: errors grow without limit between the rows")
+            raise InputError("the rates cannot be found from the angles: errors grow without bound between the rows")
         at_first = -np.einsum("kij,kj->ki", np.linalg.pinv(design), residual) * scale
         all_rows = np.stack(
             [np.einsum("kij,kj->ki", m, at_first) + offset for m, offset in zip(matrices, offsets, strict=True)]
@@ -147,50 +149,36 @@ def fitted_rates(scene: Scene, time: Array, angles: Array) -> Array:
     return rates
 
 
-def interval_ends(
-    scene: Scene,
-    time: Array,
-    states: Array,
-    intervals: Sequence[int] | None = None,
-    equations: Accelerations | None = None,
-) -> Array:
-    """Where the closed form gets from rows of states by the time of the next row.
+def interval_ends(scene: Scene, begins: Array, ends: Array, states: Array) -> Array:
+    """Where the closed form gets from each row of states.
 
     Parameters
     ----------
-    time, states : (n,) s and (n, m) angles, then rates, of the coordinates that move.
-    intervals : the numbers of the rows that are begun at; all n - 1 where left out.
-    equations : in place of the closed form's, as of `reference.motion_at`.
+    begins, ends : (n,) s, of the rows, increasing, and until when.
+    states : (n, m) angles, then rates, of the coordinates that move.
 
     Returns
     -------
-    (intervals, m)
+    (n, m)
         NaN where it does not get there.
     """
     segments = load_segments(scene)
-    if is_available() and equations is None:
-        advance = _advance_by_taylor(scene, states.shape[1])
-    else:
-        advance = _advance_by_dop853(scene, equations)
-    chosen = range(len(states) - 1) if intervals is None else intervals
-    ends = np.full((len(chosen), states.shape[1]), np.nan)
+    advance = (_advance_by_taylor if is_available() else _advance_by_dop853)(scene, states.shape[1])
+    reached_states = states.astype(float)
     place = 0
-    for row, k in enumerate(chosen):
+    for k, (state, begin, end) in enumerate(zip(states, begins.tolist(), ends.tolist(), strict=True)):
         stop_in_time()
-        state, reached = states[k], float(time[k])
+        reached = begin
         while place + 1 < len(segments) and segments[place].end <= reached:
             place += 1
         part = place
-        while True:
-            segment = segments[part]
-            # Data may go on after the scene's end, with the last loads.
-            end = float(time[k + 1]) if part + 1 == len(segments) else min(float(time[k + 1]), segment.end)
-            state = advance(segment, reached, end, state)
-            reached, part = end, part + 1
-            if reached >= time[k + 1] or not np.isfinite(state).all():
-                break
-        ends[row] = state
-    return ends
+        # Data may go on after the scene's end, with the last loads.
+        while part + 1 < len(segments) and segments[part].end < end:
+            state = advance(segments[part], reached, segments[part].end, state)
+            reached, part = segments[part].end, part + 1
+        if reached < end:
+            reached_states[k] = advance(segments[part], reached, end, state)
+    return reached_states
 
 
 _Advance = Callable[[Segment, float, float, Array], Array]
@@ -208,17 +196,19 @@ def _advance_by_taylor(scene: Scene, count: int) -> _Advance:
             entered[:] = [segment]
             propagation.enter(segment)
         integrator.time = start
-        state[:] = 0.0  # the work, too, where it is a variable
         state[:count] = values
-        outcome = integrator.propagate_until(end, max_steps=_MAX_STEPS)[0]
-        return np.full(count, np.nan) if failure(outcome) else state[:count].copy()
+        state[count:] = 0.0  # the work, where it is a variable
+        integrator.propagate_until(end, max_steps=_MAX_STEPS)
+        if integrator.time != end:  # too many steps, or not finite: what comes after it is neither
+            state[:count] = np.nan
+        return np.asarray(state[:count])
 
     return advance
 
 
-def _advance_by_dop853(scene: Scene, equations: Accelerations | None) -> _Advance:
+def _advance_by_dop853(scene: Scene, _: int) -> _Advance:
     integrator = scipy_integrator("DOP853", 2.3e-14, 1e-16)
-    solver = OdeSolver(replace(scene, outputs=("angles", "rates")), integrator, accelerations=equations)
+    solver = OdeSolver(replace(scene, outputs=("angles", "rates")), integrator)
 
     def advance(segment: Segment, start: float, end: float, values: Array) -> Array:
         part = solver.advance(Segment(start, end, segment.lines), values, np.empty(0))
@@ -231,7 +221,8 @@ def _growth_rate(scene: Scene, states: Array) -> float:
     """1/s: of a blade that is an inverted pendulum, or the rates of the motion; springs and dampers make none grow."""
     blades = rotor_form(scene).blades
     falling = [math.sqrt(math.hypot(blade.weight_x, blade.weight_y) / blade.pitch_inertia) for blade in blades]
-    turning = float(np.nanmax(np.median(np.abs(states[:, states.shape[1] // 2 :]), axis=0)))
+    finite = states[np.isfinite(states).all(axis=1), states.shape[1] // 2 :]
+    turning = float(np.median(np.abs(finite), axis=0).max()) if len(finite) else 0.0
     return max([*falling, turning])
 
 
@@ -242,7 +233,7 @@ def _transitions(scene: Scene, time: Array, states: Array) -> Array | None:
     count = 2 * half
     if len(time) < 2:
         return np.empty((0, count, count))
-    steps = _explicit_steps(scene, time, states)
+    steps = explicit_steps(scene, np.diff(time), states)
     if steps is None:
         return None
     units = np.concatenate([np.ones(half), rate_units(scene)])
@@ -250,47 +241,43 @@ def _transitions(scene: Scene, time: Array, states: Array) -> Array | None:
     moved = np.repeat(states[:-1].T[:, None, :], 1 + count, axis=1)
     for i in range(count):
         moved[i, 1 + i] += _DIFFERENCE * units[i]
-    moved = _runge_kutta(scene, time, moved, steps)
+    moved = quick_ends(scene, time[:-1], time[1:], moved, steps)
     with np.errstate(all="ignore"):
         columns = (moved[:, 1:] - moved[:, :1]) / (_DIFFERENCE * units[None, :, None])
     return np.ascontiguousarray(columns.transpose(2, 0, 1))
 
 
-def change_of_ends(scene: Scene, other: Scene, time: Array, states: Array) -> Array | None:
-    """(n - 1, m) how much further another scene with the same coordinates gets from each row of states by the time of
-    the next one, to a share of some 1e-5; None where the motion is too stiff for explicit steps."""
-    steps = _explicit_steps(scene, time, states)
-    if steps is None or other.moving_coordinates != scene.moving_coordinates:
-        return None
-    start = states[:-1].T[:, None, :]
-    ends = [_runge_kutta(rotor, time, start, steps)[:, 0].T for rotor in (other, scene)]
-    return np.asarray(ends[0] - ends[1])
-
-
-def _explicit_steps(scene: Scene, time: Array, states: Array) -> int | None:
-    """How many steps of Runge and Kutta an interval takes; None where they are too many."""
+def explicit_steps(scene: Scene, intervals: Array, states: Array) -> int | None:
+    """How many steps of Runge and Kutta each of (n,) intervals (s) takes; None where they are too many."""
     half = states.shape[1] // 2
     fastest = float(np.max(np.where(np.isfinite(states[:, half:]), np.abs(states[:, half:]), 0.0)))
     for blade in rotor_form(scene).blades:
         moment = blade.stiffness + math.hypot(blade.weight_x, blade.weight_y)
         fastest = max(fastest, math.sqrt(moment / blade.pitch_inertia), blade.damping / blade.pitch_inertia)
-    steps = fastest * float(np.diff(time).max()) / _RADIANS_PER_STEP
-    return max(math.ceil(steps), 1) if steps <= _MAX_RUNGE_KUTTA_STEPS else None
+    steps = fastest * float(intervals.max()) / _RADIANS_PER_STEP
+    most = _MAX_RUNGE_KUTTA_STEPS * max(1.0, min(1000.0 / len(intervals), 16.0))
+    return max(math.ceil(steps), 1) if steps <= most else None
 
 
-def _runge_kutta(scene: Scene, time: Array, states: Array, steps: int) -> Array:
-    """The ends of all n - 1 intervals from (m, k, n - 1) states, k of each, in steps of order 4."""
+def quick_ends(
+    scene: Scene, begins: Array, ends: Array, states: Array, steps: int, equations: Accelerations | None = None
+) -> Array:
+    """The ends of n intervals from (m, ..., n) states, all at once, in steps of order 4; by `equations` in place of the
+    closed form's. Differences of two calls are right to a share of some 1e-5."""
     form, half = rotor_form(scene), len(states) // 2
+    equations = equations or closed_form.accelerations
+    h = (ends - begins) / steps
 
     def derivative(at: Array, state: Array) -> Array:
         angles, rates = list(state[:half]), list(state[half:])
-        accelerations = closed_form.accelerations(angles, rates, form, loads_at(scene, at), np.sin, np.cos)
+        # At a jump the interval's own side of it counts.
+        inside = np.clip(at, begins + _SIDE * h, ends - _SIDE * h)
+        accelerations = equations(angles, rates, form, loads_at(scene, inside), np.sin, np.cos)
         return np.concatenate([state[half:], np.stack([np.broadcast_to(row, rates[0].shape) for row in accelerations])])
 
-    h = np.diff(time) / steps
     with np.errstate(all="ignore"):
         for step in range(steps):
-            at = time[:-1] + step * h
+            at = begins + step * h
             k1 = derivative(at, states)
             k2 = derivative(at + 0.5 * h, states + 0.5 * h * k1)
             k3 = derivative(at + 0.5 * h, states + 0.5 * h * k2)

@@ -97,5 +97,5 @@ def failure(outcome: Any) -> str:
     if outcome == outcomes.time_limit:
         return ""
     if outcome == outcomes.err_nf_state:
-        return "the state stopped being finite (heyoka: err_nf_state)"
+        return "the state became non-finite (heyoka: err_nf_state)"
     return f"heyoka: {str(outcome).rsplit('.', 1)[-1]}"

@@ -1,5 +1,5 @@
 """The closed form in quad precision, a bound on its error from two tolerances, and the growth of errors; in doubles at
-chosen times, as it is, with terms left out, or with blades elsewhere."""
+chosen times; the closed form with terms left out, or with blades elsewhere."""
 
 from __future__ import annotations
 
@@ -192,19 +192,6 @@ def reference_at(scene: Scene, times: Array) -> TimedReference:
     return TimedReference(trajectory, growth, units)
 
 
-def motion_at(scene: Scene, times: Array, equations: Accelerations | None = None) -> Trajectory:
-    """The motion at `times`, (n,) s, increasing from 0 up to the duration at most; fewer rows where it ends early. By
-    `equations` in place of the closed form, one of `LEFT_OUT` or of `at_azimuths`, where they are given."""
-    if equations is None and is_available():
-        # Compact: a scene of another structure is compiled anew, and is mostly run a few times.
-        run = Propagation(scene, times=times, tol=2.0**-52, compact_mode=True, high_accuracy=True)
-        run.integrate()
-        return run.observe()
-    solver = OdeSolver(scene, scipy_integrator("DOP853", 1e-12, 1e-14), times, equations)
-    solver.integrate()
-    return solver.observe()
-
-
 def at_azimuths(scene: Scene, azimuths: Sequence[float]) -> Accelerations:
     """The closed form with each blade at another angle about the shaft than `Scene.phases`: (blades,) rad."""
     form = rotor_form(scene, phases=[(Fraction(math.cos(angle)), Fraction(math.sin(angle))) for angle in azimuths])
@@ -215,11 +202,11 @@ def _sum(*parts: tuple[float, float, float]) -> Accelerations:
     """The sum of (weight, factor of the rotor's rate, factor of the pitches' rates)."""
 
     def equations(angles: Sequence[Number], rates: Sequence[Number], *rest: Any) -> list[Number]:
-        total = np.zeros(len(rates))
+        total: Any = 0.0
         for weight, spin, pitch in parts:
             parted = [spin * rates[0], *(pitch * rate for rate in rates[1:])]
-            total += weight * np.array(closed_form.accelerations(angles, parted, *rest))
-        return total.tolist()
+            total = total + weight * np.array(closed_form.accelerations(angles, parted, *rest))
+        return list(total)
 
     return equations
 

@@ -7,15 +7,14 @@ from dataclasses import dataclass
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from rotor_mbs.errors import InputError, MethodRefusal
-from rotor_mbs.methods.base import BuiltItem, Method, Solver, late, stability_polynomial, step_ladder
+from rotor_mbs.errors import MethodRefusal
+from rotor_mbs.methods.base import BuiltItem, Method, Solver, late, step_ladder
 from rotor_mbs.methods.settings import Settings, step
 
 if TYPE_CHECKING:
     from rotor_mbs.scenario.scene import Scene
 
 _HINT = "pip install 'rotor_mbs[mujoco]'"
-_MAX_STEPS = 1e10
 
 
 @dataclass(frozen=True)
@@ -42,8 +41,6 @@ def _items(scene: Scene) -> list[BuiltItem]:
 def _build(integrator: str) -> Callable[[Scene, Any], Solver]:
     def build(scene: Scene, settings: Rk4Settings | ImplicitFastSettings) -> Solver:
         _items(scene)
-        if scene.duration / settings.step > _MAX_STEPS:
-            raise InputError(f"setting step: {settings.step:g} s makes more than {_MAX_STEPS:g} steps")
         from rotor_mbs.models.mujoco.solver import MujocoSolver
 
         return MujocoSolver(scene, integrator, settings.step)
@@ -68,7 +65,6 @@ def _method(integrator: str, label: str, **facts: Any) -> Method:
 METHODS = (
     _method(
         "rk4", "RK4", settings=Rk4Settings, order=4,
-        stability_function=stability_polynomial(1, 1, 1 / 2, 1 / 6, 1 / 24),
         ladders=(step_ladder(10),),
         linearize=late("rotor_mbs.models.mujoco.solver:linearize"),
     ),

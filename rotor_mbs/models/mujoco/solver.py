@@ -56,7 +56,7 @@ class Engine:
         try:
             self._model = _engine.MjModel.from_xml_string(mjcf)
         except ValueError as exc:
-            raise MethodRefusal(f"MuJoCo does not take this model: {' '.join(str(exc).split())[:300]}") from exc
+            raise MethodRefusal(f"MuJoCo rejected this model: {' '.join(str(exc).split())[:300]}") from exc
         for values in (self._model.body_mass, self._model.body_inertia):
             values[values <= least] = 0.0
         self._data = _engine.MjData(self._model)
