@@ -1,15 +1,12 @@
-"""What is known of a scene without any model: exact solutions, its symmetries."""
+"""What is known of a scene without any model: exact solutions."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 
 from rotor_mbs.scenario.scene import Blade, Scene
-from rotor_mbs.scenario.time_table import Table
 from rotor_mbs.solution.trajectory import Array
 
 
@@ -74,56 +71,3 @@ def escape_rate(scene: Scene) -> float | None:
     if is_rigid or in_bearing or scene.gravity <= 0.0 or not arms:
         return None
     return math.sqrt(scene.gravity / min(arms))
-
-
-def mirrored(scene: Scene) -> Scene:
-    """The mirror image in the plane of rotation: pitches and the blades' y change sign, the rotor angle does not."""
-    blades = []
-    for blade in scene.blades:
-        x, y, z = blade.centre_of_mass
-        xx, yy, zz, xy, xz, yz = blade.inertia
-        blades.append(replace(blade, centre_of_mass=(x, -y, z), inertia=(xx, yy, zz, -xy, xz, -yz)))
-    return replace(
-        scene,
-        blades=tuple(blades),
-        initial_angles=(scene.initial_angles[0], *(-angle for angle in scene.initial_angles[1:])),
-        initial_rates=(scene.initial_rates[0], *(-rate for rate in scene.initial_rates[1:])),
-        pitch_torque=tuple(map(_negative, scene.pitch_torque)),
-        bearing_rest=tuple(map(_negative, scene.bearing_rest)),
-    )
-
-
-def _negative(table: Table) -> Table:
-    return tuple((time, -value) for time, value in table)
-
-
-def mirror_error(angles: Array, other: Array) -> float:
-    """rad: of (n, 1 + blades) angles of a scene and of its mirror image."""
-    sign = np.array([1.0, *([-1.0] * (angles.shape[1] - 1))])
-    return float(np.abs(angles - sign * other).max())
-
-
-def relabelled(scene: Scene) -> Scene:
-    """The rotor with every blade's number raised by one; the rotor's zero goes back by a blade's phase."""
-    turn = 2.0 * math.pi / len(scene.blades)
-    return replace(
-        scene,
-        blades=_rolled(scene.blades),
-        initial_angles=(scene.initial_angles[0] - turn, *_rolled(scene.initial_angles[1:])),
-        initial_rates=(scene.initial_rates[0], *_rolled(scene.initial_rates[1:])),
-        bearing_stiffness=_rolled(scene.bearing_stiffness),
-        bearing_damping=_rolled(scene.bearing_damping),
-        pitch_torque=_rolled(scene.pitch_torque),
-        bearing_rest=_rolled(scene.bearing_rest),
-    )
-
-
-def _rolled(values: Sequence[object]) -> tuple:  # type: ignore[type-arg]
-    return (*values[-1:], *values[:-1])
-
-
-def relabelling_error(angles: Array, other: Array) -> float:
-    """rad: of angles of a scene and of the relabelled scene."""
-    turn = 2.0 * math.pi / (angles.shape[1] - 1)
-    rotor = np.abs(angles[:, 0] - (other[:, 0] + turn)).max()
-    return float(max(rotor, np.abs(angles[:, 1:] - np.roll(other[:, 1:], -1, axis=1)).max()))

@@ -1,9 +1,16 @@
-"""What the paper says, read from the shipped files under `reference/`: numbers, claims, errata, its entries checked."""
+"""What the paper says, read from the shipped files under `reference/`: numbers, claims, errata, its entries checked.
+
+The paper's runs are chaotic: a claim may hold for one rounding and fail for the next. So its verdict is that of runs
+from many starts moved by rounding, for several durations, as reference/claims.json has it.
+"""
 
 from __future__ import annotations
 
 import csv
+import functools
+import json
 import tomllib
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal, NamedTuple
 
@@ -20,21 +27,11 @@ class TrajectoryNumber(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Condition:
-    """`of` stands in `relation` to another number, or to a bound; "opposite" means of opposite sign."""
-
-    of: TrajectoryNumber
-    relation: Literal["<", ">", "opposite"]
-    than: TrajectoryNumber | None = None
-    bound: float | None = None
-
-
-@dataclass(frozen=True)
 class Published:
     """A number or claim of the paper, as in reference/published.toml.
 
     A number has of, value, decimals; a claim has statement, tests. rounding: of a number, whether it is amplified
-    rounding error, which depends on how the equations are written.
+    rounding error, which depends on how the equations are written. scenes: whose runs decide it.
     """
 
     id: str
@@ -46,21 +43,12 @@ class Published:
     value: float = 0.0
     decimals: int = 0
     rounding: bool = False
-    tests: tuple[Condition, ...] = ()
+    tests: Sequence[Mapping[str, Any]] = ()
+    scenes: frozenset[str] = frozenset()
 
     @property
     def is_number(self) -> bool:
         return self.kind == "number"
-
-    @property
-    def numbers(self) -> list[TrajectoryNumber]:
-        """All that is read off runs for it, each once."""
-        sides = [self.of, *(side for test in self.tests for side in (test.of, test.than))]
-        return list(dict.fromkeys(side for side in sides if side is not None))
-
-    @property
-    def scenes(self) -> frozenset[str]:
-        return frozenset(number.scene for number in self.numbers)
 
 
 @dataclass(frozen=True)
@@ -99,13 +87,11 @@ def published() -> tuple[Published, ...]:
     """All numbers and claims, in the order of the file."""
     items = []
     for table in _tables("published")["published"]:
+        sides = [test[side] for test in table.get("tests", ()) for side in ("of", "than") if side in test]
         if "of" in table:
             table["of"] = TrajectoryNumber(*table["of"])
-        tests = []
-        for test in table.get("tests", ()):
-            sides = {key: TrajectoryNumber(*test[key]) for key in ("of", "than") if key in test}
-            tests.append(Condition(**test | sides))
-        items.append(Published(**table | {"tests": tuple(tests)}))
+            sides.append(table["of"])
+        items.append(Published(**table, scenes=frozenset(scene for scene, *_ in sides)))
     return tuple(items)
 
 
@@ -133,3 +119,58 @@ def checked_entries() -> list[CheckedEntry]:
     for row in rows:
         row["difference"], row["agrees"] = float(row["difference"]), row["agrees"] == "True"
     return [CheckedEntry(**row) for row in rows]
+
+
+HOLDS, FAILS, UNDECIDED = "holds", "fails", "undecided"
+
+
+class TrialTable(NamedTuple):
+    """The published numbers under other conditions: captions, and a row for each condition.
+
+    rows: texts of the condition; the numbers in rad or rad/s, None where there is none; whether each has the printed
+    digits.
+    """
+
+    caption: str
+    head: Sequence[str]
+    rows: Sequence[tuple[Sequence[str], Sequence[float | None], Sequence[bool]]]
+
+
+@dataclass(frozen=True)
+class ClaimStudy:
+    """The claims in words tested on many runs, and the numbers under other conditions.
+
+    rule : of the verdicts, in words.
+    runs, spread : of each scene; rad, by which their starts were moved at most.
+    methods, durations : the printed and the corrected equations; s.
+    verdicts : "holds", "fails" or "undecided" of each claim by method.
+    shares : of each claim by method, for each duration: the share of the deciding runs in which it holds (None
+        where none decides), and how many decide.
+    numbers : ids of those in `trials`.
+    """
+
+    rule: str
+    runs: int
+    spread: float
+    methods: Sequence[str]
+    durations: Sequence[float]
+    verdicts: Mapping[str, Mapping[str, str]]
+    shares: Mapping[str, Mapping[str, Sequence[tuple[float | None, int]]]]
+    numbers: Sequence[str]
+    trials: Sequence[TrialTable]
+
+    def count(self, method: str, verdict: str) -> int:
+        """How many claims have this verdict by the method."""
+        return sum(verdicts[method] == verdict for verdicts in self.verdicts.values())
+
+
+@functools.cache
+def claim_study() -> ClaimStudy:
+    """Read reference/claims.json, which `tests/support/make_claims.py` makes.
+
+    >>> claim_study().verdicts["fig11-pitches-grow"]["printed/ode45"]
+    'holds'
+    """
+    stored = json.loads((reference_folder() / "claims.json").read_text(encoding="utf-8"))
+    stored["trials"] = [TrialTable(**table) for table in stored["trials"]]
+    return ClaimStudy(**stored)

@@ -1,4 +1,4 @@
-"""The map of the stability suite: every scene and method as one of a few outcomes, and what to use which method for."""
+"""The stability suite as a map: how each method ends on every scene, whether a smaller step helps, which is fastest."""
 
 from __future__ import annotations
 
@@ -11,37 +11,30 @@ import numpy as np
 from rotor_mbs.runs.read import StoredRun, StoredScene, open_results
 from rotor_mbs.runs.records import Record, read_records
 from rotor_mbs.solution.status import code_of
-from rotor_mbs.solution.text_table import listed
+from rotor_mbs.solution.text_table import TextTable
 
 TARGET = 1e-6  # rad: what a method must reach on the stiff and light scenes
 
-# Outcome -> symbol, text. Colour is the report's.
+# What the map shows of a run: its status, or one of two that say more. Symbol, text; colour is the report's.
 OUTCOMES = {
-    "holds": ("✓", "holds"),
-    "energy_alone": ("E", "conserves energy; there is nothing else to compare it with"),
-    "smaller_step": ("▾", "holds with a smaller step"),
-    "inaccurate": ("≈", "ends, but off its bound"),
-    "loses_energy": ("↯", "loses or makes energy"),
-    "says_so": ("✗", "fails and reports it"),
-    "false_success": ("!", "fails and claims success"),
-    "refuses": ("–", "refuses a scene in which no motion exists"),
-    "timed_out": ("T", "too slow for the time limit"),
-    "unchecked": ("?", "ends; there is nothing to judge it by"),
+    "ok": ("✓", "ok"),
+    "energy_alone": ("E", "ok by its energy; there is nothing else to compare it with"),
+    "smaller_step": ("▾", "ok with a smaller step"),
+    "inaccurate": ("≈", "inaccurate: ends, but off its bound"),
+    "diverged": ("↯", "diverged"),
+    "singular": ("S", "singular"),
+    "solver_failed": ("✗", "solver failed"),
+    "timed_out": ("T", "timed out"),
+    "unchecked": ("?", "unchecked: ends; there is nothing to judge it by"),
 }
-
-_HOLDS = ("holds", "energy_alone")
-
-# Above this share of the energy scale a run has not merely lost digits.
-_ENERGY_LOST = 1e-3
 
 
 @dataclass(frozen=True)
 class SuiteRun:
     """A run of the suite: a scene by a method.
 
-    outcome: a key of OUTCOMES, from the run's status and what a ladder of steps found. angle_error: rad up to the
-    horizon, None where nothing is compared. time_reached: s, of the last finite sample. step: s, that 1e-6 rad needs,
-    where a ladder found it.
+    outcome: a key of OUTCOMES. angle_error: rad up to the horizon, None where nothing is compared. time_reached: s, of
+    the last finite sample. step: s, that 1e-6 rad needs, where a ladder found it.
     """
 
     scene: str
@@ -56,7 +49,6 @@ class SuiteRun:
     run_time_s: float
     time_reached: float
     step: float | None
-    reaches_target: bool
 
     @property
     def family(self) -> str:
@@ -70,6 +62,12 @@ class SuiteRun:
     @property
     def is_stiff_or_light(self) -> bool:
         return self.family in ("stiff", "light")
+
+    @property
+    def reaches_target(self) -> bool:
+        """Whether it is ok within 1e-6 rad, or a smaller step is."""
+        is_close = self.status == "ok" and self.angle_error is not None and self.angle_error <= TARGET
+        return is_close or self.step is not None
 
 
 _FAMILIES = {  # of scenes whose names do not begin with that of their family
@@ -93,52 +91,45 @@ def suite_runs(path: Path) -> list[SuiteRun]:
 
 
 def _suite_run(scene: StoredScene, run: StoredRun, ladder: Record | None) -> SuiteRun:
-    facts, reference = run.attributes, scene.reference
-    message, error = str(facts.get("message", "")), facts.get("angle_error_max")
-    drift, time = facts.get("energy_drift_max"), run.array("time")
-    has_reference = reference is not None and reference.status == "ok"
-    step, steps_hold, reaches_target = None, False, run.status == "ok" and error is not None and error <= TARGET
-    if ladder is not None:
-        step, steps_ok = ladder.attributes.get("step_for_target_s"), ladder.arrays["status"] == code_of("ok")
-        steps_hold = bool(steps_ok.any())
-        reaches_target |= bool(np.any(steps_ok & (ladder.arrays["angle_error_max"] <= TARGET)))
-    if run.status == "ok" and error is not None:
-        outcome = "holds"
-    elif run.status == "ok":
-        outcome = "energy_alone"
+    facts, reference, time = run.attributes, scene.reference, run.array("time")
+    outcome, message = run.status, str(facts.get("message", ""))
+    if run.status == "ok" and "angle_error_max" not in facts:
         reason = "the horizon is before the second sample"
         if reference is None:
             reason = "there is no reference"
         elif len(reference.array("time")) < 2:
             reason = f"no reference ({reference.attributes['message']})"
-        message = f"judged by its energy alone: {reason}"
-    elif steps_hold:
+        outcome, message = "energy_alone", f"judged by its energy alone: {reason}"
+    elif run.status != "ok" and ladder is not None and np.any(ladder.arrays["status"] == code_of("ok")):
         outcome = "smaller_step"
-    elif run.status in ("timed_out", "unchecked"):
-        outcome = run.status
-    elif facts.get("false_success", 0):
-        outcome = "false_success"
-    elif run.status == "singular" and not has_reference:
-        outcome = "refuses"
-    elif run.status != "inaccurate":
-        outcome = "says_so"
-    else:
-        outcome = "inaccurate" if (drift or 0.0) <= _ENERGY_LOST else "loses_energy"
     return SuiteRun(
-        scene.name,
-        run.method,
-        run.status,
-        outcome,
-        message,
-        bool(facts.get("false_success", 0)),
-        has_reference,
-        None if error is None else float(error),
-        drift,
-        float(facts["run_time_s"]),
-        float(time[-1]) if len(time) else 0.0,
-        None if step is None else float(step),
-        reaches_target,
+        scene=scene.name,
+        method=run.method,
+        status=run.status,
+        outcome=outcome,
+        message=message,
+        false_success=bool(facts.get("false_success", 0)),
+        has_reference=reference is not None and reference.status == "ok",
+        angle_error=facts.get("angle_error_max"),
+        energy_drift=facts.get("energy_drift_max"),
+        run_time_s=float(facts["run_time_s"]),
+        time_reached=float(time[-1]) if len(time) else 0.0,
+        step=None if ladder is None else ladder.attributes.get("step_for_target_s"),
     )
+
+
+def fastest_to_target(runs: Iterable[SuiteRun]) -> dict[str, str | None]:
+    """By scene with a reference, the method that is ok within 1e-6 rad, or with a smaller step, in the least time; None
+    where none is."""
+    fastest: dict[str, SuiteRun | None] = {}
+    for run in runs:
+        if not run.has_reference:
+            continue
+        before = fastest.setdefault(run.scene, None)
+        is_able = run.status == "ok" and run.reaches_target
+        if is_able and (before is None or run.run_time_s < before.run_time_s):
+            fastest[run.scene] = run
+    return {scene: None if run is None else run.method for scene, run in fastest.items()}
 
 
 def unreached(runs: Iterable[SuiteRun]) -> list[str]:
@@ -148,52 +139,21 @@ def unreached(runs: Iterable[SuiteRun]) -> list[str]:
     return [scene for scene in dict.fromkeys(run.scene for run in asked) if scene not in reached]
 
 
-def reached_by(runs: Iterable[SuiteRun], scene: str) -> str | None:
-    """The method that reaches 1e-6 rad on the scene in the least time; None where none does."""
-    able = [run for run in runs if run.scene == scene and run.status == "ok" and run.reaches_target]
-    return min(able, key=lambda run: run.run_time_s).method if able else None
+def family_table(runs: Sequence[SuiteRun], heading: Callable[[str], str] = str) -> TextTable:
+    """A row for each method, a column for each family of scenes: "12+1 of 14" are ok, of these 1 with a smaller step.
 
-
-def advice_lines(
-    runs: Sequence[SuiteRun], label: Callable[[str], str] = str, heading: Callable[[str], str] = str
-) -> list[str]:
-    """Where each method holds, what to use it for and what not, a line per method.
-
-    By family of scenes: use where nine tenths hold, not where fewer than half do even with a smaller step. label and
-    heading: how a method and a family are called.
+    Without scenes that are singular and have no reference: there no motion exists. heading: how a family is called.
     """
-    by_method: dict[str, list[SuiteRun]] = {}
-    for run in runs:
-        by_method.setdefault(run.method, []).append(run)
-    return [f"{label(method)}: {'; '.join(_advice(own, heading))}" for method, own in by_method.items()]
-
-
-def _advice(own: Sequence[SuiteRun], heading: Callable[[str], str]) -> list[str]:
-    use: list[str] = []
-    in_part: list[str] = []
-    avoid: list[str] = []
-    for family in dict.fromkeys(run.family for run in own):
-        outcomes = [run.outcome for run in own if run.family == family and run.outcome != "refuses"]
-        if not outcomes:
-            continue
-        holds = sum(outcome in _HOLDS for outcome in outcomes) / len(outcomes)
-        with_step = sum(outcome in (*_HOLDS, "smaller_step") for outcome in outcomes) / len(outcomes)
-        if holds >= 0.9:
-            use.append(family)
-        elif with_step >= 0.5:
-            in_part.append(family)
-        else:
-            avoid.append(family)
-    by_energy = sum(run.outcome == "energy_alone" for run in own)
-    alone = f" ({by_energy} by its energy alone)" if by_energy else ""
-    parts = [f"holds on {sum(run.outcome in _HOLDS for run in own)} of {len(own)}{alone}"]
-    smaller = any(run.outcome == "smaller_step" and run.family in in_part for run in own)
-    partly = "with a smaller step or not everywhere" if smaller else "not everywhere"
-    for action, families in (("use", use), (partly, in_part), ("do not use", avoid)):
-        if families:
-            parts.append(f"{action} for {listed([*map(heading, families)])}")
-    claimed = sum(run.false_success for run in own)
-    if claimed:
-        times = "once" if claimed == 1 else f"{claimed} times"
-        parts.append(f"its engine claimed success {times} where the state says otherwise")
-    return parts
+    compared = [run for run in runs if run.has_reference or run.status != "singular"]
+    families = list(dict.fromkeys(run.family for run in compared))
+    rows = []
+    for method in dict.fromkeys(run.method for run in runs):
+        cells = []
+        for family in families:
+            outcomes = [run.outcome for run in compared if run.method == method and run.family == family]
+            ok, smaller = sum(outcome in ("ok", "energy_alone") for outcome in outcomes), outcomes.count("smaller_step")
+            count = f"{ok}+{smaller}" if smaller else f"{ok}"
+            cells.append(f"{count} of {len(outcomes)}" if outcomes else "")
+        claimed = sum(run.false_success for run in runs if run.method == method)
+        rows.append((method, *cells, str(claimed)))
+    return TextTable(("method", *map(heading, families), "false successes"), rows)

@@ -11,6 +11,7 @@ from pathlib import Path
 from pkgutil import resolve_name
 from typing import TYPE_CHECKING, Any, Protocol
 
+from rotor_mbs.errors import InputError
 from rotor_mbs.methods.settings import Settings as Settings
 
 if TYPE_CHECKING:  # reading the catalogue needs none of them
@@ -21,6 +22,7 @@ if TYPE_CHECKING:  # reading the catalogue needs none of them
 
 
 STEP, TOLERANCE = "step", "tolerance"
+MAX_STEPS = 1e9  # of a run; the engines count them in 32 bits
 
 
 @dataclass(frozen=True)
@@ -90,6 +92,11 @@ class Solver(Protocol):
         """Samples of the last integration, cut before the first row that is not finite."""
 
 
+def no_items(_scene: Scene) -> list[BuiltItem]:
+    """Of a method that does not say what it builds."""
+    return []
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Method:
     """A model with one integrator.
@@ -109,7 +116,6 @@ class Method:
     fallback : name of the method to take where these are not installed; "" for none.
     order : order of convergence; None where it is not fixed.
     fixed_step : whether the step is the setting `step`.
-    stability_function : R(z) of one step for y' = λy, z = hλ; None for adaptive and implicit methods.
     ladders : settings it is benched with.
     relative_cost : run time as a multiple of the fastest method's, roughly: expensive methods are started first.
     bounds : accuracy bounds of a method from outside; those of built-in ones are in reference/accuracy.toml.
@@ -119,7 +125,7 @@ class Method:
         a model has it. Raises MethodRefusal for a state that the model cannot be linearized about.
     arrays : (settings) -> names of the quantities that not every method has and this one stores, such as
         "constraint_error".
-    sources : of a method from outside, the files whose code decides its runs.
+    sources : of a method from outside, the files whose code decides its runs, or the code itself.
     load : imports what it computes with, and prevents the use of compiled code from an earlier process: before
         timings, which exclude both.
     """
@@ -127,7 +133,7 @@ class Method:
     name: str
     label: str
     build: Callable[[Scene, Any], Solver]
-    items: Callable[[Scene], list[BuiltItem]]
+    items: Callable[[Scene], list[BuiltItem]] = no_items
     settings: type[Settings] = Settings
     is_corrected: bool = True
     is_default: bool = False
@@ -136,14 +142,13 @@ class Method:
     fallback: str = ""
     order: float | None = None
     fixed_step: bool = False
-    stability_function: Callable[[complex], complex] | None = None
     ladders: tuple[Ladder, ...] = ()
     relative_cost: float = 1.0
     bounds: tuple[Bound, ...] = ()
     solve_many: Callable[[Sequence[Scene], Any], RunBlock] | None = None
     linearize: Callable[[Scene, Any, float, float], Linearization] | None = None
     arrays: Callable[[Any], tuple[str, ...]] = lambda _: ()
-    sources: tuple[Path, ...] = ()
+    sources: tuple[Path | str, ...] = ()
     load: Callable[[], object] = lambda: None
 
     def __post_init__(self) -> None:
@@ -169,6 +174,16 @@ class Method:
     @property
     def defaults(self) -> dict[str, object]:
         return self.settings().as_dict()
+
+    def chosen(self, scene: Scene, given: Mapping[str, object]) -> Settings:
+        """The settings with the `given` values in place of defaults. Raises InputError for an unknown name, for a value
+        that is not allowed, and for a step that makes more than MAX_STEPS steps of the scene."""
+        chosen = self.settings.of(self.name, given)
+        step = getattr(chosen, STEP) if self.fixed_step else scene.duration
+        if scene.duration / step > MAX_STEPS:
+            what = f"step = {step:g} makes more than {MAX_STEPS:g} steps of {scene.duration:g} s"
+            raise InputError(f"{self.name}: {what}; allowed: a step of at least {scene.duration / MAX_STEPS:g} s")
+        return chosen
 
     def finer(self, settings: Mapping[str, object], interval: float) -> dict[str, object]:
         """The settings of the next finer rung of its ladder, {} at its end; interval: s, between samples."""
@@ -202,15 +217,3 @@ def _is_distribution_installed(distribution: str) -> bool:
 def late(place: str) -> Callable[..., Any]:
     """The function at "package.module:name", whose module is imported when it is first called."""
     return lambda *arguments: resolve_name(place)(*arguments)
-
-
-def stability_polynomial(*coefficients: float) -> Callable[[complex], complex]:
-    """R(z) of an explicit Runge-Kutta method, from its coefficients of z⁰ up."""
-
-    def stability_function(z: complex) -> complex:
-        value = 0j
-        for coefficient in reversed(coefficients):
-            value = value * z + coefficient
-        return value
-
-    return stability_function

@@ -1,25 +1,29 @@
-"""All methods by name: built-in ones, and those of installed packages (entry points). A model's code is imported when
-one of its methods is first used; its engine, when a solver is built. And which one to take for a scene where none is
-named: the rule is drawn from the stability suite."""
+"""All methods by name: built-in ones, those of installed packages (entry points), and those of files that were named. A
+model's code is imported when one of its methods is first used; its engine, when a solver is built. And which one to
+take for a scene where none is named: the rule is drawn from the stability suite."""
 
 from __future__ import annotations
 
 import functools
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from importlib import import_module, metadata
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
 from rotor_mbs.errors import InputError, MethodRefusal, nearest
 from rotor_mbs.methods.base import Ladder, Method
+from rotor_mbs.methods.method_file import ENDING, MethodFile, located, quiet, read_file
 
 if TYPE_CHECKING:  # `rotor-mbs list` reads no scene
     from rotor_mbs.scenario.scene import Scene
 
 REFERENCE = "reference"
 GROUP = "rotor_mbs.methods"
+
+R = TypeVar("R")
 
 # By the object that has them: how the names of its methods begin.
 _BUILT_IN: Mapping[str, tuple[str, ...]] = {
@@ -33,7 +37,7 @@ _BUILT_IN: Mapping[str, tuple[str, ...]] = {
 def methods() -> tuple[Method, ...]:
     """Every method, in the order of tables and legends; plug-ins last; the reference is not one of them."""
     built_in = (method for place in _BUILT_IN for method in _load(place) if method.name != REFERENCE)
-    return (*built_in, *_plug_ins().values())
+    return (*built_in, *_plug_ins().values(), *_of_files.values())
 
 
 def method_names(*, is_corrected: bool | None = None) -> tuple[str, ...]:
@@ -48,7 +52,7 @@ def look_up(name: str) -> Method | None:
             for method in _load(place):
                 if method.name == name:
                     return method
-    return _plug_ins().get(name)
+    return _of_files.get(name) or _plug_ins().get(name)
 
 
 def find_method(name: str) -> Method:
@@ -60,8 +64,9 @@ def find_method(name: str) -> Method:
 
 
 def check_names(names: str | Sequence[str]) -> tuple[str, ...]:
-    """The names, or the one name, once each, in order. Raises InputError with a line for every unknown one."""
-    names = (names,) if isinstance(names, str) else names
+    """The names, or the one name, once each, in order; of a Python file, those of all its methods. Raises InputError
+    with a line for every unknown one."""
+    names = _with_files([names] if isinstance(names, str) else names)
     known = method_names() if names else ()
     unknown = [name for name in names if name not in known]
     if unknown:
@@ -72,6 +77,54 @@ def check_names(names: str | Sequence[str]) -> tuple[str, ...]:
 def _unknown(name: str) -> str:
     known = method_names()
     return f"unknown method {name!r}{nearest(name, known)}; allowed: {', '.join(known)}"
+
+
+# Files that were named, by model, and their methods: state of this process, as a file may be edited between two calls.
+_files: dict[str, MethodFile] = {}
+_of_files: dict[str, Method] = {}
+
+
+def _with_files(names: Sequence[str]) -> list[str]:
+    """The names, those of a file's methods in place of its path. Raises InputError."""
+    expanded: list[str] = []
+    seen: dict[str, str] = {}
+    for name in names:
+        if not name.endswith(ENDING):
+            expanded.append(name)
+            continue
+        model = Path(name).stem
+        if Path(seen.setdefault(model, name)).resolve() != Path(name).resolve():
+            raise InputError(f"{name}: methods {model}/... are those of {seen[model]}; allowed: another file name")
+        expanded += _add(read_file(name))
+    return expanded
+
+
+def _add(file: MethodFile) -> list[str]:
+    """The names of its methods, which from now on are known."""
+    if _files.get(file.model) != file:
+        others = {name: method for name, method in _of_files.items() if method.model != file.model}
+        made = file.load([method for method in methods() if method.name not in _of_files])
+        _of_files.clear()
+        _of_files.update(others | made)
+        _files[file.model] = file
+    return [name for name, method in _of_files.items() if method.model == file.model]
+
+
+def with_method_files(work: Callable[..., R]) -> Callable[..., R]:
+    """`work` for another process, which gets the method files of this one, too, and where they print nothing."""
+    return partial(_in_worker, tuple(_files.values()), work) if _files else work
+
+
+def _in_worker(files: Sequence[MethodFile], work: Callable[..., R], *arguments: object) -> R:
+    with quiet():
+        for file in files:
+            _add(file)
+        return work(*arguments)
+
+
+def line_of(error: BaseException) -> str:
+    """One line of what a method raised, with file and line number where it is a file's."""
+    return located(error, [file.path for file in _files.values()])
 
 
 def settings_for(names: Sequence[str], given: Mapping[str, object]) -> dict[str, dict[str, object]]:
@@ -199,16 +252,16 @@ def choose(scene: Scene, defaults: tuple[str, ...]) -> tuple[tuple[str, ...], st
     with the reason where no motion exists to be followed."""
     reason = singular_reason(scene)
     if reason:
-        raise MethodRefusal(f"{scene.name}: refused: {reason}; name a method with -m to see what it makes of it")
+        raise MethodRefusal(f"{scene.name}: refused: {reason}; select a method with -m to run it anyway")
     closed_form = next((name for name in defaults if name.partition("/")[0] == "lagrange"), "lagrange/dop853")
     swing, decay = fastest_rates(scene)
     if decay * scene.duration > _MAX_EXPLICIT_DECAY and decay > 10.0 * swing:
-        reason = f"overdamped, fastest decay {decay:.2g} /s: an implicit method beside it"
+        reason = f"overdamped, fastest decay {decay:.2g} /s: an implicit method in addition"
         return (closed_form, "lagrange/radau"), reason
     # One point-mass blade that may come to a quarter turn of its pitch, on a hub that is light beside it.
     is_alone = len(scene.blades) == 1 and scene.blades[0].is_point_mass and _leaves_zero_pitch(scene)
     if is_alone and scene.hub_inertia < _NO_STEP_PASSES * _rotor_inertia(scene):
-        return (closed_form,), "next to singular at a pitch of ±π/2: no other method passes there"
+        return (closed_form,), "nearly singular at a pitch of ±π/2: no other method passes there"
     if is_alone and scene.hub_inertia < _NEARLY_SINGULAR * _rotor_inertia(scene):
         return (closed_form, "lagrange/dop853"), "near the singular pitch of ±π/2: methods that choose their own step"
     if swing > _MAX_EXPLICIT_SWING:
@@ -217,7 +270,7 @@ def choose(scene: Scene, defaults: tuple[str, ...]) -> tuple[tuple[str, ...], st
     if swing * scene.duration > _MAX_FIXED_STEP_TURN:
         return (closed_form,), f"long, {swing * scene.duration:.2g} rad of the fastest swing: no fixed step"
     others = (name for name in defaults if name != closed_form)
-    return (closed_form, *others), "neither stiff, singular nor long: the default set, best of each model"
+    return (closed_form, *others), "neither stiff, singular nor long: the default set, the best method of each model"
 
 
 def fastest_rates(scene: Scene) -> tuple[float, float]:

@@ -30,7 +30,7 @@ def solve(
     judged, and holds a failure of the engine. Raises InputError for an unknown method or setting, MethodRefusal,
     OutOfTimeError where a method cannot keep the samples it reached."""
     method = find_method(method) if isinstance(method, str) else method
-    chosen = method.settings.of(method.name, settings)
+    chosen = method.chosen(scene, settings)
     start = time.perf_counter()
     solver = method.build(scene, chosen)
     setup = time.perf_counter() - start

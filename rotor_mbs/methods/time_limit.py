@@ -9,6 +9,9 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from numbers import Real
+
+from rotor_mbs.errors import InputError
 
 MESSAGE = "ended by its time limit"  # of a run that was
 _MAX_LIMIT_S = 1e9  # the system's timers take no more than the seconds of its clock
@@ -29,6 +32,13 @@ class _State(threading.local):
 
 
 _state = _State()
+
+
+def checked_seconds(timeout: float) -> float:
+    """A time limit in s. Raises InputError for what is none."""
+    if isinstance(timeout, bool) or not isinstance(timeout, Real) or not timeout > 0.0:
+        raise InputError(f"timeout: {timeout!r}; allowed: seconds, more than 0")
+    return float(timeout)
 
 
 @contextmanager

@@ -30,7 +30,7 @@ _SENTENCE = keys.Kind(keys.read_text, "a sentence")
 
 @dataclass(frozen=True, slots=True)
 class Bound:
-    """The largest value that passes, in the check's own unit, for methods that `method` (a pattern with *) fits."""
+    """The largest value that passes, in the check's own unit, for methods that fit the pattern `method`."""
 
     check: str = file_key("check", keys.choice(CHECKS))
     method: str = file_key("method", _PATTERN)

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rotor_mbs.errors import InputError, RotorError, nearest
-from rotor_mbs.scenario.toml_file import read_toml, shown_path
+from rotor_mbs.scenario.toml_file import parse_toml, shown_path
 
 if TYPE_CHECKING:  # `rotor-mbs list` reads no scene
     from rotor_mbs.scenario.scene import Scene
@@ -65,10 +65,10 @@ def list_sweeps() -> list[tuple[str, str]]:
     return [(f"{sweeps_folder().name}/{path.stem}", _title(path)) for path in paths]
 
 
-def find_scenes(arguments: Sequence[str]) -> list[Scene]:
+def find_scenes(arguments: Sequence[str], known_methods: Sequence[str] = ()) -> list[Scene]:
     """The scenes that names, folders and paths of TOML files mean, in their order, each once; a shipped name goes
-    before a path (write ./paper for a folder of one's own). Raises InputError with all errors of all arguments and
-    files."""
+    before a path (write ./paper for a folder of one's own). known_methods: what a file may name, () for anything.
+    Raises InputError with all errors of all arguments and files."""
     from rotor_mbs.scenario.scene import load_scene
 
     problems: list[str] = []
@@ -92,7 +92,7 @@ def find_scenes(arguments: Sequence[str]) -> list[Scene]:
             problems.append(f"{shown_path(path)}: {clash}; allowed: different names")
         by_name.setdefault(name, path)
         try:
-            scenes.append(load_scene(path, name))
+            scenes.append(load_scene(path, name, known_methods))
         except InputError as error:
             problems.extend(error.problems)
     if problems:
@@ -121,9 +121,10 @@ def _shipped() -> dict[str, Path]:
 
 
 def _title(path: Path) -> str:
+    """Of a shipped file: all of its tables come after the title, and reading them would take most of the time."""
     try:
-        title = read_toml(path)[1].get("title")
-    except InputError as error:
+        title = parse_toml(path.read_text(encoding="utf-8").partition("\n[")[0], shown_path(path)).get("title")
+    except (InputError, OSError, UnicodeDecodeError) as error:
         return f"(broken file: {error})"
     return title if isinstance(title, str) else "(broken file: no title)"
 

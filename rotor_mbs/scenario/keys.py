@@ -136,7 +136,7 @@ def shown(value: object) -> str:
     if isinstance(value, bool):
         return "true" if value else "false"
     if isinstance(value, int):
-        return str(value) if abs(value) < 10**30 else "so large a number"
+        return str(value) if abs(value) < 10**30 else "a number of over 30 digits"
     if isinstance(value, float):
         return repr(value)
     if isinstance(value, str):

@@ -33,6 +33,7 @@ from rotor_mbs.scenario.toml_file import (
     shown_path,
     toml_lines,
     toml_value,
+    unknown_methods,
 )
 
 if TYPE_CHECKING:
@@ -240,15 +241,18 @@ def _key(path: str, *declared: Any, part: Part = "rotor", added: bool = False, *
 class Scene:
     """A rotor and what happens to it. Blade i hangs at phase 2π(i-1)/len(blades) about the shaft (+y); z is up.
 
-    initial_angles, initial_rates   (1 + blades,) rad, rad/s: rotor, then a pitch per blade
-    rotor_torque                    a table over time (see time_table), N m
-    pitch_torque                    (blades,) tables over time, N m, between hub and blade; positive as the pitch is
-    bearing_stiffness, _damping     (blades,) N m/rad, N m s/rad; of the pitch and of its rate
-    bearing_rest                    (blades,) tables over time, rad: pitch at which the spring is unloaded
-    methods, settings               by which methods `run` computes it, and with what in place of their defaults; () for
-                                    what a rule and the methods say
-    text                            the TOML text it was read from
+    Attributes
+    ----------
+    initial_angles, initial_rates : (1 + blades,) rad, rad/s: rotor, then a pitch per blade.
+    rotor_torque : a table over time (see time_table), N m.
+    pitch_torque : (blades,) tables over time, N m, between hub and blade; positive as the pitch is.
+    bearing_stiffness, bearing_damping : (blades,) N m/rad, N m s/rad; of the pitch and of its rate.
+    bearing_rest : (blades,) tables over time, rad: pitch at which the spring is unloaded.
+    methods, settings : methods that `run` uses, and settings in place of their defaults; () for the default selection.
+    text : the TOML text it was read from.
 
+    Notes
+    -----
     Loads, springs and dampers that are zero throughout are (). The class takes any values: `load_scene`, `parse_scene`
     and `replace` validate.
     """
@@ -548,15 +552,16 @@ def _plain(value: object) -> object:
 __all__ = ["load_scene", "new_scene_text", "parse_scene", "scene_toml"]
 
 
-def load_scene(path: Path | str, name: str | None = None) -> Scene:
-    """The scene in the TOML file `path`, under `name` or the file's own. Raises InputError with all errors of the file,
-    a line each: `file:line: key: what is wrong; allowed: ...`; entries are counted from 0."""
+def load_scene(path: Path | str, name: str | None = None, known_methods: Sequence[str] = ()) -> Scene:
+    """The scene in the TOML file `path`, under `name` or the file's own. known_methods: what its `methods` may name, ()
+    for anything. Raises InputError with all errors of the file, a line each: `file:line: key: what is wrong; allowed:
+    ...`; entries are counted from 0."""
     path = Path(path)
     text, tables = read_toml(path)
     if "axis" in tables and "scene" in tables:
         shown = shown_path(path)
         raise InputError(f"{shown}: is a sweep; allowed: a scene, or: rotor-mbs sweep {shown}")
-    return _scene(text, tables, path.stem if name is None else name, shown_path(path))
+    return _scene(text, tables, path.stem if name is None else name, shown_path(path), known_methods)
 
 
 def parse_scene(text: str, name: str) -> Scene:
@@ -564,11 +569,15 @@ def parse_scene(text: str, name: str) -> Scene:
     return _scene(text, parse_toml(text, name), name, name)
 
 
-def _scene(text: str, tables: dict[str, Any], name: str, source: str) -> Scene:
+def _scene(text: str, tables: dict[str, Any], name: str, source: str, known_methods: Sequence[str] = ()) -> Scene:
+    problems = unknown_methods(tables, known_methods)
     try:
-        return scene_from_tables(tables, name, text)
+        scene = scene_from_tables(tables, name, text)
     except TableError as error:
-        raise error.in_file(text, source) from error
+        problems += error.problems
+    if problems:
+        raise TableError(problems).in_file(text, source)
+    return scene
 
 
 _HEADER = """\
@@ -623,7 +632,7 @@ def new_scene_text() -> str:
     return "\n".join(parts)
 
 
-# Numbers that are allowed and yet look like a slip: degrees for radians, millimetres for metres, tonnes.
+# Numbers that are allowed but implausible: degrees for radians, millimetres for metres, tonnes.
 
 TURN = 2.0 * math.pi
 MAX_RATE = 100.0  # rad/s: a thousand revolutions per minute

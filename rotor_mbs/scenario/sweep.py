@@ -39,111 +39,13 @@ from rotor_mbs.scenario.toml_file import (
     read_toml,
     shown_path,
     toml_lines,
+    unknown_methods,
 )
 
 Array = NDArray[np.float64]
 
 SPLITS = ("train", "validation", "test")
 DRAWN = ("uniform", "normal", "sobol")
-
-
-@dataclass(frozen=True)
-class Axis:
-    key: str
-    kind: str  # values, linear, log, uniform, normal or sobol
-    numbers: tuple[float, ...]  # the values; start and end; low and high; or mean and standard deviation
-    count: int  # how many values; of a random axis, how many draws
-
-    @property
-    def is_drawn(self) -> bool:
-        return self.kind in DRAWN
-
-
-@dataclass(frozen=True)
-class Design:
-    """All rows of a sweep: axes, how they are combined, and the seed of every draw. In a "grid" the last axis is the
-    fastest, and all random axes together are one digit, the draw; "zip" takes all axes together. Every row follows from
-    its number alone, so that any part of a sweep can be computed on any computer."""
-
-    axes: tuple[Axis, ...]
-    combine: str
-    seed: int
-
-    @functools.cached_property
-    def _digits(self) -> list[list[int]]:
-        """Axes that move together, as lists of axis numbers, slowest first."""
-        if self.combine == "zip":
-            return [list(range(len(self.axes)))]
-        drawn = [i for i, axis in enumerate(self.axes) if axis.is_drawn]
-        digits: list[list[int]] = []
-        for i in range(len(self.axes)):
-            if i not in drawn:
-                digits.append([i])
-            elif i == drawn[0]:
-                digits.append(drawn)
-        return digits
-
-    @property
-    def count(self) -> int:
-        """Rows in all, counted without making one."""
-        return math.prod(self.shape)
-
-    @property
-    def shape(self) -> tuple[int, ...]:
-        """Values along every digit of a grid, slowest first."""
-        return tuple(self.axes[digit[0]].count for digit in self._digits)
-
-    def rows(self, first: int, last: int) -> Array:
-        """(last - first, axes) the rows of these numbers; after the last one they begin again."""
-        numbers = np.arange(first, last)
-        table = np.empty((len(numbers), len(self.axes)))
-        for digit in reversed(self._digits):
-            count = self.axes[digit[0]].count
-            for i in digit:
-                table[:, i] = self.values[i][numbers % count]
-            numbers = numbers // count
-        return table
-
-    @functools.cached_property
-    def values(self) -> list[Array]:
-        sobol = [axis.key for axis in self.axes if axis.kind == "sobol"]
-        if sobol:
-            from scipy.stats import qmc  # late: 0.5 s
-
-            # One scrambled sequence over all Sobol axes: points in the unit cube. Its balance belongs to powers of two:
-            # its beginning is taken of the next one.
-            count = max(axis.count for axis in self.axes if axis.kind == "sobol")
-            sampler = qmc.Sobol(len(sobol), seed=np.random.default_rng(self.seed))
-            points = sampler.random_base2((count - 1).bit_length())[:count]
-        columns = []
-        for i, axis in enumerate(self.axes):
-            if axis.kind == "values":
-                columns.append(np.array(axis.numbers))
-                continue
-            first, second = axis.numbers
-            generator = np.random.default_rng([self.seed, i])
-            if axis.kind == "linear":
-                columns.append(np.linspace(first, second, axis.count))
-            elif axis.kind == "log":
-                columns.append(np.geomspace(first, second, axis.count))
-            elif axis.kind == "sobol":
-                columns.append(first + (second - first) * points[:, sobol.index(axis.key)])
-            elif axis.kind == "uniform":
-                columns.append(generator.uniform(first, second, axis.count))
-            else:
-                columns.append(generator.normal(first, second, axis.count))
-        return columns
-
-
-def split_rows(count: int, validation: float, test: float, seed: int) -> NDArray[np.int8]:
-    """(count,) numbers of `SPLITS`; shares to the nearest row, rows drawn by `seed`."""
-    drawn = np.random.default_rng([seed, 2**32]).permutation(count)
-    first, second = round(validation * count), round(validation * count) + round(test * count)
-    codes = np.zeros(count, np.int8)
-    codes[drawn[:first]], codes[drawn[first:second]] = 1, 2
-    return codes
-
-
 MAX_COUNT = 10**15  # values of a range; too many runs are reported where they are counted
 MAX_ROWS = 10_000_000
 VARIED = ("values", "linear", "log", *DRAWN)
@@ -177,7 +79,7 @@ _SCENE_NAME = Kind(keys.LINE.read, "a shipped scene's name (paper/fig11), or a T
 
 
 @dataclass(frozen=True)
-class RangeTable:
+class Range:
     """`linear` or `log`: `count` values from `start` to `end`, both included."""
 
     start: float = file_key("start", keys.NUMBER)
@@ -185,7 +87,7 @@ class RangeTable:
     count: int = file_key("count", _COUNT)
 
 
-_LINEAR = table_of(RangeTable, "a table with start, end, count")
+_LINEAR = table_of(Range, "a table with start, end, count")
 _LOG = where(
     _LINEAR,
     lambda range: min(range.start, range.end) > 0.0,
@@ -195,13 +97,13 @@ _LOG = where(
 
 
 @dataclass(frozen=True)
-class AxisTable:
-    """One [[axis]]: a key of the scene, and where its values come from."""
+class Axis:
+    """One [[axis]]: a key of the scene, and where its values come from: one of `VARIED`."""
 
     key: str = file_key("key", Kind(_read_key, "the path of a number of the scene"))
     values: tuple[float, ...] | None = file_key("values", list_of(keys.NUMBER, "a list of numbers", 1), default=None)
-    linear: RangeTable | None = file_key("linear", _LINEAR, default=None)
-    log: RangeTable | None = file_key("log", _LOG, default=None)
+    linear: Range | None = file_key("linear", _LINEAR, default=None)
+    log: Range | None = file_key("log", _LOG, default=None)
     uniform: tuple[float, float] | None = file_key("uniform", _RANGE, default=None)
     normal: tuple[float, float] | None = file_key("normal", _NORMAL, default=None)
     sobol: tuple[float, float] | None = file_key("sobol", _RANGE, default=None)
@@ -212,19 +114,111 @@ class AxisTable:
             what = f"has {' and '.join(given)}" if given else "has no values"
             raise wrong(what, f"exactly one of {', '.join(VARIED)}")
 
-    def axis(self, draws: int) -> Axis:
-        kind = next(name for name in VARIED if getattr(self, name) is not None)
-        numbers = getattr(self, kind)
-        if kind in ("linear", "log"):
-            return Axis(self.key, kind, (numbers.start, numbers.end), numbers.count)
-        return Axis(self.key, kind, numbers, draws if kind in DRAWN else len(numbers))
+    @property
+    def is_drawn(self) -> bool:
+        return any(getattr(self, name) is not None for name in DRAWN)
+
+
+@dataclass(frozen=True)
+class Design:
+    """All rows of a sweep: axes, how they are combined, the seed and the number of draws. In a "grid" the last axis is
+    the fastest, and all random axes together are one digit, the draw; "zip" takes all axes together. Every row follows
+    from its number alone, so that any part of a sweep can be computed on any computer."""
+
+    axes: tuple[Axis, ...]
+    combine: str
+    seed: int
+    draws: int = 0
+
+    @functools.cached_property
+    def _digits(self) -> list[list[int]]:
+        """Axes that move together, as lists of axis numbers, slowest first."""
+        if self.combine == "zip":
+            return [list(range(len(self.axes)))]
+        drawn = [i for i, axis in enumerate(self.axes) if axis.is_drawn]
+        digits: list[list[int]] = []
+        for i in range(len(self.axes)):
+            if i not in drawn:
+                digits.append([i])
+            elif i == drawn[0]:
+                digits.append(drawn)
+        return digits
+
+    @property
+    def counts(self) -> tuple[int, ...]:
+        """(axes,) values of each axis, counted without making one."""
+        ranges = [axis.linear or axis.log for axis in self.axes]
+        return tuple(
+            len(axis.values) if axis.values else values.count if values else self.draws
+            for axis, values in zip(self.axes, ranges, strict=True)
+        )
+
+    @property
+    def count(self) -> int:
+        """Rows in all."""
+        return math.prod(self.shape)
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Values along every digit of a grid, slowest first."""
+        counts = self.counts
+        return tuple(counts[digit[0]] for digit in self._digits)
+
+    def rows(self, first: int, last: int) -> Array:
+        """(last - first, axes) the rows of these numbers; after the last one they begin again."""
+        numbers = np.arange(first, last)
+        table = np.empty((len(numbers), len(self.axes)))
+        for digit in reversed(self._digits):
+            count = len(self.values[digit[0]])
+            for i in digit:
+                table[:, i] = self.values[i][numbers % count]
+            numbers = numbers // count
+        return table
+
+    @functools.cached_property
+    def values(self) -> list[Array]:
+        """(values,) of each axis."""
+        sobol = [axis.key for axis in self.axes if axis.sobol]
+        if sobol:
+            from scipy.stats import qmc  # late: 0.5 s
+
+            # One scrambled sequence over all Sobol axes: points in the unit cube. Its balance belongs to powers of two:
+            # its beginning is taken of the next one.
+            sampler = qmc.Sobol(len(sobol), seed=np.random.default_rng(self.seed))
+            points = sampler.random_base2((self.draws - 1).bit_length())[: self.draws]
+        columns = []
+        for i, axis in enumerate(self.axes):
+            generator = np.random.default_rng([self.seed, i])
+            if axis.linear:
+                columns.append(np.linspace(axis.linear.start, axis.linear.end, axis.linear.count))
+            elif axis.log:
+                columns.append(np.geomspace(axis.log.start, axis.log.end, axis.log.count))
+            elif axis.uniform:
+                columns.append(generator.uniform(*axis.uniform, self.draws))
+            elif axis.normal:
+                columns.append(generator.normal(*axis.normal, self.draws))
+            elif axis.sobol:
+                low, high = axis.sobol
+                columns.append(low + (high - low) * points[:, sobol.index(axis.key)])
+            else:
+                columns.append(np.array(axis.values))
+        return columns
+
+
+def split_rows(count: int, validation: float, test: float, seed: int) -> NDArray[np.int8]:
+    """(count,) numbers of `SPLITS`; shares to the nearest row, rows drawn by `seed`."""
+    drawn = np.random.default_rng([seed, 2**32]).permutation(count)
+    first, second = round(validation * count), round(validation * count) + round(test * count)
+    codes = np.zeros(count, np.int8)
+    codes[drawn[:first]], codes[drawn[first:second]] = 1, 2
+    return codes
 
 
 _METHODS = list_of(keys.LINE, "a list of methods, model/integrator", 1)
 _SETTINGS = keys.dict_of(keys.NUMBER, "a table of a method's settings, such as tolerance = 1e-15")
 _CHANGE = keys.dict_of(keys.NUMBER, 'a table of keys of the scene and numbers, "blade.mass" = 1e4')
 _DRAWS = keys.whole(1, MAX_COUNT, "a whole number from 1 up, with random axes")
-_AXES = list_of(table_of(AxisTable), "one or more [[axis]] tables", 1)
+_AXES = list_of(table_of(Axis), "one or more [[axis]] tables", 1)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -245,11 +239,11 @@ class SweepTable:
     validation: float = file_key("validation", _SHARE, default=0.0)
     test: float = file_key("test", _SHARE, note=", less than 1 with validation", default=0.0)
     picture: str | None = file_key("picture", keys.choice(("spread", "map")), default=None)
-    axis: Sequence[AxisTable] = file_key("axis", _AXES)
+    axis: Sequence[Axis] = file_key("axis", _AXES)
 
     def __post_init__(self) -> None:
         axes = [axis.key for axis in self.axis]
-        drawn = [axis.key for axis in self.axis if any(getattr(axis, kind) is not None for kind in DRAWN)]
+        drawn = [axis.key for axis in self.axis if axis.is_drawn]
         repeated = [key for key, count in Counter(axes).items() if count > 1]
         problems = []
         if self.test + self.validation >= 1.0:
@@ -262,7 +256,7 @@ class SweepTable:
             what = f"{drawn[0]} is random, and draws is missing"
             problems.append(KeyProblem(("axis",), what, "draws = N at the top of the file"))
         if self.draws is not None and not drawn:
-            what, allowed = "draws is there, but no axis is random", f"draws with an axis of {', '.join(DRAWN)}"
+            what, allowed = "draws is given, but no axis is random", f"draws with an axis of {', '.join(DRAWN)}"
             problems.append(KeyProblem(("axis",), what, allowed))
         if problems:
             raise TableError(problems)
@@ -353,9 +347,9 @@ class Sweep:
         return Variants(self.name, {**scene_tables(self.base), "outputs": wanted}, self.keys)
 
 
-def load_sweep(path: Path) -> Sweep:
-    """The sweep in the TOML file `path`; sweeps/NAME means a shipped one. Raises InputError with all errors of the
-    file."""
+def load_sweep(path: Path, known_methods: Sequence[str] = ()) -> Sweep:
+    """The sweep in the TOML file `path`; sweeps/NAME means a shipped one. known_methods: what the file may name, () for
+    anything. Raises InputError with all errors of the file."""
     shipped = (sweeps_folder().parent / path).with_suffix(".toml")
     if not path.exists() and path.parts[:1] == ("sweeps",) and shipped.is_file():
         path = shipped
@@ -365,7 +359,7 @@ def load_sweep(path: Path) -> Sweep:
     if "initial" in tables and "blade" in tables:
         shown = shown_path(path)
         raise InputError(f"{shown}: is a scene; allowed: a sweep of scenes, or: rotor-mbs run {shown}")
-    return _sweep(path, text, tables)
+    return _sweep(path, text, tables, known_methods=known_methods)
 
 
 def sweep_of(scene: Scene, axes: Mapping[str, object], **options: object) -> Sweep:
@@ -398,13 +392,21 @@ def _plain(values: object) -> object:
     raise InputError(f"{values!r}: not a value of a sweep; allowed: numbers, texts, and lists of them")
 
 
-def _sweep(path: Path, text: str, tables: Mapping[str, object], base: Scene | None = None) -> Sweep:
+def _sweep(
+    path: Path,
+    text: str,
+    tables: Mapping[str, object],
+    base: Scene | None = None,
+    known_methods: Sequence[str] = (),
+) -> Sweep:
     """The sweep in the tables of a file; its base is the scene that it names, where none is given."""
-    source = shown_path(path)
+    source, problems = shown_path(path), unknown_methods(tables, known_methods)
     try:
         table: SweepTable = table_of(SweepTable).read(tables)
     except TableError as error:
-        raise error.in_file(text, source) from error
+        problems += error.problems
+    if problems:
+        raise TableError(problems).in_file(text, source)
     if base is None:
         is_shipped = (scenarios_folder() / f"{table.scene}.toml").is_file()
         is_beside = table.scene.endswith(".toml") and not is_shipped
@@ -418,17 +420,16 @@ def _sweep(path: Path, text: str, tables: Mapping[str, object], base: Scene | No
     if changes:
         with at_key(source, text, next(key for key in ("change", "samples", "outputs") if getattr(table, key))):
             base = base.replace(**changes)
-    axes = tuple(axis.axis(table.draws or 0) for axis in table.axis)
-    if table.combine == "zip" and len({axis.count for axis in axes}) > 1:
-        counts = ", ".join(f"{axis.key} has {axis.count}" for axis in axes)
+    design = Design(tuple(table.axis), table.combine, table.seed, table.draws or 0)
+    if table.combine == "zip" and len(set(design.counts)) > 1:
+        counts = ", ".join(f"{axis.key} has {count}" for axis, count in zip(design.axes, design.counts, strict=True))
         with at_key(source, text, "combine"):
             raise InputError(f"{counts}; allowed with zip: as many values in every axis")
-    design = Design(axes, table.combine, table.seed)
     if design.count > MAX_ROWS:
         with at_key(source, text, "axis"):
             raise InputError(f"{design.count:,} runs; allowed: at most {MAX_ROWS:,}")
     sweep = Sweep(table, base, design, text, path)
-    problems: dict[str, None] = {}
+    faults: dict[str, None] = {}
     for i, variants, row in _rows_to_check(sweep):
         try:
             variants.scene(row)
@@ -437,11 +438,11 @@ def _sweep(path: Path, text: str, tables: Mapping[str, object], base: Scene | No
             start = "" if all(problem.is_of_key for problem in error.problems) else f"{values}: "
             for problem in error.problems:
                 line = line_of(find_lines(text), ("axis", i, "key"))
-                problems.setdefault(f"{source}:{line}: {start}{problem.message}")
-            if len(problems) >= _MAX_ROW_ERRORS:
+                faults.setdefault(f"{source}:{line}: {start}{problem.message}")
+            if len(faults) >= _MAX_ROW_ERRORS:
                 break
-    if problems:
-        raise InputError(list(problems))
+    if faults:
+        raise InputError(list(faults))
     return sweep
 
 

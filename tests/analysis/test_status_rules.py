@@ -93,6 +93,11 @@ def with_error(run: Trajectory, error: float, row: int = 5, column: int = 0) -> 
     return run.replace(angles=angles)
 
 
+def with_gap(run: Trajectory, share: float) -> Trajectory:
+    """Joints that open by `share` of the longest arm."""
+    return run.replace(constraint_error=np.full(11, share * math.hypot(0.1, 10.0)))
+
+
 def without_energies(run: Trajectory) -> Trajectory:
     return run.replace(kinetic_energy=None, potential_energy=None, work=None)
 
@@ -105,10 +110,10 @@ def test_energy_angles_and_gap_have_a_bound_each(method: str) -> None:
         assert status(with_drift(exact, side * energy), method=method)[0] == expected
         assert status(with_error(exact, side * OK_ERROR), reference=exact, method=method)[0] == expected
         if BOUNDS.find("gap", method):
-            gap = np.full(11, side * BOUNDS.of("gap", method).value * math.hypot(0.1, 10.0))
-            assert status(exact.replace(constraint_error=gap), method=method)[0] == expected
+            gap = side * BOUNDS.of("gap", method).value
+            assert status(with_gap(exact, gap), method=method)[0] == expected
     if not BOUNDS.find("gap", method):
-        assert status(exact.replace(constraint_error=np.full(11, 1e-15)), method=method)[0] == "inaccurate"
+        assert status(with_gap(exact, 1e-16), method=method)[0] == "inaccurate"
 
 
 @pytest.mark.parametrize("method", method_names(is_corrected=True))
@@ -119,6 +124,12 @@ def test_the_largest_defect_has_a_bound(method: str, monkeypatch: pytest.MonkeyP
         defects = made_defects((side * bound, -side * bound), transitions=None)
         monkeypatch.setattr(judgement_module, "defects_of", lambda *_, defects=defects, **__: defects)
         assert status(moving(), method=method)[0] == expected
+
+
+def test_a_defect_is_told_with_its_size_and_its_interval(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(judgement_module, "defects_of", lambda *_, **__: made_defects((0.0, 2e-6, -2e-6)))
+    message = judge(SCENE, Solution(SCENE, METHOD, moving(), DONE), None).message
+    assert message.startswith("defect 2.0e-06 rad in the interval up to t = 0.02 s, ")
 
 
 NOTHING = Trajectory(np.empty(0), np.empty((0, 4)), np.empty((0, 4)))
@@ -148,6 +159,8 @@ KNOWN = {
     "coarse by its energy": (with_drift(moving(), (1.0 - JUST) * 1e-2), DONE, None, "inaccurate", False),
     "another motion by its energy": (with_drift(moving(), (1.0 + JUST) * 1e-2), DONE, None, "inaccurate", True),
     "coarse by its angles": (with_error(moving(), 1.0 - JUST), DONE, moving(), "inaccurate", False),
+    "coarse by its gap": (with_gap(moving(), (1.0 - JUST) * 1e-2), DONE, None, "inaccurate", False),
+    "another motion by its gap": (with_gap(moving(), (1.0 + JUST) * 1e-2), DONE, None, "inaccurate", True),
     "another motion by its angles": (with_error(moving(), 1.0 + JUST), DONE, moving(), "inaccurate", True),
 }
 

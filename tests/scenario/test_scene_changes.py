@@ -119,16 +119,6 @@ def test_an_impossible_change_is_refused_with_its_key(key: str, value: object, m
         find_scenes(["paper/fig11"])[0].replace(**{key: value})
 
 
-def test_a_tip_that_the_file_does_not_give_is_not_made_up(tmp_path: Path) -> None:
-    path = tmp_path / "scene.toml"
-    path.write_text(
-        'title = "t"\nblades = 1\ngravity = 0\nduration = 1\nsamples = 2\noutputs = ["angles"]\n'
-        "[blade]\nmass = 1\ncentre_of_mass = [1, 0, 1]\n[initial]\nangles = [0, 0]\nrates = [0, 0]\n"
-    )
-    with pytest.raises(InputError, match=r"blade\.tip: is missing"):
-        load_scene(path).replace(outputs=["tip"])
-
-
 def test_the_template_is_a_scene_with_every_key(tmp_path: Path) -> None:
     path = tmp_path / "new.toml"
     path.write_text(new_scene_text(), encoding="utf-8")

@@ -23,12 +23,10 @@ from rotor_mbs.scenario import catalogue
 from rotor_mbs.scenario.catalogue import find_scenes, list_scenes, scenarios_folder
 from rotor_mbs.scenario.scene import (
     DEFAULT_OUTPUTS,
-    OUTPUTS,
     Scene,
     is_rigid_body_inertia,
     load_scene,
     scene_hash,
-    values_per_sample,
 )
 from rotor_mbs.scenario.time_table import segments
 from rotor_mbs.scenario.toml_file import find_lines, line_of
@@ -113,15 +111,6 @@ def test_shipped_scene_has_the_numbers_of_its_caption(paper: dict[str, Scene], n
     assert scene.bearing_stiffness == ()
 
 
-def test_what_single_scenes_of_the_paper_are_for(paper: dict[str, Scene]) -> None:
-    bare = [name for name, scene in paper.items() if not all(blade.has_pitch_inertia for blade in scene.blades)]
-    assert bare == ["paper/fig04b"]
-    for torque in ("10", "50"):
-        scene = paper[f"paper/fig15-{torque}kNm"]
-        assert "not printed" in scene.title
-        assert f"does not print {torque} kN m" in scene.text
-
-
 @pytest.mark.parametrize("field", fields(Scene), ids=lambda field: field.name)
 def test_every_field_enters_the_keys_that_its_part_asks_for(paper: dict[str, Scene], field: Field[Any]) -> None:
     scene = paper["paper/fig11"]
@@ -196,13 +185,6 @@ def test_a_broken_triangle_inequality_is_found_in_any_frame(axis: int, random: n
     R, _ = np.linalg.qr(random)
     J = R @ np.diag(moments) @ R.T
     assert not is_rigid_body_inertia([J[0, 0], J[1, 1], J[2, 2], J[0, 1], J[0, 2], J[1, 2]])
-
-
-def test_values_per_sample_by_hand() -> None:
-    # Three blades: time, 4 angles, 4 rates; 3 tips of 3; 4 energies; force and moment at 3 roots and the shaft, 3 pitch
-    # moments.
-    assert values_per_sample(3, ("angles",)) == 9
-    assert values_per_sample(3, OUTPUTS) == 9 + 9 + 4 + 24 + 3
 
 
 # Every value is the number of its line.

@@ -12,7 +12,7 @@ import pytest
 from rotor_mbs.errors import InputError
 from rotor_mbs.scenario.catalogue import find_scenes, list_scenes, sweeps_folder
 from rotor_mbs.scenario.scene import scene_tables, unit_of
-from rotor_mbs.scenario.sweep import Axis, Design, Sweep, Variants, load_sweep, split_rows, sweep_of
+from rotor_mbs.scenario.sweep import Axis, Design, Range, Sweep, Variants, load_sweep, split_rows, sweep_of
 from rotor_mbs.scenario.toml_file import parse_key
 
 _HEAD = 'title = "t"\nscene = "paper/fig11"\n'
@@ -25,7 +25,7 @@ def _load(folder: Path, text: str) -> Sweep:
 
 
 def test_a_grid_runs_through_its_axes_the_last_one_fastest() -> None:
-    axes = (Axis("a", "values", (1.0, 2.0), 2), Axis("b", "linear", (0.0, 1.0), 3), Axis("c", "log", (1.0, 100.0), 3))
+    axes = (Axis("a", (1.0, 2.0)), Axis("b", linear=Range(0.0, 1.0, 3)), Axis("c", log=Range(1.0, 100.0, 3)))
     design = Design(axes, "grid", 0)
     expected = list(itertools.product([1.0, 2.0], [0.0, 0.5, 1.0], [1.0, 10.0, 100.0]))
     assert design.count == 18
@@ -35,28 +35,28 @@ def test_a_grid_runs_through_its_axes_the_last_one_fastest() -> None:
 
 
 def test_zip_takes_one_value_of_every_axis() -> None:
-    design = Design((Axis("a", "values", (1.0, 2.0), 2), Axis("b", "values", (3.0, 4.0), 2)), "zip", 0)
+    design = Design((Axis("a", (1.0, 2.0)), Axis("b", (3.0, 4.0))), "zip", 0)
     np.testing.assert_array_equal(design.rows(0, 2), [[1.0, 3.0], [2.0, 4.0]])
 
 
 def test_random_axes_are_drawn_together_and_combined_with_the_others() -> None:
-    axes = (Axis("a", "values", (1.0, 2.0), 2), Axis("b", "normal", (0.0, 1.0), 4), Axis("c", "uniform", (5.0, 6.0), 4))
-    rows = Design(axes, "grid", 7).rows(0, 8)
+    axes = (Axis("a", (1.0, 2.0)), Axis("b", normal=(0.0, 1.0)), Axis("c", uniform=(5.0, 6.0)))
+    rows = Design(axes, "grid", 7, 4).rows(0, 8)
     assert rows[:, 0].tolist() == [1.0] * 4 + [2.0] * 4
     np.testing.assert_array_equal(rows[:4, 1:], rows[4:, 1:])
     assert len(np.unique(rows[:4, 1])) == 4
 
 
 def test_a_seed_repeats_its_draws_and_another_one_does_not() -> None:
-    axes = (Axis("a", "normal", (0.0, 1.0), 50), Axis("b", "sobol", (-1.0, 1.0), 50))
-    first = Design(axes, "grid", 1).rows(0, 50)
-    np.testing.assert_array_equal(first, Design(axes, "grid", 1).rows(0, 50))
-    assert not np.isin(first, Design(axes, "grid", 2).rows(0, 50)).any()
+    axes = (Axis("a", normal=(0.0, 1.0)), Axis("b", sobol=(-1.0, 1.0)))
+    first = Design(axes, "grid", 1, 50).rows(0, 50)
+    np.testing.assert_array_equal(first, Design(axes, "grid", 1, 50).rows(0, 50))
+    assert not np.isin(first, Design(axes, "grid", 2, 50).rows(0, 50)).any()
 
 
 def test_draws_have_the_distribution_that_was_asked_for() -> None:
-    axes = tuple(Axis(kind, kind, (2.0, 3.0), 4096) for kind in ("uniform", "normal", "sobol"))
-    uniform, normal, sobol = Design(axes, "grid", 0).rows(0, 4096).T
+    axes = (Axis("u", uniform=(2.0, 3.0)), Axis("n", normal=(2.0, 3.0)), Axis("s", sobol=(2.0, 3.0)))
+    uniform, normal, sobol = Design(axes, "grid", 0, 4096).rows(0, 4096).T
     for values in (uniform, sobol):
         assert 2.0 <= values.min() < 2.01 < 2.99 < values.max() < 3.0
     # five standard errors of a mean of 4096 draws

@@ -1,0 +1,166 @@
+"""Methods that a Python file defines, named by its path: `-m ./mine.py` has `mine/...`.
+
+The file's text is read once and goes with every task to its worker process, which needs no file and computes what this
+process has read.
+"""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+import re
+import subprocess
+import sys
+import traceback
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass, replace
+from functools import partial
+from pathlib import Path
+from types import ModuleType
+from typing import TYPE_CHECKING
+
+from rotor_mbs.errors import InputError, RotorError, one_line
+from rotor_mbs.methods.base import BuiltItem, Ladder, Method, no_items, step_ladder
+from rotor_mbs.methods.time_limit import time_limit
+
+if TYPE_CHECKING:
+    from rotor_mbs.scenario.scene import Scene
+
+ENDING = ".py"
+_LOAD_S = 300.0  # large engines load in seconds, on a busy machine in minutes
+_NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.-]*")
+_LOADED = "loaded"
+_LOADING = "import sys; from rotor_mbs.methods.method_file import load_alone; load_alone(sys.argv[1])"
+
+
+@dataclass(frozen=True)
+class MethodFile:
+    path: str  # as it is named
+    text: str
+
+    @property
+    def model(self) -> str:
+        """What the names of its methods begin with: "mine" of "folder/mine.py"."""
+        return Path(self.path).stem
+
+    def load(self, built_in: Iterable[Method]) -> dict[str, Method]:
+        """Its methods by name: "mine/rk4", also where the file calls it "rk4". Raises InputError: a line with file and
+        line number for whatever the file raises."""
+        if not _NAME.fullmatch(self.model):
+            raise InputError(f"{self.path}: allowed: a file's name of letters, digits, - and _")
+        taken = next((known for known in built_in if known.model == self.model), None)
+        if taken is not None:
+            raise InputError(f"{self.path}: {taken.name} has this name; allowed: another file name")
+        module = ModuleType(f"rotor_mbs_method_file_{self.model}")
+        module.__file__ = self.path
+        sys.modules[module.__name__] = module  # dataclasses look there
+        with self.located(), _without_folder(self.path):
+            exec(compile(self.text, self.path, "exec", dont_inherit=True), vars(module))
+        methods: dict[str, Method] = {}
+        values = (value if isinstance(value, list | tuple) else [value] for value in vars(module).values())
+        defined = dict.fromkeys(one for several in values for one in several if isinstance(one, Method))
+        for method in defined:
+            if any(method is known for known in built_in):  # imported
+                continue
+            own = self._named(method)
+            if own.name in methods or not _NAME.fullmatch(own.name.rpartition("/")[2]):
+                raise InputError(f"{self.path}: method {own.name!r}; allowed: names of letters and digits, each once")
+            methods[own.name] = own
+        if not methods:
+            raise InputError(f"{self.path}: defines no Method; allowed: at least one (docs/your-engine.md)")
+        return methods
+
+    def _named(self, method: Method) -> Method:
+        name = f"{self.model}/{method.name.rpartition('/')[2]}"
+        ladders = [replace(one, method=name) if one.method == method.name else one for one in method.ladders]
+        if not ladders and "step" in method.settings.allowed():
+            ladders = [replace(step_ladder(6), method=name, label=method.label, order=method.order)]
+        return replace(
+            method,
+            name=name,
+            items=partial(self._items, method),
+            bounds=tuple(replace(bound, method=name) for bound in method.bounds),
+            ladders=tuple[Ladder, ...](ladders),
+            sources=(self.text,),
+        )
+
+    def _items(self, method: Method, scene: Scene) -> list[BuiltItem]:
+        """Where the method does not say what it builds, it is built: what it cannot represent it refuses there."""
+        with self.located(), time_limit(_LOAD_S):
+            if method.items is not no_items:
+                return method.items(scene)
+            method.build(scene, method.settings())
+            return []
+
+    @contextmanager
+    def located(self) -> Iterator[None]:
+        """What is raised in the block, but by this package on purpose, is an InputError with file and line number."""
+        try:
+            yield
+        except RotorError:
+            raise
+        except (Exception, SystemExit) as exc:  # whatever somebody's code raises
+            raise InputError(located(exc, [self.path])) from exc
+
+
+def located(error: BaseException, paths: Iterable[str]) -> str:
+    """One line of what was raised, with file and line number where that was in one of the files."""
+    paths = list(paths)
+    if isinstance(error, SyntaxError) and error.filename in paths:
+        return f"{error.filename}:{error.lineno}: {type(error).__name__}: {error.msg}"
+    frames = [frame for frame in traceback.extract_tb(error.__traceback__) if frame.filename in paths]
+    return f"{frames[-1].filename}:{frames[-1].lineno}: {one_line(error)}" if frames else one_line(error)
+
+
+def read_file(path: str) -> MethodFile:
+    """Raises InputError for a file that cannot be read, and for one that ends or hangs the process that loads it."""
+    try:
+        file = MethodFile(path, Path(path).read_text(encoding="utf-8"))
+    except (OSError, ValueError) as exc:
+        raise InputError(f"{path}: {getattr(exc, 'strerror', None) or exc}; allowed: a Python file") from exc
+    # Loaded elsewhere first: it must not end or hang this process. Without -P, Python would import from this folder.
+    command = [sys.executable, "-P", "-c", _LOADING, path]
+    try:
+        done = subprocess.run(command, stdin=subprocess.DEVNULL, capture_output=True, timeout=_LOAD_S, check=False)
+    except subprocess.TimeoutExpired as exc:
+        raise InputError(f"{path}: not loaded within {_LOAD_S:g} s") from exc
+    if not done.stdout.endswith(_LOADED.encode()):
+        raise InputError(f"{path}: ended the process that loaded it (exit code {done.returncode})")
+    return file
+
+
+def load_alone(path: str) -> None:
+    """In a process of its own. What it raises is raised again where it counts."""
+    with suppress(InputError):
+        MethodFile(path, Path(path).read_text(encoding="utf-8")).load(())
+    sys.stdout.write(_LOADED)
+
+
+@contextmanager
+def _without_folder(path: str) -> Iterator[None]:
+    """A file drake.py that says `import drake` means the package, not itself."""
+    before, folder = list(sys.path), Path(path).resolve().parent
+    sys.path[:] = [place for place in before if Path(place).resolve() != folder]
+    try:
+        yield
+    finally:
+        sys.path[:] = before
+
+
+@contextmanager
+def quiet() -> Iterator[None]:
+    """In a worker process, what is printed in the block goes nowhere, also what compiled code prints."""
+    if multiprocessing.parent_process() is None:
+        yield
+        return
+    kept = [os.dup(1), os.dup(2)]
+    with open(os.devnull, "wb") as nowhere:  # noqa: PTH123  (a device)
+        os.dup2(nowhere.fileno(), 1)
+        os.dup2(nowhere.fileno(), 2)
+    try:
+        yield
+    finally:
+        for number, saved in enumerate(kept, 1):
+            os.dup2(saved, number)
+            os.close(saved)

@@ -1,0 +1,177 @@
+"""Methods in a Python file that is named by its path: in every command, with whatever somebody's code may do."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+from support.commands import rotor_mbs
+
+import rotor_mbs as rm
+from rotor_mbs.methods import catalogue, method_file
+
+DOCUMENT = (Path(__file__).parents[2] / "docs" / "your-engine.md").read_text()
+(EXAMPLE,) = re.findall(r"```python\n(.*?)```", DOCUMENT, re.DOTALL)
+SCENE = """
+title = "One blade"
+blades = 1
+gravity = 9.81
+duration = 0.1
+samples = 6
+outputs = ["angles", "rates"]
+blade = { mass = 800, centre_of_mass = [0.3, 0.1, 5.2], inertia = [4000, 4100, 300, 0, -40, 0] }
+hub = { inertia = 5000 }
+initial = { angles = [0.5, 0.3], rates = [0.4, 0] }
+"""
+# Solvers that do what is in `integrate`; each a method of one file.
+BAD = """
+import os, time
+import numpy as np
+from rotor_mbs.methods.base import Method
+from rotor_mbs.solution.trajectory import Integration, Trajectory
+
+class Still:
+    def __init__(self, scene, settings):
+        self.scene = scene
+    def integrate(self):
+        self.act()
+        return Integration(True, "", self.scene.duration)
+    def observe(self):
+        time = np.linspace(0.0, self.scene.duration, self.scene.samples)
+        return Trajectory(time, np.tile(self.scene.initial_angles, (len(time), 1)), np.zeros((len(time), 2)))
+
+class Raises(Still):
+    def act(self):
+        return 1 / 0
+class Hangs(Still):
+    def act(self):
+        time.sleep(1e3)
+class Dies(Still):
+    def act(self):
+        os._exit(9)
+class Prints(Still):
+    def act(self):
+        print("x" * 10**6)
+        os.write(1, b"x" * 10**6)
+
+METHODS = [Method(name=kind.__name__, label=kind.__name__, build=kind) for kind in (Raises, Hangs, Dies, Prints)]
+"""
+
+
+@pytest.fixture(autouse=True)
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+    monkeypatch.chdir(tmp_path)
+    Path("one.toml").write_text(SCENE)
+    Path("mine.py").write_text(EXAMPLE)
+    yield tmp_path
+    catalogue._files.clear()
+    catalogue._of_files.clear()
+
+
+def run(*words: str) -> str:
+    ended = rotor_mbs("run", "one.toml", "-j", "1", *words)
+    assert ended.status == 0, ended
+    return ended.out
+
+
+def test_the_documents_example_is_short_complete_and_right() -> None:
+    """40 lines of code; its tolerance leaves 1e-12 an interval, on a scene with every term."""
+    assert len([line for line in EXAMPLE.splitlines() if line.strip()]) <= 40
+    scene = rm.scene("check/pitch-loads").replace(duration=0.7, samples=36, outputs=["angles", "rates"])
+    found = rm.run(scene, "mine.py")
+    assert (found.status, found.method) == ("ok", "mine/lsoda")
+    assert found.metrics["defect_max"] < 1e-11
+    with pytest.raises(rm.MethodRefusal, match="no blade without inertia"):
+        rm.run("check/held", "./mine.py")
+
+
+def test_a_run_is_keyed_by_the_code_of_its_file() -> None:
+    first = run("-m", "./mine.py", "-m", "lagrange/dop853", "-o", "o.h5")
+    assert "mine/lsoda" in first
+    assert "3 already stored" in run("-m", "mine.py", "-m", "lagrange/dop853", "-o", "o.h5")
+    Path("mine.py").write_text(EXAMPLE + "# the same\n")
+    assert "2 already stored" in run("-m", "mine.py", "-o", "o.h5")
+    Path("mine.py").write_text(EXAMPLE.replace("rtol=1e-12, atol=1e-13", "rtol=1e-6, atol=1e-7"))
+    assert "1 runs made" in run("-m", "mine.py", "-o", "o.h5")
+    runs = rm.open("o.h5")["one"]
+    assert list(runs) == ["reference", "lagrange/dop853", "mine/lsoda"]
+    assert runs["mine/lsoda"].metrics["defect_max"] > 1e-9
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "line"),
+    [
+        ("mine.py", "a = 1\nb = (\n", "mine.py:2: SyntaxError: '(' was never closed"),
+        ("mine.py", "import numpy\nimport no_engine\n", "mine.py:2: ModuleNotFoundError: No module named 'no_engine'"),
+        ("mine.py", "raise SystemExit\n", "mine.py:1: SystemExit: no message"),
+        ("mine.py", "import os\nos._exit(0)\n", "mine.py: ended the process that loaded it (exit code 0)"),
+        ("mine.py", "while True: pass\n", "mine.py: not loaded within 3 s"),
+        ("mine.py", "METHOD = 1\n", "mine.py: defines no Method; allowed: at least one (docs/your-engine.md)"),
+        ("lagrange.py", EXAMPLE, "lagrange.py: lagrange/taylor has this name; allowed: another file name"),
+        ("none.py", "", "none.py: No such file or directory; allowed: a Python file"),
+        ("other/mine.py", EXAMPLE, "other/mine.py: methods mine/... are those of mine.py; allowed: another file name"),
+    ],
+)
+def test_a_file_that_cannot_be_used_is_one_line(
+    name: str, text: str, line: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(method_file, "_LOAD_S", 3.0 if "while" in text else 60.0)
+    Path("other").mkdir()
+    if text:
+        Path(name).write_text(text)
+    named = ["-m", "mine.py"] * (name != "mine.py")
+    ended = rotor_mbs("run", "one.toml", *named, "-m", name, "-o", "o.h5")
+    assert (ended.status, ended.out, ended.err) == (2, "", f"{line}\n")
+    assert not Path("o.h5").exists()
+
+
+def test_whatever_a_method_does_is_one_line_and_loses_nothing(capfd: pytest.CaptureFixture[str]) -> None:
+    Path("bad.py").write_text("print('x' * 1000)\n" + BAD)
+    ended = rotor_mbs("run", "one.toml", "-m", "bad.py", "-m", "mine.py", "-o", "o.h5", "-j", "1", "--timeout", "2")
+    printed = "".join(capfd.readouterr())
+    assert ended.status == 1
+    assert len(ended.out + ended.err + printed) < 3000
+    runs = rm.open("o.h5")["one"]
+    statuses = {name: runs[name].status for name in runs if name != "reference"}
+    assert statuses == {
+        "bad/Raises": "solver_failed", "bad/Hangs": "timed_out", "bad/Prints": "inaccurate", "mine/lsoda": "ok"
+    }  # fmt: skip
+    assert runs["bad/Raises"].message == "bad.py:20: ZeroDivisionError: division by zero"
+    assert ended.err.count("one bad/Dies: not computed (its process died (exit code 9)") == 1
+
+
+def test_a_sweep_and_python_take_a_file() -> None:
+    scene = rm.load("one.toml").replace(outputs=["angles", "rates", "energy"])
+    runs = rm.sweep(scene, {"gravity": [9.0, 10.0]}, methods="mine.py", outputs=["angles", "rates"], workers=1)
+    assert runs.statuses == {"ok": 2}
+    assert np.array_equal(runs[1].angles, rm.run(scene.replace(gravity=10.0), "mine/lsoda").angles)
+    Path("bad.py").write_text(BAD)
+    with pytest.raises(rm.InputError, match="the file has bad/Raises, "):
+        rm.run(scene, "bad.py")
+
+
+@pytest.mark.full
+def test_the_other_commands_take_a_file() -> None:
+    stepped = EXAMPLE.replace("build=Solver", "build=Solver, settings=S").replace(
+        "class Solver", "from rotor_mbs.methods.base import Settings\nfrom rotor_mbs.methods.settings import step\n"
+        "import dataclasses\n@dataclasses.dataclass(frozen=True)\nclass S(Settings):\n    step: float = step(1.0)\n\n"
+        "class Solver"
+    )  # fmt: skip
+    Path("mine.py").write_text(stepped)
+    commands = {
+        "bench": ("bench", "one.toml", "-m", "mine.py", "-o", "b.h5", "--repeats", "1", "--budget", "20"),
+        "stability": ("stability", "one.toml", "-m", "mine.py", "-o", "s.h5"),
+    }
+    for words in commands.values():
+        ended = rotor_mbs(*words)
+        assert ended.status == 0, ended
+    assert "mine/lsoda" in rotor_mbs("report", "s.h5").out + Path("b-report/index.html").read_text()
+    ended = rotor_mbs("modes", "one.toml", "-m", "mine.py")
+    assert (ended.status, ended.err) == (
+        2,
+        "mine/lsoda: its model has no linearization; allowed: a model with `linearize`\n",
+    )
+    assert "lagrange" in rotor_mbs("modes", "one.toml", "-m", "lagrange/taylor").out

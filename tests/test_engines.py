@@ -1,0 +1,54 @@
+"""The engines of examples/engines: each where its package is installed, on a scene with every term, by its defects."""
+
+from __future__ import annotations
+
+from importlib import util
+from pathlib import Path
+
+import pytest
+
+import rotor_mbs as rm
+from rotor_mbs.methods import catalogue
+from rotor_mbs.methods.catalogue import check_names
+
+FOLDER = Path(__file__).parents[1] / "examples" / "engines"
+# Of each file its package, and per method what defects it may have, rad: round-off, or of the default step.
+ENGINES = {
+    "pinocchio": ("pinocchio", {"dop853": 1e-12, "euler": 1e-3}),
+    "drake": ("pydrake", {"rk5": 1e-12, "rk3": 1e-6, "radau3": 1e-5, "discrete": 1e-3}),
+    "dart": ("dartpy", {"dop853": 1e-12, "world": 1e-3}),
+    "kane": ("sympy", {"lsoda": 1e-11}),
+    "newton": ("newton", {"featherstone": 1e-3}),
+}
+TIGHT = {"drake/rk5": {"accuracy": 1e-13}}
+
+
+@pytest.mark.parametrize("name", ENGINES)
+def test_a_file_is_short_and_uses_none_of_our_equations(name: str) -> None:
+    text = (FOLDER / f"{name}.py").read_text()
+    assert len(text.splitlines()) <= 100
+    assert "rotor_mbs.models" not in text
+
+
+def test_every_file_is_tried() -> None:
+    assert {path.stem for path in FOLDER.glob("*.py")} == set(ENGINES)
+
+
+@pytest.mark.full
+@pytest.mark.parametrize("name", ENGINES)
+def test_an_engine_agrees_with_the_closed_form(name: str) -> None:
+    package, bounds = ENGINES[name]
+    if util.find_spec(package) is None:
+        pytest.skip(f"{package} is not installed")
+    scene = rm.scene("check/pitch-loads").replace(duration=0.7, samples=71, outputs=["angles", "rates"])
+    try:
+        assert set(check_names(str(FOLDER / f"{name}.py"))) == {f"{name}/{method}" for method in bounds}
+        for method, bound in bounds.items():
+            full = f"{name}/{method}"
+            run = rm.run(scene, full, **TIGHT.get(full, {}))
+            assert (run.status, run.metrics["defect_max"] <= bound) == ("ok", True), (full, run.message, run.metrics)
+            with pytest.raises(rm.MethodRefusal, match="no blade without inertia"):
+                rm.run("check/held", full)
+    finally:
+        catalogue._files.clear()
+        catalogue._of_files.clear()
