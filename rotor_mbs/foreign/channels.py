@@ -33,16 +33,29 @@ _FEW_DIGITS, _ALL_DIGITS = 9, 17
 _FEW_VALUES = 10
 _EQUAL = 1e-6  # of an interval between rows
 _FEWEST = 3  # rows: fewer have no motion to be compared
-# Names without digits, blanks and marks; a name of a rate is one of an angle with a word of _RATE_WORDS behind it.
-_TIME_NAMES = {"time", "t", "times"}
-_ROTOR_NAMES = {"rotor", "rotorangle", "rotorposition", "rot", "azimuth", "rotorazimuth", "azim", "psi", "shaft"}
-_PITCH_NAMES = {"pitch", "pitchangle", "bladepitch", "bldpitch", "blpitch", "ptchpmzc", "ptchpmzb", "theta", "beta"}
-_ROTOR_RATE_NAMES = {"omega"}
+# Names without digits, blanks and marks; a name of a rate is one of an angle with a word of _RATE_WORDS behind it, or
+# d before it.
+_TIME_NAMES = ("time", "t", "times", "zeit")
+_ROTOR_NAMES = (
+    "rotor", "rotorangle", "rotorposition", "rot", "azimuth", "rotorazimuth", "azim", "psi", "phi", "shaft",
+)  # fmt: skip
+_PITCH_NAMES = ("pitch", "pitchangle", "bladepitch", "bldpitch", "blpitch", "ptchpmzc", "ptchpmzb", "theta", "beta")
+_ROTOR_RATE_NAMES = ("omega",)
 _RATE_WORDS = ("rate", "speed", "velocity", "vel", "dot")
 _VECTORS = {
-    "angle": {"angles", "angle", "q", "qpos", "coordinates", "positions"},
-    "rate": {"rates", "rate", "qd", "dq", "qdot", "qvel", "coordinates_t", "velocities"},
+    "angle": ("angles", "angle", "q", "qpos", "coordinates", "positions"),
+    "rate": ("rates", "rate", "qd", "dq", "qdot", "qvel", "coordinates_t", "velocities"),
 }
+# What is understood, in words.
+KNOWN_NAMES = (
+    ("time", ", ".join(_TIME_NAMES)),
+    ("rotor", ", ".join(_ROTOR_NAMES)),
+    ("pitch of blade i, its number behind", ", ".join(_PITCH_NAMES)),
+    ("rate of the rotor", f"these with {', '.join(_RATE_WORDS)} behind, or d before; {', '.join(_ROTOR_RATE_NAMES)}"),
+    ("rate of a pitch", f"these with {', '.join(_RATE_WORDS)} behind, or d before"),
+    ("array of angles, rotor first", ", ".join(_VECTORS["angle"])),
+    ("array of rates, rotor first", ", ".join(_VECTORS["rate"])),
+)
 _UNIT_ENDING = re.compile(r"_((?:rad|deg|turns|rev)(?:_per_s|/s|_s)?|rpm|s|ms|us|min)$", re.IGNORECASE)
 
 
@@ -90,8 +103,10 @@ def guess(name: str, vector: int, known: Sequence[Channel]) -> Channel | None:
     if letters in _TIME_NAMES:
         return known[0]
     ending = next((word for word in _RATE_WORDS if letters.endswith(word)), "")
-    rate = " rate" if ending else ""
     stem = letters.removesuffix(ending)
+    if letters[:1] == "d" and letters[1:] in (*_PITCH_NAMES, *_ROTOR_NAMES):
+        ending, stem = "d", letters[1:]
+    rate = " rate" if ending else ""
     digits = re.findall(r"\d+", plain)
     if stem in _PITCH_NAMES:
         only = "1" if len([channel for channel in known if channel.kind == "angle"]) == 2 else ""
@@ -248,6 +263,12 @@ class ForeignData:
     digits: int = _ALL_DIGITS
     omitted: tuple[str, ...] = ()
 
+    def rows(self, chosen: NDArray[np.bool_] | slice) -> ForeignData:
+        return replace(
+            self, time=self.time[chosen], values=self.values[chosen], rounding=self.rounding[chosen],
+            time_rounding=self.time_rounding[chosen],
+        )  # fmt: skip
+
     @property
     def columns(self) -> list[int]:
         """Places of the channels in a matrix of all angles, then all rates."""
@@ -318,7 +339,8 @@ def half_last_digits(values: Array) -> Array:
     last = np.zeros(len(values))
     for decimals in range(_FEW_DIGITS + 1):
         unit = 10.0**-decimals
-        if unit < largest and np.allclose(values, np.round(values / unit) * unit, rtol=0.0, atol=1e-12 * largest):
+        noise = 4.0 * 2.0**-52 * largest  # of the arithmetic; with less than a hundredth of a unit any number fits
+        if 100.0 * noise < unit < largest and np.abs(values - np.round(values / unit) * unit).max() <= noise:
             last[:] = 0.5 * unit
             break
     digits = _digits(values)
@@ -327,7 +349,8 @@ def half_last_digits(values: Array) -> Array:
         last = np.maximum(last, np.where(sizes > 0.0, 0.5 * 10.0 ** (exponents + 1 - digits), 0.0))
     if last.any():
         return last
-    single = np.asarray(values, np.float32).astype(float)
+    with np.errstate(over="ignore"):  # of what is larger than single precision can be
+        single = np.asarray(values, np.float32).astype(float)
     return np.asarray(sizes * (2.0**-24 if np.array_equal(single, values) else 2.0**-53))
 
 

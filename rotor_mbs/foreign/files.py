@@ -6,11 +6,9 @@ import csv
 import math
 import os
 import re
-import struct
 import subprocess
 import sys
 import tempfile
-import zipfile
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -19,7 +17,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from rotor_mbs.errors import InputError
+from rotor_mbs.errors import InputError, ResourceError, RotorError
 from rotor_mbs.runs import files
 from rotor_mbs.runs.read import is_sweep, run_arrays
 
@@ -111,8 +109,9 @@ def shown_names(names: list[str]) -> str:
 
 LARGEST = 1 << 29  # bytes; a trajectory of a million rows of ten columns is 80 MB
 FORMATS = "text with a header, .npz, .mat, HDF5, netCDF, OpenFAST .out and .outb"
-_HDF5, _NETCDF3, _ZIP = b"\x89HDF\r\n\x1a\n", b"CDF", b"PK\x03\x04"
-_MATLAB_5 = b"MATLAB 5.0 MAT-file"
+_HDF5, _NETCDF3, _ZIP, _MATLAB_5 = b"\x89HDF\r\n\x1a\n", b"CDF", b"PK\x03\x04", b"MATLAB 5.0 MAT-file"
+_BINARY = (_HDF5, _NETCDF3, _ZIP, _MATLAB_5)
+_LIMIT_S = 120.0  # for reading a binary file
 _UTF_16 = (b"\xff\xfe", b"\xfe\xff")  # spreadsheets' "Unicode text"
 
 # Text: comma-separated values, columns divided by blanks, Exudyn's sensor files, OpenFAST's `.out`.
@@ -145,25 +144,9 @@ def read_table(path: str | os.PathLike[str], group: str = "", scene: str = "") -
             head = file.read(1024)
     except OSError as exc:
         raise InputError(f"{path}: cannot be read: {exc.strerror}") from exc
+    if head.startswith(_BINARY) or head[512:].startswith(_HDF5) or path.suffix.lower() == ".outb":
+        return table_of(source, *_read_apart(path, group, scene))
     try:
-        if head.startswith(_HDF5) or head[512:].startswith(_HDF5):  # MATLAB puts a block of its own in front
-            if files.is_of_this_program(path) and not is_sweep(path):
-                return table_of(source, run_arrays(path, group, scene))
-            return table_of(source, *files.read_arrays(path, group, scene))
-        if head.startswith(_ZIP):
-            with path.open("rb") as file, np.load(file, allow_pickle=False) as archive:
-                return table_of(source, {name: archive[name] for name in archive.files})
-        if head.startswith(_MATLAB_5):
-            return _matlab(path)
-        if head.startswith(_NETCDF3):
-            from scipy.io import netcdf_file  # late: 0.1 s
-
-            with netcdf_file(path, "r", mmap=False) as file:
-                arrays = {name: np.array(variable[:]) for name, variable in file.variables.items()}
-                units = {name: item.units.decode() for name, item in file.variables.items() if hasattr(item, "units")}
-            return table_of(source, arrays, units)
-        if path.suffix.lower() == ".outb":
-            return _openfast(path)
         if b"\x00" in head and not head.startswith(_UTF_16):
             raise InputError(f"{path}: not a format that can be read; allowed: {FORMATS}")
         content = path.read_bytes()
@@ -172,7 +155,7 @@ def read_table(path: str | os.PathLike[str], group: str = "", scene: str = "") -
         except UnicodeDecodeError:
             text = content.decode("latin-1")
         return _read_text(source, text)
-    except (OSError, ValueError, zipfile.BadZipFile, struct.error, MemoryError, KeyError) as exc:
+    except (OSError, ValueError, MemoryError) as exc:
         raise InputError(f"{path}: cannot be read: {_line(exc)}; allowed: {FORMATS}") from exc
 
 
@@ -180,34 +163,70 @@ def _line(exc: BaseException) -> str:
     return (str(exc).splitlines() or [type(exc).__name__])[0]
 
 
-# In a process of its own: SciPy's reader can end its process where a file is damaged.
-_MATLAB_READER = """import sys, numpy, scipy.io
-try:
-    read = scipy.io.loadmat(sys.argv[1])
-except Exception as exc:
-    sys.exit(str(exc) or type(exc).__name__)
-kept = {name: value for name, value in read.items() if not name.startswith("__") and value.dtype.kind in "fiu"}
-numpy.savez(sys.argv[2], *kept.values(), names=numpy.array(list(kept), dtype=str))
-"""
-_MATLAB_LIMIT_S = 120.0
-
-
-def _matlab(path: Path) -> DataTable:
+def _read_apart(path: Path, group: str, scene: str) -> tuple[dict[str, NDArray[Any]], dict[str, str]]:
+    """Arrays and units of a binary file, read by a process of its own, which a damaged file may end or keep busy."""
     with tempfile.TemporaryDirectory() as folder:
-        arrays = Path(folder) / "arrays.npz"
-        command = [sys.executable, "-c", _MATLAB_READER, str(path.absolute()), str(arrays)]
+        output = Path(folder) / "arrays.npz"
+        call = f"from {__name__} import write_arrays; write_arrays()"
+        command = [sys.executable, "-P", "-W", "ignore", "-c", call, str(path), str(output), group, scene]
+        folders = os.pathsep.join(str(Path(folder).absolute()) for folder in sys.path)
         try:
-            ended = subprocess.run(command, capture_output=True, text=True, timeout=_MATLAB_LIMIT_S, check=False)
+            ended = subprocess.run(
+                command, capture_output=True, text=True, errors="replace", timeout=_LIMIT_S, check=False,
+                env=os.environ | {"PYTHONPATH": folders},
+            )  # fmt: skip
         except subprocess.TimeoutExpired:
             raise InputError(f"{path}: cannot be read: its reader does not end; allowed: {FORMATS}") from None
+        except OSError as exc:
+            raise ResourceError(f"{path}: cannot be read: no process for its reader: {exc}") from exc
+        if ended.returncode not in (0, 1):
+            raise InputError(f"{path}: cannot be read: its reader ended; allowed: {FORMATS}")
         if ended.returncode:
-            reason = (ended.stderr.strip().splitlines() or ["its reader ended"])[0]
-            raise InputError(f"{path}: cannot be read: {reason}; allowed: {FORMATS}")
-        with np.load(arrays, allow_pickle=False) as archive:
-            return table_of(str(path), {str(name): archive[f"arr_{i}"] for i, name in enumerate(archive["names"])})
+            raise InputError(ended.stderr.strip().splitlines()[-1])
+        with np.load(output, allow_pickle=False) as archive:
+            names = archive["names"].tolist()
+            arrays = {name: archive[f"arr_{i}"] for i, name in enumerate(names)}
+            return arrays, dict(zip(names, archive["units"].tolist(), strict=True))
 
 
-def _openfast(path: Path) -> DataTable:
+def write_arrays() -> None:
+    """The process of `_read_apart`: writes the arrays of numbers to an .npz file, or ends with a line."""
+    path, output, group, scene = sys.argv[1:]
+    try:
+        arrays, units = _binary_arrays(Path(path), group, scene)
+        kept = {name: _plain(values) for name, values in arrays.items()}
+    except RotorError as exc:
+        sys.exit(str(exc))
+    except Exception as exc:  # of any library
+        sys.exit(f"{path}: cannot be read: {_line(exc)}; allowed: {FORMATS}")
+    kept = {name: values for name, values in kept.items() if values.dtype.kind in "fiu"}
+    np.savez(output, *kept.values(), names=np.array(list(kept), str), units=[units.get(name, "") for name in kept])
+
+
+def _binary_arrays(path: Path, group: str, scene: str) -> tuple[Mapping[str, Any], Mapping[str, str]]:
+    with path.open("rb") as file:
+        head = file.read(len(_MATLAB_5))
+    if head.startswith(_ZIP):
+        with path.open("rb") as file, np.load(file, allow_pickle=False) as archive:
+            return {name: archive[name] for name in archive.files}, {}
+    if head.startswith(_MATLAB_5):
+        from scipy.io import loadmat  # late: 0.1 s
+
+        return {name: values for name, values in loadmat(path).items() if not name.startswith("__")}, {}
+    if head.startswith(_NETCDF3):
+        from scipy.io import netcdf_file
+
+        with netcdf_file(path, "r", mmap=False) as file:
+            units = {name: item.units.decode() for name, item in file.variables.items() if hasattr(item, "units")}
+            return {name: np.array(variable[:]) for name, variable in file.variables.items()}, units
+    if path.suffix.lower() == ".outb":
+        return _openfast(path)
+    if files.is_of_this_program(path) and not is_sweep(path):
+        return run_arrays(path, group, scene), {}
+    return files.read_arrays(path, group, scene)
+
+
+def _openfast(path: Path) -> tuple[dict[str, Any], dict[str, str]]:
     """OpenFAST's binary output, by its own project's reader."""
     try:
         from openfast_io.FAST_output_reader import load_binary_output
@@ -216,8 +235,7 @@ def _openfast(path: Path) -> DataTable:
         raise InputError(f"{path}: openfast_io is not installed; allowed: {hint}") from exc
     values, facts, _ = load_binary_output(str(path))
     names, units = facts["attribute_names"], facts["attribute_units"]
-    arrays = {name: values[:, i] for i, name in enumerate(names)}
-    return table_of(str(path), arrays, dict(zip(names, units, strict=True)))
+    return {name: values[:, i] for i, name in enumerate(names)}, dict(zip(names, units, strict=True))
 
 
 def _read_text(source: str, text: str) -> DataTable:

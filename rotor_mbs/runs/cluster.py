@@ -19,7 +19,7 @@ from typing import Any
 
 from rotor_mbs.errors import InputError, StoreError, one_line
 from rotor_mbs.runs.pool import R, T, TaskPool, local_pool
-from rotor_mbs.runs.versions import numerics_digest, versions
+from rotor_mbs.runs.versions import numerics_digest, versions, versions_with
 
 ENGINE_FORMS = "local, or dask:tcp://host:port"
 _CONNECT_S = 3.0
@@ -36,29 +36,19 @@ def open_task_pool(name: str, workers: int) -> TaskPool:
         for variable, value in _KEEP_MEMORY.items() if workers else ():
             os.environ.setdefault(variable, value)
         return local_pool(workers, _load)
-    if re.fullmatch(r"dask:tcp://[^\s/:]+:[0-9]{1,5}", name):
-        return _open_cluster(name.removeprefix("dask:"))
-    raise InputError(f"engine {name}: no such engine; allowed: {ENGINE_FORMS}")
-
-
-def _load() -> None:
-    """What the runs of a sweep compute with, the fast path's engine too, where it is installed."""
-    import_module("rotor_mbs.studies.sweep")  # by its name: only the workers import it
-    import_module("rotor_mbs.models.lagrange.heyoka_adapter").is_available()
-
-
-def _open_cluster(address: str) -> Cluster:
+    if not re.fullmatch(r"dask:tcp://[^\s/:]+:[0-9]{1,5}", name):
+        raise InputError(f"engine {name}: no such engine; allowed: {ENGINE_FORMS}")
     import asyncio
 
-    engine = f"engine dask:{address}"
+    address, engine = name.removeprefix("dask:"), f"engine {name}"
     try:
         from distributed import Client
         from distributed.comm.core import connect
     except ImportError as exc:
         raise InputError("engine dask: dask is not installed; pip install distributed") from exc
-    for name in list(logging.root.manager.loggerDict):
-        if name.startswith(("distributed", "tornado")):  # what it logs of a lost connection is said here in a line
-            logging.getLogger(name).setLevel(logging.CRITICAL + 1)
+    for logger in list(logging.root.manager.loggerDict):
+        if logger.startswith(("distributed", "tornado")):  # what it logs of a lost connection is said here in a line
+            logging.getLogger(logger).setLevel(logging.CRITICAL + 1)
     try:  # a client would wait for the answer of another program without end
         asyncio.run(asyncio.wait_for(connect(address), _CONNECT_S)).abort()
     except Exception as exc:  # whatever answers there
@@ -75,6 +65,12 @@ def _open_cluster(address: str) -> Cluster:
             raise InputError(f"{engine}: the scheduler has no workers; allowed: one with workers")
         stack.pop_all()
     return Cluster(client)
+
+
+def _load() -> None:
+    """What the runs of a sweep compute with, the fast path's engine too, where it is installed."""
+    import_module("rotor_mbs.studies.sweep")  # by its name: only the workers import it
+    import_module("rotor_mbs.models.lagrange.heyoka_adapter").is_available()
 
 
 class Cluster(TaskPool):
@@ -106,7 +102,9 @@ class Cluster(TaskPool):
 
     def _refuse_without_scheduler(self) -> None:
         if self._client.status != "running":
-            raise StoreError("engine dask: the scheduler is gone; what is stored is kept, the same command goes on")
+            raise StoreError(
+                "engine dask: the scheduler was lost; stored runs are kept, repeat the command to continue"
+            )
 
     def _watch(self) -> None:
         """A cluster whose last worker is gone would be waited for without end."""
@@ -129,7 +127,8 @@ def identity() -> dict[str, str]:
 
 def refuse_other_code(expected: Mapping[str, str]) -> None:
     """In a worker. Raises InputError where it has another version of anything that decides a number."""
-    found = {name: identity().get(name, "missing") for name in expected}
+    known = identity()
+    found = versions_with(*(name for name in expected if name not in known)) | known  # also of a method file's packages
     wrong = [f"{name} {found[name]} (here {here})" for name, here in expected.items() if found[name] != here]
     if wrong:
         raise InputError(f"engine dask: {_OTHER_CODE} (on {socket.gethostname()}: {', '.join(wrong)})")

@@ -34,6 +34,8 @@ HDF5 = b"\x89HDF"  # what a file begins with
 _LARGEST_REPLACED = 1 << 28  # bytes, of an output that is not HDF5
 DIGESTS = "digests"  # the attribute with the digests of a group
 CHARACTERS = "characters"  # the dimension of texts that are filled in later
+# What a lock file holds, unless its process was killed before it wrote.
+_OWNER = rb"(process [0-9]+ on [!-~]*)?\Z"
 # The netCDF-4 library's name for the scale of a dimension without values.
 _WITHOUT_VALUES = "This is a netCDF dimension but not a netCDF variable."
 
@@ -113,8 +115,7 @@ def refuse_foreign(path: Path, mark: bytes) -> None:
             is_own = size == 0 or (size <= _LARGEST_REPLACED and re.search(mark, path.read_bytes()) is not None)
     if not is_own:
         raise InputError(
-            f"{path}: is another file than the output of this command, and is not replaced; allowed: another name, or "
-            "remove that file"
+            f"{path}: is not an output of this command and is not replaced; allowed: another name, or remove that file"
         )
 
 
@@ -160,7 +161,7 @@ def open_file(path: Path) -> Iterator[Any]:
         if version != FORMAT_VERSION:
             raise StoreError(
                 f"{path}: format_version {version!r}, this program reads {FORMAT_VERSION}; allowed: a file of this "
-                "version, whose runs are computed anew"
+                "version, with its runs recomputed"
             )
         yield file
 
@@ -313,7 +314,9 @@ def groups_in(group: Any, seen: set[Any] | None = None) -> Iterator[Any]:
     """A group and every one below it, but for those below a table. Raises StoreError at a link or a second name."""
     seen = set() if seen is None else seen
     if group in seen:
-        raise StoreError(f"{group.file.filename}: {group.name} is another name of a group; allowed: one name of each")
+        raise StoreError(
+            f"{group.file.filename}: {group.name} is a second name of a group; allowed: one name for each group"
+        )
     seen.add(group)
     yield group
     for _, item in () if "run" in group else members(group):
@@ -427,18 +430,17 @@ _COMPUTED = "attributes of "
 _NOT_COVERED = (DIGESTS, "CLASS", "NAME", "REFERENCE_LIST", "DIMENSION_LIST", "_Netcdf4Dimid", "_Netcdf4Coordinates")
 
 
-def array_digest(values: NDArray[Any]) -> str:
-    """Over shape and values as little-endian numbers: the same on every machine and for every HDF5 layout."""
-    return str(_of_array(values).hexdigest())
-
-
-def _of_array(values: NDArray[Any]) -> Any:
+def array_digest(values: NDArray[Any], attributes: str = "") -> str:
+    """Over shape and values as little-endian numbers: the same on every machine and for every HDF5 layout; attributes:
+    their digest, where it is over these, too."""
     if values.dtype.kind == "O":  # texts
-        return hashlib.sha256("\0".join(map(str, values.tolist())).encode())
-    values = np.ascontiguousarray(values)
-    digest = hashlib.sha256(f"{values.dtype.kind}{values.dtype.itemsize}{values.shape}".encode())
-    digest.update(values.astype(values.dtype.newbyteorder("<"), copy=False).tobytes())
-    return digest
+        digest = hashlib.sha256("\0".join(map(str, values.tolist())).encode())
+    else:
+        values = np.ascontiguousarray(values)
+        digest = hashlib.sha256(f"{values.dtype.kind}{values.dtype.itemsize}{values.shape}".encode())
+        digest.update(values.astype(values.dtype.newbyteorder("<"), copy=False).tobytes())
+    digest.update(attributes.encode())
+    return digest.hexdigest()
 
 
 def attributes_digest(target: Any) -> str:
@@ -461,9 +463,7 @@ def seal(group: Any, later: Collection[str] = ()) -> None:
 def _digest_of(dataset: Any) -> str:
     """Over values, units, long name and further attributes."""
     values = texts_of(dataset) if is_text(dataset) else values_of(dataset)
-    digest = _of_array(values)
-    digest.update(attributes_digest(dataset).encode())
-    return str(digest.hexdigest())
+    return array_digest(values, attributes_digest(dataset))
 
 
 def seal_all(group: Any) -> None:
@@ -519,43 +519,43 @@ def computed_in(digests: Mapping[str, str]) -> list[str]:
 
 # The lock: a file beside an output that no other process may write, which goes afterwards.
 
-# Outputs that this process is writing, by thread: a study takes the lock, and so does what it calls.
-_held: set[tuple[Path, int]] = set()
-
 
 @contextmanager
 def writing(output: Path) -> Iterator[None]:
     """No other process writes `output` in the block; its thread may enter it again. Raises InputError, StoreError."""
-    place = _resolved(output)
-    own = place, threading.get_ident()
-    if own in _held:
-        yield
-        return
     from filelock import FileLock, Timeout
 
+    place = _resolved(output)
     path = _lock_of(place)
-    lock = FileLock(path, timeout=0)
+    lock = FileLock(path, timeout=0, is_singleton=True)
+    if lock.is_locked:  # by this thread: a study takes the lock, and so does what it calls
+        yield
+        return
+    owner = b""
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        if path.is_symlink() or (path.exists() and not path.is_file()):
-            raise InputError(f"{path}: is a foreign file; allowed: another output, or remove it")
+        if path.is_file():
+            with suppress(OSError):
+                owner = path.read_bytes()
+        if path.is_symlink() or (path.exists() and not path.is_file()) or not re.match(_OWNER, owner):
+            raise InputError(f"{path}: was not written by rotor-mbs; allowed: another output, or remove it")
         lock.acquire()
     except Timeout:
-        owner = ""
-        with suppress(OSError, UnicodeDecodeError):
-            owner = path.read_text()
-        writer = f"another process is writing it now{f' ({owner})' if owner else ''}"
+        writer = f"another process is writing it now{f' ({owner.decode()})' if owner else ''}"
         raise InputError(f"{output}: {writer}; allowed: wait for its end, or another output") from None
     except OSError as exc:
         raise StoreError(f"{output}: cannot be written: {exc.strerror}") from exc
-    _held.add(own)
     try:
-        _remove_temporaries(place)
+        # Half-written files of processes that were killed: nobody else writes this output now.
+        temporary = re.compile(rf"\.{re.escape(place.name)}\.([0-9]+\.)?tmp")
+        for beside in place.parent.iterdir():
+            if temporary.fullmatch(beside.name):
+                with suppress(OSError):
+                    beside.unlink()
         with suppress(OSError):  # a full disk is reported by what is written to the output
             path.write_text(f"process {os.getpid()} on {socket.gethostname()}")
         yield
     finally:
-        _held.remove(own)
         with suppress(OSError):
             path.unlink()
         lock.release()
@@ -577,12 +577,3 @@ def _resolved(output: Path) -> Path:
     except (OSError, RuntimeError) as exc:  # links in a circle, a working folder that is gone
         reason = getattr(exc, "strerror", None) or "leads to no file"
         raise StoreError(f"{output}: cannot be written: {reason}") from exc
-
-
-def _remove_temporaries(place: Path) -> None:
-    """Half-written files of processes that were killed: nobody else writes this output now."""
-    own = re.compile(rf"\.{re.escape(place.name)}\.([0-9]+\.)?tmp")
-    for path in place.parent.iterdir():
-        if own.fullmatch(path.name):
-            with suppress(OSError):
-                path.unlink()

@@ -229,7 +229,7 @@ def run_in(
             is_lack = end.failure == "worker_died" and end.error is not None
             lacks = lacks + 1 if is_lack else 0
             if lacks >= _MAX_LACKS:
-                raise ResourceError(f"given up after {lacks} failures in a row: {end.message}; what is stored stays")
+                raise ResourceError(f"stopped after {lacks} failures in a row: {end.message}; stored runs are kept")
             yield end
 
     for source in (tasks, again["timed_out"]):
@@ -241,7 +241,7 @@ def run_in(
                 yield end
     for end in completed(again["worker_died"], 1):
         if end.failure == "worker_died":
-            yield replace(end, message=f"{end.message}, and again when it was tried alone")
+            yield replace(end, message=f"{end.message}, also when it was retried alone")
         else:
             yield end
 
@@ -411,21 +411,17 @@ def _initialize(initializer: Callable[[], object] | None, core: int | None) -> N
 
 
 def _end_with_parent() -> None:
+    """On Linux the kernel itself ends this process with its parent, whose end of the pipe is closed then: an engine may
+    keep the interpreter's lock for long, so that no thread of Python would notice. Elsewhere this thread does."""
     parent = multiprocessing.parent_process()
     if parent is not None:
-        _signal_at_end_of(parent.sentinel)
+        with suppress(ImportError, AttributeError, OSError):
+            import fcntl
+
+            fcntl.fcntl(parent.sentinel, fcntl.F_SETOWN, os.getpid())
+            fcntl.fcntl(parent.sentinel, fcntl.F_SETFL, fcntl.fcntl(parent.sentinel, fcntl.F_GETFL) | os.O_ASYNC)
         parent.join()
     os._exit(1)
-
-
-def _signal_at_end_of(sentinel: int) -> None:
-    """On Linux the kernel itself ends this process with its parent, whose end of the pipe is closed then: an engine may
-    keep the interpreter's lock for long, so that no thread of Python would notice. Elsewhere the thread does."""
-    with suppress(ImportError, AttributeError, OSError):
-        import fcntl
-
-        fcntl.fcntl(sentinel, fcntl.F_SETOWN, os.getpid())
-        fcntl.fcntl(sentinel, fcntl.F_SETFL, fcntl.fcntl(sentinel, fcntl.F_GETFL) | os.O_ASYNC)
 
 
 def _answer(request: bytes) -> bytes:
@@ -435,16 +431,12 @@ def _answer(request: bytes) -> bytes:
             raise _initial_error
         work, task = pickle.loads(request)
         return pickle.dumps((work(task), None))
-    except BaseException as exc:
-        return pickle.dumps((None, _picklable(exc)))
-
-
-def _picklable(error: BaseException) -> Exception:
-    """The error itself, where it arrives as it is sent; SystemExit and the like must not end the parent."""
-    if isinstance(error, Exception):
+    except Exception as exc:
         try:
-            pickle.loads(pickle.dumps(error))
+            answer = pickle.dumps((None, exc))
+            pickle.loads(answer)  # not every error arrives as it is sent
         except Exception:
-            return RuntimeError(one_line(error))
-        return error
-    return RuntimeError(one_line(error))
+            return pickle.dumps((None, RuntimeError(one_line(exc))))
+        return answer
+    except BaseException as exc:  # SystemExit and the like must not end the parent
+        return pickle.dumps((None, RuntimeError(one_line(exc))))

@@ -2,7 +2,6 @@
 
 /bench                          a row per point of a curve: a method at one setting on a scene
 /stability                      a row per step of a ladder: a fixed-step method on a scene
-/stability_limits, /symmetry    a row per method and scene: numbers of many runs
 /modes/<scene>/<model>/<kind>   modes over speed, in a file of modes
 /comparison/<scene>/data/trajectory   data of another program and the reference at their times
 """
@@ -34,6 +33,7 @@ from rotor_mbs.runs.table import (
     known_columns,
     text_of,
 )
+from rotor_mbs.runs.versions import machine, versions
 from rotor_mbs.solution.status import STATUSES, code_of
 
 _MESSAGE_LENGTH = 300
@@ -48,8 +48,6 @@ POINT_COLUMNS: Mapping[str, Mapping[str, Column]] = {
         "output_time_s repeats steps "
         "false_success left_out horizon_s uncertainty_rad samples load_before pinned_core repeatable order crc32",
         "stability": "status message angle_error_max energy_drift_max false_success step_for_target_s crc32",
-        "stability_limits": "status message largest_stable_step_s theory_s fastest_mode_per_s mode_damping_ratio crc32",
-        "symmetry": "status message mirror_error relabelling_error reversal_error angular_momentum_drift crc32",
     }.items()
 }
 _NUMBERS = ("step", "tolerance", "order_expected")  # that the design says of a point
@@ -117,7 +115,7 @@ def read_records(path: Path, *kinds: str) -> list[Record]:
 
 
 def _point_records(file: TableFile, kind: str) -> Iterator[Record]:
-    """The rows of a table that belong to one curve, one ladder, or one method and scene."""
+    """The rows of a table that belong to one curve or one ladder."""
     stored = file.table(kind)
     rows: dict[tuple[str, str], list[int]] = {}
     for i in range(len(stored.runs)):
@@ -163,6 +161,7 @@ def _point_records(file: TableFile, kind: str) -> Iterator[Record]:
 def write_records(path: Path, records: Sequence[Record]) -> None:
     """A file with these records alone, atomically. Raises StoreError."""
     with files.new_file(path) as file:
+        files.put_attributes(file, {**versions(), **machine()})
         for record in records:
             group = files.new_group(file, "/".join((record.kind, record.scene, record.name)))
             files.put_attributes(group, {"record": 1, **record.attributes})

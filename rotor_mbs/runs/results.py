@@ -54,7 +54,7 @@ _RUN_COLUMNS = (
     "run_time_s", "run_time_min_s", "output_time_s", "repeats", "engine_success", "engine_message", "false_success",
     "energy_scale_J", "energy_drift_max", "energy_gain_J", "angle_error_max", "angle_error_predicted",
     "angle_error_whole", "angle_error_end", "horizon_s", "defect_max", "defect_median", "defect_time",
-    "defect_mean", "defect_drift", "defect_floor", "defects_not_judged",
+    "defect_judged", "defect_mean", "defect_drift", "defect_floor", "defects_not_judged",
     "angular_impulse_error_max", "linear_impulse_error_max",
     "zero_pitch_max", "zero_pitch_left_s", "zero_pitch_growth_per_s", "rotor_angle_min", "rotor_angle_max",
     "rotor_rate_max",
@@ -89,7 +89,7 @@ class Asked:
     def known(self) -> dict[str, str]:
         """The columns of /runs that follow from the design."""
         method = find_method(self.method)
-        settings = method.settings.of(self.method, self.settings).as_dict()
+        settings = method.chosen(self.scene, self.settings).as_dict()
         return {
             "scene": self.scene.name,
             "method_name": self.method,
@@ -342,7 +342,16 @@ def _order(run: str) -> tuple[Any, ...]:
 def _write_tables(path: Path, tables: Sequence[Table], rows: Sequence[tuple[str, str, Rows]]) -> None:
     """A new file with these tables; of its rows those that are given, the others blank."""
     created = datetime.now(UTC).isoformat(timespec="seconds")
-    attributes = {**_description(tables), **versions(), **machine(), "created": created, "date_created": created}
+    count, scenes = 0, set[str]()
+    others = sorted(made.group for made in tables if made.group != RUNS and "crc32" in made.computed)
+    for made in tables:
+        if made.group == RUNS:
+            count, scenes = len(made.runs), set(made.known["scene"][1])
+    summary = f"{count} runs of {len(scenes)} scenes: trajectories, energies, status and errors of each"
+    if others:
+        summary += f"; tables {', '.join(others)}"
+    described = {"title": "Rotor models compared", "summary": summary, "keywords": KEYWORDS}  # as ACDD asks for them
+    attributes = {**described, **versions(), **machine(), "created": created, "date_created": created}
     with table.laid_out(path, tables, attributes) as temporary:
         file = TableFile(temporary)
         given = {(group, run): values for group, run, values in rows}
@@ -356,18 +365,6 @@ def _write_tables(path: Path, tables: Sequence[Table], rows: Sequence[tuple[str,
                     blank = blank_rows(1, place.row)
                     place.write(place.first, {name: values.get(name, blank[name]) for name in place.row.names or ()})
     files.sync_folder(path.parent)
-
-
-def _description(tables: Sequence[Table]) -> dict[str, object]:
-    """Title, summary and keywords as the ACDD conventions ask for them."""
-    runs = next((made for made in tables if made.group == RUNS), None)
-    scenes = set(runs.known["scene"][1]) if runs is not None else set()
-    count = len(runs.runs) if runs is not None else 0
-    summary = f"{count} runs of {len(scenes)} scenes: trajectories, energies, status and errors of each"
-    others = sorted(made.group for made in tables if made.group != RUNS and "crc32" in made.computed)
-    if others:
-        summary += f"; tables {', '.join(others)}"
-    return {"title": "Rotor models compared", "summary": summary, "keywords": KEYWORDS}
 
 
 # The rows of a run
@@ -396,7 +393,8 @@ def row_of_run(run: Solution, place: Place, facts: Mapping[str, object]) -> Rows
         if name in row:
             row[name][0] = value
     for name, text in (("message", run.message), ("engine_message", integration.message)):
-        row[name][0] = characters(text, row[name].shape[1])
+        if name in row:
+            row[name][0] = characters(text, row[name].shape[1])
     row["status"][0] = code_of(run.status)
     arrays = dict(run.quantities)
     if run.method == REFERENCE:
@@ -410,6 +408,7 @@ def row_of_run(run: Solution, place: Place, facts: Mapping[str, object]) -> Rows
 
 
 def repeat(row: Rows) -> None:
-    """Put status and samples where the table of the scene has them, too."""
+    """Put status and samples where the table of the scene has them, too, where there is one."""
     for name, repeated in REPEATED.items():
-        row[repeated][:] = row[name]
+        if repeated in row:
+            row[repeated][:] = row[name]

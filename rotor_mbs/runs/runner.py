@@ -10,6 +10,7 @@ from typing import Self, TypeVar
 import numpy as np
 
 from rotor_mbs.errors import InputError, MethodRefusal, StoreError
+from rotor_mbs.methods.catalogue import with_method_files
 from rotor_mbs.runs.pool import Finished, TaskPool, run_in
 from rotor_mbs.runs.table import Place, Rows
 
@@ -56,7 +57,7 @@ def compute(pool: TaskPool, perform: Callable[[T], Rows], tasks: Iterable[T]) ->
     and run_time_s of its rows as they are stored; None where nothing is, and its failure and message say why. Raises
     what a task raised of InputError, MethodRefusal and StoreError.
     """
-    work = partial(perform_and_store, perform) if pool.shares_disk else perform
+    work = with_method_files(partial(perform_and_store, perform) if pool.shares_disk else perform)
     for end in run_in(pool, work, tasks, lambda task: task.kill_after_s, lambda task: task.split()):
         task = end.task
         if isinstance(end.error, InputError | MethodRefusal | StoreError):

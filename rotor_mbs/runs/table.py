@@ -52,7 +52,7 @@ COLUMNS = {
     name: Column(("run", CHARACTERS) if CHARACTER in kind else ("run",), units, long_name, *kind)
     for name, (units, long_name, *kind) in {
         "status": ("1", "how the run ended, from its state; -1 while it is missing", "i1"),
-        "message": ("1", "why the run did not end well", CHARACTER),
+        "message": ("1", "reason why the run did not succeed", CHARACTER),
         "samples": ("1", "finite samples", "<i8"),
         "time_reached": ("s", "time of the last sample"),
         "time_limit_s": ("s", "time limit that ended the run, NaN where none did"),
@@ -78,6 +78,10 @@ COLUMNS = {
         "defect_max": ("rad", "largest defect of an interval between samples"),
         "defect_median": ("rad", "median of the intervals' defects"),
         "defect_time": ("s", "end of the interval of the largest defect"),
+        "defect_judged": (
+            "rad",
+            "largest defect beyond rounding, per 0.01 s and unit of growth in longer intervals",
+        ),
         "defect_mean": ("rad", "signed mean of the defects, of the coordinate where it is largest"),
         "defect_drift": ("rad", "largest sum of the defects of 100 intervals, each carried to their end"),
         "defect_floor": ("rad", "what the rounding of the samples may make of a defect"),
@@ -102,15 +106,7 @@ COLUMNS = {
         "pinned_core": ("1", "core that the runs were timed on, -1 for any", "<i8"),
         "order": ("1", "order of convergence of the curve, fitted above its round-off floor"),
         "step_for_target_s": ("s", "step at which the ladder reaches 1e-6 rad"),
-        "largest_stable_step_s": ("s", "largest stable step, by bisection"),
-        "theory_s": ("s", "largest stable step by the stability function"),
-        "fastest_mode_per_s": ("1/s", "largest eigenvalue of the pitches"),
-        "mode_damping_ratio": ("1", "damping ratio of the fastest mode"),
-        "mirror_error": ("rad", "error of the mirrored scene's motion"),
-        "relabelling_error": ("rad", "error of the motion with renumbered blades"),
-        "reversal_error": ("rad", "error at the start after going there and back"),
-        "angular_momentum_drift": ("1", "relative change of the angular momentum about the shaft"),
-        "code": ("1", "CRC-32 of the versions that computed the run, as `rotor-mbs sweep` tells", "<u4"),
+        "code": ("1", "CRC-32 of the versions that computed the run", "<u4"),
         "crc32": ("1", "CRC-32 of the row in all computed columns", "<u4"),
     }.items()
 }
@@ -217,7 +213,7 @@ class Place:
         statuses = {name: columns.pop(name) for name in (STATUS_REPEATED, "status") if name in columns}
         with saving(self.path), self.path.open("r+b") as file:
             if os.fstat(file.fileno()).st_ino != self.inode:
-                raise StoreError(f"{self.path}: is another file by now")
+                raise StoreError(f"{self.path}: has been replaced by another file")
             for name, status in statuses.items():
                 file.seek(self.offsets[name] + first - self.first)
                 file.write(np.full(len(status), MISSING, np.int8).data)

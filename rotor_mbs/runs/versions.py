@@ -51,16 +51,11 @@ def row_versions(method: Method) -> dict[str, str]:
 @functools.cache
 def machine() -> dict[str, str]:
     """Operating system and processor, as the system reports them; the cores that this process may use."""
-    return {"platform": platform.platform(), "cpu": f"{_processor()}, {cores()} cores"}
-
-
-def _processor() -> str:
-    information = Path("/proc/cpuinfo")
+    processor, information = platform.processor() or platform.machine(), Path("/proc/cpuinfo")
     if information.is_file():
-        for line in information.read_text(errors="replace").splitlines():
-            if line.startswith("model name"):
-                return line.partition(":")[2].strip()
-    return platform.processor() or platform.machine()
+        named = re.search(r"^model name\s*:\s*(.*?)\s*$", information.read_text(errors="replace"), re.MULTILINE)
+        processor = named[1] if named else processor
+    return {"platform": platform.platform(), "cpu": f"{processor}, {cores()} cores"}
 
 
 @functools.cache
@@ -71,10 +66,12 @@ def numerics_digest() -> str:
 
 
 @functools.cache
-def code_digest(sources: tuple[Path, ...]) -> str:
-    """Twelve hexadecimal digits of a SHA-256 over source files, without comments, docstrings and empty lines."""
+def code_digest(sources: tuple[Path | str, ...]) -> str:
+    """Twelve hexadecimal digits of a SHA-256 over source files, or texts, without comments, docstrings and empty
+    lines."""
     digest = hashlib.sha256()
-    for path in sources:
-        text = _WITHOUT_EFFECT.sub(lambda match: match[1] or "", path.read_text(encoding="utf-8", errors="replace"))
+    for source in sources:
+        code = source if isinstance(source, str) else source.read_text(encoding="utf-8", errors="replace")
+        text = _WITHOUT_EFFECT.sub(lambda match: match[1] or "", code)
         digest.update("\n".join(line.rstrip() for line in text.splitlines() if line.strip()).encode())
     return digest.hexdigest()[:12]

@@ -5,23 +5,25 @@ The curves of a scene are timed together, in rounds over all their points, by on
 
 from __future__ import annotations
 
+import gc
 import heapq
 import json
 import math
 import os
 import time
-from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
-from functools import partial
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, Generic, TypeAlias, TypeVar
+from typing import Any
 
 import numpy as np
 
+from rotor_mbs.analysis.judgement import judge
 from rotor_mbs.analysis.work_precision import SMALLEST_ERROR, fitted_order
-from rotor_mbs.errors import InputError
+from rotor_mbs.errors import OF_THE_MACHINE, InputError, RotorError, one_line
 from rotor_mbs.methods.base import STEP, TOLERANCE, Ladder
-from rotor_mbs.methods.catalogue import find_method, ladders, settings_for
+from rotor_mbs.methods.catalogue import REFERENCE, find_method, ladders, settings_for, with_method_files
+from rotor_mbs.methods.time_limit import OutOfTimeError, time_limit
 from rotor_mbs.runs import last_core
 from rotor_mbs.runs.files import writing
 from rotor_mbs.runs.pool import WorkerPool, run_in
@@ -31,28 +33,152 @@ from rotor_mbs.runs.table import Place, Rows, Table
 from rotor_mbs.runs.versions import row_versions
 from rotor_mbs.scenario.scene import Scene, scene_hash
 from rotor_mbs.solution.metrics import horizon, horizon_samples
+from rotor_mbs.solution.solution import Solution
+from rotor_mbs.solution.status import COMPLETE
 from rotor_mbs.solution.trajectory import Trajectory
-from rotor_mbs.studies.bench_worker import ERRORS, Point, PointScenes, ask, prepared_scene, start_timer, thinned
 from rotor_mbs.studies.run import OnProgress, Outcome, able_methods, ignore_progress, run_scenes
+from rotor_mbs.studies.stored_references import read_reference
 
-T = TypeVar("T", bound=Hashable)
-WarmUp: TypeAlias = Callable[[T], tuple[float, bool]]
+BENCH = "bench"
 
 LONG_RUN_S = 0.5  # runs longer than this are repeated LONG_REPEATS times at most
 LONG_REPEATS = 5
 # Of the budget, what the warm-up runs may take before expensive rungs are left out, so that there is time for about two
 # rounds; and what warm-ups and building may take together.
 _WARM_UP_SHARE, _BUILD_SHARE = 0.3, 0.6
+_REFERENCE_LIMIT_S = 60.0
+# A run longer than this is ended: a hanging engine must not eat the budget of the others.
+_RUN_LIMIT_S = 10.0
+# A process that has taken this many times its budget, and some time to load engines, hangs in one of them.
+_HANGING, _LOADING_S = 3.0, 60.0
+# Errors are compared on at most so many sample intervals: more would make every step shorter than a coarse rung's, and
+# a bench would time the reading of samples.
+_MOST_INTERVALS = 100
+# An error as large as the motion itself: such a run is a failure, not a point on the curve.
+USELESS_RAD = 1.0
+USELESS_DRIFT = 0.1  # of the energy scale, where there is no reference
+ERRORS = ("angle_error_max", "angle_error_end", "tip_error_max", "energy_drift_max", "defect_max", "defect_median")
 
 
-@dataclass
-class Timings(Generic[T]):
-    """What `conduct` found: by point, run times in s of those that can be repeated, seconds of the warm-up of all that
-    were tried, and why the budget left out the others."""
+# A point: one method at one setting
 
-    times: dict[T, list[float]] = field(default_factory=dict)
-    warm: dict[T, float] = field(default_factory=dict)
-    left_out: dict[T, str] = field(default_factory=dict)
+
+@dataclass(frozen=True)
+class Point:
+    """One method at one setting: a rung of a curve. settings as (name, value) pairs."""
+
+    curve: str
+    method: str
+    setting: float
+    settings: tuple[tuple[str, object], ...]
+
+
+class PointTimer:
+    """Builds a point, runs it as often as asked, and judges the last run.
+
+    Attributes
+    ----------
+    warm_s : s, of the warm-up run; of a point that failed until then.
+    is_repeatable : whether the warm-up run came back.
+    times : s, of the timed runs.
+    left_out : why it was not run.
+    """
+
+    def __init__(
+        self,
+        point: Point,
+        scene: Scene,
+        reference: Trajectory | None,
+        warm_up_limit_s: float = math.inf,
+        clock: Callable[[], float] = time.perf_counter,
+    ) -> None:
+        self._point, self._scene, self._reference = point, scene, reference
+        self._warm_up_limit_s, self._clock = warm_up_limit_s, clock
+        self._setup: dict[str, float] = {}
+        self._failure = "", ""  # status and message
+        self.warm_s, self.is_repeatable, self.left_out = math.nan, False, ""
+        self.times: list[float] = []
+
+    def warm_up(self) -> None:
+        """Build twice, the first time with everything compiled, and run once."""
+        start = self._clock()
+        try:
+            method = find_method(self._point.method)
+            settings = method.settings.of(self._point.method, dict(self._point.settings))
+            for name in ("setup_time_s", "setup_again_time_s"):
+                begun = self._clock()
+                self._solver = method.build(self._scene, settings)
+                self._setup[name] = self._clock() - begun
+            if not gc.isenabled():
+                gc.collect()
+            # A limit makes engines ask after every step, which takes time: only the warm-up run of a bench has one.
+            with time_limit(self._warm_up_limit_s):
+                self.warm_s = self.run()
+            if self._integration.out_of_time:
+                raise OutOfTimeError(self._integration.message)
+            self._first_angles = self._solver.observe().angles
+            self.is_repeatable = True
+        except OF_THE_MACHINE:
+            raise
+        except OutOfTimeError as exc:
+            self._failure = "timed_out", str(exc)
+        except Exception as exc:
+            self._failure = "solver_failed", str(exc) if isinstance(exc, RotorError) else one_line(exc)
+        if not self.is_repeatable:
+            self.warm_s = self._clock() - start
+
+    def run(self) -> float:
+        """Seconds of one run."""
+        start = self._clock()
+        self._integration = self._solver.integrate()
+        return self._clock() - start
+
+    def row(self) -> dict[str, Any]:
+        """The columns of the point, and `same`: whether the last run is bit for bit the first."""
+        if self.is_repeatable:
+            return self._setup | statistics(self.times) | self.judge()
+        status, message = ("left_out", self.left_out) if self.left_out else self._failure
+        nothing = {"false_success": 0, "repeats": 0, "steps": 0}
+        return {"status": status, "message": message, "run_time_s": self.warm_s, **nothing}
+
+    def judge(self) -> dict[str, Any]:
+        """Status, message, errors and steps of the last run, and the time to read out and compute its samples."""
+        start = self._clock()
+        trajectory = self._solver.observe()
+        output = self._clock() - start
+        point, scene, integration = self._point, self._scene, self._integration
+        method = find_method(point.method)
+        run = Solution(scene, point.method, trajectory, integration, dict(point.settings))
+        run.is_corrected, run.bounds = method.is_corrected, method.bounds
+        with np.errstate(over="ignore", invalid="ignore"):  # a runaway's distances may overflow
+            judgement = judge(scene, run, self._reference)
+        status, message = _status(judgement.status, judgement.message, judgement.metrics)
+        del self._solver
+        errors = judgement.metrics if status in COMPLETE else {}  # those of a run that broke off are of its part
+        return {
+            "status": status,
+            "message": message,
+            "false_success": int(integration.success and status != "ok"),
+            "steps": integration.steps or 0,
+            "output_time_s": output,
+            "same": np.array_equal(trajectory.angles, self._first_angles),
+            **{name: errors.get(name, np.nan) for name in ERRORS},
+        }
+
+
+def _status(status: str, message: str, metrics: Mapping[str, float]) -> tuple[str, str]:
+    """A bench asks how large an error is: it is a failure only where nothing of the motion is right."""
+    if status not in COMPLETE:
+        return status, message
+    if "angle_error_max" not in metrics:  # no reference: energy alone decides
+        return ("ok", "") if metrics.get("energy_drift_max", np.inf) < USELESS_DRIFT else (status, message)
+    error = metrics["angle_error_max"]
+    if error < USELESS_RAD:
+        return "ok", ""
+    return "inaccurate", f"angle error {error:.1e} rad before the horizon: as large as the motion"
+
+
+# When and how often each point runs
 
 
 def statistics(times: Sequence[float]) -> dict[str, float]:
@@ -67,61 +193,44 @@ def statistics(times: Sequence[float]) -> dict[str, float]:
     }
 
 
-def conduct(
-    ladders: Sequence[Sequence[T]],
-    warm_up: WarmUp[T],
-    repeat: Callable[[T], float],
-    budget_s: float,
-    repeats: int,
-    clock: Callable[[], float],
-) -> Timings[T]:
-    """Warms up every point, the cheapest next rung of any ladder first, then times them in rounds.
+def conduct(ladders: Sequence[Sequence[PointTimer]], budget_s: float, repeats: int, clock: Callable[[], float]) -> None:
+    """Warm up every point, the cheapest next rung of any ladder first, then time them in rounds.
 
-    ladders     each coarse to fine
-    warm_up     builds the point and runs it once: seconds, and whether it came back, so that it can be repeated
-    repeat      runs it once more: seconds
-    budget_s    for all of it, on `clock` (s)
+    Parameters
+    ----------
+    ladders : each coarse to fine.
+    budget_s : for all of it, on `clock` (s).
+    repeats : of each point at most.
     """
-    found: Timings[T] = Timings()
     start = clock()
-
-    def left() -> float:
-        return min(_WARM_UP_SHARE * budget_s - sum(found.warm.values()), _BUILD_SHARE * budget_s - (clock() - start))
-
-    _warm_all(found, ladders, warm_up, left)
-    alive = {point: max(found.warm[point], 1e-9) for point in found.times}
-    few = min(repeats, LONG_REPEATS)
-    wanted = {point: repeats if seconds <= LONG_RUN_S else few for point, seconds in alive.items()}
-    allowed = allot(alive, wanted, budget_s - (clock() - start))
-    for round_ in range(max(allowed.values(), default=0)):
-        for point, count in allowed.items():
+    _warm_all(ladders, budget_s, clock)
+    points = [point for ladder in ladders for point in ladder if point.is_repeatable]
+    wanted = [repeats if point.warm_s <= LONG_RUN_S else min(repeats, LONG_REPEATS) for point in points]
+    allowed = allot([max(point.warm_s, 1e-9) for point in points], wanted, budget_s - (clock() - start))
+    for round_ in range(max(allowed, default=0)):
+        for point, count in zip(points, allowed, strict=True):
             if round_ and clock() - start > budget_s:  # the machine has become slower
-                return found
+                return
             if round_ < count:
-                found.times[point].append(repeat(point))
-    return found
+                point.times.append(point.run())
 
 
-def _warm_all(
-    found: Timings[T],
-    ladders: Sequence[Sequence[T]],
-    warm_up: WarmUp[T],
-    left_s: Callable[[], float],
-) -> None:
+def _warm_all(ladders: Sequence[Sequence[PointTimer]], budget_s: float, clock: Callable[[], float]) -> None:
     """The rung expected to be cheapest comes next. What is left over when even that one does not fit is left out."""
+    start, warm_s = clock(), 0.0
     waiting = [(0.0, 0, number) for number, ladder in enumerate(ladders) if ladder]
     while waiting:
         expected, rung, number = heapq.heappop(waiting)
         ladder = ladders[number]
-        if rung and expected > left_s():
-            reason = f"not run: about {expected:.2g} s more were not in the budget"
-            found.left_out.update(dict.fromkeys(ladder[rung:], reason))
+        left = min(_WARM_UP_SHARE * budget_s - warm_s, _BUILD_SHARE * budget_s - (clock() - start))
+        if rung and expected > left:
+            for point in ladder[rung:]:
+                point.left_out = f"not run: about {expected:.2g} s more than the budget allows"
             continue
-        found.warm[ladder[rung]], returned = warm_up(ladder[rung])
-        if returned:
-            found.times[ladder[rung]] = []
+        ladder[rung].warm_up()
+        warm_s += ladder[rung].warm_s
         if rung + 1 < len(ladder):
-            following = _expected([found.warm[point] for point in ladder[: rung + 1]])
+            following = _expected([point.warm_s for point in ladder[: rung + 1]])
             heapq.heappush(waiting, (following, rung + 1, number))
 
 
@@ -131,25 +240,75 @@ def _expected(earlier: Sequence[float]) -> float:
     return earlier[-1] * min(max(growth, 2.0), 10.0)
 
 
-def allot(seconds: Mapping[T, float], wanted: Mapping[T, int], budget_s: float) -> dict[T, int]:
+def allot(seconds: Sequence[float], wanted: Sequence[int], budget_s: float) -> list[int]:
     """Repeats of each point: all it wants or what an equal share of time allows, and one in any case.
 
     What points that want less than their share leave is shared by the others.
     """
-    found: dict[T, int] = {}
-    by_demand = sorted(seconds, key=lambda point: wanted[point] * seconds[point])
-    for done, point in enumerate(by_demand):
+    counts = [0] * len(seconds)
+    by_demand = sorted(range(len(seconds)), key=lambda i: wanted[i] * seconds[i])
+    for done, i in enumerate(by_demand):
         share = budget_s / (len(by_demand) - done) * (1.0 + 1e-12)
-        found[point] = max(1, min(wanted[point], int(share / seconds[point])))
-        budget_s -= found[point] * seconds[point]
-    return {point: found[point] for point in seconds}
+        counts[i] = max(1, min(wanted[i], int(share / seconds[i])))
+        budget_s -= counts[i] * seconds[i]
+    return counts
 
 
-BENCH = "bench"
+@dataclass(frozen=True)
+class Measurement:
+    """Points of a scene that are timed together, in one process.
 
-_REFERENCE_LIMIT_S = 60.0
-# A run longer than this is ended: a hanging engine must not eat the budget of the others.
-_RUN_LIMIT_S = 10.0
+    points : by curve, each coarse to fine.
+    repeats, budget_s : timed runs of a point at most, and s for all of them.
+    """
+
+    scene: Scene
+    reference: Trajectory | None
+    points: Sequence[Sequence[Point]]
+    repeats: int
+    budget_s: float
+
+    def split(self) -> list[Measurement]:
+        """Its curves one by one; [] where it is one."""
+        return [replace(self, points=[own]) for own in self.points] if len(self.points) > 1 else []
+
+
+def measure(task: Measurement) -> list[list[dict[str, Any]]]:
+    """The columns of every point, by curve: timed in rounds over all points, then the last run of each judged.
+
+    For a process that does nothing else: engines are loaded beforehand, which is part of no run's time, and the garbage
+    collector is off.
+    """
+    for method in dict.fromkeys(own[0].method for own in task.points):
+        find_method(method).load()
+    gc.disable()
+    curves = [[PointTimer(point, task.scene, task.reference, _RUN_LIMIT_S) for point in own] for own in task.points]
+    conduct(curves, task.budget_s, task.repeats, time.perf_counter)
+    return [[timer.row() for timer in own] for own in curves]
+
+
+def prepared(scene: Scene, place: Place) -> tuple[Scene, Trajectory]:
+    """The scene as it is benched, without loads, and its reference, which is at `place`, at the same samples. Raises
+    InputError where there is none."""
+    reference = read_reference(place, scene)
+    if reference is None or len(reference.time) < scene.samples:
+        raise InputError(f"{scene.name}: no usable reference (it does not reach the end); a bench needs one")
+    short, k = thinned(scene)
+    short = replace(short, outputs=tuple(name for name in short.outputs if name != "loads"))
+    arrays = {name: values[::k] for name, values in reference.quantities.items()}
+    return short, Trajectory(reference.time[::k], reference.angles[::k], reference.rates[::k], **arrays)
+
+
+def thinned(scene: Scene) -> tuple[Scene, int]:
+    """The scene with every k-th sample, and k: the finest thinning with at most 100 intervals, or none."""
+    intervals = scene.samples - 1
+    k = next((k for k in range(1, intervals + 1) if intervals % k == 0 and intervals // k <= _MOST_INTERVALS), 1)
+    # A number of intervals without a fitting divisor would leave too few samples to see an error's largest.
+    k = k if intervals // k >= _MOST_INTERVALS // 5 or intervals <= _MOST_INTERVALS else 1
+    return replace(scene, samples=intervals // k + 1), k
+
+
+# Curves in a results file
 
 
 @dataclass(frozen=True)
@@ -176,6 +335,19 @@ class Curve:
         return str(self.rows[0]["run"])
 
     @property
+    def _rungs(self) -> dict[float, dict[str, object]]:
+        short, _ = thinned(self.scene)
+        return self.ladder.rungs(short.duration / (short.samples - 1))
+
+    @property
+    def points(self) -> list[Point]:
+        """A point per rung."""
+        return [
+            Point(self.ladder.curve, self.ladder.method, setting, tuple(sorted(settings.items())))
+            for setting, settings in self._rungs.items()
+        ]
+
+    @property
     def rows(self) -> list[dict[str, object]]:
         """The known columns of its points."""
         method = find_method(self.ladder.method)
@@ -190,8 +362,7 @@ class Curve:
             "order_expected": math.nan if self.ladder.order is None else self.ladder.order,
         }
         rows = []
-        short, _ = thinned(self.scene)
-        for setting, chosen in self.ladder.rungs(short.duration / (short.samples - 1)).items():
+        for setting, chosen in self._rungs.items():
             settings = method.settings.of(method.name, chosen).as_dict()
             row = known | {"settings": json.dumps(settings, sort_keys=True)}
             row |= {kind: setting if kind == self.ladder.kind else math.nan for kind in (STEP, TOLERANCE)}
@@ -258,7 +429,8 @@ def run_bench(
     with writing(output):
         changed = _complete_references(scenes, output, workers)
         # Refused before the first is measured.
-        prepared = {scene.name: prepared_scene(scene, output) for scene in scenes}
+        places = {scene.name: TableFile(output).place(f"{scene.name}/{REFERENCE}") for scene in scenes}
+        ready = {scene.name: prepared(scene, places[scene.name]) for scene in scenes}
         curves: list[Curve] = []
         left_out: list[str] = []
         options = {"repeats": repeats, "budget_s": budget_s}
@@ -271,7 +443,7 @@ def run_bench(
         made: list[Outcome] = []
         for scene in scenes:
             own = [curve for curve in missing if curve.scene.name == scene.name]
-            for outcome in _measure_scene(file, own, *prepared[scene.name], repeats, budget_s) if own else ():
+            for outcome in _measure_scene(file, own, *ready[scene.name], repeats, budget_s) if own else ():
                 made.append(replace(outcome, share=(len(made) + 1) / len(missing)))
                 on_progress(len(made), len(missing), made[-1])
         return made, left_out
@@ -309,37 +481,34 @@ def _measure_scene(
     file: TableFile, curves: Sequence[Curve], short: Scene, reference: Trajectory, repeats: int, budget_s: float
 ) -> Iterator[Outcome]:
     """Time, judge and store every point of the curves of one scene."""
-    load_before = os.getloadavg()[0]
-    points = [points_of(curve.ladder, short.duration / (short.samples - 1)) for curve in curves]
-    scenes = {point: (short, reference) for own in points for point in own}
-    measured = measure_points(scenes, points, repeats, budget_s)
+    by_name = {curve.ladder.curve: curve for curve in curves}
     core = last_core()
-    shared = facts_of(short, reference) | {"load_before": load_before, "pinned_core": -1 if core is None else core}
-    for curve, own in zip(curves, points, strict=True):
-        lost = measured.lost(own)
-        if lost:
-            yield Outcome(curve.label, curve.ladder.method, "worker_died", lost, is_stored=False)
-            continue
-        facts = shared | {"repeatable": int(measured.is_repeatable(own))}
-        yield store_curve(file, curve, measured.rows(own), facts)
-
-
-def store_curve(
-    file: TableFile, curve: Curve, points: Sequence[Mapping[str, Any]], facts: Mapping[str, object]
-) -> Outcome:
-    """Store the points of a curve; they are counted in the message."""
-    place = file.place(curve.first_run, BENCH)
-    place.write(place.first, rows_of_curve(place, curve, points, facts))
-    return Outcome(curve.label, curve.ladder.method, "ok", counts_of(points))
+    facts = facts_of(short, reference) | {"pinned_core": -1 if core is None else core}
+    task = Measurement(short, reference, [curve.points for curve in curves], repeats, budget_s)
+    with WorkerPool(1, core=core) as pool:
+        limit_s = _HANGING * budget_s + _LOADING_S
+        for end in run_in(pool, with_method_files(measure), [task], limit_s, Measurement.split):
+            for i, points in enumerate(end.task.points):
+                curve = by_name[points[0].curve]
+                if end.value is None:
+                    yield Outcome(curve.label, curve.ladder.method, end.failure, end.message, is_stored=False)
+                    continue
+                place, rows = file.place(curve.first_run, BENCH), end.value[i]
+                place.write(place.first, rows_of_curve(place, curve, rows, facts))
+                yield Outcome(curve.label, curve.ladder.method, "ok", counts_of(rows))
 
 
 def rows_of_curve(place: Place, curve: Curve, points: Sequence[Mapping[str, Any]], facts: Mapping[str, object]) -> Rows:
     """The rows of a curve, with its fitted order. facts: columns that all its points have in common."""
-    facts = {**facts, "order": curve_order(curve.ladder, points)}
+    facts = {
+        **facts,
+        "order": curve_order(curve, points),
+        "repeatable": int(all(point.get("same", True) for point in points)),
+    }
     rows = []
     for point in points:
-        values = {name: value for name, value in point.items() if name not in ("status", "message")}
-        values |= {**facts, "left_out": int(point["status"] == "left_out")}
+        values = {**point, **facts, "left_out": int(point["status"] == "left_out")}
+        del values["status"], values["message"]
         rows.append(row_of_point(place, str(point["status"]), str(point["message"]), values))
     return {name: np.concatenate([row[name] for row in rows]) for name in rows[0]}
 
@@ -351,13 +520,17 @@ def counts_of(rows: Sequence[Mapping[str, Any]]) -> str:
     return f"{len(statuses)} points, {failed} failed, {statuses.count('left_out')} left out"
 
 
-def curve_order(ladder: Ladder, rows: Sequence[Mapping[str, Any]]) -> float:
+def curve_order(curve: Curve, rows: Sequence[Mapping[str, Any]]) -> float:
     """The order of convergence over the points that are ok; NaN where it cannot be fitted."""
-    ok = [row for row in rows if row["status"] == "ok"]
-    if ladder.kind != STEP:
+    if curve.ladder.kind != STEP:
         return math.nan
-    errors = np.maximum(np.array([row["angle_error_max"] for row in ok]), SMALLEST_ERROR)
-    order = fitted_order(np.array([row["setting"] for row in ok]), errors)
+    ok = [
+        (point.setting, row["angle_error_max"])
+        for point, row in zip(curve.points, rows, strict=True)
+        if row["status"] == "ok"
+    ]
+    steps, errors = np.array(ok).reshape(-1, 2).T
+    order = fitted_order(steps, np.maximum(errors, SMALLEST_ERROR))
     return math.nan if order is None else order
 
 
@@ -369,103 +542,6 @@ def facts_of(short: Scene, reference: Trajectory) -> dict[str, Any]:
         "horizon_s": horizon(reference),
         "uncertainty_rad": 0.0 if uncertainty is None else float(uncertainty[:compared].max()),
         "samples": short.samples,
+        "load_before": os.getloadavg()[0],
+        "pinned_core": -1,
     }
-
-
-def points_of(ladder: Ladder, interval: float) -> list[Point]:
-    """A point per rung, on a scene whose samples are `interval` s apart."""
-    return [
-        Point(ladder.curve, ladder.method, setting, tuple(sorted(settings.items())))
-        for setting, settings in ladder.rungs(interval).items()
-    ]
-
-
-@dataclass
-class Measured:
-    """What was measured, by point.
-
-    Attributes
-    ----------
-    answers : of the timer, by the names they are stored under.
-    unanswered : status and message of a point that failed; "worker_died": its process died twice, nothing is known.
-    """
-
-    timings: Timings[Point] = field(default_factory=Timings)
-    answers: dict[Point, dict[str, Any]] = field(default_factory=dict)
-    unanswered: dict[Point, tuple[str, str]] = field(default_factory=dict)
-
-    def lost(self, points: Sequence[Point]) -> str:
-        """Why a curve is not stored: one of its points is lost; "" where none is."""
-        for point in points:
-            status, message = self.unanswered.get(point, ("", ""))
-            if status == "worker_died":
-                return f"{point.method} at {point.setting:g}: {message}"
-        return ""
-
-    def is_repeatable(self, points: Sequence[Point]) -> bool:
-        """Whether the last run of every point was bit for bit its first one."""
-        return all(self.answers.get(point, {}).get("same", True) for point in points)
-
-    def fail(self, point: Point, message: str) -> None:
-        """Takes note of a point that raised an error."""
-        self.unanswered[point] = ("solver_failed", message)
-        self.timings.warm[point] = math.nan
-
-    def rows(self, points: Sequence[Point]) -> list[dict[str, Any]]:
-        """The columns of each point; NaN and 0 where there is nothing."""
-        times = ("run_time_s", "run_time_min_s", "run_time_q1_s", "run_time_q3_s")
-        others = ("setup_time_s", "setup_again_time_s", "output_time_s")
-        rows = []
-        for point in points:
-            row: dict[str, Any] = {"setting": point.setting, **dict.fromkeys((*ERRORS, *times, *others), np.nan)}
-            row |= {"repeats": 0, "steps": 0, "status": "left_out", "false_success": 0, "message": ""}
-            if point in self.timings.left_out:
-                row["message"] = self.timings.left_out[point]
-            elif point in self.unanswered:
-                row["status"], row["message"] = self.unanswered[point]
-                row["run_time_s"] = self.timings.warm[point]
-            else:
-                row |= self.answers[point] | statistics(self.timings.times[point])
-            rows.append(row)
-        return rows
-
-
-def measure_points(scenes: PointScenes, points: Sequence[Sequence[Point]], repeats: int, budget_s: float) -> Measured:
-    """Times all points in rounds, and judges the last run of each; in one worker process on one core.
-
-    Parameters
-    ----------
-    points : by curve, each coarse to fine.
-    repeats, budget_s : timed runs of a point at most, and s for all of them.
-    """
-    methods = tuple(dict.fromkeys(point.method for point in scenes))
-    limit = min(_RUN_LIMIT_S, budget_s)
-    measured = Measured()
-    with WorkerPool(1, partial(start_timer, methods, scenes), last_core()) as pool:
-
-        def answer(task: str, point: Point) -> Any:
-            """None where there is none."""
-            if point in measured.unanswered:
-                return None
-            (end,) = run_in(pool, ask, [(task, point)], limit)
-            if end.failure:
-                status = "solver_failed" if end.failure == "error" else end.failure
-                measured.unanswered[point] = status, end.message
-            return end.value
-
-        def warm_up(point: Point) -> tuple[float, bool]:
-            start = time.perf_counter()
-            prepared = answer("prepare", point)
-            if prepared is None:
-                return time.perf_counter() - start, False
-            measured.answers[point] = prepared
-            return prepared["run_time_s"], True
-
-        def repeat(point: Point) -> float:
-            seconds = answer("repeat", point)
-            return math.nan if seconds is None else float(seconds)
-
-        measured.timings = conduct(points, warm_up, repeat, budget_s, repeats, time.perf_counter)
-        for point, known in measured.answers.items():
-            known |= answer("judge", point) or {}
-    return measured

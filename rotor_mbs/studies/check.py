@@ -20,7 +20,7 @@ from rotor_mbs.scenario.accuracy_bounds import Bounds
 from rotor_mbs.scenario.catalogue import find_scenes
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.studies.reference import changed_arrays
-from rotor_mbs.studies.run import OnProgress, ignore_progress, run_scenes
+from rotor_mbs.studies.run import OnProgress, able_methods, ignore_progress, run_scenes
 from rotor_mbs.studies.stored_references import shipped_files, shipped_reference
 
 # The chain takes as long as all else together; four scenes of the paper cover what it can show.
@@ -31,12 +31,15 @@ _OF_EVERY_RUN = "status"  # the name of a check that each run has one of
 _ROUNDING = 2.0**-50
 
 
-def default_set() -> tuple[list[Scene], dict[str, Sequence[str]]]:
+def default_set(names: Sequence[str] = ()) -> tuple[list[Scene], dict[str, Sequence[str]]]:
     """The scenes, and the methods by scene name, that are computed where no file is given.
 
-    Every scene of the paper by the fast models, the chain on some; the scenes made for checking by every method.
+    Every scene of the paper by the fast models, the chain on some; the scenes made for checking by every method; or all
+    by the methods that are named, where they can represent them.
     """
     paper, own = find_scenes(["paper"]), find_scenes(["check"])
+    if names:
+        return [*paper, *own], {scene.name: able_methods(scene, names)[0] for scene in (*paper, *own)}
     corrected = [name for name in method_names(is_corrected=True) if find_method(name).is_installed]
     methods: dict[str, Sequence[str]] = {
         scene.name: [name for name in default_methods() if name != _CHAIN or scene.name in _CHAIN_SCENES]
@@ -61,12 +64,15 @@ def check_file(path: Path, bounds: Bounds, required: Sequence[str] = ()) -> list
     return checks
 
 
-def check_default_set(bounds: Bounds, workers: int, on_progress: OnProgress = ignore_progress) -> list[Check]:
-    """Compute the default set and check it, and the frozen references that it is judged by."""
+def check_default_set(
+    bounds: Bounds, workers: int, on_progress: OnProgress = ignore_progress, methods: Sequence[str] = ()
+) -> list[Check]:
+    """Compute the default set, by `methods` where they are named, and check it, and the frozen references that it is
+    judged by."""
     checks = judge_frozen(bounds)
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "check.h5"
-        report = run_scenes(*default_set(), path, workers=workers, timeout_s=_TIMEOUT_S, on_progress=on_progress)
+        report = run_scenes(*default_set(methods), path, workers=workers, timeout_s=_TIMEOUT_S, on_progress=on_progress)
         checks += [_required(run.label.partition(" ")[0], run.method, run.message) for run in report.not_computed]
         checks += judge_file(path, bounds)
     return checks
@@ -154,9 +160,12 @@ def regressions(new: Sequence[Check], old: Sequence[Check], factor: float) -> li
             value, hint = math.nan, "was judged in the earlier file and is not in this one"
         else:
             value = _shrinkage(now, check)
-            hint = f"{check.value:.2e} before, {now.value:.2e} now, bound {now.bound:.2e} {now.unit}; {now.hint}"
+            hint = (
+                f"margin shrank {value:,.0f}-fold (limit {factor:g}): {check.value:.2e} before, {now.value:.2e} now, "
+                f"bound {now.bound:.2e} {now.unit}; {now.hint}"
+            )
         where = check.where._replace(channel=f"{check.name}: {check.where.channel}")
-        changes.append(Check("against", where, value, factor, hint, "times the margin"))
+        changes.append(Check("against", where, value, factor, hint, "fold"))
     return changes
 
 

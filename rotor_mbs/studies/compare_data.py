@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from time import monotonic
 
@@ -11,21 +12,23 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor_mbs.analysis.data_verdict import DEFAULT_TOLERANCE, LEVELS, ChannelErrors, DataVerdict, as_dictionary
-from rotor_mbs.analysis.judgement import FLOOR_SAFETY, OK_ERROR
+from rotor_mbs.analysis.judgement import OK_ERROR
 from rotor_mbs.errors import InputError
 from rotor_mbs.foreign.channels import ForeignData, channels
+from rotor_mbs.methods.time_limit import OutOfTimeError, stop_in_time, time_limit
 from rotor_mbs.models.lagrange import samples
 from rotor_mbs.models.lagrange.defects import FIT_ROWS, fitted_rates, interval_defects
+from rotor_mbs.models.lagrange.heyoka_adapter import is_available
 from rotor_mbs.models.lagrange.parameters import work_is_integrated
 from rotor_mbs.models.lagrange.reference import TimedReference, reference_at
 from rotor_mbs.runs.files import Column
 from rotor_mbs.runs.records import Record
 from rotor_mbs.runs.versions import versions
 from rotor_mbs.scenario.scene import Scene, scene_hash
-from rotor_mbs.solution.defects import Defects
+from rotor_mbs.solution.defects import FLOOR_SAFETY, Defects
 from rotor_mbs.solution.metrics import horizon, horizon_samples, metrics_of, running_growth
 from rotor_mbs.solution.trajectory import Array, Trajectory
-from rotor_mbs.studies.data_causes import CauseSearch, carried_errors, hidden_causes, likely_causes, states_of
+from rotor_mbs.studies.data_causes import CauseSearch, carried_errors, likely_causes, states_of
 from rotor_mbs.studies.defect_causes import DefectCauses
 
 METHOD = "data"  # what takes the place of a method's name
@@ -37,7 +40,6 @@ _START = 1e-3  # rad, rad/s: starts that differ by more are another start
 _FULL_DIGITS = 8  # as many as single precision has
 _STRETCHES = (10, 100)  # rows over which defects are added up, too
 _MOST_NAMES = 100  # of columns that were not used
-_SEARCH_S = 60.0  # of the search for causes: scenes that are stiff or have many blades would take many minutes
 
 
 @dataclass(frozen=True)
@@ -89,26 +91,34 @@ class DataStudy:
         return Record("comparison", self.scene.name, "data/trajectory", facts, arrays, columns)
 
 
-def compare_with_reference(data: ForeignData, scene: Scene, tolerance: float = DEFAULT_TOLERANCE) -> DataStudy:
+@np.errstate(all="ignore")  # data may be of any size
+def compare_with_reference(
+    data: ForeignData, scene: Scene, tolerance: float = DEFAULT_TOLERANCE, time_limit_s: float = float("inf")
+) -> DataStudy:
     """The verdict on data, by their defects over all rows, each channel against its own rounding, by their first row,
     and by their errors up to the horizon; where they differ by more than rounding, what that looks like.
 
-    Raises InputError for a tolerance that is not positive, and for data without rows in the scene's duration.
+    Raises InputError for a tolerance that is not positive, for data without rows in the scene's duration, and where
+    reference and defects take longer than `time_limit_s`.
     """
+    is_available()  # the engine is loaded before: an interrupt would leave half of it
+    ends = monotonic() + time_limit_s
     if not 0.0 < tolerance < float("inf"):
         raise InputError(f"tolerance: {tolerance!r}; allowed: a number more than 0, rad")
-    inside = data.time <= scene.duration * (1.0 + _ROUNDING)
-    cut = replace(data, time=data.time[inside], values=data.values[inside], rounding=data.rounding[inside])
-    cut = replace(cut, time_rounding=data.time_rounding[inside])
+    cut = data.rows(data.time <= scene.duration * (1.0 + _ROUNDING))
     # At the times of the data and at the scene's samples, which make growth and horizon the same for all data.
     end = max(scene.duration, float(cut.time[-1])) if len(cut.time) else scene.duration
     times = np.union1d(np.append(cut.time, end), np.linspace(0.0, scene.duration, scene.samples))
-    exact = reference_at(replace(scene, duration=end, samples=len(times), outputs=("angles", "rates")), times)
+    with _limited(ends, time_limit_s):
+        exact = reference_at(replace(scene, duration=end, samples=len(times), outputs=("angles", "rates")), times)
     run = exact.trajectory
     place: NDArray[np.int64] = np.searchsorted(run.time, cut.time)
     place = place[place < len(run.time)]
     if not len(place):
-        raise InputError(f"{data.source}: no row within the {scene.duration:g} s of {scene.name}; allowed: times in s")
+        raise InputError(
+            f"{data.source}: no row within the {scene.duration:g} s of {scene.name}; allowed: times in s from its "
+            f"start; `offset = {-data.time[0]:.6g}` of the time, in a mapping file, makes the first row the start"
+        )
     carried = carried_errors(run, exact.growth, exact.units)[place][:, data.columns]
     at_rows = Trajectory(run.time[place], run.angles[place], run.rates[place], error_growth=run.error_growth[place])
     expected = states_of(at_rows)[:, cut.columns]
@@ -118,9 +128,9 @@ def compare_with_reference(data: ForeignData, scene: Scene, tolerance: float = D
     rows, horizon_s, until = len(place), horizon(run), len(place)
     if horizon_samples(run) < len(run.time):
         until = max(int(np.searchsorted(at_rows.time, horizon_s, side="right")), 1)
-    compared = replace(cut, time=cut.time[:rows], values=cut.values[:rows], rounding=cut.rounding[:rows])
-    compared = replace(compared, time_rounding=cut.time_rounding[:rows])
-    defects, note = _defects(scene, compared, at_rows, until)
+    compared = cut.rows(slice(rows))
+    with _limited(ends, time_limit_s):
+        defects, note = _defects(scene, compared, at_rows, until)
     errors = _channel_errors(scene, compared, at_rows, run, until, defects)
     missing = [label for i, label in enumerate(scene.coordinate_labels) if i not in data.columns]
     notes = [note] if note else []
@@ -142,29 +152,50 @@ def compare_with_reference(data: ForeignData, scene: Scene, tolerance: float = D
             worst = int(excess.argmax())
             name = [*labels, *(f"{label} rate" for label in labels)][worst]
             drift = max(drift, (float(excess[worst]), f"{name}, over {stretch} rows"))
-    status, message = _status(compared, at_rows, errors, drift, until, tolerance, defect_time, missing, energy_drift)
+    # Per unit of error growth: in a motion whose errors do not grow, faults below any interval's tolerance add up.
+    beyond_rounding = np.maximum(np.abs(compared.values - expected) - FLOOR_SAFETY * compared.rounding, 0.0)
+    per_growth = (beyond_rounding / carried)[:until].max(axis=0)
+    status, message = _status(
+        compared, at_rows, errors, per_growth, drift, until, tolerance, defect_time, missing, energy_drift
+    )
     if status in ("ok", "unchecked"):
-        status, message = _uncovered(scene, compared, exact, until) or (status, message)
+        status, message = _uncovered(scene, compared, exact, until, defects) or (status, message)
     notes += _notes(scene, data, cut, missing)
     if energy_note:
         notes.append(energy_note)
     likely: list[str] = []
-    search_defects = DefectCauses(scene, defects) if defects is not None and not missing else None
-    if status != "ok":
-        whole = replace(data, values=data.values + (cut.values[0] - data.values[0]))  # the turns that `cut` has
-        largest = float((np.abs(compared.values - expected) / carried)[:until].max())
-        search = CauseSearch(scene, whole, exact, tolerance, largest, monotonic() + _SEARCH_S)
-        with np.errstate(all="ignore"):  # data may be of any size
-            likely, note = likely_causes(search, search_defects)
-        start = "" if likely else _other_start(scene, cut, expected[0], run)
-        notes += [line for line in (note, start) if line]
-    elif search_defects is not None and (likely := hidden_causes(scene, search_defects)):
+    try:
+        with np.errstate(all="ignore"), time_limit(max(ends - monotonic(), 0.0)):  # data may be of any size
+            causes = DefectCauses(scene, defects, tolerance) if defects is not None and not missing else None
+            if status != "ok":
+                whole = replace(data, values=data.values + (cut.values[0] - data.values[0]))  # the turns that `cut` has
+                largest = float((np.abs(compared.values - expected) / carried)[:until].max())
+                search = CauseSearch(scene, whole, exact, tolerance, largest, lambda *found: _defects(scene, *found)[0])
+                likely = likely_causes(search, causes)
+            elif causes is not None:
+                likely = causes.explanations()
+    except OutOfTimeError:
+        notes.append("the search for causes was ended by its time limit")
+    if status != "ok" and not likely and (start := _other_start(scene, cut, expected[0])):
+        notes.append(start)
+    if status == "ok" and likely:
         notes.append(f"within {tolerance:g} rad an interval, but not random")
     verdict = DataVerdict(
         scene.name, data.source, status, message, tolerance, errors, rows, float(at_rows.time[-1]), horizon_s,
         defect_time, predicted, energy_drift, data.read, data.unused, tuple(notes), tuple(likely),
     )  # fmt: skip
     return DataStudy(scene, cut, expected, defects, verdict)
+
+
+@contextmanager
+def _limited(ends: float, time_limit_s: float) -> Iterator[None]:
+    """Raises InputError where the block is not done when `time.monotonic` is `ends`."""
+    try:
+        with time_limit(max(ends - monotonic(), 0.0)):
+            yield
+            stop_in_time()
+    except OutOfTimeError:
+        raise InputError(f"timeout: no reference after {time_limit_s:g} s; allowed: a longer time limit") from None
 
 
 def _defects(scene: Scene, data: ForeignData, reference: Trajectory, until: int) -> tuple[Defects | None, str]:
@@ -203,10 +234,12 @@ def _defects(scene: Scene, data: ForeignData, reference: Trajectory, until: int)
 
 
 def _status(
-    data: ForeignData, reference: Trajectory, errors: Sequence[ChannelErrors], drift: tuple[float, str], until: int,
-    tolerance: float, defect_time: float | None, missing: Sequence[str], energy_drift: float | None,
+    data: ForeignData, reference: Trajectory, errors: Sequence[ChannelErrors], per_growth: Array,
+    drift: tuple[float, str], until: int, tolerance: float, defect_time: float | None, missing: Sequence[str],
+    energy_drift: float | None,
 ) -> tuple[str, str]:  # fmt: skip
-    """The first of these: another start, defects, errors up to the horizon, energy, a channel that is missed."""
+    """The first of these: another start, defects, errors up to the horizon, per unit of error growth and at all,
+    energy, a channel that is missed; per_growth: (channels,)."""
     allowed = tolerance + FLOOR_SAFETY * data.rounding[0]
     off = np.abs(data.values[0] - states_of(reference)[0, data.columns]) - allowed
     worst = int(off.argmax())
@@ -226,6 +259,12 @@ def _status(
         )
     if not drift[0] <= tolerance:
         return "inaccurate", f"{drift[1]}: defect of {drift[0]:.1e} rad beyond rounding, allowed {tolerance:.0e}"
+    worst = int(per_growth.argmax())
+    if not per_growth[worst] <= tolerance:
+        return "inaccurate", (
+            f"{errors[worst].name}: error {errors[worst].error_max:.1e} {errors[worst].unit} up to the horizon, "
+            f"{per_growth[worst]:.1e} per unit of error growth, allowed {tolerance:.0e}"
+        )
     angles = [channel for channel in errors if channel.unit == "rad"] or list(errors)
     largest = max(angles, key=lambda channel: channel.error_max)
     rounding = FLOOR_SAFETY * float(data.rounding.max(initial=0.0))
@@ -254,6 +293,7 @@ def _channel_errors(
     # Time derivatives; of rates by differences.
     accelerations = np.gradient(whole.rates, whole.time, axis=0) if len(whole.time) > 1 else 0.0 * whole.rates
     slopes = np.hstack([whole.rates, accelerations])[np.searchsorted(whole.time, time)][:, data.columns]
+    slopes[~np.isfinite(slopes)] = 0.0  # between times that are almost the same
     growth = running_growth(reference)
     errors = []
     for j, channel in enumerate(data.channels):
@@ -308,8 +348,11 @@ def _energy(scene: Scene, data: ForeignData, reference: Trajectory) -> tuple[flo
         return metrics_of(scene, run, None).get("energy_drift_max"), ""
 
 
-def _uncovered(scene: Scene, data: ForeignData, exact: TimedReference, until: int) -> tuple[str, str] | None:
-    """What the rows leave out of the motion, which is then not ok: its start, its end, or all but a row of it."""
+def _uncovered(
+    scene: Scene, data: ForeignData, exact: TimedReference, until: int, defects: Defects | None
+) -> tuple[str, str] | None:
+    """What the rows leave out of the motion, which is then not ok: its start, its end, all but a row of it, or what
+    lies beyond the horizon in intervals over which errors grow too much to be judged."""
     time, end = data.time, min(scene.duration, float(exact.trajectory.time[-1]))
     step = float(np.diff(time).max(initial=0.0))
     if time[-1] < end - 1.5 * step:
@@ -318,21 +361,20 @@ def _uncovered(scene: Scene, data: ForeignData, exact: TimedReference, until: in
         return "inaccurate", f"the data begin at t = {time[0]:.6g} s: what was before is not known"
     if until < _FEWEST:
         return "unchecked", f"{until} rows up to the horizon: too few to be compared"
+    if defects is not None and not defects.is_judged[until - 1 :].all():
+        long = until - 1 + int(np.argmin(defects.is_judged[until - 1 :]))
+        since = f"the first after t = {defects.time[long]:.6g} s"
+        return "unchecked", f"beyond the horizon the rows are too far apart to be judged, {since}"
     return None
 
 
-def _other_start(scene: Scene, data: ForeignData, expected: Array, run: Trajectory) -> str:
-    """What of the first row is not the scene's start, "" where all is, or the data begin later; run: the reference."""
+def _other_start(scene: Scene, data: ForeignData, expected: Array) -> str:
+    """What of the first row is not the scene's start, "" where all is, or the data begin later."""
     names = [channel.name for channel in channels(scene)[1:]]
     rows = zip(data.columns, data.values[0].tolist(), expected.tolist(), strict=True)
     apart = [f"{names[i]} {value:.4g} (scene: {start:.4g})" for i, value, start in rows if abs(value - start) > _START]
     if data.time[0] > 0.0 or not apart:
         return ""
-    away = np.abs(states_of(run)[:, data.columns] - data.values[0]).max(axis=1)
-    nearest = int(away.argmin())
-    if away[nearest] <= _START:
-        at = float(run.time[nearest])
-        return f"the first row is the scene's state at t = {at:.6g} s: `offset = {at:.6g}` of the time?"
     return f"the data start elsewhere, in rad and rad/s: {', '.join(apart)}; another scene, start or unit?"
 
 

@@ -1,271 +1,387 @@
-"""What the defects of data look like: a fault at a time, other equations or numbers, or a parameter that is off.
+"""What the defects of data look like: another scene, other equations, parameters that are off, or faults at a time.
 
 Nothing is run from the start: each explanation is held to the data's own states, interval by interval. It is named
-where it explains the defects to what the rounding of the data leaves, or but for a fiftieth of what they were.
+where what it leaves of the defects would agree.
 """
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+import itertools
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from rotor_mbs.errors import RotorError
 from rotor_mbs.models.lagrange import closed_form
-from rotor_mbs.models.lagrange.closed_form import load_values
-from rotor_mbs.models.lagrange.defects import change_of_ends, interval_ends
-from rotor_mbs.models.lagrange.ode_solvers import Accelerations
-from rotor_mbs.models.lagrange.parameters import rotor_form
+from rotor_mbs.models.lagrange.defects import explicit_steps, quick_ends
+from rotor_mbs.models.lagrange.parameters import load_tables, rotor_form
 from rotor_mbs.scenario.scene import Scene
+from rotor_mbs.scenario.time_table import knots
 from rotor_mbs.solution.defects import Defects
 from rotor_mbs.solution.trajectory import Array
+from rotor_mbs.studies.other_models import Model, Parameter, other_models, parameters, scenes_with_start
 
-MAX_LEFT = 0.02  # of the defects' root mean square
 _AT_FLOOR = 3.0  # times the rounding
+_LEFT = 1e-3  # of the largest defect: the rest is the other program's own error, or that of the quick steps
+_LEFT_OF_SMALL = 0.02  # where that is within the tolerance
+_ALIKE = 3.0  # times what the best explanation leaves
+_QUICK = 3e-5  # share to which a change of the model is known
+_FINE = 8  # times the steps, with which that holds also where the mass matrix is nearly singular
+_PERHAPS = 0.2  # of the defects left by steps that are not so fine
+_LEFT_OF_SETS = 0.1  # by the projections on several parameters, before they are iterated
 _SIGNIFICANT = 8.0  # standard deviations of an estimate
-_TRIED = 8  # parameters, those whose projections leave least
 _LARGEST_CHANGE = 0.6  # a share, or rad: what is further off is another scene
-_INTERVALS = 120  # that an explanation is tried on first
+_TRIED = 8  # sets of parameters, those whose projections leave least
+_SET = 3  # parameters at once
+_INTERVALS = 120  # that an explanation is tried on
 _DIFFERENCE = 1e-4  # share or rad, for the derivative by a parameter
 _ROUNDS = 8
+_INDEPENDENT = 1e-6  # determinant of the cosines between the signatures of a set
+_MOST = 6  # explanations, or faults, that are named
 _PARALLEL = 0.995  # cosine
 _ALONG = 0.9  # of a load while the rotor turns on
+_NEARLY = 0.05
 _STANDS_OUT = 30.0  # times the median of the defects
 _FAINT = 0.02  # of the largest defect: fainter ones are not told beside it
 _GAP = 6  # intervals: faults that are nearer are one
 _MOST_DIRECTIONS = 20  # rows of a fault at which loads are looked for
-_MAX_FAULTS = 6  # that are named one by one
-
-# The scene with its parameter changed by a share (or rad), or the same scene with other equations.
-Change = Callable[[float], tuple[Scene, Accelerations | None]]
 
 
 @dataclass(frozen=True)
-class Parameter:
-    """A number of the scene; unit: "" where its change is a share of it."""
+class Explanation:
+    """A text, and the share of the defects' root mean square that it leaves."""
 
-    key: str
-    unit: str
-    change: Change
-
-
-@dataclass(frozen=True)
-class Fault:
-    """A fault between two rows of the data."""
-
-    start_s: float
-    end_s: float
+    left: float
     text: str
 
 
 class DefectCauses:
-    """Explanations of the defects of data of a scene, on intervals in which they are judged."""
+    """Explanations of the defects of data of a scene, on intervals in which they are judged; tolerance: rad.
 
-    def __init__(self, scene: Scene, defects: Defects) -> None:
-        self._scene, self._defects = scene, defects
+    largest, typical : rad, the largest beyond rounding, and the median over the intervals.
+    """
+
+    def __init__(self, scene: Scene, defects: Defects, tolerance: float) -> None:
+        self._scene, self._defects, self._tolerance = scene, defects, tolerance
         moving = list(defects.moving)
-        self._values = np.hstack([defects.angles[:, moving], defects.rates[:, moving]])
-        units = self._units = np.concatenate([np.ones(len(moving)), defects.rate_units[moving]])
+        raw = np.hstack([defects.angles[:, moving], defects.rates[:, moving]])
+        self._units = np.concatenate([np.ones(len(moving)), defects.rate_units[moving]])
+        self._values = raw / self._units  # rad
         # Where a number is next to nothing its rounding is no measure.
-        floors = np.maximum(defects.floors, 0.3 * np.median(defects.floors, axis=0) + 1e-18) * units
-        self._judged = np.flatnonzero(defects.is_judged & np.isfinite(self._values).all(axis=1))
-        # In these a defect of what rounding makes is 1 at most.
-        self._weights = 1.0 / floors
-        self._normal = np.where(np.isfinite(self._values), self._values * self._weights, 0.0)
-        size = np.abs(self._normal).max(axis=1)
-        spread = np.linspace(0, len(self._judged) - 1, min(_INTERVALS, len(self._judged))).astype(int)
-        largest = self._judged[np.argsort(-size[self._judged])[: _INTERVALS // 2]]
-        self._chosen = np.unique(np.concatenate([self._judged[spread], largest])) if len(self._judged) else self._judged
+        self._floors = np.maximum(defects.floors, 0.3 * np.median(defects.floors, axis=0) + 1e-18)
+        judged = self._judged = defects.is_judged & np.isfinite(raw).all(axis=1)
+        excess = np.maximum(np.abs(np.where(judged[:, None], self._values, 0.0)) - _AT_FLOOR * self._floors, 0.0)
+        self._excess = excess.max(axis=1, initial=0.0)
+        largest = self.largest = float(self._excess.max(initial=0.0))
+        self.typical = float(np.median(self._excess))
+        self._allowed = max(_LEFT * largest, min(tolerance, _LEFT_OF_SMALL * largest))
+        # Some all over the run, and the largest; none with a kink of a load inside, where quick steps are wrong.
+        tried = judged.copy()
+        for kink in knots(load_tables(scene), scene.duration):
+            inside = (defects.time[:-1] < kink * (1.0 - 1e-9)) & (kink * (1.0 + 1e-9) < defects.time[1:])
+            tried &= ~inside
+        rows = np.flatnonzero(tried)
+        spread = rows[np.linspace(0, len(rows) - 1, min(_INTERVALS // 2, len(rows))).astype(int)] if len(rows) else rows
+        chosen = self._chosen = np.union1d(spread, rows[np.argsort(-self._excess[rows])[: _INTERVALS // 2]])
+        self._begins, self._ends = defects.time[chosen], defects.time[chosen + 1]
+        self._states = defects.states[chosen].T
+        self._tried = self._values[chosen]
+        self._weights = 1.0 / np.maximum(self._floors[chosen], 1e-4 * largest)
+        self._steps = explicit_steps(scene, self._ends - self._begins, defects.states[chosen]) if len(chosen) else None
+        self._own_ends: dict[int, Array] = {}  # by the scene, by the factor of the steps
 
     @property
     def is_rounding(self) -> bool:
         """Whether no defect is larger than what rounding explains."""
-        return not len(self._judged) or float(np.abs(self._normal[self._judged]).max()) <= _AT_FLOOR
+        return not self.largest
 
-    def within(self, size: float) -> bool:
-        """Whether no defect is larger than this (rad) beyond what rounding explains."""
-        excess = self._defects.channel_sizes[self._judged] - _AT_FLOOR * self._defects.floors[self._judged]
-        return not excess.size or float(excess.max()) <= size
+    @property
+    def is_known(self) -> bool:
+        """Whether other models can be tried: not where the motion is too stiff for explicit steps between the rows."""
+        return self._steps is not None
 
-    def left(self, scene: Scene, equations: Accelerations | None = None) -> float:
-        """Share of the defects' root mean square that another scene or other equations leave; infinite where they do
-        not explain them. A scene is tried by small steps first, which need no code to be compiled."""
-        if not len(self._judged) or scene.moving_coordinates != list(self._defects.moving):
-            return np.inf
-        if equations is None:
-            change = change_of_ends(self._scene, scene, self._defects.time, self._defects.states)
-            if change is not None:
-                residual = self._normal[self._chosen] + (change * self._weights)[self._chosen]
-                if not self._share(residual, self._chosen) < np.inf:
-                    return np.inf
-        return self._share(self._residual(scene, equations, self._chosen), self._chosen)
-
-    def parameters(self, parameters: Sequence[Parameter]) -> list[tuple[float, str]]:
-        """Of those that explain the defects by themselves: (share that is left, key and change)."""
-        chosen, explained = self._chosen, []
-        if not len(chosen):
+    def explanations(self) -> list[str]:
+        """Other scenes and equations, else parameters, as many at once as it takes up to three; of those that are alike
+        all. None where the defects follow nothing that was tried."""
+        if not self.is_known:
             return []
-        before = self._normal[chosen]
-        total = float(np.linalg.norm(before))
-        projections = []
-        for parameter in parameters:
-            slope = self._slope(parameter, 0.0, chosen)
-            size = float((slope**2).sum())
-            if np.isfinite(size) and size > 0.0:
-                estimate = -float((before * slope).sum()) / size
-                residual = before + estimate * slope
-                rest = float(np.linalg.norm(residual))
-                deviation = max(rest / np.sqrt(residual.size), 0.3) / np.sqrt(size)
-                projections.append((rest, estimate, deviation, parameter))
-        projections.sort(key=lambda projection: projection[0])
-        for rest, estimate, deviation, parameter in projections[:_TRIED]:
-            # Below the rounding of the data a parameter shows by the sum over all rows alone.
-            if self.is_rounding:
-                if abs(estimate) >= _SIGNIFICANT * deviation and abs(estimate) <= _LARGEST_CHANGE:
-                    explained.append((rest / total, _text(parameter, estimate)))
-                continue
-            change = estimate
-            for _ in range(_ROUNDS):
-                residual = self._residual(*parameter.change(change), chosen)
-                slope = self._slope(parameter, change, chosen)
-                size = float((slope**2).sum())
-                if not (np.isfinite(residual).all() and 0.0 < size < np.inf) or abs(change) > _LARGEST_CHANGE:
-                    break
-                correction = -float((residual * slope).sum()) / size
-                change += correction
-                if abs(correction) <= 1e-9 + 1e-6 * abs(change):
-                    break
-            if _SIGNIFICANT * deviation <= abs(change) <= _LARGEST_CHANGE:
-                share = self._share(self._residual(*parameter.change(change), chosen), chosen)
-                if share < np.inf:
-                    explained.append((share, _text(parameter, change)))
-        return sorted(explained)
+        explained: list[Explanation] = []
+        models = itertools.chain(other_models(self._scene), scenes_with_start(self._scene, self._first_row()))
+        for text, model in () if self.is_rounding else models:
+            if self._share(self._residual(model)) <= _PERHAPS and self._is_explained(
+                residual := self._residual(model, _FINE)
+            ):
+                explained.append(Explanation(self._share(residual), text))
+        # What has a name of its own is named, unless numbers of the scene explain far more.
+        least = min([e.left for e in explained], default=np.inf)
+        if least > 10.0 * _QUICK:
+            others = self._parameter_sets()
+            if min([e.left for e in others], default=np.inf) < 0.1 * least:
+                explained = others
+        least = max(min([e.left for e in explained], default=0.0), _QUICK)
+        # What rounding leaves is of one size whatever the cause: there the least is nearly that of the right one.
+        factor = 1.05 if self.is_rounding else _ALIKE
+        return [e.text for e in sorted(explained, key=lambda e: e.left) if e.left <= factor * least][:_MOST]
 
-    def faults(self) -> list[Fault]:
-        """What stands out of the other intervals, by its pattern in time; none where most intervals are wrong."""
-        excess = np.maximum(self._defects.channel_sizes - _AT_FLOOR * self._defects.floors, 0.0).max(axis=1)
-        excess[~np.isin(np.arange(len(excess)), self._judged)] = 0.0
-        usual = float(np.median(excess[self._judged])) if len(self._judged) else 0.0
-        wrong = np.flatnonzero(excess > max(_STANDS_OUT * usual, _FAINT * float(excess.max(initial=0.0))))
+    def scenes(self) -> list[str]:
+        """Those of the catalogue that start as the data do, and of which they may be."""
+        if not self.is_known:
+            return []
+        found = scenes_with_start(self._scene, self._first_row())
+        return [
+            text
+            for text, model in found
+            if self._left(self._residual(model, _FINE)) <= max(self._tolerance, self._allowed)
+        ]
+
+    def _first_row(self) -> Array:
+        """(2 (1 + blades),) of the data; of coordinates that are fixed the scene's."""
+        first, count = np.array([*self._scene.initial_angles, *self._scene.initial_rates]), len(self._scene.blades) + 1
+        moving = list(self._defects.moving)
+        first[[*moving, *(count + i for i in moving)]] = self._defects.states[0]
+        return first
+
+    def _parameter_sets(self) -> list[Explanation]:
+        """By least squares over the signatures of all parameters; the smallest sets that explain the defects."""
+        known, columns = [], []
+        for parameter in parameters(self._scene):
+            slope = self._slope([parameter], [0.0], 0).ravel()
+            size = float(np.linalg.norm(slope))
+            if 0.0 < size < np.inf:
+                known.append(parameter)
+                columns.append(slope / size)
+        if not known:
+            return []
+        cosines = np.array(columns) @ np.array(columns).T
+        before = (self._tried * self._weights).ravel()
+        projections, total = np.array(columns) @ before, float(before @ before)
+        best, least = list[Explanation](), np.inf
+        for count in range(1, 2 if self.is_rounding else _SET + 1):
+            sets = np.array(list(itertools.combinations(range(len(known)), count)))
+            if not len(sets):
+                break
+            matrices = cosines[sets[:, :, None], sets[:, None, :]]
+            independent = np.linalg.det(matrices) > _INDEPENDENT
+            sets, matrices = sets[independent], matrices[independent]
+            sides = projections[sets]
+            explained = (sides * np.linalg.solve(matrices, sides[..., None])[..., 0]).sum(axis=1)
+            # Of a single one that is far off the signature may be another; several are not.
+            if count > 1:
+                sets, explained = (array[explained > (1.0 - _LEFT_OF_SETS**2) * total] for array in (sets, explained))
+            fits = [self._fit([known[i] for i in chosen]) for chosen in sets[np.argsort(-explained)[:_TRIED]]]
+            found = [fit for fit in fits if fit is not None]
+            left = min([fit.left for fit in found], default=np.inf)
+            # One more is named only where that explains far more.
+            if best and left > 0.1 * least:
+                break
+            if found:
+                best, least = found, left
+            if least <= 10.0 * _QUICK:
+                break
+        return best
+
+    def _fit(self, chosen: Sequence[Parameter]) -> Explanation | None:
+        """Gauss and Newton's iteration over some parameters at once; one step where rounding hides their effect."""
+        change = np.zeros(len(chosen))
+        for _ in range(1 if self.is_rounding else _ROUNDS):
+            residual = (self._residual(_changed(self._scene, chosen, change), _FINE) * self._weights).ravel()
+            slopes = np.stack([self._slope(chosen, change, i).ravel() for i in range(len(chosen))], axis=1)
+            if not (np.isfinite(residual).all() and np.isfinite(slopes).all()):
+                return None
+            correction = -np.linalg.lstsq(slopes, residual, rcond=None)[0]
+            change = change + correction
+            if np.abs(change).max() > _LARGEST_CHANGE:
+                return None
+            if (np.abs(correction) <= 1e-9 + 1e-6 * np.abs(change)).all():
+                break
+        residual = self._residual(_changed(self._scene, chosen, change), _FINE)
+        weighted = residual * self._weights
+        if not (self.is_rounding or self._is_explained(residual)) or not np.isfinite(weighted).all():
+            return None
+        spread = float(np.sqrt((weighted**2).mean()))
+        if self.is_rounding:
+            spread = max(spread, 0.3)
+        deviation = spread * np.sqrt(np.diag(np.linalg.pinv(slopes.T @ slopes)))
+        deviation = np.maximum(deviation, _QUICK * np.abs(change))
+        if (np.abs(change) < _SIGNIFICANT * deviation).any():
+            return None
+        texts = [_off(*item) for item in zip(chosen, change.tolist(), deviation.tolist(), strict=True)]
+        return Explanation(self._share(residual), " and ".join(texts))
+
+    def _residual(self, model: Model, steps: int = 1) -> Array:
+        """(intervals, m) rad: defects by another model; infinite where it has another number of coordinates. steps: how
+        many times as many as for transition matrices."""
+        if model.scene.moving_coordinates != list(self._defects.moving):
+            return np.full_like(self._tried, np.inf)
+        try:
+            ends = self._quick_ends(model, steps)
+        except RotorError:
+            return np.full_like(self._tried, np.inf)
+        if steps not in self._own_ends:
+            self._own_ends[steps] = self._quick_ends(Model(self._scene), steps)
+        return np.asarray(self._tried + (ends - self._own_ends[steps]).T / self._units)
+
+    def _quick_ends(self, model: Model, steps: int) -> Array:
+        assert self._steps is not None
+        count = steps * self._steps
+        return quick_ends(model.scene, self._begins, self._ends, self._states, count, model.accelerations())
+
+    def _slope(self, chosen: Sequence[Parameter], at: Sequence[float] | Array, which: int) -> Array:
+        """Weighted, by one of the parameters' share, or per rad, where they are changed already."""
+        sides = []
+        for step in (_DIFFERENCE, -_DIFFERENCE):
+            change = np.array(at, float)
+            change[which] += step
+            sides.append(self._residual(_changed(self._scene, chosen, change)))
+        with np.errstate(invalid="ignore"):
+            return np.asarray((sides[0] - sides[1]) * self._weights / (2.0 * _DIFFERENCE))
+
+    def _is_explained(self, residual: Array) -> bool:
+        return self._left(residual) <= self._allowed
+
+    def _left(self, residual: Array) -> float:
+        """rad, the largest beyond rounding."""
+        return float((np.abs(residual) - _AT_FLOOR * self._floors[self._chosen]).max())
+
+    def _share(self, residual: Array) -> float:
+        before = float(np.linalg.norm(self._tried * self._weights))
+        return float(np.linalg.norm(residual * self._weights)) / (before or 1.0)
+
+    def faults(self) -> list[str]:
+        """What stands out of the other intervals, by its pattern in time; none where most intervals are wrong, or none
+        is more than the tolerance."""
+        excess = self._excess
+        if self.largest <= self._tolerance:
+            return []
+        usual = float(np.median(excess[self._judged])) if self._judged.any() else 0.0
+        wrong = np.flatnonzero(excess > max(_STANDS_OUT * usual, _FAINT * self.largest))
         # What is wrong everywhere is no fault at a time, though it shows in some places more than in others.
         if not len(wrong) or len(wrong) > 0.6 * len(excess) or _is_smooth(excess, wrong):
             return []
         groups = np.split(wrong, np.flatnonzero(np.diff(wrong) > _GAP) + 1)
-        return [self._fault(group) for group in groups]
+        texts = [self._fault(group) for group in groups[:_MOST]]
+        if len(groups) > _MOST:
+            end = float(self._defects.time[groups[-1][-1] + 1])
+            texts.append(f"and {len(groups) - _MOST} more faults until t = {end:.6g} s")
+        return texts
 
-    def _fault(self, group: NDArray[np.int64]) -> Fault:
-        """The group's intervals stand out, one after the other."""
+    def _fault(self, group: NDArray[np.int64]) -> str:
+        """Of intervals that stand out, one near the other."""
         time, half = self._defects.time, len(self._defects.moving)
         first, last = int(group[0]), int(group[-1])
         start, end = float(time[first]), float(time[last + 1])
         values = self._values[group]
-        along = self._cosine(values[0], self._flow(first))
-        at = f"t = {end:.6g} s"
-        if len(group) == 1:
-            if abs(along) >= _PARALLEL:
-                # The defect is closed form less data: along the motion where the data are behind it.
-                text = "a row repeated, or the clock late by a part of an interval" if along > 0.0 else (
-                    "a row left out and the others renumbered, or the clock early by a part of an interval"
-                )  # fmt: skip
-                return Fault(start, end, f"{text}, at {at}")
-            angles = np.abs(self._normal[first, :half]).max()
-            if angles <= _AT_FLOOR or np.abs(values[0, :half]).max() * 100.0 < np.abs(values[0, half:]).max():
-                return Fault(start, end, f"a jump of rates, or a load of one interval, before {at}")
-            return Fault(start, end, f"the motion goes on from another state after {at}")
-        if len(group) == 2 and self._defects.transitions is not None:
-            carried = self._defects.transitions[first + 1] @ values[0]
-            if self._cosine(values[1], -carried) >= _PARALLEL:
+        # Of a repeated row the defect is the motion over the interval; of a part of it, that at its end.
+        motion = values[0] + (self._defects.states[first + 1] - self._defects.states[first]) / self._units
+        along = max((_cosine(values[0], flow) for flow in (self._flow(first), motion)), key=abs)
+        if len(group) == 1 and abs(along) >= _PARALLEL:
+            # The defect is closed form less data: along the motion where the data are behind it.
+            row, clock = ("repeated", "late") if along > 0.0 else ("left out and the others renumbered", "early")
+            return f"a row {row}, or the clock {clock} by a part of an interval, at t = {end:.6g} s"
+        if len(group) == 2 and self._defects.transitions is not None and last == first + 1:
+            carried = self._defects.transitions[first + 1] @ (values[0] * self._units) / self._units
+            if _cosine(values[1], -carried) >= _PARALLEL:
                 row = f"row {first + 2}, t = {time[first + 1]:.6g} s"
                 if abs(along) >= _PARALLEL:
-                    return Fault(start, end, f"a stuck row, or one at a wrong time: {row}")
-                return Fault(start, end, f"a single wrong row: {row}")
-        # The coordinate on which a load makes such changes of the rates.
+                    return f"a stuck row, or one at a wrong time: {row}"
+                return f"a single wrong row: {row}"
+        # The coordinate on which a load makes such defects.
         chosen = group[:: max(1, len(group) // _MOST_DIRECTIONS)]
-        directions = np.stack([self._directions(row) for row in chosen], axis=1)
-        cosines = [self._cosine_of_rates(self._values[chosen, half:], direction) for direction in directions]
+        effects = self._effects(chosen)
+        cosines = [_mean_cosine(self._values[chosen], effect) for effect in effects]
         place = int(np.argmax(cosines))
         label = self._scene.coordinate_labels[self._defects.moving[place]]
-        kind = "a load on the {} that is wrong or missing" if cosines[place] >= _ALONG else "a fault of the {}"
-        return Fault(start, end, f"{kind.format(label)} from t = {start:.6g} to {end:.6g} s")
+        # N m that the data have more
+        more = -(self._values[chosen] * effects[place]).sum(axis=1) / (effects[place] ** 2).sum(
+            axis=1
+        )  # N m, of the data
+        if cosines[place] >= _ALONG and (edge := self._edge(place, start, end, more)):
+            return f"the load on the {label} {edge}"
+        if len(group) == 1:
+            # Of a change of rates in the interval the angles have got a share.
+            angles, rates = values[0, :half], values[0, half:] * self._units[half:] * (end - start)
+            share = float(angles @ rates) / (float(rates @ rates) or 1.0)
+            rest = float(np.linalg.norm(angles - share * rates))
+            if -_NEARLY <= share <= 1.0 + _NEARLY and rest <= _NEARLY * float(np.linalg.norm(rates)):
+                return f"a jump of rates, or a load of one interval, before t = {end:.6g} s"
+            return f"the motion goes on from another state after t = {end:.6g} s"
+        if cosines[place] >= _ALONG:
+            amount = f"{more.mean():+.3g} N m on the average"
+            return f"a load on the {label} that is wrong or missing from t = {start:.6g} to {end:.6g} s: {amount}"
+        return f"a fault of the {label} from t = {start:.6g} to {end:.6g} s"
 
-    def _directions(self, row: int) -> Array:
-        """(coordinates, coordinates) rad/s² that 1 N m on each coordinate that moves makes of all."""
-        state, half = self._defects.states[row], len(self._defects.moving)
-        form = rotor_form(self._scene)
+    def _edge(self, place: int, start: float, end: float, more: Array) -> str:
+        """Of intervals beside a jump of a coordinate's load, "" elsewhere; more: N m that the data have more."""
+        tables = load_tables(self._scene)[: len(self._defects.moving)]
+        for (t0, value0), (t1, value1) in itertools.pairwise(tables[place]):
+            jump = value1 - value0
+            if t0 != t1 or not jump or not start * (1.0 - 1e-9) <= t0 <= end * (1.0 + 1e-9):
+                continue
+            if len(more) == 1 and abs(abs(more[0] / jump) - 1.0) <= _NEARLY:
+                side = "late" if more[0] / jump < 0.0 else "early"
+                return f"jumps a row {side} at t = {t0:.6g} s, or has a wrong value in this row"
+            if len(more) == 2 and abs(more.sum()) <= _NEARLY * np.abs(more).max() and more[0] / jump > 0.0:
+                return f"is smoothed over its jump at t = {t0:.6g} s"
+        return ""
 
-        def accelerations(torques: Array) -> Array:
-            loads = load_values([*torques, *np.zeros(half - 1)])
-            found = closed_form.accelerations(
-                state[:half].tolist(), state[half:].tolist(), form, loads, math.sin, math.cos
-            )
-            return np.array(found)
+    def _effects(self, rows: NDArray[np.int64]) -> Array:
+        """(coordinates, rows, m) rad: what 1 N m on each coordinate that moves makes of an interval's end."""
+        defects, form = self._defects, rotor_form(self._scene)
+        begins, ends, states = defects.time[rows], defects.time[rows + 1], defects.states[rows].T
+        steps = explicit_steps(self._scene, ends - begins, defects.states[rows]) or 1
+        inertia = form.inertia + sum(blade.schur_ss + blade.schur_cc for blade in form.blades)
+        effects = []
+        for i, size in enumerate([inertia, *(blade.pitch_inertia for blade in form.blades)]):
+            torque = 1e-6 * float(size) / float((ends - begins).max()) ** 2  # far above round-off, and yet linear
 
-        free = accelerations(np.zeros(half))
-        return np.array([accelerations(1e6 * unit) - free for unit in np.eye(half)])
+            def equations(
+                angles: Any, rates: Any, form: Any, loads: Any, *rest: Any, i: int = i, x: float = torque
+            ) -> Any:
+                pitches = [p + x * (k + 1 == i) for k, p in enumerate(loads.pitches or [0.0] * len(form.blades))]
+                loads = replace(loads, rotor=loads.rotor + x * (i == 0), pitches=pitches)
+                return closed_form.accelerations(angles, rates, form, loads, *rest)
 
-    def _cosine_of_rates(self, values: Array, directions: Array) -> float:
-        """Of the defects of rates of several intervals, on the average, each with its direction."""
-        sizes = np.linalg.norm(values, axis=1) * np.linalg.norm(directions, axis=1)
-        return float(np.abs((values * directions).sum(axis=1)).sum() / (sizes.sum() or 1.0))
+            pushed, free = (quick_ends(self._scene, begins, ends, states, steps, e) for e in (equations, None))
+            effects.append((pushed - free).T / self._units / torque)
+        return np.asarray(effects)
 
     def _flow(self, row: int) -> Array:
-        """How the state goes on at a row, per s."""
+        """How the state goes on at a row, rad and, in units of the rates' defects, rad, per s."""
         states, time = self._defects.states, self._defects.time
         half = states.shape[1] // 2
         ahead = min(row + 2, len(states) - 1)
         change = (states[ahead, half:] - states[row, half:]) / (time[ahead] - time[row])
-        return np.concatenate([states[row + 1, half:], change])
-
-    def _cosine(self, first: Array, second: Array) -> float:
-        a, b = first / self._units, second / self._units
-        size = float(np.linalg.norm(a) * np.linalg.norm(b))
-        return float(a @ b) / size if size else 0.0
-
-    def _residual(self, scene: Scene, equations: Accelerations | None, intervals: NDArray[np.int64]) -> Array:
-        """(intervals, m) defects by another scene or other equations, in units of rounding."""
-        states = self._defects.states
-        equations = equations or closed_form.accelerations  # by SciPy: a scene of another structure is not compiled
-        ends = interval_ends(scene, self._defects.time, states, intervals.tolist(), equations)
-        return np.asarray((ends - states[intervals + 1]) * self._weights[intervals])
-
-    def _slope(self, parameter: Parameter, at: float, intervals: NDArray[np.int64]) -> Array:
-        """By the parameter's share, or per rad, at a change of it."""
-        sides = []
-        for step in (_DIFFERENCE, -_DIFFERENCE):
-            scene, equations = parameter.change(at + step)
-            change = None
-            if equations is None:
-                change = change_of_ends(self._scene, scene, self._defects.time, self._defects.states)
-            if change is not None:
-                sides.append((change * self._weights)[intervals])
-            else:
-                sides.append(self._residual(scene, equations, intervals))
-        return np.asarray((sides[0] - sides[1]) / (2.0 * _DIFFERENCE))
-
-    def _share(self, residual: Array, intervals: NDArray[np.int64]) -> float:
-        """What is left of the defects' root mean square; infinite where that is neither little nor rounding."""
-        if not np.isfinite(residual).all():
-            return np.inf
-        share = float(np.linalg.norm(residual) / (np.linalg.norm(self._normal[intervals]) or 1.0))
-        return share if share <= MAX_LEFT or float(np.abs(residual).max()) <= _AT_FLOOR else np.inf
+        return np.asarray(np.concatenate([states[row + 1, half:], change]) / self._units)
 
 
-def _text(parameter: Parameter, change: float) -> str:
-    amount = f"{change:+.4g} {parameter.unit}" if parameter.unit else f"{100.0 * change:+.4g} %"
-    return f"{parameter.key} off by {amount}"
+def _changed(scene: Scene, chosen: Sequence[Parameter], change: Array) -> Model:
+    model = Model(scene)
+    for parameter, amount in zip(chosen, change.tolist(), strict=True):
+        model = parameter.change(model, amount)
+    return model
+
+
+def _off(parameter: Parameter, change: float, deviation: float) -> str:
+    if parameter.unit:
+        return f"{parameter.key} off by {change:+.4g} {parameter.unit} (uncertainty {deviation:.1g})"
+    return f"{parameter.key} off by {100.0 * change:+.4g} % (uncertainty {100.0 * deviation:.1g})"
+
+
+def _cosine(first: Array, second: Array) -> float:
+    size = float(np.linalg.norm(first) * np.linalg.norm(second))
+    return float(first @ second) / size if size else 0.0
+
+
+def _mean_cosine(values: Array, directions: Array) -> float:
+    """Of (n, k) vectors with their directions, on the average by their sizes, whatever the sign."""
+    sizes = np.linalg.norm(values, axis=1) * np.linalg.norm(directions, axis=1)
+    return float(np.abs((values * directions).sum(axis=1)).sum() / (sizes.sum() or 1.0))
 
 
 def _is_smooth(size: Array, wrong: NDArray[np.int64]) -> bool:
     """Whether the sizes come down gradually beside what stands out: a fault at a time has edges."""
     edges = [i for i in (*(wrong - 1), *(wrong + 1)) if 0 <= i < len(size) and i not in set(wrong.tolist())]
     return bool(edges) and float(np.median(size[edges])) > 0.1 * float(np.median(size[wrong]))
-
-
-def fault_lines(faults: Sequence[Fault]) -> Iterator[str]:
-    """Faults in words; of many the first ones, and how many there are."""
-    for fault in faults[:_MAX_FAULTS]:
-        yield fault.text
-    if len(faults) > _MAX_FAULTS:
-        yield f"and {len(faults) - _MAX_FAULTS} more faults until t = {faults[-1].end_s:.6g} s"

@@ -33,7 +33,7 @@ from rotor_mbs.analysis.modes import (
 )
 from rotor_mbs.errors import InputError, MethodRefusal, RotorError
 from rotor_mbs.methods.base import Method
-from rotor_mbs.methods.catalogue import methods
+from rotor_mbs.methods.catalogue import find_method, methods, with_method_files
 from rotor_mbs.runs.files import writing
 from rotor_mbs.runs.pool import local_pool, run_in
 from rotor_mbs.runs.records import Record, read_records, write_records
@@ -58,6 +58,7 @@ def modes_of_scenes(
     *,
     speeds: Sequence[float] = (),
     stiffnesses: Sequence[float] = (),
+    names: Sequence[str] = (),
     workers: int,
     timeout_s: float,
     on_progress: OnProgress = ignore_progress,
@@ -65,11 +66,15 @@ def modes_of_scenes(
     """The modes of every scene into the file `output`; those of other scenes that it has are kept.
 
     speeds: rad/s, of the Campbell diagram and the Floquet multipliers. stiffnesses: N m/rad, of every bearing, for the
-    stability chart over speed. Raises InputError for a negative or repeated speed or stiffness, StoreError.
+    stability chart over speed. names: of methods whose models stand beside the closed form; by default all. Raises
+    InputError for a negative or repeated speed or stiffness, and for a method that is not linearized; StoreError.
     """
+    models = tuple(find_method(name).model for name in names)
+    for name, model in zip(names, models, strict=True):
+        if not any(method.linearize for method in methods() if method.model == model):
+            raise InputError(f"{name}: its model has no linearization; allowed: a model with `linearize`")
     speeds, stiffnesses = _increasing(speeds, "speeds"), _increasing(stiffnesses, "stiffnesses")
     made: list[Outcome] = []
-    names = {scene.name for scene in scenes}
     with writing(output):
         records: list[Record] = []
         if output.exists():
@@ -77,11 +82,11 @@ def modes_of_scenes(
             if not hashes:
                 raise InputError(f"{output}: is no file of modes; allowed: another output file")
             for name, modes in read_modes(output).items():
-                if name not in names:
+                if name not in {scene.name for scene in scenes}:
                     records += to_records(modes, {"scene_hash": hashes[name]})
         with local_pool(workers) as pool:
-            tasks = [(scene, tuple(speeds), tuple(stiffnesses)) for scene in scenes]
-            for done, end in enumerate(run_in(pool, _perform, tasks, timeout_s), 1):
+            tasks = [(scene, tuple(speeds), tuple(stiffnesses), models) for scene in scenes]
+            for done, end in enumerate(run_in(pool, with_method_files(_perform), tasks, timeout_s), 1):
                 if isinstance(end.error, RotorError):
                     raise end.error
                 scene, share = end.task[0], done / len(tasks)
@@ -103,12 +108,15 @@ def modes_of_scenes(
     return made
 
 
-def _perform(task: tuple[Scene, tuple[float, ...], tuple[float, ...]]) -> SceneModes:
+def _perform(task: tuple[Scene, tuple[float, ...], tuple[float, ...], tuple[str, ...]]) -> SceneModes:
     return compute_modes(*task)
 
 
 def compute_modes(
-    scene: Scene, speeds: Sequence[float] | Array = (), stiffnesses: Sequence[float] | Array = ()
+    scene: Scene,
+    speeds: Sequence[float] | Array = (),
+    stiffnesses: Sequence[float] | Array = (),
+    models: Sequence[str] = (),
 ) -> SceneModes:
     """All modes of `scene`: at rest under gravity; in steady rotation without gravity at `speeds` (rad/s); multipliers
     of a turn under gravity at those above 0; their stability chart over `stiffnesses` (N m/rad) of the bearings.
@@ -122,8 +130,8 @@ def compute_modes(
     )
     scene = replace(scene, pitch_torque=torques, bearing_rest=rests)
     speeds = np.array(_increasing(speeds, "speeds"))
-    rest = _linear(scene, REST, np.zeros(1), notes)
-    rotation = _linear(scene, ROTATION, speeds, notes) if len(speeds) else {}
+    rest = _linear(scene, REST, np.zeros(1), models, notes)
+    rotation = _linear(scene, ROTATION, speeds, models, notes) if len(speeds) else {}
     turning = speeds[speeds > 0.0]
     stiffness = np.array(_increasing(stiffnesses, "stiffnesses"))
     table = chart = None
@@ -139,8 +147,9 @@ def compute_modes(
     return SceneModes(scene.name, title, blades, scene.gravity, rest, rotation, table, chart, tuple(notes))
 
 
-def _linear(scene: Scene, kind: str, speeds: Array, notes: list[str]) -> dict[str, LinearModes]:
-    """By model, the closed form first; a model that cannot do any of the speeds is left out, with a note."""
+def _linear(scene: Scene, kind: str, speeds: Array, models: Sequence[str], notes: list[str]) -> dict[str, LinearModes]:
+    """By model, the closed form first, then `models`, or all; one that cannot do any of the speeds is left out, with a
+    note."""
     points = _steady_states(scene, kind, speeds)
     there = [not isinstance(point, str) for point in points]
     steady = [point for point in points if not isinstance(point, str)]
@@ -160,7 +169,11 @@ def _linear(scene: Scene, kind: str, speeds: Array, notes: list[str]) -> dict[st
         return whole
 
     modes_by_model = {}
-    for method in {method.model: method for method in methods() if method.linearize and method.is_installed}.values():
+    known = {method.model: method for method in methods() if method.linearize and method.is_installed}
+    closed_form = next(iter(known), "")
+    for method in known.values():
+        if models and method.model not in (closed_form, *models):
+            continue
         try:
             made = [_linearized(method, point) for point in steady]
         except MethodRefusal as exc:

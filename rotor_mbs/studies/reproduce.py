@@ -8,15 +8,12 @@ those of a bench, its times are good to a factor.
 from __future__ import annotations
 
 import hashlib
-import os
 from dataclasses import dataclass
 from pathlib import Path
 
 import rotor_mbs
-from rotor_mbs.analysis.claim_study import claim_study
 from rotor_mbs.analysis.claims import claims, finding
 from rotor_mbs.analysis.run_tables import method_table
-from rotor_mbs.errors import OF_THE_MACHINE, RotorError, one_line
 from rotor_mbs.methods.catalogue import REFERENCE, default_methods, errata_methods, ladders
 from rotor_mbs.runs.files import writing
 from rotor_mbs.runs.pool import Workers
@@ -31,15 +28,14 @@ from rotor_mbs.solution.text_table import TextTable
 from rotor_mbs.studies.bench import (
     BENCH,
     Curve,
-    Measured,
+    PointTimer,
     bench_table,
     facts_of,
     is_measured,
-    points_of,
+    prepared,
     replaced_points,
     rows_of_curve,
 )
-from rotor_mbs.studies.bench_worker import PointTimer, prepared
 from rotor_mbs.studies.run import (
     OnProgress,
     RunReport,
@@ -52,7 +48,6 @@ from rotor_mbs.studies.run import (
     run_tasks,
     work_of,
 )
-from rotor_mbs.studies.stored_references import read_reference
 
 # The scene whose error against run time is measured by all methods: the paper's own crest, and a horizon of 6 s.
 BENCHED = "paper/fig11"
@@ -114,7 +109,7 @@ def summary_of(path: Path) -> str:
     """Numbers and claims of the paper, and a line for each method over all its scenes."""
     with open_results(path) as results:
         runs = [run for scene in results.scenes.values() for run in scene.methods.values()]
-        rows = finding(results.scenes, claims(results.scenes), claim_study().shares)
+        rows = finding(results.scenes, claims(results.scenes))
         table = TextTable(("result", "as printed", "corrected model"), [*rows])
         return f"{table}\n\n{method_table(runs)}\n"
 
@@ -139,25 +134,16 @@ def perform_curve(task: CurveTask) -> Rows:
     """Run and judge the points of one curve, in a worker process; their rows."""
     (curve,) = curves_of(task.scene, task.method)
     assert task.reference is not None  # every curve has one
-    short, reference = prepared(curve.scene, read_reference(task.reference, curve.scene))
-    points = points_of(curve.ladder, short.duration / (short.samples - 1))
-    timer = PointTimer(dict.fromkeys(points, (short, reference)))
-    measured, longest = Measured(), 0.0
-    for point in points:
+    short, reference = prepared(curve.scene, task.reference)
+    longest, rows = 0.0, []
+    for point in curve.points:
+        timer = PointTimer(point, short, reference)
         if longest > _LONGEST_S:
-            measured.timings.left_out[point] = f"not run: the setting before took {longest:.2g} s"
-            continue
-        try:
-            seconds = timer.prepare(point)
-            measured.timings.times[point] = [seconds["run_time_s"]]
-            measured.answers[point] = seconds | timer.judge(point)
-            longest = seconds["run_time_s"]
-        except OF_THE_MACHINE:
-            raise
-        except RotorError as exc:
-            measured.fail(point, str(exc))
-        except Exception as exc:
-            measured.fail(point, one_line(exc))
-    rows = measured.rows(points)
-    facts = facts_of(short, reference) | {"load_before": os.getloadavg()[0], "pinned_core": -1}
-    return rows_of_curve(task.place, curve, rows, facts)
+            timer.left_out = f"not run: the setting before took {longest:.2g} s"
+        else:
+            timer.warm_up()
+        if timer.is_repeatable:
+            longest = timer.warm_s
+            timer.times.append(longest)
+        rows.append(timer.row())
+    return rows_of_curve(task.place, curve, rows, facts_of(short, reference))

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from rotor_mbs.analysis.judgement import judge
-from rotor_mbs.errors import OF_THE_MACHINE, InputError, MethodRefusal, RotorError, one_line
+from rotor_mbs.errors import OF_THE_MACHINE, InputError, MethodRefusal, RotorError
 from rotor_mbs.methods.catalogue import (
     REFERENCE,
     check_names,
@@ -19,6 +19,7 @@ from rotor_mbs.methods.catalogue import (
     default_methods,
     find_method,
     is_corrected,
+    line_of,
     look_up,
     method_names,
     settings_for,
@@ -329,7 +330,7 @@ def perform_run(task: RunTask) -> Rows:
         except OutOfTimeError as exc:  # from a method that cannot be stopped with its samples
             return task.failed("timed_out", str(exc))
         except Exception as exc:
-            return task.failed("solver_failed", str(exc) if isinstance(exc, RotorError) else one_line(exc))
+            return task.failed("solver_failed", str(exc) if isinstance(exc, RotorError) else line_of(exc))
     if asked.method == REFERENCE:
         reference: Trajectory | None = run.trajectory
     else:

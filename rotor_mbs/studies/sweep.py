@@ -16,12 +16,13 @@ from numpy.typing import NDArray
 from rotor_mbs.analysis.judgement import clearly_ok, defects_of, judge
 from rotor_mbs.errors import InputError
 from rotor_mbs.methods.base import Method
-from rotor_mbs.methods.catalogue import check_names, find_method, is_corrected, settings_for
+from rotor_mbs.methods.catalogue import check_names, find_method, is_corrected, settings_for, with_method_files
 from rotor_mbs.methods.solve import solve
 from rotor_mbs.methods.time_limit import OutOfTimeError, time_limit
 from rotor_mbs.models.lagrange.reference import error_growth
 from rotor_mbs.runs.files import KEYWORDS
 from rotor_mbs.runs.pool import TaskPool
+from rotor_mbs.runs.results import row_of_run
 from rotor_mbs.runs.runner import Task, compute
 from rotor_mbs.runs.sweeps import AMPLIFICATION, IDENTITY, METRICS, code_of_method, open_sweep, sweep_table
 from rotor_mbs.runs.table import MISSING, Place, Rows, Table, blank_rows, characters
@@ -33,7 +34,7 @@ from rotor_mbs.solution.metrics import Metrics, defect_metrics, energy_drifts, h
 from rotor_mbs.solution.quantities import energy_balance, quantities
 from rotor_mbs.solution.solution import Solution
 from rotor_mbs.solution.status import STATUSES, code_of
-from rotor_mbs.solution.trajectory import Array, Integration, RunBlock, Trajectory
+from rotor_mbs.solution.trajectory import Array, RunBlock, Trajectory
 
 _SIDE_BY_SIDE = ("", "angles", "rates", "tip", "energy")  # outputs that every `Method.solve_many` computes
 _OF_DEFECTS = ("defect_max", "defect_median", "defect_time", "angle_error_predicted")
@@ -93,14 +94,7 @@ def rows_of(chunk: Chunk) -> Rows:
     if find_method(chunk.method).solve_many is not None and _has_all_of(scenes[0].outputs):
         rows = _side_by_side(chunk, scenes)
     else:
-        rows = blank_rows(len(scenes), chunk.place.row)
-        for i, scene in enumerate(scenes):
-            try:
-                run = solve(chunk.method, scene, chunk.settings, time_limit_s=chunk.time_limit_s)
-                _put_run(rows, i, scene, run, chunk.time_limit_s)
-            except OutOfTimeError as exc:
-                put_end(rows, i, "timed_out", str(exc))
-                rows["time_reached"][i] = 0.0
+        rows = _one_by_one(chunk, scenes)
     if "error_growth" in rows:
         for i, scene in enumerate(scenes):
             _put_amplification(rows, i, scene)
@@ -133,36 +127,33 @@ def _scenes(chunk: Chunk) -> list[Scene]:
         raise InputError(f"runs {chunk.first} to {last}: {keys}: {error}") from error
 
 
-def _put_run(rows: Rows, i: int, scene: Scene, run: Solution, time_limit_s: float) -> None:
-    _put_verdict(rows, i, scene, run, time_limit_s)
-    trajectory = run.trajectory
-    n = len(trajectory.time)
-    for name, values in run.quantities.items():
-        if name in rows:
-            rows[name][i, :n] = values
-    _put_extremes(rows, slice(i, i + 1), trajectory.angles[None], trajectory.rates[None])
-    _put_effort(rows, i, run.integration, float(trajectory.time[-1]) if n else 0.0)
+def _one_by_one(chunk: Chunk, scenes: Sequence[Scene]) -> Rows:
+    rows = []
+    for i, scene in enumerate(scenes):
+        try:
+            run = solve(chunk.method, scene, chunk.settings, time_limit_s=chunk.time_limit_s)
+            rows.append(_judged_row(chunk, run, float(run.time[-1]) if len(run.time) else 0.0))
+        except OutOfTimeError as exc:
+            rows.append(chunk.part(i, i + 1).failed("timed_out", str(exc)))
+    return {name: np.concatenate([row[name] for row in rows]) for name in rows[0]}
 
 
-def _put_verdict(rows: Rows, i: int, scene: Scene, run: Solution, time_limit_s: float) -> None:
-    """Raises OutOfTimeError where it takes longer."""
-    with time_limit(time_limit_s):
-        verdict = judge(scene, run, None)
-    put_end(rows, i, verdict.status, verdict.message)
-    for name in ("energy_drift_max", *_OF_DEFECTS):
-        rows[name][i] = verdict.metrics.get(name, np.nan)
+def _judged_row(chunk: Chunk, run: Solution, time_reached: float) -> Rows:
+    """Raises OutOfTimeError where judging takes longer than the time limit."""
+    with time_limit(chunk.time_limit_s):
+        judgement = judge(run.scene, run, None)
+    judged = replace(run, status=judgement.status, message=judgement.message, metrics=judgement.metrics)
+    extremes = {name: values[0] for name, values in _extremes(run.angles[None], run.rates[None]).items()}
+    return row_of_run(judged, chunk.place, {"time_reached": time_reached, **extremes})
 
 
-def _put_effort(rows: Rows, i: int, integration: Integration, time_reached: float) -> None:
-    rows["time_reached"][i] = time_reached
-    rows["steps"][i] = -1 if integration.steps is None else integration.steps
-    rows["rhs_evaluations"][i] = -1 if integration.rhs_evaluations is None else integration.rhs_evaluations
-
-
-def _put_extremes(rows: Rows, runs: slice, angles: Array, rates: Array) -> None:
-    rows["rotor_angle_max"][runs] = largest(angles[:, :, 0])
-    rows["rotor_rate_max"][runs] = largest(rates[:, :, 0])
-    rows["pitch_max"][runs] = np.max([largest(angles[:, :, i]) for i in range(1, angles.shape[2])], axis=0)
+def _extremes(angles: Array, rates: Array) -> dict[str, Array]:
+    """(runs,) the largest angle and rate of the rotor, and the largest pitch of any blade, either way."""
+    return {
+        "rotor_angle_max": largest(angles[:, :, 0]),
+        "rotor_rate_max": largest(rates[:, :, 0]),
+        "pitch_max": np.max([largest(angles[:, :, i]) for i in range(1, angles.shape[2])], axis=0),
+    }
 
 
 def _side_by_side(chunk: Chunk, scenes: Sequence[Scene]) -> Rows:
@@ -187,14 +178,18 @@ def _side_by_side(chunk: Chunk, scenes: Sequence[Scene]) -> Rows:
     rows["status"][ok] = code_of("ok")
     for name in ("energy_drift_max", *_OF_DEFECTS):
         rows[name] = np.array([run.get(name, np.nan) for run in of_runs])
-    _put_extremes(rows, slice(None), found["angles"], found["rates"])
+    rows |= _extremes(found["angles"], found["rates"])
     for i, integration in enumerate(block.integrations):
-        _put_effort(rows, i, integration, integration.time_reached)
+        rows["time_reached"][i] = integration.time_reached
+        rows["steps"][i] = -1 if integration.steps is None else integration.steps
+        rows["rhs_evaluations"][i] = -1 if integration.rhs_evaluations is None else integration.rhs_evaluations
     for i in np.flatnonzero(~ok).tolist():
         run = Solution(scenes[i], method.name, block.trajectory(i), block.integrations[i], settings.as_dict())
         run.is_corrected, run.bounds = method.is_corrected, method.bounds
         try:
-            _put_verdict(rows, i, scenes[i], run, chunk.time_limit_s)
+            judged = _judged_row(chunk, run, run.integration.time_reached)
+            for name in ("status", "message", "energy_drift_max", *_OF_DEFECTS):
+                rows[name][i] = judged[name][0]
         except OutOfTimeError as exc:
             put_end(rows, i, "timed_out", f"{exc}, while its samples were judged")
     return rows
@@ -224,6 +219,7 @@ def _quantity(block: RunBlock, scenes: Sequence[Scene], method: Method, name: st
 _MAX_RUNS = 128
 _MIN_RUNS = 8
 _CHUNK_BYTES = 1 << 23
+_TIMED_SAMPLES = 20_001  # of a run, for an estimate
 
 
 # From (runs stored, runs in all, statuses of those that have just been stored).
@@ -339,10 +335,7 @@ def plan_sweep(
 ) -> SweepPlan:
     """The runs of part k of n by `methods`, else by those of the file. Raises InputError, MethodRefusal."""
     file = shown_path(sweep.path), sweep.text
-    chosen = check_names(methods)
-    if not methods:
-        with at_key(*file, "methods"):
-            chosen = check_names(sweep.table.methods)
+    chosen = check_names(methods or sweep.table.methods)
     with at_key(*file, "settings"):
         settings = settings_for(chosen, sweep.table.settings)
     for method in chosen:
@@ -440,16 +433,24 @@ def estimate_seconds(plan: SweepPlan, pool: TaskPool) -> float:
 
 
 def _seconds_per_run(plan: SweepPlan, first: int, pool: TaskPool) -> float:
+    """Of runs with very many samples, the first ones are timed."""
+    base = plan.sweep.base
+    samples = min(base.samples, _TIMED_SAMPLES)
+    share = (samples - 1) / (base.samples - 1)
+    if share < 1.0:
+        short = base.replace(samples=samples, duration=share * base.duration)
+        plan = replace(plan, sweep=replace(plan.sweep, base=short))
     row = plan.table().row_type  # only its columns count: nothing is stored
     nowhere = Place(Path(), 0, plan.first, {}, row)
     chunk = next(plan.chunks(nowhere, [(first, first + min(plan.rows, _MAX_RUNS))]))
     try:
         # The first one loads and compiles, which all others find done.
-        pool.submit(perform, chunk.part(0, 1), plan.time_limit_s).result()
+        work = with_method_files(perform)
+        pool.submit(work, chunk.part(0, 1), plan.time_limit_s).result()
         start = time.perf_counter()
-        pool.submit(perform, chunk, plan.time_limit_s).result()
+        pool.submit(work, chunk, plan.time_limit_s).result()
     except Exception as error:
         if pool.failure(error) == "error":
             raise
         return float("inf")
-    return (time.perf_counter() - start) / len(chunk.values)
+    return (time.perf_counter() - start) / len(chunk.values) / share

@@ -13,7 +13,7 @@ from support.scenes import paper
 import rotor_mbs as rm
 from rotor_mbs.cli import main
 from rotor_mbs.errors import InputError, RotorError
-from rotor_mbs.foreign.channels import channels, guess, load_data
+from rotor_mbs.foreign.channels import KNOWN_NAMES, channels, guess, half_last_digits, load_data
 
 SCENE = paper("fig08")
 TIME = np.linspace(0.0, 10.0, 201)
@@ -95,12 +95,61 @@ def test_guesses_say_what_they_took_for_what(tmp_path: Path) -> None:
         ("Azimuth", "rotor"), ("rotor speed", "rotor rate"), ("RotSpeed", "rotor rate"), ("psi_dot", "rotor rate"),
         ("pitch 1", "pitch 1"), ("PtchPMzc2", "pitch 2"), ("theta3", "pitch 3"), ("pitch_2_rate", "pitch 2 rate"),
         ("beta1_dot", "pitch 1 rate"), ("beta2", "pitch 2"), ("omega_rpm", "rotor rate"),
-        ("theta_dot_1", "pitch 1 rate"), ("pitch", None), ("tip 1 x", None), ("RotTorq", None), ("pitch 4", None),
+        ("theta_dot_1", "pitch 1 rate"), ("dtheta1", "pitch 1 rate"), ("dphi", "rotor rate"), ("phi", "rotor"),
+        ("phi_dot", "rotor rate"), ("Zeit", "time"), ("Zeit_ms", "time"), ("dt", None),
+        ("pitch", None), ("tip 1 x", None), ("RotTorq", None), ("pitch 4", None),
     ],
 )  # fmt: skip
 def test_names_that_are_known(name: str, channel: str | None) -> None:
     found = guess(name, 0, channels(SCENE))
     assert (found and found.name) == channel
+
+
+def test_names_of_mujocos_arrays_are_known() -> None:
+    assert load_data({"time": TIME, "qpos": ANGLES, "qvel": RATES}, SCENE).columns == list(range(8))
+
+
+def test_the_names_that_are_understood_are_printed_and_documented(capsys: pytest.CaptureFixture[str]) -> None:
+    """Each that is listed is understood; the list of the docs is the printed one."""
+    with pytest.raises(SystemExit) as ended:
+        main(["compare", "--names"])
+    assert ended.value.code == 0
+    shown = capsys.readouterr().out
+    document = (Path(__file__).parents[2] / "docs" / "compare.md").read_text()
+    for channel, names in KNOWN_NAMES:
+        assert f"{channel}: {names}\n" in shown
+        assert f"| {channel} | {names} |\n" in document
+        for name in [] if "rate of" in channel else names.split(", "):
+            column = f"{name}[0]" if "array" in channel else f"{name} 2" if "pitch" in channel else name
+            expected = {"time": "time", "pitch": "pitch 2"}.get(channel.split()[0], "rotor")
+            found = guess(column, 4, channels(SCENE))
+            assert found is not None, name
+            assert found.name == expected + " rate" * channel.startswith("array of rates")
+
+
+def column_of(text: str) -> np.ndarray:
+    """As `text` writes numbers of all sizes and signs, read again."""
+    values = np.random.default_rng(1).normal(size=200) * 10.0 ** np.linspace(-2, 3, 200)
+    return np.array([float(text % value) for value in values])
+
+
+@pytest.mark.parametrize("digits", [4, 6, 9])
+def test_the_last_digit_is_found(digits: int) -> None:
+    """Of significant digits half a unit of the last one of each number, of decimals the same of all."""
+    written = column_of(f"%.{digits - 1}e")
+    exponents = np.floor(np.log10(np.abs(written)))
+    np.testing.assert_allclose(half_last_digits(written), 0.5 * 10.0 ** (exponents + 1 - digits), rtol=1e-12)
+    np.testing.assert_allclose(half_last_digits(column_of(f"%.{digits}f")), 0.5 * 10.0**-digits, rtol=1e-12)
+
+
+def test_the_last_digit_of_single_and_double_precision_and_of_few_values() -> None:
+    double = column_of("%.17g")
+    np.testing.assert_array_equal(half_last_digits(double), np.abs(double) * 2.0**-53)
+    single = double.astype(np.float32).astype(float)
+    np.testing.assert_array_equal(half_last_digits(single), np.abs(single) * 2.0**-24)
+    # A pitch that stays at 0.1 rad says nothing of digits.
+    np.testing.assert_array_equal(half_last_digits(np.full(50, 0.1)), np.full(50, 0.1 * 2.0**-53))
+    assert not half_last_digits(np.zeros(50)).any()
 
 
 def test_a_mapping_says_column_unit_sign_zero_and_subset(tmp_path: Path) -> None:
@@ -231,6 +280,17 @@ def test_without_its_package_a_binary_openfast_file_says_how_to_get_it(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     FORMATS["data.outb"](tmp_path / "data.outb", SCENE, TIME, ANGLES, RATES)
-    monkeypatch.setitem(__import__("sys").modules, "openfast_io.FAST_output_reader", None)
+    (tmp_path / "openfast_io.py").write_text("raise ImportError")
+    monkeypatch.syspath_prepend(tmp_path)
     with pytest.raises(InputError, match=r"rotor_mbs\[openfast\]"):
         load_data(tmp_path / "data.outb", SCENE)
+
+
+@pytest.mark.parametrize("name", ["data.npz", "data.outb", "data3.nc", "data.nc", "data73.mat", "data.mat"])
+def test_a_reader_that_ends_its_process_is_a_line(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Every binary format is read apart: here by a library that ends its process when it is loaded."""
+    FORMATS[name](tmp_path / name, SCENE, TIME, ANGLES, RATES)
+    (tmp_path / "h5py.py").write_text("import os\nos.abort()\n")
+    monkeypatch.syspath_prepend(tmp_path)
+    with pytest.raises(InputError, match="cannot be read: its reader ended"):
+        rm.compare(tmp_path / name, SCENE)

@@ -1,8 +1,11 @@
-"""Whatever changes in a file after it was written is found: in runs, in sweeps, and in what is no file of ours."""
+"""Whatever changes in a file after it was written is found, and is a line: in runs, in sweeps, in files not of ours."""
 
 from __future__ import annotations
 
+import base64
 import shutil
+import subprocess
+import sys
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
@@ -11,16 +14,17 @@ import h5py
 import numpy as np
 import pytest
 from support.checking import failed, judged, results_file
-from support.commands import rotor_mbs
+from support.commands import PROGRAM, rotor_mbs
+from support.stored import change_row, damage
 from support.sweeps import THREE_RUNS, made_sweep
 
 import rotor_mbs as rm
 from rotor_mbs.errors import StoreError
+from rotor_mbs.runs import files
 from rotor_mbs.runs.files import seal
 from rotor_mbs.runs.read import open_results
 from rotor_mbs.runs.results import TableFile
 from rotor_mbs.runs.sweeps import StoredSweep
-from rotor_mbs.runs.table import Rows
 
 METHOD = "lagrange/dop853"
 SCENE = "check/held"
@@ -37,34 +41,12 @@ def copy(written: Path, tmp_path: Path) -> Path:
     return Path(shutil.copy(written, tmp_path / "results.h5"))
 
 
-def change_row(path: Path, run: str, column: str, change: Callable[[np.ndarray], object]) -> None:
-    """Changes a column of a row and leaves its checksum as it was."""
-    place = TableFile(path).place(run)
-    values = place.read()[column].copy()
-    change(values)
-    with path.open("r+b") as file:
-        file.seek(place.offsets[column])
-        file.write(values.tobytes())
-
-
-def last_bit(values: np.ndarray) -> None:
-    values.reshape(-1).view(np.uint8)[-8 if values.itemsize == 8 else -1] ^= 1
-
-
-def forge(path: Path, run: str, change: Callable[[Rows], object]) -> None:
-    """Changes a row and gives it the checksum that belongs to it, as a careful forger does."""
-    place = TableFile(path).place(run)
-    row = {name: values.copy() for name, values in place.read().items()}
-    change(row)
-    place.write(place.first, row)
-
-
 def test_the_last_bit_of_every_column_of_a_run_is_found(copy: Path) -> None:
     columns = TableFile(copy).place(RUN).row.names or ()
     assert {"angles", "rates", "tip", "kinetic_energy", "energy_error", "energy_drift_max", "message"} <= {*columns}
     before = copy.read_bytes()
     for column in columns:
-        change_row(copy, RUN, column, last_bit)
+        damage(copy, RUN, column)
         with open_results(copy) as results:
             run = results.scenes[SCENE].runs[METHOD]
             assert run.is_damaged, column
@@ -76,9 +58,9 @@ def test_the_last_bit_of_every_column_of_a_run_is_found(copy: Path) -> None:
 
 
 def test_check_and_report_name_a_damaged_run(copy: Path, tmp_path: Path) -> None:
-    change_row(copy, RUN, "angles", last_bit)
-    (damage,) = [check for check in failed(judged(copy)) if check.name == "integrity"]
-    assert (damage.where.scene, damage.where.method) == (SCENE, METHOD)
+    damage(copy, RUN, "angles")
+    (failure,) = [check for check in failed(judged(copy)) if check.name == "integrity"]
+    assert (failure.where.scene, failure.where.method) == (SCENE, METHOD)
     report = rotor_mbs("report", copy, "-o", tmp_path / "report")
     assert report.status == 2
     (line,) = report.err.splitlines()
@@ -102,9 +84,13 @@ LAID_OUT: dict[str, Callable[[h5py.File], object]] = {
 
 # Units of computed columns are compared by `check` alone, since that takes most of the time of reading a file.
 CASES = [(c, k) for c in LAID_OUT for k in ("check", "report", "run") if c != "a unit" or k == "check"]
+# All read a file by the same function: of each change `check`, of one the others.
+_QUICK = [(c, k) for c, k in CASES if k == "check" or c == "a setting"]
 
 
-@pytest.mark.parametrize(("change", "command"), CASES)
+@pytest.mark.parametrize(
+    ("change", "command"), [pytest.param(*case, marks=() if case in _QUICK else pytest.mark.full) for case in CASES]
+)
 def test_a_change_of_what_was_laid_out_is_refused_in_one_line(
     change: str, command: str, copy: Path, tmp_path: Path
 ) -> None:
@@ -128,20 +114,20 @@ def test_a_change_of_what_was_laid_out_is_refused_in_one_line(
 
 def test_a_growth_that_hides_an_error_is_found(copy: Path) -> None:
     """With a growth of 1e6 at the second sample nothing is compared any more, and a wrong run could be called ok."""
-    forge(copy, f"{SCENE}/reference", lambda row: row["error_growth"].__setitem__((0, 1), 1e6))
+    change_row(copy, f"{SCENE}/reference", lambda row: row["error_growth"].__setitem__(1, 1e6))
     names = {check.name for check in failed(judged(copy))}
     assert "growth" in names
     assert "integrity" not in names
 
 
 def test_an_energy_error_that_is_not_the_balance_is_found(copy: Path) -> None:
-    forge(copy, RUN, lambda row: row["energy_error"].__setitem__((0, 5), row["energy_error"][0, 5] + 1.0))
+    change_row(copy, RUN, lambda row: row["energy_error"].__setitem__(5, row["energy_error"][5] + 1.0))
     (failure,) = failed(judged(copy))
     assert (failure.name, failure.where.channel) == ("energies", "energy error")
 
 
 def test_settings_and_steps_that_are_not_the_methods_are_found(copy: Path) -> None:
-    forge(copy, RUN, lambda row: row["steps"].fill(1))
+    change_row(copy, RUN, lambda row: row["steps"].fill(1))
     assert {check.name for check in failed(judged(copy))} == {"steps"}
     columns = TableFile(copy).table("runs").computed.keys()
     with h5py.File(copy, "r+") as file:
@@ -175,7 +161,7 @@ FOREIGN: dict[str, Callable[[h5py.Group, Path], object]] = {
 }
 
 
-@pytest.mark.parametrize("is_sealed", [False, True])
+@pytest.mark.parametrize("is_sealed", [pytest.param(False, marks=pytest.mark.full), True])
 @pytest.mark.parametrize("kind", FOREIGN)
 def test_what_is_not_an_array_of_the_file_is_refused(kind: str, is_sealed: bool, copy: Path, tmp_path: Path) -> None:
     with h5py.File(copy, "r+") as file:
@@ -248,3 +234,126 @@ def test_a_changed_number_of_a_finished_sweep_is_found(column: str, swept: Path,
     for read in (partial(rm.Runs.column, name="time"), partial(rm.Runs.at, name="angles", sample=0), rm.Runs.to_xarray):
         with pytest.raises(StoreError, match="runs 0 changed"):
             read(rm.open(copy))
+
+
+# One bit of a MAT file of SciPy's, at which its reader ends the process.
+DAMAGED_MAT = base64.b64decode(
+    """
+TUFUTEFCIDUuMCBNQVQtZmlsZSBQbGF0Zm9ybTogcG9zaXgsIENyZWF0ZWQgb246IFN1biBOb3YgMjIgMjI6MTU6NDggMjAyNgAA
+AAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAABSU0OAAAAWAAAAAYAAAAIAAAABgAAAAAA
+AAAFAAAACAAAAAEAAAAFAAAAAQAEAHRpbWUJAAAAKAAAAAAAAAAAAAAAMzMzMzMzsz8zMzMzMzPDP8zMzMzMzMw/MzMzMzMz0z8O
+AAAAsAAAAAYAAAAIAAAABgAAAAAAAAAFAAAACAAAAAUAAAADAAAAAQAAAAYAAABhbmdsZXMAACkAAAB4AAAAAAAAAAAAAAAAAAAA
+AAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAA
+AAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAA
+"""
+)
+
+
+_READ_ALL = """import sys
+from pathlib import Path
+from rotor_mbs.errors import StoreError
+from rotor_mbs.runs.files import open_file
+from rotor_mbs.runs.read import open_results
+path, content = Path(sys.argv[1]), Path(sys.argv[1]).read_bytes()
+place, refused = content.find(b"\\x19\\x01"), 0
+while place >= 0:
+    path.write_bytes(content[:place] + b"\\x19\\x00" + content[place + 2 :])
+    try:
+        with open_results(path) as results:
+            [run.attributes for scene in results.scenes.values() for run in scene.runs.values()]
+    except StoreError:
+        refused += 1
+    place = content.find(b"\\x19\\x01", place + 1)
+print(refused)
+"""
+
+
+@pytest.fixture
+def results_copy(results: Path, tmp_path: Path) -> Path:
+    path = tmp_path / "r.h5"
+    path.write_bytes(results.read_bytes())
+    return path
+
+
+def test_an_attribute_that_became_a_list_is_not_read(results_copy: Path) -> None:
+    ended = subprocess.run([sys.executable, "-c", _READ_ALL, results_copy], capture_output=True, text=True, check=False)
+    assert ended.returncode == 0, ended.stderr
+    assert int(ended.stdout) > 10
+
+
+def test_a_mat_file_that_ends_its_reader_is_a_line(tmp_path: Path) -> None:
+    path = tmp_path / "z7.mat"
+    path.write_bytes(DAMAGED_MAT)
+    command = [*PROGRAM, "compare", str(path), "--scene", "paper/fig08", "-o", str(tmp_path / "pages")]
+    ended = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert ended.returncode == 2, ended
+    (line,) = ended.stderr.splitlines()
+    assert "cannot be read: its reader ended" in line
+
+
+SHAPES = {"paper/fig08/angles": (0, 3), "runs/samples": (), "runs/status": (1,), "paper/fig08/time": (2, 2)}
+
+
+@pytest.mark.parametrize(
+    ("name", "shape"),
+    [
+        pytest.param(name, shape, marks=() if shape == quick else pytest.mark.full)
+        for name, quick in SHAPES.items()
+        for shape in SHAPES.values()
+    ],
+)
+def test_a_column_of_another_shape_is_a_line(
+    name: str, shape: tuple[int, ...], results_copy: Path, tmp_path: Path
+) -> None:
+    """With right digests: they do not cover the shape of what is computed later."""
+    group, _, column = name.rpartition("/")
+    with h5py.File(results_copy, "r+") as file:
+        there = file[group]
+        later = files.computed_in(files.stored_digests(there))
+        facts = {key: there[column].attrs[key] for key in ("units", "long_name")}
+        kind = there[column].dtype
+        del there[column]
+        dataset = there.create_dataset(column, data=np.zeros(shape, kind))
+        for key, value in facts.items():
+            dataset.attrs[key] = value
+        del there.attrs[files.DIGESTS]
+        files.seal(there, later=later)
+    for command in (["check", results_copy], ["report", results_copy, "-o", tmp_path / "pages"]):
+        ended = rotor_mbs(*command)
+        assert ended.status in (1, 2), ended
+
+
+@pytest.mark.parametrize(("name", "shape"), [("status", (0,)), ("steps", (2,)), ("angles", (0, 3)), ("crc32", ())])
+def test_a_sweeps_column_of_another_shape_is_a_line(name: str, shape: tuple[int, ...], tmp_path: Path) -> None:
+    path = made_sweep(tmp_path, THREE_RUNS)
+    with h5py.File(path, "r+") as file:
+        facts, kind = {key: file[name].attrs[key] for key in ("units", "long_name")}, file[name].dtype
+        later = files.computed_in(files.stored_digests(file))
+        del file[name], file.attrs[files.DIGESTS]
+        dataset = file.create_dataset(name, data=np.zeros(shape, kind))
+        for key, value in facts.items():
+            dataset.attrs[key] = value
+        files.seal(file, later=later)
+    before = path.read_bytes()
+    ended = rotor_mbs("sweep", tmp_path / "s.toml", "-o", path, "-j", "1")
+    assert ended.status == 2, ended
+    assert len(ended.err.splitlines()) == 1
+    assert path.read_bytes() == before
+
+
+def test_a_file_that_may_not_be_read_says_so(results_copy: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuse(*_: object) -> None:
+        raise PermissionError(13, "Permission denied")
+
+    monkeypatch.setattr(Path, "open", refuse)
+    with pytest.raises(StoreError, match="cannot be read: Permission denied"), files.open_file(results_copy):
+        pass
+
+
+def test_a_dataset_without_values_is_no_column_of_data(tmp_path: Path) -> None:
+    path = tmp_path / "data.h5"
+    with h5py.File(path, "w") as file:
+        file["nothing"] = h5py.Empty("f8")
+        file["time"], file["phi"] = np.linspace(0.0, 1.0, 5), np.zeros((5, 4))
+    arrays, _ = files.read_arrays(path)
+    assert set(arrays) == {"time", "phi"}

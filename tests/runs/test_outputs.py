@@ -34,38 +34,6 @@ def copy(results: Path, tmp_path: Path) -> Path:
 
 @pytest.mark.parametrize(
     "command",
-    [
-        ["run", "paper/fig03", "-m", "lagrange/dop853"],
-        ["bench", "paper/fig03", "-m", "lagrange/dop853", "--budget", "1"],
-        ["stability", "extreme/zero-gravity"],
-        ["reference", "paper/fig03"],
-        ["modes", "paper/fig03"],
-    ],
-    ids=lambda command: command[0],
-)
-def test_a_sweeps_dataset_is_no_output_of_another_study(command: list[str], dataset: Path) -> None:
-    before = dataset.read_bytes()
-    ended = rotor_mbs(*command, "-o", dataset)
-    assert ended.status == 2
-    (line,) = ended.err.splitlines()
-    assert line.startswith(f"{dataset}: ")
-    assert "allowed: another output" in line
-    assert dataset.read_bytes() == before
-    assert {path.name for path in dataset.parent.iterdir()} == {"s.toml", dataset.name}
-
-
-@pytest.mark.parametrize("command", [["sweep"], ["reference", "paper/fig03"], ["modes", "paper/fig03"]])
-def test_no_other_study_takes_the_place_of_runs(command: list[str], copy: Path, dataset: Path) -> None:
-    before = copy.read_bytes()
-    words = ["sweep", dataset.with_name("s.toml"), "-j", "1"] if command == ["sweep"] else command
-    ended = rotor_mbs(*words, "-o", copy)
-    assert ended.status == 2
-    assert "allowed: another output" in ended.err.splitlines()[-1]
-    assert copy.read_bytes() == before
-
-
-@pytest.mark.parametrize(
-    "command",
     [["reference", "paper/fig03"], ["reproduce"], ["run", "paper/fig03"], ["sweep", "sweeps/fig11-spread"]],
     ids=lambda command: command[0],
 )
@@ -80,12 +48,21 @@ def test_no_command_writes_what_another_process_is_writing(command: list[str], t
     assert list(tmp_path.iterdir()) == []
 
 
-@pytest.mark.parametrize("make", [os.mkfifo, os.mkdir, lambda path: path.symlink_to(path.with_name("another"))])
+@pytest.mark.parametrize(
+    "make",
+    [
+        os.mkfifo,
+        os.mkdir,
+        lambda path: path.symlink_to(path.with_name("another")),
+        lambda path: path.with_name("another").rename(path) and path.with_name("another").hardlink_to(path),
+    ],
+    ids=["pipe", "folder", "link", "file"],
+)
 def test_a_lock_that_is_no_file_of_ours_is_refused(make: Callable[[Path], object], tmp_path: Path) -> None:
     """A link would be written through, a pipe waited for."""
     (tmp_path / "another").write_text("kept")
     make(tmp_path / ".r.h5.lock")
-    with pytest.raises(InputError, match="is a foreign file"), writing(tmp_path / "r.h5"):
+    with pytest.raises(InputError, match="was not written by rotor-mbs"), writing(tmp_path / "r.h5"):
         pass
     assert (tmp_path / "another").read_text() == "kept"
 
@@ -155,6 +132,7 @@ OUTPUTS = {
     "export csv": (["export", "check/held", "--to", "csv", "-o"], "csv"),
     "check junit": (["check", "{results}", "--junit"], "junit"),
     "check json": (["check", "{results}", "--json"], "json"),
+    "test-method junit": (["test-method", "lagrange/dop853", "--junit"], "junit"),
     "animate": (["animate", "check/held", "{results}", "-o"], "webp"),
     "run": (["run", "check/held", "-m", "lagrange/dop853", "-j", "1", "-o"], "results"),
     "bench": (["bench", "check/held", "-m", "lagrange/dop853", "--budget", "1", "-o"], "results"),
@@ -259,7 +237,7 @@ def test_pages_and_figures_replace_no_other_file(results: Path, tmp_path: Path) 
 
 def test_a_file_is_saved_over_none_of_another_program(dataset: Path, tmp_path: Path) -> None:
     (tmp_path / "mine.h5").write_text("mine")
-    with pytest.raises(InputError, match="is another file"):
+    with pytest.raises(InputError, match="is not an output of this command"):
         rm.open(dataset).save(tmp_path / "mine.h5")
 
 

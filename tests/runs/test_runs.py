@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 from support.commands import rotor_mbs
 from support.scenes import paper
+from support.stored import damage
 
 from rotor_mbs.errors import StoreError
 from rotor_mbs.methods.catalogue import find_method
@@ -47,16 +48,6 @@ def made(report: RunReport) -> list[str]:
 def stored(path: Path) -> list[str]:
     file = TableFile(path)
     return [label for label in file.table("runs").runs.tolist() if file.place(label).is_stored]
-
-
-def flip(path: Path, label: str, column: str) -> None:
-    """Changes the last bit of the first byte of a row's column."""
-    offset = TableFile(path).place(label).offsets[column]
-    with path.open("r+b") as file:
-        file.seek(offset)
-        byte = file.read(1)[0]
-        file.seek(offset)
-        file.write(bytes([byte ^ 1]))
 
 
 # What a file has
@@ -169,14 +160,14 @@ def test_a_damaged_row_is_computed_again_by_the_same_command(tmp_path: Path, col
     path = tmp_path / "r.h5"
     run(path)
     before = path.read_bytes()
-    flip(path, FIRST, column)
+    damage(path, FIRST, column)
     assert made(run(path)) == [METHODS[0]]
     assert path.read_bytes() == before
 
 
 def test_runs_of_a_damaged_reference_are_computed_again_with_it(tmp_path: Path) -> None:
     run(tmp_path / "r.h5")
-    flip(tmp_path / "r.h5", REFERENCE, "error_growth")
+    damage(tmp_path / "r.h5", REFERENCE, "error_growth")
     assert sorted(made(run(tmp_path / "r.h5"))) == sorted(["reference", *METHODS])
 
 

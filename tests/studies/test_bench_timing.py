@@ -1,23 +1,30 @@
-"""Fair timing against hand-computed values: a clock that is wound by hand, methods that take what they are told."""
+"""Fair timing by a clock that is wound by hand; a bench's points, their resuming, and workers that are lost."""
 
 from __future__ import annotations
 
-from collections import defaultdict
-from collections.abc import Callable, Mapping
+import os
+import signal
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
 
+import h5py
 import numpy as np
 import pytest
+from support.commands import Ended, rotor_mbs
 from support.scenes import paper
 
 from rotor_mbs.analysis import judgement
 from rotor_mbs.methods.base import BuiltItem, Settings
+from rotor_mbs.methods.catalogue import ladders
+from rotor_mbs.runs.records import Record, read_records
+from rotor_mbs.runs.results import extend_file
 from rotor_mbs.scenario.accuracy_bounds import Bound
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.trajectory import Integration, Trajectory
-from rotor_mbs.studies import bench_worker
-from rotor_mbs.studies.bench import Timings, allot, conduct, statistics
-from rotor_mbs.studies.bench_worker import Point, PointTimer
+from rotor_mbs.studies import bench
+from rotor_mbs.studies.bench import Measurement, Point, PointTimer, allot, conduct, measure, statistics
 
 SCENE = paper("fig08", duration=1.0, samples=11)
 
@@ -72,10 +79,10 @@ def point(curve: str = "a", rung: int = 0) -> Point:
     return Point(curve, curve, float(rung), ())
 
 
-def timing_process(fake: FakeMethod, monkeypatch: pytest.MonkeyPatch) -> PointTimer:
-    monkeypatch.setattr(bench_worker, "find_method", lambda _name: fake)
+def timer_of(fake: FakeMethod, monkeypatch: pytest.MonkeyPatch) -> PointTimer:
+    monkeypatch.setattr(bench, "find_method", lambda _name: fake)
     monkeypatch.setattr(judgement, "defects_of", lambda *_, **__: None)  # of a motion that is none
-    return PointTimer(defaultdict(lambda: (SCENE, still())), fake.clock)
+    return PointTimer(point(), SCENE, still(), clock=fake.clock)
 
 
 def test_median_and_quartiles() -> None:
@@ -86,12 +93,14 @@ def test_median_and_quartiles() -> None:
 
 
 def test_only_the_integration_is_timed(monkeypatch: pytest.MonkeyPatch) -> None:
-    process = timing_process(FakeMethod(Clock(), [0.5, 0.25], error=1e-3), monkeypatch)
-    assert list(process.prepare(point()).values()) == [10.0, 10.0, 0.5]
-    assert process.repeat(point()) == 0.25
-    judged = process.judge(point())
-    names = ("status", "false_success", "steps", "output_time_s", "angle_error_max", "same")
-    assert [judged[name] for name in names] == ["ok", 0, 7, 3.0, 1e-3, True]
+    timer = timer_of(FakeMethod(Clock(), [0.5, 0.25], error=1e-3), monkeypatch)
+    timer.warm_up()
+    assert timer.warm_s == 0.5
+    timer.times.append(timer.run())
+    row = timer.row()
+    names = ("setup_time_s", "setup_again_time_s", "run_time_s", "status", "false_success", "steps", "output_time_s")
+    assert [row[name] for name in names] == [10.0, 10.0, 0.25, "ok", 0, 7, 3.0]
+    assert (row["angle_error_max"], row["same"]) == (1e-3, True)
 
 
 def test_a_useless_run_that_claims_success_is_a_failure_with_its_reason(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -100,83 +109,182 @@ def test_a_useless_run_that_claims_success_is_a_failure_with_its_reason(monkeypa
         (0.0, 5, True, "diverged", True),
         (0.0, 5, False, "solver_failed", False),
     ):
-        fake = FakeMethod(Clock(), [1.0], error, success, rows)
-        process = timing_process(fake, monkeypatch)
-        process.prepare(point())
-        judged = process.judge(point())
+        timer = timer_of(FakeMethod(Clock(), [1.0], error, success, rows), monkeypatch)
+        timer.warm_up()
+        judged = timer.judge()
         assert (judged["status"], judged["false_success"]) == (status, false)
         assert judged["message"]
 
 
+def test_a_point_that_raises_is_a_failure_with_its_reason(monkeypatch: pytest.MonkeyPatch) -> None:
+    timer = timer_of(FakeMethod(Clock(), []), monkeypatch)  # no duration to take: IndexError
+    timer.warm_up()
+    row = timer.row()
+    assert (row["status"], row["message"], row["run_time_s"]) == (
+        "solver_failed",
+        "IndexError: pop from empty list",
+        20.0,
+    )
+
+
+class FakeTimer(PointTimer):
+    """Takes `seconds` a run, and says when it is repeated."""
+
+    def __init__(self, one: Point, seconds: float, order: list[Point], clock: Clock, hangs: bool) -> None:
+        super().__init__(one, SCENE, None, clock=clock)
+        self.point, self.seconds, self.order, self.clock, self.hangs = one, seconds, order, clock, hangs
+
+    def warm_up(self) -> None:
+        self.clock.now += self.seconds
+        self.warm_s, self.is_repeatable = self.seconds, not self.hangs
+
+    def run(self) -> float:
+        self.order.append(self.point)
+        self.clock.now += self.seconds
+        return self.seconds
+
+
 def run_conduct(
-    seconds: Mapping[Point, float], budget: float, repeats: int = 20, hanging: Callable[[Point], bool] = lambda _: False
-) -> tuple[Timings[Point], list[Point]]:
+    seconds: Mapping[Point, float], budget: float, repeats: int = 20, hanging: Point | None = None
+) -> tuple[list[FakeTimer], list[Point]]:
     """Conducts points that take what `seconds` says; also the order in which they were repeated."""
-    clock, order = Clock(), []
-
-    def warm_up(one: Point) -> tuple[float, bool]:
-        clock.now += seconds[one]
-        return seconds[one], not hanging(one)
-
-    def repeat(one: Point) -> float:
-        order.append(one)
-        clock.now += seconds[one]
-        return seconds[one]
-
+    clock = Clock()
+    order: list[Point] = []
+    timers = [FakeTimer(one, taken, order, clock, one == hanging) for one, taken in seconds.items()]
     names = dict.fromkeys(one.curve for one in seconds)
-    ladders = [[one for one in seconds if one.curve == name] for name in names]
-    return conduct(ladders, warm_up, repeat, budget, repeats, clock), order
+    conduct([[timer for timer in timers if timer.point.curve == name] for name in names], budget, repeats, clock)
+    return timers, order
 
 
 def test_rounds_go_over_all_points_in_turn() -> None:
     a, b = point("a"), point("b")
-    timings, order = run_conduct({a: 0.001, b: 0.002}, budget=60.0, repeats=3)
+    timers, order = run_conduct({a: 0.001, b: 0.002}, budget=60.0, repeats=3)
     assert order == [a, b, a, b, a, b]
-    assert timings.times == {a: [0.001] * 3, b: [0.002] * 3}
+    assert [timer.times for timer in timers] == [[0.001] * 3, [0.002] * 3]
 
 
 def test_long_runs_are_repeated_five_times() -> None:
-    timings, _ = run_conduct({point("a"): 0.6, point("b"): 0.4}, budget=60.0)
-    assert {one.curve: len(times) for one, times in timings.times.items()} == {"a": 5, "b": 20}
+    timers, _ = run_conduct({point("a"): 0.6, point("b"): 0.4}, budget=60.0)
+    assert [len(timer.times) for timer in timers] == [5, 20]
 
 
 def test_what_cheap_points_leave_of_the_budget_goes_to_dear_ones() -> None:
     """Of 10 s, the cheap one wants 20 · 0.1 = 2; the two dear ones share 8: four runs of 1 s each."""
-    assert allot({"cheap": 0.1, "x": 1.0, "y": 1.0}, {"cheap": 20, "x": 20, "y": 20}, 10.0) == {
-        "cheap": 20, "x": 4, "y": 4,
-    }  # fmt: skip
-    assert allot({"x": 1.0, "y": 1.0}, {"x": 5, "y": 5}, 0.0) == {"x": 1, "y": 1}
-    assert allot({"x": 1.0}, {"x": 5}, 100.0) == {"x": 5}
+    assert allot([1.0, 0.1, 1.0], [20, 20, 20], 10.0) == [4, 20, 4]
+    assert allot([1.0, 1.0], [5, 5], 0.0) == [1, 1]
+    assert allot([1.0], [5], 100.0) == [5]
 
 
 def test_a_rung_that_does_not_fit_the_budget_is_told_and_those_after_it_too() -> None:
     """1, 2, 4 s warm up of the 9 s (three tenths of 30); the next, 8 s, would not fit, nor what comes after it."""
-    seconds = {point("a", rung): 2.0**rung for rung in range(6)}
-    timings, _ = run_conduct(seconds, budget=30.0)
-    assert [one.setting for one in timings.warm] == [0, 1, 2]
-    assert [one.setting for one in timings.left_out] == [3, 4, 5]
-    assert timings.left_out[point("a", 3)] == "not run: about 8 s more were not in the budget"
-    assert set(timings.times) == set(timings.warm)
+    timers, _ = run_conduct({point("a", rung): 2.0**rung for rung in range(6)}, budget=30.0)
+    assert [bool(timer.times) for timer in timers] == [True] * 3 + [False] * 3
+    assert [bool(timer.left_out) for timer in timers] == [False] * 3 + [True] * 3
+    assert timers[3].left_out == "not run: about 8 s more than the budget allows"
+    assert timers[3].row()["status"] == "left_out"
 
 
 def test_a_cheap_ladder_is_not_cut_by_a_dear_one() -> None:
     seconds = {point("dear", rung): 4.0 * 2**rung for rung in range(3)}
     seconds |= {point("cheap", rung): 0.01 for rung in range(9)}
-    timings, _ = run_conduct(seconds, budget=30.0)
-    assert sum(one.curve == "cheap" for one in timings.times) == 9
-    assert [one.setting for one in timings.left_out] == [1, 2]
+    timers, _ = run_conduct(seconds, budget=30.0)
+    assert sum(timer.point.curve == "cheap" and bool(timer.times) for timer in timers) == 9
+    assert [timer.point.setting for timer in timers if timer.left_out] == [1, 2]
 
 
 def test_a_point_that_never_came_back_is_not_repeated() -> None:
     a, b = point("a"), point("b")
-    timings, order = run_conduct({a: 1.0, b: 0.01}, 60.0, 4, hanging=lambda one: one == a)
+    timers, order = run_conduct({a: 1.0, b: 0.01}, 60.0, 4, hanging=a)
     assert order == [b] * 4
-    assert a in timings.warm
-    assert a not in timings.times
+    assert (timers[0].warm_s, timers[0].times) == (1.0, [])
 
 
 def test_samples_are_thinned_to_a_divisor() -> None:
     cases = {1001: (101, 10), 101: (101, 1), 1084: (58, 19), 998: (998, 1), 401: (101, 4)}
     for samples, (left, every) in cases.items():
-        short, k = bench_worker.thinned(replace(SCENE, samples=samples))
+        short, k = bench.thinned(replace(SCENE, samples=samples))
         assert (short.samples, k) == (left, every)
+
+
+def benched(tmp_path: Path, *words: str, name: str = "b.h5") -> Ended:
+    return rotor_mbs("bench", *words, "-o", tmp_path / name)
+
+
+def curves(tmp_path: Path, name: str = "b.h5") -> dict[str, Record]:
+    return {curve.name: curve for curve in read_records(tmp_path / name, "bench")}
+
+
+@pytest.mark.full
+def test_a_bench_goes_on_where_it_was(tmp_path: Path) -> None:
+    quick = ("--repeats", "2", "--budget", "3")
+    assert benched(tmp_path, "paper/fig08", "-m", "lagrange/dop853", *quick).status == 0
+    first = curves(tmp_path)
+    again = benched(tmp_path, "paper/fig08", "-m", "lagrange/dop853", *quick)
+    assert "0 scenes measured, 1 already stored" in again.out
+    assert benched(tmp_path, "paper/fig08", "-m", "lagrange/dop853", "-m", "exudyn_tree/rk67", *quick).status == 0
+    second = curves(tmp_path)
+    assert set(second) == {"lagrange/dop853", "exudyn_tree/rk67"}
+    before, after = (found["lagrange/dop853"].arrays["run_time_s"] for found in (first, second))
+    np.testing.assert_array_equal(before, after)  # kept, not measured again
+    assert (tmp_path / "b-report" / "index.html").is_file()
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["b-report", "b.h5"]
+
+
+def test_the_stored_points_keep_the_contract(tmp_path: Path) -> None:
+    ended = benched(tmp_path, "check/held", "-m", "exudyn_tree/rk44", "--repeats", "2", "--budget", "0.5")
+    assert ended.status == 0, ended.err
+    with h5py.File(tmp_path / "b.h5") as file:
+        table = file["bench"]
+        columns = (
+            "angle_error_max angle_error_end tip_error_max energy_drift_max run_time_s run_time_min_s run_time_q1_s "
+            "run_time_q3_s setup_time_s output_time_s repeats steps status step tolerance left_out crc32"
+        )
+        for name in columns.split():
+            assert table[name].dims[0][0].name == "/bench/run", name
+        assert table["step"].attrs["units"] == "s"
+        assert table["scene"].asstr()[0] == "check/held"
+        assert table["run"].asstr()[0].startswith("check/held/exudyn_tree/rk44 step=")
+    (curve,) = curves(tmp_path).values()
+    assert (curve.attributes["setting_kind"], curve.attributes["order_expected"]) == ("step", 4.0)
+    assert len(curve.arrays["setting"]) == len(curve.messages) >= 6
+
+
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [
+        (("paper/fig09", "-m", "printed/ode45"), "no ladder for method 'printed/ode45'"),
+        (("extreme/singular-start", "-m", "lagrange/dop853"), "every pitch at ±π/2 leaves the rotor no inertia"),
+    ],
+)
+def test_bad_input_is_one_line(words: tuple[str, ...], says: str, tmp_path: Path) -> None:
+    ended = benched(tmp_path, *words)
+    assert ended.status == 2
+    assert says in ended.err.splitlines()[-1]
+
+
+AT_REST = paper("fig05", duration=0.1, samples=3)
+
+
+def measure_dying(task: Measurement) -> Any:
+    """As the timing worker, which one curve kills."""
+    if any(own[0].curve.endswith("deadly") for own in task.points):
+        os.kill(os.getpid(), signal.SIGKILL)
+    return measure(task)
+
+
+@pytest.mark.full
+def test_curves_are_tried_alone_where_their_process_dies(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(bench, "measure", measure_dying)
+    (ladder,) = ladders(["lagrange/ode45"])
+    short = replace(ladder, values=(1e-3,))
+    curves = [bench.Curve(AT_REST, replace(short, variant=f" {name}"), {}) for name in ("first", "deadly", "last")]
+    file = extend_file(tmp_path / "b.h5", [bench.bench_table(curves)])
+    still = np.zeros((3, 4))
+    reference = Trajectory(np.linspace(0.0, 0.1, 3), still, still, error_growth=np.ones(3))
+    ended = {
+        outcome.label.split()[-2]: outcome for outcome in bench._measure_scene(file, curves, AT_REST, reference, 2, 5.0)
+    }
+    assert [bench.is_measured(file, curve) for curve in curves] == [True, False, True]
+    assert (ended["deadly"].status, ended["deadly"].is_stored) == ("worker_died", False)
+    assert ended["deadly"].message.endswith("also when it was retried alone")
+    assert ended["first"].message == "1 points, 0 failed, 0 left out"

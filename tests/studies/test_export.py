@@ -11,14 +11,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 from support import references
-from support.scenes import paper
 
 import rotor_mbs as rm
 from rotor_mbs.cli import main
-from rotor_mbs.errors import InputError, StoreError
 from rotor_mbs.methods.solve import solve
 from rotor_mbs.scenario.scene import Scene
-from rotor_mbs.solution.metrics import angle_error, horizon_samples, metrics_of
+from rotor_mbs.solution.metrics import horizon_samples, metrics_of
 from rotor_mbs.solution.trajectory import Trajectory
 from rotor_mbs.studies.export import export
 
@@ -123,17 +121,6 @@ def test_the_csv_has_the_reference_bit_for_bit_with_units(tmp_path: Path) -> Non
     assert all(name.endswith("]") for name in header)
 
 
-def test_a_scene_without_a_shipped_reference_gets_one_computed(tmp_path: Path) -> None:
-    pytest.importorskip("heyoka")
-    scene = paper("fig08", duration=0.2, samples=3)
-    (path,) = export(scene, "csv", tmp_path / "short.csv")
-    last = [float(value) for value in path.read_text(encoding="utf-8").splitlines()[-1].split(",")]
-    assert angle_error(
-        Trajectory(np.array([0.2]), np.array([last[1:5]]), np.zeros((1, 4))),
-        Trajectory(np.array([0.2]), references.reference("paper/fig08").angles[20:21], np.zeros((1, 4))),
-    ).max() < 1e-14  # fmt: skip
-
-
 def test_the_command_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
     monkeypatch.chdir(tmp_path)
     for to in ("mjcf", "exudyn", "csv"):
@@ -143,11 +130,3 @@ def test_the_command_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsy
     assert "allowed: the name of one scene" in capsys.readouterr().err
     with pytest.raises(SystemExit, match="2"):
         main(["export", "paper/fig03", "--to", "step"])
-
-
-def test_what_cannot_be_written_and_unknown_formats_are_one_line(tmp_path: Path) -> None:
-    (tmp_path / "file").write_text("", encoding="utf-8")
-    with pytest.raises(StoreError, match="cannot be written"):
-        export(paper("fig03"), "mjcf", tmp_path / "file" / "fig03.xml")
-    with pytest.raises(InputError, match=r"allowed: mjcf, exudyn, csv$"):
-        export(paper("fig03"), "urdf", tmp_path / "fig03")

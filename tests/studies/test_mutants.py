@@ -197,51 +197,36 @@ def wrong_scenes(scene: Scene, share: float) -> Iterator[tuple[str, Scene]]:
                 yield f"blade {i + 1} {name}{place}", replace(scene, blades=blades)
 
 
+# A scene, what the names of its numbers begin with and how many these are, a method, the share, and each how many-th.
+_GENERAL, _PITCH_LOADS = ("check/general", "", 63), ("check/pitch-loads", ("pitch_torque", "bearing_rest"), 20)
+
+
 @pytest.mark.parametrize(
-    ("method", "share", "every"),
+    ("scene", "names", "count", "method", "share", "every"),
     [
-        ("lagrange/dop853", 1e-6, 31),
-        pytest.param("lagrange/dop853", 1e-6, 1, marks=pytest.mark.full),
-        pytest.param("exudyn_tree/rk67", 1e-6, 1, marks=pytest.mark.full),
-        pytest.param("mujoco/rk4", 1e-3, 1, marks=pytest.mark.nightly),
+        (*_GENERAL, "lagrange/dop853", 1e-6, 31),
+        pytest.param(*_GENERAL, "lagrange/dop853", 1e-6, 1, marks=pytest.mark.full),
+        pytest.param(*_GENERAL, "exudyn_tree/rk67", 1e-6, 1, marks=pytest.mark.full),
+        pytest.param(*_GENERAL, "mujoco/rk4", 1e-3, 1, marks=pytest.mark.nightly),
         # Of second order: a product of inertia of 25 beside 4000 kg m² shows from 3 % on.
-        pytest.param("exudyn_chain/generalized_alpha", 5e-2, 1, marks=pytest.mark.nightly),
+        pytest.param(*_GENERAL, "exudyn_chain/generalized_alpha", 5e-2, 1, marks=pytest.mark.nightly),
+        (*_PITCH_LOADS, "lagrange/dop853", 1e-4, 10),  # times of jumps and kinks, too
+        pytest.param(*_PITCH_LOADS, "lagrange/dop853", 1e-4, 1, marks=pytest.mark.full),
+        pytest.param(*_PITCH_LOADS, "exudyn_tree/rk67", 1e-4, 1, marks=pytest.mark.full),
     ],
 )
-def test_every_number_of_a_scene_counts(method: str, share: float, every: int, tmp_path: Path) -> None:
+def test_every_number_of_a_scene_counts(
+    scene: str, names: str | tuple[str, ...], count: int, method: str, share: float, every: int, tmp_path: Path
+) -> None:
     if method.startswith("mujoco"):
         pytest.importorskip("mujoco")
-    scene = shipped("check/general")
-    path = results_file(tmp_path / "numbers.h5", [scene.name], [])
-    survivors, count = [], 0
-    for name, wrong in list(wrong_scenes(scene, share))[::every]:
-        add_run(path, scene, solve(method, wrong, {}))
-        count += 1
-        if not failed(judged(path)):
-            survivors.append(name)
-    assert count == len(range(0, 63, every))
-    assert survivors == []
-
-
-@pytest.mark.parametrize(
-    ("method", "share", "every"),
-    [
-        ("lagrange/dop853", 1e-4, 10),
-        pytest.param("lagrange/dop853", 1e-4, 1, marks=pytest.mark.full),
-        pytest.param("exudyn_tree/rk67", 1e-4, 1, marks=pytest.mark.full),
-    ],
-)
-def test_every_number_of_torques_and_commands_of_pitches_counts(
-    method: str, share: float, every: int, tmp_path: Path
-) -> None:
-    """Times of jumps and kinks, too."""
-    scene = shipped("check/pitch-loads")
-    path = results_file(tmp_path / "numbers.h5", [scene.name], [])
-    wrong = [one for one in wrong_scenes(scene, share) if one[0].startswith(("pitch_torque", "bearing_rest"))]
+    right = shipped(scene)
+    path = results_file(tmp_path / "numbers.h5", [scene], [])
+    wrong = [(name, changed) for name, changed in wrong_scenes(right, share) if name.startswith(names)]
     survivors = []
     for name, changed in wrong[::every]:
-        add_run(path, scene, solve(method, changed, {}))
+        add_run(path, right, solve(method, changed, {}))
         if not failed(judged(path)):
             survivors.append(name)
-    assert len(wrong) == 20
+    assert len(wrong) == count
     assert survivors == []

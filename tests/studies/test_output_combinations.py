@@ -18,7 +18,7 @@ METHODS = ("-m", "lagrange/taylor", "-m", "exudyn_tree/rk67")
 
 @pytest.mark.parametrize(
     "combinations",
-    [[("tip",), ("angles", "rates", "tip", "energy"), ("rates", "loads")], pytest.param(ALL, marks=pytest.mark.full)],
+    [[("tip",), ("rates", "loads")], pytest.param(ALL, marks=pytest.mark.full)],
     ids=["some", "all"],
 )
 def test_every_combination_runs_is_checked_and_reported(combinations: list[tuple[str, ...]], tmp_path: Path) -> None:

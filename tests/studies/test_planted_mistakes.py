@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import functools
-import itertools
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
@@ -15,7 +14,6 @@ from support.other_code import Mistakes
 
 import rotor_mbs as rm
 from rotor_mbs.scenario.scene import Scene
-from rotor_mbs.studies import compare_data, data_causes
 
 Array = Any
 DURATION = 2.0
@@ -154,6 +152,7 @@ PLANTS = {
     ),
     "gravity": Plant("gravity of 9.81 m/s^2", changed=with_gravity(9.81)),
     "no gravity": Plant("gravity of 0 m/s^2", changed=with_gravity(0.0)),
+    "mass 1 % off, driven": Plant("blade.mass off by +1 %", "paper/fig15-10kNm", changed=lighter),
     "mass 1 % off, springs": Plant("blade.mass off by +1 %", "check/general", changed=lighter),
     "c 1 % off": Plant("blade.centre_of_mass[0] off by +1 %", changed=longer_offset),
     "missing Coriolis": Plant("without the Coriolis terms", mistakes=Mistakes(coriolis=0.0)),
@@ -183,6 +182,7 @@ PLANTS = {
     ),
     "noise": Plant("scatter from row to row, standard deviation 1", spoilt=noise(1e-4)),
     "truncated": Plant("the data end at t = 1.49 s of 2 s", spoilt=lambda t, q, w: (t[:150], q[:150], w[:150])),
+    "late": Plant("begin at t = 0.6 s", spoilt=lambda t, q, w: (t[60:], q[60:], w[60:])),
     "another scene": Plant("the scene paper/fig09", changed=lambda _: short("paper/fig09")),
     "gravity, and another zero": Plant(
         "gravity of 9.81 m/s^2; and rotor: zero off by 1.5708", changed=with_gravity(9.81),
@@ -200,10 +200,20 @@ PLANTS = {
         "time in ms taken as s; and rotor, pitch 1, pitch 2, pitch 3: degrees taken as rad",
         spoilt=lambda t, q, w: (1e3 * t, np.degrees(q), np.degrees(w)),
     ),
+    "from the end": Plant("time reversed", spoilt=lambda t, q, w: (t, q[::-1], w[::-1])),
+    "from the end, rates turned": Plant(
+        "time reversed; and rotor rate, pitch 1 rate, pitch 2 rate, pitch 3 rate: sign reversed",
+        spoilt=lambda t, q, w: (t, q[::-1], -w[::-1]),
+    ),
+    "a second late": Plant("`offset = -1` of the time", spoilt=lambda t, q, w: (t + 1.0, q, w)),
+    "gravity and c": Plant(
+        "gravity off by -1 % (uncertainty", changed=lambda scene: longer_offset(with_gravity(0.99 * 9.8)(scene))
+    ),
     "E1 and E3": Plant("erratum E1 of", mistakes=Mistakes(e1=True, e3=True)),
     "swapped columns": Plant("columns exchanged: rotor is pitch 1, pitch 1 is rotor", spoilt=columns(1, 0, 2, 3)),
 }  # fmt: skip
 REFUSED = {
+    "ten seconds late": Plant("`offset = -10` of the time", spoilt=lambda t, q, w: (t + 10.0, q, w)),
     "NaN": Plant("is nan in row 101 of 201", spoilt=not_a_number),
     "repeated time": Plant("repeats that of the row above", spoilt=spoilt({51: 0.5})),
     "decreasing time": Plant("comes before that of the row above", spoilt=spoilt({51: 0.2})),
@@ -211,7 +221,7 @@ REFUSED = {
 
 
 # One of each kind: in the columns, in time, in the scene, in the equations. The others carry the mark full.
-FAST = {"degrees", "blade order", "truncated", "one sample late", "gravity"}
+FAST = {"degrees", "blade order", "truncated", "late", "one sample late", "gravity"}
 
 
 @pytest.mark.parametrize(
@@ -225,10 +235,12 @@ def test_a_mistake_is_named(name: str) -> None:
 
 
 def test_what_is_within_the_tolerance_but_not_random_is_named() -> None:
-    """A mass that the motion cannot tell from a torque: both are named."""
-    comparison = rm.compare(Plant("", "paper/fig15-10kNm", changed=lighter).data(), short("paper/fig15-10kNm"))
+    """A mass that the motion cannot tell from a torque: both are named, also where the tolerance allows it."""
+    data, scene = Plant("", "paper/fig15-10kNm", changed=lighter).data(), short("paper/fig15-10kNm")
+    comparison = rm.compare(data, scene, tolerance=1e-3)
     assert comparison.status == "ok"
-    assert {"blade.mass off by +1 %", "torque.rotor off by -0.9901 %"} <= set(comparison.likely)
+    for cause in ("blade.mass off by +1 %", "torque.rotor off by -0.9901 %"):
+        assert any(text.startswith(f"{cause} (uncertainty ") for text in comparison.likely)
     assert any("not random" in note for note in comparison.verdict.notes)
 
 
@@ -260,13 +272,3 @@ def test_nothing_is_said_where_nothing_fits() -> None:
     assert comparison.status == "inaccurate"
     assert comparison.likely == ()
     assert comparison.verdict.notes == ()
-
-
-def test_a_search_for_causes_ends_by_its_time_limit_and_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
-    """On a clock that goes on by a second at each run, of which each scene takes one or two."""
-    seconds = itertools.count()
-    monkeypatch.setattr(compare_data, "monotonic", lambda: 0.0)
-    monkeypatch.setattr(data_causes, "monotonic", lambda: float(next(seconds)))
-    comparison = rm.compare(UNKNOWN.data(), short("paper/fig11"))
-    assert comparison.verdict.notes == ("the search for causes was ended by its time limit",)
-    assert (comparison.status, comparison.likely) == ("inaccurate", ())

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -10,32 +9,16 @@ import numpy as np
 import pytest
 from support.quadrature import Passage
 from support.references import TAYLOR, reference, run, scene
+from support.step_limits import FUNCTIONS, RK44, largest_stable_step, step_limit
+from support.symmetries import symmetry_errors
 
 from rotor_mbs.analysis.judgement import judge
 from rotor_mbs.methods.catalogue import find_method
 from rotor_mbs.runs.records import points_table
 from rotor_mbs.runs.results import Asked, extend_file, results_tables
-from rotor_mbs.scenario.catalogue import find_scenes
-from rotor_mbs.solution.metrics import horizon_samples, metrics_of
+from rotor_mbs.solution.metrics import metrics_of
 from rotor_mbs.solution.status import STATUSES
-from rotor_mbs.studies.stability import (
-    STEPS,
-    StudyTask,
-    ladder_rows,
-    largest_stable_step,
-    step_for,
-    step_limit,
-    study_points,
-    symmetry_errors,
-)
-
-QUICK = ("stiff/bearing-1e8", "stiff/bearing-1e12", "stiff/shaft-damping", "light-1e-4", "light-1e-8-hub")
-LIGHT = ("light-1e-2", "light-1e-4", "light-1e-6", "light-1e-8", "light-1e-4-hub", "light-1e-8-hub", "feather")
-
-
-def some_quick(names: Sequence[str]) -> list[object]:
-    """Each scene compiles its own equations: the others are of the full run."""
-    return [name if name in QUICK else pytest.param(name, marks=pytest.mark.full) for name in names]
+from rotor_mbs.studies.stability import STEPS, LadderTask, ladder_points, ladder_rows, step_for
 
 
 @pytest.mark.parametrize("hub", ["1e3", "1e0", "1e-3", "1e-6"])
@@ -51,24 +34,6 @@ def test_through_the_singular_pitch(hub: str) -> None:
         assert abs(float(time) - found.time[k]) * exact.pitch_rate(float(found.angles[k, 1])) <= 1e-9
         spin = abs(found.rates[k, 0])
         assert abs(float(rotor) - found.angles[k, 0]) <= 1e-9 + spin * 1e-9
-
-
-@pytest.mark.parametrize("name", some_quick(LIGHT))
-def test_light_blades_keep_to_the_quad_run(name: str) -> None:
-    exact = reference(f"extreme/{name}")
-    rows = horizon_samples(exact)
-    assert rows == len(exact.time)  # nothing grows: the whole run is held
-    error = np.abs(run(scene(f"extreme/{name}")).trajectory.angles - exact.angles).max()
-    assert error <= 1e-9
-
-
-@pytest.mark.parametrize("name", some_quick([scene.name for scene in find_scenes(["stiff"])]))
-def test_every_stiff_scene_is_solved_to_1e_6(name: str) -> None:
-    exact = reference(name)
-    assert horizon_samples(exact) == len(exact.time)
-    verdict = judge(scene(name), run(scene(name)), exact)
-    assert verdict.status == "ok", verdict.message
-    assert verdict.metrics["angle_error_max"] <= 1e-9
 
 
 def test_an_hour_of_a_regular_motion() -> None:
@@ -87,13 +52,6 @@ def test_an_hour_of_a_regular_motion() -> None:
     assert verdict.metrics["angle_error_end"] <= 1e-11  # of a pitch of 8e-3 rad, after 5000 swings
 
 
-def test_springs_of_the_hour_hold_every_pitch() -> None:
-    """Stiffer than gravity's moment on the offset mass, wherever the rotor stands."""
-    one = scene("extreme/hour-small")
-    for blade, stiffness in zip(one.blades, one.bearing_stiffness, strict=True):
-        assert stiffness > 1.5 * blade.mass * one.gravity * np.hypot(*blade.centre_of_mass[:2])
-
-
 @pytest.mark.full
 def test_the_tree_agrees_at_the_end_of_the_hour() -> None:
     """720 000 steps of order 6 at ωh = 0.07: (ωh)^7/7! a step, a few 1e-12 of the pitch, adds up to 1e-8 at most."""
@@ -104,20 +62,18 @@ def test_the_tree_agrees_at_the_end_of_the_hour() -> None:
     assert np.abs(found.angles[-1] - run(one).trajectory.angles[-1]).max() <= 1e-8
 
 
-@pytest.mark.parametrize("method", ["lagrange/radau", "exudyn_chain/generalized_alpha"])
-def test_implicit_methods_take_an_overdamped_bearing(method: str) -> None:
-    name = "stiff/bearing-1e8-damping-100"
-    verdict = judge(scene(name), run(scene(name), method), reference(name))
-    assert verdict.status == "ok", verdict.message
-    assert verdict.metrics["angle_error_max"] <= 1e-6
-
-
 def test_the_theory_of_rk44() -> None:
     """2.828 = 2√2 on the imaginary axis, 2.785 on the negative real one (Hairer & Wanner II, IV.2)."""
-    function = find_method("exudyn_tree/rk44").stability_function
-    assert function is not None
     for mode, limit in ((1j, 2.0 * np.sqrt(2.0)), (-1.0, 2.7852935634)):
-        assert largest_stable_step(function, [mode], 1e6, 100.0) == pytest.approx(limit, rel=1e-4)
+        assert largest_stable_step(RK44, [mode], 1e6, 100.0) == pytest.approx(limit, rel=1e-4)
+
+
+@pytest.mark.parametrize("method", FUNCTIONS)
+def test_a_stability_function_is_the_exponential_to_the_order_of_its_method(method: str) -> None:
+    order = find_method(method).order
+    assert order is not None
+    for z in (0.1j, -0.1, 0.2j):
+        assert abs(FUNCTIONS[method](z) - np.exp(z)) < abs(z) ** (order + 1)
 
 
 @pytest.mark.parametrize("name", ["stiff/bearing-1e8", "stiff/bearing-1e8-damping-100"])
@@ -146,10 +102,10 @@ def test_a_step_for_a_target_is_read_off_a_ladder() -> None:
 
 def test_a_ladder_of_runs_that_fail_at_once_ends(tmp_path: Path) -> None:
     light, method = scene("extreme/light-1e-8"), "exudyn_chain/generalized_alpha"
-    points = study_points(STEPS, light, method)
+    points = ladder_points(light, method)
     file = extend_file(tmp_path / "s.h5", [*results_tables([Asked(light, "reference")]), points_table(STEPS, points)])
     place = file.place(str(points[0]["run"]), STEPS)
-    rows = ladder_rows(StudyTask(label="", method=method, place=place, table=STEPS, scene=light))
+    rows = ladder_rows(LadderTask(label="", method=method, place=place, scene=light))
     statuses = [STATUSES[code] for code in rows["status"]]
     assert len(statuses) == len(points)
     assert "ok" not in statuses

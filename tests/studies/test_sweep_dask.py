@@ -115,7 +115,7 @@ def test_a_scheduler_that_dies_ends_in_one_line(
         _, errors = sweep.communicate(timeout=120)
     assert sweep.returncode == 1, errors
     assert b"Traceback" not in errors
-    assert errors.strip().splitlines()[-1].startswith(b"engine dask: the scheduler is gone; what is stored is kept")
+    assert errors.strip().splitlines()[-1].startswith(b"engine dask: the scheduler was lost; stored runs are kept")
 
 
 class _WithoutWorkers:

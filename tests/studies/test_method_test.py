@@ -1,0 +1,205 @@
+"""`test-method`: every shipped method passes, and twelve broken engines fail, each with a right reason or none."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+from support.commands import rotor_mbs
+
+from rotor_mbs.analysis.checks import Check
+from rotor_mbs.methods import catalogue
+from rotor_mbs.methods.catalogue import find_method, method_names
+from rotor_mbs.scenario.catalogue import only_scene
+from rotor_mbs.solution.trajectory import Integration, Trajectory
+from rotor_mbs.studies.method_test import NOT_FOUND, SCENES, examine, protocol_fault
+
+DOCUMENT = (Path(__file__).parents[2] / "docs" / "your-engine.md").read_text()
+(EXAMPLE,) = re.findall(r"```python\n(.*?)METHOD", DOCUMENT, re.DOTALL)
+# The equations of the document by classical Runge-Kutta steps that end at every sample and at every jump.
+RK4 = (
+    EXAMPLE
+    + """
+import dataclasses
+from rotor_mbs.methods.base import Settings
+from rotor_mbs.methods.settings import step
+from rotor_mbs.scenario.time_table import intervals, value_at
+
+@dataclasses.dataclass(frozen=True)
+class Steps(Settings):
+    step: float = step(8e-4)
+
+class Rk4(Solver):
+    def __init__(self, scene, settings):
+        super().__init__(scene, settings)
+        self.step = settings.step
+
+    def loads(self, t, part):
+        return np.array(part.loads_at(t))
+
+    def one(self, t, h, y, part):
+        k1 = self.f(t, y, part)
+        k2 = self.f(t + h / 2, y + h / 2 * k1, part)
+        k3 = self.f(t + h / 2, y + h / 2 * k2, part)
+        k4 = self.f(t + h, y + h * k3, part)
+        return y + h / 6 * (k1 + 2 * k2 + 2 * k3 + k4)
+
+    def stops(self):
+        return intervals(segments(self.scene.load_tables, self.scene.duration), self.scene.samples, every_sample=True)
+
+    def start(self):
+        return np.array(self.scene.initial_angles + self.scene.initial_rates)
+
+    def integrate(self):
+        y = self.start()
+        self.states = [y]
+        for stop in self.stops():
+            count = max(1, int(np.ceil((stop.end - stop.start) / self.step - 1e-9)))
+            h = (stop.end - stop.start) / count
+            for i in range(count):
+                y = self.one(stop.start + i * h, h, y, stop.segment)
+            if stop.ends_at_sample:
+                self.states.append(y)
+        return Integration(True, "", self.scene.duration)
+
+METHOD = Method(name="rk4", label="own, RK4", build=Rk4, settings=Steps, order=4, fixed_step=True)
+"""
+).replace("np.array(part.loads_at(t))\n        M =", "self.loads(t, part)\n        M =")
+PAST = "np.array([value_at(table, {}) for table in self.scene.load_tables])"
+# What is put in place of what, and what a reason may say beside "cause not found".
+BROKEN = {
+    "Coriolis sign": ("rotor -= 2 *", "rotor -= -2 *", "Coriolis"),
+    "inertia about the wrong point": ("+= np.array([m *", "+= np.array([2 * m *", "inertia about the root taken as about"),
+    "damping ignored": (" - self.d * v[1:]", "", "without the dampers of the bearings|damping off by -100 %"),
+    "torque late by a step": ("np.array(part.loads_at(t))", PAST.format("t - self.step"), "load|torque"),
+    "gravity along x": ("* np.cos(turn) + z * np.sin(turn))", "* np.sin(turn) - z * np.cos(turn))", "gravity|azimuth"),
+    "samples interpolated": (
+        "return Integration(True",
+        "coarse, rows = self.time[::4], np.array(self.states)[::4].T\n"
+        "        self.states = [np.array([np.interp(t, coarse, row) for row in rows]) for t in self.time]\n"
+        "        return Integration(True",
+        "samples interpolated|its last row|row",
+    ),
+    "NaN with success": (
+        "return Integration(True", "self.states[-3:] = [np.nan * y] * 3\n        return Integration(True",
+        "row [0-9]+ is not finite",
+    ),
+    "no jump handling": (
+        "return intervals(segments(self.scene.load_tables,", "return intervals(segments([()] * 9,", "load|jump"
+    ),
+    "first order": ("return y + h / 6 * (k1 + 2 * k2 + 2 * k3 + k4)", "return y + h * k1", "order (1.0|1.1|0.9)"),
+    "state kept": (
+        "        y = self.start()",
+        "        Rk4.runs = getattr(Rk4, 'runs', 0) + 1\n        y = self.start() + 1e-12 * Rk4.runs",
+        "state kept between runs",
+    ),
+    "a step too few": (
+        "for i in range(count)", "for i in range(count - (stop.end == self.scene.duration))",
+        "clock late|row repeated|row left out|its step",
+    ),
+    "angles wrapped": (
+        "return Trajectory(self.time[: len(self.states)], *np.split(np.array(self.states), 2, axis=1))",
+        "q, v = np.split(np.array(self.states), 2, axis=1)\n"
+        "        return Trajectory(self.time, (q + np.pi) % (2 * np.pi) - np.pi, v)",
+        "angles are wrapped",
+    ),
+}  # fmt: skip
+
+
+@pytest.fixture(autouse=True)
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    monkeypatch.chdir(tmp_path)
+    yield
+    catalogue._files.clear()
+    catalogue._of_files.clear()
+
+
+def examined(text: str) -> list[Check]:
+    Path("mine.py").write_text(text)
+    (name,) = catalogue.check_names("mine.py")
+    return examine(name)
+
+
+@pytest.mark.full
+def test_the_engine_that_is_broken_below_passes() -> None:
+    assert [check for check in examined(RK4) if not check.passed] == []
+
+
+@pytest.mark.full
+@pytest.mark.parametrize("fault", BROKEN)
+def test_a_broken_engine_fails_with_a_right_reason_or_none(fault: str) -> None:
+    old, new, right = BROKEN[fault]
+    assert RK4.count(old) >= 1
+    text = RK4.replace(old, new)
+    if fault == "gravity along x":
+        text = text.replace("- weight * (s * x + c * y) * np.sin(turn)", "+ weight * (s * x + c * y) * np.cos(turn)")
+    if fault == "no jump handling":
+        text = text.replace("np.array(part.loads_at(t))", PAST.format("t"))
+    failed = [check for check in examined(text) if not check.passed]
+    assert failed
+    print(fault, sorted({(check.name, check.hint) for check in failed}))
+    own = {
+        "order": r"order [0-9.]+ seen",
+        "energy": "energies or work",
+        "mirror image": "",
+        "renumbered": "",
+        "exact": "",
+    }
+    for check in failed:
+        assert NOT_FOUND in check.hint or re.search(f"{right}|{own.get(check.name, right)}", check.hint), check
+
+
+@pytest.mark.nightly
+@pytest.mark.parametrize("name", method_names(is_corrected=True))
+def test_every_shipped_method_passes(name: str) -> None:
+    if not find_method(name).is_installed:
+        pytest.skip(f"{name} is not installed")
+    assert [check for check in examine(name) if not check.passed] == []
+
+
+def test_the_command_prints_a_table_and_writes_what_a_script_reads() -> None:
+    ended = rotor_mbs("test-method", "lagrange/taylor", "--json", "t.json", "--junit", "t.xml")
+    assert ended.status == 0, ended
+    assert "lagrange/taylor  determinism   paper/fig11" in ended.out
+    checks = json.loads(Path("t.json").read_text())
+    assert {check["check"] for check in checks} == {
+        "samples", "defect", "energy", "determinism", "builds", "exact", "mirror image", "renumbered", "time limit"
+    }  # fmt: skip
+    assert b'<testsuites name="rotor-mbs check" tests=' in Path("t.xml").read_bytes()
+    assert rotor_mbs("test-method", "./none.py").status == 2
+
+
+@pytest.mark.parametrize(
+    ("change", "success", "fault"),
+    [
+        ({}, True, ""),
+        ({}, False, "reports a failure: no reason given"),
+        ({"angles": np.zeros((5, 4))}, True, "angles have the shape (5, 4); allowed: (5, 2)"),
+        ({"time": np.linspace(0.0, 0.9, 5)}, True, "its times are not the scene's sample times"),
+        ({"rates": np.full((5, 2), np.nan)}, True, "row 1 is not finite; a run ends before it"),
+        ({"work": np.zeros(4)}, True, "quantities have not as many rows as there are times"),
+        ({"angles": np.outer([3.0, 3.1, -3.1, -3.0, -2.9], [1, 0])}, True,
+         "rotor jumps by a turn at t = 0.5 s: angles are wrapped"),
+    ],
+)  # fmt: skip
+def test_what_is_wrong_with_the_form_of_a_run_is_said(change: dict[str, object], success: bool, fault: str) -> None:
+    scene = only_scene("paper/fig03").replace(duration=1.0, samples=5)
+    run = Trajectory(np.linspace(0.0, 1.0, 5), np.zeros((5, 2)), np.zeros((5, 2))).replace(**change)
+    assert protocol_fault(scene, run, Integration(success)) == fault
+
+
+def test_the_scenes_have_every_term_between_them() -> None:
+    scenes = [only_scene(name) for name in SCENES]
+    assert len(scenes) == 6
+    for name in (
+        "gravity", "hub_inertia", "rotor_torque", "pitch_torque", "bearing_stiffness", "bearing_damping",
+        "bearing_rest", "shaft_damping",
+    ):  # fmt: skip
+        assert any(getattr(scene, name) for scene in scenes), name
+    assert any(any(blade.inertia) for scene in scenes for blade in scene.blades)
+    assert any(not blade.has_pitch_inertia for scene in scenes for blade in scene.blades)
+    assert any(not scene.has_constant_loads for scene in scenes)
