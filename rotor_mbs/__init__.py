@@ -6,7 +6,7 @@ The Python API. Everything is loaded when it is first used: importing this packa
     run                      one scene by one method: a `Run`; by several, judged by its reference: `Runs`
     sweep                    one scene over the values of its parameters: `Runs`
     compare                  a trajectory of another program against a scene's reference: a `DataComparison`
-    export                   a scene for MuJoCo, Exudyn, SymPy, as CSV, as a benchmark problem
+    export                   a scene for MuJoCo or Exudyn, or its reference as CSV
     modes                    natural frequencies, damping and shapes over rotor speed: `Modes`
     open                     the `Runs` in a file: of scenes, or of a sweep
 

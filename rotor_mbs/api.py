@@ -16,7 +16,6 @@ from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from html import escape
-from numbers import Real
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, overload
 
@@ -27,6 +26,8 @@ from rotor_mbs.analysis.rehydrate import rehydrate
 from rotor_mbs.analysis.run_tables import RUN_HEAD, run_row
 from rotor_mbs.errors import InputError, MethodRefusal, PlausibilityWarning, ResourceError, StoreError
 from rotor_mbs.methods.catalogue import REFERENCE, check_names
+from rotor_mbs.methods.method_file import ENDING
+from rotor_mbs.methods.time_limit import checked_seconds
 from rotor_mbs.runs.files import HDF5, replace_file
 from rotor_mbs.runs.read import StoredRun, StoredScene, is_sweep, open_results
 from rotor_mbs.runs.results import RUNS
@@ -83,7 +84,7 @@ def scene(name: str) -> Scene:
 def load(path: str | os.PathLike[str]) -> Scene:
     """The scene in a TOML file, named like the file.
 
-    Numbers that look like a slip, such as 30 rad, give a PlausibilityWarning. Raises InputError with every fault of the
+    Implausible numbers, such as 30 rad, give a PlausibilityWarning. Raises InputError with every fault of the
     file, a line each.
     """
     found = load_scene(Path(path), Path(path).stem)
@@ -122,7 +123,8 @@ def run(
     scene : Scene or str
         From `scene`, `load`, or made by `Scene.replace`; or its name, as in all functions here.
     method : str or sequence of str
-        "model/integrator"; `rotor-mbs show` lists those that can represent a scene. Of several, an empty list stands
+        "model/integrator"; `rotor-mbs show` lists those that can represent a scene; or a Python file that defines
+        methods ("mine.py"), see docs/your-engine.md. Of several, an empty list stands
         for those that the selection rule takes for such a scene.
     timeout : float
         s, for the run, the reference and the judging together, of several methods for each; what was reached by then
@@ -169,6 +171,12 @@ def run(
     """
     scene, timeout = scene_of(scene), checked_seconds(timeout)
     if isinstance(method, str):
+        if method.endswith(ENDING):
+            method, *others = check_names(method)
+            if others:
+                raise InputError(
+                    f"method: the file has {', '.join([method, *others])}; allowed: a list, [FILE], for all"
+                )
         solution, exact = solve_judged(scene, method, settings, compute_reference=reference, time_limit_s=timeout)
         return Run(**vars(solution), reference=exact)
     chosen, reasons = selected_methods([scene], listed("method", method))
@@ -298,13 +306,6 @@ def open(path: str | os.PathLike[str]) -> Runs:
     return Runs(file)
 
 
-def checked_seconds(timeout: float) -> float:
-    """A time limit in s. Raises InputError for what is none."""
-    if isinstance(timeout, bool) or not isinstance(timeout, Real) or not timeout > 0.0:
-        raise InputError(f"timeout: {timeout!r}; allowed: seconds, more than 0")
-    return float(timeout)
-
-
 def listed(name: str, values: object) -> list[str]:
     """Texts of a list, or of anything that can be gone through once. Raises InputError."""
     texts: list[Any] = list(values) if isinstance(values, Iterable) else [values]
@@ -371,7 +372,7 @@ class Runs(Mapping[Any, Any]):
                 if label in results.scenes:
                     return Runs(self.path, label, _folder=self._folder)
         if label not in self._labels:
-            raise KeyError(f"{label}; there are: {', '.join(map(str, self._labels[:20]))}")
+            raise KeyError(f"{label}; available: {', '.join(map(str, self._labels[:20]))}")
         if self._is_sweep:
             return self._run_of_sweep(int(label))
         scene = self.scene
@@ -425,7 +426,7 @@ class Runs(Mapping[Any, Any]):
         from rotor_mbs.report.run_plots import ComparisonPlots  # late: matplotlib
 
         if not self.scene:
-            raise InputError("plot: allowed of the runs of one scene, such as runs['paper/fig11']")
+            raise InputError("plot: only of the runs of one scene, such as runs['paper/fig11']")
         reference = self[REFERENCE].trajectory if REFERENCE in self else None
         return ComparisonPlots({name: self[name] for name in self if name != REFERENCE}, reference)
 

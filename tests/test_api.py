@@ -64,19 +64,6 @@ def test_a_scene_of_ones_own_gets_a_computed_reference(tmp_path: Path) -> None:
     assert run.metrics["angle_error_max"] < 1e-10
 
 
-def test_wrong_names_and_settings_are_refused_with_what_is_allowed() -> None:
-    scene = rm.scene("paper/fig08")
-    for wrong, allowed in (
-        (lambda: rm.run(scene, "lagrange/tailor"), "lagrange/taylor"),
-        (lambda: rm.run(scene, "lagrange/dop853", tolerence=1e-3), r"tolerence.*relative_tolerance"),
-        (lambda: rm.run(scene, "lagrange/dop853", relative_tolerance=-1), "relative_tolerance"),
-        (lambda: rm.scene("paper/fig8"), "paper/fig08"),
-        (lambda: rm.scenes("papers"), "paper"),
-    ):
-        with pytest.raises(rm.InputError, match=allowed):
-            wrong()
-
-
 def test_labels_units_and_values_of_xarray(study: rm.Runs) -> None:
     pytest.importorskip("xarray")
     data = study.to_xarray()

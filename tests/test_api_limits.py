@@ -12,6 +12,7 @@ import threading
 import time
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -72,12 +73,6 @@ def test_parameters_that_are_none_are_a_line(parameters: Any) -> None:
 def test_methods_that_are_none_are_a_line(method: Any) -> None:
     with pytest.raises(InputError, match=r"^method: .*; allowed: a name, or a list of names$"):
         rm.run(_scene(), method)
-
-
-def test_methods_of_a_generator_are_those_that_run() -> None:
-    assert list(rm.run(_scene(), (name for name in [METHOD, "lagrange/radau"]))) == [
-        "reference", METHOD, "lagrange/radau",
-    ]  # fmt: skip
 
 
 def _in_daemon(path: str) -> str:
@@ -155,6 +150,19 @@ def test_a_time_limit_bounds_reference_and_judging(change: dict[str, Any], in_th
         run = rm.run(scene, "lagrange/radau", reference=True, timeout=2.0)
     assert time.monotonic() - begun < 12.0
     assert run.status in ("timed_out", "ok", "inaccurate")
+
+
+@pytest.mark.parametrize("in_thread", [False, True])
+def test_a_time_limit_bounds_the_reference_of_a_comparison(in_thread: bool) -> None:
+    """Nothing is compared with a reference that ends early."""
+    scene, data = _stiff(DAMPED), {"time": np.linspace(0.0, 0.5, 3), "rotor": np.full(3, 0.5)}
+    with ThreadPoolExecutor(1) as other:
+        call = partial(rm.compare, data, scene, timeout=1.0)
+        compared = (lambda: other.submit(call).result()) if in_thread else call
+        with pytest.raises(InputError, match="timeout: no reference after 1 s"):
+            compared()
+    with pytest.raises(InputError, match="allowed: seconds, more than 0"):
+        rm.compare(data, scene, timeout=float("nan"))
 
 
 def test_limits_of_threads_do_not_end_each_other() -> None:

@@ -119,11 +119,6 @@ def test_a_bound_of_the_package_is_the_one_that_counts() -> None:
     assert [run.status for run in runs] == ["ok", "inaccurate"]
 
 
-def test_wrong_settings_of_the_package_are_refused_with_its_own() -> None:
-    with pytest.raises(rm.InputError, match=r"step \(a number above 0, in s; default 0.002\)"):
-        rm.run(rm.load("one.toml"), "outside/rk4", steps=1e-3)
-
-
 def test_a_sweep_takes_its_runs_side_by_side_and_judges_them_by_its_own_bounds() -> None:
     """Nine runs, each once; at a step of 0.1 s they are over the package's bound, as one alone is."""
     method, blocks = find_method("outside/rk4"), []

@@ -38,15 +38,26 @@ def main(argv: Sequence[str] | None = None) -> int:
     with plain_streams():
         try:
             with _signals_as_interrupts():
-                status = _run(words)
+                from rotor_mbs.cli.arguments import parse
+
+                arguments = parse(words)
+                module, _, function = arguments.command.partition(":")
+                command = getattr(importlib.import_module(f"rotor_mbs.cli.{module}"), function)
+                status = int(command(arguments))
             sys.stdout.flush()
             return status
-        except (KeyboardInterrupt, SystemError, ImportError) as exc:
+        except (KeyboardInterrupt, RotorError, SystemError, ImportError) as exc:
             if _is_interrupt(exc):
                 show("interrupted; finished runs are stored, the same command continues", sys.stderr)
                 return EXIT_INTERRUPTED
+            if isinstance(exc, RotorError):
+                show(str(exc), sys.stderr)
+                return EXIT_BAD_INPUT if isinstance(exc, InputError | MethodRefusal | StoreError) else EXIT_FAILED
             # Without memory for a library, its loading raises either.
             show(f"code cannot be loaded: {type(exc).__name__}: {exc}", sys.stderr)
+            return EXIT_FAILED
+        except MemoryError as exc:
+            show(f"not enough memory: {exc}" if str(exc) else "not enough memory", sys.stderr)
             return EXIT_FAILED
         except BrokenPipeError:
             discard_output()
@@ -55,23 +66,6 @@ def main(argv: Sequence[str] | None = None) -> int:
             discard_output()
             show(f"{exc.filename or 'standard output'}: {exc.strerror or exc}", sys.stderr)
             return EXIT_BAD_INPUT if exc.filename else EXIT_FAILED
-
-
-def _run(words: Sequence[str]) -> int:
-    from rotor_mbs.cli.arguments import parse
-
-    arguments = parse(words)
-    module, _, function = arguments.command.partition(":")
-    try:
-        return int(getattr(importlib.import_module(f"rotor_mbs.cli.{module}"), function)(arguments))
-    except RotorError as exc:
-        if _is_interrupt(exc):
-            raise KeyboardInterrupt from exc
-        show(str(exc), sys.stderr)
-        return EXIT_BAD_INPUT if isinstance(exc, InputError | MethodRefusal | StoreError) else EXIT_FAILED
-    except MemoryError as exc:
-        show(f"not enough memory: {exc}" if str(exc) else "not enough memory", sys.stderr)
-        return EXIT_FAILED
 
 
 def _is_interrupt(error: BaseException) -> bool:

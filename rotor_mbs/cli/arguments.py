@@ -140,7 +140,7 @@ class _Parser(argparse.ArgumentParser):
         text = "a name (paper/fig05), a folder (paper), a TOML file"
         self.add_argument("scenes", metavar="SCENE", **{"nargs": "+", "help": text} | options)
 
-    def method(self, help: str = "model/integrator, as in rotor-mbs list") -> None:
+    def method(self, help: str = "model/integrator, as in rotor-mbs list, or a Python file of methods") -> None:
         self.add_argument("-m", "--method", action="append", metavar="METHOD", help=f"{help}; may be repeated")
 
     def settings(self) -> None:
@@ -166,6 +166,17 @@ class _Parser(argparse.ArgumentParser):
     def timeout(self, seconds: float = 60.0) -> None:
         text = "longer runs are stopped and recorded as timed_out (default: %(default)g)"
         self.add_argument("--timeout", type=SECONDS, default=seconds, metavar="SECONDS", help=text)
+
+
+class _Names(argparse.Action):
+    """Prints the names of columns that `compare` understands, and ends."""
+
+    def __call__(self, parser: argparse.ArgumentParser, *_: Any) -> NoReturn:
+        from rotor_mbs.foreign.channels import KNOWN_NAMES
+
+        lines = [f"{channel}: {names}" for channel, names in KNOWN_NAMES]
+        print(*lines, "upper or lower case, with or without blanks and underscores", sep="\n")
+        parser.exit(0)
 
 
 def parse(argv: Sequence[str]) -> argparse.Namespace:
@@ -202,29 +213,33 @@ def _parser() -> tuple[_Parser, dict[str, _Parser]]:
         own.set_defaults(command=function)
         return own
 
-    own = command("list", "scenes, sweeps and methods, a line each", "scenes:list_all", "", "--json")
+    own = command("list", "list scenes, sweeps and methods", "scenes:list_all", "", "--json")
     own.flag("--json", help="as JSON, for a script")
 
     own = command(
-        "show", "one scene: its data and its methods; or one method: its settings", "scenes:show",
+        "show", "show the data and methods of a scene, or the settings of a method", "scenes:show",
         "paper/fig11", "paper/fig11 --build",
     )  # fmt: skip
     own.add_argument("scene", metavar="SCENE", help="a name (paper/fig05), a TOML file, or a method (lagrange/taylor)")
     own.flag("--build", help="also the items that each model builds")
     own.flag("--json", help="as JSON, for a script")
 
-    own = command("new", "a commented scene file to start from", "scenes:new", "my.toml")
+    own = command("new", "write a commented scene file to start from", "scenes:new", "my.toml")
     own.add_argument("file", type=file, metavar="FILE", help="a TOML file that does not exist yet")
 
     own = command(
-        "reproduce", "every scene of the paper by every model, and the report", "runs:reproduce", "", "-o out -j 4"
+        "reproduce",
+        "run every scene of the paper by every model and write the report",
+        "runs:reproduce",
+        "",
+        "-o out -j 4",
     )
     own.output(folder, "DIR", REPRODUCED)
     own.jobs()
     own.timeout()
 
     own = command(
-        "run", "scenes by methods, into one results file", "runs:run",
+        "run", "run scenes by methods into one results file", "runs:run",
         "my.toml -o my.h5", "paper/fig11 -m lagrange/taylor -m exudyn_tree/rk67 --set step=1e-3",
     )  # fmt: skip
     own.scenes()
@@ -235,7 +250,7 @@ def _parser() -> tuple[_Parser, dict[str, _Parser]]:
     own.timeout()
 
     own = command(
-        "compare", "another program's trajectory against a scene's reference; exit status 1 where it differs",
+        "compare", "compare another program's trajectory with a scene's reference; exit status 1 where it differs",
         "studies:compare", "mine.csv --scene paper/fig11", "OpenFAST.out --scene my.toml --columns map.toml",
     )  # fmt: skip
     text = "text with a header, .npz, .mat, HDF5, netCDF, an Exudyn sensor file, OpenFAST .out or .outb"
@@ -243,13 +258,16 @@ def _parser() -> tuple[_Parser, dict[str, _Parser]]:
     own.add_argument("--scene", required=True, metavar="SCENE", help="a name (paper/fig05) or a TOML file")
     text = "column, unit, sign and zero of each channel (default: guessed)"
     own.add_argument("--columns", type=Path, metavar="MAP.toml", help=text)
-    text = "largest error that agrees, rad per unit of error growth (default: %(default)g)"
+    text = "largest defect, and error per unit of error growth, that agree, rad (default: %(default)g)"
     own.add_argument("--tolerance", type=POSITIVE, default=1e-6, metavar="X", help=text)
+    text = "longest time for the reference (default: %(default)g)"
+    own.add_argument("--timeout", type=SECONDS, default=600.0, metavar="SECONDS", help=text)
+    own.add_argument("--names", action=_Names, nargs=0, help="print the names of columns that are understood")
     own.output(folder, "DIR", Path("comparison"), "folder of the page (default: %(default)s)")
     own.flag("--json", help="the verdict as JSON, for a script")
 
     own = command(
-        "bench", "error against run time, method by method", "studies:bench",
+        "bench", "measure error against run time of each method", "studies:bench",
         "paper/fig11", "paper/fig11 my.toml -m lagrange/taylor -m exudyn_tree/rk67 -o bench.h5",
     )  # fmt: skip
     own.scenes()
@@ -262,42 +280,54 @@ def _parser() -> tuple[_Parser, dict[str, _Parser]]:
     text = "time for each scene (default: %(default)g)"
     own.add_argument("--budget", type=SECONDS, default=28.0, metavar="SECONDS", help=text)
 
-    own = command("reference", "quad precision references, recomputed", "runs:reference", "paper/fig08 -o reference.h5")
+    own = command("reference", "recompute quad-precision references", "runs:reference", "paper/fig08 -o reference.h5")
     own.scenes()
     own.add_argument("-o", "--output", type=file, required=True, metavar="FILE", help="output file")
     own.jobs()
     own.timeout()
 
     own = command(
-        "check", "accuracy verdicts; exit status 1 where one fails", "studies:check",
+        "check", "check the accuracy of stored runs; exit status 1 where a check fails", "studies:check",
         "", "rotor-mbs-out/results.h5 --junit check.xml",
     )  # fmt: skip
     own.add_argument("file", nargs="?", type=path, metavar="FILE", help="results file (default: a quick set, computed)")
-    own.add_argument("--bounds", type=path, metavar="TOML", help="own bounds; they precede reference/accuracy.toml")
-    text = "fail where a scene of FILE has no run of it; may be repeated"
+    own.method("compute the default set by this method, or by those of a Python file")
+    own.add_argument(
+        "--bounds", type=path, metavar="TOML", help="bounds that take precedence over reference/accuracy.toml"
+    )
+    text = "fail where a scene of FILE has no run by this method; may be repeated"
     own.add_argument("--require", action="append", metavar="METHOD", help=text)
-    text = "also fail where a verdict of this earlier results file passed with a larger margin, or its run is gone"
+    text = (
+        "also fail where a check passed in this earlier results file and its margin has shrunk, or its run is missing"
+    )
     own.add_argument("--against", type=path, metavar="OLD", help=text)
     text = "with --against: by how much a margin may shrink (default: %(default)g)"
     own.add_argument("--shrink", type=POSITIVE, default=10.0, metavar="FACTOR", help=text)
     own.add_argument("--junit", type=file, metavar="XML", help="verdicts as JUnit XML")
     own.add_argument("--json", type=file, metavar="FILE", help="verdicts as JSON; - for standard output")
-    own.flag("--github", help="the ten worst failures as annotations, a table as job summary")
+    own.flag("--github", help="write the ten worst failures as annotations and a table as job summary")
     own.flag("-v", "--verbose", help="print verdicts that pass, too")
     own.jobs()
 
     own = command(
-        "sweep", "a parameter study into one dataset", "studies:sweep",
+        "test-method", "a method examined, of your own or a built-in one: what is wrong, and the most likely reason",
+        "studies:test_method", "./mine.py", "lagrange/dop853 --json -",
+    )  # fmt: skip
+    own.add_argument("methods", nargs="+", metavar="METHOD", help="a Python file of methods, or model/integrator")
+    own.add_argument("--junit", type=file, metavar="XML", help="the checks as JUnit XML")
+    own.add_argument("--json", type=file, metavar="FILE", help="the checks as JSON; - for standard output")
+    own.timeout()
+
+    own = command(
+        "sweep", "run a parameter study into one dataset", "studies:sweep",
         "sweeps/fig11-spread -o spread.h5", "my-sweep.toml --dry-run",
     )  # fmt: skip
     own.add_argument("file", type=path, metavar="SWEEP.toml", help="or a shipped one: sweeps/fig11-spread")
-    own.method("in place of the file's methods")
-    own.output(file, "FILE", help="output file (default: the sweep's name with its ending)")
-    text = "ending of the default FILE (default: h5); contents identical"
-    own.add_argument("--format", choices=("h5", "nc"), default="h5", help=text)
+    own.method("replaces the file's methods")
+    own.output(file, "FILE", help="output file (default: the sweep's name with the ending .h5)")
     own.flag("--metadata", help="Croissant metadata and statistics for normalization beside FILE, as JSON")
     own.add_argument("--engine", default="local", metavar="ENGINE", help="local, or dask:tcp://host:port")
-    own.add_argument("--part", type=part, default=(1, 1), metavar="K/N", help="part K of N alone, for a job array")
+    own.add_argument("--part", type=part, default=(1, 1), metavar="K/N", help="only part K of N, for a job array")
     own.flag("--fresh", help="recompute stored runs")
     own.flag("--dry-run", help="print run count, estimated time, disk space")
     own.flag("--yes", help="start a sweep of over a million runs")
@@ -306,10 +336,10 @@ def _parser() -> tuple[_Parser, dict[str, _Parser]]:
     own.timeout()
 
     own = command(
-        "stability", "stiff and extreme scenes by every method: where each is stable and accurate, as a map",
+        "stability", "run stiff and extreme scenes by every method and map where each is stable and accurate",
         "studies:stability", "", "stiff/bearing-1e8 -o stiff.h5",
     )  # fmt: skip
-    own.scenes(nargs="*", help="some of them (default: stiff extreme)")
+    own.scenes(nargs="*", help="scenes or folders (default: stiff extreme)")
     own.method()
     own.settings()
     own.output(file, "FILE", Path("stability.h5"))
@@ -318,10 +348,11 @@ def _parser() -> tuple[_Parser, dict[str, _Parser]]:
     own.timeout(8.0)  # many runs of the suite would reach any limit: with a short one it ends in minutes
 
     own = command(
-        "modes", "natural frequencies at rest and over rotor speed, multipliers of a turn under gravity",
+        "modes", "compute natural frequencies at rest and over rotor speed, and Floquet multipliers under gravity",
         "studies:modes", "stiff/nrel-5mw --speeds 0:3:31",
     )  # fmt: skip
     own.scenes()
+    own.method("a method whose model stands beside the closed form, by default all; or a Python file")
     text = "rad/s, equally spaced: Campbell diagram and Floquet multipliers, as 0:3:31 (default: at rest alone)"
     own.add_argument("--speeds", type=span, default=(), metavar="FROM:TO:COUNT", help=text)
     text = "N m/rad of every bearing: the stability chart over speed and stiffness"
@@ -332,22 +363,22 @@ def _parser() -> tuple[_Parser, dict[str, _Parser]]:
     own.jobs()
     own.timeout(600.0)
 
-    own = command("report", "HTML pages from any file of this program", "studies:report", "my.h5 --open")
+    own = command("report", "write HTML pages from any file of this program", "studies:report", "my.h5 --open")
     own.results()
     own.pages("-o", "--output")
     own.flag("--open", help="show the index in the browser")
 
     own = command(
-        "figures", "the paper's figures as files for a manuscript, from a results file", "studies:figures",
+        "figures", "draw the paper's figures for a manuscript, from a results file", "studies:figures",
         "--format svg --figure 11",
     )  # fmt: skip
     own.results()
     own.output(folder, "DIR", Path("figures"))
     own.add_argument("--format", choices=("pdf", "svg", "png"), default="pdf", help="(default: %(default)s)")
-    own.add_argument("--figure", action="append", metavar="N", help="this one alone; may be repeated")
+    own.add_argument("--figure", action="append", metavar="N", help="only this figure; may be repeated")
 
     own = command(
-        "animate", "an animation of a scene, from a results file", "studies:animate",
+        "animate", "animate a scene from a results file", "studies:animate",
         "paper/fig11", "mine my.h5 -o mine.gif",
     )  # fmt: skip
     own.add_argument("scene", metavar="SCENE", help="its name in the results file")
@@ -358,7 +389,7 @@ def _parser() -> tuple[_Parser, dict[str, _Parser]]:
     own.add_argument("--offset", type=POSITIVE, metavar="TIMES", help=text)
 
     own = command(
-        "export", "a scene for MuJoCo, for Exudyn, or as CSV", "studies:export",
+        "export", "export a scene for MuJoCo or Exudyn, or its reference as CSV", "studies:export",
         "paper/fig11 --to mjcf", "my.toml --to csv -o my.csv",
     )  # fmt: skip
     own.add_argument("scene", metavar="SCENE", help="a name (paper/fig05) or a TOML file")

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 from rotor_mbs.analysis.run_tables import run_table
 from rotor_mbs.cli import EXIT_BAD_INPUT
 from rotor_mbs.cli.terminal import ProgressLine, print_doubts, print_summary, print_table, print_text
+from rotor_mbs.methods.catalogue import method_names
 from rotor_mbs.runs.files import is_being_written, replace_file
 from rotor_mbs.runs.pool import local_pool
 from rotor_mbs.runs.read import open_results
@@ -33,7 +34,7 @@ _PAGES = "rotor_mbs.report.build"
 
 def run(arguments: argparse.Namespace) -> int:
     """Methods named with -m, or by a scene's file, must represent it; without, a rule selects them."""
-    scenes = find_scenes(arguments.scenes)
+    scenes = find_scenes(arguments.scenes, method_names())
     print_doubts(scenes)
     methods, reasons = selected_methods(scenes, arguments.method or ())
     for reason in reasons:

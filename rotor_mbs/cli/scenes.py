@@ -1,17 +1,19 @@
-"""`list`, `show` and `new`: what is available, what each model builds for a scene, and a new scene file."""
+"""`list`, `show` and `new`: what is available, what each model builds for a scene, and a new scene file.
+
+`list` reads no scene: what only the others need is imported by them.
+"""
 
 from __future__ import annotations
 
 import argparse
 import json
-from dataclasses import asdict, dataclass, field, fields
+from dataclasses import asdict, fields
+from typing import Any
 
-from rotor_mbs.cli.terminal import print_doubts
 from rotor_mbs.errors import InputError, MethodRefusal
-from rotor_mbs.methods.base import BuiltItem, Method
+from rotor_mbs.methods.base import Method
 from rotor_mbs.methods.catalogue import look_up, methods
 from rotor_mbs.scenario.catalogue import list_scenes, list_sweeps, only_scene
-from rotor_mbs.scenario.scene import Scene, new_scene_text, scene_fields
 
 
 def list_all(arguments: argparse.Namespace) -> int:
@@ -36,6 +38,8 @@ def list_all(arguments: argparse.Namespace) -> int:
 
 def new(arguments: argparse.Namespace) -> int:
     """A commented scene file; never in the place of another file."""
+    from rotor_mbs.scenario.scene import new_scene_text
+
     if arguments.file.suffix != ".toml":
         raise InputError(f"{arguments.file}: is not a TOML file's name; allowed: a name that ends in .toml")
     try:
@@ -53,7 +57,7 @@ def show(arguments: argparse.Namespace) -> int:
     """One scene's data and the methods of each model, with --build its items; or the settings of a method."""
     method = look_up(arguments.scene)
     if method is None:
-        _show_scene(only_scene(arguments.scene), arguments)
+        _show_scene(arguments)
     else:
         _show_method(method, arguments)
     return 0
@@ -72,35 +76,11 @@ def _show_method(method: Method, arguments: argparse.Namespace) -> None:
     print(f"\nset one: rotor-mbs run SCENE -m {method.name} --set NAME=VALUE" if allowed else "no settings")
 
 
-def _show_scene(scene: Scene, arguments: argparse.Namespace) -> None:
-    data, models = scene_data(scene), models_of(scene)
-    if arguments.json:
-        facts = {"name": scene.name, "scene": data, "models": {model.name: asdict(model) for model in models}}
-        print(json.dumps(facts, ensure_ascii=False, indent=1))
-        return
-    print_doubts([scene])
-    print(f"{scene.name}: {scene.title}\n")
-    for key, value in data.items():
-        if isinstance(value, dict):
-            print(f"  {key}", *(f"    {part:24} {_readable(number)}" for part, number in value.items()), sep="\n")
-        else:
-            print(f"  {key:26} {_readable(value)}")
-    print("\nmethods" + (", and the items that each model builds" if arguments.build else ""))
-    for model in models:
-        print(f"  {model.line}")
-        for item in model.items if arguments.build else ():
-            print(f"    {item.kind:9} {item.name:28} {item.detail}".rstrip())
+def _show_scene(arguments: argparse.Namespace) -> None:
+    from rotor_mbs.cli.terminal import print_doubts
+    from rotor_mbs.scenario.scene import scene_fields
 
-
-def _readable(value: object) -> str:
-    if isinstance(value, dict):
-        return "; ".join(f"{key} {_readable(part)}" for key, part in value.items())
-    if isinstance(value, tuple):
-        return ", ".join(f"[{_readable(part)}]" if isinstance(part, tuple) else _readable(part) for part in value)
-    return f"{value:.10g}" if isinstance(value, float) else str(value)
-
-
-def scene_data(scene: Scene) -> dict[str, object]:
+    scene = only_scene(arguments.scene)
     data: dict[str, object] = {}
     for item in scene_fields("label", "run", "start", "rotor"):
         value, unit = getattr(scene, item.name), item.metadata["unit"]
@@ -112,39 +92,43 @@ def scene_data(scene: Scene) -> dict[str, object]:
                 data["every blade" if alike else f"blade {i + 1}"] = numbers
         elif item.metadata["key"] and item.name != "title" and (value not in ((), 0.0) or item.name == "gravity"):
             data[item.metadata["key"] if unit == "1" else f"{item.metadata['key']}, {unit}"] = value
-    return data
-
-
-@dataclass
-class SceneModel:
-    """What a model would build for the scene, or why it cannot."""
-
-    name: str
-    methods: list[str]
-    items: list[BuiltItem] = field(default_factory=list)
-    refused: str = ""
-    is_linearized: bool = False
-
-    @property
-    def line(self) -> str:
-        """ "lagrange/taylor, /ode45, ...", and what else there is to know."""
-        first, *others = self.methods
-        names = ", ".join([first, *(name.removeprefix(self.name) for name in others)])
-        if self.refused:
-            return f"{names}  (cannot represent this scene: {self.refused})"
-        return names + ("  (linearized by `rotor-mbs modes`)" if self.is_linearized else "")
-
-
-def models_of(scene: Scene) -> list[SceneModel]:
-    models: dict[str, SceneModel] = {}
+    models: dict[str, dict[str, Any]] = {}
     for method in methods():
-        known = models.setdefault(method.model, SceneModel(method.model, []))
-        known.methods.append(method.name)
-        known.is_linearized |= method.linearize is not None
-        if known.items:
-            continue
-        try:
-            known.items, known.refused = method.items(scene), ""
-        except MethodRefusal as exc:
-            known.refused = str(exc)
-    return list(models.values())
+        facts = {"name": method.model, "methods": [], "items": [], "refused": "", "is_linearized": False}
+        model = models.setdefault(method.model, facts)
+        model["methods"].append(method.name)
+        model["is_linearized"] |= method.linearize is not None
+        if not model["items"]:
+            try:
+                model["items"], model["refused"] = list(map(asdict, method.items(scene))), ""
+            except MethodRefusal as exc:
+                model["refused"] = str(exc)
+    if arguments.json:
+        print(json.dumps({"name": scene.name, "scene": data, "models": models}, ensure_ascii=False, indent=1))
+        return
+    print_doubts([scene])
+    print(f"{scene.name}: {scene.title}\n")
+    for key, value in data.items():
+        if isinstance(value, dict):
+            print(f"  {key}", *(f"    {part:24} {_readable(number)}" for part, number in value.items()), sep="\n")
+        else:
+            print(f"  {key:26} {_readable(value)}")
+    print("\nmethods" + (", and the items that each model builds" if arguments.build else ""))
+    for name, model in models.items():
+        first, *others = model["methods"]
+        line = ", ".join([first, *(other.removeprefix(name) for other in others)])  # "lagrange/taylor, /ode45, ..."
+        if model["refused"]:
+            line += f"  (not available: {model['refused']})"
+        elif model["is_linearized"]:
+            line += "  (linearized by `rotor-mbs modes`)"
+        print(f"  {line}")
+        for item in model["items"] if arguments.build else ():
+            print(f"    {item['kind']:9} {item['name']:28} {item['detail']}".rstrip())
+
+
+def _readable(value: object) -> str:
+    if isinstance(value, dict):
+        return "; ".join(f"{key} {_readable(part)}" for key, part in value.items())
+    if isinstance(value, tuple):
+        return ", ".join(f"[{_readable(part)}]" if isinstance(part, tuple) else _readable(part) for part in value)
+    return f"{value:.10g}" if isinstance(value, float) else str(value)

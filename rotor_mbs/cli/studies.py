@@ -13,6 +13,7 @@ import sys
 import time
 import webbrowser
 from collections import Counter
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -20,11 +21,12 @@ from rotor_mbs.cli import EXIT_BAD_INPUT, EXIT_FAILED, show
 from rotor_mbs.cli.arguments import pages_beside
 from rotor_mbs.cli.terminal import ProgressLine, SweepProgress, print_doubts, print_not_computed, print_table, span
 from rotor_mbs.errors import InputError, StoreError
-from rotor_mbs.methods.catalogue import check_names
+from rotor_mbs.methods.catalogue import check_names, method_names
 from rotor_mbs.runs import cores
 from rotor_mbs.scenario.catalogue import find_scenes, only_scene
 
 if TYPE_CHECKING:
+    from rotor_mbs.analysis.checks import Check
     from rotor_mbs.runs.pool import TaskPool
     from rotor_mbs.studies.sweep import SweepPlan, SweepResult
 
@@ -55,11 +57,11 @@ def bench(arguments: argparse.Namespace) -> int:
 
 
 def stability(arguments: argparse.Namespace) -> int:
-    """The stiff and extreme suite, what each method is good for, and its pages.
+    """The stiff and extreme suite, how many runs of each method are ok, and its pages.
 
     1 where a claim of the suite fails, see `unreached`, or a case was not computed.
     """
-    from rotor_mbs.analysis.stability import advice_lines, suite_runs, unreached
+    from rotor_mbs.analysis.stability import family_table, suite_runs, unreached
     from rotor_mbs.studies.stability import SUITE, run_suite
 
     start, scenes = time.monotonic(), find_scenes(arguments.scenes or SUITE)
@@ -69,7 +71,7 @@ def stability(arguments: argparse.Namespace) -> int:
             methods=check_names(arguments.method or ()), settings=dict(arguments.set or ()), on_progress=progress,
         )  # fmt: skip
     runs = suite_runs(arguments.output)
-    print(*advice_lines(runs), sep="\n")
+    print_table(family_table(runs))
     seconds = time.monotonic() - start
     print(f"{arguments.output}: {len(scenes)} scenes, {len(runs)} runs, {seconds:.0f} s in all")
     _write_pages(arguments.output, arguments.report)
@@ -88,7 +90,8 @@ def modes(arguments: argparse.Namespace) -> int:
     with ProgressLine() as progress:
         made = modes_of_scenes(
             scenes, arguments.output, speeds=arguments.speeds, stiffnesses=arguments.stiffness,
-            workers=arguments.jobs, timeout_s=arguments.timeout, on_progress=progress,
+            names=check_names(arguments.method or ()), workers=arguments.jobs, timeout_s=arguments.timeout,
+            on_progress=progress,
         )  # fmt: skip
     is_lost = print_not_computed(made)
     lost = {outcome.label.partition(" ")[0] for outcome in made if not outcome.is_stored}
@@ -106,16 +109,12 @@ def modes(arguments: argparse.Namespace) -> int:
 def check(arguments: argparse.Namespace) -> int:
     """Prints every verdict that fails (with --verbose all), then a count; status 1 where one fails."""
     from rotor_mbs.report.pages import check as formats
-    from rotor_mbs.runs.files import refuse_foreign, replace_file
     from rotor_mbs.runs.read import is_sweep
     from rotor_mbs.scenario.accuracy_bounds import load_bounds
     from rotor_mbs.studies import check as study
 
-    if arguments.junit is not None:
-        refuse_foreign(arguments.junit, formats.JUNIT)
-    if arguments.json is not None and arguments.json != Path("-"):
-        refuse_foreign(arguments.json, formats.JSON)
-    bounds = load_bounds(arguments.bounds)
+    _refuse_foreign(arguments)
+    bounds, methods = load_bounds(arguments.bounds), check_names(arguments.method or ())
     required = check_names(arguments.require or ())
     earlier = None if arguments.against is None else study.check_file(arguments.against, bounds)
     if earlier is not None and arguments.file is not None and is_sweep(arguments.against) != is_sweep(arguments.file):
@@ -124,19 +123,12 @@ def check(arguments: argparse.Namespace) -> int:
         verdicts = study.check_file(arguments.file, bounds, required)
     else:
         with ProgressLine() as progress:
-            verdicts = study.check_default_set(bounds, arguments.jobs, progress)
+            verdicts = study.check_default_set(bounds, arguments.jobs, progress, methods)
     if verdicts and earlier is not None:
         verdicts += study.regressions(verdicts, earlier, arguments.shrink)
 
-    if arguments.junit is not None:
-        replace_file(arguments.junit, formats.junit(verdicts), formats.JUNIT)
-    stream = sys.stdout
-    if arguments.json == Path("-"):
-        print(formats.as_json(verdicts))
-        stream = sys.stderr  # standard output is the JSON's alone
-    elif arguments.json is not None:
-        replace_file(arguments.json, formats.as_json(verdicts).encode(), formats.JSON)
-
+    _write_verdicts(arguments, verdicts)
+    stream = sys.stderr if arguments.json == Path("-") else sys.stdout  # standard output is the JSON's alone
     failures = [verdict for verdict in verdicts if not verdict.passed]
     for verdict in verdicts if arguments.verbose else failures:
         print(formats.line(verdict), file=stream)
@@ -150,14 +142,58 @@ def check(arguments: argparse.Namespace) -> int:
     return 1 if failures else 0
 
 
+def _refuse_foreign(arguments: argparse.Namespace) -> None:
+    """Before anything is computed: files of --junit and --json that hold something else."""
+    from rotor_mbs.report.pages import check as formats
+    from rotor_mbs.runs.files import refuse_foreign
+
+    if arguments.junit is not None:
+        refuse_foreign(arguments.junit, formats.JUNIT)
+    if arguments.json is not None and arguments.json != Path("-"):
+        refuse_foreign(arguments.json, formats.JSON)
+
+
+def _write_verdicts(arguments: argparse.Namespace, verdicts: Sequence[Check]) -> None:
+    from rotor_mbs.report.pages import check as formats
+    from rotor_mbs.runs.files import replace_file
+
+    if arguments.junit is not None:
+        replace_file(arguments.junit, formats.junit(verdicts), formats.JUNIT)
+    if arguments.json == Path("-"):
+        print(formats.as_json(verdicts))
+    elif arguments.json is not None:
+        replace_file(arguments.json, formats.as_json(verdicts).encode(), formats.JSON)
+
+
+def test_method(arguments: argparse.Namespace) -> int:
+    """What holds of each method, and the most likely reason where something does not; 1 where something does not."""
+    from rotor_mbs.solution.text_table import TextTable
+    from rotor_mbs.studies.method_test import examine
+
+    names = check_names(arguments.methods)
+    _refuse_foreign(arguments)
+    verdicts = [verdict for name in names for verdict in examine(name, arguments.timeout)]
+    _write_verdicts(arguments, verdicts)
+    if arguments.json != Path("-"):
+        rows: list[tuple[str, ...]] = []
+        for one in verdicts:
+            note = "" if one.passed and one.name != "refusal" else one.hint
+            number = f"{one.value:.1e}" if one.unit else ""
+            outcome = "pass" if one.passed else "FAIL"
+            rows.append((one.where.method, one.name, one.where.scene, number, one.unit, outcome, note))
+        print_table(TextTable(("method", "check", "scene", "seen", "unit", "", "most likely reason"), rows))
+    return int(not all(verdict.passed for verdict in verdicts))
+
+
 def compare(arguments: argparse.Namespace) -> int:
     """Data of another program against a scene's reference: a table, its page, the numbers as a results file."""
     from rotor_mbs.analysis.data_verdict import as_dictionary
     from rotor_mbs.report.data_comparison import compare as compare_data
 
     found = compare_data(
-        arguments.data, only_scene(arguments.scene), columns=arguments.columns, tolerance=arguments.tolerance
-    )
+        arguments.data, only_scene(arguments.scene), columns=arguments.columns, tolerance=arguments.tolerance,
+        timeout=arguments.timeout,
+    )  # fmt: skip
     page, stored = found.to_html(arguments.output), arguments.output / "comparison.h5"
     found.save(stored)
     if arguments.json:
@@ -215,12 +251,13 @@ def sweep(arguments: argparse.Namespace) -> int:
         from rotor_mbs.scenario.sweep import load_sweep
         from rotor_mbs.studies.sweep import plan_sweep, run_sweep
 
-        plan = plan_sweep(load_sweep(arguments.file), arguments.method or (), arguments.part, arguments.timeout)
+        study = load_sweep(arguments.file, method_names())
+        plan = plan_sweep(study, arguments.method or (), arguments.part, arguments.timeout)
         if arguments.dry_run:
             return _show_estimate(plan, pool, arguments)
         if plan.runs > _MANY_RUNS and not arguments.yes:
             raise InputError(f"{arguments.file}: {plan.runs:,} runs; allowed without --yes: at most {_MANY_RUNS:,}")
-        output = arguments.output or Path(f"{plan.sweep.name}.{arguments.format}")
+        output = arguments.output or Path(f"{plan.sweep.name}.h5")
         try:
             with SweepProgress(as_json=arguments.json) as progress:
                 result = run_sweep(plan, output, pool, progress, fresh=arguments.fresh)
@@ -237,7 +274,7 @@ def sweep(arguments: argparse.Namespace) -> int:
         if result.older:
             show(f"{result.older} runs were computed by other versions; --fresh computes them again", sys.stderr)
         for line in result.lost:
-            show(f"{line}; not computed, the same command tries again", sys.stderr)
+            show(f"{line}; not computed; repeat the command to try again", sys.stderr)
         if plan.sweep.table.picture and arguments.part == (1, 1):
             from rotor_mbs.report.pages.sweep import save_picture  # late: matplotlib
             from rotor_mbs.runs.sweeps import StoredSweep

@@ -204,7 +204,7 @@ def print_summary(report: RunReport, output: Path) -> int:
     counts = {
         "completed": completed,
         "failed": failed,
-        "of the printed equations broke off": len(statuses) - ok - completed - failed,
+        "of the printed equations ended early": len(statuses) - ok - completed - failed,
         "not computed": lost,
     }
     parts = [f"{ok} ok", *(f"{n} {what}" for what, n in counts.items() if n)]
@@ -228,5 +228,5 @@ def print_not_computed(made: Sequence[Outcome]) -> bool:
     """A line for each run whose process died or could not start; whether there are any."""
     lost = [outcome for outcome in made if not outcome.is_stored]
     for outcome in lost:
-        print(f"{outcome.label}: not computed ({outcome.message}); the same command tries again", file=sys.stderr)
+        print(f"{outcome.label}: not computed ({outcome.message}); repeat the command to try again", file=sys.stderr)
     return bool(lost)

@@ -15,10 +15,11 @@ import numpy as np
 from rotor_mbs.analysis.data_verdict import DEFAULT_TOLERANCE, LEVELS, ChannelErrors, DataVerdict, from_dictionary
 from rotor_mbs.errors import InputError
 from rotor_mbs.foreign.channels import load_data
+from rotor_mbs.methods.time_limit import checked_seconds
 from rotor_mbs.report import plots
 from rotor_mbs.report.core import canvas
 from rotor_mbs.report.core.canvas import Panels
-from rotor_mbs.report.core.elements import LegendEntry, PageTable, Picture, Row, Section, TableCell, line_entry
+from rotor_mbs.report.core.elements import PageTable, Picture, Row, Section, TableCell
 from rotor_mbs.report.core.files import write_page
 from rotor_mbs.report.core.looks import GREY, Look, coordinate_look
 from rotor_mbs.report.core.numbers import number, typeset, with_unit
@@ -26,6 +27,7 @@ from rotor_mbs.report.core.svg import picture
 from rotor_mbs.report.plots import Series
 from rotor_mbs.runs.read import OpenResults
 from rotor_mbs.runs.records import Record, read_records, write_records
+from rotor_mbs.runs.versions import machine, versions
 from rotor_mbs.scenario.catalogue import scene_of
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.solution import need_xarray
@@ -39,6 +41,7 @@ def compare(
     *,
     columns: str | os.PathLike[str] | Mapping[str, Any] | None = None,
     tolerance: float = DEFAULT_TOLERANCE,
+    timeout: float = 600.0,
 ) -> DataComparison:
     """A trajectory of another program, judged against the scene's reference at the times of the data.
 
@@ -49,11 +52,13 @@ def compare(
     columns : a mapping file, or a mapping with the same keys: column, unit, sign, offset of each channel, and whether
         it is wrapped. Without it they are guessed from the names; `verdict.read` says how.
     tolerance : rad that the defect of an interval may have beyond the rounding of the data.
+    timeout : s, for the reference and the defects; a search for causes ends then, too.
 
     Raises
     ------
     InputError
-        For data that cannot be read or compared: one line with the file, column or row, and what is allowed.
+        For data that cannot be read or compared: one line with the file, column or row, and what is allowed; and where
+        there is no reference by the time limit.
 
     Examples
     --------
@@ -70,8 +75,8 @@ def compare(
     """
     if isinstance(scene, list | tuple):
         raise InputError("compare: data and a scene; allowed: rotor_mbs.run(scene, methods) for methods of one scene")
-    scene = scene_of(scene)
-    study = compare_with_reference(load_data(data, scene, columns), scene, tolerance)
+    scene, timeout = scene_of(scene), checked_seconds(timeout)
+    study = compare_with_reference(load_data(data, scene, columns), scene, tolerance, timeout)
     verdict = study.verdict
     return DataComparison(study, verdict, verdict.status, verdict.message, verdict.agrees, verdict.likely)
 
@@ -119,7 +124,7 @@ class DataComparison:
 
     def to_html(self, folder: str | os.PathLike[str]) -> Path:
         """The page into a folder; its path."""
-        return write_page(folder, "data_comparison", comparison_page(self.study.record()))
+        return write_page(folder, "data_comparison", comparison_page(self.study.record()), versions() | machine())
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Data, reference, errors and verdict as a results file. Raises StoreError where it cannot be written."""
@@ -156,9 +161,6 @@ def stored_comparison_page(place: int, opened: OpenResults) -> dict[str, object]
 def comparison_page(record: Record) -> dict[str, object]:
     """The content of the page: verdict, pictures, tables."""
     verdict = verdict_of(record)
-    legend = [LegendEntry(channel.name, _look(channel)) for channel in _drawn(verdict)]
-    legend.append(line_entry("reference", width=5.0))
-    legend.append(line_entry("tolerance", GREY, ":"))
     facts = [
         ("Channels compared", ", ".join(channel.name for channel in verdict.channels)),
         ("Rows", f"{verdict.rows}, until {with_unit(verdict.compared_until, 's', 4)}"),
@@ -183,7 +185,7 @@ def comparison_page(record: Record) -> dict[str, object]:
         "title": record.attributes["title"],
         "source": Path(verdict.source).name,
         "facts": facts,
-        "errors": Section(_pictures(record, verdict), legend),
+        "errors": Section(_pictures(record, verdict)),
         "channels": Section(tables=[PageTable("", table.head, rows)]),
     }
 
@@ -223,7 +225,7 @@ def defect_panels(record: Record) -> Panels | None:
     if not sizes:
         return None
     series = [Series(time[1:], np.nan_to_num(values), look) for look, values in sizes.items()]
-    series.append(Series(time[1:], np.full(len(time) - 1, verdict.tolerance), Look(GREY, ":", "")))
+    series.append(Series(time[1:], np.full(len(time) - 1, verdict.tolerance), Look(GREY, ":", "", "tolerance")))
     return plots.errors(series, "defect of an interval (rad)")
 
 
@@ -243,7 +245,7 @@ def _drawn(verdict: DataVerdict) -> Sequence[ChannelErrors]:
 def _look(channel: ChannelErrors) -> Look:
     """The look of the channel's coordinate: 0 the rotor, 1 the pitch of blade 1, ..."""
     digits = "".join(filter(str.isdigit, channel.name))
-    return coordinate_look(int(digits) if digits else 0)
+    return coordinate_look(int(digits or 0))
 
 
 def _pictures(record: Record, verdict: DataVerdict) -> list[Picture]:
@@ -257,7 +259,7 @@ def _pictures(record: Record, verdict: DataVerdict) -> list[Picture]:
         for channel in channels:
             data, reference = _array(record, channel), _array(record, channel, "_reference")
             drawn += [data, reference]
-            canvas.curve(axes, *plots.thin(time, reference), Look(GREY, "-", ""), 4.0, alpha=0.4)
+            canvas.curve(axes, *plots.thin(time, reference), Look(GREY, "-", "", "reference"), 4.0, alpha=0.4)
             canvas.curve(axes, *plots.thin(time, data), _look(channel))
         plots.set_range(axes, np.stack(drawn, axis=1))
         axes.set_ylabel(plots.ANGLE_AXIS)

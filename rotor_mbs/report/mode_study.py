@@ -24,16 +24,15 @@ from rotor_mbs.analysis.modes import (
     to_records,
 )
 from rotor_mbs.errors import InputError
-from rotor_mbs.report.core import canvas
 from rotor_mbs.report.core.canvas import Panels, curve, growth_map, log_axis, panels
-from rotor_mbs.report.core.elements import LegendEntry, PageTable, Picture, Row, Section, TableCell
+from rotor_mbs.report.core.elements import PageTable, Picture, Row, Section, TableCell
 from rotor_mbs.report.core.files import write_page
 from rotor_mbs.report.core.looks import BLUE, GREY, VERMILLION, Look, coordinate_look, with_capital
 from rotor_mbs.report.core.numbers import NOTHING, number
 from rotor_mbs.report.core.svg import picture
-from rotor_mbs.report.pages.scene_tables import versions
 from rotor_mbs.runs.read import OpenResults
 from rotor_mbs.runs.records import write_records
+from rotor_mbs.runs.versions import machine, versions
 from rotor_mbs.scenario.catalogue import scene_of
 from rotor_mbs.scenario.scene import Scene, scene_hash
 from rotor_mbs.solution.solution import need_xarray
@@ -114,7 +113,7 @@ class Modes(SceneModes):
 
     def to_html(self, folder: str | os.PathLike[str]) -> Path:
         """The page into a folder; its path."""
-        return write_page(folder, "modes", modes_page([self]))
+        return write_page(folder, "modes", modes_page([self]), versions() | machine())
 
     def _repr_html_(self) -> str:
         drawn = self.plot()._repr_svg_() if self.rotation else ""
@@ -146,11 +145,10 @@ class ModePlots:
             change = np.where(np.nanmax(known) > 1e-6 * top, known - first, np.nan)
             every = (k, frequencies.shape[1] * max(1, len(speeds) // 24))
             for axes, values in zip(panel.axes, (known, change), strict=True):
-                curve(axes, speeds, values, mode_look(k), markevery=every, markersize=4.0)
+                curve(axes, speeds, values, mode_look(k, modes.names[k]), markevery=every, markersize=4.0)
         panel.axes[0].set_ylim(0.0, top)
         panel.axes[0].set_ylabel("frequency (rad/s)")
         panel.axes[1].set_ylabel("change (rad/s)")
-        canvas.legend(panel.axes[0], [(name, mode_look(k)) for k, name in enumerate(modes.names)])
         return panel
 
     def damping(self) -> Panels:
@@ -160,7 +158,7 @@ class ModePlots:
         curves = {"damping ratio": modes.damping_ratios, "growth rate (1/s)": modes.growth_rates}
         for axes, (label, numbers) in zip(panel.axes, curves.items(), strict=True):
             for k, values in enumerate(numbers.T):
-                curve(axes, modes.speeds, values, replace(mode_look(k), marker=""))
+                curve(axes, modes.speeds, values, replace(mode_look(k, modes.names[k]), marker=""))
             axes.set_ylabel(label)
         return panel
 
@@ -173,8 +171,10 @@ class ModePlots:
         axes = panel.axes[0]
         sizes = np.abs(table.multipliers)
         shown = np.where(sizes > 0.0, sizes, np.nan)
-        curve(axes, table.speeds, shown, Look(BLUE, "", "o"), markersize=2.0, markerfacecolor=BLUE)
-        curve(axes, table.speeds, table.largest, Look(VERMILLION, "-", ""), 1.5)
+        for k, sizes_of_one in enumerate(shown.T):
+            look = Look(BLUE, "", "o", "" if k else "each")
+            curve(axes, table.speeds, sizes_of_one, look, markersize=2.0, markerfacecolor=BLUE)
+        curve(axes, table.speeds, table.largest, Look(VERMILLION, "-", "", "largest"), 1.5)
         axes.axhline(1.0, color=GREY, linewidth=0.8)
         known = sizes[np.isfinite(sizes) & (sizes > 0.0)]
         if len(known) and known.max() / known.min() > 10.0:
@@ -191,7 +191,8 @@ class ModePlots:
             raise InputError(f"{self._modes.scene}: no stability chart; it needs gravity, speeds and stiffnesses")
         panel = panels((3.6,), SPEED_AXIS)
         label = "growth over a turn (powers of ten)"
-        growth_map(panel, table.speeds, table.stiffnesses, table.largest, MAX_GROWTH, label, 1.0 + GROWTH)
+        boundary = Look(VERMILLION, "-", "", "boundary of what is stable")
+        growth_map(panel, table.speeds, table.stiffnesses, table.largest, MAX_GROWTH, label, boundary, 1.0 + GROWTH)
         panel.axes[0].set_ylabel("bearing stiffness (N m/rad)")
         return panel
 
@@ -201,19 +202,19 @@ class ModePlots:
         raise InputError(f"{self._modes.scene}: no modes over speed; ask for speeds")
 
 
-def mode_look(index: int) -> Look:
+def mode_look(index: int, name: str) -> Look:
     """Line and marker of a mode: equal frequencies lie on each other, so that each mode has its own marker."""
-    return replace(coordinate_look(index), marker=_MARKS[index % len(_MARKS)])
+    return replace(coordinate_look(index, name), marker=_MARKS[index % len(_MARKS)])
 
 
 def stored_modes_page(opened: OpenResults) -> dict[str, object]:
     """The content of the page, from a results file."""
-    return modes_page(list(read_modes(opened.path).values())) | {"versions": versions(opened.attributes)}
+    return modes_page(list(read_modes(opened.path).values()))
 
 
 def modes_page(modes: Sequence[SceneModes]) -> dict[str, object]:
     """The content of the page: a part for each scene, of which each id is unique on the page."""
-    return {"scenes": [_scene_part(scene_modes, f"scene{i}") for i, scene_modes in enumerate(modes)], "versions": []}
+    return {"scenes": [_scene_part(scene_modes, f"scene{i}") for i, scene_modes in enumerate(modes)]}
 
 
 def _scene_part(modes: SceneModes, name: str) -> dict[str, object]:
@@ -222,7 +223,6 @@ def _scene_part(modes: SceneModes, name: str) -> dict[str, object]:
     rotation = next(iter(modes.rotation.values()), None)
     plots = ModePlots(modes)
     pictures: list[Picture] = []
-    legend: list[LegendEntry] = []
     fastest = Section()
     if rotation is not None and not np.isnan(rotation.growth_rates).all():
         last = len(rotation.speeds) - 1
@@ -231,7 +231,6 @@ def _scene_part(modes: SceneModes, name: str) -> dict[str, object]:
         if last > 0:
             caption = "Damped frequencies in the rotor's frame; 1P, 2P: multiples of the rotor speed"
             pictures.append(picture(plots(), f"{name}-campbell", caption))
-            legend += [LegendEntry(label, mode_look(k)) for k, label in enumerate(rotation.names)]
             if max(np.nanmax(np.abs(rotation.damping_ratios), initial=0.0), np.nanmax(rotation.growth_rates)) > 1e-9:
                 caption = "Damping ratios and growth rates"
                 pictures.append(picture(plots.damping(), f"{name}-damping", caption))
@@ -241,10 +240,9 @@ def _scene_part(modes: SceneModes, name: str) -> dict[str, object]:
     if table is not None:
         if len(table.speeds) > 1 and np.isfinite(table.largest).any():
             caption = "Floquet multipliers of a turn under gravity; above 1 a motion grows"
-            entries = [LegendEntry("each", Look(BLUE, "", "o")), LegendEntry("largest", Look(VERMILLION, "-", ""))]
-            turning.append(picture(plots.multipliers(), f"{name}-multipliers", caption, legend=entries))
+            turning.append(picture(plots.multipliers(), f"{name}-multipliers", caption))
         if modes.chart is not None:
-            caption = "Stability chart: growth over a turn under gravity; a line bounds what is stable"
+            caption = "Stability chart: growth over a turn under gravity"
             turning.append(picture(plots.chart(), f"{name}-chart", caption))
         rows: list[Row] = []
         for i, (speed, largest) in enumerate(zip(table.speeds.tolist(), table.largest.tolist(), strict=True)):
@@ -263,9 +261,9 @@ def _scene_part(modes: SceneModes, name: str) -> dict[str, object]:
         "notes": ([with_capital(floquet_sentence(modes.floquet))] if modes.floquet is not None else [])
         + list(modes.notes),
         "rest": Section(tables=[] if rest is None else _tables(rest, 0, f"{modes.scene}, at rest")),
-        "campbell": Section(pictures, legend),
+        "campbell": Section(pictures),
         "fastest": fastest,
-        "turning": Section(turning, (), multiplier_tables),
+        "turning": Section(turning, multiplier_tables),
     }
 
 

@@ -12,7 +12,7 @@ import numpy as np
 from rotor_mbs.report.core import canvas
 from rotor_mbs.report.core.canvas import TIME_AXIS, Panels
 from rotor_mbs.report.core.looks import GREY, Look, coordinate_look
-from rotor_mbs.report.core.numbers import scaled
+from rotor_mbs.report.core.numbers import scaled, with_unit
 from rotor_mbs.solution.trajectory import Array
 
 ANGLE_AXIS, RATE_AXIS = "angle (rad)", "rate (rad/s)"
@@ -103,7 +103,7 @@ def errors(series: Sequence[Series], label: str, horizon: float | None = None, *
         canvas.curve(axes, time, sizes, curve.look, 1.0 if curve.look.marker else 1.8, markevery=(first, step))
         if signed:
             above = np.arange(first, len(time), step)[values[first::step] > 0.0]
-            look = replace(curve.look, line="")
+            look = replace(curve.look, line="", label="")
             canvas.curve(axes, time[above], sizes[above], look, markerfacecolor=curve.look.colour)
         known += sizes[np.isfinite(sizes)].tolist()
     # A little below, so that a curve at a power of ten does not lie on the axis.
@@ -136,7 +136,7 @@ def is_cut(values: Array) -> bool:
 def mark_time(axes: Any, end: float, horizon: float | None) -> None:
     """A vertical line where the horizon lies before the end (s) of what is drawn."""
     if horizon is not None and horizon < end:
-        axes.axvline(horizon, color=GREY, linestyle="--", linewidth=1.3)
+        axes.axvline(horizon, color=GREY, linestyle="--", linewidth=1.3, label=f"horizon {with_unit(horizon, 's', 3)}")
 
 
 def paths(tip: Array) -> Panels:
@@ -163,12 +163,13 @@ def draw_paths(axes: Any, tip: Array) -> None:
         axes.text(*(corner + 1.2 * end), name, color=GREY, ha="center", va="center", fontsize="small")
     axes.text(*(corner - [0.0, 0.12 * reach]), f"{length:g} m", color=GREY, ha="left", va="center", fontsize="small")
     for blade in range(tip.shape[1]):
-        colour = coordinate_look(blade + 1).colour
-        path = projected(tip[:, blade])
-        axes.plot(*path.T, color=colour, linewidth=0.8)
+        colour, path = coordinate_look(blade + 1).colour, projected(tip[:, blade])
+        axes.plot(*path.T, color=colour, linewidth=0.8, label=f"blade {blade + 1}")
         for end, dashes, fill in ((path[0], (0, (3, 2)), "white"), (path[-1], "-", colour)):
             axes.plot((0.0, end[0]), (0.0, end[1]), color=colour, linestyle=dashes, linewidth=1.6)
             axes.plot(*end[:, None], marker="o", markersize=4, markeredgecolor=colour, markerfacecolor=fill)
+    for dashes, width, label in (("--", 1.6, "blade at the start"), ("-", 1.6, "at the end"), ("-", 3.0, "shaft")):
+        axes.plot([], [], color=GREY, linestyle=dashes, linewidth=width, label=label)
 
 
 def projected(points: Array) -> Array:

@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
-from typing import Any
 
 import numpy as np
 
 from rotor_mbs.errors import InputError
 from rotor_mbs.models.lagrange.defects import interval_defects
 from rotor_mbs.report import plots
-from rotor_mbs.report.core import canvas
 from rotor_mbs.report.core.canvas import Panels
-from rotor_mbs.report.core.looks import BLUE, INK, VERMILLION, Look, label_of, look_of
+from rotor_mbs.report.core.looks import BLUE, INK, VERMILLION, Look, look_of
 from rotor_mbs.report.pages.quantities import component_panels
 from rotor_mbs.report.plots import Series
 from rotor_mbs.solution.metrics import angle_error, energy_scale, horizon
@@ -38,12 +35,12 @@ class RunPlots:
         """Kinetic energy, potential energy, and their sum less the work (J) over time. Raises InputError without."""
         run = self._run
         kinetic, potential, work = (_quantity(run, name) for name in ("kinetic_energy", "potential_energy", "work"))
-        curves = {"kinetic": kinetic, "potential": potential, "total less work": kinetic + potential - work}
-        looks = dict(zip(curves, (Look(VERMILLION, "-", ""), Look(BLUE, "--", ""), Look(INK, "-", "")), strict=True))
-        series = [Series(run.time, values, looks[name]) for name, values in curves.items()]
-        picture = plots.lines([("energy (J)", series)])
-        canvas.legend(picture.axes[0], list(looks.items()))
-        return picture
+        curves = (
+            (kinetic, Look(VERMILLION, "-", "", "kinetic")),
+            (potential, Look(BLUE, "--", "", "potential")),
+            (kinetic + potential - work, Look(INK, "-", "", "total less work")),
+        )
+        return plots.lines([("energy (J)", [Series(run.time, *curve) for curve in curves])]).with_legend()
 
     def loads(self, name: str = "blade_root_force") -> Panels:
         """A load over time: a panel per axis with a line per blade, or one panel with a line per axis (or blade).
@@ -55,9 +52,7 @@ class RunPlots:
         values, load = _quantity(self._run, name), next((load for load in LOADS if load.name == name), None)
         if load is None or load.plot is None:
             raise InputError(f"no load {name!r}; allowed: {', '.join(load.name for load in LOADS)}")
-        panels, looks = component_panels(load, load.plot, self._run.time, values)
-        canvas.legend(panels.axes[0], list(looks.items()))
-        return panels
+        return component_panels(load, load.plot, self._run.time, values).with_legend()
 
     def defects(self) -> Panels:
         """The size (rad) of every interval's defect over time. Raises InputError for fewer than two samples."""
@@ -88,7 +83,7 @@ class ComparisonPlots:
         if self._reference is None:
             raise InputError("no reference to compare with; allowed: run(..., reference=True) computes one")
         series = self._series([angle_error(run.trajectory, self._reference) for run in self._runs])
-        return self._with_legend(plots.errors(series, "largest angle error (rad)", horizon(self._reference)))
+        return plots.errors(series, "largest angle error (rad)", horizon(self._reference)).with_legend()
 
     def defects(self) -> Panels:
         """The size (rad) of each run's interval defects over time. Raises InputError for fewer than two samples."""
@@ -98,38 +93,24 @@ class ComparisonPlots:
                 raise InputError("the run left fewer than two samples; there is no interval to draw")
             sizes = interval_defects(run.scene, run.time, run.angles, run.rates).sizes
             series.append(Series(run.time[1:], sizes, look_of(run.method)))
-        return self._with_legend(plots.errors(series, "defect (rad)"))
+        return plots.errors(series, "defect (rad)").with_legend()
 
     def rotor(self) -> Panels:
         """The rotor's angle (rad) by each method over time."""
         series = self._series([run.angles[:, 0] for run in self._runs])
-        return self._with_legend(plots.lines([("rotor angle (rad)", series)]))
+        return plots.lines([("rotor angle (rad)", series)]).with_legend()
 
     def energy_error(self) -> Panels:
-        """|energy less work, less its start| of each run, of the scene's energy scale. Raises InputError without."""
+        """Size of the energy error of each run, relative to the scene's energy scale. Raises InputError without."""
         errors = []
         for run in self._runs:
             scale = energy_scale(run.scene, run.trajectory)
             errors.append(np.abs(_quantity(run, "energy_error")) / (scale or 1.0))
-        return self._with_legend(plots.errors(self._series(errors), "energy error, of the energy scale"))
+        return plots.errors(self._series(errors), "energy error, of the energy scale").with_legend()
 
     def _series(self, values: Sequence[Array]) -> list[Series]:
         pairs = zip(self._runs, values, strict=True)
         return [Series(_some(run.time)[: len(array)], array, look_of(run.method)) for run, array in pairs]
-
-    def _with_legend(self, panels: Panels) -> Panels:
-        looks = {label_of(run.method): look_of(run.method) for run in self._runs}
-        # Above the axes: curves over decades leave no room.
-        above: dict[str, Any] = {
-            "loc": "lower left",
-            "bbox_to_anchor": (0.0, 1.0),
-            "ncols": 2,
-            "frameon": False,
-            "fontsize": 8.0,
-        }
-        canvas.legend(panels.axes[0], list(looks.items()), **above)
-        panels.figure.subplots_adjust(top=0.95 - 0.07 * math.ceil(len(looks) / 2))
-        return panels
 
 
 def _some(time: Array) -> Array:

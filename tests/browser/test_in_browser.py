@@ -51,7 +51,7 @@ def report(tmp_path_factory: pytest.TempPathFactory) -> Path:
     out = write_report(results, folder / "out").parent
     sweep = write_report(made_sweep(folder), folder / "sweep")
     shutil.copy(sweep, out / "sweep.html")
-    modes = write_page(folder / "modes", "modes", modes_page([compute_modes(paper("fig11"), [0.0, 2.0, 3.0])]))
+    modes = write_page(folder / "modes", "modes", modes_page([compute_modes(paper("fig11"), [0.0, 2.0, 3.0])]), {})
     return shutil.copy(modes, out / "modes.html").parent
 
 

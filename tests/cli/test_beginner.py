@@ -18,6 +18,7 @@ MISTAKES: dict[str, tuple[dict[str, str], str, str]] = {
     "a method by its integrator": ({}, "run {file} -m rk67", "perhaps exudyn_tree/rk67"),
     "a misspelt command": ({}, "rnu {file}", "perhaps run"),
     "a misspelt setting": ({}, "run {file} -m lagrange/taylor --set tolerence=1e-9", "perhaps tolerance"),
+    "a step too short": ({}, "run {file} -m exudyn_tree/rk67 --set step=1e-300", "allowed: a step of at least 1e-08 s"),
     "a setting out of range": (
         {}, "run {file} -m exudyn_tree/rk67 --set step=-1", "step (a number above 0, in s; default"
     ),
@@ -30,9 +31,18 @@ MISTAKES: dict[str, tuple[dict[str, str], str, str]] = {
     "a report of a scene file": ({}, "report {file}", "allowed: a file that rotor-mbs wrote"),
     "a report of nothing": ({}, "report missing.h5", "as rotor-mbs run or reproduce writes it"),
     "a folder as the output": ({}, "run {file} -o .", "a file's name, not a folder"),
-    "a method of the file": ({"methods = []": 'methods = ["rk67"]'}, "run {file}", "mine:10: methods: unknown method"),
+    "a method of the file": (
+        {"methods = []": 'methods = ["rk67"]'}, "run {file}", "mine.toml:10: methods: unknown method"
+    ),
     "an option that is none": ({}, "run {file} --stiff", "rotor-mbs run: unrecognized arguments: --stiff; see"),
     "a new file that would not run": ({}, "new mine.txt", "allowed: a name that ends in .toml"),
+    "a time limit that is none": ({}, "run {file} --timeout nan", "allowed: seconds, more than 0"),
+    "a bench of nothing": ({}, "bench", "required: SCENE"),
+    "a folder of scenes to show": ({}, "show paper", "one scene"),
+    "a report of a folder": ({}, "report .", "is a folder"),
+    "an option in front": ({}, "--frobnicate list", "unrecognized arguments: --frobnicate"),
+    "a method that cannot": ({"inertia = 0.0": "inertia = 3.0"}, "run {file} -m printed/ode45", "hub"),
+    "an output below a file": ({}, "run {file} -m lagrange/dop853 -o {file}/r.h5", "mine.toml"),
     "a new file over an old one": ({}, "new {file}", "allowed: a file that does not exist yet"),
 }  # fmt: skip
 SLIPS: dict[str, tuple[str, str, str]] = {
@@ -128,26 +138,8 @@ def test_a_scene_names_its_methods_and_settings(folder: Path) -> None:
     assert "mine:38: settings: no setting 'stp', perhaps step" in refused.err
 
 
-@pytest.mark.parametrize("span", ["0:1e300:3", "0:inf:3", "nan:1:3", "1:0:3"])
-@pytest.mark.parametrize("option", ["--speeds", "--stiffness"])
-def test_numbers_that_no_rotor_has_are_a_line(option: str, span: str) -> None:
-    ended = rotor_mbs("modes", "check/held", option, span)
-    assert ended.status == 2
-    assert "0 <= FROM < TO <= 1e+25" in ended.err
-    assert len(ended.err.splitlines()) == 1
-
-
 @pytest.mark.parametrize("jobs", ["999999999", "1025", "0", "-1", "1.5"])
 def test_more_processes_than_a_machine_has_are_a_line(jobs: str) -> None:
     ended = rotor_mbs("run", "check/held", "-j", jobs)
     assert ended.status == 2
     assert "allowed: a whole number from 1 to 1024" in ended.err
-
-
-def test_files_of_the_other_kind_name_their_command(tmp_path: Path) -> None:
-    (tmp_path / "scene.toml").write_text(new_scene_text())
-    (tmp_path / "sweep.toml").write_text(
-        'title = "a"\nscene = "paper/fig11"\n[[axis]]\nkey = "gravity"\nvalues = [1]\n'
-    )
-    assert f"rotor-mbs sweep {tmp_path / 'sweep.toml'}" in rotor_mbs("run", tmp_path / "sweep.toml").err
-    assert f"rotor-mbs run {tmp_path / 'scene.toml'}" in rotor_mbs("sweep", tmp_path / "scene.toml").err

@@ -176,4 +176,73 @@ def test_the_gitlab_job_is_plain_bash_too(earlier: Path, folder: Path) -> None:
     done = _bash("\n".join(job["script"]), folder, **variables)
     assert done.returncode == 0, done
     for name in [job["artifacts"]["reports"]["junit"], *job["artifacts"]["paths"]]:
-        assert (folder / name).stat().st_size
+        assert (folder / name.replace("$FILE", str(earlier))).stat().st_size
+
+
+# The whole workflows of docs/check.md
+
+GITHUB, GITLAB = map(yaml.safe_load, re.findall(r"```yaml\n(.*?)```", (ROOT / "docs/check.md").read_text(), re.DOTALL))
+PIP = "python -m pip install"
+
+
+@pytest.fixture
+def project(folder: Path) -> Path:
+    """A repository with one scene, and what a runner puts there; `cache` is what later runs are given."""
+    scene = (ROOT / "scenarios" / f"{SCENE}.toml").read_text()
+    (folder / "my.toml").write_text(re.sub(r"(?m)^duration = .*$", "duration = 0.2", scene))
+    return folder
+
+
+def _github_run(folder: Path, ref: str) -> list[str]:
+    """Runs the workflow's steps in turn; returns the names of what was used, with what was found in the cache."""
+    used, matched = [], ""
+    cached = folder / "cache" / "results.h5"
+    for step in GITHUB["jobs"]["accuracy"]["steps"]:
+        if "if" in step:
+            assert step["if"] == "github.ref == 'refs/heads/main'"
+            if ref != "refs/heads/main":
+                continue
+        given, action = step.get("with", {}), step.get("uses", "").split("@")[0]
+        used.append(action)
+        if "run" in step:
+            done = _bash(step["run"].replace(PIP, "echo"), folder)
+            assert done.returncode == 0, done
+        elif action == "actions/cache/restore" and cached.exists():
+            (folder / "main").mkdir(exist_ok=True)
+            (folder / given["path"]).write_bytes(cached.read_bytes())
+            matched = given["restore-keys"]
+        elif action == "actions/cache/save":
+            cached.parent.mkdir(exist_ok=True)
+            cached.write_bytes((folder / given["path"]).read_bytes())
+        elif action == "./rotor_mbs/.github/actions/check":
+            assert given["against"] == "${{ steps.main.outputs.cache-matched-key && 'main/results.h5' || '' }}"
+            steps = _run_action(folder, **{**given, "against": "main/results.h5" if matched else ""})
+            assert [step.returncode for step in steps] == [0, 0], steps[-1]
+            used[-1] += " against" * ("against" in (folder / "rotor-mbs-check" / "verdicts.json").read_text())
+    return used
+
+
+@pytest.mark.full
+def test_the_workflow_for_github_has_no_earlier_file_at_first_and_then_compares(project: Path) -> None:
+    check, save = "./rotor_mbs/.github/actions/check", "actions/cache/save"
+    first = _github_run(project, "refs/heads/main")
+    assert check in first
+    assert save in first
+    second = _github_run(project, "refs/pull/1/merge")
+    assert f"{check} against" in second
+    assert save not in second
+
+
+@pytest.mark.full
+def test_the_pipeline_for_gitlab_has_no_earlier_file_at_first_and_then_compares(project: Path) -> None:
+    template = yaml.safe_load((ROOT / ".gitlab/rotor-mbs-check.yml").read_text())[GITLAB["accuracy"]["extends"]]
+    job = {**template, **GITLAB["accuracy"], "variables": {**template["variables"], **GITLAB["accuracy"]["variables"]}}
+    assert GITLAB["keep"]["cache"][0]["paths"] == job["cache"][0]["paths"] == [job["variables"]["AGAINST"]]
+    script = "\n".join([*job["before_script"], *job["script"]]).replace(PIP, "echo")
+    first = _bash(script, project, **job["variables"])
+    assert first.returncode == 0, first
+    assert "no earlier file" in first.stdout
+    assert _bash("\n".join(GITLAB["keep"]["script"]), project).returncode == 0
+    second = _bash(script, project, **job["variables"])
+    assert second.returncode == 0, second
+    assert "no earlier file" not in second.stdout

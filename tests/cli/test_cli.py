@@ -184,44 +184,10 @@ def test_a_run_over_its_time_limit_is_recorded_and_the_rest_goes_on(quick: Path)
         assert results.scenes["quick"].runs[method].status == "ok"
 
 
-def test_a_run_without_a_single_finite_sample_is_stored_as_what_it_is() -> None:
-    """Rates of 1e200: the engine reports success, and has nothing to show for it."""
-    assert rotor_mbs("run", "extreme/rate-1e200", "-m", "exudyn_tree/rk44", "-o", "r.h5", "-j", "1").status == 1
-    with open_results(Path("r.h5")) as results:
-        run = results.scenes["extreme/rate-1e200"].runs["exudyn_tree/rk44"]
-        assert run.status == "diverged"
-        assert run.attributes["false_success"] == 1
-        assert not len(run.array("time"))
-
-
-# Bad input
-
-
-@pytest.mark.parametrize(
-    ("command", "says"),
-    [
-        ("run paper/fig99", "no such scene"),
-        ("run ../paper", "../paper"),
-        ("run paper/fig05 -m magic/rk4", "allowed: printed/ode45"),
-        ("run paper/fig05 -j 0", "allowed: a whole number from 1 to"),
-        ("run paper/fig05 --timeout nan", "allowed: seconds, more than 0"),
-        ("show paper", "one scene"),
-        ("report missing.h5", "no such file"),
-        ("report .", "is a folder"),
-        ("frobnicate", "no command 'frobnicate'; allowed: list"),
-        ("reprodcue", "perhaps reproduce"),
-        ("--frobnicate list", "unrecognized arguments: --frobnicate"),
-        ("bench", "required: SCENE"),
-        ("bench paper/fig11 --budget 0", "allowed: seconds, more than 0"),
-        ("bench paper/fig11 --no-such-option", "--no-such-option"),
-        ("run quick.toml -m printed/ode45", "hub"),
-        ("run quick.toml -m lagrange/dop853 -o quick.toml/r.h5", "quick.toml"),
-    ],
-)
-def test_bad_usage_ends_with_2_and_one_clear_line(command: str, says: str, quick: Path) -> None:
-    quick.write_text(QUICK.format(angle=0.5) + "[hub]\ninertia = 3.0\n")
-    ended = rotor_mbs(*command.split())
+@pytest.mark.parametrize("command", ["run", "sweep"])
+def test_a_misspelt_method_of_a_file_is_told_with_the_other_errors(command: str, quick: Path) -> None:
+    quick.write_text('methods = ["lagrange/tailor"]\nsamples = 1\n')
+    ended = rotor_mbs(command, quick)
     assert ended.status == 2
-    assert ended.out == ""
-    assert says in ended.err
-    assert len(ended.err.splitlines()) == 1
+    assert f"{quick}:1: methods: unknown method 'lagrange/tailor', perhaps lagrange/taylor; allowed: " in ended.err
+    assert f"{quick}:2: samples: 1 is out of range" in ended.err

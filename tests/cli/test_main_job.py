@@ -1,15 +1,17 @@
-"""The main job, `reproduce`: on two scenes every default method, errata, a bench, the report, a second call; on all."""
+"""The main job, `reproduce`: on two scenes, a second call, on all; and when a call has something to do."""
 
 from __future__ import annotations
 
+import argparse
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import pytest
 from support.commands import Ended, rotor_mbs
 from support.scenes import PAPER
 
+from rotor_mbs.cli import runs
 from rotor_mbs.methods.catalogue import is_corrected
 from rotor_mbs.runs.read import open_results
 from rotor_mbs.scenario.catalogue import find_scenes
@@ -49,7 +51,7 @@ def test_every_method_has_run_and_those_of_the_correct_equations_are_ok(call: tu
 def test_the_report_is_whole_and_needs_no_network(call: tuple[Path, Ended, Ended]) -> None:
     pages = {path.name: path.read_text() for path in (call[0] / "report").glob("*.html")}
     assert {"index.html", "errata.html"} <= set(pages)
-    assert len(pages) == len(SCENES) + 5  # index, errata, the figures one by one, the bench and its scene
+    assert len(pages) == len(SCENES) + 4  # index, errata, the figures one by one, the benches
     for page in pages.values():
         assert not re.search(r'(?:src|href)="(?:https?:)?//(?!doi\.org/)', page)  # a link to the paper asks for nothing
 
@@ -87,5 +89,60 @@ def test_every_scene_by_every_model_and_all_right_ones_ok(tmp_path: Path) -> Non
     assert sum(drift > 1e-3 for drift in printed_drifts) > len(printed_drifts) / 2
     index = (tmp_path / "report" / "index.html").read_text()
     assert 'Published numbers reproduced</th><td class="n">4 of 4</td>' in index
-    assert len(list((tmp_path / "report").glob("*.html"))) == len(PAPER) + 5
+    assert len(list((tmp_path / "report").glob("*.html"))) == len(PAPER) + 4
     assert rotor_mbs("check", tmp_path / "results.h5").status == 0
+
+
+@pytest.fixture
+def again(folder: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., bool]:
+    """Calls `reproduce`, with work that writes a results file and an index; returns whether the work was done."""
+    done: list[Path] = []
+
+    def work(_arguments: argparse.Namespace, results: Path, pages: Path) -> tuple[int, str]:
+        done.append(results)
+        pages.mkdir(parents=True, exist_ok=True)
+        (pages / "index.html").touch()
+        if not results.exists():
+            results.write_bytes(bytes(1000))
+        return int(Path("fails").exists()), "result as printed: what came out\n"
+
+    def called(*options: str) -> bool:
+        done.clear()
+        ended = rotor_mbs("reproduce", "-o", folder, *options)
+        assert ended.status == int(bool(done) and Path("fails").exists())
+        assert "result as printed: what came out" in ended.out
+        assert ("nothing to do" in ended.out) == (not done)
+        return bool(done)
+
+    monkeypatch.setattr(runs, "_reproduce", work)
+    return called
+
+
+CHANGES: dict[str, Callable[[], object]] = {
+    "nothing": lambda: None,
+    "a bit of the results": lambda: Path("results.h5").write_bytes(bytes(999) + b"\x01"),
+    "no results": Path("results.h5").unlink,
+    "no index": Path("report/index.html").unlink,
+    "unfinished work": Path(".results.h5.lock").touch,
+    "a call that failed": Path("fails").touch,
+}
+
+
+@pytest.mark.parametrize("change", CHANGES)
+def test_only_what_changed_is_looked_into(again: Callable[..., bool], change: str) -> None:
+    if change == "a call that failed":
+        CHANGES[change]()
+        assert again()
+    else:
+        assert again()
+        CHANGES[change]()
+    assert again() == (change != "nothing")
+
+
+def test_another_time_limit_or_other_code_is_looked_into(
+    again: Callable[..., bool], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert again()
+    assert again("--timeout", "5")
+    monkeypatch.setattr(reproduce, "versions", lambda: {"rotor_mbs": "other code"})
+    assert again("--timeout", "5")

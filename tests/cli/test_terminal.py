@@ -1,18 +1,30 @@
-"""Progress and tables on a terminal and in a log."""
+"""Progress and tables on a terminal and in a log; interrupts; output without a reader, and a full one."""
 
 from __future__ import annotations
 
 import io
+import os
 import signal
+import subprocess
 import time
 from collections.abc import Callable
 from contextlib import suppress
+from dataclasses import replace
+from pathlib import Path
 
+import numpy as np
 import pytest
-from support.commands import rotor_mbs
+from support.commands import PROGRAM, rotor_mbs
+from support.stored import Made, rotor, store
+from support.sweeps import THREE_RUNS
 
+from rotor_mbs.analysis.run_tables import bench_table, method_table, run_table
 from rotor_mbs.cli.terminal import ProgressLine, coloured
 from rotor_mbs.errors import MethodRefusal
+from rotor_mbs.runs.read import open_results
+from rotor_mbs.runs.records import Record
+from rotor_mbs.runs.sweeps import StoredSweep
+from rotor_mbs.scenario.catalogue import find_scenes
 from rotor_mbs.studies.run import Outcome
 
 
@@ -77,7 +89,7 @@ def test_an_estimate_counts_what_comes_after_the_cases() -> None:
 
 def _ends_by(patch: pytest.MonkeyPatch, action: Callable[[], object]) -> tuple[int, str]:
     """Status and errors of a command in which `action` takes the place of its first step."""
-    patch.setattr("rotor_mbs.cli.runs.find_scenes", lambda _: action())
+    patch.setattr("rotor_mbs.cli.runs.find_scenes", lambda *_: action())
     ended = rotor_mbs("run", "paper/fig03")
     return ended.status, ended.err
 
@@ -133,3 +145,70 @@ def test_an_interrupt_where_python_ignores_exceptions_comes_again(monkeypatch: p
         return []
 
     assert _ends_by(monkeypatch, interrupted)[0] == 130
+
+
+@pytest.mark.parametrize(("words", "status"), [(("list",), 0), (("new", "mine.toml"), 1)])
+def test_a_closed_pipe_is_no_success_but_of_a_command_that_only_prints(words: tuple[str, ...], status: int) -> None:
+    """As by `| true`."""
+    reading, writing = os.pipe()
+    os.close(reading)
+    try:
+        assert subprocess.run([*PROGRAM, *words], stdout=writing, stderr=subprocess.DEVNULL).returncode == status
+    finally:
+        os.close(writing)
+
+
+@pytest.mark.full
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="fills standard output as Linux does")
+def test_full_output_and_closed_errors_lose_no_run(folder: Path) -> None:
+    Path("s.toml").write_text(THREE_RUNS)
+    command = [*PROGRAM, "sweep", "s.toml", "-o", "o.h5", "-j", "1"]
+    assert subprocess.run(["sh", "-c", 'exec "$@" 2>&- > /dev/full', "sh", *command]).returncode == 1  # no summary
+    assert StoredSweep(folder / "o.h5").column("status").tolist() == [0, 0, 0]
+
+
+SCENE = find_scenes(["paper/fig05"])[0]
+GOOD, BAD = "lagrange/dop853", "exudyn_tree/rk67"
+
+
+def stored(tmp_path: Path, *, scenes: int = 1) -> Path:
+    runs = []
+    for i in range(scenes):
+        scene = replace(SCENE, name=f"paper/s{i}")
+        runs += [Made(scene, "reference", rotor(np.sin), versions={"frozen_with": "1.0"})]
+        runs += [Made(scene, GOOD, rotor(lambda t: np.sin(t) + 1e-9), attributes={"defect_max": 3e-12})]
+        runs += [Made(scene, BAD, rotor(lambda t: np.sin(t) + 0.25), attributes={"status": "inaccurate"})]
+    return store(tmp_path / "r.h5", runs)
+
+
+def test_a_row_for_each_run_with_its_status_error_drift_and_time(tmp_path: Path) -> None:
+    with open_results(stored(tmp_path)) as results:
+        table = run_table(results.scenes, {"paper/s0": [GOOD, BAD], "not there": [GOOD]})
+    assert table.rows == [
+        ("paper/s0", "reference", "ok", "", "", "0.0e+00", "read"),  # shipped, and no error against itself
+        ("paper/s0", GOOD, "ok", "3.0e-12", "1.0e-09", "0.0e+00", "0.002"),
+        ("paper/s0", BAD, "inaccurate", "", "2.5e-01", "0.0e+00", "0.002"),
+    ]
+
+
+def test_many_runs_are_a_row_for_each_method_with_the_largest_of_those_that_are_ok(tmp_path: Path) -> None:
+    with open_results(stored(tmp_path, scenes=14)) as results:
+        table = run_table(results.scenes, {name: [GOOD, BAD] for name in results.scenes})
+        runs = [run for scene in results.scenes.values() for run in scene.methods.values()]
+        assert method_table(runs).rows == table.rows
+    assert table.rows == [
+        (GOOD, "14 of 14 ok", "3.0e-12", "1.0e-09", "0.0e+00", "0.002"),
+        (BAD, "0 of 14 ok", "", "", "", "0.002"),
+    ]
+
+
+def test_a_bench_curve_has_its_smallest_error_and_the_times_to_given_ones() -> None:
+    arrays = {
+        "angle_error_max": np.array([1e-2, 1e-4, np.nan]),
+        "run_time_s": np.array([1.0, 10.0, 20.0]),
+        "status": np.array([0, 0, 2]),
+    }
+    (row,) = bench_table([Record("bench", "paper/fig05", GOOD, arrays=arrays)]).rows
+    assert row[:4] == ("paper/fig05", GOOD, "2 of 3", "1.0e-04")
+    assert float(row[4]) == np.round(10**0.5, 2)  # halfway between the two, in logarithms
+    assert row[5:] == ("", "")

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rotor_mbs.errors import MethodRefusal
-from rotor_mbs.methods.base import BuiltItem, Method, Settings, stability_polynomial, step_ladder
+from rotor_mbs.methods.base import BuiltItem, Method, Settings, step_ladder
 from rotor_mbs.methods.settings import number
 from rotor_mbs.scenario.accuracy_bounds import Bound
 from rotor_mbs.solution.trajectory import Integration, RunBlock, Trajectory
@@ -88,6 +88,5 @@ def items(scene):
 METHOD = Method(
     name="outside/rk4", label="from outside, RK4", settings=Rk4Settings, build=Solver,
     items=items, order=4, fixed_step=True, ladders=(step_ladder(6),), solve_many=solve_many,
-    stability_function=stability_polynomial(1.0, 1.0, 1 / 2, 1 / 6, 1 / 24),
     bounds=(Bound("defect", "outside/rk4", 1e-6, "order 4"), Bound("energy", "outside/rk4", 1e-6, "order 4")),
 )  # fmt: skip

@@ -33,15 +33,16 @@ pytestmark = [
 SWEEP = (
     'title = "s"\nscene = "a.toml"\n[[axis]]\nkey = "initial.angles[1]"\nlinear = {start = 0, end = 0.1, count = 100}\n'
 )
-METHODS = "-m lagrange/dop853 -m exudyn_tree/rk67"
+# A limit that no run of a loaded machine reaches.
+METHODS, LIMIT = "-m lagrange/dop853 -m exudyn_tree/rk67", "--timeout 1000"
 # The output stands last; `check` has none.
 COMMANDS = {
-    "run": f"run a.toml b.toml {METHODS} -j 2 -o run.h5",
-    "sweep": "sweep s.toml -j 2 -o sweep.h5",
-    "reproduce": "reproduce -j 2 -o reproduce",
+    "run": f"run a.toml b.toml {METHODS} {LIMIT} -j 2 -o run.h5",
+    "sweep": f"sweep s.toml {LIMIT} -j 2 -o sweep.h5",
+    "reproduce": f"reproduce {LIMIT} -j 2 -o reproduce",
     "bench": "bench a.toml -m lagrange/dop853 --budget 1 -o bench.h5",
     "report": "report whole.h5 -o report",
-    "reference": "reference a.toml -j 1 -o reference.h5",
+    "reference": f"reference a.toml {LIMIT} -j 1 -o reference.h5",
     "modes": "modes a.toml -j 1 -o modes.h5",
     "check": "check whole.h5",
 }
@@ -59,7 +60,7 @@ def prepare(folder: Path) -> None:
     for name, duration in (("a", 1.0), ("b", 2.0)):
         write(folder / f"{name}.toml", scene_toml(paper("fig11", samples=101, duration=duration)))
     write(folder / "s.toml", SWEEP)
-    finish(folder, f"run a.toml {METHODS} -o whole.h5")
+    finish(folder, f"run a.toml {METHODS} {LIMIT} -o whole.h5")
 
 
 def finish(folder: Path, command: str) -> None:

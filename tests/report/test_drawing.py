@@ -15,8 +15,7 @@ from rotor_mbs.methods.catalogue import ladders, method_names
 from rotor_mbs.report import plots as figures
 from rotor_mbs.report.core import canvas, numbers, svg
 from rotor_mbs.report.core.canvas import panels
-from rotor_mbs.report.core.elements import MARKS
-from rotor_mbs.report.core.looks import COLOURS, GREY, PALETTE, Look, class_of, coordinate_look, look_of
+from rotor_mbs.report.core.looks import COLOURS, GREY, Look, class_of, coordinate_look, look_of
 from rotor_mbs.report.mode_study import ModePlots
 from rotor_mbs.report.pages import scene as scene_page
 from rotor_mbs.report.pages.index import energy_of_scenes
@@ -110,6 +109,15 @@ def test_paths_have_equal_scales_and_an_axis_of_stated_length() -> None:
     np.testing.assert_allclose(np.ptp(axis[:, 1]), 10.0 * np.cos(np.radians(14.0)))
 
 
+def test_the_legend_of_a_picture_has_what_is_labelled_once_as_it_is_drawn() -> None:
+    series = [Series(TIME, 1e-9 + TIME, CORRECTED), Series(TIME, 2.0 + TIME, CORRECTED), Series(TIME, 3.0 + TIME, LOOK)]
+    legend = str(svg.picture(figures.errors(series, "error (rad)", horizon=6.0), "n", "t").legend)
+    entries = re.findall(r"<li>(.*?)</svg> (.*?)</li>", legend)
+    assert [label.replace(numbers.SPACE, " ") for _, label in entries] == ["closed form, Taylor", "horizon 6.00 s"]
+    assert f'class="{class_of(CORRECTED.colour)} open"' in entries[0][0]
+    assert "stroke-dasharray" in entries[1][0]
+
+
 def _is_vertical(line: Line2D) -> bool:
     x, y = line.get_xydata().T
     return bool(x[0] == x[1] and y[0] != y[1] and x[0] < 0.0)
@@ -153,7 +161,7 @@ def test_every_method_and_every_curve_of_a_bench_has_a_look_of_its_own() -> None
         a, b = looks[first], looks[second]
         assert (a.colour != b.colour) + (a.line != b.line) + (a.marker != b.marker) >= 2, (first, second)
     for look in looks.values():
-        assert look.marker in MARKS  # the legend can draw it
+        assert look.marker in svg.MARKS
         assert look.colour in COLOURS
 
 
@@ -161,15 +169,8 @@ def test_a_method_of_another_package_is_grey_and_looks_the_same_every_time() -> 
     looks = [look_of(f"package{i}/rk4") for i in range(20)]
     assert looks == [look_of(f"package{i}/rk4") for i in range(20)]
     assert {look.colour for look in looks} == {GREY}
-    assert {look.marker for look in looks} <= MARKS.keys()
+    assert {look.marker for look in looks} <= svg.MARKS.keys()
     assert len(set(looks)) > 10
-
-
-def test_colours_of_methods_and_of_coordinates_differ() -> None:
-    of_methods = {look_of(name).colour for name in ("reference", *method_names())}
-    of_coordinates = {coordinate_look(index).colour for index in range(12)}
-    assert not of_methods & of_coordinates
-    assert of_methods | of_coordinates <= set(PALETTE)
 
 
 # Pictures as SVG
@@ -205,12 +206,6 @@ def test_a_gap_in_a_curve_is_a_gap_in_its_picture() -> None:
     assert curve is not None
     assert curve[1].count("M") == 2
     assert "nan" not in text
-
-
-def test_a_straight_curve_of_many_samples_is_short() -> None:
-    picture = panels((2.0,), "time (s)")
-    picture.axes[0].plot(TIME, 0.3 * TIME, color=COLOURS[2])
-    assert len(str(svg.picture(picture, "n", "t").svg)) < 5000  # a thousand steps would be 8 characters each
 
 
 def test_a_factor_of_the_tick_labels_stands_with_the_unit() -> None:

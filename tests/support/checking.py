@@ -95,6 +95,8 @@ EVERY_SECOND_SAMPLE = 2.0  # in place of a share of gravity: the others are left
 WRONG = {
     "offset": with_wrong_offset,
     "defect": with_wrong_gravity,
+    "defect median": with_wrong_gravity,
+    "error": with_wrong_offset,
     "energy": with_wrong_offset,
     "impulse": with_wrong_offset,
     "loads": with_wrong_mass,

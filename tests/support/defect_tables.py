@@ -13,7 +13,6 @@ from pathlib import Path
 
 import numpy as np
 
-from rotor_mbs.analysis.judgement import FLOOR_SAFETY
 from rotor_mbs.analysis.rehydrate import reference_of, rehydrate
 from rotor_mbs.methods.catalogue import is_corrected
 from rotor_mbs.models.lagrange import closed_form
@@ -22,6 +21,7 @@ from rotor_mbs.models.lagrange.samples import loads_at
 from rotor_mbs.runs.read import open_results
 from rotor_mbs.scenario.accuracy_bounds import shipped_bounds
 from rotor_mbs.scenario.scene import Scene
+from rotor_mbs.solution.defects import FLOOR_SAFETY
 from rotor_mbs.solution.metrics import HORIZON_GROWTH
 from rotor_mbs.solution.trajectory import Array, Trajectory
 
@@ -68,7 +68,8 @@ def signatures(scene: Scene, motion: Trajectory) -> dict[str, Array]:
 
 def main(path: Path) -> None:
     methods: dict[str, list[str]] = {}
-    predictions, bounds = [], shipped_bounds()
+    predictions: dict[str, list[str]] = {}
+    bounds = shipped_bounds()
     with open_results(path) as results:
         for name, stored in results.scenes.items():
             reference = reference_of(stored)
@@ -96,19 +97,20 @@ def main(path: Path) -> None:
                         )
                         cells.append(f"{seen:.0e}" if seen < 1.0 else "-")
                     true, predicted = facts["angle_error_max"], facts.get("angle_error_predicted", np.nan)
-                    # Rounding is random from interval to interval: it adds up as the root of their number.
-                    growth = min(float(np.nanmax(reference.error_growth)), HORIZON_GROWTH)
-                    floor = facts["defect_floor"] * growth * np.sqrt(len(reference.time))
-                    judged = "" if not 10.0 * floor <= true <= 0.1 else f"{predicted / true:.2f}"
-                    numbers = f"{facts['horizon_s']:.2f} | {true:.1e} | {predicted:.1e} | {judged}"
-                    predictions.append(f"| {name} | {run.method} | {numbers} |")
+                    floor = facts["defect_floor"] * min(float(np.nanmax(reference.error_growth)), HORIZON_GROWTH)
+                    ratio = f"{predicted / true:.2f}" if 10.0 * floor <= true <= 0.1 else ""
+                    row = predictions.setdefault(name, [f"{facts['horizon_s']:.2f}"])
+                    row += [f"{true:.1e}", f"{predicted:.1e}", ratio]
                 methods.setdefault(run.method, []).append(f"| {name} | " + " | ".join(cells) + " |")
     for method, rows in methods.items():
         heads = ["scene", "largest (rad)", "median (rad)", *(FAULTS if is_corrected(method) else ())]
         print(f"\n**{method}**\n\n| {' | '.join(heads)} |\n|{'---|' * len(heads)}")
         print(*rows, sep="\n")
-    print("\n| scene | method | horizon (s) | error (rad) | predicted (rad) | predicted / error |")
-    print("|---|---|---|---|---|---|", *predictions, sep="\n")
+    heads = ["scene", "horizon (s)"]
+    for method in (method for method in methods if is_corrected(method)):
+        heads += [f"{method}: error (rad)", "predicted", "ratio"]
+    print(f"\n| {' | '.join(heads)} |\n|{'---|' * len(heads)}")
+    print(*(f"| {name} | {' | '.join(row)} |" for name, row in predictions.items()), sep="\n")
 
 
 if __name__ == "__main__":

@@ -1,6 +1,7 @@
-"""Makes reference/claims.json: the paper's claims as shares of many runs, its numbers under other conditions.
+"""Makes claim_runs.json, the paper's claims on many runs and its numbers under other conditions, and the verdicts that
+follow from them, reference/claims.json.
 
-    python tests/support/make_claims.py [--runs N] [--seed N] [--jobs N] [--output FILE]
+    python tests/support/make_claims.py [--runs N] [--seed N] [--jobs N]
 
 The same seed gives the same file, and fewer runs are the first of more. With 100 runs these are 8,484 runs.
 """
@@ -22,17 +23,30 @@ from unittest import mock
 
 import numpy as np
 
-from rotor_mbs.analysis.claim_study import ClaimShare, Conditions, NumberTrial
-from rotor_mbs.analysis.claims import NumberValues, claim_holds, measure, rounds_to
+from rotor_mbs.analysis.claims import rounds_to
 from rotor_mbs.analysis.judgement import judge
 from rotor_mbs.analysis.published import Published, TrajectoryNumber, published
 from rotor_mbs.methods.catalogue import find_method
 from rotor_mbs.methods.solve import solve
 from rotor_mbs.models.printed import literal
+from rotor_mbs.report.core.numbers import number, power, with_unit
 from rotor_mbs.runs.versions import versions
 from rotor_mbs.scenario.catalogue import find_scenes
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.status import COMPLETE
+from support.claim_study import (
+    FILE,
+    RULE,
+    ClaimRuns,
+    ClaimShare,
+    Conditions,
+    NumberTrial,
+    NumberValues,
+    claim_holds,
+    claim_runs,
+    measure,
+    numbers_of,
+)
 from support.gravity_rows import DEFAULT_ROW, GRAVITY_ROWS
 
 PRINTED = "printed/ode45"
@@ -90,7 +104,7 @@ def claim_shares(
 ) -> list[ClaimShare]:
     """Every claim in words by the printed equations and by the corrected closed form."""
     claims = [item for item in (published() if items is None else items) if not item.is_number]
-    asked = dict.fromkeys(number for item in claims for number in item.numbers)
+    asked = dict.fromkeys(number for item in claims for number in numbers_of(item))
     scenes = find_scenes(sorted({number.scene for number in asked}))
     shares = []
     with Pool(jobs) as pool:
@@ -181,7 +195,7 @@ def number_trials(
         for (_, conditions), numbers in zip(tasks, pool.imap(numbers_of_run, tasks), strict=True):
             values |= {(conditions, number): value for number, value in numbers.items()}
     return [
-        NumberTrial(item.id, conditions, value, rounds_to(value, item.value, item.decimals),
+        NumberTrial(item.id, conditions, value, rounds_to(value, item),
                     remainder(scenes[AT_REST], conditions.gravity_row))
         for conditions in dict.fromkeys(tried)
         for item in items
@@ -196,11 +210,11 @@ def remainder(scene: Scene, row: str) -> float:
     return GRAVITY_ROWS[row].moment(mass, c, d, scene.gravity, scene.initial_angles[0], *cosines)
 
 
-# The file
+# The files
 
 
-def as_json(shares: Iterable[ClaimShare], trials: Iterable[NumberTrial], runs: int, seed: int) -> str:
-    """The text of reference/claims.json, with a line for each row of a table."""
+def runs_as_json(shares: Iterable[ClaimShare], trials: Iterable[NumberTrial], runs: int, seed: int) -> str:
+    """The text of claim_runs.json, with a line for each row of a table."""
     facts: Mapping[str, object] = {
         "seed": seed,
         "runs": runs,
@@ -227,16 +241,89 @@ def as_json(shares: Iterable[ClaimShare], trials: Iterable[NumberTrial], runs: i
     return "{\n" + ",\n".join(parts) + "\n}\n"
 
 
+def verdicts_as_json(study: ClaimRuns) -> str:
+    """The text of reference/claims.json: verdicts, shares and tables that follow from the runs."""
+    shares, trials = study
+    usual = trials.usual
+    items = {item.id: item for item in published() if item.id in trials.numbers}
+
+    def known(value: float) -> float | None:
+        return None if math.isnan(value) else value
+
+    def row(conditions: Conditions, *labels: str) -> tuple[list[str], list[float | None], list[bool]]:
+        tried = [trials.under(conditions)[name] for name in items]
+        return [*labels], [known(trial.value) for trial in tried], [trial.reproduced for trial in tried]
+
+    over = f", over {with_unit(usual.duration, 's')}"
+    tables = [
+        {
+            "caption": "The published numbers by the duration of the run",
+            "head": ["Duration"],
+            "rows": [row(tried, with_unit(tried.duration, "s")) for tried in trials.of_row(usual.gravity_row)],
+        },
+        {
+            "caption": f"The published numbers by the tolerances of ode45{over}",
+            "head": ["RelTol", "AbsTol"],
+            "rows": [
+                row(tried, ten_to(tried.relative_tolerance), ten_to(tried.absolute_tolerance))
+                for tried in trials.with_tolerances()
+            ],
+        },
+        {
+            "caption": f"By the way of writing the first row of (56){over}",
+            "head": ["Row", "At the start (N m)"],
+            "rows": [
+                row(conditions, formula, number(next(iter(trials.under(conditions).values())).remainder))
+                for name, formula in trials.rows.items()
+                for conditions in [replace(usual, gravity_row=name)]
+            ],
+        },
+    ]
+    facts: dict[str, object] = {
+        "rule": RULE,
+        "runs": shares.runs,
+        "spread": shares.spread,
+        "methods": shares.methods,
+        "durations": shares.durations,
+        "verdicts": {
+            claim: {method: shares.verdict(claim, method) for method in shares.methods} for claim in shares.claims
+        },
+        "shares": {
+            claim: {
+                method: [(known(share.share), share.deciding) for share in shares.of(claim, method)]
+                for method in shares.methods
+            }
+            for claim in shares.claims
+        },
+        "numbers": list(items),
+        "trials": tables,
+    }
+    parts = []
+    for name, value in facts.items():
+        text = json.dumps(value, ensure_ascii=False)
+        if isinstance(value, dict):  # a line for each claim
+            lines = [f"  {json.dumps(key)}: {json.dumps(entry)}" for key, entry in value.items()]
+            text = "{\n" + ",\n".join(lines) + "\n }"
+        parts.append(f' "{name}": {text}')
+    return "{\n" + ",\n".join(parts) + "\n}\n"
+
+
+def ten_to(value: float) -> str:
+    """A power of ten, as pages show it."""
+    return power(int(f"{value:.0e}".partition("e")[2]))
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--runs", type=int, default=RUNS, metavar="N")
     parser.add_argument("--seed", type=int, default=SEED, metavar="N")
     parser.add_argument("--jobs", type=int, default=2, metavar="N")
-    parser.add_argument("--output", type=Path, default=Path(__file__).parents[2] / "reference" / "claims.json")
     arguments = parser.parse_args()
     shares = claim_shares(runs=arguments.runs, seed=arguments.seed, jobs=arguments.jobs)
     trials = number_trials(jobs=arguments.jobs)
-    arguments.output.write_text(as_json(shares, trials, arguments.runs, arguments.seed), encoding="utf-8")
+    FILE.write_text(runs_as_json(shares, trials, arguments.runs, arguments.seed), encoding="utf-8")
+    verdicts = Path(__file__).parents[2] / "reference" / "claims.json"
+    verdicts.write_text(verdicts_as_json(claim_runs()), encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -126,36 +126,29 @@ _TARGETS = (
 TARGETS = tuple(one for one in _TARGETS if one.group != "mujoco" or importlib.util.find_spec("mujoco"))
 
 
-# What sees the mutants of a module that no check can see.
-_PARTS = "models/test_exudyn_parts.py::test_"
+# What sees the mutants of a module that no check can see: files of a few seconds, of the others single tests.
+_PARTS = ("models/test_exudyn_parts.py",)
 _MUJOCO = "models/test_mujoco.py::test_"
-_PITCH = "models/test_pitch_loads.py::test_"
+_WORK = "models/test_pitch_loads.py::test_work_"
 _RULES = (
     "analysis/test_status_rules.py",
-    "solution/test_unchecked.py::test_a_wrong_motion_is_unchecked_where_nothing_can_tell",
-    "solution/test_judgement.py::test_an_open_joint_is_caught",
-    "solution/test_unchecked.py::test_a_start_turns_away_leaves_ten_units_in_its_last_place_open",
+    "solution/test_judgement.py::test_a_run_that_broke_off_names_time_and_reason",
+    "solution/test_judgement.py::test_a_wrong_motion_is_unchecked_where_nothing_can_tell",
+    "solution/test_judgement.py::test_a_start_turns_away_leaves_ten_units_in_its_last_place_open",
 )
-_CHECK = "studies/test_check.py::test_"
-_REFERENCE = "models/test_reference.py::test_"
+_CHECK = "studies/test_check.py::test_a_"
 _PRINTED = ("models/test_printed.py", "analysis/test_errata.py")
-_DEFAULTS = "analysis/test_run_integrity.py::test_defaults_are_the_settings_that_the_bounds_were_found_with"
+_DEFAULTS = "analysis/test_run_integrity.py"
 _TESTS = {
     f"{_L}.closed_form": _PRINTED,
     f"{_L}.parameters": _PRINTED,
-    f"{_P}.literal": _PRINTED,
+    f"{_P}.literal": (*_PRINTED, "models/test_printed_method.py::test_figure_4b_is_a_pendulum"),
     f"{_P}.derivation": _PRINTED,
-    f"{_M}.geometry": (f"{_PARTS}mountings_balance_exactly",),
-    f"{_M}.chain": (f"{_PARTS}a_spring_over_time_resists_from_its_offset",),
-    f"{_M}.sensor_samples": (
-        f"{_PARTS}unwrapping_follows_rates_over_turns_between_rows",
-        f"{_PARTS}cumulative_integral_is_exact_on_uneven_rows",
-        f"{_PARTS}cumulative_integral_of_a_mirrored_function_is_mirrored",
-        "models/test_exudyn_work.py",
-        f"{_PITCH}work_of_a_constant_torque_and_of_a_constant_rest_angle[exudyn_tree/rk44]",
-    ),
+    f"{_M}.geometry": _PARTS,
+    f"{_M}.chain": _PARTS,
+    f"{_M}.sensor_samples": (*_PARTS, f"{_WORK}of_a_constant_torque_and_of_a_constant_rest_angle[exudyn_tree/rk44]"),
     "rotor_mbs.scenario.time_table": ("scenario/test_time_table.py",),
-    f"{_M}.tree": ("solution/test_judgement_messages.py",),
+    f"{_M}.tree": ("solution/test_judgement.py::test_the_tree_is_listed_with_what_it_has",),
     f"{_J}.mjcf": (
         f"{_MUJOCO}point_masses_have_no_inertia_that_the_scene_does_not_give",
         f"{_MUJOCO}an_inertia_at_the_limit_of_the_triangle_inequality",
@@ -166,64 +159,23 @@ _TESTS = {
         f"{_MUJOCO}torque_ramp_on_a_balanced_rotor",
         f"{_MUJOCO}full_inertia_springs_dampers_and_torque_follow_the_closed_form",
     ),
-    "rotor_mbs.analysis.judgement": ("solution/test_judgement_messages.py", *_RULES),
+    "rotor_mbs.analysis.judgement": _RULES,
     "rotor_mbs.solution.metrics": _RULES,
     "rotor_mbs.models.ode45": (_DEFAULTS, "models/test_ode45.py"),
-    f"{_M}.schemes": (
-        _DEFAULTS,
-        f"{_PARTS}counts_of_steps_and_evaluations",
-        f"{_PARTS}an_implicit_scheme_has_accelerations_anyway",
-        f"{_PARTS}a_wrong_setting_is_told_with_what_is_allowed",
-    ),
-    f"{_M}.solvers": (
-        _DEFAULTS,
-        f"{_PARTS}samples_the_engine_cannot_tell_apart_are_refused",
-        f"{_PARTS}a_wrong_setting_is_told_with_what_is_allowed",
-        f"{_PARTS}an_implicit_scheme_has_accelerations_anyway",
-        f"{_PARTS}loads_and_rotation_vectors_are_refused_together_alone",
-        f"{_PARTS}rows_between_samples_are_kept_where_work_needs_them",
-        f"{_PARTS}a_scheme_that_chooses_its_steps_ends_one_at_every_sample",
-        "models/test_extrapolation.py::test_steps_are_those_of_all_runs_and_fit_each_other",
-    ),
+    f"{_M}.schemes": (_DEFAULTS, *_PARTS),
+    f"{_M}.solvers": (_DEFAULTS, *_PARTS, "models/test_extrapolation.py::test_steps_are_those_of_all_columns"),
     f"{_M}.adapter": (
-        f"{_PARTS}counts_of_steps_and_evaluations",
-        f"{_PARTS}a_solve_that_fails_is_counted_to_the_last_step_that_it_took",
-        f"{_PARTS}samples_stand_exactly_at_their_times",
-        f"{_PARTS}a_row_stands_at_the_end_of_every_step_that_an_adaptive_scheme_takes",
-        f"{_PARTS}loads_at_the_start_are_those_of_the_start_whatever_intervals_follow",
-        f"{_PARTS}the_cause_of_a_failure_is_found_behind_others",
-        f"{_PARTS}a_hopeless_solve_ends_soon_and_says_so_in_one_line[exudyn_tree/dopri5]",
-        "solution/test_judgement.py::test_a_long_run_keeps_its_samples_when_ended[exudyn_tree/rk67]",
-        f"{_PARTS}a_scheme_that_chooses_its_steps_ends_one_at_every_sample",
-        "models/test_linearization.py::test_joint_forces_stiffen_the_chain",
-        "models/test_linearization.py::test_closed_form_tree_chain_and_mujoco_have_the_same_frequencies[paper/fig08-0.0]",
-        f"{_PARTS}ctrl_c_inside_a_solve_is_an_interrupt",
+        *_PARTS,
+        "models/test_linearization.py",
         "models/test_exudyn_models.py::test_large_chains_alone_are_solved_by_a_sparse_factorization",
     ),
     f"{_L}.ode_solvers": ("models/test_segments.py",),
     f"{_L}.methods": (_DEFAULTS, "methods/test_settings.py"),
-    f"{_L}.taylor": (
-        "models/test_sweep_ensemble.py::test_runs_side_by_side_are_the_runs_one_by_one[fixed pitch]",
-        "models/test_segments.py",
-        "models/test_lagrange.py::test_error_growth_is_that_of_neighbouring_runs",
-    ),
-    f"{_L}.samples": (
-        f"{_PITCH}work_of_a_constant_torque_and_of_a_constant_rest_angle[lagrange/dop853]",
-        f"{_PITCH}work_and_energy_of_a_step_of_the_command[lagrange/dop853]",
-        "models/test_segments.py",
-    ),
+    f"{_L}.taylor": ("models/test_segments.py", "models/test_lagrange.py", "models/test_sweep_ensemble.py"),
+    f"{_L}.samples": ("models/test_segments.py", f"{_WORK}and_energy_of_a_step_of_the_command[lagrange/dop853]"),
     f"{_L}.reference": (
-        f"{_CHECK}a_reference_computed_now_is_the_frozen_one[check/general]",
-        f"{_REFERENCE}the_uncertainty_is_ten_times_difference_and_rounding_and_never_falls",
-        f"{_REFERENCE}a_reference_that_fails_says_why_and_how_far_the_better_run_came",
-        f"{_REFERENCE}a_reference_has_loads_where_they_are_asked_for",
-        f"{_REFERENCE}a_reference_of_which_one_run_ends_early",
-        f"{_REFERENCE}quotients_are_known_as_far_as_both_runs_went",
-        f"{_REFERENCE}where_heyoka_is_not_installed_the_fallback_takes_its_place",
-        f"{_REFERENCE}growth_over_one_interval_is_that_over_its_halves",
-        f"{_REFERENCE}a_pitch_that_is_fixed_has_no_growth_and_no_unit",
-        f"{_REFERENCE}amplification_of_a_stiff_oscillation_is_one",
-        f"{_REFERENCE}growth_is_known_as_far_as_the_variational_equations_went",
+        "models/test_reference.py",
+        f"{_CHECK}reference_computed_now_is_the_frozen_one[check/general]",
         "studies/test_compare_data.py::test_growth_of_each_channel_is_at_most_that_of_all",
         "studies/test_compare_data.py::test_the_reference_at_the_times_of_the_data_is_the_frozen_one",
     ),
@@ -231,10 +183,10 @@ _TESTS = {
     f"{_A}.kinematics": ("analysis/test_checks.py",),
     f"{_A}.checks": (
         "analysis/test_checks.py",
-        f"{_CHECK}a_run_that_was_changed_together_with_its_checksum_fails",
-        f"{_CHECK}a_reference_that_is_altered_or_not_there_fails",
+        f"{_CHECK}run_that_was_changed_together_with_its_checksum_fails",
+        f"{_CHECK}reference_that_is_altered_or_not_there_fails",
     ),
-    f"{_A}.run_integrity": ("analysis/test_run_integrity.py",),
+    f"{_A}.run_integrity": (_DEFAULTS,),
     f"{_A}.claims": ("analysis/test_claims.py",),
 }
 

@@ -3,8 +3,6 @@
     >>> c, s3 = Symbol("c"), Symbol("s3")
     >>> str(-c * s3 + 2 * c**2)
     '-c s3 + 2 c²'
-    >>> str(0.1 * CodeSymbol("w0") * CodeSymbol("w1"))
-    '0.1*w0*w1'
 
 Sums, products, quotients and whole powers; zeros and ones are dropped, nothing else is simplified.
 """
@@ -21,8 +19,6 @@ _SUPERSCRIPTS = str.maketrans("0123456789", "⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 class Symbol:
     """A formula as text; `binding` tells whether it needs brackets inside another."""
-
-    times = " "  # between the factors of a product
 
     def __init__(self, text: str, binding: int = _ATOM) -> None:
         self.text = text
@@ -79,13 +75,7 @@ class Symbol:
             return -left
         factor = _bracketed(right, _PRODUCT)
         factor = f"({factor})" if factor.startswith("-") else factor
-        return self._formula(f"{_bracketed(left, _PRODUCT)}{self.times}{factor}", _PRODUCT)
-
-
-class CodeSymbol(Symbol):
-    """A formula in Python's notation."""
-
-    times = "*"
+        return self._formula(f"{_bracketed(left, _PRODUCT)} {factor}", _PRODUCT)
 
 
 def _is(operand: Operand, number: int) -> bool:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import io
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,11 +17,10 @@ from matplotlib.axis import Axis
 from matplotlib.collections import QuadMesh as QuadMesh
 from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
 from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
 
 from rotor_mbs.errors import InputError
-from rotor_mbs.report.core.looks import VERMILLION, Look
+from rotor_mbs.report.core.looks import Look
 from rotor_mbs.report.core.numbers import power
 from rotor_mbs.runs.files import replace_file
 
@@ -47,6 +46,25 @@ class Panels:
 
     def _repr_svg_(self) -> str:
         return encoded(self.figure, "svg", for_print=False).decode()
+
+    def labelled(self) -> dict[str, Any]:
+        """The first artist of each label, in the order in which they were drawn."""
+        artists: dict[str, Any] = {}
+        for axes in self.figure.axes:
+            for artist, label in zip(*axes.get_legend_handles_labels(), strict=True):
+                artists.setdefault(label, artist)
+        return artists
+
+    def with_legend(self) -> Panels:
+        """Itself, with a legend above: curves over decades leave no room on the axes."""
+        artists = self.labelled()
+        with style():
+            self.axes[0].legend(
+                artists.values(), artists, loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2, frameon=False,
+                fontsize=8.0,
+            )  # fmt: skip
+        self.figure.subplots_adjust(top=0.95 - 0.07 * math.ceil(len(artists) / 2))
+        return self
 
     def save(self, path: str | Path) -> None:
         """As PDF, SVG or PNG, by the ending of `path`. Raises InputError for another one, StoreError."""
@@ -98,15 +116,6 @@ def style(*, for_print: bool = False) -> AbstractContextManager[None]:
     return matplotlib.rc_context(_PRINT_STYLE if for_print else _PAGE_STYLE)
 
 
-def legend(target: Any, labelled: Sequence[tuple[str, Look]], *, for_print: bool = False, **place: Any) -> None:
-    """A line per (label, look) on axes, where they have most room, or where `place` says, on axes or a figure."""
-    with style(for_print=for_print):
-        handles = [
-            Line2D([], [], color=look.colour, ls=look.line, marker=look.marker, label=label) for label, look in labelled
-        ]
-        target.legend(handles=handles, **(place or {"loc": "best", "fontsize": 8.0}))
-
-
 def encoded(figure: Figure, kind: str, *, for_print: bool = True) -> bytes:
     """The figure as a file of one of KINDS; the same bytes every time."""
     metadata: dict[str, Any] = {"pdf": {"CreationDate": None}, "svg": {"Date": None}, "png": {"Software": None}}[kind]
@@ -135,9 +144,9 @@ def ticks(axis: Any, labels: Mapping[float, str]) -> None:
 
 
 def curve(axes: Any, x: Any, y: Any, look: Look, width: float = 1.2, **more: Any) -> None:
-    """A line with markers that are white inside, as far as the look has them."""
+    """A line with markers that are white inside, as far as the look has them; its label stands in the legend."""
     axes.plot(
-        x, y, color=look.colour, linestyle=look.line, linewidth=width, marker=look.marker,
+        x, y, color=look.colour, linestyle=look.line, linewidth=width, marker=look.marker, label=look.label or "_",
         **{"markersize": 4.2, "markerfacecolor": "white"} | more,
     )  # fmt: skip
 
@@ -153,11 +162,12 @@ def colour_map(
         panels.figure.colorbar(mesh, ax=axes).set_label(label)
 
 
-def growth_map(panels: Panels, x: Any, y: Any, growth: Any, largest: float, label: str, boundary: float) -> bool:
-    """Powers of ten of the growth as colour, from 1 to `largest`, and whether there is a line at `boundary`."""
+def growth_map(
+    panels: Panels, x: Any, y: Any, growth: Any, largest: float, label: str, boundary: Look, at: float
+) -> None:
+    """Powers of ten of the growth as colour, from 1 to `largest`, and a line where it is `at`."""
     levels, top = np.log10(np.maximum(growth, np.finfo(float).tiny)), np.log10(largest)
     colour_map(panels, x, y, np.clip(levels, 0.0, top), label, 0.0, top)
-    has_line = min(levels.shape) > 1 and bool(np.nanmin(levels) < np.log10(boundary) < np.nanmax(levels))
-    if has_line:
-        panels.axes[0].contour(x, y, levels, levels=[np.log10(boundary)], colors=[VERMILLION], linewidths=1.0)
-    return has_line
+    if min(levels.shape) > 1 and np.nanmin(levels) < np.log10(at) < np.nanmax(levels):
+        panels.axes[0].contour(x, y, levels, levels=[np.log10(at)], colors=[boundary.colour], linewidths=1.0)
+        curve(panels.axes[0], [], [], boundary)  # for the legend

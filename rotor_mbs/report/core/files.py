@@ -9,29 +9,48 @@ from collections.abc import Iterable, Mapping, Sequence
 from functools import cache
 from os import PathLike
 from pathlib import Path
+from typing import NamedTuple
 
 import jinja2
 from markupsafe import Markup, escape
 
 from rotor_mbs.errors import StoreError
 from rotor_mbs.report.core import numbers
-from rotor_mbs.report.core.elements import DASHES, MARKS
-from rotor_mbs.report.core.looks import GREY, class_of, palette_css, with_light_palette
+from rotor_mbs.report.core.looks import palette_css, with_light_palette
 from rotor_mbs.runs.files import refuse_foreign, replace_file
 
 GENERATOR = "rotor_mbs report"
 _MARK = f'<meta name="generator" content="{GENERATOR}">'.encode()  # of every page
 INDEX, ERRATA, FIGURES = "index.html", "errata.html", "figures.html"
 BENCH, MODES, COMPARISON, CHECK = "bench.html", "modes.html", "comparison.html", "check.html"
-Site = Sequence[tuple[str, str]]  # (file, label) of the main pages of a report, in order
+BENCH_CSV = "bench.csv"
 _TEMPLATES = Path(__file__).resolve().parents[1] / "templates"
 _LONGEST = 100  # characters; file systems allow 255 bytes
-_OTHERS = ("bench-", "data--")  # beginnings of the names of other pages than those of scenes
+_OTHERS = "data--"  # the beginning of the names of other pages than those of scenes
 _CONTENTS = "<!-- contents -->"  # its place in a template
 _SECTION = re.compile(r'<section id="([^"]+)"[^>]*>\s*(?:<details><summary>)?<h2>(.*?)</h2>')
-_MANY_SECTIONS = 4
+_MANY_SECTIONS = 3
+# Attributes of a results file that say what made it.
+_VERSIONS = ("rotor_mbs", "python", "exudyn", "heyoka", "mujoco", "numpy", "scipy", "h5py", "platform", "cpu")
 # Control characters but those of lines and tabs, and halves of surrogate pairs: names and messages come from any file.
 _UNPRINTABLE = re.compile(r"[\x00-\x08\x0b\x0c\x0e-\x1f\x7f-\x9f\ud800-\udfff]")
+
+
+class Site(NamedTuple):
+    """What all pages of a report show: (file, label) of the main ones, in order, and what made the results."""
+
+    links: Sequence[tuple[str, str]] = ()
+    versions: Sequence[tuple[str, str]] = ()
+
+
+_NO_SITE = Site()
+
+
+def made_with(attributes: Mapping[str, object]) -> list[tuple[str, str]]:
+    """(what, version) of the programs and the computer that made a file, and when."""
+    made = [(name, str(attributes[name])) for name in _VERSIONS if attributes.get(name)]
+    created = str(attributes.get("created", ""))
+    return [*made, ("created", f"{created[:16].replace('T', numbers.SPACE)}{numbers.SPACE}UTC")] if created else made
 
 
 def page_names(scenes: Iterable[str]) -> dict[str, str]:
@@ -78,11 +97,13 @@ def _mark_of(name: str) -> bytes:
     return rb"\Ascene,method," if name.endswith(".csv") else _MARK
 
 
-def render(template: str, page: Mapping[str, object], site: Site = (), here: str = "") -> str:
+def render(template: str, page: Mapping[str, object], site: Site = _NO_SITE, here: str = "") -> str:
     """The HTML of `page` by templates/`template`.html.j2, which says what `page` must have; with a table of contents
     where the page has many sections."""
-    links = [(file, label, file == here) for file, label in site] if {file for file, _ in site} - {here} else []
-    html = _environment().get_template(f"{template}.html.j2").render(page=page, site=links)
+    links = [(file, label, file == here) for file, label in site.links]
+    if all(is_here for _, _, is_here in links):
+        links = []
+    html = _environment().get_template(f"{template}.html.j2").render(page=page, links=links, versions=site.versions)
     sections = _SECTION.findall(html)
     contents = ""
     if len(sections) >= _MANY_SECTIONS:
@@ -91,9 +112,12 @@ def render(template: str, page: Mapping[str, object], site: Site = (), here: str
     return html.replace(_CONTENTS, contents, 1)
 
 
-def write_page(folder: str | PathLike[str], template: str, page: Mapping[str, object]) -> Path:
-    """One page as the index of a folder; its path. Raises StoreError where it cannot be written."""
-    write_pages(Path(folder), {INDEX: render(template, page)})
+def write_page(
+    folder: str | PathLike[str], template: str, page: Mapping[str, object], attributes: Mapping[str, object]
+) -> Path:
+    """One page as the index of a folder; its path. attributes: of what it shows, with what made it. Raises StoreError
+    where it cannot be written."""
+    write_pages(Path(folder), {INDEX: render(template, page, Site(versions=made_with(attributes)))})
     return Path(folder) / INDEX
 
 
@@ -122,8 +146,6 @@ def _environment() -> jinja2.Environment:
         style=Markup(palette_css() + style + picture.strip()),
         scripts=scripts,
         hashes=hashes,
-        marks=MARKS,
-        dashes=DASHES,
     )
     environment.filters.update(
         number=numbers.number,
@@ -131,7 +153,6 @@ def _environment() -> jinja2.Environment:
         typeset=numbers.typeset,
         formula=numbers.formula,
         breakable=_breakable,
-        ink=lambda colour: class_of(colour) or class_of(GREY),
     )
     return environment
 

@@ -4,18 +4,22 @@ from __future__ import annotations
 
 import re
 import zlib
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from rotor_mbs.methods.catalogue import label_of as label_of
 
 
 @dataclass(frozen=True)
 class Look:
-    """How a curve is drawn: colour ("#0072b2"), line ("-", "--", "-.", ":") and marker, in matplotlib's notation."""
+    """How a curve is drawn, in matplotlib's notation: colour ("#0072b2"), line ("-", "--", "-.", ":") and marker.
+
+    label: what it is called in a legend; "" where it stands in none.
+    """
 
     colour: str
     line: str
     marker: str
+    label: str = ""
 
 
 # Every colour of a picture, and what stands for it on a dark page. A picture has colours of methods or of coordinates,
@@ -78,11 +82,11 @@ _OTHER_MARKERS = ("D", "o", "s", "^", "v", "P", "X", "h", "p", "<", ">")
 def look_of(curve: str) -> Look:
     """Return how a method, or a curve of the bench, is drawn; one that is not in the table in grey."""
     if curve in _LOOKS:
-        return _LOOKS[curve]
+        return replace(_LOOKS[curve], label=label_of(curve))
     code = zlib.crc32(curve.encode("utf-8", "replace"))
     line = _OTHER_LINES[code % len(_OTHER_LINES)]
     marker = _OTHER_MARKERS[code // len(_OTHER_LINES) % len(_OTHER_MARKERS)]
-    return Look(GREY, line, marker)
+    return Look(GREY, line, marker, label_of(curve))
 
 
 def class_of(colour: str) -> str:
@@ -107,7 +111,9 @@ def with_capital(text: str) -> str:
     return text[:1].upper() + text[1:]
 
 
-def coordinate_look(index: int) -> Look:
+def coordinate_look(index: int, label: str = "") -> Look:
     """Line of a coordinate: 0 the rotor, i the pitch (and the tip) of blade i."""
-    colour = COORDINATES[0] if index == 0 else COORDINATES[1 + (index - 1) % (len(COORDINATES) - 1)]
-    return Look(colour, "-" if index == 0 else ("-", "--", "-.")[(index - 1) % 3], "")
+    if not index:
+        return Look(COORDINATES[0], "-", "", label or "rotor")
+    colour = COORDINATES[1 + (index - 1) % (len(COORDINATES) - 1)]
+    return Look(colour, ("-", "--", "-.")[(index - 1) % 3], "", label or f"pitch {index}")

@@ -15,10 +15,10 @@ _PREFIXES = (
 )  # fmt: skip
 SPACE = "\N{NO-BREAK SPACE}"
 _COMPUTED = re.compile(r"(?<![\w./-])(-?\d+(?:\.\d+)?)e([+-]?\d+)\b")
-# A symbol with its index: c, q̇2, U33,3. In prose those with an index alone, "a" may be a word there,
-# and E1 is an erratum.
+# A symbol with its index: c, q̇2, U33,3. In prose "a" may be a word, E1 is an erratum, and "kg m²" is a unit.
 _SYMBOL = re.compile(r"(?<![A-Za-z&#])(q̇|[A-Za-zα-ω])(\d+(?:,\d)?)?(?![A-Za-z])")
-_SYMBOL_IN_PROSE = re.compile(r"(?<![A-Za-z&#])(q̇|[cdmqsUα-ω])(\d+(?:,\d)?)(?![A-Za-z])")
+_SYMBOL_IN_PROSE = re.compile(r"(?<![A-Za-z&#])(?<!kg )(?<!N )(q̇|[cdmqsUα-ω])(\d+(?:,\d)?)?(?![A-Za-z'])")
+_ALONE_IN_PROSE = "cdm"  # symbols there without an index
 _SIGN = re.compile(r"(?<![\w)])-(?=\S)|(?<= )-(?= )")
 
 
@@ -104,6 +104,8 @@ def formula(text: str, *, in_prose: bool = False) -> Markup:
     symbol = _SYMBOL_IN_PROSE if in_prose else _SYMBOL
 
     def typeset(match: re.Match[str]) -> str:
-        return f"<i>{match[1]}</i><sub>{match[2]}</sub>" if match[2] else f"<i>{match[1]}</i>"
+        if match[2]:
+            return f"<i>{match[1]}</i><sub>{match[2]}</sub>"
+        return match[0] if in_prose and match[1] not in _ALONE_IN_PROSE else f"<i>{match[1]}</i>"
 
     return Markup(symbol.sub(typeset, _SIGN.sub("−", str(escape(text)))))

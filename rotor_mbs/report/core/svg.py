@@ -11,16 +11,33 @@ from collections.abc import Iterator, Sequence
 from html import escape
 from typing import Any
 
+import markupsafe
 import numpy as np
 from markupsafe import Markup
 
 from rotor_mbs.report.core.canvas import TIME_AXIS, Panels, QuadMesh, hex_colour, style
-from rotor_mbs.report.core.elements import MARKS, LegendEntry, Picture
+from rotor_mbs.report.core.elements import Picture
 from rotor_mbs.report.core.looks import INK, PAPER, class_of
 from rotor_mbs.report.core.numbers import SPACE, power
 from rotor_mbs.solution.trajectory import Array
 
 Box = tuple[float, float, float, float]  # left, top, right, bottom
+# Paths of markers around a point, in relative steps: several can stand in one path.
+MARKS = {
+    "o": "m3 0c0 4-6 4-6 0c0-4 6-4 6 0z",
+    "s": "m-3-3h6v6h-6z",
+    "^": "m0-3.5l3.5 6.5h-7z",
+    "v": "m0 3.5l3.5-6.5h-7z",
+    "x": "m-3-3l6 6m0-6l-6 6",
+    "D": "m0-4l4 4l-4 4l-4-4z",
+    "P": "m-1-3h2v2h2v2h-2v2h-2v-2h-2v-2h2z",
+    "X": "m-3-1.8l1.2-1.2 1.8 1.8 1.8-1.8 1.2 1.2-1.8 1.8 1.8 1.8-1.2 1.2-1.8-1.8-1.8 1.8-1.2-1.2 1.8-1.8z",
+    "h": "m0-3.2l2.8 1.6v3.2l-2.8 1.6-2.8-1.6v-3.2z",
+    "*": "m0-4l1 3h3l-2 2l1 3l-3-2l-3 2l1-3l-2-2h3z",
+    "<": "m-3.5 0l6.5-3.5v7z",
+    ">": "m3.5 0l-6.5-3.5v7z",
+    "p": "m0-4l3.8 2.8l-1.5 4.4h-4.6l-1.5-4.4z",
+}
 _DASHES = {"--": (3.7, 1.6), "-.": (6.4, 1.6, 1.0, 1.6), ":": (1.0, 1.65)}
 _ANCHORS = {"left": "start", "right": "end", "center": "middle"}
 _DROPS = {"center": 3.4, "center_baseline": 3.4, "top": 11.0, "bottom": -2.0}  # of a text below its place
@@ -30,10 +47,9 @@ _LETTER = 5.3  # points, the mean width of a letter
 _SHADES = 16  # of a map
 
 
-def picture(
-    panels: Panels, name: str, caption: str, notes: Sequence[str] = (), legend: Sequence[LegendEntry] = ()
-) -> Picture:
-    """The figure for a page, an `svg` element whose alternative text is the caption; `name` is unique on the page."""
+def picture(panels: Panels, name: str, caption: str, notes: Sequence[str] = ()) -> Picture:
+    """The figure for a page, an `svg` element whose alternative text is the caption; `name` is unique on the page. Its
+    legend has the labels of what is drawn."""
     page = _Page(panels.figure)
     with style():
         body = "".join(part for axes in panels.figure.axes for part in page.axes(axes))
@@ -41,7 +57,13 @@ def picture(
         f'<svg viewBox="0 0 {_short(page.width)} {_short(page.height)}" role="img" aria-labelledby="{name}-t">'
         f'<title id="{name}-t">{escape(caption)}</title>{body}{page.cursor(panels.axes)}</svg>'
     )
-    return Picture(Markup(text), caption, notes, legend)
+    items = []
+    for label, artist in panels.labelled().items():
+        swatch = "".join(_swatch(artist))
+        items.append(f'<li><svg viewBox="0 0 24 8" width="34" height="12" aria-hidden="true">{swatch}</svg> ')
+        items.append(f"{markupsafe.escape(label)}</li>")
+    legend = f'<ul class="legend">{"".join(items)}</ul>' if items else ""
+    return Picture(Markup(text), caption, notes, Markup(legend))
 
 
 class _Page:
@@ -132,23 +154,11 @@ class _Page:
             yield _words(left, top - 6.0, title, "start")
 
     def _line(self, line: Any) -> Iterator[str]:
-        """A curve, then its markers: one path, which begins at the place of each and goes on in relative steps."""
-        colour, width, pattern = line.get_color(), float(line.get_linewidth()), line.get_linestyle()
-        if pattern in ("-", *_DASHES) and width > 0.0 and (text := self._path(line.get_path(), line.get_transform())):
-            dashes = " ".join(_short(width * dash) for dash in _DASHES.get(pattern, ()))
-            more = _opacity(line.get_alpha()) + (f' stroke-dasharray="{dashes}"' if dashes else "")
-            yield f'<path{_ink(colour)}{more} stroke-width="{width:.3g}" d="{text}"/>'
-        marker, (first, step) = MARKS.get(str(line.get_marker()), ""), line.get_markevery() or (0, 1)
+        first, step = line.get_markevery() or (0, 1)
         data = np.asarray(line.get_xydata(), float)[first::step]
         data = data[np.isfinite(data).all(axis=1)]
-        if marker and len(data):
-            scale = float(line.get_markersize()) / 6.0
-            shape = re.sub(r"\d*\.?\d+", lambda digits: _short(float(digits[0]) * scale), marker)
-            places = self._placed(line.get_transform().transform(data))
-            face = hex_colour(line.get_markerfacecolor()) if line.get_markerfacecolor() != "none" else ""
-            ink = _ink(line.get_markeredgecolor(), {"": "", PAPER: " open"}.get(face, " filled"))
-            text = "".join(f"M{_short(x)} {_short(y)}{shape}" for x, y in places)
-            yield f'<path{ink} stroke-width="{float(line.get_markeredgewidth()):.2g}" d="{text}"/>'
+        places = self._placed(line.get_transform().transform(data)) if len(data) else data
+        yield from _curve(line, self._path(line.get_path(), line.get_transform()), places)
 
     def _map(self, mesh: Any) -> Iterator[str]:
         """Cells as colour, in shades; neighbours in a row that have the same shade are one rectangle."""
@@ -195,6 +205,32 @@ class _Page:
                 x, y = 0.1 * tenths[0]
                 parts.append(f"M{_short(x)} {_short(y)}l{' '.join(numbers).replace(' -', '-')}")
         return "".join(parts)
+
+
+def _curve(line: Any, path: str, places: Array) -> Iterator[str]:
+    """A line along a path, then its markers: one path, from the place of each in relative steps."""
+    width, pattern = float(line.get_linewidth()), line.get_linestyle()
+    if pattern in ("-", *_DASHES) and width > 0.0 and path:
+        dashes = " ".join(_short(width * dash) for dash in _DASHES.get(pattern, ()))
+        more = _opacity(line.get_alpha()) + (f' stroke-dasharray="{dashes}"' if dashes else "")
+        yield f'<path{_ink(line.get_color())}{more} stroke-width="{width:.3g}" d="{path}"/>'
+    marker = MARKS.get(str(line.get_marker()), "")
+    if marker and len(places):
+        scale = float(line.get_markersize()) / 6.0
+        shape = re.sub(r"\d*\.?\d+", lambda digits: _short(float(digits[0]) * scale), marker)
+        face = hex_colour(line.get_markerfacecolor()) if line.get_markerfacecolor() != "none" else ""
+        ink = _ink(line.get_markeredgecolor(), {"": "", PAPER: " open"}.get(face, " filled"))
+        text = "".join(f"M{_short(x)} {_short(y)}{shape}" for x, y in places)
+        yield f'<path{ink} stroke-width="{float(line.get_markeredgewidth()):.2g}" d="{text}"/>'
+
+
+def _swatch(artist: Any) -> Iterator[str]:
+    """A piece of a curve with its marker, or of an area, for a legend."""
+    if hasattr(artist, "get_xydata"):
+        yield from _curve(artist, "M0 4H24", np.array([[12.0, 4.0]]))
+    else:
+        *_, alpha = face = np.atleast_2d(artist.get_facecolor())[0]
+        yield f'<path{_ink(hex_colour(face))}{_opacity(float(alpha))} stroke-width="6" d="M0 4H24"/>'
 
 
 def _ticks(axis: Any) -> tuple[Array, Sequence[str]]:

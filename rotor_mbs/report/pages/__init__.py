@@ -5,9 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
-from rotor_mbs.analysis.claim_study import ClaimStudy
 from rotor_mbs.analysis.claims import Claim
-from rotor_mbs.analysis.published import Erratum
+from rotor_mbs.analysis.published import ClaimStudy, Erratum
 from rotor_mbs.analysis.stability import SuiteRun
 from rotor_mbs.runs.records import Record
 

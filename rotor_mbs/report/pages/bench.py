@@ -1,4 +1,4 @@
-"""Error against run time: its pages, one for each scene and an index; its section on others; diagram, tables, CSV."""
+"""Error against run time: its page, its section on other pages; diagram, tables, CSV."""
 
 from __future__ import annotations
 
@@ -9,7 +9,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
-from markupsafe import Markup
 
 from rotor_mbs.analysis import work_precision
 from rotor_mbs.analysis.rehydrate import scene_of
@@ -17,12 +16,12 @@ from rotor_mbs.errors import MethodRefusal
 from rotor_mbs.methods.catalogue import find_method, ladders
 from rotor_mbs.report.core import canvas
 from rotor_mbs.report.core.canvas import Panels
-from rotor_mbs.report.core.elements import LegendEntry, PageTable, Picture, Row, Section, TableCell, line_entry
-from rotor_mbs.report.core.files import Site, page_names, render
+from rotor_mbs.report.core.elements import PageTable, Picture, Row, Section, TableCell
+from rotor_mbs.report.core.files import BENCH_CSV
 from rotor_mbs.report.core.looks import GREY, Look, label_of, look_of
 from rotor_mbs.report.core.numbers import NOTHING, number, power, prefixed, with_unit
 from rotor_mbs.report.core.svg import picture
-from rotor_mbs.report.pages.scene_tables import method_cell, versions, words_of
+from rotor_mbs.report.pages.scene_tables import method_cell, words_of
 from rotor_mbs.runs.read import OpenResults, StoredScene
 from rotor_mbs.runs.records import Record, read_records
 from rotor_mbs.runs.table import COLUMNS
@@ -38,71 +37,56 @@ _LOWEST_ERROR = 1e-16  # rad: smaller ones are drawn there
 _FAILED_LEFT, _FAILED, _FAILED_RIGHT = 3.0, 20.0, 120.0  # rad: the band of failed runs on the axis of errors
 
 
-def bench_pages(main: str, site: Site, results: OpenResults) -> dict[str, str]:
-    """By file name, the pages on the curves of `results`, and CSV; `main`: the file of the one over all scenes."""
+def bench_page(results: OpenResults) -> dict[str, object]:
+    """The content of the page: the fastest methods, then the curves of each scene."""
     grouped = work_precision.by_scene(read_records(results.path, "bench"))
     scenes = {name: grouped[name] for name in natural_order(grouped)}
-    files = {name: f"bench-{file}" for name, file in page_names(scenes).items()}
-    pictures = []
+    parts = []
     for i, (name, curves) in enumerate(scenes.items()):
-        small = picture(diagram(curves, height=2.6, small=True), f"bench-s{i}", name)
-        pictures.append(replace(small, caption=Markup('<a href="{}">{}</a>').format(files[name], name)))
-    every_curve = [curve for curves in scenes.values() for curve in curves]
-    one_of_each = {curve.name: curve for curve in every_curve}
-    index = {
-        "fastest": Section(tables=[overview_table(scenes, files)]),
-        "scenes": Section(pictures, cost_legend(list(one_of_each.values()))),
-        "csv": "bench.csv",
-        "versions": versions(results.attributes),
-    }
-    pages = {main: render("bench", index, site, main), "bench.csv": csv_text(every_curve)}
-    for name, curves in scenes.items():
-        csv_file = files[name].removesuffix(".html") + ".csv"
-        pictures = [picture(diagram(curves), "bench-0", "Run time of the integration alone")]
+        pictures = [picture(diagram(curves), f"bench-{i}", "Run time of the integration alone: lower left is best")]
         if "is_short" not in curves[0].attributes:  # workers there keep what runs before have compiled
             caption = "With set-up (everything compiled anew) and reading out of samples"
-            pictures.append(picture(diagram(curves, with_setup=True), "bench-1", caption))
+            pictures.append(picture(diagram(curves, with_setup=True), f"bench-{i}-setup", caption))
         orders = []
         for curve in curves:
             if "order_expected" in curve.attributes:
                 order = number(curve.attributes.get("order"), 3)
                 orders.append([method_cell(curve.name), order, f"{curve.attributes['order_expected']:g}"])
-        caption = "Fitted on the finest points above the round-off floor."
-        page = {
-            "scene": name,
+        caption = "Order of convergence, fitted on the finest points above the round-off floor"
+        parts.append({
+            "id": f"scene-{i}",
+            "name": name,
             "facts": curves[0].attributes,
-            "diagram": Section(pictures, cost_legend(curves)),
-            "reach": Section(tables=[reach_table(curves)]),
-            "order": Section(tables=[PageTable(caption, ["method", "order", "expected"], orders)]),
-            "failures": Section(tables=[failure_table(curves, results.scenes.get(name))]),
-            "points": Section(tables=[_point_table(curves)]),
-            "csv": csv_file,
-        }
-        pages[files[name]] = render("bench_scene", page, site)
-        pages[csv_file] = csv_text(curves)
-    return pages
+            "diagram": Section(pictures),
+            "tables": [
+                reach_table(curves),
+                PageTable(caption, ["method", "order", "expected"], orders),
+                failure_table(curves, results.scenes.get(name)),
+            ],
+            "points": _point_table(curves),
+        })  # fmt: skip
+    return {"fastest": overview_table(scenes), "scenes": parts, "csv": BENCH_CSV}
 
 
 def cost_section(scene: StoredScene, curves: Sequence[Record]) -> Section:
     """The curves measured on the scene, else its own runs, a point each; empty where no run has an error."""
-    known = [*curves] or work_precision.own_points(scene)
-    shown = cost_picture(known, f"Error against run time, {scene.name}")
-    if shown is None:
-        return Section()
-    notes = []
-    if not curves:
-        notes.append("Each point is a run of this file, timed while others ran beside it: good to a factor of two.")
-    return Section([shown], cost_legend(known), notes=notes)
+    pictures = cost_picture(curves or work_precision.own_points(scene), f"Error against run time, {scene.name}")
+    notes = (
+        []
+        if curves
+        else ["Each point is a run of this file, timed while others ran beside it: good to a factor of two."]
+    )
+    return Section(pictures, notes=notes)
 
 
-def cost_picture(curves: Sequence[Record], caption: str, legend: Sequence[LegendEntry] = ()) -> Picture | None:
-    """The diagram; None where no point stands on it."""
+def cost_picture(curves: Sequence[Record], caption: str) -> list[Picture]:
+    """The diagram; none where no point stands on it."""
     if not any(work_precision.succeeded(curve).any() for curve in curves):
-        return None
-    return picture(diagram(curves, height=3.4), "cost", f"{caption}: lower left is best", legend=legend)
+        return []
+    return [picture(diagram(curves, height=3.4), "cost", f"{caption}: lower left is best")]
 
 
-def diagram(curves: Sequence[Record], *, with_setup: bool = False, height: float = 3.9, small: bool = False) -> Panels:
+def diagram(curves: Sequence[Record], *, with_setup: bool = False, height: float = 3.9) -> Panels:
     """All curves of a scene, Pareto front, quartiles, and failed runs on a strip at the right.
 
     As work-precision diagrams are drawn in the field: the error falls to the left, the time downwards.
@@ -112,16 +96,20 @@ def diagram(curves: Sequence[Record], *, with_setup: bool = False, height: float
     points = [work_precision.points(curve, with_setup=with_setup) for curve in curves]
     errors, seconds = np.concatenate(points, axis=1) if points else np.empty((2, 0))
     front = work_precision.pareto(errors, seconds)
-    axes.plot(
-        np.maximum(errors[front], _LOWEST_ERROR), seconds[front],
-        color=_FRONT_COLOUR, linewidth=6.0, solid_capstyle="round", zorder=0.5,
-    )  # fmt: skip
+    if len(front) > 1:
+        axes.plot(
+            np.maximum(errors[front], _LOWEST_ERROR), seconds[front], label="best of all (Pareto front)",
+            color=_FRONT_COLOUR, linewidth=6.0, solid_capstyle="round", zorder=0.5,
+        )  # fmt: skip
     times = [seconds]
     for curve, (own_errors, own_seconds) in zip(curves, points, strict=True):
         look = look_of(curve.name)
+        if len(own_errors) < 2:
+            look = replace(look, line="")
         shown = np.maximum(own_errors, _LOWEST_ERROR)
-        canvas.curve(axes, shown, own_seconds, look, 1.0, markersize=3.0 if small else 4.2)
-        if not with_setup and not small:
+        if len(shown):
+            canvas.curve(axes, shown, own_seconds, look, 1.0)
+        if not with_setup:
             chosen = work_precision.succeeded(curve)
             low, high = curve.arrays["run_time_q1_s"][chosen], curve.arrays["run_time_q3_s"][chosen]
             axes.vlines(shown, low, high, color=look.colour, linewidth=2.2, alpha=0.6)
@@ -130,17 +118,22 @@ def diagram(curves: Sequence[Record], *, with_setup: bool = False, height: float
         times.append(failed)
         if with_setup:
             failed = failed + np.nan_to_num(curve.arrays["setup_time_s"][is_failed])
-        axes.plot(
-            np.full(len(failed), _FAILED), failed, linestyle="none", marker="x", markersize=4.0, color=look.colour
-        )
-    if _uncertainty(curves) > _LOWEST_ERROR:
-        axes.axvspan(_LOWEST_ERROR / 10.0, _uncertainty(curves), color=GREY, alpha=0.2, linewidth=0)
+        if len(failed):
+            marks = Look(look.colour, "", "x", "" if len(shown) else look.label)
+            canvas.curve(axes, np.full(len(failed), _FAILED), failed, marks, markersize=4.0)
+    # Of the reference; in quad precision far beyond the edge of the diagram.
+    uncertainty = max((float(curve.attributes.get("uncertainty_rad", 0.0)) for curve in curves), default=0.0)
+    if uncertainty > _LOWEST_ERROR:
+        label = "uncertainty of the reference"
+        axes.axvspan(_LOWEST_ERROR / 10.0, uncertainty, color=GREY, alpha=0.2, linewidth=0, label=label)
     smallest = max(errors.min(initial=1e-3), _LOWEST_ERROR)
     lowest = math.floor(math.log10(smallest) + 1e-9)
     labels = {10.0**e: power(e) for e in range(0, lowest - 1, -2 if lowest > -12 else -3)}
     largest = 3.0
-    if _has_failed(curves):
-        axes.axvspan(_FAILED_LEFT, _FAILED_RIGHT, color="#f2e3de", linewidth=0, zorder=0)
+    if any(work_precision.failed(curve).any() for curve in curves):
+        axes.axvspan(
+            _FAILED_LEFT, _FAILED_RIGHT, color="#f2e3de", linewidth=0, zorder=0, label="failed: drawn at its time"
+        )
         labels[_FAILED] = "failed"
         largest = _FAILED_RIGHT
     axes.set(xscale="log", xlim=(10.0**lowest / 2.0, largest))
@@ -151,33 +144,6 @@ def diagram(curves: Sequence[Record], *, with_setup: bool = False, height: float
     canvas.log_axis(axes, 10.0 ** math.floor(math.log10(shortest)), longest)
     axes.set_ylabel("set-up, run and read-out (s)" if with_setup else "run time (s)")
     return panels
-
-
-def _has_failed(curves: Sequence[Record]) -> bool:
-    return any(work_precision.failed(curve).any() for curve in curves)
-
-
-def _uncertainty(curves: Sequence[Record]) -> float:
-    """rad, of the reference: in quad precision far beyond the edge of the diagram, where it is not drawn."""
-    return max((float(curve.attributes.get("uncertainty_rad", 0.0)) for curve in curves), default=0.0)
-
-
-def cost_legend(curves: Sequence[Record]) -> list[LegendEntry]:
-    """Methods, front, failed points and uncertainty, as far as they are in the diagram."""
-    entries = []
-    for curve in curves:
-        look, count = look_of(curve.name), int(work_precision.succeeded(curve).sum())
-        if count < 2:  # a point alone, or none but failed ones
-            look = replace(look, line="", marker=look.marker if count else "x")
-        entries.append(LegendEntry(label_of(curve.name), look))
-    points = [work_precision.points(curve) for curve in curves]
-    if points and len(work_precision.pareto(*np.concatenate(points, axis=1))) > 1:
-        entries.append(line_entry("best of all (Pareto front)", _FRONT_COLOUR, width=6.0))
-    if _has_failed(curves):
-        entries.append(LegendEntry("failed: drawn at its time", Look(GREY, "", "x")))
-    if _uncertainty(curves) > _LOWEST_ERROR:
-        entries.append(line_entry("uncertainty of the reference", width=8.0))
-    return entries
 
 
 def csv_text(curves: Sequence[Record]) -> str:
@@ -193,12 +159,12 @@ def csv_text(curves: Sequence[Record]) -> str:
     return stream.getvalue()
 
 
-def overview_table(scenes: Mapping[str, Sequence[Record]], files: Mapping[str, str]) -> PageTable:
+def overview_table(scenes: Mapping[str, Sequence[Record]]) -> PageTable:
     """A row per scene: for each target the fastest method with its time, and the next one with its ratio."""
     rows: list[Row] = []
-    for scene, curves in scenes.items():
+    for i, (scene, curves) in enumerate(scenes.items()):
         is_cut = any(work_precision.left_out(curve) for curve in curves)
-        row = [TableCell(scene, href=files[scene])]
+        row = [TableCell(scene, href=f"#scene-{i}")]
         for target in work_precision.TARGETS_RAD:
             ranked = work_precision.fastest(curves, target)
             if not ranked:

@@ -5,11 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import replace
 
-from rotor_mbs.analysis.claim_study import FAILS, HOLDS, RULE, UNDECIDED, ClaimShares, Conditions, NumberTrials
 from rotor_mbs.analysis.claims import STATISTICS, Claim
-from rotor_mbs.analysis.published import Published, published
+from rotor_mbs.analysis.published import FAILS, HOLDS, UNDECIDED, ClaimStudy, Published, published
 from rotor_mbs.report.core.elements import PageTable, Row, TableCell
-from rotor_mbs.report.core.numbers import NOTHING, SPACE, fixed, number, power, with_unit
+from rotor_mbs.report.core.numbers import NOTHING, SPACE, fixed, number
 
 ROUNDING = "amplified rounding error, which depends on how the equations are written"
 _UNITS = {"angle": "rad", "rate": "rad/s"}
@@ -28,7 +27,8 @@ def number_table(claims: Iterable[Claim]) -> PageTable:
         if item.rounding and printed.holds:
             verdict = replace(verdict, note=ROUNDING)
         body = "rotor" if item.of.coordinate == 0 else f"pitch {item.of.coordinate}"
-        description = f"{STATISTICS[item.of.statistic].text} {body} {item.of.quantity} ({_unit(item)})"
+        _, words = STATISTICS[item.of.quantity, item.of.statistic]
+        description = f"{words} {body} {item.of.quantity} ({_unit(item)})"
         rows.append([
             item.figure,
             TableCell(description, note=f"«{item.quote}»", note_language="es"),
@@ -42,16 +42,14 @@ def number_table(claims: Iterable[Claim]) -> PageTable:
 
 
 def _unit(item: Published) -> str:
-    """Of a number; "" where it has none."""
-    return _UNITS[item.of.quantity] if item.of is not None and STATISTICS[item.of.statistic].has_unit else ""
+    return _UNITS[item.of.quantity] if item.of is not None else ""
 
 
-def claim_table(claims: Iterable[Claim], shares: ClaimShares | None = None) -> PageTable:
-    """The claims in words, a row each: verdicts by the shares of many runs, if there are any, else by stored runs."""
-    durations = [] if shares is None else shares.durations
+def claim_table(claims: Iterable[Claim], study: ClaimStudy) -> PageTable:
+    """The claims in words, a row each: verdicts by the shares of many runs."""
     head = ["Figure", "Claim"]
     for side in ("As printed", "Corrected model"):
-        head += [side, *(f"over {duration:g}{SPACE}s" for duration in durations)]
+        head += [side, *(f"over {duration:g}{SPACE}s" for duration in study.durations)]
     rows: list[Row] = []
     for claim in claims:
         item = claim.published
@@ -59,16 +57,12 @@ def claim_table(claims: Iterable[Claim], shares: ClaimShares | None = None) -> P
             continue
         statement = TableCell(item.statement, note=f"«{item.quote}»", note_language="es")
         row: list[TableCell | str] = [item.figure, statement]
-        for place, result in enumerate((claim.printed, claim.corrected)):
-            if shares is None or item.id not in shares.claims:
-                row += [_verdict(result.holds, HOLDS, FAILS), *[""] * len(durations)]
-                continue
-            method = shares.methods[place]
-            verdict = shares.verdict(item.id, method)
+        for method in study.methods:
+            verdict = study.verdicts[item.id][method]
             row.append(TableCell(verdict, tone=_TONES[verdict]))
-            for share in shares.of(item.id, method):
-                percent = f"{100.0 * share.share:.0f}{SPACE}%" if share.deciding else NOTHING
-                row.append(TableCell(percent, note=f"of {share.deciding}"))
+            for share, deciding in study.shares[item.id][method]:
+                percent = NOTHING if share is None else f"{100.0 * share:.0f}{SPACE}%"
+                row.append(TableCell(percent, note=f"of {deciding}"))
         rows.append(row)
     return PageTable("Published claims", head, rows)
 
@@ -79,46 +73,26 @@ def _verdict(holds: bool | None, yes: str, no: str) -> TableCell:
     return TableCell(yes if holds else no, tone="good" if holds else "bad")
 
 
-def study_note(shares: ClaimShares) -> str:
+def study_note(study: ClaimStudy) -> str:
     """What the shares are, and the rule of the verdicts."""
     return (
-        f"Percentages: of the deciding runs, of {shares.runs} of each scene from starts whose angles were moved by up "
-        f"to {number(shares.spread)} rad. {RULE}"
+        f"Percentages: of the deciding runs, of {study.runs} of each scene from starts whose angles were moved by up "
+        f"to {number(study.spread)} rad. {study.rule}"
     )
 
 
-def trial_tables(trials: NumberTrials) -> list[PageTable]:
+def trial_tables(study: ClaimStudy) -> list[PageTable]:
     """The published numbers for other durations, other tolerances and other ways of writing the first row of (56)."""
-    items = {item.id: item for item in published() if item.id in trials.numbers}
-    heads = [f"Fig. {item.figure}: {fixed(item.value, item.decimals)} {_unit(item)}" for item in items.values()]
-    usual = trials.usual
-
-    def values(conditions: Conditions) -> list[TableCell]:
-        tried = trials.under(conditions)
-        return [
-            TableCell(fixed(tried[name].value, item.decimals), tone="good" if tried[name].reproduced else "")
-            for name, item in items.items()
-        ]
-
-    durations: list[Row] = [
-        [with_unit(conditions.duration, "s"), *values(conditions)] for conditions in trials.of_row(usual.gravity_row)
-    ]
-    tolerances: list[Row] = [
-        [_power(conditions.relative_tolerance), _power(conditions.absolute_tolerance), *values(conditions)]
-        for conditions in trials.with_tolerances()
-    ]
-    rows: list[Row] = []
-    for row, formula in trials.rows.items():
-        conditions = replace(usual, gravity_row=row)
-        remainder = next(iter(trials.under(conditions).values())).remainder
-        rows.append([formula, number(remainder), *values(conditions)])
-    over = f", over {with_unit(usual.duration, 's')}"
-    return [
-        PageTable("The published numbers by the duration of the run", ("Duration", *heads), durations),
-        PageTable(f"The published numbers by the tolerances of ode45{over}", ("RelTol", "AbsTol", *heads), tolerances),
-        PageTable(f"By the way of writing the first row of (56){over}", ("Row", "At the start (N m)", *heads), rows),
-    ]
-
-
-def _power(value: float) -> str:
-    return power(int(f"{value:.0e}".partition("e")[2]))
+    items = [item for item in published() if item.id in study.numbers]
+    heads = [f"Fig. {item.figure}: {fixed(item.value, item.decimals)} {_unit(item)}" for item in items]
+    tables = []
+    for table in study.trials:
+        rows: list[Row] = []
+        for labels, values, reproduced in table.rows:
+            cells = [
+                TableCell(fixed(value, item.decimals), tone="good" if is_reproduced else "")
+                for value, is_reproduced, item in zip(values, reproduced, items, strict=True)
+            ]
+            rows.append([*labels, *cells])
+        tables.append(PageTable(table.caption, (*table.head, *heads), rows))
+    return tables

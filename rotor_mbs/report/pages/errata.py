@@ -26,7 +26,8 @@ def errata_page(context: Context, opened: OpenResults) -> dict[str, object]:
     agreeing = [entry for entry in entries if entry.agrees]
     differing = [entry for entry in entries if not entry.agrees]
     differing_table = PageTable(
-        f"{len(differing)} of {len(entries)} printed entries differ from what follows from (3)",
+        f"{len(differing)} of {len(entries)} printed entries differ from what follows from (3); the errata explain "
+        f"{sum(bool(entry.explained_by) for entry in differing)}",
         ("Equation", "Entry", "Printed", "Correct", "Relative difference", "Explained by"),
         [
             (

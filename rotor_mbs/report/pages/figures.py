@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -17,8 +16,7 @@ from rotor_mbs.errors import InputError
 from rotor_mbs.methods.catalogue import look_up
 from rotor_mbs.report import plots
 from rotor_mbs.report.core import canvas, svg
-from rotor_mbs.report.core.elements import LegendEntry
-from rotor_mbs.report.core.looks import COLOURS, Look, coordinate_look, label_of, with_capital
+from rotor_mbs.report.core.looks import COLOURS, Look, label_of, with_capital
 from rotor_mbs.report.core.numbers import minus, number, prefixed, with_unit
 from rotor_mbs.report.pages import Context
 from rotor_mbs.report.pages.claim_tables import number_table
@@ -101,8 +99,8 @@ def draw(figure: PaperFigure, axes: Sequence[Any], runs: Mapping[str, StoredRun]
             plots.draw_coordinates(panel, run.array("time"), run.array(name), label)
         else:
             series = [
-                plots.Series(run.array("time"), run.array(name)[:, 0], torque_look(place))
-                for place, run in enumerate(runs.values())
+                plots.Series(run.array("time"), run.array(name)[:, 0], torque_look(place, torque))
+                for place, (torque, run) in enumerate(runs.items())
             ]
             plots.draw_lines(panel, series, label)
             plots.set_range(panel, np.concatenate([curve.values for curve in series])[:, None])
@@ -112,20 +110,9 @@ def draw(figure: PaperFigure, axes: Sequence[Any], runs: Mapping[str, StoredRun]
     axes[1].set_xlabel(canvas.TIME_AXIS)
 
 
-def torque_look(place: int) -> Look:
+def torque_look(place: int, label: str) -> Look:
     """Line of the curve at `place` in a figure of torques."""
-    return Look(COLOURS[place % len(COLOURS)], ("-", "--", "-.", ":")[place % 4], "")
-
-
-def legend(figure: PaperFigure, scenes: Mapping[str, StoredScene]) -> list[tuple[str, Look]]:
-    """(label, look) of the curves: coordinates, blades, or torques."""
-    if figure.kind == TORQUES:
-        return [(label, torque_look(i)) for i, (label, _) in enumerate(figure.panels)]
-    runs = compared_runs(scenes[figure.panels[0][1]])
-    labels = next(iter(runs.values())).labels if runs else []
-    if figure.kind == MOTION:
-        return [(label, coordinate_look(i)) for i, label in enumerate(labels)]
-    return [(f"blade {i}", replace(coordinate_look(i), line="-")) for i in range(1, len(labels))]
+    return Look(COLOURS[place % len(COLOURS)], ("-", "--", "-.", ":")[place % 4], "", label)
 
 
 def write_figures(results: Path, folder: Path, kind: str, numbers: Iterable[str] = ()) -> list[Path]:
@@ -179,15 +166,18 @@ def composed(figure: PaperFigure, scenes: Mapping[str, StoredScene]) -> canvas.P
                 axes.set_ylabel("")
         for row, letter in zip(table, pictures if is_paths else (), strict=False):
             row[0].text(-0.08, 0.94, f"({letter})", transform=row[0].transAxes)
-    labelled = legend(figure, scenes)
-    place = {"loc": "lower center", "ncols": min(len(labelled), 5), "handlelength": 2.6}
-    canvas.legend(panels.figure, labelled, for_print=True, **place)
+        labelled = panels.labelled()
+        columns = min(len(labelled), 5)
+        panels.figure.legend(labelled.values(), labelled, loc="lower center", ncols=columns, handlelength=2.6)
     return panels
 
 
-def walk_figure(figure: PaperFigure, context: Context, opened: OpenResults) -> dict[str, object]:
-    """The part of the page about one figure."""
-    scenes = opened.scenes
+def figures_page(figures: Sequence[PaperFigure], context: Context, opened: OpenResults) -> dict[str, object]:
+    """The content of the page that goes through the figures."""
+    return {"figures": [_walk(figure, context, opened.scenes) for figure in figures]}
+
+
+def _walk(figure: PaperFigure, context: Context, scenes: Mapping[str, StoredScene]) -> dict[str, object]:
     runs_of_panels = panel_runs(figure, scenes)
     is_torques = figure.kind == TORQUES  # all in one picture per model
     panels = []
@@ -203,7 +193,8 @@ def walk_figure(figure: PaperFigure, context: Context, opened: OpenResults) -> d
                 drawn.figure.subplots_adjust(top=0.93, hspace=0.2)  # room for headings
             draw(figure, drawn.axes, runs)
             heading, label = HEADINGS[key], label_of(next(iter(runs.values())).method)
-            caption = with_capital(label) if label.startswith(heading.lower()) else f"{heading}: {label}"
+            is_named = label.lower().startswith(heading.lower())
+            caption = with_capital(label) if is_named else f"{heading}: {label}"
             pictures.append(svg.picture(drawn, f"f{figure.number}{letter}-{key}", caption))
         panels.append({
             "letter": letter,
@@ -215,7 +206,6 @@ def walk_figure(figure: PaperFigure, context: Context, opened: OpenResults) -> d
     return {
         "number": figure.number,
         "kind": figure.kind,
-        "legend": [LegendEntry(label, look) for label, look in legend(figure, scenes)],
         "panels": panels,
         "numbers": number_table([claim for claim in context.claims if claim.published.figure == figure.number]),
     }

@@ -9,18 +9,19 @@ from dataclasses import replace
 import numpy as np
 
 from rotor_mbs.analysis import run_selection
-from rotor_mbs.analysis.claims import agreement, finding
+from rotor_mbs.analysis.claims import finding
 from rotor_mbs.analysis.judgement import OK_ERROR
 from rotor_mbs.analysis.rehydrate import scene_of
+from rotor_mbs.analysis.run_tables import agreement
 from rotor_mbs.report import plots
 from rotor_mbs.report.core import canvas
 from rotor_mbs.report.core.canvas import Panels
-from rotor_mbs.report.core.elements import LegendEntry, PageTable, Picture, Row, Section, TableCell
+from rotor_mbs.report.core.elements import PageTable, Picture, Row, Section, TableCell
 from rotor_mbs.report.core.looks import Look, label_of, look_of
 from rotor_mbs.report.core.numbers import SPACE, number, power, prefixed, with_unit
 from rotor_mbs.report.core.svg import picture
 from rotor_mbs.report.pages import Context, claim_tables, quantities
-from rotor_mbs.report.pages.bench import cost_legend, cost_picture
+from rotor_mbs.report.pages.bench import cost_picture
 from rotor_mbs.report.pages.figures import compared_runs
 from rotor_mbs.report.pages.quantities import VISIBLE, angle_difference, parting
 from rotor_mbs.report.pages.scene import key_picture
@@ -32,7 +33,6 @@ from rotor_mbs.report.pages.scene_tables import (
     metric,
     status_cell,
     status_text,
-    versions,
 )
 from rotor_mbs.report.pages.viewer import viewer
 from rotor_mbs.runs.read import OpenResults, StoredScene
@@ -56,7 +56,6 @@ _LOWEST_ENERGY = 1e-16  # relative: smaller errors are drawn there
 def index_page(context: Context, opened: OpenResults) -> dict[str, object]:
     """The content of the index; what the file has no data for is None or empty. Its last tables are folded."""
     scenes, claims, study = opened.scenes, context.claims, context.study
-    shares = None if study is None else study.shares
     model = "Corrected model" if claims else "Model"  # of a user's own rotor nothing was corrected
     # The scene with a published extreme that is no rounding error; else one with both models; else the first.
     both = [name for name, scene in scenes.items() if len(run_selection.sides(scene)) > 1]
@@ -91,47 +90,45 @@ def index_page(context: Context, opened: OpenResults) -> dict[str, object]:
             f"{100.0 * compared / whole:.0f}{SPACE}%: each scene up to its horizon."
         )
     return {
-        "paper": PageTable("", ("Result", "As printed", model), finding(scenes, claims, shares)),
+        "paper": PageTable("", ("Result", "As printed", model), finding(scenes, claims)),
         "scene": shown,
         "viewer": viewer(scenes[shown], {label_of(run.method): run for run in sides}),
         "still": still,
-        "crest": key_picture(sides, own_claims, horizon(scenes[shown]), "crest"),
-        "defects": _defects(scenes, shown),
-        "energy": _energy(scenes, model),
-        "cost": cost_picture(curves, f"Error against run time of all methods, {benched}", cost_legend(curves)),
+        "pictures": [
+            *key_picture(sides, own_claims, horizon(scenes[shown]), "crest"),
+            *_defects(scenes, shown),
+            *_energy(scenes, model),
+            *cost_picture(curves, f"Error against run time of all methods, {benched}"),
+        ],
         "methods": Section(tables=[PageTable("", agreement_head, agreement_rows)], notes=notes),
         "heat": heat_map(scenes, context.files),
         "scenes": Section(tables=[scene_table(scenes, context.files, model)]),
         "numbers": Section(
             tables=[
                 claim_tables.number_table(claims),
-                *(claim_tables.trial_tables(study.numbers) if study is not None else ()),
+                *(claim_tables.trial_tables(study) if study is not None else ()),
             ],
             notes=[text for key, text in context.conditions.items() if not key.startswith("fig")],
         ),
         "claims": Section(
-            tables=[claim_tables.claim_table(claims, shares)],
-            notes=[] if shares is None else [claim_tables.study_note(shares)],
+            tables=[] if study is None else [claim_tables.claim_table(claims, study)],
+            notes=[] if study is None else [claim_tables.study_note(study)],
         ),
-        "versions": versions(opened.attributes),
         "is_paper": bool(claims),
     }
 
 
-def _defects(scenes: Scenes, name: str) -> Picture | None:
+def _defects(scenes: Scenes, name: str) -> list[Picture]:
     """Interval defects of the printed and the corrected models over the whole of one scene."""
     scene, stored = scene_of(scenes[name]), scenes[name]
     if scene is None:
-        return None
+        return []
     runs = run_selection.corrected_runs(stored)
     if (printed := run_selection.printed_run(stored)) is not None:
         runs = {printed.method: printed} | runs
     curves = quantities.defects(scene, runs)
     caption = f"{name}: what the closed form makes of each sample by the next, less what each run has there"
-    return quantities.error_picture(
-        curves, "defect of an interval (rad)", "defects", caption,
-        legend=quantities.run_legend(quantities.visible(curves)),
-    )  # fmt: skip
+    return quantities.error_picture(curves, "defect of an interval (rad)", "defects", caption)
 
 
 def scene_table(scenes: Scenes, files: Mapping[str, str], model: str) -> PageTable:
@@ -169,27 +166,26 @@ def scene_table(scenes: Scenes, files: Mapping[str, str], model: str) -> PageTab
     return PageTable("", head, rows)
 
 
-def _energy(scenes: Scenes, model: str) -> Picture | None:
+def _energy(scenes: Scenes, model: str) -> list[Picture]:
     """A mark per scene for the printed model's gain, and for the drift of each corrected one, called `model`."""
     rows: dict[str, list[tuple[float, Look]]] = {}
-    looks: dict[str, Look] = {}
+    has_printed = False
     for name, scene in scenes.items():
         corrected = run_selection.corrected_runs(scene)
         for run in scene.methods.values():
             gain, scale = metric(run, "energy_gain_J"), metric(run, "energy_scale_J")
             value = None
             if run.method == run_selection.PRINTED and gain is not None and scale:
-                value = gain / scale
+                value, has_printed = gain / scale, True
             elif run.method in corrected and scale:
                 value = metric(run, "energy_drift_max")
             if value is not None and math.isfinite(value):
-                looks[run.method] = replace(look_of(run.method), line="")
-                rows.setdefault(name.removeprefix("paper/"), []).append((value, looks[run.method]))
-    if run_selection.PRINTED not in looks:
-        return None
+                look = replace(look_of(run.method), line="")
+                rows.setdefault(name.removeprefix("paper/"), []).append((value, look))
+    if not has_printed:
+        return []
     caption = f"Spurious energy gain as printed, and energy drift of each {model.lower()}, by scene"
-    legend = [LegendEntry(label_of(name), look) for name, look in looks.items()]
-    return picture(energy_of_scenes(rows), "energy-scenes", caption, legend=legend)
+    return [picture(energy_of_scenes(rows), "energy-scenes", caption)]
 
 
 def energy_of_scenes(rows: Mapping[str, Sequence[tuple[float, Look]]]) -> Panels:

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import NamedTuple
 
 import numpy as np
 
@@ -13,7 +12,7 @@ from rotor_mbs.methods.catalogue import REFERENCE
 from rotor_mbs.models.lagrange.defects import interval_defects
 from rotor_mbs.report import plots
 from rotor_mbs.report.core.canvas import Panels
-from rotor_mbs.report.core.elements import LegendEntry, PageTable, Picture, Section
+from rotor_mbs.report.core.elements import PageTable, Picture, Section
 from rotor_mbs.report.core.looks import Look, coordinate_look, label_of, look_of, with_capital
 from rotor_mbs.report.core.numbers import number, prefixed
 from rotor_mbs.report.core.svg import picture
@@ -24,17 +23,7 @@ from rotor_mbs.solution.quantities import Plot, Quantity, known_quantities, size
 from rotor_mbs.solution.trajectory import Array
 
 Runs = Mapping[str, StoredRun]
-Curves = dict[str, Series]  # by method
 VISIBLE = 0.05  # rad: what one can see in a figure of the paper's size
-
-
-class Component(NamedTuple):
-    """A component of a quantity over time."""
-
-    group: str  # the panel it is drawn in
-    label: str  # its line there
-    place: int  # index of the line's look
-    values: Array  # (n,)
 
 
 def plotted_quantities(scene: StoredScene) -> list[tuple[Quantity, Plot]]:
@@ -53,18 +42,12 @@ def quantity_sections(scene: StoredScene, runs: Runs, horizon: float | None) -> 
             continue
         name = f"quantity-{quantity.name}"
         if plot.logarithmic:
-            sizes_of_runs = {method: _over_components(np.abs(run.array(quantity.name))) for method, run in own.items()}
-            curves = over_time(own, sizes_of_runs)
-            shown = error_picture(curves, plot.axis, name, plot.title, horizon) if visible(curves) else None
-            section = Section([] if shown is None else [shown], run_legend(visible(curves)))
+            curves = over_time(own, {m: _largest(np.abs(run.array(quantity.name))) for m, run in own.items()})
+            section = Section(error_picture(curves, plot.axis, name, plot.title, horizon) if visible(curves) else [])
         elif len(quantity.dimensions) == 1:
-            lines = {}
-            for method, run in own.items():
-                look = replace(look_of(method), marker="")
-                lines[method] = Series(run.array("time"), run.array(quantity.name), look)
-            panels = plots.lines([(plot.axis, list(lines.values()))], horizon)
-            legend = [LegendEntry(label_of(method), line.look) for method, line in lines.items()]
-            section = Section([picture(panels, name, plot.title)], legend)
+            curves = over_time(own, {method: run.array(quantity.name) for method, run in own.items()})
+            curves = [curve._replace(look=replace(curve.look, marker="")) for curve in curves]
+            section = Section([picture(plots.lines([(plot.axis, curves)], horizon), name, plot.title)])
         else:
             section = _components_section(quantity, plot, own, name, horizon)
         sections.append((name, plot.title, section))
@@ -72,132 +55,101 @@ def quantity_sections(scene: StoredScene, runs: Runs, horizon: float | None) -> 
 
 
 def _components_section(quantity: Quantity, plot: Plot, runs: Runs, name: str, horizon: float | None) -> Section:
+    """Every run; of a quantity that is judged against the reference that one alone, the errors and its extremes."""
     rule = quantity.judgement
     is_compared = rule is not None and rule.with_reference and REFERENCE in runs
     pictures: list[Picture] = []
-    legend: list[LegendEntry] = []
     for i, run in enumerate([runs[REFERENCE]] if is_compared else runs.values()):
-        values = run.array(quantity.name)
-        panels, looks = component_panels(quantity, plot, run.array("time"), values, run.labels, horizon)
+        panels = component_panels(quantity, plot, run.array("time"), run.array(quantity.name), run.labels, horizon)
         caption = f"{with_capital(label_of(run.method))}: {quantity.long_name}"
         pictures.append(picture(panels, f"{name}-{i}", caption))
-        legend = [LegendEntry(label, look) for label, look in looks.items()]
     if not is_compared:
-        return Section(pictures, legend)
-    exact = runs[REFERENCE].array(quantity.name)
-
-    def difference(run: StoredRun) -> Array:
-        """The largest over blades, at the samples that both have; of vectors the length."""
-        values = run.array(quantity.name)
-        n = min(len(values), len(exact))
-        return _over_components(sizes(quantity, values[:n] - exact[:n]))
-
-    others = {method: run for method, run in runs.items() if method != REFERENCE}
-    errors = over_time(others, {method: difference(run) for method, run in others.items()})
-    shown = error_picture(
-        errors, f"difference ({quantity.units})", f"{name}-error", "Largest difference from the reference", horizon,
-        legend=run_legend(visible(errors)),
-    )  # fmt: skip
-    if shown is not None:
-        pictures.append(shown)
-    time = runs[REFERENCE].array("time")
+        return Section(pictures)
+    time, exact = runs[REFERENCE].array("time"), runs[REFERENCE].array(quantity.name)
+    differences = {}
+    for method, run in runs.items():
+        if method != REFERENCE:  # at the samples that both have; the largest over blades, of vectors the length
+            values = run.array(quantity.name)
+            n = min(len(values), len(exact))
+            differences[method] = _largest(sizes(quantity, values[:n] - exact[:n]))
+    axis, caption = f"difference ({quantity.units})", "Largest difference from the reference"
+    pictures += error_picture(over_time(runs, differences), axis, f"{name}-error", caption, horizon)
     rows = []
-    for part in components(quantity, exact, runs[REFERENCE].labels):
-        row = [f"{part.label} {part.group}".strip()]
-        for k in (int(part.values.argmin()), int(part.values.argmax())):
-            row += [prefixed(float(part.values[k]), quantity.units), number(float(time[k]), 4)]
+    for panel, look, values in components(quantity, exact, runs[REFERENCE].labels):
+        row = [f"{look.label} {panel}".strip()]
+        for k in (int(values.argmin()), int(values.argmax())):
+            row += [prefixed(float(values[k]), quantity.units), number(float(time[k]), 4)]
         rows.append(row)
     head = ("Component", "Smallest", "at (s)", "Largest", "at (s)")
-    return Section(pictures, legend, [PageTable("Extremes in the reference", head, rows)])
+    return Section(pictures, [PageTable("Extremes in the reference", head, rows)])
 
 
 def component_panels(
     quantity: Quantity, plot: Plot, time: Array, values: Array, labels: Sequence[str] = (), horizon: float | None = None
-) -> tuple[Panels, dict[str, Look]]:
-    """A panel per axis with a line per blade, or one panel with a line per component; the looks of the lines."""
+) -> Panels:
+    """A panel per axis with a line per blade, or one panel with a line per component."""
     rows: dict[str, list[Series]] = {}
-    looks: dict[str, Look] = {}
-    for part in components(quantity, values, labels):
-        looks[part.label] = coordinate_look(part.place)
-        axis = f"{part.group} {plot.axis}".strip()
-        rows.setdefault(axis, []).append(Series(time, part.values, looks[part.label]))
-    return plots.lines(list(rows.items()), horizon, height=2.3 if len(rows) == 1 else 1.3), looks
+    for panel, look, component in components(quantity, values, labels):
+        rows.setdefault(f"{panel} {plot.axis}".strip(), []).append(Series(time, component, look))
+    return plots.lines(list(rows.items()), horizon, height=2.3 if len(rows) == 1 else 1.3)
 
 
-def over_time(runs: Runs, values: Mapping[str, Array]) -> Curves:
+def components(quantity: Quantity, values: Array, labels: Sequence[str] = ()) -> list[tuple[str, Look, Array]]:
+    """(panel, look, values (n,)) of each component: with blades and axes a panel per axis, else one panel."""
+    first = 1 if quantity.dimensions[1] == "blade" else 0  # a blade has the look of its pitch
+    names = {"coordinate": labels, "axis": "xyz"}.get(quantity.dimensions[1])
+    if names is None:
+        names = [f"blade {i + 1}" for i in range(values.shape[1])]
+    looks = [coordinate_look(first + i, label) for i, label in enumerate(names[: values.shape[1]])]
+    if values.ndim == 2:
+        return [("", look, values[:, i]) for i, look in enumerate(looks)]
+    return [(axis, look, values[:, i, k]) for i, look in enumerate(looks) for k, axis in enumerate("xyz")]
+
+
+def over_time(runs: Runs, values: Mapping[str, Array]) -> list[Series]:
     """The values (n,) of runs, by method, over their first samples."""
-    return {method: Series(runs[method].array("time")[: len(x)], x, look_of(method)) for method, x in values.items()}
+    return [Series(runs[method].array("time")[: len(x)], x, look_of(method)) for method, x in values.items()]
 
 
-def _over_components(values: Array) -> Array:
+def _largest(values: Array) -> Array:
     """(n,) of (n, ...): the largest over the components."""
     largest: Array = values.reshape(len(values), -1).max(axis=1)
     return largest
 
 
-def components(quantity: Quantity, values: Array, labels: Sequence[str] = ()) -> list[Component]:
-    """One by one: with blades and axes, a panel per axis and a line per blade; else one panel."""
-    names = {"coordinate": labels, "axis": ["x", "y", "z"]}
-    shown = names.get(quantity.dimensions[1], [f"blade {i + 1}" for i in range(values.shape[1])])[: values.shape[1]]
-    first = 1 if quantity.dimensions[1] == "blade" else 0  # a blade has the look of its pitch
-    if values.ndim == 2:
-        return [Component("", label, first + i, values[:, i]) for i, label in enumerate(shown)]
-    return [
-        Component(axis, label, first + i, values[:, i, k])
-        for i, label in enumerate(shown)
-        for k, axis in enumerate("xyz")
-    ]
-
-
 def error_picture(
-    curves: Curves, axis: str, name: str, caption: str, horizon: float | None = None, others: Sequence[Series] = (),
-    legend: Sequence[LegendEntry] = (), *, signed: bool = False,
-) -> Picture | None:  # fmt: skip
-    """The curves and `others`, which have no marker; None where there is nothing to draw or to note."""
+    curves: Sequence[Series], axis: str, name: str, caption: str, horizon: float | None = None,
+    others: Sequence[Series] = (), notes: Sequence[str] = (), *, signed: bool = False,
+) -> list[Picture]:  # fmt: skip
+    """A picture of the curves and of `others`, which have no marker; none where there is no curve."""
     if not curves:
-        return None
+        return []
     shown = visible(curves)
-    exact = [label_of(method) for method in curves if method not in shown]
-    notes = [f"No curve, because nowhere above 10⁻¹⁸: {'; '.join(exact)}."] if exact else []
-    panels = plots.errors([*others, *shown.values()], axis, horizon, signed=signed)
-    return picture(panels, name, caption, notes, legend)
+    exact = [curve.look.label for curve in curves if not visible([curve])]
+    notes = [*notes, *([f"No curve, because nowhere above 10⁻¹⁸: {'; '.join(exact)}."] if exact else [])]
+    return [picture(plots.errors([*others, *shown], axis, horizon, signed=signed), name, caption, notes)]
 
 
-def visible(curves: Curves) -> Curves:
+def visible(curves: Sequence[Series]) -> list[Series]:
     """The curves that a logarithmic axis can show."""
-    return {method: curve for method, curve in curves.items() if np.abs(curve.values).max() > LOWEST}
+    return [curve for curve in curves if np.abs(curve.values).max() > LOWEST]
 
 
-def run_legend(methods: Iterable[str]) -> list[LegendEntry]:
-    """An entry per method, as its error curves are drawn."""
-    return [LegendEntry(label_of(method), look_of(method)) for method in methods]
-
-
-def defects(scene: Scene, runs: Runs) -> Curves:
+def defects(scene: Scene, runs: Runs) -> list[Series]:
     """The size (rad) of the defect of every interval, at its end; a fault in time stands out in its own intervals."""
-    curves = {}
+    curves = []
     for method, run in runs.items():
         time = run.array("time") if "angles" in run and "rates" in run else np.empty(0)
-        if len(time) < 2:
-            continue
-        sizes = interval_defects(scene, time, run.array("angles"), run.array("rates")).sizes
-        curves[method] = Series(time[1:], sizes, look_of(method))
+        if len(time) >= 2:
+            sizes = interval_defects(scene, time, run.array("angles"), run.array("rates")).sizes
+            curves.append(Series(time[1:], sizes, look_of(method)))
     return curves
-
-
-def differences(runs: Runs, reference: StoredRun | None) -> Curves:
-    """Largest angle difference (rad) from the reference over the coordinates, at the samples that both have."""
-    if reference is None or "angles" not in reference or not len(reference.array("time")):
-        return {}
-    values = {method: angle_difference(run, reference) for method, run in runs.items() if "angles" in run}
-    return over_time(runs, values)
 
 
 def angle_difference(first: StoredRun, second: StoredRun) -> Array:
     """(common samples,) rad: the largest over the coordinates."""
     n = min(len(first.array("time")), len(second.array("time")))
-    largest: Array = np.abs(first.array("angles")[:n] - second.array("angles")[:n]).max(axis=1)
-    return largest
+    return _largest(np.abs(first.array("angles")[:n] - second.array("angles")[:n]))
 
 
 def parting(printed: StoredRun, corrected: StoredRun) -> tuple[float | None, float]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -15,7 +15,7 @@ from rotor_mbs.methods.catalogue import REFERENCE, is_corrected
 from rotor_mbs.report import plots
 from rotor_mbs.report.core import canvas
 from rotor_mbs.report.core.canvas import TIME_AXIS, Panels
-from rotor_mbs.report.core.elements import LegendEntry, PageTable, Picture, Row, Section, line_entry
+from rotor_mbs.report.core.elements import PageTable, Picture, Row, Section
 from rotor_mbs.report.core.looks import GREY, VERMILLION, Look, coordinate_look, label_of, look_of, with_capital
 from rotor_mbs.report.core.numbers import fixed, number, prefixed, with_unit
 from rotor_mbs.report.core.svg import picture
@@ -34,7 +34,7 @@ from rotor_mbs.solution.text_table import listed
 from rotor_mbs.solution.trajectory import Array
 
 MAX_PUBLISHED = 2  # published values on one picture
-COMMAND, TAKEN = Look(GREY, ":", ""), Look(VERMILLION, "--", "")
+COMMAND, TAKEN = Look(GREY, ":", "", "command"), Look(VERMILLION, "--", "", "taken by the shaft's damper")
 EXTREMES = ("rotor_angle_min", "rotor_angle_max", "rotor_rate_max")
 
 
@@ -53,14 +53,16 @@ def scene_page(name: str, context: Context, opened: OpenResults) -> dict[str, ob
     place = pages.index(context.files[name])
     claims = [claim for claim in context.claims if name in claim.published.scenes]
     study = context.study
-    tables = [claim_tables.number_table(claims), claim_tables.claim_table(claims, study.shares if study else None)]
+    tables = [claim_tables.number_table(claims)]
+    if study is not None:
+        tables.append(claim_tables.claim_table(claims, study))
     # Where a number is rounding error, what it is under other conditions.
     if study is not None and any(claim.published.rounding for claim in claims):
-        tables += claim_tables.trial_tables(study.numbers)
+        tables += claim_tables.trial_tables(study)
     condition = context.conditions.get(name.rpartition("/")[2])
     notes = [condition] if condition else []
     if study is not None and any(not claim.published.is_number for claim in claims):
-        notes.append(claim_tables.study_note(study.shares))
+        notes.append(claim_tables.study_note(study))
     suite_runs = [run for run in context.suite_runs if run.scene == name]
     figures = str(scene.attributes.get("figures", ""))
     parsed = scene_of(scene)
@@ -78,9 +80,9 @@ def scene_page(name: str, context: Context, opened: OpenResults) -> dict[str, ob
         "key": key_picture(runs, claims, horizon),
         "paths": _tips_section(runs),
         "motion": _motion_section(runs, horizon),
-        "difference": _difference_section(scene, sides, drawn, horizon),
+        "difference": _difference_section(scene, drawn, horizon),
         "defects": _defect_section(parsed, drawn),
-        "energy": _energy_section(sides, drawn, horizon),
+        "energy": _energy_section(drawn, horizon),
         "drive": _drive_section(parsed, sides.get("corrected")),
         "cost": cost_section(scene, context.curves.get(name, ())),
         "steps": step_section(name, context.ladders),
@@ -108,20 +110,17 @@ def opening_comment(scene: StoredScene) -> str:
 
 def key_picture(
     sides: Sequence[StoredRun], claims: Sequence[Claim], horizon: float | None, name: str = "key"
-) -> Picture | None:
+) -> list[Picture]:
     """The rotor's angle and the pitch that differs most, printed and corrected, with published values.
 
-    Of one model alone all its angles. None where no run has angles.
+    Of one model alone all its angles. Empty where no run has angles.
     """
     runs = [run for run in sides if "angles" in run]
     if not runs:
-        return None
-    labels = runs[0].labels
+        return []
     if len(runs) == 1:
         panels = plots.motion(runs[0].array("time"), runs[0].array("angles"), None, horizon)
-        legend = [LegendEntry(label, coordinate_look(i)) for i, label in enumerate(labels)]
-        caption = f"{with_capital(label_of(runs[0].method))}: angles over time"
-        return picture(panels, name, caption, legend=[*legend, *horizon_entry(horizon, runs)])
+        return [picture(panels, name, f"{with_capital(label_of(runs[0].method))}: angles over time")]
     # Beside the rotor the pitch that differs most, or moves most.
     shown = [0]
     printed, corrected = (run.array("angles") for run in runs)
@@ -131,14 +130,13 @@ def key_picture(
         if largest.size and largest.max() > 1e-6:
             shown.append(1 + int(largest.argmax()))
             break
-    # The printed model is dashed upon the corrected one.
-    looks = {
-        run.method: Look(look_of(run.method).colour, line, "") for run, line in zip(runs, ("--", "-"), strict=True)
-    }
     panels_of = []
     for i in shown:
-        series = [Series(run.array("time"), run.array("angles")[:, i], looks[run.method]) for run in reversed(runs)]
-        panels_of.append((f"{labels[i]} angle (rad)", series))
+        series = []
+        for run, line in zip(reversed(runs), ("-", "--"), strict=True):  # the printed model is dashed upon the other
+            look = replace(look_of(run.method), line=line, marker="")
+            series.append(Series(run.array("time"), run.array("angles")[:, i], look))
+        panels_of.append((f"{runs[0].labels[i]} angle (rad)", series))
     marks = []
     for claim in claims:
         item, of = claim.published, claim.published.of
@@ -147,12 +145,7 @@ def key_picture(
             marks.append((shown.index(of.coordinate), item.value, text))
     parted, difference = parting(*runs)
     caption = f"Rotor and pitch angles of both models, which differ by up to {with_unit(difference, 'rad')}"
-    widths = {"-": 2.4, "--": 1.3}
-    legend = [LegendEntry(label_of(method), look, widths[look.line]) for method, look in looks.items()]
-    legend += horizon_entry(horizon, runs)
-    if marks:
-        legend.append(line_entry("published", line=":"))
-    return picture(departure(panels_of, marks[:MAX_PUBLISHED], horizon, parted), name, caption, legend=legend)
+    return [picture(departure(panels_of, marks[:MAX_PUBLISHED], horizon, parted), name, caption)]
 
 
 def departure(
@@ -175,7 +168,7 @@ def departure(
             if panel == place:
                 low, high = axes.get_ylim()
                 axes.set_ylim(min(low, value), max(high, value + 0.12 * (high - low)))
-                axes.axhline(value, color=GREY, linewidth=1.0, linestyle=":")
+                axes.axhline(value, color=GREY, linewidth=1.0, linestyle=":", label="published")
                 beside = parted if parted is not None and parted < 0.1 * end else 0.0  # not across its line
                 axes.text(beside + 0.01 * end, value, text, color=GREY, ha="left", va="bottom", fontsize=8.5)
         plots.mark_time(axes, end, horizon)
@@ -188,13 +181,6 @@ def departure(
                 axes.set_ylim(low, high)
                 axes.text(parted + 0.01 * end, high, text, color=GREY, ha="left", va="top", fontsize=8.5)
     return panels
-
-
-def horizon_entry(horizon: float | None, runs: Iterable[StoredRun]) -> list[LegendEntry]:
-    """For the legend, where the line is drawn: before the end of a run."""
-    if horizon is None or not any(horizon < float(run.array("time")[-1]) for run in runs):
-        return []
-    return [line_entry(f"horizon {with_unit(horizon, 's', 3)}", line="--")]
 
 
 def _motion_section(sides: Sequence[StoredRun], horizon: float | None) -> Section:
@@ -213,8 +199,7 @@ def _motion_section(sides: Sequence[StoredRun], horizon: float | None) -> Sectio
             notes.append(f"Only the range is meaningful, samples are too far apart: {listed(unresolved)}.")
         panels = plots.motion(run.array("time"), angles, rates, horizon)
         pictures.append(picture(panels, f"motion-{i}", with_capital(label_of(run.method)), notes))
-    legend = [LegendEntry(label, coordinate_look(i)) for i, label in enumerate(runs[0].labels)]
-    return Section(pictures, [*legend, *horizon_entry(horizon, runs)], [range_table(runs)])
+    return Section(pictures, [range_table(runs)])
 
 
 def _unresolved(run: StoredRun) -> list[str]:
@@ -260,8 +245,6 @@ def _tips_section(sides: Sequence[StoredRun]) -> Section:
         for i, run in enumerate(runs)
     ]
     blades = range(1, 1 + runs[0].array("tip").shape[1])
-    lines = [LegendEntry(f"blade {i}", coordinate_look(i)) for i in blades]
-    ends = [line_entry("blade at the start", line="--"), line_entry("at the end"), line_entry("shaft", width=4)]
     head = ["Blade"]
     rows = [[str(i)] for i in blades]
     for run in runs:
@@ -276,22 +259,23 @@ def _tips_section(sides: Sequence[StoredRun]) -> Section:
         head.append("largest distance of both")
         for row, gap in zip(rows, np.linalg.norm(first[:count] - second[:count], axis=2).max(axis=0), strict=True):
             row.append(prefixed(float(gap), "m"))
-    return Section(pictures, [*lines, *ends], [PageTable("Paths of the tips", head, rows)])
+    return Section(pictures, [PageTable("Paths of the tips", head, rows)])
 
 
-def _difference_section(scene: StoredScene, sides: Runs, drawn: Runs, horizon: float | None) -> Section:
+def _difference_section(scene: StoredScene, drawn: Runs, horizon: float | None) -> Section:
     """Each run's largest angle difference from the reference, and the uncertainties that are known."""
     reference = scene.reference
-    runs = {name: run for name, run in drawn.items() if name != REFERENCE}
-    curves = quantities.differences(runs, reference)
-    if not curves or reference is None:
+    if reference is None or "angles" not in reference or not len(reference.array("time")):
         return Section()
+    runs = {method: run for method, run in drawn.items() if method != REFERENCE}
+    differences = {
+        method: quantities.angle_difference(run, reference) for method, run in runs.items() if "angles" in run
+    }
     others = []
-    legend = quantities.run_legend(quantities.visible(curves))
     if "error_growth" in reference:
         growth = np.maximum(np.maximum.accumulate(reference.array("error_growth")), 1.0)
-        others.append(Series(reference.array("time"), float(np.finfo(float).eps) * growth, Look(GREY, ":", "")))
-        legend.append(line_entry("rounding error of the initial state, grown", line=":"))
+        look = Look(GREY, ":", "", "rounding error of the initial state, grown")
+        others.append(Series(reference.array("time"), float(np.finfo(float).eps) * growth, look))
     rows = []
     for method, run in {REFERENCE: reference, **runs}.items():
         if "angle_uncertainty" not in run:
@@ -300,19 +284,17 @@ def _difference_section(scene: StoredScene, sides: Runs, drawn: Runs, horizon: f
         largest = float(uncertainty[time <= (horizon or np.inf)].max())
         rows.append([method_cell(method), number(largest), number(float(uncertainty.max()))])
         if uncertainty.max() > LOWEST:
-            look = Look(GREY, "-", "") if method == REFERENCE else Look(look_of(method).colour, ":", "")
-            others.append(Series(time, uncertainty, look))
-            legend.append(LegendEntry(f"{label_of(method)}: its uncertainty", look))
+            colour, line = (GREY, "-") if method == REFERENCE else (look_of(method).colour, ":")
+            others.append(Series(time, uncertainty, Look(colour, line, "", f"{label_of(method)}: its uncertainty")))
     shown = quantities.error_picture(
-        curves, "largest angle difference (rad)", "difference",
+        quantities.over_time(runs, differences), "largest angle difference (rad)", "difference",
         "Largest difference from the reference, over all angles", horizon, others,
     )  # fmt: skip
-    legend += horizon_entry(horizon, sides.values())
     table = PageTable(
         "Uncertainty of the angles, by the method's own estimate (rad)",
         ("Method", "up to the horizon", "whole run"), rows,
     )  # fmt: skip
-    return Section([shown] if shown else [], legend, [table] if rows else [])
+    return Section(shown, [table] if shown and rows else [])
 
 
 def _defect_section(scene: Scene | None, drawn: Runs) -> Section:
@@ -320,21 +302,21 @@ def _defect_section(scene: Scene | None, drawn: Runs) -> Section:
     if scene is None:
         return Section()
     curves = quantities.defects(scene, drawn)
-    shown = quantities.error_picture(curves, "defect (rad)", "defects", "Interval defects, over all of every run")
-    legend = quantities.run_legend(quantities.visible(curves))
-    return Section([shown] if shown else [], legend)
+    return Section(
+        quantities.error_picture(curves, "defect (rad)", "defects", "Interval defects, over all of every run")
+    )
 
 
-def _energy_section(sides: Runs, drawn: Runs, horizon: float | None) -> Section:
+def _energy_section(drawn: Runs, horizon: float | None) -> Section:
     """Energy less work from its start, of every run; what each run has and how well it conserves it."""
     runs = {name: run for name, run in drawn.items() if "energy_error" in run}
     curves = quantities.over_time(runs, {name: run.array("energy_error") for name, run in runs.items()})
-    caption = "Energy error: change of total energy less work"
-    shown = quantities.error_picture(curves, "|energy error| (J)", "energy", caption, horizon, signed=True)
-    if shown is None:
+    shown = quantities.error_picture(
+        curves, "|energy error| (J)", "energy", "Energy error: change of total energy less work", horizon,
+        notes=["Filled marks: gained. Open marks: lost."], signed=True,
+    )  # fmt: skip
+    if not shown:
         return Section()
-    shown = replace(shown, notes=["Filled marks: gained. Open marks: lost.", *shown.notes])
-    legend = [*quantities.run_legend(quantities.visible(curves)), *horizon_entry(horizon, sides.values())]
     head = (
         "Method", "Largest kinetic energy (J)", "Work at the end (J)", "Largest gain (J)", "Drift (relative)",
     )  # fmt: skip
@@ -344,7 +326,7 @@ def _energy_section(sides: Runs, drawn: Runs, horizon: float | None) -> Section:
         work = float(run.array("work")[-1]) if "work" in run and run.array("work").any() else None
         gain, drift = metric(run, "energy_gain_J"), metric(run, "energy_drift_max")
         rows.append([method_cell(name), number(kinetic, 3), number(work, 3), number(gain, 3), number(drift)])
-    return Section([shown], legend, [PageTable("", head, rows)])
+    return Section(shown, [PageTable("", head, rows)])
 
 
 def _drive_section(scene: Scene | None, run: StoredRun | None) -> Section:
@@ -368,19 +350,16 @@ def _drive_section(scene: Scene | None, run: StoredRun | None) -> Section:
 
     time, angles, rates = run.array("time"), run.array("angles"), run.array("rates")
     pictures: list[Picture] = []
-    legend: list[LegendEntry] = []
     rows: list[list[str]] = []
     if scene.has_torque:
         torque = over_time(scene.rotor_torque)
-        powers = [Series(time, torque * rates[:, 0], coordinate_look(0))]
+        powers = [Series(time, torque * rates[:, 0], coordinate_look(0, "torque on the rotor"))]
         add_numbers("Torque on the rotor", torque, "N m", with_work=False)
         add_numbers("Its power", powers[0].values, "W")
         if scene.shaft_damping:
             powers.append(Series(time, scene.shaft_damping * rates[:, 0] ** 2, TAKEN))
             add_numbers("Taken by the shaft's damper", powers[1].values, "W")
-            legend.append(LegendEntry("torque on the rotor", coordinate_look(0)))
-            legend.append(LegendEntry("taken by the shaft's damper", TAKEN))
-        torques = [Series(time, torque, coordinate_look(0))]
+        torques = [Series(time, torque, coordinate_look(0, "torque on the rotor"))]
         add_picture("drive", "Rotor torque and its power", [("torque (N m)", torques), ("power (W)", powers)])
     driven = [i for i in range(len(scene.blades)) if any(scene.pitch_load(i))]
     if driven:
@@ -398,8 +377,5 @@ def _drive_section(scene: Scene | None, run: StoredRun | None) -> Section:
             add_numbers(f"Actuator {i + 1}, power", powers[-1].values, "W")
         rows_of_panels = [("pitch (rad)", pitches), ("actuators' power (W)", powers)]
         add_picture("pitch-drive", "Pitches, their commands and actuators", rows_of_panels)
-        legend += [LegendEntry(f"pitch {i + 1}", coordinate_look(1 + i)) for i in range(len(scene.blades))]
-        if any(scene.bearing_rest):
-            legend.append(LegendEntry("command", COMMAND))
     table = PageTable("", ("Quantity", "Largest", "At the end", "Work"), rows)
-    return Section(pictures, legend, [table] if rows else [])
+    return Section(pictures, [table] if rows else [])

@@ -2,20 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 
 from rotor_mbs.analysis import run_selection
 from rotor_mbs.analysis.judgement import OK_ERROR
 from rotor_mbs.methods.catalogue import REFERENCE, is_corrected, look_up
 from rotor_mbs.report.core.elements import PageTable, Row, TableCell
 from rotor_mbs.report.core.looks import label_of
-from rotor_mbs.report.core.numbers import SPACE, number, prefixed, with_unit
+from rotor_mbs.report.core.numbers import number, prefixed, with_unit
 from rotor_mbs.runs.read import StoredRun, StoredScene
 from rotor_mbs.solution.status import GOOD
 
 _ERRORS_OF_RUNS = ("angle_error_max", "angle_error_whole", "tip_error_max")  # against the reference
-# Attributes of a results file that say what made it.
-_VERSIONS = ("rotor_mbs", "python", "exudyn", "heyoka", "numpy", "scipy", "h5py", "platform", "cpu")
 
 
 def status_text(run: StoredRun) -> str:
@@ -133,10 +131,3 @@ def failure_table(scene: StoredScene) -> PageTable:
             message = str(run.attributes.get("message", ""))
             rows.append([run_cell(run), status_cell(run), message, with_unit(reached, "s", 4)])
     return PageTable("", ("Method", "Status", "Message", "Samples up to"), rows)
-
-
-def versions(attributes: Mapping[str, object]) -> list[tuple[str, str]]:
-    """(what, version) of the programs and the computer that made a file, and when."""
-    made = [(name, str(attributes[name])) for name in _VERSIONS if attributes.get(name)]
-    created = str(attributes.get("created", ""))
-    return [*made, ("created", f"{created[:16].replace('T', SPACE)}{SPACE}UTC")] if created else made

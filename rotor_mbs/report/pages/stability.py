@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 
 import numpy as np
 
 from rotor_mbs.analysis import run_selection
-from rotor_mbs.analysis.stability import OUTCOMES, TARGET, SuiteRun, advice_lines, reached_by
+from rotor_mbs.analysis.stability import OUTCOMES, TARGET, SuiteRun, family_table, fastest_to_target
 from rotor_mbs.report.core import canvas
 from rotor_mbs.report.core.canvas import Panels
 from rotor_mbs.report.core.elements import PageTable, Row, Section, TableCell
@@ -16,7 +15,6 @@ from rotor_mbs.report.core.looks import GREY, Look, label_of, look_of
 from rotor_mbs.report.core.numbers import number, with_unit
 from rotor_mbs.report.core.svg import picture
 from rotor_mbs.report.pages import Context
-from rotor_mbs.report.pages.quantities import run_legend
 from rotor_mbs.report.pages.scene_tables import horizon, method_cell, run_cell
 from rotor_mbs.report.plots import HIGHEST, LOWEST
 from rotor_mbs.runs.read import OpenResults, StoredScene
@@ -24,28 +22,22 @@ from rotor_mbs.runs.records import Record, read_records
 from rotor_mbs.solution.trajectory import Array
 
 _FOLDERS = ("stiff", "extreme")
-_SUITE = ("stability", "stability_limits", "symmetry")
 NOT_COMPARED = "horizon before the second sample"
 _FAMILIES = {"needle": "on a needle", "scale": "out of scale"}  # headings that are not the family's name
-_CONSERVED = {
-    "angular_momentum_drift": "angular momentum (relative)",
-    "mirror_error": "mirror image (rad)",
-    "relabelling_error": "blades renumbered (rad)",
-    "reversal_error": "there and back (rad)",
-}
-_NOT_BAD = ("holds", "energy_alone", "smaller_step", "refuses")
+_NOT_BAD = ("ok", "energy_alone", "smaller_step")
 
 
 def is_stability_suite(results: OpenResults) -> bool:
-    """Whether the file is of the suite: it has ladders of steps, limits or conservation, or all its scenes are."""
+    """Whether the file is of the suite: it has ladders of steps, or all its scenes are of the suite."""
     folders = {name.partition("/")[0] for name, scene in results.scenes.items() if scene.methods}
-    return bool(read_records(results.path, *_SUITE)) or (bool(folders) and folders <= set(_FOLDERS))
+    return bool(read_records(results.path, "stability")) or (bool(folders) and folders <= set(_FOLDERS))
 
 
 def stability_page(context: Context, opened: OpenResults) -> dict[str, object]:
     """The content of the map, which is the index of the suite."""
-    runs, records, scenes = context.suite_runs, read_records(opened.path, *_SUITE), opened.scenes
+    runs = context.suite_runs
     methods = list(dict.fromkeys(run.method for run in runs))
+    fastest_methods = fastest_to_target(runs)
     families: dict[str, list[dict[str, object]]] = {}
     for scene, file in context.files.items():
         own = {run.method: run for run in runs if run.scene == scene}
@@ -56,49 +48,34 @@ def stability_page(context: Context, opened: OpenResults) -> dict[str, object]:
                 marks.append(None)
                 continue
             symbol, text = OUTCOMES[run.outcome]
-            if run.false_success and run.outcome != "false_success":
-                symbol += "!"
+            if run.false_success:
+                symbol, text = f"{symbol}!", f"{text}; its engine claims success"
             marks.append((run.outcome, symbol, f"{label_of(run.method)}: {text}. {run.message}".strip()))
-        first = next(iter(own.values()))
         fastest: TableCell | str = "no method"
-        if not first.has_reference:
+        if scene not in fastest_methods:
             fastest = "no reference"
         elif all(run.angle_error is None for run in own.values()):
             fastest = NOT_COMPARED
-        elif reached := reached_by(list(own.values()), scene):
-            fastest = method_cell(reached)
+        elif known := fastest_methods[scene]:
+            fastest = method_cell(known)
         row: dict[str, object] = {
             "scene": scene,
             "href": file,
-            "title": scenes[scene].title,
+            "title": opened.scenes[scene].title,
             "marks": marks,
             "fastest": fastest,
         }
-        families.setdefault(_FAMILIES.get(first.family, first.family), []).append(row)
-    limits, conserved = [], []
-    for record in records:
-        facts = record.attributes
-        if record.kind == "stability_limits" and math.isfinite(facts.get("largest_stable_step_s", math.nan)):
-            step, theory, mode = facts["largest_stable_step_s"], facts["theory_s"], facts["fastest_mode_per_s"]
-            numbers = [f"{step:.4g}", f"{theory:.4g}", f"{step / theory:.3f}", f"{step * mode:.3f}"]
-            numbers.append(f"{facts['mode_damping_ratio']:.3g}")
-            limits.append([record.scene, method_cell(record.method), *numbers])
-        drifts = [facts.get(name) for name in _CONSERVED]
-        if record.kind == "symmetry" and any(value is not None for value in drifts):
-            conserved.append([record.scene, method_cell(record.method), *map(number, drifts)])
-    limits_head = (
-        "Scene", "Method", "found by bisection (s)", "theory (s)", "found / theory", "step × |λ|", "damping ratio of λ",
-    )  # fmt: skip
-    conserved_head = ["Scene", "Method", *_CONSERVED.values()]
+        family = next(iter(own.values())).family
+        families.setdefault(_FAMILIES.get(family, family), []).append(row)
     used = {run.outcome for run in runs}
+    counts = family_table(runs, lambda family: _FAMILIES.get(family, family))
+    rows: list[Row] = [[method_cell(method), *cells] for method, *cells in counts.rows]
     return {
         "methods": [(label_of(name), name) for name in methods],
         "families": list(families.items()),
         "key": [(outcome, symbol, text) for outcome, (symbol, text) in OUTCOMES.items() if outcome in used],
-        "summary": advice_lines(runs, label_of, lambda family: f"“{_FAMILIES.get(family, family)}”"),
+        "summary": Section(tables=[PageTable("", ("Method", *counts.head[1:]), rows)]),
         "false_successes": sum(run.false_success for run in runs),
-        "limits": Section(tables=[PageTable("", limits_head, limits)]),
-        "conservation": Section(tables=[PageTable("", conserved_head, conserved)]),
     }
 
 
@@ -135,7 +112,7 @@ def step_section(scene: str, ladders: Sequence[Record]) -> Section:
         return Section()
     curves = [(arrays["step"], arrays["angle_error_max"], look_of(method)) for method, arrays in own.items()]
     caption = "Largest angle error up to the horizon over the fixed step; no mark where the run failed"
-    return Section([picture(error_over_step(curves, TARGET), "steps", caption)], run_legend(own))
+    return Section([picture(error_over_step(curves, TARGET), "steps", caption)])
 
 
 def error_over_step(series: Sequence[tuple[Array, Array, Look]], target: float) -> Panels:

@@ -13,13 +13,12 @@ from numpy.typing import NDArray
 
 from rotor_mbs.analysis.sweep_numbers import GROWN, Spread, StabilityMap, spread_of, stability_map
 from rotor_mbs.errors import InputError, StoreError
-from rotor_mbs.report.core import canvas
 from rotor_mbs.report.core.canvas import TIME_AXIS, Panels, colour_map, curve, growth_map, log_axis, panels
-from rotor_mbs.report.core.elements import LegendEntry, PageTable, Picture, Section
+from rotor_mbs.report.core.elements import PageTable, Picture, Section
 from rotor_mbs.report.core.looks import BLUE, VERMILLION, Look, with_capital
 from rotor_mbs.report.core.numbers import SPACE, apart
 from rotor_mbs.report.core.svg import picture
-from rotor_mbs.report.pages.scene_tables import versions, words_of
+from rotor_mbs.report.pages.scene_tables import words_of
 from rotor_mbs.runs.sweeps import StoredSweep, parameter_name
 from rotor_mbs.scenario.scene import parse_scene
 from rotor_mbs.solution.status import GOOD, STATUSES
@@ -33,7 +32,6 @@ _MAX_RESPONSES = 3
 _MAX_POINTS = 200  # of a distribution
 _MAX_RUNS = 1000  # that have a point
 _MAX_GROWTH = 1e4  # the colours end there: the pitch has turned many times
-MEDIAN, GROWTH, BOUNDARY = Look(BLUE, "-", ""), Look(VERMILLION, "--", ""), Look(VERMILLION, "-", "")
 _COORDINATE = re.compile(r"initial\.(angles|rates)\[(\d+)\]")
 
 
@@ -45,8 +43,8 @@ def sweep_page(sweep: StoredSweep) -> dict[str, object]:
     plots = _responses(sweep, ok)
     if _picture_kind(sweep):
         try:
-            panels, caption, line, legend = _asked_picture(sweep)
-            plots = [picture(panels, "asked", caption, legend=legend)]
+            panels, caption, line = _asked_picture(sweep)
+            plots = [picture(panels, "asked", caption)]
         except (InputError, StoreError) as exc:
             line = f"No picture: {exc}."
         lines.append(line)
@@ -84,7 +82,6 @@ def sweep_page(sweep: StoredSweep) -> dict[str, object]:
         "parameters": Section(tables=[PageTable("", head, parameter_rows)]),
         "distributions": Section(distributions),
         "toml": str(sweep.attributes.get("sweep_toml", "")),
-        "versions": versions(sweep.attributes),
     }
 
 
@@ -101,9 +98,8 @@ def field_name(key: str) -> str:
 
 def save_picture(sweep: StoredSweep, path: Path) -> str:
     """The picture that the sweep's file asks for, as a file; a line about it. Raises InputError, StoreError."""
-    panels, _, line, legend = _asked_picture(sweep)
-    canvas.legend(panels.axes[0], [(entry.label, entry.look) for entry in legend])
-    panels.save(path)
+    panels, _, line = _asked_picture(sweep)
+    panels.with_legend().save(path)
     return f"{path}: {line}"
 
 
@@ -115,28 +111,25 @@ def _picture_kind(sweep: StoredSweep) -> str:
         return ""
 
 
-def _asked_picture(sweep: StoredSweep) -> tuple[Panels, str, str, list[LegendEntry]]:
-    """That picture, its caption, its result in a line, its legend."""
+def _asked_picture(sweep: StoredSweep) -> tuple[Panels, str, str]:
+    """That picture, its caption, its result in a line."""
     if _picture_kind(sweep) == "spread":
         spread = spread_of(sweep)
-        rate = f"{spread.exponent:.3f} ± {spread.uncertainty:.3f} per s"
         line = (
-            f"Nearby starts part with the largest Lyapunov exponent {rate} ({spread.pairs} pairs, {spread.start:.2f} "
-            f"to {spread.end:.2f} s)."
+            f"Nearby starts part with the largest Lyapunov exponent {_rate(spread)} ({spread.pairs} pairs, "
+            f"{spread.start:.2f} to {spread.end:.2f} s)."
         )
-        legend = [
-            LegendEntry(f"10 to 90 % of {spread.pairs} pairs", MEDIAN, 8.0),
-            LegendEntry("median", MEDIAN),
-            LegendEntry(f"growth {rate}", GROWTH),
-        ]
-        return spread_panels(spread), "Separation of nearby starts", line, legend
+        return spread_panels(spread), "Separation of nearby starts", line
     start = parse_scene(str(sweep.attributes["scene_toml"]), str(sweep.attributes["base_scene"])).initial_angles
     growth = stability_map(sweep, max(map(abs, start[1:]), default=0.0))
     y_label, x_label = (_axis(field_name(key), sweep.columns[parameter_name(key)].units) for key in sweep.keys)
-    panels, has_line = map_panels(growth, x_label, y_label)
     line = f"The pitches grow {GROWN:g}-fold in {growth.unstable.sum()} of {growth.growth.size} runs."
     caption = "Growth of the pitches: the largest pitch of a run, of the largest at its start"
-    return panels, caption, line, [LegendEntry(f"{GROWN:g} times its start", BOUNDARY)] if has_line else []
+    return map_panels(growth, x_label, y_label), caption, line
+
+
+def _rate(spread: Spread) -> str:
+    return f"{spread.exponent:.3f} ± {spread.uncertainty:.3f} per s"
 
 
 def _responses(sweep: StoredSweep, ok: NDArray[np.bool_]) -> list[Picture]:
@@ -194,27 +187,30 @@ def spread_panels(spread: Spread) -> Panels:
     panel = panels((3.6,), TIME_AXIS)
     axes = panel.axes[0]
     seen = spread.low > 0.0
-    axes.fill_between(spread.time[seen], spread.low[seen], spread.high[seen], color=BLUE, alpha=0.2, lw=0)
-    curve(axes, spread.time, spread.median, MEDIAN)
+    label = f"10 to 90 % of {spread.pairs} pairs"
+    axes.fill_between(spread.time[seen], spread.low[seen], spread.high[seen], color=BLUE, alpha=0.2, lw=0, label=label)
+    curve(axes, spread.time, spread.median, Look(BLUE, "-", "", "median"))
     inside = (spread.time >= spread.start) & (spread.time <= spread.end)
     time, growth = spread.time[inside], spread.growth[inside]
     # Through the window's middle, at the slope that was found.
-    curve(axes, time, np.exp(np.log(growth).mean() + spread.exponent * (time - time.mean())), GROWTH)
+    fitted = np.exp(np.log(growth).mean() + spread.exponent * (time - time.mean()))
+    curve(axes, time, fitted, Look(VERMILLION, "--", "", f"growth {_rate(spread)}"))
     log_axis(axes, float(spread.low[seen].min()), float(spread.high.max()))
     axes.set_ylabel("separation of the angles (rad)")
     return panel
 
 
-def map_panels(growth: StabilityMap, x_label: str, y_label: str) -> tuple[Panels, bool]:
-    """Growth of the pitches as colour over both axes, and whether there is the line where they grew tenfold."""
+def map_panels(growth: StabilityMap, x_label: str, y_label: str) -> Panels:
+    """Growth of the pitches as colour over both axes, and the line where they grew tenfold, if there is one."""
     panel = panels((3.8,), x_label)
     axes = panel.axes[0]
     label = "largest pitch, of its start (powers of ten)"
-    has_line = growth_map(panel, growth.x, growth.y, growth.growth, _MAX_GROWTH, label, GROWN)
+    boundary = Look(VERMILLION, "-", "", f"{GROWN:g} times its start")
+    growth_map(panel, growth.x, growth.y, growth.growth, _MAX_GROWTH, label, boundary, GROWN)
     axes.ticklabel_format(style="plain")
     axes.set_ylabel(y_label)
     panel.figure.subplots_adjust(left=0.18)
-    return panel, has_line
+    return panel
 
 
 def response(parameter: Array, values: Array, x_label: str, y_label: str, *, logarithmic: bool) -> Panels:
@@ -235,7 +231,7 @@ def distribution(values: Array, label: str, *, logarithmic: bool) -> Panels:
     known = np.sort(values[np.isfinite(values) & ((values > 0.0) | (not logarithmic))])
     if len(known) > _MAX_POINTS:
         known = known[np.linspace(0, len(known) - 1, _MAX_POINTS).round().astype(int)]
-    curve(panel.axes[0], known, np.linspace(0.0, 100.0, len(known)), MEDIAN)
+    curve(panel.axes[0], known, np.linspace(0.0, 100.0, len(known)), Look(BLUE, "-", ""))
     if logarithmic:
         log_axis(panel.axes[0], known[0], known[-1], "x")
     panel.axes[0].set(ylim=(0.0, 101.0), ylabel="share of runs (%)")
