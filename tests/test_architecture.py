@@ -90,13 +90,12 @@ SCENE_KEY: Patch = {
     "solution/impulse.py": {"scene.shaft_damping * (angles": "scene.shaft_brake * run.time + "},
 }
 PAGE: Patch = {
-    "report/pages/names.py": {"": "def names_page(opened):\n    return [*opened.scenes]\n"},
-    "report/templates/names.html.j2": {"": '{% extends "base.html.j2" %}{% block main %}{{ page }}{% endblock %}'},
-    "report/core/files.py": {"Site = Seq": 'NAMES = "names.html"\n', "CHECK}": "NAMES, "},
+    "report/pages/names.py": {"": "def names_page(opened):\n    return {'all': [*opened.scenes]}\n"},
+    "report/templates/names.html.j2": {"": '{% extends "base.html.j2" %}{% block main %}{{ page.all }}{% endblock %}'},
+    "report/core/files.py": {'BENCH_CSV = "': 'NAMES = "names.html"\n'},
     "report/build.py": {
         "from rotor_mbs.report.pages.scene ": "from rotor_mbs.report.pages.names import names_page\n",
-        "    names = {file": '    labels[files.NAMES] = "Names"\n',
-        "    made = _made(": '    tasks.append(partial(_page, "names", files.NAMES, site, names_page))\n',
+        "    pages[0] = pages[0]": '    pages.append(Page(files.NAMES, "Names", "names", names_page))\n',
     },
 }
 MASS = "def mass(arguments):\n    print(mass_of(only_scene(arguments.scene)))\n    return 0\n"

@@ -190,7 +190,7 @@ class _Examination:
                     return f"its step of {step:g} s: half of it leaves {left:.1e} rad, order {seen:.1f}"
         try:
             data = load_data({"time": run.time, "angles": run.angles, "rates": run.rates}, scene)
-            likely = compare_with_reference(data, scene, self._bound).verdict.likely
+            likely = compare_with_reference(data, scene, 0.0).verdict.likely
         except RotorError:
             likely = ()
         return " or ".join(likely) or NOT_FOUND
