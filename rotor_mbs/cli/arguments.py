@@ -326,6 +326,8 @@ def _parser() -> tuple[_Parser, dict[str, _Parser]]:
     own.method("replaces the file's methods")
     own.output(file, "FILE", help="output file (default: the sweep's name with the ending .h5)")
     own.flag("--metadata", help="Croissant metadata and statistics for normalization beside FILE, as JSON")
+    text = "also a folder that load_dataset of Hugging Face reads: a file per split, and a dataset card"
+    own.add_argument("--datasets", type=path, metavar="DIR", help=text)
     own.add_argument("--engine", default="local", metavar="ENGINE", help="local, or dask:tcp://host:port")
     own.add_argument("--part", type=part, default=(1, 1), metavar="K/N", help="only part K of N, for a job array")
     own.flag("--fresh", help="recompute stored runs")

@@ -286,6 +286,11 @@ def sweep(arguments: argparse.Namespace) -> int:
 
             names = ", ".join(place.name for place in describe(result.path))
             print(f"{result.path}: described in {names}", file=sys.stderr if arguments.json else sys.stdout)
+        if arguments.datasets:
+            from rotor_mbs.studies.sweep_metadata import write_splits
+
+            names = ", ".join(place.name for place in write_splits(result.path, arguments.datasets))
+            print(f"{arguments.datasets}: {names}", file=sys.stderr if arguments.json else sys.stdout)
         return 0 if result.is_ok else 1
 
 

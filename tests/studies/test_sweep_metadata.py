@@ -15,8 +15,9 @@ import numpy as np
 import pytest
 
 from rotor_mbs.cli import main
+from rotor_mbs.errors import InputError
 from rotor_mbs.solution.status import code_of
-from rotor_mbs.studies.sweep_metadata import describe
+from rotor_mbs.studies.sweep_metadata import describe, write_splits
 
 ROOT = Path(__file__).parents[2]
 SWEEP = """
@@ -42,7 +43,7 @@ def dataset(tmp_path_factory: pytest.TempPathFactory) -> Path:
     (folder / "study.toml").write_text(SWEEP)
     path = folder / "out" / "study.nc"
     command = ["sweep", str(folder / "study.toml"), "-o", str(path), "--metadata", "-j", "1"]
-    assert main(command) == 0
+    assert main([*command, "--datasets", str(folder / "splits")]) == 0
     return path
 
 
@@ -99,9 +100,49 @@ def test_croissant_is_valid(dataset: Path) -> None:
     mlcroissant.Dataset(jsonld=str(dataset.with_suffix(".croissant.json")))  # raises where it is not
 
 
+def test_a_split_has_its_runs_bit_for_bit(dataset: Path) -> None:
+    folder = dataset.parents[1] / "splits"
+    with h5py.File(dataset) as whole:
+        for code, split in enumerate(("train", "validation", "test")):
+            rows = np.flatnonzero(whole["split"][()] == code)
+            with h5py.File(folder / f"{split}.h5") as file:
+                assert {len(item) for item in file.values()} == {len(rows)} != {0}
+                for name in ("run", "bearing_stiffness", "status", "angles", "tip"):
+                    assert file[name][()].tobytes() == whole[name][()][rows].tobytes()
+                    assert file[name].attrs["units"] == whole[name].attrs["units"]
+
+
+def test_a_dataset_card_replaces_its_own_kind_only(dataset: Path, tmp_path: Path) -> None:
+    *files, card = write_splits(dataset, tmp_path)
+    text = card.read_text()
+    assert [file.name for file in files] == ["train.h5", "validation.h5", "test.h5"]
+    assert all(f"path: {file.name}" in text for file in files)
+    write_splits(dataset, tmp_path)
+    card.write_text("of somebody else")
+    with pytest.raises(InputError, match="is not an output of this command"):
+        write_splits(dataset, tmp_path)
+
+
+@pytest.mark.full
+@pytest.mark.filterwarnings("ignore")  # of the reader and what it imports
+def test_hugging_face_reads_the_folder_bit_for_bit(dataset: Path, tmp_path: Path) -> None:
+    datasets = pytest.importorskip("datasets")
+    loaded = datasets.load_dataset(str(dataset.parents[1] / "splits"), cache_dir=str(tmp_path))
+    with h5py.File(dataset) as file:
+        for code, split in enumerate(("train", "validation", "test")):
+            rows = np.flatnonzero(file["split"][()] == code)
+            assert loaded[split].num_rows == len(rows)
+            for name in ("run", "bearing_stiffness", "status", "angles", "tip"):
+                values = file[name][()][rows]
+                there = np.array(loaded[split].data.column(name).to_pylist(), values.dtype)
+                assert (there.shape, there.tobytes()) == (values.shape, values.tobytes())
+
+
 def test_the_loader_of_the_documentation(dataset: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Its text, run with a stand-in for PyTorch: normalized inputs and angles of the training runs."""
-    [code] = re.findall(r"```python\n([^`]*, torch\n[^`]*)```", (ROOT / "docs/sweeps.md").read_text(), re.DOTALL)
+    [code] = re.findall(
+        r"```python\n(import h5py[^`]*, torch\n[^`]*)```", (ROOT / "docs/sweeps.md").read_text(), re.DOTALL
+    )
     data = SimpleNamespace(TensorDataset=lambda *arrays: arrays)
     torch = SimpleNamespace(utils=SimpleNamespace(data=data), from_numpy=lambda array: array)
     monkeypatch.setitem(sys.modules, "torch", torch)
