@@ -176,7 +176,7 @@ class System:
             integration.initialStepSize = min(it.currentStepSize, interval.end - interval.start)
         return total
 
-    # For extrapolation: integrations of one interval from a state that the caller sets, without rows of the sensors.
+    # For extrapolation: integrations of one interval from a state that the caller sets.
 
     @property
     def sensors(self) -> list[str]:
@@ -187,12 +187,14 @@ class System:
         """What the coordinates are displacements from."""
         return np.array(self._mbs.systemData.GetODE2Coordinates(_engine.ConfigurationType.Reference))
 
-    def begin(self, scheme: Scheme) -> None:
-        """Go back to the initial state, to be integrated by an implicit scheme."""
+    def begin(self, scheme: Scheme, *, with_rows: bool) -> None:
+        """Go back to the initial state, to be integrated by an implicit scheme; sensors keep every step of the last
+        `advance`, or nothing."""
         data = self._mbs.systemData
         data.SetSystemState(self._initial_state, _engine.ConfigurationType.Initial)
         self._settings = _settings(scheme, data.ODE2Size(), data.AEsize())
-        self._settings.solution.sensors.active = False
+        self._settings.solution.sensors.active = with_rows
+        self._settings.solution.sensors.writePeriod = 0.0
         self._solver = _engine.MainSolverImplicitSecondOrder()
 
     def initial_values(self, time: float) -> tuple[Array, Array]:

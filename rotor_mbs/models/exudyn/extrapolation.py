@@ -10,6 +10,7 @@ constraints changes its sign with every step, and only after an even number of s
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -19,7 +20,7 @@ from rotor_mbs.models.exudyn.moments import Loads
 from rotor_mbs.models.exudyn.schemes import Scheme
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.scenario.time_table import Interval, intervals
-from rotor_mbs.solution.trajectory import Array, Integration, Trajectory
+from rotor_mbs.solution.trajectory import Array, Integration, Trajectory, all_coordinates
 
 # Of 2, 4, ..., 14 substeps. Twelve and fourteen serve tolerances below 1e-9 rad.
 MOST_COLUMNS = 7
@@ -61,7 +62,16 @@ class ExtrapolatedSolver:
         self._least_error = max(tolerance, _ROUNDING)
         self._newton_tolerance = float(str(scheme.options["newton.relativeTolerance"]))
         self._intervals = intervals(self._loads.segments, scene.samples, every_sample=True)
-        self.system = System(chain.parts(scene, self._loads))
+        # Dampers and loads over time want it along the path: it is extrapolated with the state.
+        self._integrates_work = scene.wants("energy") and scene.work_needs_path
+        parts = chain.parts(scene, self._loads)
+        sensors = [part.name for part in parts if part.kind == "sensor"]
+        self._of_rates = [name for name in sensors if name.endswith(("rotation", "spin"))]
+        for number, part in enumerate(parts):
+            if part.kind == "sensor":  # what is stored, the engine evaluates after every step
+                stored = part.name in self._of_rates
+                parts[number] = replace(part, parameters={**part.parameters, "storeInternal": stored})
+        self.system = System(parts)
         # Of each body the displacement from a reference and the change of four Euler parameters.
         self._reference = self.system.reference.reshape(-1, 7)
         self._sizes = np.abs(self._reference).max(axis=0)
@@ -71,6 +81,7 @@ class ExtrapolatedSolver:
         self._total = Integration(True)
         self._halvings = 0
         self.columns: list[int] = []  # of each part
+        self._works: list[float] = []  # J
         self._times: list[float] = []
         self._states: list[Array] = []
         self._turns: list[Array] = []  # of the springs
@@ -80,11 +91,11 @@ class ExtrapolatedSolver:
         """From sample to sample. Where a load has a kink, accelerations and multipliers are calculated anew."""
         self._total = Integration(True, steps=0, rhs_evaluations=0)
         self._halvings, self.columns = 0, []
-        self._times, self._states, self._turns, self._within = [], [], [], []
+        self._times, self._states, self._turns, self._within, self._works = [], [], [], [], []
         first = self._intervals[0]
         self._loads.enter(first)
-        self.system.begin(self._scheme)
-        self._keep(0.0, first, *self.system.initial_values(0.0))
+        self.system.begin(self._scheme, with_rows=self._integrates_work)
+        self._keep(0.0, first, *self.system.initial_values(0.0), 0.0)
         failure = ""
         with polled():
             for interval in self._intervals:
@@ -123,13 +134,29 @@ class ExtrapolatedSolver:
                 return MESSAGE
             if failure:
                 return failure
-            row = neville(row, self.system.values())
+            values = self.system.values()
+            if self._integrates_work:
+                values = np.append(values, self._work(interval))
+            row = neville(row, values)
             # The error of the value beside it in the table, which has two orders less than what is kept.
             if column and self._is_met(row[-1] - row[-2], row[-1], end - start):
                 self.columns.append(column + 1)
-                self._keep(end, interval, self._consistent(row[-1]), self.system.turns())
+                state, gained = row[-1], 0.0
+                if self._integrates_work:
+                    state, gained = state[:-1], float(state[-1])
+                self._keep(end, interval, self._consistent(state), self.system.turns(), self._works[-1] + gained)
                 return ""
         return f"near t = {start:.6g} s the error of {end - start:.3g} s stays above the tolerance"
+
+    def _work(self, interval: Interval) -> float:
+        """J, of loads and dampers over the substeps of one column: by the trapezoidal rule, whose error is a power
+        series of the substep's square, as the state's is."""
+        tables = {name: self.system.rows(name) for name in self._of_rates}
+        time = tables["hub spin"][:, 0]
+        moving = sensor_samples.joint_rates(self._scene, lambda name: tables[name][:, 1:])
+        _, rates = all_coordinates(self._scene, np.zeros_like(moving), moving)
+        power = sensor_samples.power(self._scene, interval.segment, time, rates)
+        return float(np.trapezoid(power, time))
 
     def _is_met(self, difference: Array, values: Array, span: float) -> bool:
         """Whether a difference of Euler parameters, or of their rates over `span` s, is below half the tolerance (they
@@ -160,8 +187,9 @@ class ExtrapolatedSolver:
             kinds[:, :, columns][sizes[:, :, columns] < _INSIGNIFICANT * largest[:, None, None]] = 0.0
         return values
 
-    def _keep(self, time: float, interval: Interval, values: Array, turns: Array) -> None:
+    def _keep(self, time: float, interval: Interval, values: Array, turns: Array, work: float) -> None:
         self.system.start_from(values, turns)
+        self._works.append(work)
         self._times.append(time)
         self._states.append(values)
         self._turns.append(turns)
@@ -175,8 +203,9 @@ class ExtrapolatedSolver:
             for name, read in self.system.read(time, values, turns).items():
                 tables[name].append(np.concatenate([[time], read]))
         rows = {name: np.array(table) for name, table in tables.items()}
+        rows["work"] = np.stack([self._times, self._works], axis=1)
         # A diverging state may overflow in its energies; the rows are cut where they stop being finite.
         with np.errstate(over="ignore", invalid="ignore"):
             return sensor_samples.chain_trajectory(
-                self._scene, self._loads.segments, rows.__getitem__, between_rows=True
+                self._scene, self._loads.segments, rows.__getitem__, has_work=self._integrates_work
             )

@@ -59,16 +59,16 @@ def tree_trajectory(scene: Scene, segments: Sequence[Segment], recorded: Callabl
 
 
 def chain_trajectory(
-    scene: Scene, segments: Sequence[Segment], recorded: Callable[[str], Array], between_rows: bool = False
+    scene: Scene, segments: Sequence[Segment], recorded: Callable[[str], Array], has_work: bool = False
 ) -> Trajectory:
     """Joint angles from the bodies' rotation matrices, rates from their angular velocities, and the joints' gaps;
-    `between_rows`: see `work`."""
+    `has_work`: there are rows "work" in J, and `work` need not integrate."""
     placed = chain.placed_bodies(scene)
     bodies = [(part.name, part.body) for part in placed]
     state = [f"{name} {what}" for name, _ in bodies for what in ("position", "rotation", "spin")]
     read = _Reader(scene, recorded, state)
     angles, rates = _joint_motion(scene, read)
-    fields = _fields(scene, segments, read, angles, rates, bodies, between_rows)
+    fields = _fields(scene, segments, read, angles, rates, bodies, has_work)
     # Every body's hub centre, which the joints keep together with the ground's and the hub's.
     hub, *blades = (
         read.sampled(f"{name} position") - matrices(read.sampled(f"{name} rotation")) @ body.com
@@ -82,20 +82,26 @@ def chain_trajectory(
 
 
 def _joint_motion(scene: Scene, read: _Reader) -> tuple[Array, Array]:
-    hub, hub_spin = matrices(read.all("hub rotation")), read.all("hub spin")
+    hub, rates = matrices(read.all("hub rotation")), joint_rates(scene, read.all)
     wrapped = np.arctan2(hub[:, 0, 2] - hub[:, 2, 0], hub[:, 0, 0] + hub[:, 2, 2])
-    rates = [hub_spin[:, 1]]
-    angles = [unwrap(read.time, wrapped, rates[0], scene.initial_angles[0])]
-    hub_omega = (hub @ hub_spin[:, :, None])[:, :, 0]
-    for i in pitching(scene):
-        blade = matrices(read.all(f"blade {i + 1} rotation"))
-        x, y, z = np.moveaxis(blade, 2, 0)
+    angles = [unwrap(read.time, wrapped, rates[:, 0], scene.initial_angles[0])]
+    for column, i in enumerate(pitching(scene), start=1):
+        x, y, _ = np.moveaxis(matrices(read.all(f"blade {i + 1} rotation")), 2, 0)
         seat_x, seat_y = hub @ mounting(i, len(scene.blades))[:, 0], hub[:, :, 1]
         wrapped = np.arctan2(_dot(seat_y, x) - _dot(seat_x, y), _dot(seat_x, x) + _dot(seat_y, y))
-        rate = read.all(f"blade {i + 1} spin")[:, 2] - _dot(hub_omega, z)
-        angles.append(unwrap(read.time, wrapped, rate, scene.initial_angles[1 + i]))
-        rates.append(rate)
-    return all_coordinates(scene, np.stack(angles, axis=1), np.stack(rates, axis=1))
+        angles.append(unwrap(read.time, wrapped, rates[:, column], scene.initial_angles[1 + i]))
+    return all_coordinates(scene, np.stack(angles, axis=1), rates)
+
+
+def joint_rates(scene: Scene, values: Callable[[str], Array]) -> Array:
+    """(n, coordinates that move) rad/s of the chain, from (n, k) values of its sensors."""
+    hub, hub_spin = matrices(values("hub rotation")), values("hub spin")
+    hub_omega = (hub @ hub_spin[:, :, None])[:, :, 0]
+    rates = [hub_spin[:, 1]]
+    for i in pitching(scene):
+        z = matrices(values(f"blade {i + 1} rotation"))[:, :, 2]
+        rates.append(values(f"blade {i + 1} spin")[:, 2] - _dot(hub_omega, z))
+    return np.stack(rates, axis=1)
 
 
 def _dot(a: Array, b: Array) -> Array:
@@ -109,7 +115,7 @@ def _fields(
     angles: Array,
     rates: Array,
     bodies: Sequence[tuple[str, Body]],
-    between_rows: bool = False,
+    has_work: bool = False,
 ) -> dict[str, Array]:
     """What the scene asks for, at the samples. angles and rates are (rows, 1 + blades)."""
     fields = {"angles": angles[read.samples], "rates": rates[read.samples]}
@@ -117,7 +123,10 @@ def _fields(
         tips = [read.sampled(f"tip {i + 1}") for i in range(len(scene.blades))]
         fields["tip"] = np.stack(tips, axis=1)
     if scene.wants("energy"):
-        fields["work"] = work(scene, segments, read.time, angles, rates, between_rows)[read.samples]
+        if has_work:
+            fields["work"] = read.sampled("work")[:, 0]
+        else:
+            fields["work"] = work(scene, segments, read.time, angles, rates)[read.samples]
         fields["potential_energy"], of_rests = springs(scene, fields["angles"])
         if any(scene.bearing_rest):
             fields["work"] += of_rests
@@ -159,29 +168,15 @@ def springs(scene: Scene, angles: Array) -> tuple[Array, Array]:
     return energy, of_rests
 
 
-def work(
-    scene: Scene,
-    segments: Sequence[Segment],
-    time: Array,
-    angles: Array,
-    rates: Array,
-    between_rows: bool = False,
-) -> Array:
+def work(scene: Scene, segments: Sequence[Segment], time: Array, angles: Array, rates: Array) -> Array:
     """(n,) J of the torques less what the dampers took, from all rows, samples among them: s, rad, rad/s. A spring
-    whose rest angle r changes counts as one that is unloaded at 0 and a torque k r; see `springs`. Between rows the
-    power is interpolated; with `between_rows`, for rows far apart, it is calculated from interpolated rates."""
+    whose rest angle r changes counts as one that is unloaded at 0 and a torque k r; see `springs`."""
     if not scene.work_needs_path:
         turned, torques = angles - angles[:1], segments[0].values
         exact: Array = torques[ROTOR] * turned[:, 0]
         for column, load, _ in drives(scene):
             exact = exact + torques[load] * turned[:, column] if column else exact
         return exact
-
-    def power(segment: Segment, time: Array, rates: Array) -> Array:
-        drawn: Array = -(rates**2) @ np.array(scene.dampings)
-        for column, load, factor in drives(scene):
-            drawn = drawn + factor * segment.at(load, time) * rates[..., column]
-        return drawn
 
     out, done = np.zeros(len(time)), 0.0
     slack = 1e-9 * scene.duration / (scene.samples - 1)
@@ -190,25 +185,30 @@ def work(
         if last - first < 2:
             break
         inside = slice(first, last)
-        if between_rows:
-            at, weights = _gauss_points(time[inside], _POINTS)
-            gained = (power(segment, at, _rates_at(at, time[inside], angles[inside], rates[inside])) * weights).sum(
-                axis=1
-            )
-            out[inside] = done + np.concatenate([[0.0], np.cumsum(gained)])
-        else:
-            out[inside] = done + cumulative_integral(time[inside], power(segment, time[inside], rates[inside]))
+        drawn = power(scene, segment, time[inside], rates[inside])
+        out[inside] = done + cumulative_integral(time[inside], drawn)
         done = out[last - 1]
     return out
+
+
+def power(scene: Scene, segment: Segment, time: Array, rates: Array) -> Array:
+    """(n,) W of what `work` is the integral of; rates: (n, 1 + blades) rad/s."""
+    drawn: Array = -(rates**2) @ np.array(scene.dampings)
+    for column, load, factor in drives(scene):
+        drawn = drawn + factor * segment.at(load, time) * rates[:, column]
+    return drawn
 
 
 def cumulative_integral(time: Array, values: Array) -> Array:
     """(n,) integral from the first row to each row, by a local polynomial through the eight nearest rows, which need
     not be equally spaced; exact by Gauss-Legendre points."""
-    window = _windows(time)
+    points = min(_POINTS, len(time))
+    first = np.clip(np.arange(len(time) - 1) - (points // 2 - 1), 0, len(time) - points)
+    window = first[:, None] + np.arange(points)
     nodes, known = time[window], values[window]
-    points = window.shape[1]
-    at, weights = _gauss_points(time, (points + 1) // 2)
+    abscissae, weights = np.polynomial.legendre.leggauss((points + 1) // 2)
+    half = 0.5 * np.diff(time)
+    at = (time[:-1] + half)[:, None] + half[:, None] * abscissae
     polynomial = np.zeros_like(at)
     for j in range(points):
         basis = np.ones_like(at)
@@ -216,40 +216,4 @@ def cumulative_integral(time: Array, values: Array) -> Array:
             if k != j:
                 basis *= (at - nodes[:, k, None]) / (nodes[:, j] - nodes[:, k])[:, None]
         polynomial += basis * known[:, j, None]
-    return np.concatenate([[0.0], np.cumsum((polynomial * weights).sum(axis=1))])
-
-
-def _windows(time: Array) -> NDArray[np.intp]:
-    """(n - 1, points) the rows nearest to each interval between rows."""
-    points = min(_POINTS, len(time))
-    first = np.clip(np.arange(len(time) - 1) - (points // 2 - 1), 0, len(time) - points)
-    return np.asarray(first[:, None] + np.arange(points))
-
-
-def _gauss_points(time: Array, count: int) -> tuple[Array, Array]:
-    """(n - 1, count) points in s between rows, and their weights."""
-    abscissae, weights = np.polynomial.legendre.leggauss(count)
-    half = 0.5 * np.diff(time)
-    return (time[:-1] + half)[:, None] + half[:, None] * abscissae, half[:, None] * weights
-
-
-def _rates_at(at: Array, time: Array, angles: Array, rates: Array) -> Array:
-    """(n - 1, k, coordinates) rates at (n - 1, k) points between rows: from Hermite's polynomial, which has
-    the angles and rates of the eight nearest rows."""
-    window = _windows(time)
-    nodes = time[window]
-    out = np.zeros((*at.shape, angles.shape[1]))
-    to_nodes = at[:, :, None] - nodes[:, None, :]
-    for j in range(window.shape[1]):
-        others = np.delete(nodes, j, axis=1)
-        from_node = nodes[:, j, None] - others
-        basis = np.prod(np.delete(to_nodes, j, axis=2) / from_node[:, None, :], axis=2)
-        slope = basis * np.sum(1.0 / np.delete(to_nodes, j, axis=2), axis=2)
-        slope_at_node = np.sum(1.0 / from_node, axis=1)[:, None]
-        distance = to_nodes[:, :, j]
-        of_angle = 2.0 * basis * (slope * (1.0 - 2.0 * distance * slope_at_node) - basis * slope_at_node)
-        of_rate = basis * (basis + 2.0 * distance * slope)
-        # Angles less that of the interval's first row: their weights add up to zero.
-        turned = angles[window[:, j]] - angles[:-1]
-        out += of_angle[:, :, None] * turned[:, None, :] + of_rate[:, :, None] * rates[window[:, j]][:, None, :]
-    return out
+    return np.concatenate([[0.0], np.cumsum((polynomial * (half[:, None] * weights)).sum(axis=1))])
