@@ -140,8 +140,10 @@ def _stiff(change: dict[str, Any]) -> Scene:
     ],
 )
 def test_a_time_limit_bounds_reference_and_judging(change: dict[str, Any], in_thread: bool) -> None:
-    """Of the limit of 2 s: as long again for the engine's compilation, and a second for observing and for judging; in seconds
-    of the processor, which other processes do not lengthen."""
+    """Of the limit of 2 s: as long again for the engine's compilation, and a second for observing and for judging.
+
+    In seconds of the processor, which other processes do not lengthen.
+    """
     scene = _stiff(change)
     begun = time.process_time()
     if in_thread:
