@@ -77,7 +77,7 @@ def test_full_inertia_springs_dampers_and_torque_follow_the_closed_form(name: st
 
 @pytest.mark.parametrize(
     ("integrator", "order", "steps"),
-    [("rk4", 4, [2e-3, 1e-3, 5e-4]), ("implicitfast", 1, [5e-4, 2.5e-4, 1.25e-4])],
+    [("rk4", 4, [2e-3, 1e-3, 5e-4]), *((name, 1, [5e-4, 2.5e-4, 1.25e-4]) for name in ("implicitfast", "implicit"))],
 )
 @pytest.mark.parametrize("name", [pytest.param("point masses", marks=pytest.mark.full), "mixed"])
 def test_order_of_convergence(name: str, integrator: str, order: int, steps: list[float]) -> None:
@@ -135,7 +135,7 @@ def test_an_inertia_at_the_limit_of_the_triangle_inequality() -> None:
         assert np.abs(run(scene).angles - closed_form(scene)[:, :2]).max() < bound
 
 
-@pytest.mark.parametrize("method", ["mujoco/rk4", "mujoco/implicitfast"])
+@pytest.mark.parametrize("method", ["mujoco/rk4", "mujoco/implicitfast", "mujoco/implicit"])
 def test_runs_are_within_their_bounds_and_an_impossible_step_is_refused(method: str) -> None:
     for name in ("check/general", "check/held", "check/point-masses"):
         scene = references.scene(name)

@@ -41,6 +41,7 @@ OF_LOW_ORDER: dict[str, tuple[tuple[int, ...], dict[str, float]]] = {
     "exudyn_chain/generalized_alpha": ((2, 3), {**NEWTON, "spectral_radius": 0.5}),
     "exudyn_chain/newmark_index2": ((2, 4), NEWTON),
     "mujoco/implicitfast": ((1, 2, 3), {}),
+    "mujoco/implicit": ((1, 2, 3), {}),
 }
 CORRECTED = [*TO_ROUND_OFF, *OF_LOW_ORDER]
 

@@ -1,4 +1,4 @@
-"""The methods of this package: one model with two of the engine's integrators. Importing this does not load MuJoCo."""
+"""The methods of this package: one model with three of the engine's integrators. Importing this does not load MuJoCo."""
 
 from __future__ import annotations
 
@@ -23,8 +23,8 @@ class Rk4Settings(Settings):
 
 
 @dataclass(frozen=True)
-class ImplicitFastSettings(Settings):
-    """Semi-implicit Euler, dampers at the end of the step, order 1."""
+class FirstOrderSettings(Settings):
+    """Semi-implicit Euler, dampers at the end of the step; `implicit` has Coriolis forces there, too."""
 
     step: float = step(5e-5)
 
@@ -39,7 +39,7 @@ def _items(scene: Scene) -> list[BuiltItem]:
 
 
 def _build(integrator: str) -> Callable[[Scene, Any], Solver]:
-    def build(scene: Scene, settings: Rk4Settings | ImplicitFastSettings) -> Solver:
+    def build(scene: Scene, settings: Rk4Settings | FirstOrderSettings) -> Solver:
         _items(scene)
         from rotor_mbs.models.mujoco.solver import MujocoSolver
 
@@ -69,9 +69,13 @@ METHODS = (
         linearize=late("rotor_mbs.models.mujoco.solver:linearize"),
     ),
     # First the new rates, with forces at the start of the step and dampers at its end; then angles with these rates.
-    # The ladder of this first-order method begins where something is left of a motion.
-    _method(
-        "implicitfast", "implicit fast", settings=ImplicitFastSettings, order=1,
-        ladders=(step_ladder(10, first=5),),
+    # The ladders of these first-order methods begin where something is left of a motion. The engine's Euler has the
+    # same dampers, and gives the bits of implicitfast.
+    *(
+        _method(
+            integrator, label, settings=FirstOrderSettings, order=1,
+            ladders=(step_ladder(10, first=5),),
+        )
+        for integrator, label in (("implicitfast", "implicit fast"), ("implicit", "implicit"))
     ),
 )  # fmt: skip

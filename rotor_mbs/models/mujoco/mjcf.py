@@ -30,7 +30,7 @@ from rotor_mbs.scenario.time_table import Segment, Table, constant_value, is_con
 
 LEAST = 2e-15  # kg, kg m²
 
-INTEGRATORS = {"rk4": "RK4", "implicitfast": "implicitfast"}
+INTEGRATORS = {"rk4": "RK4", "implicitfast": "implicitfast", "implicit": "implicit"}
 _FILE_STEP = 2.5e-4  # s, the largest time step of a file: the default of mujoco/rk4
 
 

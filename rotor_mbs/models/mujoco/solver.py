@@ -118,7 +118,7 @@ class Engine:
 _STEPS = (1e-3, 2e-3, 4e-3, 8e-3)
 
 # Evaluations of the equations of motion in a step.
-_STAGES = {"rk4": 4, "implicitfast": 1}
+_STAGES = {"rk4": 4, "implicitfast": 1, "implicit": 1}
 
 
 class _Row(NamedTuple):

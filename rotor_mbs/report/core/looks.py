@@ -74,6 +74,7 @@ _LOOKS = {
     "exudyn_chain/newmark_index2_rotation_vector": Look(PURPLE, ":", "p"),
     "mujoco/rk4": Look(PURPLE, "--", "X"),
     "mujoco/implicitfast": Look(PURPLE, "-.", "h"),
+    "mujoco/implicit": Look(PURPLE, ":", "h"),
 }
 _OTHER_LINES = (":", "-.", "--", "-")
 _OTHER_MARKERS = ("D", "o", "s", "^", "v", "P", "X", "h", "p", "<", ">")
