@@ -134,7 +134,7 @@ class Defects:
     def judged_size(self) -> float:
         """rad: what a method's bound is for: the largest defect beyond rounding, in a longer interval or one with more
         growth as many times smaller as a method's own errors add up to more there; 0 where none is judged."""
-        longer = np.maximum(np.diff(self.time) / _BOUND_INTERVAL, 1.0) * np.maximum(self.growth / _BOUND_GROWTH, 1.0)
+        longer = np.maximum(np.diff(self.time) / _BOUND_INTERVAL, 1.0) * np.fmax(self.growth / _BOUND_GROWTH, 1.0)
         judged = self.is_judged
         sizes = self.sizes[judged]
         with np.errstate(invalid="ignore"):
