@@ -7,25 +7,18 @@ from functools import partial
 from pathlib import Path
 from typing import NamedTuple
 
-import numpy as np
-
-from rotor_mbs.analysis import published, run_selection
-from rotor_mbs.analysis.claims import claims
-from rotor_mbs.analysis.stability import suite_runs
-from rotor_mbs.analysis.work_precision import by_scene
 from rotor_mbs.errors import StoreError
-from rotor_mbs.methods.catalogue import errata_methods
 from rotor_mbs.report.core import files
-from rotor_mbs.report.core.files import Site, page_names, render
-from rotor_mbs.report.pages import Context
+from rotor_mbs.report.core.files import Site, render
+from rotor_mbs.report.pages import Report
 from rotor_mbs.report.pages.bench import bench_page, csv_text
 from rotor_mbs.report.pages.errata import errata_page
 from rotor_mbs.report.pages.figures import available, figures_page
 from rotor_mbs.report.pages.index import index_page
 from rotor_mbs.report.pages.scene import scene_page
-from rotor_mbs.report.pages.stability import is_stability_suite, stability_page
+from rotor_mbs.report.pages.stability import stability_page
 from rotor_mbs.runs.pool import Workers, pool_of, run_in
-from rotor_mbs.runs.read import OpenResults, is_sweep, open_results
+from rotor_mbs.runs.read import is_sweep, open_results
 from rotor_mbs.runs.records import read_records
 from rotor_mbs.runs.sweeps import StoredSweep
 
@@ -41,7 +34,7 @@ class Page(NamedTuple):
     file: str
     label: str
     template: str
-    content: Callable[[OpenResults], Mapping[str, object]]
+    content: Callable[[Report], Mapping[str, object]]
 
 
 def write_report(
@@ -67,7 +60,7 @@ def write_report(
         sweep = StoredSweep(results)
         return files.write_page(output, "sweep", sweep_page(sweep), sweep.attributes)
     with open_results(results) as opened:
-        planned = _plan(opened, checked)
+        planned = _plan(Report(**vars(opened)), checked)
         site = Site([(page.file, page.label) for page in planned if page.label], files.made_with(opened.attributes))
     pages: dict[str, str] = {}
     on_page(0, len(planned))
@@ -88,37 +81,25 @@ def write_report(
 def make_pages(results: Path, site: Site, pages: Sequence[Page]) -> dict[str, str]:
     """The work of a process: pages by file name. Raises StoreError."""
     with open_results(results) as opened:
-        return {page.file: render(page.template, page.content(opened), site, page.file) for page in pages}
+        report = Report(**vars(opened))
+        return {page.file: render(page.template, page.content(report), site, page.file) for page in pages}
 
 
-def _plan(opened: OpenResults, checked: bool) -> list[Page]:
+def _plan(report: Report, checked: bool) -> list[Page]:
     """The pages for what the file has. The first of the main pages is the index."""
-    path, scenes = opened.path, opened.scenes
-    modes, bench, compared = (read_records(path, kind) for kind in ("modes", "bench", "comparison"))
-    has_runs = any(scene.methods for scene in scenes.values()) or not (modes or bench or compared)
+    modes, bench, compared = (read_records(report.path, kind) for kind in ("modes", "bench", "comparison"))
+    has_runs = any(scene.methods for scene in report.scenes.values()) or not (modes or bench or compared)
+    if has_runs and not report.scenes:
+        raise StoreError(f"{report.path}: no scene in it, nothing to report")
     pages: list[Page] = []
-    context = Context({})
-    if has_runs and not scenes:
-        raise StoreError(f"{path}: no scene in it, nothing to report")
-    if has_runs and is_stability_suite(opened):
-        runs = suite_runs(path)
-        ladders = [
-            record for record in read_records(path, "stability") if np.isfinite(record.arrays["angle_error_max"]).any()
-        ]
-        context = Context(page_names(dict.fromkeys(run.scene for run in runs)), suite_runs=runs, ladders=ladders)
-        pages.append(Page(files.INDEX, "Stability suite", "stability", partial(stability_page, context)))
+    if has_runs and report.is_suite:
+        pages.append(Page(files.INDEX, "Stability suite", "stability", stability_page))
     elif has_runs:
-        printed = {run_selection.PRINTED, *errata_methods().values()}
-        errata = published.errata() if any(printed & {*scene.runs} for scene in scenes.values()) else ()
-        decided = claims(scenes)
-        conditions, study = (published.conditions(), published.claim_study()) if decided else ({}, None)
-        context = Context(page_names(scenes), decided, conditions, study, by_scene(bench), errata)
-        pages.append(Page(files.INDEX, "Overview", "index", partial(index_page, context)))
-        if figures := available(scenes):
-            content = partial(figures_page, figures, context)
-            pages.append(Page(files.FIGURES, "The paper's figures", "figures", content))
-        if errata:
-            pages.append(Page(files.ERRATA, "Errata", "errata", partial(errata_page, context)))
+        pages.append(Page(files.INDEX, "Overview", "index", index_page))
+        if available(report.scenes):
+            pages.append(Page(files.FIGURES, "The paper's figures", "figures", figures_page))
+        if report.errata:
+            pages.append(Page(files.ERRATA, "Errata", "errata", errata_page))
     if bench:
         pages.append(Page(files.BENCH, "Error against run time", "bench", bench_page))
     if modes:
@@ -136,6 +117,6 @@ def _plan(opened: OpenResults, checked: bool) -> list[Page]:
 
         pages.append(Page(files.CHECK, "Accuracy check", "check", check_page))
     pages[0] = pages[0]._replace(file=files.INDEX)
-    for scene, file in context.files.items():
-        pages.append(Page(file, "", "scene", partial(scene_page, scene, context)))
+    if has_runs:
+        pages += [Page(file, "", "scene", partial(scene_page, scene)) for scene, file in report.files.items()]
     return pages

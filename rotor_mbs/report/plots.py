@@ -13,6 +13,7 @@ from rotor_mbs.report.core import canvas
 from rotor_mbs.report.core.canvas import TIME_AXIS, Panels
 from rotor_mbs.report.core.looks import GREY, Look, coordinate_look
 from rotor_mbs.report.core.numbers import scaled, with_unit
+from rotor_mbs.solution.quantities import Plot, Quantity
 from rotor_mbs.solution.trajectory import Array
 
 ANGLE_AXIS, RATE_AXIS = "angle (rad)", "rate (rad/s)"
@@ -86,6 +87,28 @@ def lines(rows: Sequence[tuple[str, Sequence[Series]]], horizon: float | None = 
         draw_lines(axes, series, label.replace("(", f"({prefix}", 1), scale)
         mark_time(axes, max(float(curve.time[-1]) for curve in series), horizon)
     return panels
+
+
+def component_panels(
+    quantity: Quantity, plot: Plot, time: Array, values: Array, labels: Sequence[str] = (), horizon: float | None = None
+) -> Panels:
+    """A panel per axis with a line per blade, or one panel with a line per component."""
+    rows: dict[str, list[Series]] = {}
+    for panel, look, component in components(quantity, values, labels):
+        rows.setdefault(f"{panel} {plot.axis}".strip(), []).append(Series(time, component, look))
+    return lines(list(rows.items()), horizon, height=2.3 if len(rows) == 1 else 1.3)
+
+
+def components(quantity: Quantity, values: Array, labels: Sequence[str] = ()) -> list[tuple[str, Look, Array]]:
+    """(panel, look, values (n,)) of each component: with blades and axes a panel per axis, else one panel."""
+    first = 1 if quantity.dimensions[1] == "blade" else 0  # a blade has the look of its pitch
+    names = {"coordinate": labels, "axis": "xyz"}.get(quantity.dimensions[1])
+    if names is None:
+        names = [f"blade {i + 1}" for i in range(values.shape[1])]
+    looks = [coordinate_look(first + i, label) for i, label in enumerate(names[: values.shape[1]])]
+    if values.ndim == 2:
+        return [("", look, values[:, i]) for i, look in enumerate(looks)]
+    return [(axis, look, values[:, i, k]) for i, look in enumerate(looks) for k, axis in enumerate("xyz")]
 
 
 def errors(series: Sequence[Series], label: str, horizon: float | None = None, *, signed: bool = False) -> Panels:

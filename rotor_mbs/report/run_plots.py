@@ -11,7 +11,6 @@ from rotor_mbs.models.lagrange.defects import interval_defects
 from rotor_mbs.report import plots
 from rotor_mbs.report.core.canvas import Panels
 from rotor_mbs.report.core.looks import BLUE, INK, VERMILLION, Look, look_of
-from rotor_mbs.report.pages.quantities import component_panels
 from rotor_mbs.report.plots import Series
 from rotor_mbs.solution.metrics import angle_error, energy_scale, horizon
 from rotor_mbs.solution.quantities import LOADS
@@ -52,7 +51,7 @@ class RunPlots:
         values, load = _quantity(self._run, name), next((load for load in LOADS if load.name == name), None)
         if load is None or load.plot is None:
             raise InputError(f"no load {name!r}; allowed: {', '.join(load.name for load in LOADS)}")
-        return component_panels(load, load.plot, self._run.time, values).with_legend()
+        return plots.component_panels(load, load.plot, self._run.time, values).with_legend()
 
     def defects(self) -> Panels:
         """The size (rad) of every interval's defect over time. Raises InputError for fewer than two samples."""

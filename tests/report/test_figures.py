@@ -60,14 +60,14 @@ def test_models_are_compared_in_numbers(tmp_path: Path) -> None:
     assert (same["0.05 rad off from (s)"], same["Largest difference (rad)"]) == ("never", "0")
 
 
-def test_a_figure_has_three_pictures_its_conditions_and_the_published_number(drawn: Path, tmp_path: Path) -> None:
+def test_a_figure_has_three_pictures_its_scene_and_the_published_number(drawn: Path, tmp_path: Path) -> None:
     folder = write_report(drawn, tmp_path / "out").parent
     text = (folder / "figures.html").read_text(encoding="utf-8").replace("\N{NO-BREAK SPACE}", " ")
     section = re.search(r'<section id="figure-11".*?</section>', text, re.S)
     assert section is not None
     assert section[0].count("<figure>") == section[0].count('role="img"') == 3
     assert ">2.7315<" in section[0]
-    assert "q(0) = [π/6, π/4, π/6, π/2] rad, dq/dt(0) = [π/10, 0, 0, 0] rad/s, g = 9.80 m/s²" in section[0]
+    assert "at the start pi/6, pi/4, pi/6, pi/2 rad and pi/10, 0, 0, 0 rad/s" in section[0]
     assert section[0].count('data-kind="svg"') == section[0].count('data-kind="png"') == 3
     # Fig. 13a is the same run; 13b is not in the file.
     figure_13 = re.search(r'<section id="figure-13".*?</section>', text, re.S)

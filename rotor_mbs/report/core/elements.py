@@ -19,6 +19,8 @@ class TableCell:
     href: str = ""
     note: str = ""  # small text below
     note_language: str = ""  # where it is not English
+    shade: str = ""  # classes of the whole cell, in a map of scenes and methods
+    title: str = ""  # what a pointer on it, or a screen reader, is told
 
 
 Row = Sequence[TableCell | str]
@@ -29,10 +31,10 @@ class PageTable:
     """A table. The first cell of a row is its heading; a column in which no row has anything is left out."""
 
     caption: str
-    head: Sequence[str]
+    head: Row
     rows: Sequence[Row]
 
-    def columns(self) -> list[tuple[int, str, bool]]:
+    def columns(self) -> list[tuple[int, TableCell | str, bool]]:
         """Place, heading, and whether most cells are numbers (on the right), of each column that is shown."""
         shown = []
         for place, heading in enumerate(self.head):

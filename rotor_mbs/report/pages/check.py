@@ -123,7 +123,6 @@ def check_page(opened: OpenResults) -> dict[str, object]:
     """What `rotor-mbs check` finds in the results file. Raises StoreError, InputError."""
     checks = judge_file(opened.path, load_bounds(None))
     failed = [check for check in checks if not check.passed]
-    count = f"{len(failed)} of {len(checks)} checks fail" if failed else f"All {len(checks)} checks pass"
     # A count of faults has no distance to its bound: zero is all there is.
     measured = [check for check in worst_first(checks) if check.passed and 0.0 < check.margin < math.inf]
     largest: dict[tuple[str, str, float], Check] = {}  # by name, method and bound; not a number before all others
@@ -131,25 +130,24 @@ def check_page(opened: OpenResults) -> dict[str, object]:
         key = (check.name, check.where.method, check.bound)
         if key not in largest or not check.value <= largest[key].value:
             largest[key] = check
-
-    def table(caption: str, shown: Sequence[Check]) -> Section:
+    sections = {
+        "failures": ("Checks that fail", worst_first(failed)),
+        "nearest": ("The checks that pass by least", measured[:WORST]),
+        "all": ("The largest number seen of every check, method and bound", [*largest.values()]),
+    }
+    page: dict[str, object] = {"count": len(checks), "failed": len(failed)}
+    for section, (caption, shown) in sections.items():
         rows: list[Row] = []
         for check in shown:
             rows.append([
-                printable(check.name),
-                method_cell(printable(check.where.method)),
-                TableCell(printable(check.where.scene), note=printable(check.where.channel)),
+                check.name,
+                method_cell(check.where.method),
+                TableCell(check.where.scene, note=check.where.channel),
                 number(check.value),
                 with_unit(check.bound, check.unit),
                 number(check.margin, 3) if math.isfinite(check.margin) else NOTHING,
-                TableCell("pass", "good") if check.passed else TableCell("fail", "bad", note=printable(check.hint)),
+                TableCell("pass", "good") if check.passed else TableCell("fail", "bad", note=check.hint),
             ])  # fmt: skip
         head = ("Check", "Method", "Where", "Seen", "Bound", "Margin", "Outcome")
-        return Section(tables=[PageTable(caption, head, rows)])
-
-    return {
-        "lead": [f"{count}: numbers computed again from the stored samples, each against its bound."],
-        "failures": table("Checks that fail", worst_first(failed)),
-        "nearest": table("The checks that pass by least", measured[:WORST]),
-        "all": table("The largest number seen of every check, method and bound", [*largest.values()]),
-    }
+        page[section] = Section(tables=[PageTable(caption, head, rows)])
+    return page

@@ -11,16 +11,15 @@ from rotor_mbs.analysis.published import CheckedEntry, checked_entries
 from rotor_mbs.methods.catalogue import errata_methods
 from rotor_mbs.report.core.elements import PageTable, Row, Section, TableCell
 from rotor_mbs.report.core.numbers import formula, number, prefixed
-from rotor_mbs.report.pages import Context
+from rotor_mbs.report.pages import Report
 from rotor_mbs.report.pages.scene_tables import metric, status_text
-from rotor_mbs.runs.read import OpenResults
 from rotor_mbs.solution.status import GOOD
 
 _PLACE = re.compile(r"row (\d) column (\d)")
 Cell = tuple[Markup, Markup | None]  # an entry as printed; the correct one where it is faulty
 
 
-def errata_page(context: Context, opened: OpenResults) -> dict[str, object]:
+def errata_page(report: Report) -> dict[str, object]:
     """The content of the page of errata."""
     entries = checked_entries()
     agreeing = [entry for entry in entries if entry.agrees]
@@ -47,9 +46,9 @@ def errata_page(context: Context, opened: OpenResults) -> dict[str, object]:
         for what in ("angle change to the horizon (rad)", "whole run (rad)", "energy gain"):
             effects_head.append(f"{erratum}: {what}")
     effects: list[Row] = []
-    for name, scene in opened.scenes.items():
+    for name, scene in report.scenes.items():
         runs = [scene.methods.get(method) for method in errata_methods().values()]
-        row: list[TableCell | str] = [TableCell(name, href=context.files[name], note=scene.title)]
+        row: list[TableCell | str] = [TableCell(name, href=report.files[name], note=scene.title)]
         for run in runs:
             if run is None:
                 row += ["", "", ""]
@@ -62,7 +61,7 @@ def errata_page(context: Context, opened: OpenResults) -> dict[str, object]:
     effects_table = PageTable("", effects_head, effects)
     agreeing_rows = [(e.equation, e.entry, formula(e.printed), number(e.difference)) for e in agreeing]
     return {
-        "errata": [(erratum, matrices(entries, erratum.stands_in)) for erratum in context.errata],
+        "errata": [(erratum, matrices(entries, erratum.stands_in)) for erratum in report.errata],
         "differing": Section(tables=[differing_table]),
         "effects": Section(tables=[effects_table]),
         "agreeing": PageTable("", ("Equation", "Entry", "Printed", "Relative difference"), agreeing_rows),

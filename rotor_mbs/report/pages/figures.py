@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import math
+import tomllib
 from collections.abc import Iterable, Mapping, Sequence
-from fractions import Fraction
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -17,11 +16,10 @@ from rotor_mbs.methods.catalogue import look_up
 from rotor_mbs.report import plots
 from rotor_mbs.report.core import canvas, svg
 from rotor_mbs.report.core.looks import COLOURS, Look, label_of, with_capital
-from rotor_mbs.report.core.numbers import minus, number, prefixed, with_unit
-from rotor_mbs.report.pages import Context
+from rotor_mbs.report.pages import Report
 from rotor_mbs.report.pages.claim_tables import number_table
 from rotor_mbs.runs.files import replace_file
-from rotor_mbs.runs.read import OpenResults, StoredRun, StoredScene, open_results
+from rotor_mbs.runs.read import StoredRun, StoredScene, open_results
 
 MOTION, PATHS, TORQUES = "motion", "paths", "torques"
 # The models that are compared, by key, in order from left to right.
@@ -98,21 +96,16 @@ def draw(figure: PaperFigure, axes: Sequence[Any], runs: Mapping[str, StoredRun]
             run = next(iter(runs.values()))
             plots.draw_coordinates(panel, run.array("time"), run.array(name), label)
         else:
-            series = [
-                plots.Series(run.array("time"), run.array(name)[:, 0], torque_look(place, torque))
-                for place, (torque, run) in enumerate(runs.items())
-            ]
+            series = []
+            for place, (torque, run) in enumerate(runs.items()):
+                look = Look(COLOURS[place], ("-", "--", "-.", ":")[place], "", torque)
+                series.append(plots.Series(run.array("time"), run.array(name)[:, 0], look))
             plots.draw_lines(panel, series, label)
             plots.set_range(panel, np.concatenate([curve.values for curve in series])[:, None])
     axes[0].set_title("(a) position", loc="left")
     axes[0].tick_params(labelbottom=False)
     axes[1].set_title("(b) angular velocity", loc="left")
     axes[1].set_xlabel(canvas.TIME_AXIS)
-
-
-def torque_look(place: int, label: str) -> Look:
-    """Line of the curve at `place` in a figure of torques."""
-    return Look(COLOURS[place % len(COLOURS)], ("-", "--", "-.", ":")[place % 4], "", label)
 
 
 def write_figures(results: Path, folder: Path, kind: str, numbers: Iterable[str] = ()) -> list[Path]:
@@ -172,63 +165,35 @@ def composed(figure: PaperFigure, scenes: Mapping[str, StoredScene]) -> canvas.P
     return panels
 
 
-def figures_page(figures: Sequence[PaperFigure], context: Context, opened: OpenResults) -> dict[str, object]:
+def figures_page(report: Report) -> dict[str, object]:
     """The content of the page that goes through the figures."""
-    return {"figures": [_walk(figure, context, opened.scenes) for figure in figures]}
-
-
-def _walk(figure: PaperFigure, context: Context, scenes: Mapping[str, StoredScene]) -> dict[str, object]:
-    runs_of_panels = panel_runs(figure, scenes)
-    is_torques = figure.kind == TORQUES  # all in one picture per model
-    panels = []
-    for letter, name in [("", figure.panels[0][1])] if is_torques else figure.panels:
-        first = next(other.number for other in FIGURES if name in [scene for _, scene in other.panels])
-        conditions = f"The run of Figure {first}:"
-        if first == figure.number:
-            conditions = _conditions(scenes[name], with_torque=not is_torques)
-        pictures = []
-        for key, runs in runs_of_panels.get(letter, {}).items():
-            drawn = canvas.panels((4.1,) if figure.kind == PATHS else (1.7, 1.7), "")
-            if figure.kind != PATHS:
-                drawn.figure.subplots_adjust(top=0.93, hspace=0.2)  # room for headings
-            draw(figure, drawn.axes, runs)
-            heading, label = HEADINGS[key], label_of(next(iter(runs.values())).method)
-            is_named = label.lower().startswith(heading.lower())
-            caption = with_capital(label) if is_named else f"{heading}: {label}"
-            pictures.append(svg.picture(drawn, f"f{figure.number}{letter}-{key}", caption))
-        panels.append({
-            "letter": letter,
-            "scene": name,
-            "href": context.files[name],
-            "conditions": conditions,
-            "pictures": pictures,
+    figures = []
+    for figure in available(report.scenes):
+        runs_of_panels = panel_runs(figure, report.scenes)
+        panels = []
+        # Torques are all in one picture per model.
+        for letter, scene in [("", figure.panels[0][1])] if figure.kind == TORQUES else figure.panels:
+            pictures = []
+            for key, runs in runs_of_panels.get(letter, {}).items():
+                drawn = canvas.panels((4.1,) if figure.kind == PATHS else (1.7, 1.7), "")
+                if figure.kind != PATHS:
+                    drawn.figure.subplots_adjust(top=0.93, hspace=0.2)  # room for headings
+                draw(figure, drawn.axes, runs)
+                heading, label = HEADINGS[key], label_of(next(iter(runs.values())).method)
+                is_named = label.lower().startswith(heading.lower())
+                caption = with_capital(label) if is_named else f"{heading}: {label}"
+                pictures.append(svg.picture(drawn, f"f{figure.number}{letter}-{key}", caption))
+            parsed = scene_of(report.scenes[scene])
+            panels.append({
+                "letter": letter,
+                "scene": scene,
+                "title": report.scenes[scene].title,
+                "initial": {} if parsed is None else tomllib.loads(parsed.text)["initial"],  # pi/6 as it is written
+                "href": report.files[scene],
+                "pictures": pictures,
+            })  # fmt: skip
+        claims = [claim for claim in report.claims if claim.published.figure == figure.number]
+        figures.append({
+            "number": figure.number, "kind": figure.kind, "panels": panels, "numbers": number_table(claims),
         })  # fmt: skip
-    return {
-        "number": figure.number,
-        "kind": figure.kind,
-        "panels": panels,
-        "numbers": number_table([claim for claim in context.claims if claim.published.figure == figure.number]),
-    }
-
-
-def _conditions(stored: StoredScene, *, with_torque: bool = True) -> str:
-    """The initial state, torque, gravity and duration; "" where the stored text is not a scene."""
-    scene = scene_of(stored)
-    if scene is None:
-        return ""
-    angles, rates = (", ".join(in_pi(x) for x in values) for values in (scene.initial_angles, scene.initial_rates))
-    parts = [f"q(0) = [{angles}] rad", f"dq/dt(0) = [{rates}] rad/s"]
-    if with_torque and not scene.has_constant_torque:
-        parts.append("a torque that changes over time")
-    elif with_torque and scene.torque_at(0.0):
-        parts.append(f"rotor torque {prefixed(scene.torque_at(0.0), 'N m')}")
-    return f"{', '.join(parts)}, g = {number(scene.gravity, 3)} m/s², {with_unit(scene.duration, 's', 4)}."
-
-
-def in_pi(value: float) -> str:
-    """ "11π/12" where `value` is a simple multiple of π, else four digits."""
-    part = Fraction(value / math.pi).limit_denominator(12)
-    if value and abs(float(part) * math.pi - value) < 1e-12:
-        top = {1: "π", -1: "−π"}.get(part.numerator, f"{minus(str(part.numerator))}π")
-        return top if part.denominator == 1 else f"{top}/{part.denominator}"
-    return minus(f"{value:.4g}")
+    return {"figures": figures}

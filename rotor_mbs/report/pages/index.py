@@ -10,9 +10,9 @@ import numpy as np
 
 from rotor_mbs.analysis import run_selection
 from rotor_mbs.analysis.claims import finding
-from rotor_mbs.analysis.judgement import OK_ERROR
 from rotor_mbs.analysis.rehydrate import scene_of
-from rotor_mbs.analysis.run_tables import agreement
+from rotor_mbs.analysis.run_tables import method_table
+from rotor_mbs.analysis.stability import OUTCOMES
 from rotor_mbs.report import plots
 from rotor_mbs.report.core import canvas
 from rotor_mbs.report.core.canvas import Panels
@@ -20,13 +20,11 @@ from rotor_mbs.report.core.elements import PageTable, Picture, Row, Section, Tab
 from rotor_mbs.report.core.looks import Look, label_of, look_of
 from rotor_mbs.report.core.numbers import SPACE, number, power, prefixed, with_unit
 from rotor_mbs.report.core.svg import picture
-from rotor_mbs.report.pages import Context, claim_tables, quantities
+from rotor_mbs.report.pages import Report, claim_tables
 from rotor_mbs.report.pages.bench import cost_picture
 from rotor_mbs.report.pages.figures import compared_runs
-from rotor_mbs.report.pages.quantities import VISIBLE, angle_difference, parting
-from rotor_mbs.report.pages.scene import key_picture
+from rotor_mbs.report.pages.scene import VISIBLE, angle_difference, defects, error_picture, key_picture, parting
 from rotor_mbs.report.pages.scene_tables import (
-    bounded_cell,
     compared_time,
     horizon,
     method_cell,
@@ -35,27 +33,18 @@ from rotor_mbs.report.pages.scene_tables import (
     status_text,
 )
 from rotor_mbs.report.pages.viewer import viewer
-from rotor_mbs.runs.read import OpenResults, StoredScene
+from rotor_mbs.runs.read import StoredScene
+from rotor_mbs.solution.status import GOOD
 
 Scenes = Mapping[str, StoredScene]
 # Errors of the heat map: a shade for each of these powers of ten and below, the last for all that is larger.
 _SHADES = (-12, -10, -8, -6, -4, -2, 0)
-_MARKS = {
-    "ok": "",
-    "completed": "",
-    "inaccurate": "≠",
-    "timed_out": "T",
-    "diverged": "↯",
-    "singular": "S",
-    "unchecked": "?",
-}
-_FAILED = "✗"
 _LOWEST_ENERGY = 1e-16  # relative: smaller errors are drawn there
 
 
-def index_page(context: Context, opened: OpenResults) -> dict[str, object]:
+def index_page(report: Report) -> dict[str, object]:
     """The content of the index; what the file has no data for is None or empty. Its last tables are folded."""
-    scenes, claims, study = opened.scenes, context.claims, context.study
+    scenes, claims, study = report.scenes, report.claims, report.study
     model = "Corrected model" if claims else "Model"  # of a user's own rotor nothing was corrected
     # The scene with a published extreme that is no rounding error; else one with both models; else the first.
     both = [name for name, scene in scenes.items() if len(run_selection.sides(scene)) > 1]
@@ -67,21 +56,16 @@ def index_page(context: Context, opened: OpenResults) -> dict[str, object]:
             break
     sides = list(run_selection.sides(scenes[shown]).values())
     own_claims = [claim for claim in claims if shown in claim.published.scenes]
+    printed = run_selection.printed_run(scenes[shown])
+    judged = {} if printed is None else {printed.method: printed}
+    judged |= run_selection.corrected_runs(scenes[shown])
     still = None
     for run in sides:
         if "tip" in run:
             still = picture(plots.paths(run.array("tip")), "still", f"{shown}: paths of the tips")
-    benched = next((scene for scene in context.curves if scene in scenes), "")
-    curves = context.curves.get(benched, ())
-    agreement_head = (
-        "Method", "Runs", "Largest defect (rad)", f"Largest angle error up to each horizon (rad), at most {OK_ERROR:g}",
-        "Largest energy drift (relative)", "Longest run",
-    )  # fmt: skip
-    agreement_rows: list[Row] = []
-    for row in agreement(run for scene in scenes.values() for run in run_selection.corrected_runs(scene).values()):
-        cells = [method_cell(row.method), row.runs, number(row.defect), bounded_cell(row.angle_error)]
-        cells.append(number(row.energy_drift))
-        agreement_rows.append([*cells, prefixed(row.longest_s, "s")])
+    benched = next((scene for scene in report.curves if scene in scenes), "")
+    methods = method_table(run for scene in scenes.values() for run in run_selection.corrected_runs(scene).values())
+    method_rows = [(method_cell(name), *cells) for name, *cells in methods.rows]
     compared, whole = compared_time(scenes.values())
     notes = []
     if compared:
@@ -96,19 +80,24 @@ def index_page(context: Context, opened: OpenResults) -> dict[str, object]:
         "still": still,
         "pictures": [
             *key_picture(sides, own_claims, horizon(scenes[shown]), "crest"),
-            *_defects(scenes, shown),
+            *error_picture(
+                defects(scene_of(scenes[shown]), judged),
+                "defect of an interval (rad)",
+                "defects",
+                f"{shown}: what the closed form makes of each sample by the next, less what each run has there",
+            ),
             *_energy(scenes, model),
-            *cost_picture(curves, f"Error against run time of all methods, {benched}"),
+            *cost_picture(report.curves.get(benched, ()), f"Error against run time of all methods, {benched}"),
         ],
-        "methods": Section(tables=[PageTable("", agreement_head, agreement_rows)], notes=notes),
-        "heat": heat_map(scenes, context.files),
-        "scenes": Section(tables=[scene_table(scenes, context.files, model)]),
+        "methods": Section(tables=[PageTable("", methods.head, method_rows)], notes=notes),
+        "heat": heat_map(scenes, report.files),
+        "scenes": Section(tables=[scene_table(scenes, report.files, model)]),
         "numbers": Section(
             tables=[
                 claim_tables.number_table(claims),
                 *(claim_tables.trial_tables(study) if study is not None else ()),
             ],
-            notes=[text for key, text in context.conditions.items() if not key.startswith("fig")],
+            notes=[text for key, text in report.conditions.items() if not key.startswith("fig")],
         ),
         "claims": Section(
             tables=[] if study is None else [claim_tables.claim_table(claims, study)],
@@ -116,19 +105,6 @@ def index_page(context: Context, opened: OpenResults) -> dict[str, object]:
         ),
         "is_paper": bool(claims),
     }
-
-
-def _defects(scenes: Scenes, name: str) -> list[Picture]:
-    """Interval defects of the printed and the corrected models over the whole of one scene."""
-    scene, stored = scene_of(scenes[name]), scenes[name]
-    if scene is None:
-        return []
-    runs = run_selection.corrected_runs(stored)
-    if (printed := run_selection.printed_run(stored)) is not None:
-        runs = {printed.method: printed} | runs
-    curves = quantities.defects(scene, runs)
-    caption = f"{name}: what the closed form makes of each sample by the next, less what each run has there"
-    return quantities.error_picture(curves, "defect of an interval (rad)", "defects", caption)
 
 
 def scene_table(scenes: Scenes, files: Mapping[str, str], model: str) -> PageTable:
@@ -208,31 +184,30 @@ def heat_map(scenes: Scenes, files: Mapping[str, str]) -> dict[str, object] | No
     methods = run_selection.in_catalogue_order(names)
     if any(run_selection.PRINTED in scene.methods for scene in scenes.values()):
         methods.insert(0, run_selection.PRINTED)
-    rows = []
+    rows: list[Row] = []
     key = {}
     is_compared = False
     for name, scene in scenes.items():
-        cells: list[tuple[int, str, str, str] | None] = []
+        compared, whole = compared_time([scene])
+        row: list[TableCell | str] = [TableCell(name, href=files[name]), f"{number(compared, 3)} of {number(whole, 3)}"]
         for method in methods:
             run = scene.methods.get(method)
             if run is None:
-                cells.append(None)
+                row.append("")
                 continue
             error = metric(run, "angle_error_max")
+            mark = "" if run.status in GOOD else OUTCOMES[run.status][0]
             is_compared = is_compared or error is not None
-            text = "" if error is None else number(error)
             shade = len(_SHADES)
             if error is not None and math.isfinite(error):
                 shade = sum(error > 10.0**exponent for exponent in _SHADES)
-            mark = _MARKS.get(run.status, _FAILED)
             if mark:
                 key[mark] = status_text(run)
-            spoken = f"{label_of(method)}: {text or 'no error known'}, {status_text(run)}"
-            cells.append((shade, text, mark, spoken))
-        compared, whole = compared_time([scene])
-        rows.append((name, files[name], f"{number(compared, 3)} of {number(whole, 3)}", cells))
+            title = f"{label_of(method)}: {'no error known' if error is None else number(error)}, {status_text(run)}"
+            row.append(TableCell(f"{number(error)} {mark}".rstrip(), shade=f"n h{shade}", title=title))
+        rows.append(row)
     if not is_compared:
         return None
     shades = [*(f"≤{SPACE}{power(exponent)}" for exponent in _SHADES), f">{SPACE}{power(_SHADES[-1])}"]
-    methods_shown = [(label_of(name), name) for name in methods]
-    return {"methods": methods_shown, "rows": rows, "key": sorted(key.items()), "shades": shades}
+    table = PageTable("", ("Scene", "Compared (s)", *map(method_cell, methods)), rows)
+    return {"table": table, "key": sorted(key.items()), "shades": shades}

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -12,6 +12,7 @@ from rotor_mbs.analysis.claims import Claim
 from rotor_mbs.analysis.exact import escape_rate
 from rotor_mbs.analysis.rehydrate import scene_of
 from rotor_mbs.methods.catalogue import REFERENCE, is_corrected
+from rotor_mbs.models.lagrange.defects import interval_defects
 from rotor_mbs.report import plots
 from rotor_mbs.report.core import canvas
 from rotor_mbs.report.core.canvas import TIME_AXIS, Panels
@@ -19,28 +20,29 @@ from rotor_mbs.report.core.elements import PageTable, Picture, Row, Section
 from rotor_mbs.report.core.looks import GREY, VERMILLION, Look, coordinate_look, label_of, look_of, with_capital
 from rotor_mbs.report.core.numbers import fixed, number, prefixed, with_unit
 from rotor_mbs.report.core.svg import picture
-from rotor_mbs.report.pages import Context, claim_tables, quantities, scene_tables
+from rotor_mbs.report.pages import Report, claim_tables, scene_tables
 from rotor_mbs.report.pages.bench import cost_section
-from rotor_mbs.report.pages.quantities import VISIBLE, Runs, parting
 from rotor_mbs.report.pages.scene_tables import method_cell, metric
 from rotor_mbs.report.pages.stability import outcome_section, step_section
 from rotor_mbs.report.pages.viewer import viewer
 from rotor_mbs.report.plots import LOWEST, Series
-from rotor_mbs.runs.read import OpenResults, StoredRun, StoredScene
+from rotor_mbs.runs.read import StoredRun, StoredScene
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.scenario.time_table import Table, value_at
+from rotor_mbs.solution.quantities import Plot, Quantity, known_quantities, sizes
 from rotor_mbs.solution.status import GOOD
-from rotor_mbs.solution.text_table import listed
 from rotor_mbs.solution.trajectory import Array
 
+Runs = Mapping[str, StoredRun]
+VISIBLE = 0.05  # rad: what one can see in a figure of the paper's size
 MAX_PUBLISHED = 2  # published values on one picture
 COMMAND, TAKEN = Look(GREY, ":", "", "command"), Look(VERMILLION, "--", "", "taken by the shaft's damper")
 EXTREMES = ("rotor_angle_min", "rotor_angle_max", "rotor_rate_max")
 
 
-def scene_page(name: str, context: Context, opened: OpenResults) -> dict[str, object]:
+def scene_page(name: str, report: Report) -> dict[str, object]:
     """The content of the page of a scene."""
-    scene = opened.scenes[name]
+    scene = report.scenes[name]
     horizon = scene_tables.horizon(scene)
     # The printed run and the one that stands for the corrected model, then the others of corrected models.
     sides = run_selection.sides(scene)
@@ -49,21 +51,21 @@ def scene_page(name: str, context: Context, opened: OpenResults) -> dict[str, ob
     for method, run in run_selection.corrected_runs(scene).items():
         if run_selection.has_samples(run):
             drawn[method] = run
-    pages = ["", *context.files.values(), ""]
-    place = pages.index(context.files[name])
-    claims = [claim for claim in context.claims if name in claim.published.scenes]
-    study = context.study
+    pages = ["", *report.files.values(), ""]
+    place = pages.index(report.files[name])
+    claims = [claim for claim in report.claims if name in claim.published.scenes]
+    study = report.study
     tables = [claim_tables.number_table(claims)]
     if study is not None:
         tables.append(claim_tables.claim_table(claims, study))
     # Where a number is rounding error, what it is under other conditions.
     if study is not None and any(claim.published.rounding for claim in claims):
         tables += claim_tables.trial_tables(study)
-    condition = context.conditions.get(name.rpartition("/")[2])
+    condition = report.conditions.get(name.rpartition("/")[2])
     notes = [condition] if condition else []
     if study is not None and any(not claim.published.is_number for claim in claims):
         notes.append(claim_tables.study_note(study))
-    suite_runs = [run for run in context.suite_runs if run.scene == name]
+    suite_runs = [run for run in report.suite_runs if run.scene == name]
     figures = str(scene.attributes.get("figures", ""))
     parsed = scene_of(scene)
     has_zero_pitch = any("zero_pitch_max" in run.attributes for run in scene.runs.values())
@@ -81,12 +83,14 @@ def scene_page(name: str, context: Context, opened: OpenResults) -> dict[str, ob
         "paths": _tips_section(runs),
         "motion": _motion_section(runs, horizon),
         "difference": _difference_section(scene, drawn, horizon),
-        "defects": _defect_section(parsed, drawn),
+        "defects": Section(
+            error_picture(defects(parsed, drawn), "defect (rad)", "defects", "Interval defects, over all of every run")
+        ),
         "energy": _energy_section(drawn, horizon),
         "drive": _drive_section(parsed, sides.get("corrected")),
-        "cost": cost_section(scene, context.curves.get(name, ())),
-        "steps": step_section(name, context.ladders),
-        "quantities": quantities.quantity_sections(scene, drawn, horizon),
+        "cost": cost_section(scene, report.curves.get(name, ())),
+        "steps": step_section(name, report.ladders),
+        "quantities": quantity_sections(scene, drawn, horizon),
         "metrics": Section(tables=[scene_tables.metrics_table(scene)]),
         "has_horizon": horizon is not None,
         "has_printed": any(run.status in GOOD and not is_corrected(run.method) for run in scene.runs.values()),
@@ -190,25 +194,9 @@ def _motion_section(sides: Sequence[StoredRun], horizon: float | None) -> Sectio
         return Section()
     pictures = []
     for i, run in enumerate(runs):
-        angles, rates = run.get("angles"), run.get("rates")
-        notes = []
-        if any(values is not None and plots.is_cut(values) for values in (angles, rates)):
-            notes.append("Values beyond the axes are cut off.")
-        unresolved = _unresolved(run)
-        if unresolved:
-            notes.append(f"Only the range is meaningful, samples are too far apart: {listed(unresolved)}.")
-        panels = plots.motion(run.array("time"), angles, rates, horizon)
-        pictures.append(picture(panels, f"motion-{i}", with_capital(label_of(run.method)), notes))
+        panels = plots.motion(run.array("time"), run.get("angles"), run.get("rates"), horizon)
+        pictures.append(picture(panels, f"motion-{i}", with_capital(label_of(run.method))))
     return Section(pictures, [range_table(runs)])
-
-
-def _unresolved(run: StoredRun) -> list[str]:
-    """Coordinates that at their largest rate would cross their whole range between two samples."""
-    if "angles" not in run or "rates" not in run or len(run.array("time")) < 2:
-        return []
-    interval = float(run.array("time")[1] - run.array("time")[0])
-    ranges, fastest = np.ptp(run.array("angles"), axis=0), np.abs(run.array("rates")).max(axis=0)
-    return [label for label, a, w in zip(run.labels, ranges, fastest, strict=True) if w * interval > a > 0.0]
 
 
 def range_table(runs: Sequence[StoredRun]) -> PageTable:
@@ -268,50 +256,28 @@ def _difference_section(scene: StoredScene, drawn: Runs, horizon: float | None) 
     if reference is None or "angles" not in reference or not len(reference.array("time")):
         return Section()
     runs = {method: run for method, run in drawn.items() if method != REFERENCE}
-    differences = {
-        method: quantities.angle_difference(run, reference) for method, run in runs.items() if "angles" in run
-    }
     others = []
     if "error_growth" in reference:
         growth = np.maximum(np.maximum.accumulate(reference.array("error_growth")), 1.0)
         look = Look(GREY, ":", "", "rounding error of the initial state, grown")
         others.append(Series(reference.array("time"), float(np.finfo(float).eps) * growth, look))
-    rows = []
     for method, run in {REFERENCE: reference, **runs}.items():
-        if "angle_uncertainty" not in run:
-            continue
-        time, uncertainty = run.array("time"), run.array("angle_uncertainty")
-        largest = float(uncertainty[time <= (horizon or np.inf)].max())
-        rows.append([method_cell(method), number(largest), number(float(uncertainty.max()))])
-        if uncertainty.max() > LOWEST:
+        if "angle_uncertainty" in run and run.array("angle_uncertainty").max() > LOWEST:
             colour, line = (GREY, "-") if method == REFERENCE else (look_of(method).colour, ":")
-            others.append(Series(time, uncertainty, Look(colour, line, "", f"{label_of(method)}: its uncertainty")))
-    shown = quantities.error_picture(
-        quantities.over_time(runs, differences), "largest angle difference (rad)", "difference",
+            look = Look(colour, line, "", f"{label_of(method)}: its uncertainty")
+            others.append(Series(run.array("time"), run.array("angle_uncertainty"), look))
+    differences = {method: angle_difference(run, reference) for method, run in runs.items() if "angles" in run}
+    return Section(error_picture(
+        over_time(runs, differences), "largest angle difference (rad)", "difference",
         "Largest difference from the reference, over all angles", horizon, others,
-    )  # fmt: skip
-    table = PageTable(
-        "Uncertainty of the angles, by the method's own estimate (rad)",
-        ("Method", "up to the horizon", "whole run"), rows,
-    )  # fmt: skip
-    return Section(shown, [table] if shown and rows else [])
-
-
-def _defect_section(scene: Scene | None, drawn: Runs) -> Section:
-    """The size of every interval's defect, of each run with angles and rates."""
-    if scene is None:
-        return Section()
-    curves = quantities.defects(scene, drawn)
-    return Section(
-        quantities.error_picture(curves, "defect (rad)", "defects", "Interval defects, over all of every run")
-    )
+    ))  # fmt: skip
 
 
 def _energy_section(drawn: Runs, horizon: float | None) -> Section:
     """Energy less work from its start, of every run; what each run has and how well it conserves it."""
     runs = {name: run for name, run in drawn.items() if "energy_error" in run}
-    curves = quantities.over_time(runs, {name: run.array("energy_error") for name, run in runs.items()})
-    shown = quantities.error_picture(
+    curves = over_time(runs, {name: run.array("energy_error") for name, run in runs.items()})
+    shown = error_picture(
         curves, "|energy error| (J)", "energy", "Energy error: change of total energy less work", horizon,
         notes=["Filled marks: gained. Open marks: lost."], signed=True,
     )  # fmt: skip
@@ -379,3 +345,115 @@ def _drive_section(scene: Scene | None, run: StoredRun | None) -> Section:
         add_picture("pitch-drive", "Pitches, their commands and actuators", rows_of_panels)
     table = PageTable("", ("Quantity", "Largest", "At the end", "Work"), rows)
     return Section(pictures, [table] if rows else [])
+
+
+def plotted_quantities(scene: StoredScene) -> list[tuple[Quantity, Plot]]:
+    """The quantities of the scene with a plot: built in, or of an installed package that its outputs name."""
+    parsed = scene_of(scene)
+    quantities = known_quantities(parsed.outputs if parsed is not None else ())
+    return [(quantity, quantity.plot) for quantity in quantities if quantity.plot is not None and quantity.is_over_time]
+
+
+def quantity_sections(scene: StoredScene, runs: Runs, horizon: float | None) -> list[tuple[str, str, Section]]:
+    """(id, heading, section) of each such quantity that one of `runs` has."""
+    sections = []
+    for quantity, plot in plotted_quantities(scene):
+        own = {method: run for method, run in runs.items() if quantity.name in run}
+        if not own:
+            continue
+        name = f"quantity-{quantity.name}"
+        if plot.logarithmic:
+            curves = over_time(own, {m: _largest(np.abs(run.array(quantity.name))) for m, run in own.items()})
+            section = Section(error_picture(curves, plot.axis, name, plot.title, horizon))
+        elif len(quantity.dimensions) == 1:
+            curves = over_time(own, {method: run.array(quantity.name) for method, run in own.items()})
+            curves = [curve._replace(look=replace(curve.look, marker="")) for curve in curves]
+            section = Section([picture(plots.lines([(plot.axis, curves)], horizon), name, plot.title)])
+        else:
+            section = _components_section(quantity, plot, own, name, horizon)
+        sections.append((name, plot.title, section))
+    return sections
+
+
+def _components_section(quantity: Quantity, plot: Plot, runs: Runs, name: str, horizon: float | None) -> Section:
+    """Every run; of a quantity that is judged against the reference that one alone, the errors and its extremes."""
+    rule = quantity.judgement
+    is_compared = rule is not None and rule.with_reference and REFERENCE in runs
+    pictures: list[Picture] = []
+    for i, run in enumerate([runs[REFERENCE]] if is_compared else runs.values()):
+        panels = plots.component_panels(
+            quantity, plot, run.array("time"), run.array(quantity.name), run.labels, horizon
+        )
+        caption = f"{with_capital(label_of(run.method))}: {quantity.long_name}"
+        pictures.append(picture(panels, f"{name}-{i}", caption))
+    if not is_compared:
+        return Section(pictures)
+    time, exact = runs[REFERENCE].array("time"), runs[REFERENCE].array(quantity.name)
+    differences = {}
+    for method, run in runs.items():
+        if method != REFERENCE:  # at the samples that both have; the largest over blades, of vectors the length
+            values = run.array(quantity.name)
+            n = min(len(values), len(exact))
+            differences[method] = _largest(sizes(quantity, values[:n] - exact[:n]))
+    axis, caption = f"difference ({quantity.units})", "Largest difference from the reference"
+    pictures += error_picture(over_time(runs, differences), axis, f"{name}-error", caption, horizon)
+    rows = []
+    for panel, look, values in plots.components(quantity, exact, runs[REFERENCE].labels):
+        row = [f"{look.label} {panel}".strip()]
+        for k in (int(values.argmin()), int(values.argmax())):
+            row += [prefixed(float(values[k]), quantity.units), number(float(time[k]), 4)]
+        rows.append(row)
+    head = ("Component", "Smallest", "at (s)", "Largest", "at (s)")
+    return Section(pictures, [PageTable("Extremes in the reference", head, rows)])
+
+
+def over_time(runs: Runs, values: Mapping[str, Array]) -> list[Series]:
+    """The values (n,) of runs, by method, over their first samples."""
+    return [Series(runs[method].array("time")[: len(x)], x, look_of(method)) for method, x in values.items()]
+
+
+def _largest(values: Array) -> Array:
+    """(n,) of (n, ...): the largest over the components."""
+    largest: Array = values.reshape(len(values), -1).max(axis=1)
+    return largest
+
+
+def error_picture(
+    curves: Sequence[Series], axis: str, name: str, caption: str, horizon: float | None = None,
+    others: Sequence[Series] = (), notes: Sequence[str] = (), *, signed: bool = False,
+) -> list[Picture]:  # fmt: skip
+    """A picture of the curves and of `others`, which have no marker; none where there is no curve."""
+    shown, exact = [], []
+    for curve in curves:
+        if np.abs(curve.values).max() > LOWEST:
+            shown.append(curve)
+        else:
+            exact.append(curve.look.label)
+    if exact:
+        notes = [*notes, f"No curve, because nowhere above 10⁻¹⁸: {'; '.join(exact)}."]
+    panels = plots.errors([*others, *shown], axis, horizon, signed=signed)
+    return [picture(panels, name, caption, notes)] if curves else []
+
+
+def defects(scene: Scene | None, runs: Runs) -> list[Series]:
+    """The size (rad) of the defect of every interval, at its end; a fault in time stands out in its own intervals."""
+    curves = []
+    for method, run in runs.items():
+        time = run.array("time") if "angles" in run and "rates" in run else np.empty(0)
+        if scene is not None and len(time) >= 2:
+            sizes = interval_defects(scene, time, run.array("angles"), run.array("rates")).sizes
+            curves.append(Series(time[1:], sizes, look_of(method)))
+    return curves
+
+
+def angle_difference(first: StoredRun, second: StoredRun) -> Array:
+    """(common samples,) rad: the largest over the coordinates."""
+    n = min(len(first.array("time")), len(second.array("time")))
+    return _largest(np.abs(first.array("angles")[:n] - second.array("angles")[:n]))
+
+
+def parting(printed: StoredRun, corrected: StoredRun) -> tuple[float | None, float]:
+    """When the angles of both first differ by VISIBLE (s; None: never), and the largest difference (rad)."""
+    gap = angle_difference(printed, corrected)
+    apart = np.flatnonzero(gap > VISIBLE)
+    return (float(printed.array("time")[apart[0]]) if len(apart) else None), float(gap.max(initial=0.0))

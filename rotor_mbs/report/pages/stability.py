@@ -14,67 +14,56 @@ from rotor_mbs.report.core.elements import PageTable, Row, Section, TableCell
 from rotor_mbs.report.core.looks import GREY, Look, label_of, look_of
 from rotor_mbs.report.core.numbers import number, with_unit
 from rotor_mbs.report.core.svg import picture
-from rotor_mbs.report.pages import Context
+from rotor_mbs.report.pages import Report
 from rotor_mbs.report.pages.scene_tables import horizon, method_cell, run_cell
 from rotor_mbs.report.plots import HIGHEST, LOWEST
-from rotor_mbs.runs.read import OpenResults, StoredScene
-from rotor_mbs.runs.records import Record, read_records
+from rotor_mbs.runs.read import StoredScene
+from rotor_mbs.runs.records import Record
 from rotor_mbs.solution.trajectory import Array
 
-_FOLDERS = ("stiff", "extreme")
 NOT_COMPARED = "horizon before the second sample"
 _FAMILIES = {"needle": "on a needle", "scale": "out of scale"}  # headings that are not the family's name
 _NOT_BAD = ("ok", "energy_alone", "smaller_step")
 
 
-def is_stability_suite(results: OpenResults) -> bool:
-    """Whether the file is of the suite: it has ladders of steps, or all its scenes are of the suite."""
-    folders = {name.partition("/")[0] for name, scene in results.scenes.items() if scene.methods}
-    return bool(read_records(results.path, "stability")) or (bool(folders) and folders <= set(_FOLDERS))
-
-
-def stability_page(context: Context, opened: OpenResults) -> dict[str, object]:
+def stability_page(report: Report) -> dict[str, object]:
     """The content of the map, which is the index of the suite."""
-    runs = context.suite_runs
+    runs = report.suite_runs
     methods = list(dict.fromkeys(run.method for run in runs))
-    fastest_methods = fastest_to_target(runs)
-    families: dict[str, list[dict[str, object]]] = {}
-    for scene, file in context.files.items():
+    fastest = fastest_to_target(runs)
+    rows: list[Row] = []
+    for scene, file in report.files.items():
         own = {run.method: run for run in runs if run.scene == scene}
-        marks: list[tuple[str, str, str] | None] = []
+        family = next(iter(own.values())).family
+        row: list[TableCell | str] = [
+            TableCell(scene, href=file, note=report.scenes[scene].title),
+            _FAMILIES.get(family, family),
+        ]
         for method in methods:
-            run = own.get(method)
-            if run is None:
-                marks.append(None)
+            if method not in own:
+                row.append("")
                 continue
+            run = own[method]
             symbol, text = OUTCOMES[run.outcome]
             if run.false_success:
                 symbol, text = f"{symbol}!", f"{text}; its engine claims success"
-            marks.append((run.outcome, symbol, f"{label_of(run.method)}: {text}. {run.message}".strip()))
-        fastest: TableCell | str = "no method"
-        if scene not in fastest_methods:
-            fastest = "no reference"
+            title = f"{label_of(method)}: {text}. {run.message}".strip()
+            row.append(TableCell(symbol, shade=f"mark {run.outcome}", title=title))
+        if scene not in fastest:
+            row.append("no reference")
         elif all(run.angle_error is None for run in own.values()):
-            fastest = NOT_COMPARED
-        elif known := fastest_methods[scene]:
-            fastest = method_cell(known)
-        row: dict[str, object] = {
-            "scene": scene,
-            "href": file,
-            "title": opened.scenes[scene].title,
-            "marks": marks,
-            "fastest": fastest,
-        }
-        family = next(iter(own.values())).family
-        families.setdefault(_FAMILIES.get(family, family), []).append(row)
+            row.append(NOT_COMPARED)
+        else:
+            name = fastest[scene]
+            row.append("no method" if name is None else method_cell(name))
+        rows.append(row)
     used = {run.outcome for run in runs}
     counts = family_table(runs, lambda family: _FAMILIES.get(family, family))
-    rows: list[Row] = [[method_cell(method), *cells] for method, *cells in counts.rows]
+    count_rows = [(method_cell(method), *cells) for method, *cells in counts.rows]
     return {
-        "methods": [(label_of(name), name) for name in methods],
-        "families": list(families.items()),
+        "map": PageTable("", ("Scene", "Kind", *map(method_cell, methods), "Fastest to 10⁻⁶ rad"), rows),
         "key": [(outcome, symbol, text) for outcome, (symbol, text) in OUTCOMES.items() if outcome in used],
-        "summary": Section(tables=[PageTable("", ("Method", *counts.head[1:]), rows)]),
+        "summary": Section(tables=[PageTable("", counts.head, count_rows)]),
         "false_successes": sum(run.false_success for run in runs),
     }
 
