@@ -1,4 +1,4 @@
-"""The methods of this package: one model with three of the engine's integrators. Importing this does not load MuJoCo."""
+"""The methods of this package: one model with three of the engine's integrators. No import of MuJoCo."""
 
 from __future__ import annotations
 
