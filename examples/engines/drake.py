@@ -68,13 +68,13 @@ class Solver:
         plant.Finalize()
         self.loads = builder.AddSystem(Loads(np.array([scene.bearing(i)[0] for i in range(len(scene.blades))])))
         builder.Connect(self.loads.get_output_port(), plant.get_applied_generalized_force_input_port())
-        self.simulator = Simulator(builder.Build())
-        if scheme:
-            ResetIntegratorFromFlags(self.simulator, scheme, interval).set_target_accuracy(settings.accuracy)
+        self.simulator, self.settings, self.scheme = Simulator(builder.Build()), settings, (scheme, interval)
 
     def integrate(self):
         context, scene, self.loads.part = self.simulator.get_mutable_context(), self.scene, None
         context.SetTime(0.0)
+        if self.scheme[0]:  # a new one: it keeps its step and its Jacobian
+            ResetIntegratorFromFlags(self.simulator, *self.scheme).set_target_accuracy(self.settings.accuracy)
         inside = self.plant.GetMyMutableContextFromRoot(context)
         self.plant.SetPositionsAndVelocities(inside, np.array(scene.initial_angles + scene.initial_rates))
         self.states = [self.plant.GetPositionsAndVelocities(inside)]

@@ -49,6 +49,7 @@ _FOLLOWS_STEP = 0.6  # order with which a defect must fall with the step to be a
 _STANDS_OUT = 30.0  # times the median of the defects
 _LONG = 1000.0  # times the duration, of a run that is to be stopped
 _STOP_S, _LOAD_S = 0.5, 20.0
+_FIRST_S = 300.0  # of a first run, in which an engine may compile its code
 NOT_FOUND = "cause not found"
 
 
@@ -118,6 +119,7 @@ class _Examination:
         self._refused: set[str] = set()
 
     def checks(self) -> list[Check]:
+        self._ask(replace(only_scene(_SMOOTH), duration=0.02, samples=2, outputs=("angles", "rates")), limit=_FIRST_S)
         for name, (duration, samples, allowance) in SCENES.items():
             scene = replace(only_scene(name), duration=duration, samples=samples, outputs=("angles", "rates", "energy"))
             self._scene(scene, allowance)
