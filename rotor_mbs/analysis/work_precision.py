@@ -9,13 +9,18 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from rotor_mbs.analysis import kinematics
 from rotor_mbs.analysis.run_selection import corrected_runs
-from rotor_mbs.runs.read import StoredScene
+from rotor_mbs.runs.read import StoredRun, StoredScene
 from rotor_mbs.runs.records import Record
+from rotor_mbs.scenario.scene import Scene
+from rotor_mbs.solution.metrics import energy_scale
 from rotor_mbs.solution.status import code_of
-from rotor_mbs.solution.trajectory import Array
+from rotor_mbs.solution.trajectory import Array, Trajectory
 
 TARGETS_RAD = (1e-3, 1e-6, 1e-9)
+
+ANGLE_ERROR = "angle_error_max"  # up to the horizon, rad
 
 # Below this many roundings of a double of order one an error of exactly zero is drawn and interpolated.
 SMALLEST_ERROR = 1e-17
@@ -33,9 +38,9 @@ class Reach(NamedTuple):
     ratio: float
 
 
-def succeeded(curve: Record) -> NDArray[np.bool_]:
+def succeeded(curve: Record, error: str = ANGLE_ERROR) -> NDArray[np.bool_]:
     """(settings,) Which points stand on the curve: run to the end, and not useless."""
-    known = np.isfinite(curve.arrays["angle_error_max"]) & np.isfinite(curve.arrays["run_time_s"])
+    known = np.isfinite(curve.arrays[error]) & np.isfinite(curve.arrays["run_time_s"])
     return np.asarray(known & (curve.arrays["status"] == code_of("ok")))
 
 
@@ -49,13 +54,13 @@ def left_out(curve: Record) -> int:
     return curve.statuses.count("left_out")
 
 
-def points(curve: Record, *, with_setup: bool = False) -> tuple[Array, Array]:
+def points(curve: Record, error: str = ANGLE_ERROR, *, with_setup: bool = False) -> tuple[Array, Array]:
     """(errors in rad, times in s) of the points on the curve; with_setup: what one run costs, building included."""
-    chosen = succeeded(curve)
+    chosen = succeeded(curve, error)
     seconds = curve.arrays["run_time_s"][chosen]
     if with_setup:
         seconds = seconds + curve.arrays["setup_time_s"][chosen] + curve.arrays["output_time_s"][chosen]
-    return np.maximum(curve.arrays["angle_error_max"][chosen], SMALLEST_ERROR), seconds
+    return np.maximum(curve.arrays[error][chosen], SMALLEST_ERROR), seconds
 
 
 def pareto(errors: Array, seconds: Array) -> NDArray[np.intp]:
@@ -116,6 +121,28 @@ def own_points(scene: StoredScene) -> list[Record]:
             arrays["status"] = np.array([code_of("ok")])
             curves.append(Record("bench", scene.name, name, arrays=arrays))
     return curves
+
+
+def best(curves: Sequence[Record], column: str) -> float | None:
+    """The smallest value of a column over the points on these curves; None where there is none."""
+    values = [curve.arrays[column][succeeded(curve)] for curve in curves if column in curve.arrays]
+    known = [value for array in values for value in array.tolist() if math.isfinite(value)]
+    return min(known, default=None)
+
+
+def energy_drift(scene: Scene, run: StoredRun) -> float | None:
+    """Largest change of the energy less the work, of the energy scale, both by plain rotation of the bodies: also of a
+    run that has angles and rates alone. None where it has not, or the work is no function of the angles."""
+    if not {"angles", "rates"} <= set(run.names) or len(run.array("time")) < 2:
+        return None
+    time, angles, rates = (run.array(name) for name in ("time", "angles", "rates"))
+    work = kinematics.work_of_constant_loads(scene, angles)
+    if work is None:
+        return None
+    kinetic = kinematics.kinetic_energy(scene, angles, rates)
+    error = kinetic + kinematics.potential_energy(scene, time, angles) - work
+    scale = energy_scale(scene, Trajectory(time, angles, rates, kinetic_energy=kinetic, work=work))
+    return float(np.abs(error - error[0]).max()) / (scale or 1.0)
 
 
 def by_scene(curves: Sequence[Record]) -> Mapping[str, list[Record]]:

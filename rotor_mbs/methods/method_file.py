@@ -21,7 +21,7 @@ from types import ModuleType
 from typing import TYPE_CHECKING
 
 from rotor_mbs.errors import InputError, RotorError, one_line
-from rotor_mbs.methods.base import BuiltItem, Ladder, Method, no_items, step_ladder
+from rotor_mbs.methods.base import BuiltItem, Ladder, Method, no_items, step_ladder, tolerance_ladder
 from rotor_mbs.methods.time_limit import time_limit
 
 if TYPE_CHECKING:
@@ -30,6 +30,7 @@ if TYPE_CHECKING:
 ENDING = ".py"
 _LOAD_S = 300.0  # large engines load in seconds, on a busy machine in minutes
 _NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.-]*")
+_TOLERANCES = ("tolerance", "relative_tolerance", "accuracy")  # settings that make a ladder where there is no step
 _LOADED = "loaded"
 _LOADING = "import sys; from rotor_mbs.methods.method_file import load_alone; load_alone(sys.argv[1])"
 
@@ -74,8 +75,16 @@ class MethodFile:
     def _named(self, method: Method) -> Method:
         name = f"{self.model}/{method.name.rpartition('/')[2]}"
         ladders = [replace(one, method=name) if one.method == method.name else one for one in method.ladders]
-        if not ladders and "step" in method.settings.allowed():
-            ladders = [replace(step_ladder(6), method=name, label=method.label, order=method.order)]
+        if not ladders:
+            allowed = method.settings.allowed()
+            tolerance = next((setting for setting in _TOLERANCES if setting in allowed), "")
+            if "step" in allowed:
+                ladders = [step_ladder(6)]
+            elif tolerance:
+                steps = [10.0**-k for k in range(3, 14) if allowed[tolerance].at_least <= 10.0**-k]
+                ladders = [tolerance_ladder(lambda value: {tolerance: value}, *steps)]
+            order = method.order if "step" in allowed else None
+            ladders = [replace(ladder, method=name, label=method.label, order=order) for ladder in ladders]
         return replace(
             method,
             name=name,

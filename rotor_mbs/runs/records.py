@@ -44,8 +44,8 @@ POINT_COLUMNS: Mapping[str, Mapping[str, Column]] = {
     table: {name: COLUMNS[name] for name in names.split()}
     for table, names in {
         "bench": "status message angle_error_max angle_error_end tip_error_max energy_drift_max defect_max "
-        "defect_median run_time_s run_time_min_s run_time_q1_s run_time_q3_s setup_time_s setup_again_time_s "
-        "output_time_s repeats steps "
+        "defect_median zero_pitch_max run_time_s run_time_min_s run_time_q1_s run_time_q3_s setup_time_s "
+        "setup_again_time_s output_time_s repeats steps "
         "false_success left_out horizon_s uncertainty_rad samples load_before pinned_core repeatable order crc32",
         "stability": "status message angle_error_max energy_drift_max false_success step_for_target_s crc32",
     }.items()
@@ -148,7 +148,7 @@ def _point_records(file: TableFile, kind: str) -> Iterator[Record]:
             if value == value and column != "status":
                 facts[column] = value
         facts |= {"messages": messages, "method": known["method_name"], "setting_kind": setting_kind}
-        facts |= {column: known[column] for column in ("scene_hash", "order_expected") if column in known}
+        facts |= {column: known[column] for column in ("scene_hash", "order_expected", "versions") if column in known}
         facts |= json.loads(known.get("options", "{}"))
         if facts.get("order_expected") != facts.get("order_expected"):  # NaN: an adaptive method has none
             del facts["order_expected"]

@@ -22,7 +22,7 @@ from rotor_mbs.analysis.judgement import judge
 from rotor_mbs.analysis.work_precision import SMALLEST_ERROR, fitted_order
 from rotor_mbs.errors import OF_THE_MACHINE, InputError, RotorError, one_line
 from rotor_mbs.methods.base import STEP, TOLERANCE, Ladder
-from rotor_mbs.methods.catalogue import REFERENCE, find_method, ladders, settings_for, with_method_files
+from rotor_mbs.methods.catalogue import REFERENCE, find_method, ladders, methods, settings_for, with_method_files
 from rotor_mbs.methods.time_limit import OutOfTimeError, time_limit
 from rotor_mbs.runs import last_core
 from rotor_mbs.runs.files import writing
@@ -57,7 +57,10 @@ _MOST_INTERVALS = 100
 # An error as large as the motion itself: such a run is a failure, not a point on the curve.
 USELESS_RAD = 1.0
 USELESS_DRIFT = 0.1  # of the energy scale, where there is no reference
-ERRORS = ("angle_error_max", "angle_error_end", "tip_error_max", "energy_drift_max", "defect_max", "defect_median")
+ERRORS = (
+    "angle_error_max", "angle_error_end", "tip_error_max", "energy_drift_max", "defect_max", "defect_median",
+    "zero_pitch_max",
+)  # fmt: skip
 
 
 # A point: one method at one setting
@@ -318,7 +321,7 @@ class Curve:
     Attributes
     ----------
     scene, ladder : what is measured.
-    options : of the study, stored with each point.
+    options : of the study, stored with each point, with facts of the method that a page may want.
     """
 
     scene: Scene
@@ -351,6 +354,12 @@ class Curve:
     def rows(self) -> list[dict[str, object]]:
         """The known columns of its points."""
         method = find_method(self.ladder.method)
+        facts = {
+            **self.options,
+            "duration_s": self.scene.duration,
+            "linearizes": any(other.linearize for other in methods() if other.model == method.model),
+            "lines": sum(len(text.splitlines()) for text in method.sources if isinstance(text, str)),
+        }
         known: dict[str, object] = {
             "scene": self.scene.name,
             "method_name": method.name,
@@ -358,7 +367,7 @@ class Curve:
             "setting_kind": self.ladder.kind,
             "versions": json.dumps(row_versions(method), sort_keys=True),
             "scene_hash": scene_hash(self.scene),
-            "options": json.dumps({**self.options, "duration_s": self.scene.duration}, sort_keys=True),
+            "options": json.dumps(facts, sort_keys=True),
             "order_expected": math.nan if self.ladder.order is None else self.ladder.order,
         }
         rows = []

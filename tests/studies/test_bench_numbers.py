@@ -4,13 +4,17 @@ from __future__ import annotations
 
 import csv
 import io
+from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
 from rotor_mbs.analysis.work_precision import (
+    energy_drift,
     failed,
     fastest,
     fitted_order,
@@ -18,14 +22,19 @@ from rotor_mbs.analysis.work_precision import (
     succeeded,
     time_to_reach,
 )
+from rotor_mbs.methods.solve import solve
 from rotor_mbs.report.build import write_report
 from rotor_mbs.report.pages.bench import (
     csv_text,
     diagram,
+    engine_tables,
     failure_table,
 )
+from rotor_mbs.runs.read import open_results
 from rotor_mbs.runs.records import POINT_COLUMNS, Record, points_table, read_records, row_of_point
 from rotor_mbs.runs.results import TableFile, extend_file
+from rotor_mbs.scenario.catalogue import only_scene
+from rotor_mbs.solution.metrics import metrics_of
 from rotor_mbs.solution.status import STATUSES
 
 
@@ -98,6 +107,51 @@ def test_ratios_are_to_the_fastest() -> None:
     assert slow.seconds == pytest.approx(1e-2 * 10**0.5)
     assert (fast.ratio, slow.ratio) == (1.0, pytest.approx(slow.seconds / fast.seconds))
     assert [one.name for one, _ in fastest([SLOW, FAST], 1e-6)] == ["lagrange/taylor"]
+
+
+def test_a_row_for_each_engine_with_dashes_for_what_the_file_does_not_say(tmp_path: Path) -> None:
+    versions = '{"python": "3.11", "code": "ab", "plug-in": "cd", "pin": "4.1.0"}'
+    own = curve(
+        "mine/euler", [1e-2, 1e-3], [2e-3, 8e-3], order=0.98, order_expected=1.0, versions=versions, lines=99,
+        linearizes=False,
+    )  # fmt: skip
+    columns: list[tuple[Record, dict[str, list[float]]]] = [
+        (FAST, {"defect_max": [1e-3, 1e-7, 1e-13], "zero_pitch_max": [0.0] * 3}),
+        (SLOW, {"defect_max": [np.nan, 1e-3, 1e-5, 0.0, 0.0]}),
+        (own, {"defect_max": [1e-4, 1e-5], "zero_pitch_max": [0.0, 0.5]}),
+    ]
+    curves = [
+        replace(known, arrays={**known.arrays, **{name: np.array(values) for name, values in more.items()}})
+        for known, more in columns
+    ]
+    with open_results(stored(tmp_path / "a.h5", FAST)) as results:
+        reached, able = engine_tables(results, {"paper/fig09": curves})
+
+    def texts(row: Any) -> list[str]:
+        return [cell if isinstance(cell, str) else cell.text for cell in row]
+
+    assert [texts(row)[1:] for row in reached.rows] == [
+        ["1 of 1", "adaptive", "1.0×10⁻¹³", "1.0×10⁻¹⁰", "1 of 1, × 1.0", "1 of 1, × 1.0", "1 of 1, × 1.0", "–", "kept",
+         "no failure"],
+        ["1 of 1", "5.9 of 6", "1.0×10⁻⁵", "1.0×10⁻⁴", *["0 of 1"] * 3, "–", "–", "1 of 2"],
+        ["1 of 1", "0.98 of 1", "1.0×10⁻⁵", "0.0010", *["0 of 1"] * 3, "–", "left", "no failure"],
+    ]  # fmt: skip
+    assert [texts(row)[1:] for row in able.rows] == [
+        ["–"] * 6, ["–"] * 6, ["–", "–", "–", "no", "pin 4.1.0", "99"]
+    ]  # fmt: skip
+    notes = [cell.note for cell in reached.rows[1][5:8] if not isinstance(cell, str)]
+    assert notes == ["1 not measured"] * 3
+
+
+def test_energy_drift_of_angles_and_rates_is_that_of_the_models_own_energies() -> None:
+    scene = only_scene("paper/fig11").replace(duration=2.0, samples=51)
+    run = solve("lagrange/ode45", scene, {})
+    stub: Any = SimpleNamespace(names=["time", "angles", "rates"], array=run.trajectory.get)
+    drift = metrics_of(scene, run.trajectory, None)["energy_drift_max"]
+    assert drift > 1e-9
+    assert energy_drift(scene, stub) == pytest.approx(drift, rel=1e-4)
+    stub.names.remove("rates")
+    assert energy_drift(scene, stub) is None
 
 
 @pytest.mark.parametrize("order", [2, 4, 6])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
+import json
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -12,6 +13,7 @@ import numpy as np
 
 from rotor_mbs.analysis import work_precision
 from rotor_mbs.analysis.rehydrate import scene_of
+from rotor_mbs.analysis.stability import SuiteRun, suite_runs
 from rotor_mbs.errors import MethodRefusal
 from rotor_mbs.methods.catalogue import find_method, ladders
 from rotor_mbs.report.core import canvas
@@ -22,16 +24,25 @@ from rotor_mbs.report.core.looks import GREY, Look, label_of, look_of
 from rotor_mbs.report.core.numbers import NOTHING, number, power, prefixed, with_unit
 from rotor_mbs.report.core.svg import picture
 from rotor_mbs.report.pages.scene_tables import method_cell, words_of
-from rotor_mbs.runs.read import OpenResults, StoredScene
+from rotor_mbs.runs.read import OpenResults, StoredRun, StoredScene
 from rotor_mbs.runs.records import Record, read_records
 from rotor_mbs.runs.table import COLUMNS
 from rotor_mbs.scenario.catalogue import natural_order
+from rotor_mbs.scenario.scene import Scene
+from rotor_mbs.solution.status import COMPLETE
 
 _TARGETS = [f"{power(round(math.log10(target)))} rad" for target in work_precision.TARGETS_RAD]
 _POINT_COLUMNS = (
     "angle_error_max", "angle_error_end", "tip_error_max", "energy_drift_max", "run_time_s", "run_time_q1_s",
     "run_time_q3_s", "run_time_min_s", "setup_time_s", "setup_again_time_s", "output_time_s", "repeats", "steps",
 )  # fmt: skip
+_ERRORS = {
+    work_precision.ANGLE_ERROR: "largest angle error up to the horizon (rad)",
+    "defect_max": "largest defect of an interval between samples (rad)",
+}
+_ENGINE_TARGETS = (1e-6, 1e-9, 1e-10)  # rad
+_LONG_S = 100.0  # of a run whose energy drift says something
+_NO_ENGINE = ("rotor_mbs", "python", "numpy", "h5py", "code", "plug-in")  # among the versions of a row
 _FRONT_COLOUR = "#c8c8c8"
 _LOWEST_ERROR = 1e-16  # rad: smaller ones are drawn there
 _FAILED_LEFT, _FAILED, _FAILED_RIGHT = 3.0, 20.0, 120.0  # rad: the band of failed runs on the axis of errors
@@ -43,7 +54,12 @@ def bench_page(results: OpenResults) -> dict[str, object]:
     scenes = {name: grouped[name] for name in natural_order(grouped)}
     parts = []
     for i, (name, curves) in enumerate(scenes.items()):
-        pictures = [picture(diagram(curves), f"bench-{i}", "Run time of the integration alone: lower left is best")]
+        pictures = [
+            picture(diagram(curves), f"bench-{i}", "Run time of the integration alone: lower left is best"),
+            picture(
+                diagram(curves, error="defect_max"), f"bench-{i}-defect", "The same by the defects of its intervals"
+            ),
+        ]
         if "is_short" not in curves[0].attributes:  # workers there keep what runs before have compiled
             caption = "With set-up (everything compiled anew) and reading out of samples"
             pictures.append(picture(diagram(curves, with_setup=True), f"bench-{i}-setup", caption))
@@ -65,7 +81,12 @@ def bench_page(results: OpenResults) -> dict[str, object]:
             ],
             "points": _point_table(curves),
         })  # fmt: skip
-    return {"fastest": overview_table(scenes), "scenes": parts, "csv": BENCH_CSV}
+    return {
+        "engines": engine_tables(results, scenes),
+        "fastest": overview_table(scenes),
+        "scenes": parts,
+        "csv": BENCH_CSV,
+    }
 
 
 def cost_section(scene: StoredScene, curves: Sequence[Record]) -> Section:
@@ -86,14 +107,16 @@ def cost_picture(curves: Sequence[Record], caption: str) -> list[Picture]:
     return [picture(diagram(curves, height=3.4), "cost", f"{caption}: lower left is best")]
 
 
-def diagram(curves: Sequence[Record], *, with_setup: bool = False, height: float = 3.9) -> Panels:
-    """All curves of a scene, Pareto front, quartiles, and failed runs on a strip at the right.
+def diagram(
+    curves: Sequence[Record], *, error: str = work_precision.ANGLE_ERROR, with_setup: bool = False, height: float = 3.9
+) -> Panels:
+    """All curves of a scene over one of their errors, Pareto front, quartiles, and failed runs on a strip at the right.
 
     As work-precision diagrams are drawn in the field: the error falls to the left, the time downwards.
     """
-    panels = canvas.panels((height,), "largest angle error up to the horizon (rad)")
+    panels = canvas.panels((height,), _ERRORS[error])
     axes = panels.axes[0]
-    points = [work_precision.points(curve, with_setup=with_setup) for curve in curves]
+    points = [work_precision.points(curve, error, with_setup=with_setup) for curve in curves]
     errors, seconds = np.concatenate(points, axis=1) if points else np.empty((2, 0))
     front = work_precision.pareto(errors, seconds)
     if len(front) > 1:
@@ -110,7 +133,7 @@ def diagram(curves: Sequence[Record], *, with_setup: bool = False, height: float
         if len(shown):
             canvas.curve(axes, shown, own_seconds, look, 1.0)
         if not with_setup:
-            chosen = work_precision.succeeded(curve)
+            chosen = work_precision.succeeded(curve, error)
             low, high = curve.arrays["run_time_q1_s"][chosen], curve.arrays["run_time_q3_s"][chosen]
             axes.vlines(shown, low, high, color=look.colour, linewidth=2.2, alpha=0.6)
         is_failed = work_precision.failed(curve)
@@ -123,7 +146,7 @@ def diagram(curves: Sequence[Record], *, with_setup: bool = False, height: float
             canvas.curve(axes, np.full(len(failed), _FAILED), failed, marks, markersize=4.0)
     # Of the reference; in quad precision far beyond the edge of the diagram.
     uncertainty = max((float(curve.attributes.get("uncertainty_rad", 0.0)) for curve in curves), default=0.0)
-    if uncertainty > _LOWEST_ERROR:
+    if uncertainty > _LOWEST_ERROR and error == work_precision.ANGLE_ERROR:
         label = "uncertainty of the reference"
         axes.axvspan(_LOWEST_ERROR / 10.0, uncertainty, color=GREY, alpha=0.2, linewidth=0, label=label)
     smallest = max(errors.min(initial=1e-3), _LOWEST_ERROR)
@@ -176,12 +199,148 @@ def overview_table(scenes: Mapping[str, Sequence[Record]]) -> PageTable:
                 note = f"then {label_of(second.name)}, {number(slower.ratio)} times as long"
             else:
                 note = "no other was measured to there" if is_cut else "no other gets there"
-            row.append(
-                TableCell(f"{label_of(first.name)} ({first.name}): {prefixed(reach.seconds, 's', 2)}", note=note)
-            )
+            label = label_of(first.name)
+            name = label if label == first.name else f"{label} ({first.name})"
+            row.append(TableCell(f"{name}: {prefixed(reach.seconds, 's', 2)}", note=note))
         rows.append(row)
     caption = "Run time of the fastest method to an angle error, and how many times as long the next one takes."
     return PageTable(caption, ["scene", *_TARGETS], rows)
+
+
+def engine_tables(results: OpenResults, scenes: Mapping[str, Sequence[Record]]) -> list[PageTable]:
+    """A row per method: what it reaches over all scenes and what that costs; what it can compute. What the file does
+    not know is a dash."""
+    curves = [curve for of_scene in scenes.values() for curve in of_scene]
+    parsed = {name: scene for name, stored in results.scenes.items() if (scene := scene_of(stored)) is not None}
+    suite = [run for run in suite_runs(results.path) if run.scene.startswith(("stiff/", "extreme/"))]
+    # The shortest that is long enough.
+    durations = {name: scene.duration for name, scene in parsed.items() if results.scenes[name].methods}
+    long = min((name for name in durations if durations[name] >= _LONG_S), key=lambda name: durations[name], default="")
+    reached: list[Row] = []
+    able: list[Row] = []
+    for method in dict.fromkeys(curve.method for curve in curves):
+        own = {name: [curve for curve in of_scene if curve.method == method] for name, of_scene in scenes.items()}
+        own = {name: of_scene for name, of_scene in own.items() if of_scene}
+        reached.append([
+            method_cell(method),
+            f"{sum(any(map(_is_ok, curves)) for curves in own.values())} of {len(own)}",
+            _order_cell([curve for of_scene in own.values() for curve in of_scene]),
+            _worst_cell(own, "defect_max"),
+            _worst_cell(own, work_precision.ANGLE_ERROR),
+            *(_reach_cell(scenes, own, target) for target in _ENGINE_TARGETS),
+            _drift_cell(parsed[long], results.scenes[long].methods.get(method)) if long else NOTHING,
+            _zero_pitch_cell(own),
+            _false_success_cell(own, [run for run in suite if run.method == method]),
+        ])  # fmt: skip
+        facts = next(iter(own.values()))[0].attributes
+        damped = {name: own[name] for name in own if name in parsed and parsed[name].has_damping}
+        loaded = {name: own[name] for name in own if name in parsed and not parsed[name].has_constant_loads}
+        with_loads = [stored.runs.get(method) for name, stored in results.scenes.items() if parsed[name].wants("loads")]
+        loads = ["yes" if "blade_root_force" in run else "no" for run in with_loads if run is not None]
+        versions = json.loads(facts.get("versions", "{}"))
+        engine = [f"{name} {version}" for name, version in versions.items() if name not in _NO_ENGINE]
+        able.append([
+            method_cell(method),
+            _worst_cell(damped, work_precision.ANGLE_ERROR),
+            _worst_cell(loaded, work_precision.ANGLE_ERROR),
+            max(loads, default=NOTHING),
+            {True: "yes", False: "no"}.get(facts.get("linearizes", ""), NOTHING),
+            ", ".join(engine) or NOTHING,
+            str(facts.get("lines") or NOTHING),
+        ])  # fmt: skip
+    drift = f"energy drift in {durations[long]:g} s" if long else "energy drift"
+    targets = [f"{power(round(math.log10(target)))} rad" for target in _ENGINE_TARGETS]
+    head = [
+        "method", "ok on scenes", "order seen", "smallest defect (rad)", "smallest error (rad)", *targets, drift,
+        "zero pitch", "failures called ok",
+    ]  # fmt: skip
+    able_head = [
+        "method", "joint damping", "load over time", "loads", "linearization", "engine", "lines of its file",
+    ]  # fmt: skip
+    return [
+        PageTable("Accuracy and cost over all scenes", head, reached),
+        PageTable("What it computes: the smallest angle error (rad) where a scene has it", able_head, able),
+    ]
+
+
+def _worst_cell(own: Mapping[str, Sequence[Record]], column: str) -> TableCell | str:
+    """The smallest value on the scene where that is largest, of scenes on which a setting is ok."""
+    values = {name: work_precision.best(curves, column) for name, curves in own.items()}
+    known = {name: value for name, value in values.items() if value is not None}
+    if not known:
+        return TableCell("none ok", "bad") if own else NOTHING
+    worst = max(known, key=lambda name: known[name])
+    return TableCell(number(known[worst]), note=worst if len(own) > 1 else "")
+
+
+def _is_ok(curve: Record) -> bool:
+    return bool(work_precision.succeeded(curve).any())
+
+
+def _reach_cell(
+    scenes: Mapping[str, Sequence[Record]], own: Mapping[str, Sequence[Record]], target: float
+) -> TableCell:
+    """On how many scenes it reaches the target, the median of the ratios of its run times to the fastest, and them."""
+    reached: dict[str, work_precision.Reach] = {}
+    cut = 0  # scenes on which it was not measured to there
+    for name, curves in own.items():
+        ranked = work_precision.fastest(scenes[name], target)
+        reach = next((reach for curve, reach in ranked if any(curve is one for one in curves)), None)
+        if reach is not None:
+            reached[name] = reach
+        elif any(work_precision.left_out(curve) for curve in curves):
+            cut += 1
+    text, note = f"{len(reached)} of {len(own)}", f"{cut} not measured" if cut else ""
+    if reached:
+        seconds = [reach.seconds for reach in reached.values()]
+        text += f", × {number(float(np.median([reach.ratio for reach in reached.values()])))}"
+        times = dict.fromkeys(prefixed(value, "s", 2) for value in (min(seconds), max(seconds)))
+        note = "; ".join(filter(None, [" to ".join(times), note]))
+    return TableCell(text, note=note)
+
+
+def _order_cell(curves: Sequence[Record]) -> str:
+    """The median of the fitted orders of a method with a fixed step, and the order that it claims."""
+    claimed = [curve.attributes["order_expected"] for curve in curves if "order_expected" in curve.attributes]
+    seen = [curve.attributes["order"] for curve in curves if claimed and "order" in curve.attributes]
+    if not claimed:
+        return "adaptive"
+    return f"{number(float(np.median(seen)) if seen else None)} of {claimed[0]:g}"
+
+
+def _drift_cell(scene: Scene, run: StoredRun | None) -> TableCell | str:
+    if run is None:
+        return NOTHING
+    if run.status not in COMPLETE:
+        return TableCell(words_of(run.status), "bad")
+    return TableCell(number(work_precision.energy_drift(scene, run)), note=scene.name)
+
+
+def _zero_pitch_cell(own: Mapping[str, Sequence[Record]]) -> TableCell | str:
+    """Whether pitches that are zero in the reference are zero at every setting."""
+    values = [
+        curve.arrays["zero_pitch_max"][work_precision.succeeded(curve)]
+        for curves in own.values() for curve in curves if "zero_pitch_max" in curve.arrays
+    ]  # fmt: skip
+    known = [value for array in values for value in array.tolist() if math.isfinite(value)]
+    if not known:
+        return NOTHING
+    return "kept" if not any(known) else TableCell("left", "bad", note=f"up to {with_unit(max(known), 'rad')}")
+
+
+def _false_success_cell(own: Mapping[str, Sequence[Record]], suite: Sequence[SuiteRun]) -> TableCell | str:
+    """Of the runs of the stability suite that went wrong, where the file has them; else of the settings here."""
+    if suite:
+        # What the time limit ended is no failure of the engine.
+        failed = [run for run in suite if run.status not in ("ok", "unchecked", "timed_out")]
+        claimed, count, note = sum(run.false_success for run in failed), len(failed), f"{len(suite)} runs of the suite"
+    else:
+        curves = [curve for of_scene in own.values() for curve in of_scene]
+        claimed = sum(int(curve.arrays["false_success"].sum()) for curve in curves)
+        count, note = sum(int(work_precision.failed(curve).sum()) for curve in curves), "of the settings here"
+    if not count:
+        return TableCell("no failure", note=note)
+    return TableCell(f"{claimed} of {count}", "bad" if claimed else "", note=note)
 
 
 def reach_table(curves: Sequence[Record]) -> PageTable:
