@@ -28,7 +28,7 @@ SOURCES = {path.relative_to(PACKAGE).as_posix(): path.read_text() for path in so
 CHOSEN = {
     "methods/catalogue.py", "studies/check.py", "studies/check_probes.py", "studies/check_status_rules.py",
     "studies/stability.py", "studies/claims.py", "analysis/run_selection.py", "api.py",
-    "scenario/sweep.py", "report/core/looks.py",
+    "scenario/sweep.py",
 }  # fmt: skip
 
 

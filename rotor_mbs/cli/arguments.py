@@ -20,7 +20,6 @@ EXPORT_FORMATS = ("mjcf", "exudyn", "csv")
 
 _MAX_SPEED = 1e25  # rad/s or N m/rad, as of numbers in a scene
 _MAX_SPAN = 10_000  # numbers of FROM:TO:COUNT
-_MAX_NAME_BYTES = 200  # of a file's name; file systems allow 255, and temporary names are longer
 _MAX_NUMBER = 1e9  # of a count; of seconds: thirty years
 
 
@@ -35,40 +34,21 @@ def pages_beside(results: Path) -> Path:
     return results.parent / ("report" if results.name == "results.h5" else f"{results.stem}-report")
 
 
-def path(text: str) -> Path:
-    """A path that the system can look up, whether something is there or not."""
-    try:
-        Path(text).stat()
-    except (FileNotFoundError, NotADirectoryError):
-        pass
-    except OSError as exc:
-        raise argparse.ArgumentTypeError(f"{_short(text)}: {exc.strerror}; allowed: a path that can be read") from exc
-    except ValueError as exc:
-        raise argparse.ArgumentTypeError(f"{_short(text)}: {exc}; allowed: a path without it") from exc
-    return Path(text)
-
-
 def file(text: str) -> Path:
-    """An output file: neither an empty name, nor an existing folder, and short enough for temporary names."""
-    output = path(text)
+    """An output file: neither an empty name nor an existing folder."""
+    output = Path(text)
     if not output.name or output.name == ".." or output.is_dir():
         raise argparse.ArgumentTypeError(f"{text!r} given, allowed: a file's name, not a folder")
-    if len(os.fsencode(output.name)) > _MAX_NAME_BYTES:
-        raise argparse.ArgumentTypeError(f"{_short(text)}: allowed: a file's name of at most {_MAX_NAME_BYTES} bytes")
     return output
 
 
 def folder(text: str) -> Path:
     """An output folder: one that exists, or that can be made."""
-    output = path(text)
+    output = Path(text)
     existing = next((place for place in (output, *output.parents) if place.exists()), output)
     if not (existing.is_dir() and os.access(existing, os.W_OK)):
         raise argparse.ArgumentTypeError(f"{text!r} given, allowed: a folder that can be written")
     return output
-
-
-def _short(text: str) -> str:
-    return ascii(text if len(text) <= 80 else f"{text[:77]}...")
 
 
 def span(text: str) -> tuple[float, ...]:
@@ -157,7 +137,7 @@ class _Parser(argparse.ArgumentParser):
 
     def results(self) -> None:
         text = "results file (default: results.h5 of this folder, else that of reproduce)"
-        self.add_argument("file", nargs="?", type=path, default=default_results(), metavar="FILE", help=text)
+        self.add_argument("file", nargs="?", type=Path, default=default_results(), metavar="FILE", help=text)
 
     def jobs(self) -> None:
         text = "parallel processes (default: the cores, %(default)s)"
@@ -290,17 +270,17 @@ def _parser() -> tuple[_Parser, dict[str, _Parser]]:
         "check", "check the accuracy of stored runs; exit status 1 where a check fails", "studies:check",
         "", "rotor-mbs-out/results.h5 --junit check.xml",
     )  # fmt: skip
-    own.add_argument("file", nargs="?", type=path, metavar="FILE", help="results file (default: a quick set, computed)")
+    own.add_argument("file", nargs="?", type=Path, metavar="FILE", help="results file (default: a quick set, computed)")
     own.method("compute the default set by this method, or by those of a Python file")
     own.add_argument(
-        "--bounds", type=path, metavar="TOML", help="bounds that take precedence over reference/accuracy.toml"
+        "--bounds", type=Path, metavar="TOML", help="bounds that take precedence over reference/accuracy.toml"
     )
     text = "fail where a scene of FILE has no run by this method; may be repeated"
     own.add_argument("--require", action="append", metavar="METHOD", help=text)
     text = (
         "also fail where a check passed in this earlier results file and its margin has shrunk, or its run is missing"
     )
-    own.add_argument("--against", type=path, metavar="OLD", help=text)
+    own.add_argument("--against", type=Path, metavar="OLD", help=text)
     text = "with --against: by how much a margin may shrink (default: %(default)g)"
     own.add_argument("--shrink", type=POSITIVE, default=10.0, metavar="FACTOR", help=text)
     own.add_argument("--junit", type=file, metavar="XML", help="verdicts as JUnit XML")
@@ -322,18 +302,18 @@ def _parser() -> tuple[_Parser, dict[str, _Parser]]:
         "sweep", "run a parameter study into one dataset", "studies:sweep",
         "sweeps/fig11-spread -o spread.h5", "my-sweep.toml --dry-run",
     )  # fmt: skip
-    own.add_argument("file", type=path, metavar="SWEEP.toml", help="or a shipped one: sweeps/fig11-spread")
+    own.add_argument("file", type=Path, metavar="SWEEP.toml", help="or a shipped one: sweeps/fig11-spread")
     own.method("replaces the file's methods")
     own.output(file, "FILE", help="output file (default: the sweep's name with the ending .h5)")
     own.flag("--metadata", help="Croissant metadata and statistics for normalization beside FILE, as JSON")
     text = "also a folder that load_dataset of Hugging Face reads: a file per split, and a dataset card"
-    own.add_argument("--datasets", type=path, metavar="DIR", help=text)
+    own.add_argument("--datasets", type=Path, metavar="DIR", help=text)
     own.add_argument("--engine", default="local", metavar="ENGINE", help="local, or dask:tcp://host:port")
     own.add_argument("--part", type=part, default=(1, 1), metavar="K/N", help="only part K of N, for a job array")
     own.flag("--fresh", help="recompute stored runs")
     own.flag("--dry-run", help="print run count, estimated time, disk space")
     own.flag("--yes", help="start a sweep of over a million runs")
-    own.flag("--json", help="progress and summary as JSON lines")
+    own.flag("--json", help="the summary, or the estimate, as JSON")
     own.jobs()
     own.timeout()
 

@@ -4,16 +4,14 @@ from __future__ import annotations
 
 import argparse
 import sys
-import threading
 import time
 from functools import partial
 from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from rotor_mbs.analysis.run_tables import run_table
 from rotor_mbs.cli import EXIT_BAD_INPUT
-from rotor_mbs.cli.terminal import ProgressLine, print_doubts, print_summary, print_table, print_text
+from rotor_mbs.cli.terminal import ProgressLine, print_doubts, print_summary, print_table
 from rotor_mbs.methods.catalogue import method_names
 from rotor_mbs.runs.files import is_being_written, replace_file
 from rotor_mbs.runs.pool import local_pool
@@ -23,13 +21,6 @@ from rotor_mbs.studies.reference import compute_references
 from rotor_mbs.studies.reproduce import made_from, summary_of
 from rotor_mbs.studies.reproduce import reproduce as reproduce_paper
 from rotor_mbs.studies.run import run_scenes, selected_methods
-
-if TYPE_CHECKING:
-    from rotor_mbs.studies.run import Outcome
-
-# Of the time of `reproduce`: runs, pages.
-_REPRODUCE_PARTS = (0.8, 0.2)
-_PAGES = "rotor_mbs.report.build"
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -68,29 +59,20 @@ def reproduce(arguments: argparse.Namespace) -> int:
         replace_file(summary, text.encode(), rb"\A\s*(result|method) ")
         if status == 0:
             replace_file(stamp, made_from(results, arguments.timeout).encode(), rb"\A[0-9a-f]{64}\Z")
-    print_text(summary.read_text(encoding="utf-8"))
+    print_table(summary.read_text(encoding="utf-8"))
     print(f"report: {index}\n{time.monotonic() - start:.1f} s in all")
     return status
 
 
 def _reproduce(arguments: argparse.Namespace, results: Path, pages: Path) -> tuple[int, str]:
-    """The exit status and the summary. One pool does all, so that its processes load code while this one is busy."""
+    """The exit status and the summary; one pool of processes does all."""
     load_runs = partial(import_module, "rotor_mbs.studies.reproduce")
-    with local_pool(arguments.jobs, load_runs) as pool, ProgressLine(parts=_REPRODUCE_PARTS) as progress:
+    with local_pool(arguments.jobs, load_runs) as pool, ProgressLine() as progress:
+        report = reproduce_paper(results, workers=pool, timeout_s=arguments.timeout, on_progress=progress)
+        from rotor_mbs.report.build import write_report  # late: matplotlib
 
-        def on_progress(done: int, total: int, outcome: Outcome) -> None:
-            progress(done, total, outcome)
-            if done == total:
-                for _ in range(pool.workers):
-                    pool.submit(import_module, _PAGES, arguments.timeout)
-
-        threading.Thread(target=import_module, args=(_PAGES,)).start()
-        report = reproduce_paper(results, workers=pool, timeout_s=arguments.timeout, on_progress=on_progress)
-        from rotor_mbs.report.build import write_report
-
-        summary = pool.submit(summary_of, results, arguments.timeout)
         write_report(results, pages, pool, partial(progress.stage, "pages and figures"))
-        return print_summary(report, results), summary.result()
+    return print_summary(report, results), summary_of(results)
 
 
 def reference(arguments: argparse.Namespace) -> int:

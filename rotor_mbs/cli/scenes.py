@@ -7,7 +7,8 @@ from __future__ import annotations
 
 import argparse
 import json
-from dataclasses import asdict, fields
+from collections.abc import Iterator
+from dataclasses import asdict
 from typing import Any
 
 from rotor_mbs.errors import InputError, MethodRefusal
@@ -78,20 +79,9 @@ def _show_method(method: Method, arguments: argparse.Namespace) -> None:
 
 def _show_scene(arguments: argparse.Namespace) -> None:
     from rotor_mbs.cli.terminal import print_doubts
-    from rotor_mbs.scenario.scene import scene_fields
+    from rotor_mbs.scenario.scene import scene_tables, unit_of
 
     scene = only_scene(arguments.scene)
-    data: dict[str, object] = {}
-    for item in scene_fields("label", "run", "start", "rotor"):
-        value, unit = getattr(scene, item.name), item.metadata["unit"]
-        if item.name == "blades":
-            data["blades"] = len(value)
-            alike = all(blade == value[0] for blade in value)
-            for i, blade in enumerate(value[:1] if alike else value):
-                numbers = {f"{part.name}, {part.metadata['unit']}": getattr(blade, part.name) for part in fields(blade)}
-                data["every blade" if alike else f"blade {i + 1}"] = numbers
-        elif item.metadata["key"] and item.name != "title" and (value not in ((), 0.0) or item.name == "gravity"):
-            data[item.metadata["key"] if unit == "1" else f"{item.metadata['key']}, {unit}"] = value
     models: dict[str, dict[str, Any]] = {}
     for method in methods():
         facts = {"name": method.model, "methods": [], "items": [], "refused": "", "is_linearized": False}
@@ -103,16 +93,16 @@ def _show_scene(arguments: argparse.Namespace) -> None:
                 model["items"], model["refused"] = list(map(asdict, method.items(scene))), ""
             except MethodRefusal as exc:
                 model["refused"] = str(exc)
+    tables = scene_tables(scene)
     if arguments.json:
-        print(json.dumps({"name": scene.name, "scene": data, "models": models}, ensure_ascii=False, indent=1))
+        print(json.dumps({"name": scene.name, "scene": tables, "models": models}, ensure_ascii=False, indent=1))
         return
     print_doubts([scene])
-    print(f"{scene.name}: {scene.title}\n")
-    for key, value in data.items():
-        if isinstance(value, dict):
-            print(f"  {key}", *(f"    {part:24} {_readable(number)}" for part, number in value.items()), sep="\n")
-        else:
-            print(f"  {key:26} {_readable(value)}")
+    print(f"{scene.name}\n")
+    for path, value in _keys(tables):
+        name = "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in path)[1:]
+        unit = "" if unit_of(path) == "1" else f", {unit_of(path)}"
+        print(f"  {name + unit:28} {value}")
     print("\nmethods" + (", and the items that each model builds" if arguments.build else ""))
     for name, model in models.items():
         first, *others = model["methods"]
@@ -126,9 +116,13 @@ def _show_scene(arguments: argparse.Namespace) -> None:
             print(f"    {item['kind']:9} {item['name']:28} {item['detail']}".rstrip())
 
 
-def _readable(value: object) -> str:
+def _keys(value: Any, path: tuple[str | int, ...] = ()) -> Iterator[tuple[tuple[str | int, ...], Any]]:
+    """The path and the value of each key of a scene file."""
     if isinstance(value, dict):
-        return "; ".join(f"{key} {_readable(part)}" for key, part in value.items())
-    if isinstance(value, tuple):
-        return ", ".join(f"[{_readable(part)}]" if isinstance(part, tuple) else _readable(part) for part in value)
-    return f"{value:.10g}" if isinstance(value, float) else str(value)
+        for name, inner in value.items():
+            yield from _keys(inner, (*path, name))
+    elif isinstance(value, list) and value and isinstance(value[0], dict):  # a table per blade
+        for place, inner in enumerate(value):
+            yield from _keys(inner, (*path, place))
+    else:
+        yield path, value

@@ -19,16 +19,15 @@ from typing import TYPE_CHECKING
 
 from rotor_mbs.cli import EXIT_BAD_INPUT, EXIT_FAILED, show
 from rotor_mbs.cli.arguments import pages_beside
-from rotor_mbs.cli.terminal import ProgressLine, SweepProgress, print_doubts, print_not_computed, print_table, span
+from rotor_mbs.cli.terminal import ProgressLine, print_doubts, print_not_computed, print_table, span
 from rotor_mbs.errors import InputError, StoreError
 from rotor_mbs.methods.catalogue import check_names, method_names
 from rotor_mbs.runs import cores
 from rotor_mbs.scenario.catalogue import find_scenes, only_scene
+from rotor_mbs.solution.status import GOOD
 
 if TYPE_CHECKING:
     from rotor_mbs.analysis.checks import Check
-    from rotor_mbs.runs.pool import TaskPool
-    from rotor_mbs.studies.sweep import SweepPlan, SweepResult
 
 _MANY_RUNS = 1_000_000  # that a sweep does not start without --yes
 
@@ -135,7 +134,9 @@ def check(arguments: argparse.Namespace) -> int:
     if arguments.github:
         for verdict in formats.worst_first(failures)[: formats.WORST]:
             print(formats.github(verdict), file=stream)
-        _append_job_summary(formats.summary(verdicts))
+        if summary := os.environ.get("GITHUB_STEP_SUMMARY"):  # where GitHub takes a job's summary from
+            with Path(summary).open("a", encoding="utf-8") as file:
+                file.write(formats.summary(verdicts))
     runs = ", ".join(f"{count} {method}" for method, count in study.judged_runs(verdicts).items())
     print(f"runs judged: {runs or 'none'}", file=stream)
     print(f"{len(verdicts) - len(failures)} passed, {len(failures)} failed", file=stream)
@@ -228,7 +229,7 @@ def report(arguments: argparse.Namespace) -> int:
 
 def figures(arguments: argparse.Namespace) -> int:
     """The paper's figures as files for a manuscript into `arguments.output`."""
-    from rotor_mbs.report.pages.figures import write_figures
+    from rotor_mbs.report.pages.paper import write_figures
 
     print(*write_figures(arguments.file, arguments.output, arguments.format, arguments.figure or ()), sep="\n")
     return 0
@@ -249,18 +250,32 @@ def sweep(arguments: argparse.Namespace) -> int:
 
     with open_task_pool(arguments.engine, arguments.jobs) as pool:  # its workers load their code meanwhile
         from rotor_mbs.scenario.sweep import load_sweep
-        from rotor_mbs.studies.sweep import plan_sweep, run_sweep
+        from rotor_mbs.studies.sweep import estimate_seconds, plan_sweep, run_sweep
 
         study = load_sweep(arguments.file, method_names())
         plan = plan_sweep(study, arguments.method or (), arguments.part, arguments.timeout)
         if arguments.dry_run:
-            return _show_estimate(plan, pool, arguments)
+            size, seconds = plan.runs * plan.table().row_type.itemsize, estimate_seconds(plan, pool)
+            if arguments.json:
+                facts = {"runs": plan.runs, "methods": list(plan.methods), "seconds": seconds, "bytes": size}
+                print(json.dumps(facts))
+            else:
+                print(f"{plan.runs:,} runs by {', '.join(plan.methods)}: about {span(seconds)} on {arguments.engine}")
+                print(f"{size / 1e6:,.3f} MB")
+            return 0
         if plan.runs > _MANY_RUNS and not arguments.yes:
             raise InputError(f"{arguments.file}: {plan.runs:,} runs; allowed without --yes: at most {_MANY_RUNS:,}")
         output = arguments.output or Path(f"{plan.sweep.name}.h5")
+        made: Counter[str] = Counter()
+
+        def on_progress(done: int, total: int, statuses: Counter[str]) -> None:
+            made.update(statuses)
+            failed = [f", {count} {status}" for status, count in sorted(made.items()) if status not in GOOD]
+            progress.stage("runs", done, total, "".join(failed))
+
         try:
-            with SweepProgress(as_json=arguments.json) as progress:
-                result = run_sweep(plan, output, pool, progress, fresh=arguments.fresh)
+            with ProgressLine() as progress:
+                result = run_sweep(plan, output, pool, on_progress, fresh=arguments.fresh)
         except StoreError as exc:
             show(str(exc), sys.stderr)
             is_full = isinstance(exc.__cause__, OSError) and exc.__cause__.errno in (
@@ -269,8 +284,15 @@ def sweep(arguments: argparse.Namespace) -> int:
                 errno.EFBIG,
             )
             # What is stored stays, the same command continues; else nothing was begun.
-            return EXIT_FAILED if is_full or progress.has_made_runs else EXIT_BAD_INPUT
-        _summarize_sweep(result, as_json=arguments.json)
+            return EXIT_FAILED if is_full or made else EXIT_BAD_INPUT
+        stream = sys.stderr if arguments.json else sys.stdout  # standard output is the JSON's alone
+        if arguments.json:
+            facts = {"runs": result.runs, "made": result.made, "statuses": result.statuses, "files": [str(result.path)]}
+            print(json.dumps({"event": "end", **facts, "seconds": round(result.seconds, 3)}))
+        else:
+            by_status = ", ".join(f"{count} {status}" for status, count in Counter(result.statuses).most_common())
+            rate = f", {result.made / result.seconds:.4g} per s" if result.made else ""
+            print(f"{result.path}: {result.runs} runs: {by_status}; {result.made} made in {result.seconds:.1f} s{rate}")
         if result.older:
             show(f"{result.older} runs were computed by other versions; --fresh computes them again", sys.stderr)
         for line in result.lost:
@@ -279,64 +301,21 @@ def sweep(arguments: argparse.Namespace) -> int:
             from rotor_mbs.report.pages.sweep import save_picture  # late: matplotlib
             from rotor_mbs.runs.sweeps import StoredSweep
 
-            line = save_picture(StoredSweep(result.path), output.with_suffix(".svg"))
-            print(line, file=sys.stderr if arguments.json else sys.stdout)
+            print(save_picture(StoredSweep(result.path), output.with_suffix(".svg")), file=stream)
         if arguments.metadata:
             from rotor_mbs.studies.sweep_metadata import describe
 
             names = ", ".join(place.name for place in describe(result.path))
-            print(f"{result.path}: described in {names}", file=sys.stderr if arguments.json else sys.stdout)
+            print(f"{result.path}: described in {names}", file=stream)
         if arguments.datasets:
             from rotor_mbs.studies.sweep_metadata import write_splits
 
             names = ", ".join(place.name for place in write_splits(result.path, arguments.datasets))
-            print(f"{arguments.datasets}: {names}", file=sys.stderr if arguments.json else sys.stdout)
+            print(f"{arguments.datasets}: {names}", file=stream)
         return 0 if result.is_ok else 1
-
-
-def _summarize_sweep(result: SweepResult, *, as_json: bool) -> None:
-    if as_json:
-        facts = {"runs": result.runs, "made": result.made, "statuses": result.statuses, "files": [str(result.path)]}
-        print(json.dumps({"event": "end", **facts, "seconds": round(result.seconds, 3)}))
-        return
-    by_status = ", ".join(f"{count} {status}" for status, count in Counter(result.statuses).most_common())
-    rate = f", {result.made / result.seconds:.4g} per s" if result.made else ""
-    print(f"{result.path}: {result.runs} runs: {by_status}; {result.made} made in {result.seconds:.1f} s{rate}")
-
-
-def _show_estimate(plan: SweepPlan, pool: TaskPool, arguments: argparse.Namespace) -> int:
-    from rotor_mbs.studies.sweep import estimate_seconds
-
-    size, seconds = plan.runs * plan.table().row_type.itemsize, estimate_seconds(plan, pool)
-    if arguments.json:
-        facts = {"runs": plan.runs, "methods": list(plan.methods), "seconds": seconds, "bytes": size, "files": 1}
-        print(json.dumps(facts))
-        return 0
-    print(f"{plan.runs:,} runs by {', '.join(plan.methods)}: about {span(seconds)} on {arguments.engine}")
-    print(f"{_size(size)} in 1 file")
-    return 0
-
-
-def _size(count: float) -> str:
-    for unit in ("bytes", "kB", "MB", "GB"):
-        if count < 1000.0:
-            return f"{count:.4g} {unit}"
-        count /= 1000.0
-    return f"{count:.4g} TB"
 
 
 def _write_pages(results: Path, folder: Path | None = None) -> None:
     from rotor_mbs.report.build import write_report
 
     print(f"report: {write_report(results, folder or pages_beside(results))}")
-
-
-def _append_job_summary(text: str) -> None:
-    """Into the file that GitHub names in the environment of a job's step; nothing elsewhere."""
-    path = os.environ.get("GITHUB_STEP_SUMMARY")
-    if path:
-        try:
-            with Path(path).open("a", encoding="utf-8") as file:
-                file.write(text)
-        except OSError as exc:
-            raise StoreError(f"{path} (GITHUB_STEP_SUMMARY): cannot be written: {exc.strerror}") from exc

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import json
 import os
 import re
 import shutil
 import sys
 import threading
 import time
-from collections import Counter
 from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
@@ -27,6 +25,7 @@ if TYPE_CHECKING:  # a sweep's workers load their code meanwhile
 # How a status is coloured on a terminal: well; open to doubt; anything else went wrong.
 _COLOURS = {"ok": "32", "inaccurate": "33", "unchecked": "33"}
 _BAD = "31"
+_RENEWED_S, _LOGGED_S = 0.1, 10.0  # between two lines of a stage, on a terminal and in a log
 _STATUS = re.compile(rf"\b({'|'.join((*STATUSES, 'no_reference'))})\b")
 
 
@@ -37,28 +36,25 @@ def coloured(text: str, stream: TextIO) -> str:
     return _STATUS.sub(lambda found: f"\x1b[{_COLOURS.get(found[0], _BAD)}m{found[0]}\x1b[0m", text)
 
 
-def print_table(table: TextTable) -> None:
-    """On standard output, after an empty line; nothing where it has no rows."""
-    if table.rows:
-        print_text(str(table))
+def print_table(table: TextTable | str) -> None:
+    """On standard output, after an empty line, with its statuses coloured on a terminal; nothing without rows."""
+    if isinstance(table, str) or table.rows:
+        text, stream = printable(str(table)), getattr(sys.stdout, "unfiltered", sys.stdout)
+        print("", coloured(text, stream), sep="\n", file=stream)
 
 
-def print_text(text: str) -> None:
-    """On standard output, after an empty line, with its statuses coloured on a terminal."""
-    text, stream = printable(text), getattr(sys.stdout, "unfiltered", sys.stdout)
-    print("", coloured(text, stream), sep="\n", file=stream)
-
-
-class _RenewedLine:
+class ProgressLine:
     """One line that renews itself on a terminal, plain lines in a log. A context manager that clears it.
 
-    On a terminal it is renewed every second, so that a long run is no silence.
+    Called after each run. What is left is estimated from the work done, not from the number of runs. On a terminal the
+    line is renewed every second, so that a long run is no silence.
     """
 
     def __init__(self, stream: TextIO | None = None) -> None:
         self._stream = sys.stderr if stream is None else stream
         self._is_terminal = self._stream.isatty()
-        self._start = time.monotonic()
+        self._start = self._last = self._stage_start = time.monotonic()
+        self._stage, self._share_before = "", 0.0
         self._text = "starting"
         self._lock = threading.Lock()
         self._ended = threading.Event()
@@ -73,6 +69,35 @@ class _RenewedLine:
         with self._lock:
             if self._is_terminal:
                 self._print("\r\x1b[K", end="")
+
+    def __call__(self, done: int, total: int, outcome: Outcome) -> None:
+        if done == 1:
+            self._stage_start, self._share_before = self._last, 0.0
+        self._last = time.monotonic()
+        seconds = f" {outcome.seconds:.3f} s" if outcome.seconds > 0.0 else ""
+        if outcome.is_shipped:
+            seconds = " (read, not computed)"
+        reason = f": {outcome.message}" if outcome.message else ""
+        text = f"[{done:{len(str(total))}d}/{total}] {outcome.label} {outcome.status}{seconds}{reason}"
+        keep = outcome.status not in GOOD  # a person must not miss it
+        self._show(text if keep else self._estimate(outcome.share) + text, keep=keep)
+
+    def stage(self, name: str, done: int, total: int, note: str = "") -> None:
+        """What has no outcomes of its own, such as drawing pages: called before the first and after each."""
+        now = time.monotonic()
+        if name != self._stage:
+            self._stage, self._stage_start, self._share_before = name, now, done / total
+        elif done < total and now - self._last < (_RENEWED_S if self._is_terminal else _LOGGED_S):
+            return
+        self._last = now
+        self._show(f"{self._estimate(done / total)}{name} {done}/{total}{note}")
+
+    def _estimate(self, share: float) -> str:
+        """ "40%, about 20 s left  ", for a terminal."""
+        if not self._is_terminal or not self._share_before < share < 1.0:
+            return ""
+        left = (self._last - self._stage_start) / (share - self._share_before) * (1.0 - share)
+        return f"{share:4.0%}, about {span(left)} left  "
 
     def _renew(self) -> None:
         while not self._ended.is_set():
@@ -95,97 +120,13 @@ class _RenewedLine:
 
     def _print_over(self, text: str) -> None:
         elapsed = f"  {span(time.monotonic() - self._start)}"
-        self._print(f"\r\x1b[K{text[: self._width - len(elapsed)]}{elapsed}", end="")
+        width = shutil.get_terminal_size().columns - 1
+        self._print(f"\r\x1b[K{text[: width - len(elapsed)]}{elapsed}", end="")
 
     def _print(self, text: str, end: str = "\n") -> None:
         """A progress that nobody can read any more must not end the work."""
         with suppress(OSError, ValueError):
             print(text, end=end, file=getattr(self._stream, "unfiltered", self._stream), flush=True)
-
-    @property
-    def _width(self) -> int:
-        return shutil.get_terminal_size().columns - 1
-
-
-class ProgressLine(_RenewedLine):
-    """Called after each run. What is left is estimated from the work done, not from the number of runs.
-
-    parts: shares of the work, in order, of the lists of runs and of the stages that a command has. Where the lists are
-    more than these, each is estimated by itself.
-    """
-
-    def __init__(self, stream: TextIO | None = None, parts: Sequence[float] = (1.0,)) -> None:
-        super().__init__(stream)
-        self._parts = parts
-        self._part = -1
-        self._last = self._part_start = self._start
-
-    def __call__(self, done: int, total: int, outcome: Outcome) -> None:
-        if done == 1:
-            self._begin_part()
-        self._last = time.monotonic()
-        seconds = f" {outcome.seconds:.3f} s" if outcome.seconds > 0.0 else ""
-        if outcome.is_shipped:
-            seconds = " (read, not computed)"
-        reason = f": {outcome.message}" if outcome.message else ""
-        text = f"[{done:{len(str(total))}d}/{total}] {outcome.label} {outcome.status}{seconds}{reason}"
-        keep = outcome.status not in GOOD  # a person must not miss it
-        self._show(text if keep else self._estimate(outcome.share) + text, keep=keep)
-
-    def stage(self, text: str, done: int, total: int) -> None:
-        """What is done beside runs, such as drawing pages: called before the first (done = 0) and after each."""
-        if done == 0:
-            self._begin_part()
-        self._last = time.monotonic()
-        self._show(f"{self._estimate(done / total)}{text} {done}/{total}")
-
-    def _begin_part(self) -> None:
-        self._part += 1
-        if self._part >= len(self._parts):  # by itself
-            self._part_start = self._last
-
-    def _estimate(self, share: float) -> str:
-        """ "40%, about 20 s left  ", for a terminal."""
-        if self._part < len(self._parts):
-            share = sum(self._parts[: self._part]) + share * self._parts[self._part]
-        if not self._is_terminal or not 0.0 < share < 1.0:
-            return ""
-        left = (self._last - self._part_start) / share * (1.0 - share)
-        return f"{share:4.0%}, about {span(left)} left  "
-
-
-class SweepProgress(_RenewedLine):
-    """Called with runs stored, runs in all, and the statuses of those just stored; with a bar, or as JSON lines."""
-
-    def __init__(self, *, as_json: bool = False) -> None:
-        super().__init__()
-        self._as_json = as_json
-        self._is_terminal = self._is_terminal and not as_json
-        self._every_s = 0.1 if self._is_terminal else 10.0
-        self._shown = self._start
-        self._made: Counter[str] = Counter()
-
-    @property
-    def has_made_runs(self) -> bool:
-        return bool(self._made)
-
-    def __call__(self, done: int, total: int, statuses: Counter[str]) -> None:
-        self._made += statuses
-        now = time.monotonic()
-        if not statuses or (now - self._shown < self._every_s and done < total):
-            return
-        self._shown = now
-        rate = self._made.total() / max(now - self._start, 1e-9)
-        if self._as_json:
-            facts = {"done": done, "total": total, "runs_per_s": round(rate, 3), "statuses": self._made}
-            self._show(json.dumps({"event": "progress", **facts}))
-            return
-        failed = [f"{count} {name}" for name, count in sorted(self._made.items()) if name not in GOOD]
-        text = ", ".join([f"{done}/{total} runs", f"{rate:.4g} per s", f"{span((total - done) / rate)} left", *failed])
-        room = min(40, self._width - len(text) - 3)
-        if self._is_terminal and room > 5:
-            text = f"[{'#' * (room * done // total):{room}}] {text}"
-        self._show(text)
 
 
 def span(seconds: float) -> str:

@@ -9,12 +9,11 @@ from typing import NamedTuple
 
 from rotor_mbs.errors import StoreError
 from rotor_mbs.report.core import files
-from rotor_mbs.report.core.files import Site, render
+from rotor_mbs.report.core.files import Pairs, render
 from rotor_mbs.report.pages import Report
 from rotor_mbs.report.pages.bench import bench_page, csv_text
-from rotor_mbs.report.pages.errata import errata_page
-from rotor_mbs.report.pages.figures import available, figures_page
 from rotor_mbs.report.pages.index import index_page
+from rotor_mbs.report.pages.paper import available, errata_page, figures_page
 from rotor_mbs.report.pages.scene import scene_page
 from rotor_mbs.report.pages.stability import stability_page
 from rotor_mbs.runs.pool import Workers, pool_of, run_in
@@ -61,13 +60,14 @@ def write_report(
         return files.write_page(output, "sweep", sweep_page(sweep), sweep.attributes)
     with open_results(results) as opened:
         planned = _plan(Report(**vars(opened)), checked)
-        site = Site([(page.file, page.label) for page in planned if page.label], files.made_with(opened.attributes))
+        made = files.made_with(opened.attributes)
+    links = [(page.file, page.label) for page in planned if page.label]
     pages: dict[str, str] = {}
     on_page(0, len(planned))
     with pool_of(0 if jobs == 1 else jobs) as pool:
         count = min(_GROUPS * pool.workers, len(planned)) if pool.workers > 1 else 1
         groups = [planned[start::count] for start in range(count)]
-        for finished in run_in(pool, partial(make_pages, results, site), groups, _TIMEOUT_S):
+        for finished in run_in(pool, partial(make_pages, results, made, links), groups, _TIMEOUT_S):
             if finished.value is None:
                 raise finished.error or StoreError(f"{results}: a page was not made: {finished.message}")
             pages |= finished.value
@@ -78,11 +78,11 @@ def write_report(
     return output / files.INDEX
 
 
-def make_pages(results: Path, site: Site, pages: Sequence[Page]) -> dict[str, str]:
+def make_pages(results: Path, made: Pairs, links: Pairs, pages: Sequence[Page]) -> dict[str, str]:
     """The work of a process: pages by file name. Raises StoreError."""
     with open_results(results) as opened:
         report = Report(**vars(opened))
-        return {page.file: render(page.template, page.content(report), site, page.file) for page in pages}
+        return {page.file: render(page.template, page.content(report), made, links, page.file) for page in pages}
 
 
 def _plan(report: Report, checked: bool) -> list[Page]:

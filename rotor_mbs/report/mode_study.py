@@ -14,6 +14,7 @@ import numpy as np
 
 from rotor_mbs.analysis.modes import (
     GROWTH,
+    FloquetTable,
     LinearModes,
     SceneModes,
     floquet_sentence,
@@ -189,12 +190,9 @@ class ModePlots:
         table = self._modes.chart
         if table is None:
             raise InputError(f"{self._modes.scene}: no stability chart; it needs gravity, speeds and stiffnesses")
-        panel = panels((3.6,), SPEED_AXIS)
-        label = "growth over a turn (powers of ten)"
-        boundary = Look(VERMILLION, "-", "", "boundary of what is stable")
-        growth_map(panel, table.speeds, table.stiffnesses, table.largest, MAX_GROWTH, label, boundary, 1.0 + GROWTH)
-        panel.axes[0].set_ylabel("bearing stiffness (N m/rad)")
-        return panel
+        labels = (SPEED_AXIS, "bearing stiffness (N m/rad)", "growth over a turn (powers of ten)")
+        boundary = (1.0 + GROWTH, "boundary of what is stable")
+        return growth_map(table.speeds, table.stiffnesses, table.largest, labels, MAX_GROWTH, boundary)
 
     def _rotation(self) -> LinearModes:
         for linear in self._modes.rotation.values():
@@ -214,57 +212,53 @@ def stored_modes_page(opened: OpenResults) -> dict[str, object]:
 
 def modes_page(modes: Sequence[SceneModes]) -> dict[str, object]:
     """The content of the page: a part for each scene, of which each id is unique on the page."""
-    return {"scenes": [_scene_part(scene_modes, f"scene{i}") for i, scene_modes in enumerate(modes)]}
-
-
-def _scene_part(modes: SceneModes, name: str) -> dict[str, object]:
-    sources = max((list(kind.values()) for kind in (modes.rest, modes.rotation)), key=len)
-    rest = next(iter(modes.rest.values()), None)
-    rotation = next(iter(modes.rotation.values()), None)
-    plots = ModePlots(modes)
-    pictures: list[Picture] = []
-    fastest = Section()
-    if rotation is not None and not np.isnan(rotation.growth_rates).all():
-        last = len(rotation.speeds) - 1
-        state = f"{modes.scene}, {number(float(rotation.speeds[last]), 4)} rad/s"
-        fastest = Section(tables=_tables(rotation, last, state))
-        if last > 0:
-            caption = "Damped frequencies in the rotor's frame; 1P, 2P: multiples of the rotor speed"
-            pictures.append(picture(plots(), f"{name}-campbell", caption))
-            if max(np.nanmax(np.abs(rotation.damping_ratios), initial=0.0), np.nanmax(rotation.growth_rates)) > 1e-9:
-                caption = "Damping ratios and growth rates"
-                pictures.append(picture(plots.damping(), f"{name}-damping", caption))
-    turning: list[Picture] = []
-    multiplier_tables = []
-    table = modes.floquet
-    if table is not None:
-        if len(table.speeds) > 1 and np.isfinite(table.largest).any():
+    parts = []
+    for place, scene in enumerate(modes):
+        name, plots = f"scene{place}", ModePlots(scene)
+        rest, rotation = (next(iter(kind.values()), None) for kind in (scene.rest, scene.rotation))
+        campbell: list[Picture] = []
+        fastest: list[PageTable] = []
+        if rotation is not None and not np.isnan(rotation.growth_rates).all():
+            last = len(rotation.speeds) - 1
+            fastest = _tables(rotation, last, f"{scene.scene}, {number(float(rotation.speeds[last]), 4)} rad/s")
+            if last > 0:
+                caption = "Damped frequencies in the rotor's frame; 1P, 2P: multiples of the rotor speed"
+                campbell.append(picture(plots(), f"{name}-campbell", caption))
+                if (
+                    max(np.nanmax(np.abs(rotation.damping_ratios), initial=0.0), np.nanmax(rotation.growth_rates))
+                    > 1e-9
+                ):
+                    campbell.append(picture(plots.damping(), f"{name}-damping", "Damping ratios and growth rates"))
+        turning: list[Picture] = []
+        if scene.floquet is not None and len(scene.floquet.speeds) > 1 and np.isfinite(scene.floquet.largest).any():
             caption = "Floquet multipliers of a turn under gravity; above 1 a motion grows"
             turning.append(picture(plots.multipliers(), f"{name}-multipliers", caption))
-        if modes.chart is not None:
+        if scene.chart is not None:
             caption = "Stability chart: growth over a turn under gravity"
             turning.append(picture(plots.chart(), f"{name}-chart", caption))
-        rows: list[Row] = []
-        for i, (speed, largest) in enumerate(zip(table.speeds.tolist(), table.largest.tolist(), strict=True)):
-            cell = TableCell(_shown(largest, 7), "bad" if table.stable[i] == 0 else "", note=table.messages[i])
-            numbers = ((table.growth_rates, 4), (table.product_error, 2), (table.torque, 4))
-            rows.append([number(speed, 4), cell, *(_shown(float(values[i]), digits) for values, digits in numbers)])
-        head = ("Speed (rad/s)", "largest multiplier", "growth rate (1/s)", "product less trace", "torque (N m)")
-        multiplier_tables = [PageTable(f"{modes.scene}: multipliers", head, rows)]
-    return {
-        "id": name,
-        "name": modes.scene,
-        "title": modes.title,
-        "models": [f"{linear.label} ({linear.source})" for linear in sources],
-        "agrees": modes.agrees,
-        "difference": modes.disagreement,
-        "notes": ([with_capital(floquet_sentence(modes.floquet))] if modes.floquet is not None else [])
-        + list(modes.notes),
-        "rest": Section(tables=[] if rest is None else _tables(rest, 0, f"{modes.scene}, at rest")),
-        "campbell": Section(pictures),
-        "fastest": fastest,
-        "turning": Section(turning, multiplier_tables),
-    }
+        sources = max((list(kind.values()) for kind in (scene.rest, scene.rotation)), key=len)
+        parts.append({
+            "id": name,
+            "modes": scene,
+            "models": [f"{linear.label} ({linear.source})" for linear in sources],
+            "notes": ([with_capital(floquet_sentence(scene.floquet))] if scene.floquet is not None else [])
+            + list(scene.notes),
+            "rest": Section(tables=[] if rest is None else _tables(rest, 0, f"{scene.scene}, at rest")),
+            "campbell": Section(campbell),
+            "fastest": Section(tables=fastest),
+            "turning": Section(turning, [] if scene.floquet is None else [_multipliers(scene.scene, scene.floquet)]),
+        })  # fmt: skip
+    return {"scenes": parts}
+
+
+def _multipliers(scene: str, table: FloquetTable) -> PageTable:
+    rows: list[Row] = []
+    for i, (speed, largest) in enumerate(zip(table.speeds.tolist(), table.largest.tolist(), strict=True)):
+        cell = TableCell(_shown(largest, 7), "bad" if table.stable[i] == 0 else "", note=table.messages[i])
+        numbers = ((table.growth_rates, 4), (table.product_error, 2), (table.torque, 4))
+        rows.append([number(speed, 4), cell, *(_shown(float(values[i]), digits) for values, digits in numbers)])
+    head = ("Speed (rad/s)", "largest multiplier", "growth rate (1/s)", "product less trace", "torque (N m)")
+    return PageTable(f"{scene}: multipliers", head, rows)
 
 
 def _tables(linear: LinearModes, i: int, state: str) -> list[PageTable]:
@@ -285,9 +279,9 @@ def _tables(linear: LinearModes, i: int, state: str) -> list[PageTable]:
         largest = max(float(amplitudes.max()), 1e-300)
         shapes.append([name, *(_shown(float(amplitude) / largest, 3) for amplitude in amplitudes)])
     caption = f"{state}: modes by the {linear.label} ({linear.source})"
-    table = PageTable(caption, ("Mode", *columns), frequencies)
     head = ("Shape", "rotor", *multiblade(linear.blades)[0])
-    return [table, PageTable(f"{state}: shapes, the largest amplitude 1", head, shapes)]
+    shape_caption = f"{state}: shapes, the largest amplitude 1"
+    return [PageTable(caption, ("Mode", *columns), frequencies), PageTable(shape_caption, head, shapes)]
 
 
 def _shown(value: float, digits: int) -> str:

@@ -39,31 +39,30 @@ class Series(NamedTuple):
 
 def motion(time: Array, angles: Array | None, rates: Array | None, horizon: float | None = None) -> Panels:
     """Angles (rad), then rates (rad/s), both (n, coordinates); either may be missing."""
-    drawn: list[tuple[str, Array, int]] = []
-    for name, values in (("angle (rad)", angles), ("rate (rad/s)", rates)):
+    rows: list[tuple[str, Sequence[Series]]] = []
+    for name, values in ((ANGLE_AXIS, angles), (RATE_AXIS, rates)):
         if values is not None:
-            drawn.append((f"rotor {name}", values[:, :1], 0))
-            if values.shape[1] > 1:
-                drawn.append((f"pitch {name}", values[:, 1:], 1))
-    panels = canvas.panels(tuple(1.45 if first else 1.1 for _, _, first in drawn), TIME_AXIS)
-    for axes, (label, values, first) in zip(panels.axes, drawn, strict=True):
-        draw_coordinates(axes, time, values, label, first)
-        mark_time(axes, float(time[-1]), horizon)
-    return panels
+            series = coordinate_series(time, values)
+            rows += [(f"rotor {name}", series[:1]), (f"pitch {name}", series[1:])]
+    rows = [row for row in rows if row[1]]
+    return lines(rows, horizon, [1.45 if label.startswith("pitch") else 1.1 for label, _ in rows])
 
 
-def draw_coordinates(axes: Any, time: Array, values: Array, label: str, first: int = 0) -> None:
-    """A line per coordinate of `values` (n, coordinates), which begin with the coordinate number `first`."""
-    draw_lines(axes, [Series(time, x, coordinate_look(first + i)) for i, x in enumerate(values.T)], label)
-    set_range(axes, values)
+def coordinate_series(time: Array, values: Array) -> list[Series]:
+    """A curve per coordinate of `values` (n, coordinates)."""
+    return [Series(time, x, coordinate_look(i)) for i, x in enumerate(values.T)]
 
 
-def draw_lines(axes: Any, series: Sequence[Series], label: str, scale: float = 1.0) -> None:
-    """The curves over one vertical axis, divided by `scale`."""
+def draw_lines(axes: Any, series: Sequence[Series], label: str) -> None:
+    """The curves over one vertical axis: of angles and rates in their range, of others in k or M of a unit."""
+    shortest = min(len(curve.values) for curve in series)
+    values = np.stack([curve.values[:shortest] for curve in series], axis=1)
+    scale, prefix = scaled(float(np.abs(values).max()) if "(" in label and "(rad" not in label else 1.0)
     for curve in series:
-        time, values = thin(curve.time, curve.values)
-        canvas.curve(axes, time, values / scale, curve.look)
-    axes.set_ylabel(label)
+        canvas.curve(axes, *thin(curve.time, curve.values / scale), curve.look)
+    if "(rad" in label:
+        set_range(axes, values)
+    axes.set_ylabel(label.replace("(", f"({prefix}", 1))
 
 
 def set_range(axes: Any, values: Array) -> None:
@@ -77,14 +76,13 @@ def set_range(axes: Any, values: Array) -> None:
         axes.set_ylim(middle - margin, middle + margin)
 
 
-def lines(rows: Sequence[tuple[str, Sequence[Series]]], horizon: float | None = None, height: float = 2.3) -> Panels:
-    """Panels one above the other, (label with a unit, curves) each; large numbers in k or M of the unit."""
-    panels = canvas.panels((height,) * len(rows), TIME_AXIS)
+def lines(
+    rows: Sequence[tuple[str, Sequence[Series]]], horizon: float | None = None, heights: Sequence[float] = ()
+) -> Panels:
+    """Panels one above the other: (label with a unit, curves) each."""
+    panels = canvas.panels(tuple(heights) or (2.3,) * len(rows), TIME_AXIS)
     for axes, (label, series) in zip(panels.axes, rows, strict=True):
-        has_prefix = "(" in label and "(rad" not in label
-        largest = max(float(np.abs(curve.values).max()) for curve in series)
-        scale, prefix = scaled(largest if has_prefix else 1.0)
-        draw_lines(axes, series, label.replace("(", f"({prefix}", 1), scale)
+        draw_lines(axes, series, label)
         mark_time(axes, max(float(curve.time[-1]) for curve in series), horizon)
     return panels
 
@@ -96,7 +94,7 @@ def component_panels(
     rows: dict[str, list[Series]] = {}
     for panel, look, component in components(quantity, values, labels):
         rows.setdefault(f"{panel} {plot.axis}".strip(), []).append(Series(time, component, look))
-    return lines(list(rows.items()), horizon, height=2.3 if len(rows) == 1 else 1.3)
+    return lines(list(rows.items()), horizon, [2.3 if len(rows) == 1 else 1.3] * len(rows))
 
 
 def components(quantity: Quantity, values: Array, labels: Sequence[str] = ()) -> list[tuple[str, Look, Array]]:

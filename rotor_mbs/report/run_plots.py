@@ -18,55 +18,6 @@ from rotor_mbs.solution.solution import Solution
 from rotor_mbs.solution.trajectory import Array, Trajectory
 
 
-class RunPlots:
-    """Figures of one run."""
-
-    def __init__(self, run: Solution, reference: Trajectory | None) -> None:
-        self._run, self._reference = run, reference
-
-    def __call__(self) -> Panels:
-        """Angles (rad) and rates (rad/s) over time (s): rotor and pitches."""
-        run = self._run
-        horizon_s = None if self._reference is None else horizon(self._reference)
-        return plots.motion(_some(run.time), run.angles, run.rates, horizon_s)
-
-    def energy(self) -> Panels:
-        """Kinetic energy, potential energy, and their sum less the work (J) over time. Raises InputError without."""
-        run = self._run
-        kinetic, potential, work = (_quantity(run, name) for name in ("kinetic_energy", "potential_energy", "work"))
-        curves = (
-            (kinetic, Look(VERMILLION, "-", "", "kinetic")),
-            (potential, Look(BLUE, "--", "", "potential")),
-            (kinetic + potential - work, Look(INK, "-", "", "total less work")),
-        )
-        return plots.lines([("energy (J)", [Series(run.time, *curve) for curve in curves])]).with_legend()
-
-    def loads(self, name: str = "blade_root_force") -> Panels:
-        """A load over time: a panel per axis with a line per blade, or one panel with a line per axis (or blade).
-
-        name: blade_root_force, blade_root_moment, shaft_force, shaft_moment or pitch_actuator_moment (N, N m).
-
-        Raises InputError where the run does not have it.
-        """
-        values, load = _quantity(self._run, name), next((load for load in LOADS if load.name == name), None)
-        if load is None or load.plot is None:
-            raise InputError(f"no load {name!r}; allowed: {', '.join(load.name for load in LOADS)}")
-        return plots.component_panels(load, load.plot, self._run.time, values).with_legend()
-
-    def defects(self) -> Panels:
-        """The size (rad) of every interval's defect over time. Raises InputError for fewer than two samples."""
-        return ComparisonPlots({self._run.method: self._run}, self._reference).defects()
-
-    def error(self) -> Panels:
-        """Largest angle error (rad) against the reference over time. Raises InputError where there is none."""
-        return ComparisonPlots({self._run.method: self._run}, self._reference).error()
-
-    def tips(self) -> Panels:
-        """Paths of the blade tips (m). Raises InputError where the scene does not ask for them."""
-        _some(self._run.time)
-        return plots.paths(_quantity(self._run, "tip"))
-
-
 class ComparisonPlots:
     """Figures of several runs of one scene."""
 
@@ -110,6 +61,48 @@ class ComparisonPlots:
     def _series(self, values: Sequence[Array]) -> list[Series]:
         pairs = zip(self._runs, values, strict=True)
         return [Series(_some(run.time)[: len(array)], array, look_of(run.method)) for run, array in pairs]
+
+
+class RunPlots(ComparisonPlots):
+    """Figures of one run; those of several, too."""
+
+    def __init__(self, run: Solution, reference: Trajectory | None) -> None:
+        super().__init__({run.method: run}, reference)
+        self._run = run
+
+    def __call__(self) -> Panels:
+        """Angles (rad) and rates (rad/s) over time (s): rotor and pitches."""
+        run = self._run
+        horizon_s = None if self._reference is None else horizon(self._reference)
+        return plots.motion(_some(run.time), run.angles, run.rates, horizon_s)
+
+    def energy(self) -> Panels:
+        """Kinetic energy, potential energy, and their sum less the work (J) over time. Raises InputError without."""
+        run = self._run
+        kinetic, potential, work = (_quantity(run, name) for name in ("kinetic_energy", "potential_energy", "work"))
+        curves = (
+            (kinetic, Look(VERMILLION, "-", "", "kinetic")),
+            (potential, Look(BLUE, "--", "", "potential")),
+            (kinetic + potential - work, Look(INK, "-", "", "total less work")),
+        )
+        return plots.lines([("energy (J)", [Series(run.time, *curve) for curve in curves])]).with_legend()
+
+    def loads(self, name: str = "blade_root_force") -> Panels:
+        """A load over time: a panel per axis with a line per blade, or one panel with a line per axis (or blade).
+
+        name: blade_root_force, blade_root_moment, shaft_force, shaft_moment or pitch_actuator_moment (N, N m).
+
+        Raises InputError where the run does not have it.
+        """
+        values, load = _quantity(self._run, name), next((load for load in LOADS if load.name == name), None)
+        if load is None or load.plot is None:
+            raise InputError(f"no load {name!r}; allowed: {', '.join(load.name for load in LOADS)}")
+        return plots.component_panels(load, load.plot, self._run.time, values).with_legend()
+
+    def tips(self) -> Panels:
+        """Paths of the blade tips (m). Raises InputError where the scene does not ask for them."""
+        _some(self._run.time)
+        return plots.paths(_quantity(self._run, "tip"))
 
 
 def _some(time: Array) -> Array:

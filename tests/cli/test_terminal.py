@@ -75,16 +75,18 @@ def test_colour_is_for_terminals_that_want_it(monkeypatch: pytest.MonkeyPatch) -
     assert coloured("17 of 17 ok", Terminal()) == "17 of 17 ok"
 
 
-def test_an_estimate_counts_what_comes_after_the_cases() -> None:
-    screen = Terminal()
-    with ProgressLine(screen, parts=(0.5, 0.5)) as progress:
-        progress(1, 2, outcome(share=0.5))
-        assert " 25%, about" in screen.getvalue()
-        progress(2, 2, outcome(share=1.0))
-        progress.stage("pages", 0, 10)
-        progress.stage("pages", 5, 10)
-        assert " 75%, about" in screen.getvalue()
-        assert "pages 5/10" in screen.getvalue()
+def test_a_stage_is_estimated_from_what_this_call_did_and_thinned_in_a_log(monkeypatch: pytest.MonkeyPatch) -> None:
+    clock = [0.0]
+    monkeypatch.setattr("rotor_mbs.cli.terminal.time.monotonic", lambda: clock[0])
+    screen, log = Terminal(), io.StringIO()
+    for stream in (screen, log):
+        progress = ProgressLine(stream)
+        for seconds, done in ((0.0, 20), (6.0, 50), (7.0, 55), (12.0, 100)):
+            clock[0] = seconds
+            progress.stage("runs", done, 100, ", 1 diverged")
+        clock[0] = 0.0
+    assert " 50%, about 10 s left  runs 50/100, 1 diverged" in screen.getvalue()  # 30 in 6 s, 50 are left
+    assert [line.split(",")[0] for line in log.getvalue().splitlines()] == ["runs 20/100", "runs 100/100"]
 
 
 def _ends_by(patch: pytest.MonkeyPatch, action: Callable[[], object]) -> tuple[int, str]:

@@ -13,8 +13,9 @@ from support.stored import Made, rotor, store
 
 from rotor_mbs.cli import main
 from rotor_mbs.report.build import write_report
-from rotor_mbs.report.pages.figures import FIGURES, available, composed
+from rotor_mbs.report.core.elements import TableCell
 from rotor_mbs.report.pages.index import scene_table
+from rotor_mbs.report.pages.paper import FIGURES, available, composed
 from rotor_mbs.runs.read import open_results
 from rotor_mbs.scenario.catalogue import find_scenes
 
@@ -51,12 +52,15 @@ def test_models_are_compared_in_numbers(tmp_path: Path) -> None:
         Made(replace(scene, name="paper/fig12"), "printed/ode45", RIGHT),
     ]
     with open_results(store(tmp_path / "r.h5", runs)) as opened:
-        table = scene_table(opened.scenes, dict.fromkeys(opened.scenes, "x.html"), "Model")
-    row, same = (dict(zip(table.head, row, strict=True)) for row in table.rows)
+        table, _ = scene_table(opened.scenes, dict.fromkeys(opened.scenes, "x.html"), "Model")
+    head = [cell if isinstance(cell, str) else cell.note for cell in table.head]
+    row, same = (dict(zip(head, row, strict=True)) for row in table.rows)
     assert row["0.05 rad off from (s)"] == "2.50"
     assert row["Largest difference (rad)"] == "0.20"
     assert str(row["Energy gain"]).replace("\N{NO-BREAK SPACE}", " ") == "2.00 kJ"
-    assert row["Exudyn: largest difference up to the horizon (rad)"] == "1.0×10⁻⁸"
+    error = row["exudyn_tree/rk67"]
+    assert isinstance(error, TableCell)
+    assert (error.text, error.shade[:3]) == ("1.0×10⁻⁸", "n h")
     assert (same["0.05 rad off from (s)"], same["Largest difference (rad)"]) == ("never", "0")
 
 

@@ -27,10 +27,8 @@ from rotor_mbs.report.core import numbers
 from rotor_mbs.report.core.elements import PageTable, Row, Section
 from rotor_mbs.report.core.files import page_names, render, write_pages
 from rotor_mbs.report.core.looks import COLOURS, COORDINATES
-from rotor_mbs.report.pages import claim_tables
 from rotor_mbs.report.pages import scene as scene_page
-from rotor_mbs.report.pages.errata import matrices
-from rotor_mbs.report.pages.index import heat_map
+from rotor_mbs.report.pages.paper import claim_table, matrices, trial_tables
 from rotor_mbs.report.pages.scene import parting, range_table
 from rotor_mbs.report.pages.scene_tables import compared_time
 from rotor_mbs.runs import results as results_module
@@ -90,24 +88,22 @@ def test_the_index_opens_with_what_was_found_and_pictures_and_folds_its_other_ta
     assert rows["Scenes in which energy rises by more than 0.001 of its scale without work"] == ["2 of 4", ""]
     assert rows["Largest spurious energy gain of a complete run"] == ["1 MJ", ""]  # not that of the broken run
     assert rows["closed form, Taylor"][:2] == ["1 of 1 ok", "1.0×10⁻¹¹"]  # 1e-12 per second over 10 s
-    heat = text.index('id="errors"')
+    heat = text.index('id="scenes"')
     for shown in ('class="viewer"', 'class="card still"', ">published 2.7315 rad<", "energy error / energy scale"):
         assert 0 < text.index(shown) < heat, shown
-    rest = text[text.index('<section id="scenes"') :]
+    rest = text[text.index('<section id="numbers"') :]
     assert "<table" in rest
     assert "<table" not in re.sub(r"<details>.*?</details>", "", rest, flags=re.S)
     assert len(text.encode()) < 600_000
 
 
-def test_the_heat_map_has_the_errors_the_methods_and_the_marks(report: Path, tmp_path: Path) -> None:
-    heat = text_of(report, "index.html").partition('id="errors"')[2]
+def test_the_scenes_have_the_errors_the_methods_and_the_marks(report: Path) -> None:
+    heat = text_of(report, "index.html").partition('id="scenes"')[2]
     assert "lagrange/taylor" in heat
     row = heat[heat.index("paper-fig11.html") :].partition("</tr>")[0]
     shades = re.findall(r'<td class="n h(\d)" title="[^"]*">\S*(?: (\D))?</td>', row)
     assert shades == [("7", ""), ("1", ""), ("2", "≈")]
     assert "≈: inaccurate" in heat
-    with open_results(store(tmp_path / "r.h5", [Made(FIG11, TAYLOR, SWING)])) as opened:
-        assert heat_map(opened.scenes, {"paper/fig11": "x.html"}) is None  # nothing was compared
 
 
 def test_equations_that_are_not_claimed_correct_are_not_called_ok(report: Path) -> None:
@@ -182,6 +178,7 @@ def test_one_scene_and_one_method_make_a_report_without_empty_sections(tmp_path:
     page, index = text_of(folder, "mine.html"), text_of(folder, "index.html")
     assert sections_of(page) == ["motion", "metrics"]
     assert sections_of(index) == ["methods", "scenes"]
+    assert 'class="n h' not in index  # nothing was compared
     assert 'href="index.html"' in page
     assert "<nav" not in index
     for text in (page, index):
@@ -271,7 +268,7 @@ def test_verdicts_of_claims_are_those_of_the_shares() -> None:
         },
     }
     study = replace(claim_study(), durations=[8.0, 10.0], **known)
-    table = claim_tables.claim_table([Claim(item) for item in items], study)
+    table = claim_table([Claim(item) for item in items], study)
     assert [cells_of(row[2:]) for row in table.rows] == [
         ["holds", "100 %", "100 %", "fails", "0 %", "0 %"],
         ["undecided", "75 %", "75 %", "undecided", "–", "–"],
@@ -284,7 +281,7 @@ def test_the_numbers_stand_in_tables_by_duration_tolerances_and_way_of_writing()
     def reproduced(table: PageTable) -> list[bool]:
         return [all(not isinstance(cell, str) and cell.tone == "good" for cell in row[-4:]) for row in table.rows]
 
-    by_duration, by_tolerance, by_row = map(reproduced, claim_tables.trial_tables(claim_study()))
+    by_duration, by_tolerance, by_row = map(reproduced, trial_tables(claim_study()))
     assert by_duration == [False, False, False, False, True, False]
     assert (sum(by_tolerance), sum(by_row), len(by_row)) == (1, 8, 12)
 

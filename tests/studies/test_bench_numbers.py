@@ -24,6 +24,7 @@ from rotor_mbs.analysis.work_precision import (
 )
 from rotor_mbs.methods.solve import solve
 from rotor_mbs.report.build import write_report
+from rotor_mbs.report.core.looks import look_of
 from rotor_mbs.report.pages.bench import (
     csv_text,
     diagram,
@@ -176,12 +177,12 @@ def test_failures_are_points_and_none_is_dropped() -> None:
 
 def test_the_diagram_draws_what_was_measured() -> None:
     axes = diagram([FAST, SLOW]).axes[0]
-    drawn = [line.get_xydata().tolist() for line in axes.lines if line.get_marker() == "o"]
+    drawn = [line.get_xydata().tolist() for line in axes.lines if line.get_marker() == look_of(FAST.name).marker]
     assert drawn == [[[1e-2, 1e-3], [1e-6, 2e-3], [1e-10, 4e-3]]]
     assert (axes.get_xscale(), axes.get_yscale()) == ("log", "log")
     assert axes.get_xlim()[0] < axes.get_xlim()[1]  # errors fall to the left
     with_setup = diagram([FAST], with_setup=True).axes[0]
-    drawn = [line.get_ydata().tolist() for line in with_setup.lines if line.get_marker() == "o"]
+    drawn = [line.get_ydata().tolist() for line in with_setup.lines if line.get_marker() == look_of(FAST.name).marker]
     assert drawn == [[1.001, 1.002, 1.004]]
 
 

@@ -13,14 +13,13 @@ from typing import Any
 import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.axis import Axis
 from matplotlib.collections import QuadMesh as QuadMesh
 from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
 
 from rotor_mbs.errors import InputError
-from rotor_mbs.report.core.looks import Look
+from rotor_mbs.report.core.looks import VERMILLION, Look
 from rotor_mbs.report.core.numbers import power
 from rotor_mbs.runs.files import replace_file
 
@@ -76,22 +75,14 @@ class Panels:
 
 def panels(heights: tuple[float, ...], x_label: str) -> Panels:
     """Panels one below the other; heights in inches, that of the top one first. x_label: of the last one."""
-    # Axes made here have no tick objects before they are drawn; those of a page are not, and these took a quarter.
-    lazy_ticks = {name: vars(Axis)[name] for name in ("majorTicks", "minorTicks")}
     figure = Figure(figsize=(WIDTH, sum(heights) + 0.6), facecolor="white")
     axes: list[Axes] = []
-    try:
-        for name in lazy_ticks:
-            setattr(Axis, name, ())
-        with style():
-            grid = figure.add_gridspec(len(heights), 1, height_ratios=heights)
-            for row in range(len(heights)):
-                axes.append(figure.add_subplot(grid[row], sharex=axes[0] if axes else None))
-                axes[-1].tick_params(labelbottom=row == len(heights) - 1)
-            axes[-1].set_xlabel(x_label)
-    finally:
-        for name, descriptor in lazy_ticks.items():
-            setattr(Axis, name, descriptor)
+    with style():
+        grid = figure.add_gridspec(len(heights), 1, height_ratios=heights)
+        for row in range(len(heights)):
+            axes.append(figure.add_subplot(grid[row], sharex=axes[0] if axes else None))
+            axes[-1].tick_params(labelbottom=row == len(heights) - 1)
+        axes[-1].set_xlabel(x_label)
     # Fixed margins: the layout does not depend on the fonts.
     height = float(figure.get_figheight())
     figure.subplots_adjust(left=0.16, right=0.965, bottom=0.45 / height, top=1.0 - 0.15 / height, hspace=0.09)
@@ -152,22 +143,29 @@ def curve(axes: Any, x: Any, y: Any, look: Look, width: float = 1.2, **more: Any
 
 
 def colour_map(
-    panels: Panels, x: Any, y: Any, values: Any, label: str, lowest: float | None = None, highest: float | None = None
-) -> None:
-    """`values` (y, x) as colour over `x` and `y`, with a scale on the right; its range is theirs by default."""
-    axes = panels.axes[0]
-    mesh = axes.pcolormesh(x, y, values, cmap="cividis", shading="nearest", vmin=lowest, vmax=highest, rasterized=True)
+    x: Any, y: Any, values: Any, labels: tuple[str, str, str], limits: tuple[float, float] | None = None
+) -> Panels:
+    """`values` (y, x) as colour, with a scale on the right; labels: of x, y and the colours, which span the limits."""
+    low, high = (None, None) if limits is None else limits
+    map_panels = panels((3.8,), labels[0])
+    axes = map_panels.axes[0]
+    mesh = axes.pcolormesh(x, y, values, cmap="cividis", shading="nearest", vmin=low, vmax=high, rasterized=True)
     axes.grid(visible=False)
+    axes.set_ylabel(labels[1])
     with style():
-        panels.figure.colorbar(mesh, ax=axes).set_label(label)
+        map_panels.figure.colorbar(mesh, ax=axes).set_label(labels[2])
+    map_panels.figure.subplots_adjust(left=0.18)
+    return map_panels
 
 
 def growth_map(
-    panels: Panels, x: Any, y: Any, growth: Any, largest: float, label: str, boundary: Look, at: float
-) -> None:
-    """Powers of ten of the growth as colour, from 1 to `largest`, and a line where it is `at`."""
-    levels, top = np.log10(np.maximum(growth, np.finfo(float).tiny)), np.log10(largest)
-    colour_map(panels, x, y, np.clip(levels, 0.0, top), label, 0.0, top)
-    if min(levels.shape) > 1 and np.nanmin(levels) < np.log10(at) < np.nanmax(levels):
-        panels.axes[0].contour(x, y, levels, levels=[np.log10(at)], colors=[boundary.colour], linewidths=1.0)
-        curve(panels.axes[0], [], [], boundary)  # for the legend
+    x: Any, y: Any, growth: Any, labels: tuple[str, str, str], largest: float, boundary: tuple[float, str]
+) -> Panels:
+    """Powers of ten of the growth as colour, from 1 to `largest`, and a line with a label where it has a value."""
+    levels, top = np.log10(np.maximum(growth, np.finfo(float).tiny)), math.log10(largest)
+    map_panels = colour_map(x, y, np.clip(levels, 0.0, top), labels, (0.0, top))
+    level, look = math.log10(boundary[0]), Look(VERMILLION, "-", "", boundary[1])
+    if min(levels.shape) > 1 and np.nanmin(levels) < level < np.nanmax(levels):
+        map_panels.axes[0].contour(x, y, levels, levels=[level], colors=[look.colour], linewidths=1.0)
+        curve(map_panels.axes[0], [], [], look)  # for the legend
+    return map_panels

@@ -9,7 +9,6 @@ from collections.abc import Iterable, Mapping, Sequence
 from functools import cache
 from os import PathLike
 from pathlib import Path
-from typing import NamedTuple
 
 import jinja2
 from markupsafe import Markup, escape
@@ -30,20 +29,11 @@ _OTHERS = "data--"  # the beginning of the names of other pages than those of sc
 _CONTENTS = "<!-- contents -->"  # its place in a template
 _SECTION = re.compile(r'<section id="([^"]+)"[^>]*>\s*(?:<details><summary>)?<h2>(.*?)</h2>')
 _MANY_SECTIONS = 3
+Pairs = Sequence[tuple[str, str]]
 # Attributes of a results file that say what made it.
 _VERSIONS = ("rotor_mbs", "python", "exudyn", "heyoka", "mujoco", "numpy", "scipy", "h5py", "platform", "cpu")
 # Control characters but those of lines and tabs, and halves of surrogate pairs: names and messages come from any file.
 _UNPRINTABLE = re.compile(r"[\x00-\x08\x0b\x0c\x0e-\x1f\x7f-\x9f\ud800-\udfff]")
-
-
-class Site(NamedTuple):
-    """What all pages of a report show: (file, label) of the main ones, in order, and what made the results."""
-
-    links: Sequence[tuple[str, str]] = ()
-    versions: Sequence[tuple[str, str]] = ()
-
-
-_NO_SITE = Site()
 
 
 def made_with(attributes: Mapping[str, object]) -> list[tuple[str, str]]:
@@ -97,13 +87,15 @@ def _mark_of(name: str) -> bytes:
     return rb"\Ascene,method," if name.endswith(".csv") else _MARK
 
 
-def render(template: str, page: Mapping[str, object], site: Site = _NO_SITE, here: str = "") -> str:
-    """The HTML of `page` by templates/`template`.html.j2, which says what `page` must have; with a table of contents
-    where the page has many sections."""
-    links = [(file, label, file == here) for file, label in site.links]
-    if all(is_here for _, _, is_here in links):
-        links = []
-    html = _environment().get_template(f"{template}.html.j2").render(page=page, links=links, versions=site.versions)
+def render(
+    template: str, page: Mapping[str, object], made: Pairs = (), links: Pairs = (), here: str = ""
+) -> str:  # fmt: skip
+    """The HTML of `page` by templates/`template`.html.j2, with a table of contents where it has many sections.
+
+    made: what made the results, see `made_with`. links: (file, label) of the main pages; here: the file of this one.
+    """
+    shown = [] if all(file == here for file, _ in links) else [(file, label, file == here) for file, label in links]
+    html = _environment().get_template(f"{template}.html.j2").render(page=page, links=shown, versions=made)
     sections = _SECTION.findall(html)
     contents = ""
     if len(sections) >= _MANY_SECTIONS:
@@ -117,7 +109,7 @@ def write_page(
 ) -> Path:
     """One page as the index of a folder; its path. attributes: of what it shows, with what made it. Raises StoreError
     where it cannot be written."""
-    write_pages(Path(folder), {INDEX: render(template, page, Site(versions=made_with(attributes)))})
+    write_pages(Path(folder), {INDEX: render(template, page, made_with(attributes))})
     return Path(folder) / INDEX
 
 

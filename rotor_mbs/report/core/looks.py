@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import functools
 import re
 import zlib
+from collections import Counter
 from dataclasses import dataclass, replace
 
+from rotor_mbs.methods.catalogue import REFERENCE, is_corrected, ladders, method_names
 from rotor_mbs.methods.catalogue import label_of as label_of
 
 
@@ -46,48 +49,34 @@ _VARIABLES = {name: (colour, PALETTE[colour]) for colour, name in _CLASSES.items
     "grid": ("#e4e4e4", "#333b44"),
 }
 
-# By the name of a method, or of a curve of the bench: the method's name and its variant.
-_LOOKS = {
-    "reference": Look(BLUE, "-.", "*"),
-    "printed/ode45": Look(INK, "-", "x"),
-    "printed_e1/ode45": Look(INK, "--", "<"),
-    "printed_e2/ode45": Look(INK, "-.", ">"),
-    "printed_e3/ode45": Look(INK, ":", "p"),
-    "lagrange/taylor": Look(BLUE, "-", "o"),
-    "lagrange/ode45": Look(LIGHT_BLUE, "-", "v"),
-    "lagrange/dop853": Look(BLUE, "--", "D"),
-    "lagrange/radau": Look(LIGHT_BLUE, "--", "*"),
-    "exudyn_tree/rk44": Look(ORANGE, "-.", "P"),
-    "exudyn_tree/rk67": Look(VERMILLION, "--", "s"),
-    "exudyn_tree/dopri5": Look(VERMILLION, "-", "<"),
-    "exudyn_tree/generalized_alpha": Look(ORANGE, "-", "^"),
-    "exudyn_tree/generalized_alpha_rho0.7": Look(ORANGE, "--", "^"),
-    "exudyn_tree/generalized_alpha_rho1.0": Look(ORANGE, ":", "^"),
-    "exudyn_chain/extrapolated": Look(GREEN, "-.", "^"),
-    "exudyn_chain/generalized_alpha": Look(GREEN, "-", "s"),
-    "exudyn_chain/generalized_alpha_rho0.7": Look(GREEN, "--", "^"),
-    "exudyn_chain/generalized_alpha_rho1.0": Look(GREEN, ":", "^"),
-    "exudyn_chain/generalized_alpha_rotation_vector": Look(GREEN, "-.", ">"),
-    "exudyn_chain/generalized_alpha_rho0.7_rotation_vector": Look(GREEN, "--", ">"),
-    "exudyn_chain/generalized_alpha_rho1.0_rotation_vector": Look(GREEN, ":", ">"),
-    "exudyn_chain/newmark_index2": Look(PURPLE, "-", "D"),
-    "exudyn_chain/newmark_index2_rotation_vector": Look(PURPLE, ":", "p"),
-    "mujoco/rk4": Look(PURPLE, "--", "X"),
-    "mujoco/implicitfast": Look(PURPLE, "-.", "h"),
-    "mujoco/implicit": Look(PURPLE, ":", "h"),
-}
-_OTHER_LINES = (":", "-.", "--", "-")
-_OTHER_MARKERS = ("D", "o", "s", "^", "v", "P", "X", "h", "p", "<", ">")
+# Of the printed equations, then of the other models in the order of the catalogue; those of other packages are grey.
+_MODEL_COLOURS = ((INK,), (BLUE, LIGHT_BLUE), (VERMILLION, ORANGE), (GREEN,), (PURPLE,))
+_LINES = ("-", "--", "-.", ":")
+_MARKERS = ("o", "s", "^", "D", "v", "P", "X", "h", "p", "<", ">")
+
+
+@functools.cache
+def _catalogue_looks() -> dict[str, Look]:
+    """By the name of each method and of each curve of the bench: within a model lines and markers take turns."""
+    models, counts = {"printed": 0}, Counter[str]()
+    looks = {REFERENCE: Look(BLUE, "-.", "*")}
+    for curve in dict.fromkeys([*method_names(), *(ladder.curve for ladder in ladders())]):
+        model = curve.partition("/")[0] if is_corrected(curve) else "printed"
+        place, turn = models.setdefault(model, len(models)), counts[model]
+        colours = _MODEL_COLOURS[place] if place < len(_MODEL_COLOURS) else (GREY,)
+        marker = _MARKERS[(turn + 3 * place) % len(_MARKERS)]
+        looks[curve] = Look(colours[turn % len(colours)], _LINES[turn // len(colours) % len(_LINES)], marker)
+        counts[model] += 1
+    return looks
 
 
 def look_of(curve: str) -> Look:
-    """Return how a method, or a curve of the bench, is drawn; one that is not in the table in grey."""
-    if curve in _LOOKS:
-        return replace(_LOOKS[curve], label=label_of(curve))
-    code = zlib.crc32(curve.encode("utf-8", "replace"))
-    line = _OTHER_LINES[code % len(_OTHER_LINES)]
-    marker = _OTHER_MARKERS[code // len(_OTHER_LINES) % len(_OTHER_MARKERS)]
-    return Look(GREY, line, marker, label_of(curve))
+    """Return how a method, or a curve of the bench, is drawn; one that is not in the catalogue in grey."""
+    look = _catalogue_looks().get(curve)
+    if look is None:
+        code = zlib.crc32(curve.encode("utf-8", "replace"))
+        look = Look(GREY, _LINES[code % 4], _MARKERS[code // 4 % len(_MARKERS)])
+    return replace(look, label=label_of(curve))
 
 
 def class_of(colour: str) -> str:

@@ -67,15 +67,6 @@ def prefixed(value: float | None, unit: str, digits: int = 3) -> str:
     return f"{minus(f'{scaled:.{decimals}f}')}{SPACE}{prefix}{unit}"
 
 
-def apart(*values: float) -> list[str]:
-    """Each with as many digits, four or more, as different values need to differ."""
-    for digits in range(4, 17):
-        texts = [number(value, digits) for value in values]
-        if len(set(texts)) == len(set(values)):
-            break
-    return [number(value, 4) if digits == 16 else text for value, text in zip(values, texts, strict=True)]
-
-
 def scaled(largest: float) -> tuple[float, str]:
     """What an axis up to `largest` is divided by, and the prefix of its unit for that."""
     return next(((scale, prefix) for scale, prefix in _PREFIXES[2:4] if largest >= scale), (1.0, ""))

@@ -18,18 +18,16 @@ from rotor_mbs.report.core import canvas
 from rotor_mbs.report.core.canvas import Panels
 from rotor_mbs.report.core.elements import PageTable, Picture, Row, Section, TableCell
 from rotor_mbs.report.core.looks import Look, label_of, look_of
-from rotor_mbs.report.core.numbers import SPACE, number, power, prefixed, with_unit
+from rotor_mbs.report.core.numbers import SPACE, number, power, prefixed
 from rotor_mbs.report.core.svg import picture
-from rotor_mbs.report.pages import Report, claim_tables
+from rotor_mbs.report.pages import Report, paper
 from rotor_mbs.report.pages.bench import cost_picture
-from rotor_mbs.report.pages.figures import compared_runs
-from rotor_mbs.report.pages.scene import VISIBLE, angle_difference, defects, error_picture, key_picture, parting
+from rotor_mbs.report.pages.scene import VISIBLE, defects, error_picture, key_picture, parting
 from rotor_mbs.report.pages.scene_tables import (
     compared_time,
     horizon,
     method_cell,
     metric,
-    status_cell,
     status_text,
 )
 from rotor_mbs.report.pages.viewer import viewer
@@ -37,7 +35,7 @@ from rotor_mbs.runs.read import StoredScene
 from rotor_mbs.solution.status import GOOD
 
 Scenes = Mapping[str, StoredScene]
-# Errors of the heat map: a shade for each of these powers of ten and below, the last for all that is larger.
+# Errors: a shade for each of these powers of ten and below, the last for all that is larger.
 _SHADES = (-12, -10, -8, -6, -4, -2, 0)
 _LOWEST_ENERGY = 1e-16  # relative: smaller errors are drawn there
 
@@ -73,6 +71,8 @@ def index_page(report: Report) -> dict[str, object]:
             f"Compared with the reference over {number(compared, 3)} of {number(whole, 3)} s of simulated time, "
             f"{100.0 * compared / whole:.0f}{SPACE}%: each scene up to its horizon."
         )
+    table, marks = scene_table(scenes, report.files, model)
+    shades = [*(f"≤{SPACE}{power(exponent)}" for exponent in _SHADES), f">{SPACE}{power(_SHADES[-1])}"]
     return {
         "paper": PageTable("", ("Result", "As printed", model), finding(scenes, claims)),
         "scene": shown,
@@ -90,56 +90,71 @@ def index_page(report: Report) -> dict[str, object]:
             *cost_picture(report.curves.get(benched, ()), f"Error against run time of all methods, {benched}"),
         ],
         "methods": Section(tables=[PageTable("", methods.head, method_rows)], notes=notes),
-        "heat": heat_map(scenes, report.files),
-        "scenes": Section(tables=[scene_table(scenes, report.files, model)]),
+        "scenes": table,
+        "marks": sorted(marks.items()),
+        "shades": shades if compared else [],
         "numbers": Section(
             tables=[
-                claim_tables.number_table(claims),
-                *(claim_tables.trial_tables(study) if study is not None else ()),
+                paper.number_table(claims),
+                *(paper.trial_tables(study) if study is not None else ()),
             ],
             notes=[text for key, text in report.conditions.items() if not key.startswith("fig")],
         ),
-        "claims": Section(
-            tables=[] if study is None else [claim_tables.claim_table(claims, study)],
-            notes=[] if study is None else [claim_tables.study_note(study)],
-        ),
+        "claims": Section(tables=[] if study is None else [paper.claim_table(claims, study)]),
+        "study": study,
         "is_paper": bool(claims),
     }
 
 
-def scene_table(scenes: Scenes, files: Mapping[str, str], model: str) -> PageTable:
-    """A row per scene: how far the printed model and Exudyn are from the corrected one, which is called `model`."""
-    head = (
-        "Scene", "Figure", "Compared up to the horizon", "As printed, ode45", f"{VISIBLE:g} rad off from (s)",
-        "Largest difference (rad)", "Energy gain", "Largest pitch (rad)", f"{model}: largest pitch (rad)",
-        "Exudyn: largest difference up to the horizon (rad)",
-    )  # fmt: skip
+def scene_table(scenes: Scenes, files: Mapping[str, str], model: str) -> tuple[PageTable, dict[str, str]]:
+    """A row per scene: errors of all methods, how far the printed model is from the corrected one, called `model`.
+
+    Returns the table, and what its marks stand for.
+    """
+    names = dict.fromkeys(name for scene in scenes.values() for name in run_selection.corrected_runs(scene))
+    methods = run_selection.in_catalogue_order(names)
+    if any(run_selection.PRINTED in scene.methods for scene in scenes.values()):
+        methods.insert(0, run_selection.PRINTED)
+    marks: dict[str, str] = {}
     rows: list[Row] = []
     for name, scene in scenes.items():
-        until = horizon(scene)
-        figures = str(scene.attributes.get("figures", ""))
-        row: list[TableCell | str] = [TableCell(name, href=files[name], note=scene.title), figures]
-        row.append(with_unit(until, "s", 3))
-        runs = compared_runs(scene)
-        corrected = runs.get("corrected")
-        stored = scene.methods.get(run_selection.PRINTED)
-        row.append("" if stored is None else status_cell(stored))
-        if "printed" in runs and corrected is not None:
-            parted, largest = parting(runs["printed"], corrected)
-            row += ["never" if parted is None else number(parted, 3), number(largest)]
-        else:
-            row += ["", ""]
-        row.append("" if stored is None else prefixed(metric(stored, "energy_gain_J"), "J"))
-        for key in ("printed", "corrected"):
-            row.append(number(float(np.abs(runs[key].array("angles")[:, 1:]).max(initial=0.0))) if key in runs else "")
-        if "exudyn" in runs and corrected is not None:
-            gap = angle_difference(runs["exudyn"], corrected)
-            time = corrected.array("time")[: len(gap)]
-            row.append(number(float(gap[time <= (until or np.inf)].max(initial=0.0))))
-        else:
-            row.append("")
+        compared, whole = compared_time([scene])
+        row: list[TableCell | str] = [TableCell(name, href=files[name], note=scene.title)]
+        row += [
+            str(scene.attributes.get("figures", "")),
+            f"{number(compared, 3)} of {number(whole, 3)}" * (whole > 0.0),
+        ]
+        for method in methods:
+            run = scene.methods.get(method)
+            if run is None:
+                row.append("")
+                continue
+            error, shade, mark = metric(run, "angle_error_max"), "n", ""
+            if error is not None:
+                is_finite = math.isfinite(error)
+                shade = f"n h{sum(error > 10.0**exponent for exponent in _SHADES) if is_finite else len(_SHADES)}"
+            if run.status not in GOOD:
+                mark = OUTCOMES[run.status][0]
+                marks[mark] = status_text(run)
+            title = f"{label_of(method)}: {'no error known' if error is None else number(error)}, {status_text(run)}"
+            row.append(TableCell(f"{number(error)} {mark}".rstrip(), shade=shade, title=title))
+        sides = {side: run for side, run in run_selection.sides(scene).items() if "angles" in run}
+        parted = largest = None
+        if len(sides) == 2:
+            parted, largest = parting(*sides.values())
+        row.append("" if largest is None else "never" if parted is None else number(parted, 3))
+        row.append("" if largest is None else number(largest))
+        printed = scene.methods.get(run_selection.PRINTED)
+        row.append("" if printed is None else prefixed(metric(printed, "energy_gain_J"), "J"))
+        for side in ("printed", "corrected"):
+            run = sides.get(side)
+            row.append("" if run is None else number(float(np.abs(run.array("angles")[:, 1:]).max(initial=0.0))))
         rows.append(row)
-    return PageTable("", head, rows)
+    head = (
+        "Scene", "Figure", "Compared (s)", *map(method_cell, methods), f"{VISIBLE:g} rad off from (s)",
+        "Largest difference (rad)", "Energy gain", "Largest pitch (rad)", f"{model}: largest pitch (rad)",
+    )  # fmt: skip
+    return PageTable("Largest angle error up to the horizon (rad), by method", head, rows), marks
 
 
 def _energy(scenes: Scenes, model: str) -> list[Picture]:
@@ -176,38 +191,3 @@ def energy_of_scenes(rows: Mapping[str, Sequence[tuple[float, Look]]]) -> Panels
     canvas.ticks(axes.yaxis, dict(enumerate(rows)))
     panels.figure.subplots_adjust(left=0.25)
     return panels
-
-
-def heat_map(scenes: Scenes, files: Mapping[str, str]) -> dict[str, object] | None:
-    """Scene by method, the largest angle error up to the horizon; None where no run was compared with a reference."""
-    names = dict.fromkeys(name for scene in scenes.values() for name in run_selection.corrected_runs(scene))
-    methods = run_selection.in_catalogue_order(names)
-    if any(run_selection.PRINTED in scene.methods for scene in scenes.values()):
-        methods.insert(0, run_selection.PRINTED)
-    rows: list[Row] = []
-    key = {}
-    is_compared = False
-    for name, scene in scenes.items():
-        compared, whole = compared_time([scene])
-        row: list[TableCell | str] = [TableCell(name, href=files[name]), f"{number(compared, 3)} of {number(whole, 3)}"]
-        for method in methods:
-            run = scene.methods.get(method)
-            if run is None:
-                row.append("")
-                continue
-            error = metric(run, "angle_error_max")
-            mark = "" if run.status in GOOD else OUTCOMES[run.status][0]
-            is_compared = is_compared or error is not None
-            shade = len(_SHADES)
-            if error is not None and math.isfinite(error):
-                shade = sum(error > 10.0**exponent for exponent in _SHADES)
-            if mark:
-                key[mark] = status_text(run)
-            title = f"{label_of(method)}: {'no error known' if error is None else number(error)}, {status_text(run)}"
-            row.append(TableCell(f"{number(error)} {mark}".rstrip(), shade=f"n h{shade}", title=title))
-        rows.append(row)
-    if not is_compared:
-        return None
-    shades = [*(f"≤{SPACE}{power(exponent)}" for exponent in _SHADES), f">{SPACE}{power(_SHADES[-1])}"]
-    table = PageTable("", ("Scene", "Compared (s)", *map(method_cell, methods)), rows)
-    return {"table": table, "key": sorted(key.items()), "shades": shades}

@@ -14,16 +14,15 @@ from rotor_mbs.analysis.rehydrate import scene_of
 from rotor_mbs.methods.catalogue import REFERENCE, is_corrected
 from rotor_mbs.models.lagrange.defects import interval_defects
 from rotor_mbs.report import plots
-from rotor_mbs.report.core import canvas
-from rotor_mbs.report.core.canvas import TIME_AXIS, Panels
+from rotor_mbs.report.core.canvas import Panels
 from rotor_mbs.report.core.elements import PageTable, Picture, Row, Section
 from rotor_mbs.report.core.looks import GREY, VERMILLION, Look, coordinate_look, label_of, look_of, with_capital
 from rotor_mbs.report.core.numbers import fixed, number, prefixed, with_unit
 from rotor_mbs.report.core.svg import picture
-from rotor_mbs.report.pages import Report, claim_tables, scene_tables
+from rotor_mbs.report.pages import Report, paper, scene_tables
 from rotor_mbs.report.pages.bench import cost_section
 from rotor_mbs.report.pages.scene_tables import method_cell, metric
-from rotor_mbs.report.pages.stability import outcome_section, step_section
+from rotor_mbs.report.pages.stability import step_section
 from rotor_mbs.report.pages.viewer import viewer
 from rotor_mbs.report.plots import LOWEST, Series
 from rotor_mbs.runs.read import StoredRun, StoredScene
@@ -55,16 +54,13 @@ def scene_page(name: str, report: Report) -> dict[str, object]:
     place = pages.index(report.files[name])
     claims = [claim for claim in report.claims if name in claim.published.scenes]
     study = report.study
-    tables = [claim_tables.number_table(claims)]
+    tables = [paper.number_table(claims)]
     if study is not None:
-        tables.append(claim_tables.claim_table(claims, study))
+        tables.append(paper.claim_table(claims, study))
     # Where a number is rounding error, what it is under other conditions.
     if study is not None and any(claim.published.rounding for claim in claims):
-        tables += claim_tables.trial_tables(study)
+        tables += paper.trial_tables(study)
     condition = report.conditions.get(name.rpartition("/")[2])
-    notes = [condition] if condition else []
-    if study is not None and any(not claim.published.is_number for claim in claims):
-        notes.append(claim_tables.study_note(study))
     suite_runs = [run for run in report.suite_runs if run.scene == name]
     figures = str(scene.attributes.get("figures", ""))
     parsed = scene_of(scene)
@@ -75,9 +71,9 @@ def scene_page(name: str, report: Report) -> dict[str, object]:
         "figures": figures and f"{'Figures' if ',' in figures else 'Figure'} {figures} of the paper",
         "toml": str(scene.attributes.get("scene_toml", "")),
         "source": opening_comment(scene),
-        "failures": Section(tables=[] if suite_runs else [scene_tables.failure_table(scene)]),
-        "outcomes": outcome_section(scene, suite_runs),
-        "claims": Section(tables=[table for table in tables if table.rows], notes=notes),
+        "failures": Section(tables=[scene_tables.failure_table(scene, suite_runs)]),
+        "claims": Section(tables=[table for table in tables if table.rows], notes=[condition] if condition else []),
+        "study": study if any(not claim.published.is_number for claim in claims) else None,
         "viewer": viewer(scene, {label_of(run.method): run for run in runs}),
         "key": key_picture(runs, claims, horizon),
         "paths": _tips_section(runs),
@@ -159,14 +155,10 @@ def departure(
     parted: float | None = None,
 ) -> Panels:
     """A panel per (axis label, curves), with published values (panel, value, text) and the time of parting (s)."""
-    panels = canvas.panels((1.75,) * len(panels_of), TIME_AXIS)
-    for place, (axes, (label, series)) in enumerate(zip(panels.axes, panels_of, strict=True)):
-        for curve in series:
-            time, values = plots.thin(curve.time, curve.values)
-            canvas.curve(axes, time, values, curve.look, 2.4 if curve.look.line == "-" else 1.3)
-        shortest = min(len(curve.values) for curve in series)
-        plots.set_range(axes, np.stack([curve.values[:shortest] for curve in series], axis=1))
-        axes.set_ylabel(label)
+    panels = plots.lines(panels_of, heights=[1.75] * len(panels_of))
+    for place, (axes, (_, series)) in enumerate(zip(panels.axes, panels_of, strict=True)):
+        for line in axes.get_lines():  # a dashed curve lies upon a wide one
+            line.set_linewidth(2.4 if line.get_linestyle() == "-" else 1.3)
         end = max(float(curve.time[-1]) for curve in series)
         for panel, value, text in marks:
             if panel == place:
@@ -308,7 +300,7 @@ def _drive_section(scene: Scene | None, run: StoredRun | None) -> Section:
         rows.append([name, prefixed(float(np.abs(values).max()), unit), prefixed(float(values[-1]), unit), work])
 
     def add_picture(name: str, caption: str, series: Sequence[tuple[str, Sequence[Series]]]) -> None:
-        panels = plots.lines(series, height=1.3)
+        panels = plots.lines(series, heights=[1.3] * len(series))
         for axes in panels.axes:  # they have the zero
             low, high = axes.get_ylim()
             axes.set_ylim(min(low, 0.0), max(high, 0.0))

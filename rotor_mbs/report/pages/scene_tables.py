@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 from rotor_mbs.analysis import run_selection
 from rotor_mbs.analysis.judgement import OK_ERROR
+from rotor_mbs.analysis.stability import OUTCOMES, SuiteRun
 from rotor_mbs.methods.catalogue import REFERENCE, is_corrected, look_up
 from rotor_mbs.report.core.elements import PageTable, Row, TableCell
 from rotor_mbs.report.core.looks import label_of
@@ -18,10 +19,7 @@ _ERRORS_OF_RUNS = ("angle_error_max", "angle_error_whole", "tip_error_max")  # a
 
 def status_text(run: StoredRun) -> str:
     """ "solver failed" of "solver_failed"; of equations that are not claimed to be correct never "ok"."""
-    status = run.status
-    if status == "ok" and not is_corrected(run.method):
-        status = "completed"
-    return words_of(status)
+    return words_of("completed" if run.status == "ok" and not is_corrected(run.method) else run.status)
 
 
 def words_of(status: str) -> str:
@@ -31,16 +29,6 @@ def words_of(status: str) -> str:
 def status_cell(run: StoredRun) -> TableCell:
     text = status_text(run)
     return TableCell(text, tone="good" if text == "ok" else "" if run.status in GOOD else "bad")
-
-
-def error_cell(run: StoredRun) -> TableCell:
-    """The largest angle error up to the horizon; marked where it is beyond what is claimed."""
-    return bounded_cell(metric(run, "angle_error_max"), is_corrected(run.method))
-
-
-def bounded_cell(error: float | None, is_claimed: bool = True) -> TableCell:
-    is_over = is_claimed and error is not None and not error <= OK_ERROR
-    return TableCell(number(error), tone="bad" if is_over else "")
 
 
 def method_cell(name: str) -> TableCell | str:
@@ -99,10 +87,12 @@ def metrics_table(scene: StoredScene) -> PageTable:
     for run in run_selection.in_order(scene).values():
         row = [run_cell(run), status_cell(run)]
         for name in head:
+            value = metric(run, name)
+            is_over = name == "angle_error_max" and value is not None and not value <= OK_ERROR
             if run.method == REFERENCE and name in _ERRORS_OF_RUNS:
                 row.append("")
             else:
-                row.append(error_cell(run) if name == "angle_error_max" else number(metric(run, name)))
+                row.append(TableCell(number(value), tone="bad" if is_over and is_corrected(run.method) else ""))
         # Whether pitches that are exactly zero in the reference stayed so, and until when.
         left, rate = metric(run, "zero_pitch_left_s"), metric(run, "zero_pitch_growth_per_s")
         if "zero_pitch_max" not in run.attributes:
@@ -122,12 +112,18 @@ def metrics_table(scene: StoredScene) -> PageTable:
     )
 
 
-def failure_table(scene: StoredScene) -> PageTable:
-    """The runs that did not do what is expected of their method."""
-    rows = []
+def failure_table(scene: StoredScene, suite_runs: Sequence[SuiteRun] = ()) -> PageTable:
+    """The runs that are not ok, or are for a reason that should be known; with the steps that the suite has found."""
+    judged = {run.method: run for run in suite_runs}
+    rows: list[Row] = []
     for run in run_selection.in_order(scene).values():
-        if run.status not in GOOD:
+        status, message, step = status_cell(run), str(run.attributes.get("message", "")), ""
+        if run.method in judged:
+            suite_run = judged[run.method]
+            message, step = suite_run.message, with_unit(suite_run.step, "s")
+            if suite_run.outcome != run.status:
+                status = TableCell(OUTCOMES[suite_run.outcome][1])
+        if run.status not in GOOD or status.text != status_text(run):
             reached = float(run.array("time")[-1]) if run_selection.has_samples(run) else 0.0
-            message = str(run.attributes.get("message", ""))
-            rows.append([run_cell(run), status_cell(run), message, with_unit(reached, "s", 4)])
-    return PageTable("", ("Method", "Status", "Message", "Samples up to"), rows)
+            rows.append([run_cell(run), status, message, with_unit(reached, "s", 4), step])
+    return PageTable("", ("Method", "Status", "Message", "Samples up to", "Step for 10⁻⁶ rad"), rows)

@@ -6,24 +6,20 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from rotor_mbs.analysis import run_selection
-from rotor_mbs.analysis.stability import OUTCOMES, TARGET, SuiteRun, family_table, fastest_to_target
+from rotor_mbs.analysis.stability import OUTCOMES, TARGET, family_table, fastest_to_target
 from rotor_mbs.report.core import canvas
 from rotor_mbs.report.core.canvas import Panels
 from rotor_mbs.report.core.elements import PageTable, Row, Section, TableCell
 from rotor_mbs.report.core.looks import GREY, Look, label_of, look_of
-from rotor_mbs.report.core.numbers import number, with_unit
 from rotor_mbs.report.core.svg import picture
 from rotor_mbs.report.pages import Report
-from rotor_mbs.report.pages.scene_tables import horizon, method_cell, run_cell
+from rotor_mbs.report.pages.scene_tables import method_cell
 from rotor_mbs.report.plots import HIGHEST, LOWEST
-from rotor_mbs.runs.read import StoredScene
 from rotor_mbs.runs.records import Record
 from rotor_mbs.solution.trajectory import Array
 
 NOT_COMPARED = "horizon before the second sample"
 _FAMILIES = {"needle": "on a needle", "scale": "out of scale"}  # headings that are not the family's name
-_NOT_BAD = ("ok", "energy_alone", "smaller_step")
 
 
 def stability_page(report: Report) -> dict[str, object]:
@@ -66,32 +62,6 @@ def stability_page(report: Report) -> dict[str, object]:
         "summary": Section(tables=[PageTable("", counts.head, count_rows)]),
         "false_successes": sum(run.false_success for run in runs),
     }
-
-
-def outcome_section(scene: StoredScene, own: Sequence[SuiteRun]) -> Section:
-    """The outcome of each method; what limits the accuracy of any: rounding of the initial state times its growth."""
-    if not own:
-        return Section()
-    rows: list[Row] = []
-    for run in own:
-        symbol, text = OUTCOMES[run.outcome]
-        if run.outcome in _NOT_BAD:
-            outcome = TableCell(f"{symbol} {text}", note=run.message)
-        else:  # the tone brings its own symbol
-            outcome = TableCell(text, "bad", note=run.message)
-        numbers = [number(x) for x in (run.angle_error, run.energy_drift, run.run_time_s or None, run.step)]
-        rows.append([run_cell(scene.runs[run.method]), outcome, *numbers, f"{run.time_reached:.4g}"])
-    head = (
-        "Method", "Outcome", "angle error (rad)", "energy drift", "run time (s)", "step for 10⁻⁶ rad (s)",
-        "reached (s)",
-    )  # fmt: skip
-    limits = []
-    reference = scene.reference
-    if reference is not None and run_selection.has_samples(reference) and "error_growth" in reference:
-        names = ("angle_uncertainty", "error_growth")
-        limits.append([with_unit(horizon(scene), "s", 4), *(number(float(reference.array(n).max())) for n in names)])
-    limits_head = ("Horizon", "largest uncertainty of the angles (rad)", "error growth by the end")
-    return Section(tables=[PageTable("", head, rows), PageTable("The reference", limits_head, limits)])
 
 
 def step_section(scene: str, ladders: Sequence[Record]) -> Section:

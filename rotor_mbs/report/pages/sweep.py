@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import re
 import tomllib
-from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -16,7 +15,7 @@ from rotor_mbs.errors import InputError, StoreError
 from rotor_mbs.report.core.canvas import TIME_AXIS, Panels, colour_map, curve, growth_map, log_axis, panels
 from rotor_mbs.report.core.elements import PageTable, Picture, Section
 from rotor_mbs.report.core.looks import BLUE, VERMILLION, Look, with_capital
-from rotor_mbs.report.core.numbers import SPACE, apart
+from rotor_mbs.report.core.numbers import SPACE
 from rotor_mbs.report.core.svg import picture
 from rotor_mbs.report.pages.scene_tables import words_of
 from rotor_mbs.runs.sweeps import StoredSweep, parameter_name
@@ -57,7 +56,7 @@ def sweep_page(sweep: StoredSweep) -> dict[str, object]:
         values = values[np.isfinite(values)]
         if len(values) < 2 or not np.ptp(values):
             continue
-        low, middle, high = apart(*map(float, np.quantile(values, (0.05, 0.5, 0.95))))
+        low, middle, high = (f"{value:.6g}" for value in np.quantile(values, (0.05, 0.5, 0.95)))
         caption = _axis(with_capital(column.long_name), column.units)
         note = f"Median {middle}, 5 to 95 % from {low} to {high}."
         panels = distribution(values, _axis(name.replace("_", " "), column.units), logarithmic=_is_wide(values))
@@ -71,7 +70,7 @@ def sweep_page(sweep: StoredSweep) -> dict[str, object]:
     for key in sweep.keys:
         name = parameter_name(key)
         values, unit = sweep.column(name), sweep.columns[name].units
-        limits = [f"{text}{SPACE}{unit}" for text in apart(float(np.nanmin(values)), float(np.nanmax(values)))]
+        limits = [f"{value:.12g}{SPACE}{unit}" for value in (np.nanmin(values), np.nanmax(values))]
         parameter_rows.append((field_name(key), key, *limits, str(len(np.unique(values)))))
     head = ("Parameter", "Key", "From", "To", "Values")
     return {
@@ -147,8 +146,10 @@ def _responses(sweep: StoredSweep, ok: NDArray[np.bool_]) -> list[Picture]:
     shape = json.loads(sweep.attributes.get("shape", "[]"))  # of a grid: values along every axis, slowest first
     if len(shape) == len(axes) == 2 and min(shape) > 1:
         rows, columns = shape
-        grids = [x[: rows * columns].reshape(rows, columns) for x in (*axes.values(), values)]
-        panels = grid_map(grids[1][0], grids[0][:, 0], grids[2], [*reversed(labels.values())], label)
+        y, x, grid = (numbers[: rows * columns].reshape(rows, columns) for numbers in (*axes.values(), values))
+        y_label, x_label = labels.values()
+        panels = colour_map(x[0], y[:, 0], grid, (x_label, y_label, label))
+        panels.axes[0].set(xscale="log" if _is_wide(x) else "linear", yscale="log" if _is_wide(y) else "linear")
         return [picture(panels, "grid", with_capital(quantity))]
     pictures = []
     known = np.isfinite(values)
@@ -159,18 +160,6 @@ def _responses(sweep: StoredSweep, ok: NDArray[np.bool_]) -> list[Picture]:
             caption = f"{with_capital(quantity)} of each run over the {field_name(key)}"
             pictures.append(picture(panels, f"over-{parameter_name(key)}", caption))
     return pictures
-
-
-def grid_map(x: Array, y: Array, values: Array, labels: Sequence[str], label: str) -> Panels:
-    """`values` (y, x) as colour over both axes; labels: of x, of y; label: of the colours."""
-    panel = panels((3.8,), labels[0])
-    colour_map(panel, x, y, values, label)
-    panel.axes[0].set_ylabel(labels[1])
-    for values_of_axis, which in ((x, "x"), (y, "y")):
-        if _is_wide(values_of_axis):
-            panel.axes[0].set(**{f"{which}scale": "log"})
-    panel.figure.subplots_adjust(left=0.18)
-    return panel
 
 
 def _axis(label: str, unit: str) -> str:
@@ -202,15 +191,11 @@ def spread_panels(spread: Spread) -> Panels:
 
 def map_panels(growth: StabilityMap, x_label: str, y_label: str) -> Panels:
     """Growth of the pitches as colour over both axes, and the line where they grew tenfold, if there is one."""
-    panel = panels((3.8,), x_label)
-    axes = panel.axes[0]
-    label = "largest pitch, of its start (powers of ten)"
-    boundary = Look(VERMILLION, "-", "", f"{GROWN:g} times its start")
-    growth_map(panel, growth.x, growth.y, growth.growth, _MAX_GROWTH, label, boundary, GROWN)
-    axes.ticklabel_format(style="plain")
-    axes.set_ylabel(y_label)
-    panel.figure.subplots_adjust(left=0.18)
-    return panel
+    labels = (x_label, y_label, "largest pitch, of its start (powers of ten)")
+    boundary = (GROWN, f"{GROWN:g} times its start")
+    panels_of_map = growth_map(growth.x, growth.y, growth.growth, labels, _MAX_GROWTH, boundary)
+    panels_of_map.axes[0].ticklabel_format(style="plain")
+    return panels_of_map
 
 
 def response(parameter: Array, values: Array, x_label: str, y_label: str, *, logarithmic: bool) -> Panels:

@@ -1,25 +1,198 @@
-"""The paper's figures, each model side by side, for a manuscript and on the page that goes through them."""
+"""The paper: its numbers and claims as tables, its errata, its figures on a page and for a manuscript."""
 
 from __future__ import annotations
 
+import re
 import tomllib
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
-import numpy as np
+from markupsafe import Markup
 
 from rotor_mbs.analysis import run_selection
+from rotor_mbs.analysis.claims import STATISTICS, Claim
+from rotor_mbs.analysis.published import (
+    FAILS,
+    HOLDS,
+    UNDECIDED,
+    CheckedEntry,
+    ClaimStudy,
+    Published,
+    checked_entries,
+    published,
+)
 from rotor_mbs.analysis.rehydrate import scene_of
 from rotor_mbs.errors import InputError
-from rotor_mbs.methods.catalogue import look_up
+from rotor_mbs.methods.catalogue import errata_methods, look_up
 from rotor_mbs.report import plots
 from rotor_mbs.report.core import canvas, svg
+from rotor_mbs.report.core.elements import PageTable, Row, Section, TableCell
 from rotor_mbs.report.core.looks import COLOURS, Look, label_of, with_capital
+from rotor_mbs.report.core.numbers import NOTHING, SPACE, fixed, formula, number, prefixed
 from rotor_mbs.report.pages import Report
-from rotor_mbs.report.pages.claim_tables import number_table
+from rotor_mbs.report.pages.scene_tables import metric, status_text
 from rotor_mbs.runs.files import replace_file
 from rotor_mbs.runs.read import StoredRun, StoredScene, open_results
+from rotor_mbs.solution.status import GOOD
+
+ROUNDING = "amplified rounding error, which depends on how the equations are written"
+_UNITS = {"angle": "rad", "rate": "rad/s"}
+_TONES = {HOLDS: "good", FAILS: "bad", UNDECIDED: ""}
+
+
+def number_table(claims: Iterable[Claim]) -> PageTable:
+    """The published numbers, a row each."""
+    head = ("Figure", "Quantity", "Published", "As printed", "Reproduced?", "Corrected model", "Same number?")
+    rows: list[Row] = []
+    for claim in claims:
+        item, printed, corrected = claim.published, claim.printed, claim.corrected
+        if item.of is None:
+            continue
+        verdict = _verdict(printed.holds, "yes", "no")
+        if item.rounding and printed.holds:
+            verdict = replace(verdict, note=ROUNDING)
+        body = "rotor" if item.of.coordinate == 0 else f"pitch {item.of.coordinate}"
+        _, words = STATISTICS[item.of.quantity, item.of.statistic]
+        description = f"{words} {body} {item.of.quantity} ({_unit(item)})"
+        rows.append([
+            item.figure,
+            TableCell(description, note=f"«{item.quote}»", note_language="es"),
+            fixed(item.value, item.decimals),
+            fixed(printed.value, item.decimals + 2),
+            verdict,
+            fixed(corrected.value, item.decimals + 2),
+            _verdict(corrected.holds, "yes", "no"),
+        ])  # fmt: skip
+    return PageTable("Published numbers", head, rows)
+
+
+def _unit(item: Published) -> str:
+    return _UNITS[item.of.quantity] if item.of is not None else ""
+
+
+def claim_table(claims: Iterable[Claim], study: ClaimStudy) -> PageTable:
+    """The claims in words, a row each: verdicts by the shares of many runs."""
+    head = ["Figure", "Claim"]
+    for side in ("As printed", "Corrected model"):
+        head += [side, *(f"over {duration:g}{SPACE}s" for duration in study.durations)]
+    rows: list[Row] = []
+    for claim in claims:
+        item = claim.published
+        if item.is_number:
+            continue
+        statement = TableCell(item.statement, note=f"«{item.quote}»", note_language="es")
+        row: list[TableCell | str] = [item.figure, statement]
+        for method in study.methods:
+            verdict = study.verdicts[item.id][method]
+            row.append(TableCell(verdict, tone=_TONES[verdict]))
+            for share, deciding in study.shares[item.id][method]:
+                percent = NOTHING if share is None else f"{100.0 * share:.0f}{SPACE}%"
+                row.append(TableCell(percent, note=f"of {deciding}"))
+        rows.append(row)
+    return PageTable("Published claims", head, rows)
+
+
+def _verdict(holds: bool | None, yes: str, no: str) -> TableCell:
+    if holds is None:
+        return TableCell(NOTHING)
+    return TableCell(yes if holds else no, tone="good" if holds else "bad")
+
+
+def trial_tables(study: ClaimStudy) -> list[PageTable]:
+    """The published numbers for other durations, other tolerances and other ways of writing the first row of (56)."""
+    items = [item for item in published() if item.id in study.numbers]
+    heads = [f"Fig. {item.figure}: {fixed(item.value, item.decimals)} {_unit(item)}" for item in items]
+    tables = []
+    for table in study.trials:
+        rows: list[Row] = []
+        for labels, values, reproduced in table.rows:
+            cells = [
+                TableCell(fixed(value, item.decimals), tone="good" if is_reproduced else "")
+                for value, is_reproduced, item in zip(values, reproduced, items, strict=True)
+            ]
+            rows.append([*labels, *cells])
+        tables.append(PageTable(table.caption, (*table.head, *heads), rows))
+    return tables
+
+
+_PLACE = re.compile(r"row (\d) column (\d)")
+Cell = tuple[Markup, Markup | None]  # an entry as printed; the correct one where it is faulty
+
+
+def errata_page(report: Report) -> dict[str, object]:
+    """The content of the page of errata."""
+    entries = checked_entries()
+    agreeing = [entry for entry in entries if entry.agrees]
+    differing = [entry for entry in entries if not entry.agrees]
+    differing_table = PageTable(
+        f"{len(differing)} of {len(entries)} printed entries differ from what follows from (3); the errata explain "
+        f"{sum(bool(entry.explained_by) for entry in differing)}",
+        ("Equation", "Entry", "Printed", "Correct", "Relative difference", "Explained by"),
+        [
+            (
+                e.equation,
+                e.entry,
+                formula(e.printed),
+                formula(e.right),
+                number(e.difference),
+                e.explained_by or "nothing",
+            )
+            for e in differing
+        ],
+    )
+    # What each erratum alone does.
+    effects_head = ["Scene"]
+    for erratum in errata_methods():
+        for what in ("angle change to the horizon (rad)", "whole run (rad)", "energy gain"):
+            effects_head.append(f"{erratum}: {what}")
+    effects: list[Row] = []
+    for name, scene in report.scenes.items():
+        runs = [scene.methods.get(method) for method in errata_methods().values()]
+        row: list[TableCell | str] = [TableCell(name, href=report.files[name], note=scene.title)]
+        for run in runs:
+            if run is None:
+                row += ["", "", ""]
+                continue
+            status = "" if run.status in GOOD else status_text(run)
+            row.append(TableCell(number(metric(run, "angle_error_max")), note=status))
+            row += [number(metric(run, "angle_error_whole")), prefixed(metric(run, "energy_gain_J"), "J")]
+        if any(run is not None for run in runs):
+            effects.append(row)
+    effects_table = PageTable("", effects_head, effects)
+    agreeing_rows = [(e.equation, e.entry, formula(e.printed), number(e.difference)) for e in agreeing]
+    return {
+        "errata": [(erratum, matrices(entries, erratum.stands_in)) for erratum in report.errata],
+        "differing": Section(tables=[differing_table]),
+        "effects": Section(tables=[effects_table]),
+        "agreeing": PageTable("", ("Equation", "Entry", "Printed", "Relative difference"), agreeing_rows),
+        "largest_agreeing": max((entry.difference for entry in agreeing), default=0.0),
+    }
+
+
+def matrices(entries: Sequence[CheckedEntry], equations: Sequence[str]) -> list[tuple[str, list[list[Cell]]]]:
+    """(equation, rows of its matrix) of those of `equations` that are matrices."""
+    shown = []
+    for equation in equations:
+        places = {}
+        for entry in entries:
+            place = _PLACE.fullmatch(entry.entry)
+            if entry.equation == equation and place is not None:
+                places[int(place[1]), int(place[2])] = entry
+        if places:
+            rows, columns = (range(1, 1 + max(place[axis] for place in places)) for axis in (0, 1))
+            matrix = []
+            for row in rows:
+                cells: list[Cell] = []
+                for column in columns:
+                    checked = places.get((row, column))
+                    printed = Markup() if checked is None else formula(checked.printed)
+                    cells.append((printed, None if checked is None or checked.agrees else formula(checked.right)))
+                matrix.append(cells)
+            shown.append((equation, matrix))
+    return shown
+
 
 MOTION, PATHS, TORQUES = "motion", "paths", "torques"
 # The models that are compared, by key, in order from left to right.
@@ -92,16 +265,14 @@ def draw(figure: PaperFigure, axes: Sequence[Any], runs: Mapping[str, StoredRun]
         return
     labels = (plots.ANGLE_AXIS, plots.RATE_AXIS)
     for panel, name, label in zip(axes, ("angles", "rates"), labels, strict=True):
-        if figure.kind == MOTION:
-            run = next(iter(runs.values()))
-            plots.draw_coordinates(panel, run.array("time"), run.array(name), label)
-        else:
-            series = []
-            for place, (torque, run) in enumerate(runs.items()):
+        series = []
+        for place, (torque, run) in enumerate(runs.items()):
+            of_run = plots.coordinate_series(run.array("time"), run.array(name))
+            if figure.kind == TORQUES:
                 look = Look(COLOURS[place], ("-", "--", "-.", ":")[place], "", torque)
-                series.append(plots.Series(run.array("time"), run.array(name)[:, 0], look))
-            plots.draw_lines(panel, series, label)
-            plots.set_range(panel, np.concatenate([curve.values for curve in series])[:, None])
+                of_run = [of_run[0]._replace(look=look)]
+            series += of_run
+        plots.draw_lines(panel, series, label)
     axes[0].set_title("(a) position", loc="left")
     axes[0].tick_params(labelbottom=False)
     axes[1].set_title("(b) angular velocity", loc="left")
