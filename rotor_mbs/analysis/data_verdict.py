@@ -1,4 +1,4 @@
-"""How far data are from a reference, channel by channel, and what became of a comparison; as JSON and back."""
+"""How far data are from what they should be, channel by channel, and what became of a comparison; as JSON and back."""
 
 from __future__ import annotations
 
@@ -7,20 +7,26 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass, fields
 from typing import Any
 
-LEVELS = (1e-3, 1e-6, 1e-9)  # rad, rad/s: until when data agree to each
-DEFAULT_TOLERANCE = 1e-6  # rad, of an interval's defect
+import numpy as np
+
+from rotor_mbs.solution.trajectory import Array
+
+LEVELS = (1e-3, 1e-6, 1e-9)  # rad, rad/s, or of the largest: until when data agree to each
+DEFAULT_TOLERANCE = 1e-6  # rad, of an interval's defect; of a load's largest; of a frequency
 
 
 @dataclass(frozen=True)
 class ChannelErrors:
-    """A channel of data, such as "pitch 1" in "rad", against the reference.
+    """A channel of data, such as "pitch 1" in "rad", against the reference; loads against those of the data's states.
 
     error_max, error_whole : the largest error up to the horizon, and at all.
-    defect : rad, the largest over all intervals (of a rate times the interval), less what the rounding of the data
-        explains; None where it cannot be known.
-    floor : rad, the largest that rounding explains.
-    agrees_until : s, for each of `LEVELS`, of the last row before the error is larger; NaN where the first row is.
-    lag_s, scale, offset : least squares of data = scale * reference(t - lag) + offset up to the horizon.
+    defect : what is judged, less what the rounding of the data explains; None where it cannot be known. Of an angle or
+        a rate (times the interval) the largest over all intervals, rad; of a load the largest error, of the load's
+        largest size; of a frequency the largest error, of its size.
+    floor : the largest that rounding explains, likewise.
+    agrees_until : s (rad/s of a table of modes), for each of `LEVELS`, of the last row before the error is larger; NaN
+        where the first row is.
+    lag_s, scale, offset : least squares of data = scale * reference(t - lag) + offset up to the horizon, of a state.
     """
 
     name: str
@@ -30,9 +36,17 @@ class ChannelErrors:
     defect: float | None
     floor: float | None
     agrees_until: tuple[float, ...]
-    lag_s: float
-    scale: float
-    offset: float
+    lag_s: float | None = None
+    scale: float | None = None
+    offset: float | None = None
+    defect_unit: str = "rad"
+
+
+def agrees_until(rows: Array, error: Array) -> tuple[float, ...]:
+    """For each of `LEVELS` the last of (n,) times, or speeds, before the error is larger; NaN where the first is."""
+    beyond = [np.flatnonzero(~(error <= level)) for level in LEVELS]
+    ends = [int(places[0]) if len(places) else len(rows) for places in beyond]
+    return tuple(float(rows[end - 1]) if end else math.nan for end in ends)
 
 
 @dataclass(frozen=True)
@@ -48,6 +62,7 @@ class DataVerdict:
     energy_drift : largest change of the energy of the data, of its scale; None where it cannot be known.
     read, unused, notes : how columns were read; columns that were not; what else there is to know.
     likely : what the difference looks like, of what was tried; empty where nothing fits, or nothing was tried.
+    axis : "time", or "speed" of a table of modes, whose `compared_until` is in rad/s.
     """
 
     scene: str
@@ -66,6 +81,7 @@ class DataVerdict:
     unused: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
     likely: tuple[str, ...] = ()
+    axis: str = "time"
 
     @property
     def agrees(self) -> bool:
@@ -76,6 +92,7 @@ def from_dictionary(stored: Mapping[str, Any]) -> DataVerdict:
     """The verdict of which `as_dictionary` made this, also where it has been JSON since."""
     values = {item.name: stored[item.name] for item in fields(DataVerdict)}
     values = {name: tuple(value) if isinstance(value, list) else value for name, value in values.items()}
+    values["horizon_s"] = math.nan if values["horizon_s"] is None else values["horizon_s"]
     channels = [
         channel
         | {"agrees_until": tuple(math.nan if time is None else time for time in channel["agrees_until"].values())}
@@ -87,6 +104,7 @@ def from_dictionary(stored: Mapping[str, Any]) -> DataVerdict:
 def as_dictionary(verdict: DataVerdict) -> dict[str, object]:
     """For JSON: NaN as None."""
     values = asdict(verdict) | {"agrees": verdict.agrees}
+    values["horizon_s"] = None if math.isnan(verdict.horizon_s) else verdict.horizon_s
     for channel in values["channels"]:
         times = dict(zip(map(str, LEVELS), channel["agrees_until"], strict=True))
         channel["agrees_until"] = {level: None if math.isnan(time) else time for level, time in times.items()}

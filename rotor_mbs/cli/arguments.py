@@ -152,9 +152,9 @@ class _Names(argparse.Action):
     """Prints the names of columns that `compare` understands, and ends."""
 
     def __call__(self, parser: argparse.ArgumentParser, *_: Any) -> NoReturn:
-        from rotor_mbs.foreign.channels import KNOWN_NAMES
+        from rotor_mbs.foreign.channels import KNOWN_NAMES, LOAD_AND_MODE_NAMES
 
-        lines = [f"{channel}: {names}" for channel, names in KNOWN_NAMES]
+        lines = [f"{channel}: {names}" for channel, names in KNOWN_NAMES + LOAD_AND_MODE_NAMES]
         print(*lines, "upper or lower case, with or without blanks and underscores", sep="\n")
         parser.exit(0)
 

@@ -1,13 +1,14 @@
-"""The channels that data may have: time, and angle and rate of every coordinate; which column is which, in which unit,
-sign and zero: from a mapping file (see docs/compare.md), or guessed from the names. Data of a scene in s, rad, rad/s;
-refused where they cannot be compared.
+"""The channels that data may have: time, angle and rate of every coordinate, components of loads; of a table of modes:
+speed, frequencies. Which column is which, in which unit, sign and zero: from a mapping file (see docs/compare.md), or
+guessed from the names. Data of a scene in SI units; refused where they cannot be compared.
 
 A channel is sign * (column + offset), the offset in the column's own unit. What a mapping leaves out is not compared;
-the time alone is guessed then. All are guessed where it names a group alone.
+the time (or speed) alone is guessed then. All are guessed where it names a group alone.
 """
 
 from __future__ import annotations
 
+import itertools
 import os
 import re
 from collections import Counter
@@ -25,10 +26,11 @@ from rotor_mbs.scenario import keys
 from rotor_mbs.scenario.keys import Kind, file_key, wrong
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.scenario.toml_file import TableError, read_toml
+from rotor_mbs.solution.quantities import LOADS
 
 Array = NDArray[np.float64]
 
-TIME = "time"
+TIME, SPEED = "time", "speed"
 _FEW_DIGITS, _ALL_DIGITS = 9, 17
 _FEW_VALUES = 10
 _EQUAL = 1e-6  # of an interval between rows
@@ -46,6 +48,17 @@ _VECTORS = {
     "angle": ("angles", "angle", "q", "qpos", "coordinates", "positions"),
     "rate": ("rates", "rate", "qd", "dq", "qdot", "qvel", "coordinates_t", "velocities"),
 }
+# By the frame in which a scene's loads have them, the other frames in which data may have them.
+FRAMES = {"blade": ("rotor", "base"), "base": ("rotor",)}
+# OpenFAST's root loads, of the blade on the hub: x along the shaft, z along the blade, y against the rotor's sense; the
+# axes b turn with the pitch, the axes c do not.
+_OPENFAST = re.compile(r"root([fm])([xyz])([bc])(\d+)", re.IGNORECASE)
+_OPENFAST_AXES = {"x": ("y", -1), "y": ("x", 1), "z": ("z", -1)}
+_SPEED_NAMES = ("speed", "rotorspeed", "rotspeed", "omega")
+_FREQUENCIES = {
+    "frequency": ("frequency", "freq", "f", "mode", "frequencies", "dampedfrequency", "dampedfrequencies"),
+    "undamped frequency": ("undampedfrequency", "undampedfrequencies", "naturalfrequency", "naturalfrequencies"),
+}
 # What is understood, in words.
 KNOWN_NAMES = (
     ("time", ", ".join(_TIME_NAMES)),
@@ -56,50 +69,105 @@ KNOWN_NAMES = (
     ("array of angles, rotor first", ", ".join(_VECTORS["angle"])),
     ("array of rates, rotor first", ", ".join(_VECTORS["rate"])),
 )
-_UNIT_ENDING = re.compile(r"_((?:rad|deg|turns|rev)(?:_per_s|/s|_s)?|rpm|s|ms|us|min)$", re.IGNORECASE)
+LOAD_AND_MODE_NAMES = (
+    ("load: its blade's number and x, y or z behind, or an array", ", ".join(load.name for load in LOADS)),
+    ("load at a root, as OpenFAST has it", "RootFxb1, RootMyc2 and the like"),
+    ("modes: rotor speed, where there is no time", ", ".join(_SPEED_NAMES)),
+    ("modes: damped frequency, its number behind, or an array", ", ".join(_FREQUENCIES["frequency"])),
+    ("modes: undamped frequency, likewise", ", ".join(_FREQUENCIES["undamped frequency"])),
+)
+_UNIT_ENDING = re.compile(r"_((?:rad|deg|turns|rev)(?:_per_s|/s|_s)?|rpm|hz|s|ms|us|min|(?-i:k?Nm?))$", re.IGNORECASE)
 
 
 @dataclass(frozen=True)
 class Channel:
-    """A coordinate's angle or rate, or the time: "rotor", "pitch 1", "rotor rate", "pitch 1 rate", "time".
+    """A coordinate's angle or rate, the component of a load, the time: "rotor", "pitch 1 rate", "shaft force x"; of a
+    table of modes: "speed", "frequency 1".
 
-    kind: "angle", "rate" or "time". column: of the matrix of angles, then rates; -1 for the time.
+    kind: of its unit, a key of `BASE_UNITS`. column: of the matrix of angles, then rates, then loads; of the damped,
+    then the undamped frequencies; -1 for time and speed. frame: of a load, where it is not the scene's. sign: of the
+    column's numbers, where its name has a convention.
     """
 
     name: str
     kind: str
     column: int
+    frame: str = ""
+    sign: int = 1
 
     @property
     def key(self) -> str:
         """Its key in a mapping file: "pitch_1_rate"."""
-        return self.name.replace(" ", "_")
+        return self.name.replace(",", "").replace(" ", "_")
 
     @property
     def unit(self) -> str:
         return BASE_UNITS[self.kind]
 
+    @property
+    def is_load(self) -> bool:
+        return self.kind in ("force", "moment")
+
+    def in_frame(self, frame: str) -> Channel:
+        """Raises InputError where it has no components there."""
+        own = "blade" if self.name.startswith("blade root") else "base" if self.name.startswith("shaft") else ""
+        if frame == own:
+            return self
+        if not self.is_load or frame not in FRAMES.get(own, ()):
+            allowed = f"{own}, {', '.join(FRAMES[own])}" if own else "none"
+            raise InputError(f"{self.key}: frame {frame!r}; allowed: {allowed}")
+        return replace(self, name=f"{self.name}, {frame} frame", frame=frame)
+
 
 def channels(scene: Scene) -> list[Channel]:
     """Those that data of the scene may have, the time first."""
     labels = scene.coordinate_labels
-    angles = [Channel(label, "angle", i) for i, label in enumerate(labels)]
-    rates = [Channel(f"{label} rate", "rate", len(labels) + i) for i, label in enumerate(labels)]
-    return [Channel(TIME, "time", -1), *angles, *rates]
+    known = [Channel(TIME, "time", -1), *(Channel(label, "angle", i) for i, label in enumerate(labels))]
+    known += [Channel(f"{label} rate", "rate", len(labels) + i) for i, label in enumerate(labels)]
+    for load in LOADS:
+        blades = [f" {i + 1}" for i in range(len(scene.blades))] if "blade" in load.dimensions else [""]
+        for ending in itertools.product(blades, (" x", " y", " z") if "axis" in load.dimensions else [""]):
+            name = load.name.replace("_", " ") + "".join(ending)
+            known.append(Channel(name, "force" if load.units == "N" else "moment", len(known) - 1))
+    return known
+
+
+def mode_channels(scene: Scene) -> list[Channel]:
+    """Those that a table of modes may have, the speed first."""
+    names = [f"{kind} {i + 1}" for kind in _FREQUENCIES for i in range(len(scene.coordinate_labels))]
+    return [Channel(SPEED, "rate", -1), *(Channel(name, "frequency", i) for i, name in enumerate(names))]
 
 
 def guess(name: str, vector: int, known: Sequence[Channel]) -> Channel | None:
     """The channel that a column's name suggests, None where it suggests none.
 
     vector   how many columns its array has, 0 where it is none: `q[0]` is the rotor where there is one per coordinate
+    known    `channels` or `mode_channels`
     """
-    entry = re.fullmatch(r"(.*)\[(\d+)\]", name)
-    if entry is not None:
-        array = entry[1].rpartition("/")[2].strip().lower()
-        fitting = [channel for channel in known if array in _VECTORS.get(channel.kind, ())]
-        return fitting[int(entry[2])] if len(fitting) == vector else None
+    entry = re.fullmatch(r"(.*)\[([\d,]+)\]", name)
+    array = entry[1].rpartition("/")[2].strip().lower() if entry else ""
     plain = split_unit(name)[0].lower()
-    letters = re.sub(r"[^a-z]", "", plain)
+    letters, digits = re.sub(r"[^a-z]", "", plain), re.findall(r"\d+", plain)
+    by_name = {channel.name: channel for channel in known}
+    if known[0].name == SPEED:
+        number = int(digits[-1]) + (entry is not None) if digits else 1
+        kinds = [f"{kind} {number}" for kind, names in _FREQUENCIES.items() if letters in names]
+        return by_name.get(SPEED if letters in _SPEED_NAMES else kinds[0] if kinds else "")
+    if openfast := _OPENFAST.fullmatch(plain):
+        axis, sign = _OPENFAST_AXES[openfast[2]]
+        load = by_name.get(f"blade root {'force' if openfast[1] == 'f' else 'moment'} {openfast[4]} {axis}")
+        return load and replace(load.in_frame("rotor" if openfast[3] == "c" else "blade"), sign=sign)
+    if entry is not None:
+        place = [int(number) for number in entry[2].split(",")]
+        fitting = [channel for channel in known if array in _VECTORS.get(channel.kind, ())]
+        fitting = fitting or [channel for channel in known if array and channel.key.startswith(f"{array}_")]
+        offset = 3 * place[0] + place[1] if len(place) == 2 else place[0]
+        return fitting[offset] if len(fitting) == vector else None
+    words = re.findall(r"[a-z]+|\d+", plain)
+    frame = words[-2] if words[-1:] == ["frame"] and len(words) > 2 else ""
+    load = by_name.get(" ".join(words[:-2] if frame else words))
+    if load is not None and load.is_load:
+        return load.in_frame(frame) if frame else load
     if letters in _TIME_NAMES:
         return known[0]
     ending = next((word for word in _RATE_WORDS if letters.endswith(word)), "")
@@ -107,7 +175,6 @@ def guess(name: str, vector: int, known: Sequence[Channel]) -> Channel | None:
     if letters[:1] == "d" and letters[1:] in (*_PITCH_NAMES, *_ROTOR_NAMES):
         ending, stem = "d", letters[1:]
     rate = " rate" if ending else ""
-    digits = re.findall(r"\d+", plain)
     if stem in _PITCH_NAMES:
         only = "1" if len([channel for channel in known if channel.kind == "angle"]) == 2 else ""
         wanted = f"pitch {digits[-1] if digits else only}{rate}"
@@ -117,7 +184,7 @@ def guess(name: str, vector: int, known: Sequence[Channel]) -> Channel | None:
         wanted = f"rotor{rate}"
     else:
         return None
-    return next((channel for channel in known if channel.name == wanted), None)
+    return by_name.get(wanted)
 
 
 def split_unit(name: str) -> tuple[str, str]:
@@ -125,7 +192,7 @@ def split_unit(name: str) -> tuple[str, str]:
     match = _UNIT_ENDING.search(name)
     if match is None:
         return name, ""
-    return name[: match.start()], match[1].lower().replace("_per_s", "/s").replace("_s", "/s")
+    return name[: match.start()], re.sub("_(?:per_)?s$", "/s", match[1].lower())
 
 
 def _read_sign(value: object) -> int:
@@ -139,6 +206,7 @@ class Entry:
     """What a mapping file says of a channel: sign * (column + offset) in `unit`.
 
     wrapped   whether turns are missing, so that jumps of more than half a turn are taken out
+    frame     of a load, "" for that of the scene's loads
     """
 
     column: str = file_key("column", Kind(keys.read_text, "the name of a column"))
@@ -146,6 +214,7 @@ class Entry:
     sign: int = file_key("sign", Kind(_read_sign, "1, -1"), default=1)
     offset: float = file_key("offset", keys.NUMBER, note=", in the column's unit", default=0.0)
     wrapped: bool = file_key("wrapped", keys.FLAG, default=False)
+    frame: str = file_key("frame", keys.choice(("blade", "rotor", "base")), default="")
 
 
 def _read_entry(value: object) -> Entry:
@@ -161,15 +230,17 @@ _GROUP = Kind(keys.read_text, "the path of a group in the file")
 def read_mapping(
     columns: str | os.PathLike[str] | Mapping[str, Any] | None, scene: Scene
 ) -> tuple[dict[str, Entry], str, tuple[str, ...]]:
-    """An entry by the key of a channel, the group of an HDF5 file, and the names of channels that are not to be missed:
-    {}, "" and () where no mapping is given.
+    """An entry by the key of a channel, the group of an HDF5 file, and the names of channels that are neither compared
+    nor missed: {}, "" and () where no mapping is given.
 
     columns: a TOML file, or a mapping of the same keys. Raises InputError with every fault, a line each.
     """
     if columns is None:
         return {}, "", ()
-    declared = {channel.key: file_key(channel.key, _ENTRY, default=None).metadata for channel in channels(scene)}
-    names = {channel.key: channel.name for channel in channels(scene) if channel.kind == "angle"}
+    known = [*channels(scene), *mode_channels(scene)]
+    declared = {channel.key: file_key(channel.key, _ENTRY, default=None).metadata for channel in known}
+    names = {channel.key: channel.name for channel in known if channel.kind != "time"}
+    names |= {load.name: load.name.replace("_", " ") for load in LOADS}  # with all its components
     omit = keys.list_of(keys.choice(tuple(names)), f"a list of {', '.join(names)}")
     declared["group"] = file_key("group", _GROUP, default="").metadata
     declared["omit"] = file_key("omit", omit, default=()).metadata
@@ -186,35 +257,46 @@ def read_mapping(
     group = found.pop("group")
     omitted = tuple(names[key] for key in found.pop("omit"))
     entries = {key: entry for key, entry in found.items() if entry is not None}
-    if entries.keys() == {TIME} or not (entries or group or omitted):
+    if entries.keys() in ({TIME}, {SPEED}) or not (entries or group or omitted):
         raise InputError(f"{name}: no channel to compare; allowed: {', '.join(declared)}")
     return entries, group, omitted
 
 
 def find_channels(
-    table: DataTable, scene: Scene, entries: Mapping[str, Entry]
+    table: DataTable, scene: Scene, entries: Mapping[str, Entry], omitted: Sequence[str] = ()
 ) -> tuple[dict[Channel, Entry], tuple[str, ...]]:
-    """Where each channel comes from, with its unit, the time first, and a line for each that says so. Raises
-    InputError."""
-    known = channels(scene)
+    """Where each channel comes from, with its unit, the time first, and a line for each that says so; those of a table
+    of modes where there is no time, but a speed and frequencies. Raises InputError."""
     vectors = Counter(name.rpartition("[")[0] for name in table.columns if name.endswith("]"))
-    guessed: dict[str, str] = {}
-    for name in table.columns:
-        channel = guess(name, vectors[name.rpartition("[")[0]], known)
-        if channel is None or (entries and channel.name != TIME):
+
+    def guesses(known: Sequence[Channel]) -> list[tuple[Channel, str]]:
+        guessed = [(guess(name, vectors[name.rpartition("[")[0]], known), name) for name in table.columns]
+        return [(channel, name) for channel, name in guessed if channel is not None]
+
+    known, other = channels(scene), mode_channels(scene)
+    guessed = guesses(known)
+    mapped = [channel.key for channel in other if channel.key in entries]
+    if mapped or not (entries or any(channel == known[0] for channel, _ in guessed)):
+        modes = guesses(other)
+        if mapped or {channel.kind for channel, _ in modes} == {"rate", "frequency"}:
+            known, guessed = other, modes
+    sources: dict[Channel, Entry] = {}
+    for channel in known:
+        if entry := entries.get(channel.key):
+            sources[channel.in_frame(entry.frame) if entry.frame else channel] = entry
+    for channel, name in guessed:
+        if (entries and (channel != known[0] or channel in sources)) or _is_omitted(channel, omitted):
             continue
-        if channel.name in guessed:
+        if twice := [entry.column for other, entry in sources.items() if other.name == channel.name]:
             raise InputError(
-                f"{table.source}: both {guessed[channel.name]!r} and {name!r} could be {channel.name}; allowed: "
+                f"{table.source}: both {twice[0]!r} and {name!r} could be {channel.name}; allowed: "
                 f"`{channel.key}` in a mapping file says which"
             )
-        guessed[channel.name] = name
+        sources[channel] = Entry(column=name, sign=channel.sign)
     chosen: dict[Channel, Entry] = {}
     lines = []
-    for channel in known:
-        if channel.key not in entries and channel.name not in guessed:
-            continue
-        entry = entries.get(channel.key) or Entry(column=guessed[channel.name])
+    for channel in sorted(sources, key=lambda channel: channel.column):
+        entry = sources[channel]
         stated = table[entry.column].unit or split_unit(entry.column)[1]
         unit = entry.unit or stated
         if unit and unit.lower() not in UNITS[channel.kind]:
@@ -231,24 +313,33 @@ def find_channels(
         lines.append(f"{line} ({', '.join(notes)})" if notes else line)
     shown = shown_names(list(table.columns))
     if known[0] not in chosen:
-        raise InputError(f"{table.source}: no column for the time; it has: {shown}; allowed: `time` in a mapping file")
-    if len(chosen) == 1:
         raise InputError(
-            f"{table.source}: no column for an angle or a rate; it has: {shown}; allowed: a mapping file (columns)"
+            f"{table.source}: no column for the {known[0].name}; it has: {shown}; allowed: `{known[0].key}` in a "
+            "mapping file"
         )
+    if all(channel.is_load or channel == known[0] for channel in chosen):
+        what = "a frequency" if known is other else "an angle or a rate"
+        raise InputError(f"{table.source}: no column for {what}; it has: {shown}; allowed: a mapping file (columns)")
     return chosen, tuple(lines)
+
+
+def _is_omitted(channel: Channel, omitted: Sequence[str]) -> bool:
+    name = channel.name.partition(",")[0]
+    return any(name == other or (channel.is_load and name.startswith(f"{other} ")) for other in omitted)
 
 
 @dataclass(frozen=True)
 class ForeignData:
-    """Samples of another program.
+    """Samples of another program, or its modes over speed.
 
-    time, values : (n,) s, increasing from 0 or later; (n, channels) rad or rad/s, what `channels` says.
+    time, values : (n,) s, increasing from 0 or later; (n, channels) in SI units, what `channels` says. Of a table of
+        modes the speeds, rad/s, in place of the times.
     read, unused : a line for each channel: column, unit, and what was assumed; names of the other columns.
     rounding, time_rounding : (n, channels), (n,) half a unit in the last digit of each number, as it was written.
     wrapped : for each channel, whether whole turns are missing from it.
     digits : how many significant digits the numbers have, at most; 17 where they have all.
     omitted : names of channels that are not to be missed.
+    is_modes : whether it is a table of modes.
     """
 
     source: str
@@ -262,6 +353,7 @@ class ForeignData:
     wrapped: tuple[bool, ...] = ()
     digits: int = _ALL_DIGITS
     omitted: tuple[str, ...] = ()
+    is_modes: bool = False
 
     def rows(self, chosen: NDArray[np.bool_] | slice) -> ForeignData:
         return replace(
@@ -269,9 +361,24 @@ class ForeignData:
             time_rounding=self.time_rounding[chosen],
         )  # fmt: skip
 
+    def only(self, *, loads: bool) -> ForeignData:
+        """The channels of loads alone, or all others."""
+        chosen = [j for j, channel in enumerate(self.channels) if channel.is_load == loads]
+        return replace(
+            self, channels=tuple(self.channels[j] for j in chosen), values=self.values[:, chosen],
+            rounding=self.rounding[:, chosen], wrapped=tuple(self.wrapped[j] for j in chosen if self.wrapped),
+        )  # fmt: skip
+
+    def beside(self, other: ForeignData) -> ForeignData:
+        """With the channels of `other`, of the same rows."""
+        return replace(
+            self, channels=self.channels + other.channels, values=np.hstack([self.values, other.values]),
+            rounding=np.hstack([self.rounding, other.rounding]), wrapped=self.wrapped + other.wrapped,
+        )  # fmt: skip
+
     @property
     def columns(self) -> list[int]:
-        """Places of the channels in a matrix of all angles, then all rates."""
+        """Places of the channels in a matrix of all angles, then all rates, then all loads."""
         return [channel.column for channel in self.channels]
 
 
@@ -283,7 +390,7 @@ def load_data(
     """Data from a file or from arrays by name, by a mapping or by guesses. Raises InputError, StoreError."""
     entries, group, omitted = read_mapping(columns, scene)
     table = table_of("data", data) if isinstance(data, Mapping) else read_table(data, group, scene.name)
-    chosen, lines = find_channels(table, scene, entries)
+    chosen, lines = find_channels(table, scene, entries, omitted)
     lengths = {entry.column: len(table[entry.column].values) for entry in chosen.values()}
     if len(set(lengths.values())) > 1:
         shown = ", ".join(f"{name} has {length} rows" for name, length in lengths.items())
@@ -302,19 +409,27 @@ def load_data(
         last_digits.append(half_last_digits(values) * abs(factor))
         si_values: Array = entry.sign * (values + entry.offset) * factor
         arrays.append(np.unwrap(si_values) if entry.wrapped else si_values)
-    _refuse_wrong_times(table.source, arrays[0])
+    is_modes = next(iter(chosen)).name == SPEED
+    if is_modes:
+        order = np.argsort(arrays[0], kind="stable")
+        arrays, last_digits = ([array[order] for array in columns] for columns in (arrays, last_digits))
+        if arrays[0][0] < 0.0 or (np.diff(arrays[0]) == 0.0).any():
+            raise InputError(f"{table.source}: a speed below 0, or one that repeats; allowed: a row for each speed")
+    else:
+        _refuse_wrong_times(table.source, arrays[0])
     return ForeignData(
         table.source,
         arrays[0],
         np.stack(arrays[1:], axis=1),
         tuple(chosen)[1:],
         np.stack(last_digits[1:], axis=1),
-        _time_rounding(arrays[0], last_digits[0]),
+        last_digits[0] if is_modes else _time_rounding(arrays[0], last_digits[0]),
         lines,
         tuple(name for name in table.columns if name not in lengths),
         tuple(entry.wrapped for entry in chosen.values())[1:],
-        max(_digits(table[entry.column].values) for channel, entry in chosen.items() if channel.name != TIME),
+        max(_digits(table[entry.column].values) for channel, entry in list(chosen.items())[1:]),
         omitted,
+        is_modes,
     )
 
 

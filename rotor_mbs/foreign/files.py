@@ -30,9 +30,18 @@ _ANGLES = {
 _TIMES = {**dict.fromkeys(("s", "sec", "second", "seconds"), 1.0), "ms": 1e-3, "us": 1e-6, "µs": 1e-6, "min": 60.0}
 _RATES = {f"{unit}{per}": factor for unit, factor in _ANGLES.items() for per in ("/s", "/sec", " s-1")}
 _RATES |= dict.fromkeys(("rpm", "rev/min", "r/min"), math.pi / 30.0) | {"hz": 2.0 * math.pi}
-UNITS = {"time": _TIMES, "angle": _ANGLES, "rate": _RATES}
-ALLOWED_UNITS = {"time": "s, ms, us, min", "angle": "rad, deg, turns", "rate": "rad/s, deg/s, turns/s, rpm"}
-BASE_UNITS = {"time": "s", "angle": "rad", "rate": "rad/s"}
+_FORCES = {"n": 1.0, "kn": 1e3}
+_MOMENTS = {f"{unit}{mark}m": factor for unit, factor in _FORCES.items() for mark in (" ", "", "-", "*", "·", ".")}
+UNITS = {
+    "time": _TIMES, "angle": _ANGLES, "rate": _RATES, "frequency": _RATES, "force": _FORCES, "moment": _MOMENTS,
+}  # fmt: skip
+ALLOWED_UNITS = {
+    "time": "s, ms, us, min", "angle": "rad, deg, turns", "rate": "rad/s, deg/s, turns/s, rpm",
+    "frequency": "rad/s, Hz", "force": "N, kN", "moment": "N m, kN m",
+}  # fmt: skip
+BASE_UNITS = {
+    "time": "s", "angle": "rad", "rate": "rad/s", "frequency": "rad/s", "force": "N", "moment": "N m",
+}  # fmt: skip
 
 
 _SHOWN = 12  # names that a message lists
@@ -61,16 +70,21 @@ class DataTable:
 
 
 def table_of(source: str, arrays: Mapping[str, Any], units: Mapping[str, str] | None = None) -> DataTable:
-    """Columns from arrays by name; one of two dimensions (n, k) becomes `name[0]` ... `name[k-1]`.
+    """Columns from arrays by name; one of two dimensions (n, k) becomes `name[0]` ... `name[k-1]`, one of three
+    (n, j, k) `name[0,0]` ... `name[j-1,k-1]`.
 
     Arrays that are no numbers, are single numbers, or have more dimensions are left out. An array (k, n) beside others
     of length n is turned, as MATLAB's are where they are stored by HDF5.
     """
     try:
-        numeric = {name: np.squeeze(_plain(values)) for name, values in arrays.items()}
+        numeric = {name: _plain(values) for name, values in arrays.items()}
     except ValueError as exc:
         raise InputError(f"{source}: rows of different lengths; allowed: arrays (n,) and (n, columns)") from exc
-    numeric = {name: values for name, values in numeric.items() if values.dtype.kind in "fiu" and values.ndim in (1, 2)}
+    is_row = any(values.shape == (1,) for values in numeric.values())  # of a single speed
+    numeric = {
+        name: values if is_row and values.shape[:1] == (1,) else np.squeeze(values) for name, values in numeric.items()
+    }
+    numeric = {name: values for name, values in numeric.items() if values.dtype.kind in "fiu" and 0 < values.ndim < 4}
     rows = max((values.size for values in numeric.values() if values.ndim == 1), default=0)
     columns: dict[str, DataColumn] = {}
     for name, values in numeric.items():
@@ -79,9 +93,9 @@ def table_of(source: str, arrays: Mapping[str, Any], units: Mapping[str, str] | 
         if values.ndim == 1:
             columns[plain] = DataColumn(values.astype(float), unit)
             continue
-        turned = values.T if values.shape[1] == rows != values.shape[0] else values
-        for number, column in enumerate(turned.T):
-            columns[f"{plain}[{number}]"] = DataColumn(column.astype(float), unit)
+        turned = values.T if values.shape[-1] == rows != values.shape[0] else values
+        for place in np.ndindex(turned.shape[1:]):
+            columns[f"{plain}[{','.join(map(str, place))}]"] = DataColumn(turned[:, *place].astype(float), unit)
     if not columns:
         raise InputError(f"{source}: no columns of numbers in it; allowed: a time and angles, as columns or arrays")
     return DataTable(source, columns)

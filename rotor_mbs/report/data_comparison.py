@@ -33,6 +33,7 @@ from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.solution import need_xarray
 from rotor_mbs.solution.text_table import TextTable
 from rotor_mbs.studies.compare_data import DataStudy, compare_with_reference
+from rotor_mbs.studies.data_modes import compare_modes
 
 
 def compare(
@@ -76,7 +77,11 @@ def compare(
     if isinstance(scene, list | tuple):
         raise InputError("compare: data and a scene; allowed: rotor_mbs.run(scene, methods) for methods of one scene")
     scene, timeout = scene_of(scene), checked_seconds(timeout)
-    study = compare_with_reference(load_data(data, scene, columns), scene, tolerance, timeout)
+    foreign = load_data(data, scene, columns)
+    if foreign.is_modes:
+        study = compare_modes(foreign, scene, tolerance)
+    else:
+        study = compare_with_reference(foreign, scene, tolerance, timeout)
     verdict = study.verdict
     return DataComparison(study, verdict, verdict.status, verdict.message, verdict.agrees, verdict.likely)
 
@@ -116,7 +121,7 @@ class DataComparison:
         """
         record = self.study.record()
         variables = {
-            name: ("time", record.arrays[name], {"units": column.units, "long_name": column.long_name})
+            name: (column.dimensions, record.arrays[name], {"units": column.units, "long_name": column.long_name})
             for name, column in record.columns.items()
         }
         facts = {name: record.attributes[name] for name in ("source", "status", "message", "tolerance")}
@@ -137,9 +142,10 @@ class DataComparison:
         if verdict.unused:
             lines.append(f"  not used: {', '.join(verdict.unused[:12])}{', ...' * (len(verdict.unused) > 12)}")
         lines += ["", str(self.table()), ""]
-        lines.append(
-            f"compared until {verdict.compared_until:g} s, judged up to the horizon at {verdict.horizon_s:g} s"
-        )
+        if verdict.axis == "time":
+            lines.append(
+                f"compared until {verdict.compared_until:g} s, judged up to the horizon at {verdict.horizon_s:g} s"
+            )
         if verdict.energy_drift is not None:
             lines.append(f"energy balance: {verdict.energy_drift:.1e} of the energy scale")
         lines += verdict.notes
@@ -163,10 +169,13 @@ def comparison_page(record: Record) -> dict[str, object]:
     verdict = verdict_of(record)
     facts = [
         ("Channels compared", ", ".join(channel.name for channel in verdict.channels)),
-        ("Rows", f"{verdict.rows}, until {with_unit(verdict.compared_until, 's', 4)}"),
-        ("Judged up to the horizon", with_unit(verdict.horizon_s, "s", 4)),
-        ("Tolerance", f"{number(verdict.tolerance)} rad in an interval, beyond rounding"),
+        ("Rows", f"{verdict.rows}, until {with_unit(verdict.compared_until, _axis_unit(verdict), 4)}"),
     ]
+    if verdict.axis == "time":
+        facts.append(("Judged up to the horizon", with_unit(verdict.horizon_s, "s", 4)))
+    units = dict.fromkeys(channel.defect_unit for channel in verdict.channels)
+    allowed = " or ".join("rad in an interval" if unit == "rad" else unit for unit in units)
+    facts.append(("Tolerance", f"{number(verdict.tolerance)} {allowed}, beyond rounding"))
     if verdict.unused:
         facts.append(("Columns not used", ", ".join(verdict.unused)))
     if verdict.message:
@@ -195,10 +204,16 @@ def channel_table(verdict: DataVerdict) -> TextTable:
     rows = []
     for channel in verdict.channels:
         errors = (f"{channel.error_max:.1e} {channel.unit}", _defect(channel))
-        until = ("never" if np.isnan(time) else f"{time:.6g} s" for time in channel.agrees_until)
-        fit = (f"{channel.lag_s:.1e}", f"{channel.scale - 1.0:.1e}", f"{channel.offset:.1e}")
+        until = ("never" if np.isnan(x) else f"{x:.6g} {_axis_unit(verdict)}" for x in channel.agrees_until)
+        fit = ("", "", "")
+        if channel.lag_s is not None and channel.scale is not None and channel.offset is not None:
+            fit = (f"{channel.lag_s:.1e}", f"{channel.scale - 1.0:.1e}", f"{channel.offset:.1e}")
         rows.append((channel.name, *errors, *until, *fit))
     return TextTable((*head, "lag (s)", "scale - 1", "offset"), rows)
+
+
+def _axis_unit(verdict: DataVerdict) -> str:
+    return "s" if verdict.axis == "time" else "rad/s"
 
 
 def verdict_of(record: Record) -> DataVerdict:
@@ -209,17 +224,21 @@ def verdict_of(record: Record) -> DataVerdict:
 def error_panels(record: Record) -> Panels:
     """The error of each channel over time, on a logarithmic axis."""
     verdict, channels = verdict_of(record), _drawn(verdict_of(record))
-    time = record.arrays["time"]
-    series = [Series(time, np.abs(_array(record, channel, "_error")), _look(channel)) for channel in channels]
-    return plots.errors(series, f"error ({channels[0].unit})", verdict.horizon_s)
+    rows = record.arrays[verdict.axis]
+    series = [Series(rows, np.abs(_array(record, channel, "_error")), _look(channel)) for channel in channels]
+    panels = plots.errors(series, f"error ({channels[0].unit})", verdict.horizon_s)
+    if verdict.axis == "speed":
+        panels.axes[-1].set_xlabel(canvas.SPEED_AXIS)
+    return panels
 
 
 def defect_panels(record: Record) -> Panels | None:
     """The defects of each coordinate over time, the larger of angle and rate, with the tolerance; None without any."""
-    verdict, time = verdict_of(record), record.arrays["time"]
+    verdict = verdict_of(record)
+    time = record.arrays[verdict.axis]
     sizes: dict[Look, Any] = {}
     for channel in verdict.channels:
-        if channel.defect is not None:
+        if channel.defect is not None and channel.defect_unit == "rad":
             values, look = _array(record, channel, "_defect")[1:], _look(channel)
             sizes[look] = np.fmax(sizes[look], values) if look in sizes else values
     if not sizes:
@@ -230,7 +249,7 @@ def defect_panels(record: Record) -> Panels | None:
 
 
 def _defect(channel: ChannelErrors) -> str:
-    return "" if channel.defect is None else f"{channel.defect:.1e} rad"
+    return "" if channel.defect is None else f"{channel.defect:.1e} {channel.defect_unit}"
 
 
 def _array(record: Record, channel: ChannelErrors, ending: str = "") -> Any:
@@ -238,8 +257,10 @@ def _array(record: Record, channel: ChannelErrors, ending: str = "") -> Any:
 
 
 def _drawn(verdict: DataVerdict) -> Sequence[ChannelErrors]:
-    """The channels that are drawn: the angles, else the rates."""
-    return [channel for channel in verdict.channels if channel.unit == "rad"] or verdict.channels
+    """The channels that are drawn: the angles, else the rates; of modes all."""
+    units = [channel.unit for channel in verdict.channels]
+    unit = "rad" if "rad" in units else units[0]
+    return [channel for channel in verdict.channels if channel.unit == unit]
 
 
 def _look(channel: ChannelErrors) -> Look:
@@ -251,9 +272,10 @@ def _look(channel: ChannelErrors) -> Look:
 def _pictures(record: Record, verdict: DataVerdict) -> list[Picture]:
     """Angles of the data upon those of the reference; errors; defects."""
     pictures = []
-    channels, time = [channel for channel in verdict.channels if channel.unit == "rad"], record.arrays["time"]
-    if channels:
-        panels = canvas.panels((2.9,), canvas.TIME_AXIS)
+    channels, time = _drawn(verdict), record.arrays[verdict.axis]
+    is_modes = verdict.axis == "speed"
+    if is_modes or channels[0].unit == "rad":
+        panels = canvas.panels((2.9,), canvas.SPEED_AXIS if is_modes else canvas.TIME_AXIS)
         axes = panels.axes[0]
         drawn = []
         for channel in channels:
@@ -262,9 +284,10 @@ def _pictures(record: Record, verdict: DataVerdict) -> list[Picture]:
             canvas.curve(axes, *plots.thin(time, reference), Look(GREY, "-", "", "reference"), 4.0, alpha=0.4)
             canvas.curve(axes, *plots.thin(time, data), _look(channel))
         plots.set_range(axes, np.stack(drawn, axis=1))
-        axes.set_ylabel(plots.ANGLE_AXIS)
-        pictures.append(picture(panels, "motion", "Angles of the data, upon those of the reference"))
-    caption = "Error against the reference; vertical line: horizon"
+        axes.set_ylabel("frequency (rad/s)" if is_modes else plots.ANGLE_AXIS)
+        what = "Frequencies" if is_modes else "Angles"
+        pictures.append(picture(panels, "motion", f"{what} of the data, upon those of the reference"))
+    caption = "Error against the reference" + ("" if is_modes else "; vertical line: horizon")
     pictures.append(picture(error_panels(record), "errors-0", caption))
     defects = defect_panels(record)
     if defects is not None:

@@ -25,7 +25,7 @@ from rotor_mbs.analysis.modes import (
     to_records,
 )
 from rotor_mbs.errors import InputError
-from rotor_mbs.report.core.canvas import Panels, curve, growth_map, log_axis, panels
+from rotor_mbs.report.core.canvas import SPEED_AXIS, Panels, curve, growth_map, log_axis, panels
 from rotor_mbs.report.core.elements import PageTable, Picture, Row, Section, TableCell
 from rotor_mbs.report.core.files import write_page
 from rotor_mbs.report.core.looks import BLUE, GREY, VERMILLION, Look, coordinate_look, with_capital
@@ -40,7 +40,6 @@ from rotor_mbs.solution.solution import need_xarray
 from rotor_mbs.solution.text_table import TextTable
 from rotor_mbs.studies.modes import compute_modes
 
-SPEED_AXIS = "rotor speed (rad/s)"
 _MARKS = ("o", "s", "^", "D", "v", "P", "x")
 # Growth over a turn beyond which the colours of the chart end.
 MAX_GROWTH = 1e3

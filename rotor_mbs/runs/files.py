@@ -368,7 +368,7 @@ def is_of_this_program(path: Path) -> bool:
 
 
 def read_arrays(path: Path, group: str = "", scene: str = "") -> tuple[dict[str, NDArray[Any]], dict[str, str]]:
-    """Arrays of numbers of up to two dimensions and their units by name, of any HDF5 file: those of one group.
+    """Arrays of numbers of up to three dimensions and their units by name, of any HDF5 file: those of one group.
 
     group: its path, or the end of it; may be left out where one group alone has arrays, or one alone but the reference
     below `scene`. Raises StoreError with the groups that there are.
@@ -410,7 +410,7 @@ def _array_places(file: Any) -> dict[str, list[str]]:
         if (
             isinstance(item, h5py.Dataset)
             and item.dtype.kind in "fiu"
-            and 0 < len(item.shape or ()) <= 2
+            and 0 < len(item.shape or ()) <= 3
             and item.size > 1
         ):
             folder, _, name = path.rpartition("/")

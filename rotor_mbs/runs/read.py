@@ -182,7 +182,7 @@ def run_arrays(path: Path, group: str = "", scene: str = "") -> dict[str, NDArra
     with open_results(path) as results:
         runs = {f"{name}/{run.method}": run for name, known in results.scenes.items() for run in known.runs.values()}
         run = runs[files.chosen_group(path, list(runs), group.strip("/"), scene)]
-        return {name: run.array(name) for name in run.names if run.array(name).ndim <= 2}
+        return {name: run.array(name) for name in run.names if run.array(name).ndim <= 3}
 
 
 def is_sweep(path: Path) -> bool:

@@ -11,7 +11,7 @@ from time import monotonic
 import numpy as np
 from numpy.typing import NDArray
 
-from rotor_mbs.analysis.data_verdict import DEFAULT_TOLERANCE, LEVELS, ChannelErrors, DataVerdict, as_dictionary
+from rotor_mbs.analysis.data_verdict import DEFAULT_TOLERANCE, ChannelErrors, DataVerdict, agrees_until, as_dictionary
 from rotor_mbs.analysis.judgement import OK_ERROR
 from rotor_mbs.errors import InputError
 from rotor_mbs.foreign.channels import ForeignData, channels
@@ -29,6 +29,7 @@ from rotor_mbs.solution.defects import FLOOR_SAFETY, Defects
 from rotor_mbs.solution.metrics import horizon, horizon_samples, metrics_of, running_growth
 from rotor_mbs.solution.trajectory import Array, Trajectory
 from rotor_mbs.studies.data_causes import CauseSearch, carried_errors, likely_causes, states_of
+from rotor_mbs.studies.data_loads import compare_loads
 from rotor_mbs.studies.defect_causes import DefectCauses
 
 METHOD = "data"  # what takes the place of a method's name
@@ -57,10 +58,10 @@ class DataStudy:
     verdict: DataVerdict
 
     def record(self) -> Record:
-        """As a record of a results file: of each channel data, reference, error, and error amplification."""
-        values = self.data.values[: self.verdict.rows]
-        columns = {"time": Column(("time",), "s", "time")}
-        arrays: dict[str, Array] = {"time": self.data.time[: self.verdict.rows]}
+        """As a record of a results file: of each channel data, reference, error, and defect of an angle or a rate."""
+        values, axis = self.data.values[: self.verdict.rows], self.verdict.axis
+        scale = Column((axis,), "s", "time") if axis == "time" else Column((axis,), "rad/s", "rotor speed")
+        columns, arrays = {axis: scale}, {axis: self.data.time[: self.verdict.rows]}
         kinds = {
             "": ("", values),
             "_reference": (", reference", self.expected),
@@ -69,7 +70,9 @@ class DataStudy:
         for j, channel in enumerate(self.data.channels):
             for ending, (what, array) in kinds.items():
                 arrays[channel.key + ending] = array[:, j]
-                columns[channel.key + ending] = Column(("time",), channel.unit, channel.name + what)
+                columns[channel.key + ending] = Column((axis,), channel.unit, channel.name + what)
+            if channel.is_load or self.data.is_modes:
+                continue
             # Of the interval that ends at a row; NaN where there is none.
             defect = np.full(len(values), np.nan)
             known = of_channel(self.scene, self.defects, channel.column)
@@ -88,7 +91,8 @@ class DataStudy:
             "verdict": json.dumps(as_dictionary(verdict)),
             **versions(),
         }
-        return Record("comparison", self.scene.name, "data/trajectory", facts, arrays, columns)
+        name = "data/modes" if self.data.is_modes else "data/trajectory"
+        return Record("comparison", self.scene.name, name, facts, arrays, columns)
 
 
 @np.errstate(all="ignore")  # data may be of any size
@@ -105,6 +109,7 @@ def compare_with_reference(
     ends = monotonic() + time_limit_s
     if not 0.0 < tolerance < float("inf"):
         raise InputError(f"tolerance: {tolerance!r}; allowed: a number more than 0, rad")
+    loads, data = data.only(loads=True), data.only(loads=False)
     cut = data.rows(data.time <= scene.duration * (1.0 + _ROUNDING))
     # At the times of the data and at the scene's samples, which make growth and horizon the same for all data.
     end = max(scene.duration, float(cut.time[-1])) if len(cut.time) else scene.duration
@@ -180,6 +185,19 @@ def compare_with_reference(
         notes.append(start)
     if status == "ok" and likely:
         notes.append(f"within {tolerance:g} rad an interval, but not random")
+    if loads.channels:
+        loads = loads.rows(slice(rows))
+        own = np.full((rows, len(loads.channels)), np.nan)
+        if defects is None:
+            notes.append("no loads: the motion that they belong to is not known")
+            status, message = ("unchecked", notes[-1]) if status == "ok" else (status, message)
+        else:
+            found = compare_loads(scene, loads, defects, tolerance)
+            own[: len(found.expected)] = found.expected
+            errors, likely = errors + found.errors, [*likely, *found.likely]
+            if found.message and status in ("ok", "unchecked"):
+                status, message = "inaccurate", found.message
+        expected, cut = np.hstack([expected, own]), compared.beside(loads)
     verdict = DataVerdict(
         scene.name, data.source, status, message, tolerance, errors, rows, float(at_rows.time[-1]), horizon_s,
         defect_time, predicted, energy_drift, data.read, data.unused, tuple(notes), tuple(likely),
@@ -298,11 +316,6 @@ def _channel_errors(
     errors = []
     for j, channel in enumerate(data.channels):
         error = np.abs(data.values[:, j] - expected[:, j])
-        agrees_until = []
-        for level in LEVELS:
-            beyond = np.flatnonzero(~(error <= level))
-            last = int(beyond[0]) - 1 if len(beyond) else len(time) - 1
-            agrees_until.append(float(time[last]) if last >= 0 else float("nan"))
         # Linear least squares, each row by its weight; what a channel cannot show is 0 or 1.
         weight = growth[:until]
         columns = np.stack([-slopes[:until, j], expected[:until, j], np.ones(until)], axis=1) / weight[:, None]
@@ -317,7 +330,7 @@ def _channel_errors(
         errors.append(
             ChannelErrors(
                 channel.name, channel.unit, float(error[:until].max()), float(error.max()), defect, floor,
-                tuple(agrees_until), float(lag), 1.0 + float(scale), float(offset),
+                agrees_until(time, error), float(lag), 1.0 + float(scale), float(offset),
             )
         )  # fmt: skip
     return tuple(errors)

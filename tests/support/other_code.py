@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 from scipy.integrate import solve_ivp
+from scipy.spatial.transform import Rotation
 
 from rotor_mbs.scenario.scene import Scene
 
@@ -63,6 +64,41 @@ def acceleration(scene: Scene, t: float, state: Array) -> Array:
     count = 1 + len(scene.blades)
     loads = [value_at(table, t) for table in (scene.rotor_torque, *scene.pitch_torque, *scene.bearing_rest)]
     return np.concatenate([state[count:], _equations(scene, NONE)(loads, state[:count], state[count:])])
+
+
+def loads(scene: Scene, times: Array, angles: Array, rates: Array) -> dict[str, Array]:
+    """The loads of docs/loads.md by Newton's and Euler's laws in the base frame, from the accelerations above."""
+    states = np.hstack([angles, rates])
+    slopes = np.array([acceleration(scene, t, state) for t, state in zip(times, states, strict=True)])
+    accelerations = slopes[:, angles.shape[1] :]
+    shaft = np.array([0.0, 1.0, 0.0])
+    roots, total_force, total_moment = [], 0.0, scene.hub_inertia * accelerations[:, :1] * shaft
+    for i, blade in enumerate(scene.blades):
+        frame = about("y", angles[:, 0] + scene.phases[i]) * about("z", angles[:, 1 + i])
+        axis = frame.apply([0.0, 0.0, 1.0])
+        spin, rate = rates[:, :1] * shaft, rates[:, 1 + i, None] * axis
+        omega = spin + rate
+        alpha = accelerations[:, :1] * shaft + accelerations[:, 1 + i, None] * axis + np.cross(spin, rate)
+        r = frame.apply(blade.centre_of_mass)
+        xx, yy, zz, xy, xz, yz = blade.inertia
+        matrices = frame.as_matrix()
+        tensor = matrices @ np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]) @ matrices.transpose(0, 2, 1)
+        force = blade.mass * (np.cross(alpha, r) + np.cross(omega, np.cross(omega, r)) + [0.0, 0.0, scene.gravity])
+        spun = np.einsum("nij,nj->ni", tensor, omega)
+        moment = np.einsum("nij,nj->ni", tensor, alpha) + np.cross(omega, spun) + np.cross(r, force)
+        roots.append((frame.inv().apply(force), frame.inv().apply(moment)))
+        total_force, total_moment = total_force + force, total_moment + moment
+    forces, moments = (np.stack(vectors, axis=1) for vectors in zip(*roots, strict=True))
+    torque = np.array([value_at(scene.rotor_torque, t) for t in times])
+    return {
+        "blade_root_force": forces, "blade_root_moment": moments, "shaft_force": total_force,
+        "shaft_moment": total_moment - torque[:, None] * shaft, "pitch_actuator_moment": moments[:, :, 2],
+    }  # fmt: skip
+
+
+def about(axis: str, angles: Array) -> Rotation:
+    """Rotations by (n,) rad about an axis."""
+    return Rotation.from_rotvec(np.outer(angles, np.eye(3)["xyz".index(axis)]))
 
 
 def value_at(table: Array, t: Array) -> Array:

@@ -1,11 +1,11 @@
 """A user's script for Pinocchio, which knows nothing of this package: a rotor's numbers in JSON to a CSV in degrees.
 
-    pip install pin scipy && python pinocchio_script.py rotor.json out.csv
+    pip install pin scipy && python pinocchio_script.py rotor.json out.csv [loads]
 
 Accelerations by Pinocchio's articulated-body algorithm, over time by SciPy's DOP853 from one knot of the loads to the
 next. In the JSON: blades (mass, centre_of_mass, inertia xx yy zz xy xz yz), hub_inertia, gravity, stiffness, damping,
 shaft_damping, angles and rates at the start, times, and loads: rows [t, value] of the rotor's torque, of each pitch's
-torque, then of each spring's rest angle.
+torque, then of each spring's rest angle. With `loads`, also the joints' forces by the recursive Newton-Euler algorithm.
 """
 
 import json
@@ -34,11 +34,37 @@ def model_of(rotor):
     return model
 
 
+def torques(rotor, t, y):
+    """(1 + blades,) N m on the joints, and that of the drive alone, at a state (2 (1 + blades),)."""
+    blades = len(rotor["blades"])
+    q, v = y[: 1 + blades], y[1 + blades :]
+    loads = np.array([np.interp(t, *np.transpose(table)) if table else 0.0 for table in rotor["loads"]])
+    spring = np.array(rotor["stiffness"]) * (q[1:] - loads[1 + blades :])
+    pitch = loads[1 : 1 + blades] - spring - np.array(rotor["damping"]) * v[1:]
+    return np.array([loads[0] - rotor["shaft_damping"] * v[0], *pitch]), loads[0]
+
+
+def joint_loads(rotor, states):
+    """Columns by name: forces (N) and moments (N m) of the joints; those of the shaft in the rotor's frame."""
+    model = model_of(rotor)
+    data, count, rows = model.createData(), model.nv, []
+    for t, y in zip(rotor["times"], states, strict=True):
+        q, v = y[:count], y[count:]
+        torque, drive = torques(rotor, t, y)
+        pin.rnea(model, data, q, v, pin.aba(model, data, q, v, torque))
+        shaft, *roots = (np.concatenate([f.linear, f.angular]) for f in list(data.f)[1:])
+        shaft[4] -= drive  # which the bearing does not transmit
+        rows.append(np.concatenate([shaft, *roots]))
+    kinds = [f"{kind} {{}}{axis}" for kind in ("force", "moment") for axis in "xyz"]
+    names = ["shaft " + kind.format("") + " rotor frame" for kind in kinds]
+    names += [f"blade root {kind.format(f'{i} ')}" for i in range(1, count) for kind in kinds]
+    return dict(zip(names, np.transpose(rows), strict=True))
+
+
 def trajectory(rotor):
     """(n, 2 (1 + blades)) at the times, of which the first is 0."""
     model = model_of(rotor)
-    data, count, blades = model.createData(), model.nv, model.nv - 1
-    stiffness, damping = np.array(rotor["stiffness"]), np.array(rotor["damping"])
+    data, count = model.createData(), model.nv
     times = np.array(rotor["times"])
     knots = {t for table in rotor["loads"] for t, _ in table if 0.0 < t < times[-1]}
     rows = [np.array([*rotor["angles"], *rotor["rates"]])[:, None]]
@@ -46,12 +72,8 @@ def trajectory(rotor):
 
         def slope(t, y, start=start, end=end):
             margin = 1e-9 * (end - start)  # a jump counts for the interval that it begins
-            at = min(max(t, start + margin), end - margin)
-            loads = np.array([np.interp(at, *np.transpose(table)) if table else 0.0 for table in rotor["loads"]])
-            q, v = y[:count], y[count:]
-            pitch = loads[1 : 1 + blades] - stiffness * (q[1:] - loads[1 + blades :]) - damping * v[1:]
-            torque = np.array([loads[0] - rotor["shaft_damping"] * v[0], *pitch])
-            return np.concatenate([v, pin.aba(model, data, q, v, torque)])
+            torque, _ = torques(rotor, min(max(t, start + margin), end - margin), y)
+            return np.concatenate([y[count:], pin.aba(model, data, y[:count], y[count:], torque)])
 
         inside = times[(times > start) & (times <= end)]
         run = solve_ivp(slope, (start, end), rows[-1][:, -1], "DOP853", np.union1d(inside, end), rtol=1e-11, atol=1e-12)
@@ -63,8 +85,10 @@ def trajectory(rotor):
 
 if __name__ == "__main__":
     rotor = json.loads(Path(sys.argv[1]).read_text())
-    states = np.degrees(trajectory(rotor))
+    states = trajectory(rotor)
     names = ["rotor", *(f"pitch {i + 1}" for i in range(len(rotor["blades"])))]
     header = ["time [s]", *(f"{name} [deg]" for name in names), *(f"{name} rate [deg/s]" for name in names)]
-    table = np.column_stack([rotor["times"], states])
+    columns = joint_loads(rotor, states) if "loads" in sys.argv else {}
+    header += [f"{name} [{'N m' if 'moment' in name else 'N'}]" for name in columns]
+    table = np.column_stack([rotor["times"], np.degrees(states), *columns.values()])
     np.savetxt(sys.argv[2], table, delimiter=",", header=",".join(header), comments="", fmt="%.17g")

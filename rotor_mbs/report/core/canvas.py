@@ -24,7 +24,7 @@ from rotor_mbs.report.core.numbers import power
 from rotor_mbs.runs.files import replace_file
 
 WIDTH = 5.2  # in; on a telephone's 360 px a text of 9.5 points is then 9 px high
-TIME_AXIS = "time (s)"
+TIME_AXIS, SPEED_AXIS = "time (s)", "rotor speed (rad/s)"
 hex_colour = to_hex  # of any colour of matplotlib's: "#0072b2"
 PRINT_WIDTH = 174.0 / 25.4  # in; two columns of a journal
 FONT_FILE = Path(matplotlib.get_data_path()) / "fonts" / "ttf" / "DejaVuSans.ttf"

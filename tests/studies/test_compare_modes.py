@@ -1,0 +1,163 @@
+"""Tables of frequencies over rotor speed: right ones are ok, wrong units and missing stiffening are named."""
+
+from __future__ import annotations
+
+import functools
+import math
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import rotor_mbs as rm
+from rotor_mbs.cli import main
+from rotor_mbs.report.data_comparison import DataComparison
+from rotor_mbs.scenario.scene import Scene
+from rotor_mbs.studies.modes import compute_modes
+
+Array = Any
+SPEEDS = np.linspace(0.0, 3.0, 7)
+DAMPED, SPRUNG, UNEQUAL = "stiff/nrel-5mw-damped", "stiff/nrel-5mw", "check/general"
+
+
+@functools.cache
+def tables(name: str) -> tuple[Array, Array]:
+    """(speeds, modes) damped and undamped frequencies by Exudyn's linearization of its own model, rad/s."""
+    scene = rm.scene(name).replace(gravity=0.0)
+    modes = compute_modes(scene, SPEEDS, models=("exudyn_tree",)).rotation["exudyn_tree"]
+    return modes.damped_frequencies, modes.undamped_frequencies
+
+
+def blade_alone(scene: Scene, *, stiffening: bool) -> Array:
+    """(speeds,) rad/s of a blade that pitches on its spring while the rotor turns steadily, by sums over its masses.
+
+    With the distances u across the shaft and v along it from the pitch axis, at pitch 0: J θ'' + (k + Ω² Σ m (u² - v²))
+    θ = 0; of linear displacements alone, without the share of u², which is of second order.
+    """
+    blade = scene.blades[0]
+    x, y, _ = blade.centre_of_mass
+    xx, yy, zz = blade.inertia[:3]
+    across, along = 0.5 * (yy + zz - xx) + blade.mass * x * x, 0.5 * (xx + zz - yy) + blade.mass * y * y
+    stiffness = scene.bearing_stiffness[0] + SPEEDS**2 * (across * stiffening - along)
+    return np.sqrt(stiffness / (across + along))
+
+
+def compare(name: str, frequencies: Array, speeds: Array = SPEEDS, key: str = "frequencies") -> DataComparison:
+    return rm.compare({"speed": speeds, key: frequencies}, name)
+
+
+@pytest.mark.parametrize("name", [SPRUNG, DAMPED, UNEQUAL])
+def test_right_frequencies_of_another_engine_are_ok(name: str) -> None:
+    damped, undamped = tables(name)
+    order = np.argsort(damped[:, 1:], axis=1)  # by size, without the rotor's own zero
+    for found in (
+        compare(name, damped), compare(name, np.take_along_axis(damped[:, 1:], order, 1)),
+        compare(name, undamped, key="undamped_frequencies"),
+    ):  # fmt: skip
+        assert (found.status, found.message, found.likely) == ("ok", "", ())
+    # Exudyn's difference quotients; a hundredth of a percent is seen.
+    assert max(channel.defect or 0.0 for channel in compare(name, damped).verdict.channels) < 1e-8
+    assert compare(name, damped * 1.0001).status == "inaccurate"
+
+
+MISTAKES: dict[str, tuple[str, Callable[[Array, Array], tuple[Array, Array]], str]] = {
+    "Hz": (SPRUNG, lambda f, _: (SPEEDS, f / (2.0 * math.pi)), "frequencies in Hz taken as rad/s"),
+    "Hz, unequal blades": (UNEQUAL, lambda f, _: (SPEEDS, f / (2.0 * math.pi)), "frequencies in Hz taken as rad/s"),
+    "per minute": (SPRUNG, lambda f, _: (SPEEDS, f * 30.0 / math.pi), "frequencies in rpm taken as rad/s"),
+    "rpm": (UNEQUAL, lambda f, _: (SPEEDS * 30.0 / math.pi, f), "speeds in rpm taken as rad/s"),
+    "turns per second": (UNEQUAL, lambda f, _: (SPEEDS / (2.0 * math.pi), f), "speeds in Hz taken as rad/s"),
+    "rpm and Hz": (
+        UNEQUAL, lambda f, _: (SPEEDS * 30.0 / math.pi, f / (2.0 * math.pi)),
+        "frequencies in Hz taken as rad/s; and speeds in rpm taken as rad/s",
+    ),
+    "undamped": (DAMPED, lambda _, u: (SPEEDS, u), "undamped frequencies"),
+    "whirl": (
+        UNEQUAL, lambda f, _: (SPEEDS, np.abs(f[:, 1:] - SPEEDS[:, None])),
+        "frequencies in the fixed frame (whirl), the rotor's speed below or above those in the rotor's frame",
+    ),
+    "no stiffening": (
+        SPRUNG, lambda *_: (SPEEDS, np.repeat(blade_alone(rm.scene(SPRUNG), stiffening=False)[:, None], 2, axis=1)),
+        "centrifugal stiffening is missing: f² = f0² - α Ω², α = ",
+    ),
+    "no stiffening, in Hz": (
+        SPRUNG, lambda *_: (SPEEDS, blade_alone(rm.scene(SPRUNG), stiffening=False)[:, None] / (2.0 * math.pi)),
+        "frequencies in Hz taken as rad/s; and centrifugal stiffening is missing: f² = f0² - α Ω², α = ",
+    ),
+    "unequal blades, softened": (
+        UNEQUAL, lambda _, u: (SPEEDS, np.sqrt(u[:1, 1:] ** 2 - 0.4 * SPEEDS[:, None] ** 2)),
+        "centrifugal stiffening is missing: f² = f0² - α Ω², α = 0.4",
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("mistake", MISTAKES)
+def test_a_mistake_is_named(mistake: str) -> None:
+    name, change, text = MISTAKES[mistake]
+    speeds, frequencies = change(*tables(name))
+    found = compare(name, frequencies, speeds)
+    assert found.status == "inaccurate"
+    assert found.likely[0].startswith(text), found.likely
+    assert len(found.likely) == 1
+
+
+def test_a_blade_with_its_stiffening_is_right() -> None:
+    """The sums over its masses are those of the scene: what is left out above is the stiffening alone."""
+    assert compare(SPRUNG, blade_alone(rm.scene(SPRUNG), stiffening=True)[:, None]).status == "ok"
+
+
+def test_what_nothing_explains_has_no_cause() -> None:
+    damped, _ = tables(UNEQUAL)
+    for wrong in (1.01 * damped, damped * np.linspace(1.0, 1.01, len(SPEEDS))[:, None]):
+        assert compare(UNEQUAL, wrong).likely == ()
+
+
+def test_the_command_reads_a_table_in_rpm_and_hz_and_few_digits(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Rows in any order; a mapping with omit; the page again from the stored file."""
+    damped, _ = tables(UNEQUAL)
+    rows = np.column_stack([SPEEDS * 30.0 / math.pi, damped[:, 1:] / (2.0 * math.pi)])[::-1]
+    for digits, factor, status in (("%.17g", 1.0, 0), ("%.5e", 1.0, 0), ("%.17g", 1.001, 1)):
+        head = "speed [rpm],f1 [Hz],f2 [Hz],freq_3_Hz"
+        np.savetxt(tmp_path / "m.csv", rows * [1.0, factor, 1.0, 1.0], digits, ",", header=head, comments="")
+        call = ["compare", str(tmp_path / "m.csv"), "--scene", UNEQUAL, "-o", str(tmp_path / "page")]
+        assert main(call) == status
+        shown = capsys.readouterr().out
+        assert "frequency 3 = 'freq_3_Hz' [hz]" in shown
+        assert "horizon" not in shown
+        page = (tmp_path / "page" / "index.html").read_text()
+        assert ("inaccurate" in page) == (status == 1)
+        assert "of its size" in page
+        assert main(["report", str(tmp_path / "page" / "comparison.h5"), "-o", str(tmp_path / "again")]) == 0
+        assert (tmp_path / "again" / "index.html").read_text() == page
+        capsys.readouterr()
+    assert main([*call, "--json"]) == 1
+    assert '"axis": "speed"' in capsys.readouterr().out
+    (tmp_path / "map.toml").write_text('omit = ["frequency_1"]\n')
+    assert main([*call, "--columns", str(tmp_path / "map.toml")]) == 0
+
+
+def test_a_single_speed_and_rest() -> None:
+    damped, _ = tables(UNEQUAL)
+    assert compare(UNEQUAL, damped[-1:], SPEEDS[-1:]).status == "ok"
+    rest = compute_modes(rm.scene(UNEQUAL), models=("exudyn_tree",)).rest["exudyn_tree"]
+    assert compare(UNEQUAL, rest.damped_frequencies, np.zeros(1)).status == "ok"
+
+
+@pytest.mark.parametrize(
+    ("data", "message"),
+    [
+        ({"speed": [0.0, 1.0, 1.0], "f1": [1.0, 2.0, 3.0]}, "one that repeats"),
+        ({"speed": [-1.0, 1.0], "f1": [1.0, 2.0]}, "a speed below 0"),
+        ({"speed": [0.0, 1.0], "f1": [1.0, np.nan]}, "'f1' is nan in row 2"),
+        ({"speed": [0.0, 1.0], "other": [1.0, 2.0]}, "no column for the time"),
+        ({"speed": [0.0, 1.0], **{f"f{i}": [1.0, 2.0] for i in range(1, 5)}, "undamped frequency 1": [1.0, 2.0]},
+         "5 frequencies; allowed: 4"),
+        ({"speed [kg]": [0.0, 1.0], "f1": [1.0, 2.0]}, "'kg'; allowed: rad/s"),
+    ],
+)  # fmt: skip
+def test_wrong_tables_are_refused(data: dict[str, Array], message: str) -> None:
+    with pytest.raises(rm.InputError, match=message):
+        rm.compare(data, UNEQUAL)
