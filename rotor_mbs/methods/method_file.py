@@ -6,11 +6,14 @@ process has read.
 
 from __future__ import annotations
 
+import atexit
 import multiprocessing
 import os
+import pickle
 import re
 import subprocess
 import sys
+import threading
 import traceback
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
@@ -18,11 +21,10 @@ from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from types import ModuleType
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from rotor_mbs.errors import InputError, RotorError, one_line
 from rotor_mbs.methods.base import BuiltItem, Ladder, Method, no_items, step_ladder, tolerance_ladder
-from rotor_mbs.methods.time_limit import time_limit
 
 if TYPE_CHECKING:
     from rotor_mbs.scenario.scene import Scene
@@ -31,8 +33,9 @@ ENDING = ".py"
 _LOAD_S = 300.0  # large engines load in seconds, on a busy machine in minutes
 _NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.-]*")
 _TOLERANCES = ("tolerance", "relative_tolerance", "accuracy")  # settings that make a ladder where there is no step
-_LOADED = "loaded"
-_LOADING = "import sys; from rotor_mbs.methods.method_file import load_alone; load_alone(sys.argv[1])"
+_SERVING = "from rotor_mbs.methods.method_file import answer_questions; answer_questions()"
+_MOST_PROCESSES = 4  # of files that are loaded apart
+_END_S = 5.0  # until such a process has ended
 
 
 @dataclass(frozen=True)
@@ -95,8 +98,14 @@ class MethodFile:
         )
 
     def _items(self, method: Method, scene: Scene) -> list[BuiltItem]:
-        """Where the method does not say what it builds, it is built: what it cannot represent it refuses there."""
-        with self.located(), time_limit(_LOAD_S):
+        """Where the method does not say what it builds, it is built: what it cannot represent it refuses there. In a
+        process of its own: somebody's code may end or hang it."""
+        items: list[BuiltItem] = _apart(self).ask(f"{self.model}/{method.name.rpartition('/')[2]}", scene)
+        return items
+
+    def build_items(self, method: Method, scene: Scene) -> list[BuiltItem]:
+        """As `_items`, in this process."""
+        with self.located():
             if method.items is not no_items:
                 return method.items(scene)
             method.build(scene, method.settings())
@@ -128,22 +137,102 @@ def read_file(path: str) -> MethodFile:
         file = MethodFile(path, Path(path).read_text(encoding="utf-8"))
     except (OSError, ValueError) as exc:
         raise InputError(f"{path}: {getattr(exc, 'strerror', None) or exc}; allowed: a Python file") from exc
-    # Loaded elsewhere first: it must not end or hang this process. Without -P, Python would import from this folder.
-    command = [sys.executable, "-P", "-c", _LOADING, path]
-    try:
-        done = subprocess.run(command, stdin=subprocess.DEVNULL, capture_output=True, timeout=_LOAD_S, check=False)
-    except subprocess.TimeoutExpired as exc:
-        raise InputError(f"{path}: not loaded within {_LOAD_S:g} s") from exc
-    if not done.stdout.endswith(_LOADED.encode()):
-        raise InputError(f"{path}: ended the process that loaded it (exit code {done.returncode})")
+    _apart(file)
     return file
 
 
-def load_alone(path: str) -> None:
-    """In a process of its own. What it raises is raised again where it counts."""
+class _Process:
+    """A process that has loaded a file, and builds its methods. Raises InputError where the file ends or hangs it."""
+
+    def __init__(self, file: MethodFile) -> None:
+        self._path = file.path
+        # Without -P, Python would import from this folder.
+        command = [sys.executable, "-P", "-c", _SERVING]
+        pipe, nothing = subprocess.PIPE, subprocess.DEVNULL
+        self._process = subprocess.Popen(command, stdin=pipe, stdout=pipe, stderr=nothing)
+        late = f"{self._path}: not loaded within {_LOAD_S:g} s"
+        self._ask(file, late, f"{self._path}: ended the process that loaded it")
+
+    def ask(self, name: str, scene: Scene) -> Any:
+        """What the method builds for the scene. Raises MethodRefusal, InputError."""
+        late = f"{name}: builds nothing for {scene.name} within {_LOAD_S:g} s"
+        answer = self._ask((name, scene), late, f"{name}: ended the process that built it for {scene.name}")
+        if isinstance(answer, RotorError):
+            raise answer
+        return answer
+
+    def _ask(self, question: object, late: str, ended: str) -> Any:
+        timer = threading.Timer(_LOAD_S, self._process.kill)
+        timer.start()
+        try:
+            assert self._process.stdin is not None
+            assert self._process.stdout is not None
+            pickle.dump(question, self._process.stdin)
+            self._process.stdin.flush()
+            return pickle.load(self._process.stdout)
+        except (OSError, EOFError):
+            is_late = not timer.is_alive()
+            self.close()
+            raise InputError(late if is_late else f"{ended} (exit code {self._process.returncode})") from None
+        finally:
+            timer.cancel()
+
+    def close(self) -> None:
+        _processes.pop(self._path, None)
+        with suppress(subprocess.TimeoutExpired):
+            self._process.communicate(timeout=_END_S)  # it ends with its input
+        self._process.kill()
+        self._process.wait()
+
+
+_processes: dict[str, tuple[MethodFile, _Process]] = {}
+
+
+def _apart(file: MethodFile) -> _Process:
+    """The process that has loaded this text of the file."""
+    known = _processes.get(file.path)
+    if known is not None and known[0] == file:
+        return known[1]
+    if known is not None:
+        known[1].close()
+    elif len(_processes) == _MOST_PROCESSES:
+        next(iter(_processes.values()))[1].close()
+    process = _Process(file)
+    _processes[file.path] = file, process
+    return process
+
+
+@atexit.register
+def _close_processes() -> None:
+    for _, process in list(_processes.values()):
+        process.close()
+
+
+def answer_questions() -> None:
+    """What a `_Process` does: loads the file, then builds what is asked. What loading raises is raised again where it
+    counts."""
+    answers = os.fdopen(os.dup(1), "wb")
+    with open(os.devnull, "wb") as nowhere:  # noqa: PTH123  (a device)
+        os.dup2(nowhere.fileno(), 1)
+    questions = sys.stdin.buffer
+    file: MethodFile = pickle.load(questions)
+    methods: dict[str, Method] = {}
     with suppress(InputError):
-        MethodFile(path, Path(path).read_text(encoding="utf-8")).load(())
-    sys.stdout.write(_LOADED)
+        methods = file.load(())
+    answer: object = None
+    while True:
+        pickle.dump(answer, answers)
+        answers.flush()
+        try:
+            name, scene = pickle.load(questions)
+        except EOFError:
+            return
+        try:
+            items = methods[name].items
+            assert isinstance(items, partial)
+            answer = file.build_items(items.args[0], scene)
+        except RotorError as exc:
+            answer = exc
 
 
 @contextmanager

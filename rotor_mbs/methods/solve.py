@@ -8,11 +8,13 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from rotor_mbs.errors import RotorError
 from rotor_mbs.methods.base import Method
 from rotor_mbs.methods.catalogue import find_method
 from rotor_mbs.methods.time_limit import time_limit
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.solution import Solution
+from rotor_mbs.solution.trajectory import shape_fault
 
 _OBSERVING_S = 1.0  # in any case, of what was reached by the time limit
 
@@ -28,7 +30,7 @@ def solve(
     """Build once, integrate up to `repeats` times within `budget_s`, the garbage collector off, and observe once;
     `settings` that differ from the defaults; `time_limit_s` is for the integrations together. The Solution is not yet
     judged, and holds a failure of the engine. Raises InputError for an unknown method or setting, MethodRefusal,
-    OutOfTimeError where a method cannot keep the samples it reached."""
+    OutOfTimeError where a method cannot keep the samples it reached, RotorError where an array has a wrong shape."""
     method = find_method(method) if isinstance(method, str) else method
     chosen = method.chosen(scene, settings)
     start = time.perf_counter()
@@ -57,6 +59,8 @@ def solve(
     ):  # of a runaway: the judgement sees what is not finite
         trajectory = solver.observe()
     output = time.perf_counter() - start
+    if fault := shape_fault(scene, trajectory):
+        raise RotorError(f"{method.name}: {fault}")
     return Solution(
         scene,
         method.name,

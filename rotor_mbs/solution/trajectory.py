@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from rotor_mbs.scenario.scene import Scene
-from rotor_mbs.solution.quantities import NAMES
+from rotor_mbs.solution.quantities import NAMES, known_quantities, row_shape
 from rotor_mbs.solution.quantities import Array as Array  # with the samples, for the models
 from rotor_mbs.solution.quantities import sample_times as sample_times
 
@@ -59,6 +59,19 @@ class Trajectory:
 
 
 _FIELDS = ("time", "angles", "rates")
+
+
+def shape_fault(scene: Scene, run: Trajectory) -> str:
+    """The array that has not the shape of the scene and as many rows as there are times; "" where all have."""
+    time = np.shape(run.time)
+    if len(time) != 1:
+        return f"time has the shape {time}; allowed: one dimension"
+    for quantity in known_quantities(scene.outputs):
+        values = run.get(quantity.name)
+        wanted = (*time, *row_shape(quantity, scene))
+        if quantity.is_over_time and values is not None and np.shape(values) != wanted:
+            return f"{quantity.name} has the shape {np.shape(values)}; allowed: {wanted}"
+    return ""
 
 
 @dataclass(slots=True)

@@ -26,7 +26,7 @@ from rotor_mbs.scenario.catalogue import only_scene
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.defects import Defects
 from rotor_mbs.solution.metrics import metrics_of
-from rotor_mbs.solution.trajectory import Array, Integration, Trajectory, sample_times
+from rotor_mbs.solution.trajectory import Array, Integration, Trajectory, sample_times, shape_fault
 from rotor_mbs.studies.compare_data import compare_with_reference
 
 # Between them they have every term; those with fewer terms first. With durations in s that show each at work, and how
@@ -257,13 +257,9 @@ class _Examination:
 
 def protocol_fault(scene: Scene, run: Trajectory, integration: Integration) -> str:
     """What is wrong with the form of a run that claims to be complete; "" where nothing is."""
-    times, columns = sample_times(scene), 1 + len(scene.blades)
-    n = len(run.time)
-    for name, values in {"angles": run.angles, "rates": run.rates}.items():
-        if np.shape(values) != (n, columns):
-            return f"{name} have the shape {np.shape(values)}; allowed: {(n, columns)}"
-    if any(len(values) != n for values in run.quantities.values()):
-        return "quantities have not as many rows as there are times"
+    if fault := shape_fault(scene, run):
+        return fault
+    times, n = sample_times(scene), len(run.time)
     rows = np.isfinite(np.hstack([run.time[:, None], run.angles, run.rates])).all(axis=1)
     if not rows.all():
         return f"row {1 + int(np.argmin(rows))} is not finite; a run ends before it"

@@ -57,7 +57,26 @@ class Prints(Still):
         print("x" * 10**6)
         os.write(1, b"x" * 10**6)
 
-METHODS = [Method(name=kind.__name__, label=kind.__name__, build=kind) for kind in (Raises, Hangs, Dies, Prints)]
+class Shape(Still):
+    def act(self):
+        pass
+    def observe(self):
+        run = super().observe()
+        return run.replace(angles=run.angles[:, :1])
+
+METHODS = [
+    Method(name=kind.__name__, label=kind.__name__, build=kind) for kind in (Raises, Hangs, Dies, Prints, Shape)
+]
+"""
+# A solver that does one of these when it is built.
+BAD_BUILD = """
+import os, time
+from rotor_mbs.methods.base import Method
+
+def build(scene, settings):
+    {}
+
+METHOD = Method(name="bad", label="bad", build=build)
 """
 
 
@@ -137,10 +156,31 @@ def test_whatever_a_method_does_is_one_line_and_loses_nothing(capfd: pytest.Capt
     runs = rm.open("o.h5")["one"]
     statuses = {name: runs[name].status for name in runs if name != "reference"}
     assert statuses == {
-        "bad/Raises": "solver_failed", "bad/Hangs": "timed_out", "bad/Prints": "inaccurate", "mine/lsoda": "ok"
+        "bad/Raises": "solver_failed", "bad/Hangs": "timed_out", "bad/Prints": "inaccurate", "mine/lsoda": "ok",
+        "bad/Shape": "solver_failed",
     }  # fmt: skip
+    assert runs["bad/Shape"].message == "bad/Shape: angles has the shape (6, 1); allowed: (6, 2)"
     assert runs["bad/Raises"].message == "bad.py:20: ZeroDivisionError: division by zero"
     assert ended.err.count("one bad/Dies: not computed (its process died (exit code 9)") == 1
+
+
+@pytest.mark.parametrize(
+    ("act", "line"),
+    [
+        ("os._exit(3)", "bad/bad: ended the process that built it for one (exit code 3)"),
+        ("time.sleep(1e3)", "bad/bad: builds nothing for one within 5 s"),
+        ("1 / 0", "bad.py:6: ZeroDivisionError: division by zero"),
+        ("print('x' * 10**6); os.write(1, b'x' * 10**6); 1 / 0", "bad.py:6: ZeroDivisionError: division by zero"),
+    ],
+)
+def test_a_build_that_ends_or_hangs_its_process_is_one_line(
+    act: str, line: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What a method without `items` refuses is known from building it, not in the process of the command."""
+    monkeypatch.setattr(method_file, "_LOAD_S", 5.0 if "sleep" in act else 60.0)
+    Path("bad.py").write_text(BAD_BUILD.format(act))
+    ended = rotor_mbs("run", "one.toml", "-m", "bad.py", "-o", "o.h5")
+    assert (ended.status, ended.out, ended.err) == (2, "", f"{line}\n")
 
 
 def test_a_sweep_and_python_take_a_file() -> None:
