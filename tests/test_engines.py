@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from importlib import util
 from pathlib import Path
 
@@ -28,6 +29,7 @@ def test_a_file_is_short_and_uses_none_of_our_equations(name: str) -> None:
     text = (FOLDER / f"{name}.py").read_text()
     assert len(text.splitlines()) <= 100
     assert "rotor_mbs.models" not in text
+    assert re.search(r"# tried with \S+ \d+\.\d+", text), "the version it was tried with"
 
 
 def test_every_file_is_tried() -> None:

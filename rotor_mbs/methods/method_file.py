@@ -34,7 +34,7 @@ _LOAD_S = 300.0  # large engines load in seconds, on a busy machine in minutes
 _NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.-]*")
 _TOLERANCES = ("tolerance", "relative_tolerance", "accuracy")  # settings that make a ladder where there is no step
 _SERVING = "from rotor_mbs.methods.method_file import answer_questions; answer_questions()"
-_MOST_PROCESSES = 4  # of files that are loaded apart
+_MOST_PROCESSES = 16  # of files that are loaded apart
 _END_S = 5.0  # until such a process has ended
 
 
