@@ -92,10 +92,9 @@ SCENE_KEY: Patch = {
 PAGE: Patch = {
     "report/pages/names.py": {"": "def names_page(opened):\n    return {'all': [*opened.scenes]}\n"},
     "report/templates/names.html.j2": {"": '{% extends "base.html.j2" %}{% block main %}{{ page.all }}{% endblock %}'},
-    "report/core/files.py": {'BENCH_CSV = "': 'NAMES = "names.html"\n'},
     "report/build.py": {
         "from rotor_mbs.report.pages.scene ": "from rotor_mbs.report.pages.names import names_page\n",
-        "    pages[0] = pages[0]": '    pages.append(Page(files.NAMES, "Names", "names", names_page))\n',
+        "    pages[0] = pages[0]": '    pages.append(Page("names", "Names", names_page))\n',
     },
 }
 MASS = "def mass(arguments):\n    print(mass_of(only_scene(arguments.scene)))\n    return 0\n"

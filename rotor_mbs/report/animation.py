@@ -5,20 +5,19 @@ from __future__ import annotations
 import io
 import shutil
 import subprocess
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
-from PIL import Image, ImageDraw, ImageFont
+from PIL import Image
 
 from rotor_mbs.analysis import run_selection
 from rotor_mbs.analysis.kinematics import tip_paths
 from rotor_mbs.analysis.rehydrate import scene_of
 from rotor_mbs.errors import InputError, StoreError
-from rotor_mbs.report.core.canvas import FONT_FILE
-from rotor_mbs.report.core.looks import GREY, coordinate_look, label_of
+from rotor_mbs.report.core import canvas
+from rotor_mbs.report.core.looks import GREY, INK, coordinate_look, label_of
 from rotor_mbs.report.pages.viewer import magnification
 from rotor_mbs.report.plots import projected
 from rotor_mbs.runs.files import refuse_foreign, replace_file, replacing
@@ -30,9 +29,7 @@ SUFFIXES = (".webp", ".gif", ".mp4")
 RATE = 20  # frames a second, in real time
 _MARK = b"rotor_mbs animation"  # in the metadata of every file
 _MAX_FRAMES = 600  # a longer scene is shown faster
-_SIDE, _TOP, _FINE = 420, 40, 2  # pixels of a square, of the line of text above; drawn at twice the size, then reduced
 _PATH_POINTS = 4  # along a path, from one frame to the next
-_INK, _FAINT = "#1b1f24", "#d5dae0"
 
 
 def write_animation(results: Path, name: str, output: Path, magnified: float | None = None) -> Path:
@@ -77,7 +74,7 @@ def write_animation(results: Path, name: str, output: Path, magnified: float | N
 
 
 def frames(stored: StoredScene, magnified: float | None) -> Iterator[Image.Image]:
-    """The pictures. Raises InputError where nothing can be drawn."""
+    """The runs side by side: paths up to the frame, then the blades. Raises InputError where nothing can be drawn."""
     scene = scene_of(stored)
     runs = {label_of(run.method): run for run in run_selection.sides(stored).values() if "angles" in run}
     if scene is None or not runs:
@@ -87,66 +84,51 @@ def frames(stored: StoredScene, magnified: float | None) -> Iterator[Image.Image
     at = np.linspace(0.0, end, (count - 1) * _PATH_POINTS + 1)
     needed = magnification(scene)
     factor = 1.0 if needed is None else float(magnified or needed)
-    drawn = {
-        name: wires(scene, run.array("time"), np.nan_to_num(run.array("angles"), posinf=0.0, neginf=0.0), at, factor)
-        for name, run in runs.items()
-    }
-    return (_picture(drawn, i, float(at[i]), factor) for i in range(0, len(at), _PATH_POINTS))
+    reach = 1.08 * max(float(np.linalg.norm(blade.tip)) for blade in scene.blades)
+    panels, moving = canvas.squares(len(runs)), []
+    for axes, (name, run) in zip(panels.axes, runs.items(), strict=True):
+        angles = np.nan_to_num(run.array("angles"), posinf=0.0, neginf=0.0)
+        corners = wires(scene, run.array("time"), angles, at, factor)
+        axes.set(xlim=(-reach, reach), ylim=(-reach, reach))
+        axes.plot([0.0], [0.0], marker="o", color=INK, markersize=8.0, zorder=3.0)
+        paths, blades = [], []
+        for blade in range(len(scene.blades)):
+            colour = coordinate_look(blade + 1).colour
+            paths += axes.plot([], [], color=colour, linewidth=0.8)
+            blades += axes.fill([0.0], [0.0], facecolor="#dddddd", edgecolor=colour, linewidth=2.2)
+        ended = int(np.searchsorted(at, run.array("time")[-1], side="right"))  # after the last sample it stands still
+        moving.append((axes, name, corners, ended, paths, blades))
+    offset = f", offset drawn ×{factor:g}" if factor != 1.0 else ""
+    clock = panels.figure.text(0.01, 0.93, "", color=GREY)
+
+    def picture(frame: int) -> Image.Image:
+        for axes, name, corners, ended, paths, blades in moving:
+            last = min(frame, ended - 1)
+            axes.set_title(f"{name}, ended at {at[last]:.2f} s" if frame > last else name, loc="left", x=0.02, y=1.03)
+            for i, (path, blade) in enumerate(zip(paths, blades, strict=True)):
+                path.set_data(*corners[: last + 1, i, 1].T)
+                blade.set_xy([(0.0, 0.0), *corners[last, i]])
+        clock.set_text(f"t = {at[frame]:.2f} s{offset}")
+        return Image.fromarray(canvas.pixels(panels.figure))
+
+    return (picture(frame) for frame in range(0, len(at), _PATH_POINTS))
 
 
-class Wires(NamedTuple):
-    """A run at equally spaced times, as points (frames, blades, 2) in m, projected."""
+def wires(scene: Scene, time: Array, angles: Array, at: Array, magnified: float) -> Array:
+    """Corners of the blades at the times `at` (s); distances from the pitch axis are drawn `magnified` times.
 
-    axis: Array  # the pitch axis' end
-    edge: Array  # the tip
-    root: Array  # the tip's offset at the hub
-    reach: float  # m from the hub to the farthest tip
-    ended: int  # the frame after the last that the run has
-
-
-def wires(scene: Scene, time: Array, angles: Array, at: Array, magnified: float) -> Wires:
-    """At the times `at` (s); distances from the pitch axis are drawn `magnified` times."""
+    Returns (times, blades, 3, 2) m, projected: the pitch axis' end, the tip, and the tip's offset at the hub.
+    """
     moved = np.stack([np.interp(at, time, column) for column in angles.T], axis=1)
-    lines = []
+    corners = []
     for across, along in ((0.0, 1.0), (magnified, 1.0), (magnified, 0.06)):
         blades = []
         for blade in scene.blades:
             x, y, z = blade.tip
             blades.append(replace(blade, tip=(across * x, across * y, along * z)))
         paths = tip_paths(replace(scene, blades=tuple(blades)), moved)
-        lines.append(projected(paths.reshape(-1, 3)).reshape(*paths.shape[:2], 2))
-    reach = max(float(np.linalg.norm(blade.tip)) for blade in scene.blades)
-    axis, edge, root = lines
-    return Wires(axis, edge, root, reach, int(np.searchsorted(at, time[-1], side="right")))
-
-
-def _picture(drawn: Mapping[str, Wires], frame: int, time: float, magnified: float) -> Image.Image:
-    """The runs side by side: paths up to the frame, then the blades."""
-    size = (_SIDE * len(drawn), _SIDE + _TOP)
-    image = Image.new("RGB", (_FINE * size[0], _FINE * size[1]), "white")
-    pen = ImageDraw.Draw(image)
-    font = ImageFont.truetype(str(FONT_FILE), 12 * _FINE)
-    for place, (name, wire) in enumerate(drawn.items()):
-        left = _FINE * place * _SIDE
-        last = min(frame, wire.ended - 1)
-        over = f", ended at {time * last / frame:.2f} s" if frame > last else ""
-        pen.text((left + 12 * _FINE, 4 * _FINE), f"{name}{over}", _INK, font)
-        centre = (left + _FINE * _SIDE / 2, _FINE * (_TOP + _SIDE / 2))
-        scale = 0.5 * _FINE * _SIDE / (1.08 * wire.reach)
-        edge, axis, root = (points * (scale, -scale) + centre for points in (wire.edge, wire.axis, wire.root))
-        for blade in range(edge.shape[1]):
-            path = [tuple(point) for point in edge[: last + 1, blade].tolist()]
-            if len(path) > 1:
-                pen.line(path, fill=coordinate_look(blade + 1).colour, width=_FINE)
-        for blade in range(edge.shape[1]):
-            corners = [centre, *(tuple(points[last, blade].tolist()) for points in (axis, edge, root))]
-            pen.polygon(corners, fill=_FAINT)
-            pen.line([*corners, centre], fill=coordinate_look(blade + 1).colour, width=3 * _FINE, joint="curve")
-        dot = 6 * _FINE
-        pen.ellipse((centre[0] - dot, centre[1] - dot, centre[0] + dot, centre[1] + dot), fill=_INK)
-    text = f"t = {time:.2f} s" + (f", offset drawn ×{magnified:g}" if magnified != 1.0 else "")
-    pen.text((12 * _FINE, 22 * _FINE), text, GREY, font)
-    return image.resize(size, Image.Resampling.LANCZOS)
+        corners.append(projected(paths.reshape(-1, 3)).reshape(*paths.shape[:2], 2))
+    return np.stack(corners, axis=2)
 
 
 def _film(pictures: Iterator[Image.Image], output: Path) -> None:

@@ -28,12 +28,12 @@ OnPage = Callable[[int, int], None]  # with how many are drawn, of how many
 
 
 class Page(NamedTuple):
-    """A page before it is made: its file, its label in the navigation ("": it is not there), template and content."""
+    """A page before it is made: template, label in the navigation ("": it is not there), content, and its file."""
 
-    file: str
-    label: str
     template: str
+    label: str
     content: Callable[[Report], Mapping[str, object]]
+    file: str = ""  # by default named like the template
 
 
 def write_report(
@@ -93,30 +93,29 @@ def _plan(report: Report, checked: bool) -> list[Page]:
         raise StoreError(f"{report.path}: no scene in it, nothing to report")
     pages: list[Page] = []
     if has_runs and report.is_suite:
-        pages.append(Page(files.INDEX, "Stability suite", "stability", stability_page))
+        pages.append(Page("stability", "Stability suite", stability_page))
     elif has_runs:
-        pages.append(Page(files.INDEX, "Overview", "index", index_page))
+        pages.append(Page("index", "Overview", index_page))
         if available(report.scenes):
-            pages.append(Page(files.FIGURES, "The paper's figures", "figures", figures_page))
+            pages.append(Page("figures", "The paper's figures", figures_page))
         if report.errata:
-            pages.append(Page(files.ERRATA, "Errata", "errata", errata_page))
+            pages.append(Page("errata", "Errata", errata_page))
     if bench:
-        pages.append(Page(files.BENCH, "Error against run time", "bench", bench_page))
+        pages.append(Page("bench", "Error against run time", bench_page))
     if modes:
         from rotor_mbs.report.mode_study import stored_modes_page  # late, as above
 
-        pages.append(Page(files.MODES, "Modes", "modes", stored_modes_page))
+        pages.append(Page("modes", "Modes", stored_modes_page))
     for place, record in enumerate(compared):
         from rotor_mbs.report.data_comparison import stored_comparison_page
 
-        file = f"data--{place + 1}.html" if place else files.COMPARISON
-        content = partial(stored_comparison_page, place)
-        pages.append(Page(file, f"Data against {record.scene}", "data_comparison", content))
+        content, file = partial(stored_comparison_page, place), f"data--{place + 1}.html"
+        pages.append(Page("data_comparison", f"Data against {record.scene}", content, file))
     if has_runs and checked:
         from rotor_mbs.report.pages.check import check_page
 
-        pages.append(Page(files.CHECK, "Accuracy check", "check", check_page))
+        pages.append(Page("check", "Accuracy check", check_page))
     pages[0] = pages[0]._replace(file=files.INDEX)
     if has_runs:
-        pages += [Page(file, "", "scene", partial(scene_page, scene)) for scene, file in report.files.items()]
-    return pages
+        pages += [Page("scene", "", partial(scene_page, scene), file) for scene, file in report.files.items()]
+    return [page._replace(file=page.file or f"{page.template}.html") for page in pages]

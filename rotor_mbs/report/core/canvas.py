@@ -13,10 +13,12 @@ from typing import Any
 import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.collections import QuadMesh as QuadMesh
 from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
+from numpy.typing import NDArray
 
 from rotor_mbs.errors import InputError
 from rotor_mbs.report.core.looks import VERMILLION, Look
@@ -27,7 +29,6 @@ WIDTH = 5.2  # in; on a telephone's 360 px a text of 9.5 points is then 9 px hig
 TIME_AXIS, SPEED_AXIS = "time (s)", "rotor speed (rad/s)"
 hex_colour = to_hex  # of any colour of matplotlib's: "#0072b2"
 PRINT_WIDTH = 174.0 / 25.4  # in; two columns of a journal
-FONT_FILE = Path(matplotlib.get_data_path()) / "fonts" / "ttf" / "DejaVuSans.ttf"
 MARK = b"rotor_mbs pictures"  # in the metadata of every picture that is a file
 KINDS = ("pdf", "svg", "png")
 _PAGE_STYLE, _PRINT_STYLE = (  # without matplotlib's defaults
@@ -100,6 +101,23 @@ def print_grid(rows: int, columns: int, height: float) -> Panels:
             hspace=0.26 / height, wspace=0.34,
         )  # fmt: skip
     return Panels(figure, list(made.flat))
+
+
+def squares(count: int) -> Panels:
+    """Axes with equal scales and without a frame side by side, 420 pixels each, below room for two lines of text."""
+    with style():
+        figure = Figure(figsize=(4.2 * count, 4.6), dpi=100, facecolor="white")
+        axes = [figure.add_axes((i / count, 0.0, 1.0 / count, 4.2 / 4.6), aspect="equal") for i in range(count)]
+    for square in axes:
+        square.set_axis_off()
+    return Panels(figure, [*axes])
+
+
+def pixels(figure: Figure) -> NDArray[np.uint8]:
+    """(height, width, 3) The figure as it is now, in red, green and blue."""
+    canvas = FigureCanvasAgg(figure)
+    canvas.draw()
+    return np.asarray(canvas.buffer_rgba())[..., :3]
 
 
 def style(*, for_print: bool = False) -> AbstractContextManager[None]:

@@ -20,8 +20,7 @@ from rotor_mbs.runs.files import refuse_foreign, replace_file
 
 GENERATOR = "rotor_mbs report"
 _MARK = f'<meta name="generator" content="{GENERATOR}">'.encode()  # of every page
-INDEX, ERRATA, FIGURES = "index.html", "errata.html", "figures.html"
-BENCH, MODES, COMPARISON, CHECK = "bench.html", "modes.html", "comparison.html", "check.html"
+INDEX = "index.html"
 BENCH_CSV = "bench.csv"
 _TEMPLATES = Path(__file__).resolve().parents[1] / "templates"
 _LONGEST = 100  # characters; file systems allow 255 bytes
@@ -49,7 +48,7 @@ def page_names(scenes: Iterable[str]) -> dict[str, str]:
     Raises StoreError for a name with a part ".." or ".": no file of this program has one.
     """
     names: dict[str, str] = {}
-    taken = {INDEX, ERRATA, FIGURES, BENCH, MODES, COMPARISON, CHECK}
+    taken = {path.stem for path in _TEMPLATES.glob("*.html.j2")}  # other pages are named like their templates
     for scene in scenes:
         if {"..", "."} & set(re.split(r"[/\\]", scene)):
             raise StoreError(f"scene name {scene!r} cannot be made a file name; allowed: no part .. or .")
