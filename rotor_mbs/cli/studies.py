@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from rotor_mbs.analysis.checks import Check
 
 _MANY_RUNS = 1_000_000  # that a sweep does not start without --yes
+_DISK_IS_FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 
 
 def bench(arguments: argparse.Namespace) -> int:
@@ -278,11 +279,7 @@ def sweep(arguments: argparse.Namespace) -> int:
                 result = run_sweep(plan, output, pool, on_progress, fresh=arguments.fresh)
         except StoreError as exc:
             show(str(exc), sys.stderr)
-            is_full = isinstance(exc.__cause__, OSError) and exc.__cause__.errno in (
-                errno.ENOSPC,
-                errno.EDQUOT,
-                errno.EFBIG,
-            )
+            is_full = isinstance(exc.__cause__, OSError) and exc.__cause__.errno in _DISK_IS_FULL
             # What is stored stays, the same command continues; else nothing was begun.
             return EXIT_FAILED if is_full or made else EXIT_BAD_INPUT
         stream = sys.stderr if arguments.json else sys.stdout  # standard output is the JSON's alone

@@ -55,13 +55,13 @@ def test_models_are_compared_in_numbers(tmp_path: Path) -> None:
         table, _ = scene_table(opened.scenes, dict.fromkeys(opened.scenes, "x.html"), "Model")
     head = [cell if isinstance(cell, str) else cell.note for cell in table.head]
     row, same = (dict(zip(head, row, strict=True)) for row in table.rows)
-    assert row["0.05 rad off from (s)"] == "2.50"
-    assert row["Largest difference (rad)"] == "0.20"
-    assert str(row["Energy gain"]).replace("\N{NO-BREAK SPACE}", " ") == "2.00 kJ"
+    assert row["Printed: 0.05 rad off from (s)"] == "2.50"
+    assert row["Printed: largest difference (rad)"] == "0.20"
+    assert str(row["Printed: energy gain"]).replace("\N{NO-BREAK SPACE}", " ") == "2.00 kJ"
     error = row["exudyn_tree/rk67"]
     assert isinstance(error, TableCell)
     assert (error.text, error.shade[:3]) == ("1.0×10⁻⁸", "n h")
-    assert (same["0.05 rad off from (s)"], same["Largest difference (rad)"]) == ("never", "0")
+    assert (same["Printed: 0.05 rad off from (s)"], same["Printed: largest difference (rad)"]) == ("never", "0")
 
 
 def test_a_figure_has_three_pictures_its_scene_and_the_published_number(drawn: Path, tmp_path: Path) -> None:

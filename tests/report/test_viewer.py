@@ -14,7 +14,7 @@ from support.scenes import paper
 from support.stored import Made, rotor, store
 
 from rotor_mbs.report.build import write_report
-from rotor_mbs.report.pages.viewer import FEWEST, MOST, frames, magnification, packed, script_json, viewer
+from rotor_mbs.report.pages.viewer import MAX_FRAMES, magnification, packed, script_json, viewer
 from rotor_mbs.runs.read import open_results
 
 FIG11 = paper("fig11", samples=301)
@@ -40,16 +40,13 @@ def test_angles_come_back_to_a_ten_thousandth_of_a_radian_over_any_number_of_tur
     np.testing.assert_allclose(found, angles, atol=0.5001e-4)  # rounding, which does not add up
 
 
-def test_frames_follow_from_the_fastest_rate() -> None:
-    """A rotor at 4 rad/s for 300 s turned backwards with 361 frames: 3.3 rad from one to the next."""
-    time = np.linspace(0.0, 300.0, 3001)
-    turning, still = np.stack([4.0 * time, 0.0 * time], axis=1), np.zeros((3001, 2))
-    assert frames([(time, turning), (time, still)]) == MOST
-    assert frames([(time, still)]) == FEWEST
-    assert frames([(time, 0.1 * turning)]) == MOST  # 120 rad in steps of 0.05
-    assert frames([(time, 0.025 * turning)]) == pytest.approx(601, abs=1)
-    # Samples that are hardly more than needed are shown as they are.
-    assert frames([(time[:1001], turning[:1001])]) == 1001
+def test_a_short_run_has_a_frame_for_each_sample_and_a_long_one_no_more_than_fit_a_page(tmp_path: Path) -> None:
+    for samples, wanted in ((301, 301), (5001, MAX_FRAMES)):
+        scene = paper("fig11", samples=samples)
+        with open_results(store(tmp_path / f"{samples}.h5", [Made(scene, "reference", TURNING)])) as opened:
+            made = viewer(opened.scenes["paper/fig11"], dict(opened.scenes["paper/fig11"].runs))
+        assert made is not None
+        assert len(unpacked(json.loads(str(made["data"]))["models"][0])) == wanted
 
 
 @pytest.mark.parametrize(("rate", "noted"), [(4.0, ""), (400.0, "turns by up to 13 rad from one frame to the next")])

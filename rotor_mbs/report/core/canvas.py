@@ -115,7 +115,7 @@ def squares(count: int) -> Panels:
 
 def pixels(figure: Figure) -> NDArray[np.uint8]:
     """(height, width, 3) The figure as it is now, in red, green and blue."""
-    canvas = FigureCanvasAgg(figure)
+    canvas: Any = FigureCanvasAgg(figure)
     canvas.draw()
     return np.asarray(canvas.buffer_rgba())[..., :3]
 

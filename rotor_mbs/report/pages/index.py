@@ -151,8 +151,9 @@ def scene_table(scenes: Scenes, files: Mapping[str, str], model: str) -> tuple[P
             row.append("" if run is None else number(float(np.abs(run.array("angles")[:, 1:]).max(initial=0.0))))
         rows.append(row)
     head = (
-        "Scene", "Figure", "Compared (s)", *map(method_cell, methods), f"{VISIBLE:g} rad off from (s)",
-        "Largest difference (rad)", "Energy gain", "Largest pitch (rad)", f"{model}: largest pitch (rad)",
+        "Scene", "Figure", "Compared (s)", *map(method_cell, methods), f"Printed: {VISIBLE:g} rad off from (s)",
+        "Printed: largest difference (rad)", "Printed: energy gain", "Printed: largest pitch (rad)",
+        f"{model}: largest pitch (rad)",
     )  # fmt: skip
     return PageTable("Largest angle error up to the horizon (rad), by method", head, rows), marks
 

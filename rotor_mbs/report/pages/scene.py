@@ -291,38 +291,25 @@ def _drive_section(scene: Scene | None, run: StoredRun | None) -> Section:
     """Torque and power at the shaft; pitches, their commands and the power of their actuators."""
     if scene is None or run is None or "rates" not in run or "angles" not in run or not len(run.array("time")):
         return Section()
+    time, angles, rates = run.array("time"), run.array("angles"), run.array("rates")
 
     def over_time(table: Table) -> Array:
         return np.array([value_at(table, t) for t in time.tolist()])
 
-    def add_numbers(name: str, values: Array, unit: str, *, with_work: bool = True) -> None:
-        work = prefixed(float(np.trapezoid(values, time)), "J") if with_work else ""
-        rows.append([name, prefixed(float(np.abs(values).max()), unit), prefixed(float(values[-1]), unit), work])
-
-    def add_picture(name: str, caption: str, series: Sequence[tuple[str, Sequence[Series]]]) -> None:
-        panels = plots.lines(series, heights=[1.3] * len(series))
-        for axes in panels.axes:  # they have the zero
-            low, high = axes.get_ylim()
-            axes.set_ylim(min(low, 0.0), max(high, 0.0))
-        pictures.append(picture(panels, name, caption))
-
-    time, angles, rates = run.array("time"), run.array("angles"), run.array("rates")
-    pictures: list[Picture] = []
-    rows: list[list[str]] = []
+    drawn: dict[str, list[tuple[str, list[Series]]]] = {}  # by caption
+    numbers: list[tuple[str, Array, str]] = []
     if scene.has_torque:
-        torque = over_time(scene.rotor_torque)
-        powers = [Series(time, torque * rates[:, 0], coordinate_look(0, "torque on the rotor"))]
-        add_numbers("Torque on the rotor", torque, "N m", with_work=False)
-        add_numbers("Its power", powers[0].values, "W")
+        look, torque = coordinate_look(0, "torque on the rotor"), over_time(scene.rotor_torque)
+        powers = [Series(time, torque * rates[:, 0], look)]
+        numbers += [("Torque on the rotor", torque, "N m"), ("Its power", powers[0].values, "W")]
         if scene.shaft_damping:
             powers.append(Series(time, scene.shaft_damping * rates[:, 0] ** 2, TAKEN))
-            add_numbers("Taken by the shaft's damper", powers[1].values, "W")
-        torques = [Series(time, torque, coordinate_look(0, "torque on the rotor"))]
-        add_picture("drive", "Rotor torque and its power", [("torque (N m)", torques), ("power (W)", powers)])
+            numbers.append(("Taken by the shaft's damper", powers[1].values, "W"))
+        torques = [Series(time, torque, look)]
+        drawn["Rotor torque and its power"] = [("torque (N m)", torques), ("power (W)", powers)]
     driven = [i for i in range(len(scene.blades)) if any(scene.pitch_load(i))]
     if driven:
-        pitches = [Series(time, pitch, coordinate_look(1 + i)) for i, pitch in enumerate(angles.T[1:])]
-        powers = []
+        pitches, powers = plots.coordinate_series(time, angles)[1:], []
         for i in driven:
             torque, rest = map(over_time, scene.pitch_load(i))
             stiffness, damping = scene.bearing(i)
@@ -330,11 +317,22 @@ def _drive_section(scene: Scene | None, run: StoredRun | None) -> Section:
             powers.append(Series(time, moment * rates[:, 1 + i], coordinate_look(1 + i)))
             if scene.pitch_load(i)[1]:
                 pitches.append(Series(time, rest, COMMAND))
-            ends = (float(np.abs(angles[:, 1 + i]).max()), float(angles[-1, 1 + i]))
-            rows.append([f"Pitch {i + 1}", *(with_unit(angle, "rad", 4) for angle in ends), ""])
-            add_numbers(f"Actuator {i + 1}, power", powers[-1].values, "W")
-        rows_of_panels = [("pitch (rad)", pitches), ("actuators' power (W)", powers)]
-        add_picture("pitch-drive", "Pitches, their commands and actuators", rows_of_panels)
+            numbers += [
+                (f"Pitch {i + 1}", angles[:, 1 + i], "rad"),
+                (f"Actuator {i + 1}, power", powers[-1].values, "W"),
+            ]
+        drawn["Pitches, their commands and actuators"] = [("pitch (rad)", pitches), ("actuators' power (W)", powers)]
+    pictures: list[Picture] = []
+    for caption, panels_of in drawn.items():
+        panels = plots.lines(panels_of, heights=[1.3] * len(panels_of))
+        for axes in panels.axes:  # they have the zero
+            low, high = axes.get_ylim()
+            axes.set_ylim(min(low, 0.0), max(high, 0.0))
+        pictures.append(picture(panels, f"drive-{len(pictures)}", caption))
+    rows = []
+    for name, values, unit in numbers:
+        work = prefixed(float(np.trapezoid(values, time)), "J") if unit == "W" else ""
+        rows.append((name, *(prefixed(float(x), unit) for x in (np.abs(values).max(), values[-1])), work))
     table = PageTable("", ("Quantity", "Largest", "At the end", "Work"), rows)
     return Section(pictures, [table] if rows else [])
 

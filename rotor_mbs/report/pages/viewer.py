@@ -5,7 +5,7 @@ from __future__ import annotations
 import base64
 import json
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -18,8 +18,7 @@ from rotor_mbs.runs.read import StoredRun, StoredScene
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.trajectory import Array
 
-FEWEST, MOST = 241, 2401  # frames: of a slow motion; of a page of a size that can be mailed
-_ARC = 0.05  # rad that a coordinate turns from a frame to the next, where the samples and MOST allow it
+MAX_FRAMES = 2401  # of a page of a size that can be mailed; a shorter run has a frame for each sample
 _COARSE = 0.5 * math.pi  # rad from a frame to the next beyond which the page says that it interpolates
 _QUANTUM, _LARGEST = 1e-4, 32767  # rad: a pixel at the tip on any screen; 16 bits with a sign
 _VISIBLE = 0.1  # of the longest blade
@@ -41,11 +40,10 @@ def viewer(stored: StoredScene, runs: Mapping[str, StoredRun]) -> dict[str, Any]
             moves[name] = time[:count], angles[:count]
     if not moves:
         return None
-    end = max(float(time[-1]) for time, _ in moves.values())
-    if end <= 0.0:
+    longest = max((time for time, _ in moves.values()), key=lambda time: float(time[-1]))
+    if longest[-1] <= 0.0:
         return None
-    count = frames(list(moves.values()))
-    step = end / (count - 1)
+    step = float(longest[-1]) / (min(len(longest), MAX_FRAMES) - 1)
     data = {
         "step": step,
         "colours": [class_of(coordinate_look(i + 1).colour) for i in range(len(scene.blades))],
@@ -59,20 +57,9 @@ def viewer(stored: StoredScene, runs: Mapping[str, StoredRun]) -> dict[str, Any]
     for name, (time, angles) in moves.items():
         largest = float(np.abs(np.diff(angles_at(time, angles, step), axis=0)).max(initial=0.0))
         if largest > _COARSE:
-            turned = with_unit(largest, "rad")
-            notes.append(
-                f"{with_capital(name)} turns by up to {turned} from one frame to the next, the limit of the page's "
-                "data: in between the picture goes evenly."
-            )
+            turned = f"{with_capital(name)} turns by up to {with_unit(largest, 'rad')} from one frame to the next"
+            notes.append(f"{turned}: in between the picture goes evenly.")
     return {"data": script_json(data), "models": list(moves), "magnified": magnification(scene), "notes": notes}
-
-
-def frames(moves: Sequence[tuple[Array, Array]]) -> int:
-    """How many frames the runs (time in s, angles in rad) need: as many as the fastest motion takes, at most MOST."""
-    time = max((time for time, _ in moves), key=lambda time: float(time[-1]))
-    rate = max(float((np.abs(np.diff(a, axis=0)).max(axis=1) / np.diff(t)).max()) for t, a in moves)
-    needed = min(max(math.ceil(min(rate * float(time[-1]) / _ARC, 1e9)) + 1, FEWEST), MOST)
-    return len(time) if len(time) <= MOST and needed > len(time) // 2 else needed
 
 
 def angles_at(time: Array, angles: Array, step: float) -> Array:
