@@ -22,7 +22,6 @@ from typing import TYPE_CHECKING, Any, overload
 import numpy as np
 
 from rotor_mbs.analysis.judgement import defects_of
-from rotor_mbs.analysis.rehydrate import rehydrate
 from rotor_mbs.analysis.run_tables import RUN_HEAD, run_row
 from rotor_mbs.errors import InputError, MethodRefusal, PlausibilityWarning, ResourceError, StoreError
 from rotor_mbs.methods.catalogue import REFERENCE, check_names
@@ -360,10 +359,7 @@ class Runs(Mapping[Any, Any]):
     def _stored_labels(self) -> list[Any]:
         if self._is_sweep:
             return [int(run) for run in self._sweep.column("run")[self._sweep.column("status") != MISSING]]
-        with open_results(self.path) as results:
-            if self.scene:
-                return list(results.scenes[self.scene].runs)
-            return [f"{scene.name}/{method}" for scene in results.scenes.values() for method in scene.runs]
+        return [run.method if self.scene else f"{run.scene}/{run.method}" for run in self._runs()]
 
     def __getitem__(self, label: Any) -> Any:
         """Raises KeyError for what the file does not have, StoreError for samples that cannot be read."""
@@ -375,13 +371,10 @@ class Runs(Mapping[Any, Any]):
             raise KeyError(f"{label}; available: {', '.join(map(str, self._labels[:20]))}")
         if self._is_sweep:
             return self._run_of_sweep(int(label))
-        scene = self.scene
         with open_results(self.path) as results:
-            if not scene:
-                scene = next(name for name in results.scenes if label.startswith(f"{name}/"))
-                label = label.removeprefix(f"{scene}/")
-            stored = results.scenes[scene]
-            return _loaded(stored, stored.runs[label])
+            name = self.scene or next(name for name in results.scenes if label.startswith(f"{name}/"))
+            scene = results.scenes[name]
+            return _loaded(scene, scene.runs[label.removeprefix(f"{name}/")])
 
     def __iter__(self) -> Iterator[Any]:
         return iter(self._labels)
@@ -394,31 +387,24 @@ class Runs(Mapping[Any, Any]):
         if self._is_sweep:
             codes = self._sweep.column("status").tolist()
             return dict(Counter(STATUSES[code] for code in codes if code != MISSING))
-        return dict(Counter(status for _, _, status, _ in self._rows()))
+        return dict(Counter(run.status for run in self._runs()))
 
     @functools.cached_property
     def _sweep(self) -> StoredSweep:
         """Read whole once, to verify it."""
         return StoredSweep(self.path)
 
-    def _rows(self) -> list[tuple[str, str, str, dict[str, Any]]]:
-        """Scene, method, status and metrics of each run."""
+    def _runs(self) -> Iterator[StoredRun]:
         with open_results(self.path) as results:
-            scenes = [results.scenes[self.scene]] if self.scene else results.scenes.values()
-            return [
-                (scene.name, run.method, run.status, run.attributes) for scene in scenes for run in scene.runs.values()
-            ]
+            for scene in [results.scenes[self.scene]] if self.scene else results.scenes.values():
+                yield from scene.runs.values()
 
     def table(self) -> TextTable:
         """A row for each run: status, error (rad), energy drift (of the energy scale), run time (s)."""
         if self._is_sweep:
             counts: list[tuple[str, ...]] = [(status, str(count)) for status, count in self.statuses.items()]
             return TextTable(("status", "runs"), counts)
-        rows = []
-        for scene, method, status, facts in self._rows():
-            seconds = None if "frozen_with" in facts else facts.get("run_time_s", 0.0)
-            cells = run_row(method, status, {} if method == REFERENCE else facts, seconds)
-            rows.append(cells if self.scene else (scene, *cells))
+        rows = [run_row(run) if self.scene else (run.scene, *run_row(run)) for run in self._runs()]
         return TextTable(RUN_HEAD if self.scene else ("scene", *RUN_HEAD), rows)
 
     @property
@@ -475,7 +461,7 @@ class Runs(Mapping[Any, Any]):
             return data
         with xarray.open_dataset(self.path, group=self.scene) as scene:
             data = _labelled(scene.load())
-        return data.assign(status=("run", [status for _, _, status, _ in self._rows()]))
+        return data.assign(status=("run", [run.status for run in self._runs()]))
 
     def save(self, path: str | os.PathLike[str]) -> Path:
         """The file under another name, which `rotor-mbs report` and `rotor_mbs.open` read. Replaces a file of this
@@ -550,11 +536,11 @@ def _labelled(data: Any) -> Any:
 
 def _loaded(scene: StoredScene, stored: StoredRun) -> Run:
     """A run as it was stored."""
-    found = rehydrate(scene, stored)
-    if found.run is None:
-        raise StoreError(f"{scene.name}/{stored.method}: {'; '.join(found.faults)}")
+    solution = stored.solution(scene.scene)
+    if solution is None:
+        raise StoreError(f"{scene.name}/{stored.method}: {'; '.join(stored.faults(scene.scene))}")
     facts = stored.attributes
-    run = Run(**vars(found.run), reference=None if stored.method == REFERENCE else found.reference)
+    run = Run(**vars(solution), reference=None if stored.method == REFERENCE else scene.reference_trajectory)
     run.status, run.message = stored.status, str(facts.get("message", ""))
     run.metrics = {name: value for name, value in facts.items() if isinstance(value, float)}
     setup, seconds, output = (float(facts.get(f"{name}_time_s", 0.0)) for name in ("setup", "run", "output"))

@@ -24,7 +24,6 @@ from rotor_mbs.analysis.judgement import (
     quantity_errors,
     start_slack,
 )
-from rotor_mbs.analysis.rehydrate import Rehydrated, reference_of, rehydrate
 from rotor_mbs.analysis.run_integrity import copies, settings_faults, steps_off
 from rotor_mbs.analysis.run_selection import PRINTED
 from rotor_mbs.errors import InputError, StoreError
@@ -99,10 +98,6 @@ def checks_of(results: OpenResults, frozen: Sequence[OpenResults], bounds: Bound
         for scene in results.scenes.values():
             own = bounds.for_scene(scene.name if _is_shipped(scene) else "")
             known = shipped.get(scene.name) if own.scene else None
-            try:
-                reference = reference_of(scene)  # once for all runs of the scene
-            except StoreError:
-                reference = None  # fails with each of them
             for run in scene.runs.values():
                 hint = "its row changed after it was written" if run.is_damaged else "as written"
                 where = Where(scene.name, run.method, "row")
@@ -110,7 +105,8 @@ def checks_of(results: OpenResults, frozen: Sequence[OpenResults], bounds: Bound
                 try:
                     # Whatever goes wrong with a run that is known to be damaged is that damage.
                     with reading(str(scene.name), run.method) if run.is_damaged else nullcontext():
-                        checks += _of_run(run, own, rehydrate(scene, run, reference), _motion_ends(scene))
+                        faults, solution = run.faults(scene.scene), run.solution(scene.scene)
+                        checks += _of_run(run, own, solution, faults, scene.reference_trajectory, _motion_ends(scene))
                 except StoreError as exc:
                     checks.append(_of(run, "complete", "all", math.nan, own, "faults", str(exc)))
             checks += _copies(scene, own)
@@ -155,29 +151,37 @@ def _motion_ends(scene: StoredScene) -> bool:
     return reference is not None and "time" in reference and reference.status == "singular"
 
 
-def _of_run(run: StoredRun, bounds: Bounds, stored: Rehydrated, motion_ends: bool) -> Iterator[Check]:
+def _of_run(
+    run: StoredRun,
+    bounds: Bounds,
+    solution: Solution | None,
+    faults: list[str],
+    reference: Trajectory | None,
+    motion_ends: bool,
+) -> Iterator[Check]:
     """A run that stops early and reports it is complete where the motion ends there."""
-    reports_it = stored.run is not None and run.status not in COMPLETE
-    excused = reports_it and (motion_ends or not is_corrected(run.method))
-    faults = [] if excused else stored.faults
+    reports_it = solution is not None and run.status not in COMPLETE
+    if reports_it and (motion_ends or not is_corrected(run.method)):
+        faults = []
     hint = "; ".join(faults) or "every channel, row and number is present"
     if faults and run.status != "ok":
         hint += f"; stored as {run.status}: {run.attributes.get('message', '')}"
     yield _of(run, "complete", "all", float(len(faults)), bounds, "faults", hint)
-    if stored.run is None:
+    if solution is None:
         return
-    judgement = judge(stored.scene, stored.run, stored.reference)
+    scene = solution.scene
+    judgement = judge(scene, solution, reference)
     yield _status(run, bounds, judgement)
-    channel, worst, hint = _changed_metric(run, judgement.metrics, stored.run)
+    channel, worst, hint = _changed_metric(run, judgement.metrics, solution)
     yield _of(run, "metrics", channel, worst, bounds, "relative", hint)
-    yield from _of_settings(run, bounds, stored.scene)
-    if len(stored.run.trajectory.time):
-        yield from _of_samples(run, bounds, stored.scene, stored.run)
+    yield from _of_settings(run, bounds, scene)
+    if len(solution.trajectory.time):
+        yield from _of_samples(run, bounds, scene, solution)
         if is_corrected(run.method):
-            yield from _of_corrected_model(run, bounds, stored.scene, stored.run.trajectory, judgement.metrics)
+            yield from _of_corrected_model(run, bounds, scene, solution.trajectory, judgement.metrics)
         own_growth = judgement.defects.error_growth if judgement.defects is not None else None
-        if run.method == REFERENCE and own_growth is not None and "error_growth" in stored.run.trajectory.quantities:
-            growth = stored.run.trajectory.error_growth
+        if run.method == REFERENCE and own_growth is not None and "error_growth" in solution.trajectory.quantities:
+            growth = solution.trajectory.error_growth
             known = np.isfinite(own_growth) & (own_growth < HORIZON_GROWTH)
             off = float(np.abs(np.log(growth[known] / own_growth[known])).max(initial=0.0))
             hint = "the horizon that follows from it is not that of its own samples"
@@ -367,7 +371,7 @@ def _of_reference(scene: StoredScene, shipped: StoredRun | None, bounds: Bounds)
         hint = "the file has no reference to compare the runs with"
         yield make_check(bounds, "reference", Where(scene.name, REFERENCE, "all"), math.nan, "rad", hint)
     elif shipped is not None:
-        if "frozen_with" in stored.attributes:  # it says that it was read from the shipped file
+        if stored.is_frozen:  # it says that it was read from the shipped file
             names = [name for name in ("angles", "rates", "error_growth", "angle_uncertainty") if name in shipped]
             changed = [
                 name for name in names if name in stored and not _is_same(stored.array(name), shipped.array(name))

@@ -18,11 +18,12 @@ RUN_HEAD = ("method", "status", "largest defect (rad)", "error (rad), ok to 0.01
 _MOST_ROWS = 40  # of a table with a row for each run
 
 
-def run_row(method: str, status: str, facts: Mapping[str, object], seconds: float | None) -> tuple[str, ...]:
-    """Cells under RUN_HEAD; facts: metrics by their stored names; seconds: None where nothing was integrated."""
-    time = "read" if seconds is None else f"{seconds:.3g}"
-    numbers = (_short(facts.get(name)) for name in ("defect_max", "angle_error_max", "energy_drift_max"))
-    return (method, status, *numbers, time)
+def run_row(run: StoredRun) -> tuple[str, ...]:
+    """Cells under RUN_HEAD."""
+    facts = run.attributes
+    error = "" if run.method == REFERENCE else _short(facts.get("angle_error_max"))  # none against itself
+    time = "read" if run.is_frozen else f"{facts.get('run_time_s', 0.0):.3g}"
+    return run.method, run.status, _short(facts.get("defect_max")), error, _short(facts.get("energy_drift_max")), time
 
 
 def run_table(scenes: Mapping[str, StoredScene], wanted: Mapping[str, Iterable[str]]) -> TextTable:
@@ -36,14 +37,7 @@ def run_table(scenes: Mapping[str, StoredScene], wanted: Mapping[str, Iterable[s
     ]
     if len(runs) > _MOST_ROWS:
         return method_table(run for run in runs if run.method != REFERENCE)
-    rows = []
-    for run in runs:
-        facts = dict(run.attributes)
-        seconds = None if "frozen_with" in facts else facts.get("run_time_s", 0.0)
-        if run.method == REFERENCE:  # it has no error against itself
-            facts.pop("angle_error_max", None)
-        rows.append((run.scene, *run_row(run.method, run.status, facts, seconds)))
-    return TextTable(("scene", *RUN_HEAD), rows)
+    return TextTable(("scene", *RUN_HEAD), [(run.scene, *run_row(run)) for run in runs])
 
 
 class Agreement(NamedTuple):
@@ -82,13 +76,12 @@ def _largest(runs: Iterable[StoredRun], name: str) -> float | None:
 
 def method_table(runs: Iterable[StoredRun]) -> TextTable:
     """A row for each method: how many of its runs ended well, and the largest numbers among those."""
+    head = ("method", "runs", "largest defect (rad)", "largest error (rad)", "largest drift", "longest (s)")
     rows = []
     for row in agreement(runs):
-        worst = {"defect_max": row.defect, "angle_error_max": row.angle_error, "energy_drift_max": row.energy_drift}
-        rows.append(run_row(row.method, row.runs, worst, row.longest_s))
-    return TextTable(
-        ("method", "runs", "largest defect (rad)", "largest error (rad)", "largest drift", "longest (s)"), rows
-    )
+        numbers = map(_short, (row.defect, row.angle_error, row.energy_drift))
+        rows.append((row.method, row.runs, *numbers, f"{row.longest_s:.3g}"))
+    return TextTable(head, rows)
 
 
 def bench_table(curves: Sequence[Record]) -> TextTable:

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from rotor_mbs.runs.read import StoredRun, StoredScene, open_results
+from rotor_mbs.runs.read import StoredRun, open_results
 from rotor_mbs.runs.records import Record, read_records
 from rotor_mbs.solution.status import code_of
 from rotor_mbs.solution.text_table import TextTable
@@ -84,14 +84,14 @@ def suite_runs(path: Path) -> list[SuiteRun]:
     ladders = {(record.scene, record.name): record for record in read_records(path, "stability")}
     with open_results(path) as results:
         return [
-            _suite_run(scene, run, ladders.get((scene.name, name)))
+            _suite_run(run, scene.reference, ladders.get((scene.name, name)))
             for scene in results.scenes.values()
             for name, run in scene.methods.items()
         ]
 
 
-def _suite_run(scene: StoredScene, run: StoredRun, ladder: Record | None) -> SuiteRun:
-    facts, reference, time = run.attributes, scene.reference, run.array("time")
+def _suite_run(run: StoredRun, reference: StoredRun | None, ladder: Record | None) -> SuiteRun:
+    facts, time = run.attributes, run.array("time")
     outcome, message = run.status, str(facts.get("message", ""))
     if run.status == "ok" and "angle_error_max" not in facts:
         reason = "the horizon is before the second sample"
@@ -103,7 +103,7 @@ def _suite_run(scene: StoredScene, run: StoredRun, ladder: Record | None) -> Sui
     elif run.status != "ok" and ladder is not None and np.any(ladder.arrays["status"] == code_of("ok")):
         outcome = "smaller_step"
     return SuiteRun(
-        scene=scene.name,
+        scene=run.scene,
         method=run.method,
         status=run.status,
         outcome=outcome,

@@ -14,7 +14,6 @@ from PIL import Image
 
 from rotor_mbs.analysis import run_selection
 from rotor_mbs.analysis.kinematics import tip_paths
-from rotor_mbs.analysis.rehydrate import scene_of
 from rotor_mbs.errors import InputError, StoreError
 from rotor_mbs.report.core import canvas
 from rotor_mbs.report.core.looks import GREY, INK, coordinate_look, label_of
@@ -75,10 +74,10 @@ def write_animation(results: Path, name: str, output: Path, magnified: float | N
 
 def frames(stored: StoredScene, magnified: float | None) -> Iterator[Image.Image]:
     """The runs side by side: paths up to the frame, then the blades. Raises InputError where nothing can be drawn."""
-    scene = scene_of(stored)
+    scene = stored.scene
     runs = {label_of(run.method): run for run in run_selection.sides(stored).values() if "angles" in run}
-    if scene is None or not runs:
-        raise InputError(f"{stored.name}: nothing to draw: no angles, or its scene file is not known")
+    if not runs:
+        raise InputError(f"{stored.name}: nothing to draw: no angles")
     end = max(float(run.array("time")[-1]) for run in runs.values())
     count = max(2, min(round(end * RATE) + 1, _MAX_FRAMES))
     at = np.linspace(0.0, end, (count - 1) * _PATH_POINTS + 1)

@@ -13,6 +13,7 @@ import threading
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import h5py
@@ -33,6 +34,7 @@ KEYWORDS = "multibody dynamics, wind turbine rotor, Euler-Lagrange equations, mo
 HDF5 = b"\x89HDF"  # what a file begins with
 _LARGEST_REPLACED = 1 << 28  # bytes, of an output that is not HDF5
 DIGESTS = "digests"  # the attribute with the digests of a group
+_NOT_ATTRIBUTES = (DIGESTS, "CLASS", "NAME", "REFERENCE_LIST", "DIMENSION_LIST", "_Netcdf4Dimid", "_Netcdf4Coordinates")
 CHARACTERS = "characters"  # the dimension of texts that are filled in later
 # What a lock file holds, unless its process was killed before it wrote.
 _OWNER = rb"(process [0-9]+ on [!-~]*)?\Z"
@@ -50,12 +52,14 @@ _UNPACKED, _UNPACKED_BYTES = 100, 1 << 26
 
 
 class Column(NamedTuple):
-    """A dataset: its dimensions (names of scales), units, what it is, and the type of its values in the file."""
+    """A dataset: its dimensions (names of scales; a scale has its own name), units, what it is, the type of its values
+    in the file, and further attributes."""
 
     dimensions: tuple[str, ...]
     units: str
     long_name: str
     kind: str = "<f8"
+    attributes: Mapping[str, Any] = MappingProxyType({})
 
 
 @contextmanager
@@ -179,12 +183,6 @@ def reading(path: Path | str, what: str = "") -> Iterator[None]:
         raise StoreError(f"{place}: damaged or incomplete ({reason})") from exc
 
 
-def members(group: Any) -> Iterator[tuple[str, Any]]:
-    """(name, item) of a group, in order. Raises StoreError at a link that leads out of the file or nowhere."""
-    for name in group:
-        yield name, member(group, name)
-
-
 def member(group: Any, name: str) -> Any:
     """A member of a group. Raises KeyError where there is none, StoreError at a link."""
     if is_link(group, name):
@@ -194,23 +192,19 @@ def member(group: Any, name: str) -> Any:
     return group[name]
 
 
-def is_text(dataset: Any) -> bool:
-    """Whether a dataset has texts of any length."""
-    return h5py.check_string_dtype(dataset.dtype) is not None and dataset.dtype.kind == "O"
-
-
-def texts_of(dataset: Any) -> NDArray[Any]:
-    """(n,) A dataset of texts, whole. Raises StoreError where it is stored in another file."""
-    _refuse_outside(dataset)
-    return np.array([plain(text) for text in dataset[()]], dtype=object)
-
-
 def values_of(dataset: Any) -> NDArray[Any]:
-    """An array, whole. Raises StoreError where it is not in the file, or claims far more than the file holds."""
+    """An array of numbers, or of texts, whole. Raises StoreError where it is not in the file, or claims far more than
+    the file holds."""
     place = f"{dataset.file.filename}: {dataset.name}"
-    if not isinstance(dataset, h5py.Dataset) or dataset.shape is None or dataset.dtype.kind == "O":
+    if not isinstance(dataset, h5py.Dataset) or dataset.shape is None:
         raise StoreError(f"{place} is no array")
-    _refuse_outside(dataset)
+    layout = dataset.id.get_create_plist()
+    if layout.get_external_count() or layout.get_layout() == h5py.h5d.VIRTUAL:
+        raise StoreError(f"{place} is stored in another file; allowed: arrays of this file")
+    if dataset.dtype.kind == "O":
+        if h5py.check_string_dtype(dataset.dtype) is None:
+            raise StoreError(f"{place} is no array")
+        return np.array([plain(text) for text in dataset[()]], dtype=object)
     kept = dataset.id.get_storage_size()
     if kept > dataset.file.id.get_filesize() or dataset.nbytes > max(_UNPACKED_BYTES, _UNPACKED * kept):
         raise StoreError(f"{place} claims {dataset.nbytes:.2g} bytes and has {kept:.2g}")
@@ -233,8 +227,7 @@ def put(group: Any, name: str, values: Any, column: Column) -> Any:
 
 
 def _described(dataset: Any, group: Any, column: Column) -> Any:
-    dataset.attrs["units"] = column.units
-    dataset.attrs["long_name"] = column.long_name
+    put_attributes(dataset, {"units": column.units, "long_name": column.long_name, **column.attributes})
     for axis, dimension in enumerate(column.dimensions):
         if group[dimension] == dataset:
             dataset.make_scale(dimension)
@@ -275,8 +268,8 @@ def plain(value: Any) -> Any:
 
 
 def attributes_of(target: Any) -> dict[str, Any]:
-    """As plain Python values."""
-    return {name: attribute(target, name) for name in target.attrs if name not in ("REFERENCE_LIST", DIGESTS)}
+    """As plain Python values, without those that the library writes and changes by itself, and the digests."""
+    return {name: attribute(target, name) for name in target.attrs if name not in _NOT_ATTRIBUTES}
 
 
 def attribute(target: Any, name: str, default: Any = None) -> Any:
@@ -291,15 +284,6 @@ def attribute(target: Any, name: str, default: Any = None) -> Any:
     return plain(target.attrs[name])
 
 
-def _refuse_outside(dataset: Any) -> None:
-    """Raises StoreError for an array that is stored in another file."""
-    layout = dataset.id.get_create_plist()
-    if layout.get_external_count() or layout.get_layout() == h5py.h5d.VIRTUAL:
-        raise StoreError(
-            f"{dataset.file.filename}: {dataset.name} is stored in another file; allowed: arrays of this file"
-        )
-
-
 def dimensions_of(dataset: Any) -> list[str]:
     """The names of its scales; "" where a dimension has none.
 
@@ -308,6 +292,23 @@ def dimensions_of(dataset: Any) -> list[str]:
     """
     names = [str(attribute(dimension[0], "NAME")) if len(dimension) else "" for dimension in dataset.dims]
     return [CHARACTERS if name.startswith(_WITHOUT_VALUES) else name for name in names]
+
+
+def columns_of(group: Any) -> dict[str, Column]:
+    """What the datasets of a group are, by name."""
+    columns = {}
+    for name, dataset in group.items():
+        if not is_group(dataset) and not is_dimension_only(dataset):
+            dimensions = tuple(dimension or name for dimension in dimensions_of(dataset))
+            # Lists of texts as such; numbers as they are, whose type belongs to the attribute.
+            attributes = {
+                name: dataset.attrs[name] if isinstance(value, list) and not isinstance(value[0], str) else value
+                for name, value in attributes_of(dataset).items()
+                if name != "_Encoding"
+            }
+            units, long_name = (str(attributes.pop(name)) for name in ("units", "long_name"))
+            columns[name] = Column(dimensions, units, long_name, dataset.dtype.str, attributes)
+    return columns
 
 
 def groups_in(group: Any, seen: set[Any] | None = None) -> Iterator[Any]:
@@ -319,7 +320,8 @@ def groups_in(group: Any, seen: set[Any] | None = None) -> Iterator[Any]:
         )
     seen.add(group)
     yield group
-    for _, item in () if "run" in group else members(group):
+    for name in () if "run" in group else group:
+        item = member(group, name)
         if is_group(item):
             yield from groups_in(item, seen)
 
@@ -426,9 +428,6 @@ def _array_places(file: Any) -> dict[str, list[str]]:
 ATTRIBUTES = "attributes"
 _COMPUTED = "attributes of "
 
-# What the library writes and changes by itself.
-_NOT_COVERED = (DIGESTS, "CLASS", "NAME", "REFERENCE_LIST", "DIMENSION_LIST", "_Netcdf4Dimid", "_Netcdf4Coordinates")
-
 
 def array_digest(values: NDArray[Any], attributes: str = "") -> str:
     """Over shape and values as little-endian numbers: the same on every machine and for every HDF5 layout; attributes:
@@ -445,8 +444,7 @@ def array_digest(values: NDArray[Any], attributes: str = "") -> str:
 
 def attributes_digest(target: Any) -> str:
     """Over names and values, in any order."""
-    covered = {name: attribute(target, name) for name in target.attrs if name not in _NOT_COVERED}
-    return hashlib.sha256(json.dumps(covered, sort_keys=True).encode()).hexdigest()
+    return hashlib.sha256(json.dumps(attributes_of(target), sort_keys=True).encode()).hexdigest()
 
 
 def seal(group: Any, later: Collection[str] = ()) -> None:
@@ -462,8 +460,7 @@ def seal(group: Any, later: Collection[str] = ()) -> None:
 
 def _digest_of(dataset: Any) -> str:
     """Over values, units, long name and further attributes."""
-    values = texts_of(dataset) if is_text(dataset) else values_of(dataset)
-    return array_digest(values, attributes_digest(dataset))
+    return array_digest(values_of(dataset), attributes_digest(dataset))
 
 
 def seal_all(group: Any) -> None:

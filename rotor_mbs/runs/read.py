@@ -1,4 +1,5 @@
-"""Results files read back: scenes and runs by name, rows when they are asked for. Needs no engine."""
+"""Results files read back: scenes and runs by name, rows when they are asked for; of a run also what was stored, its
+Solution, so that it can be judged again. Needs no engine."""
 
 from __future__ import annotations
 
@@ -15,12 +16,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor_mbs.errors import StoreError
-from rotor_mbs.methods.catalogue import REFERENCE
+from rotor_mbs.methods.catalogue import REFERENCE, look_up
 from rotor_mbs.runs import files
-from rotor_mbs.runs.results import OF_METHODS, REPEATED, RUNS, TableFile
-from rotor_mbs.runs.table import MISSING, Place, Rows, checksums, text_of
+from rotor_mbs.runs.results import FROZEN, OF_METHODS, RUNS, TableFile
+from rotor_mbs.runs.table import MISSING, REPEATED, Place, Rows, checksums, text_of
 from rotor_mbs.scenario.catalogue import natural_order
+from rotor_mbs.scenario.scene import Scene, coordinate_labels, parse_scene
+from rotor_mbs.solution.quantities import known_quantities, quantities, row_shape
+from rotor_mbs.solution.solution import Solution
 from rotor_mbs.solution.status import STATUSES
+from rotor_mbs.solution.trajectory import Integration, Trajectory
 
 _TEXTS = ("message", "engine_message")
 _OWN_NAMES = {name: quantity for quantity, name in OF_METHODS.items()}
@@ -39,7 +44,6 @@ class StoredRun:
     method: str
     known: Mapping[str, Any]
     scales: Mapping[str, NDArray[Any]]
-    _labels: tuple[str, ...]
     _place: Place
     _file: IO[bytes]
     _verify: bool = True
@@ -78,10 +82,12 @@ class StoredRun:
             number = value.item()
             if (isinstance(number, int) and number >= 0) or (isinstance(number, float) and number == number):
                 facts[name] = number
-        versions = json.loads(self.known["versions"])
-        if "frozen_with" in versions:
-            facts["frozen_with"] = versions["frozen_with"]
         return facts
+
+    @property
+    def is_frozen(self) -> bool:
+        """Whether it is a reference that was read from a shipped file."""
+        return "frozen_with" in json.loads(self.known["versions"])
 
     @property
     def status(self) -> str:
@@ -95,7 +101,8 @@ class StoredRun:
     @property
     def labels(self) -> list[str]:
         """Names of the coordinates: rotor, pitch 1, ...; none where neither angles nor rates are stored."""
-        return list(self._labels) if "angles" in self or "rates" in self else []
+        is_known = "angles" in self or "rates" in self
+        return list(coordinate_labels(len(self.scales["coordinate"]) - 1)) if is_known else []
 
     @property
     def samples(self) -> int:
@@ -127,6 +134,54 @@ class StoredRun:
     def get(self, name: str) -> NDArray[Any] | None:
         return self._arrays.get(name)
 
+    def faults(self, scene: Scene, *, complete: bool = True) -> list[str]:
+        """A line for every array that is missing or wrong; complete: every sample must be there, else as many as there
+        are times. A frozen reference need not have what follows from its angles and rates."""
+        rows = scene.samples if complete or "time" not in self else len(self.array("time"))
+        expected: dict[str, tuple[int, ...]] = {"time": (rows,)}
+        for quantity in quantities(scene.outputs):
+            if self.is_frozen and quantity.name not in (*FROZEN, *self.names):
+                continue
+            if quantity.required or (quantity.name == "angle_uncertainty" and self.method == REFERENCE):
+                expected[quantity.name] = (rows, *row_shape(quantity, scene))
+        faults = []
+        for name, shape in expected.items():
+            if name not in self:
+                faults.append(f"{name} is missing")
+                continue
+            values = self.array(name)
+            if values.dtype.kind != "f" or values.shape[1:] != shape[1:]:
+                faults.append(f"{name} has shape {values.shape} of {values.dtype}, not {shape} of numbers")
+            elif len(values) != shape[0]:
+                faults.append(f"{name} has {len(values)} rows, not {shape[0]}")
+            elif not np.isfinite(values).all():
+                faults.append(f"{name} is not finite at sample {int(np.argwhere(~np.isfinite(values))[0][0])}")
+        return faults
+
+    def trajectory(self, scene: Scene) -> Trajectory | None:
+        """Its samples; None where its arrays cannot be used. Angles and rates that were not asked for are zeros, which
+        are not judged."""
+        if self.faults(scene, complete=False):
+            return None
+        time = self.array("time")
+        blank = np.zeros((len(time), 1 + len(scene.blades)))
+        names = {quantity.name for quantity in known_quantities(scene.outputs) if quantity.is_over_time}
+        arrays = {name: self.array(name) for name in names if name in self}
+        return Trajectory(**{"time": time, "angles": blank, "rates": blank, **arrays})
+
+    def solution(self, scene: Scene) -> Solution | None:
+        """The run without its judgement; None where its arrays cannot be used."""
+        trajectory, facts = self.trajectory(scene), self.attributes
+        if trajectory is None:
+            return None
+        success = bool(facts.get("engine_success", self.is_frozen))  # a frozen reference has no report of its engine
+        out_of_time = self.status == "timed_out" and not success
+        engine = Integration(success, str(facts.get("engine_message", "")), out_of_time=out_of_time)
+        solution = Solution(scene, self.method, trajectory, engine, self.settings)
+        if (method := look_up(self.method)) is not None:
+            solution.is_corrected, solution.bounds = method.is_corrected, method.bounds
+        return solution
+
 
 @dataclass(frozen=True)
 class StoredScene:
@@ -135,6 +190,16 @@ class StoredScene:
     name: str
     attributes: dict[str, Any]
     runs: dict[str, StoredRun]
+
+    @functools.cached_property
+    def scene(self) -> Scene:
+        """Raises InputError where its text is no scene."""
+        return parse_scene(str(self.attributes["scene_toml"]), self.name)
+
+    @functools.cached_property
+    def reference_trajectory(self) -> Trajectory | None:
+        """None where there is no reference, or its arrays cannot be used."""
+        return None if self.reference is None else self.reference.trajectory(self.scene)
 
     @property
     def title(self) -> str:
@@ -205,12 +270,8 @@ def _scenes(stored: TableFile, file: IO[bytes], verify: bool, only: Collection[s
         scene = str(known["scene"])
         if only is not None and scene not in only:
             continue
-        arrays = stored.table(scene)
-        scales = arrays.known
-        labels = tuple(map(str, arrays.labels.get("coordinate", ())))
-        by_scene[scene].append(
-            StoredRun(scene, str(known["method_name"]), known, scales, labels, stored.place(run), file, verify)
-        )
+        method, scales = str(known["method_name"]), stored.table(scene).known
+        by_scene[scene].append(StoredRun(scene, method, known, scales, stored.place(run), file, verify))
     for scene, found in by_scene.items():
         if found:
             yield StoredScene(scene, dict(stored.table(scene).attributes), {run.method: run for run in found})

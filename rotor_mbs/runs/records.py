@@ -24,12 +24,7 @@ from rotor_mbs.runs.results import TableFile
 from rotor_mbs.runs.table import (
     COLUMNS,
     MISSING,
-    Place,
-    Rows,
     Table,
-    blank_rows,
-    characters,
-    columns_of,
     known_columns,
     text_of,
 )
@@ -92,15 +87,6 @@ def points_table(group: str, points: Sequence[Mapping[str, object]]) -> Table:
     return Table(group, runs, known_columns(points), POINT_COLUMNS[group], characters=_MESSAGE_LENGTH)
 
 
-def row_of_point(place: Place, status: str, message: str, values: Mapping[str, object]) -> Rows:
-    row = blank_rows(1, place.row)
-    row["status"][0], row["message"][0] = code_of(status), characters(message, row["message"].shape[1])
-    for name, value in values.items():
-        if name in row:
-            row[name][0] = value
-    return row
-
-
 def read_records(path: Path, *kinds: str) -> list[Record]:
     """The records of these kinds, in the order of the file; no curve of which a point is missing. Raises StoreError."""
     with files.open_file(path) as file, files.reading(path):
@@ -117,42 +103,32 @@ def read_records(path: Path, *kinds: str) -> list[Record]:
 def _point_records(file: TableFile, kind: str) -> Iterator[Record]:
     """The rows of a table that belong to one curve or one ladder."""
     stored = file.table(kind)
-    rows: dict[tuple[str, str], list[int]] = {}
-    for i in range(len(stored.runs)):
-        known = file.known(kind, i)
-        rows.setdefault((known["scene"], known.get("curve", known["method_name"])), []).append(i)
-    for (scene, name), numbers in rows.items():
-        values = []
-        for i in numbers:
-            place = file.place(stored.runs[i], kind)
-            row = place.read()
-            if place.stored(row["status"])[0] == MISSING:
-                break
-            values.append({column: array[0] for column, array in row.items()})
-        if len(values) < len(numbers):
+    statuses = stored.statuses()
+    columns = stored.place().read(len(stored.runs)) | {
+        name: stored.known[name] for name in _NUMBERS if name in stored.known
+    }
+    names = stored.known.get("curve", stored.known["method_name"])
+    owners = list(zip(stored.known["scene"], names, strict=True))
+    for scene, name in dict.fromkeys(owners):
+        own = [i for i, owner in enumerate(owners) if owner == (scene, name)]
+        if (statuses[own] == MISSING).any():
             continue
-        points = [file.known(kind, i) for i in numbers]
-        known = points[0]
-        arrays = {column: np.array([row[column] for row in values]) for column in values[0]}
-        messages = [text_of(text) for text in arrays.pop("message")]
-        arrays |= {column: np.array([row[column] for row in points]) for column in _NUMBERS if column in known}
+        known = file.known(kind, own[0])
+        arrays = {column: values[own] for column, values in columns.items()}
         setting_kind = str(known.get("setting_kind", "step"))
-        if setting_kind in arrays:
-            arrays["setting"] = arrays[setting_kind]
-        if kind == "stability":  # steps that were not needed
-            used = [i for i, row in enumerate(values) if row["status"] != code_of("left_out")]
+        arrays["setting"] = arrays[setting_kind]
+        facts: dict[str, Any] = {
+            column: value
+            for column, values in arrays.items()
+            if column not in ("status", "message", "setting") and (value := values[0].item()) == value
+        }
+        messages = [text_of(text) for text in arrays.pop("message")]
+        if kind == "stability":  # without steps that were not needed
+            used = arrays["status"] != code_of("left_out")
             arrays = {column: array[used] for column, array in arrays.items()}
-        facts: dict[str, Any] = {}
-        for column in arrays:
-            value = values[0][column].item() if column in values[0] else float("nan")
-            if value == value and column != "status":
-                facts[column] = value
         facts |= {"messages": messages, "method": known["method_name"], "setting_kind": setting_kind}
-        facts |= {column: known[column] for column in ("scene_hash", "order_expected", "versions") if column in known}
-        facts |= json.loads(known.get("options", "{}"))
-        if facts.get("order_expected") != facts.get("order_expected"):  # NaN: an adaptive method has none
-            del facts["order_expected"]
-        yield Record(kind, scene, name, facts, arrays)
+        facts |= {column: known[column] for column in ("scene_hash", "versions") if column in known}
+        yield Record(kind, scene, name, facts | json.loads(known.get("options", "{}")), arrays)
 
 
 # Groups of arrays
@@ -181,7 +157,7 @@ def _group_records(file: Any, kind: str) -> Iterator[Record]:
         if damages:
             raise StoreError(f"{file.filename}: {path}: {', '.join(damages)} changed after they were written")
         parts = path.removeprefix(f"{kind}/").split("/")
-        columns = columns_of(group)
+        columns = files.columns_of(group)
         arrays = {name: files.values_of(group[name]) for name in columns}
         scales_first = dict(sorted(columns.items(), key=lambda column: column[1].dimensions != (column[0],)))
         scene, name = "/".join(parts[:-2]), "/".join(parts[-2:])

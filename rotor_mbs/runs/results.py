@@ -24,13 +24,12 @@ from rotor_mbs.runs import files, table
 from rotor_mbs.runs.files import KEYWORDS, Column
 from rotor_mbs.runs.table import (
     COLUMNS,
-    STATUS_REPEATED,
+    REPEATED,
     Place,
     Rows,
     StoredTable,
     Table,
     blank_rows,
-    characters,
     known_columns,
     text_of,
 )
@@ -39,7 +38,7 @@ from rotor_mbs.scenario.catalogue import natural_key
 from rotor_mbs.scenario.scene import Scene, scene_hash
 from rotor_mbs.solution.quantities import LOADS, quantities
 from rotor_mbs.solution.solution import Solution
-from rotor_mbs.solution.status import STATUSES, code_of
+from rotor_mbs.solution.status import STATUSES
 
 RUNS = "runs"
 # What a frozen reference stores: it cannot be computed again from angles and rates as precisely.
@@ -59,8 +58,6 @@ _RUN_COLUMNS = (
     "zero_pitch_max", "zero_pitch_left_s", "zero_pitch_growth_per_s", "rotor_angle_min", "rotor_angle_max",
     "rotor_rate_max",
 )  # fmt: skip
-# What a scene's table repeats of /runs, by its name there; in a row it has this name.
-REPEATED = {"status": STATUS_REPEATED, "samples": "samples_repeated"}
 
 
 @dataclass(frozen=True)
@@ -154,9 +151,9 @@ def scene_table(runs: Sequence[Asked], arrays: Collection[str] | None = None) ->
         "signal": "angles",
         "axes": ["run", "time", "coordinate"],
     }
-    scales, labels = table.scene_scales(scene, computed.values())
+    scales = table.scene_scales(scene, computed.values())
     repeated = {name: COLUMNS[name] for name in REPEATED}
-    return Table(scene.name, [run.method for run in runs], {}, repeated | computed, scales, labels, attributes)
+    return Table(scene.name, [run.method for run in runs], scales, repeated | computed, attributes)
 
 
 def results_tables(asked: Sequence[Asked]) -> list[Table]:
@@ -238,14 +235,16 @@ class TableFile:
         return list(missing.values()), kept
 
 
-def extend_file(path: Path, wanted: Sequence[Table], dropped: Collection[tuple[str, str]] = ()) -> TableFile:
-    """Make the file hold the rows of `wanted` tables, beside those that it has, but for the (group, run) of `dropped`.
+def extend_file(path: Path, wanted: Sequence[Table], replaced: Collection[tuple[str, str, str]] = ()) -> TableFile:
+    """Make the file hold the rows of `wanted` tables, beside those that it has.
 
-    Where it has all of them as they are asked for, nothing is written. Else a file is laid out beside it, the rows that
-    stay are copied, and it takes the place of the old one. A row of which anything in the design differs (settings,
-    versions, the scene's numbers) is missing afterwards. Raises InputError where runs of a scene that has other numbers
-    by now would be dropped and not computed again, StoreError where the file cannot be read or written, or is a
-    sweep's.
+    replaced: (group, scene, curve or method) of stored rows that go where they are not wanted.
+
+    Where the file has all rows as they are asked for, nothing is written. Else a file is laid out beside it, the rows
+    that stay are copied, and it takes the place of the old one. A row of which anything in the design differs
+    (settings, versions, the scene's numbers) is missing afterwards. Raises InputError where runs of a scene that has
+    other numbers by now would be dropped and not computed again, StoreError where the file cannot be read or written,
+    or is a sweep's.
     """
     if path.is_symlink():  # a link stays one
         path = path.resolve()
@@ -257,7 +256,16 @@ def extend_file(path: Path, wanted: Sequence[Table], dropped: Collection[tuple[s
         raise StoreError(f"{path}: holds the dataset of a sweep; allowed: another output file")
     with files.open_file(path) as file, files.reading(path):
         stored = {group: table.as_table(file, group) for group in old.groups}
-    _refuse_losses(path, stored.get(RUNS), new.get(RUNS))
+    wanted_runs = _known_rows(new.get(RUNS))
+    hashes = {row["scene"]: row["scene_hash"] for row in wanted_runs.values()}
+    lost = [
+        f"{path}: {row['scene']}: has {row['method_name']} of a scene of that name with other numbers, which this call "
+        "would drop; allowed: another output file, or a call that has this method too"
+        for run, row in _known_rows(stored.get(RUNS)).items()
+        if hashes.get(row["scene"], row["scene_hash"]) != row["scene_hash"] and run not in wanted_runs
+    ]
+    if lost:
+        raise InputError(lost)
     merged: dict[str, Table] = {}
     kept: list[tuple[str, str]] = []
     for group in dict.fromkeys((*stored, *new)):
@@ -265,8 +273,12 @@ def extend_file(path: Path, wanted: Sequence[Table], dropped: Collection[tuple[s
         base = made or stored[group]
         if "crc32" not in base.computed:
             continue
-        rows = {run: row for run, row in _known_rows(before).items() if (group, run) not in dropped}
         asked = _known_rows(made)
+        rows = {
+            run: row
+            for run, row in _known_rows(before).items()
+            if run in asked or (group, row["scene"], row.get("curve", row["method_name"])) not in replaced
+        }
         kept += [(group, run) for run in rows if run not in asked or _is_same(rows[run], asked[run])]
         rows |= asked
         if rows:
@@ -292,20 +304,6 @@ def extend_file(path: Path, wanted: Sequence[Table], dropped: Collection[tuple[s
     rows_kept = [(group, run, place.read()) for group, run, place in places if place.is_stored]
     _write_tables(path, list(merged.values()), rows_kept)
     return TableFile(path)
-
-
-def _refuse_losses(path: Path, stored: Table | None, asked: Table | None) -> None:
-    """Raises InputError where stored runs of a scene with other numbers would be dropped and not computed again."""
-    wanted = _known_rows(asked)
-    hashes = {row["scene"]: row["scene_hash"] for row in wanted.values()}
-    lost = [
-        f"{path}: {row['scene']}: has {row['method_name']} of a scene of that name with other numbers, which this call "
-        "would drop; allowed: another output file, or a call that has this method too"
-        for run, row in _known_rows(stored).items()
-        if hashes.get(row["scene"], row["scene_hash"]) != row["scene_hash"] and run not in wanted
-    ]
-    if lost:
-        raise InputError(lost)
 
 
 def _known_rows(made: Table | None) -> dict[str, dict[str, Any]]:
@@ -363,8 +361,7 @@ def _write_tables(path: Path, tables: Sequence[Table], rows: Sequence[tuple[str,
                     place.clear()
                 else:
                     blank = blank_rows(1, place.row)
-                    place.write(place.first, {name: values.get(name, blank[name]) for name in place.row.names or ()})
-    files.sync_folder(path.parent)
+                    place.write({name: values.get(name, blank[name]) for name in place.row.names or ()})
 
 
 # The rows of a run
@@ -372,43 +369,29 @@ def _write_tables(path: Path, tables: Sequence[Table], rows: Sequence[tuple[str,
 
 def row_of_run(run: Solution, place: Place, facts: Mapping[str, object]) -> Rows:
     """The row of a run: status, metrics, times, arrays. facts: further columns by name."""
-    row = blank_rows(1, place.row)
     integration = run.integration
-    values: dict[str, object] = {
-        "samples": len(run.time),
-        "time_reached": integration.time_reached,
-        "engine_success": int(integration.success),
-        "setup_time_s": run.setup_time_s,
-        "run_time_s": float(np.median(run.run_times_s)),
-        "run_time_min_s": min(run.run_times_s),
-        "output_time_s": run.output_time_s,
-        "repeats": len(run.run_times_s),
-        **run.metrics,
-        **facts,
-    }
-    for name, count in (("steps", integration.steps), ("rhs_evaluations", integration.rhs_evaluations)):
-        if count is not None:
-            values[name] = count
-    for name, value in values.items():
-        if name in row:
-            row[name][0] = value
-    for name, text in (("message", run.message), ("engine_message", integration.message)):
-        if name in row:
-            row[name][0] = characters(text, row[name].shape[1])
-    row["status"][0] = code_of(run.status)
     arrays = dict(run.quantities)
     if run.method == REFERENCE:
         arrays |= {"angles": run.angles, "rates": run.rates}
-    for name, array in arrays.items():
-        column = name if run.method == REFERENCE else OF_METHODS.get(name, name)
-        if column in row:
-            row[column][0, : len(array)] = array
-    repeat(row)
-    return row
-
-
-def repeat(row: Rows) -> None:
-    """Put status and samples where the table of the scene has them, too, where there is one."""
-    for name, repeated in REPEATED.items():
-        if repeated in row:
-            row[repeated][:] = row[name]
+    else:
+        arrays = {OF_METHODS.get(name, name): array for name, array in arrays.items()}
+    return place.rows_of(
+        {
+            "status": run.status,
+            "message": run.message,
+            "engine_message": integration.message,
+            "samples": len(run.time),
+            "time_reached": integration.time_reached,
+            "steps": -1 if integration.steps is None else integration.steps,
+            "rhs_evaluations": -1 if integration.rhs_evaluations is None else integration.rhs_evaluations,
+            "engine_success": int(integration.success),
+            "setup_time_s": run.setup_time_s,
+            "run_time_s": float(np.median(run.run_times_s)),
+            "run_time_min_s": min(run.run_times_s),
+            "output_time_s": run.output_time_s,
+            "repeats": len(run.run_times_s),
+            **run.metrics,
+            **facts,
+            **arrays,
+        }
+    )

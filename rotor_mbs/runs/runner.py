@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from abc import ABC, abstractmethod
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import Self, TypeVar
@@ -19,7 +20,7 @@ _REPORTED = ("status", "message", "run_time_s")
 
 
 @dataclass(frozen=True, kw_only=True)
-class Task:
+class Task(ABC):
     """Consecutive rows of a table, computed at once by one process.
 
     label, method: in a line of progress. reference: where the row is that must be stored before. kill_after_s: after
@@ -38,6 +39,10 @@ class Task:
         """Number of the first row, with which its checksum begins."""
         return self.place.first
 
+    @abstractmethod
+    def perform(self) -> Rows:
+        """Compute its rows, in a worker process."""
+
     def split(self) -> Sequence[Self]:
         """Its rows one by one; an empty sequence where it is one row, or cannot be split."""
         return ()
@@ -50,32 +55,34 @@ class Task:
 T = TypeVar("T", bound=Task)
 
 
-def compute(pool: TaskPool, perform: Callable[[T], Rows], tasks: Iterable[T]) -> Iterator[Finished[T, Rows]]:
+def compute(pool: TaskPool, tasks: Iterable[T]) -> Iterator[Finished[T, Rows]]:
     """Compute tasks in a pool that is open, and store their rows: by the worker where it sees the file.
 
     However the loop ends, the rows of what has ended are in the file. The `value` of a finished task is status, message
     and run_time_s of its rows as they are stored; None where nothing is, and its failure and message say why. Raises
     what a task raised of InputError, MethodRefusal and StoreError.
     """
-    work = with_method_files(partial(perform_and_store, perform) if pool.shares_disk else perform)
+    work = with_method_files(partial(perform, stores=pool.shares_disk))
     for end in run_in(pool, work, tasks, lambda task: task.kill_after_s, lambda task: task.split()):
         task = end.task
         if isinstance(end.error, InputError | MethodRefusal | StoreError):
             raise end.error
         if end.value is not None:
             if not pool.shares_disk:
-                task.place.write(task.first, end.value)
+                task.place.write(end.value)
             yield end
             continue
         status = "solver_failed" if end.failure == "error" else end.failure
         rows = None if end.failure == "worker_died" else task.failed(status, end.message)
         if rows is not None:
-            task.place.write(task.first, rows)
+            task.place.write(rows)
         yield Finished(task, rows, end.failure, end.message)
 
 
-def perform_and_store(perform: Callable[[T], Rows], task: T) -> Rows:
-    """In a worker that sees the file: the rows are computed and written; what is reported of them comes back."""
-    rows = perform(task)
-    task.place.write(task.first, rows)
+def perform(task: Task, *, stores: bool) -> Rows:
+    """In a worker: the rows of a task; where it `stores` them, as it sees the file, what is reported of them."""
+    rows = task.perform()
+    if not stores:
+        return rows
+    task.place.write(rows)
     return {name: np.asarray(rows[name]) for name in _REPORTED if name in rows}

@@ -27,11 +27,10 @@ from rotor_mbs.runs.files import Column, writing
 from rotor_mbs.runs.table import (
     COLUMNS,
     MISSING,
-    Place,
     StoredTable,
     Table,
-    columns_of,
-    lay_out,
+    flags,
+    laid_out,
     scene_scales,
     stored_table,
 )
@@ -81,29 +80,29 @@ def sweep_table(sweep: Sweep, methods: Sequence[str], numbers: range) -> Table:
         column = Column(("run",), unit, f"varied parameter {key}")
         known[parameter_name(key)] = column, np.ascontiguousarray(values[:, i])
     known["variant"] = Column(("run",), "1", "row of the design, the same for every method"), runs % rows
-    known["method_code"] = Column(("run",), "1", "by which method"), (runs // rows).astype(np.int8)
-    flags = {"method_code": methods}
+    column = Column(("run",), "1", "by which method", attributes=flags(methods))
+    known["method_code"] = column, (runs // rows).astype(np.int8)
     if options.validation or options.test:
         splits = split_rows(rows, options.validation, options.test, options.seed)
-        known["split"] = Column(("run",), "1", "for training, validation or testing"), splits[runs % rows]
-        flags["split"] = SPLITS
+        column = Column(("run",), "1", "for training, validation or testing", attributes=flags(SPLITS))
+        known["split"] = column, splits[runs % rows]
     kind = {"float64": "<f8", "float32": "<f4"}[options.precision]
     asked = [quantity for quantity in quantities.quantities(sweep.outputs) if quantity.output and quantity.required]
     trajectories = {
         quantity.name: Column(("run", *quantity.dimensions), quantity.units, quantity.long_name, kind)
         for quantity in asked
     }
-    scales, labels = scene_scales(sweep.base, trajectories.values())
     computed = METRICS | (AMPLIFICATION if options.amplification else {}) | trajectories
-    return Table("", runs, known, computed, scales, labels, flags=flags, characters=MESSAGE_LENGTH)
+    known = scene_scales(sweep.base, trajectories.values()) | known
+    return Table("", runs, known, computed, characters=MESSAGE_LENGTH)
 
 
 @contextmanager
 def open_sweep(
     output: Path, table: Table, attributes: Mapping[str, object], time_limit_s: float = 0.0, *, fresh: bool = False
-) -> Iterator[tuple[Place, NDArray[np.int8]]]:
-    """The file `output`, laid out where it is not there, which no other process writes in the block: where its runs
-    are, and (runs,) their statuses, MISSING where they are to be computed.
+) -> Iterator[tuple[StoredTable, NDArray[np.int8]]]:
+    """The file `output`, laid out where it is not there, which no other process writes in the block: its table, and
+    (runs,) their statuses, MISSING where they are to be computed.
 
     time_limit_s: runs that a shorter limit ended are missing. fresh: all runs are to be computed; what is stored of one
     stays until it is. Raises InputError where the output holds something else, or another process is writing it,
@@ -113,23 +112,22 @@ def open_sweep(
         path = output.resolve() if output.is_symlink() else output  # a link stays one
         is_new = not path.exists()
         if is_new:
-            lay_out(path, [table], attributes)
+            with laid_out(path, [table], attributes):
+                pass
         with files.open_file(path) as file, files.reading(path):
             if files.attribute(file, IDENTITY) != attributes[IDENTITY]:
                 raise InputError(
                     f"{path}: holds something else than this sweep; allowed: another output file, or remove that one"
                 )
             stored = stored_table(file)
-        place, marked = stored.place(), stored.statuses()
-        statuses = place.stored(marked)
-        limit = stored.computed["time_limit_s"]
-        limits = np.memmap(path, limit.kind, "r", limit.offset, limit.shape) if len(marked) else np.empty(0)
-        statuses[(statuses == code_of("timed_out")) & (limits < time_limit_s)] = MISSING
-        place.mark_missing(np.flatnonzero((marked != MISSING) & (statuses == MISSING)).tolist())  # readers see it, too
+        statuses = stored.statuses()
+        statuses[(statuses == code_of("timed_out")) & (stored.column("time_limit_s") < time_limit_s)] = MISSING
+        taken_back = np.flatnonzero((stored.column("status") != MISSING) & (statuses == MISSING))
+        stored.place().mark_missing(taken_back.tolist())  # readers see it, too
         if fresh:
             statuses[:] = MISSING
         try:
-            yield place, statuses
+            yield stored, statuses
         finally:
             if is_new and (statuses == MISSING).all():
                 path.unlink(missing_ok=True)  # a sweep that stored nothing leaves nothing
@@ -150,15 +148,14 @@ class StoredSweep:
             if IDENTITY not in self.attributes:
                 raise StoreError(f"{path}: no sweep's dataset; allowed: a file that `rotor-mbs sweep` wrote")
             self._table: StoredTable = stored_table(file)
-            columns = columns_of(file)
+            columns = files.columns_of(file)
         table = self._table
         del columns["run"]
         self.columns = {"run": Column(("run",), "1", "run number, from 0"), **columns}
         self.keys: list[str] = self.attributes["parameter_keys"]
         with files.reading(path):
-            place, marked = table.place(), table.statuses()
-            statuses = place.stored(marked)
-        self.damaged_runs = place.first + np.flatnonzero((marked != MISSING) & (statuses == MISSING))
+            is_damaged = (table.column("status") != MISSING) & (table.statuses() == MISSING)
+        self.damaged_runs = table.runs[is_damaged]
         if len(self.damaged_runs) and not allow_damaged_runs:
             which = ", ".join(map(str, self.damaged_runs[:5])) + (" ..." if len(self.damaged_runs) > 5 else "")
             raise StoreError(
@@ -173,16 +170,4 @@ class StoredSweep:
 
     def column(self, name: str) -> NDArray[Any]:
         """A dataset; computed ones as they lie in the file, read where they are indexed. Raises StoreError."""
-        table = self._table
-        if name == "run":
-            return table.runs
-        if name in table.computed:
-            stored = table.computed[name]
-            if not all(stored.shape):
-                return np.empty(stored.shape, stored.kind)
-            with files.reading(self._path, name):
-                values: NDArray[Any] = np.memmap(self._path, stored.kind, "r", stored.offset, stored.shape)
-            return values
-        if name in table.known:
-            return table.known[name]
-        raise StoreError(f"{self._path}: does not hold {name}; allowed: a sweep whose outputs have it")
+        return self._table.column(name)

@@ -22,7 +22,7 @@ import os
 import zlib
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, nullcontext
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import IO, Any, NamedTuple
 
@@ -34,22 +34,25 @@ from rotor_mbs.runs import files
 from rotor_mbs.runs.files import CHARACTERS, Column
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.quantities import SCALES, scale_values
-from rotor_mbs.solution.status import STATUSES
+from rotor_mbs.solution.status import STATUSES, code_of
 
 # (rows, ...) arrays by the name of their dataset.
 Rows = dict[str, NDArray[Any]]
 
 MISSING = -1  # status of a row that is not stored
-STATUS_REPEATED = "status_repeated"  # in a row, the status for a second table
+# What the table of a scene's arrays repeats of the run's row in another table; in a row it has this name.
+REPEATED = {"status": "status_repeated", "samples": "samples_repeated"}
 CHARACTER = "S1"  # kind of a column of texts that are computed: (run, characters), UTF-8, then zeros
-STATUS_FLAGS = {
-    "flag_values": np.arange(MISSING, len(STATUSES), dtype=np.int8),
-    "flag_meanings": " ".join(("missing", *STATUSES)),
-}
+
+
+def flags(names: Sequence[str], first: int = 0) -> dict[str, Any]:
+    """The attributes of a column of codes, as CF has them: what each code from `first` on means."""
+    return {"flag_values": np.arange(first, first + len(names), dtype=np.int8), "flag_meanings": " ".join(names)}
+
 
 # What a computed column with a value a row is, whichever table has it: units, long name, type where it is no double.
 COLUMNS = {
-    name: Column(("run", CHARACTERS) if CHARACTER in kind else ("run",), units, long_name, *kind)
+    name: Column(("run", CHARACTERS) if CHARACTER in kind else ("run",), units, long_name, kind[0] if kind else "<f8")
     for name, (units, long_name, *kind) in {
         "status": ("1", "how the run ended, from its state; -1 while it is missing", "i1"),
         "message": ("1", "reason why the run did not succeed", CHARACTER),
@@ -110,6 +113,7 @@ COLUMNS = {
         "crc32": ("1", "CRC-32 of the row in all computed columns", "<u4"),
     }.items()
 }
+COLUMNS["status"] = COLUMNS["status"]._replace(attributes=flags(("missing", *STATUSES), MISSING))
 # What the design says of each row of a table, in this order: units, long name. What has no entry is no column.
 KNOWN = {
     "scene": ("1", "scene"),
@@ -137,12 +141,9 @@ class Table:
     ----------
     group : where it stands in the file; "" for the root.
     runs : (rows,) the scale `run`: texts that tell the rows apart, or their numbers.
-    known : by name, column and values of what the design says of each row.
+    known : by name, column and values of the other dimensions' scales, and of what the design says of each row.
     computed : columns that are computed. One without the dimension `run` belongs to the reference.
-    scales : by name, column and values of the other dimensions.
-    labels : texts for the entries of a scale, by its name.
     attributes : of the group.
-    flags : names that the codes of a known column stand for, by its name.
     characters : of each computed text.
     """
 
@@ -150,16 +151,13 @@ class Table:
     runs: Sequence[str] | NDArray[np.int64]
     known: Mapping[str, tuple[Column, Any]]
     computed: Mapping[str, Column]
-    scales: Mapping[str, tuple[Column, NDArray[Any]]] = field(default_factory=dict)
-    labels: Mapping[str, Sequence[str]] = field(default_factory=dict)
     attributes: Mapping[str, object] = field(default_factory=dict)
-    flags: Mapping[str, Sequence[str]] = field(default_factory=dict)
     characters: int = 0
 
     @property
     def row_type(self) -> np.dtype[np.void]:
         """The computed columns of one row, in the order in which its checksum covers them."""
-        lengths = {name: len(values) for name, (_, values) in self.scales.items()} | {CHARACTERS: self.characters}
+        lengths = {name: len(values) for name, (_, values) in self.known.items()} | {CHARACTERS: self.characters}
         shapes = {
             name: tuple(lengths[dimension] for dimension in column.dimensions if dimension != "run")
             for name, column in self.computed.items()
@@ -178,18 +176,19 @@ def known_columns(rows: Sequence[Mapping[str, object]]) -> dict[str, tuple[Colum
     return columns
 
 
-def scene_scales(
-    scene: Scene, columns: Iterable[Column]
-) -> tuple[dict[str, tuple[Column, NDArray[Any]]], dict[str, tuple[str, ...]]]:
-    """`scales` and `labels` of a table with these columns over a scene's samples."""
+def scene_scales(scene: Scene, columns: Iterable[Column]) -> dict[str, tuple[Column, Any]]:
+    """The scales of a table with these columns over a scene's samples, as part of `known`."""
     used = {"time"}.union(*(column.dimensions for column in columns))
     values = scale_values(scene)
-    scales = {
-        name: (Column((name,), scale.units, scale.long_name), values[name])
+    attributes: dict[str, Any] = {
+        "time": {"standard_name": "time"},
+        "coordinate": {"labels": scene.coordinate_labels},
+    }
+    return {
+        name: (Column((name,), scale.units, scale.long_name, attributes=attributes.get(name, {})), values[name])
         for name, scale in SCALES.items()
         if name in used
     }
-    return scales, {"coordinate": scene.coordinate_labels} if "coordinate" in used else {}
 
 
 @dataclass(frozen=True)
@@ -207,48 +206,58 @@ class Place:
     offsets: Mapping[str, int]
     row: np.dtype[np.void]
 
-    def write(self, first: int, rows: Rows) -> None:
-        """Store the rows from number `first` on, their statuses last; meanwhile they are missing. Raises StoreError."""
-        columns = rows | {"crc32": checksums(first, rows, self.row)}
-        statuses = {name: columns.pop(name) for name in (STATUS_REPEATED, "status") if name in columns}
+    def rows_of(self, values: Mapping[str, object], count: int = 1) -> Rows:
+        """Rows with these values, the same in each, by the name of their column: numbers, a text, the name of a status,
+        the first samples of an array. The other columns are blank; what is no column here is left out."""
+        rows = blank_rows(count, self.row)
+        for name, value in values.items():
+            if name == "status":
+                rows[name][:] = code_of(str(value))
+            elif name in rows and isinstance(value, str):
+                rows[name][:] = characters(value, rows[name].shape[1])
+            elif name in rows and isinstance(value, np.ndarray):
+                rows[name][:, : len(value)] = value
+            elif name in rows:
+                rows[name][:] = value
+        for name, repeated in REPEATED.items():
+            if repeated in rows:
+                rows[repeated][:] = rows[name]
+        return rows
+
+    def at(self, row: int) -> Place:
+        """The place of a later row, counted from the first."""
+        offsets = {name: offset + row * self.row[name].itemsize for name, offset in self.offsets.items()}
+        return replace(self, first=self.first + row, offsets=offsets)
+
+    def write(self, rows: Rows) -> None:
+        """Store consecutive rows, their statuses last; meanwhile they are missing. Raises StoreError."""
+        columns = rows | {"crc32": checksums(self.first, rows, self.row)}
+        statuses = {name: columns.pop(name) for name in (REPEATED["status"], "status") if name in columns}
         with saving(self.path), self.path.open("r+b") as file:
             if os.fstat(file.fileno()).st_ino != self.inode:
                 raise StoreError(f"{self.path}: has been replaced by another file")
             for name, status in statuses.items():
-                file.seek(self.offsets[name] + first - self.first)
+                file.seek(self.offsets[name])
                 file.write(np.full(len(status), MISSING, np.int8).data)
             for name, values in columns.items():
-                file.seek(self.offsets[name] + (first - self.first) * self.row[name].itemsize)
+                file.seek(self.offsets[name])
                 file.write(np.ascontiguousarray(values).data)
             file.flush()
             os.fsync(file.fileno())
             for name, status in statuses.items():
-                file.seek(self.offsets[name] + first - self.first)
+                file.seek(self.offsets[name])
                 file.write(np.ascontiguousarray(status, np.int8).data)
 
-    def read(self, count: int = 1, start: int = 0, file: IO[bytes] | None = None) -> Rows:
-        """(count, ...) The columns of the rows from `start` on; file: one that is open. Raises OSError, ValueError."""
+    def read(self, count: int = 1, file: IO[bytes] | None = None) -> Rows:
+        """(count, ...) The columns of so many rows; file: one that is open. Raises OSError, ValueError."""
         with nullcontext(file) if file is not None else self.path.open("rb") as source:
             rows = {}
             for name in self.row.names or ():
                 kind = self.row[name]
-                source.seek(self.offsets[name] + start * kind.itemsize)
+                source.seek(self.offsets[name])
                 content = source.read(count * kind.itemsize)
                 rows[name] = np.frombuffer(content, kind.base).reshape(count, *kind.shape)
         return rows
-
-    def stored(self, marked: NDArray[np.int8]) -> NDArray[np.int8]:
-        """(rows,) The statuses `marked` in the file; MISSING where a checksum is wrong."""
-        statuses = np.full_like(marked, MISSING)
-        step = max(_READ_BYTES // self.row.itemsize, 1)
-        for start in range(0, len(marked), step):
-            status = marked[start : start + step]
-            if (status == MISSING).all():
-                continue
-            rows = self.read(len(status), start)
-            is_right = checksums(self.first + start, rows, self.row) == rows["crc32"]
-            statuses[start : start + step] = np.where(is_right & (status < len(STATUSES)), status, MISSING)
-        return statuses
 
     @property
     def is_stored(self) -> bool:
@@ -268,7 +277,7 @@ class Place:
         """Take back the statuses of some rows, counted from the first, before they are computed again."""
         with saving(self.path), self.path.open("r+b") as file:
             for row in rows:
-                for name in ("status", STATUS_REPEATED):
+                for name in ("status", REPEATED["status"]):
                     if name in self.offsets:
                         file.seek(self.offsets[name] + row)
                         file.write(np.int8(MISSING).tobytes())
@@ -305,17 +314,11 @@ def text_of(values: NDArray[np.bytes_]) -> str:
 # Laying out
 
 
-def lay_out(path: Path, tables: Sequence[Table], attributes: Mapping[str, object]) -> None:
-    """A new file with room for all rows; complete under its name, or not there. Raises StoreError."""
-    with laid_out(path, tables, attributes):
-        pass
-    files.sync_folder(path.parent)
-
-
 @contextmanager
 def laid_out(path: Path, tables: Sequence[Table], attributes: Mapping[str, object]) -> Iterator[Path]:
-    """The new file under a temporary name, which takes the place of `path` after the block. Its space is reserved
-    twice: HDF5 does not survive a disk that fills up under it, and truncates the file it begins."""
+    """A new file with room for all rows, under a temporary name; after the block it is complete under its name, or not
+    there. Its space is reserved twice: HDF5 does not survive a disk that fills up under it, and truncates the file it
+    begins. Raises StoreError."""
     with files.replacing(path) as temporary:
         rows = sum(len(table.runs) * (table.row_type.itemsize + 8 * (4 + len(table.known))) for table in tables)
         _reserve(temporary, _HEAD_BYTES + rows)
@@ -326,6 +329,7 @@ def laid_out(path: Path, tables: Sequence[Table], attributes: Mapping[str, objec
             files.seal_all(file)
         _reserve(temporary, temporary.stat().st_size)
         yield temporary
+    files.sync_folder(path.parent)
 
 
 def _reserve(path: Path, size: int) -> None:
@@ -347,24 +351,13 @@ def _put_table(file: Any, table: Table) -> None:
     files.put(group, "run", table.runs, Column(("run",), "1", "run"))
     if table.characters:
         files.put_dimension(group, CHARACTERS, table.characters)
-    for name, (column, values) in table.scales.items():
-        dataset = files.put(group, name, values, column)
-        if name in table.labels:
-            files.put_attributes(dataset, {"labels": list(table.labels[name])})
-        if name == "time":
-            files.put_attributes(dataset, {"standard_name": "time"})
     for name, (column, values) in table.known.items():
-        dataset = files.put(group, name, values, column)
-        if name in table.flags:
-            codes = np.arange(len(table.flags[name]), dtype=np.int8)
-            files.put_attributes(dataset, {"flag_values": codes, "flag_meanings": " ".join(table.flags[name])})
+        files.put(group, name, values, column)
     row = table.row_type
     for name, column in table.computed.items():
         kind = row[name].base
         shape = (len(table.runs), *row[name].shape) if "run" in column.dimensions else row[name].shape
-        dataset = files.put_empty(group, name, shape, kind, column, MISSING if name == "status" else None)
-        if name == "status":
-            files.put_attributes(dataset, STATUS_FLAGS)
+        files.put_empty(group, name, shape, kind, column, MISSING if name == "status" else None)
     of_reference = [name for name, column in table.computed.items() if "run" not in column.dimensions]
     if of_reference:
         files.put_attributes(group, {_OF_REFERENCE: of_reference})
@@ -388,7 +381,7 @@ class StoredTable:
     """A table in a file as it was laid out; rows are read by their `Place`.
 
     runs: (rows,) texts or numbers. known: by name, the values of scales and of what the design says of each row.
-    labels: texts for the entries of a scale. computed: the computed columns by name, in the order of the checksum.
+    computed: the computed columns by name, in the order of the checksum.
     """
 
     path: Path
@@ -396,21 +389,47 @@ class StoredTable:
     group: str
     runs: NDArray[Any]
     known: Mapping[str, NDArray[Any]]
-    labels: Mapping[str, Sequence[str]]
     computed: Mapping[str, StoredColumn]
     attributes: Mapping[str, Any]
 
+    def column(self, name: str) -> NDArray[Any]:
+        """(rows, ...) A column, or a scale; a computed one as it lies in the file, read where it is indexed. Raises
+        StoreError where there is none of that name."""
+        if name == "run":
+            return self.runs
+        if name in self.known:
+            return self.known[name]
+        if name not in self.computed:
+            raise StoreError(f"{self.path}: does not hold {name}; allowed: a sweep whose outputs have it")
+        stored = self.computed[name]
+        if not all(stored.shape):
+            return np.empty(stored.shape, stored.kind)
+        with files.reading(self.path, name):
+            values: NDArray[Any] = np.memmap(self.path, stored.kind, "r", stored.offset, stored.shape)
+        return values
+
     def statuses(self) -> NDArray[np.int8]:
-        """(rows,) as they stand in the file now."""
-        return np.fromfile(self.path, np.int8, len(self.runs), offset=self.computed["status"].offset)
+        """(rows,) of those that are there as they were written; MISSING for the others."""
+        marked, place = np.array(self.column("status")), self.place()
+        statuses = np.full_like(marked, MISSING)
+        step = max(_READ_BYTES // place.row.itemsize, 1)
+        for start in range(0, len(marked), step):
+            status, part = marked[start : start + step], place.at(start)
+            if (status == MISSING).all():
+                continue
+            rows = part.read(len(status))
+            is_right = checksums(part.first, rows, part.row) == rows["crc32"]
+            statuses[start : start + step] = np.where(is_right & (status < len(STATUSES)), status, MISSING)
+        return statuses
 
     def place(self, row: int = 0) -> Place:
         """Where the rows from `row` on are. Their checksums begin with the run where that is a number, else the row."""
-        number = int(self.runs[row]) if self.runs.dtype.kind == "i" and len(self.runs) else row
+        first = int(self.runs[0]) if self.runs.dtype.kind == "i" and len(self.runs) else 0
         columns = {name: stored for name, stored in self.computed.items() if stored.is_of_runs}
         kinds = np.dtype([(name, stored.kind, stored.shape[1:]) for name, stored in columns.items()])
-        offsets = {name: stored.offset + row * kinds[name].itemsize for name, stored in columns.items()}
-        return Place(self.path, self.inode, number, offsets, kinds)
+        return Place(self.path, self.inode, first, {name: stored.offset for name, stored in columns.items()}, kinds).at(
+            row
+        )
 
 
 def stored_table(file: Any, group: str = "") -> StoredTable:
@@ -421,7 +440,6 @@ def stored_table(file: Any, group: str = "") -> StoredTable:
     attributes = files.attributes_of(item)
     of_reference = attributes.pop(_OF_REFERENCE, [])
     known: dict[str, NDArray[Any]] = {}
-    labels: dict[str, Sequence[str]] = {}
     computed: dict[str, StoredColumn] = {}
     for name, dataset in item.items():
         if files.is_group(dataset):
@@ -434,12 +452,10 @@ def stored_table(file: Any, group: str = "") -> StoredTable:
                 raise StoreError(f"{path}: {dataset.name} is not contiguous; allowed: a file as it was laid out")
             computed[name] = StoredColumn(dataset.dtype, dataset.shape, offset or 0, name not in of_reference)
         elif name != CHARACTERS:
-            known[name] = files.texts_of(dataset) if files.is_text(dataset) else files.values_of(dataset)
-            if "labels" in dataset.attrs:
-                labels[name] = files.attribute(dataset, "labels")
+            known[name] = files.values_of(dataset)
     runs = known.pop("run")
     _refuse_shapes(path, runs, known, computed, str(item.name))
-    return StoredTable(path, path.stat().st_ino, group, runs, known, labels, computed, attributes)
+    return StoredTable(path, path.stat().st_ino, group, runs, known, computed, attributes)
 
 
 def _refuse_shapes(
@@ -489,25 +505,12 @@ def _refuse_changes(item: Any, group: str, *, with_columns: bool = False) -> Non
 def as_table(file: Any, group: str) -> Table:
     """What would lay out a table of an open file anew."""
     stored, item = stored_table(file, group), file[group] if group else file
-    columns = columns_of(item)
-    scales: dict[str, tuple[Column, NDArray[Any]]] = {}
-    known: dict[str, tuple[Column, NDArray[Any]]] = {}
-    for name, values in stored.known.items():
-        (scales if columns[name].dimensions == (name,) else known)[name] = columns[name], values
+    columns = files.columns_of(item)
+    known = {name: (columns[name], values) for name, values in stored.known.items()}
     computed = {name: columns[name] for name in stored.computed}
     attributes = {name: value for name, value in stored.attributes.items() if group}
     characters = len(item[CHARACTERS]) if CHARACTERS in item else 0
-    return Table(group, stored.runs.tolist(), known, computed, scales, stored.labels, attributes, characters=characters)
-
-
-def columns_of(group: Any) -> dict[str, Column]:
-    columns = {}
-    for name, dataset in group.items():
-        if not files.is_group(dataset) and not files.is_dimension_only(dataset):
-            dimensions = tuple(dimension or name for dimension in files.dimensions_of(dataset))
-            units, long_name = (str(files.attribute(dataset, name)) for name in ("units", "long_name"))
-            columns[name] = Column(dimensions, units, long_name, dataset.dtype.str)
-    return columns
+    return Table(group, stored.runs.tolist(), known, computed, attributes, characters)
 
 
 def table_groups(path: Path) -> list[str]:

@@ -17,7 +17,7 @@ from operator import attrgetter
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
-from rotor_mbs.errors import InputError
+from rotor_mbs.errors import InputError, nearest
 from rotor_mbs.scenario import keys
 from rotor_mbs.scenario.keys import Kind, counted, file_key, list_of, read_each, shown, where, wrong
 from rotor_mbs.scenario.time_table import Table, is_constant, is_one_table, value_at
@@ -28,12 +28,12 @@ from rotor_mbs.scenario.toml_file import (
     TableError,
     parse_key,
     parse_toml,
+    plain_value,
     read_toml,
     shown_key,
     shown_path,
     toml_lines,
     toml_value,
-    unknown_methods,
 )
 
 if TYPE_CHECKING:
@@ -316,7 +316,7 @@ class Scene:
 
     @property
     def coordinate_labels(self) -> tuple[str, ...]:
-        return ("rotor", *(f"pitch {i + 1}" for i in range(len(self.blades))))
+        return coordinate_labels(len(self.blades))
 
     @property
     def moving_coordinates(self) -> list[int]:
@@ -360,7 +360,7 @@ class Scene:
         tables = scene_tables(self)
         try:
             for path, value in changes.items():
-                put_value(tables, parse_key(path), _plain(value))
+                put_value(tables, parse_key(path), plain_value(value))
             changed = scene_from_tables(tables, self.name)
         except TableError as error:
             raise InputError(f"{self.name}: {problem.message}" for problem in error.problems) from error
@@ -372,6 +372,10 @@ class Scene:
     def torque_at(self, time: float) -> float:
         """Rotor torque in N m at `time` in s; at a jump, the value after it."""
         return value_at(self.rotor_torque, time)
+
+
+def coordinate_labels(blades: int) -> tuple[str, ...]:
+    return ("rotor", *(f"pitch {i + 1}" for i in range(blades)))
 
 
 BLADE_KEYS = keys.declared_keys(Blade)
@@ -542,13 +546,6 @@ def _as_list(tables: Mapping[str, Any], value: Any, path: KeyPath, last: int) ->
     return [0.0] * (last + 1) if value is None else value
 
 
-def _plain(value: object) -> object:
-    """Tuples and NumPy values as the lists and numbers of a TOML file."""
-    if isinstance(value, tuple | list):
-        return [_plain(entry) for entry in value]
-    return value.tolist() if hasattr(value, "tolist") else value
-
-
 __all__ = ["load_scene", "new_scene_text", "parse_scene", "scene_toml"]
 
 
@@ -570,7 +567,12 @@ def parse_scene(text: str, name: str) -> Scene:
 
 
 def _scene(text: str, tables: dict[str, Any], name: str, source: str, known_methods: Sequence[str] = ()) -> Scene:
-    problems = unknown_methods(tables, known_methods)
+    problems = []
+    names = tables.get("methods")
+    for method in names if isinstance(names, list) and known_methods else ():
+        if isinstance(method, str) and method not in known_methods:
+            what = f"unknown method {method!r}{nearest(method, known_methods)}"
+            problems.append(KeyProblem(("methods",), what, ", ".join(known_methods)))
     try:
         scene = scene_from_tables(tables, name, text)
     except TableError as error:

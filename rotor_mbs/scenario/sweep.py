@@ -7,7 +7,7 @@ import dataclasses
 import functools
 import math
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -36,10 +36,10 @@ from rotor_mbs.scenario.toml_file import (
     find_lines,
     line_of,
     parse_key,
+    plain_value,
     read_toml,
     shown_path,
     toml_lines,
-    unknown_methods,
 )
 
 Array = NDArray[np.float64]
@@ -347,9 +347,9 @@ class Sweep:
         return Variants(self.name, {**scene_tables(self.base), "outputs": wanted}, self.keys)
 
 
-def load_sweep(path: Path, known_methods: Sequence[str] = ()) -> Sweep:
-    """The sweep in the TOML file `path`; sweeps/NAME means a shipped one. known_methods: what the file may name, () for
-    anything. Raises InputError with all errors of the file."""
+def load_sweep(path: Path) -> Sweep:
+    """The sweep in the TOML file `path`; sweeps/NAME means a shipped one. Raises InputError with all errors of the
+    file."""
     shipped = (sweeps_folder().parent / path).with_suffix(".toml")
     if not path.exists() and path.parts[:1] == ("sweeps",) and shipped.is_file():
         path = shipped
@@ -359,7 +359,7 @@ def load_sweep(path: Path, known_methods: Sequence[str] = ()) -> Sweep:
     if "initial" in tables and "blade" in tables:
         shown = shown_path(path)
         raise InputError(f"{shown}: is a scene; allowed: a sweep of scenes, or: rotor-mbs run {shown}")
-    return _sweep(path, text, tables, known_methods=known_methods)
+    return _sweep(path, text, tables)
 
 
 def sweep_of(scene: Scene, axes: Mapping[str, object], **options: object) -> Sweep:
@@ -368,45 +368,24 @@ def sweep_of(scene: Scene, axes: Mapping[str, object], **options: object) -> Swe
     sweep's `text`."""
     if not isinstance(axes, Mapping):
         raise InputError(f"parameters: {axes!r}; allowed: a dictionary from keys to lists of values")
-    plain_options = {key: _plain(value) for key, value in options.items()}
-    tables: dict[str, object] = {"title": scene.title, "scene": scene.name, **plain_options}
+    given = {key: plain_value(value) for key, value in options.items()}
+    tables: dict[str, object] = {"title": scene.title, "scene": scene.name, **given}
     listed: list[dict[str, object]] = []
     for key, values in axes.items():
-        plain = _plain(values)
+        plain = plain_value(values)
         listed.append({"key": key, **(plain if isinstance(plain, dict) else {"values": plain})})
     text = "".join([toml_lines(tables), *("\n[[axis]]\n" + toml_lines(axis) for axis in listed)])
     tables["axis"] = listed
     return _sweep(Path("sweep"), text, tables, scene)
 
 
-def _plain(values: object) -> object:
-    """As a TOML file has it: arrays, ranges, generators as lists. Raises InputError for what it cannot have."""
-    if isinstance(values, np.ndarray | np.generic):
-        values = values.tolist()
-    if isinstance(values, Mapping):
-        return {str(key): _plain(value) for key, value in values.items()}
-    if isinstance(values, str | bool | int | float):
-        return values
-    if isinstance(values, Iterable):
-        return [_plain(value) for value in values]
-    raise InputError(f"{values!r}: not a value of a sweep; allowed: numbers, texts, and lists of them")
-
-
-def _sweep(
-    path: Path,
-    text: str,
-    tables: Mapping[str, object],
-    base: Scene | None = None,
-    known_methods: Sequence[str] = (),
-) -> Sweep:
+def _sweep(path: Path, text: str, tables: Mapping[str, object], base: Scene | None = None) -> Sweep:
     """The sweep in the tables of a file; its base is the scene that it names, where none is given."""
-    source, problems = shown_path(path), unknown_methods(tables, known_methods)
+    source = shown_path(path)
     try:
         table: SweepTable = table_of(SweepTable).read(tables)
     except TableError as error:
-        problems += error.problems
-    if problems:
-        raise TableError(problems).in_file(text, source)
+        raise error.in_file(text, source) from error
     if base is None:
         is_shipped = (scenarios_folder() / f"{table.scene}.toml").is_file()
         is_beside = table.scene.endswith(".toml") and not is_shipped

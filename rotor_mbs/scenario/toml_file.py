@@ -5,12 +5,12 @@ from __future__ import annotations
 import json
 import re
 import tomllib
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from rotor_mbs.errors import InputError, nearest
+from rotor_mbs.errors import InputError
 
 KeyPath = tuple[str | int, ...]
 
@@ -69,16 +69,6 @@ class TableError(ValueError):
         if len(messages) > MAX_PROBLEMS:
             shown.append(f"{source}: {len(messages) - MAX_PROBLEMS} more errors")
         return InputError(shown)
-
-
-def unknown_methods(tables: Mapping[str, Any], known: Sequence[str]) -> list[KeyProblem]:
-    """A problem for each name in the `methods` of a file that is not `known`; none where any is allowed, ()."""
-    names = tables.get("methods")
-    return [
-        KeyProblem(("methods",), f"unknown method {name!r}{nearest(name, known)}", ", ".join(known))
-        for name in (names if isinstance(names, list) and known else ())
-        if isinstance(name, str) and name not in known
-    ]
 
 
 def shown_path(path: Path) -> str:
@@ -153,12 +143,25 @@ def parse_toml(text: str, source: str) -> dict[str, Any]:
         raise InputError(f"{source}:1: a number is too long; allowed: |x| <= 1e300") from error
 
 
+def plain_value(value: Any) -> Any:
+    """As a TOML file has it: arrays, tuples, ranges, generators as lists. What no file can have stays as it is."""
+    if hasattr(value, "tolist"):  # of NumPy
+        value = value.tolist()
+    if isinstance(value, Mapping):
+        return {str(key): plain_value(entry) for key, entry in value.items()}
+    if isinstance(value, Iterable) and not isinstance(value, str):
+        return [plain_value(entry) for entry in value]
+    return value
+
+
 def toml_value(value: object) -> str:
-    """The value in TOML: text, numbers bit for bit, lists, and mappings as inline tables."""
+    """The value in TOML: text, numbers bit for bit, lists, and mappings as inline tables. Raises InputError."""
     if isinstance(value, Mapping):
         return f"{{{', '.join(f'{json.dumps(key)} = {toml_value(entry)}' for key, entry in value.items())}}}"
     if isinstance(value, list | tuple):
         return f"[{', '.join(toml_value(entry) for entry in value)}]"
+    if not isinstance(value, str | bool | int | float):
+        raise InputError(f"{value!r}: not a value of a file; allowed: numbers, texts, and lists of them")
     return repr(float(value)) if isinstance(value, float) else json.dumps(value, ensure_ascii=False)
 
 

@@ -27,7 +27,7 @@ from rotor_mbs.methods.time_limit import OutOfTimeError, time_limit
 from rotor_mbs.runs import last_core
 from rotor_mbs.runs.files import writing
 from rotor_mbs.runs.pool import WorkerPool, run_in
-from rotor_mbs.runs.records import points_table, row_of_point
+from rotor_mbs.runs.records import points_table
 from rotor_mbs.runs.results import TableFile, extend_file
 from rotor_mbs.runs.table import Place, Rows, Table
 from rotor_mbs.runs.versions import row_versions
@@ -333,6 +333,11 @@ class Curve:
         return f"{self.scene.name} {self.ladder.curve} bench"
 
     @property
+    def key(self) -> tuple[str, str, str]:
+        """By which its rows are found: table, scene, curve."""
+        return BENCH, self.scene.name, self.ladder.curve
+
+    @property
     def first_run(self) -> str:
         """The label of its first row."""
         return str(self.rows[0]["run"])
@@ -382,19 +387,6 @@ class Curve:
 def bench_table(curves: Sequence[Curve]) -> Table:
     """The table of the points of these curves."""
     return points_table(BENCH, [row for curve in curves for row in curve.rows])
-
-
-def replaced_points(output: Path, curves: Sequence[Curve]) -> list[tuple[str, str]]:
-    """(group, run) of stored points of these curves that are no longer among them."""
-    if not output.exists():
-        return []
-    file = TableFile(output)
-    if BENCH not in file.groups:
-        return []
-    stored = file.table(BENCH)
-    labels = {(curve.scene.name, curve.ladder.curve): [row["run"] for row in curve.rows] for curve in curves}
-    owners = zip(stored.runs, stored.known["scene"], stored.known["curve"], strict=True)
-    return [(BENCH, run) for run, scene, name in owners if run not in labels.get((scene, name), [run])]
 
 
 def is_measured(file: TableFile, curve: Curve) -> bool:
@@ -447,7 +439,7 @@ def run_bench(
             able, refused = able_methods(scene, dict.fromkeys(ladder.method for ladder in chosen))
             curves += [Curve(scene, ladder, options) for ladder in chosen if ladder.method in able]
             left_out += refused
-        file = extend_file(output, [bench_table(curves)], replaced_points(output, curves))
+        file = extend_file(output, [bench_table(curves)], [curve.key for curve in curves])
         missing = [curve for curve in curves if curve.scene.name in changed or not is_measured(file, curve)]
         made: list[Outcome] = []
         for scene in scenes:
@@ -503,7 +495,7 @@ def _measure_scene(
                     yield Outcome(curve.label, curve.ladder.method, end.failure, end.message, is_stored=False)
                     continue
                 place, rows = file.place(curve.first_run, BENCH), end.value[i]
-                place.write(place.first, rows_of_curve(place, curve, rows, facts))
+                place.write(rows_of_curve(place, curve, rows, facts))
                 yield Outcome(curve.label, curve.ladder.method, "ok", counts_of(rows))
 
 
@@ -514,11 +506,7 @@ def rows_of_curve(place: Place, curve: Curve, points: Sequence[Mapping[str, Any]
         "order": curve_order(curve, points),
         "repeatable": int(all(point.get("same", True) for point in points)),
     }
-    rows = []
-    for point in points:
-        values = {**point, **facts, "left_out": int(point["status"] == "left_out")}
-        del values["status"], values["message"]
-        rows.append(row_of_point(place, str(point["status"]), str(point["message"]), values))
+    rows = [place.rows_of({**point, **facts, "left_out": int(point["status"] == "left_out")}) for point in points]
     return {name: np.concatenate([row[name] for row in rows]) for name in rows[0]}
 
 

@@ -16,9 +16,9 @@ from rotor_mbs.models.exudyn.script import exudyn_script
 from rotor_mbs.models.mujoco.mjcf import mjcf_file
 from rotor_mbs.runs.files import refuse_foreign, replace_file
 from rotor_mbs.scenario.catalogue import scene_of
-from rotor_mbs.scenario.scene import Scene, scene_hash
+from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution import quantities
-from rotor_mbs.studies.stored_references import frozen_solution, shipped_reference
+from rotor_mbs.studies.stored_references import frozen_solution
 
 
 def export(scene: Scene | str, to: str, output: str | os.PathLike[str]) -> list[Path]:
@@ -60,8 +60,7 @@ def export(scene: Scene | str, to: str, output: str | os.PathLike[str]) -> list[
 
 def reference_csv(scene: Scene) -> str:
     """The scene's reference, shipped or computed, as comma-separated values. StoreError where it does not begin."""
-    is_shipped = shipped_reference(scene_hash(scene)) is not None
-    solution = frozen_solution(scene) if is_shipped else solve(REFERENCE, scene, {})
+    solution = frozen_solution(scene) or solve(REFERENCE, scene, {})
     trajectory = solution.trajectory
     if not len(trajectory.time):
         raise StoreError(f"{scene.name}: no reference: {solution.integration.message or 'no motion from its start'}")

@@ -13,10 +13,8 @@ from rotor_mbs.errors import InputError, StoreError
 from rotor_mbs.methods.catalogue import REFERENCE
 from rotor_mbs.runs.files import array_digest, replace_file, writing
 from rotor_mbs.runs.read import OpenResults, open_results
-from rotor_mbs.runs.results import FROZEN, Asked, extend_file, repeat, runs_table, scene_table
-from rotor_mbs.runs.table import blank_rows
+from rotor_mbs.runs.results import FROZEN, Asked, extend_file, runs_table, scene_table
 from rotor_mbs.scenario.scene import Scene
-from rotor_mbs.solution.status import code_of
 from rotor_mbs.studies.run import OnProgress, RunReport, ignore_progress, run_scenes
 
 _FACTS = ("steps", "time_reached", "setup_time_s", "run_time_s", "output_time_s")
@@ -61,15 +59,10 @@ def _freeze(scenes: Sequence[Scene], results: OpenResults, target: Path) -> None
     file = extend_file(target, [runs_table([asked for asked, _ in references]), *tables])
     for asked, run in references:
         place = file.place(asked.run)
-        row = blank_rows(1, place.row)
-        row["status"][0], row["samples"][0] = code_of(run.status), run.samples
-        for name in _FACTS:
-            row[name][0] = run.attributes[name]
-        for name in FROZEN:
-            if name in run and name in row:
-                row[name][0, : run.samples] = run.array(name)
-        repeat(row)
-        place.write(place.first, row)
+        values: dict[str, object] = {"status": run.status, "samples": run.samples}
+        values |= {name: run.attributes[name] for name in _FACTS}
+        values |= {name: run.array(name) for name in FROZEN if name in run}
+        place.write(place.rows_of(values))
     with open_results(target) as frozen:
         lines = [f"{digest}  {scene} {name}\n" for (scene, name), digest in _digests(frozen).items()]
     replace_file(target.with_suffix(".sha256"), "".join(lines).encode(), rb"\A[0-9a-f]{64}  \S+ \w+\n")

@@ -33,18 +33,15 @@ from rotor_mbs.studies.bench import (
     facts_of,
     is_measured,
     prepared,
-    replaced_points,
     rows_of_curve,
 )
 from rotor_mbs.studies.run import (
     OnProgress,
     RunReport,
-    RunTask,
     able_methods,
     asked_runs,
     compute_tasks,
     ignore_progress,
-    perform_run,
     run_tasks,
     work_of,
 )
@@ -60,6 +57,24 @@ class CurveTask(Task):
 
     scene: Scene
 
+    def perform(self) -> Rows:
+        """Run and judge the points of one curve; their rows."""
+        (curve,) = curves_of(self.scene, self.method)
+        assert self.reference is not None  # every curve has one
+        short, reference = prepared(curve.scene, self.reference)
+        longest, rows = 0.0, []
+        for point in curve.points:
+            timer = PointTimer(point, short, reference)
+            if longest > _LONGEST_S:
+                timer.left_out = f"not run: the setting before took {longest:.2g} s"
+            else:
+                timer.warm_up()
+            if timer.is_repeatable:
+                longest = timer.warm_s
+                timer.times.append(longest)
+            rows.append(timer.row())
+        return rows_of_curve(self.place, curve, rows, facts_of(short, reference))
+
 
 def reproduce(
     output: Path, *, workers: Workers, timeout_s: float, on_progress: OnProgress = ignore_progress
@@ -71,7 +86,7 @@ def reproduce(
     curves = short_curves(benched)
     asked = asked_runs(scenes, methods, {})
     with writing(output):
-        file = extend_file(output, [*results_tables(asked), bench_table(curves)], replaced_points(output, curves))
+        file = extend_file(output, [*results_tables(asked), bench_table(curves)], [curve.key for curve in curves])
         missing, kept = file.take_back_missing(asked, timeout_s)
         runs: list[Task] = [*run_tasks(file, missing, timeout_s)]
         reference = f"{benched.name}/{REFERENCE}"
@@ -89,7 +104,7 @@ def reproduce(
             for curve in curves
             if is_new or not is_measured(file, curve)
         ]
-        made = compute_tasks([*runs, *of_curves], perform, workers, on_progress)
+        made = compute_tasks([*runs, *of_curves], workers, on_progress)
         labels = {task.label for task in runs}
         return RunReport([outcome for outcome in made if outcome.label in labels], kept)
 
@@ -114,11 +129,6 @@ def summary_of(path: Path) -> str:
         return f"{table}\n\n{method_table(runs)}\n"
 
 
-def perform(task: RunTask | CurveTask) -> Rows:
-    """A run, or a curve beside the runs, in a worker process."""
-    return perform_curve(task) if isinstance(task, CurveTask) else perform_run(task)
-
-
 def short_curves(scene: Scene) -> list[Curve]:
     """A short curve of each method on `scene`."""
     able, _ = able_methods(scene, list(dict.fromkeys(ladder.method for ladder in ladders())))
@@ -128,22 +138,3 @@ def short_curves(scene: Scene) -> list[Curve]:
 def curves_of(scene: Scene, method: str) -> list[Curve]:
     options = {"budget_s": _LONGEST_S, "is_short": True}
     return [Curve(scene, ladder.short, options) for ladder in ladders([method]) if not ladder.variant]
-
-
-def perform_curve(task: CurveTask) -> Rows:
-    """Run and judge the points of one curve, in a worker process; their rows."""
-    (curve,) = curves_of(task.scene, task.method)
-    assert task.reference is not None  # every curve has one
-    short, reference = prepared(curve.scene, task.reference)
-    longest, rows = 0.0, []
-    for point in curve.points:
-        timer = PointTimer(point, short, reference)
-        if longest > _LONGEST_S:
-            timer.left_out = f"not run: the setting before took {longest:.2g} s"
-        else:
-            timer.warm_up()
-        if timer.is_repeatable:
-            longest = timer.warm_s
-            timer.times.append(longest)
-        rows.append(timer.row())
-    return rows_of_curve(task.place, curve, rows, facts_of(short, reference))

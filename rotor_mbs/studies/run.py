@@ -6,7 +6,6 @@ import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -58,6 +57,27 @@ class RunTask(Task):
         run = without_samples(asked.scene, asked.method, asked.settings, status, message)
         limit = self.time_limit_s if status == "timed_out" else np.nan
         return row_of_run(run, self.place, {"false_success": 0, "time_limit_s": limit})
+
+    def perform(self) -> Rows:
+        """Solve and judge one run; its row."""
+        asked, end = self.asked, time.monotonic() + self.time_limit_s
+        shipped = frozen_solution(asked.scene) if asked.is_shipped else None
+        try:
+            run = shipped or solve(
+                asked.method, asked.scene, asked.settings, _REPEATS, _REPEAT_BUDGET_S, self.time_limit_s
+            )
+        except OF_THE_MACHINE:
+            raise
+        except OutOfTimeError as exc:  # from a method that cannot be stopped with its samples
+            return self.failed("timed_out", str(exc))
+        except Exception as exc:
+            return self.failed("solver_failed", str(exc) if isinstance(exc, RotorError) else line_of(exc))
+        reference = run.trajectory if asked.method == REFERENCE else None
+        if self.reference is not None:
+            reference = read_reference(self.reference, asked.scene)
+        run, false_success = _judged(run, reference, end)
+        limit = self.time_limit_s if run.status == "timed_out" and shipped is None else np.nan
+        return row_of_run(run, self.place, {"false_success": int(false_success), "time_limit_s": limit})
 
 
 def work_of(scene: Scene, method: str) -> float:
@@ -147,7 +167,7 @@ def run_scenes(
     with writing(output):
         file = extend_file(output, results_tables(asked))
         missing, kept = file.take_back_missing(asked, timeout_s)
-        made = compute_tasks(run_tasks(file, missing, timeout_s), perform_run, workers, on_progress)
+        made = compute_tasks(run_tasks(file, missing, timeout_s), workers, on_progress)
         return RunReport(made, kept)
 
 
@@ -158,11 +178,17 @@ def asked_runs(
     *,
     use_frozen: bool = True,
 ) -> list[Asked]:
-    """The rows of these scenes by their `methods`, the reference of each scene first. Raises InputError."""
+    """The rows of these scenes by their `methods`, the reference of each scene first: the shipped one, where there is
+    one and it may be used, or one to be computed. Raises InputError."""
     given = settings_for(list(dict.fromkeys(name for scene in scenes for name in methods[scene.name])), settings)
     asked: list[Asked] = []
     for scene in scenes:
-        asked.append(asked_reference(scene, use_frozen=use_frozen))
+        versions = None
+        shipped = shipped_reference(scene_hash(scene)) if use_frozen else None
+        if shipped is not None:
+            source = {"frozen_with": shipped.frozen_with, "frozen_file": digest(shipped.path)[:12]}
+            versions = row_versions(find_method(REFERENCE)) | source
+        asked.append(Asked(scene, REFERENCE, versions=versions))
         asked += [Asked(scene, name, own_settings(scene, name) | given[name]) for name in methods[scene.name]]
     return asked
 
@@ -185,26 +211,22 @@ def run_tasks(file: TableFile, asked: Sequence[Asked], timeout_s: float) -> list
     ]
 
 
-def compute_tasks(
-    tasks: Sequence[Task], perform: Callable[[Any], Rows], workers: Workers, on_progress: OnProgress
-) -> list[Outcome]:
+def compute_tasks(tasks: Sequence[Task], workers: Workers, on_progress: OnProgress) -> list[Outcome]:
     """References first; then, if their references are there, the other rows, the slowest first; what became of each."""
     made: list[Outcome] = []
     if not tasks:
         return made
     with pool_of(workers) as pool:
         work, done = sum(task.work for task in tasks), 0.0
-        for end in _compute_in_order(pool, perform, tasks):
+        for end in _compute_in_order(pool, tasks):
             done += end.task.work
             made.append(_outcome(end, done / work))
             on_progress(len(made), len(tasks), made[-1])
     return made
 
 
-def _compute_in_order(
-    pool: TaskPool, perform: Callable[[Any], Rows], tasks: Sequence[Task]
-) -> Iterator[Finished[Task, Rows]]:
-    yield from compute(pool, perform, [task for task in tasks if task.reference is None])
+def _compute_in_order(pool: TaskPool, tasks: Sequence[Task]) -> Iterator[Finished[Task, Rows]]:
+    yield from compute(pool, [task for task in tasks if task.reference is None])
     waiting = [task for task in tasks if task.reference is not None]
     ready = [task for task in waiting if task.reference is not None and task.reference.is_stored]
     # Slowest first, so that no long one starts last and keeps one process busy while the others wait; between them the
@@ -212,7 +234,7 @@ def _compute_in_order(
     ready.sort(key=lambda task: -task.work)
     quarter, count = len(ready) // 4, len(ready)
     turns = [task for pair in zip(ready[:quarter], ready[count - quarter :], strict=True) for task in pair]
-    yield from compute(pool, perform, [*turns, *ready[quarter : count - quarter]])
+    yield from compute(pool, [*turns, *ready[quarter : count - quarter]])
     for task in waiting:
         if task not in ready:
             yield Finished(task, None, "no_reference", "its reference was not computed")
@@ -251,9 +273,8 @@ def solve_judged(
     Arguments, errors raised and an example: `rotor_mbs.run`.
     """
     end = time.monotonic() + time_limit_s
-    reference, is_short = None, False
-    if shipped_reference(scene_hash(scene)) is not None:
-        reference = frozen_solution(scene).trajectory
+    shipped, is_short = frozen_solution(scene), False
+    reference = None if shipped is None else shipped.trajectory
     own = own_settings(scene, method) | dict(settings or {})
     try:
         run = solve(method, scene, own, _REPEATS, _REPEAT_BUDGET_S, time_limit_s)
@@ -298,48 +319,12 @@ def next_to_try(scene: Scene, method: str, settings: Mapping[str, object], statu
     return f"; as fine as its ladder goes, next to try: {others[0]}" if others else ""
 
 
-def asked_reference(scene: Scene, *, use_frozen: bool = True) -> Asked:
-    """The reference of a scene: the shipped one, where there is one and it may be used, or one to be computed."""
-    shipped = shipped_reference(scene_hash(scene)) if use_frozen else None
-    if shipped is None:
-        return Asked(scene, REFERENCE)
-    source = {"frozen_with": shipped.frozen_with, "frozen_file": digest(shipped.path)[:12]}
-    return Asked(scene, REFERENCE, versions={**row_versions(find_method(REFERENCE)), **source})
-
-
 def own_settings(scene: Scene, method: str) -> dict[str, object]:
     """Those of the scene's settings that the method has. Raises InputError for one that no method at all has."""
     if not scene.settings:
         return {}
     with at_key(scene.name, scene.text, "settings"):
         return settings_for(method_names(), dict(scene.settings)).get(method, {})
-
-
-def perform_run(task: RunTask) -> Rows:
-    """Solve and judge one run, in a worker process; its row."""
-    asked = task.asked
-    facts: dict[str, object] = {}
-    end = time.monotonic() + task.time_limit_s
-    if asked.is_shipped:
-        run = frozen_solution(asked.scene)
-    else:
-        try:
-            run = solve(asked.method, asked.scene, asked.settings, _REPEATS, _REPEAT_BUDGET_S, task.time_limit_s)
-        except OF_THE_MACHINE:
-            raise
-        except OutOfTimeError as exc:  # from a method that cannot be stopped with its samples
-            return task.failed("timed_out", str(exc))
-        except Exception as exc:
-            return task.failed("solver_failed", str(exc) if isinstance(exc, RotorError) else line_of(exc))
-    if asked.method == REFERENCE:
-        reference: Trajectory | None = run.trajectory
-    else:
-        reference = read_reference(task.reference, asked.scene) if task.reference is not None else None
-    run, false_success = _judged(run, reference, end)
-    facts["false_success"] = int(false_success)
-    if run.status == "timed_out" and not asked.is_shipped:
-        facts["time_limit_s"] = task.time_limit_s
-    return row_of_run(run, task.place, facts)
 
 
 def without_samples(scene: Scene, method: str, settings: Mapping[str, object], status: str, message: str) -> Solution:

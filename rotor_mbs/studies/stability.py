@@ -10,13 +10,13 @@ from pathlib import Path
 import numpy as np
 
 from rotor_mbs.analysis.judgement import Judgement, judge
-from rotor_mbs.analysis.stability import TARGET, SuiteRun, suite_runs
+from rotor_mbs.analysis.stability import TARGET, suite_runs
 from rotor_mbs.methods.catalogue import REFERENCE, find_method, method_names, settings_for
 from rotor_mbs.methods.solve import solve
 from rotor_mbs.methods.time_limit import OutOfTimeError, time_limit
 from rotor_mbs.runs.files import writing
-from rotor_mbs.runs.records import points_table, row_of_point
-from rotor_mbs.runs.results import TableFile, extend_file
+from rotor_mbs.runs.records import points_table
+from rotor_mbs.runs.results import extend_file
 from rotor_mbs.runs.runner import Task
 from rotor_mbs.runs.table import Rows
 from rotor_mbs.runs.versions import row_versions
@@ -54,6 +54,43 @@ class LadderTask(Task):
     """A ladder of steps of a scene by a method, on its way to a worker process: rows of the table STEPS."""
 
     scene: Scene
+
+    def perform(self) -> Rows:
+        """Errors in rad over steps in s, and the step that the target needs; steps that are not needed are left out."""
+        scene, method = self.scene, self.method
+        reference = read_reference(self.reference, scene) if self.reference is not None else None
+        steps = ladder_steps(scene)
+        judgements: list[Judgement] = []
+        expected = 0.0
+        for step in steps:
+            if expected > _LONGEST_RUN_S:
+                break
+            judgement, seconds = _judged(scene, method, {"step": step}, reference)
+            judgements.append(judgement)
+            if judgement.metrics.get("angle_error_max", np.inf) <= 0.1 * TARGET and judgement.status == "ok":
+                break
+            expected = _FACTOR * seconds
+        # A run that broke off has no error up to the horizon.
+        errors = [
+            judgement.metrics.get("angle_error_max", np.nan) if judgement.status in COMPLETE else np.nan
+            for judgement in judgements
+        ]
+        needed = step_for(TARGET, np.array(steps[: len(errors)]), np.array(errors))
+        rows = []
+        for i in range(len(steps)):
+            if i >= len(judgements):
+                rows.append(self.place.rows_of({"status": "left_out", "false_success": 0}))
+                continue
+            values = {
+                "status": judgements[i].status,
+                "message": judgements[i].message,
+                "angle_error_max": errors[i],
+                "energy_drift_max": judgements[i].metrics.get("energy_drift_max", np.nan),
+                "false_success": int(judgements[i].false_success),
+                "step_for_target_s": np.nan if needed is None else needed,
+            }
+            rows.append(self.place.rows_of(values))
+        return {name: np.concatenate([row[name] for row in rows]) for name in rows[0]}
 
 
 def run_suite(
@@ -96,11 +133,22 @@ def complete_ladders(
     on_progress: OnProgress = ignore_progress,
 ) -> list[Outcome]:
     """The ladders of steps of these scenes, where the runs in `output` call for them."""
-    wanted = _wanted(scenes, suite_runs(output))
+    by_name = {scene.name: scene for scene in scenes}
+    # Where a fixed step may matter: the stiff and light scenes, and runs that failed at the default step.
+    wanted = [
+        (by_name[run.scene], run.method)
+        for run in suite_runs(output)
+        if run.scene in by_name
+        and run.has_reference
+        and find_method(run.method).fixed_step
+        and (run.is_stiff_or_light or run.status in ("inaccurate", "diverged", "solver_failed"))
+    ]
     points = {(scene.name, method): ladder_points(scene, method) for scene, method in wanted}
     tables = [points_table(STEPS, [point for own in points.values() for point in own])] if points else []
     with writing(output):
-        file = extend_file(output, tables, _stale(output, points, methods))
+        # Ladders of these scenes and methods that the runs no longer call for go.
+        replaced = [(STEPS, scene, method) for scene, able in methods.items() for method in able]
+        file = extend_file(output, tables, replaced)
         tasks = []
         for scene, method in wanted:
             own = [file.place(str(point["run"]), STEPS) for point in points[scene.name, method]]
@@ -116,36 +164,7 @@ def complete_ladders(
                         scene=scene,
                     )
                 )
-        return compute_tasks(tasks, ladder_rows, workers, on_progress)
-
-
-def _wanted(scenes: Sequence[Scene], runs: Sequence[SuiteRun]) -> list[tuple[Scene, str]]:
-    """Where a fixed step may matter: the stiff and light scenes, and runs that failed at the default step."""
-    by_name = {scene.name: scene for scene in scenes}
-    return [
-        (by_name[run.scene], run.method)
-        for run in runs
-        if run.scene in by_name
-        and run.has_reference
-        and find_method(run.method).fixed_step
-        and (run.is_stiff_or_light or run.status in ("inaccurate", "diverged", "solver_failed"))
-    ]
-
-
-def _stale(
-    output: Path, points: Mapping[tuple[str, str], object], methods: Mapping[str, Sequence[str]]
-) -> list[tuple[str, str]]:
-    """(table, run) of stored ladders of these scenes and methods that the runs no longer call for."""
-    file = TableFile(output)
-    if STEPS not in file.groups:
-        return []
-    stored = file.table(STEPS)
-    owners = zip(stored.runs, stored.known["scene"], stored.known["method_name"], strict=True)
-    return [
-        (STEPS, run)
-        for run, scene, method in owners
-        if method in methods.get(scene, ()) and (scene, method) not in points
-    ]
+        return compute_tasks(tasks, workers, on_progress)
 
 
 def ladder_points(scene: Scene, method: str) -> list[dict[str, object]]:
@@ -165,42 +184,6 @@ def ladder_steps(scene: Scene) -> list[float]:
     while scene.duration <= _MAX_STEPS * steps[-1] / _FACTOR:
         steps.append(steps[-1] / _FACTOR)
     return steps
-
-
-def ladder_rows(task: LadderTask) -> Rows:
-    """Errors in rad over steps in s, and the step that the target needs; steps that are not needed are left out."""
-    scene, method = task.scene, task.method
-    reference = read_reference(task.reference, scene) if task.reference is not None else None
-    steps = ladder_steps(scene)
-    judgements: list[Judgement] = []
-    expected = 0.0
-    for step in steps:
-        if expected > _LONGEST_RUN_S:
-            break
-        judgement, seconds = _judged(scene, method, {"step": step}, reference)
-        judgements.append(judgement)
-        if judgement.metrics.get("angle_error_max", np.inf) <= 0.1 * TARGET and judgement.status == "ok":
-            break
-        expected = _FACTOR * seconds
-    # A run that broke off has no error up to the horizon.
-    errors = [
-        judgement.metrics.get("angle_error_max", np.nan) if judgement.status in COMPLETE else np.nan
-        for judgement in judgements
-    ]
-    needed = step_for(TARGET, np.array(steps[: len(errors)]), np.array(errors))
-    rows = []
-    for i in range(len(steps)):
-        if i >= len(judgements):
-            rows.append(row_of_point(task.place, "left_out", "", {"false_success": 0}))
-            continue
-        values = {
-            "angle_error_max": errors[i],
-            "energy_drift_max": judgements[i].metrics.get("energy_drift_max", np.nan),
-            "false_success": int(judgements[i].false_success),
-            "step_for_target_s": np.nan if needed is None else needed,
-        }
-        rows.append(row_of_point(task.place, judgements[i].status, judgements[i].message, values))
-    return {name: np.concatenate([row[name] for row in rows]) for name in rows[0]}
 
 
 def step_for(target: float, steps: np.ndarray, errors: np.ndarray) -> float | None:

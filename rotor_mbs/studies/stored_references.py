@@ -12,9 +12,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from rotor_mbs.errors import StoreError
 from rotor_mbs.methods.catalogue import REFERENCE
-from rotor_mbs.runs.read import StoredRun, open_results
+from rotor_mbs.runs.read import open_results
 from rotor_mbs.runs.results import FROZEN, RUNS, TableFile
 from rotor_mbs.runs.table import MISSING, Place
 from rotor_mbs.scenario.catalogue import reference_folder
@@ -74,7 +73,7 @@ def read_reference(place: Place, scene: Scene) -> Trajectory | None:
     if key in _recent:
         return _recent[key]
     arrays = {name: row[name][0][:samples] for name in FROZEN if name in row}
-    reference = _rebuilt(scene, {"time": sample_times(scene)[:samples], **arrays})
+    reference = rebuilt_reference(scene, {"time": sample_times(scene)[:samples], **arrays})
     if scene.samples <= _SHORT:
         if len(_recent) >= _MAX_RECENT:
             _recent.pop(next(iter(_recent)))
@@ -82,13 +81,9 @@ def read_reference(place: Place, scene: Scene) -> Trajectory | None:
     return reference
 
 
-def rebuilt_reference(scene: Scene, stored: StoredRun) -> Trajectory:
-    """A stored reference with what its scene asks for, computed from its angles and rates by its own closed form."""
-    names = [name for name in ("time", *FROZEN) if name in stored]
-    return _rebuilt(scene, {name: stored.array(name) for name in names})
-
-
-def _rebuilt(scene: Scene, arrays: Mapping[str, NDArray[Any]]) -> Trajectory:
+def rebuilt_reference(scene: Scene, arrays: Mapping[str, NDArray[Any]]) -> Trajectory:
+    """A stored reference with what its scene asks for, computed from its angles and rates by its own closed form.
+    arrays: time and `FROZEN`, by name, as far as they are stored."""
     from rotor_mbs.models.lagrange import samples
 
     known = {name: values for name, values in arrays.items() if not np.isnan(values[:1]).all()}
@@ -99,16 +94,18 @@ def _rebuilt(scene: Scene, arrays: Mapping[str, NDArray[Any]]) -> Trajectory:
     return reference
 
 
-def frozen_solution(scene: Scene) -> Solution:
-    """The shipped reference of a scene, with the settings and times of when it was computed. Raises StoreError."""
+def frozen_solution(scene: Scene) -> Solution | None:
+    """The shipped reference of a scene, with the settings and times of when it was computed; None where there is none.
+    Raises StoreError where it cannot be read."""
     shipped = shipped_reference(scene_hash(scene))
     if shipped is None:
-        raise StoreError(f"{reference_folder()}: no frozen reference of {scene.name}; `rotor-mbs reference` makes one")
+        return None
     with open_results(shipped.path, only=[shipped.scene]) as results:
         stored = results.scenes[shipped.scene].reference
         assert stored is not None  # a file of references has one for each scene
         facts = stored.attributes
-        trajectory = rebuilt_reference(scene, stored)
+        arrays = {name: stored.array(name) for name in ("time", *FROZEN) if name in stored}
+        trajectory = rebuilt_reference(scene, arrays)
         is_complete = len(trajectory.time) == scene.samples
         engine = Integration(
             is_complete,

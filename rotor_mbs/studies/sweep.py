@@ -7,7 +7,9 @@ import json
 import time
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import nullcontext
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -23,9 +25,9 @@ from rotor_mbs.models.lagrange.reference import error_growth
 from rotor_mbs.runs.files import KEYWORDS
 from rotor_mbs.runs.pool import TaskPool
 from rotor_mbs.runs.results import row_of_run
-from rotor_mbs.runs.runner import Task, compute
+from rotor_mbs.runs.runner import Task, compute, perform
 from rotor_mbs.runs.sweeps import AMPLIFICATION, IDENTITY, METRICS, code_of_method, open_sweep, sweep_table
-from rotor_mbs.runs.table import MISSING, Place, Rows, Table, blank_rows, characters
+from rotor_mbs.runs.table import MISSING, Place, Rows, Table, blank_rows
 from rotor_mbs.runs.versions import machine, versions
 from rotor_mbs.scenario.scene import Scene, scene_hash
 from rotor_mbs.scenario.sweep import Sweep, Variants
@@ -43,10 +45,9 @@ _GRACE_S = 5.0  # in which a run that ends itself at its limit stores what it re
 
 @dataclass(frozen=True, kw_only=True)
 class Chunk(Task):
-    """Runs by one method, the first of them number `start`; values: (runs, keys) the varied numbers; code: of the
-    versions that compute them, stored with each; with_defects: of runs side by side, too."""
+    """Runs by one method; values: (runs, keys) the varied numbers; code: of the versions that compute them, stored with
+    each; with_defects: of runs side by side, too."""
 
-    start: int
     values: NDArray[np.float64]
     variants: Variants
     settings: Mapping[str, object]
@@ -54,9 +55,22 @@ class Chunk(Task):
     code: int
     with_defects: bool = False
 
-    @property
-    def first(self) -> int:
-        return self.start
+    def perform(self) -> Rows:
+        """(runs, ...) columns of all its runs, failures of runs included. Raises InputError, MethodRefusal."""
+        scenes = _scenes(self)
+        if find_method(self.method).solve_many is not None and _has_all_of(scenes[0].outputs):
+            rows = _side_by_side(self, scenes)
+        else:
+            rows = _one_by_one(self, scenes)
+        if "error_growth" in rows:  # of the motion, from the variational equations of the closed form, by any method
+            for i, scene in enumerate(scenes):
+                angles = np.empty((scene.samples, 0))
+                time = np.linspace(0.0, scene.duration, scene.samples)
+                motion = Trajectory(time, angles, angles, error_growth=error_growth(scene))
+                rows["error_growth"][i], rows["horizon_s"][i] = running_growth(motion)[-1], horizon(motion)
+        rows["time_limit_s"][rows["status"] == code_of("timed_out")] = self.time_limit_s
+        rows["code"][:] = self.code
+        return rows
 
     def split(self) -> list[Chunk]:
         """Its runs one by one; [] where it is one run."""
@@ -65,52 +79,17 @@ class Chunk(Task):
     def part(self, start: int, end: int) -> Chunk:
         values = self.values[start:end]
         kill_after_s = limit_of(len(values), self.time_limit_s)
-        return replace(self, start=self.start + start, values=values, kill_after_s=kill_after_s)
+        return replace(self, place=self.place.at(start), values=values, kill_after_s=kill_after_s)
 
     def failed(self, status: str, message: str) -> Rows:
-        rows = blank_rows(len(self.values), self.place.row)
-        put_end(rows, slice(None), status, message)
-        rows["time_reached"][:], rows["code"][:] = 0.0, self.code
-        rows["time_limit_s"][:] = self.time_limit_s if status == "timed_out" else np.nan
-        return rows
+        limit = self.time_limit_s if status == "timed_out" else np.nan
+        values = {"status": status, "message": message, "time_reached": 0.0, "code": self.code, "time_limit_s": limit}
+        return self.place.rows_of(values, len(self.values))
 
 
 def limit_of(runs: int, time_limit_s: float) -> float:
     """When the worker of so many runs is ended: a method may compute them one after the other."""
     return time_limit_s * runs + _GRACE_S
-
-
-def perform(chunk: Chunk) -> Rows:
-    """(runs, ...) columns of all runs of a chunk, failures of runs included. Raises InputError, MethodRefusal."""
-    rows = rows_of(chunk)
-    rows["time_limit_s"][rows["status"] == code_of("timed_out")] = chunk.time_limit_s
-    rows["code"][:] = chunk.code
-    return rows
-
-
-def rows_of(chunk: Chunk) -> Rows:
-    """(runs, ...) columns of all its runs. Raises InputError, MethodRefusal; a run's failure is in its row."""
-    scenes = _scenes(chunk)
-    if find_method(chunk.method).solve_many is not None and _has_all_of(scenes[0].outputs):
-        rows = _side_by_side(chunk, scenes)
-    else:
-        rows = _one_by_one(chunk, scenes)
-    if "error_growth" in rows:
-        for i, scene in enumerate(scenes):
-            _put_amplification(rows, i, scene)
-    return rows
-
-
-def put_end(rows: Rows, runs: int | slice, status: str, message: str) -> None:
-    rows["status"][runs], rows["message"][runs] = code_of(status), characters(message, rows["message"].shape[1])
-
-
-def _put_amplification(rows: Rows, i: int, scene: Scene) -> None:
-    """Adds the motion's error amplification, from the variational equations of the closed form, whatever the method."""
-    angles = np.empty((scene.samples, 0))
-    time = np.linspace(0.0, scene.duration, scene.samples)
-    motion = Trajectory(time, angles, angles, error_growth=error_growth(scene))
-    rows["error_growth"][i], rows["horizon_s"][i] = running_growth(motion)[-1], horizon(motion)
 
 
 def _has_all_of(outputs: Sequence[str]) -> bool:
@@ -188,10 +167,11 @@ def _side_by_side(chunk: Chunk, scenes: Sequence[Scene]) -> Rows:
         run.is_corrected, run.bounds = method.is_corrected, method.bounds
         try:
             judged = _judged_row(chunk, run, run.integration.time_reached)
-            for name in ("status", "message", "energy_drift_max", *_OF_DEFECTS):
-                rows[name][i] = judged[name][0]
         except OutOfTimeError as exc:
-            put_end(rows, i, "timed_out", f"{exc}, while its samples were judged")
+            judged = chunk.place.rows_of({"status": "timed_out", "message": f"{exc}, while its samples were judged"})
+            judged |= {name: rows[name][i : i + 1] for name in ("energy_drift_max", *_OF_DEFECTS)}
+        for name in ("status", "message", "energy_drift_max", *_OF_DEFECTS):
+            rows[name][i] = judged[name][0]
     return rows
 
 
@@ -268,9 +248,8 @@ class SweepPlan:
                 yield Chunk(
                     label=f"runs {first} to {end - 1}",
                     method=method.name,
-                    place=place,
+                    place=place.at(first - self.first),
                     kill_after_s=limit_of(end - first, self.time_limit_s),
-                    start=first,
                     values=values,
                     variants=variants,
                     settings=settings,
@@ -282,21 +261,10 @@ class SweepPlan:
 
     def _identity(self) -> str:
         sweep, table = self.sweep, self.sweep.table
-        content = [
-            scene_hash(sweep.base),
-            sweep.keys,
-            table.combine,
-            [axis.is_drawn for axis in sweep.design.axes],
-            self.methods,
-            table.settings,
-            sweep.outputs,
-            table.precision,
-            table.amplification,
-            table.defects,
-            [table.validation, table.test],
-            table.seed,
-            [self.first, self.last],
-        ]
+        options = [table.combine, table.settings, table.precision, table.amplification, table.defects, table.seed]
+        axes = [(axis.key, axis.is_drawn) for axis in sweep.design.axes]
+        runs = [self.methods, self.first, self.last, table.validation, table.test]
+        content = [scene_hash(sweep.base), sweep.outputs, axes, options, runs]
         digest = hashlib.sha256(json.dumps(content, sort_keys=True).encode())
         for values in sweep.design.values:
             digest.update(values.tobytes())
@@ -335,7 +303,8 @@ def plan_sweep(
 ) -> SweepPlan:
     """The runs of part k of n by `methods`, else by those of the file. Raises InputError, MethodRefusal."""
     file = shown_path(sweep.path), sweep.text
-    chosen = check_names(methods or sweep.table.methods)
+    with nullcontext() if methods else at_key(*file, "methods"):
+        chosen = check_names(methods or sweep.table.methods)
     with at_key(*file, "settings"):
         settings = settings_for(chosen, sweep.table.settings)
     for method in chosen:
@@ -369,47 +338,41 @@ def run_sweep(
     output: Path,
     pool: TaskPool,
     on_progress: OnProgress = lambda *_: None,
-    work: Callable[[Chunk], Rows] = perform,
     *,
     fresh: bool = False,
 ) -> SweepResult:
     """Computes the runs that `output` misses. However it is interrupted, the same call continues from there.
 
-    on_progress: called when runs have been stored, first with those that were there. work: what is done with a chunk of
-    runs in a worker. fresh: whether runs that are stored are computed again. Raises InputError, MethodRefusal where the
-    sweep cannot be done, or the output is another file; StoreError where it cannot be written: what was stored stays.
+    on_progress: called when runs have been stored, first with those that were there. fresh: whether runs that are
+    stored are computed again. Raises InputError, MethodRefusal where the sweep cannot be done, or the output is another
+    file; StoreError where it cannot be written: what was stored stays.
     """
     start = time.monotonic()
     opened = open_sweep(output, plan.table(), plan.attributes(), plan.time_limit_s, fresh=fresh)
-    with opened as (place, statuses):
+    with opened as (stored, statuses):
+        place = stored.place()
         missing, lost = int((statuses == MISSING).sum()), list[str]()
         done = plan.runs - missing
-        older = _older(plan, place, statuses)
+        now = np.array([code_of_method(name) for name in plan.methods], np.uint32)
+        is_older = stored.column("code") != now[np.arange(plan.first, plan.last) // plan.rows]
+        older = int((is_older & (statuses != MISSING)).sum())
         on_progress(done, plan.runs, Counter())
-        for end in compute(pool, work, plan.chunks(place, _gaps(plan, statuses), pool.workers)):
+        for end in compute(pool, plan.chunks(place, _gaps(plan, statuses), pool.workers)):
             chunk = end.task
             assert isinstance(chunk, Chunk)
             if end.value is None:  # nothing is known of these runs: they stay missing
                 lost += [f"run {run}: {end.message}" for run in range(chunk.first, chunk.first + len(chunk.values))]
                 on_progress(done, plan.runs, Counter({end.failure: len(chunk.values)}))
                 continue
-            stored = end.value["status"]
-            statuses[chunk.first - plan.first : chunk.first - plan.first + len(stored)] = stored
-            done += len(stored)
-            on_progress(done, plan.runs, _counted(stored))
-        seconds, made = time.monotonic() - start, missing - len(lost)
+            made = end.value["status"]
+            statuses[chunk.first - plan.first : chunk.first - plan.first + len(made)] = made
+            done += len(made)
+            on_progress(done, plan.runs, _counted(made))
+        seconds = time.monotonic() - start
         failed = np.unique((np.flatnonzero(statuses != code_of("ok")) + plan.first) // plan.rows)
         is_ok = not any(is_corrected(plan.methods[number]) for number in failed)
         counts = _counted(statuses)
-        return SweepResult(place.path, plan.runs, made, counts, seconds, is_ok, tuple(lost), older)
-
-
-def _older(plan: SweepPlan, place: Place, statuses: NDArray[np.int8]) -> int:
-    """How many stored runs other versions computed than those here."""
-    codes = np.fromfile(place.path, "<u4", plan.runs, offset=place.offsets["code"])
-    now = np.array([code_of_method(name) for name in plan.methods], np.uint32)
-    methods = (np.arange(plan.first, plan.last)) // plan.rows
-    return int(((statuses != MISSING) & (codes != now[methods])).sum())
+        return SweepResult(place.path, plan.runs, missing - len(lost), counts, seconds, is_ok, tuple(lost), older)
 
 
 def _counted(statuses: NDArray[np.int8]) -> Counter[str]:
@@ -423,34 +386,29 @@ def _gaps(plan: SweepPlan, statuses: NDArray[np.int8]) -> list[tuple[int, int]]:
 
 
 def estimate_seconds(plan: SweepPlan, pool: TaskPool) -> float:
-    """How long all runs will take, from one chunk of each method; infinite where one did not end in its time."""
-    seconds = 0.0
-    for k in range(len(plan.methods)):
-        runs = max(min(plan.last, (k + 1) * plan.rows) - max(plan.first, k * plan.rows), 0)
-        if runs:
-            seconds += runs * _seconds_per_run(plan, k * plan.rows, pool) / pool.workers
-    return seconds
-
-
-def _seconds_per_run(plan: SweepPlan, first: int, pool: TaskPool) -> float:
-    """Of runs with very many samples, the first ones are timed."""
-    base = plan.sweep.base
+    """How long all runs will take, from one chunk of each method; infinite where one did not end in its time. Of runs
+    with very many samples, the first ones are timed."""
+    base, timed = plan.sweep.base, plan
     samples = min(base.samples, _TIMED_SAMPLES)
     share = (samples - 1) / (base.samples - 1)
     if share < 1.0:
         short = base.replace(samples=samples, duration=share * base.duration)
-        plan = replace(plan, sweep=replace(plan.sweep, base=short))
-    row = plan.table().row_type  # only its columns count: nothing is stored
-    nowhere = Place(Path(), 0, plan.first, {}, row)
-    chunk = next(plan.chunks(nowhere, [(first, first + min(plan.rows, _MAX_RUNS))]))
-    try:
-        # The first one loads and compiles, which all others find done.
-        work = with_method_files(perform)
-        pool.submit(work, chunk.part(0, 1), plan.time_limit_s).result()
-        start = time.perf_counter()
-        pool.submit(work, chunk, plan.time_limit_s).result()
-    except Exception as error:
-        if pool.failure(error) == "error":
-            raise
-        return float("inf")
-    return (time.perf_counter() - start) / len(chunk.values) / share
+        timed = replace(plan, sweep=replace(plan.sweep, base=short))
+    nowhere = Place(Path(), 0, plan.first, {}, timed.table().row_type)  # only its columns count: nothing is stored
+    work, seconds = with_method_files(partial(perform, stores=False)), 0.0
+    for first in range(0, plan.rows * len(plan.methods), plan.rows):
+        runs = min(plan.last, first + plan.rows) - max(plan.first, first)
+        if runs <= 0:
+            continue
+        chunk = next(timed.chunks(nowhere, [(first, first + min(plan.rows, _MAX_RUNS))]))
+        try:
+            # The first one loads and compiles, which all others find done.
+            pool.submit(work, chunk.part(0, 1), plan.time_limit_s).result()
+            start = time.perf_counter()
+            pool.submit(work, chunk, plan.time_limit_s).result()
+        except Exception as error:
+            if pool.failure(error) == "error":
+                raise
+            return float("inf")
+        seconds += runs * (time.perf_counter() - start) / len(chunk.values) / share / pool.workers
+    return seconds

@@ -15,10 +15,9 @@ from support.stored import Arrays, Made, damage, rotor, store
 
 from rotor_mbs.analysis import checks
 from rotor_mbs.analysis.judgement import defects_of, energy_slack, judge, start_slack
-from rotor_mbs.analysis.rehydrate import Rehydrated
 from rotor_mbs.methods.catalogue import REFERENCE
 from rotor_mbs.methods.solve import solve
-from rotor_mbs.runs.read import open_results
+from rotor_mbs.runs.read import StoredRun, open_results
 from rotor_mbs.scenario.accuracy_bounds import load_bounds
 from rotor_mbs.scenario.catalogue import reference_folder
 from rotor_mbs.scenario.scene import Scene
@@ -174,8 +173,7 @@ def test_an_early_end_is_excused_where_the_motion_ends(
 ) -> None:
     run = replace(run_of(), method=method)
     one, faults = stored(method, status=status, attributes={"message": "over π/2"}), ["angles has 4 rows, not 5"]
-    found = Rehydrated(run.scene, run if has_run else None, None, faults)
-    given = list(checks._of_run(one, BOUNDS, found, motion_ends))
+    given = list(checks._of_run(one, BOUNDS, run if has_run else None, faults, None, motion_ends))
     assert values(given)["complete", "all"] == complete
     assert (f"stored as {status}: over π/2" in given[0].hint) == (complete == 1.0 and status != "ok")
     assert ("stored as" in given[0].hint) == (complete == 1.0 and status != "ok")
@@ -271,7 +269,7 @@ def test_a_damaged_row_fails_and_what_cannot_be_read_is_incomplete(
     def fail(*_: object) -> None:
         raise KeyError("angles")
 
-    monkeypatch.setattr(checks, "rehydrate", fail)
+    monkeypatch.setattr(StoredRun, "solution", fail)
     path = store(tmp_path / "r.h5", [Made(paper("fig11", samples=501), METHOD, rotor(np.zeros_like))])
     with open_results(path) as results, pytest.raises(KeyError):
         checks.checks_of(results, [], BOUNDS)

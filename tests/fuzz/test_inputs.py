@@ -22,7 +22,7 @@ from rotor_mbs.runs.table import MISSING, text_of
 from rotor_mbs.scenario.scene import parse_scene, scene_toml
 from rotor_mbs.scenario.sweep import load_sweep
 from rotor_mbs.solution.status import STATUSES
-from rotor_mbs.studies.run import RunTask, able_methods, perform_run, selected_methods
+from rotor_mbs.studies.run import RunTask, able_methods, selected_methods
 from rotor_mbs.studies.sweep import plan_sweep, run_sweep
 
 pytestmark = pytest.mark.full
@@ -59,8 +59,8 @@ def _run_fault(scene: object, method: str, folder: Path, statuses: Counter[objec
             (folder / "r.h5").unlink(missing_ok=True)
             asked = Asked(scene, method)
             place = extend_file(folder / "r.h5", results_tables([asked])).place(asked.run)
-            row = perform_run(RunTask(label="", method=method, place=place, asked=asked, time_limit_s=_LIMIT_S))
-            place.write(place.first, row)
+            row = RunTask(label="", method=method, place=place, asked=asked, time_limit_s=_LIMIT_S).perform()
+            place.write(row)
             statuses[STATUSES[int(row["status"][0])]] += 1
             message = text_of(row["message"][0])
             if "Error: " in message.partition(" ")[0] + " ":

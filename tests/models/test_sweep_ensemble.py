@@ -19,7 +19,7 @@ from rotor_mbs.scenario.sweep import Variants, sweep_of
 from rotor_mbs.solution.metrics import energy_drifts
 from rotor_mbs.solution.quantities import energy_balance
 from rotor_mbs.solution.solution import Solution
-from rotor_mbs.studies.sweep import Chunk, rows_of
+from rotor_mbs.studies.sweep import Chunk
 
 pytest.importorskip("heyoka")
 LANES = lanes()
@@ -154,13 +154,13 @@ def test_any_chunks_give_the_same_bytes(changes: dict[str, object], keys: list[s
     sweep = sweep_of(variants.scene(values[0]), {"gravity": [9.8]}, outputs=["angles", "rates", "tip", "energy"])
     row = sweep_table(sweep, ["lagrange/taylor"], range(len(values))).row_type
     whole = Chunk(
-        label="", method="lagrange/taylor", place=Place(Path(), 0, 0, {}, row), start=0, values=np.array(values),
+        label="", method="lagrange/taylor", place=Place(Path(), 0, 0, {}, row), values=np.array(values),
         variants=variants, settings={}, time_limit_s=60.0, code=0,
     )  # fmt: skip
-    expected = rows_of(whole)
+    expected = whole.perform()
     for size in (1, LANES - 1, LANES):
         for start in range(0, len(values), size):
-            part = rows_of(whole.part(start, min(start + size, len(values))))
+            part = whole.part(start, min(start + size, len(values))).perform()
             for name, result in part.items():
                 assert result.tobytes() == expected[name][start : start + size].tobytes(), (name, start, size)
 

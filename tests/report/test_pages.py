@@ -172,11 +172,11 @@ def test_colours_of_pictures_and_legends(report: Path) -> None:
 
 
 def test_one_scene_and_one_method_make_a_report_without_empty_sections(tmp_path: Path) -> None:
-    scene = replace(PLAIN, name="mine", title="Mine", figures=(), text="")
+    scene = replace(PLAIN, name="mine", title="Mine", figures=()).replace()
     folder = write_report(store(tmp_path / "r.h5", [Made(scene, TAYLOR, SWING)]), tmp_path / "out").parent
     assert sorted(path.name for path in folder.iterdir()) == ["index.html", "mine.html"]
     page, index = text_of(folder, "mine.html"), text_of(folder, "index.html")
-    assert sections_of(page) == ["motion", "metrics"]
+    assert sections_of(page) == ["motion", "metrics", "file"]
     assert sections_of(index) == ["methods", "scenes"]
     assert 'class="n h' not in index  # nothing was compared
     assert 'href="index.html"' in page

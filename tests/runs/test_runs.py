@@ -23,7 +23,7 @@ from rotor_mbs.runs.results import TableFile
 from rotor_mbs.runs.table import Rows
 from rotor_mbs.runs.versions import code_digest, row_versions
 from rotor_mbs.scenario.catalogue import find_scenes
-from rotor_mbs.studies.run import Outcome, RunReport, RunTask, perform_run, run_scenes
+from rotor_mbs.studies.run import Outcome, RunReport, RunTask, run_scenes
 
 SCENE = paper("fig08")
 METHODS = ("lagrange/dop853", "exudyn_tree/rk67", "lagrange/ode45")
@@ -37,7 +37,7 @@ def blank(task: RunTask) -> Rows:
 
 def run(path: Path, methods: Sequence[str] = METHODS, **options: object) -> RunReport:
     given = {"workers": 0, "timeout_s": 60.0, "perform": blank, **options}
-    with patch("rotor_mbs.studies.run.perform_run", given.pop("perform")):
+    with patch.object(RunTask, "perform", given.pop("perform")):
         return run_scenes([SCENE], {SCENE.name: methods}, path, **given)  # type: ignore[arg-type]
 
 
@@ -86,13 +86,13 @@ def test_names_and_units_keep_the_contract(results: Path) -> None:
 
 def test_a_row_that_is_taken_back_is_missing_in_both_tables(tmp_path: Path) -> None:
     path = tmp_path / "r.h5"
-    run(path, perform=perform_run)
+    run(path, perform=RunTask.perform)
     TableFile(path).place(FIRST).mark_missing([0])
     with h5py.File(path) as file:
         table = file[SCENE.name]
         assert table["run"].asstr()[table["status"][()] == -1].tolist() == [METHODS[0]]
         assert file["runs/run"].asstr()[file["runs/status"][()] == -1].tolist() == [FIRST]
-    run(path, perform=perform_run)
+    run(path, perform=RunTask.perform)
     with h5py.File(path) as file:
         assert (file[f"{SCENE.name}/status"][()] == 0).all()
 
@@ -188,7 +188,7 @@ def test_an_error_of_a_method_is_a_run_that_failed(tmp_path: Path, monkeypatch: 
         raise ZeroDivisionError("by nothing")
 
     monkeypatch.setitem(find_method(METHODS[0]).__dict__, "build", build)
-    (failure,) = run(tmp_path / "r.h5", METHODS[:1], perform=perform_run).failures
+    (failure,) = run(tmp_path / "r.h5", METHODS[:1], perform=RunTask.perform).failures
     assert (failure.status, failure.message) == ("solver_failed", "ZeroDivisionError: by nothing")
     assert stored(tmp_path / "r.h5") == [REFERENCE, FIRST]
 

@@ -15,10 +15,11 @@ from support.scenes import paper
 from rotor_mbs.errors import InputError, StoreError
 from rotor_mbs.runs import files
 from rotor_mbs.runs.files import CHARACTERS, Column, writing
-from rotor_mbs.runs.records import points_table, row_of_point
+from rotor_mbs.runs.records import points_table
 from rotor_mbs.runs.results import Asked, TableFile, extend_file, results_tables
 from rotor_mbs.runs.table import (
     CHARACTER,
+    COLUMNS,
     MISSING,
     Place,
     Rows,
@@ -26,7 +27,7 @@ from rotor_mbs.runs.table import (
     Table,
     blank_rows,
     characters,
-    lay_out,
+    laid_out,
     stored_table,
     text_of,
 )
@@ -37,16 +38,16 @@ ENGINES = ("h5netcdf", "netcdf4")
 
 
 def _table() -> Table:
-    time = Column(("time",), "s", "time"), np.linspace(0.0, 1.0, SAMPLES)
+    time = Column(("time",), "s", "time", attributes={"standard_name": "time"}), np.linspace(0.0, 1.0, SAMPLES)
     computed = {
-        "status": Column(("run",), "1", "status", "i1"),
+        "status": COLUMNS["status"],
         "message": Column(("run", CHARACTERS), "1", "message", CHARACTER),
         "steps": Column(("run",), "1", "steps", "<i8"),
         "angles": Column(("run", "time"), "rad", "angles"),
         "crc32": Column(("run",), "1", "checksum", "<u4"),
     }
-    known = {"stiffness": (Column(("run",), "N m/rad", "stiffness"), np.arange(ROWS, dtype=float))}
-    return Table("", np.arange(ROWS), known, computed, {"time": time}, characters=40)
+    known = {"time": time, "stiffness": (Column(("run",), "N m/rad", "stiffness"), np.arange(ROWS, dtype=float))}
+    return Table("", np.arange(ROWS), known, computed, characters=40)
 
 
 def _stored(path: Path) -> StoredTable:
@@ -65,7 +66,8 @@ def _rows(place: Place, first: int, count: int) -> Rows:
 @pytest.fixture
 def path(tmp_path: Path) -> Path:
     made = tmp_path / "t.h5"
-    lay_out(made, [_table()], {"title": "t"})
+    with laid_out(made, [_table()], {"title": "t"}):
+        pass
     return made
 
 
@@ -73,12 +75,12 @@ def _fill(path: Path, starts: range) -> None:
     place = _stored(path).place()
     for first in starts:
         count = min(4, ROWS - first)
-        place.write(first, _rows(place, first, count))
+        place.at(first).write(_rows(place, first, count))
 
 
 def _missing(path: Path) -> list[int]:
     table = _stored(path)
-    return np.flatnonzero(table.place().stored(table.statuses()) == MISSING).tolist()
+    return np.flatnonzero(table.statuses() == MISSING).tolist()
 
 
 @pytest.mark.parametrize("engine", ENGINES)
@@ -107,7 +109,8 @@ def test_every_dimension_has_its_scale_and_every_array_is_contiguous(path: Path)
 
 def test_the_order_of_writing_does_not_show(path: Path, tmp_path: Path) -> None:
     other = tmp_path / "o.h5"
-    lay_out(other, [_table()], {"title": "t"})
+    with laid_out(other, [_table()], {"title": "t"}):
+        pass
     _fill(path, range(0, ROWS, 4))
     _fill(other, range(0, ROWS, 4)[::-1])
     assert path.read_bytes() == other.read_bytes()
@@ -125,7 +128,7 @@ def test_rows_without_their_status_are_missing(path: Path) -> None:
 def test_rows_of_another_number_do_not_count(path: Path) -> None:
     """Bytes that are copied to another row have the wrong checksum."""
     place = _stored(path).place()
-    place.write(0, _rows(place, 0, 1))
+    place.write(_rows(place, 0, 1))
     rows = place.read(1)
     moved = _stored(path).place(3)
     with path.open("r+b") as file:
@@ -138,10 +141,11 @@ def test_rows_of_another_number_do_not_count(path: Path) -> None:
 def test_a_worker_of_an_earlier_file_does_not_write_to_its_successor(path: Path) -> None:
     place = _stored(path).place()
     path.rename(path.with_name("kept.h5"))  # keeps its inode from being used again
-    lay_out(path, [_table()], {"title": "t"})
+    with laid_out(path, [_table()], {"title": "t"}):
+        pass
     before = path.read_bytes()
     with pytest.raises(StoreError, match="has been replaced by another file"):
-        place.write(0, _rows(place, 0, 1))
+        place.write(_rows(place, 0, 1))
     assert path.read_bytes() == before
 
 
@@ -162,7 +166,7 @@ def _write(file: TableFile, run: str, value: float) -> None:
     place = file.place(run)
     row = blank_rows(1, place.row)
     row["status"][0], row["samples"][0], row["angles"][:] = 0, 11, value
-    place.write(place.first, row)
+    place.write(row)
 
 
 def _runs(path: Path) -> list[str]:
@@ -211,14 +215,14 @@ def test_tables_of_other_studies_stay_beside_the_runs(tmp_path: Path) -> None:
     point = {"run": "a", "scene": "paper/fig08", "method_name": "lagrange/taylor", "step": 0.5, "tolerance": np.nan}
     file = extend_file(path, [points_table("stability", [point])])
     place = file.place("a", "stability")
-    place.write(place.first, row_of_point(place, "ok", "", {"angle_error_max": 0.25}))
+    place.write(place.rows_of({"status": "ok", "angle_error_max": 0.25}))
     file = extend_file(path, results_tables(_asked("lagrange/taylor", "exudyn_tree/rk67")))
     assert file.place("a", "stability").is_stored
     assert file.place("a", "stability").read()["angle_error_max"].tolist() == [0.25]
     assert extend_file(path, [points_table("stability", [point])]).place("a", "stability").is_stored
     changed = extend_file(path, [points_table("stability", [point | {"step": 0.25}])])
     assert not changed.place("a", "stability").is_stored
-    file = extend_file(path, [], dropped=[("stability", "a")])
+    file = extend_file(path, [], replaced=[("stability", "paper/fig08", "lagrange/taylor")])
     assert "stability" not in file.groups
 
 

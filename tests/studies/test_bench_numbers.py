@@ -32,7 +32,7 @@ from rotor_mbs.report.pages.bench import (
     failure_table,
 )
 from rotor_mbs.runs.read import open_results
-from rotor_mbs.runs.records import POINT_COLUMNS, Record, points_table, read_records, row_of_point
+from rotor_mbs.runs.records import POINT_COLUMNS, Record, points_table, read_records
 from rotor_mbs.runs.results import TableFile, extend_file
 from rotor_mbs.scenario.catalogue import only_scene
 from rotor_mbs.solution.metrics import metrics_of
@@ -202,7 +202,8 @@ def stored(path: Path, *curves: Record) -> Path:
         for i, point in enumerate(known_points(curve)):
             place = file.place(str(point["run"]), "bench")
             values = {name: array[i] for name, array in curve.arrays.items() if name not in ("setting", "status")}
-            place.write(place.first, row_of_point(place, curve.statuses[i], curve.messages[i], facts | values))
+            values |= {"status": curve.statuses[i], "message": curve.messages[i]}
+            place.write(place.rows_of(facts | values))
     return path
 
 

@@ -25,7 +25,6 @@ from support.stored import Made, change_row, damage, drop, rotor, store
 
 from rotor_mbs.analysis import checks
 from rotor_mbs.analysis.judgement import judge
-from rotor_mbs.analysis.rehydrate import reference_of, rehydrate
 from rotor_mbs.cli import main
 from rotor_mbs.methods.catalogue import REFERENCE, method_names
 from rotor_mbs.methods.solve import solve
@@ -262,7 +261,7 @@ def test_a_model_that_is_not_there_is_missed_where_it_is_required(
 ) -> None:
     required = ("--require", METHOD, "--require", "exudyn_tree/rk67")
     lines_of(capsys, copy, *required, status=0)
-    drop(copy, f"check/general/{METHOD}")
+    drop(copy, "check/general", METHOD)
     lines_of(capsys, copy, status=0)
     named(lines_of(capsys, copy, *required, status=1), "FAIL required: check/general", METHOD, "not in the file")
 
@@ -270,7 +269,7 @@ def test_a_model_that_is_not_there_is_missed_where_it_is_required(
 def test_a_reference_that_is_altered_or_not_there_fails(copy: Path, capsys: pytest.CaptureFixture[str]) -> None:
     change_row(copy, "check/held/reference", _with("angles", 50, 1.2345))
     named(lines_of(capsys, copy, status=1), "FAIL reference: check/held reference angles", "an altered reference")
-    drop(copy, "check/held/reference")
+    drop(copy, "check/held", "reference")
     named(lines_of(capsys, copy, status=1), "FAIL reference: check/held reference all", "no reference")
 
 
@@ -403,18 +402,18 @@ def test_each_stored_number_that_is_edited_is_seen(scene: str, method: str, tmp_
     with open_results(path) as results:
         of_scene = results.scenes[scene]
         run = of_scene.runs[method]
-        stored = rehydrate(of_scene, run, reference_of(of_scene))
-        assert stored.run is not None
-        metrics = judge(stored.scene, stored.run, stored.reference).metrics
+        solution = run.solution(of_scene.scene)
+        assert solution is not None
+        metrics = judge(of_scene.scene, solution, of_scene.reference_trajectory).metrics
         bound = load_bounds().of("metrics", method).value
         assert {"horizon_s", "defect_max", "angle_error_max", "energy_drift_max"} <= set(metrics)
-        assert checks._changed_metric(run, metrics, stored.run)[1] <= bound
+        assert checks._changed_metric(run, metrics, solution)[1] <= bound
         for name in metrics:
             value = float(run.attributes[name])
             # The rotor's extremes by what ode45's tolerance leaves of them, and more.
             value = 1.02 * value + 0.002 if name.startswith("rotor_") else 0.5 * value or 1.0
             edited = SimpleNamespace(method=method, attributes={**run.attributes, name: value})
-            channel, off, hint = checks._changed_metric(edited, metrics, stored.run)
+            channel, off, hint = checks._changed_metric(edited, metrics, solution)
             assert (channel, off > bound) == (name, True), hint
 
 

@@ -18,7 +18,7 @@ from rotor_mbs.runs.records import points_table
 from rotor_mbs.runs.results import Asked, extend_file, results_tables
 from rotor_mbs.solution.metrics import metrics_of
 from rotor_mbs.solution.status import STATUSES
-from rotor_mbs.studies.stability import STEPS, LadderTask, ladder_points, ladder_rows, step_for
+from rotor_mbs.studies.stability import STEPS, LadderTask, ladder_points, step_for
 
 
 @pytest.mark.parametrize("hub", ["1e3", "1e0", "1e-3", "1e-6"])
@@ -105,7 +105,7 @@ def test_a_ladder_of_runs_that_fail_at_once_ends(tmp_path: Path) -> None:
     points = ladder_points(light, method)
     file = extend_file(tmp_path / "s.h5", [*results_tables([Asked(light, "reference")]), points_table(STEPS, points)])
     place = file.place(str(points[0]["run"]), STEPS)
-    rows = ladder_rows(LadderTask(label="", method=method, place=place, scene=light))
+    rows = LadderTask(label="", method=method, place=place, scene=light).perform()
     statuses = [STATUSES[code] for code in rows["status"]]
     assert len(statuses) == len(points)
     assert "ok" not in statuses

@@ -15,7 +15,7 @@ import pytest
 from rotor_mbs.runs.cluster import open_task_pool
 from rotor_mbs.runs.table import Place
 from rotor_mbs.scenario.sweep import load_sweep
-from rotor_mbs.studies.sweep import perform, plan_sweep
+from rotor_mbs.studies.sweep import Chunk, plan_sweep
 
 pytestmark = [
     pytest.mark.nightly,
@@ -67,7 +67,7 @@ def test_a_worker_does_not_grow(tmp_path: Path, method: str, samples: int, durat
         for chunk in plan.chunks(nowhere, [(0, 11_000)]):
             if not before and chunk.first >= 1000:
                 before = pool.submit(_resident, None, 60.0).result()
-            pool.submit(perform, chunk, 60.0).result()
+            pool.submit(Chunk.perform, chunk, 60.0).result()
         after = pool.submit(_resident, None, 60.0).result()
     print(f"\n{method}, {samples} samples: {before:.1f} MB after 1,000 runs, {after:.1f} MB after 11,000")
     assert after - before < 20.0

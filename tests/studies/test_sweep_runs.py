@@ -8,6 +8,7 @@ import resource
 import signal
 import time
 from pathlib import Path
+from unittest.mock import patch
 
 import h5py
 import numpy as np
@@ -24,9 +25,8 @@ from rotor_mbs.runs.versions import code_digest
 from rotor_mbs.scenario.catalogue import find_scenes
 from rotor_mbs.scenario.sweep import load_sweep
 from rotor_mbs.solution.metrics import horizon
-from rotor_mbs.studies import sweep
 from rotor_mbs.studies.stored_references import frozen_solution
-from rotor_mbs.studies.sweep import Chunk, estimate_seconds, perform, plan_sweep, run_sweep
+from rotor_mbs.studies.sweep import Chunk, estimate_seconds, plan_sweep, run_sweep
 
 _SWEEP = """
 title = "starts and springs"
@@ -153,13 +153,15 @@ def test_a_damaged_run_is_computed_again_by_the_same_command(tmp_path: Path, col
     assert output.read_bytes() == before
 
 
-def _killing(chunk: Chunk) -> Rows:
+class _Killing(Chunk):
     """Run 5 kills its process, wherever it is tried, and leaves a mark each time."""
-    if chunk.first <= 5 < chunk.first + len(chunk.values):
-        with Path(os.environ["ROTOR_TEST_MARKS"]).open("a") as marks:
-            marks.write(f"{len(chunk.values)}\n")
-        os.kill(os.getpid(), signal.SIGKILL)
-    return perform(chunk)
+
+    def perform(self) -> Rows:
+        if self.first <= 5 < self.first + len(self.values):
+            with Path(os.environ["ROTOR_TEST_MARKS"]).open("a") as marks:
+                marks.write(f"{len(self.values)}\n")
+            os.kill(os.getpid(), signal.SIGKILL)
+        return super().perform()
 
 
 @pytest.mark.full
@@ -170,7 +172,8 @@ def test_a_run_that_kills_its_worker_is_found_and_the_others_go_on(
     marks, output = tmp_path / "marks", tmp_path / "o.h5"
     monkeypatch.setenv("ROTOR_TEST_MARKS", str(marks))
     sweep = load_sweep(_file(tmp_path, draws=16))
-    result = run_local(sweep, output, methods=[method], workers=2, work=_killing)
+    with patch("rotor_mbs.studies.sweep.Chunk", _Killing):
+        result = run_local(sweep, output, methods=[method], workers=2)
     assert (result.made, result.statuses, result.is_ok) == (31, {"ok": 31}, False)
     (line,) = result.lost
     assert line.startswith("run 5: its process died")
@@ -185,16 +188,18 @@ def test_a_run_that_kills_its_worker_is_found_and_the_others_go_on(
     assert (again.made, again.statuses, again.is_ok, again.lost) == (1, {"ok": 32}, True, ())
 
 
-def _hanging(chunk: Chunk) -> Rows:
-    if chunk.first == 2:
-        time.sleep(600.0)
-    return perform(chunk)
+class _Hanging(Chunk):
+    def perform(self) -> Rows:
+        if self.first == 2:
+            time.sleep(600.0)
+        return super().perform()
 
 
 @pytest.mark.full
 def test_a_run_that_hangs_is_ended_and_the_others_go_on(tmp_path: Path) -> None:
     output = tmp_path / "o.h5"
-    result = run_local(load_sweep(_file(tmp_path)), output, workers=2, timeout_s=6.0, work=_hanging)
+    with patch("rotor_mbs.studies.sweep.Chunk", _Hanging):
+        result = run_local(load_sweep(_file(tmp_path)), output, workers=2, timeout_s=6.0)
     assert result.statuses == {"ok": 7, "timed_out": 1}
     assert StoredSweep(output).column("message")[2].tobytes().rstrip(b"\0") == b"ended after 11 s"
     assert StoredSweep(output).column("time_limit_s")[2] == 6.0
@@ -327,7 +332,7 @@ def test_an_estimate_times_the_beginning_of_runs_with_very_many_samples(
         time.sleep(0.01)
         return {}
 
-    monkeypatch.setattr(sweep, "perform", record)
+    monkeypatch.setattr(Chunk, "perform", record)
     plan = plan_sweep(load_sweep(path))
     seconds = estimate_seconds(plan, SerialPool())
     interval = plan.sweep.base.duration / 1_000_000

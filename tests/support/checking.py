@@ -42,7 +42,7 @@ def add_run(path: Path, scene: Scene, run: Solution) -> None:
     judgement = judge(scene, run, read_reference(file.place(f"{scene.name}/{REFERENCE}"), scene))
     run = replace(run, scene=scene, status=judgement.status, message=judgement.message, metrics=judgement.metrics)
     place = file.place(asked.run)
-    place.write(place.first, row_of_run(run, place, {"false_success": int(judgement.false_success)}))
+    place.write(row_of_run(run, place, {"false_success": int(judgement.false_success)}))
 
 
 def judged(path: Path, bounds: Bounds | None = None) -> list[Check]:

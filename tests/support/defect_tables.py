@@ -13,7 +13,6 @@ from pathlib import Path
 
 import numpy as np
 
-from rotor_mbs.analysis.rehydrate import reference_of, rehydrate
 from rotor_mbs.methods.catalogue import is_corrected
 from rotor_mbs.models.lagrange import closed_form
 from rotor_mbs.models.lagrange.parameters import rate_units, rotor_form
@@ -72,11 +71,11 @@ def main(path: Path) -> None:
     bounds = shipped_bounds()
     with open_results(path) as results:
         for name, stored in results.scenes.items():
-            reference = reference_of(stored)
+            reference = stored.reference_trajectory
             assert reference is not None
             of_fault: dict[str, Array] = {}
             for run in stored.runs.values():
-                solution = rehydrate(stored, run, reference).run
+                solution = run.solution(stored.scene)
                 if solution is None or run.method == "reference":
                     continue
                 of_fault = of_fault or signatures(solution.scene, reference)

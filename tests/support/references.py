@@ -27,7 +27,8 @@ def reference(name: str) -> Trajectory:
     with open_results(reference_folder() / f"{name.split('/')[0]}.h5") as results:
         stored = results.scenes[name].reference
         assert stored is not None
-        return rebuilt_reference(scene(name), stored)
+        arrays = {array: stored.array(array) for array in stored.names}
+        return rebuilt_reference(scene(name), arrays)
 
 
 def run(one: Scene, method: str = TAYLOR, **settings: object) -> Solution:

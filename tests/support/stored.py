@@ -75,7 +75,7 @@ def store(path: Path, runs: Sequence[Made]) -> Path:
         facts = {**metrics, **made.attributes}
         run.status, run.message = str(facts.pop("status", "ok")), str(facts.pop("message", ""))
         place = file.place(f"{made.scene.name}/{made.method}")
-        place.write(place.first, row_of_run(run, place, facts))
+        place.write(row_of_run(run, place, facts))
     return path
 
 
@@ -92,7 +92,7 @@ class Arrays:
         self, method: str, status: str = "ok", attributes: Any = (), settings: Any = (), **arrays: Any
     ) -> None:
         self.scene, self.method, self.status, self.arrays = "scene", method, status, arrays
-        self.attributes, self.settings = dict(attributes), dict(settings)
+        self.attributes, self.settings, self.is_frozen = dict(attributes), dict(settings), False
 
     def __contains__(self, name: str) -> bool:
         return name in self.arrays
@@ -121,9 +121,9 @@ def change_row(path: Path, run: str, change: Callable[[Rows], None]) -> None:
     place = TableFile(path).place(run)
     row = {name: values.copy() for name, values in place.read().items()}
     change({name: values[0, ...] for name, values in row.items()})
-    place.write(place.first, row)
+    place.write(row)
 
 
-def drop(path: Path, run: str) -> None:
+def drop(path: Path, scene: str, method: str) -> None:
     """Take a run out of a file."""
-    extend_file(path, [], dropped=[(RUNS, run)])
+    extend_file(path, [], replaced=[(RUNS, scene, method)])

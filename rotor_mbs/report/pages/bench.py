@@ -12,7 +12,6 @@ from dataclasses import replace
 import numpy as np
 
 from rotor_mbs.analysis import work_precision
-from rotor_mbs.analysis.rehydrate import scene_of
 from rotor_mbs.analysis.stability import SuiteRun, suite_runs
 from rotor_mbs.errors import MethodRefusal
 from rotor_mbs.methods.catalogue import find_method, ladders
@@ -211,7 +210,7 @@ def engine_tables(results: OpenResults, scenes: Mapping[str, Sequence[Record]]) 
     """A row per method: what it reaches over all scenes and what that costs; what it can compute. What the file does
     not know is a dash."""
     curves = [curve for of_scene in scenes.values() for curve in of_scene]
-    parsed = {name: scene for name, stored in results.scenes.items() if (scene := scene_of(stored)) is not None}
+    parsed = {name: stored.scene for name, stored in results.scenes.items()}
     suite = [run for run in suite_runs(results.path) if run.scene.startswith(("stiff/", "extreme/"))]
     # The shortest that is long enough.
     durations = {name: scene.duration for name, scene in parsed.items() if results.scenes[name].methods}
@@ -397,11 +396,10 @@ def failure_table(curves: Sequence[Record], stored: StoredScene | None = None) -
             claimed = "yes" if curve.arrays["false_success"][i] else ""
             seconds = prefixed(_finite(curve.arrays["run_time_s"][i]), "s")
             rows.append([method_cell(curve.name), setting, seconds, words_of(status), claimed, message])
-    scene = None if stored is None else scene_of(stored)
-    if scene is not None:
+    if stored is not None:
         for name in dict.fromkeys(ladder.method for ladder in ladders()):
             try:
-                find_method(name).items(scene)
+                find_method(name).items(stored.scene)
             except MethodRefusal as exc:
                 rows.append([method_cell(name), "", "", "cannot represent the scene", "", str(exc)])
     head = ["method", "setting", "run time", "status", "engine reported ok", "reason"]

@@ -10,7 +10,6 @@ import numpy as np
 
 from rotor_mbs.analysis import run_selection
 from rotor_mbs.analysis.claims import finding
-from rotor_mbs.analysis.rehydrate import scene_of
 from rotor_mbs.analysis.run_tables import method_table
 from rotor_mbs.analysis.stability import OUTCOMES
 from rotor_mbs.report import plots
@@ -81,7 +80,7 @@ def index_page(report: Report) -> dict[str, object]:
         "pictures": [
             *key_picture(sides, own_claims, horizon(scenes[shown]), "crest"),
             *error_picture(
-                defects(scene_of(scenes[shown]), judged),
+                defects(scenes[shown].scene, judged),
                 "defect of an interval (rad)",
                 "defects",
                 f"{shown}: what the closed form makes of each sample by the next, less what each run has there",

@@ -23,7 +23,6 @@ from rotor_mbs.analysis.published import (
     checked_entries,
     published,
 )
-from rotor_mbs.analysis.rehydrate import scene_of
 from rotor_mbs.errors import InputError
 from rotor_mbs.methods.catalogue import errata_methods, look_up
 from rotor_mbs.report import plots
@@ -354,12 +353,12 @@ def figures_page(report: Report) -> dict[str, object]:
                 is_named = label.lower().startswith(heading.lower())
                 caption = with_capital(label) if is_named else f"{heading}: {label}"
                 pictures.append(svg.picture(drawn, f"f{figure.number}{letter}-{key}", caption))
-            parsed = scene_of(report.scenes[scene])
+
             panels.append({
                 "letter": letter,
                 "scene": scene,
                 "title": report.scenes[scene].title,
-                "initial": {} if parsed is None else tomllib.loads(parsed.text)["initial"],  # pi/6 as it is written
+                "initial": tomllib.loads(report.scenes[scene].scene.text)["initial"],  # pi/6 as it is written
                 "href": report.files[scene],
                 "pictures": pictures,
             })  # fmt: skip

@@ -10,7 +10,6 @@ import numpy as np
 from rotor_mbs.analysis import run_selection
 from rotor_mbs.analysis.claims import Claim
 from rotor_mbs.analysis.exact import escape_rate
-from rotor_mbs.analysis.rehydrate import scene_of
 from rotor_mbs.methods.catalogue import REFERENCE, is_corrected
 from rotor_mbs.models.lagrange.defects import interval_defects
 from rotor_mbs.report import plots
@@ -63,7 +62,6 @@ def scene_page(name: str, report: Report) -> dict[str, object]:
     condition = report.conditions.get(name.rpartition("/")[2])
     suite_runs = [run for run in report.suite_runs if run.scene == name]
     figures = str(scene.attributes.get("figures", ""))
-    parsed = scene_of(scene)
     has_zero_pitch = any("zero_pitch_max" in run.attributes for run in scene.runs.values())
     return {
         "name": name,
@@ -80,10 +78,12 @@ def scene_page(name: str, report: Report) -> dict[str, object]:
         "motion": _motion_section(runs, horizon),
         "difference": _difference_section(scene, drawn, horizon),
         "defects": Section(
-            error_picture(defects(parsed, drawn), "defect (rad)", "defects", "Interval defects, over all of every run")
+            error_picture(
+                defects(scene.scene, drawn), "defect (rad)", "defects", "Interval defects, over all of every run"
+            )
         ),
         "energy": _energy_section(drawn, horizon),
-        "drive": _drive_section(parsed, sides.get("corrected")),
+        "drive": _drive_section(scene.scene, sides.get("corrected")),
         "cost": cost_section(scene, report.curves.get(name, ())),
         "steps": step_section(name, report.ladders),
         "quantities": quantity_sections(scene, drawn, horizon),
@@ -91,7 +91,7 @@ def scene_page(name: str, report: Report) -> dict[str, object]:
         "has_horizon": horizon is not None,
         "has_printed": any(run.status in GOOD and not is_corrected(run.method) for run in scene.runs.values()),
         "has_zero_pitch": has_zero_pitch,
-        "escape_rate": escape_rate(parsed) if has_zero_pitch and parsed is not None else None,
+        "escape_rate": escape_rate(scene.scene) if has_zero_pitch else None,
         "previous": pages[place - 1],
         "next": pages[place + 1],
     }
@@ -287,9 +287,9 @@ def _energy_section(drawn: Runs, horizon: float | None) -> Section:
     return Section(shown, [PageTable("", head, rows)])
 
 
-def _drive_section(scene: Scene | None, run: StoredRun | None) -> Section:
+def _drive_section(scene: Scene, run: StoredRun | None) -> Section:
     """Torque and power at the shaft; pitches, their commands and the power of their actuators."""
-    if scene is None or run is None or "rates" not in run or "angles" not in run or not len(run.array("time")):
+    if run is None or "rates" not in run or "angles" not in run or not len(run.array("time")):
         return Section()
     time, angles, rates = run.array("time"), run.array("angles"), run.array("rates")
 
@@ -339,8 +339,8 @@ def _drive_section(scene: Scene | None, run: StoredRun | None) -> Section:
 
 def plotted_quantities(scene: StoredScene) -> list[tuple[Quantity, Plot]]:
     """The quantities of the scene with a plot: built in, or of an installed package that its outputs name."""
-    parsed = scene_of(scene)
-    quantities = known_quantities(parsed.outputs if parsed is not None else ())
+
+    quantities = known_quantities(scene.scene.outputs)
     return [(quantity, quantity.plot) for quantity in quantities if quantity.plot is not None and quantity.is_over_time]
 
 
@@ -425,12 +425,12 @@ def error_picture(
     return [picture(panels, name, caption, notes)] if curves else []
 
 
-def defects(scene: Scene | None, runs: Runs) -> list[Series]:
+def defects(scene: Scene, runs: Runs) -> list[Series]:
     """The size (rad) of the defect of every interval, at its end; a fault in time stands out in its own intervals."""
     curves = []
     for method, run in runs.items():
         time = run.array("time") if "angles" in run and "rates" in run else np.empty(0)
-        if scene is not None and len(time) >= 2:
+        if len(time) >= 2:
             sizes = interval_defects(scene, time, run.array("angles"), run.array("rates")).sizes
             curves.append(Series(time[1:], sizes, look_of(method)))
     return curves

@@ -11,7 +11,6 @@ from typing import Any
 import numpy as np
 from markupsafe import Markup
 
-from rotor_mbs.analysis.rehydrate import scene_of
 from rotor_mbs.report.core.looks import class_of, coordinate_look, with_capital
 from rotor_mbs.report.core.numbers import with_unit
 from rotor_mbs.runs.read import StoredRun, StoredScene
@@ -26,9 +25,7 @@ _VISIBLE = 0.1  # of the longest blade
 
 def viewer(stored: StoredScene, runs: Mapping[str, StoredRun]) -> dict[str, Any] | None:
     """What the template needs of at most two runs, by the name to be shown; None without bodies or angles."""
-    scene = scene_of(stored)
-    if scene is None:
-        return None
+    scene = stored.scene
     moves: dict[str, tuple[Array, Array]] = {}
     for name, run in runs.items():
         time, angles = run.get("time"), run.get("angles")
