@@ -8,6 +8,7 @@ import json
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from itertools import cycle
 
 import numpy as np
 
@@ -19,7 +20,7 @@ from rotor_mbs.report.core import canvas
 from rotor_mbs.report.core.canvas import Panels
 from rotor_mbs.report.core.elements import PageTable, Picture, Row, Section, TableCell
 from rotor_mbs.report.core.files import BENCH_CSV
-from rotor_mbs.report.core.looks import GREY, Look, label_of, look_of
+from rotor_mbs.report.core.looks import COORDINATES, GREY, Look, label_of, look_of
 from rotor_mbs.report.core.numbers import NOTHING, number, power, prefixed, with_unit
 from rotor_mbs.report.core.svg import picture
 from rotor_mbs.report.pages.scene_tables import method_cell, words_of
@@ -124,8 +125,13 @@ def diagram(
             color=_FRONT_COLOUR, linewidth=6.0, solid_capstyle="round", zorder=0.5,
         )  # fmt: skip
     times = [seconds]
+    # Methods that are not known here, of files, would all be grey: a colour for each file.
+    looks = {curve.name: look_of(curve.name) for curve in curves}
+    unknown = dict.fromkeys(name.partition("/")[0] for name, look in looks.items() if look.colour == GREY)
+    colours = dict(zip(unknown, cycle(COORDINATES), strict=False))
     for curve, (own_errors, own_seconds) in zip(curves, points, strict=True):
-        look = look_of(curve.name)
+        look = looks[curve.name]
+        look = replace(look, colour=colours.get(curve.name.partition("/")[0], look.colour))
         if len(own_errors) < 2:
             look = replace(look, line="")
         shown = np.maximum(own_errors, _LOWEST_ERROR)
@@ -248,7 +254,7 @@ def engine_tables(results: OpenResults, scenes: Mapping[str, Sequence[Record]]) 
             str(facts.get("lines") or NOTHING),
         ])  # fmt: skip
     drift = f"energy drift in {durations[long]:g} s" if long else "energy drift"
-    targets = [f"{power(round(math.log10(target)))} rad" for target in _ENGINE_TARGETS]
+    targets = [f"to {power(round(math.log10(target)))} rad" for target in _ENGINE_TARGETS]
     head = [
         "method", "ok on scenes", "order seen", "smallest defect (rad)", "smallest error (rad)", *targets, drift,
         "zero pitch", "failures called ok",
@@ -267,7 +273,8 @@ def _worst_cell(own: Mapping[str, Sequence[Record]], column: str) -> TableCell |
     values = {name: work_precision.best(curves, column) for name, curves in own.items()}
     known = {name: value for name, value in values.items() if value is not None}
     if not known:
-        return TableCell("none ok", "bad") if own else NOTHING
+        is_cut = any(work_precision.left_out(curve) for curves in own.values() for curve in curves)
+        return (TableCell("not measured") if is_cut else TableCell("none ok", "bad")) if own else NOTHING
     worst = max(known, key=lambda name: known[name])
     return TableCell(number(known[worst]), note=worst if len(own) > 1 else "")
 
