@@ -183,6 +183,23 @@ def test_a_run_that_a_shorter_limit_ended_is_computed_again(tmp_path: Path) -> N
     assert made(run(tmp_path / "r.h5", timeout_s=6.0)) == [METHODS[0]]
 
 
+def test_a_shipped_reference_that_was_not_read_in_time_is_read_again(tmp_path: Path) -> None:
+    """But not one that ends early itself: it has no limit."""
+
+    def slow(task: RunTask) -> Rows:
+        return task.failed("timed_out", "too slow") if task.asked.method == "reference" else blank(task)
+
+    def short(task: RunTask) -> Rows:
+        rows = slow(task)
+        rows["time_limit_s"][:] = np.nan
+        return rows
+
+    run(tmp_path / "r.h5", METHODS[:1], perform=slow, timeout_s=5.0)
+    assert made(run(tmp_path / "r.h5", METHODS[:1], timeout_s=4.0)) == []
+    assert made(run(tmp_path / "r.h5", METHODS[:1], perform=short, timeout_s=6.0)) == ["reference", METHODS[0]]
+    assert made(run(tmp_path / "r.h5", METHODS[:1], timeout_s=7.0)) == []
+
+
 def test_an_error_of_a_method_is_a_run_that_failed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     def build(*_: object) -> object:
         raise ZeroDivisionError("by nothing")

@@ -317,6 +317,8 @@ def _order_cell(curves: Sequence[Record]) -> str:
 def _drift_cell(scene: Scene, run: StoredRun | None) -> TableCell | str:
     if run is None:
         return NOTHING
+    if run.status == "timed_out":
+        return TableCell("not measured", note="over its time limit")
     if run.status not in COMPLETE:
         return TableCell(words_of(run.status), "bad")
     return TableCell(number(work_precision.energy_drift(scene, run)), note=scene.name)
@@ -340,6 +342,8 @@ def _false_success_cell(own: Mapping[str, Sequence[Record]], suite: Sequence[Sui
         # What the time limit ended is no failure of the engine.
         failed = [run for run in suite if run.status not in ("ok", "unchecked", "timed_out")]
         claimed, count, note = sum(run.false_success for run in failed), len(failed), f"{len(suite)} runs of the suite"
+        if late := sum(run.status == "timed_out" for run in suite):
+            note += f", {late} over the time limit"
     else:
         curves = [curve for of_scene in own.values() for curve in of_scene]
         claimed = sum(int(curve.arrays["false_success"].sum()) for curve in curves)
