@@ -52,7 +52,7 @@ def naming(pattern: str) -> set[str]:
 def test_the_layers_are_those_of_the_import_contract() -> None:
     contracts = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["importlinter"]["contracts"]
     (layers,) = (one["layers"] for one in contracts if one["type"] == "layers")
-    assert re.findall(r"^\| `(\w+)` \|", TEXT.partition("## The way")[0], re.M) == layers
+    assert re.findall(r"^\| `(\w+)` \|", TEXT.partition("## Data flow")[0], re.M) == layers
 
 
 def test_every_place_that_is_named_exists() -> None:
@@ -122,10 +122,8 @@ ENGINE: Patch = {
 
 def places_to_touch(addition: str) -> tuple[list[str], list[str]]:
     """What the row of the table names, and of these what there always is to touch."""
-    row = re.findall(rf"^\| {addition} \| (.*) \|$", TEXT, re.M)[0].partition("; from outside")[0]
-    every, always = (
-        re.findall(r"`([\w/]+/(?:\w+\.\w+)?|\w+\.toml)`", text) for text in (row, row.split("; where it")[0])
-    )
+    row = re.findall(rf"^\| {addition} \| (.*) \|$", TEXT, re.M)[0].partition("; from another package")[0]
+    every, always = (re.findall(r"`([\w/]+/(?:\w+\.\w+)?|\w+\.toml)`", text) for text in (row, row.split("; if ")[0]))
     return every, always
 
 

@@ -60,21 +60,22 @@ _FREQUENCIES = {
     "undamped frequency": ("undampedfrequency", "undampedfrequencies", "naturalfrequency", "naturalfrequencies"),
 }
 # What is understood, in words.
+_RATE_AFFIXES = f"the suffix {', '.join(_RATE_WORDS[:-1])} or {_RATE_WORDS[-1]}, or the prefix d"
 KNOWN_NAMES = (
     ("time", ", ".join(_TIME_NAMES)),
     ("rotor", ", ".join(_ROTOR_NAMES)),
-    ("pitch of blade i, its number behind", ", ".join(_PITCH_NAMES)),
-    ("rate of the rotor", f"these with {', '.join(_RATE_WORDS)} behind, or d before; {', '.join(_ROTOR_RATE_NAMES)}"),
-    ("rate of a pitch", f"these with {', '.join(_RATE_WORDS)} behind, or d before"),
+    ("pitch of blade i, followed by the blade's number", ", ".join(_PITCH_NAMES)),
+    ("rotor rate", f"a name of the rotor with {_RATE_AFFIXES}; {', '.join(_ROTOR_RATE_NAMES)}"),
+    ("pitch rate", f"a name of a pitch with {_RATE_AFFIXES}"),
     ("array of angles, rotor first", ", ".join(_VECTORS["angle"])),
     ("array of rates, rotor first", ", ".join(_VECTORS["rate"])),
 )
 LOAD_AND_MODE_NAMES = (
-    ("load: its blade's number and x, y or z behind, or an array", ", ".join(load.name for load in LOADS)),
-    ("load at a root, as OpenFAST has it", "RootFxb1, RootMyc2 and the like"),
-    ("modes: rotor speed, where there is no time", ", ".join(_SPEED_NAMES)),
-    ("modes: damped frequency, its number behind, or an array", ", ".join(_FREQUENCIES["frequency"])),
-    ("modes: undamped frequency, likewise", ", ".join(_FREQUENCIES["undamped frequency"])),
+    ("load, followed by the blade's number and x, y or z; or an array", ", ".join(load.name for load in LOADS)),
+    ("root load of OpenFAST", "RootFxb1, RootMyc2, ..."),
+    ("modes: rotor speed, if there is no time", ", ".join(_SPEED_NAMES)),
+    ("modes: damped frequency, followed by its number; or an array", ", ".join(_FREQUENCIES["frequency"])),
+    ("modes: undamped frequency, followed by its number; or an array", ", ".join(_FREQUENCIES["undamped frequency"])),
 )
 _UNIT_ENDING = re.compile(r"_((?:rad|deg|turns|rev)(?:_per_s|/s|_s)?|rpm|hz|s|ms|us|min|(?-i:k?Nm?))$", re.IGNORECASE)
 

@@ -24,12 +24,12 @@ from rotor_mbs.solution.defects import FLOOR_SAFETY
 from rotor_mbs.solution.metrics import HORIZON_GROWTH
 from rotor_mbs.solution.trajectory import Array, Trajectory
 
-FAULTS = ("c", "gravity", "Coriolis term", "torque", "phase")
-_SMALL = 1e-7  # relative (of the phase rad): far above rounding, and the defects are linear in it
+FAULTS = ("c", "gravity", "Coriolis term", "torque", "azimuth (rad)")
+_SMALL = 1e-7  # relative (of the azimuth rad): far above rounding, and the defects are linear in it
 
 
 def signatures(scene: Scene, motion: Trajectory) -> dict[str, Array]:
-    """(n,) rad for each of `FAULTS`: the size of every interval's defect for a relative fault of 1 (of a phase 1 rad).
+    """(n,) rad for each of `FAULTS`: size of each interval's defect for a relative fault of 1 (an azimuth of 1 rad).
 
     To first order in the interval h: a wrong acceleration Δa is a defect of h Δa in the rates.
     """
@@ -61,7 +61,7 @@ def signatures(scene: Scene, motion: Trajectory) -> dict[str, Array]:
         "gravity": size(accelerations(rotor_form(replace(scene, gravity=scene.gravity * further))) - right) / _SMALL,
         "Coriolis term": size(products + accelerations(rates=0.0 * rates)),
         "torque": size(accelerations(loads=replace(loads, rotor=np.asarray(loads.rotor) * further)) - right) / _SMALL,
-        "phase": size(accelerations(rotor_form(scene, phases=phases)) - right) / _SMALL,
+        "azimuth (rad)": size(accelerations(rotor_form(scene, phases=phases)) - right) / _SMALL,
     }
 
 
