@@ -139,7 +139,8 @@ class Defects:
         sizes = self.sizes[judged]
         with np.errstate(invalid="ignore"):
             beyond = np.maximum(sizes - FLOOR_SAFETY * self.floor[judged].max(initial=0.0), 0.0) / longer[judged]
-        return float(np.where(np.isfinite(sizes), beyond, np.inf).max(initial=0.0))
+        # Of a runaway whose floor overflows, too, nothing is within a bound.
+        return float(np.where(np.isfinite(sizes) & ~np.isnan(beyond), beyond, np.inf).max(initial=0.0))
 
     @functools.cached_property
     def predicted(self) -> Array | None:

@@ -265,6 +265,8 @@ def test_the_bound_is_for_a_hundredth_of_a_second_without_growth() -> None:
     rounded = made_defects(SIZES, rounding=np.full((4, 2), 1e-10))
     assert rounded.judged_size == pytest.approx(3e-9 - 3.0 * 2e-10)
     assert made_defects((1e-9, np.nan, 2e-9)).judged_size == np.inf
+    runaway = made_defects(SIZES, rounding=np.full((4, 2), np.nan))
+    assert defect_metrics(runaway, None)["defect_judged"] == np.inf
 
 
 @pytest.mark.parametrize(("growth", "left_out"), [(0.9 * MAX_INTERVAL_GROWTH, 0), (1.1 * MAX_INTERVAL_GROWTH, 1)])
