@@ -31,7 +31,7 @@ from rotor_mbs.runs.files import HDF5, replace_file
 from rotor_mbs.runs.read import StoredRun, StoredScene, is_sweep, open_results
 from rotor_mbs.runs.results import RUNS
 from rotor_mbs.runs.sweeps import StoredSweep, parameter_name
-from rotor_mbs.runs.table import MISSING, table_groups
+from rotor_mbs.runs.table import MISSING, table_groups, text_of
 from rotor_mbs.scenario.catalogue import list_scenes, only_scene, scene_of
 from rotor_mbs.scenario.scene import Scene, doubts, load_scene, parse_scene
 from rotor_mbs.solution.defects import Defects
@@ -491,7 +491,7 @@ class Runs(Mapping[Any, Any]):
         blank = np.full((samples, 1 + len(scene.blades)), np.nan)
         arrays = {"angles": blank, "rates": blank, **{name: array[:samples] for name, array in arrays.items()}}
         status = STATUSES[int(sweep.column("status")[row])]
-        message = sweep.column("message")[row].tobytes().rstrip(b"\0").decode(errors="ignore")
+        message = text_of(sweep.column("message")[row])
         time = np.array(sweep.column("time")[:samples])
         metrics = {
             name: float(sweep.column(name)[row])

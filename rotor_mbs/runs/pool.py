@@ -225,7 +225,17 @@ def run_in(
 
     def ended(waiting: dict[Future[R], T]) -> Iterator[Finished[T, R]]:
         nonlocal lacks
-        for end in _ended(pool, waiting):
+        for future in wait(waiting, return_when=FIRST_COMPLETED).done:
+            task, error = waiting.pop(future), CancelledError() if future.cancelled() else future.exception()
+            if error is None:
+                end = Finished(task, future.result())
+            elif isinstance(error, OF_THE_MACHINE):
+                lack = "code" if isinstance(error, ImportError) else "memory, files or processes"
+                end = Finished(task, None, "worker_died", f"not enough {lack}: {one_line(error)}", error)
+            elif (failure := pool.failure(error)) == "error":
+                end = Finished(task, None, failure, one_line(error), error)
+            else:
+                end = Finished(task, None, failure, str(error), error if getattr(error, "at_start", False) else None)
             is_lack = end.failure == "worker_died" and end.error is not None
             lacks = lacks + 1 if is_lack else 0
             if lacks >= _MAX_LACKS:
@@ -244,20 +254,6 @@ def run_in(
             yield replace(end, message=f"{end.message}, also when it was retried alone")
         else:
             yield end
-
-
-def _ended(pool: TaskPool, waiting: dict[Future[R], T]) -> Iterator[Finished[T, R]]:
-    for future in wait(waiting, return_when=FIRST_COMPLETED).done:
-        task, error = waiting.pop(future), CancelledError() if future.cancelled() else future.exception()
-        if error is None:
-            yield Finished(task, future.result())
-        elif isinstance(error, OF_THE_MACHINE):
-            lack = "code" if isinstance(error, ImportError) else "memory, files or processes"
-            yield Finished(task, None, "worker_died", f"not enough {lack}: {one_line(error)}", error)
-        elif (failure := pool.failure(error)) == "error":
-            yield Finished(task, None, failure, one_line(error), error)
-        else:
-            yield Finished(task, None, failure, str(error), error if getattr(error, "at_start", False) else None)
 
 
 @contextmanager

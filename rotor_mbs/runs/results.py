@@ -1,10 +1,5 @@
-"""Results files as they are written: a row per run in the table /runs, its arrays in a table of its scene.
-
-/runs           run (text), scene, method_name, settings, versions; status, message, metrics, times
-/paper/fig11    run (text), status, samples, time, coordinate, ...; angles (run, time, coordinate), tip, energies, loads
-                error_growth, angle_uncertainty (time): of the reference
-/bench, /stability ...   tables of other studies, each row with a status of its own
-"""
+"""Results files as they are written: a row per run in the table /runs, its arrays in a table of its scene, and tables
+of other studies beside them (/bench, /stability); see `table`."""
 
 from __future__ import annotations
 

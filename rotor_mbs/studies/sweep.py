@@ -145,7 +145,13 @@ def _side_by_side(chunk: Chunk, scenes: Sequence[Scene]) -> Rows:
     errors = energy_balance(kinetic, found["potential_energy"], work)
     drifts = energy_drifts(scenes, kinetic, work, errors)
     angles = largest(found["angles"].reshape(len(scenes), -1))
-    of_runs = [_metrics(chunk, scene, block.trajectory(i), drifts[i]) for i, scene in enumerate(scenes)]
+    # What decides whether a run is clearly ok. Without defects it is the energy: runs side by side are the closed form
+    # itself, and their defects cost ten times as much as they do.
+    of_runs: list[Metrics] = []
+    for i, scene in enumerate(scenes):
+        defects = defects_of(scene, block.trajectory(i)) if chunk.with_defects else None
+        of_defects = {} if defects is None else defect_metrics(defects, None)
+        of_runs.append({"energy_drift_max": float(drifts[i]), **of_defects})
     ok = clearly_ok(scenes, method.name, block.integrations, block.samples, of_runs, angles, method.bounds)
     row = chunk.place.row
     metrics = np.dtype([(name, row[name]) for name in row.names or () if name in METRICS | AMPLIFICATION])
@@ -173,13 +179,6 @@ def _side_by_side(chunk: Chunk, scenes: Sequence[Scene]) -> Rows:
         for name in ("status", "message", "energy_drift_max", *_OF_DEFECTS):
             rows[name][i] = judged[name][0]
     return rows
-
-
-def _metrics(chunk: Chunk, scene: Scene, run: Trajectory, drift: float) -> Metrics:
-    """What decides whether a run is clearly ok. Without defects it is the energy: runs side by side are the closed form
-    itself, and their defects cost ten times as much as they do."""
-    defects = defects_of(scene, run) if chunk.with_defects else None
-    return {"energy_drift_max": float(drift)} | ({} if defects is None else defect_metrics(defects, None))
 
 
 def _quantity(block: RunBlock, scenes: Sequence[Scene], method: Method, name: str) -> Array:

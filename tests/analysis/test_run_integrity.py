@@ -10,7 +10,7 @@ import pytest
 from support.scenes import paper
 from support.stored import Arrays
 
-from rotor_mbs.analysis.run_integrity import copies, same_settings, settings_faults, steps_off
+from rotor_mbs.analysis.checks import copies, same_settings, settings_faults, steps_off
 from rotor_mbs.methods.catalogue import find_method, look_up
 from rotor_mbs.scenario.accuracy_bounds import expected_settings
 

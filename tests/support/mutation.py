@@ -118,7 +118,6 @@ _TARGETS = (
     Target("analysis", f"{_A}.exact", "exact_rotor_angle _stays_at_zero_pitch _about_shaft _pendulum"),
     Target("analysis", f"{_A}.kinematics", "*"),
     Target("analysis", f"{_A}.checks", "*", 0.5),
-    Target("analysis", f"{_A}.run_integrity", "*", 0.5),
     Target("analysis", f"{_A}.claims", "*", 0.5),
 )  # fmt: skip
 
@@ -183,10 +182,10 @@ _TESTS = {
     f"{_A}.kinematics": ("analysis/test_checks.py",),
     f"{_A}.checks": (
         "analysis/test_checks.py",
+        _DEFAULTS,
         f"{_CHECK}run_that_was_changed_together_with_its_checksum_fails",
         f"{_CHECK}reference_that_is_altered_or_not_there_fails",
     ),
-    f"{_A}.run_integrity": (_DEFAULTS,),
     f"{_A}.claims": ("analysis/test_claims.py",),
 }
 
