@@ -8,6 +8,7 @@ import shutil
 import sys
 import threading
 import time
+from collections import Counter
 from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
@@ -139,16 +140,8 @@ def span(seconds: float) -> str:
 def print_summary(report: RunReport, output: Path) -> int:
     """The runs in a few lines; the exit status: 1 where a run that should succeed did not, or was not computed."""
     is_lost = print_not_computed(report.made)
-    statuses = [run.status for run in report.made if run.is_stored]
-    failed, lost = len(report.failures), len(report.not_computed)
-    ok, completed = statuses.count("ok"), statuses.count("completed")
-    counts = {
-        "completed": completed,
-        "failed": failed,
-        "of the printed equations ended early": len(statuses) - ok - completed - failed,
-        "not computed": lost,
-    }
-    parts = [f"{ok} ok", *(f"{n} {what}" for what, n in counts.items() if n)]
+    counts = Counter(run.status if run.is_stored else "not computed" for run in report.made)
+    parts = [f"{count} {status}" for status, count in counts.most_common()]
     made = f"{len(report.made)} runs made ({', '.join(parts)})" if report.made else "nothing to do"
     print(f"{output}: {made}, {len(report.kept)} already stored")
     for line in report.stored_failures:
