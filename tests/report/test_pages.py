@@ -30,11 +30,13 @@ from rotor_mbs.report.core.looks import COLOURS, COORDINATES
 from rotor_mbs.report.pages import scene as scene_page
 from rotor_mbs.report.pages.paper import claim_table, matrices, trial_tables
 from rotor_mbs.report.pages.scene import parting, range_table
-from rotor_mbs.report.pages.scene_tables import compared_time
+from rotor_mbs.report.pages.scene_tables import METRICS, compared_time
 from rotor_mbs.runs import results as results_module
 from rotor_mbs.runs.read import open_results
+from rotor_mbs.runs.results import metric_columns
 from rotor_mbs.scenario.accuracy_bounds import load_bounds
 from rotor_mbs.scenario.catalogue import find_scenes
+from rotor_mbs.scenario.scene import known_outputs
 from rotor_mbs.solution.quantities import Plot, Quantity
 from rotor_mbs.studies.check import judge_file
 
@@ -113,6 +115,11 @@ def test_equations_that_are_not_claimed_correct_are_not_called_ok(report: Path) 
     assert rows["closed form, Taylor"][0] == "ok"
     assert "is not thereby correct" in metrics
     assert "<small>lagrange/taylor</small>" in metrics  # the name that the command line and the file have
+
+
+def test_every_metric_of_the_summary_is_a_column_of_a_file() -> None:
+    """Else it is left out of every page, silently."""
+    assert set(METRICS) <= metric_columns(known_outputs()).keys()
 
 
 def test_a_failed_run_shows_its_reason_and_its_partial_data(report: Path) -> None:

@@ -49,7 +49,7 @@ def number_table(claims: Iterable[Claim]) -> PageTable:
         item, printed, corrected = claim.published, claim.printed, claim.corrected
         if item.of is None:
             continue
-        verdict = _verdict(printed.holds, "yes", "no")
+        verdict = _verdict(printed.holds)
         if item.rounding and printed.holds:
             verdict = replace(verdict, note=ROUNDING)
         body = "rotor" if item.of.coordinate == 0 else f"pitch {item.of.coordinate}"
@@ -62,7 +62,7 @@ def number_table(claims: Iterable[Claim]) -> PageTable:
             fixed(printed.value, item.decimals + 2),
             verdict,
             fixed(corrected.value, item.decimals + 2),
-            _verdict(corrected.holds, "yes", "no"),
+            _verdict(corrected.holds),
         ])  # fmt: skip
     return PageTable("Published numbers", head, rows)
 
@@ -93,10 +93,10 @@ def claim_table(claims: Iterable[Claim], study: ClaimStudy) -> PageTable:
     return PageTable("Published claims", head, rows)
 
 
-def _verdict(holds: bool | None, yes: str, no: str) -> TableCell:
+def _verdict(holds: bool | None) -> TableCell:
     if holds is None:
         return TableCell(NOTHING)
-    return TableCell(yes if holds else no, tone="good" if holds else "bad")
+    return TableCell("yes" if holds else "no", tone="good" if holds else "bad")
 
 
 def trial_tables(study: ClaimStudy) -> list[PageTable]:

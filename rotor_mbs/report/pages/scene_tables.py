@@ -9,11 +9,17 @@ from rotor_mbs.analysis.judgement import OK_ERROR
 from rotor_mbs.analysis.stability import OUTCOMES, SuiteRun
 from rotor_mbs.methods.catalogue import REFERENCE, is_corrected, look_up
 from rotor_mbs.report.core.elements import PageTable, Row, TableCell
-from rotor_mbs.report.core.looks import label_of
-from rotor_mbs.report.core.numbers import number, prefixed, with_unit
+from rotor_mbs.report.core.looks import label_of, with_capital
+from rotor_mbs.report.core.numbers import number, with_unit
 from rotor_mbs.runs.read import StoredRun, StoredScene
+from rotor_mbs.runs.results import metric_columns
 from rotor_mbs.solution.status import GOOD
 
+METRICS = (
+    "defect_max", "defect_median", "defect_time", "angle_error_max", "angle_error_predicted", "angle_error_whole",
+    "tip_error_max", "energy_drift_max", "angular_impulse_error_max", "zero_pitch_max", "zero_pitch_left_s",
+    "zero_pitch_growth_per_s", "steps", "rhs_evaluations", "setup_time_s", "run_time_s",
+)  # fmt: skip
 _ERRORS_OF_RUNS = ("angle_error_max", "angle_error_whole", "tip_error_max")  # against the reference
 
 
@@ -70,46 +76,24 @@ def compared_time(scenes: Iterable[StoredScene]) -> tuple[float, float]:
 
 
 def metrics_table(scene: StoredScene) -> PageTable:
-    """Every run of the scene."""
-    head = {
-        "defect_max": "Largest defect of an interval (rad)",
-        "defect_median": "Median defect (rad)",
-        "defect_time_s": "Largest defect at (s)",
-        "angle_error_max": f"Angle error to the horizon (rad), at most {OK_ERROR:g}",
-        "error_predicted_end": "Predicted error at the end (rad)",
-        "angle_error_whole": "Angle error, whole run (rad)",
-        "tip_error_max": "Tip error to the horizon (m)",
-        "energy_drift_max": "Energy drift (relative)",
-        "angular_impulse_error_max": "Angular momentum about the shaft, error (relative)",
-        "constraint_error_max": "Joint gap (m)",
-    }
+    """Every run of the scene, with the metrics that its file describes."""
+    columns = metric_columns(scene.scene.outputs)
+    judged = [name for name in columns if name.endswith("_error_max") and name not in METRICS]
+    shown = {name: columns[name] for name in (*METRICS, *judged) if name in columns}
     rows: list[Row] = []
     for run in run_selection.in_order(scene).values():
         row = [run_cell(run), status_cell(run)]
-        for name in head:
+        for name in shown:
             value = metric(run, name)
             is_over = name == "angle_error_max" and value is not None and not value <= OK_ERROR
             if run.method == REFERENCE and name in _ERRORS_OF_RUNS:
                 row.append("")
             else:
-                row.append(TableCell(number(value), tone="bad" if is_over and is_corrected(run.method) else ""))
-        # Whether pitches that are exactly zero in the reference stayed so, and until when.
-        left, rate = metric(run, "zero_pitch_left_s"), metric(run, "zero_pitch_growth_per_s")
-        if "zero_pitch_max" not in run.attributes:
-            row.append("")
-        elif left is None:
-            row.append("kept")
-        else:
-            growing = "" if rate is None else f", growing {with_unit(rate, '/s', 3)}"
-            row.append(f"left at {with_unit(left, 's', 3)}{growing}")
-        for name in ("steps", "rhs_evaluations"):
-            count = metric(run, name)
-            row.append("" if count is None else f"{count:.0f}")
-        row += [prefixed(metric(run, name), "s") for name in ("setup_time_s", "run_time_s")]
+                row.append(TableCell(number(value, 3), tone="bad" if is_over and is_corrected(run.method) else ""))
         rows.append(row)
-    return PageTable(
-        "", ("Method", "Status", *head.values(), "Zero pitch", "Steps", "Evaluations", "Set-up", "Run"), rows
-    )
+    units = [f" ({column.units})" if column.units != "1" else "" for column in shown.values()]
+    names = [with_capital(column.long_name) + unit for column, unit in zip(shown.values(), units, strict=True)]
+    return PageTable("", ("Method", "Status", *names), rows)
 
 
 def failure_table(scene: StoredScene, suite_runs: Sequence[SuiteRun] = ()) -> PageTable:
