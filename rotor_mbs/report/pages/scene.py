@@ -61,13 +61,9 @@ def scene_page(name: str, report: Report) -> dict[str, object]:
         tables += paper.trial_tables(study)
     condition = report.conditions.get(name.rpartition("/")[2])
     suite_runs = [run for run in report.suite_runs if run.scene == name]
-    figures = str(scene.attributes.get("figures", ""))
     has_zero_pitch = any("zero_pitch_max" in run.attributes for run in scene.runs.values())
     return {
-        "name": name,
-        "title": scene.title,
-        "figures": figures and f"{'Figures' if ',' in figures else 'Figure'} {figures} of the paper",
-        "toml": str(scene.attributes.get("scene_toml", "")),
+        "scene": scene,
         "source": opening_comment(scene),
         "failures": Section(tables=[scene_tables.failure_table(scene, suite_runs)]),
         "claims": Section(tables=[table for table in tables if table.rows], notes=[condition] if condition else []),
@@ -77,11 +73,7 @@ def scene_page(name: str, report: Report) -> dict[str, object]:
         "paths": _tips_section(runs),
         "motion": _motion_section(runs, horizon),
         "difference": _difference_section(scene, drawn, horizon),
-        "defects": Section(
-            error_picture(
-                defects(scene.scene, drawn), "defect (rad)", "defects", "Interval defects, over all of every run"
-            )
-        ),
+        "defects": Section(error_picture(defects(scene.scene, drawn), "defect (rad)", "defects", "Interval defects")),
         "energy": _energy_section(drawn, horizon),
         "drive": _drive_section(scene.scene, sides.get("corrected")),
         "cost": cost_section(scene, report.curves.get(name, ())),
