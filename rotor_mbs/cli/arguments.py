@@ -230,15 +230,18 @@ def _parser() -> tuple[_Parser, dict[str, _Parser]]:
     own.timeout()
 
     own = command(
-        "compare", "compare another program's trajectory with a scene's reference; exit status 1 where it differs",
+        "compare", "compare another program's trajectory, loads or modes with a scene; exit status 1 where they differ",
         "studies:compare", "mine.csv --scene paper/fig11", "OpenFAST.out --scene my.toml --columns map.toml",
     )  # fmt: skip
-    text = "text with a header, .npz, .mat, HDF5, netCDF, an Exudyn sensor file, OpenFAST .out or .outb"
+    text = "text with a header, .json, .npz, .mat, HDF5, netCDF, an Exudyn sensor file, OpenFAST .out or .outb"
     own.add_argument("data", type=Path, metavar="DATA", help=text)
     own.add_argument("--scene", required=True, metavar="SCENE", help="a name (paper/fig05) or a TOML file")
     text = "column, unit, sign and zero of each channel (default: guessed)"
     own.add_argument("--columns", type=Path, metavar="MAP.toml", help=text)
-    text = "largest defect, and error per unit of error growth, that agree, rad (default: %(default)g)"
+    text = (
+        "largest defect, and error per unit of error growth, that agree, rad; error of a load, of its largest; of a "
+        "frequency, of its size (default: %(default)g)"
+    )
     own.add_argument("--tolerance", type=POSITIVE, default=1e-6, metavar="X", help=text)
     text = "longest time for the reference (default: %(default)g)"
     own.add_argument("--timeout", type=SECONDS, default=600.0, metavar="SECONDS", help=text)

@@ -149,7 +149,7 @@ def guess(name: str, vector: int, known: Sequence[Channel]) -> Channel | None:
     array = entry[1].rpartition("/")[2].strip().lower() if entry else ""
     plain = split_unit(name)[0].lower()
     letters, digits = re.sub(r"[^a-z]", "", plain), re.findall(r"\d+", plain)
-    by_name = {channel.name: channel for channel in known}
+    by_name, is_one_blade = {channel.name: channel for channel in known}, all(c.name != "pitch 2" for c in known)
     if known[0].name == SPEED:
         number = int(digits[-1]) + (entry is not None) if digits else 1
         kinds = [f"{kind} {number}" for kind, names in _FREQUENCIES.items() if letters in names]
@@ -166,7 +166,8 @@ def guess(name: str, vector: int, known: Sequence[Channel]) -> Channel | None:
         return fitting[offset] if len(fitting) == vector else None
     words = re.findall(r"[a-z]+|\d+", plain)
     frame = words[-2] if words[-1:] == ["frame"] and len(words) > 2 else ""
-    load = by_name.get(" ".join(words[:-2] if frame else words))
+    named = " ".join(words[:-2] if frame else words)
+    load = by_name.get(named) or by_name.get(f"{named} 1" if is_one_blade else "")
     if load is not None and load.is_load:
         return load.in_frame(frame) if frame else load
     if letters in _TIME_NAMES:
@@ -177,8 +178,7 @@ def guess(name: str, vector: int, known: Sequence[Channel]) -> Channel | None:
         ending, stem = "d", letters[1:]
     rate = " rate" if ending else ""
     if stem in _PITCH_NAMES:
-        only = "1" if len([channel for channel in known if channel.kind == "angle"]) == 2 else ""
-        wanted = f"pitch {digits[-1] if digits else only}{rate}"
+        wanted = f"pitch {digits[-1] if digits else '1' * is_one_blade}{rate}"
     elif letters in _ROTOR_RATE_NAMES:
         wanted = "rotor rate"
     elif stem in _ROTOR_NAMES:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import json
 import math
 import os
 import re
@@ -122,7 +123,7 @@ def shown_names(names: list[str]) -> str:
 
 
 LARGEST = 1 << 29  # bytes; a trajectory of a million rows of ten columns is 80 MB
-FORMATS = "text with a header, .npz, .mat, HDF5, netCDF, OpenFAST .out and .outb"
+FORMATS = "text with a header, .json, .npz, .mat, HDF5, netCDF, OpenFAST .out and .outb"
 _HDF5, _NETCDF3, _ZIP, _MATLAB_5 = b"\x89HDF\r\n\x1a\n", b"CDF", b"PK\x03\x04", b"MATLAB 5.0 MAT-file"
 _BINARY = (_HDF5, _NETCDF3, _ZIP, _MATLAB_5)
 _LIMIT_S = 120.0  # for reading a binary file
@@ -168,6 +169,8 @@ def read_table(path: str | os.PathLike[str], group: str = "", scene: str = "") -
             text = content.decode("utf-16" if content.startswith(_UTF_16) else "utf-8-sig")
         except UnicodeDecodeError:
             text = content.decode("latin-1")
+        if text.lstrip().startswith("{"):  # JSON: arrays by name
+            return table_of(source, {name: np.asarray(values) for name, values in json.loads(text).items()})
         return _read_text(source, text)
     except (OSError, ValueError, MemoryError) as exc:
         raise InputError(f"{path}: cannot be read: {_line(exc)}; allowed: {FORMATS}") from exc

@@ -44,15 +44,18 @@ def compare(
     tolerance: float = DEFAULT_TOLERANCE,
     timeout: float = 600.0,
 ) -> DataComparison:
-    """A trajectory of another program, judged against the scene's reference at the times of the data.
+    """A trajectory of another program, judged against the scene's reference at the times of the data; its loads, by
+    those of the closed form at its own states; or a table of its modes.
 
     Parameters
     ----------
     data : a file, or arrays by name: `time` (n,) s, `angles` and `rates` (n, 1 + blades) rad and rad/s, or a column
-        each, such as `rotor`, `pitch_1_deg`; any of them may be missing.
+        each, such as `rotor`, `pitch_1_deg`; any of them may be missing. Loads by their names (N, N m), see
+        docs/compare.md. Without time: `speed` (m,) rad/s, `frequencies` (m, modes) rad/s.
     columns : a mapping file, or a mapping with the same keys: column, unit, sign, offset of each channel, and whether
         it is wrapped. Without it they are guessed from the names; `verdict.read` says how.
-    tolerance : rad that the defect of an interval may have beyond the rounding of the data.
+    tolerance : rad that the defect of an interval may have beyond the rounding of the data; share of its largest that a
+        load may be off, of itself a frequency.
     timeout : s, for the reference and the defects; a search for causes ends then, too.
 
     Raises
@@ -205,9 +208,8 @@ def channel_table(verdict: DataVerdict) -> TextTable:
     for channel in verdict.channels:
         errors = (f"{channel.error_max:.1e} {channel.unit}", _defect(channel))
         until = ("never" if np.isnan(x) else f"{x:.6g} {_axis_unit(verdict)}" for x in channel.agrees_until)
-        fit = ("", "", "")
-        if channel.lag_s is not None and channel.scale is not None and channel.offset is not None:
-            fit = (f"{channel.lag_s:.1e}", f"{channel.scale - 1.0:.1e}", f"{channel.offset:.1e}")
+        numbers = channel.lag_s, channel.scale and channel.scale - 1.0, channel.offset
+        fit = ("" if x is None else f"{x:.1e}" for x in numbers)
         rows.append((channel.name, *errors, *until, *fit))
     return TextTable((*head, "lag (s)", "scale - 1", "offset"), rows)
 

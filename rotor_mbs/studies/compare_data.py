@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from rotor_mbs.analysis.data_verdict import DEFAULT_TOLERANCE, ChannelErrors, DataVerdict, agrees_until, as_dictionary
 from rotor_mbs.analysis.judgement import OK_ERROR
 from rotor_mbs.errors import InputError
-from rotor_mbs.foreign.channels import ForeignData, channels
+from rotor_mbs.foreign.channels import ForeignData
 from rotor_mbs.methods.time_limit import OutOfTimeError, stop_in_time, time_limit
 from rotor_mbs.models.lagrange import samples
 from rotor_mbs.models.lagrange.defects import FIT_ROWS, fitted_rates, interval_defects
@@ -165,7 +165,13 @@ def compare_with_reference(
     )
     if status in ("ok", "unchecked"):
         status, message = _uncovered(scene, compared, exact, until, defects) or (status, message)
-    notes += _notes(scene, data, cut, missing)
+    if len(data.time) > len(cut.time):
+        notes.append(f"{len(data.time) - len(cut.time)} rows after the scene's {scene.duration:g} s are not compared")
+    if data.digits < _FULL_DIGITS:
+        rounding = 0.5 * 10.0 ** (1 - data.digits)
+        notes.append(f"numbers of {data.digits} digits: their rounding alone is {rounding:.0e} of their size")
+    if missing:
+        notes.append(f"no angle of: {', '.join(missing)}")
     if energy_note:
         notes.append(energy_note)
     likely: list[str] = []
@@ -181,8 +187,14 @@ def compare_with_reference(
                 likely = causes.explanations()
     except OutOfTimeError:
         notes.append("the search for causes was ended by its time limit")
-    if status != "ok" and not likely and (start := _other_start(scene, cut, expected[0])):
-        notes.append(start)
+    apart = [
+        f"{channel.name} {value:.4g} (scene: {start:.4g})"
+        for channel, value, start in zip(data.channels, cut.values[0], expected[0], strict=True)
+        if abs(value - start) > _START
+    ]
+    if status != "ok" and not likely and apart and data.time[0] == 0.0:
+        start_text = f"the data start elsewhere, in rad and rad/s: {', '.join(apart)}"
+        notes.append(f"{start_text}; another scene, start or unit?")
     if status == "ok" and likely:
         notes.append(f"within {tolerance:g} rad an interval, but not random")
     if loads.channels:
@@ -379,25 +391,3 @@ def _uncovered(
         since = f"the first after t = {defects.time[long]:.6g} s"
         return "unchecked", f"beyond the horizon the rows are too far apart to be judged, {since}"
     return None
-
-
-def _other_start(scene: Scene, data: ForeignData, expected: Array) -> str:
-    """What of the first row is not the scene's start, "" where all is, or the data begin later."""
-    names = [channel.name for channel in channels(scene)[1:]]
-    rows = zip(data.columns, data.values[0].tolist(), expected.tolist(), strict=True)
-    apart = [f"{names[i]} {value:.4g} (scene: {start:.4g})" for i, value, start in rows if abs(value - start) > _START]
-    if data.time[0] > 0.0 or not apart:
-        return ""
-    return f"the data start elsewhere, in rad and rad/s: {', '.join(apart)}; another scene, start or unit?"
-
-
-def _notes(scene: Scene, whole: ForeignData, data: ForeignData, missing: Sequence[str]) -> list[str]:
-    notes = []
-    if len(whole.time) > len(data.time):
-        notes.append(f"{len(whole.time) - len(data.time)} rows after the scene's {scene.duration:g} s are not compared")
-    if data.digits < _FULL_DIGITS:
-        rounding = 0.5 * 10.0 ** (1 - data.digits)
-        notes.append(f"numbers of {data.digits} digits: their rounding alone is {rounding:.0e} of their size")
-    if missing:
-        notes.append(f"no angle of: {', '.join(missing)}")
-    return notes

@@ -315,26 +315,15 @@ def _columns_by_first_row(search: CauseSearch) -> Iterator[tuple[str, ForeignDat
     if off and all(channel.kind == "angle" for channel, z in zip(data.channels, zero, strict=True) if z):
         texts = ", ".join(f"{name}: zero off by {z:.6g}" for name, z in off)
         yield texts, replace(data, values=data.values - zero)
-    coordinates = np.array(data.columns) % count
-    groups = {"rotor": coordinates == 0, "pitches": coordinates > 0, "all": coordinates >= 0}
-    kinds = np.array([channel.kind == "rate" for channel in data.channels])
-    for chosen in groups.values():
+    coordinates, rates = np.array(data.columns) % count, np.array(data.columns) >= count
+    for chosen in (coordinates == 0, coordinates > 0, coordinates >= 0, rates):  # rotor, pitches, all, rates
         names = ", ".join(channel.name for channel, c in zip(data.channels, chosen, strict=True) if c)
-        reversed_ = replace(data, values=data.values * np.where(chosen, -1.0, 1.0))
-        degrees = np.where(chosen, _DEGREE, 1.0)
-        for text, corrected in (
-            ("sign reversed", reversed_),
-            ("degrees taken as rad", replace(data, values=data.values * degrees, rounding=data.rounding * degrees)),
-        ):
+        degrees = "deg/s taken as rad/s" if chosen is rates else "degrees taken as rad"
+        for text, factor in (("sign reversed", -1.0), (degrees, _DEGREE)):
+            factors = np.where(chosen, factor, 1.0)
+            corrected = replace(data, values=data.values * factors, rounding=data.rounding * np.abs(factors))
             if chosen.any() and starts_right(corrected):
                 yield f"{names}: {text}", corrected
-    if kinds.any() and starts_right(replace(data, values=data.values * np.where(kinds, _DEGREE, 1.0))):
-        factors = np.where(kinds, _DEGREE, 1.0)
-        names = ", ".join(channel.name for channel in data.channels if channel.kind == "rate")
-        yield (
-            f"{names}: deg/s taken as rad/s",
-            replace(data, values=data.values * factors, rounding=data.rounding * factors),
-        )
     blades = range(1, count)
     orders = itertools.permutations(blades) if count <= 4 else [[*blades][::-1]]
     for order in orders:

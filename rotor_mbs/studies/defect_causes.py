@@ -294,10 +294,9 @@ class DefectCauses:
         cosines = [_mean_cosine(self._values[chosen], effect) for effect in effects]
         place = int(np.argmax(cosines))
         label = self._scene.coordinate_labels[self._defects.moving[place]]
-        # N m that the data have more
-        more = -(self._values[chosen] * effects[place]).sum(axis=1) / (effects[place] ** 2).sum(
-            axis=1
-        )  # N m, of the data
+        # N m that the data have more.
+        sizes = (effects[place] ** 2).sum(axis=1)
+        more = -(self._values[chosen] * effects[place]).sum(axis=1) / sizes
         if cosines[place] >= _ALONG and (edge := self._edge(place, start, end, more)):
             return f"the load on the {label} {edge}"
         if len(group) == 1:

@@ -6,6 +6,7 @@ import json
 import os
 import subprocess
 import sys
+from collections.abc import Callable
 from dataclasses import asdict, replace
 from pathlib import Path
 
@@ -112,6 +113,49 @@ def test_a_script_for_pinocchio_agrees(tmp_path: Path, name: str) -> None:
     # As of the other code: SciPy at 1e-11; a wrong number in the model makes 1e-4 at least.
     assert max(channel.defect or 0.0 for channel in found.verdict.channels) < 1e-8
     assert len(found.verdict.channels) == 2 * len(scene.initial_angles)
+
+
+# What is kept of the numbers of a right run: (angles, rates) -> the same, or no rates.
+KEPT: dict[str, Callable[[np.ndarray], np.ndarray]] = {
+    "all digits": lambda values: values,
+    "six digits": np.vectorize(lambda value: float(f"{value:.5e}")),
+    "single precision": lambda values: values.astype(np.float32).astype(float),
+}
+
+
+IN_DEGREES = ("data.csv", "data.out", "data.outb")  # there six digits are others than those of rad
+
+
+@pytest.mark.full
+@pytest.mark.parametrize(
+    ("kind", "kept"), [(kind, kept) for kind in FORMATS for kept in KEPT if kind not in IN_DEGREES or "all" in kept]
+)
+def test_a_right_run_is_ok_in_every_format(tmp_path: Path, kind: str, kept: str) -> None:
+    """As far as the digits tell; angles alone where the format has no rates. OpenFAST's azimuth is wrapped."""
+    if kind.endswith(".outb"):
+        pytest.importorskip("openfast_io")
+    scene = scene_of("paper/fig11", 1.0)
+    time = np.linspace(0.0, 1.0, scene.samples)
+    angles, rates = map(KEPT[kept], other_code.trajectory(scene, time))
+    FORMATS[kind](tmp_path / kind, scene, time, angles, rates)
+    columns = None
+    if kind == "data.out":
+        columns = {"rotor": {"column": "Azimuth", "wrapped": True}, "pitch_1": "BldPitch1", "pitch_2": "BldPitch2"}
+        columns |= {"pitch_3": "BldPitch3"}
+    found = rm.compare(tmp_path / kind, scene, columns=columns)
+    assert (found.status, found.message, found.likely) == ("ok", "", ())
+
+
+@pytest.mark.parametrize(
+    ("name", "content"),
+    [("d.parquet", b"PAR1\x15\x04" + bytes(60)), ("d.xlsx", b"PK\x03\x04" + bytes(60)), ("d.json", b'{"time": [0, 1'),
+     ("d.json", b'{"time": {"a": 1}}'), ("d.json", b"[1, 2]")],
+)  # fmt: skip
+def test_what_cannot_be_read_is_told_in_a_line(tmp_path: Path, name: str, content: bytes) -> None:
+    (tmp_path / name).write_bytes(content)
+    with pytest.raises(rm.InputError, match="allowed: ") as caught:
+        rm.compare(tmp_path / name, "paper/fig03")
+    assert len(caught.value.problems) == 1
 
 
 def test_the_reference_at_the_times_of_the_data_is_the_frozen_one() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import struct
 from collections.abc import Callable
 from pathlib import Path
@@ -99,6 +100,23 @@ def netcdf_3(path: Path, scene: Scene, time: Array, angles: Array, rates: Array)
             variable.units = "s" if name == "time" else "rad"
 
 
+def json_arrays(path: Path, scene: Scene, time: Array, angles: Array, rates: Array) -> None:  # noqa: ARG001
+    path.write_text(json.dumps({"time": time.tolist(), "angles": angles.tolist(), "rates": rates.tolist()}))
+
+
+def decimal_commas(path: Path, scene: Scene, time: Array, angles: Array, rates: Array) -> None:
+    """As a German spreadsheet saves it."""
+    rows = [
+        ";".join(f"{x!r}".replace(".", ",") for x in row) for row in np.column_stack([time, angles, rates]).tolist()
+    ]
+    path.write_text("\n".join([";".join(["Zeit [s]", *_names(scene)]), *rows]))
+
+
+def tabs(path: Path, scene: Scene, time: Array, angles: Array, rates: Array) -> None:
+    rows = np.column_stack([time, angles, rates])
+    np.savetxt(path, rows, delimiter="\t", header="\t".join(["time", *_names(scene)]), comments="", fmt="%.17g")
+
+
 Writer = Callable[[Path, Scene, Array, Array, Array], None]
 FORMATS: dict[str, Writer] = {
     "data.csv": comma_separated,
@@ -111,4 +129,7 @@ FORMATS: dict[str, Writer] = {
     "data73.mat": matlab_73,
     "data.nc": netcdf_variables,
     "data3.nc": netcdf_3,
+    "data.json": json_arrays,
+    "commas.csv": decimal_commas,
+    "data.tsv": tabs,
 }
