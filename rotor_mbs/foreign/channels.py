@@ -59,6 +59,7 @@ _FREQUENCIES = {
     "frequency": ("frequency", "freq", "f", "mode", "frequencies", "dampedfrequency", "dampedfrequencies"),
     "undamped frequency": ("undampedfrequency", "undampedfrequencies", "naturalfrequency", "naturalfrequencies"),
 }
+_LOAD_NAMES = tuple(load.name.replace("_", " ") for load in LOADS)
 # What is understood, in words.
 _RATE_AFFIXES = f"the suffix {', '.join(_RATE_WORDS[:-1])} or {_RATE_WORDS[-1]}, or the prefix d"
 KNOWN_NAMES = (
@@ -241,7 +242,8 @@ def read_mapping(
     known = [*channels(scene), *mode_channels(scene)]
     declared = {channel.key: file_key(channel.key, _ENTRY, default=None).metadata for channel in known}
     names = {channel.key: channel.name for channel in known if channel.kind != "time"}
-    names |= {load.name: load.name.replace("_", " ") for load in LOADS}  # with all its components
+    # With all their components, or modes.
+    names |= {name.replace(" ", "_"): name for name in (*_LOAD_NAMES, *_FREQUENCIES)}
     omit = keys.list_of(keys.choice(tuple(names)), f"a list of {', '.join(names)}")
     declared["group"] = file_key("group", _GROUP, default="").metadata
     declared["omit"] = file_key("omit", omit, default=()).metadata
@@ -326,7 +328,8 @@ def find_channels(
 
 def _is_omitted(channel: Channel, omitted: Sequence[str]) -> bool:
     name = channel.name.partition(",")[0]
-    return any(name == other or (channel.is_load and name.startswith(f"{other} ")) for other in omitted)
+    is_one_of_many = channel.is_load or channel.kind == "frequency"
+    return any(name == other or (is_one_of_many and name.startswith(f"{other} ")) for other in omitted)
 
 
 @dataclass(frozen=True)

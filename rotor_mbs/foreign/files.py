@@ -20,7 +20,8 @@ from numpy.typing import NDArray
 
 from rotor_mbs.errors import InputError, ResourceError, RotorError
 from rotor_mbs.runs import files
-from rotor_mbs.runs.read import is_sweep, run_arrays
+from rotor_mbs.runs.read import run_arrays
+from rotor_mbs.runs.results import RUNS, table_groups
 
 # By dimension: factor to s, rad or rad/s.
 _ANGLES = {
@@ -238,7 +239,7 @@ def _binary_arrays(path: Path, group: str, scene: str) -> tuple[Mapping[str, Any
             return {name: np.array(variable[:]) for name, variable in file.variables.items()}, units
     if path.suffix.lower() == ".outb":
         return _openfast(path)
-    if files.is_of_this_program(path) and not is_sweep(path):
+    if files.is_of_this_program(path) and RUNS in table_groups(path):
         return run_arrays(path, group, scene), {}
     return files.read_arrays(path, group, scene)
 

@@ -24,7 +24,8 @@ _SMALL = 1e-3  # of the largest force at a root: components that stay below are 
 _ROUNDING = 16.0 * 2.0**-53  # of that force: of the sums that a load is
 _STEP = 1e-7  # of a state, for the derivative of the loads
 _FEWEST = 5  # rows: with fewer, something always fits
-_MOST_LEFT = 1e-4  # of the largest, by a mistake that is named
+_MOST_LEFT = 1e-4  # of the largest, by a mistake that is named,
+_LEFT = 1e-2  # and of the difference: another program's own error is no mistake
 _UNITS = {1.0: "", 1e-3: "kN taken as N", 1e3: "N taken as kN"}
 _FACTORS = [sign * factor for sign in (1.0, -1.0) for factor in _UNITS]
 _FRAMES = (
@@ -104,7 +105,8 @@ def compare_loads(scene: Scene, loads: ForeignData, defects: Defects, tolerance:
     time, values, rounding = time[judged], values[judged], rounding[judged]
     matrices = {frame: matrix[judged] for frame, matrix in matrices.items()}
     least = _SMALL * arms * float(largest_force.max(initial=0.0))
-    search = _LoadCauses(scene, known, matrices, loads.channels, time, values, rounding, least, tolerance)
+    before = np.abs(values - expected[judged]).max(axis=0, initial=0.0)
+    search = _LoadCauses(scene, known, matrices, loads.channels, time, values, rounding, before, least, tolerance)
     errors, wrong = [], []
     message, largest = "" if judged.any() else "no row in which the loads are known", 0.0
     for j, channel in enumerate(loads.channels):
@@ -127,8 +129,8 @@ def compare_loads(scene: Scene, loads: ForeignData, defects: Defects, tolerance:
 @dataclass(frozen=True)
 class _LoadCauses:
     """known : the components of the scene's loads. matrices : by frame (n, known) of the closed form. channels, values,
-    rounding : of the data, (n, channels), and what they may differ by; least : (channels,) the smallest scale of an
-    error."""
+    rounding : of the data, (n, channels), and what they may differ by; before : (channels,) the largest difference;
+    least : (channels,) the smallest scale of an error."""
 
     scene: Scene
     known: list[Channel]
@@ -137,6 +139,7 @@ class _LoadCauses:
     time: Array
     values: Array
     rounding: Array
+    before: Array
     least: Array
     tolerance: float
 
@@ -147,7 +150,7 @@ class _LoadCauses:
         """Whether a component is `factor` times another one, which is not next to nothing unless it may be."""
         scale = self.scale(j, candidate)
         left = np.abs(self.values[:, j] / factor - candidate) - FLOOR_SAFETY * self.rounding[:, j] / min(abs(factor), 1)
-        allowed = min(self.tolerance, _MOST_LEFT) * scale
+        allowed = min(min(self.tolerance, _MOST_LEFT) * scale, _LEFT * self.before[j])
         return float(left.max()) <= allowed and (may_vanish or float(np.abs(candidate).max()) > 100.0 * allowed)
 
     def causes(self, wrong: list[int]) -> list[str]:

@@ -23,7 +23,8 @@ from rotor_mbs.studies.compare_data import DataStudy
 from rotor_mbs.studies.modes import compute_modes
 
 _SLOW = 1e-3  # of the largest frequency: slower ones are judged by this, not by their own size
-_MOST_LEFT = 1e-4  # of a frequency, by a mistake that is named
+_MOST_LEFT = 1e-4  # of a frequency, by a mistake that is named,
+_LEFT = 1e-2  # and of the difference: another program's own error is no mistake
 _MOST_SPEEDS = 1000
 _HZ, _RPM = 2.0 * math.pi, math.pi / 30.0  # rad/s
 _UNITS = {1.0: "", _HZ: "Hz taken as rad/s", 1.0 / _HZ: "rad/s taken as Hz",
@@ -41,7 +42,13 @@ def compare_modes(data: ForeignData, scene: Scene, tolerance: float) -> DataStud
         raise InputError(f"tolerance: {tolerance!r}; allowed: a number more than 0")
     if len(data.time) > _MOST_SPEEDS:
         raise InputError(f"{data.source}: {len(data.time)} speeds; allowed: up to {_MOST_SPEEDS}")
+    if len({channel.name.startswith("undamped") for channel in data.channels}) > 1:
+        allowed = 'omit = ["undamped_frequency"], or ["frequency"], in a mapping file'
+        raise InputError(f"{data.source}: damped and undamped frequencies in one table; allowed: {allowed}")
     search = _ModeCauses(scene, data, tolerance)
+    modes = search.modes(1.0)
+    if isinstance(modes, str):
+        raise InputError(f"{data.source}: nothing to compare with: {modes}")
     error, expected = search.errors(data.values, data.rounding, search.families(1.0)[0][1])
     known = np.isfinite(expected).all(axis=1)
     channels, messages = [], []
@@ -58,8 +65,8 @@ def compare_modes(data: ForeignData, scene: Scene, tolerance: float) -> DataStud
             messages.append((worst, f"{channel.name}: off by {worst:.1e} of its size beyond rounding, {at}"))
     status, message = ("inaccurate", max(messages)[1]) if messages else ("ok", "")
     if not known.all():
-        notes = search.modes(1.0).messages
-        status, message = "unchecked" if status == "ok" else status, message or next(filter(None, notes), "no modes")
+        status = "unchecked" if status == "ok" else status
+        message = message or next(filter(None, modes.messages), "no modes")
     likely = search.causes() if messages else []
     end = float(data.time[-1])
     verdict = DataVerdict(
@@ -75,23 +82,28 @@ class _ModeCauses:
     data: ForeignData
     tolerance: float
 
-    def modes(self, factor: float, *, with_rest: bool = False) -> LinearModes:
-        """Of the closed form at the data's speeds times a factor, and at rest without gravity before them."""
+    def modes(self, factor: float, *, with_rest: bool = False) -> LinearModes | str:
+        """Of the closed form at the data's speeds times a factor, and without rotation before them; why there are none.
+        """
         speeds = self.data.time * factor
         if not speeds.any() and not with_rest:
-            return compute_modes(self.scene, models=(CLOSED_FORM,)).rest[CLOSED_FORM]
+            found = compute_modes(self.scene, models=(CLOSED_FORM,))
+            return found.rest.get(CLOSED_FORM, "; ".join(found.notes))
         # Without gravity there are no Floquet multipliers to compute; these modes are without it anyway.
         speeds = np.union1d(0.0, speeds) if with_rest else speeds
-        return compute_modes(replace(self.scene, gravity=0.0), speeds, models=(CLOSED_FORM,)).rotation[CLOSED_FORM]
+        found = compute_modes(replace(self.scene, gravity=0.0), speeds, models=(CLOSED_FORM,))
+        return found.rotation.get(CLOSED_FORM, "; ".join(found.notes))
 
     def families(self, factor: float) -> list[tuple[str, Array]]:
         """What a program may call its frequencies, (speeds, columns or modes); the first are those that are right."""
         modes = self.modes(factor)
+        if isinstance(modes, str):
+            return []
         damped, undamped, speed = modes.damped_frequencies, modes.undamped_frequencies, modes.speeds[:, None]
-        names = [channel.name.startswith("undamped") for channel in self.data.channels]
-        right, other = (undamped, damped) if all(names) else (damped, undamped)
+        is_undamped = self.data.channels[0].name.startswith("undamped")
+        right, other = (undamped, damped) if is_undamped else (damped, undamped)
         whirl = np.concatenate([right, np.abs(right - speed), right + speed], axis=1)
-        text = "damped frequencies in place of undamped ones" if all(names) else "undamped frequencies"
+        text = "damped frequencies" if is_undamped else "undamped frequencies"
         frame = "in the fixed frame (whirl), the rotor's speed below or above those in the rotor's frame"
         return [("", right), (text, other), (f"frequencies {frame}", whirl)]
 
@@ -113,7 +125,8 @@ class _ModeCauses:
     def causes(self) -> list[str]:
         """The least that explains all: a wrong unit, of frequencies or speeds, another kind of frequency, or missing
         stiffening; several texts for one table where they are alike."""
-        allowed = min(self.tolerance, _MOST_LEFT)
+        before = self.errors(self.data.values, self.data.rounding, self._families[1.0][0][1])[0]
+        allowed = min(self.tolerance, _MOST_LEFT, _LEFT * float(np.nanmax(before, initial=0.0)))
         found = [(cost, text) for cost, text, left in self._explanations() if left <= allowed]
         least = min(found, default=(0, ""))[0]
         return [text for cost, text in found if cost == least]
@@ -148,11 +161,11 @@ class _ModeCauses:
         none of u², which is of second order in θ: what is left, -Ω² Σ m v², softens.
         """
         modes = self.modes(1.0, with_rest=True)
+        if isinstance(modes, str) or np.count_nonzero(self.data.time) < 3:
+            return math.inf, ""
         squares, places = modes.undamped_frequencies**2, np.searchsorted(modes.speeds, self.data.time)
         turning = self.data.time**2
         wrong = self.errors(values, rounding, modes.damped_frequencies[places])[0].max(axis=0) > self.tolerance
-        if np.count_nonzero(turning) < 3 or not wrong.any():
-            return math.inf, ""
         largest, alphas = 0.0, []
         for column, digits in zip(values.T[wrong], rounding.T[wrong], strict=True):
             fits = []

@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 import json
-import os
 import subprocess
 import sys
 from collections.abc import Callable
-from dataclasses import asdict, replace
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 from support import other_code
-from support.data_files import FORMATS
+from support.data_files import FORMATS, pinocchio_file
 
 import rotor_mbs as rm
 from rotor_mbs.analysis.data_verdict import as_dictionary
@@ -89,25 +88,8 @@ def test_an_exported_script_for_exudyn_agrees(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("name", ["paper/fig08", "paper/fig09", "paper/fig11", "check/general", "check/pitch-loads"])
 def test_a_script_for_pinocchio_agrees(tmp_path: Path, name: str) -> None:
-    """By the interpreter that PINOCCHIO_PYTHON names, which need not have this package; see `support`'s script."""
-    python = os.environ.get("PINOCCHIO_PYTHON", sys.executable)
-    if subprocess.run([python, "-c", "import pinocchio"], capture_output=True, check=False).returncode:
-        pytest.skip("no pinocchio: pip install pin, or PINOCCHIO_PYTHON")
     scene = rm.scene(name)
-    duration = scene.duration
-    blades = range(len(scene.blades))
-    bearings, loads = zip(*map(scene.bearing, blades), strict=True), zip(*map(scene.pitch_load, blades), strict=True)
-    (stiffness, damping), (torques, rests) = bearings, loads
-    knots = [t for table in (scene.rotor_torque, *torques, *rests) for t, _ in table if 0.0 < t < duration]
-    rotor = {
-        "blades": [asdict(blade) for blade in scene.blades], "hub_inertia": scene.hub_inertia, "gravity": scene.gravity,
-        "stiffness": stiffness, "damping": damping, "shaft_damping": scene.shaft_damping,
-        "angles": scene.initial_angles, "rates": scene.initial_rates, "loads": [scene.rotor_torque, *torques, *rests],
-        "times": np.union1d(uneven(duration), knots).tolist(),
-    }  # fmt: skip
-    (tmp_path / "rotor.json").write_text(json.dumps(rotor))
-    script = Path(__file__).parents[1] / "support" / "pinocchio_script.py"
-    subprocess.run([python, "-P", script, "rotor.json", "pinocchio.csv"], check=True, cwd=tmp_path)
+    pinocchio_file(tmp_path / "pinocchio.csv", scene, uneven(scene.duration))
     found = rm.compare(tmp_path / "pinocchio.csv", scene)
     assert (found.status, found.message) == ("ok", "")
     # As of the other code: SciPy at 1e-11; a wrong number in the model makes 1e-4 at least.

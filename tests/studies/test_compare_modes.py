@@ -139,6 +139,14 @@ def test_the_command_reads_a_table_in_rpm_and_hz_and_few_digits(
     assert main([*call, "--columns", str(tmp_path / "map.toml")]) == 0
 
 
+def test_the_programs_own_file_of_modes_is_data_too(tmp_path: Path) -> None:
+    scene = rm.scene(UNEQUAL).replace(gravity=0.0)
+    rm.modes(scene, speeds=SPEEDS).save(tmp_path / "modes.h5")
+    mapping = {"group": "exudyn_tree/rotation", "omit": ["undamped_frequency"]}
+    found = rm.compare(tmp_path / "modes.h5", scene, columns=mapping)
+    assert (found.status, len(found.verdict.channels)) == ("ok", 4)
+
+
 def test_a_single_speed_and_rest() -> None:
     damped, _ = tables(UNEQUAL)
     assert compare(UNEQUAL, damped[-1:], SPEEDS[-1:]).status == "ok"
@@ -154,7 +162,7 @@ def test_a_single_speed_and_rest() -> None:
         ({"speed": [0.0, 1.0], "f1": [1.0, np.nan]}, "'f1' is nan in row 2"),
         ({"speed": [0.0, 1.0], "other": [1.0, 2.0]}, "no column for the time"),
         ({"speed": [0.0, 1.0], **{f"f{i}": [1.0, 2.0] for i in range(1, 5)}, "undamped frequency 1": [1.0, 2.0]},
-         "5 frequencies; allowed: 4"),
+         "damped and undamped frequencies in one table"),
         ({"speed [kg]": [0.0, 1.0], "f1": [1.0, 2.0]}, "'kg'; allowed: rad/s"),
     ],
 )  # fmt: skip
