@@ -153,7 +153,8 @@ def guess(name: str, vector: int, known: Sequence[Channel]) -> Channel | None:
     by_name, is_one_blade = {channel.name: channel for channel in known}, all(c.name != "pitch 2" for c in known)
     if known[0].name == SPEED:
         number = int(digits[-1]) + (entry is not None) if digits else 1
-        kinds = [f"{kind} {number}" for kind, names in _FREQUENCIES.items() if letters in names]
+        # A column "mode" alone numbers them.
+        kinds = [f"{kind} {number}" for kind, names in _FREQUENCIES.items() if letters in names and plain != "mode"]
         return by_name.get(SPEED if letters in _SPEED_NAMES else kinds[0] if kinds else "")
     if openfast := _OPENFAST.fullmatch(plain):
         axis, sign = _OPENFAST_AXES[openfast[2]]

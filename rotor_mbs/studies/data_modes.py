@@ -83,8 +83,7 @@ class _ModeCauses:
     tolerance: float
 
     def modes(self, factor: float, *, with_rest: bool = False) -> LinearModes | str:
-        """Of the closed form at the data's speeds times a factor, and without rotation before them; why there are none.
-        """
+        """Of the closed form at the data's speeds times a factor, and without rotation before; why there are none."""
         speeds = self.data.time * factor
         if not speeds.any() and not with_rest:
             found = compute_modes(self.scene, models=(CLOSED_FORM,))
