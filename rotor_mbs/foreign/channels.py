@@ -167,7 +167,7 @@ def guess(name: str, vector: int, known: Sequence[Channel]) -> Channel | None:
         offset = 3 * place[0] + place[1] if len(place) == 2 else place[0]
         return fitting[offset] if len(fitting) == vector else None
     words = re.findall(r"[a-z]+|\d+", plain)
-    frame = words[-2] if words[-1:] == ["frame"] and len(words) > 2 else ""
+    frame = words[-2] if words[-2:] in (["blade", "frame"], ["rotor", "frame"], ["base", "frame"]) else ""
     named = " ".join(words[:-2] if frame else words)
     load = by_name.get(named) or by_name.get(f"{named} 1" if is_one_blade else "")
     if load is not None and load.is_load:
