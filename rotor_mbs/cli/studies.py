@@ -21,7 +21,7 @@ from rotor_mbs.cli import EXIT_BAD_INPUT, EXIT_FAILED, show
 from rotor_mbs.cli.arguments import pages_beside
 from rotor_mbs.cli.terminal import ProgressLine, print_doubts, print_not_computed, print_table, span
 from rotor_mbs.errors import InputError, StoreError
-from rotor_mbs.methods.catalogue import check_names
+from rotor_mbs.methods.catalogue import check_names, method_names
 from rotor_mbs.runs import cores
 from rotor_mbs.scenario.catalogue import find_scenes, only_scene
 from rotor_mbs.solution.status import GOOD
@@ -253,7 +253,7 @@ def sweep(arguments: argparse.Namespace) -> int:
         from rotor_mbs.scenario.sweep import load_sweep
         from rotor_mbs.studies.sweep import estimate_seconds, plan_sweep, run_sweep
 
-        study = load_sweep(arguments.file)
+        study = load_sweep(arguments.file, method_names())
         plan = plan_sweep(study, arguments.method or (), arguments.part, arguments.timeout)
         if arguments.dry_run:
             size, seconds = plan.runs * plan.table().row_type.itemsize, estimate_seconds(plan, pool)

@@ -17,7 +17,7 @@ from operator import attrgetter
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
-from rotor_mbs.errors import InputError, nearest
+from rotor_mbs.errors import InputError
 from rotor_mbs.scenario import keys
 from rotor_mbs.scenario.keys import Kind, counted, file_key, list_of, read_each, shown, where, wrong
 from rotor_mbs.scenario.time_table import Table, is_constant, is_one_table, value_at
@@ -34,6 +34,7 @@ from rotor_mbs.scenario.toml_file import (
     shown_path,
     toml_lines,
     toml_value,
+    unknown_methods,
 )
 
 if TYPE_CHECKING:
@@ -567,12 +568,7 @@ def parse_scene(text: str, name: str) -> Scene:
 
 
 def _scene(text: str, tables: dict[str, Any], name: str, source: str, known_methods: Sequence[str] = ()) -> Scene:
-    problems = []
-    names = tables.get("methods")
-    for method in names if isinstance(names, list) and known_methods else ():
-        if isinstance(method, str) and method not in known_methods:
-            what = f"unknown method {method!r}{nearest(method, known_methods)}"
-            problems.append(KeyProblem(("methods",), what, ", ".join(known_methods)))
+    problems = unknown_methods(tables, known_methods)
     try:
         scene = scene_from_tables(tables, name, text)
     except TableError as error:

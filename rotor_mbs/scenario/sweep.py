@@ -40,6 +40,7 @@ from rotor_mbs.scenario.toml_file import (
     read_toml,
     shown_path,
     toml_lines,
+    unknown_methods,
 )
 
 Array = NDArray[np.float64]
@@ -347,9 +348,9 @@ class Sweep:
         return Variants(self.name, {**scene_tables(self.base), "outputs": wanted}, self.keys)
 
 
-def load_sweep(path: Path) -> Sweep:
-    """The sweep in the TOML file `path`; sweeps/NAME means a shipped one. Raises InputError with all errors of the
-    file."""
+def load_sweep(path: Path, known_methods: Sequence[str] = ()) -> Sweep:
+    """The sweep in the TOML file `path`; sweeps/NAME means a shipped one. known_methods: what the file may name, () for
+    anything. Raises InputError with all errors of the file."""
     shipped = (sweeps_folder().parent / path).with_suffix(".toml")
     if not path.exists() and path.parts[:1] == ("sweeps",) and shipped.is_file():
         path = shipped
@@ -359,7 +360,7 @@ def load_sweep(path: Path) -> Sweep:
     if "initial" in tables and "blade" in tables:
         shown = shown_path(path)
         raise InputError(f"{shown}: is a scene; allowed: a sweep of scenes, or: rotor-mbs run {shown}")
-    return _sweep(path, text, tables)
+    return _sweep(path, text, tables, known_methods=known_methods)
 
 
 def sweep_of(scene: Scene, axes: Mapping[str, object], **options: object) -> Sweep:
@@ -379,13 +380,21 @@ def sweep_of(scene: Scene, axes: Mapping[str, object], **options: object) -> Swe
     return _sweep(Path("sweep"), text, tables, scene)
 
 
-def _sweep(path: Path, text: str, tables: Mapping[str, object], base: Scene | None = None) -> Sweep:
+def _sweep(
+    path: Path,
+    text: str,
+    tables: Mapping[str, object],
+    base: Scene | None = None,
+    known_methods: Sequence[str] = (),
+) -> Sweep:
     """The sweep in the tables of a file; its base is the scene that it names, where none is given."""
-    source = shown_path(path)
+    source, problems = shown_path(path), unknown_methods(tables, known_methods)
     try:
         table: SweepTable = table_of(SweepTable).read(tables)
     except TableError as error:
-        raise error.in_file(text, source) from error
+        problems += error.problems
+    if problems:
+        raise TableError(problems).in_file(text, source)
     if base is None:
         is_shipped = (scenarios_folder() / f"{table.scene}.toml").is_file()
         is_beside = table.scene.endswith(".toml") and not is_shipped

@@ -10,7 +10,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from rotor_mbs.errors import InputError
+from rotor_mbs.errors import InputError, nearest
 
 KeyPath = tuple[str | int, ...]
 
@@ -69,6 +69,16 @@ class TableError(ValueError):
         if len(messages) > MAX_PROBLEMS:
             shown.append(f"{source}: {len(messages) - MAX_PROBLEMS} more errors")
         return InputError(shown)
+
+
+def unknown_methods(tables: Mapping[str, Any], known: Sequence[str]) -> list[KeyProblem]:
+    """A problem for each name in the `methods` of a file that is not `known`; none where any is allowed, ()."""
+    names = tables.get("methods")
+    return [
+        KeyProblem(("methods",), f"unknown method {name!r}{nearest(name, known)}", ", ".join(known))
+        for name in (names if isinstance(names, list) and known else ())
+        if isinstance(name, str) and name not in known
+    ]
 
 
 def shown_path(path: Path) -> str:

@@ -7,7 +7,6 @@ import json
 import time
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import nullcontext
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -302,8 +301,7 @@ def plan_sweep(
 ) -> SweepPlan:
     """The runs of part k of n by `methods`, else by those of the file. Raises InputError, MethodRefusal."""
     file = shown_path(sweep.path), sweep.text
-    with nullcontext() if methods else at_key(*file, "methods"):
-        chosen = check_names(methods or sweep.table.methods)
+    chosen = check_names(methods or sweep.table.methods)
     with at_key(*file, "settings"):
         settings = settings_for(chosen, sweep.table.settings)
     for method in chosen:
