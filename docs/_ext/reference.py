@@ -1,4 +1,4 @@
-"""The reference pages, written from what the program itself declares, before Sphinx reads the sources.
+"""The reference pages, generated from the program itself before Sphinx reads the sources.
 
 `docs/reference/` is made anew by every build: docstrings, the scene's and the sweep's keys, the parser of the command
 line, the catalogue of methods, the bounds, and the arrays of files that are written for this purpose.
@@ -294,6 +294,19 @@ validation = 0.5
 key = "bearing.stiffness"
 values = [1e3, 2e3]
 """
+_MEANINGS = {
+    "missing": "not computed yet",
+    "ok": "defects, energy balance and error up to the horizon within the bounds",
+    "inaccurate": "end reached, but one of these bounds is exceeded",
+    "diverged": "end not reached: values grew without limit",
+    "singular": "end not reached, or not reliable: the motion passes a singularity of the mass matrix",
+    "solver_failed": "end not reached: the integrator failed",
+    "timed_out": "end not reached: time limit",
+    "left_out": "point of a benchmark that was not computed because of the time budget",
+    "worker_died": "the worker process died",
+    "unchecked": "end reached, but the accuracy cannot be assessed",
+    "completed": "end reached by the printed equations, whose accuracy is not assessed",
+}
 _EXAMPLES = {
     "Results": (
         "`run`, `reproduce` and `reference` write one row per run into `/runs`, and the arrays over time into a group "
@@ -301,7 +314,7 @@ _EXAMPLES = {
         "run scene.toml -m lagrange/dop853 -m exudyn_chain/extrapolated -o results.h5 -j 1",
     ),
     "Benchmarks": (
-        "`bench` adds a row per point: a method at one setting on a scene.",
+        "`bench` writes a row per point (a method with one setting on a scene) into `/bench`, references into `/runs`.",
         "bench scene.toml -m lagrange/dop853 --budget 1 --repeats 1 -o bench.h5",
     ),
     "Sweeps": ("One flat table at the root.", "sweep study.toml -o sweep.h5 -j 1"),
@@ -311,19 +324,25 @@ _EXAMPLES = {
 _WRITTEN = {"Comparisons": "comparison.h5"}
 
 
+def _statuses() -> list[list[object]]:
+    return [[code, name, _MEANINGS[name]] for code, name in enumerate(STATUSES)]
+
+
 def _file_format() -> str:
     parts = [
         "All files are HDF5, readable by netCDF-4, xarray, MATLAB and h5py, without links or compression. Numbers are "
         "little-endian; every dataset has `units` and `long_name`, and every dimension a dataset of its name (a "
         "dimension scale). Arrays are contiguous, so that a row lies at a fixed offset. The tables below list the "
         "content of files that were written when these pages were built.",
-        "A row is stored where its `status` is not -1 and its `crc32` is right. All values of a row that is not "
-        "stored are NaN, -1 or empty text; arrays over time are NaN after the last sample of a run, of which `samples` "
-        "has the number. Text that is known when the file is laid out is of variable length, UTF-8; text that is "
-        "computed, such as `message`, is UTF-8 in an array of single characters, filled with zeros. The attribute "
-        "`digests` of a group has SHA-256 digests of everything that is not a row.",
+        "A row is complete if its `status` is not -1 and its `crc32` is correct; a file is complete if all rows are. "
+        "All values of a missing row are NaN, -1 or empty text. Arrays over time are NaN after the last sample of a "
+        "run; `samples` is the number of samples. Text that is known when the file is created is of variable length, "
+        "UTF-8. Computed text, such as `message`, is UTF-8 in an array of single characters, padded with zeros; xarray "
+        "reads it as text. The attribute `digests` of a group has SHA-256 digests of everything that is not a row. "
+        "`versions` of a row is a JSON text with the versions that computed it; the attributes of `/` have those that "
+        "created the file. Signs and frames: [Reading results](../data.md).",
         "## Status codes",
-        table(["code", "status"], [[-1, "missing"], *enumerate(STATUSES)]),
+        table(["code", "status", "meaning"], [[-1, "missing", _MEANINGS["missing"]], *_statuses()]),
     ]
     with tempfile.TemporaryDirectory() as folder, contextlib.chdir(folder):
         scene = rotor_mbs.scene("check/general").replace(

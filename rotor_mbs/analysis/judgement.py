@@ -164,7 +164,7 @@ def _broken_off(scene: Scene, run: Solution) -> tuple[str, str]:
 
 
 def _through_singularity(scene: Scene, run: Solution, reference: Trajectory | None) -> tuple[str, str]:
-    """Complete runs of a motion that does not exist: from a singular state, or past the time where it ends."""
+    """Complete runs of scenes without a solution: from a singular state, or past the time where the solution ends."""
     share = rotor_inertia_shares(scene, run.trajectory.angles[:1])[0]
     if share < _NO_INERTIA:
         return "singular", "every pitch at ±π/2 leaves the rotor no inertia, from the start on"

@@ -132,15 +132,15 @@ class _Parser(argparse.ArgumentParser):
         self.add_argument("-o", "--output", type=kind, default=default, metavar=metavar, help=help)
 
     def pages(self, *names: str) -> None:
-        text = "folder of the pages (default: beside FILE, its name with -report; of results.h5: report)"
+        text = "folder for the pages (default: NAME-report beside NAME.h5; report beside results.h5)"
         self.add_argument(*names, type=folder, metavar="DIR", help=text)
 
     def results(self) -> None:
-        text = "results file (default: results.h5 of this folder, else that of reproduce)"
+        text = "results file (default: results.h5, or else rotor-mbs-out/results.h5)"
         self.add_argument("file", nargs="?", type=Path, default=default_results(), metavar="FILE", help=text)
 
     def jobs(self) -> None:
-        text = "parallel processes (default: the cores, %(default)s)"
+        text = "parallel processes (default: number of cores, %(default)s)"
         self.add_argument("-j", "--jobs", type=JOBS, default=cores(), metavar="N", help=text)
 
     def timeout(self, seconds: float = 60.0) -> None:
@@ -175,10 +175,10 @@ def _parser() -> tuple[_Parser, dict[str, _Parser]]:
     formatter = argparse.RawDescriptionHelpFormatter
     parser = _Parser(
         prog="rotor-mbs",
-        description="Scenes of a rotor by independent models, compared with each other and with a published paper.",
+        description="Simulate rotor scenes with independent models, and compare these with each other and a paper.",
         epilog="start with:\n  rotor-mbs list\n  rotor-mbs show paper/fig11\n  rotor-mbs run paper/fig11\n"
         "rotor-mbs COMMAND --help shows the options of a command and an example.\n"
-        "exit status: 0 all well; 1 a check failed or a run did not succeed; 2 bad input; 130 interrupted",
+        "exit status: 0 success; 1 a check failed or a run did not succeed; 2 bad input; 130 interrupted",
         formatter_class=formatter,
     )
     parser.add_argument("--version", action="version", version=f"rotor-mbs {rotor_mbs.__version__}")
@@ -194,22 +194,22 @@ def _parser() -> tuple[_Parser, dict[str, _Parser]]:
         return own
 
     own = command("list", "list scenes, sweeps and methods", "scenes:list_all", "", "--json")
-    own.flag("--json", help="as JSON, for a script")
+    own.flag("--json", help="print JSON")
 
     own = command(
         "show", "show the data and methods of a scene, or the settings of a method", "scenes:show",
         "paper/fig11", "paper/fig11 --build",
     )  # fmt: skip
     own.add_argument("scene", metavar="SCENE", help="a name (paper/fig05), a TOML file, or a method (lagrange/taylor)")
-    own.flag("--build", help="also the items that each model builds")
-    own.flag("--json", help="as JSON, for a script")
+    own.flag("--build", help="also list the items that each model builds")
+    own.flag("--json", help="print JSON")
 
     own = command("new", "write a commented scene file to start from", "scenes:new", "my.toml")
     own.add_argument("file", type=file, metavar="FILE", help="a TOML file that does not exist yet")
 
     own = command(
         "reproduce",
-        "run every scene of the paper by every model and write the report",
+        "run every scene of the paper with every model and write the report",
         "runs:reproduce",
         "",
         "-o out -j 4",
@@ -219,7 +219,7 @@ def _parser() -> tuple[_Parser, dict[str, _Parser]]:
     own.timeout()
 
     own = command(
-        "run", "run scenes by methods into one results file", "runs:run",
+        "run", "run scenes with one or more methods and store them in a results file", "runs:run",
         "my.toml -o my.h5", "paper/fig11 -m lagrange/taylor -m exudyn_tree/rk67 --set step=1e-3",
     )  # fmt: skip
     own.scenes()
@@ -230,7 +230,7 @@ def _parser() -> tuple[_Parser, dict[str, _Parser]]:
     own.timeout()
 
     own = command(
-        "compare", "compare another program's trajectory, loads or modes with a scene; exit status 1 where they differ",
+        "compare", "compare another program's trajectory, loads or modes with a scene; exit status 1 if they differ",
         "studies:compare", "mine.csv --scene paper/fig11", "OpenFAST.out --scene my.toml --columns map.toml",
     )  # fmt: skip
     text = "text with a header, .json, .npz, .mat, HDF5, netCDF, an Exudyn sensor file, OpenFAST .out or .outb"
@@ -239,28 +239,28 @@ def _parser() -> tuple[_Parser, dict[str, _Parser]]:
     text = "column, unit, sign and zero of each channel (default: guessed)"
     own.add_argument("--columns", type=Path, metavar="MAP.toml", help=text)
     text = (
-        "largest defect, and error per unit of error growth, that agree, rad; error of a load, of its largest; of a "
-        "frequency, of its size (default: %(default)g)"
+        "bound on defects, and on errors divided by error growth, rad; relative bound on loads and frequencies "
+        "(default: %(default)g)"
     )
     own.add_argument("--tolerance", type=POSITIVE, default=1e-6, metavar="X", help=text)
-    text = "longest time for the reference (default: %(default)g)"
+    text = "time limit for the reference (default: %(default)g)"
     own.add_argument("--timeout", type=SECONDS, default=600.0, metavar="SECONDS", help=text)
-    own.add_argument("--names", action=_Names, nargs=0, help="print the names of columns that are understood")
-    own.output(folder, "DIR", Path("comparison"), "folder of the page (default: %(default)s)")
-    own.flag("--json", help="the verdict as JSON, for a script")
+    own.add_argument("--names", action=_Names, nargs=0, help="print the accepted column names and exit")
+    own.output(folder, "DIR", Path("comparison"), "output folder (default: %(default)s)")
+    own.flag("--json", help="print the verdict as JSON")
 
     own = command(
-        "bench", "measure error against run time of each method", "studies:bench",
+        "bench", "measure error and run time of each method at several tolerances or steps", "studies:bench",
         "paper/fig11", "paper/fig11 my.toml -m lagrange/taylor -m exudyn_tree/rk67 -o bench.h5",
     )  # fmt: skip
     own.scenes()
     own.method()
     own.settings()
     own.output(file, "FILE", Path("bench.h5"))
-    text = "timed runs of each point (default: %(default)s; 5 at most for runs over 0.5 s)"
+    text = "timed runs per point (default: %(default)s; at most 5 for runs over 0.5 s)"
     own.add_argument("--repeats", type=COUNT, default=20, metavar="N", help=text)
     # At this default the paper's seventeen scenes take eight minutes.
-    text = "time for each scene (default: %(default)g)"
+    text = "time budget per scene (default: %(default)g)"
     own.add_argument("--budget", type=SECONDS, default=28.0, metavar="SECONDS", help=text)
 
     own = command("reference", "recompute quad-precision references", "runs:reference", "paper/fig08 -o reference.h5")
@@ -270,21 +270,19 @@ def _parser() -> tuple[_Parser, dict[str, _Parser]]:
     own.timeout()
 
     own = command(
-        "check", "check the accuracy of stored runs; exit status 1 where a check fails", "studies:check",
+        "check", "check the accuracy of stored runs; exit status 1 if a check fails", "studies:check",
         "", "rotor-mbs-out/results.h5 --junit check.xml",
     )  # fmt: skip
-    own.add_argument("file", nargs="?", type=Path, metavar="FILE", help="results file (default: a quick set, computed)")
-    own.method("compute the default set by this method, or by those of a Python file")
+    own.add_argument("file", nargs="?", type=Path, metavar="FILE", help="results file (default: compute a set of runs)")
+    own.method("method, or Python file of methods, for the default set")
     own.add_argument(
         "--bounds", type=Path, metavar="TOML", help="bounds that take precedence over reference/accuracy.toml"
     )
-    text = "fail where a scene of FILE has no run by this method; may be repeated"
+    text = "fail if a scene of FILE has no run with this method; may be repeated"
     own.add_argument("--require", action="append", metavar="METHOD", help=text)
-    text = (
-        "also fail where a check passed in this earlier results file and its margin has shrunk, or its run is missing"
-    )
+    text = "also fail if the margin of a check has shrunk, or its run is missing, relative to this earlier results file"
     own.add_argument("--against", type=Path, metavar="OLD", help=text)
-    text = "with --against: by how much a margin may shrink (default: %(default)g)"
+    text = "with --against: factor by which a margin may shrink (default: %(default)g)"
     own.add_argument("--shrink", type=POSITIVE, default=10.0, metavar="FACTOR", help=text)
     own.add_argument("--junit", type=file, metavar="XML", help="verdicts as JUnit XML")
     own.add_argument("--json", type=file, metavar="FILE", help="verdicts as JSON; - for standard output")
@@ -293,7 +291,7 @@ def _parser() -> tuple[_Parser, dict[str, _Parser]]:
     own.jobs()
 
     own = command(
-        "test-method", "a method examined, of your own or a built-in one: what is wrong, and the most likely reason",
+        "test-method", "test a method, your own or a built-in one, and report faults with their most likely causes",
         "studies:test_method", "./mine.py", "lagrange/dop853 --json -",
     )  # fmt: skip
     own.add_argument("methods", nargs="+", metavar="METHOD", help="a Python file of methods, or model/integrator")
@@ -305,23 +303,23 @@ def _parser() -> tuple[_Parser, dict[str, _Parser]]:
         "sweep", "run a parameter study into one dataset", "studies:sweep",
         "sweeps/fig11-spread -o spread.h5", "my-sweep.toml --dry-run",
     )  # fmt: skip
-    own.add_argument("file", type=Path, metavar="SWEEP.toml", help="or a shipped one: sweeps/fig11-spread")
-    own.method("replaces the file's methods")
-    own.output(file, "FILE", help="output file (default: the sweep's name with the ending .h5)")
-    own.flag("--metadata", help="Croissant metadata and statistics for normalization beside FILE, as JSON")
-    text = "also a folder that load_dataset of Hugging Face reads: a file per split, and a dataset card"
+    own.add_argument("file", type=Path, metavar="SWEEP.toml", help="a file, or a shipped sweep (sweeps/fig11-spread)")
+    own.method("method to use instead of those in the file")
+    own.output(file, "FILE", help="output file (default: name of the sweep with .h5)")
+    own.flag("--metadata", help="also write Croissant metadata and normalization statistics beside FILE, as JSON")
+    text = "also write a folder for Hugging Face datasets: a file per split and a dataset card"
     own.add_argument("--datasets", type=Path, metavar="DIR", help=text)
     own.add_argument("--engine", default="local", metavar="ENGINE", help="local, or dask:tcp://host:port")
-    own.add_argument("--part", type=part, default=(1, 1), metavar="K/N", help="only part K of N, for a job array")
+    own.add_argument("--part", type=part, default=(1, 1), metavar="K/N", help="compute part K of N, for a job array")
     own.flag("--fresh", help="recompute stored runs")
     own.flag("--dry-run", help="print run count, estimated time, disk space")
-    own.flag("--yes", help="start a sweep of over a million runs")
-    own.flag("--json", help="the summary, or the estimate, as JSON")
+    own.flag("--yes", help="confirm a sweep of more than a million runs")
+    own.flag("--json", help="print the summary or the estimate as JSON")
     own.jobs()
     own.timeout()
 
     own = command(
-        "stability", "run stiff and extreme scenes by every method and map where each is stable and accurate",
+        "stability", "run stiff and extreme scenes with every method and report which are stable and accurate",
         "studies:stability", "", "stiff/bearing-1e8 -o stiff.h5",
     )  # fmt: skip
     own.scenes(nargs="*", help="scenes or folders (default: stiff extreme)")
@@ -337,21 +335,21 @@ def _parser() -> tuple[_Parser, dict[str, _Parser]]:
         "studies:modes", "stiff/nrel-5mw --speeds 0:3:31",
     )  # fmt: skip
     own.scenes()
-    own.method("a method whose model stands beside the closed form, by default all; or a Python file")
-    text = "rad/s, equally spaced: Campbell diagram and Floquet multipliers, as 0:3:31 (default: at rest alone)"
+    own.method("method whose model is compared with the closed form (default: all), or a Python file")
+    text = "rotor speeds in rad/s, equally spaced, such as 0:3:31 (default: only at rest)"
     own.add_argument("--speeds", type=span, default=(), metavar="FROM:TO:COUNT", help=text)
-    text = "N m/rad of every bearing: the stability chart over speed and stiffness"
+    text = "bearing stiffnesses in N m/rad, for a stability chart over speed and stiffness"
     own.add_argument("--stiffness", type=span, default=(), metavar="FROM:TO:COUNT", help=text)
     own.output(file, "FILE", Path("modes.h5"))
     own.pages("--report")
-    own.flag("--json", help="the table as JSON, for a script")
+    own.flag("--json", help="print the table as JSON")
     own.jobs()
     own.timeout(600.0)
 
     own = command("report", "write HTML pages from any file of this program", "studies:report", "my.h5 --open")
     own.results()
     own.pages("-o", "--output")
-    own.flag("--open", help="show the index in the browser")
+    own.flag("--open", help="open the index in a browser")
 
     own = command(
         "figures", "draw the paper's figures for a manuscript, from a results file", "studies:figures",
@@ -366,11 +364,11 @@ def _parser() -> tuple[_Parser, dict[str, _Parser]]:
         "animate", "animate a scene from a results file", "studies:animate",
         "paper/fig11", "mine my.h5 -o mine.gif",
     )  # fmt: skip
-    own.add_argument("scene", metavar="SCENE", help="its name in the results file")
+    own.add_argument("scene", metavar="SCENE", help="name of a scene in the results file")
     own.results()
-    text = "FILE.gif, FILE.webp, or FILE.mp4 where ffmpeg is installed (default: the scene's name with .webp)"
+    text = "FILE.gif, FILE.webp, or FILE.mp4 (requires ffmpeg) (default: name of the scene with .webp)"
     own.output(file, "FILE", help=text)
-    text = "factor on the tip's distance from its pitch axis as drawn (default: scaled to 10 %% of blade length)"
+    text = "magnification of the tip's distance from its pitch axis (default: scaled to 10 %% of blade length)"
     own.add_argument("--offset", type=POSITIVE, metavar="TIMES", help=text)
 
     own = command(
@@ -378,8 +376,8 @@ def _parser() -> tuple[_Parser, dict[str, _Parser]]:
         "paper/fig11 --to mjcf", "my.toml --to csv -o my.csv",
     )  # fmt: skip
     own.add_argument("scene", metavar="SCENE", help="a name (paper/fig05) or a TOML file")
-    text = "mjcf: a MuJoCo model; exudyn: a script without this package; csv: the reference trajectory"
+    text = "mjcf: MuJoCo model; exudyn: stand-alone Exudyn script; csv: reference trajectory"
     own.add_argument("--to", required=True, choices=EXPORT_FORMATS, metavar="FORMAT", help=text)
-    own.output(file, "FILE", help="output file (default: the scene's name with an ending)")
+    own.output(file, "FILE", help="output file (default: name of the scene with a suffix)")
 
     return parser, dict(commands.choices)

@@ -76,7 +76,7 @@ def _reproduce(arguments: argparse.Namespace, results: Path, pages: Path) -> tup
 
 
 def reference(arguments: argparse.Namespace) -> int:
-    """References computed anew, whatever is shipped."""
+    """References are recomputed, also those that are shipped."""
     with ProgressLine() as progress:
         report = compute_references(
             find_scenes(arguments.scenes), arguments.output, workers=arguments.jobs, timeout_s=arguments.timeout,

@@ -61,7 +61,7 @@ def test_all_numbers_come_out_under_the_papers_tolerances_and_for_12_s_alone() -
 @pytest.mark.parametrize("one", published(), ids=lambda one: one.id)
 def test_what_is_measured_exists(one: Published) -> None:
     # A number that is rounding error is said to be so in the conditions, by its figure.
-    assert not one.rounding or "likelier reading" in conditions()[f"fig{int(one.figure):02d}"]
+    assert not one.rounding or "most probable form" in conditions()[f"fig{int(one.figure):02d}"]
     assert one.scenes == {asked.scene for asked in numbers_of(one)}
     for asked in numbers_of(one):
         assert len(find_scenes([asked.scene])) == 1

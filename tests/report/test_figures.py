@@ -126,7 +126,7 @@ def test_a_figure_shows_each_model_in_a_column_as_it_was_stored(drawn: Path) -> 
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["figures", "FILE", "--figure", "2", "-o", "out"], "figure 2: not in it; allowed: 8, 9"),
+        (["figures", "FILE", "--figure", "2", "-o", "out"], "figure 2: not in the file; allowed: 8, 9"),
         (
             ["animate", "paper/fig12", "FILE", "-o", "a.webp"],
             "'paper/fig12': no such scene in it; allowed: paper/fig08",

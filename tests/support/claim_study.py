@@ -130,10 +130,10 @@ def claim_holds(item: Published, values: NumberValues) -> bool | None:
 SURE = 0.95  # share of the deciding runs from which on a claim holds; 1 - SURE: up to which it fails
 DECIDING = 0.5  # share of the runs that must decide
 RULE = (
-    f"A claim holds where at least {100 * SURE:.0f} % of the deciding runs say so for every duration, fails where at "
-    f"most {100 * (1 - SURE):.0f} % do for every duration, and is undecided otherwise, also where fewer than "
-    f"{100 * DECIDING:.0f} % of the runs decide. A run that broke off or whose energy rose a thousandfold decides "
-    "nothing."
+    f"A claim holds if it is true in at least {100 * SURE:.0f} % of the deciding runs for every duration, fails if it "
+    f"is true in at most {100 * (1 - SURE):.0f} % for every duration, and is undecided otherwise, or if fewer than "
+    f"{100 * DECIDING:.0f} % of the runs are deciding. A run that ended early or whose energy rose a thousandfold is "
+    "not deciding."
 )
 
 

@@ -270,7 +270,7 @@ def verdicts_as_json(study: ClaimRuns) -> str:
             ],
         },
         {
-            "caption": f"By the way of writing the first row of (56){over}",
+            "caption": f"The published numbers by form of the first row of (56){over}",
             "head": ["Row", "At the start (N m)"],
             "rows": [
                 row(conditions, formula, number(next(iter(trials.under(conditions).values())).remainder))

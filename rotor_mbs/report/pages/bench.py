@@ -160,7 +160,7 @@ def diagram(
     largest = 3.0
     if any(work_precision.failed(curve).any() for curve in curves):
         axes.axvspan(
-            _FAILED_LEFT, _FAILED_RIGHT, color="#f2e3de", linewidth=0, zorder=0, label="failed: drawn at its time"
+            _FAILED_LEFT, _FAILED_RIGHT, color="#f2e3de", linewidth=0, zorder=0, label="failed, at its run time"
         )
         labels[_FAILED] = "failed"
         largest = _FAILED_RIGHT
@@ -201,14 +201,14 @@ def overview_table(scenes: Mapping[str, Sequence[Record]]) -> PageTable:
             first, reach = ranked[0]
             if len(ranked) > 1:
                 second, slower = ranked[1]
-                note = f"then {label_of(second.name)}, {number(slower.ratio)} times as long"
+                note = f"second: {label_of(second.name)}, {number(slower.ratio)} times as long"
             else:
                 note = "no other was measured to there" if is_cut else "no other gets there"
             label = label_of(first.name)
             name = label if label == first.name else f"{label} ({first.name})"
             row.append(TableCell(f"{name}: {prefixed(reach.seconds, 's', 2)}", note=note))
         rows.append(row)
-    caption = "Run time of the fastest method to an angle error, and how many times as long the next one takes."
+    caption = "Run time of the fastest method for an angle error, and run time of the second fastest relative to it."
     return PageTable(caption, ["scene", *_TARGETS], rows)
 
 

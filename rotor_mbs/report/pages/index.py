@@ -83,7 +83,7 @@ def index_page(report: Report) -> dict[str, object]:
                 defects(scenes[shown].scene, judged),
                 "defect of an interval (rad)",
                 "defects",
-                f"{shown}: what the closed form makes of each sample by the next, less what each run has there",
+                f"{shown}: interval defects",
             ),
             *_energy(scenes, model),
             *cost_picture(report.curves.get(benched, ()), f"Error against run time of all methods, {benched}"),

@@ -298,9 +298,10 @@ def write_figures(results: Path, folder: Path, kind: str, numbers: Iterable[str]
         have = {figure.number: figure for figure in available(opened.scenes)}
         asked = list(dict.fromkeys(numbers)) or list(have)
         unknown = [number for number in asked if number not in have]
-        if unknown or not have:
-            allowed = ", ".join(have) or "none: it has no scene of the paper"
-            raise InputError(f"{results}: figure {', '.join(unknown) or 'of the paper'}: not in it; allowed: {allowed}")
+        if not have:
+            raise InputError(f"{results}: no scene of the paper in the file; allowed: a file of rotor-mbs reproduce")
+        if unknown:
+            raise InputError(f"{results}: figure {', '.join(unknown)}: not in the file; allowed: {', '.join(have)}")
         made = {f"fig{int(n):02d}.{kind}": canvas.encoded(composed(have[n], opened.scenes).figure, kind) for n in asked}
     for name, content in made.items():
         replace_file(folder / name, content, canvas.MARK)

@@ -136,7 +136,7 @@ def key_picture(
             text = f"published {fixed(item.value, item.decimals)} rad"
             marks.append((shown.index(of.coordinate), item.value, text))
     parted, difference = parting(*runs)
-    caption = f"Rotor and pitch angles of both models, which differ by up to {with_unit(difference, 'rad')}"
+    caption = f"Rotor and pitch angles of both models; largest difference {with_unit(difference, 'rad')}"
     return [picture(departure(panels_of, marks[:MAX_PUBLISHED], horizon, parted), name, caption)]
 
 
@@ -228,7 +228,7 @@ def _tips_section(sides: Sequence[StoredRun]) -> Section:
     if len(runs) > 1:
         first, second = (run.array("tip") for run in runs)
         count = min(len(first), len(second))
-        head.append("largest distance of both")
+        head.append("largest distance between both")
         for row, gap in zip(rows, np.linalg.norm(first[:count] - second[:count], axis=2).max(axis=0), strict=True):
             row.append(prefixed(float(gap), "m"))
     return Section(pictures, [PageTable("Paths of the tips", head, rows)])
@@ -243,7 +243,7 @@ def _difference_section(scene: StoredScene, drawn: Runs, horizon: float | None) 
     others = []
     if "error_growth" in reference:
         growth = np.maximum(np.maximum.accumulate(reference.array("error_growth")), 1.0)
-        look = Look(GREY, ":", "", "rounding error of the initial state, grown")
+        look = Look(GREY, ":", "", "rounding error of the initial state times error growth")
         others.append(Series(reference.array("time"), float(np.finfo(float).eps) * growth, look))
     for method, run in {REFERENCE: reference, **runs}.items():
         if "angle_uncertainty" in run and run.array("angle_uncertainty").max() > LOWEST:
@@ -263,7 +263,7 @@ def _energy_section(drawn: Runs, horizon: float | None) -> Section:
     curves = over_time(runs, {name: run.array("energy_error") for name, run in runs.items()})
     shown = error_picture(
         curves, "|energy error| (J)", "energy", "Energy error: change of total energy less work", horizon,
-        notes=["Filled marks: gained. Open marks: lost."], signed=True,
+        notes=["Filled marks: energy gained. Open marks: energy lost."], signed=True,
     )  # fmt: skip
     if not shown:
         return Section()
@@ -412,7 +412,7 @@ def error_picture(
         else:
             exact.append(curve.look.label)
     if exact:
-        notes = [*notes, f"No curve, because nowhere above 10⁻¹⁸: {'; '.join(exact)}."]
+        notes = [*notes, f"Below 10⁻¹⁸ everywhere, not plotted: {'; '.join(exact)}."]
     panels = plots.errors([*others, *shown], axis, horizon, signed=signed)
     return [picture(panels, name, caption, notes)] if curves else []
 
