@@ -318,10 +318,10 @@ def _drift_cell(scene: Scene, run: StoredRun | None) -> TableCell | str:
     if run is None:
         return NOTHING
     if run.status == "timed_out":
-        return TableCell("not measured", note="over its time limit")
+        return "not measured"
     if run.status not in COMPLETE:
         return TableCell(words_of(run.status), "bad")
-    return TableCell(number(work_precision.energy_drift(scene, run)), note=scene.name)
+    return number(work_precision.energy_drift(scene, run))
 
 
 def _zero_pitch_cell(own: Mapping[str, Sequence[Record]]) -> TableCell | str:
