@@ -142,6 +142,7 @@ def test_a_row_for_each_engine_with_dashes_for_what_the_file_does_not_say(tmp_pa
     ]  # fmt: skip
     notes = [cell.note for cell in reached.rows[1][5:8] if not isinstance(cell, str)]
     assert notes == ["1 not measured"] * 3
+    assert [row[3].note for row in reached.rows if not isinstance(row[3], str)] == ["", "finer not measured", ""]
 
 
 def test_energy_drift_of_angles_and_rates_is_that_of_the_models_own_energies() -> None:

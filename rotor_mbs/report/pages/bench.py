@@ -276,7 +276,8 @@ def _worst_cell(own: Mapping[str, Sequence[Record]], column: str) -> TableCell |
         is_cut = any(work_precision.left_out(curve) for curves in own.values() for curve in curves)
         return (TableCell("not measured") if is_cut else TableCell("none ok", "bad")) if own else NOTHING
     worst = max(known, key=lambda name: known[name])
-    return TableCell(number(known[worst]), note=worst if len(own) > 1 else "")
+    finer = "finer not measured" if any(map(work_precision.left_out, own[worst])) else ""
+    return TableCell(number(known[worst]), note="; ".join(filter(None, [worst if len(own) > 1 else "", finer])))
 
 
 def _is_ok(curve: Record) -> bool:
