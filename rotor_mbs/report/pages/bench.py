@@ -276,8 +276,8 @@ def _worst_cell(own: Mapping[str, Sequence[Record]], column: str) -> TableCell |
         is_cut = any(work_precision.left_out(curve) for curves in own.values() for curve in curves)
         return (TableCell("not measured") if is_cut else TableCell("none ok", "bad")) if own else NOTHING
     worst = max(known, key=lambda name: known[name])
-    finer = "finer not measured" if any(map(work_precision.left_out, own[worst])) else ""
-    return TableCell(number(known[worst]), note="; ".join(filter(None, [worst if len(own) > 1 else "", finer])))
+    bound = "≤ " if any(map(work_precision.left_out, own[worst])) else ""
+    return TableCell(bound + number(known[worst]), note=worst if len(own) > 1 else "")
 
 
 def _is_ok(curve: Record) -> bool:
@@ -297,12 +297,14 @@ def _reach_cell(
             reached[name] = reach
         elif any(work_precision.left_out(curve) for curve in curves):
             cut += 1
-    text, note = f"{len(reached)} of {len(own)}", f"{cut} not measured" if cut else ""
+    if not reached and cut:
+        return TableCell("not measured")
+    text, note = f"{'≥ ' if cut else ''}{len(reached)} of {len(own)}", ""
     if reached:
         seconds = [reach.seconds for reach in reached.values()]
         text += f", × {number(float(np.median([reach.ratio for reach in reached.values()])))}"
         times = dict.fromkeys(prefixed(value, "s", 2) for value in (min(seconds), max(seconds)))
-        note = "; ".join(filter(None, [" to ".join(times), note]))
+        note = " to ".join(times)
     return TableCell(text, note=note)
 
 
