@@ -284,7 +284,8 @@ def _scatter(search: CauseSearch, data: ForeignData) -> list[str]:
     sizes = (centred**2).mean(axis=0)
     if not wrong.any() or not ((sizes > 0.0) & (sizes < math.inf)).all():
         return []
-    common = np.abs((centred[1:] * centred[:-1]).mean(axis=0)) / sizes
+    # Of every second row alone neighbours have nothing in common either.
+    common = np.max([np.abs((centred[n:] * centred[:-n]).mean(axis=0)) for n in (1, 2)], axis=0) / sizes
     half = len(data.time) // 2
     early, late = ((centred[part] ** 2).mean(axis=0) for part in (slice(None, half), slice(half, None)))
     if (common > 3.0 / math.sqrt(len(errors))).any() or (late > 2.0 * early).any() or (early > 2.0 * late).any():

@@ -7,6 +7,7 @@ where what it leaves of the defects would agree.
 from __future__ import annotations
 
 import itertools
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -42,8 +43,12 @@ _ROUNDS = 8
 _INDEPENDENT = 1e-6  # determinant of the cosines between the signatures of a set
 _MOST = 6  # explanations, or faults, that are named
 _PARALLEL = 0.995  # cosine
-_ALONG = 0.9  # of a load while the rotor turns on
 _NEARLY = 0.05
+_LEFT_OF_LOADS = 0.15  # of the defects: a load changes within an interval, and the rotor turns on
+_OF_COORDINATE = 0.1  # of a coordinate's defects are a load's on it, the rest of those on others
+_OF_USUAL = 10.0  # times a coordinate's own median: less says nothing of it
+_AT_END = 3  # intervals
+_OF_ENDS = 1e-3  # of the largest defect: the others are large enough for those at the ends to be of the same cause
 _STANDS_OUT = 30.0  # times the median of the defects
 _FAINT = 0.02  # of the largest defect: fainter ones are not told beside it
 _GAP = 6  # intervals: faults that are nearer are one
@@ -262,6 +267,9 @@ class DefectCauses:
         if not len(wrong) or len(wrong) > 0.6 * len(excess) or _is_smooth(excess, wrong):
             return []
         groups = np.split(wrong, np.flatnonzero(np.diff(wrong) > _GAP) + 1)
+        # A filter, or differences in place of rates, are wrong in all rows, and most at the ends.
+        if usual > _OF_ENDS * self.largest:
+            groups = [group for group in groups if group[-1] >= _AT_END and group[0] < len(excess) - _AT_END]
         texts = [self._fault(group) for group in groups[:_MOST]]
         if len(groups) > _MOST:
             end = float(self._defects.time[groups[-1][-1] + 1])
@@ -288,17 +296,11 @@ class DefectCauses:
                 if abs(along) >= _PARALLEL:
                     return f"a stuck row, or one at a wrong time: {row}"
                 return f"a single wrong row: {row}"
-        # The coordinate on which a load makes such defects.
+        # The coordinates on which loads make such defects.
         chosen = group[:: max(1, len(group) // _MOST_DIRECTIONS)]
-        effects = self._effects(chosen)
-        cosines = [_mean_cosine(self._values[chosen], effect) for effect in effects]
-        place = int(np.argmax(cosines))
-        label = self._scene.coordinate_labels[self._defects.moving[place]]
-        # N m that the data have more.
-        sizes = (effects[place] ** 2).sum(axis=1)
-        more = -(self._values[chosen] * effects[place]).sum(axis=1) / sizes
-        if cosines[place] >= _ALONG and (edge := self._edge(place, start, end, more)):
-            return f"the load on the {label} {edge}"
+        loads, acting = self._loads(chosen)  # N m that the data have more
+        if len(acting) == 1 and (edge := self._edge(*acting, start, end, loads[:, acting[0]])):
+            return f"the load on the {self._label(acting[0])} {edge}"
         if len(group) == 1:
             # Of a change of rates in the interval the angles have got a share.
             angles, rates = values[0, :half], values[0, half:] * self._units[half:] * (end - start)
@@ -307,10 +309,36 @@ class DefectCauses:
             if -_NEARLY <= share <= 1.0 + _NEARLY and rest <= _NEARLY * float(np.linalg.norm(rates)):
                 return f"a jump of rates, or a load of one interval, before t = {end:.6g} s"
             return f"the motion goes on from another state after t = {end:.6g} s"
-        if cosines[place] >= _ALONG:
-            amount = f"{more.mean():+.3g} N m on the average"
-            return f"a load on the {label} that is wrong or missing from t = {start:.6g} to {end:.6g} s: {amount}"
-        return f"a fault of the {label} from t = {start:.6g} to {end:.6g} s"
+        if acting:
+            amounts = " and ".join(f"{loads[:, i].mean():+.3g} N m on the {self._label(i)}" for i in acting)
+            return f"a load that is wrong or missing from t = {start:.6g} to {end:.6g} s: on the average {amounts}"
+        largest = int(np.abs(values).max(axis=0).argmax()) % half
+        return f"a fault from t = {start:.6g} to {end:.6g} s, largest in the {self._label(largest)}"
+
+    def _label(self, place: int) -> str:
+        return self._scene.coordinate_labels[self._defects.moving[place]]
+
+    def _loads(self, rows: NDArray[np.int64]) -> tuple[Array, list[int]]:
+        """(rows, coordinates) N m that explain the defects of some intervals best, and the coordinates on which they
+        act; none where loads leave too much."""
+        values, effects = self._values[rows], self._effects(rows)
+        usual = np.median(np.abs(self._values[self._judged]), axis=0) + _AT_FLOOR * self._floors[rows].max(axis=0)
+        # Each channel counts alike: a pitch moves by millions of what the rotor does.
+        units = np.linalg.norm(values, axis=0) + _OF_USUAL * math.sqrt(len(rows)) * usual
+        sizes = np.linalg.norm(effects / units, axis=2)
+        if not (np.isfinite(sizes).all() and sizes.all()):
+            return np.zeros(sizes.T.shape), []
+        matrices = (effects / units / sizes[:, :, None]).transpose(1, 2, 0)
+        loads = -(np.linalg.pinv(matrices) @ (values / units)[:, :, None])[:, :, 0] / sizes.T
+        parts = loads.T[:, :, None] * effects
+        if np.linalg.norm((values + parts.sum(axis=0)) / units) > _LEFT_OF_LOADS * np.linalg.norm(values / units):
+            return loads, []
+        acting = []
+        for i, part in enumerate(parts):
+            own = [i, len(parts) + i]
+            if np.linalg.norm(part[:, own] / units[own]) > _OF_COORDINATE:
+                acting.append(i)
+        return loads, acting
 
     def _edge(self, place: int, start: float, end: float, more: Array) -> str:
         """Of intervals beside a jump of a coordinate's load, "" elsewhere; more: N m that the data have more."""
@@ -372,12 +400,6 @@ def _off(parameter: Parameter, change: float, deviation: float) -> str:
 def _cosine(first: Array, second: Array) -> float:
     size = float(np.linalg.norm(first) * np.linalg.norm(second))
     return float(first @ second) / size if size else 0.0
-
-
-def _mean_cosine(values: Array, directions: Array) -> float:
-    """Of (n, k) vectors with their directions, on the average by their sizes, whatever the sign."""
-    sizes = np.linalg.norm(values, axis=1) * np.linalg.norm(directions, axis=1)
-    return float(np.abs((values * directions).sum(axis=1)).sum() / (sizes.sum() or 1.0))
 
 
 def _is_smooth(size: Array, wrong: NDArray[np.int64]) -> bool:
