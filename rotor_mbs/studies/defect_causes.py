@@ -299,7 +299,7 @@ class DefectCauses:
         # The coordinates on which loads make such defects.
         chosen = group[:: max(1, len(group) // _MOST_DIRECTIONS)]
         loads, acting = self._loads(chosen)  # N m that the data have more
-        if len(acting) == 1 and (edge := self._edge(*acting, start, end, loads[:, acting[0]])):
+        if len(acting) == 1 and (edge := self._edge(acting[0], start, end, loads[:, acting[0]])):
             return f"the load on the {self._label(acting[0])} {edge}"
         if len(group) == 1:
             # Of a change of rates in the interval the angles have got a share.
