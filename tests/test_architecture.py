@@ -26,8 +26,7 @@ SOURCES = {path.relative_to(PACKAGE).as_posix(): path.read_text() for path in so
 # Where a method is chosen by its name: the selection rule, the check, the suite's patient method, defaults of the
 # API, and the printed equations, which the analysis of the paper is about.
 CHOSEN = {
-    "methods/catalogue.py", "studies/check.py", "studies/check_probes.py", "studies/check_status_rules.py",
-    "studies/stability.py", "studies/claims.py", "analysis/run_selection.py", "api.py",
+    "methods/catalogue.py", "studies/check.py", "studies/stability.py", "analysis/run_selection.py", "api.py",
     "scenario/sweep.py",
 }  # fmt: skip
 
