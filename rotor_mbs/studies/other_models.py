@@ -23,6 +23,9 @@ _GRAVITIES = (9.8, 9.80665, 9.81, 9.82, 10.0, 0.0)
 _QUARTERS = {90: math.pi / 2.0, 180: math.pi, 270: -math.pi / 2.0}  # zeros that people choose, by degrees
 _SAME_START = 1e-3  # rad, rad/s: a scene that starts farther off cannot be the one
 _MOST_BLADES = 6  # that are tried one by one
+_OF_BEARINGS = {  # fields of a scene with an entry per blade, and their keys
+    "bearing_stiffness": "bearing.stiffness", "bearing_damping": "bearing.damping", "pitch_torque": "torque.pitch",
+}  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -171,6 +174,12 @@ def parameters(scene: Scene) -> Iterator[Parameter]:
                 paths = [("blades", b, field.name, *entry) for b in chosen]
                 place = f"[{entry[0]}]" if entry else ""
                 yield Parameter(f"blade{number}.{field.name}{place}", "", _share_of(paths))
+        for name, key in _OF_BEARINGS.items() if number else ():
+            values = getattr(scene, name)
+            if len(values) == len(blades) and _scaled(values[chosen[0]], 1.0) != values[chosen[0]]:
+                yield Parameter(f"{key}{number}", "", _share_of([(name, chosen[0])]))
+        if any(scene.bearing_stiffness):
+            yield Parameter(f"bearing.rest{number}", "rad", functools.partial(_rest_moved, chosen))
         which = f"blade {chosen[0] + 1}" if len(chosen) == 1 else "all blades"
         yield Parameter(f"azimuth of {which}", "rad", functools.partial(_azimuth_moved, chosen))
         yield Parameter(f"zero of the pitch of {which}", "rad", functools.partial(_zero_moved, chosen))
@@ -183,6 +192,14 @@ def _share_of(paths: Sequence[Sequence[str | int]]) -> Callable[[Model, float], 
 def _azimuth_moved(chosen: Sequence[int], model: Model, change: float) -> Model:
     azimuths = model.azimuths or model.scene.phases
     return replace(model, azimuths=tuple(angle + change * (i in chosen) for i, angle in enumerate(azimuths)))
+
+
+def _rest_moved(chosen: Sequence[int], model: Model, change: float) -> Model:
+    rests = model.scene.bearing_rest or (((0.0, 0.0),),) * len(model.scene.blades)
+    moved = tuple(
+        tuple((t, angle + change) for t, angle in rest) if i in chosen else rest for i, rest in enumerate(rests)
+    )
+    return replace(model, scene=replace(model.scene, bearing_rest=moved))
 
 
 def _zero_moved(chosen: Sequence[int], model: Model, change: float) -> Model:

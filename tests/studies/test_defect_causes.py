@@ -207,6 +207,24 @@ def test_one_parameter_is_named_alone_and_from_rounding_too() -> None:
     assert alone[0].startswith("gravity off by +2 % (uncertainty ")
 
 
+SPRUNG = replace(SCENE, bearing_stiffness=(6e3, 5e3, 8e3), bearing_damping=(300.0, 500.0, 400.0))
+
+
+@pytest.mark.parametrize(
+    ("change", "text"),
+    [
+        ({"bearing.damping": [330, 500, 400]}, "bearing.damping[0] off by +10 % (uncertainty "),
+        ({"bearing.stiffness": [6e3, 4e3, 8e3]}, "bearing.stiffness[1] off by -20 % (uncertainty "),
+        ({"bearing.rest": [0, 0, 0.1]}, "bearing.rest[2] off by +0.1 rad (uncertainty "),
+        ({"bearing.rest": [-0.1, -0.1, -0.1]}, "bearing.rest off by -0.1 rad (uncertainty "),
+    ],
+)
+def test_a_number_of_one_bearing_is_named(change: dict[str, list[float]], text: str) -> None:
+    """In numbers that differ from blade to blade, by what the right text rounds to."""
+    (found,) = causes(*run(SPRUNG.replace(**change)), SPRUNG).explanations()
+    assert found.startswith(text)
+
+
 def test_a_sine_that_nothing_makes_is_not_explained() -> None:
     time, angles, rates = run()
     data = causes(time, angles + 1e-3 * np.sin(7.0 * time)[:, None], rates)
