@@ -476,13 +476,29 @@ def test_json_on_standard_output_is_alone_there(good: Path, capsys: pytest.Captu
 # From the command line to the end, and without heyoka
 
 
-@pytest.mark.full
-def test_without_heyoka_the_stand_in_serves(tmp_path: Path) -> None:
-    """A package of that name that cannot be imported goes before the real one, in every process."""
+@pytest.fixture
+def without_heyoka(tmp_path: Path) -> str:
+    """The path of a process in which heyoka cannot be imported: a module of that name goes before the real one."""
     (tmp_path / "site").mkdir()
     (tmp_path / "site" / "sitecustomize.py").write_text("import sys\nsys.modules['heyoka'] = None\n")
-    path = os.pathsep.join([str(tmp_path / "site"), str(ROOT)])
-    done = _run_check("--json", str(tmp_path / "c.json"), path=path)
+    return os.pathsep.join([str(tmp_path / "site"), str(ROOT)])
+
+
+@pytest.mark.full
+def test_without_heyoka_a_scene_of_ones_own_has_a_reference(without_heyoka: str, tmp_path: Path) -> None:
+    (tmp_path / "own.toml").write_text(paper("fig11", duration=0.5, samples=51).text)
+    command = [sys.executable, "-m", "rotor_mbs", "run", str(tmp_path / "own.toml"), "-o", str(tmp_path / "r.h5")]
+    subprocess.run(command, env={**os.environ, "PYTHONPATH": without_heyoka}, check=True, timeout=300)
+    done = _run_check(str(tmp_path / "r.h5"), "--json", str(tmp_path / "c.json"), path=without_heyoka)
+    assert done.returncode == 0, done.stdout + done.stderr
+    methods = {row["method"] for row in json.loads((tmp_path / "c.json").read_text())}
+    assert {REFERENCE, "lagrange/dop853"} <= methods
+    assert "lagrange/taylor" not in methods
+
+
+@pytest.mark.nightly
+def test_without_heyoka_the_stand_in_serves(without_heyoka: str, tmp_path: Path) -> None:
+    done = _run_check("--json", str(tmp_path / "c.json"), path=without_heyoka)
     assert done.returncode == 0, done.stdout + done.stderr
     rows = json.loads((tmp_path / "c.json").read_text())
     assert rows
