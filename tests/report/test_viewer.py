@@ -106,7 +106,7 @@ def test_the_viewer_explains_an_offset_too_small_to_be_seen(tmp_path: Path, text
     assert 'class="viewer"' in page
     assert "<script" in page
     assert 'data-part="offset"' in page
-    assert ("so near the pitch axis that pitch could not be seen" in page) == is_explained
+    assert ("so close to the pitch axis that pitch motion would be invisible" in page) == is_explained
     assert 'id="paths"' in page
 
 
