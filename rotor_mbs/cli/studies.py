@@ -180,10 +180,13 @@ def test_method(arguments: argparse.Namespace) -> int:
         rows: list[tuple[str, ...]] = []
         for one in verdicts:
             note = "" if one.passed and one.name != "refusal" else one.hint
-            number = f"{one.value:.1e}" if one.unit else ""
+            number, bound = (f"{one.value:.1e}", f"{one.bound:.1e}") if one.unit else ("", "")
             outcome = "pass" if one.passed else "FAIL"
-            rows.append((one.where.method, one.name, one.where.scene, number, one.unit, outcome, note))
-        print_table(TextTable(("method", "check", "scene", "seen", "unit", "", "most likely reason"), rows))
+            rows.append((one.where.method, one.name, one.where.scene, number, bound, one.unit, outcome, note))
+        heads = ("method", "check", "scene", "seen", "allowed", "unit", "result", "reason")
+        print_table(TextTable(heads, rows))
+        failed = sum(not verdict.passed for verdict in verdicts)
+        print(f"{len(verdicts) - failed} passed, {failed} failed")
     return int(not all(verdict.passed for verdict in verdicts))
 
 

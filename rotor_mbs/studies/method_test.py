@@ -46,6 +46,7 @@ OWN_BOUND = 1e-6
 _ORDER_BAND = 0.3
 _COARSEST = 0.02  # s, of the steps whose order is looked for
 _FOLLOWS_STEP = 0.6  # order with which a defect must fall with the step to be an error of the step
+_STRICT = 1e-15  # rad, so that no cause is named which leaves a part of the defects
 _STANDS_OUT = 30.0  # times the median of the defects
 _LONG = 1000.0  # times the duration, of a run that is to be stopped
 _STOP_S, _LOAD_S = 0.5, 20.0
@@ -192,7 +193,7 @@ class _Examination:
                     return f"its step of {step:g} s: half of it leaves {left:.1e} rad, order {seen:.1f}"
         try:
             data = load_data({"time": run.time, "angles": run.angles, "rates": run.rates}, scene)
-            likely = compare_with_reference(data, scene, 0.0).verdict.likely
+            likely = compare_with_reference(data, scene, _STRICT).verdict.likely
         except RotorError:
             likely = ()
         return " or ".join(likely) or NOT_FOUND
