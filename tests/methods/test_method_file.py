@@ -133,6 +133,7 @@ def test_a_run_is_keyed_by_the_code_of_its_file() -> None:
         ("none.py", "", "none.py: No such file or directory; allowed: a Python file"),
         ("other/mine.py", EXAMPLE, "other/mine.py: methods mine/... are those of mine.py; allowed: another file name"),
     ],
+    ids=["syntax", "import", "exit", "ends", "hangs", "no method", "a shipped name", "no file", "a name twice"],
 )
 def test_a_file_that_cannot_be_used_is_one_line(
     name: str, text: str, line: str, monkeypatch: pytest.MonkeyPatch
