@@ -480,7 +480,9 @@ def _digits(values: Array) -> int:
     sizes = 10.0 ** np.floor(np.log10(np.abs(some)))
     for digits in range(1, _FEW_DIGITS + 1):
         unit = sizes * 10.0 ** (1 - digits)
-        if np.allclose(some, np.round(some / unit) * unit, rtol=1e-12, atol=0.0):
+        with np.errstate(all="ignore"):  # of a number near the smallest there is the unit may be 0: no digits fit
+            rounded = np.round(some / unit) * unit
+        if np.allclose(some, rounded, rtol=1e-12, atol=0.0):
             return digits
     return _ALL_DIGITS
 

@@ -17,6 +17,7 @@ from support.data_files import FORMATS, pinocchio_file
 import rotor_mbs as rm
 from rotor_mbs.analysis.data_verdict import as_dictionary
 from rotor_mbs.cli import main
+from rotor_mbs.foreign.channels import half_last_digits
 from rotor_mbs.models.lagrange import reference
 from rotor_mbs.report.build import write_report
 from rotor_mbs.report.data_comparison import verdict_of
@@ -323,6 +324,11 @@ def test_numbers_of_few_digits_are_noticed(tmp_path: Path) -> None:
     assert "numbers of 4 digits: their rounding alone is 5e-04 of their size" in found.verdict.notes
     heavier = run.scene.replace(gravity=9.0)
     assert not rm.compare(tmp_path / "low.out", heavier).agrees
+
+
+def test_a_number_next_to_the_smallest_there_is_does_not_count_as_digits() -> None:
+    """A flipped bit may make one: no unit of it can be written."""
+    assert half_last_digits(np.array([1.0 / 3.0, 2.0 / 3.0, 5e-324])).max() < 1e-15
 
 
 def test_six_digits_are_called_six_digits_and_no_scatter() -> None:
