@@ -20,7 +20,8 @@ import rotor_mbs as rm
 from rotor_mbs.errors import InputError
 from rotor_mbs.scenario.scene import Scene
 
-METHOD, OTHER = "lagrange/dop853", "lagrange/radau"
+# Not Radau: its answer differed once between two processes, by what is not known; its steps solve equations by LAPACK.
+METHOD, OTHER = "lagrange/dop853", "lagrange/ode45"
 
 
 def _scene(number: int) -> Scene:
