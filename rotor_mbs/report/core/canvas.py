@@ -7,6 +7,7 @@ import math
 from collections.abc import Mapping
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -14,10 +15,12 @@ import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.collections import QuadMesh as QuadMesh
-from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.markers import MarkerStyle
+from matplotlib.patches import Patch, PathPatch, Rectangle
 from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
+from matplotlib.transforms import Affine2D, IdentityTransform
 from numpy.typing import NDArray
 
 from rotor_mbs.errors import InputError
@@ -27,7 +30,6 @@ from rotor_mbs.runs.files import replace_file
 
 WIDTH = 5.2  # in; on a telephone's 360 px a text of 9.5 points is then 9 px high
 TIME_AXIS, SPEED_AXIS = "time (s)", "rotor speed (rad/s)"
-hex_colour = to_hex  # of any colour of matplotlib's: "#0072b2"
 PRINT_WIDTH = 174.0 / 25.4  # in; two columns of a journal
 MARK = b"rotor_mbs pictures"  # in the metadata of every picture that is a file
 KINDS = ("pdf", "svg", "png")
@@ -134,6 +136,37 @@ def encoded(figure: Figure, kind: str, *, for_print: bool = True) -> bytes:
         stream = io.BytesIO()
         figure.savefig(stream, format=kind, metadata=metadata)
     return stream.getvalue()
+
+
+def swatch(artist: Any) -> bytes:
+    """A piece of a curve with its marker, or of an area, for a legend: an SVG file, 24 by 8 points."""
+    if isinstance(artist, Patch):
+        return _swatch(None, tuple(artist.get_facecolor()), "", 0.0, "", "", 0.0, None)
+    return _swatch(
+        artist.get_color(), None, artist.get_linestyle(), artist.get_linewidth(), artist.get_marker(),
+        artist.get_markerfacecolor(), artist.get_markersize(), artist.get_alpha(),
+    )  # fmt: skip
+
+
+@cache
+def _swatch(
+    colour: Any, area: Any, line: Any, width: float, marker: str, inside: Any, size: float, alpha: float | None
+) -> bytes:
+    with style():
+        figure = Figure(figsize=(24.0 / 72.0, 8.0 / 72.0), dpi=72)
+        figure.patch.set_visible(False)
+    if area is not None:
+        figure.add_artist(Rectangle((0.0, 0.1), 1.0, 0.8, facecolor=area, linewidth=0.0))
+    elif line not in ("", "None"):
+        figure.add_artist(Line2D((0.0, 1.0), (0.5, 0.5), color=colour, linestyle=line, linewidth=width, alpha=alpha))
+    if marker not in ("", "None"):  # as a path: a marker would be referred to by a name
+        form = MarkerStyle(marker)
+        place = form.get_transform() + Affine2D().scale(size).translate(12.0, 4.0)
+        path = place.transform_path(form.get_path())
+        figure.add_artist(
+            PathPatch(path, transform=IdentityTransform(), edgecolor=colour, facecolor=inside, linewidth=1.0)
+        )
+    return encoded(figure, "svg", for_print=False)
 
 
 def log_axis(axes: Any, lowest: float, highest: float, which: str = "y") -> None:

@@ -15,7 +15,7 @@ from markupsafe import Markup, escape
 
 from rotor_mbs.errors import StoreError
 from rotor_mbs.report.core import numbers
-from rotor_mbs.report.core.looks import palette_css, with_light_palette
+from rotor_mbs.report.core.looks import light_palette_css, palette_css
 from rotor_mbs.runs.files import refuse_foreign, replace_file
 
 GENERATOR = "rotor_mbs report"
@@ -130,7 +130,7 @@ def _environment() -> jinja2.Environment:
     # For the content security policy of a page, which allows its script alone.
     digests = {name: hashlib.sha256(text.encode()).digest() for name, text in scripts.items()}
     hashes = {name: base64.b64encode(digest).decode("ascii") for name, digest in digests.items()}
-    alone = with_light_palette(picture.replace("figure>svg", ":root"))  # of a picture that is saved as a file
+    alone = light_palette_css() + picture.replace("figure>svg", ":root")  # of a picture that is saved as a file
     environment.globals.update(
         picture_style=alone,
         generator=GENERATOR,

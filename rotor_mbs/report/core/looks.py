@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import functools
-import re
 import zlib
 from collections import Counter
 from dataclasses import dataclass, replace
@@ -27,7 +26,7 @@ class Look:
 
 # Every colour of a picture, and what stands for it on a dark page. A picture has colours of methods or of coordinates,
 # never of both.
-INK, PAPER, GREY = "#000000", "#ffffff", "#666666"
+INK, PAPER, GREY, GRID = "#000000", "#ffffff", "#666666", "#e4e4e4"
 BLUE, VERMILLION, GREEN, PURPLE = "#0072b2", "#d55e00", "#009e73", "#cc79a7"
 ORANGE, LIGHT_BLUE = "#e69f00", "#56b4e9"
 _METHODS = {  # Okabe & Ito's, distinguishable with colour blindness; without the yellow, which does not show on white
@@ -38,16 +37,19 @@ _COORDINATES = {  # Tol's muted ones: the rotor, then a blade each
     "#4a5058": "#c9ced4", "#882255": "#e583b2", "#2a8a7e": "#62cdbf", "#5a46b5": "#ab9ff5", "#8a7a1c": "#d6c75c",
     "#b5505f": "#f2a3ae",
 }  # fmt: skip
-_OTHERS = {GREY: "#a3adb8", PAPER: "#1d2127", "#c8c8c8": "#4d5560", "#dddddd": "#3a424b", "#f2e3de": "#3a2e2a"}
+_OTHERS = {
+    GREY: "#a3adb8",
+    PAPER: "#1d2127",
+    "#c8c8c8": "#4d5560",
+    "#dddddd": "#3a424b",
+    "#f2e3de": "#3a2e2a",
+    GRID: "#333b44",
+}
 PALETTE = {**_METHODS, **_COORDINATES, **_OTHERS}
 COLOURS, COORDINATES = tuple(_METHODS), tuple(_COORDINATES)
-_CLASSES = {colour: f"k{place}" for place, colour in enumerate(PALETTE)}
-_CLASS_RULES = "".join(f".{name}{{color:var(--{name})}}" for name in _CLASSES.values())
 # Of the style sheet, by name: the light and the dark colour.
-_VARIABLES = {name: (colour, PALETTE[colour]) for colour, name in _CLASSES.items()} | {
-    "sheet": (PAPER, PALETTE[PAPER]),
-    "grid": ("#e4e4e4", "#333b44"),
-}
+_NAMES = {colour: f"k{place}" for place, colour in enumerate(PALETTE)} | {INK: "ink", PAPER: "sheet", GRID: "grid"}
+_VARIABLES = {name: (colour, PALETTE[colour]) for colour, name in _NAMES.items()}
 
 # Of the printed equations, then of the other models in the order of the catalogue; those of other packages are grey.
 _MODEL_COLOURS = ((INK,), (BLUE, LIGHT_BLUE), (VERMILLION, ORANGE), (GREEN,), (PURPLE,))
@@ -79,21 +81,20 @@ def look_of(curve: str) -> Look:
     return replace(look, label=label_of(curve))
 
 
-def class_of(colour: str) -> str:
-    """The class of a colour of the palette in the style sheet; "" for another colour."""
-    return _CLASSES.get(colour, "")
+def name_of_colour(colour: str) -> str:
+    """The variable of the style sheet, "k1", that stands for a colour of the palette; "" for another colour."""
+    return _NAMES.get(colour, "")
 
 
 def palette_css() -> str:
-    """The palette as variables of a style sheet, light and, where the page is dark, dark; and a class per colour."""
+    """The palette as variables of a style sheet, light and, where the page is dark, dark."""
     light, dark = (";".join(f"--{name}:{pair[i]}" for name, pair in _VARIABLES.items()) for i in (0, 1))
-    night = "@media screen and (prefers-color-scheme:dark)"
-    return f":root{{{light}}}\n{night}{{:root{{{dark}}}}}\n{_CLASS_RULES}\n"
+    return f":root{{{light}}}\n@media screen and (prefers-color-scheme:dark){{:root{{{dark}}}}}\n"
 
 
-def with_light_palette(css: str) -> str:
-    """`css` of pictures and the classes of the palette, with light colours in place of variables."""
-    return re.sub(r"var\(--(\w+)\)", lambda variable: _VARIABLES[variable[1]][0], _CLASS_RULES + css)
+def light_palette_css() -> str:
+    """The light colours alone, of a picture that is a file."""
+    return f":root{{{';'.join(f'--{name}:{light}' for name, (light, _) in _VARIABLES.items())}}}\n"
 
 
 def with_capital(text: str) -> str:

@@ -228,7 +228,7 @@ def engine_tables(results: OpenResults, scenes: Mapping[str, Sequence[Record]]) 
         own = {name: of_scene for name, of_scene in own.items() if of_scene}
         reached.append([
             method_cell(method),
-            f"{sum(any(map(_is_ok, curves)) for curves in own.values())} of {len(own)}",
+            f"{sum(any('ok' in curve.statuses for curve in curves) for curves in own.values())} of {len(own)}",
             _order_cell([curve for of_scene in own.values() for curve in of_scene]),
             _worst_cell(own, "defect_max"),
             _worst_cell(own, work_precision.ANGLE_ERROR),
@@ -269,19 +269,15 @@ def engine_tables(results: OpenResults, scenes: Mapping[str, Sequence[Record]]) 
 
 
 def _worst_cell(own: Mapping[str, Sequence[Record]], column: str) -> TableCell | str:
-    """The smallest value on the scene where that is largest, of scenes on which a setting is ok."""
+    """The smallest value on the scene where that is largest, of scenes that it can run to the end."""
     values = {name: work_precision.best(curves, column) for name, curves in own.items()}
     known = {name: value for name, value in values.items() if value is not None}
     if not known:
         is_cut = any(work_precision.left_out(curve) for curves in own.values() for curve in curves)
-        return (TableCell("not measured") if is_cut else TableCell("none ok", "bad")) if own else NOTHING
+        return (TableCell("not measured") if is_cut else TableCell("none", "bad")) if own else NOTHING
     worst = max(known, key=lambda name: known[name])
     bound = "≤ " if any(map(work_precision.left_out, own[worst])) else ""
     return TableCell(bound + number(known[worst]), note=worst if len(own) > 1 else "")
-
-
-def _is_ok(curve: Record) -> bool:
-    return bool(work_precision.succeeded(curve).any())
 
 
 def _reach_cell(
@@ -362,7 +358,7 @@ def reach_table(curves: Sequence[Record]) -> PageTable:
     for curve in curves:
         errors = curve.arrays["angle_error_max"][work_precision.succeeded(curve)]
         missing = TableCell(
-            NOTHING, note=f"{with_unit(errors.min(), 'rad')} at best" if len(errors) else "no run is ok"
+            NOTHING, note=f"{with_unit(errors.min(), 'rad')} at best" if len(errors) else "no run to the end"
         )
         count = work_precision.left_out(curve)
         if count:
@@ -401,8 +397,9 @@ def failure_table(curves: Sequence[Record], stored: StoredScene | None = None) -
     rows: list[Row] = []
     for curve in curves:
         left_out = [i for i, status in enumerate(curve.statuses) if status == "left_out"]
+        on_curve = work_precision.succeeded(curve)
         for i, (status, message) in enumerate(zip(curve.statuses, curve.messages, strict=True)):
-            if status == "ok" or i in left_out[1:]:
+            if on_curve[i] or i in left_out[1:]:
                 continue
             setting = _setting(curve, i)
             if i in left_out and len(left_out) > 1:

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from markupsafe import Markup
 
-from rotor_mbs.report.core.looks import class_of, coordinate_look, with_capital
+from rotor_mbs.report.core.looks import coordinate_look, name_of_colour, with_capital
 from rotor_mbs.report.core.numbers import with_unit
 from rotor_mbs.runs.read import StoredRun, StoredScene
 from rotor_mbs.scenario.scene import Scene
@@ -43,7 +43,7 @@ def viewer(stored: StoredScene, runs: Mapping[str, StoredRun]) -> dict[str, Any]
     step = float(longest[-1]) / (min(len(longest), MAX_FRAMES) - 1)
     data = {
         "step": step,
-        "colours": [class_of(coordinate_look(i + 1).colour) for i in range(len(scene.blades))],
+        "colours": [name_of_colour(coordinate_look(i + 1).colour) for i in range(len(scene.blades))],
         "blades": [
             {"phase": phase, "tip": blade.tip, "mass": blade.centre_of_mass}
             for phase, blade in zip(scene.phases, scene.blades, strict=True)

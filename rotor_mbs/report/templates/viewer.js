@@ -132,14 +132,14 @@
       });
       pen.beginPath();
       pen.arc(...see.at([0, 0, 0]), 6, 0, 2 * Math.PI);
-      pen.fillStyle = shade("k0");
+      pen.fillStyle = shade("ink");
       pen.fill();
     };
 
     const label = (index, x, y, dashed) => {
       const one = models[index], last = (one.frames.length - 1) * data.step, over = now > last + 0.5 * data.step;
       pen.font = "600 14px system-ui, sans-serif";
-      pen.fillStyle = over ? shade("bad") : shade("k0");
+      pen.fillStyle = over ? shade("bad") : shade("ink");
       const text = `${one.name}${dashed ? ` (${box.dataset.dashed})` : ""}`;
       pen.fillText(over ? `${text}: ${box.dataset.ended} ${last.toFixed(2)} s` : text, x, y);
     };
