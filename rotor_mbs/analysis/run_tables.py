@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import NamedTuple
 
 from rotor_mbs.analysis.run_selection import in_catalogue_order
-from rotor_mbs.analysis.work_precision import TARGETS_RAD, points, succeeded, time_to_reach
+from rotor_mbs.analysis.work_precision import TARGETS_RAD, points, time_to_reach
 from rotor_mbs.methods.catalogue import REFERENCE, is_corrected
 from rotor_mbs.runs.read import StoredRun, StoredScene
 from rotor_mbs.runs.records import Record
@@ -90,7 +90,7 @@ def bench_table(curves: Sequence[Record]) -> TextTable:
     for curve in curves:
         errors, seconds = points(curve)
         times = [time_to_reach(errors, seconds, target) for target in TARGETS_RAD]
-        count = f"{int(succeeded(curve).sum())} of {len(curve.statuses)}"
+        count = f"{curve.statuses.count('ok')} of {len(curve.statuses)}"
         best = _short(float(errors.min())) if len(errors) else ""
         rows.append((curve.scene, curve.name, count, best, *("" if t is None else f"{t:.2e}" for t in times)))
     return TextTable(

@@ -15,12 +15,15 @@ from rotor_mbs.runs.read import StoredRun, StoredScene
 from rotor_mbs.runs.records import Record
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.metrics import energy_scale
-from rotor_mbs.solution.status import code_of
+from rotor_mbs.solution.status import COMPLETE, code_of
 from rotor_mbs.solution.trajectory import Array, Trajectory
 
 TARGETS_RAD = (1e-3, 1e-6, 1e-9)
 
 ANGLE_ERROR = "angle_error_max"  # up to the horizon, rad
+
+# An error as large as the motion itself: such a run is a failure, not a point on the curve.
+USELESS_RAD = 1.0
 
 # Below this many roundings of a double of order one an error of exactly zero is drawn and interpolated.
 SMALLEST_ERROR = 1e-17
@@ -39,9 +42,10 @@ class Reach(NamedTuple):
 
 
 def succeeded(curve: Record, error: str = ANGLE_ERROR) -> NDArray[np.bool_]:
-    """(settings,) Which points stand on the curve: run to the end, and not useless."""
-    known = np.isfinite(curve.arrays[error]) & np.isfinite(curve.arrays["run_time_s"])
-    return np.asarray(known & (curve.arrays["status"] == code_of("ok")))
+    """(settings,) Which points stand on the curve: run to the end, and not useless. A coarse one need not be ok."""
+    is_complete = np.isin(curve.arrays["status"], [code_of(status) for status in COMPLETE])
+    is_known = np.isfinite(curve.arrays[error]) & np.isfinite(curve.arrays["run_time_s"])
+    return np.asarray(is_complete & is_known & (curve.arrays[ANGLE_ERROR] < USELESS_RAD))
 
 
 def failed(curve: Record) -> NDArray[np.bool_]:
@@ -118,7 +122,7 @@ def own_points(scene: StoredScene) -> list[Record]:
         if run.status in ("ok", "inaccurate") and arrays["run_time_s"][0] > 0.0:
             for quartile in ("min", "q1", "q3"):
                 arrays[f"run_time_{quartile}_s"] = arrays["run_time_s"]
-            arrays["status"] = np.array([code_of("ok")])
+            arrays["status"] = np.array([code_of(run.status)])
             curves.append(Record("bench", scene.name, name, arrays=arrays))
     return curves
 

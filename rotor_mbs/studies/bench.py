@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 
 from rotor_mbs.analysis.judgement import judge
-from rotor_mbs.analysis.work_precision import SMALLEST_ERROR, fitted_order
+from rotor_mbs.analysis.work_precision import SMALLEST_ERROR, USELESS_RAD, fitted_order
 from rotor_mbs.errors import OF_THE_MACHINE, InputError, RotorError, one_line
 from rotor_mbs.methods.base import STEP, TOLERANCE, Ladder
 from rotor_mbs.methods.catalogue import REFERENCE, find_method, ladders, methods, settings_for, with_method_files
@@ -54,9 +54,6 @@ _HANGING, _LOADING_S = 3.0, 60.0
 # Errors are compared on at most so many sample intervals: more would make every step shorter than a coarse rung's, and
 # a bench would time the reading of samples.
 _MOST_INTERVALS = 100
-# An error as large as the motion itself: such a run is a failure, not a point on the curve.
-USELESS_RAD = 1.0
-USELESS_DRIFT = 0.1  # of the energy scale, where there is no reference
 ERRORS = (
     "angle_error_max", "angle_error_end", "tip_error_max", "energy_drift_max", "defect_max", "defect_median",
     "zero_pitch_max",
@@ -155,30 +152,18 @@ class PointTimer:
         run.is_corrected, run.bounds = method.is_corrected, method.bounds
         with np.errstate(over="ignore", invalid="ignore"):  # a runaway's distances may overflow
             judgement = judge(scene, run, self._reference)
-        status, message = _status(judgement.status, judgement.message, judgement.metrics)
         del self._solver
+        status = judgement.status
         errors = judgement.metrics if status in COMPLETE else {}  # those of a run that broke off are of its part
         return {
             "status": status,
-            "message": message,
-            "false_success": int(integration.success and status != "ok"),
+            "message": judgement.message,
+            "false_success": int(judgement.false_success),
             "steps": integration.steps or 0,
             "output_time_s": output,
             "same": np.array_equal(trajectory.angles, self._first_angles),
             **{name: errors.get(name, np.nan) for name in ERRORS},
         }
-
-
-def _status(status: str, message: str, metrics: Mapping[str, float]) -> tuple[str, str]:
-    """A bench asks how large an error is: it is a failure only where nothing of the motion is right."""
-    if status not in COMPLETE:
-        return status, message
-    if "angle_error_max" not in metrics:  # no reference: energy alone decides
-        return ("ok", "") if metrics.get("energy_drift_max", np.inf) < USELESS_DRIFT else (status, message)
-    error = metrics["angle_error_max"]
-    if error < USELESS_RAD:
-        return "ok", ""
-    return "inaccurate", f"angle error {error:.1e} rad before the horizon: as large as the motion"
 
 
 # When and how often each point runs
@@ -513,20 +498,21 @@ def rows_of_curve(place: Place, curve: Curve, points: Sequence[Mapping[str, Any]
 def counts_of(rows: Sequence[Mapping[str, Any]]) -> str:
     """How many points a curve has, in words."""
     statuses = [row["status"] for row in rows]
-    failed = sum(status not in ("ok", "left_out") for status in statuses)
-    return f"{len(statuses)} points, {failed} failed, {statuses.count('left_out')} left out"
+    ok, inaccurate, left_out = (statuses.count(status) for status in ("ok", "inaccurate", "left_out"))
+    failed = len(statuses) - ok - inaccurate - left_out
+    return f"{len(statuses)} points: {ok} ok, {inaccurate} inaccurate, {failed} failed, {left_out} left out"
 
 
 def curve_order(curve: Curve, rows: Sequence[Mapping[str, Any]]) -> float:
-    """The order of convergence over the points that are ok; NaN where it cannot be fitted."""
+    """The order of convergence over the points on the curve; NaN where it cannot be fitted."""
     if curve.ladder.kind != STEP:
         return math.nan
-    ok = [
+    on_curve = [
         (point.setting, row["angle_error_max"])
         for point, row in zip(curve.points, rows, strict=True)
-        if row["status"] == "ok"
+        if row["status"] in COMPLETE and row["angle_error_max"] < USELESS_RAD
     ]
-    steps, errors = np.array(ok).reshape(-1, 2).T
+    steps, errors = np.array(on_curve).reshape(-1, 2).T
     order = fitted_order(steps, np.maximum(errors, SMALLEST_ERROR))
     return math.nan if order is None else order
 
