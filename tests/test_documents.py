@@ -35,15 +35,12 @@ def python_of(name: str) -> list[str]:
     return [block for block in blocks if "torch" not in block]
 
 
-@pytest.mark.parametrize("name", TEXTS)
-def test_every_command_is_one(name: str) -> None:
-    for arguments in commands(TEXTS[name]):
+def test_every_command_is_one() -> None:
+    calls = [call for text in TEXTS.values() for call in commands(text)]
+    assert len(calls) > 15
+    for arguments in calls:
         replaced = ["3/16" if word.startswith("$SLURM_ARRAY_TASK_ID") else word for word in arguments]
         parse(replaced)  # ends with status 2 where it is none
-
-
-def test_there_are_commands_to_be_tried() -> None:
-    assert sum(len(commands(text)) for text in TEXTS.values()) > 15
 
 
 @pytest.mark.parametrize("path", DOCUMENTS, ids=lambda path: path.name)
@@ -52,47 +49,15 @@ def test_every_link_leads_somewhere(path: Path) -> None:
         assert target.startswith("https://") or (path.parent / target).exists(), target
 
 
-@pytest.mark.parametrize("name", TEXTS)
-def test_lines_fit_an_editor(name: str) -> None:
-    """But tables, which cannot be wrapped."""
-    long = [line for line in TEXTS[name].splitlines() if len(line) > 125 and not line.startswith("|")]
-    assert not long
-
-
 @pytest.fixture(scope="module", autouse=True)
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
-    """A folder with the files that the documents read: a scene, results, a bench, a sweep, data of another program."""
+    """Where the Python of documents runs, with the README's scene."""
     with pytest.MonkeyPatch.context() as patch:
         folder = tmp_path_factory.mktemp("documents")
         patch.chdir(folder)
         patch.setenv("MPLBACKEND", "Agg")
         (folder / "my.toml").write_text(OWN_SCENE)
         yield folder
-
-
-@pytest.fixture(scope="module")
-def paper_results(folder: Path) -> None:
-    rm.run("paper/fig11", ["lagrange/taylor", "exudyn_tree/rk67"]).save(folder / "rotor-mbs-out" / "results.h5")
-
-
-@pytest.fixture(scope="module")
-def data(folder: Path) -> None:
-    rm.export(rm.scene("paper/fig11"), "csv", folder / "mine.csv")
-
-
-@pytest.fixture(scope="module")
-def dataset(folder: Path) -> None:
-    """The sweep of docs/sweeps.md, with fewer runs that are as long."""
-    (sweep,) = re.findall(r"```toml\n(title.*?)```", TEXTS["sweeps.md"], re.DOTALL)
-    fewer = sweep.replace("draws = 100 ", "draws = 4 ").replace("amplification = true", "amplification = false")
-    assert fewer != sweep
-    (folder / "sweep.toml").write_text(fewer)
-    assert main(["sweep", "sweep.toml", "-o", "study.h5", "-j", "1"]) == 0
-
-
-@pytest.fixture(scope="module")
-def bench() -> None:
-    main(shlex.split("bench check/general -m lagrange/dop853 -o bench.h5 --budget 1 --repeats 1"))
 
 
 def test_the_readmes_own_scene_is_one() -> None:
@@ -102,9 +67,9 @@ def test_the_readmes_own_scene_is_one() -> None:
     assert scene.has_damping
 
 
-@pytest.mark.usefixtures("paper_results")
-def test_the_readmes_python_runs(capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_readmes_python_runs(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """First the API, then what reads a results file."""
+    rm.run("paper/fig11", ["lagrange/taylor", "exudyn_tree/rk67"]).save(folder / "rotor-mbs-out" / "results.h5")
     (first,), reading = python_of("README.md"), python_of("data.md")
     shorter = first.replace("duration=5.0, samples=501", "duration=0.5, samples=51")  # the references of 5 s take 6 s
     assert shorter != first
@@ -117,14 +82,26 @@ def test_the_readmes_python_runs(capsys: pytest.CaptureFixture[str]) -> None:
     assert "exudyn_tree/rk67" in capsys.readouterr().out
 
 
+def make_inputs(name: str) -> None:
+    """The files that a document's Python reads."""
+    if name == "compare.md":
+        rm.export("paper/fig11", "csv", "mine.csv")
+    elif name == "sweeps.md":
+        (sweep,) = re.findall(r"```toml\n(title.*?)```", TEXTS[name], re.DOTALL)
+        fewer = sweep.replace("draws = 100 ", "draws = 4 ").replace("amplification = true", "amplification = false")
+        assert fewer != sweep
+        Path("sweep.toml").write_text(fewer)
+        assert main(["sweep", "sweep.toml", "-o", "study.h5", "-j", "1"]) == 0
+    elif name == "bench.md":
+        main(shlex.split("bench check/general -m lagrange/dop853 -o bench.h5 --budget 1 --repeats 1"))
+
+
 @pytest.mark.full
 @pytest.mark.parametrize(
     "name", [name for name in TEXTS if python_of(name) and name not in ("README.md", "data.md", "tour.md")]
 )
-def test_the_python_of_documents_runs(name: str, request: pytest.FixtureRequest) -> None:
-    needed = {"compare.md": "data", "sweeps.md": "dataset", "bench.md": "bench"}
-    if name in needed:
-        request.getfixturevalue(needed[name])
+def test_the_python_of_documents_runs(name: str) -> None:
+    make_inputs(name)
     names: dict[str, Any] = {}
     for code in python_of(name):
         exec(code, names)

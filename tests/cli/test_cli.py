@@ -33,15 +33,6 @@ rates = [0, 0]
 BOTH = ("-m", "lagrange/dop853", "-m", "exudyn_tree/rk67")
 
 
-def hashes(path: Path) -> dict[str, str]:
-    with open_results(path) as results:
-        return {
-            f"{scene.name}/{run.method}": run.known["scene_hash"]
-            for scene in results.scenes.values()
-            for run in scene.runs.values()
-        }
-
-
 @pytest.fixture(scope="module")
 def first_run(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Ended]:
     """The results file of `quick`, and the command that made it."""
@@ -93,16 +84,12 @@ def test_list_and_every_help_load_no_library_that_takes_time() -> None:
     assert not loaded & {"numpy", "scipy", "pydantic", "h5py", "matplotlib", "exudyn", "heyoka", "mujoco", "pebble"}
 
 
-@pytest.mark.parametrize("scene", ["paper/fig11", "paper/fig15-1kNm", "stiff/nrel-5mw-damped"])
-def test_show_fits_a_screen(scene: str) -> None:
-    assert len(rotor_mbs("show", scene).out.splitlines()) <= 30
-
-
 def test_show_build_lists_what_a_scene_needs_and_no_more() -> None:
     text = rotor_mbs("show", "paper/fig15-1kNm", "--build").out
     assert "rotor torque" in text
     assert "exudyn_chain" in text
     assert "rotor torque" not in rotor_mbs("show", "paper/fig05", "--build").out
+    assert "(not available: " in rotor_mbs("show", "stiff/nrel-5mw-damped").out
 
 
 def test_show_prints_the_settings_of_a_method() -> None:
@@ -133,14 +120,6 @@ def test_files_and_pages_have_the_same_default_in_every_command() -> None:
 # Runs
 
 
-def test_a_new_scene_file_is_one_and_replaces_no_other() -> None:
-    assert rotor_mbs("new", "mine.toml").status == 0
-    assert rotor_mbs("show", "mine.toml").status == 0
-    again = rotor_mbs("new", "mine.toml")
-    assert again.status == 2
-    assert "File exists" in again.err
-
-
 def test_settings_are_stored_and_unknown_ones_refused(quick: Path, stored: Path) -> None:
     command = ("run", quick, "-m", "lagrange/dop853", "-o", stored, "-j", "1", "--set")
     ended = rotor_mbs(*command, "relative_tolerance=1e-6")
@@ -150,11 +129,9 @@ def test_settings_are_stored_and_unknown_ones_refused(quick: Path, stored: Path)
         assert results.scenes["quick"].runs["lagrange/dop853"].settings["relative_tolerance"] == 1e-6
         notes = [str(cell.note) for cell, *_ in metrics_table(results.scenes["quick"]).rows]
         assert "lagrange/dop853, relative_tolerance = 1e-06" in notes
-    for wrong, says in (("tolerence=1e-3", "tolerence"), ("relative_tolerance=-1", "-1"), ("x", "NAME=VALUE")):
-        refused = rotor_mbs(*command, wrong)
-        assert refused.status == 2
-        assert says in refused.err
-        assert len(refused.err.splitlines()) == 1
+    refused = rotor_mbs(*command, "x")
+    assert refused.status == 2
+    assert "NAME=VALUE" in refused.err
 
 
 def test_run_writes_every_run_and_a_second_one_has_nothing_to_do(
@@ -169,8 +146,8 @@ def test_run_writes_every_run_and_a_second_one_has_nothing_to_do(
     assert "nothing to do, 3 " in rotor_mbs("run", quick, *BOTH, "-o", stored, "-j", "1").out
     assert stored.read_bytes() == before
     assert "1 runs made" in rotor_mbs("run", quick, "-m", "lagrange/radau", "-o", stored, "-j", "1").out
-    methods = ("exudyn_tree/rk67", "lagrange/dop853", "lagrange/radau", "reference")
-    assert sorted(hashes(stored)) == [f"quick/{method}" for method in methods]
+    with open_results(stored) as results:
+        assert set(results.scenes["quick"].methods) == {"lagrange/dop853", "exudyn_tree/rk67", "lagrange/radau"}
     assert {path.name for path in Path().iterdir()} == {"quick.toml", "r.h5"}
 
 

@@ -10,6 +10,7 @@ import time
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -100,23 +101,29 @@ def _ends_by(patch: pytest.MonkeyPatch, action: Callable[[], object]) -> tuple[i
 def test_an_interrupt_inside_compiled_code_is_an_interrupt(
     error: type[Exception], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """h5py's locks make a SystemError of it, loading an engine an ImportError, which may be taken for a lack."""
+    """h5py's locks make a SystemError of it, loading an engine an ImportError, which may be taken for a lack.
 
-    def interrupted() -> None:
-        raise error("initialization failed") from KeyboardInterrupt()
+    Without an interrupt, code that cannot be loaded (where there is no memory for a library, for example) is one line.
+    """
 
-    status, errors = _ends_by(monkeypatch, interrupted)
+    def fail(cause: BaseException | None = None) -> None:
+        raise error("failed to map segment") from cause
+
+    status, errors = _ends_by(monkeypatch, partial(fail, KeyboardInterrupt()))
     assert status == 130
     assert errors.startswith("interrupted; ")
+    if error is not MethodRefusal:
+        line = f"code cannot be loaded: {error.__name__}: failed to map segment\n"
+        assert _ends_by(monkeypatch, fail) == (1, line)
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
 def test_an_interrupt_that_becomes_another_error_without_a_trace(number: int, monkeypatch: pytest.MonkeyPatch) -> None:
     """NumPy's own loading: PyCapsule_Import("datetime") forgets why the import failed."""
+    if signal.getsignal(number) == signal.SIG_IGN:  # as nohup does with SIGHUP, which then is not the command's
+        pytest.skip("the signal is ignored here")
 
     def interrupted() -> None:
-        if signal.getsignal(number) == signal.SIG_IGN:  # as nohup does with SIGHUP, which then is not the command's
-            pytest.skip("the signal is ignored here")
         with suppress(KeyboardInterrupt):
             signal.raise_signal(number)
         raise ImportError("PyCapsule_Import could not import module")
@@ -124,25 +131,13 @@ def test_an_interrupt_that_becomes_another_error_without_a_trace(number: int, mo
     assert _ends_by(monkeypatch, interrupted)[0] == 130
 
 
-@pytest.mark.parametrize("error", [SystemError, ImportError])
-def test_code_that_cannot_be_loaded_is_one_line(error: type[Exception], monkeypatch: pytest.MonkeyPatch) -> None:
-    """As where there is no memory for a library: "failed to map segment from shared object"."""
-
-    def short_of_memory() -> None:
-        raise error("failed to map segment")
-
-    line = f"code cannot be loaded: {error.__name__}: failed to map segment\n"
-    assert _ends_by(monkeypatch, short_of_memory) == (1, line)
-
-
-class _InterruptedAtItsEnd:
-    def __del__(self) -> None:
-        raise KeyboardInterrupt
-
-
 def test_an_interrupt_where_python_ignores_exceptions_comes_again(monkeypatch: pytest.MonkeyPatch) -> None:
+    class Interrupted:
+        def __del__(self) -> None:
+            raise KeyboardInterrupt
+
     def interrupted() -> list[object]:
-        _InterruptedAtItsEnd()
+        Interrupted()
         time.sleep(1.0)
         return []
 

@@ -27,12 +27,6 @@ def unpacked(packed: dict) -> np.ndarray:  # type: ignore[type-arg]
     return packed["start"] + packed["quantum"] * np.cumsum(steps.astype(int), axis=0)
 
 
-def data_of(text: str) -> dict:  # type: ignore[type-arg]
-    found = re.search(r'<script type="application/json">(.*?)</script>', text, re.S)
-    assert found is not None
-    return json.loads(found[1])
-
-
 def test_angles_come_back_to_a_ten_thousandth_of_a_radian_over_any_number_of_turns() -> None:
     time = np.linspace(0.0, 10.0, 1001)
     angles = np.stack([200.0 * time, -3.0 + np.sin(time)], axis=1)
@@ -40,31 +34,33 @@ def test_angles_come_back_to_a_ten_thousandth_of_a_radian_over_any_number_of_tur
     np.testing.assert_allclose(found, angles, atol=0.5001e-4)  # rounding, which does not add up
 
 
-def test_a_short_run_has_a_frame_for_each_sample_and_a_long_one_no_more_than_fit_a_page(tmp_path: Path) -> None:
-    for samples, wanted in ((301, 301), (5001, MAX_FRAMES)):
-        scene = paper("fig11", samples=samples)
-        with open_results(store(tmp_path / f"{samples}.h5", [Made(scene, "reference", TURNING)])) as opened:
-            made = viewer(opened.scenes["paper/fig11"], dict(opened.scenes["paper/fig11"].runs))
-        assert made is not None
-        assert len(unpacked(json.loads(str(made["data"]))["models"][0])) == wanted
+def viewer_of(folder: Path, run: Made) -> dict:  # type: ignore[type-arg]
+    """What the viewer of a file with this run has."""
+    with open_results(store(folder / "r.h5", [run])) as opened:
+        scene = opened.scenes[run.scene.name]
+        made = viewer(scene, dict(scene.runs))
+    assert made is not None
+    return made
+
+
+@pytest.mark.parametrize(("samples", "frames"), [(301, 301), (5001, MAX_FRAMES)])
+def test_a_frame_for_each_sample_but_no_more_than_fit_a_page(tmp_path: Path, samples: int, frames: int) -> None:
+    made = viewer_of(tmp_path, Made(paper("fig11", samples=samples), "reference", TURNING))
+    assert len(unpacked(json.loads(str(made["data"]))["models"][0])) == frames
 
 
 @pytest.mark.parametrize(("rate", "noted"), [(4.0, ""), (400.0, "turns by up to 13 rad from one frame to the next")])
 def test_a_motion_too_fast_for_the_frames_is_stated(tmp_path: Path, rate: float, noted: str) -> None:
-    path = store(tmp_path / "r.h5", [Made(FIG11, "reference", rotor(lambda t: rate * t))])
-    with open_results(path) as opened:
-        scene = opened.scenes["paper/fig11"]
-        made = viewer(scene, dict(scene.runs))
-    assert made is not None
-    assert bool(made["notes"]) == bool(noted)
-    assert noted in "".join(made["notes"]).replace("\N{NO-BREAK SPACE}", " ")
+    notes = viewer_of(tmp_path, Made(FIG11, "reference", rotor(lambda t: rate * t)))["notes"]
+    assert bool(notes) == bool(noted)
+    assert noted in "".join(notes).replace("\N{NO-BREAK SPACE}", " ")
 
 
 def test_a_page_holds_both_models_thinned_and_small(tmp_path: Path) -> None:
     runs = [Made(FIG11, "reference", TURNING), Made(FIG11, "printed/ode45", TURNING, until=0.5)]
     folder = write_report(store(tmp_path / "r.h5", runs), tmp_path / "out").parent
     text = (folder / "paper-fig11.html").read_text(encoding="utf-8")
-    data = data_of(text)
+    (data,) = map(json.loads, re.findall(r'<script type="application/json">(.*?)</script>', text, re.S))
     assert [model["name"] for model in data["models"]] == ["as printed, ode45", "reference, quad precision"]
     counts = [len(unpacked(model)) for model in data["models"]]
     assert counts[1] == 301  # every sample
@@ -78,11 +74,7 @@ def test_a_page_holds_both_models_thinned_and_small(tmp_path: Path) -> None:
 
 def test_a_run_is_drawn_up_to_its_first_sample_that_is_not_finite(tmp_path: Path) -> None:
     broken = rotor(lambda t: np.where(t > 4.0, np.nan, t))
-    path = store(tmp_path / "r.h5", [Made(replace(FIG11, outputs=("angles",)), "lagrange/taylor", broken)])
-    with open_results(path) as opened:
-        scene = opened.scenes["paper/fig11"]
-        made = viewer(scene, dict(scene.runs))
-    assert made is not None
+    made = viewer_of(tmp_path, Made(replace(FIG11, outputs=("angles",)), "lagrange/taylor", broken))
     data = json.loads(str(made["data"]))
     assert (len(unpacked(data["models"][0])) - 1) * data["step"] == pytest.approx(4.0, abs=0.05)
 
@@ -93,21 +85,13 @@ def test_an_offset_is_drawn_as_a_tenth_of_the_blade_and_never_smaller(offset: fl
     assert magnification(scene) == factor
 
 
-@pytest.mark.parametrize(
-    ("text", "is_explained"),
-    [
-        (re.sub(r"tip = .*", "tip = [0.1, 0, 11]", FIG11.text), True),
-        (re.sub(r"tip = .*", "tip = [5, 0, 11]", FIG11.text), False),
-    ],
-)
-def test_the_viewer_explains_an_offset_too_small_to_be_seen(tmp_path: Path, text: str, is_explained: bool) -> None:
+@pytest.mark.parametrize(("offset", "is_explained"), [("0.1", True), ("5", False)])
+def test_the_viewer_explains_an_offset_too_small_to_be_seen(tmp_path: Path, offset: str, is_explained: bool) -> None:
+    text = re.sub(r"tip = .*", f"tip = [{offset}, 0, 11]", FIG11.text)
     path = store(tmp_path / "r.h5", [Made(replace(FIG11, text=text), "reference", TURNING)])
     page = (write_report(path, tmp_path / "out").parent / "paper-fig11.html").read_text(encoding="utf-8")
-    assert 'class="viewer"' in page
-    assert "<script" in page
     assert 'data-part="offset"' in page
     assert ("so close to the pitch axis that pitch motion would be invisible" in page) == is_explained
-    assert 'id="paths"' in page
 
 
 def test_data_cannot_end_the_script_element() -> None:

@@ -10,7 +10,8 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
 from functools import partial
 from importlib import import_module
 from pathlib import Path
@@ -19,7 +20,7 @@ from typing import Any
 import pytest
 
 from rotor_mbs.errors import ResourceError
-from rotor_mbs.runs.pool import Finished, SerialPool, TaskLostError, WorkerPool, run_in
+from rotor_mbs.runs.pool import Finished, SerialPool, TaskLostError, TaskPool, WorkerPool, run_in
 
 # Beyond any start of a process on a busy machine.
 _LONG_S = 60.0
@@ -37,26 +38,31 @@ def _end(_: object) -> None:
     os._exit(3)
 
 
+@contextmanager
+def _limited(kind: int, soft: int) -> Iterator[None]:
+    """A limit of the system on this process and on those that it starts."""
+    limits = resource.getrlimit(kind)
+    resource.setrlimit(kind, (soft, limits[1]))
+    try:
+        yield
+    finally:
+        resource.setrlimit(kind, limits)
+
+
 def test_a_time_out_under_a_memory_limit_is_no_end_of_a_task() -> None:
     """What lacks memory may wait for it; a limit far above what is used bounds nothing here."""
-    limits = resource.getrlimit(resource.RLIMIT_AS)
-    resource.setrlimit(resource.RLIMIT_AS, (1 << 46, limits[1]))
-    try:
-        with WorkerPool(1) as pool:
-            end = pool.submit(time.sleep, _LONG_S, 0.2).exception()
-    finally:
-        resource.setrlimit(resource.RLIMIT_AS, limits)
+    with _limited(resource.RLIMIT_AS, 1 << 46), WorkerPool(1) as pool:
+        end = pool.submit(time.sleep, _LONG_S, 0.2).exception()
     assert isinstance(end, TaskLostError)
-    assert (end.failure, str(end)) == (
-        "worker_died", "ended after 0.2 s under a memory limit (ulimit -v) of 67108864 MiB",
-    )  # fmt: skip
+    assert end.failure == "worker_died"
+    assert str(end) == "ended after 0.2 s under a memory limit (ulimit -v) of 67108864 MiB"
 
 
 class _Unusual(Exception):
     """Is pickled, but not made of what it was pickled to."""
 
-    def __init__(self, one: str, other: str) -> None:
-        super().__init__(f"{one} and {other}")
+    def __init__(self, first: str, second: str) -> None:
+        super().__init__(f"{first} and {second}")
 
 
 class _FailsToUnpickle:
@@ -95,10 +101,6 @@ def test_an_error_of_a_task_arrives_and_its_process_goes_on(
 _state: list[int] = []
 
 
-def _set_state(number: int) -> None:
-    _state.append(number)
-
-
 def _add_to_state(number: int) -> list[int]:
     _state.append(number)
     return _state
@@ -111,7 +113,7 @@ def _cores(_: object) -> set[int]:
 @pytest.mark.skipif(not hasattr(os, "sched_getaffinity"), reason="no process affinity here")
 def test_one_process_on_one_core_keeps_its_state() -> None:
     core = max(os.sched_getaffinity(0))
-    with WorkerPool(1, partial(_set_state, 5), core) as pool:
+    with WorkerPool(1, partial(_add_to_state, 5), core) as pool:
         assert pool.submit(_cores, None, _LONG_S).result() == {core}
         pool.submit(_add_to_state, 6, _LONG_S).result()
         assert pool.submit(_add_to_state, 7, _LONG_S).result() == [5, 6, 7]
@@ -128,16 +130,12 @@ def test_an_error_of_the_initializer_is_the_error_of_its_tasks() -> None:
 def test_a_system_without_room_for_a_process_costs_the_tasks_of_that_time() -> None:
     with WorkerPool(1) as pool:
         pid = pool.submit(_pid, None, _LONG_S).result()
-        limits = resource.getrlimit(resource.RLIMIT_NOFILE)
-        resource.setrlimit(resource.RLIMIT_NOFILE, (3, limits[1]))
-        try:
+        with _limited(resource.RLIMIT_NOFILE, 3):
             os.kill(pid, signal.SIGKILL)
             for _ in range(2):
                 with pytest.raises(TaskLostError, match="died") as refused:
                     pool.submit(_pid, None, _LONG_S).result()
                 assert refused.value.failure == "worker_died"
-        finally:
-            resource.setrlimit(resource.RLIMIT_NOFILE, limits)
         assert pool.submit(_pid, None, _LONG_S).result() != pid
 
 
@@ -177,8 +175,8 @@ def test_no_more_processes_are_started_than_there_are_tasks() -> None:
         assert len({*multiprocessing.active_children()} - before) == 1
 
 
-def _ends(work: Callable[[Any], Any], tasks: Sequence[Any], workers: int = 1) -> list[Finished[Any, Any]]:
-    with WorkerPool(workers) as pool:
+def _ends(work: Callable[[Any], Any], tasks: Iterable[Any], pool: TaskPool) -> list[Finished[Any, Any]]:
+    with pool:
         return list(run_in(pool, work, tasks, _LONG_S))
 
 
@@ -191,9 +189,9 @@ def _die_once(folder: str) -> str:
 
 
 def test_a_task_whose_worker_died_is_tried_once_more(tmp_path: Path) -> None:
-    ends = _ends(_die_once, [str(tmp_path)])
+    ends = _ends(_die_once, [str(tmp_path)], WorkerPool(1))
     assert [(end.value, end.failure) for end in ends] == [("done", "")]
-    ends = _ends(_end, [None])
+    ends = _ends(_end, [None], WorkerPool(1))
     assert [(end.failure, end.message) for end in ends] == [
         ("worker_died", "its process died (exit code 3), also when it was retried alone")
     ]
@@ -202,11 +200,11 @@ def test_a_task_whose_worker_died_is_tried_once_more(tmp_path: Path) -> None:
 @pytest.mark.full
 @pytest.mark.skipif(not Path("/proc/self/fd").exists(), reason="counts open files in /proc")
 def test_dead_processes_leave_no_open_files() -> None:
-    _ends(_pid, [0])  # opens what stays open
+    _ends(_pid, [0], WorkerPool(1))  # opens what stays open
     before = len(list(Path("/proc/self/fd").iterdir()))
     gc.disable()
     try:
-        ended = _ends(_end, list(range(4)), 2)
+        ended = _ends(_end, range(4), WorkerPool(2))
         assert len(list(Path("/proc/self/fd").iterdir())) <= before
     finally:
         gc.enable()
@@ -257,7 +255,7 @@ def test_workers_end_with_their_parent(tmp_path: Path, signals: list[signal.Sign
     assert not any(Path(f"/proc/{pid}").exists() for pid in pids)
 
 
-def _lost(_: int) -> int:
+def _lacks_files(_: int) -> int:
     raise OSError(24, "Too many open files")
 
 
@@ -265,15 +263,11 @@ def test_a_machine_without_room_is_given_up_after_some_tasks_in_a_row() -> None:
     """Thousands of tasks would each be tried alone, a second each."""
     tasks = iter(range(10_000))
     with pytest.raises(ResourceError, match="stopped after 10 failures in a row: not enough memory, files"):
-        list(run_in(SerialPool(), _lost, tasks, _LONG_S))
+        _ends(_lacks_files, tasks, SerialPool())
     assert next(tasks) < 20
 
 
-def _exit(_: int) -> int:
-    raise SystemExit(3)
-
-
 def test_a_task_that_exits_ends_no_process() -> None:
-    (end,) = run_in(SerialPool(), _exit, [1], _LONG_S)
+    (end,) = _ends(_raise, [SystemExit(3)], SerialPool())
     assert end.failure == "error"
     assert "SystemExit: 3" in end.message
