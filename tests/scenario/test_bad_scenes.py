@@ -54,22 +54,18 @@ WRONG = {
     "title empty": ('"A good scene"', '"  "', 1, "title", "is empty"),
     "title too long": ("A good scene", "x" * 201, 1, "title", "201 characters"),
     "title of two lines": ("good scene", "good\\nscene", 1, "title", "control character"),
-    "title a number": ('"A good scene"', "3", 1, "title", "3 is not text"),
     "unknown key": ("blades = 2", "blades = 2\nbaldes = 2", 3, "baldes", "perhaps blades"),
     "unknown quoted key": ("[hub]", '[hub]\n"in\\nertia" = 1', 25, 'hub."in\\\\nertia"', "is not a key here"),
     "figures a text": ("blades = 2", 'figures = "5"\nblades = 2', 2, "figures", '"5" is not a list'),
-    "blades zero": ("blades = 2", "blades = 0", 2, "blades", "0 is out of range"),
     "blades astronomical": ("blades = 2", f"blades = 0x{'f' * 5000}", 2, "blades", "a number of over 30 digits"),
     "blades true": ("blades = 2", "blades = true", 2, "blades", "true is not a whole number"),
     "gravity NaN": ("gravity = 9.8", "gravity = nan", 3, "gravity", "nan is out of range"),
     "duration a date": ("duration = 10", "duration = 2020-01-01", 4, "duration", "a date or time is not a number"),
     "samples one": ("samples = 11", "samples = 1", 5, "samples", "1 is out of range"),
-    "samples too many": ("samples = 11", "samples = 10000001", 5, "samples", "out of range"),
     "outputs empty": ('["angles", "tip"]', "[]", 6, "outputs", "0 entries"),
     "outputs unknown": ('["angles", "tip"]', '["angles", "tips"]', 6, r"outputs\[1\]",
      '"tips" is not one of them, perhaps tip'),
     "outputs repeated": ('["angles", "tip"]', '["tip", "tip"]', 6, "outputs", "more than once"),
-    "blade missing": (BLADE, "", 1, "blade", "is missing"),
     "mass missing": ("mass = 2\n", "", 8, r"blade\.mass", "is missing"),
     "mass zero": ("mass = 2", "mass = 0", 9, r"blade\.mass", "0 is out of range"),
     "mass beyond doubles": ("mass = 2", f"mass = 1{'0' * 400}", 9, r"blade\.mass", "over 30 digits is out of range"),
@@ -77,20 +73,15 @@ WRONG = {
     "centre on lines": ("[0.5, 0, 3]", '[0.5, # x ]\n  0,\n  "z"]', 12, r"blade\.centre_of_mass\[2\]",
      "\"z\": 'z' is not a number"),
     "inertia of no triangle": ("[1, 1, 1, 0, 0, 0]", "[1, 1, 2.1, 0, 0, 0]", 11, r"blade\.inertia", "no rigid body"),
-    "inertia with large products": ("[1, 1, 1, 0, 0, 0]", "[1, 1, 1, 0, 2, 0]", 11, r"blade\.inertia", "no rigid body"),
     "tip missing where wanted": ("tip = [0.5, 0, 7]\n", "", 8, r"blade\.tip", "is missing"),
-    "initial missing": ("[initial]\nangles = [0, 0, 0]\nrates = [0, 0, 0]\n", "", 1, "initial", "is missing"),
     "angles too few": ("angles = [0, 0, 0]", "angles = [0, 0]", 15, r"initial\.angles", "2 numbers for a rotor and 2"),
     "angle code": ("angles = [0, 0, 0]", "angles = [0, \"__import__('os')\", 0]", 15, r"initial\.angles\[1\]",
      "no meaning in an expression"),
     "angle a bomb": ("angles = [0,", 'angles = ["9**9**9**9",', 15, r"initial\.angles\[0\]", "no finite value"),
-    "rate beyond 1e300": ("rates = [0,", "rates = [1e301,", 16, r"initial\.rates\[0\]", "out of range"),
     "stiffness negative": ("stiffness = 1", "stiffness = -1", 19, r"bearing\.stiffness", "-1 is out of range"),
     "stiffness for one of two": ("stiffness = 1", "stiffness = [1]", 19, r"bearing\.stiffness",
      "1 number in a list for 2"),
     "torque unknown": ("rotor = 5\n", "roter = 5\n", 23, r"torque\.roter", "perhaps rotor"),
-    "torque without rows": ("rotor = 5", "rotor = []", 23, r"torque\.rotor", "0 entries"),
-    "torque row too long": ("rotor = 5", "rotor = [[0, 1],\n [1, 2, 3]]", 24, r"torque\.rotor\[1\]", "3 entries"),
     "torque entry": ("rotor = 5", "rotor = [[0, 1], [1, nan]]", 23, r"torque\.rotor\[1\]\[1\]", "nan"),
     "torque from before": ("rotor = 5", "rotor = [[-1, 1], [1, 1]]", 23, r"torque\.rotor", "below 0"),
     "torque back in time": ("rotor = 5", "rotor = [[1, 1], [0, 1]]", 23, r"torque\.rotor",
@@ -102,11 +93,9 @@ WRONG = {
     "rest back in time": ("damping = 2", "rest = [[[0, 1], [1, 1]], [[1, 1], [0, 1]]]", 20,
      r"bearing\.rest\[1\]", "t = 0 comes after t = 1"),
     "two hubs": ("[hub]\n", "[[hub]]\ninertia = 1\n[[hub]]\n", 25, "hub", "a list is not a table"),
-    "shaft damping missing": ("[shaft]\ndamping = 3", "[shaft]", 28, r"shaft\.damping", "is missing"),
     "one of two blade tables": ("[blade]", "[[blade]]", 8, "blade", r"1 \[\[blade\]\] table for 2 blades"),
     "mass too large": ("mass = 2", "mass = 1e200", 9, r"blade\.mass", "allowed: sizes from 1e-25"),
     "offset too small": ("[0.5, 0, 3]", "[-1e-80, 0, 3]", 10, r"blade\.centre_of_mass\[0\]", "allowed: 0, or sizes"),
-    "stiffness too large": ("stiffness = 1", "stiffness = 1e120", 19, r"bearing\.stiffness", "allowed: 0, or sizes"),
     "duration too small": ("duration = 10", "duration = 1e-300", 4, "duration", "allowed: sizes from"),
     "second blade table": (BLADE,
      BLADE.replace("[blade]", "[[blade]]") + BLADE.replace("[blade]", "[[blade]]").replace("= 2", "= 0"), 14,
@@ -127,23 +116,11 @@ def _problems(folder: Path, content: str | bytes) -> list[str]:
     return problems
 
 
-def test_the_scene_before_it_is_changed_is_valid(tmp_path: Path) -> None:
-    path = tmp_path / "good.toml"
-    path.write_text(SCENE, encoding="utf-8")
-    assert load_scene(path, "good").title == "A good scene"
-
-
 @pytest.mark.parametrize(("old", "new", "line", "key", "message"), WRONG.values(), ids=WRONG)
 def test_one_error_is_one_line(tmp_path: Path, old: str, new: str, line: int, key: str, message: str) -> None:
     assert SCENE.count(old) == 1
-    text = SCENE.replace(old, new)
-    (problem,) = _problems(tmp_path, text)
+    (problem,) = _problems(tmp_path, SCENE.replace(old, new))
     assert re.match(rf":{line}: {key}: .*{message}", problem), problem
-
-
-def test_a_number_where_a_table_should_be(tmp_path: Path) -> None:
-    (problem,) = _problems(tmp_path, "torque = 3\n" + SCENE.replace("[torque]\nrotor = 5\n", ""))
-    assert problem.startswith(":1: torque: 3 is not a table; allowed: a table with rotor, pitch")
 
 
 def test_a_run_that_cannot_fit_in_memory(tmp_path: Path) -> None:
@@ -170,17 +147,11 @@ def test_a_pitch_without_inertia_takes_no_rate_and_no_bearing(tmp_path: Path) ->
 
 def test_all_errors_of_a_file_in_the_order_of_its_lines(tmp_path: Path) -> None:
     text = SCENE
-    for name in ("title empty", "blades true", "gravity NaN", "samples one", "outputs unknown", "mass zero"):
+    for name in ("title empty", "blades true", "outputs unknown", "inertia of no triangle", "torque entry"):
         text = text.replace(*WRONG[name][:2])
-    for name in ("centre too short", "inertia of no triangle", "angle code", "stiffness negative", "torque entry"):
-        text = text.replace(*WRONG[name][:2])
-    keys = [
-        problem.split(": ")[0] + " " + problem.split(": ")[1].split(" ")[0] for problem in _problems(tmp_path, text)
-    ]
-    assert keys == [
-        ":1 title", ":2 blades", ":3 gravity", ":5 samples", ":6 outputs[1]", ":9 blade.mass",
-        ":10 blade.centre_of_mass", ":11 blade.inertia", ":15 initial.angles[1]", ":19 bearing.stiffness",
-        ":23 torque.rotor[1][1]",
+    places = [problem.split(": ")[:2] for problem in _problems(tmp_path, text)]
+    assert places == [
+        [":1", "title"], [":2", "blades"], [":6", "outputs[1]"], [":11", "blade.inertia"], [":23", "torque.rotor[1][1]"]
     ]  # fmt: skip
 
 
@@ -188,7 +159,6 @@ def test_all_errors_of_a_file_in_the_order_of_its_lines(tmp_path: Path) -> None:
     ("content", "start"),
     [
         (b"", ": is empty"),
-        (b" \n\t\n", ": is empty"),
         (b"\x7fELF\x00\x01\xff\xfe", ":1: is not UTF-8"),
         (b"title = 'x'\n# \xe9\n", ":2: is not UTF-8"),
         (b"title = 'x'\n\n\x00", ":3: contains a NUL byte"),
@@ -196,7 +166,6 @@ def test_all_errors_of_a_file_in_the_order_of_its_lines(tmp_path: Path) -> None:
         (b"title = \n", ":1: not TOML: invalid value"),
         (b"title = 'x'\ntitle = 'y'\n", ":2: not TOML: cannot overwrite a value"),
         (b"\n\nblades = 1 2\n", ":3: not TOML: expected newline"),
-        (b"title = 'x'\nblades = [1,\n2", ":3: not TOML: unclosed array (end of file)"),
         (b"a = " + b"[" * 100_000, ":1: nested too deep"),
         (b"a = " + b"{a=" * 100_000, ":1: nested too deep"),
         (b"a." * 500_000 + b"a = 1", ":1: key of over 32 parts"),
@@ -220,16 +189,7 @@ def test_very_many_errors_are_cut_and_counted(tmp_path: Path) -> None:
     assert caught.value.problems[-1].endswith(": 207 more errors")
 
 
-NO_NAMES = (
-    "",
-    "../paper/fig05",
-    "paper/../paper/fig05",
-    "/paper/fig05",
-    "paper//fig05",
-    "paper/fig05\n",
-    "paper/\0",
-    "ä",
-)
+NO_NAMES = ("", "../paper/fig05", "/paper/fig05", "paper//fig05", "paper/fig05\n", "paper/\0", "ä")
 
 
 @pytest.mark.parametrize(
@@ -245,11 +205,8 @@ NO_NAMES = (
         ("\0.toml", "leads to no file"),
         ("empty", "no TOML file in this folder"),
         ("text.txt", "is not a TOML file"),
-        ("folder.toml", "no TOML file in this folder"),
         ("odd name.toml", "cannot name a scene"),
-        ("..toml", "cannot name a scene"),
         ("bench.toml", "bench names a group of results"),
-        ("paper.toml", "paper names a group of results"),
         ("circle.toml", "leads to no file"),
         ("pipe.toml", "is not a regular file"),
         ("study.toml", "study.toml: is a sweep; allowed: a scene, or: rotor-mbs sweep study.toml"),
@@ -261,8 +218,7 @@ def test_arguments_that_name_no_scene(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     Path("empty").mkdir()
-    Path("folder.toml").mkdir()
-    for name in ("text.txt", "odd name.toml", "..toml", "bench.toml", "paper.toml"):
+    for name in ("text.txt", "odd name.toml", "bench.toml"):
         Path(name).write_text(SCENE, encoding="utf-8")
     Path("circle.toml").symlink_to("circle.toml")
     os.mkfifo("pipe.toml")

@@ -15,26 +15,22 @@ from rotor_mbs.scenario.keys import ALLOWED, MAX_DEPTH, MAX_LENGTH, evaluate, re
 @pytest.mark.parametrize(
     ("text", "value"),
     [
-        ("1", 1.0), (" 2.50 ", 2.5), (".5", 0.5), ("5.", 5.0), ("1e-3", 1e-3), ("1E+3", 1e3), ("pi/6", math.pi / 6),
-        ("11*pi/12", 11 * math.pi / 12), ("-pi/3", -math.pi / 3), ("hypot(0.08, 0.03)", math.hypot(0.08, 0.03)),
-        ("sqrt(2)", math.sqrt(2.0)), ("deg(180)", math.pi), ("007", 7.0), ("+".join("1" * 100), 100.0),
-        ("1 - 2 - 3", -4.0), ("8/4/2", 1.0), ("2**3**2", 512.0), ("-2**2", -4.0), ("2**-1", 0.5), ("--3", 3.0),
-        ("2*-3", -6.0), ("(1 + 2)*3", 9.0), ("1 + 2*3", 7.0), ("1e200*1e-200", 1.0),
+        (" 2.50 ", 2.5), (".5", 0.5), ("5.", 5.0), ("1E+3", 1e3), ("007", 7.0), ("deg(180)", math.pi),
+        ("11*pi/12", 11 * math.pi / 12), ("2**3**2", 512.0), ("+".join("1" * 100), 100.0), ("1e200*1e-200", 1.0),
     ],
 )  # fmt: skip
 def test_value(text: str, value: float) -> None:
-    # The same operations in the same order: equal to the last bit.
+    """What `test_agrees_with_python_to_the_last_bit` does not write: spaces, ways of writing numbers, degrees."""
     assert evaluate(text) == value
 
 
 @pytest.mark.parametrize(
     "text",
     [
-        "", "   ", "1e400", "9**9**9**9", "1e300*1e300", "1/0", "0**-1", "(-8)**(1/3)", "sqrt(-1)", "nan", "inf",
-        "-inf", "e", "Pi", "٣", "１", "²", "1_000", "0x10", "1j", "1 2", "1,2", "1 +", "+1", "*1", "1//2", "7 % 2",
-        "(1", "1)", "()", "sqrt", "sqrt()", "sqrt(1, 2)", "hypot(1)", "hypot(1, 2, 3)", "pi(2)", "deg(1, 2)",
-        "hypot(1, 2,)", "sqrt(*1)", "1 if 1 else 2", "2pi", "abs(1)", "__import__('os')", "(1).__class__", "[1]",
-        "1\n+1", "1 # one", "1;2", "true",
+        "", "   ", "1e400", "9**9**9**9", "1/0", "(-8)**(1/3)", "sqrt(-1)", "nan", "-inf", "Pi", "٣", "²", "1_000",
+        "0x10", "1j", "1 2", "1,2", "1 +", "+1", "*1", "1//2", "7 % 2", "(1", "1)", "()", "sqrt", "sqrt()",
+        "hypot(1)", "hypot(1, 2, 3)", "pi(2)", "hypot(1, 2,)", "sqrt(*1)", "1 if 1 else 2", "2pi", "abs(1)",
+        "__import__('os')", "(1).__class__", "[1]", "1\n+1", "1 # one", "1;2",
     ],
 )  # fmt: skip
 def test_refused_with_one_sentence_that_says_what_is_allowed(text: str) -> None:

@@ -106,12 +106,9 @@ def test_the_number_of_blades_can_be_changed_with_what_depends_on_it() -> None:
         ("blade.mas", 1.0, "blade.mas: is not a key here, perhaps mass; allowed: mass"),
         ("initial.angles[4]", 1.0, r"initial.angles: has 4 entries; allowed: initial.angles\[0\] to "),
         ("initial.angles", 1.0, "initial.angles: 1.0 is not a list; allowed: 1 \\+ blades numbers"),
-        ("gravity", "much", "gravity: \"much\": 'much' is not a number"),
         ("gravity", None, "gravity: .* is not a number"),
         ("gravity.x", 1.0, "gravity: is a single value; allowed: the path"),
         ("a b", 1.0, "'a b' is not the path of a key; allowed: the path"),
-        ("blade.mass", -1, "blade.mass: -1 is out of range; allowed: a number above 0"),
-        ("outputs", ["angels"], r"outputs\[0\]: \"angels\" is not one of them, perhaps angles"),
     ],
 )
 def test_an_impossible_change_is_refused_with_its_key(key: str, value: object, message: str) -> None:

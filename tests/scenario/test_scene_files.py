@@ -28,7 +28,6 @@ from rotor_mbs.scenario.scene import (
     load_scene,
     scene_hash,
 )
-from rotor_mbs.scenario.time_table import segments
 from rotor_mbs.scenario.toml_file import find_lines, line_of
 
 # The captions: figures, q(0) in rad, dq/dt(0) in rad/s, rotor torque in N m.
@@ -72,24 +71,16 @@ rates = [0, 0, 0]
 """
 
 
-@pytest.fixture(scope="module")
-def paper() -> dict[str, Scene]:
-    return {scene.name: scene for scene in find_scenes(["paper"])}
+FIG11 = find_scenes(["paper/fig11"])[0]
 
 
-def _load(folder: Path, text: str) -> Scene:
-    path = folder / "scene.toml"
-    path.write_text(text, encoding="utf-8")
-    return load_scene(path, "scene")
-
-
-def test_the_paper_folder_holds_the_scenes_of_the_captions_in_order(paper: dict[str, Scene]) -> None:
-    assert list(paper) == list(PAPER)
+def test_the_paper_folder_holds_the_scenes_of_the_captions_in_order() -> None:
+    assert [scene.name for scene in find_scenes(["paper"])] == list(PAPER)
 
 
 @pytest.mark.parametrize("name", PAPER)
-def test_shipped_scene_has_the_numbers_of_its_caption(paper: dict[str, Scene], name: str) -> None:
-    scene = paper[name]
+def test_shipped_scene_has_the_numbers_of_its_caption(name: str) -> None:
+    scene = find_scenes([name])[0]
     figures, angles, rates, torque = PAPER[name]
     # pi/6 and the like are one correctly rounded operation here and in the file: equal to the last bit.
     assert scene.figures == figures
@@ -112,12 +103,17 @@ def test_shipped_scene_has_the_numbers_of_its_caption(paper: dict[str, Scene], n
 
 
 @pytest.mark.parametrize("field", fields(Scene), ids=lambda field: field.name)
-def test_every_field_enters_the_keys_that_its_part_asks_for(paper: dict[str, Scene], field: Field[Any]) -> None:
-    scene = paper["paper/fig11"]
-    value = getattr(scene, field.name)
-    changed = replace(scene, **{field.name: value[1:] if isinstance(value, tuple | str) and value else 3.0})
-    assert (scene_hash(changed) != scene_hash(scene)) == (field.metadata["part"] != "label")
-    assert (changed.rotor_key != scene.rotor_key) == (field.metadata["part"] == "rotor")
+def test_every_field_enters_the_keys_that_its_part_asks_for(field: Field[Any]) -> None:
+    value = getattr(FIG11, field.name)
+    changed = replace(FIG11, **{field.name: value[1:] if isinstance(value, tuple | str) and value else 3.0})
+    assert (scene_hash(changed) != scene_hash(FIG11)) == (field.metadata["part"] != "label")
+    assert (changed.rotor_key != FIG11.rotor_key) == (field.metadata["part"] == "rotor")
+
+
+def _load(folder: Path, text: str) -> Scene:
+    path = folder / "scene.toml"
+    path.write_text(text, encoding="utf-8")
+    return load_scene(path, "scene")
 
 
 def test_what_is_optional_is_left_out(tmp_path: Path) -> None:
@@ -127,34 +123,18 @@ def test_what_is_optional_is_left_out(tmp_path: Path) -> None:
     assert scene.blades[0].tip == scene.blades[0].centre_of_mass == (0.5, 0.0, 3.0)
 
 
-@pytest.mark.parametrize(
-    ("old", "new"),
-    [("[0, 0, 0]\n", "[1e200, 0, 0]\n"), ("0.5, 0, 3", "0, 0, 3"), ("mass = 2", "mass = 1e-25"), ("9.8", "1e25")],
-)
-def test_what_a_run_can_show_is_not_refused(tmp_path: Path, old: str, new: str) -> None:
-    assert _load(tmp_path, SCENE.replace(old, new)).blades
-
-
 @pytest.mark.parametrize("big", [1e-25, 1e25])
 @pytest.mark.parametrize("small", [1e-25, 1e25])
-def test_what_follows_from_extreme_sizes_is_a_normal_double(paper: dict[str, Scene], big: float, small: float) -> None:
+def test_what_follows_from_extreme_sizes_is_a_normal_double(big: float, small: float) -> None:
     """Inertias, moments, energies and accelerations: the closed form neither overflows nor underflows with them."""
     rotor = {"blades": 2, "blade.mass": big, "blade.centre_of_mass": [small, 0, big], "bearing.stiffness": big}
     start = {"initial.angles": [0, 0, 0], "initial.rates": [0, 0, 0]}
-    scene = paper["paper/fig11"].replace(**rotor, **start, **{"torque.rotor": big, "gravity": big})
+    scene = FIG11.replace(**rotor, **start, **{"torque.rotor": big, "gravity": big})
     form, values = rotor_form(scene), load_values([big, big, big, small, small])
     state = [0.1, 0.2, 0.3], [1.0, 1.0, 1.0]
     kinetic, potential = energies(*state, form, values, math.sin, math.cos)
     for number in (kinetic, potential, *accelerations(*state, form, values, math.sin, math.cos)):
         assert 1e-110 < abs(number) < 1e110
-
-
-def test_a_thousand_blades_and_twenty_thousand_rows_fit(tmp_path: Path) -> None:
-    rows = [[k / 20_000, k % 7] for k in range(20_000)]
-    text = SCENE.replace("blades = 2", "blades = 1000").replace("[0, 0, 0]", str([0] * 1001))
-    scene = _load(tmp_path, f"{text}[torque]\nrotor = {rows}\n")
-    assert len(scene.blades) == len(scene.phases) == 1000
-    assert len(segments([scene.rotor_torque], scene.duration)) == 20_000
 
 
 def test_hash_ignores_how_the_scene_is_written(tmp_path: Path) -> None:
