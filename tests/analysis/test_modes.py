@@ -28,26 +28,11 @@ def test_a_mode_that_grows_without_oscillating_has_no_undamped_frequency():
     assert found.growth_rates == pytest.approx([3.0], rel=1e-14)
 
 
-def test_two_masses_between_three_springs():
-    found = modes.modes_of(np.array([[2.0, -1.0], [-1.0, 2.0]]), np.zeros((2, 2)), is_cyclic=False)
-    assert found.undamped_frequencies == pytest.approx([1.0, math.sqrt(3.0)], rel=1e-14)
-    np.testing.assert_allclose(found.shapes, [[1.0, 1.0], [1.0, -1.0]], atol=1e-14)
-
-
 def test_a_rotor_nothing_holds_has_an_eigenvalue_of_exact_zero():
     stiffness, damping = np.array([[0.0, 3.0], [0.0, 50.0]]), np.diag([0.2, 0.0])
     found = modes.modes_of(stiffness, damping, is_cyclic=True)
     assert found.eigenvalues[0].tolist() == pytest.approx([-0.2, 0.0], abs=1e-14)
     assert found.undamped_frequencies == pytest.approx([0.0, math.sqrt(50.0)], rel=1e-13)
-
-
-@pytest.mark.parametrize("blades", [1, 2, 3, 4, 5, 6])
-def test_multiblade_shapes_undo_the_multiblade_matrix(blades):
-    names, matrix = modes.multiblade(blades)
-    assert len(names) == blades
-    amplitudes = np.arange(1.0, blades + 2.0)
-    shape = np.array([amplitudes[0], *(matrix @ amplitudes[1:])], dtype=complex)
-    np.testing.assert_allclose(modes.multiblade_shapes(shape), amplitudes, atol=1e-14)
 
 
 def _equal_blades(blades: int) -> tuple[np.ndarray, np.ndarray]:
@@ -63,9 +48,13 @@ def _equal_blades(blades: int) -> tuple[np.ndarray, np.ndarray]:
 
 @pytest.mark.parametrize("blades", [1, 2, 3, 4, 5])
 def test_multiblade_coordinates_split_the_modes_of_equal_blades(blades):
+    names, matrix = modes.multiblade(blades)
+    amplitudes = np.arange(1.0, blades + 2.0)
+    shape = np.array([amplitudes[0], *(matrix @ amplitudes[1:])], dtype=complex)
+    np.testing.assert_allclose(modes.multiblade_shapes(shape), amplitudes, atol=1e-14)
     split = modes.isotropic_modes(*_equal_blades(blades))
     whole = modes.modes_of(*_equal_blades(blades), is_cyclic=True)
-    assert split.names == ("rotor", *modes.multiblade(blades)[0])
+    assert split.names == ("rotor", *names)
     np.testing.assert_allclose(np.sort(split.growth_rates), np.sort(whole.growth_rates), atol=1e-7)
     np.testing.assert_allclose(np.sort(split.damped_frequencies), np.sort(whole.damped_frequencies), atol=1e-7)
     for k in range(2, 1 + blades):

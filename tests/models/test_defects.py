@@ -14,7 +14,6 @@ from support.scenes import PAPER, paper
 
 from rotor_mbs.analysis.judgement import judge
 from rotor_mbs.errors import InputError
-from rotor_mbs.methods.catalogue import find_method
 from rotor_mbs.methods.solve import solve
 from rotor_mbs.models.lagrange import defects as defects_module
 from rotor_mbs.models.lagrange.defects import fitted_rates, interval_defects
@@ -41,10 +40,6 @@ def fig11_run() -> Trajectory:
     return solve(DOP853, FIG11, {}).trajectory
 
 
-def states(run: Trajectory) -> Array:
-    return np.hstack([run.angles, run.rates])
-
-
 def signed(defects: Defects) -> Array:
     return np.hstack([defects.angles, defects.rates])
 
@@ -56,12 +51,10 @@ def intervals(defects: Defects) -> list[int]:
 
 # ---- Of a right run
 
-
 JUMPS = ((0.0, 0.0), (0.5, 2e6), (0.7525, 3e6), (0.7525, -2e6), (1.2, 1e6))
 RIGHT = {
     "one blade": paper("fig03", duration=2.0, samples=201),
     "a torque that jumps inside an interval": paper("fig03", duration=2.0, samples=201, rotor_torque=JUMPS),
-    "a pitch that is fixed": paper("fig04b", duration=2.0, samples=201),
     "chaos": paper("fig11", duration=2.0, samples=201),
     "a stiff bearing": shipped("stiff/bearing-1e8"),
     "a damped turbine": shipped("stiff/nrel-5mw-damped"),
@@ -99,10 +92,11 @@ def test_half_the_step_divides_the_defects_by_two_to_the_order(method: str, orde
     assert np.log2(medians[0] / medians[1]) == pytest.approx(order, abs=0.2)
 
 
-# ---- Strong: a wrong term is seen in the intervals where it acts, in proportion
+# ---- Faults: a wrong load, a wrong row, a wrong start. Wrong numbers of a model are those of test_planted_faults.py,
+# patterns that are named those of studies/test_defect_causes.py.
 
 
-def test_a_wrong_torque_is_seen_in_its_intervals_alone() -> None:
+def test_a_wrong_torque_is_seen_in_its_intervals_alone_in_proportion() -> None:
     """For half a second; linear in the torque but for what the motion itself makes of it, 1e-3 within a second."""
     largest = []
     for torque in (1e3, 2e3):
@@ -113,21 +107,6 @@ def test_a_wrong_torque_is_seen_in_its_intervals_alone() -> None:
         largest.append(signed(defects)[30:80])
     off = np.abs(largest[1] - 2.0 * largest[0]).max(axis=0)
     assert (off <= 1e-2 * np.abs(largest[1]).max(axis=0)).all()
-
-
-def test_a_wrong_gravity_is_seen_in_every_interval_in_proportion() -> None:
-    """Down to a relative 1e-9, of which the defects are a thousand times above their floor."""
-    pytest.importorskip("heyoka")
-    sizes = []
-    for share in (1e-6, 1e-9):
-        run = solve(TAYLOR, replace(FIG11, gravity=FIG11.gravity * (1.0 + share)), {}).trajectory
-        defects = defects_of(FIG11, run)
-        assert (defects.sizes > 10.0 * defects.floor).all()
-        sizes.append(np.median(defects.sizes) / share)
-    assert sizes[0] == pytest.approx(sizes[1], rel=1e-2)
-
-
-# ---- Patterns: what the defects of a wrong row look like
 
 
 def test_one_wrong_row_gives_two_defects_of_which_the_second_undoes_the_first() -> None:
@@ -143,31 +122,6 @@ def test_one_wrong_row_gives_two_defects_of_which_the_second_undoes_the_first() 
     assert defects.transitions is not None
     # Beyond the linear part: squares of the error.
     np.testing.assert_allclose(second, -defects.transitions[row] @ first, rtol=1e-4, atol=1e-9)
-
-
-def test_a_row_dropped_with_its_time_is_a_gap_and_without_it_one_defect_along_the_motion() -> None:
-    run = fig11_run()
-    kept = np.delete(np.arange(101), 40)
-    gap = interval_defects(FIG11, run.time[kept], run.angles[kept], run.rates[kept])
-    assert intervals(gap) == []
-    renumbered = interval_defects(FIG11, run.time[:-1], run.angles[kept], run.rates[kept])
-    assert intervals(renumbered) == [39]
-    defect, motion = signed(renumbered)[39], states(run)[41] - states(run)[40]
-    assert -defect @ motion / np.linalg.norm(defect) / np.linalg.norm(motion) == pytest.approx(1.0, abs=1e-3)
-
-
-def test_a_kick_of_a_rate_is_one_defect_without_an_angle() -> None:
-    run, row = fig11_run(), 40
-    rates = run.rates[row].copy()
-    rates[2] += 1e-5
-    after = replace(FIG11, duration=0.6, samples=61, initial_angles=tuple(run.angles[row]), initial_rates=tuple(rates))
-    rest = solve(DOP853, after, {}).trajectory
-    kicked = interval_defects(
-        FIG11, run.time, np.vstack([run.angles[:row], rest.angles]), np.vstack([run.rates[:row], rest.rates])
-    )
-    assert intervals(kicked) == [row - 1]
-    assert np.abs(kicked.angles[row - 1]).max() < NOISE
-    np.testing.assert_allclose(kicked.rates[row - 1], [0.0, 0.0, -1e-5, 0.0], rtol=0, atol=1e-10)
 
 
 def test_a_wrong_start_has_no_defect_but_is_in_the_predicted_error() -> None:
@@ -244,12 +198,11 @@ def test_pitches_at_rest_by_symmetry_are_those_that_stay_exactly_zero(name: str)
 
 # ---- What cannot be judged
 
-
 SIZES = (1e-9, 3e-9, 2e-9)
 
 
 def test_numbers_of_defects() -> None:
-    metrics = defect_metrics(made_defects(SIZES), None)
+    metrics = defect_metrics(made_defects(SIZES), None)  # rad, of intervals of 0.01 s
     assert (metrics["defect_max"], metrics["defect_median"], metrics["defect_time"]) == (3e-9, 2e-9, 0.02)
     assert (metrics["defect_mean"], metrics["angle_error_predicted"]) == pytest.approx((2e-9, 6e-9))
     assert metrics["defects_not_judged"] == 0
@@ -271,19 +224,15 @@ def test_the_bound_is_for_a_hundredth_of_a_second_without_growth() -> None:
 
 @pytest.mark.parametrize(("growth", "left_out"), [(0.9 * MAX_INTERVAL_GROWTH, 0), (1.1 * MAX_INTERVAL_GROWTH, 1)])
 def test_an_interval_of_huge_growth_is_counted_and_not_judged(growth: float, left_out: int) -> None:
+    """But for one without an end, which fails however much grows there."""
     transitions = np.tile(np.eye(2), (3, 1, 1))
     transitions[1, 0, 1] = growth
     metrics = defect_metrics(made_defects(SIZES, transitions=transitions), None)
     assert metrics["defects_not_judged"] == left_out
     assert metrics["defect_max"] == (2e-9 if left_out else 3e-9)
-
-
-@pytest.mark.parametrize("growth", [1.0, np.inf])
-def test_an_interval_without_an_end_fails_however_much_grows_there(growth: float) -> None:
-    transitions = np.tile(np.eye(2), (3, 1, 1))
-    transitions[1, 0, 1] = growth
-    metrics = defect_metrics(made_defects((1e-9, np.nan, 2e-9), transitions=transitions), None)
-    assert metrics["defect_max"] == np.inf
+    transitions[1, 0, 1] = 1.0 if left_out == 0 else np.inf
+    endless = made_defects((1e-9, np.nan, 2e-9), transitions=transitions)
+    assert defect_metrics(endless, None)["defect_max"] == np.inf
 
 
 @pytest.mark.parametrize("rate", [1e200, 1e20, 1e4])
@@ -300,32 +249,14 @@ def test_a_row_that_is_no_motion_is_inaccurate(rate: float) -> None:
 
 
 @pytest.mark.parametrize(
-    "method",
-    [
-        "lagrange/taylor", "exudyn_tree/rk67",
-        *(pytest.param(name, marks=pytest.mark.full) for name in (
-            "lagrange/dop853", "lagrange/ode45", "lagrange/radau", "exudyn_tree/dopri5", "exudyn_chain/extrapolated",
-            "exudyn_chain/generalized_alpha", "mujoco/rk4",
-        )),
-    ],
-)  # fmt: skip
+    "method", [TAYLOR, "exudyn_tree/rk67", pytest.param("exudyn_chain/generalized_alpha", marks=pytest.mark.full)]
+)
 @pytest.mark.parametrize("samples", [101, 11])
 def test_how_far_apart_samples_are_decides_no_status(method: str, samples: int) -> None:
     """Over a second errors grow up to 200 times, and a method's own ones add up: the run is the same."""
-    if not find_method(method).is_installed:
-        pytest.skip(f"{method} is not installed")
     scene = replace(paper("fig11"), samples=samples, outputs=("angles", "rates"))
     judgement = judge(scene, solve(method, scene, {}), None)
     assert (judgement.status, judgement.message) == ("ok", "")
-
-
-def test_a_torque_of_half_a_second_is_seen_in_coarse_samples() -> None:
-    scene = replace(paper("fig11"), samples=21, outputs=("angles", "rates"))
-    pushed = replace(scene, rotor_torque=((0.0, 0.0), (5.65, 0.0), (5.65, 2e3), (6.15, 2e3), (6.15, 0.0)))
-    judgement = judge(scene, solve("lagrange/taylor", pushed, {}), None)
-    assert judgement.status == "inaccurate"
-    assert judgement.message.startswith("defect ")
-    assert 6.0 <= judgement.metrics["defect_time"] <= 6.5
 
 
 def test_a_run_that_left_the_symmetry_has_one_horizon_with_and_without_a_reference() -> None:

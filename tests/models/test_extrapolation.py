@@ -12,14 +12,10 @@ from support.rotors import FIG11, closed_form
 from rotor_mbs.methods.catalogue import find_method
 from rotor_mbs.methods.solve import solve
 from rotor_mbs.models.exudyn.extrapolation import ExtrapolatedSolver
-from rotor_mbs.scenario.catalogue import find_scenes
 from rotor_mbs.scenario.scene import Scene
-from rotor_mbs.solution.metrics import horizon_samples
 
 METHOD = "exudyn_chain/extrapolated"
 SHORT = replace(FIG11, duration=1.0, samples=101)
-PAPER_SCENES = [found.name for found in find_scenes(["paper"])]
-_QUICK = ("paper/fig03", "paper/fig08")
 
 
 def beginning(name: str, samples: int) -> Scene:
@@ -58,10 +54,9 @@ def test_with_every_column_the_order_rises_by_two(columns: int, coarse: int, mon
     assert np.log2(found[0] / found[1]) == pytest.approx(2 * columns, abs=0.6)
 
 
-@pytest.mark.parametrize("tolerance", [1e-5, 1e-7, 1e-9])
+@pytest.mark.parametrize("tolerance", [1e-5, 1e-9])
 def test_errors_follow_the_tolerance(tolerance: float) -> None:
-    """What is kept of an interval is better than the value that the estimate is of: a hundred of them, for a second in
-    which errors do not grow tenfold, end within a hundred tolerances."""
+    """A hundred intervals of a second in which errors do not grow tenfold."""
     angles = solve(METHOD, SHORT, {"tolerance": tolerance}).angles
     assert np.abs(angles - exact_angles(SHORT)).max() < 100 * tolerance
 
@@ -111,11 +106,10 @@ def test_loads_at_every_sample_from_the_first_on() -> None:
         assert off.max() < 1e-5
 
 
-@pytest.mark.parametrize(("duration", "samples"), [(2.0, 301), (1.2, 61)])
-def test_the_work_of_loads_and_dampers_along_the_substeps(duration: float, samples: int) -> None:
-    """Springs that swing by 1.3 and by 3.8 rad between samples: the energy keeps to 1e-6 of the largest kinetic one,
-    where a power interpolated through the samples loses 2e-3 and more."""
-    given = replace(scene("turbine/pitch-step"), duration=duration, samples=samples, outputs=("angles", "energy"))
+def test_the_work_of_loads_and_dampers_along_the_substeps() -> None:
+    """Springs that swing by 3.8 rad between samples: the energy keeps to 1e-6 of the largest kinetic one, where a power
+    interpolated through the samples loses 2e-3 and more."""
+    given = replace(scene("turbine/pitch-step"), duration=1.2, samples=61, outputs=("angles", "energy"))
     result = solve(METHOD, given, {})
     total = result["kinetic_energy"] + result["potential_energy"] - result["work"]
     assert np.abs(total - total[0]).max() < 1e-6 * result["kinetic_energy"].max()
@@ -128,18 +122,3 @@ def test_no_newton_step_converges_and_the_run_says_so(monkeypatch: pytest.Monkey
     assert not result.integration.success
     assert result.integration.message
     assert len(result.time) == 1
-
-
-@pytest.mark.parametrize(
-    ("name", "tolerance", "bound"),
-    [
-        pytest.param(name, *case, marks=() if name in _QUICK and case[1] == 1e-4 else pytest.mark.full)
-        for name in PAPER_SCENES
-        for case in ((3e-8, 1e-4), (1e-10, 1e-6))
-    ],
-)
-def test_up_to_the_horizon(name: str, tolerance: float, bound: float) -> None:
-    """At the default tolerance the bound that comparisons of the paper are read by; 2.9e-5 rad was seen on fig13b."""
-    samples = horizon_samples(reference(name))
-    result = solve(METHOD, beginning(name, samples), {"tolerance": tolerance})
-    assert np.abs(result.angles - reference(name).angles[:samples]).max() <= bound

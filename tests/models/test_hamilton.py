@@ -16,39 +16,26 @@ from rotor_mbs.models.lagrange.parameters import RotorForm, rotor_form
 from rotor_mbs.scenario.scene import Scene
 
 
-class Exact:
+class Exact(Fraction):
     """A rational number that takes floats for what they are."""
 
-    def __init__(self, value: Any) -> None:
-        self.value = value.value if isinstance(value, Exact) else Fraction(value)
 
-    def __add__(self, other: Any) -> Exact:
-        return Exact(self.value + Exact(other).value)
+def _operation(name: str) -> Any:
+    return lambda self, other: Exact(getattr(Fraction, name)(self, Fraction(other)))
 
-    def __sub__(self, other: Any) -> Exact:
-        return Exact(self.value - Exact(other).value)
 
-    def __rsub__(self, other: Any) -> Exact:
-        return Exact(Exact(other).value - self.value)
-
-    def __mul__(self, other: Any) -> Exact:
-        return Exact(self.value * Exact(other).value)
-
-    def __truediv__(self, other: Any) -> Exact:
-        return Exact(self.value / Exact(other).value)
-
-    __radd__, __rmul__ = __add__, __mul__
+for _name in ("__add__", "__radd__", "__sub__", "__rsub__", "__mul__", "__rmul__", "__truediv__"):
+    setattr(Exact, _name, _operation(_name))
 
 
 def sin(half_tangent: Exact) -> Exact:
     """Of the angle whose half has this tangent: rational. An angle's own value enters the springs alone."""
-    t = half_tangent.value
-    return Exact(2 * t / (1 + t * t))
+    return Exact(2 * half_tangent / (1 + half_tangent * half_tangent))
 
 
 def cos(half_tangent: Exact) -> Exact:
-    t = half_tangent.value
-    return Exact((1 - t * t) / (1 + t * t))
+    square = half_tangent * half_tangent
+    return Exact((1 - square) / (1 + square))
 
 
 def derivatives_of_momenta(
@@ -85,5 +72,5 @@ def test_both_forms_are_the_same_equations_exactly(given: Scene) -> None:
         rates_again = hamilton.rates(angles, p, form, sin, cos)
         forces = hamilton.forces(angles, rates, form, loads, sin, cos)
         expected = derivatives_of_momenta(angles, rates, accelerations(angles, rates, form, loads, sin, cos), form)
-        assert [given.value for given in rates_again] == [given.value for given in rates]
-        assert [given.value for given in forces] == [given.value for given in expected]
+        assert rates_again == rates
+        assert forces == expected
