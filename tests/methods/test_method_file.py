@@ -26,47 +26,33 @@ blade = { mass = 800, centre_of_mass = [0.3, 0.1, 5.2], inertia = [4000, 4100, 3
 hub = { inertia = 5000 }
 initial = { angles = [0.5, 0.3], rates = [0.4, 0] }
 """
-# Solvers that do what is in `integrate`; each a method of one file.
+# Methods of one file, each of which does something else in `integrate`.
 BAD = """
 import os, time
 import numpy as np
 from rotor_mbs.methods.base import Method
 from rotor_mbs.solution.trajectory import Integration, Trajectory
 
+ACTS = {
+    "Raises": lambda: 1 / 0,
+    "Hangs": lambda: time.sleep(1e3),
+    "Dies": lambda: os._exit(9),
+    "Prints": lambda: [print("x" * 10**6), os.write(1, b"x" * 10**6)],
+    "Shape": lambda: None,
+}
+
 class Still:
-    def __init__(self, scene, settings):
-        self.scene = scene
+    def __init__(self, scene, name):
+        self.scene, self.name = scene, name
     def integrate(self):
-        self.act()
+        ACTS[self.name]()
         return Integration(True, "", self.scene.duration)
     def observe(self):
         time = np.linspace(0.0, self.scene.duration, self.scene.samples)
-        return Trajectory(time, np.tile(self.scene.initial_angles, (len(time), 1)), np.zeros((len(time), 2)))
+        columns = 1 if self.name == "Shape" else 2
+        return Trajectory(time, np.tile(self.scene.initial_angles[:columns], (len(time), 1)), np.zeros((len(time), 2)))
 
-class Raises(Still):
-    def act(self):
-        return 1 / 0
-class Hangs(Still):
-    def act(self):
-        time.sleep(1e3)
-class Dies(Still):
-    def act(self):
-        os._exit(9)
-class Prints(Still):
-    def act(self):
-        print("x" * 10**6)
-        os.write(1, b"x" * 10**6)
-
-class Shape(Still):
-    def act(self):
-        pass
-    def observe(self):
-        run = super().observe()
-        return run.replace(angles=run.angles[:, :1])
-
-METHODS = [
-    Method(name=kind.__name__, label=kind.__name__, build=kind) for kind in (Raises, Hangs, Dies, Prints, Shape)
-]
+METHODS = [Method(name=name, label=name, build=lambda scene, _, name=name: Still(scene, name)) for name in ACTS]
 """
 # A solver that does one of these when it is built.
 BAD_BUILD = """
@@ -124,7 +110,6 @@ def test_a_run_is_keyed_by_the_code_of_its_file() -> None:
     ("name", "text", "line"),
     [
         ("mine.py", "a = 1\nb = (\n", "mine.py:2: SyntaxError: '(' was never closed"),
-        ("mine.py", "import numpy\nimport no_engine\n", "mine.py:2: ModuleNotFoundError: No module named 'no_engine'"),
         ("mine.py", "raise SystemExit\n", "mine.py:1: SystemExit: no message"),
         ("mine.py", "import os\nos._exit(0)\n", "mine.py: ended the process that loaded it (exit code 0)"),
         ("mine.py", "while True: pass\n", "mine.py: not loaded within 3 s"),
@@ -133,7 +118,7 @@ def test_a_run_is_keyed_by_the_code_of_its_file() -> None:
         ("none.py", "", "none.py: No such file or directory; allowed: a Python file"),
         ("other/mine.py", EXAMPLE, "other/mine.py: methods mine/... are those of mine.py; allowed: another file name"),
     ],
-    ids=["syntax", "import", "exit", "ends", "hangs", "no method", "a shipped name", "no file", "a name twice"],
+    ids=["syntax", "exit", "ends", "hangs", "no method", "a shipped name", "no file", "a name twice"],
 )
 def test_a_file_that_cannot_be_used_is_one_line(
     name: str, text: str, line: str, monkeypatch: pytest.MonkeyPatch
@@ -161,7 +146,7 @@ def test_whatever_a_method_does_is_one_line_and_loses_nothing(capfd: pytest.Capt
         "bad/Shape": "solver_failed",
     }  # fmt: skip
     assert runs["bad/Shape"].message == "bad/Shape: angles has the shape (6, 1); allowed: (6, 2)"
-    assert runs["bad/Raises"].message == "bad.py:20: ZeroDivisionError: division by zero"
+    assert runs["bad/Raises"].message == "bad.py:9: ZeroDivisionError: division by zero"
     assert ended.err.count("one bad/Dies: not computed (its process died (exit code 9)") == 1
 
 
@@ -170,7 +155,6 @@ def test_whatever_a_method_does_is_one_line_and_loses_nothing(capfd: pytest.Capt
     [
         ("os._exit(3)", "bad/bad: ended the process that built it for one (exit code 3)"),
         ("time.sleep(1e3)", "bad/bad: builds nothing for one within 5 s"),
-        ("1 / 0", "bad.py:6: ZeroDivisionError: division by zero"),
         ("print('x' * 10**6); os.write(1, b'x' * 10**6); 1 / 0", "bad.py:6: ZeroDivisionError: division by zero"),
     ],
 )
@@ -202,18 +186,13 @@ def test_the_other_commands_take_a_file() -> None:
         "class Solver"
     )  # fmt: skip
     Path("mine.py").write_text(stepped)
-    commands = {
-        "bench": ("bench", "one.toml", "-m", "mine.py", "-o", "b.h5", "--repeats", "1", "--budget", "20"),
-        "stability": ("stability", "one.toml", "-m", "mine.py", "-o", "s.h5"),
-    }
-    for words in commands.values():
-        ended = rotor_mbs(*words)
+    for words in ("bench -m mine.py -o b.h5 --repeats 1 --budget 20", "stability -m mine.py -o s.h5"):
+        command, *options = words.split()
+        ended = rotor_mbs(command, "one.toml", *options)
         assert ended.status == 0, ended
     assert "mine/lsoda" in rotor_mbs("report", "s.h5").out + Path("b-report/index.html").read_text()
     ended = rotor_mbs("modes", "one.toml", "-m", "mine.py")
-    assert (ended.status, ended.err) == (
-        2,
-        "mine/lsoda: its model has no linearization; allowed: a model with `linearize`\n",
-    )
+    assert ended.status == 2
+    assert ended.err == "mine/lsoda: its model has no linearization; allowed: a model with `linearize`\n"
     ended = rotor_mbs("modes", "one.toml", "-m", "lagrange/taylor")
     assert (ended.status, ended.err) == (0, "[1/1] one modes ok\n")

@@ -15,16 +15,15 @@ from rotor_mbs.errors import MethodRefusal
 from rotor_mbs.methods.catalogue import choose, is_corrected, methods, singular_reason
 from rotor_mbs.methods.solve import solve
 from rotor_mbs.scenario.catalogue import find_scenes
-from rotor_mbs.scenario.scene import Scene
 
 DEFAULT_METHODS = tuple(method.name for method in methods() if method.is_default)
 
 
-@pytest.mark.parametrize("name", PAPER)
-def test_scenes_of_the_paper_keep_the_default_set(name: str) -> None:
-    methods = choose(paper(name), DEFAULT_METHODS)[0]
-    assert methods[0] == "lagrange/taylor"  # not the printed model, which comes first in the paper's comparison
-    assert set(methods) == set(DEFAULT_METHODS)
+def test_scenes_of_the_paper_keep_the_default_set() -> None:
+    for name in PAPER:
+        methods = choose(paper(name), DEFAULT_METHODS)[0]
+        assert methods[0] == "lagrange/taylor"  # not the printed model, which comes first in the paper's comparison
+        assert set(methods) == set(DEFAULT_METHODS), name
 
 
 CHOOSE_THEIR_STEP, IMPLICIT = ("lagrange/taylor", "exudyn_tree/dopri5"), ("lagrange/taylor", "lagrange/radau")
@@ -34,12 +33,10 @@ CHOOSE_THEIR_STEP, IMPLICIT = ("lagrange/taylor", "exudyn_tree/dopri5"), ("lagra
     ("name", "expected"),
     [
         ("bearing-1e8", CHOOSE_THEIR_STEP),
-        ("bearing-1e12", CHOOSE_THEIR_STEP),
         ("slow-rotor", CHOOSE_THEIR_STEP),
         ("one-blade-stiff", CHOOSE_THEIR_STEP),
         # Overdamped: no fixed step of Exudyn's stays within its bound on all of them.
         ("bearing-1e8-damping-100", IMPLICIT),
-        ("bearing-1e12-damping-100", IMPLICIT),
         ("shaft-damping", IMPLICIT),
     ],
 )
@@ -51,8 +48,6 @@ def test_stiff_scenes_get_methods_that_stay_within_their_bounds(name: str, expec
 
 # No method at all: rates that overflow when squared, and 7.9e6 s of simulated time within the suite's time limit.
 _NOTHING_HOLDS = ("extreme/rate-1e200", "extreme/pendulum-million")
-
-
 _QUICK = ("stiff/bearing-1e8", "stiff/shaft-damping", "extreme/light-1e-4")
 
 
@@ -87,16 +82,10 @@ def test_what_has_no_motion_is_refused(name: str, tmp_path: Path, capsys: pytest
 
 
 @pytest.mark.parametrize(
-    "able",
-    [
-        replace(scene("extreme/singular-one-blade"), hub_inertia=1e-6),
-        replace(scene("extreme/singular-one-blade"), bearing_stiffness=(1e6,)),
-        paper("fig03"),
-    ],
-    ids=["with a hub", "held by a spring", "pitch exactly zero"],
+    "changes", [{"hub_inertia": 1e-6}, {"bearing_stiffness": (1e6,)}], ids=["with a hub", "held by a spring"]
 )
-def test_one_blade_is_taken_where_it_does_not_end(able: Scene) -> None:
-    assert choose(able, DEFAULT_METHODS)[0]
+def test_one_blade_is_taken_where_it_does_not_end(changes: dict[str, object]) -> None:
+    assert choose(replace(scene("extreme/singular-one-blade"), **changes), DEFAULT_METHODS)[0]
 
 
 def test_a_run_names_every_method_it_took_first_the_one_it_stands_by(

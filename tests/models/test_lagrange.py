@@ -13,7 +13,7 @@ from support.scenes import general, paper
 
 from rotor_mbs.analysis.judgement import judge
 from rotor_mbs.methods.solve import solve
-from rotor_mbs.models.lagrange import closed_form
+from rotor_mbs.models.lagrange import closed_form, reference
 from rotor_mbs.models.lagrange.closed_form import LoadValues
 from rotor_mbs.models.lagrange.parameters import rotor_form
 from rotor_mbs.scenario.catalogue import find_scenes
@@ -22,7 +22,6 @@ from rotor_mbs.solution.trajectory import Trajectory
 
 heyoka = pytest.importorskip("heyoka")
 
-METHODS = ("lagrange/taylor", "lagrange/dop853")
 TWO = {"initial_angles": (0.1, 0.3, -0.2), "initial_rates": (0.2, 0.1, 0.4)}
 
 
@@ -119,8 +118,6 @@ def test_error_growth_is_that_of_neighbouring_runs() -> None:
 
 @pytest.mark.full
 def test_the_fallback_reference_states_its_uncertainty(monkeypatch: pytest.MonkeyPatch) -> None:
-    from rotor_mbs.models.lagrange import reference
-
     scene = paper("fig11", duration=7.0, samples=701)
     true = run(scene, "reference")
     monkeypatch.setattr(reference, "is_available", lambda: False)

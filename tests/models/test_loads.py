@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import functools
 import itertools
 import math
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from support.other_code import about
 from support.rotors import make_scene
 from support.scenes import general, paper
 
@@ -17,6 +17,7 @@ from rotor_mbs.scenario.catalogue import find_scenes
 from rotor_mbs.scenario.scene import Blade, Scene
 from rotor_mbs.scenario.time_table import value_at
 from rotor_mbs.solution.quantities import longest_arm
+from rotor_mbs.solution.trajectory import Trajectory
 
 LOADS = ("blade_root_force", "blade_root_moment", "shaft_force", "shaft_moment", "pitch_actuator_moment")
 OUTPUTS = ("angles", "rates", "energy", "loads")
@@ -85,15 +86,14 @@ def test_centrifugal_force_of_a_turning_rotor(method: str) -> None:
 
 
 def test_gyroscopic_moment_of_a_pitching_blade(method: str) -> None:
-    """A blade that spins about its own axis in a turning rotor: the moment is Ω × L + what turns its tensor.
+    """Of equal transverse moments, with the polar moment C, that spins about its own axis in a turning rotor.
 
-    With equal transverse moments A and polar moment C about the pitch axis, angular momentum about the hub centre is
-    L = A' Ω e_y + C θ̇ e_z (A' with the mass at its arm), and only e_z turns, with Ω e_y × e_z = Ω e_x: the moment is
-    C θ̇ Ω along the azimuth's x axis in the rotor, and none is left along the shaft.
+    Of its angular momentum A' Ω e_y + C θ̇ e_z only e_z turns, with Ω e_y × e_z = Ω e_x: the moment is C θ̇ Ω along the
+    azimuth's x axis in the rotor, and none is left along the shaft.
     """
     speed, rate, C = 2.0, 5.0, 150.0
-    blade = Blade(MASS, (0.0, 0.0, ARM), (900.0, 900.0, C, 0.0, 0.0, 0.0), (0.0, 0.0, 12.0))
-    scene = make_scene((0.0, 0.4), (speed, rate), (blade,), gravity=0.0, duration=0.2, samples=21, outputs=OUTPUTS)
+    blade = replace(BEAM, inertia=(900.0, 900.0, C, 0.0, 0.0, 0.0))
+    scene = replace(beam((0.0, 0.4), (speed, rate), gravity=0.0), blades=(blade,))
     run = loads(method, scene)
     pitch, azimuth = run.angles[:, 1], run.angles[:, 0]
     assert off(run.rates, [speed, rate]) < 1e-6
@@ -156,10 +156,7 @@ def test_actuator_moment_is_the_moment_about_the_pitch_axis(method: str) -> None
 
 def rotations(azimuth, pitch):
     """(n, 3, 3) Ry(azimuth) Rz(pitch)."""
-    s, c, sp, cp = np.sin(azimuth), np.cos(azimuth), np.sin(pitch), np.cos(pitch)
-    zero = np.zeros_like(s)
-    rows = [[c * cp, -c * sp, s], [sp, cp, zero], [-s * cp, s * sp, c]]
-    return np.moveaxis(np.array(rows), 2, 0)
+    return (about("y", azimuth) * about("z", pitch)).as_matrix()
 
 
 # The chain against the closed form.
@@ -186,21 +183,11 @@ AGREEING = {
 }
 
 
-@functools.cache
-def chain_loads(name: str, refinement: int) -> dict[str, np.ndarray]:
-    scene, step = AGREEING[name]
-    settings = {"step": step / refinement, **TIGHT}
-    run = loads("exudyn_chain/newmark_index2", scene, **settings)
-    return {load: run.get(load) for load in LOADS}
-
-
-def load_error(scene: Scene, result: dict[str, np.ndarray], exact) -> float:
+def load_error(scene: Scene, result: Trajectory, exact: Trajectory) -> float:
     """Of the largest force at a root; moments of that force at the longest arm."""
     force = np.linalg.norm(exact.blade_root_force, axis=-1).max()
-    return max(
-        off(result[name], exact.get(name)) / (force * (1.0 if "force" in name else longest_arm(scene)))
-        for name in LOADS
-    )
+    units = {name: force if "force" in name else force * longest_arm(scene) for name in LOADS}
+    return max(off(result.get(name), exact.get(name)) / unit for name, unit in units.items())
 
 
 @pytest.mark.parametrize(
@@ -209,13 +196,13 @@ def load_error(scene: Scene, result: dict[str, np.ndarray], exact) -> float:
 def test_chain_and_closed_form_agree_at_second_order_and_by_extrapolation(name: str) -> None:
     """Multipliers against Newton and Euler: errors a quarter at half the step (ratios seen: 3.94 to 4.01); by
     extrapolation within each interval 1e-6 of the largest load."""
-    scene, _ = AGREEING[name]
+    scene, step = AGREEING[name]
     exact = loads("lagrange/dop853", scene)
-    errors = [load_error(scene, chain_loads(name, refinement), exact) for refinement in (1, 2, 4)]
-    for larger, smaller in itertools.pairwise(errors):
+    steps = (step, step / 2, step / 4)
+    runs = [loads("exudyn_chain/newmark_index2", scene, step=step, **TIGHT) for step in steps]
+    for larger, smaller in itertools.pairwise(load_error(scene, run, exact) for run in runs):
         assert larger / smaller == pytest.approx(4.0, abs=0.2)
-    extrapolated = loads("exudyn_chain/extrapolated", scene, tolerance=1e-10)
-    assert load_error(scene, {load: extrapolated.get(load) for load in LOADS}, exact) < 1e-6
+    assert load_error(scene, loads("exudyn_chain/extrapolated", scene, tolerance=1e-10), exact) < 1e-6
 
 
 def test_at_a_jump_of_the_torque_stands_the_load_before_it(method: str) -> None:

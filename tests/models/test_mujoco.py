@@ -119,7 +119,7 @@ def test_an_inertia_at_the_limit_of_the_triangle_inequality() -> None:
 
 @pytest.mark.parametrize("method", ["mujoco/rk4", "mujoco/implicitfast", "mujoco/implicit"])
 def test_runs_are_within_their_bounds_and_an_impossible_step_is_refused(method: str) -> None:
-    for name in ("check/general", "check/held", "check/point-masses"):
+    for name in ("check/general", "check/held"):
         scene = references.scene(name)
         assert judge(scene, solve(method, scene, {}), references.reference(name)).status == "ok"
     with pytest.raises(InputError, match="steps"):
