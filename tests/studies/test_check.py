@@ -98,21 +98,9 @@ def test_where_there_is_nothing_to_judge_the_command_says_so(
 
 
 @pytest.mark.full
-def test_the_default_set_passes(tmp_path: Path) -> None:
-    """All of it, as a user starts it."""
-    files = ["--json", tmp_path / "check.json", "--junit", tmp_path / "check.xml"]
-    done = _run_check(*map(str, files))
-    assert done.returncode == 0, done.stdout
-    rows = json.loads((tmp_path / "check.json").read_text())
-    assert all(row["passed"] for row in rows)
-
-
-def _run_check(*arguments: str, path: str = str(ROOT)) -> subprocess.CompletedProcess[str]:
-    """`rotor-mbs check` in a process of its own, with `path` to import from."""
-    return subprocess.run(
-        [sys.executable, "-m", "rotor_mbs", "check", *arguments],
-        capture_output=True, text=True, env={**os.environ, "PYTHONPATH": path}, timeout=550,
-    )  # fmt: skip
+def test_the_default_set_passes(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    lines_of(capsys, "--json", tmp_path / "check.json", status=0)
+    assert all(row["passed"] for row in json.loads((tmp_path / "check.json").read_text()))
 
 
 # Faults in the models
@@ -147,30 +135,19 @@ def test_an_erratum_in_the_closed_form_fails(
     named(lines, f"FAIL energy: {scene} {METHOD} balance:", "a force")
 
 
-def _differences(scene_name: str) -> dict[str, float]:
-    """How far a reference that is computed now is from the frozen one, by the name of the bound."""
-    scene = shipped(scene_name)
-    frozen, own = frozen_solution(scene).trajectory, solve(REFERENCE, scene, {}).trajectory
-    assert own.angle_uncertainty is not None
-    until = horizon_samples(frozen)
-    growth = np.abs(np.log(running_growth(own) / running_growth(frozen)))
-    used = (own.angle_uncertainty > 0.0) & (frozen.angle_uncertainty > 0.0)
-    uncertainty = np.abs(np.log(own.angle_uncertainty[used] / frozen.angle_uncertainty[used]))
-    beyond = np.abs(own.angles - frozen.angles).max(axis=1) - own.angle_uncertainty
-    return {
-        "reference": float(np.maximum(beyond, 0.0).max()),
-        "growth": float(growth[:until].max()),
-        "uncertainty": float(uncertainty.max(initial=0.0)),
-    }
-
-
 @pytest.mark.parametrize(
     "scene", ["check/general", *(pytest.param(f"paper/{name}", marks=pytest.mark.full) for name in ("fig08", "fig11"))]
 )
 def test_a_reference_computed_now_is_the_frozen_one(scene: str) -> None:
     pytest.importorskip("heyoka")
-    for name, difference in _differences(scene).items():
-        assert difference <= load_bounds().of(name, REFERENCE).value
+    frozen, own = (run.trajectory for run in (frozen_solution(shipped(scene)), solve(REFERENCE, shipped(scene), {})))
+    assert own.angle_uncertainty is not None
+    growth = np.abs(np.log(running_growth(own) / running_growth(frozen)))[: horizon_samples(frozen)]
+    used = (own.angle_uncertainty > 0.0) & (frozen.angle_uncertainty > 0.0)
+    uncertainty = np.abs(np.log(own.angle_uncertainty[used] / frozen.angle_uncertainty[used]))
+    beyond = np.abs(own.angles - frozen.angles).max(axis=1) - own.angle_uncertainty
+    for name, differences in {"reference": beyond, "growth": growth, "uncertainty": uncertainty}.items():
+        assert differences.max(initial=0.0) <= load_bounds().of(name, REFERENCE).value
 
 
 # Faults in files
@@ -192,7 +169,6 @@ TAMPERING: dict[str, tuple[Callable[[Rows], None], tuple[str, ...]]] = {
     "a sample missing": (_without_last_sample, ("FAIL complete", "time has 150 rows, not 151")),
     "a channel missing": (_with("tip", ..., math.nan), ("FAIL complete", "tip is missing")),
     "a NaN": (_with("rates", 7, math.nan), ("FAIL complete", "rates is not finite at sample 7")),
-    "an infinity": (_with("tip", 7, math.inf), ("FAIL complete", "tip is not finite at sample 7")),
     "a touched angle": (_with("angles", 20, 3.0), ("FAIL tip",)),
     "a touched rate": (_with("rates", 20, 3.0), ("FAIL energies", "kinetic energy")),
     "a touched start": (_with("rates", 0, 1.0), ("FAIL start",)),
@@ -200,7 +176,6 @@ TAMPERING: dict[str, tuple[Callable[[Rows], None], tuple[str, ...]]] = {
     "a touched potential energy": (_with("potential_energy", 20, 3.0), ("FAIL energies", "potential energy")),
     "a touched work": (_with("work", 20, 3.0), ("FAIL energy", "balance")),
     "an edited error": (_with("angle_error_max", ..., 1e-17), ("FAIL metrics", "angle_error_max")),
-    "an edited horizon": (_with("horizon_s", ..., 0.1), ("FAIL metrics", "horizon_s")),
     "a huge number": (_with("angles", 20, 1e308), ("FAIL tip",)),
 }
 
@@ -294,13 +269,7 @@ def test_a_frozen_reference_touched_in_its_last_bit_fails(own_references: Path) 
     (failure,) = failed(check.judge_frozen(load_bounds(), [path]))
     assert failure.where == ("paper/fig12", REFERENCE, "angles")
     assert "paper.h5: angles not as frozen" in formats.line(failure)
-
-
-def test_a_shipped_reference_is_judged_by_the_digests_beside_it(own_references: Path) -> None:
-    path = own_references / "check.h5"
-    change_row(path, "check/held/reference", lambda row: row["error_growth"].__imul__(1.0 + 1e-15))
-    (failure,) = failed(check.judge_file(path, load_bounds()))
-    assert (failure.name, failure.where) == ("frozen", ("check/held", REFERENCE, "error_growth"))
+    assert ("frozen", failure.where) in [(check.name, check.where) for check in failed(judged(path))]
 
 
 def test_a_frozen_reference_gone_added_damaged_or_without_digests_fails(own_references: Path) -> None:
@@ -391,7 +360,6 @@ def test_a_users_bound_goes_before_the_shipped_one(
 @pytest.mark.parametrize(
     ("scene", "method"),
     [
-        ("check/loads", "lagrange/ode45"),
         ("check/loads", "exudyn_chain/generalized_alpha"),
         pytest.param("paper/fig08", "printed/ode45", marks=pytest.mark.full),
     ],
@@ -473,33 +441,29 @@ def test_json_on_standard_output_is_alone_there(good: Path, capsys: pytest.Captu
     assert captured.err.endswith(" passed, 0 failed\n")
 
 
-# From the command line to the end, and without heyoka
+# Without heyoka
 
 
-@pytest.fixture
-def without_heyoka(tmp_path: Path) -> str:
-    """The path of a process in which heyoka cannot be imported: a module of that name goes before the real one."""
-    (tmp_path / "site").mkdir()
-    (tmp_path / "site" / "sitecustomize.py").write_text("import sys\nsys.modules['heyoka'] = None\n")
-    return os.pathsep.join([str(tmp_path / "site"), str(ROOT)])
+def run_without_heyoka(folder: Path, *words: object) -> None:
+    """The command in a process where heyoka cannot be imported; it must end with status 0."""
+    (folder / "sitecustomize.py").write_text("import sys\nsys.modules['heyoka'] = None\n")
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join([str(folder), str(ROOT)])}
+    command = [sys.executable, "-m", "rotor_mbs", *map(str, words)]
+    done = subprocess.run(command, capture_output=True, text=True, env=environment, timeout=550)
+    assert done.returncode == 0, done.stdout + done.stderr
 
 
 @pytest.mark.full
-def test_without_heyoka_a_scene_of_ones_own_has_a_reference(without_heyoka: str, tmp_path: Path) -> None:
+def test_without_heyoka_a_scene_of_ones_own_has_a_reference(tmp_path: Path) -> None:
     (tmp_path / "own.toml").write_text(paper("fig11", duration=0.5, samples=51).text)
-    command = [sys.executable, "-m", "rotor_mbs", "run", str(tmp_path / "own.toml"), "-o", str(tmp_path / "r.h5")]
-    subprocess.run(command, env={**os.environ, "PYTHONPATH": without_heyoka}, check=True, timeout=300)
-    done = _run_check(str(tmp_path / "r.h5"), "--json", str(tmp_path / "c.json"), path=without_heyoka)
-    assert done.returncode == 0, done.stdout + done.stderr
+    run_without_heyoka(tmp_path, "run", tmp_path / "own.toml", "-o", tmp_path / "r.h5")
+    run_without_heyoka(tmp_path, "check", tmp_path / "r.h5", "--json", tmp_path / "c.json")
     methods = {row["method"] for row in json.loads((tmp_path / "c.json").read_text())}
     assert {REFERENCE, "lagrange/dop853"} <= methods
     assert "lagrange/taylor" not in methods
 
 
 @pytest.mark.nightly
-def test_without_heyoka_the_stand_in_serves(without_heyoka: str, tmp_path: Path) -> None:
-    done = _run_check("--json", str(tmp_path / "c.json"), path=without_heyoka)
-    assert done.returncode == 0, done.stdout + done.stderr
-    rows = json.loads((tmp_path / "c.json").read_text())
-    assert rows
-    assert not any(row["method"] == "lagrange/taylor" for row in rows)
+def test_without_heyoka_the_stand_in_serves(tmp_path: Path) -> None:
+    run_without_heyoka(tmp_path, "check", "--json", tmp_path / "c.json")
+    assert "lagrange/taylor" not in {row["method"] for row in json.loads((tmp_path / "c.json").read_text())}

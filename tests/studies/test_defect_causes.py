@@ -121,10 +121,6 @@ PATTERNS: dict[str, tuple[Callable[[], Rows], str]] = {
     "a late edge": (
         driven((0.51, JUMP)), "the load on the rotor jumps a row late at t = 0.5 s, or has a wrong value in this row",
     ),
-    "a value missing at the edge": (
-        driven((0.5, 0.0), (0.51, JUMP)),
-        "the load on the rotor jumps a row late at t = 0.5 s, or has a wrong value in this row",
-    ),
     "an early edge": (
         driven((0.49, JUMP)), "the load on the rotor jumps a row early at t = 0.5 s, or has a wrong value in this row",
     ),
@@ -144,11 +140,6 @@ PATTERNS: dict[str, tuple[Callable[[], Rows], str]] = {
         "a load that is wrong or missing from t = 0.7 to 0.8 s: on the average +5e+04 N m on the rotor and +100 N m on "
         "the pitch 3",
     ),
-    "two loads that are no load of the rotor's": (
-        lambda: run(replace(SCENE, pitch_torque=(BESIDE, steps(), BESIDE))),
-        "a load that is wrong or missing from t = 0.7 to 0.8 s: on the average +100 N m on the pitch 1 and +100 N m on "
-        "the pitch 3",
-    ),
 }  # fmt: skip
 
 
@@ -165,8 +156,8 @@ def differences() -> Rows:
     return time, angles, np.gradient(angles, time, axis=0)
 
 
-@pytest.mark.parametrize("rows", [averaged, differences])
-def test_the_ends_of_what_is_wrong_in_all_rows_are_no_fault(rows: Callable[[], Rows]) -> None:
+@pytest.mark.parametrize("rows", [run, averaged, differences])
+def test_what_is_right_or_wrong_in_all_rows_has_no_fault_at_a_time(rows: Callable[[], Rows]) -> None:
     assert causes(*rows()).faults() == []
 
 
@@ -176,10 +167,6 @@ def test_a_fault_at_a_time_is_named(name: str) -> None:
     assert causes(*rows()).faults() == [text]
 
 
-def test_a_right_run_has_no_fault() -> None:
-    assert causes(*run()).faults() == []
-
-
 def test_faults_far_apart_are_named_each() -> None:
     time, angles, rates = wrong()
     angles[60, 2] += 1e-3
@@ -187,10 +174,9 @@ def test_faults_far_apart_are_named_each() -> None:
     assert found == ["a single wrong row: row 41, t = 0.4 s", "a single wrong row: row 61, t = 0.6 s"]
 
 
-def with_numbers(scene: Scene, mass: float, gravity: float, torque: float = 0.0) -> Scene:
+def with_numbers(scene: Scene, mass: float, gravity: float) -> Scene:
     blades = tuple(replace(blade, mass=blade.mass * (1.0 + mass)) for blade in scene.blades)
-    torques = tuple((t, value * (1.0 + torque)) for t, value in scene.rotor_torque)
-    return replace(scene, blades=blades, gravity=scene.gravity * (1.0 + gravity), rotor_torque=torques)
+    return replace(scene, blades=blades, gravity=scene.gravity * (1.0 + gravity))
 
 
 def test_parameters_that_are_off_are_named_together_with_estimate_and_uncertainty() -> None:
@@ -199,12 +185,8 @@ def test_parameters_that_are_off_are_named_together_with_estimate_and_uncertaint
     assert "gravity off by -2 % (uncertainty " in found[0]
     assert any("blade.mass off by +1 % (uncertainty " in text for text in found)
     assert all(" and " in text for text in found)
-
-
-def test_one_parameter_is_named_alone_and_from_rounding_too() -> None:
-    alone = causes(*run(with_numbers(SCENE, 0.0, 0.02))).explanations()
-    assert len(alone) == 1
-    assert alone[0].startswith("gravity off by +2 % (uncertainty ")
+    (alone,) = causes(*run(with_numbers(SCENE, 0.0, 0.02))).explanations()
+    assert alone.startswith("gravity off by +2 % (uncertainty ")
 
 
 SPRUNG = replace(SCENE, bearing_stiffness=(6e3, 5e3, 8e3), bearing_damping=(300.0, 500.0, 400.0))
@@ -215,7 +197,6 @@ SPRUNG = replace(SCENE, bearing_stiffness=(6e3, 5e3, 8e3), bearing_damping=(300.
     [
         ({"bearing.damping": [330, 500, 400]}, "bearing.damping[0] off by +10 % (uncertainty "),
         ({"bearing.stiffness": [6e3, 4e3, 8e3]}, "bearing.stiffness[1] off by -20 % (uncertainty "),
-        ({"bearing.rest": [0, 0, 0.1]}, "bearing.rest[2] off by +0.1 rad (uncertainty "),
         ({"bearing.rest": [-0.1, -0.1, -0.1]}, "bearing.rest off by -0.1 rad (uncertainty "),
     ],
 )

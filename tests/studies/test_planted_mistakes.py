@@ -58,12 +58,11 @@ def lighter(scene: Scene) -> Scene:
 
 
 def longer_offset(scene: Scene) -> Scene:
-    def moved(x: float, y: float, z: float) -> tuple[float, float, float]:
-        return 1.01 * x, y, z
-
-    return replace(
-        scene, blades=tuple(replace(blade, centre_of_mass=moved(*blade.centre_of_mass)) for blade in scene.blades)
-    )
+    blades = []
+    for blade in scene.blades:
+        x, y, z = blade.centre_of_mass
+        blades.append(replace(blade, centre_of_mass=(1.01 * x, y, z)))
+    return replace(scene, blades=tuple(blades))
 
 
 def pitched(angle: float) -> Callable[[Scene], Scene]:
@@ -94,31 +93,11 @@ def noise(size: float) -> Callable[[Array, Array, Array], tuple[Array, Array, Ar
     return lambda time, angles, rates: (time, angles + drawn[0], rates + drawn[1])
 
 
-def spoilt(rows: dict[int, float]) -> Callable[[Array, Array, Array], tuple[Array, Array, Array]]:
-    """Other times in some rows."""
-
-    def change(time: Array, angles: Array, rates: Array) -> tuple[Array, Array, Array]:
-        for row, value in rows.items():
-            time[row] = value
-        return time, angles, rates
-
-    return change
-
-
-def not_a_number(time: Array, angles: Array, rates: Array) -> tuple[Array, Array, Array]:
-    angles[100, 2] = np.nan
-    return time, angles, rates
-
-
 THIRD = 2.0 * np.pi / 3.0
 QUARTER = np.array([np.pi / 2.0, 0.0, 0.0, 0.0])
 # Scenes: those in which the mistake changes the motion.
 PLANTS = {
     "degrees": Plant("degrees taken as rad", spoilt=lambda t, q, w: (t, np.degrees(q), np.degrees(w))),
-    "degrees of pitch alone": Plant(
-        "pitch 1, pitch 2, pitch 3: degrees taken as rad", with_rates=False,
-        spoilt=lambda t, q, w: (t, np.hstack([q[:, :1], np.degrees(q[:, 1:])]), w),
-    ),
     "sign of pitch": Plant(
         "sign reversed", spoilt=lambda t, q, w: (t, q * [1, -1, -1, -1], w * [1, -1, -1, -1]),
     ),
@@ -126,19 +105,12 @@ PLANTS = {
     "a factor": Plant("too large by a factor: rotor by 1.001", spoilt=lambda t, q, w: (t, 1.001 * q, 1.001 * w)),
     "blade order": Plant("columns exchanged: pitch 1 is pitch 3", spoilt=columns(0, 3, 1, 2)),
     "phase": Plant("blades numbered the other way round", mistakes=Mistakes(phases=(0.0, 2.0 * THIRD, THIRD))),
-    "blade 2 in the place of blade 3": Plant(
-        "blade 2 at an azimuth of 240 degrees in place of 120",
-        mistakes=Mistakes(phases=(0.0, 2.0 * THIRD, 2.0 * THIRD)),
-    ),
     "blade 2 a little off": Plant(
         "azimuth of blade 2 off by +0.05 rad", mistakes=Mistakes(phases=(0.0, THIRD + 0.05, 2.0 * THIRD))
     ),
     "no phases": Plant("all blades at the azimuth of blade 1", mistakes=Mistakes(phases=(0.0, 0.0, 0.0))),
     "phases in degrees": Plant(
         "azimuths of the blades in degrees taken as rad", mistakes=Mistakes(phases=(0.0, 120.0, 240.0))
-    ),
-    "blade 1 in the place of blade 2": Plant(
-        "blade 1 at an azimuth of 120 degrees where it is 0", mistakes=Mistakes(phases=(THIRD, 2.0 * THIRD, 0.0))
     ),
     "blade 1 down": Plant(
         "blade 1 at an azimuth of 180 degrees where it is 0",
@@ -151,32 +123,20 @@ PLANTS = {
         "zero of the pitch of all blades off by +0.3588 rad", changed=pitched(np.arctan2(0.03, 0.08))
     ),
     "gravity": Plant("gravity of 9.81 m/s^2", changed=with_gravity(9.81)),
-    "no gravity": Plant("gravity of 0 m/s^2", changed=with_gravity(0.0)),
     "mass 1 % off, driven": Plant("blade.mass off by +1 %", "paper/fig15-10kNm", changed=lighter),
-    "mass 1 % off, springs": Plant("blade.mass off by +1 %", "check/general", changed=lighter),
     "c 1 % off": Plant("blade.centre_of_mass[0] off by +1 %", changed=longer_offset),
     "missing Coriolis": Plant("without the Coriolis terms", mistakes=Mistakes(coriolis=0.0)),
-    "missing Coriolis, full inertia": Plant(
-        "without the Coriolis terms", "check/general", mistakes=Mistakes(coriolis=0.0)
-    ),
     "E1": Plant("erratum E1 of", mistakes=Mistakes(e1=True)),
     "E2": Plant("erratum E2 of", mistakes=Mistakes(e2=True)),
-    "E2 and E3": Plant("erratum E2 and E3 of", mistakes=Mistakes(e2=True, e3=True)),
     "as printed": Plant("erratum E1 and E2 and E3 of", mistakes=Mistakes(e1=True, e2=True, e3=True)),
     "one sample late": Plant(
         "a constant lag of 0.01 s, 1 rows (late)",
         spoilt=lambda t, q, w: (t, np.vstack([q[:1], q[:-1]]), np.vstack([w[:1], w[:-1]])),
     ),
-    "one sample early": Plant(
-        "a constant lag of -0.01 s, 1 rows (early)", spoilt=lambda t, q, w: (t[:-1], q[1:], w[1:])
-    ),
     "half a sample late": Plant("a constant lag of 0.005 s (late)", spoilt=lambda t, q, w: (t + 0.005, q, w)),
     "time in ms": Plant("time in ms taken as s", spoilt=lambda t, q, w: (1e3 * t, q, w)),
     "numbers of rows": Plant("row numbers taken as s", spoilt=lambda t, q, w: (np.arange(1.0 * len(t)), q, w)),
     "wrapped": Plant("wrapped, taken as unwrapped", "paper/fig12", spoilt=lambda t, q, w: (t, wrapped(q), w)),
-    "wrapped, from another zero": Plant(
-        "pitch 3: zero off by 1.5, wrapped", "paper/fig12", spoilt=lambda t, q, w: (t, wrapped(q + 1.5), w)
-    ),
     "rates as angles": Plant(
         "rotor is rotor rate, pitch 1 is pitch 1 rate", with_rates=False, spoilt=lambda t, q, w: (t, w, q)
     ),
@@ -200,7 +160,6 @@ PLANTS = {
         "time in ms taken as s; and rotor, pitch 1, pitch 2, pitch 3: degrees taken as rad",
         spoilt=lambda t, q, w: (1e3 * t, np.degrees(q), np.degrees(w)),
     ),
-    "from the end": Plant("time reversed", spoilt=lambda t, q, w: (t, q[::-1], w[::-1])),
     "from the end, rates turned": Plant(
         "time reversed; and rotor rate, pitch 1 rate, pitch 2 rate, pitch 3 rate: sign reversed",
         spoilt=lambda t, q, w: (t, q[::-1], -w[::-1]),
@@ -209,17 +168,7 @@ PLANTS = {
     "gravity and c": Plant(
         "gravity off by -1 % (uncertainty", changed=lambda scene: longer_offset(with_gravity(0.99 * 9.8)(scene))
     ),
-    "E1 and E3": Plant("erratum E1 of", mistakes=Mistakes(e1=True, e3=True)),
-    "swapped columns": Plant("columns exchanged: rotor is pitch 1, pitch 1 is rotor", spoilt=columns(1, 0, 2, 3)),
 }  # fmt: skip
-REFUSED = {
-    "ten seconds late": Plant("`offset = -10` of the time", spoilt=lambda t, q, w: (t + 10.0, q, w)),
-    "NaN": Plant("is nan in row 101 of 201", spoilt=not_a_number),
-    "repeated time": Plant("repeats that of the row above", spoilt=spoilt({51: 0.5})),
-    "decreasing time": Plant("comes before that of the row above", spoilt=spoilt({51: 0.2})),
-}
-
-
 # One of each kind: in the columns, in time, in the scene, in the equations. The others carry the mark full.
 FAST = {"degrees", "blade order", "truncated", "late", "one sample late", "gravity"}
 
@@ -244,10 +193,11 @@ def test_what_is_within_the_tolerance_but_not_random_is_named() -> None:
     assert any("not random" in note for note in comparison.verdict.notes)
 
 
-@pytest.mark.parametrize("name", REFUSED)
-def test_what_cannot_be_compared_is_refused(name: str) -> None:
-    with pytest.raises(rm.InputError, match=REFUSED[name].says):
-        rm.compare(REFUSED[name].data(), short("paper/fig11"))
+def test_data_of_another_time_are_refused() -> None:
+    """What no file can have, a NaN, a time twice, is in tests/foreign."""
+    late = Plant("", spoilt=lambda t, q, w: (t + 10.0, q, w)).data()
+    with pytest.raises(rm.InputError, match="`offset = -10` of the time"):
+        rm.compare(late, short("paper/fig11"))
 
 
 @pytest.mark.parametrize("scene", ["paper/fig11", "check/general"])
@@ -260,15 +210,3 @@ def test_a_true_run_with_the_noise_of_rounding_is_ok(scene: str) -> None:
 def test_e3_alone_is_no_mistake() -> None:
     """The power of a term whose coefficient is zero unless E2 is in."""
     assert rm.compare(Plant("", mistakes=Mistakes(e3=True)).data(), short("paper/fig11")).agrees
-
-
-# A sine that no mistake makes.
-UNKNOWN = Plant("", spoilt=lambda t, q, w: (t, q + 1e-2 * np.sin(7.0 * t)[:, None], w))
-
-
-@pytest.mark.full
-def test_nothing_is_said_where_nothing_fits() -> None:
-    comparison = rm.compare(UNKNOWN.data(), short("paper/fig11"))
-    assert comparison.status == "inaccurate"
-    assert comparison.likely == ()
-    assert comparison.verdict.notes == ()
