@@ -8,11 +8,9 @@ import multiprocessing
 import pickle
 import subprocess
 import sys
-import threading
 import time
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -30,28 +28,34 @@ def _scene() -> Scene:
     return rm.scene("paper/fig08").replace(duration=0.2, samples=11)
 
 
-@pytest.mark.parametrize("timeout", [-1, 0, float("-inf"), float("nan"), "3", None, True])
-@pytest.mark.parametrize("method", [METHOD, [METHOD]], ids=["one", "several"])
-def test_a_time_limit_that_is_none_is_a_line(timeout: Any, method: Any) -> None:
-    with pytest.raises(InputError, match=r"^timeout: .*; allowed: seconds, more than 0$"):
-        rm.run(_scene(), method, timeout=timeout)
-    with pytest.raises(InputError, match=r"^timeout: .*; allowed: seconds, more than 0$"):
-        rm.sweep(_scene(), {"gravity": [9.8]}, methods=[METHOD], timeout=timeout)
+def _sweep(**options: Any) -> rm.Runs:
+    return rm.sweep(_scene(), **{"parameters": {"gravity": [9.0, 9.8]}, "methods": [METHOD], **options})
+
+
+SECONDS, COUNT = "allowed: seconds, more than 0$", "allowed: a whole number from 0 to 1024$"
+WRONG = [
+    *(("timeout", value, SECONDS) for value in (-1, 0, float("-inf"), float("nan"), "3", None, True)),
+    *(("workers", value, COUNT) for value in (-1, 1.5, "2", None, 10**9)),
+]
+
+
+@pytest.mark.parametrize(("name", "value", "allowed"), WRONG)
+def test_a_wrong_limit_is_a_line(name: str, value: Any, allowed: str) -> None:
+    line = f"^{name}: .*; {allowed}"
+    with pytest.raises(InputError, match=line):
+        rm.run(_scene(), [METHOD], **{name: value})
+    with pytest.raises(InputError, match=line):
+        _sweep(**{name: value})
+    if name == "timeout":
+        with pytest.raises(InputError, match=line):
+            rm.run(_scene(), METHOD, timeout=value)
 
 
 @pytest.mark.parametrize("timeout", [1e308, float("inf")])
 def test_a_time_limit_beyond_any_run_is_none(timeout: float) -> None:
     assert rm.run(_scene(), METHOD, timeout=timeout).status == "ok"
     assert rm.run(_scene(), [METHOD], timeout=timeout).statuses == {"ok": 2}
-    assert rm.sweep(_scene(), {"gravity": [9.8]}, methods=[METHOD], timeout=timeout).statuses == {"ok": 1}
-
-
-@pytest.mark.parametrize("workers", [-1, 1.5, "2", None, 10**9])
-def test_a_number_of_workers_that_is_none_is_a_line(workers: Any) -> None:
-    with pytest.raises(InputError, match=r"^workers: .*; allowed: a whole number from 0 to 1024$"):
-        rm.run(_scene(), [METHOD], workers=workers)
-    with pytest.raises(InputError, match=r"^workers: .*; allowed: a whole number from 0 to 1024$"):
-        rm.sweep(_scene(), {"gravity": [9.8]}, methods=[METHOD], workers=workers)
+    assert _sweep(timeout=timeout).statuses == {"ok": 2}
 
 
 @pytest.mark.parametrize(
@@ -64,20 +68,20 @@ def test_values_of_a_sweep_may_be_anything_that_is_gone_through_once(values: Any
 
 
 @pytest.mark.parametrize("parameters", [["gravity"], {"gravity": object()}, {"gravity": 1.0}, {"gravity": "12"}])
-def test_parameters_that_are_none_are_a_line(parameters: Any) -> None:
+def test_wrong_parameters_are_a_line(parameters: Any) -> None:
     with pytest.raises(InputError, match="allowed: "):
-        rm.sweep(_scene(), parameters)
+        _sweep(parameters=parameters)
 
 
 @pytest.mark.parametrize("method", [None, 3, [3]])
-def test_methods_that_are_none_are_a_line(method: Any) -> None:
+def test_wrong_methods_are_a_line(method: Any) -> None:
     with pytest.raises(InputError, match=r"^method: .*; allowed: a name, or a list of names$"):
         rm.run(_scene(), method)
 
 
 def _in_daemon(path: str) -> str:
     try:
-        rm.sweep(_scene(), {"gravity": [9.0, 9.8]}, methods=[METHOD], workers=1, output=path)
+        _sweep(workers=1, output=path)
     except InputError as error:
         return str(error)
     return "stored"
@@ -88,7 +92,7 @@ def test_a_daemonic_process_stores_no_runs_that_never_ran(tmp_path: Path) -> Non
     with multiprocessing.get_context("spawn").Pool(1) as pool:
         assert pool.apply(_in_daemon, (str(path),)).endswith("allowed: workers=0")
     assert not path.exists()
-    assert rm.sweep(_scene(), {"gravity": [9.0, 9.8]}, methods=[METHOD], output=path).statuses == {"ok": 2}
+    assert _sweep(output=path).statuses == {"ok": 2}
 
 
 UNGUARDED = """import rotor_mbs as rm
@@ -113,104 +117,69 @@ def test_the_reason_of_lost_workers_is_told(call: str, tmp_path: Path) -> None:
     assert 'in a script, the call belongs under `if __name__ == "__main__":`' in told
 
 
-DAMPED = {"bearing.damping": [1e9, 1e9]}
-FAST = {"initial.rates": [0.3, 1e4, 1e4]}
-SHAFT = {"shaft.damping": 1e12}
-
-
-def _stiff(change: dict[str, Any]) -> Scene:
+def _stiff(kind: str = "damper") -> Scene:
     scene = rm.scene("check/general")
-    count = len(scene.blades)
-    changes = {key: [1e9] * count if key == "bearing.damping" else value for key, value in change.items()}
-    if "initial.rates" in changes:
-        changes["initial.rates"] = [0.3, *[1e4] * count]
-    return scene.replace(**changes)
+    blades = len(scene.blades)
+    changes: dict[str, dict[str, Any]] = {
+        "damper": {"bearing.damping": [1e9] * blades},
+        "fast": {"initial.rates": [0.3, *[1e4] * blades]},
+        "shaft": {"shaft.damping": 1e12},
+    }
+    return scene.replace(**changes[kind])
 
 
+def _in_thread(call: Callable[[], Any]) -> Any:
+    with ThreadPoolExecutor(1) as other:
+        return other.submit(call).result()
+
+
+def _here(call: Callable[[], Any]) -> Any:
+    return call()
+
+
+@pytest.mark.parametrize("called", [_here, pytest.param(_in_thread, marks=pytest.mark.full)])
 @pytest.mark.parametrize(
-    ("change", "in_thread"),
-    [
-        pytest.param(DAMPED, False, id="damper-main"),
-        *(
-            pytest.param(change, in_thread, id=f"{name}-{'thread' if in_thread else 'main'}", marks=pytest.mark.full)
-            for name, change in (("damper", DAMPED), ("fast", FAST), ("shaft", SHAFT))
-            for in_thread in (False, True)
-            if in_thread or name != "damper"
-        ),
-    ],
+    "kind", ["damper", *(pytest.param(kind, marks=pytest.mark.full) for kind in ("fast", "shaft"))]
 )
-def test_a_time_limit_bounds_reference_and_judging(change: dict[str, Any], in_thread: bool) -> None:
+def test_a_time_limit_bounds_reference_and_judging(kind: str, called: Callable[..., rm.Run]) -> None:
     """Of the limit of 2 s: as long again for the engine's compilation, and a second for observing and for judging.
 
     In seconds of the processor, which other processes do not lengthen.
     """
-    scene = _stiff(change)
     begun = time.process_time()
-    if in_thread:
-        with ThreadPoolExecutor(1) as other:
-            run = other.submit(rm.run, scene, "lagrange/radau", reference=True, timeout=2.0).result()
-    else:
-        run = rm.run(scene, "lagrange/radau", reference=True, timeout=2.0)
+    run = called(lambda: rm.run(_stiff(kind), "lagrange/radau", reference=True, timeout=2.0))
     assert time.process_time() - begun < 12.0
     assert run.status in ("timed_out", "ok", "inaccurate")
 
 
-@pytest.mark.parametrize("in_thread", [False, True])
-def test_a_time_limit_bounds_the_reference_of_a_comparison(in_thread: bool) -> None:
+@pytest.mark.parametrize("called", [_here, _in_thread])
+def test_a_time_limit_bounds_the_reference_of_a_comparison(called: Callable[..., object]) -> None:
     """Nothing is compared with a reference that ends early."""
-    scene, data = _stiff(DAMPED), {"time": np.linspace(0.0, 0.5, 3), "rotor": np.full(3, 0.5)}
-    with ThreadPoolExecutor(1) as other:
-        call = partial(rm.compare, data, scene, timeout=1.0)
-        compared = (lambda: other.submit(call).result()) if in_thread else call
-        with pytest.raises(InputError, match="timeout: no reference after 1 s"):
-            compared()
-    with pytest.raises(InputError, match="allowed: seconds, more than 0"):
-        rm.compare(data, scene, timeout=float("nan"))
+    data = {"time": np.linspace(0.0, 0.5, 3), "rotor": np.full(3, 0.5)}
+    with pytest.raises(InputError, match="timeout: no reference after 1 s"):
+        called(lambda: rm.compare(data, _stiff(), timeout=1.0))
+    with pytest.raises(InputError, match=SECONDS):
+        rm.compare(data, _stiff(), timeout=float("nan"))
 
 
 def test_limits_of_threads_do_not_end_each_other() -> None:
     """A short run's limit, which is over with it, is not that of a long run in another thread."""
-    scene = _stiff(DAMPED)
-    ended: dict[str, float] = {}
 
-    def run(name: str, scene: Scene, timeout: float) -> None:
+    def long() -> float:
         begun = time.monotonic()
-        for _ in range(1 if name == "long" else 20):
-            rm.run(scene, "lagrange/radau", reference=name == "long", timeout=timeout)
-        ended[name] = time.monotonic() - begun
+        rm.run(_stiff(), "lagrange/radau", reference=True, timeout=2.0)
+        return time.monotonic() - begun
 
-    threads = [
-        threading.Thread(target=run, args=("long", scene, 2.0)),
-        threading.Thread(target=run, args=("short", _scene(), 1e3)),
-    ]
-    for thread in threads:
-        thread.start()
-    for thread in threads:
-        thread.join(60.0)
-    assert ended["long"] < 15.0
+    def short() -> list[rm.Run]:
+        return [rm.run(_scene(), "lagrange/radau", timeout=limit) for limit in (1e3, 1e-3) * 10]
+
+    with ThreadPoolExecutor(2) as threads:
+        ended, runs = threads.submit(long), threads.submit(short)
+        assert ended.result(60.0) < 15.0
+        assert {run.status for run in runs.result()[::2]} == {"ok"}
 
 
-def test_threads_that_run_several_methods_have_the_same_result() -> None:
-    def compared(_: int) -> list[str]:
-        return [
-            f"{run.status} {run.angles.tobytes().hex()}"
-            for run in rm.run(_scene(), [METHOD, "lagrange/radau"]).values()
-        ]
-
-    with ThreadPoolExecutor(4) as threads:
-        first, *others = threads.map(compared, range(8))
-    assert all(other == first for other in others)
-
-
-def _several() -> rm.Runs:
-    return rm.run(_scene(), [METHOD])
-
-
-def _swept() -> rm.Runs:
-    return rm.sweep(_scene(), {"gravity": [9.0, 9.8]}, methods=[METHOD])
-
-
-@pytest.mark.parametrize("make", [_several, _swept], ids=["run", "sweep"])
+@pytest.mark.parametrize("make", [lambda: rm.run(_scene(), [METHOD]), _sweep], ids=["run", "sweep"])
 @pytest.mark.parametrize(
     "copied",
     [copy.copy, copy.deepcopy, lambda runs: pickle.loads(pickle.dumps(runs))],

@@ -13,7 +13,6 @@ import pickle
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 
-import numpy as np
 import pytest
 
 import rotor_mbs as rm
@@ -102,14 +101,3 @@ def test_a_call_has_its_own_answer_wherever_it_is_made(count: int) -> None:
     assert [asyncio.run(_in_loop(number)) for number in range(0, count, 3)] == alone[::3]
     with multiprocessing.get_context("spawn").Pool(1) as daemons:
         assert daemons.map(answer, range(count)) == alone
-
-
-def test_a_call_in_a_thread_is_not_ended_by_the_limit_of_another() -> None:
-    """A limit of 10 ms in some threads; the runs of the others, without one, reach their ends."""
-
-    def angles(number: int) -> float:
-        run = rm.run(_scene(1), METHOD, timeout=1e-3 if number % 2 else float("inf"))
-        return float(run.time[-1]) if len(run.time) else np.nan
-
-    with ThreadPoolExecutor(4) as threads:
-        assert set(list(threads.map(angles, range(20)))[::2]) == {0.2}

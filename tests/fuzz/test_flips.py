@@ -1,29 +1,156 @@
-"""Files with one bit flipped, this program's and others: a verdict or a line, never a crash, a hang or a wrong value.
+"""Damaged files, this program's and others: a verdict or a line, never a crash, a hang or a wrong value.
 
 The long form (1,000 files): `pytest -m nightly tests/fuzz/test_flips.py`.
 """
 
 from __future__ import annotations
 
+import random
+import warnings
+from collections import Counter
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 import pytest
-from support.flips import FOREIGN, OWN, faults_of_flips, prepare
-from support.fuzzing import tried
+from support.data_files import FORMATS
+from support.fuzzing import answers, tried, write
+from support.scenes import paper
+from support.sweeps import run_local
+
+import rotor_mbs as rm
+from rotor_mbs.errors import RotorError
+from rotor_mbs.runs.pool import WorkerPool
+from rotor_mbs.scenario.scene import scene_toml
+from rotor_mbs.scenario.sweep import load_sweep
+from rotor_mbs.studies.run import run_scenes
+
+METHOD = "lagrange/dop853"
+SWEEP = f'title = "s"\nscene = "a.toml"\nmethods = ["{METHOD}"]\n[[axis]]\nkey = "gravity"\nvalues = [9.7, 9.8]\n'
+OWN = ("results.h5", "sweep.h5")
+FOREIGN = ("data.mat", "data73.mat", "data.nc", "data3.nc", "data.npz", "data.outb")
+_EDGE = 8192  # bytes at both ends: most of a large file is arrays, descriptions are at its beginning and its end
+_LIMIT_S = 120.0  # for one file
+
+
+def damaged(content: bytes, seed: int) -> bytes:
+    """With one bit flipped; of some files eight, or a piece overwritten, or the rest cut off."""
+    chance, changed = random.Random(seed), bytearray(content)
+    edge = min(_EDGE, len(changed))
+    place = chance.choice(
+        [chance.randrange(len(changed)), chance.randrange(edge), len(changed) - 1 - chance.randrange(edge)]
+    )
+    kind = chance.choice(["bit", "bit", "bit", "bit", "bits", "piece", "cut"])
+    if kind == "cut":
+        return content[:place]
+    if kind == "piece":
+        size = len(changed[place : place + 64])
+        changed[place : place + size] = chance.randbytes(size)
+        return bytes(changed)
+    others = [chance.randrange(edge) for _ in range(7)] if kind == "bits" else []
+    for at in (place, *others):
+        changed[at] ^= 1 << chance.randrange(8)
+    return bytes(changed)
+
+
+def resume(folder: Path, path: Path) -> None:
+    """What `run` and `sweep` do with a file that is there."""
+    if "sweep" in path.name:
+        run_local(load_sweep(folder / "s.toml"), path, 0)
+    else:
+        run_scenes([rm.load(folder / "a.toml")], {"a": [METHOD]}, path, workers=0, timeout_s=60.0)
+
+
+def contents(path: Path) -> dict[object, tuple[object, ...]]:
+    """By run: all but times, versions and the numbers of steps."""
+    return {
+        label: (run.status, run.message, run.time.tobytes(), run.angles.tobytes(), run.rates.tobytes())
+        for label, run in rm.open(path).items()
+    }
+
+
+def attempt(call: Callable[[], object]) -> str:
+    try:
+        call()
+    except RotorError as refusal:
+        if not str(refusal):
+            raise ValueError("refused without a reason") from refusal
+        return "refused"
+    return "done"
+
+
+def use_damaged(folder: Path, name: str, seed: int) -> list[str]:
+    """Opens, checks, reports and continues a damaged file of this program; returns the outcomes."""
+    warnings.simplefilter("error")
+    whole, broken = contents(folder / name), folder / f"broken-{name}"
+    broken.write_bytes(damaged((folder / name).read_bytes(), seed))
+
+    def read() -> None:
+        wrong = [label for label, values in contents(broken).items() if values != whole.get(label)]
+        assert not wrong, f"wrong values are read of {wrong}"
+
+    def continue_it() -> None:
+        resume(folder, broken)
+        assert contents(broken) == whole, "wrong values are stored"
+
+    outcomes = [f"opened: {attempt(read)}"]
+    commands = [["check", str(broken), "-j", "1"]]
+    if seed % 5 == 0:
+        commands.append(["report", str(broken), "-o", str(folder / "pages"), "-j", "1"])
+    for command in commands:
+        status, fault = answers(command)
+        assert not fault, fault
+        outcomes.append(f"{command[0]}: status {status}")
+    return [*outcomes, f"continued: {attempt(continue_it)}"]
 
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    path = tmp_path_factory.mktemp("flips")
-    prepare(path)
-    return path
+    folder = tmp_path_factory.mktemp("flips")
+    scene = paper("fig11", samples=11, duration=0.1)
+    write(folder / "a.toml", scene_toml(scene))
+    write(folder / "s.toml", SWEEP)
+    for name in OWN:
+        resume(folder, folder / name)
+    run = rm.run(scene, METHOD)
+    for name in FOREIGN:
+        FORMATS[name](folder / name, scene, run.time, run.angles, run.rates)
+    return folder
 
 
-@pytest.mark.parametrize(
+COUNTS = pytest.mark.parametrize(
     "count", [pytest.param(5, marks=pytest.mark.full), pytest.param(125, marks=pytest.mark.nightly)]
 )
-@pytest.mark.parametrize("name", [*OWN, *FOREIGN])
-def test_a_flipped_bit(name: str, count: int, folder: Path) -> None:
-    outcomes, faults = faults_of_flips(name, folder, 0, count)
-    print(f"{name}: {tried(outcomes, faults)}")
+
+
+@COUNTS
+@pytest.mark.parametrize("name", OWN)
+def test_a_damaged_file_of_this_program(name: str, count: int, folder: Path) -> None:
+    """In a process of its own, which a file may end."""
+    outcomes: Counter[object] = Counter()
+    faults: list[str] = []
+    with WorkerPool(1) as pool:
+        for seed in range(count):
+            try:
+                outcomes.update(pool.submit(partial(use_damaged, folder, name), seed, _LIMIT_S).result())
+            except Exception as exc:
+                faults.append(f"seed {seed}: {type(exc).__name__}: {exc}")
+    print(tried(outcomes, faults))
+    assert not faults, tried(outcomes, faults)
+
+
+@COUNTS
+@pytest.mark.parametrize("name", FOREIGN)
+def test_a_damaged_file_of_another_program(name: str, count: int, folder: Path) -> None:
+    outcomes: Counter[object] = Counter()
+    faults: list[str] = []
+    broken = folder / f"broken-{name}"
+    for seed in range(count):
+        broken.write_bytes(damaged((folder / name).read_bytes(), seed))
+        command = ["compare", str(broken), "--scene", str(folder / "a.toml"), "-o", str(folder / "pages")]
+        status, fault = answers(command)
+        outcomes[status] += 1
+        if fault:
+            faults.append(f"seed {seed}: {fault}")
+    print(tried(outcomes, faults))
     assert not faults, tried(outcomes, faults)

@@ -7,12 +7,12 @@ from __future__ import annotations
 
 import os
 import random
-import re
 import shutil
 import signal
 import subprocess
 import time
 import uuid
+from contextlib import suppress
 from pathlib import Path
 
 import h5py
@@ -50,8 +50,7 @@ COMMANDS = {
 COMPUTING = ("run", "sweep", "reproduce", "bench")
 OUTPUTS = {name: command.split()[-1] for name, command in COMMANDS.items() if name != "check"}
 SIGNALS = (signal.SIGKILL, signal.SIGTERM, signal.SIGHUP, signal.SIGINT)
-LATEST_SIGNAL_S = {"reproduce": 40.0}  # of the others:
-LATEST_SIGNAL_OF_OTHERS_S = 6.0
+LATEST_SIGNAL_S = {name: 40.0 if name == "reproduce" else 6.0 for name in COMMANDS}
 END_OF_WORKERS_S = 8.0
 
 
@@ -98,18 +97,16 @@ def end_once(folder: Path, name: str, chance: random.Random) -> bool:
         )  # fmt: skip
     hit = False
     try:
-        process.wait(chance.uniform(0.05, LATEST_SIGNAL_S.get(name, LATEST_SIGNAL_OF_OTHERS_S)))
+        process.wait(chance.uniform(0.05, LATEST_SIGNAL_S[name]))
     except subprocess.TimeoutExpired:
         # Not Python's own resource tracker, which multiprocessing starts anew with a warning.
         workers = sorted(number for number, line in processes_of(mark).items() if "spawn_main" in line)
         if not hits_worker:
             process.send_signal(number)
         elif workers:
-            hit = True
-            try:
+            with suppress(ProcessLookupError):  # it ended meanwhile
                 os.kill(chance.choice(workers), signal.SIGKILL)
-            except ProcessLookupError:  # it ended meanwhile
-                hit = False
+                hit = True
     status, printed = process.wait(300.0), (folder / "log").read_text()
     # 130 in order; -number before Python has started, and always for SIGKILL. `python -m` itself makes an end by SIGINT
     # of a 130 where the interrupt passed through generated code (a dataclass that is loaded): 130 for a shell.
@@ -123,21 +120,14 @@ def end_once(folder: Path, name: str, chance: random.Random) -> bool:
     assert stored_runs(folder / OUTPUTS["sweep"]) >= stored, "finished runs were lost"
     if number != signal.SIGKILL:
         assert temporaries(folder) <= before, (name, number)  # those of killed processes stay until the next call
-    unknown = [path.name for path in folder.iterdir() if not is_known(path.name)]
+    known = ("a.", "b.", "s.", "log", "whole.", *(Path(output).stem for output in OUTPUTS.values()))
+    unknown = [path.name for path in folder.iterdir() if not path.name.lstrip(".").startswith(known)]
     assert not unknown, (name, number, unknown)
     return status == 0
 
 
 def temporaries(folder: Path) -> set[str]:
     return {path.name for path in folder.glob(".*.tmp")}
-
-
-def is_known(name: str) -> bool:
-    """Inputs, outputs with their pages and digests, and what stays until the next call of the same command."""
-    outputs = "|".join(map(re.escape, OUTPUTS.values()))
-    stems = "|".join(re.escape(Path(output).stem) for output in OUTPUTS.values())
-    known = rf"[abs]\.toml|whole\.h5|log|({outputs})(\.full\.h5)?|({stems})(-report|\.sha256)|\..*\.([0-9]+\.tmp|lock)"
-    return bool(re.fullmatch(known, name))
 
 
 def contents(path: Path) -> dict[str, bytes]:

@@ -1,4 +1,4 @@
-"""Seeded random inputs: scene files, sweep files, damage to stored files; and what a command may answer to them."""
+"""Seeded random scene files and sweep files, and what a command may answer to them."""
 
 from __future__ import annotations
 
@@ -109,27 +109,6 @@ def _damaged_line(chance: random.Random, lines: Sequence[str]) -> str:
     key = line.partition("=")[0]
     found[place] = chance.choice(["", f"{line}\n{line}", line[: len(line) // 2], f"{key}= {chance.choice(_ODD)}"])
     return "\n".join(found) + "\n"
-
-
-def damaged(content: bytes, seed: int) -> bytes:
-    """The content with a few bits flipped, a piece overwritten, cut off or moved."""
-    chance = random.Random(seed)
-    found = bytearray(content)
-    # Most of a file is arrays; descriptions and indices are at its beginning and its end.
-    edge = min(len(found), 8192)
-    place = chance.choice(
-        [chance.randrange(len(found)), chance.randrange(edge), len(found) - 1 - chance.randrange(edge)]
-    )
-    kind = chance.randrange(5)
-    if kind == 0:
-        return bytes(found[:place])
-    for _ in range(chance.choice([1, 1, 8])):
-        found[place] ^= 1 << chance.randrange(8)
-        place = chance.randrange(edge)
-    if kind == 1:
-        size = chance.choice([4, 64, 512])
-        found[place : place + size] = chance.randbytes(len(found[place : place + size]))
-    return bytes(found)
 
 
 def answers(command: Sequence[str], allowed: Iterable[int] = (0, 1, 2)) -> tuple[int | None, str]:
