@@ -112,7 +112,7 @@ def _tables(name: str) -> dict[str, Any]:
 def checked_entries() -> list[CheckedEntry]:
     """Every printed entry against derivatives of (3), in the order of the equations: reference/errata-check.csv.
 
-    `tests/support/printed_entries.py` computes the file, and a test compares it with the derivation.
+    Tests compute every entry (`tests/support/printed_entries.py`) and compare the file with it.
     """
     with (reference_folder() / "errata-check.csv").open(encoding="utf-8", newline="") as file:
         rows: list[dict[str, Any]] = list(csv.DictReader(file))

@@ -315,9 +315,7 @@ def trials_under(study: Mapping[str, Any]) -> dict[Conditions, list[Row]]:
 
 def runs_as_json(shares: Sequence[Row], trials: Sequence[Row], runs: int, seed: int) -> str:
     """The text of claim_runs.json."""
-    rows = [
-        {"name": name, "formula": row.formula, "is_of_56": row.of is not None} for name, row in GRAVITY_ROWS.items()
-    ]
+    rows = [{"name": name, "formula": row.formula, "is_of_56": row.is_of_56} for name, row in GRAVITY_ROWS.items()]
     facts = {
         "seed": seed, "runs": runs, "spread": SPREAD, "made_with": versions(), "usual": usual_conditions()._asdict(),
         "rows": rows, "shares": shares, "trials": trials,
