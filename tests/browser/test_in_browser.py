@@ -35,11 +35,10 @@ SWING = rotor(lambda t: 0.5 + 0.2 * t, lambda t: np.sin(3.0 * t), np.cos, np.sin
 AXE_RULES = ["wcag2a", "wcag2aa", "wcag21a", "wcag21aa", "best-practice"]
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="module")
 def report(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    named = os.environ.get("ROTOR_MBS_REPORT")
-    if named:
-        return Path(named)
+    if "ROTOR_MBS_REPORT" in os.environ:
+        return Path(os.environ["ROTOR_MBS_REPORT"])
     folder = tmp_path_factory.mktemp("report")
     runs = []
     for name in ("fig11", "fig14c", "fig03"):
@@ -55,7 +54,7 @@ def report(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return shutil.copy(modes, out / "modes.html").parent
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="module")
 def pages(report: Path) -> list[Path]:
     return sorted(report.glob("*.html"))
 
@@ -67,17 +66,16 @@ def page() -> Iterator[Page]:
     opened.close()
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="module")
 def axe(tmp_path_factory: pytest.TempPathFactory) -> str:
     """axe-core's text, as npm has it."""
     if not shutil.which("npm"):
         pytest.skip("no npm to get axe-core with")
     folder = tmp_path_factory.mktemp("axe")
     done = subprocess.run(["npm", "pack", "axe-core@4"], cwd=folder, capture_output=True, text=True, check=False)
-    archive = next(folder.glob("axe-core-*.tgz"), None)
-    if done.returncode or archive is None:
+    if done.returncode:
         pytest.skip(f"npm could not get axe-core: {done.stderr.strip()[-200:]}")
-    with tarfile.open(archive) as packed:
+    with tarfile.open(next(folder.glob("axe-core-*.tgz"))) as packed:
         member = packed.extractfile("package/axe.min.js")
         assert member is not None
         return member.read().decode()
@@ -123,9 +121,9 @@ def test_captions_are_not_cut_off_and_first_columns_stay_on_a_telephone(page: Pa
         assert all(abs(way) < 2 for way in moved), path.name
 
 
-def open_viewer(page: Page, pages: list[Path], width: int = 1440) -> bytes:
+def open_viewer(page: Page, report: Path, width: int = 1440) -> bytes:
     """A scene's page, with the viewer in sight and its keyboard; what is seen."""
-    page.open(next(path for path in pages if path.name == "paper-fig11.html"), width)
+    page.open(report / "paper-fig11.html", width)
     page.run("document.querySelector('.viewer').scrollIntoView(); document.querySelector('.viewer canvas').focus()")
     return settled(page)
 
@@ -136,31 +134,39 @@ def settled(page: Page) -> bytes:
     return page.picture()
 
 
-def test_the_viewer_moves_and_stops(page: Page, pages: list[Path]) -> None:
-    still = open_viewer(page, pages)
+def part(name: str) -> str:
+    """The script of a part of the viewer."""
+    return f"document.querySelector('[data-part={name}]')"
+
+
+def set_part(page: Page, name: str, value: object) -> None:
+    page.run(f"{part(name)}.value = '{value}'; {part(name)}.dispatchEvent(new Event('input'))")
+
+
+def test_the_viewer_moves_and_stops(page: Page, report: Path) -> None:
+    still = open_viewer(page, report)
     assert settled(page) == still  # nothing moves before one asks
-    page.run("document.querySelector('[data-part=play]').click()")
+    page.run(f"{part('play')}.click()")
     moving = settled(page)
     assert moving != still
-    page.run("document.querySelector('[data-part=play]').click()")
+    page.run(f"{part('play')}.click()")
     stopped = settled(page)
     assert settled(page) == stopped != moving
     assert page.faults == []
 
 
-def test_the_viewer_obeys_the_keyboard(page: Page, pages: list[Path]) -> None:
-    clock = "document.querySelector('[data-part=clock]').textContent"
-    seen = [open_viewer(page, pages)]
+def test_the_viewer_obeys_the_keyboard(page: Page, report: Path) -> None:
+    seen = [open_viewer(page, report)]
     for key, number in (("ArrowLeft", 37), ("ArrowUp", 38), ("End", 35)):
         page.key(key, number=number)
         seen.append(settled(page))
     assert len(set(seen)) == len(seen)
-    assert page.run(clock) == "10.00 s"
+    assert page.run(f"{part('clock')}.textContent") == "10.00 s"
     page.key("Home", number=36)
     page.key(".", "Period", 190)
     settled(page)
     step = page.run("JSON.parse(document.querySelector('.viewer script').textContent).step")
-    assert page.run(clock) == f"{step:.2f} s"  # one frame
+    assert page.run(f"{part('clock')}.textContent") == f"{step:.2f} s"  # one frame
     reached = set()
     for _ in range(60):
         page.key("Tab", number=9)
@@ -175,12 +181,11 @@ _LINES = """[...document.querySelectorAll('figure>svg:has(>.now)')].map(svg => {
   return [getComputedStyle(line).visibility, tick ? middle(line) - middle(tick) : null]; })"""
 
 
-def test_a_line_in_the_time_plots_follows_the_viewer(page: Page, pages: list[Path]) -> None:
-    open_viewer(page, pages)
+def test_a_line_in_the_time_plots_follows_the_viewer(page: Page, report: Path) -> None:
+    open_viewer(page, report)
     height = page.run("document.documentElement.scrollHeight")
     assert {seen for seen, _ in page.run(_LINES)} == {"hidden"}
-    page.run("document.querySelector('[data-part=time]').value = 600;"
-             "document.querySelector('[data-part=time]').dispatchEvent(new Event('input'))")  # fmt: skip
+    set_part(page, "time", 600)
     time.sleep(0.3)
     found = page.run(_LINES)  # at 6 s, where the tick of 6 s is
     assert {seen for seen, _ in found} == {"visible"}
@@ -241,55 +246,48 @@ def test_drawn_angles_are_those_of_the_data_and_fast_paths_are_round(page: Page,
 
 
 @pytest.mark.parametrize("how", ["mouse", "touch"])
-def test_the_view_turns_by_dragging(page: Page, pages: list[Path], how: str) -> None:
-    still = open_viewer(page, pages, 390)
+def test_the_view_turns_by_dragging(page: Page, report: Path, how: str) -> None:
+    still = open_viewer(page, report, 390)
     x, y = page.run("(() => { const b = document.querySelector('.viewer canvas').getBoundingClientRect();"
                     "return [b.left + 150, b.top + 120]; })()")  # fmt: skip
     if how == "mouse":
-        for kind, at in (
-            ("mousePressed", x),
-            ("mouseMoved", x + 40),
-            ("mouseMoved", x + 90),
-            ("mouseReleased", x + 90),
-        ):
-            page.call("Input.dispatchMouseEvent", type=kind, x=at, y=y, button="left", buttons=1, clickCount=1)
+        for kind, way in (("Pressed", 0), ("Moved", 40), ("Moved", 90), ("Released", 90)):
+            pressed = {"button": "left", "buttons": 1, "clickCount": 1}
+            page.call("Input.dispatchMouseEvent", type=f"mouse{kind}", x=x + way, y=y, **pressed)
     else:
         page.call("Emulation.setTouchEmulationEnabled", enabled=True)
-        for kind, points in (("touchStart", [x]), ("touchMove", [x + 40]), ("touchMove", [x + 90]), ("touchEnd", [])):
-            page.call("Input.dispatchTouchEvent", type=kind, touchPoints=[{"x": at, "y": y} for at in points])
+        for kind, points in (("Start", [x]), ("Move", [x + 40]), ("Move", [x + 90]), ("End", [])):
+            touched = [{"x": at, "y": y} for at in points]
+            page.call("Input.dispatchTouchEvent", type=f"touch{kind}", touchPoints=touched)
         page.call("Emulation.setTouchEmulationEnabled", enabled=False)
     assert settled(page) != still
 
 
-def test_overlaid_and_magnified_pictures_differ(page: Page, pages: list[Path]) -> None:
-    seen = [open_viewer(page, pages)]
-    for part, value in (("mode", "over"), ("offset", "5"), ("time", "500")):
-        page.run(
-            f"(() => {{ const e = document.querySelector('[data-part={part}]'); e.value = '{value}';"
-            "e.dispatchEvent(new Event('input')); })()"
-        )
+def test_overlaid_and_magnified_pictures_differ(page: Page, report: Path) -> None:
+    seen = [open_viewer(page, report)]
+    for name, value in (("mode", "over"), ("offset", 5), ("time", 500)):
+        set_part(page, name, value)
         seen.append(settled(page))
     assert len(set(seen)) == len(seen)
-    assert page.run("document.querySelector('[data-part=times]').textContent") == "×5"
+    assert page.run(f"{part('times')}.textContent") == "×5"
 
 
-def test_without_scripts_and_in_print_the_still_picture_stands(page: Page, pages: list[Path]) -> None:
+def test_without_scripts_and_in_print_the_still_picture_stands(page: Page, report: Path) -> None:
+    viewer = "document.querySelector('.viewer').offsetHeight > 0"
+    still = "document.querySelector('#paths figure svg').getBoundingClientRect().height > 100"
     page.call("Emulation.setScriptExecutionDisabled", value=True)
-    scene = next(path for path in pages if path.name == "paper-fig11.html")
-    page.open(scene, 390)
+    page.open(report / "paper-fig11.html", 390)
     page.call("Emulation.setScriptExecutionDisabled", value=False)
-    assert page.run("document.querySelector('.viewer').offsetHeight") == 0
-    assert page.run("document.querySelector('#paths figure svg').getBoundingClientRect().height") > 100
-    page.open(scene, 1440)
-    assert page.run("document.querySelector('.viewer').offsetHeight") > 100
+    assert (page.run(viewer), page.run(still)) == (False, True)
+    page.open(report / "paper-fig11.html", 1440)
+    assert page.run(viewer)
     page.call("Emulation.setEmulatedMedia", media="print")
-    assert page.run("document.querySelector('.viewer').offsetHeight") == 0
-    assert page.run("document.querySelector('#paths figure svg').getBoundingClientRect().height") > 100
+    assert (page.run(viewer), page.run(still)) == (False, True)
     page.call("Emulation.setEmulatedMedia", media="")
 
 
-def test_a_picture_can_be_saved_at_print_size(page: Page, pages: list[Path]) -> None:
-    page.open(next(path for path in pages if path.name == "figures.html"), 1440)
+def test_a_picture_can_be_saved_at_print_size(page: Page, report: Path) -> None:
+    page.open(report / "figures.html", 1440)
     page.run(
         "window.saved = []; URL.createObjectURL = (blob) => { saved.push(blob); return 'blob:none'; };"
         "HTMLAnchorElement.prototype.click = function () { saved.push(this.download); }; 0"
