@@ -16,16 +16,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 from support.commands import PROGRAM, rotor_mbs
+from support.scenes import paper
 from support.stored import Made, rotor, store
 from support.sweeps import THREE_RUNS
 
-from rotor_mbs.analysis.run_tables import bench_table, method_table, run_table
+from rotor_mbs.analysis.run_tables import bench_table, run_table
 from rotor_mbs.cli.terminal import ProgressLine, coloured
 from rotor_mbs.errors import MethodRefusal
 from rotor_mbs.runs.read import open_results
 from rotor_mbs.runs.records import Record
 from rotor_mbs.runs.sweeps import StoredSweep
-from rotor_mbs.scenario.catalogue import find_scenes
 from rotor_mbs.studies.run import Outcome
 
 
@@ -164,36 +164,25 @@ def test_full_output_and_closed_errors_lose_no_run(folder: Path) -> None:
     assert StoredSweep(folder / "o.h5").column("status").tolist() == [0, 0, 0]
 
 
-SCENE = find_scenes(["paper/fig05"])[0]
 GOOD, BAD = "lagrange/dop853", "exudyn_tree/rk67"
 
 
-def stored(tmp_path: Path, *, scenes: int = 1) -> Path:
+def test_a_row_for_each_run_and_of_many_runs_one_for_each_method(tmp_path: Path) -> None:
     runs = []
-    for i in range(scenes):
-        scene = replace(SCENE, name=f"paper/s{i}")
+    for i in range(14):
+        scene = replace(paper("fig05"), name=f"paper/s{i}")
         runs += [Made(scene, "reference", rotor(np.sin), versions={"frozen_with": "1.0"})]
         runs += [Made(scene, GOOD, rotor(lambda t: np.sin(t) + 1e-9), attributes={"defect_max": 3e-12})]
         runs += [Made(scene, BAD, rotor(lambda t: np.sin(t) + 0.25), attributes={"status": "inaccurate"})]
-    return store(tmp_path / "r.h5", runs)
-
-
-def test_a_row_for_each_run_with_its_status_error_drift_and_time(tmp_path: Path) -> None:
-    with open_results(stored(tmp_path)) as results:
-        table = run_table(results.scenes, {"paper/s0": [GOOD, BAD], "not there": [GOOD]})
-    assert table.rows == [
+    with open_results(store(tmp_path / "r.h5", runs)) as results:
+        few = run_table(results.scenes, {"paper/s0": [GOOD, BAD], "not there": [GOOD]})
+        many = run_table(results.scenes, {name: [GOOD, BAD] for name in results.scenes})
+    assert few.rows == [
         ("paper/s0", "reference", "ok", "", "", "0.0e+00", "read"),  # shipped, and no error against itself
         ("paper/s0", GOOD, "ok", "3.0e-12", "1.0e-09", "0.0e+00", "0.002"),
         ("paper/s0", BAD, "inaccurate", "", "2.5e-01", "0.0e+00", "0.002"),
     ]
-
-
-def test_many_runs_are_a_row_for_each_method_with_the_largest_of_those_that_are_ok(tmp_path: Path) -> None:
-    with open_results(stored(tmp_path, scenes=14)) as results:
-        table = run_table(results.scenes, {name: [GOOD, BAD] for name in results.scenes})
-        runs = [run for scene in results.scenes.values() for run in scene.methods.values()]
-        assert method_table(runs).rows == table.rows
-    assert table.rows == [
+    assert many.rows == [  # with the largest of those that are ok
         (GOOD, "14 of 14 ok", "3.0e-12", "1.0e-09", "0.0e+00", "0.002"),
         (BAD, "0 of 14 ok", "", "", "", "0.002"),
     ]

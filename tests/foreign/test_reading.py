@@ -105,10 +105,6 @@ def test_names_that_are_known(name: str, channel: str | None) -> None:
     assert (found and found.name) == channel
 
 
-def test_names_of_mujocos_arrays_are_known() -> None:
-    assert load_data({"time": TIME, "qpos": ANGLES, "qvel": RATES}, SCENE).columns == list(range(8))
-
-
 def test_the_names_that_are_understood_are_printed_and_documented(capsys: pytest.CaptureFixture[str]) -> None:
     """Each that is listed is understood; the list of the docs is the printed one."""
     with pytest.raises(SystemExit) as ended:

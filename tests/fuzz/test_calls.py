@@ -10,7 +10,7 @@ import asyncio
 import hashlib
 import multiprocessing
 import pickle
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
 
 import pytest
@@ -23,65 +23,43 @@ from rotor_mbs.scenario.scene import Scene
 METHOD, OTHER = "lagrange/dop853", "lagrange/ode45"
 
 
-def _scene(number: int) -> Scene:
+def scene(number: int) -> Scene:
     """Each call has a scene of its own, so that no call can have the answer of another one."""
     scene = rm.scene("paper/fig08").replace(duration=0.2, samples=11, gravity=9.0 + 0.01 * number)
     return scene if number % 2 else pickle.loads(pickle.dumps(scene))
 
 
-def _of(runs: rm.Runs) -> list[object]:
-    return [(label, run.status, run.angles.tobytes()) for label, run in runs.items()]
-
-
-def _run(number: int) -> object:
-    run = rm.run(_scene(number), METHOD, timeout=100.0)
-    return run.status, run.angles.tobytes()
-
-
-def _several(number: int) -> object:
-    return _of(rm.run(_scene(number), (name for name in (METHOD, OTHER))))
-
-
-def _sweep(number: int) -> object:
+def swept(number: int, **options: object) -> rm.Runs:
     values = (0.1 * i for i in range(number % 3 + 1))
-    return _of(rm.sweep(_scene(number), {"initial.angles[1]": values}, methods=[METHOD], samples=3))
+    return rm.sweep(scene(number), {"initial.angles[1]": values}, methods=[METHOD], samples=3, **options)
 
 
-def _pickled(number: int) -> object:
-    return _of(pickle.loads(pickle.dumps(rm.run(_scene(number), [METHOD]))))
+def compared(number: int) -> dict[str, rm.Run]:
+    run = rm.run(scene(number), METHOD)
+    assert rm.compare({"time": run.time, "angles": run.angles, "rates": run.rates}, scene(number)).status == "ok"
+    return {METHOD: run}
 
 
-def _compare(number: int) -> object:
-    scene = _scene(number)
-    run = rm.run(scene, METHOD)
-    return rm.compare({"time": run.time, "angles": run.angles, "rates": run.rates}, scene).status
-
-
-def _wrong_limit(number: int) -> object:
-    return rm.run(_scene(number), [METHOD], timeout=(-1.0, 0.0, float("nan"), float("-inf"))[number % 4])
-
-
-def _wrong_workers(number: int) -> object:
-    return rm.sweep(_scene(number), {"gravity": [1.0]}, methods=[METHOD], workers=(-1, 10**9, 0.5)[number % 3])
-
-
-def _short(number: int) -> object:
-    """Whatever it reached, it is said that the limit ended it."""
-    return rm.run(_scene(number).replace(samples=100_001), "exudyn_tree/rk44", timeout=0.01).status
-
-
-CALLS: list[Callable[[int], object]] = [
-    _run, _several, _sweep, _pickled, _compare, _wrong_limit, _wrong_workers, _short,
-]  # fmt: skip
+WRONG_LIMITS, WRONG_WORKERS = (-1.0, 0.0, float("nan"), float("-inf")), (-1, 10**9, 0.5)
+CALLS: dict[str, Callable[[int], Mapping[str, rm.Run]]] = {
+    "one": lambda n: {METHOD: rm.run(scene(n), METHOD, timeout=100.0)},
+    "several": lambda n: rm.run(scene(n), (name for name in (METHOD, OTHER))),
+    "sweep": swept,
+    "pickled": lambda n: pickle.loads(pickle.dumps(rm.run(scene(n), [METHOD]))),
+    "compare": compared,
+    "wrong limit": lambda n: rm.run(scene(n), [METHOD], timeout=WRONG_LIMITS[n % 4]),
+    "wrong workers": lambda n: swept(n, workers=WRONG_WORKERS[n % 3]),
+}
 
 
 def answer(number: int) -> str:
     """The digest of what a call returns, or its line."""
-    call = CALLS[number % len(CALLS)]
+    name = list(CALLS)[number % len(CALLS)]
     try:
-        return f"{call.__name__} {hashlib.sha256(repr(call(number)).encode()).hexdigest()}"
+        runs = [(label, run.status, run.angles.tobytes()) for label, run in CALLS[name](number).items()]
+        return f"{name}: {hashlib.sha256(repr(runs).encode()).hexdigest()}"
     except InputError as error:
-        return f"{call.__name__} {error}"
+        return f"{name}: {error}"
 
 
 async def _in_loop(number: int) -> str:
@@ -95,7 +73,7 @@ async def _in_loop(number: int) -> str:
 def test_a_call_has_its_own_answer_wherever_it_is_made(count: int) -> None:
     alone = [answer(number) for number in range(count)]
     assert len(set(alone)) > count // 2
-    assert all("allowed: " in line for line in alone if line.startswith("_wrong"))
+    assert all("allowed: " in line for line in alone if line.startswith("wrong"))
     with ThreadPoolExecutor(8) as threads:
         assert list(threads.map(answer, range(count))) == alone
     assert [asyncio.run(_in_loop(number)) for number in range(0, count, 3)] == alone[::3]

@@ -79,13 +79,6 @@ def test_a_figure_has_three_pictures_its_scene_and_the_published_number(drawn: P
     assert ("(a)</h3>" in figure_13[0], "(b)</h3>" in figure_13[0]) == (True, False)
 
 
-def test_a_file_without_the_papers_scenes_has_no_such_page(tmp_path: Path) -> None:
-    scene = replace(paper("fig11", samples=51), name="mine", figures=())
-    folder = write_report(store(tmp_path / "r.h5", [Made(scene, "reference", RIGHT)]), tmp_path / "out").parent
-    assert not (folder / "figures.html").exists()
-    assert "figures.html" not in (folder / "index.html").read_text(encoding="utf-8")
-
-
 # As files
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shlex
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
@@ -87,28 +88,6 @@ def test_a_pipe_is_written_to(tmp_path: Path) -> None:
     finally:
         os.close(far_end)
     assert pipe.is_fifo()
-
-
-@pytest.mark.parametrize("place", [".", "..", ""])
-@pytest.mark.parametrize("command", [["run", "paper/fig03", "-o"], ["sweep", "x.toml", "-o"], ["check", "--junit"]])
-def test_a_folder_is_no_output(command: list[str], place: str) -> None:
-    ended = rotor_mbs(*command, place)
-    assert ended.status == 2
-    (line,) = ended.err.strip().splitlines()
-    assert "allowed: a file's name, not a folder" in line
-
-
-@pytest.mark.parametrize("place", ["there.csv", "there.csv/new"])
-@pytest.mark.parametrize(
-    "command", ["compare none.csv --scene paper/fig03 -o", "reproduce -o", "modes paper/fig03 --report"]
-)
-def test_a_file_is_no_folder_for_pages(command: str, place: str, tmp_path: Path) -> None:
-    """Refused with the arguments, before anything is read or computed."""
-    (tmp_path / "there.csv").touch()
-    ended = rotor_mbs(*command.split(), tmp_path / place)
-    assert ended.status == 2
-    (line,) = ended.err.splitlines()
-    assert "allowed: a folder that can be written" in line
 
 
 # Every option that names an output, and what its earlier output is called in `kinds`; "" where it is no file beside it.
@@ -201,14 +180,15 @@ def test_what_a_sweep_writes_beside_its_dataset_replaces_no_other_file(name: str
 
 
 def test_pages_figures_and_saved_runs_replace_no_other_file(results: Path, tmp_path: Path) -> None:
-    for command, name in (("report", "paper-fig08.html"), ("report", "index.html"), ("figures", "fig08.pdf")):
-        folder = tmp_path / f"{command}-{name}"
+    for command, names in {"report": ["paper-fig08.html", "index.html"], "figures": ["fig08.pdf"]}.items():
+        folder = tmp_path / command
         folder.mkdir()
-        (folder / name).write_text("<title>mine</title>")
-        assert rotor_mbs(command, results, "-o", folder).status == 2
-        assert (folder / name).read_text() == "<title>mine</title>"
-        assert [path.name for path in folder.iterdir()] == [name]
-        (folder / name).unlink()
+        for name in names:
+            (folder / name).write_text("<title>mine</title>")
+            assert rotor_mbs(command, results, "-o", folder).status == 2
+            assert (folder / name).read_text() == "<title>mine</title>"
+            assert [path.name for path in folder.iterdir()] == [name]
+            (folder / name).unlink()
         for _ in range(2):
             assert rotor_mbs(command, results, "-o", folder).status == 0
     (tmp_path / "mine.h5").write_text("mine")
@@ -216,25 +196,36 @@ def test_pages_figures_and_saved_runs_replace_no_other_file(results: Path, tmp_p
         rm.open(results).save(tmp_path / "mine.h5")
 
 
+FILES = ("run paper/fig03 -o", "sweep x.toml -o", "check --junit")
+PAGES = ("compare none.csv --scene paper/fig03 -o", "reproduce -o", "modes paper/fig03 --report")
+UNWRITABLE = (
+    "export check/held --to csv -o /",
+    "export check/held --to csv -o /proc/none/x.csv",
+    "sweep {sweep} -o {sweep}",
+    "sweep {sweep} -o /proc/none/x.h5",
+    "check {results} --junit /proc/none/x.xml",
+    "animate .. {results}",
+    "animate .. {results} -o /proc/none/x.webp",
+    "run check/held -m lagrange/ode45 -o /proc/none/x.h5",
+    "new /proc/none/x.toml",
+    "figures {results} -o /proc/none/x",
+    "report {results} -o /proc/none/x",
+)
+
+
 @pytest.mark.parametrize(
-    "command",
+    ("command", "allowed"),
     [
-        "export check/held --to csv -o /",
-        "export check/held --to csv -o /proc/none/x.csv",
-        "sweep {sweep} -o {sweep}",
-        "sweep {sweep} -o /proc/none/x.h5",
-        "check {results} --junit /proc/none/x.xml",
-        "animate .. {results}",
-        "animate .. {results} -o /proc/none/x.webp",
-        "run check/held -m lagrange/ode45 -o /proc/none/x.h5",
-        "new /proc/none/x.toml",
-        "figures {results} -o /proc/none/x",
-        "report {results} -o /proc/none/x",
+        *((f"{command} {place}", "a file's name, not a folder") for command in FILES for place in (".", "..", "''")),
+        *((f"{command} {{sweep}}{end}", "a folder that can be written") for command in PAGES for end in ("", "/new")),
+        *((command, "") for command in UNWRITABLE),
     ],
 )
-def test_an_output_that_cannot_be_written_is_a_line(command: str, results: Path, dataset: Path) -> None:
+def test_an_output_that_cannot_be_written_is_a_line(command: str, allowed: str, results: Path, dataset: Path) -> None:
+    """Found with the arguments where it can be, before anything is read or computed."""
     sweep = dataset.with_name("s.toml")
-    ended = rotor_mbs(*command.format(results=results, sweep=sweep).split())
+    ended = rotor_mbs(*shlex.split(command.format(results=results, sweep=sweep)))
     assert ended.status == 2, ended
     assert len(ended.err.splitlines()) == 1, ended.err
+    assert f"allowed: {allowed}" in ended.err or not allowed
     assert "[[axis]]" in sweep.read_text()

@@ -94,6 +94,7 @@ def netcdf_variables(path: Path, scene: Scene, time: Array, angles: Array, rates
             file[name.replace(" ", "_")].attrs["units"] = "rad/s" if "rate" in name else "rad"
         file["time"] = time
         file["time"].attrs["units"] = np.bytes_("s")
+        file["nothing"] = h5py.Empty("f8")  # a dataset without values is no column
 
 
 def netcdf_3(path: Path, scene: Scene, time: Array, angles: Array, rates: Array) -> None:  # noqa: ARG001
