@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from support import other_code
-from support.data_files import FORMATS, pinocchio_file
+from support.data_files import FORMATS
 
 import rotor_mbs as rm
 from rotor_mbs.analysis.data_verdict import as_dictionary
@@ -61,17 +61,6 @@ def test_a_correct_code_agrees(tmp_path: Path, name: str, kind: str, duration: f
     assert (found.status, found.message, found.likely) == ("ok", "", ())
     # SciPy at 1e-11 makes errors of some 1e-11 a step; a wrong digit in the equations, at least 1e-4.
     assert max(channel.defect or 0.0 for channel in found.verdict.channels) < 1e-8
-
-
-@pytest.mark.parametrize("name", ["paper/fig08", "paper/fig09", "paper/fig11", "check/general", "check/pitch-loads"])
-def test_a_script_for_pinocchio_agrees(tmp_path: Path, name: str) -> None:
-    scene = rm.scene(name)
-    pinocchio_file(tmp_path / "pinocchio.csv", scene, uneven(scene.duration))
-    found = rm.compare(tmp_path / "pinocchio.csv", scene)
-    assert (found.status, found.message) == ("ok", "")
-    # As of the other code: SciPy at 1e-11; a wrong number in the model makes 1e-4 at least.
-    assert max(channel.defect or 0.0 for channel in found.verdict.channels) < 1e-8
-    assert len(found.verdict.channels) == 2 * len(scene.initial_angles)
 
 
 # What is kept of the numbers of a right run: (angles, rates) -> the same, or no rates.

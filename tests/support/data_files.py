@@ -3,18 +3,13 @@
 from __future__ import annotations
 
 import json
-import os
 import struct
-import subprocess
-import sys
 from collections.abc import Callable
-from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
 import h5py
 import numpy as np
-import pytest
 import scipy.io
 
 from rotor_mbs.scenario.scene import Scene
@@ -121,28 +116,6 @@ def decimal_commas(path: Path, scene: Scene, time: Array, angles: Array, rates: 
 def tabs(path: Path, scene: Scene, time: Array, angles: Array, rates: Array) -> None:
     rows = np.column_stack([time, angles, rates])
     np.savetxt(path, rows, delimiter="\t", header="\t".join(["time", *_names(scene)]), comments="", fmt="%.17g")
-
-
-def pinocchio_file(path: Path, scene: Scene, times: Array, *more: str) -> None:
-    """What `pinocchio_script` writes of a scene, by the interpreter of PINOCCHIO_PYTHON, which need not have this
-    package; skips the test where there is no pinocchio."""
-    python = os.environ.get("PINOCCHIO_PYTHON", sys.executable)
-    if subprocess.run([python, "-c", "import pinocchio"], capture_output=True, check=False).returncode:
-        pytest.skip("no pinocchio: pip install pin, or PINOCCHIO_PYTHON")
-    blades = range(len(scene.blades))
-    bearings, loads = zip(*map(scene.bearing, blades), strict=True), zip(*map(scene.pitch_load, blades), strict=True)
-    (stiffness, damping), (torques, rests) = bearings, loads
-    tables = [scene.rotor_torque, *torques, *rests]
-    knots = [t for table in tables for t, _ in table if 0.0 < t < scene.duration]
-    rotor = {
-        "blades": [asdict(blade) for blade in scene.blades], "hub_inertia": scene.hub_inertia, "gravity": scene.gravity,
-        "stiffness": stiffness, "damping": damping, "shaft_damping": scene.shaft_damping,
-        "angles": scene.initial_angles, "rates": scene.initial_rates, "loads": tables,
-        "times": np.union1d(times, knots).tolist(),
-    }  # fmt: skip
-    numbers, script = path.with_suffix(".json"), Path(__file__).with_name("pinocchio_script.py")
-    numbers.write_text(json.dumps(rotor))
-    subprocess.run([python, "-P", script, numbers, path, *more], check=True)
 
 
 Writer = Callable[[Path, Scene, Array, Array, Array], None]
