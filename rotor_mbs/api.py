@@ -22,28 +22,25 @@ from typing import TYPE_CHECKING, Any, overload
 import numpy as np
 
 from rotor_mbs.analysis.judgement import defects_of
-from rotor_mbs.analysis.run_tables import RUN_HEAD, run_row
+from rotor_mbs.analysis.run_tables import RUN_HEAD, TextTable, run_row
 from rotor_mbs.errors import InputError, MethodRefusal, PlausibilityWarning, ResourceError, StoreError
 from rotor_mbs.methods.catalogue import REFERENCE, check_names
 from rotor_mbs.methods.method_file import ENDING
 from rotor_mbs.methods.time_limit import checked_seconds
 from rotor_mbs.runs.files import HDF5, replace_file
 from rotor_mbs.runs.read import StoredRun, StoredScene, is_sweep, open_results
-from rotor_mbs.runs.results import RUNS
 from rotor_mbs.runs.sweeps import StoredSweep, parameter_name
-from rotor_mbs.runs.table import MISSING, table_groups, text_of
+from rotor_mbs.runs.table import MISSING, RUNS, table_groups, text_of
 from rotor_mbs.scenario.catalogue import list_scenes, only_scene, scene_of
 from rotor_mbs.scenario.scene import Scene, doubts, load_scene, parse_scene
 from rotor_mbs.solution.defects import Defects
 from rotor_mbs.solution.quantities import known_quantities
-from rotor_mbs.solution.solution import Solution, need_xarray
 from rotor_mbs.solution.status import STATUSES
-from rotor_mbs.solution.text_table import TextTable
-from rotor_mbs.solution.trajectory import Integration, Trajectory
+from rotor_mbs.solution.trajectory import Integration, Solution, Trajectory, need_xarray
 from rotor_mbs.studies.run import run_scenes, selected_methods, solve_judged
 
 if TYPE_CHECKING:
-    from rotor_mbs.report.run_plots import ComparisonPlots, RunPlots
+    from rotor_mbs.report.plots import ComparisonPlots, RunPlots
 
 _NO_LIMIT_S = 1e9
 _SHOWN = 5  # lines of lost runs
@@ -220,7 +217,7 @@ class Run(Solution):
 
     @property
     def plot(self) -> RunPlots:
-        from rotor_mbs.report.run_plots import RunPlots  # late: matplotlib
+        from rotor_mbs.report.plots import RunPlots  # late: matplotlib
 
         return RunPlots(self, self.reference)
 
@@ -409,7 +406,7 @@ class Runs(Mapping[Any, Any]):
 
     @property
     def plot(self) -> ComparisonPlots:
-        from rotor_mbs.report.run_plots import ComparisonPlots  # late: matplotlib
+        from rotor_mbs.report.plots import ComparisonPlots  # late: matplotlib
 
         if not self.scene:
             raise InputError("plot: only of the runs of one scene, such as runs['paper/fig11']")

@@ -20,7 +20,7 @@ from support.commands import PROGRAM, rotor_mbs
 import rotor_mbs as rm
 from rotor_mbs.methods.catalogue import find_method
 from rotor_mbs.report.build import write_report
-from rotor_mbs.runs.records import read_records
+from rotor_mbs.runs.read import read_records
 
 SOURCES = Path(__file__).parent / "extension"
 PACKAGES = {

@@ -15,8 +15,6 @@ from typing import NamedTuple
 import numpy as np
 
 from rotor_mbs.analysis import kinematics
-from rotor_mbs.analysis.claims import claims
-from rotor_mbs.analysis.exact import exact_rotor_angle
 from rotor_mbs.analysis.judgement import (
     Judgement,
     energy_slack,
@@ -25,6 +23,8 @@ from rotor_mbs.analysis.judgement import (
     quantity_errors,
     start_slack,
 )
+from rotor_mbs.analysis.kinematics import exact_rotor_angle
+from rotor_mbs.analysis.published import claims
 from rotor_mbs.analysis.run_selection import PRINTED
 from rotor_mbs.errors import InputError, StoreError
 from rotor_mbs.methods.catalogue import REFERENCE, is_corrected, look_up, methods
@@ -37,9 +37,8 @@ from rotor_mbs.scenario.scene import Scene, scene_hash
 from rotor_mbs.solution.defects import DRIFT_ROWS, FLOOR_SAFETY
 from rotor_mbs.solution.metrics import HORIZON_GROWTH, Metrics, energy_scale, running_growth
 from rotor_mbs.solution.quantities import energy_error
-from rotor_mbs.solution.solution import Solution
 from rotor_mbs.solution.status import COMPLETE
-from rotor_mbs.solution.trajectory import Array, Trajectory
+from rotor_mbs.solution.trajectory import Array, Solution, Trajectory
 
 # Extremes at ode45's own points, which are others when it starts between: its relative tolerance, of rad or rad/s.
 _READ_OFF = 1e-3

@@ -21,8 +21,7 @@ from rotor_mbs.scenario.scene import Blade, Scene
 from rotor_mbs.solution.defects import Defects
 from rotor_mbs.solution.metrics import ANGLE_LIMIT, Metrics, metrics_of
 from rotor_mbs.solution.quantities import Array, Quantity, QuantityMetric, known_quantities
-from rotor_mbs.solution.solution import Solution
-from rotor_mbs.solution.trajectory import Integration, Trajectory
+from rotor_mbs.solution.trajectory import Integration, Solution, Trajectory
 
 # rad: the largest error of an angle, up to the horizon, of a run that is called ok.
 OK_ERROR = 0.01

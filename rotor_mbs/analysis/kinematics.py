@@ -1,10 +1,12 @@
-"""Tip paths and energies by plain rotation of the scene's bodies: computed again, independently of all models."""
+"""What is known of a scene without any model: tip paths and energies by plain rotation of bodies, exact solutions."""
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
-from rotor_mbs.scenario.scene import Scene
+from rotor_mbs.scenario.scene import Blade, Scene
 from rotor_mbs.scenario.time_table import value_at
 from rotor_mbs.solution.trajectory import Array
 
@@ -63,3 +65,66 @@ def _frames(scene: Scene, angles: Array, blade: int) -> Array:
 def _rotated(frames: Array, point: tuple[float, float, float]) -> Array:
     """(n, 3) m."""
     return np.asarray(frames @ np.array(point))
+
+
+def exact_rotor_angle(scene: Scene, time: Array) -> tuple[str, Array] | None:
+    """(name, (n,) rad) of the rotor's angle where every pitch stays at zero; None where no exact solution is known.
+
+    One blade let go at rest: a pendulum (elliptic functions; Abramowitz & Stegun 22.2). Equal blades in balance:
+    gravity cancels, a constant torque gives q0 + Ω0 t + τ t² / (2 I).
+    """
+    if not _stays_at_zero_pitch(scene):
+        return None
+    if len(scene.blades) == 1:
+        return _pendulum(scene, time)
+    if any(blade != scene.blades[0] for blade in scene.blades) or not scene.has_constant_torque:
+        return None
+    inertia = scene.hub_inertia + sum(_about_shaft(blade) for blade in scene.blades)
+    torque = scene.torque_at(0.0)
+    angle = scene.initial_angles[0] + scene.initial_rates[0] * time + torque * time**2 / (2.0 * inertia)
+    return ("constant torque" if torque else "uniform rotation" if scene.initial_rates[0] else "rest"), angle
+
+
+def _stays_at_zero_pitch(scene: Scene) -> bool:
+    """Zero pitch is invariant for blades that their own x-z plane mirrors; nothing may damp the rotor."""
+    mirrored = all(b.centre_of_mass[1] == 0.0 and b.inertia[3] == 0.0 and b.inertia[5] == 0.0 for b in scene.blades)
+    at_zero = not any(scene.initial_angles[1:]) and not any(scene.initial_rates[1:])
+    driven = any(table for i in range(len(scene.blades)) for table in scene.pitch_load(i))
+    return mirrored and at_zero and not driven and scene.shaft_damping == 0.0
+
+
+def _about_shaft(blade: Blade) -> float:
+    """kg m²: about the y axis through the hub centre, at zero pitch."""
+    x, _, z = blade.centre_of_mass
+    return blade.inertia[1] + blade.mass * (x * x + z * z)
+
+
+def _pendulum(scene: Scene, time: Array) -> tuple[str, Array] | None:
+    from scipy.special import ellipj, ellipk
+
+    blade = scene.blades[0]
+    x, _, z = blade.centre_of_mass
+    arm, lead = math.hypot(x, z), math.atan2(x, z)
+    if scene.has_torque or scene.initial_rates[0] or not scene.gravity or not arm:
+        return None
+    frequency = math.sqrt(blade.mass * scene.gravity * arm / (scene.hub_inertia + _about_shaft(blade)))
+    amplitude = math.pi - (scene.initial_angles[0] + lead)  # from straight down
+    if not -math.pi < amplitude < math.pi:
+        return None
+    modulus = math.sin(amplitude / 2.0)
+    sn = ellipj(ellipk(modulus**2) - frequency * time, modulus**2)[0]
+    return "pendulum", math.pi - 2.0 * np.arcsin(modulus * sn) - lead
+
+
+def escape_rate(scene: Scene) -> float | None:
+    """1/s: sqrt(g/c) of the fastest blade, a pendulum about its pitch axis that stands upside down (below the shaft).
+
+    c is a point mass' distance from the pitch axis, g gravity. None for blades with inertia of their own, for bearings
+    with springs, dampers or torques, and where nothing makes the pitch unstable.
+    """
+    arms = [arm for blade in scene.blades if (arm := math.hypot(*blade.centre_of_mass[:2])) > 0.0]
+    is_rigid = not all(blade.is_point_mass for blade in scene.blades)
+    in_bearing = scene.bearing_stiffness or scene.bearing_damping or scene.pitch_torque
+    if is_rigid or in_bearing or scene.gravity <= 0.0 or not arms:
+        return None
+    return math.sqrt(scene.gravity / min(arms))

@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 
 from rotor_mbs.errors import InputError, StoreError
 from rotor_mbs.runs.files import Column
-from rotor_mbs.runs.records import Record, read_records
+from rotor_mbs.runs.read import Record, read_records
 from rotor_mbs.solution.trajectory import Array
 
 Complex = NDArray[np.complex128]

@@ -1,18 +1,18 @@
-"""Results as small tables for a terminal or a notebook: of runs, of methods over many runs, of bench curves."""
+"""Small tables for a terminal or a notebook: of runs, of methods over many runs, of bench curves."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from html import escape
 from typing import NamedTuple
 
 from rotor_mbs.analysis.run_selection import in_catalogue_order
 from rotor_mbs.analysis.work_precision import TARGETS_RAD, points, time_to_reach
 from rotor_mbs.methods.catalogue import REFERENCE, is_corrected
-from rotor_mbs.runs.read import StoredRun, StoredScene
-from rotor_mbs.runs.records import Record
+from rotor_mbs.runs.read import Record, StoredRun, StoredScene
 from rotor_mbs.solution.status import GOOD
-from rotor_mbs.solution.text_table import TextTable
 
 RUN_HEAD = ("method", "status", "largest defect (rad)", "error (rad), ok to 0.01", "energy drift", "time (s)")
 _MOST_ROWS = 40  # of a table with a row for each run
@@ -100,3 +100,30 @@ def bench_table(curves: Sequence[Record]) -> TextTable:
 
 def _short(value: object) -> str:
     return f"{value:.1e}" if isinstance(value, float) and math.isfinite(value) else ""
+
+
+def listed(texts: Sequence[str]) -> str:
+    if len(texts) == 1:
+        return texts[0]
+    return f"{', '.join(texts[:-1])} and {texts[-1]}"
+
+
+@dataclass(frozen=True)
+class TextTable:
+    """Rows of text under a heading; printed in columns, a table in a notebook."""
+
+    head: tuple[str, ...]
+    rows: list[tuple[str, ...]]
+
+    def __str__(self) -> str:
+        rows = [self.head, *self.rows]
+        widths = [max(len(cell) for cell in column) for column in zip(*rows, strict=True)]
+        lines = ["  ".join(f"{cell:{width}}" for cell, width in zip(row, widths, strict=True)) for row in rows]
+        return "\n".join(line.rstrip() for line in lines)
+
+    __repr__ = __str__
+
+    def _repr_html_(self) -> str:
+        head = "".join(f"<th>{escape(cell)}</th>" for cell in self.head)
+        rows = "".join(f"<tr>{''.join(f'<td>{escape(cell)}</td>' for cell in row)}</tr>" for row in self.rows)
+        return f"<table><tr>{head}</tr>{rows}</table>"

@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 
 from rotor_mbs.analysis import kinematics
 from rotor_mbs.analysis.run_selection import corrected_runs
-from rotor_mbs.runs.read import StoredRun, StoredScene
-from rotor_mbs.runs.records import Record
+from rotor_mbs.runs.read import Record, StoredRun, StoredScene
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.metrics import energy_scale
 from rotor_mbs.solution.status import COMPLETE, code_of

@@ -48,23 +48,23 @@ def main(argv: Sequence[str] | None = None) -> int:
             return status
         except (KeyboardInterrupt, RotorError, SystemError, ImportError) as exc:
             if _is_interrupt(exc):
-                show("interrupted; finished runs are stored, the same command continues", sys.stderr)
+                print_line("interrupted; finished runs are stored, the same command continues", sys.stderr)
                 return EXIT_INTERRUPTED
             if isinstance(exc, RotorError):
-                show(str(exc), sys.stderr)
+                print_line(str(exc), sys.stderr)
                 return EXIT_BAD_INPUT if isinstance(exc, InputError | MethodRefusal | StoreError) else EXIT_FAILED
             # Without memory for a library, its loading raises either.
-            show(f"code cannot be loaded: {type(exc).__name__}: {exc}", sys.stderr)
+            print_line(f"code cannot be loaded: {type(exc).__name__}: {exc}", sys.stderr)
             return EXIT_FAILED
         except MemoryError as exc:
-            show(f"not enough memory: {exc}" if str(exc) else "not enough memory", sys.stderr)
+            print_line(f"not enough memory: {exc}" if str(exc) else "not enough memory", sys.stderr)
             return EXIT_FAILED
         except BrokenPipeError:
             discard_output()
             return EXIT_OK if words[:1] and words[0] in _ONLY_PRINT else EXIT_FAILED
         except OSError as exc:
             discard_output()
-            show(f"{exc.filename or 'standard output'}: {exc.strerror or exc}", sys.stderr)
+            print_line(f"{exc.filename or 'standard output'}: {exc.strerror or exc}", sys.stderr)
             return EXIT_BAD_INPUT if exc.filename else EXIT_FAILED
 
 
@@ -148,7 +148,7 @@ def plain_streams() -> Iterator[None]:
             sys.stdout, sys.stderr = before
 
 
-def show(text: str, stream: TextIO) -> None:
+def print_line(text: str, stream: TextIO) -> None:
     """Print a line that may be lost: where nobody reads it any more, or the disk is full, it is dropped."""
     with suppress(OSError, ValueError):
         print(text, file=stream, flush=True)

@@ -193,18 +193,18 @@ def _parser() -> tuple[_Parser, dict[str, _Parser]]:
         own.set_defaults(command=function)
         return own
 
-    own = command("list", "list scenes, sweeps and methods", "scenes:list_all", "", "--json")
+    own = command("list", "list scenes, sweeps and methods", "commands:list_all", "", "--json")
     own.flag("--json", help="print JSON")
 
     own = command(
-        "show", "show the data and methods of a scene, or the settings of a method", "scenes:show",
+        "show", "show the data and methods of a scene, or the settings of a method", "commands:show",
         "paper/fig11", "paper/fig11 --build",
     )  # fmt: skip
     own.add_argument("scene", metavar="SCENE", help="a name (paper/fig05), a TOML file, or a method (lagrange/taylor)")
     own.flag("--build", help="also list the items that each model builds")
     own.flag("--json", help="print JSON")
 
-    own = command("new", "write a commented scene file to start from", "scenes:new", "my.toml")
+    own = command("new", "write a commented scene file to start from", "commands:new", "my.toml")
     own.add_argument("file", type=file, metavar="FILE", help="a TOML file that does not exist yet")
 
     own = command(
@@ -231,7 +231,7 @@ def _parser() -> tuple[_Parser, dict[str, _Parser]]:
 
     own = command(
         "compare", "compare another program's trajectory, loads or modes with a scene; exit status 1 if they differ",
-        "studies:compare", "mine.csv --scene paper/fig11", "OpenFAST.out --scene my.toml --columns map.toml",
+        "commands:compare", "mine.csv --scene paper/fig11", "OpenFAST.out --scene my.toml --columns map.toml",
     )  # fmt: skip
     text = "text with a header, .json, .npz, .mat, HDF5, netCDF, an Exudyn sensor file, OpenFAST .out or .outb"
     own.add_argument("data", type=Path, metavar="DATA", help=text)
@@ -250,7 +250,7 @@ def _parser() -> tuple[_Parser, dict[str, _Parser]]:
     own.flag("--json", help="print the verdict as JSON")
 
     own = command(
-        "bench", "measure error and run time of each method at several tolerances or steps", "studies:bench",
+        "bench", "measure error and run time of each method at several tolerances or steps", "commands:bench",
         "paper/fig11", "paper/fig11 my.toml -m lagrange/taylor -m exudyn_tree/rk67 -o bench.h5",
     )  # fmt: skip
     own.scenes()
@@ -270,7 +270,7 @@ def _parser() -> tuple[_Parser, dict[str, _Parser]]:
     own.timeout()
 
     own = command(
-        "check", "check the accuracy of stored runs; exit status 1 if a check fails", "studies:check",
+        "check", "check the accuracy of stored runs; exit status 1 if a check fails", "commands:check",
         "", "rotor-mbs-out/results.h5 --junit check.xml",
     )  # fmt: skip
     own.add_argument("file", nargs="?", type=Path, metavar="FILE", help="results file (default: compute a set of runs)")
@@ -292,7 +292,7 @@ def _parser() -> tuple[_Parser, dict[str, _Parser]]:
 
     own = command(
         "test-method", "test a method, your own or a built-in one, and report faults with their most likely causes",
-        "studies:test_method", "./mine.py", "lagrange/dop853 --json -",
+        "commands:test_method", "./mine.py", "lagrange/dop853 --json -",
     )  # fmt: skip
     own.add_argument("methods", nargs="+", metavar="METHOD", help="a Python file of methods, or model/integrator")
     own.add_argument("--junit", type=file, metavar="XML", help="the checks as JUnit XML")
@@ -300,7 +300,7 @@ def _parser() -> tuple[_Parser, dict[str, _Parser]]:
     own.timeout()
 
     own = command(
-        "sweep", "run a parameter study into one dataset", "studies:sweep",
+        "sweep", "run a parameter study into one dataset", "commands:sweep",
         "sweeps/fig11-spread -o spread.h5", "my-sweep.toml --dry-run",
     )  # fmt: skip
     own.add_argument("file", type=Path, metavar="SWEEP.toml", help="a file, or a shipped sweep (sweeps/fig11-spread)")
@@ -320,7 +320,7 @@ def _parser() -> tuple[_Parser, dict[str, _Parser]]:
 
     own = command(
         "stability", "run stiff and extreme scenes with every method and report which are stable and accurate",
-        "studies:stability", "", "stiff/bearing-1e8 -o stiff.h5",
+        "commands:stability", "", "stiff/bearing-1e8 -o stiff.h5",
     )  # fmt: skip
     own.scenes(nargs="*", help="scenes or folders (default: stiff extreme)")
     own.method()
@@ -332,7 +332,7 @@ def _parser() -> tuple[_Parser, dict[str, _Parser]]:
 
     own = command(
         "modes", "compute natural frequencies at rest and over rotor speed, and Floquet multipliers under gravity",
-        "studies:modes", "stiff/nrel-5mw --speeds 0:3:31",
+        "commands:modes", "stiff/nrel-5mw --speeds 0:3:31",
     )  # fmt: skip
     own.scenes()
     own.method("method whose model is compared with the closed form (default: all), or a Python file")
@@ -346,13 +346,13 @@ def _parser() -> tuple[_Parser, dict[str, _Parser]]:
     own.jobs()
     own.timeout(600.0)
 
-    own = command("report", "write HTML pages from any file of this program", "studies:report", "my.h5 --open")
+    own = command("report", "write HTML pages from any file of this program", "commands:report", "my.h5 --open")
     own.results()
     own.pages("-o", "--output")
     own.flag("--open", help="open the index in a browser")
 
     own = command(
-        "figures", "draw the paper's figures for a manuscript, from a results file", "studies:figures",
+        "figures", "draw the paper's figures for a manuscript, from a results file", "commands:figures",
         "--format svg --figure 11",
     )  # fmt: skip
     own.results()
@@ -361,7 +361,7 @@ def _parser() -> tuple[_Parser, dict[str, _Parser]]:
     own.add_argument("--figure", action="append", metavar="N", help="only this figure; may be repeated")
 
     own = command(
-        "animate", "animate a scene from a results file", "studies:animate",
+        "animate", "animate a scene from a results file", "commands:animate",
         "paper/fig11", "mine my.h5 -o mine.gif",
     )  # fmt: skip
     own.add_argument("scene", metavar="SCENE", help="name of a scene in the results file")
@@ -372,7 +372,7 @@ def _parser() -> tuple[_Parser, dict[str, _Parser]]:
     own.add_argument("--offset", type=POSITIVE, metavar="TIMES", help=text)
 
     own = command(
-        "export", "export a scene for MuJoCo or Exudyn, or its reference as CSV", "studies:export",
+        "export", "export a scene for MuJoCo or Exudyn, or its reference as CSV", "commands:export",
         "paper/fig11 --to mjcf", "my.toml --to csv -o my.csv",
     )  # fmt: skip
     own.add_argument("scene", metavar="SCENE", help="a name (paper/fig05) or a TOML file")

@@ -18,8 +18,8 @@ from rotor_mbs.cli import printable
 from rotor_mbs.solution.status import GOOD, STATUSES
 
 if TYPE_CHECKING:  # a sweep's workers load their code meanwhile
+    from rotor_mbs.analysis.run_tables import TextTable
     from rotor_mbs.scenario.scene import Scene
-    from rotor_mbs.solution.text_table import TextTable
     from rotor_mbs.studies.run import Outcome, RunReport
 
 

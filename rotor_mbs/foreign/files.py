@@ -21,8 +21,7 @@ from numpy.typing import NDArray
 from rotor_mbs.errors import InputError, ResourceError, RotorError
 from rotor_mbs.runs import files
 from rotor_mbs.runs.read import run_arrays
-from rotor_mbs.runs.results import RUNS
-from rotor_mbs.runs.table import table_groups
+from rotor_mbs.runs.table import RUNS, table_groups
 
 # By dimension: factor to s, rad or rad/s.
 _ANGLES = {

@@ -13,8 +13,7 @@ from rotor_mbs.methods.base import Method
 from rotor_mbs.methods.catalogue import find_method
 from rotor_mbs.methods.time_limit import time_limit
 from rotor_mbs.scenario.scene import Scene
-from rotor_mbs.solution.solution import Solution
-from rotor_mbs.solution.trajectory import shape_fault
+from rotor_mbs.solution.trajectory import Solution, shape_fault
 
 _OBSERVING_S = 1.0  # in any case, of what was reached by the time limit
 

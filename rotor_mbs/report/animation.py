@@ -15,8 +15,8 @@ from PIL import Image
 from rotor_mbs.analysis import run_selection
 from rotor_mbs.analysis.kinematics import tip_paths
 from rotor_mbs.errors import InputError, StoreError
-from rotor_mbs.report.core import canvas
-from rotor_mbs.report.core.looks import GREY, INK, coordinate_look, label_of
+from rotor_mbs.report import canvas
+from rotor_mbs.report.looks import GREY, INK, coordinate_look, label_of
 from rotor_mbs.report.pages.viewer import magnification
 from rotor_mbs.report.plots import projected
 from rotor_mbs.runs.files import refuse_foreign, replace_file, replacing

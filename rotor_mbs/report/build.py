@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import NamedTuple
 
 from rotor_mbs.errors import StoreError
-from rotor_mbs.report.core import files
-from rotor_mbs.report.core.files import Pairs, render
+from rotor_mbs.report import files
+from rotor_mbs.report.files import Pairs, render
 from rotor_mbs.report.pages import Report
 from rotor_mbs.report.pages.bench import bench_page, csv_text
 from rotor_mbs.report.pages.index import index_page
@@ -17,8 +17,7 @@ from rotor_mbs.report.pages.paper import available, errata_page, figures_page
 from rotor_mbs.report.pages.scene import scene_page
 from rotor_mbs.report.pages.stability import stability_page
 from rotor_mbs.runs.pool import Workers, pool_of, run_in
-from rotor_mbs.runs.read import is_sweep, open_results
-from rotor_mbs.runs.records import read_records
+from rotor_mbs.runs.read import is_sweep, open_results, read_records
 from rotor_mbs.runs.sweeps import StoredSweep
 
 _GROUPS = 4  # of pages per worker, so that none waits long for the last one

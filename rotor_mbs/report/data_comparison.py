@@ -13,25 +13,22 @@ from typing import Any
 import numpy as np
 
 from rotor_mbs.analysis.data_verdict import DEFAULT_TOLERANCE, LEVELS, ChannelErrors, DataVerdict, from_dictionary
+from rotor_mbs.analysis.run_tables import TextTable
 from rotor_mbs.errors import InputError
 from rotor_mbs.foreign.channels import load_data
 from rotor_mbs.methods.time_limit import checked_seconds
-from rotor_mbs.report import plots
-from rotor_mbs.report.core import canvas
-from rotor_mbs.report.core.canvas import Panels
-from rotor_mbs.report.core.elements import PageTable, Picture, Row, Section, TableCell
-from rotor_mbs.report.core.files import write_page
-from rotor_mbs.report.core.looks import GREY, Look, coordinate_look
-from rotor_mbs.report.core.numbers import number, typeset, with_unit
-from rotor_mbs.report.core.svg import picture
+from rotor_mbs.report import canvas, plots
+from rotor_mbs.report.canvas import Panels
+from rotor_mbs.report.elements import PageTable, Picture, Row, Section, TableCell, picture
+from rotor_mbs.report.files import write_page
+from rotor_mbs.report.looks import GREY, Look, coordinate_look
+from rotor_mbs.report.numbers import number, typeset, with_unit
 from rotor_mbs.report.plots import Series
-from rotor_mbs.runs.read import OpenResults
-from rotor_mbs.runs.records import Record, read_records, write_records
+from rotor_mbs.runs.read import OpenResults, Record, read_records, write_records
 from rotor_mbs.runs.versions import machine, versions
 from rotor_mbs.scenario.catalogue import scene_of
 from rotor_mbs.scenario.scene import Scene
-from rotor_mbs.solution.solution import need_xarray
-from rotor_mbs.solution.text_table import TextTable
+from rotor_mbs.solution.trajectory import need_xarray
 from rotor_mbs.studies.compare_data import DataStudy, compare_with_reference
 from rotor_mbs.studies.data_modes import compare_modes
 

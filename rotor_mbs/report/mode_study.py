@@ -24,20 +24,18 @@ from rotor_mbs.analysis.modes import (
     read_modes,
     to_records,
 )
+from rotor_mbs.analysis.run_tables import TextTable
 from rotor_mbs.errors import InputError
-from rotor_mbs.report.core.canvas import SPEED_AXIS, Panels, curve, growth_map, log_axis, panels
-from rotor_mbs.report.core.elements import PageTable, Picture, Row, Section, TableCell
-from rotor_mbs.report.core.files import write_page
-from rotor_mbs.report.core.looks import BLUE, GREY, VERMILLION, Look, coordinate_look, with_capital
-from rotor_mbs.report.core.numbers import NOTHING, number
-from rotor_mbs.report.core.svg import picture
-from rotor_mbs.runs.read import OpenResults
-from rotor_mbs.runs.records import write_records
+from rotor_mbs.report.canvas import SPEED_AXIS, Panels, curve, growth_map, log_axis, panels
+from rotor_mbs.report.elements import PageTable, Picture, Row, Section, TableCell, picture
+from rotor_mbs.report.files import write_page
+from rotor_mbs.report.looks import BLUE, GREY, VERMILLION, Look, coordinate_look, with_capital
+from rotor_mbs.report.numbers import NOTHING, number
+from rotor_mbs.runs.read import OpenResults, write_records
 from rotor_mbs.runs.versions import machine, versions
 from rotor_mbs.scenario.catalogue import scene_of
 from rotor_mbs.scenario.scene import Scene, scene_hash
-from rotor_mbs.solution.solution import need_xarray
-from rotor_mbs.solution.text_table import TextTable
+from rotor_mbs.solution.trajectory import need_xarray
 from rotor_mbs.studies.modes import compute_modes
 
 _MARKS = ("o", "s", "^", "D", "v", "P", "x")

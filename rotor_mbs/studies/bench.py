@@ -27,15 +27,13 @@ from rotor_mbs.methods.time_limit import OutOfTimeError, time_limit
 from rotor_mbs.runs import last_core
 from rotor_mbs.runs.files import writing
 from rotor_mbs.runs.pool import WorkerPool, run_in
-from rotor_mbs.runs.records import points_table
-from rotor_mbs.runs.results import TableFile, extend_file
-from rotor_mbs.runs.table import Place, Rows, Table
+from rotor_mbs.runs.read import points_table
+from rotor_mbs.runs.table import Place, Rows, Table, TableFile, extend_file
 from rotor_mbs.runs.versions import row_versions
 from rotor_mbs.scenario.scene import Scene, scene_hash
 from rotor_mbs.solution.metrics import horizon, horizon_samples
-from rotor_mbs.solution.solution import Solution
 from rotor_mbs.solution.status import COMPLETE
-from rotor_mbs.solution.trajectory import Trajectory
+from rotor_mbs.solution.trajectory import Solution, Trajectory
 from rotor_mbs.studies.run import OnProgress, Outcome, able_methods, ignore_progress, run_scenes
 from rotor_mbs.studies.stored_references import read_reference
 

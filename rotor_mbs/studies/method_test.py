@@ -12,8 +12,8 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from rotor_mbs.analysis.checks import Check, Where
-from rotor_mbs.analysis.exact import exact_rotor_angle
 from rotor_mbs.analysis.judgement import defects_of, energy_slack
+from rotor_mbs.analysis.kinematics import exact_rotor_angle
 from rotor_mbs.analysis.work_precision import fitted_order
 from rotor_mbs.errors import MethodRefusal, RotorError
 from rotor_mbs.foreign.channels import load_data

@@ -36,11 +36,10 @@ from rotor_mbs.methods.base import Method
 from rotor_mbs.methods.catalogue import find_method, methods, with_method_files
 from rotor_mbs.runs.files import writing
 from rotor_mbs.runs.pool import local_pool, run_in
-from rotor_mbs.runs.records import Record, read_records, write_records
+from rotor_mbs.runs.read import Record, read_records, write_records
 from rotor_mbs.scenario.scene import Scene, scene_hash
 from rotor_mbs.scenario.time_table import value_at
-from rotor_mbs.solution.linearization import Linearization
-from rotor_mbs.solution.trajectory import Array
+from rotor_mbs.solution.trajectory import Array, Linearization
 from rotor_mbs.studies.run import OnProgress, Outcome, ignore_progress
 
 if TYPE_CHECKING:

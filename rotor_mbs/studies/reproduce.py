@@ -12,19 +12,17 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import rotor_mbs
-from rotor_mbs.analysis.claims import claims, finding
-from rotor_mbs.analysis.run_tables import method_table
+from rotor_mbs.analysis.published import claims, finding
+from rotor_mbs.analysis.run_tables import TextTable, method_table
 from rotor_mbs.methods.catalogue import REFERENCE, default_methods, errata_methods, ladders
 from rotor_mbs.runs.files import writing
 from rotor_mbs.runs.pool import Workers
 from rotor_mbs.runs.read import open_results
-from rotor_mbs.runs.results import extend_file, results_tables
 from rotor_mbs.runs.runner import Task
-from rotor_mbs.runs.table import Rows
+from rotor_mbs.runs.table import Rows, extend_file, results_tables
 from rotor_mbs.runs.versions import versions
 from rotor_mbs.scenario.catalogue import find_scenes, reference_folder, scenarios_folder
 from rotor_mbs.scenario.scene import Scene
-from rotor_mbs.solution.text_table import TextTable
 from rotor_mbs.studies.bench import (
     BENCH,
     Curve,

@@ -27,15 +27,13 @@ from rotor_mbs.methods.solve import solve
 from rotor_mbs.methods.time_limit import OutOfTimeError, time_limit
 from rotor_mbs.runs.files import writing
 from rotor_mbs.runs.pool import Finished, TaskPool, Workers, pool_of
-from rotor_mbs.runs.results import Asked, TableFile, extend_file, results_tables, row_of_run
 from rotor_mbs.runs.runner import Task, compute
-from rotor_mbs.runs.table import Rows, text_of
+from rotor_mbs.runs.table import Asked, Rows, TableFile, extend_file, results_tables, row_of_run, text_of
 from rotor_mbs.runs.versions import row_versions
 from rotor_mbs.scenario.scene import Scene, scene_hash
 from rotor_mbs.scenario.toml_file import at_key
-from rotor_mbs.solution.solution import Solution
 from rotor_mbs.solution.status import STATUSES
-from rotor_mbs.solution.trajectory import Integration, Trajectory
+from rotor_mbs.solution.trajectory import Integration, Solution, Trajectory
 from rotor_mbs.studies.stored_references import digest, frozen_solution, read_reference, shipped_reference
 
 # Short runs are repeated, so that the stored time is not that of a cold cache; long ones are not.

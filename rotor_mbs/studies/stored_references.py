@@ -14,13 +14,11 @@ from numpy.typing import NDArray
 
 from rotor_mbs.methods.catalogue import REFERENCE
 from rotor_mbs.runs.read import open_results
-from rotor_mbs.runs.results import FROZEN, RUNS, TableFile
-from rotor_mbs.runs.table import MISSING, Place
+from rotor_mbs.runs.table import FROZEN, MISSING, RUNS, Place, TableFile
 from rotor_mbs.scenario.catalogue import reference_folder
 from rotor_mbs.scenario.scene import Scene, scene_hash
 from rotor_mbs.solution.quantities import sample_times
-from rotor_mbs.solution.solution import Solution
-from rotor_mbs.solution.trajectory import Integration, Trajectory
+from rotor_mbs.solution.trajectory import Integration, Solution, Trajectory
 
 # References that stay in memory: of so many samples, at some 30 numbers each, twenty of them take 25 MB at most.
 _SHORT, _MAX_RECENT = 5001, 20

@@ -23,19 +23,17 @@ from rotor_mbs.methods.time_limit import OutOfTimeError, time_limit
 from rotor_mbs.models.lagrange.reference import error_growth
 from rotor_mbs.runs.files import KEYWORDS
 from rotor_mbs.runs.pool import TaskPool
-from rotor_mbs.runs.results import row_of_run
 from rotor_mbs.runs.runner import Task, compute, perform
 from rotor_mbs.runs.sweeps import AMPLIFICATION, IDENTITY, METRICS, code_of_method, open_sweep, sweep_table
-from rotor_mbs.runs.table import MISSING, Place, Rows, Table, blank_rows
+from rotor_mbs.runs.table import MISSING, Place, Rows, Table, blank_rows, row_of_run
 from rotor_mbs.runs.versions import machine, versions
 from rotor_mbs.scenario.scene import Scene, scene_hash
 from rotor_mbs.scenario.sweep import Sweep, Variants
 from rotor_mbs.scenario.toml_file import TableError, at_key, shown_path
 from rotor_mbs.solution.metrics import Metrics, defect_metrics, energy_drifts, horizon, largest, running_growth
 from rotor_mbs.solution.quantities import energy_balance, quantities
-from rotor_mbs.solution.solution import Solution
 from rotor_mbs.solution.status import STATUSES, code_of
-from rotor_mbs.solution.trajectory import Array, RunBlock, Trajectory
+from rotor_mbs.solution.trajectory import Array, RunBlock, Solution, Trajectory
 
 _SIDE_BY_SIDE = ("", "angles", "rates", "tip", "energy")  # outputs that every `Method.solve_many` computes
 _OF_DEFECTS = ("defect_max", "defect_median", "defect_time", "angle_error_predicted")

@@ -23,7 +23,7 @@ from rotor_mbs.scenario.catalogue import reference_folder
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.metrics import energy_scale, metrics_of
 from rotor_mbs.solution.quantities import Quantity, QuantityMetric
-from rotor_mbs.solution.solution import Solution
+from rotor_mbs.solution.trajectory import Solution
 
 METHOD, BOUNDS = "lagrange/dop853", load_bounds()
 

@@ -11,9 +11,20 @@ from support.scenes import paper
 from support.stored import Made, rotor, store
 
 from rotor_mbs.analysis import run_selection
-from rotor_mbs.analysis.claims import STATISTICS, Claim, NumberResult, claims, finding, rounds_to
-from rotor_mbs.analysis.exact import escape_rate
-from rotor_mbs.analysis.published import HOLDS, Published, TrajectoryNumber, claim_study, published
+from rotor_mbs.analysis.kinematics import escape_rate
+from rotor_mbs.analysis.published import (
+    HOLDS,
+    STATISTICS,
+    Claim,
+    NumberResult,
+    Published,
+    TrajectoryNumber,
+    claim_study,
+    claims,
+    finding,
+    published,
+    rounds_to,
+)
 from rotor_mbs.analysis.run_tables import agreement
 from rotor_mbs.runs.read import open_results
 from rotor_mbs.scenario.catalogue import natural_order

@@ -10,7 +10,7 @@ import pytest
 from support import other_code
 from support.scenes import paper
 
-from rotor_mbs.analysis.exact import exact_rotor_angle
+from rotor_mbs.analysis.kinematics import exact_rotor_angle
 from rotor_mbs.scenario.scene import Scene
 
 RIGID = replace(paper("fig03").blades[0], inertia=(3e5, 4e5, 2e5, 0.0, 0.0, 0.0))

@@ -19,8 +19,7 @@ from rotor_mbs.scenario.accuracy_bounds import load_bounds
 from rotor_mbs.scenario.catalogue import find_scenes
 from rotor_mbs.scenario.scene import Blade, Scene
 from rotor_mbs.solution.metrics import ANGLE_LIMIT, metrics_of
-from rotor_mbs.solution.solution import Solution
-from rotor_mbs.solution.trajectory import Integration, Trajectory
+from rotor_mbs.solution.trajectory import Integration, Solution, Trajectory
 
 Array = Any
 DONE, FAILED = Integration(True), Integration(False, "gave up")

@@ -25,7 +25,7 @@ from support.stored import Made, rotor, store
 from support.sweeps import made_sweep
 
 from rotor_mbs.report.build import write_report
-from rotor_mbs.report.core.files import write_page
+from rotor_mbs.report.files import write_page
 from rotor_mbs.report.mode_study import modes_page
 from rotor_mbs.studies.modes import compute_modes
 

@@ -13,7 +13,7 @@ import pytest
 from support.commands import Ended, rotor_mbs
 
 from rotor_mbs.cli.arguments import pages_beside, parse
-from rotor_mbs.report.pages.scene_tables import metrics_table
+from rotor_mbs.report.pages import metrics_table
 from rotor_mbs.runs.read import open_results
 
 QUICK = """

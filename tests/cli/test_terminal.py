@@ -23,8 +23,7 @@ from support.sweeps import THREE_RUNS
 from rotor_mbs.analysis.run_tables import bench_table, run_table
 from rotor_mbs.cli.terminal import ProgressLine, coloured
 from rotor_mbs.errors import MethodRefusal
-from rotor_mbs.runs.read import open_results
-from rotor_mbs.runs.records import Record
+from rotor_mbs.runs.read import Record, open_results
 from rotor_mbs.runs.sweeps import StoredSweep
 from rotor_mbs.studies.run import Outcome
 

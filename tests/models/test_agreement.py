@@ -15,8 +15,7 @@ from rotor_mbs.methods.catalogue import find_method
 from rotor_mbs.methods.solve import solve
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.metrics import angle_error, horizon_samples, metrics_of, running_growth
-from rotor_mbs.solution.solution import Solution
-from rotor_mbs.solution.trajectory import Trajectory
+from rotor_mbs.solution.trajectory import Solution, Trajectory
 
 BEST = ("lagrange/taylor", "exudyn_tree/rk67", "mujoco/rk4")
 # rad up to the horizon, where an error may have grown 1e5-fold, and of the energy scale; MuJoCo's at four times its

@@ -11,7 +11,7 @@ from support.rotors import FIG11, closed_form
 
 from rotor_mbs.methods.catalogue import find_method
 from rotor_mbs.methods.solve import solve
-from rotor_mbs.models.exudyn.extrapolation import ExtrapolatedSolver
+from rotor_mbs.models.exudyn.solvers import ExtrapolatedSolver
 from rotor_mbs.scenario.scene import Scene
 
 METHOD = "exudyn_chain/extrapolated"

@@ -10,7 +10,7 @@ from support.exudyn_runs import CHAIN, energy_error, run
 from support.rotors import FIG11, PAPER, SLIM, STOUT, D, closed_form, make_scene
 from support.scenes import paper
 
-from rotor_mbs.analysis.exact import exact_rotor_angle
+from rotor_mbs.analysis.kinematics import exact_rotor_angle
 from rotor_mbs.methods.catalogue import find_method
 from rotor_mbs.models.exudyn.adapter import linear_solver
 

@@ -19,7 +19,7 @@ from rotor_mbs.scenario.scene import Scene, scene_tables
 from rotor_mbs.scenario.sweep import Variants, sweep_of
 from rotor_mbs.solution.metrics import energy_drifts
 from rotor_mbs.solution.quantities import energy_balance
-from rotor_mbs.solution.solution import Solution
+from rotor_mbs.solution.trajectory import Solution
 from rotor_mbs.studies.sweep import Chunk
 
 pytest.importorskip("heyoka")

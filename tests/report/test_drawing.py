@@ -12,10 +12,11 @@ from support.stored import rotor
 
 from rotor_mbs.analysis.modes import FloquetTable, SceneModes
 from rotor_mbs.methods.catalogue import ladders, method_names
+from rotor_mbs.report import canvas, numbers
 from rotor_mbs.report import plots as figures
-from rotor_mbs.report.core import canvas, numbers, svg
-from rotor_mbs.report.core.canvas import panels
-from rotor_mbs.report.core.looks import COLOURS, GREY, Look, coordinate_look, look_of, name_of_colour
+from rotor_mbs.report.canvas import panels
+from rotor_mbs.report.elements import picture as picture_in_page
+from rotor_mbs.report.looks import COLOURS, GREY, Look, coordinate_look, look_of, name_of_colour
 from rotor_mbs.report.mode_study import ModePlots
 from rotor_mbs.report.pages import scene as scene_page
 from rotor_mbs.report.pages.index import energy_of_scenes
@@ -111,7 +112,7 @@ def test_paths_have_equal_scales_and_an_axis_of_stated_length() -> None:
 
 def test_the_legend_of_a_picture_has_what_is_labelled_once_as_it_is_drawn() -> None:
     series = [Series(TIME, 1e-9 + TIME, CORRECTED), Series(TIME, 2.0 + TIME, CORRECTED), Series(TIME, 3.0 + TIME, LOOK)]
-    legend = str(svg.picture(figures.errors(series, "error (rad)", horizon=6.0), "n", "t").legend)
+    legend = str(picture_in_page(figures.errors(series, "error (rad)", horizon=6.0), "n", "t").legend)
     entries = re.findall(r"<li>(.*?)</svg> (.*?)</li>", legend)
     assert [label.replace(numbers.SPACE, " ") for _, label in entries] == ["closed form, Taylor", "horizon 6.00 s"]
     assert f"stroke: var(--{name_of_colour(CORRECTED.colour)})" in entries[0][0]
@@ -178,7 +179,7 @@ def test_a_picture_in_a_page_has_its_labels_its_title_and_the_colours_of_the_pag
     picture.axes[0].plot([0.0, 1.0, 2.0], [0.1234567, 0.5, 0.25], color=COLOURS[2], marker="s")
     canvas.ticks(picture.axes[0].yaxis, {0.125: "0.125", 0.625: "0.625"})
     picture.axes[0].set_ylabel("angle (rad)")
-    text = str(svg.picture(picture, "motion", "title <b>").svg)
+    text = str(picture_in_page(picture, "motion", "title <b>").svg)
     for shown in (">0.125<", ">time (s)<", ">angle (rad)<", "title &lt;b&gt;"):
         assert shown in text
     colours = set(re.findall(r"#[0-9a-f]{6}|var\(--\w+\)", text))
@@ -190,7 +191,7 @@ def test_a_factor_of_the_tick_labels_stands_with_the_unit() -> None:
     picture = panels((2.0,), "time (s)")
     picture.axes[0].plot([0.0, 1.0], [0.0, 3e-4])
     picture.axes[0].set_ylabel("pitch angle (rad)")
-    text = str(svg.picture(picture, "a", "b").svg).replace(numbers.SPACE, " ")
+    text = str(picture_in_page(picture, "a", "b").svg).replace(numbers.SPACE, " ")
     assert ">pitch angle (10⁻⁴ rad)<" in text
     assert ">3.0<" in text
     assert "1e" not in text
@@ -206,7 +207,7 @@ def test_powers_of_ten_are_labelled_within_the_axes_alone() -> None:
         (ModePlots(SceneModes("s", "t", 1, 9.8, floquet=table)).multipliers(), ["10⁻²", "10⁻¹", "10⁰"]),
         (picture, ["10⁻¹⁶", "10⁻¹⁵", "10⁻¹⁴", "10⁻¹³"]),
     ):
-        text = str(svg.picture(shown, "n", "t").svg)
+        text = str(picture_in_page(shown, "n", "t").svg)
         assert re.findall(r">(10[⁻\d⁰¹²³⁴-⁹]+)<", text) == labels
         assert "$" not in text
 

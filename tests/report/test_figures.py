@@ -13,7 +13,7 @@ from support.stored import Made, rotor, store
 
 from rotor_mbs.cli import main
 from rotor_mbs.report.build import write_report
-from rotor_mbs.report.core.elements import TableCell
+from rotor_mbs.report.elements import TableCell
 from rotor_mbs.report.pages.index import scene_table
 from rotor_mbs.report.pages.paper import FIGURES, available, composed
 from rotor_mbs.runs.read import open_results

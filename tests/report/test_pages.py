@@ -16,22 +16,21 @@ from support.scenes import paper
 from support.stored import Made, rotor, store
 from support.sweeps import made_sweep
 
-from rotor_mbs.analysis.claims import Claim
-from rotor_mbs.analysis.published import CheckedEntry, claim_study, errata, published
+from rotor_mbs.analysis.published import CheckedEntry, Claim, claim_study, errata, published
 from rotor_mbs.errors import InputError, StoreError
 from rotor_mbs.methods.catalogue import find_method, look_up
 from rotor_mbs.methods.solve import solve
+from rotor_mbs.report import numbers
 from rotor_mbs.report.build import write_report
-from rotor_mbs.report.core import numbers
-from rotor_mbs.report.core.elements import PageTable, Row, Section
-from rotor_mbs.report.core.files import page_names, render, write_pages
-from rotor_mbs.report.core.looks import COLOURS, COORDINATES
+from rotor_mbs.report.elements import PageTable, Row, Section
+from rotor_mbs.report.files import page_names, render, write_pages
+from rotor_mbs.report.looks import COLOURS, COORDINATES
+from rotor_mbs.report.pages import METRICS, compared_time
 from rotor_mbs.report.pages.paper import claim_table, matrices, trial_tables
 from rotor_mbs.report.pages.scene import quantity_sections, range_table
-from rotor_mbs.report.pages.scene_tables import METRICS, compared_time
-from rotor_mbs.runs import results as results_module
+from rotor_mbs.runs import table as table_module
 from rotor_mbs.runs.read import open_results
-from rotor_mbs.runs.results import metric_columns
+from rotor_mbs.runs.table import metric_columns
 from rotor_mbs.scenario.accuracy_bounds import load_bounds
 from rotor_mbs.scenario.catalogue import find_scenes
 from rotor_mbs.scenario.scene import known_outputs
@@ -334,7 +333,7 @@ def test_the_uncertainty_that_a_method_gives_of_its_run_is_drawn(
     """No built-in method stores one; a plug-in may."""
     storing = replace(find_method("exudyn_chain/newmark_index2"), arrays=lambda _: ("angle_uncertainty",))
     monkeypatch.setattr(
-        "rotor_mbs.runs.results.find_method", lambda name: storing if name == storing.name else find_method(name)
+        "rotor_mbs.runs.table.find_method", lambda name: storing if name == storing.name else find_method(name)
     )
     path, (scene,) = results_file(tmp_path / "r.h5", ["check/held"], []), find_scenes(["check/held"])
     run = solve("exudyn_chain/newmark_index2", scene, {"step": 5e-3})
@@ -363,7 +362,7 @@ def test_the_page_of_a_driven_scene_shows_power_pitch_and_command_and_no_other_d
 
 def test_texts_from_the_file_are_escaped(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Of a method that is not installed, too."""
-    monkeypatch.setattr(results_module, "find_method", lambda name: look_up(name) or find_method(TAYLOR))
+    monkeypatch.setattr(table_module, "find_method", lambda name: look_up(name) or find_method(TAYLOR))
     evil = "<script>alert(1)</script>"
     scene = replace(FIG11, name="a b/<i>", title=f"{evil}\x1b[2J", text=f"# {evil}\n{FIG11.text}\n# </pre>{evil}")
     failed = {"status": "singular", "message": evil}

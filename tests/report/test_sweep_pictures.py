@@ -12,15 +12,19 @@ from scipy.integrate import solve_ivp
 from support.scenes import ARM, GRAVITY, MASS, OFFSET, paper
 from support.sweeps import made_sweep
 
-from rotor_mbs.analysis.sweep_numbers import Spread, StabilityMap, lyapunov_exponent, spread_of, stability_map
 from rotor_mbs.errors import InputError
-from rotor_mbs.report.core.elements import Section
+from rotor_mbs.report.elements import Section
 from rotor_mbs.report.pages.sweep import (
+    Spread,
+    StabilityMap,
     distribution,
+    lyapunov_exponent,
     map_panels,
     response,
     save_picture,
+    spread_of,
     spread_panels,
+    stability_map,
     sweep_page,
 )
 from rotor_mbs.runs.sweeps import StoredSweep

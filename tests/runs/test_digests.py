@@ -20,8 +20,8 @@ import rotor_mbs as rm
 from rotor_mbs.errors import StoreError
 from rotor_mbs.runs import files
 from rotor_mbs.runs.read import open_results
-from rotor_mbs.runs.results import TableFile
 from rotor_mbs.runs.sweeps import StoredSweep
+from rotor_mbs.runs.table import TableFile
 
 METHOD = "lagrange/dop853"
 SCENE = "check/held"

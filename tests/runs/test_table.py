@@ -15,19 +15,22 @@ from support.scenes import paper
 from rotor_mbs.errors import InputError, StoreError
 from rotor_mbs.runs import files
 from rotor_mbs.runs.files import CHARACTERS, Column, writing
-from rotor_mbs.runs.records import points_table
-from rotor_mbs.runs.results import Asked, TableFile, extend_file, results_tables
+from rotor_mbs.runs.read import points_table
 from rotor_mbs.runs.table import (
     CHARACTER,
     COLUMNS,
     MISSING,
+    Asked,
     Place,
     Rows,
     StoredTable,
     Table,
+    TableFile,
     blank_rows,
     characters,
+    extend_file,
     laid_out,
+    results_tables,
     stored_table,
     text_of,
 )

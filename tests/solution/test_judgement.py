@@ -22,8 +22,7 @@ from rotor_mbs.models.exudyn.solvers import MultibodySolver
 from rotor_mbs.scenario.accuracy_bounds import Bound
 from rotor_mbs.scenario.scene import Blade, Scene
 from rotor_mbs.solution.metrics import ANGLE_LIMIT
-from rotor_mbs.solution.solution import Solution
-from rotor_mbs.solution.trajectory import Integration, Trajectory
+from rotor_mbs.solution.trajectory import Integration, Solution, Trajectory
 
 
 def caught(chosen: Scene, result: Solution, exact: Trajectory | None = None) -> Judgement:

@@ -15,8 +15,7 @@ from rotor_mbs.methods.solve import solve
 from rotor_mbs.scenario.catalogue import find_scenes
 from rotor_mbs.solution.metrics import metrics_of
 from rotor_mbs.solution.quantities import LOADS
-from rotor_mbs.solution.solution import Solution
-from rotor_mbs.solution.trajectory import Array, Trajectory
+from rotor_mbs.solution.trajectory import Array, Solution, Trajectory
 
 SCENE = paper("fig08", duration=2.0, samples=201, outputs=("angles",))
 TIME = np.linspace(0.0, 2.0, 201)

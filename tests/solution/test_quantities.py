@@ -18,8 +18,7 @@ from rotor_mbs.methods.solve import solve
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution import quantities
 from rotor_mbs.solution.quantities import BUILT_IN, Quantity
-from rotor_mbs.solution.solution import Solution
-from rotor_mbs.solution.trajectory import Integration, Trajectory
+from rotor_mbs.solution.trajectory import Integration, Solution, Trajectory
 from rotor_mbs.studies.run import solve_judged
 
 PLUG_IN = """

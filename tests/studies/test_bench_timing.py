@@ -18,8 +18,8 @@ from support.scenes import paper
 from rotor_mbs.analysis import judgement
 from rotor_mbs.methods.base import BuiltItem, Settings
 from rotor_mbs.methods.catalogue import ladders
-from rotor_mbs.runs.records import Record, read_records
-from rotor_mbs.runs.results import extend_file
+from rotor_mbs.runs.read import Record, read_records
+from rotor_mbs.runs.table import extend_file
 from rotor_mbs.scenario.accuracy_bounds import Bound
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.trajectory import Integration, Trajectory

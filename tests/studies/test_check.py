@@ -31,8 +31,7 @@ from rotor_mbs.methods.solve import solve
 from rotor_mbs.models.lagrange import closed_form
 from rotor_mbs.report.pages import check as formats
 from rotor_mbs.runs.read import open_results
-from rotor_mbs.runs.results import extend_file
-from rotor_mbs.runs.table import Rows, characters
+from rotor_mbs.runs.table import Rows, characters, extend_file
 from rotor_mbs.scenario import catalogue
 from rotor_mbs.scenario.accuracy_bounds import Bound, Bounds, load_bounds
 from rotor_mbs.scenario.catalogue import find_scenes, reference_folder

@@ -16,7 +16,7 @@ from rotor_mbs.analysis.modes import read_modes, to_records
 from rotor_mbs.cli import main
 from rotor_mbs.errors import InputError, StoreError
 from rotor_mbs.methods.catalogue import find_method
-from rotor_mbs.runs.records import write_records
+from rotor_mbs.runs.read import write_records
 from rotor_mbs.scenario.catalogue import find_scenes
 from rotor_mbs.studies import modes as study
 

@@ -9,13 +9,21 @@ from pathlib import Path
 import pytest
 from support.commands import rotor_mbs
 
-from rotor_mbs.analysis.stability import OUTCOMES, SuiteRun, family_table, fastest_to_target, suite_runs, unreached
 from rotor_mbs.report.build import write_report
 from rotor_mbs.report.pages.stability import NOT_COMPARED
-from rotor_mbs.runs.records import read_records
+from rotor_mbs.runs.read import read_records
 from rotor_mbs.scenario.catalogue import find_scenes
 from rotor_mbs.studies.run import Outcome, run_scenes
-from rotor_mbs.studies.stability import STEPS, complete_ladders
+from rotor_mbs.studies.stability import (
+    OUTCOMES,
+    STEPS,
+    SuiteRun,
+    complete_ladders,
+    family_table,
+    fastest_to_target,
+    suite_runs,
+    unreached,
+)
 
 SCENES = ("stiff/bearing-1e8-damping-100", "extreme/light-1e-8", "extreme/rate-1e200")
 

@@ -24,13 +24,12 @@ from unittest import mock
 
 import numpy as np
 
-from rotor_mbs.analysis.claims import rounds_to
 from rotor_mbs.analysis.judgement import judge
-from rotor_mbs.analysis.published import FAILS, HOLDS, UNDECIDED, Published, TrajectoryNumber, published
+from rotor_mbs.analysis.published import FAILS, HOLDS, UNDECIDED, Published, TrajectoryNumber, published, rounds_to
 from rotor_mbs.methods.catalogue import find_method
 from rotor_mbs.methods.solve import solve
 from rotor_mbs.models.printed import literal
-from rotor_mbs.report.core.numbers import number, power, with_unit
+from rotor_mbs.report.numbers import number, power, with_unit
 from rotor_mbs.runs.versions import versions
 from rotor_mbs.scenario.catalogue import find_scenes, reference_folder
 from rotor_mbs.scenario.scene import Scene

@@ -10,8 +10,7 @@ from rotor_mbs.methods.solve import solve
 from rotor_mbs.runs.read import open_results
 from rotor_mbs.scenario.catalogue import find_scenes, reference_folder
 from rotor_mbs.scenario.scene import Scene
-from rotor_mbs.solution.solution import Solution
-from rotor_mbs.solution.trajectory import Trajectory
+from rotor_mbs.solution.trajectory import Solution, Trajectory
 from rotor_mbs.studies.stored_references import rebuilt_reference
 
 TAYLOR = "lagrange/taylor"

@@ -10,12 +10,10 @@ from typing import Any
 import numpy as np
 
 from rotor_mbs.errors import StoreError
-from rotor_mbs.runs.results import RUNS, Asked, TableFile, extend_file, results_tables, row_of_run
-from rotor_mbs.runs.table import Rows
+from rotor_mbs.runs.table import RUNS, Asked, Rows, TableFile, extend_file, results_tables, row_of_run
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.metrics import metrics_of
-from rotor_mbs.solution.solution import Solution
-from rotor_mbs.solution.trajectory import Integration, Trajectory
+from rotor_mbs.solution.trajectory import Integration, Solution, Trajectory
 
 Curve = Callable[[Any], Any]  # time (n,) to angles (n, coordinates)
 

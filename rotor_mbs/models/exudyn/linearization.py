@@ -14,8 +14,7 @@ from rotor_mbs.models.exudyn.adapter import Linearized, System
 from rotor_mbs.models.exudyn.geometry import quaternion
 from rotor_mbs.models.exudyn.moments import Loads
 from rotor_mbs.scenario.scene import Scene
-from rotor_mbs.solution.linearization import Linearization, limit_at_zero, scene_at
-from rotor_mbs.solution.trajectory import Array
+from rotor_mbs.solution.trajectory import Array, Linearization, limit_at_zero, scene_at
 
 # rad, m: each doubling of the step takes one order of it out of the error.
 _STEPS = tuple(1e-3 * 2.0**k for k in range(6))

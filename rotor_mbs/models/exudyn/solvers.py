@@ -1,22 +1,221 @@
-"""The engine's systems as solvers."""
+"""The engine's systems as solvers; the chain also by extrapolation within each interval between samples."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from rotor_mbs.errors import MethodRefusal
 from rotor_mbs.methods.base import BuiltItem, Solver
+from rotor_mbs.methods.time_limit import MESSAGE, is_over, polled
 from rotor_mbs.models.exudyn import chain, geometry, sensor_samples, tree
-from rotor_mbs.models.exudyn.extrapolation import ExtrapolatedSolver
 from rotor_mbs.models.exudyn.geometry import Part
 from rotor_mbs.models.exudyn.moments import Loads
 from rotor_mbs.models.exudyn.schemes import ExtrapolatedSettings, Scheme, SchemeSettings
 from rotor_mbs.scenario.scene import Scene
-from rotor_mbs.scenario.time_table import Segment, intervals
-from rotor_mbs.solution.trajectory import Array, Integration, Trajectory
+from rotor_mbs.scenario.time_table import Interval, Segment, intervals
+from rotor_mbs.solution.trajectory import Array, Integration, Trajectory, all_coordinates
+
+# Of 2, 4, ..., 14 substeps. Twelve and fourteen serve tolerances below 1e-9 rad.
+MOST_COLUMNS = 7
+
+# A part of an interval is at least 1/4096 of it.
+_MOST_HALVINGS = 12
+
+# No estimate is smaller than some units in the last place of Euler parameters.
+_ROUNDING = 100.0 * float(np.finfo(float).eps)
+
+# Components below this share of the largest of their kind are rounding errors, and set to zero. Else motions that a
+# symmetry forbids (pitches that stay at zero) begin with 1e-27 rad and grow to the size of the others.
+_INSIGNIFICANT = 0.5 * float(np.finfo(float).eps)
+
+
+def substeps(column: int) -> int:
+    """How many equal steps column 0, 1, ... takes."""
+    return 2 * (column + 1)
+
+
+def neville(previous: Sequence[Array], values: Array) -> list[Array]:
+    """The next row of the table, from the one before ([] for the first): `values` of its own column, then those without
+    the error's terms of second, fourth, ... power of the substep."""
+    column = len(previous)
+    row = [values]
+    for k, before in enumerate(previous):
+        ratio = (substeps(column) / substeps(column - 1 - k)) ** 2
+        row.append(row[k] + (row[k] - before) / (ratio - 1.0))
+    return row
+
+
+# Extrapolation within each interval between samples (Gragg, Bulirsch, Stoer): from the same state the trapezoidal rule
+# takes 2, 4, 6, ... equal substeps, Neville's scheme in the square of the substep eliminates one even power of the
+# error with each column, and the next interval starts from what the table ends with.
+#
+# E. Hairer, S. P. Nørsett, G. Wanner, Solving Ordinary Differential Equations I, 2nd ed., II.9; E. Hairer, G. Wanner,
+# II, VI.5. Numbers of substeps are even: with constraints at velocity level an error of the accelerations along the
+# constraints changes its sign with every step, and only after an even number of steps is it the same in all columns.
+
+
+class ExtrapolatedSolver:
+    """See `methods.base.Solver`; `tolerance` (rad) is for the estimated error of each part of an interval."""
+
+    def __init__(self, scene: Scene, scheme: Scheme, tolerance: float) -> None:
+        from rotor_mbs.models.exudyn.adapter import System  # late: to list what is built needs no engine
+
+        self._scene, self._scheme, self._loads = scene, scheme, Loads(scene)
+        self._least_error = max(tolerance, _ROUNDING)
+        self._newton_tolerance = float(str(scheme.options["newton.relativeTolerance"]))
+        self._intervals = intervals(self._loads.segments, scene.samples, every_sample=True)
+        # Dampers and loads over time want it along the path: it is extrapolated with the state.
+        self._integrates_work = scene.wants("energy") and scene.work_needs_path
+        parts = chain.parts(scene, self._loads)
+        sensors = [part.name for part in parts if part.kind == "sensor"]
+        self._of_rates = [name for name in sensors if name.endswith(("rotation", "spin"))]
+        for number, part in enumerate(parts):
+            if part.kind == "sensor":  # what is stored, the engine evaluates after every step
+                stored = part.name in self._of_rates
+                parts[number] = replace(part, parameters={**part.parameters, "storeInternal": stored})
+        self.system = System(parts)
+        # Of each body the displacement from a reference and the change of four Euler parameters.
+        self._reference = self.system.reference.reshape(-1, 7)
+        self._sizes = np.abs(self._reference).max(axis=0)
+        self._coordinates = self._reference.size
+        places = np.arange(3 * self._coordinates).reshape(3, -1, 7)
+        self._rotations = places[:, :, 3:].reshape(3, -1)  # of Euler parameters, their rates and accelerations
+        self._total = Integration(True)
+        self._halvings = 0
+        self.columns: list[int] = []  # of each part
+        self._works: list[float] = []  # J
+        self._times: list[float] = []
+        self._states: list[Array] = []
+        self._turns: list[Array] = []  # of the springs
+        self._within: list[Interval] = []
+
+    def integrate(self) -> Integration:
+        """From sample to sample. Where a load has a kink, accelerations and multipliers are calculated anew."""
+        self._total = Integration(True, steps=0, rhs_evaluations=0)
+        self._halvings, self.columns = 0, []
+        self._times, self._states, self._turns, self._within, self._works = [], [], [], [], []
+        first = self._intervals[0]
+        self._loads.enter(first)
+        self.system.begin(self._scheme, with_rows=self._integrates_work)
+        self._keep(0.0, first, *self.system.initial_values(0.0), 0.0)
+        failure = ""
+        with polled():
+            for interval in self._intervals:
+                if interval.segment is not self._loads.segment:
+                    self._loads.enter(interval)
+                    self.system.start_from(*self.system.initial_values(interval.start))
+                failure = self._cross(interval, interval.start, interval.end, 0)
+                if failure:
+                    break
+        self._total.success, self._total.message = not failure, failure
+        self._total.out_of_time = failure == MESSAGE
+        self._total.time_reached = self._times[-1]
+        return self._total
+
+    def _cross(self, interval: Interval, start: float, end: float, halvings: int) -> str:
+        """Integrate from `start` to `end` (s) in one part or in halves; why not, or "". Parts are as small as the last
+        ones had to be, and twice as large again where two columns less would do."""
+        if halvings >= self._halvings:
+            failure = self._part(interval, start, end)
+            if not failure:
+                if self.columns[-1] <= MOST_COLUMNS - 2:
+                    self._halvings = max(0, halvings - 1)
+                return ""
+            if failure == MESSAGE or halvings == _MOST_HALVINGS:
+                return failure
+            self._halvings = halvings + 1
+        middle = 0.5 * (start + end)
+        return self._cross(interval, start, middle, halvings + 1) or self._cross(interval, middle, end, halvings + 1)
+
+    def _part(self, interval: Interval, start: float, end: float) -> str:
+        """Columns are added until the estimated error is met; why it was not, or ""."""
+        row: list[Array] = []
+        for column in range(MOST_COLUMNS):
+            failure = self.system.advance(start, end, substeps(column), self._total)
+            if is_over():
+                return MESSAGE
+            if failure:
+                return failure
+            values = self.system.values()
+            if self._integrates_work:
+                values = np.append(values, self._work(interval))
+            row = neville(row, values)
+            # The error of the value beside it in the table, which has two orders less than what is kept.
+            if column and self._is_met(row[-1] - row[-2], row[-1], end - start):
+                self.columns.append(column + 1)
+                state, gained = row[-1], 0.0
+                if self._integrates_work:
+                    state, gained = state[:-1], float(state[-1])
+                self._keep(end, interval, self._consistent(state), self.system.turns(), self._works[-1] + gained)
+                return ""
+        return f"near t = {start:.6g} s the error of {end - start:.3g} s stays above the tolerance"
+
+    def _work(self, interval: Interval) -> float:
+        """J, of loads and dampers over the substeps of one column: by the trapezoidal rule, whose error is a power
+        series of the substep's square, as the state's is."""
+        tables = {name: self.system.rows(name) for name in self._of_rates}
+        time = tables["hub spin"][:, 0]
+        moving = sensor_samples.joint_rates(self._scene, lambda name: tables[name][:, 1:])
+        _, rates = all_coordinates(self._scene, np.zeros_like(moving), moving)
+        power = sensor_samples.power(self._scene, interval.segment, time, rates)
+        return float(np.trapezoid(power, time))
+
+    def _is_met(self, difference: Array, values: Array, span: float) -> bool:
+        """Whether a difference of Euler parameters, or of their rates over `span` s, is below half the tolerance (they
+        are half of an angle), or as small as Newton's method, which stops at a share of the forces, leaves it."""
+        rotations, rates, _ = np.abs(difference[self._rotations]).max(axis=1)
+        error = 2.0 * max(rotations, span * rates)
+        if error <= self._least_error:
+            return True
+        accelerations = np.abs(values[self._rotations[2]]).max()
+        return bool(error <= self._newton_tolerance * span**2 * accelerations)
+
+    def _consistent(self, values: Array) -> Array:
+        """The extrapolated state with Euler parameters of length one and rates that keep it. The engine takes both for
+        granted: else what errors of the length do to the motion is ten times as much as all other errors. Rounding
+        errors are set to zero."""
+        kinds = values[: 3 * self._coordinates].reshape(
+            3, -1, 7
+        )  # derivatives, bodies, displacement and Euler parameters
+        parameters = kinds[0, :, 3:] + self._reference[:, 3:]
+        parameters /= np.sqrt((parameters * parameters).sum(axis=1))[:, None]
+        kinds[0, :, 3:] = parameters - self._reference[:, 3:]
+        rates = kinds[1, :, 3:]
+        rates -= parameters * (parameters * rates).sum(axis=1)[:, None]
+        sizes = np.abs(kinds)
+        for columns in (slice(0, 3), slice(3, 7)):
+            largest = sizes[:, :, columns].max(axis=(1, 2))
+            largest[0] = max(largest[0], self._sizes[columns].max())
+            kinds[:, :, columns][sizes[:, :, columns] < _INSIGNIFICANT * largest[:, None, None]] = 0.0
+        return values
+
+    def _keep(self, time: float, interval: Interval, values: Array, turns: Array, work: float) -> None:
+        self.system.start_from(values, turns)
+        self._works.append(work)
+        self._times.append(time)
+        self._states.append(values)
+        self._turns.append(turns)
+        self._within.append(interval)
+
+    def observe(self) -> Trajectory:
+        """What the sensors read of each state, under the load before a jump."""
+        tables: dict[str, list[Array]] = {name: [] for name in self.system.sensors}
+        for time, values, turns, interval in zip(self._times, self._states, self._turns, self._within, strict=True):
+            self._loads.enter(interval)
+            for name, read in self.system.read(time, values, turns).items():
+                tables[name].append(np.concatenate([[time], read]))
+        rows = {name: np.array(table) for name, table in tables.items()}
+        rows["work"] = np.stack([self._times, self._works], axis=1)
+        # A diverging state may overflow in its energies; the rows are cut where they stop being finite.
+        with np.errstate(over="ignore", invalid="ignore"):
+            return sensor_samples.chain_trajectory(
+                self._scene, self._loads.segments, rows.__getitem__, has_work=self._integrates_work
+            )
+
 
 Reading = Callable[[Scene, Sequence[Segment], Callable[[str], Array]], Trajectory]
 

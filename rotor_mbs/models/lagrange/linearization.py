@@ -16,8 +16,7 @@ from rotor_mbs.models.lagrange.closed_form import LoadValues
 from rotor_mbs.models.lagrange.parameters import RotorForm, rotor_form
 from rotor_mbs.models.lagrange.samples import loads_at_start
 from rotor_mbs.scenario.scene import Scene
-from rotor_mbs.solution.linearization import Linearization
-from rotor_mbs.solution.trajectory import Array
+from rotor_mbs.solution.trajectory import Array, Linearization
 
 # rad: a step of Newton's method below this is followed by three more, and the state is found.
 _SMALL_STEP = 1e-6

@@ -15,9 +15,18 @@ from rotor_mbs.methods import time_limit
 from rotor_mbs.models.mujoco import mjcf
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.scenario.time_table import Interval, Segment, intervals, is_constant, steps_and_rows, values_at
-from rotor_mbs.solution.linearization import Linearization, limit_at_zero, scene_at
 from rotor_mbs.solution.quantities import named_loads
-from rotor_mbs.solution.trajectory import Array, Integration, Trajectory, all_coordinates, finite_samples, sample_times
+from rotor_mbs.solution.trajectory import (
+    Array,
+    Integration,
+    Linearization,
+    Trajectory,
+    all_coordinates,
+    finite_samples,
+    limit_at_zero,
+    sample_times,
+    scene_at,
+)
 
 # The engine's types are compiled. Without this, it writes its warnings to a file in the working folder.
 _engine: Any = mujoco

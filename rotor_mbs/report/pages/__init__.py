@@ -1,21 +1,26 @@
-"""One module per page: a report's data to the content of the page."""
+"""One module per page: a report's data to the content of the page. Here what several pages have: the report itself,
+cells and tables of stored runs."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from functools import cached_property
 
 import numpy as np
 
 from rotor_mbs.analysis import published, run_selection
-from rotor_mbs.analysis.claims import Claim, claims
-from rotor_mbs.analysis.published import ClaimStudy, Erratum
-from rotor_mbs.analysis.stability import SuiteRun, suite_runs
+from rotor_mbs.analysis.judgement import OK_ERROR
+from rotor_mbs.analysis.published import Claim, ClaimStudy, Erratum, claims
 from rotor_mbs.analysis.work_precision import by_scene
-from rotor_mbs.methods.catalogue import errata_methods
-from rotor_mbs.report.core.files import page_names
-from rotor_mbs.runs.read import OpenResults
-from rotor_mbs.runs.records import Record, read_records
+from rotor_mbs.methods.catalogue import REFERENCE, errata_methods, is_corrected, look_up
+from rotor_mbs.report.elements import PageTable, Row, TableCell
+from rotor_mbs.report.files import page_names
+from rotor_mbs.report.looks import label_of, with_capital
+from rotor_mbs.report.numbers import number, with_unit
+from rotor_mbs.runs.read import OpenResults, Record, StoredRun, StoredScene, read_records
+from rotor_mbs.runs.table import metric_columns
+from rotor_mbs.solution.status import GOOD
+from rotor_mbs.studies.stability import OUTCOMES, SuiteRun, suite_runs
 
 _SUITE_FOLDERS = {"stiff", "extreme"}
 
@@ -69,3 +74,104 @@ class Report(OpenResults):
         """Errors over steps that were measured for the suite."""
         records = read_records(self.path, "stability")
         return [record for record in records if np.isfinite(record.arrays["angle_error_max"]).any()]
+
+
+METRICS = (
+    "defect_max", "defect_median", "defect_time", "angle_error_max", "angle_error_predicted", "angle_error_whole",
+    "tip_error_max", "energy_drift_max", "angular_impulse_error_max", "zero_pitch_max", "zero_pitch_left_s",
+    "zero_pitch_growth_per_s", "steps", "rhs_evaluations", "setup_time_s", "run_time_s",
+)  # fmt: skip
+# Against the reference, which has none itself.
+_ERRORS_OF_RUNS = ("angle_error_max", "angle_error_predicted", "angle_error_whole", "tip_error_max")
+
+
+def status_text(run: StoredRun) -> str:
+    """ "solver failed" of "solver_failed"; of equations that are not claimed to be correct never "ok"."""
+    return words_of("completed" if run.status == "ok" and not is_corrected(run.method) else run.status)
+
+
+def words_of(status: str) -> str:
+    return status.replace("_", " ")
+
+
+def status_cell(run: StoredRun) -> TableCell:
+    text = status_text(run)
+    return TableCell(text, tone="good" if text == "ok" else "" if run.status in GOOD else "bad")
+
+
+def method_cell(name: str) -> TableCell | str:
+    """A method's label, and below it the name that the command line and the file have."""
+    label = label_of(name)
+    return label if label == name else TableCell(label, note=name)
+
+
+def run_cell(run: StoredRun) -> TableCell | str:
+    """A run's method, and below it the settings that are not the method's defaults."""
+    method = look_up(run.method)
+    defaults = {} if method is None else method.defaults
+    own = [f"{name} = {value}" for name, value in run.settings.items() if defaults.get(name, value) != value]
+    note = ", ".join([run.method, *own])
+    return TableCell(label_of(run.method), note=note) if own else method_cell(run.method)
+
+
+def metric(run: StoredRun, name: str) -> float | None:
+    """A number stored with the run; None where it has none."""
+    value = run.attributes.get(name)
+    return float(value) if isinstance(value, float | int) else None
+
+
+def horizon_of(scene: StoredScene) -> float | None:
+    """s; None where no run was compared with a reference."""
+    known = [metric(run, "horizon_s") for run in scene.runs.values()]
+    return next((value for value in known if value is not None), None)
+
+
+def compared_time(scenes: Iterable[StoredScene]) -> tuple[float, float]:
+    """s: how much of the scenes' time lies before their horizons, and how much they have in all."""
+    compared = whole = 0.0
+    for scene in scenes:
+        if scene.reference is not None and run_selection.has_samples(scene.reference):
+            end = float(scene.reference.array("time")[-1])
+            whole += end
+            compared += min(horizon_of(scene) or 0.0, end)
+    return compared, whole
+
+
+def metrics_table(scene: StoredScene) -> PageTable:
+    """Every run of the scene, with the metrics that its file describes."""
+    columns = metric_columns(scene.scene.outputs)
+    judged = [name for name in columns if name.endswith("_error_max") and name not in METRICS]
+    shown = {name: columns[name] for name in (*METRICS, *judged) if name in columns}
+    rows: list[Row] = []
+    for run in run_selection.in_order(scene).values():
+        row = [run_cell(run), status_cell(run)]
+        for name in shown:
+            value = metric(run, name)
+            is_over = name == "angle_error_max" and value is not None and not value <= OK_ERROR
+            if run.method == REFERENCE and name in _ERRORS_OF_RUNS:
+                row.append("")
+            else:
+                row.append(TableCell(number(value, 3), tone="bad" if is_over and is_corrected(run.method) else ""))
+        rows.append(row)
+    names = []
+    for name, column in shown.items():
+        unit = f"{column.units}, at most {OK_ERROR:g}" if name == "angle_error_max" else column.units
+        names.append(with_capital(column.long_name) + (f" ({unit})" if unit != "1" else ""))
+    return PageTable("", ("Method", "Status", *names), rows)
+
+
+def failure_table(scene: StoredScene, suite_runs: Sequence[SuiteRun] = ()) -> PageTable:
+    """The runs that are not ok, or are for a reason that should be known; with the steps that the suite has found."""
+    judged = {run.method: run for run in suite_runs}
+    rows: list[Row] = []
+    for run in run_selection.in_order(scene).values():
+        status, message, step = status_cell(run), str(run.attributes.get("message", "")), ""
+        if run.method in judged:
+            suite_run = judged[run.method]
+            message, step = suite_run.message, with_unit(suite_run.step, "s")
+            if suite_run.outcome != run.status:
+                status = TableCell(OUTCOMES[suite_run.outcome][1])
+        if run.status not in GOOD or status.text != status_text(run):
+            reached = float(run.array("time")[-1]) if run_selection.has_samples(run) else 0.0
+            rows.append([run_cell(run), status, message, with_unit(reached, "s", 4), step])
+    return PageTable("", ("Method", "Status", "Message", "Samples up to", "Step for 10⁻⁶ rad"), rows)

@@ -13,23 +13,21 @@ from itertools import cycle
 import numpy as np
 
 from rotor_mbs.analysis import work_precision
-from rotor_mbs.analysis.stability import SuiteRun, suite_runs
 from rotor_mbs.errors import MethodRefusal
 from rotor_mbs.methods.catalogue import find_method, ladders
-from rotor_mbs.report.core import canvas
-from rotor_mbs.report.core.canvas import Panels
-from rotor_mbs.report.core.elements import PageTable, Picture, Row, Section, TableCell
-from rotor_mbs.report.core.files import BENCH_CSV
-from rotor_mbs.report.core.looks import COORDINATES, GREY, Look, label_of, look_of
-from rotor_mbs.report.core.numbers import NOTHING, number, power, prefixed, with_unit
-from rotor_mbs.report.core.svg import picture
-from rotor_mbs.report.pages.scene_tables import method_cell, words_of
-from rotor_mbs.runs.read import OpenResults, StoredRun, StoredScene
-from rotor_mbs.runs.records import Record, read_records
+from rotor_mbs.report import canvas
+from rotor_mbs.report.canvas import Panels
+from rotor_mbs.report.elements import PageTable, Picture, Row, Section, TableCell, picture
+from rotor_mbs.report.files import BENCH_CSV
+from rotor_mbs.report.looks import COORDINATES, GREY, Look, label_of, look_of
+from rotor_mbs.report.numbers import NOTHING, number, power, prefixed, with_unit
+from rotor_mbs.report.pages import method_cell, words_of
+from rotor_mbs.runs.read import OpenResults, Record, StoredRun, StoredScene, read_records
 from rotor_mbs.runs.table import COLUMNS
 from rotor_mbs.scenario.catalogue import natural_order
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.status import COMPLETE
+from rotor_mbs.studies.stability import SuiteRun, suite_runs
 
 _TARGETS = [f"{power(round(math.log10(target)))} rad" for target in work_precision.TARGETS_RAD]
 _POINT_COLUMNS = (

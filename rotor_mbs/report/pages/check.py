@@ -9,9 +9,9 @@ from collections.abc import Sequence
 from xml.etree import ElementTree
 
 from rotor_mbs.analysis.checks import Check
-from rotor_mbs.report.core.elements import PageTable, Row, Section, TableCell
-from rotor_mbs.report.core.numbers import NOTHING, number, with_unit
-from rotor_mbs.report.pages.scene_tables import method_cell
+from rotor_mbs.report.elements import PageTable, Row, Section, TableCell
+from rotor_mbs.report.numbers import NOTHING, number, with_unit
+from rotor_mbs.report.pages import method_cell
 from rotor_mbs.runs.read import OpenResults
 from rotor_mbs.scenario.accuracy_bounds import load_bounds
 from rotor_mbs.studies.check import judge_file

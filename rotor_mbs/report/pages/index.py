@@ -9,29 +9,28 @@ from dataclasses import replace
 import numpy as np
 
 from rotor_mbs.analysis import run_selection
-from rotor_mbs.analysis.claims import finding
+from rotor_mbs.analysis.published import finding
 from rotor_mbs.analysis.run_tables import method_table
-from rotor_mbs.analysis.stability import OUTCOMES
-from rotor_mbs.report import plots
-from rotor_mbs.report.core import canvas
-from rotor_mbs.report.core.canvas import Panels
-from rotor_mbs.report.core.elements import PageTable, Picture, Row, Section, TableCell
-from rotor_mbs.report.core.looks import Look, label_of, look_of
-from rotor_mbs.report.core.numbers import SPACE, number, power, prefixed
-from rotor_mbs.report.core.svg import picture
-from rotor_mbs.report.pages import Report, paper
-from rotor_mbs.report.pages.bench import cost_picture
-from rotor_mbs.report.pages.scene import VISIBLE, defects, error_picture, key_picture, parting
-from rotor_mbs.report.pages.scene_tables import (
+from rotor_mbs.report import canvas, plots
+from rotor_mbs.report.canvas import Panels
+from rotor_mbs.report.elements import PageTable, Picture, Row, Section, TableCell, picture
+from rotor_mbs.report.looks import Look, label_of, look_of
+from rotor_mbs.report.numbers import SPACE, number, power, prefixed
+from rotor_mbs.report.pages import (
+    Report,
     compared_time,
-    horizon,
+    horizon_of,
     method_cell,
     metric,
+    paper,
     status_text,
 )
+from rotor_mbs.report.pages.bench import cost_picture
+from rotor_mbs.report.pages.scene import VISIBLE, defects, error_picture, key_picture, parting
 from rotor_mbs.report.pages.viewer import viewer
 from rotor_mbs.runs.read import StoredScene
 from rotor_mbs.solution.status import GOOD
+from rotor_mbs.studies.stability import OUTCOMES
 
 Scenes = Mapping[str, StoredScene]
 # Errors: a shade for each of these powers of ten and below, the last for all that is larger.
@@ -78,7 +77,7 @@ def index_page(report: Report) -> dict[str, object]:
         "viewer": viewer(scenes[shown], {label_of(run.method): run for run in sides}),
         "still": still,
         "pictures": [
-            *key_picture(sides, own_claims, horizon(scenes[shown]), "crest"),
+            *key_picture(sides, own_claims, horizon_of(scenes[shown]), "crest"),
             *error_picture(
                 defects(scenes[shown].scene, judged),
                 "defect of an interval (rad)",

@@ -12,12 +12,13 @@ from typing import Any, NamedTuple
 from markupsafe import Markup
 
 from rotor_mbs.analysis import run_selection
-from rotor_mbs.analysis.claims import STATISTICS, Claim
 from rotor_mbs.analysis.published import (
     FAILS,
     HOLDS,
+    STATISTICS,
     UNDECIDED,
     CheckedEntry,
+    Claim,
     ClaimStudy,
     Published,
     checked_entries,
@@ -25,13 +26,11 @@ from rotor_mbs.analysis.published import (
 )
 from rotor_mbs.errors import InputError
 from rotor_mbs.methods.catalogue import errata_methods, look_up
-from rotor_mbs.report import plots
-from rotor_mbs.report.core import canvas, svg
-from rotor_mbs.report.core.elements import PageTable, Row, Section, TableCell
-from rotor_mbs.report.core.looks import COLOURS, Look, label_of, with_capital
-from rotor_mbs.report.core.numbers import NOTHING, SPACE, fixed, formula, number, prefixed
-from rotor_mbs.report.pages import Report
-from rotor_mbs.report.pages.scene_tables import metric, status_text
+from rotor_mbs.report import canvas, plots
+from rotor_mbs.report.elements import PageTable, Row, Section, TableCell, picture
+from rotor_mbs.report.looks import COLOURS, Look, label_of, with_capital
+from rotor_mbs.report.numbers import NOTHING, SPACE, fixed, formula, number, prefixed
+from rotor_mbs.report.pages import Report, metric, status_text
 from rotor_mbs.runs.files import replace_file
 from rotor_mbs.runs.read import StoredRun, StoredScene, open_results
 from rotor_mbs.solution.status import GOOD
@@ -353,7 +352,7 @@ def figures_page(report: Report) -> dict[str, object]:
                 heading, label = HEADINGS[key], label_of(next(iter(runs.values())).method)
                 is_named = label.lower().startswith(heading.lower())
                 caption = with_capital(label) if is_named else f"{heading}: {label}"
-                pictures.append(svg.picture(drawn, f"f{figure.number}{letter}-{key}", caption))
+                pictures.append(picture(drawn, f"f{figure.number}{letter}-{key}", caption))
 
             panels.append({
                 "letter": letter,

@@ -8,19 +8,17 @@ from dataclasses import replace
 import numpy as np
 
 from rotor_mbs.analysis import run_selection
-from rotor_mbs.analysis.claims import Claim
-from rotor_mbs.analysis.exact import escape_rate
+from rotor_mbs.analysis.kinematics import escape_rate
+from rotor_mbs.analysis.published import Claim
 from rotor_mbs.methods.catalogue import REFERENCE, is_corrected
 from rotor_mbs.models.lagrange.defects import interval_defects
 from rotor_mbs.report import plots
-from rotor_mbs.report.core.canvas import Panels
-from rotor_mbs.report.core.elements import PageTable, Picture, Row, Section
-from rotor_mbs.report.core.looks import GREY, VERMILLION, Look, coordinate_look, label_of, look_of, with_capital
-from rotor_mbs.report.core.numbers import fixed, number, prefixed, with_unit
-from rotor_mbs.report.core.svg import picture
-from rotor_mbs.report.pages import Report, paper, scene_tables
+from rotor_mbs.report.canvas import Panels
+from rotor_mbs.report.elements import PageTable, Picture, Row, Section, picture
+from rotor_mbs.report.looks import GREY, VERMILLION, Look, coordinate_look, label_of, look_of, with_capital
+from rotor_mbs.report.numbers import fixed, number, prefixed, with_unit
+from rotor_mbs.report.pages import Report, failure_table, horizon_of, method_cell, metric, metrics_table, paper
 from rotor_mbs.report.pages.bench import cost_section
-from rotor_mbs.report.pages.scene_tables import method_cell, metric
 from rotor_mbs.report.pages.stability import step_section
 from rotor_mbs.report.pages.viewer import viewer
 from rotor_mbs.report.plots import LOWEST, Series
@@ -41,7 +39,7 @@ EXTREMES = ("rotor_angle_min", "rotor_angle_max", "rotor_rate_max")
 def scene_page(name: str, report: Report) -> dict[str, object]:
     """The content of the page of a scene."""
     scene = report.scenes[name]
-    horizon = scene_tables.horizon(scene)
+    horizon = horizon_of(scene)
     # The printed run and the one that stands for the corrected model, then the others of corrected models.
     sides = run_selection.sides(scene)
     runs = list(sides.values())
@@ -65,7 +63,7 @@ def scene_page(name: str, report: Report) -> dict[str, object]:
     return {
         "scene": scene,
         "source": opening_comment(scene),
-        "failures": Section(tables=[scene_tables.failure_table(scene, suite_runs)]),
+        "failures": Section(tables=[failure_table(scene, suite_runs)]),
         "claims": Section(tables=[table for table in tables if table.rows], notes=[condition] if condition else []),
         "study": study if any(not claim.published.is_number for claim in claims) else None,
         "viewer": viewer(scene, {label_of(run.method): run for run in runs}),
@@ -79,7 +77,7 @@ def scene_page(name: str, report: Report) -> dict[str, object]:
         "cost": cost_section(scene, report.curves.get(name, ())),
         "steps": step_section(name, report.ladders),
         "quantities": quantity_sections(scene, drawn, horizon),
-        "metrics": Section(tables=[scene_tables.metrics_table(scene)]),
+        "metrics": Section(tables=[metrics_table(scene)]),
         "has_horizon": horizon is not None,
         "has_printed": any(run.status in GOOD and not is_corrected(run.method) for run in scene.runs.values()),
         "has_zero_pitch": has_zero_pitch,

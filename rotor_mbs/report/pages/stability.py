@@ -6,17 +6,15 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from rotor_mbs.analysis.stability import OUTCOMES, TARGET, family_table, fastest_to_target
-from rotor_mbs.report.core import canvas
-from rotor_mbs.report.core.canvas import Panels
-from rotor_mbs.report.core.elements import PageTable, Row, Section, TableCell
-from rotor_mbs.report.core.looks import GREY, Look, label_of, look_of
-from rotor_mbs.report.core.svg import picture
-from rotor_mbs.report.pages import Report
-from rotor_mbs.report.pages.scene_tables import method_cell
+from rotor_mbs.report import canvas
+from rotor_mbs.report.canvas import Panels
+from rotor_mbs.report.elements import PageTable, Row, Section, TableCell, picture
+from rotor_mbs.report.looks import GREY, Look, label_of, look_of
+from rotor_mbs.report.pages import Report, method_cell
 from rotor_mbs.report.plots import HIGHEST, LOWEST
-from rotor_mbs.runs.records import Record
+from rotor_mbs.runs.read import Record
 from rotor_mbs.solution.trajectory import Array
+from rotor_mbs.studies.stability import OUTCOMES, TARGET, family_table, fastest_to_target
 
 NOT_COMPARED = "horizon before the second sample"
 _FAMILIES = {"needle": "on a needle", "scale": "out of scale"}  # headings that are not the family's name

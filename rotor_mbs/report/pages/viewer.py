@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 from markupsafe import Markup
 
-from rotor_mbs.report.core.looks import coordinate_look, name_of_colour, with_capital
-from rotor_mbs.report.core.numbers import with_unit
+from rotor_mbs.report.looks import coordinate_look, name_of_colour, with_capital
+from rotor_mbs.report.numbers import with_unit
 from rotor_mbs.runs.read import StoredRun, StoredScene
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.trajectory import Array

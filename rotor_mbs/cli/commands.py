@@ -1,6 +1,6 @@
-"""Commands that make one study each and print its outcome, and those that draw what is stored.
+"""The commands but for `run`, `reproduce` and `reference`: what is available, a study each, pages and pictures.
 
-Each loads what it computes with, and not the others'; no model is loaded for pages and pictures.
+Each loads what it needs, and not what the others need: `list` reads no scene, and pages load no model.
 """
 
 from __future__ import annotations
@@ -13,21 +13,135 @@ import sys
 import time
 import webbrowser
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
-from rotor_mbs.cli import EXIT_BAD_INPUT, EXIT_FAILED, show
+from rotor_mbs.cli import EXIT_BAD_INPUT, EXIT_FAILED, print_line
 from rotor_mbs.cli.arguments import pages_beside
 from rotor_mbs.cli.terminal import ProgressLine, print_doubts, print_not_computed, print_table, span
-from rotor_mbs.errors import InputError, StoreError
-from rotor_mbs.methods.catalogue import check_names, method_names
+from rotor_mbs.errors import InputError, MethodRefusal, StoreError
+from rotor_mbs.methods.base import Method
+from rotor_mbs.methods.catalogue import check_names, look_up, method_names, methods
 from rotor_mbs.runs import cores
-from rotor_mbs.scenario.catalogue import find_scenes, only_scene
+from rotor_mbs.scenario.catalogue import find_scenes, list_scenes, list_sweeps, only_scene
 from rotor_mbs.solution.status import GOOD
 
 if TYPE_CHECKING:
     from rotor_mbs.analysis.checks import Check
+
+
+def list_all(arguments: argparse.Namespace) -> int:
+    """Name and title of every shipped scene and sweep, name and label of every method."""
+    scenes, sweeps = list_scenes(), list_sweeps()
+    labels = [(method.name, method.label) for method in methods()]
+    if arguments.json:
+        kinds = {"scene": scenes, "sweep": sweeps, "method": labels}
+        rows = [{"name": name, "title": title, "kind": kind} for kind in kinds for name, title in kinds[kind]]
+        print(json.dumps(rows, ensure_ascii=False))
+        return 0
+    headings: dict[str, list[tuple[str, str]]] = {}
+    for name, title in scenes:
+        headings.setdefault(f"scenes: {name.partition('/')[0]}", []).append((name, title))
+    headings |= {"sweeps": sweeps, "methods": labels}
+    width = max(len(name) for entries in headings.values() for name, _ in entries)
+    for heading, entries in headings.items():
+        print(heading, *(f"  {name:{width}}  {title}" for name, title in entries), "", sep="\n")
+    print("next: rotor-mbs show NAME; rotor-mbs run SCENE [-m METHOD]; rotor-mbs sweep SWEEP; rotor-mbs new FILE.toml")
+    return 0
+
+
+def new(arguments: argparse.Namespace) -> int:
+    """A commented scene file; never in the place of another file."""
+    from rotor_mbs.scenario.scene import new_scene_text
+
+    if arguments.file.suffix != ".toml":
+        raise InputError(f"{arguments.file}: is not a TOML file's name; allowed: a name that ends in .toml")
+    try:
+        with arguments.file.open("x", encoding="utf-8") as file:
+            file.write(new_scene_text())
+    except OSError as exc:
+        raise InputError(
+            f"{arguments.file}: cannot be created: {exc.strerror}; allowed: a file that does not exist yet"
+        ) from exc
+    print(f"{arguments.file}: edit it, then: rotor-mbs run {arguments.file}")
+    return 0
+
+
+def show(arguments: argparse.Namespace) -> int:
+    """One scene's data and the methods of each model, with --build its items; or the settings of a method."""
+    method = look_up(arguments.scene)
+    if method is None:
+        _show_scene(arguments)
+    else:
+        _show_method(method, arguments)
+    return 0
+
+
+def _show_method(method: Method, arguments: argparse.Namespace) -> None:
+    allowed, defaults = method.settings.allowed(), method.defaults
+    if arguments.json:
+        rules = {name: {"allowed": str(rule), "doc": rule.doc} for name, rule in allowed.items()}
+        facts = {"name": method.name, "label": method.label, "settings": defaults, "allowed": rules}
+        print(json.dumps(facts, ensure_ascii=False, indent=1))
+        return
+    print(f"{method.name}: {method.label}\n")
+    for name, rule in allowed.items():
+        print(f"  {name:26} {defaults[name]!s:>16}  {rule}; {rule.doc}".rstrip("; "))
+    print(f"\nset one: rotor-mbs run SCENE -m {method.name} --set NAME=VALUE" if allowed else "no settings")
+
+
+def _show_scene(arguments: argparse.Namespace) -> None:
+    from rotor_mbs.cli.terminal import print_doubts
+    from rotor_mbs.scenario.scene import scene_tables, unit_of
+
+    scene = only_scene(arguments.scene)
+    models: dict[str, dict[str, Any]] = {}
+    for method in methods():
+        facts = {"name": method.model, "methods": [], "items": [], "refused": "", "is_linearized": False}
+        model = models.setdefault(method.model, facts)
+        model["methods"].append(method.name)
+        model["is_linearized"] |= method.linearize is not None
+        if not model["items"]:
+            try:
+                model["items"], model["refused"] = list(map(asdict, method.items(scene))), ""
+            except MethodRefusal as exc:
+                model["refused"] = str(exc)
+    tables = scene_tables(scene)
+    if arguments.json:
+        print(json.dumps({"name": scene.name, "scene": tables, "models": models}, ensure_ascii=False, indent=1))
+        return
+    print_doubts([scene])
+    print(f"{scene.name}\n")
+    for path, value in _keys(tables):
+        name = "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in path)[1:]
+        unit = "" if unit_of(path) == "1" else f", {unit_of(path)}"
+        print(f"  {name + unit:28} {value}")
+    print("\nmethods" + (", and the items that each model builds" if arguments.build else ""))
+    for name, model in models.items():
+        first, *others = model["methods"]
+        line = ", ".join([first, *(other.removeprefix(name) for other in others)])  # "lagrange/taylor, /ode45, ..."
+        if model["refused"]:
+            line += f"  (not available: {model['refused']})"
+        elif model["is_linearized"]:
+            line += "  (linearized by `rotor-mbs modes`)"
+        print(f"  {line}")
+        for item in model["items"] if arguments.build else ():
+            print(f"    {item['kind']:9} {item['name']:28} {item['detail']}".rstrip())
+
+
+def _keys(value: Any, path: tuple[str | int, ...] = ()) -> Iterator[tuple[tuple[str | int, ...], Any]]:
+    """The path and the value of each key of a scene file."""
+    if isinstance(value, dict):
+        for name, inner in value.items():
+            yield from _keys(inner, (*path, name))
+    elif isinstance(value, list) and value and isinstance(value[0], dict):  # a table per blade
+        for place, inner in enumerate(value):
+            yield from _keys(inner, (*path, place))
+    else:
+        yield path, value
+
 
 _MANY_RUNS = 1_000_000  # that a sweep does not start without --yes
 _DISK_IS_FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
@@ -36,7 +150,7 @@ _DISK_IS_FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 def bench(arguments: argparse.Namespace) -> int:
     """Error against run time, and its pages. 0 also where points failed: they are what is measured."""
     from rotor_mbs.analysis.run_tables import bench_table
-    from rotor_mbs.runs.records import read_records
+    from rotor_mbs.runs.read import read_records
     from rotor_mbs.studies.bench import run_bench
 
     scenes, output = find_scenes(arguments.scenes), arguments.output
@@ -61,8 +175,7 @@ def stability(arguments: argparse.Namespace) -> int:
 
     1 where a claim of the suite fails, see `unreached`, or a case was not computed.
     """
-    from rotor_mbs.analysis.stability import family_table, suite_runs, unreached
-    from rotor_mbs.studies.stability import SUITE, run_suite
+    from rotor_mbs.studies.stability import SUITE, family_table, run_suite, suite_runs, unreached
 
     start, scenes = time.monotonic(), find_scenes(arguments.scenes or SUITE)
     with ProgressLine() as progress:
@@ -169,7 +282,7 @@ def _write_verdicts(arguments: argparse.Namespace, verdicts: Sequence[Check]) ->
 
 def test_method(arguments: argparse.Namespace) -> int:
     """What holds of each method, and the most likely reason where something does not; 1 where something does not."""
-    from rotor_mbs.solution.text_table import TextTable
+    from rotor_mbs.analysis.run_tables import TextTable
     from rotor_mbs.studies.method_test import examine
 
     names = check_names(arguments.methods)
@@ -281,7 +394,7 @@ def sweep(arguments: argparse.Namespace) -> int:
             with ProgressLine() as progress:
                 result = run_sweep(plan, output, pool, on_progress, fresh=arguments.fresh)
         except StoreError as exc:
-            show(str(exc), sys.stderr)
+            print_line(str(exc), sys.stderr)
             is_full = isinstance(exc.__cause__, OSError) and exc.__cause__.errno in _DISK_IS_FULL
             # What is stored stays, the same command continues; else nothing was begun.
             return EXIT_FAILED if is_full or made else EXIT_BAD_INPUT
@@ -294,9 +407,9 @@ def sweep(arguments: argparse.Namespace) -> int:
             rate = f", {result.made / result.seconds:.4g} per s" if result.made else ""
             print(f"{result.path}: {result.runs} runs: {by_status}; {result.made} made in {result.seconds:.1f} s{rate}")
         if result.older:
-            show(f"{result.older} runs were computed by other versions; --fresh computes them again", sys.stderr)
+            print_line(f"{result.older} runs were computed by other versions; --fresh computes them again", sys.stderr)
         for line in result.lost:
-            show(f"{line}; not computed; repeat the command to try again", sys.stderr)
+            print_line(f"{line}; not computed; repeat the command to try again", sys.stderr)
         if plan.sweep.table.picture and arguments.part == (1, 1):
             from rotor_mbs.report.pages.sweep import save_picture  # late: matplotlib
             from rotor_mbs.runs.sweeps import StoredSweep

@@ -24,8 +24,8 @@ from matplotlib.transforms import Affine2D, IdentityTransform
 from numpy.typing import NDArray
 
 from rotor_mbs.errors import InputError
-from rotor_mbs.report.core.looks import VERMILLION, Look
-from rotor_mbs.report.core.numbers import power
+from rotor_mbs.report.looks import VERMILLION, Look
+from rotor_mbs.report.numbers import power
 from rotor_mbs.runs.files import replace_file
 
 WIDTH = 5.2  # in; on a telephone's 360 px a text of 9.5 points is then 9 px high

@@ -14,15 +14,15 @@ import jinja2
 from markupsafe import Markup, escape
 
 from rotor_mbs.errors import StoreError
-from rotor_mbs.report.core import numbers
-from rotor_mbs.report.core.looks import light_palette_css, palette_css
+from rotor_mbs.report import numbers
+from rotor_mbs.report.looks import light_palette_css, palette_css
 from rotor_mbs.runs.files import refuse_foreign, replace_file
 
 GENERATOR = "rotor_mbs report"
 _MARK = f'<meta name="generator" content="{GENERATOR}">'.encode()  # of every page
 INDEX = "index.html"
 BENCH_CSV = "bench.csv"
-_TEMPLATES = Path(__file__).resolve().parents[1] / "templates"
+_TEMPLATES = Path(__file__).resolve().parent / "templates"
 _LONGEST = 100  # characters; file systems allow 255 bytes
 _OTHERS = "data--"  # the beginning of the names of other pages than those of scenes
 _CONTENTS = "<!-- contents -->"  # its place in a template

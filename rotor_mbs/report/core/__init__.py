@@ -1,1 +1,0 @@
-"""What every page and figure is made with: canvas, SVG, page elements, templates, number formats, files."""
