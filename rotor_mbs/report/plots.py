@@ -192,7 +192,7 @@ def draw_paths(axes: Any, tip: Array) -> None:
         axes.plot(*path.T, color=colour, linewidth=0.8, label=f"blade {blade + 1}")
         for end, dashes, fill in ((path[0], (0, (3, 2)), "white"), (path[-1], "-", colour)):
             axes.plot((0.0, end[0]), (0.0, end[1]), color=colour, linestyle=dashes, linewidth=1.6)
-            axes.plot(*end[:, None], marker="o", markersize=4, markeredgecolor=colour, markerfacecolor=fill)
+            axes.plot(*end[:, None], color=colour, marker="o", markersize=4, markerfacecolor=fill)
     for dashes, width, label in (("--", 1.6, "blade at the start"), ("-", 1.6, "at the end"), ("-", 3.0, "shaft")):
         axes.plot([], [], color=GREY, linestyle=dashes, linewidth=width, label=label)
 
