@@ -1,0 +1,41 @@
+"""What the models that are equations share: the items of a scene, and the settings of ode45. Needs no NumPy."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from rotor_mbs.methods.base import BuiltItem
+from rotor_mbs.methods.settings import Settings, number
+
+if TYPE_CHECKING:
+    from rotor_mbs.scenario.scene import Scene
+
+
+@dataclass(frozen=True)
+class Ode45Settings(Settings):
+    relative_tolerance: float = number(1e-6, above=0.0, doc="relative tolerance of the local error")
+    absolute_tolerance: float = number(1e-9, above=0.0, doc="absolute tolerance of the local error, rad and rad/s")
+
+
+def equation_items(scene: Scene, sources: tuple[str, str] = ("", "")) -> list[BuiltItem]:
+    """The equations and terms of the scene; sources: where the rotor's and a pitch's come from."""
+    moving = scene.moving_coordinates
+    built = [BuiltItem("equation", scene.coordinate_labels[i], sources[i > 0]) for i in moving]
+    built += [
+        BuiltItem("term", f"blade {i} fixed", "its pitch has no inertia")
+        for i in range(1, 1 + len(scene.blades))
+        if i not in moving
+    ]
+    optional = {
+        "hub inertia": scene.hub_inertia != 0.0,
+        "gravity": scene.gravity != 0.0,
+        "rotor torque": scene.has_torque,
+        "pitch torque": any(scene.pitch_torque),
+        "bearing stiffness": any(scene.bearing_stiffness),
+        "bearing rest angle": any(scene.pitch_load(i - 1)[1] for i in moving[1:]),
+        "bearing damping": any(scene.bearing_damping),
+        "shaft damping": scene.shaft_damping != 0.0,
+    }
+    built += [BuiltItem("term", name) for name, there in optional.items() if there]
+    return built + [BuiltItem("output", name) for name in scene.outputs]

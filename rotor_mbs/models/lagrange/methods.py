@@ -7,17 +7,9 @@ from dataclasses import dataclass
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from rotor_mbs.methods.base import (
-    Ladder,
-    Method,
-    Ode45Settings,
-    Solver,
-    equation_items,
-    late,
-    tolerance_ladder,
-    tolerance_pair,
-)
+from rotor_mbs.methods.base import Ladder, Method, Solver, late, tolerance_ladder, tolerance_pair
 from rotor_mbs.methods.settings import Settings, number
+from rotor_mbs.models import Ode45Settings, equation_items
 
 if TYPE_CHECKING:  # the list of methods needs none of them
     from rotor_mbs.scenario.scene import Scene

@@ -11,7 +11,8 @@ from typing import Any
 import numpy as np
 
 from rotor_mbs.methods import time_limit as deadline
-from rotor_mbs.methods.base import BuiltItem, equation_items
+from rotor_mbs.methods.base import BuiltItem
+from rotor_mbs.models import equation_items
 from rotor_mbs.models.lagrange import closed_form, hamilton, samples
 from rotor_mbs.models.lagrange.closed_form import LoadValues, load_values
 from rotor_mbs.models.lagrange.heyoka_adapter import Parameters, array_of, failure, heyoka

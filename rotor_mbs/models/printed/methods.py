@@ -8,7 +8,8 @@ from dataclasses import asdict
 from typing import TYPE_CHECKING
 
 from rotor_mbs.errors import MethodRefusal
-from rotor_mbs.methods.base import BuiltItem, Method, Ode45Settings, equation_items
+from rotor_mbs.methods.base import BuiltItem, Method
+from rotor_mbs.models import Ode45Settings, equation_items
 from rotor_mbs.models.printed import literal
 from rotor_mbs.models.printed.derivation import DerivedRotor, Errata
 
