@@ -10,37 +10,34 @@ import numpy as np
 
 from rotor_mbs.methods.solve import solve
 from rotor_mbs.scenario.scene import Scene
-from rotor_mbs.scenario.time_table import Table
 from rotor_mbs.solution.impulse import angular_momentum
 from rotor_mbs.solution.trajectory import Array, Trajectory
 
 
-def _run(scene: Scene, method: str) -> Trajectory:
-    return solve(method, scene, {}).trajectory
-
-
 def symmetry_errors(scene: Scene, method: str) -> dict[str, float]:
-    """What an exact run conserves: errors in rad, of the angular momentum relative.
+    """Of a scene without gravity and torque: errors in rad, of the angular momentum relative."""
 
-    What does not exist for the scene is left out.
-    """
-    there = _run(scene, method)
-    errors = {
-        "mirror_error": mirror_error(there.angles, _run(mirrored(scene), method).angles),
-        "relabelling_error": relabelling_error(there.angles, _run(relabelled(scene), method).angles),
-    }
+    def run(scene: Scene) -> Trajectory:
+        return solve(method, scene, {}).trajectory
+
+    there = run(scene)
     # From the last sample on with all rates reversed it runs back to its start.
-    end = tuple(there.angles[-1].tolist()), tuple((-there.rates[-1]).tolist())
-    back = _run(replace(scene, initial_angles=end[0], initial_rates=end[1]), method)
-    errors["reversal_error"] = float(np.abs(back.angles[-1] - np.array(scene.initial_angles)).max())
-    if scene.gravity == 0.0 and not scene.has_torque:
-        momentum = angular_momentum(scene, there.angles, there.rates)
-        errors["angular_momentum_drift"] = float(np.abs(momentum - momentum[0]).max() / abs(momentum[0]))
-    return errors
+    end = {"initial_angles": tuple(there.angles[-1].tolist()), "initial_rates": tuple((-there.rates[-1]).tolist())}
+    back = run(replace(scene, **end))
+    momentum = angular_momentum(scene, there.angles, there.rates)
+    return {
+        "mirror_error": mirror_error(there.angles, run(mirrored(scene)).angles),
+        "relabelling_error": relabelling_error(there.angles, run(relabelled(scene)).angles),
+        "reversal_error": float(np.abs(back.angles[-1] - np.array(scene.initial_angles)).max()),
+        "angular_momentum_drift": float(np.abs(momentum - momentum[0]).max() / abs(momentum[0])),
+    }
 
 
 def mirrored(scene: Scene) -> Scene:
-    """The mirror image in the plane of rotation: pitches and the blades' y change sign, the rotor angle does not."""
+    """The mirror image in the plane of rotation: pitches and the blades' y change sign, the rotor angle does not.
+
+    Of a scene without loads on its pitches.
+    """
     blades = []
     for blade in scene.blades:
         x, y, z = blade.centre_of_mass
@@ -51,13 +48,7 @@ def mirrored(scene: Scene) -> Scene:
         blades=tuple(blades),
         initial_angles=(scene.initial_angles[0], *(-angle for angle in scene.initial_angles[1:])),
         initial_rates=(scene.initial_rates[0], *(-rate for rate in scene.initial_rates[1:])),
-        pitch_torque=tuple(map(_negative, scene.pitch_torque)),
-        bearing_rest=tuple(map(_negative, scene.bearing_rest)),
     )
-
-
-def _negative(table: Table) -> Table:
-    return tuple((time, -value) for time, value in table)
 
 
 def mirror_error(angles: Array, other: Array) -> float:
