@@ -178,21 +178,7 @@ def test_a_sweep_and_python_take_a_file() -> None:
         rm.run(scene, "bad.py")
 
 
-@pytest.mark.full
-def test_the_other_commands_take_a_file() -> None:
-    stepped = EXAMPLE.replace("build=Solver", "build=Solver, settings=S").replace(
-        "class Solver", "from rotor_mbs.methods.base import Settings\nfrom rotor_mbs.methods.settings import step\n"
-        "import dataclasses\n@dataclasses.dataclass(frozen=True)\nclass S(Settings):\n    step: float = step(1.0)\n\n"
-        "class Solver"
-    )  # fmt: skip
-    Path("mine.py").write_text(stepped)
-    for words in ("bench -m mine.py -o b.h5 --repeats 1 --budget 20", "stability -m mine.py -o s.h5"):
-        command, *options = words.split()
-        ended = rotor_mbs(command, "one.toml", *options)
-        assert ended.status == 0, ended
-    assert "mine/lsoda" in rotor_mbs("report", "s.h5").out + Path("b-report/index.html").read_text()
+def test_a_model_without_linearization_has_no_modes() -> None:
     ended = rotor_mbs("modes", "one.toml", "-m", "mine.py")
     assert ended.status == 2
     assert ended.err == "mine/lsoda: its model has no linearization; allowed: a model with `linearize`\n"
-    ended = rotor_mbs("modes", "one.toml", "-m", "lagrange/taylor")
-    assert (ended.status, ended.err) == (0, "[1/1] one modes ok\n")

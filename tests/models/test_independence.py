@@ -60,28 +60,27 @@ def test_a_model_runs_without_the_other_engines(method: str, blocked: tuple[str,
 )
 def test_without_its_engine_a_method_says_how_to_get_it(engine: str, method: str, hint: str, tmp_path: Path) -> None:
     """And belongs to no default set."""
-    output = str(tmp_path / "x.h5")
-    code = f"""
-from rotor_mbs.cli import main
-from rotor_mbs.methods.catalogue import default_methods, find_method
-assert {method!r} not in default_methods() and not find_method({method!r}).is_installed
-sys.exit(main(["run", "paper/fig08", "-m", {method!r}, "-o", {output!r}]))
-"""
-    done = python(code, (engine,))
+    arguments = ["run", "paper/fig08", "-m", method, "-o", str(tmp_path / "x.h5")]
+    done = python(
+        "from rotor_mbs.cli import main\n"
+        "from rotor_mbs.methods.catalogue import default_methods, find_method\n"
+        f"assert {method!r} not in default_methods() and not find_method({method!r}).is_installed\n"
+        f"sys.exit(main({arguments!r}))",
+        (engine,),
+    )
     assert done.returncode == 2
     assert hint in done.stderr
     assert "Traceback" not in done.stderr
-    assert not Path(output).exists()
+    assert not list(tmp_path.iterdir())
 
 
 def test_items_of_every_method_are_listed_without_an_engine() -> None:
-    code = (
-        "from support.scenes import paper\n"
-        "from rotor_mbs.methods.catalogue import methods\n"
-        "assert all(method.items(paper('fig08')) for method in methods() if method.is_installed)\n"
-        "print(sorted(set(sys.modules) & {'exudyn', 'heyoka', 'mujoco', 'scipy'}))"
-    )
-    done = python(code)
+    done = python("""
+from support.scenes import paper
+from rotor_mbs.methods.catalogue import methods
+assert all(method.items(paper("fig08")) for method in methods() if method.is_installed)
+print(sorted(set(sys.modules) & {"exudyn", "heyoka", "mujoco", "scipy"}))
+""")
     assert done.stdout.splitlines()[-1] == "[]", done.stderr
 
 

@@ -157,12 +157,6 @@ def test_a_singularity_ends_the_run_with_what_was_reached():
         assert len(part) == len(result.trajectory.time)
 
 
-def test_integrating_twice_gives_the_same():
-    solver = METHODS[0].build(FIG05, METHODS[0].settings())
-    first, second = solver.integrate(), solver.integrate()
-    assert first == second
-
-
 def test_items_are_what_the_scene_needs():
     def names(given):
         return {item.name for item in METHODS[0].items(given)}

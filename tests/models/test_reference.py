@@ -11,6 +11,7 @@ import pytest
 from support import multiprecision
 from support.references import reference as frozen_reference
 from support.references import scene as shipped_scene
+from support.rotors import AXIAL, make_scene
 from support.scenes import PAPER, general, paper
 
 from rotor_mbs.methods.solve import solve
@@ -21,7 +22,7 @@ from rotor_mbs.models.lagrange.reference import ReferenceSolver, build, referenc
 from rotor_mbs.models.lagrange.samples import quad_loads, sampled_loads
 from rotor_mbs.models.lagrange.taylor import Propagation
 from rotor_mbs.runs.pool import WorkerPool, run_in
-from rotor_mbs.scenario.scene import Scene, parse_scene
+from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.trajectory import Integration
 
 
@@ -101,8 +102,7 @@ def test_a_reference_has_loads_where_they_are_asked_for() -> None:
 
 
 @pytest.mark.parametrize("is_available", [True, False])
-@pytest.mark.parametrize("shorter", [0, 1])
-@pytest.mark.parametrize("rows", [1, 3])
+@pytest.mark.parametrize(("shorter", "rows"), [(0, 1), (1, 3)])
 def test_a_reference_of_which_one_run_ends_early(
     is_available: bool, shorter: int, rows: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -135,20 +135,15 @@ def test_where_heyoka_is_not_installed_the_fallback_takes_its_place(monkeypatch:
 def test_quotients_are_known_as_far_as_both_runs_went(is_perturbed: bool, monkeypatch: pytest.MonkeyPatch) -> None:
     scene, solver_of = paper("fig03", duration=0.1, samples=4), reference_module._in_doubles
 
-    class EndsEarly:
-        def __init__(self, start: Scene, tolerances: tuple[float, float], times: Any) -> None:
-            self._run, self._rows = solver_of(start, tolerances, times), 2 if (start != scene) is is_perturbed else 4
-
-        def integrate(self) -> None:
-            self._run.integrate()
-
-        @property
-        def states(self) -> Any:
-            return self._run.states[: self._rows]
+    def ends_early(start: Scene, tolerances: tuple[float, float], times: Any) -> Any:
+        run = solver_of(start, tolerances, times)
+        run.integrate()
+        rows = 2 if (start != scene) is is_perturbed else 4
+        return SimpleNamespace(integrate=lambda: None, states=run.states[:rows])
 
     times = np.linspace(0.0, 0.1, 4)
     whole = reference_module._matrices_by_quotients(scene, times)
-    monkeypatch.setattr(reference_module, "_in_doubles", EndsEarly)
+    monkeypatch.setattr(reference_module, "_in_doubles", ends_early)
     result = reference_module._matrices_by_quotients(scene, times)
     assert result[:2].tobytes() == whole[:2].tobytes()
     assert np.all(np.isposinf(result[2:]))
@@ -193,12 +188,7 @@ def test_a_pitch_that_is_fixed_has_no_growth_and_no_unit(monkeypatch: pytest.Mon
 
 def test_amplification_of_a_stiff_oscillation_is_one() -> None:
     """An undamped spring of 1000 rad/s turns (angle, rate/ω) in a circle: no error of it grows, in either channel."""
-    text = (
-        'title = "s"\nblades = 1\ngravity = 0\nduration = 0.1\nsamples = 6\noutputs = ["angles", "rates"]\n'
-        "[blade]\nmass = 10\ncentre_of_mass = [0, 0, 1]\ninertia = [2, 2, 1, 0, 0, 0]\n"
-        "[bearing]\nstiffness = 1e6\n[initial]\nangles = [0, 0.01]\nrates = [0, 0]\n"
-    )
-    scene = parse_scene(text, "s")
+    scene = make_scene([0, 0.01], [0, 0], (AXIAL,), gravity=0.0, duration=0.1, samples=6, bearing_stiffness=(7e6,))
     result = reference_at(scene, np.linspace(0.0, 0.1, 6))
     np.testing.assert_allclose(result.units, [1.0, 1.0, 1.0, 1000.0])
     np.testing.assert_allclose(result.growth[:, [1, 3]], 1.0, rtol=1e-9)

@@ -142,12 +142,9 @@ def test_the_order_of_taylors_series_is_that_of_its_tolerance(tolerance: float |
     ("weight", "kinetic", "torque", "unit"),
     [
         (1.2e6, 0.0, 0.0, 2.0**20),
-        (0.0, 2.0e6, 0.0, 2.0**20),
         (0.0, 0.0, 1.2e6, 2.0**20),
-        (4e5, 4e5, 4e5, 2.0**20),
         (9e5, 9e5, 9e5, 2.0**21),
         (0.0, 0.0, 2.5, 2.0),
-        (0.0, 0.0, 0.7, 1.0),
         (0.0, 0.0, 0.0, 1.0),
     ],
 )
