@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import difflib
-from collections.abc import Iterable, Iterator
-from contextlib import contextmanager
+from collections.abc import Iterable
 
 
 class RotorError(Exception):
@@ -46,15 +45,6 @@ def one_line(error: BaseException) -> str:
     """The type of an exception and the first line of its text."""
     text = str(error).strip().splitlines()
     return f"{type(error).__name__}: {text[0] if text else 'no message'}"
-
-
-@contextmanager
-def saving(path: object) -> Iterator[None]:
-    """What the system refuses in the block is a StoreError about `path`."""
-    try:
-        yield
-    except OSError as exc:
-        raise StoreError(f"{path}: cannot be written: {exc.strerror or exc}; nothing stored before is lost") from exc
 
 
 def nearest(name: str, known: Iterable[str]) -> str:

@@ -20,7 +20,7 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-from rotor_mbs.errors import InputError, StoreError, saving
+from rotor_mbs.errors import InputError, StoreError
 
 if TYPE_CHECKING:
     from _typeshed import ReadableBuffer as Buffer
@@ -60,6 +60,15 @@ class Column(NamedTuple):
     long_name: str
     kind: str = "<f8"
     attributes: Mapping[str, Any] = MappingProxyType({})
+
+
+@contextmanager
+def saving(path: object) -> Iterator[None]:
+    """What the system refuses in the block is a StoreError about `path`."""
+    try:
+        yield
+    except OSError as exc:
+        raise StoreError(f"{path}: cannot be written: {exc.strerror or exc}; nothing stored before is lost") from exc
 
 
 @contextmanager

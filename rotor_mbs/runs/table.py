@@ -32,10 +32,10 @@ from typing import IO, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from rotor_mbs.errors import InputError, StoreError, saving
+from rotor_mbs.errors import InputError, StoreError
 from rotor_mbs.methods.catalogue import REFERENCE, find_method, method_names
 from rotor_mbs.runs import files
-from rotor_mbs.runs.files import CHARACTERS, KEYWORDS, Column
+from rotor_mbs.runs.files import CHARACTERS, KEYWORDS, Column, saving
 from rotor_mbs.runs.versions import machine, row_versions, versions
 from rotor_mbs.scenario.catalogue import natural_key
 from rotor_mbs.scenario.scene import Scene, scene_hash

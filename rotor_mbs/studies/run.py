@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -26,8 +26,8 @@ from rotor_mbs.methods.catalogue import (
 from rotor_mbs.methods.solve import solve
 from rotor_mbs.methods.time_limit import OutOfTimeError, time_limit
 from rotor_mbs.runs.files import writing
-from rotor_mbs.runs.pool import Finished, TaskPool, Workers, pool_of
-from rotor_mbs.runs.runner import Task, compute
+from rotor_mbs.runs.pool import Finished, Workers, pool_of
+from rotor_mbs.runs.runner import Task, compute_in_order
 from rotor_mbs.runs.table import Asked, Rows, TableFile, extend_file, results_tables, row_of_run, text_of
 from rotor_mbs.runs.versions import row_versions
 from rotor_mbs.scenario.scene import Scene, scene_hash
@@ -210,32 +210,17 @@ def run_tasks(file: TableFile, asked: Sequence[Asked], timeout_s: float) -> list
 
 
 def compute_tasks(tasks: Sequence[Task], workers: Workers, on_progress: OnProgress) -> list[Outcome]:
-    """References first; then, if their references are there, the other rows, the slowest first; what became of each."""
+    """What became of each task, in the order in which they end."""
     made: list[Outcome] = []
     if not tasks:
         return made
     with pool_of(workers) as pool:
         work, done = sum(task.work for task in tasks), 0.0
-        for end in _compute_in_order(pool, tasks):
+        for end in compute_in_order(pool, tasks):
             done += end.task.work
             made.append(_outcome(end, done / work))
             on_progress(len(made), len(tasks), made[-1])
     return made
-
-
-def _compute_in_order(pool: TaskPool, tasks: Sequence[Task]) -> Iterator[Finished[Task, Rows]]:
-    yield from compute(pool, [task for task in tasks if task.reference is None])
-    waiting = [task for task in tasks if task.reference is not None]
-    ready = [task for task in waiting if task.reference is not None and task.reference.is_stored]
-    # Slowest first, so that no long one starts last and keeps one process busy while the others wait; between them the
-    # fastest, which are those that are compiled, so that two processes seldom compile the same code at once.
-    ready.sort(key=lambda task: -task.work)
-    quarter, count = len(ready) // 4, len(ready)
-    turns = [task for pair in zip(ready[:quarter], ready[count - quarter :], strict=True) for task in pair]
-    yield from compute(pool, [*turns, *ready[quarter : count - quarter]])
-    for task in waiting:
-        if task not in ready:
-            yield Finished(task, None, "no_reference", "its reference was not computed")
 
 
 def _outcome(end: Finished[Task, Rows], share: float) -> Outcome:
