@@ -1,4 +1,5 @@
-"""What the README and `docs/` tell a reader to type is understood, what they link to is there, their Python runs."""
+"""What the README and `docs/` tell a reader to type is understood, what they link to is there, their Python runs;
+the generated reference pages have everything."""
 
 from __future__ import annotations
 
@@ -12,8 +13,9 @@ import pytest
 
 import rotor_mbs as rm
 from rotor_mbs.cli import main
-from rotor_mbs.cli.arguments import parse
-from rotor_mbs.scenario.scene import load_scene
+from rotor_mbs.cli.arguments import _parser, parse
+from rotor_mbs.methods.catalogue import method_names
+from rotor_mbs.scenario.scene import BLADE_KEYS, SCENE_KEYS, load_scene
 
 ROOT = Path(__file__).parents[1]
 DOCUMENTS = (ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md")))
@@ -117,3 +119,23 @@ def test_the_tour_prints_what_it_says(capsys: pytest.CaptureFixture[str]) -> Non
     printed = capsys.readouterr().out
     assert printed
     assert set(printed.split("\n")) <= {line.removeprefix("    ") for line in TEXTS["tour.md"].split("\n")}
+
+
+def test_every_public_name_key_command_and_method_is_on_a_reference_page(monkeypatch: pytest.MonkeyPatch) -> None:
+    """`sphinx-build` itself fails where a built-in array is missing from the page of the file format."""
+    pytest.importorskip("sphinx", reason="extra docs")
+    monkeypatch.syspath_prepend(str(ROOT / "docs" / "_ext"))
+    from reference import declared_pages
+
+    pages = declared_pages()
+    for name in (*rm.__all__, "assert_agrees", "Modes", "RunPlots"):
+        assert f"api/{name}" in pages, name
+        assert f"(api/{name}.md)" in pages["api"]
+    expected = {
+        "command-line": [f"## {name}" for name in _parser()[1]],
+        "scene-file": [f"`{key['key']}`" for key in SCENE_KEYS.values() if key["key"] != "blade"]
+        + [f"`blade.{key['key']}`" for key in BLADE_KEYS.values()],
+        "methods": [f"## {name}" for name in method_names()],
+    }
+    for name, texts in expected.items():
+        assert not [text for text in texts if text not in pages[name]], name

@@ -7,11 +7,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from support.commands import refusal, rotor_mbs
 from support.data_files import FORMATS
 from support.scenes import paper
 
 import rotor_mbs as rm
-from rotor_mbs.cli import main
 from rotor_mbs.errors import InputError, RotorError
 from rotor_mbs.foreign.channels import KNOWN_NAMES, channels, guess, half_last_digits, load_data
 
@@ -105,12 +105,9 @@ def test_names_that_are_known(name: str, channel: str | None) -> None:
     assert (found and found.name) == channel
 
 
-def test_the_names_that_are_understood_are_printed_and_documented(capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_names_that_are_understood_are_printed_and_documented() -> None:
     """Each that is listed is understood; the list of the docs is the printed one."""
-    with pytest.raises(SystemExit) as ended:
-        main(["compare", "--names"])
-    assert ended.value.code == 0
-    shown = capsys.readouterr().out
+    shown = rotor_mbs("compare", "--names").out
     document = (Path(__file__).parents[2] / "docs" / "compare.md").read_text()
     for channel, names in KNOWN_NAMES:
         assert f"{channel}: {names}\n" in shown
@@ -223,14 +220,11 @@ WRONG: dict[str, tuple[Callable[[Path], object], str]] = {
 
 
 @pytest.mark.parametrize("case", WRONG)
-def test_wrong_input_is_one_line_and_status_2(tmp_path: Path, case: str, capsys: pytest.CaptureFixture[str]) -> None:
+def test_wrong_input_is_one_line_and_status_2(tmp_path: Path, case: str) -> None:
     make, message = WRONG[case]
     path = tmp_path / "data.csv"
     make(path)
-    assert main(["compare", str(path), "--scene", "paper/fig08", "-o", str(tmp_path / "page")]) == 2
-    error = capsys.readouterr().err
-    assert message in error
-    assert len(error.splitlines()) == 1
+    assert message in refusal("compare", path, "--scene", "paper/fig08", "-o", tmp_path / "page")
     assert not (tmp_path / "page").exists()
 
 

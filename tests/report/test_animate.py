@@ -9,10 +9,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 from PIL import Image
+from support.commands import refusal, rotor_mbs
 from support.scenes import paper
 from support.stored import Made, rotor, store
 
-from rotor_mbs.cli import main
 from rotor_mbs.report.animation import wires
 
 SHORT = paper("fig11", duration=1.0, samples=101)
@@ -29,7 +29,7 @@ def results(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.mark.parametrize("suffix", ["webp", "gif"])
 def test_an_animation_moves_for_as_long_as_the_scene(results: Path, tmp_path: Path, suffix: str) -> None:
     output = tmp_path / f"new/a.{suffix}"
-    assert main(["animate", "paper/fig11", str(results), "-o", str(output)]) == 0
+    assert rotor_mbs("animate", "paper/fig11", results, "-o", output).status == 0
     with Image.open(output) as image:
         assert image.n_frames == 21  # 1 s at 20 frames a second, both ends
         assert image.size[0] > image.size[1]  # two models side by side
@@ -62,14 +62,13 @@ def test_wires_stand_where_the_rotor_is() -> None:
 
 
 def test_without_ffmpeg_a_film_is_refused_with_what_to_do(
-    results: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+    results: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(shutil, "which", lambda _: None)
-    assert main(["animate", "paper/fig11", str(results), "-o", str(tmp_path / "a.mp4")]) == 2
-    assert "MP4 needs ffmpeg" in capsys.readouterr().err
+    assert "MP4 needs ffmpeg" in refusal("animate", "paper/fig11", results, "-o", tmp_path / "a.mp4")
 
 
 @pytest.mark.skipif(shutil.which("ffmpeg") is None, reason="no ffmpeg here")
 def test_a_film_is_made_where_ffmpeg_is(results: Path, tmp_path: Path) -> None:
-    assert main(["animate", "paper/fig11", str(results), "-o", str(tmp_path / "a.mp4")]) == 0
+    assert rotor_mbs("animate", "paper/fig11", results, "-o", tmp_path / "a.mp4").status == 0
     assert (tmp_path / "a.mp4").read_bytes()[4:8] == b"ftyp"

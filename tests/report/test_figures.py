@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from support.commands import refusal
 from support.scenes import paper
 from support.stored import Made, rotor, store
 
@@ -130,12 +131,8 @@ def test_a_figure_shows_each_model_in_a_column_as_it_was_stored(drawn: Path) -> 
     ],
 )
 def test_bad_input_is_one_line_and_status_2(
-    drawn: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch,
-    arguments: list[str], message: str,
-) -> None:  # fmt: skip
+    drawn: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, arguments: list[str], message: str
+) -> None:
     monkeypatch.chdir(tmp_path)
-    assert main([str(drawn) if word == "FILE" else word for word in arguments]) == 2
-    error = capsys.readouterr().err
-    assert message in error
-    assert error.count("\n") == 1
+    assert message in refusal(*(drawn if word == "FILE" else word for word in arguments))
     assert not list(tmp_path.iterdir())

@@ -29,3 +29,11 @@ def rotor_mbs(*words: object) -> Ended:
             status = int(str(exc.code))
     assert "Traceback" not in err.getvalue()
     return Ended(status, out.getvalue(), err.getvalue())
+
+
+def refusal(*words: object) -> str:
+    """The line of a command that ends with status 2."""
+    ended = rotor_mbs(*words)
+    assert ended.status == 2, ended
+    (line,) = ended.err.splitlines()
+    return line
