@@ -43,14 +43,13 @@ EXPLAINED = {
     r"tree\._tree .*0\.0 -> ": "the offset of a spring of no stiffness: the rotor's",
     r"ode_solvers\._right_hand_side .*isinstance\(state": "plain floats or the array's own: the same numbers",
     r"ode_solvers\.__init__ .*0\.0 -> ": "the work of constant torques is known from the angles",
-    r"(samples\.loads_at(_start)?|kinematics\.work_of_constant_loads|exact\.exact_rotor_angle) .*0\.0 -> ": (
+    r"(samples\.loads_at(_start)?|kinematics\.(work_of_constant_loads|exact_rotor_angle)) .*0\.0 -> ": (
         "a constant load is the same at any time"
     ),
     r"taylor\.equation_numbers .*0\.0 -> ": "takes a place that the next line fills",
     r"taylor\.(_UNROLLED_BLADES|compiled|is_compact) |adapter\.(_settings .*|)(constraints|_OLD_JACOBIAN_FROM)": (
         "decides how long a run takes, not what comes out"
     ),
-    r"claims\._RELATIONS .*value \* other scaled": "its sign alone counts",
     r"checks\._of_reference .*: 0 -> 1": "compared by its length: no shipped reference has a single sample",
     r"checks\._bent_columns .*0 -> 1": "one row is as much too short as none",
     r"checks\._of_samples .*: 1 -> 2": "one zero or two: the largest is zero",
