@@ -164,7 +164,7 @@ def open_file(path: Path) -> Iterator[Any]:
         file = h5py.File(path, "r")
     except OSError as exc:
         raise StoreError(
-            f"{path}: not a readable HDF5 file ({str(exc).splitlines()[0]}); allowed: a file that rotor-mbs wrote"
+            f"{path}: not a readable HDF5 file ({_reason(exc)}); allowed: a file that rotor-mbs wrote"
         ) from exc
     with file:
         with reading(path):
@@ -370,6 +370,12 @@ def sync_folder(folder: Path) -> None:
             os.close(handle)
 
 
+def _reason(error: Exception) -> str:
+    """What HDF5 says in brackets, "file signature not found", without the name of its function."""
+    text = str(error).splitlines()[0]
+    return text.partition("(")[2].rpartition(")")[0] or text
+
+
 def is_of_this_program(path: Path) -> bool:
     try:
         with h5py.File(path, "r") as file:
@@ -392,7 +398,7 @@ def read_arrays(path: Path, group: str = "", scene: str = "") -> tuple[dict[str,
             arrays = {name: chosen[name][()] for name in places[name]}
             units = {name: str(attribute(chosen[name], "units", "")) for name in arrays}
     except (OSError, RuntimeError, KeyError, ValueError, TypeError) as exc:
-        raise StoreError(f"{path}: not a readable HDF5 file ({str(exc).splitlines()[0]})") from exc
+        raise StoreError(f"{path}: not a readable HDF5 file ({_reason(exc)})") from exc
     return arrays, {name: unit for name, unit in units.items() if unit}
 
 

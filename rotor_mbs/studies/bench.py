@@ -434,7 +434,10 @@ def run_bench(
 
 
 def with_settings(chosen: Sequence[Ladder], settings: Mapping[str, object]) -> list[Ladder]:
-    """The ladders with these settings fixed, where their methods have them and they are no choice of the ladder itself.
+    """The ladders with these settings fixed, where their methods have them.
+
+    Of a method whose ladders differ by such a setting, those with the given value are kept; where none has it, its
+    first ladder with the given value.
 
     Raises
     ------
@@ -445,7 +448,12 @@ def with_settings(chosen: Sequence[Ladder], settings: Mapping[str, object]) -> l
     varied = {name for ladder in chosen for name in ladder.fill(1.0) if name in own[ladder.method]}
     if varied:
         raise InputError(f"bench varies {', '.join(sorted(varied))} itself; allowed: other settings of the methods")
-    return [replace(ladder, choices={**own[ladder.method], **ladder.choices}) for ladder in chosen]
+    kept = []
+    for method, given in own.items():
+        of_method = [ladder for ladder in chosen if ladder.method == method]
+        fitting = [ladder for ladder in of_method if all(ladder.choices.get(k, given[k]) == given[k] for k in given)]
+        kept += [replace(ladder, choices={**ladder.choices, **given}) for ladder in fitting or of_method[:1]]
+    return kept
 
 
 def _complete_references(scenes: Sequence[Scene], output: Path, workers: int) -> set[str]:
