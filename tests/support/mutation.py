@@ -88,7 +88,11 @@ _PARTS = ("models/test_exudyn_parts.py",)
 _PRINTED = ("models/test_printed.py", "analysis/test_errata.py")
 _DEFAULTS = "analysis/test_run_integrity.py"
 _WORK = "models/test_pitch_loads.py::test_work_"
-_SENSORS = (*_PARTS, f"{_WORK}of_a_constant_torque_and_of_a_constant_rest_angle[exudyn_tree/rk44]")
+_SENSORS = (
+    *_PARTS,
+    f"{_WORK}of_a_constant_torque_and_of_a_constant_rest_angle[exudyn_tree/rk44]",
+    "models/test_exact_solutions.py::test_a_thousand_radians_a_second_are_counted_turn_by_turn",
+)
 _MUJOCO = "models/test_mujoco.py::test_"
 _JUDGEMENT = "solution/test_judgement.py::test_"
 _RULES = (
