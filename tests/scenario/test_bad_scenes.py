@@ -52,36 +52,26 @@ ON_THE_AXIS = "[blade]\nmass = 2\ncentre_of_mass = [0, 0, 3]\ntip = [0.5, 0, 7]\
 # What to write for what, and the line and key of the one error, with a piece of its message.
 WRONG = {
     "title empty": ('"A good scene"', '"  "', 1, "title", "is empty"),
-    "title too long": ("A good scene", "x" * 201, 1, "title", "201 characters"),
     "title of two lines": ("good scene", "good\\nscene", 1, "title", "control character"),
     "unknown key": ("blades = 2", "blades = 2\nbaldes = 2", 3, "baldes", "perhaps blades"),
     "unknown quoted key": ("[hub]", '[hub]\n"in\\nertia" = 1', 25, 'hub."in\\\\nertia"', "is not a key here"),
-    "figures a text": ("blades = 2", 'figures = "5"\nblades = 2', 2, "figures", '"5" is not a list'),
     "blades astronomical": ("blades = 2", f"blades = 0x{'f' * 5000}", 2, "blades", "a number of over 30 digits"),
     "blades true": ("blades = 2", "blades = true", 2, "blades", "true is not a whole number"),
     "gravity NaN": ("gravity = 9.8", "gravity = nan", 3, "gravity", "nan is out of range"),
     "duration a date": ("duration = 10", "duration = 2020-01-01", 4, "duration", "a date or time is not a number"),
-    "samples one": ("samples = 11", "samples = 1", 5, "samples", "1 is out of range"),
     "outputs empty": ('["angles", "tip"]', "[]", 6, "outputs", "0 entries"),
     "outputs unknown": ('["angles", "tip"]', '["angles", "tips"]', 6, r"outputs\[1\]",
      '"tips" is not one of them, perhaps tip'),
     "outputs repeated": ('["angles", "tip"]', '["tip", "tip"]', 6, "outputs", "more than once"),
     "mass missing": ("mass = 2\n", "", 8, r"blade\.mass", "is missing"),
     "mass zero": ("mass = 2", "mass = 0", 9, r"blade\.mass", "0 is out of range"),
-    "mass beyond doubles": ("mass = 2", f"mass = 1{'0' * 400}", 9, r"blade\.mass", "over 30 digits is out of range"),
-    "centre too short": ("[0.5, 0, 3]", "[0.5, 0]", 10, r"blade\.centre_of_mass", "2 entries"),
     "centre on lines": ("[0.5, 0, 3]", '[0.5, # x ]\n  0,\n  "z"]', 12, r"blade\.centre_of_mass\[2\]",
      "\"z\": 'z' is not a number"),
     "inertia of no triangle": ("[1, 1, 1, 0, 0, 0]", "[1, 1, 2.1, 0, 0, 0]", 11, r"blade\.inertia", "no rigid body"),
     "tip missing where wanted": ("tip = [0.5, 0, 7]\n", "", 8, r"blade\.tip", "is missing"),
     "angles too few": ("angles = [0, 0, 0]", "angles = [0, 0]", 15, r"initial\.angles", "2 numbers for a rotor and 2"),
-    "angle code": ("angles = [0, 0, 0]", "angles = [0, \"__import__('os')\", 0]", 15, r"initial\.angles\[1\]",
-     "no meaning in an expression"),
-    "angle a bomb": ("angles = [0,", 'angles = ["9**9**9**9",', 15, r"initial\.angles\[0\]", "no finite value"),
-    "stiffness negative": ("stiffness = 1", "stiffness = -1", 19, r"bearing\.stiffness", "-1 is out of range"),
     "stiffness for one of two": ("stiffness = 1", "stiffness = [1]", 19, r"bearing\.stiffness",
      "1 number in a list for 2"),
-    "torque unknown": ("rotor = 5\n", "roter = 5\n", 23, r"torque\.roter", "perhaps rotor"),
     "torque entry": ("rotor = 5", "rotor = [[0, 1], [1, nan]]", 23, r"torque\.rotor\[1\]\[1\]", "nan"),
     "torque from before": ("rotor = 5", "rotor = [[-1, 1], [1, 1]]", 23, r"torque\.rotor", "below 0"),
     "torque back in time": ("rotor = 5", "rotor = [[1, 1], [0, 1]]", 23, r"torque\.rotor",
@@ -96,7 +86,6 @@ WRONG = {
     "one of two blade tables": ("[blade]", "[[blade]]", 8, "blade", r"1 \[\[blade\]\] table for 2 blades"),
     "mass too large": ("mass = 2", "mass = 1e200", 9, r"blade\.mass", "allowed: sizes from 1e-25"),
     "offset too small": ("[0.5, 0, 3]", "[-1e-80, 0, 3]", 10, r"blade\.centre_of_mass\[0\]", "allowed: 0, or sizes"),
-    "duration too small": ("duration = 10", "duration = 1e-300", 4, "duration", "allowed: sizes from"),
     "second blade table": (BLADE,
      BLADE.replace("[blade]", "[[blade]]") + BLADE.replace("[blade]", "[[blade]]").replace("= 2", "= 0"), 14,
      r"blade\[1\]\.mass", "0 is out of range"),
@@ -163,9 +152,7 @@ def test_all_errors_of_a_file_in_the_order_of_its_lines(tmp_path: Path) -> None:
         (b"title = 'x'\n# \xe9\n", ":2: is not UTF-8"),
         (b"title = 'x'\n\n\x00", ":3: contains a NUL byte"),
         (b"x" * (MAX_BYTES + 1), ": is larger than 1048576 bytes"),
-        (b"title = \n", ":1: not TOML: invalid value"),
         (b"title = 'x'\ntitle = 'y'\n", ":2: not TOML: cannot overwrite a value"),
-        (b"\n\nblades = 1 2\n", ":3: not TOML: expected newline"),
         (b"a = " + b"[" * 100_000, ":1: nested too deep"),
         (b"a = " + b"{a=" * 100_000, ":1: nested too deep"),
         (b"a." * 500_000 + b"a = 1", ":1: key of over 32 parts"),
@@ -197,14 +184,11 @@ NO_NAMES = ("", "../paper/fig05", "/paper/fig05", "paper//fig05", "paper/fig05\n
     [
         *((argument, "is neither a scene's name nor a TOML file") for argument in NO_NAMES),
         ("paper/fig5", "no such scene, perhaps paper/fig05"),
-        ("papers", "no such scene, perhaps paper"),
         ("nothing-like-it", "no such scene; allowed: what `rotor-mbs list` names"),
-        ("x" * 5000, "no such scene"),
         ("missing.toml", "missing.toml: cannot be read: No such file"),
         ("x" * 5000 + ".toml", "cannot be read"),
         ("\0.toml", "leads to no file"),
         ("empty", "no TOML file in this folder"),
-        ("text.txt", "is not a TOML file"),
         ("odd name.toml", "cannot name a scene"),
         ("bench.toml", "bench names a group of results"),
         ("circle.toml", "leads to no file"),
@@ -218,7 +202,7 @@ def test_arguments_that_name_no_scene(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     Path("empty").mkdir()
-    for name in ("text.txt", "odd name.toml", "bench.toml"):
+    for name in ("odd name.toml", "bench.toml"):
         Path(name).write_text(SCENE, encoding="utf-8")
     Path("circle.toml").symlink_to("circle.toml")
     os.mkfifo("pipe.toml")
