@@ -105,7 +105,7 @@ def test_the_default_set_passes(tmp_path: Path, capsys: pytest.CaptureFixture[st
 # Faults in the models
 
 
-@pytest.mark.parametrize("errata", [{"e1": True}, {"e2": True}])
+@pytest.mark.parametrize("errata", [{"e1": True}, pytest.param({"e2": True}, marks=pytest.mark.full)])
 def test_the_papers_errata_fail(errata: dict[str, bool], tmp_path: Path) -> None:
     """In another code's run, put in as a right method's."""
     scene = shipped("paper/fig11")

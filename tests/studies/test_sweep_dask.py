@@ -20,7 +20,7 @@ from rotor_mbs.errors import InputError, StoreError
 from rotor_mbs.runs import cluster as dask_cluster
 from rotor_mbs.runs.pool import SerialPool, run_in
 
-pytest.importorskip("distributed")
+Client = pytest.importorskip("distributed").Client
 pytestmark = pytest.mark.full
 
 _SWEEP = """
@@ -29,8 +29,8 @@ scene = "paper/fig11"
 methods = ["lagrange/dop853"]
 samples = 21
 outputs = ["angles"]
-change = { duration = 3.0 }
-draws = 60
+change = {{ duration = 3.0 }}
+draws = {draws}
 
 [[axis]]
 key = "initial.angles[1]"
@@ -55,36 +55,35 @@ def cluster() -> Iterator[tuple[str, list[subprocess.Popen[bytes]]]]:
             )
             for command in commands
         ]
-        _wait_for_workers(address)
+        with Client(address, timeout=30, set_as_default=False) as client:
+            client.wait_for_workers(2, timeout=60)
         yield address, processes
         for process in processes:
             process.kill()
 
 
-def _wait_for_workers(address: str) -> None:
-    from distributed import Client
-
-    with Client(address, timeout=30, set_as_default=False) as client:
-        client.wait_for_workers(2, timeout=60)
+def swept(folder: Path, address: str, victim: subprocess.Popen[bytes], draws: int) -> tuple[str, str, int]:
+    """Output, errors and status of s.toml into dask.h5 on a cluster of which a process is killed after five runs."""
+    path, output = folder / "s.toml", folder / "dask.h5"
+    path.write_text(_SWEEP.format(draws=draws))
+    command = [sys.executable, "-m", "rotor_mbs", "sweep", str(path), "-o", str(output), "--engine", f"dask:{address}"]
+    with subprocess.Popen(command, stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as sweep:
+        while sweep.poll() is None and stored_runs(output) < 5:
+            time.sleep(0.01)
+        assert sweep.poll() is None, sweep.communicate()
+        victim.kill()
+        return (*sweep.communicate(timeout=120), sweep.wait())
 
 
 def test_a_killed_worker_of_a_cluster_loses_nothing(
     tmp_path: Path, cluster: tuple[str, list[subprocess.Popen[bytes]]]
 ) -> None:
-    address, processes = cluster
-    path, local, remote = tmp_path / "s.toml", tmp_path / "local.h5", tmp_path / "dask.h5"
-    path.write_text(_SWEEP)
-    command = [sys.executable, "-m", "rotor_mbs", "sweep", str(path), "-o", str(remote), "--engine", f"dask:{address}"]
-    with subprocess.Popen(command, stderr=subprocess.PIPE, stdout=subprocess.PIPE) as sweep:
-        while sweep.poll() is None and stored_runs(remote) < 5:
-            time.sleep(0.01)
-        assert sweep.poll() is None, sweep.communicate()
-        processes[1].kill()
-        output, errors = sweep.communicate(timeout=120)
-    assert sweep.returncode == 0, (output, errors)
-    assert b"60 runs: 60 ok" in output
-    assert main(["sweep", str(path), "-o", str(local)]) == 0
-    assert remote.read_bytes() == local.read_bytes()
+    address, (_, worker, _) = cluster
+    output, errors, status = swept(tmp_path, address, worker, 60)
+    assert status == 0, (output, errors)
+    assert "60 runs: 60 ok" in output
+    assert main(["sweep", str(tmp_path / "s.toml"), "-o", str(tmp_path / "local.h5")]) == 0
+    assert (tmp_path / "dask.h5").read_bytes() == (tmp_path / "local.h5").read_bytes()
 
 
 def test_a_worker_with_other_code_or_another_version_is_refused() -> None:
@@ -104,18 +103,11 @@ def _run_as_worker(expected: dict[str, str], task: int) -> int:
 def test_a_scheduler_that_dies_ends_in_one_line(
     tmp_path: Path, cluster: tuple[str, list[subprocess.Popen[bytes]]]
 ) -> None:
-    address, processes = cluster
-    path, remote = tmp_path / "s.toml", tmp_path / "dask.h5"
-    path.write_text(_SWEEP.replace("draws = 60", "draws = 4000"))
-    command = [sys.executable, "-m", "rotor_mbs", "sweep", str(path), "-o", str(remote), "--engine", f"dask:{address}"]
-    with subprocess.Popen(command, stderr=subprocess.PIPE, stdout=subprocess.PIPE) as sweep:
-        while sweep.poll() is None and stored_runs(remote) < 5:
-            time.sleep(0.01)
-        processes[0].kill()
-        _, errors = sweep.communicate(timeout=120)
-    assert sweep.returncode == 1, errors
-    assert b"Traceback" not in errors
-    assert errors.strip().splitlines()[-1].startswith(b"engine dask: the scheduler was lost; stored runs are kept")
+    address, (scheduler, *_) = cluster
+    _, errors, status = swept(tmp_path, address, scheduler, 4000)
+    assert status == 1, errors
+    assert "Traceback" not in errors
+    assert errors.strip().splitlines()[-1].startswith("engine dask: the scheduler was lost; stored runs are kept")
 
 
 class _WithoutWorkers:

@@ -1,22 +1,22 @@
 """How run time grows with the number of blades and with the duration: a table for each method.
 
-python tests/support/cost_scaling.py [METHOD...] [--budget SECONDS]
+    python tests/support/cost_scaling.py [METHOD...]
 
-Each method runs at one setting; sizes after one that took longer than the budget are left out.
+Each method runs at one setting; sizes after one that took longer than BUDGET_S are left out.
 """
 
 from __future__ import annotations
 
-import argparse
+import sys
 from dataclasses import replace
 
 import numpy as np
 
-from rotor_mbs.methods.catalogue import methods
 from rotor_mbs.methods.solve import solve
 from rotor_mbs.scenario.catalogue import find_scenes
 from rotor_mbs.scenario.scene import Scene
 
+BUDGET_S = 30.0
 BLADES = (1, 2, 3, 6, 12, 24, 48, 96)
 DURATIONS = (1.0, 10.0, 60.0, 600.0, 3600.0)  # s
 SETTINGS: dict[str, dict[str, object]] = {
@@ -50,24 +50,18 @@ def with_blades(scene: Scene, count: int) -> Scene:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("methods", nargs="*", metavar="METHOD")
-    parser.add_argument("--budget", type=float, default=30.0, metavar="SECONDS")
-    arguments = parser.parse_args()
     # Blades pitched a little, for the second in which no error has grown much; a plain pendulum, which stays regular.
     many, one = find_scenes(["paper/fig08"])[0], find_scenes(["paper/fig03"])[0]
     studies = {
         "blades": {float(count): with_blades(many, count) for count in BLADES},
         "simulated s": {t: replace(one, duration=t, samples=round(10 * t) + 1) for t in DURATIONS},
     }
-    for method in methods():
-        if method.name not in SETTINGS or (arguments.methods and method.name not in arguments.methods):
-            continue
+    for method in sys.argv[1:] or SETTINGS:
         for kind, scenes in studies.items():
             for size, scene in scenes.items():
-                seconds = min(solve(method.name, scene, SETTINGS[method.name], repeats=3).run_times_s)
-                print(f"{method.name:32s} {size:8g} {kind:12s} {seconds:.3e} s", flush=True)
-                if seconds > arguments.budget:
+                seconds = min(solve(method, scene, SETTINGS[method], repeats=3).run_times_s)
+                print(f"{method:32s} {size:8g} {kind:12s} {seconds:.3e} s", flush=True)
+                if seconds > BUDGET_S:
                     break
 
 
