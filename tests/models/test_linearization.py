@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from support.references import scene as shipped
 from support.rotors import AXIAL, acceleration, make_scene
 from support.scenes import general
 
@@ -15,15 +16,10 @@ from rotor_mbs.errors import InputError
 from rotor_mbs.methods.catalogue import find_method
 from rotor_mbs.models.exudyn import linearization as engine
 from rotor_mbs.models.lagrange import linearization as closed
-from rotor_mbs.scenario.catalogue import find_scenes
 from rotor_mbs.scenario.scene import Blade, Scene
 
 DAMPED = general(bearing_damping=(30.0, 20.0, 10.0), shaft_damping=50.0)
 SLAB = Blade(120.0, (0.0, 0.0, 6.0), (900.0, 400.0, 520.0, 0.0, 0.0, 0.0), (0.0, 0.0, 9.0))
-
-
-def shipped(name: str) -> Scene:
-    return find_scenes([name])[0]
 
 
 def without_gravity(scene: Scene, speed: float) -> Scene:
@@ -65,8 +61,7 @@ def test_derivatives_of_the_closed_form_are_those_of_the_equations_written_once_
 
 
 def test_pendulum():
-    blade = replace(AXIAL)
-    J = blade.inertia[1] + blade.mass * 9.0
+    blade, J = AXIAL, AXIAL.inertia[1] + AXIAL.mass * 9.0
     hanging = make_scene([2.5, 0.1], [0, 0], (blade,), gravity=9.81, hub_inertia=20.0, bearing_stiffness=(70.0,))
     assert closed.equilibrium(hanging) == pytest.approx([math.pi, 0.0], abs=1e-12)
     expected = [math.sqrt(blade.mass * 9.81 * 3.0 / (J + 20.0)), math.sqrt(10.0)]

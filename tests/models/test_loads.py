@@ -9,11 +9,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from support.other_code import about
+from support.references import scene as shipped
 from support.rotors import make_scene
 from support.scenes import general, paper
 
 from rotor_mbs.methods.solve import solve
-from rotor_mbs.scenario.catalogue import find_scenes
 from rotor_mbs.scenario.scene import Blade, Scene
 from rotor_mbs.scenario.time_table import value_at
 from rotor_mbs.solution.quantities import longest_arm
@@ -165,9 +165,8 @@ TIGHT = {"newton_relative_tolerance": 1e-12, "newton_absolute_tolerance": 1e-12}
 SHORT = {"duration": 0.4, "samples": 21, "outputs": ("angles", "rates", "loads")}
 
 
-def as_shipped(name: str, duration: float, samples: int) -> Scene:
-    """The beginning of a shipped scene: nothing of it is softened or left out."""
-    return replace(find_scenes([name])[0], **{**SHORT, "duration": duration, "samples": samples})
+def beginning(name: str, duration: float, samples: int) -> Scene:
+    return replace(shipped(name), **{**SHORT, "duration": duration, "samples": samples})
 
 
 # Scene and step, s. A bearing of 1e9 N m/rad makes an NREL blade swing at 188 rad/s, and the step must resolve that.
@@ -176,10 +175,10 @@ AGREEING = {
     "fig08": (paper("fig08", **{**SHORT, "duration": 1.6}), 8e-3),
     "fig09": (paper("fig09", **SHORT), 2e-3),
     "full inertia": (replace(DRIVEN, **SHORT), 2e-3),
-    "NREL 5 MW": (as_shipped("stiff/nrel-5mw", 0.05, 6), 2e-4),
-    "NREL 5 MW, damped": (as_shipped("stiff/nrel-5mw-damped", 0.05, 6), 2e-4),
+    "NREL 5 MW": (beginning("stiff/nrel-5mw", 0.05, 6), 2e-4),
+    "NREL 5 MW, damped": (beginning("stiff/nrel-5mw-damped", 0.05, 6), 2e-4),
     # Past the step of the command at 1 s, by 5.9 swings of the bearing.
-    "NREL 5 MW, pitch step": (as_shipped("turbine/pitch-step", 1.2, 181), 1.0 / 6000.0),
+    "NREL 5 MW, pitch step": (beginning("turbine/pitch-step", 1.2, 181), 1.0 / 6000.0),
 }
 
 

@@ -1,6 +1,6 @@
-"""The tables of docs/reading.md, from a file of `rotor-mbs reproduce`: python tests/support/defect_tables.py results.h5
+"""Numbers of docs/reading.md, from a file of `rotor-mbs reproduce`: python tests/support/defect_tables.py results.h5
 
-Defects of every default method, the smallest relative faults that they would show, and predicted against true errors.
+Defects of every default method, the smallest relative faults that they would show, and predicted beside true errors.
 """
 
 from __future__ import annotations
@@ -17,11 +17,10 @@ from rotor_mbs.methods.catalogue import is_corrected
 from rotor_mbs.models.lagrange import closed_form
 from rotor_mbs.models.lagrange.parameters import rate_units, rotor_form
 from rotor_mbs.models.lagrange.samples import loads_at
-from rotor_mbs.runs.read import open_results
+from rotor_mbs.runs.read import StoredRun, open_results
 from rotor_mbs.scenario.accuracy_bounds import shipped_bounds
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.defects import FLOOR_SAFETY
-from rotor_mbs.solution.metrics import HORIZON_GROWTH
 from rotor_mbs.solution.trajectory import Array, Trajectory
 
 FAULTS = ("c", "gravity", "Coriolis term", "torque", "azimuth (rad)")
@@ -65,10 +64,26 @@ def signatures(scene: Scene, motion: Trajectory) -> dict[str, Array]:
     }
 
 
+def smallest_faults(scene: str, run: StoredRun, of_fault: dict[str, Array]) -> list[str]:
+    """The relative size of each fault from which a bound would show it; "-" where the motion has none of it.
+
+    A wrong number is in every interval: it shows where its largest defect is above the bound on the largest, or their
+    median above the bound on the median.
+    """
+    own = shipped_bounds().for_scene(scene)
+    limits = [(own.of("defect", run.method).value + FLOOR_SAFETY * run.attributes["defect_floor"], np.max)]
+    if (of_median := own.find("defect median", run.method)) is not None:
+        limits.append((of_median.value, np.median))
+    seen = [
+        min((limit / float(size(sizes)) for limit, size in limits if size(sizes) > 1e-12), default=1.0)
+        for sizes in of_fault.values()
+    ]
+    return [f"{share:.0e}" if share < 1.0 else "-" for share in seen]
+
+
 def main(path: Path) -> None:
-    methods: dict[str, list[str]] = {}
-    predictions: dict[str, list[str]] = {}
-    bounds = shipped_bounds()
+    heads = ["method", "scene", "largest (rad)", "median (rad)", *FAULTS, "horizon (s)", "error (rad)", "predicted"]
+    rows = []
     with open_results(path) as results:
         for name, stored in results.scenes.items():
             reference = stored.reference_trajectory
@@ -80,36 +95,13 @@ def main(path: Path) -> None:
                     continue
                 of_fault = of_fault or signatures(solution.scene, reference)
                 facts = run.attributes
-                largest, median = facts["defect_max"], facts["defect_median"]
-                cells = [f"{largest:.0e}", f"{median:.0e}"]
+                row = [run.method, name, f"{facts['defect_max']:.0e}", f"{facts['defect_median']:.0e}"]
                 if is_corrected(run.method):
-                    # A wrong number is in every interval: it shows where its largest defect is above the bound on the
-                    # largest, or their median above the bound on the median.
-                    own = bounds.for_scene(name)
-                    slack = FLOOR_SAFETY * facts["defect_floor"]
-                    limits = [(own.of("defect", run.method).value + slack, np.max)]
-                    if (of_median := own.find("defect median", run.method)) is not None:
-                        limits.append((of_median.value, np.median))
-                    for sizes in of_fault.values():
-                        seen = min(
-                            (limit / float(size(sizes)) for limit, size in limits if size(sizes) > 1e-12), default=1.0
-                        )
-                        cells.append(f"{seen:.0e}" if seen < 1.0 else "-")
-                    true, predicted = facts["angle_error_max"], facts.get("angle_error_predicted", np.nan)
-                    floor = facts["defect_floor"] * min(float(np.nanmax(reference.error_growth)), HORIZON_GROWTH)
-                    ratio = f"{predicted / true:.2f}" if 10.0 * floor <= true <= 0.1 else ""
-                    row = predictions.setdefault(name, [f"{facts['horizon_s']:.2f}"])
-                    row += [f"{true:.1e}", f"{predicted:.1e}", ratio]
-                methods.setdefault(run.method, []).append(f"| {name} | " + " | ".join(cells) + " |")
-    for method, rows in methods.items():
-        heads = ["scene", "largest (rad)", "median (rad)", *(FAULTS if is_corrected(method) else ())]
-        print(f"\n**{method}**\n\n| {' | '.join(heads)} |\n|{'---|' * len(heads)}")
-        print(*rows, sep="\n")
-    heads = ["scene", "horizon (s)"]
-    for method in (method for method in methods if is_corrected(method)):
-        heads += [f"{method}: error (rad)", "predicted", "ratio"]
-    print(f"\n| {' | '.join(heads)} |\n|{'---|' * len(heads)}")
-    print(*(f"| {name} | {' | '.join(row)} |" for name, row in predictions.items()), sep="\n")
+                    row += [*smallest_faults(name, run, of_fault), f"{facts['horizon_s']:.2f}"]
+                    row += [f"{facts['angle_error_max']:.1e}", f"{facts.get('angle_error_predicted', np.nan):.1e}"]
+                rows.append(row)
+    for row in [heads, ["---"] * len(heads), *sorted(rows)]:
+        print("|", " | ".join(row), "|")
 
 
 if __name__ == "__main__":
