@@ -16,6 +16,7 @@ import h5py
 import numpy as np
 import pytest
 from support.commands import PROGRAM, rotor_mbs
+from support.packages import install
 
 import rotor_mbs as rm
 from rotor_mbs.methods.catalogue import find_method
@@ -24,8 +25,8 @@ from rotor_mbs.runs.read import read_records
 
 SOURCES = Path(__file__).parent / "extension"
 PACKAGES = {
-    "rotor_rk4": "[rotor_mbs.methods]\nrk4 = rotor_rk4:METHOD\n",
-    "rotor_momentum": "[rotor_mbs.quantities]\nmomentum = rotor_momentum:QUANTITY\n",
+    "rotor_rk4": ("rotor_mbs.methods", {"rk4": "rotor_rk4:METHOD"}),
+    "rotor_momentum": ("rotor_mbs.quantities", {"momentum": "rotor_momentum:QUANTITY"}),
 }
 SCENE = """
 title = "Two pitched blades"
@@ -59,12 +60,8 @@ def forget_what_is_installed() -> None:
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
     """A folder on the path with the packages as an installer leaves them, and two scenes; commands run there."""
     folder = tmp_path_factory.mktemp("site")
-    for module, entry_points in PACKAGES.items():
-        (folder / f"{module}.py").write_text((SOURCES / f"{module}.py").read_text())
-        about = folder / f"{module}-1.0.dist-info"
-        about.mkdir()
-        (about / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {module}\nVersion: 1.0\n")
-        (about / "entry_points.txt").write_text(entry_points)
+    for module, (group, entry_points) in PACKAGES.items():
+        install(folder, module, (SOURCES / f"{module}.py").read_text(), group, entry_points)
     (folder / "one.toml").write_text(SCENE.format(more=""))
     (folder / "two.toml").write_text(SCENE.format(more=', "momentum"'))
     with pytest.MonkeyPatch.context() as patch:

@@ -7,25 +7,17 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from support.packages import install
 
 from rotor_mbs.errors import InputError
 from rotor_mbs.methods import catalogue
 from rotor_mbs.methods.catalogue import find_method, methods
 
+GROUP = "rotor_mbs.methods"
 MADE_UP = (Path(__file__).parents[1] / "extension" / "rotor_rk4.py").read_text()
 MADE_UP += """
 TAKEN = Method(name="lagrange/taylor", label="x", build=Solver, items=items)
 """
-
-
-def install(folder: Path, name: str, entry_points: dict[str, str], source: str = "") -> None:
-    """A package as an installer leaves it, on a folder of sys.path."""
-    (folder / f"{name}.py").write_text(source)
-    about = folder / f"{name}-1.0.dist-info"
-    about.mkdir()
-    (about / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {name}\nVersion: 1.0\n")
-    lines = "\n".join(f"{key} = {value}" for key, value in entry_points.items())
-    (about / "entry_points.txt").write_text(f"[rotor_mbs.methods]\n{lines}\n")
 
 
 @pytest.fixture
@@ -78,8 +70,8 @@ def test_plug_ins_that_cannot_be_used_are_left_out_with_one_line_each(
     site: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
     entry_points = {"a": "no_such_module:METHOD", "b": "made_up:MISSING", "c": "made_up:np", "d": "made_up:TAKEN"}
-    install(site, "made_up", {**entry_points, "e": "made_up:METHOD"}, MADE_UP)
-    install(site, "own_exit", {"x": "own_exit:X"}, "raise SystemExit(3)\n")
+    install(site, "made_up", MADE_UP, GROUP, {**entry_points, "e": "made_up:METHOD"})
+    install(site, "own_exit", "raise SystemExit(3)\n", GROUP, {"x": "own_exit:X"})
     assert "outside/rk4" in {method.name for method in methods()}
     assert find_method("outside/rk4").distributions == ("made_up",)
     assert sorted(record.getMessage().partition(" left out")[0] for record in caplog.records) == [
@@ -90,7 +82,7 @@ def test_plug_ins_that_cannot_be_used_are_left_out_with_one_line_each(
 
 
 def test_reading_a_built_in_method_imports_no_plug_in(site: Path) -> None:
-    install(site, "made_up", {"own": "made_up:METHOD"}, "raise SystemExit('imported')")
+    install(site, "made_up", "raise SystemExit('imported')", GROUP, {"own": "made_up:METHOD"})
     assert find_method("exudyn_tree/rk67").label
 
 

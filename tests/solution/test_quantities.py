@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from support.packages import install
 from support.scenes import paper
 
 from rotor_mbs.analysis.judgement import judge
@@ -37,14 +38,9 @@ ASKED = replace(SCENE, outputs=("angles", "squares"))
 @pytest.fixture
 def plug_in(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     """An installed package with the output `squares`."""
-    folder = tmp_path / "site"
-    (folder / "squares-1.dist-info").mkdir(parents=True)
-    (folder / "squares.py").write_text(PLUG_IN)
-    (folder / "squares-1.dist-info" / "METADATA").write_text("Metadata-Version: 2.1\nName: squares\nVersion: 1\n")
-    (folder / "squares-1.dist-info" / "entry_points.txt").write_text(
-        "[rotor_mbs.quantities]\nsquares = squares:SQUARES\nbroken = squares:NOTHING\nnumber = math:pi\n"
-    )
-    monkeypatch.syspath_prepend(folder)
+    outputs = {"squares": "squares:SQUARES", "broken": "squares:NOTHING", "number": "math:pi"}
+    install(tmp_path, "squares", PLUG_IN, "rotor_mbs.quantities", outputs)
+    monkeypatch.syspath_prepend(tmp_path)
     quantities.installed.cache_clear()
     yield
     quantities.installed.cache_clear()
