@@ -18,7 +18,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.markers import MarkerStyle
-from matplotlib.patches import Patch, PathPatch, Rectangle
+from matplotlib.patches import PathPatch, Rectangle
 from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
 from matplotlib.transforms import Affine2D, IdentityTransform
 from numpy.typing import NDArray
@@ -140,8 +140,8 @@ def encoded(figure: Figure, kind: str, *, for_print: bool = True) -> bytes:
 
 def swatch(artist: Any) -> bytes:
     """A piece of a curve with its marker, or of an area, for a legend: an SVG file, 24 by 8 points."""
-    if isinstance(artist, Patch):
-        return _swatch(None, tuple(artist.get_facecolor()), "", 0.0, "", "", 0.0, None)
+    if not isinstance(artist, Line2D):
+        return _swatch(None, tuple(np.atleast_2d(artist.get_facecolor())[0].tolist()), "", 0.0, "", "", 0.0, None)
     return _swatch(
         artist.get_color(), None, artist.get_linestyle(), artist.get_linewidth(), artist.get_marker(),
         artist.get_markerfacecolor(), artist.get_markersize(), artist.get_alpha(),

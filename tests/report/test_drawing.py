@@ -110,6 +110,14 @@ def test_paths_have_equal_scales_and_an_axis_of_stated_length() -> None:
     np.testing.assert_allclose(np.ptp(axis[:, 1]), 10.0 * np.cos(np.radians(14.0)))
 
 
+def test_an_area_stands_in_the_legend_in_its_colour() -> None:
+    picture = panels((2.0,), "time (s)")
+    picture.axes[0].fill_between(TIME, 0.0, TIME, color=COLOURS[2], label="between")
+    picture.axes[0].axvspan(1.0, 2.0, color=COLOURS[3], label="span")
+    legend = str(picture_in_page(picture, "n", "t").legend)
+    assert re.findall(r"fill: var\(--(\w+)\)", legend) == [name_of_colour(colour) for colour in COLOURS[2:4]]
+
+
 def test_the_legend_of_a_picture_has_what_is_labelled_once_as_it_is_drawn() -> None:
     series = [Series(TIME, 1e-9 + TIME, CORRECTED), Series(TIME, 2.0 + TIME, CORRECTED), Series(TIME, 3.0 + TIME, LOOK)]
     legend = str(picture_in_page(figures.errors(series, "error (rad)", horizon=6.0), "n", "t").legend)
