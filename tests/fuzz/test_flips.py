@@ -7,19 +7,16 @@ from __future__ import annotations
 
 import random
 import warnings
-from collections import Counter
-from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 
 import pytest
 from support.data_files import FORMATS
-from support.fuzzing import answers, tried, write
+from support.fuzzing import outcome, outcome_of_call, try_all, write
 from support.scenes import paper
 from support.sweeps import run_local
 
 import rotor_mbs as rm
-from rotor_mbs.errors import RotorError
 from rotor_mbs.runs.pool import WorkerPool
 from rotor_mbs.scenario.scene import scene_toml
 from rotor_mbs.scenario.sweep import load_sweep
@@ -69,16 +66,6 @@ def contents(path: Path) -> dict[object, tuple[object, ...]]:
     }
 
 
-def attempt(call: Callable[[], object]) -> str:
-    try:
-        call()
-    except RotorError as refusal:
-        if not str(refusal):
-            raise ValueError("refused without a reason") from refusal
-        return "refused"
-    return "done"
-
-
 def use_damaged(folder: Path, name: str, seed: int) -> list[str]:
     """Opens, checks, reports and continues a damaged file of this program; returns the outcomes."""
     warnings.simplefilter("error")
@@ -93,15 +80,10 @@ def use_damaged(folder: Path, name: str, seed: int) -> list[str]:
         resume(folder, broken)
         assert contents(broken) == whole, "wrong values are stored"
 
-    outcomes = [f"opened: {attempt(read)}"]
-    commands = [["check", str(broken), "-j", "1"]]
+    outcomes = [f"opened: {outcome_of_call(read)}", outcome("check", broken, "-j", "1")]
     if seed % 5 == 0:
-        commands.append(["report", str(broken), "-o", str(folder / "pages"), "-j", "1"])
-    for command in commands:
-        status, fault = answers(command)
-        assert not fault, fault
-        outcomes.append(f"{command[0]}: status {status}")
-    return [*outcomes, f"continued: {attempt(continue_it)}"]
+        outcomes.append(outcome("report", broken, "-o", folder / "pages", "-j", "1"))
+    return [*outcomes, f"continued: {outcome_of_call(continue_it)}"]
 
 
 @pytest.fixture(scope="module")
@@ -127,30 +109,17 @@ COUNTS = pytest.mark.parametrize(
 @pytest.mark.parametrize("name", OWN)
 def test_a_damaged_file_of_this_program(name: str, count: int, folder: Path) -> None:
     """In a process of its own, which a file may end."""
-    outcomes: Counter[object] = Counter()
-    faults: list[str] = []
     with WorkerPool(1) as pool:
-        for seed in range(count):
-            try:
-                outcomes.update(pool.submit(partial(use_damaged, folder, name), seed, _LIMIT_S).result())
-            except Exception as exc:
-                faults.append(f"seed {seed}: {type(exc).__name__}: {exc}")
-    print(tried(outcomes, faults))
-    assert not faults, tried(outcomes, faults)
+        use = partial(use_damaged, folder, name)
+        try_all(range(count), lambda seed: pool.submit(use, seed, _LIMIT_S).result())
 
 
 @COUNTS
 @pytest.mark.parametrize("name", FOREIGN)
 def test_a_damaged_file_of_another_program(name: str, count: int, folder: Path) -> None:
-    outcomes: Counter[object] = Counter()
-    faults: list[str] = []
-    broken = folder / f"broken-{name}"
-    for seed in range(count):
+    def compare(seed: int) -> list[str]:
+        broken = folder / f"broken-{name}"
         broken.write_bytes(damaged((folder / name).read_bytes(), seed))
-        command = ["compare", str(broken), "--scene", str(folder / "a.toml"), "-o", str(folder / "pages")]
-        status, fault = answers(command)
-        outcomes[status] += 1
-        if fault:
-            faults.append(f"seed {seed}: {fault}")
-    print(tried(outcomes, faults))
-    assert not faults, tried(outcomes, faults)
+        return [outcome("compare", broken, "--scene", folder / "a.toml", "-o", folder / "pages")]
+
+    try_all(range(count), compare)

@@ -5,17 +5,15 @@ The long forms (10,000 scenes, 2,000 sweeps): `pytest -m nightly tests/fuzz`.
 
 from __future__ import annotations
 
-import traceback
-from collections import Counter
+from collections.abc import Iterable
 from contextlib import closing
 from pathlib import Path
 
 import pytest
-from support.fuzzing import answers, scene_text, sweep_text, tried, write
+from support.fuzzing import outcome, outcome_of_call, scene_text, sweep_text, try_all, write
 from support.scenes import paper
 
 import rotor_mbs as rm
-from rotor_mbs.errors import InputError, MethodRefusal
 from rotor_mbs.runs.cluster import open_task_pool
 from rotor_mbs.runs.sweeps import StoredSweep
 from rotor_mbs.runs.table import MISSING
@@ -31,57 +29,47 @@ _LIMIT_S = 0.2
 
 
 @pytest.mark.parametrize(
-    ("first", "count"),
-    [(0, 40), (9119, 1), pytest.param(0, 10_000, marks=pytest.mark.nightly)],
+    "seeds",
+    [range(40), [9119], pytest.param(range(10_000), marks=pytest.mark.nightly)],
     ids=["short", "a speed beyond double precision", "long"],
 )
-def test_scenes(tmp_path: Path, first: int, count: int) -> None:
+def test_scenes(tmp_path: Path, seeds: Iterable[int]) -> None:
     """Shown, and run by one method: nothing but a status, or a refusal with its reason."""
-    outcomes: Counter[object] = Counter()
-    faults: list[str] = []
-    for seed in range(first, first + count):
-        path, method = write(tmp_path / "scene.toml", scene_text(seed)), METHODS[seed % len(METHODS)]
-        status, fault = answers(["show", str(path)], (0, 2))
-        outcomes[f"shown {status}"] += 1
-        try:
-            if status == 0 and not fault:
-                run = rm.run(parse_scene(path.read_text(), "scene"), method, timeout=_LIMIT_S)
-                outcomes[run.status] += 1
-                if "Error: " in run.message:  # an exception of the code in place of a reason
-                    fault = f"{method}: {run.message}"
-        except (InputError, MethodRefusal) as exc:
-            fault = "" if str(exc) else f"{method}: refused without a reason"
-        except Exception:
-            fault = f"{method}: {traceback.format_exc()[-700:]}"
-        if fault:
-            faults.append(f"seed {seed}: {fault}")
-    print(tried(outcomes, faults))
-    assert not faults, tried(outcomes, faults)
+
+    def show_and_run(seed: int) -> list[str]:
+        path = write(tmp_path / "scene.toml", scene_text(seed))
+        shown = outcome("show", path, allowed=(0, 2))
+
+        def run() -> str:
+            scene = parse_scene(path.read_text(), "scene")
+            run = rm.run(scene, METHODS[seed % len(METHODS)], timeout=_LIMIT_S)
+            assert "Error: " not in run.message, run.message  # an exception of the code in place of a reason
+            return run.status
+
+        return [shown, outcome_of_call(run)]
+
+    try_all(seeds, show_and_run)
 
 
 @pytest.mark.parametrize(
-    ("first", "count"), [(0, 30), pytest.param(0, 2_000, marks=pytest.mark.nightly)], ids=["short", "long"]
+    "seeds", [range(30), pytest.param(range(2_000), marks=pytest.mark.nightly)], ids=["short", "long"]
 )
-def test_sweeps(tmp_path: Path, first: int, count: int) -> None:
+def test_sweeps(tmp_path: Path, seeds: Iterable[int]) -> None:
     """Made by a worker process, which is ended where a run never ends; then read, and verified."""
     write(tmp_path / "base.toml", scene_toml(paper("fig11", samples=11, duration=0.1)))
-    outcomes: Counter[object] = Counter()
-    faults: list[str] = []
+
+    def sweep(seed: int) -> list[str]:
+        path = write(tmp_path / "sweep.toml", sweep_text(seed, "base.toml"))
+
+        def run() -> str:
+            result = run_sweep(plan_sweep(load_sweep(path), time_limit_s=_LIMIT_S), tmp_path / f"{seed}.h5", pool)
+            statuses = StoredSweep(result.path).column("status")
+            assert not result.lost
+            assert not (statuses == MISSING).any()
+            result.path.unlink()
+            return " ".join(sorted({STATUSES[code] for code in statuses.tolist()}))
+
+        return [outcome_of_call(run)]
+
     with closing(open_task_pool("local", 1)) as pool:
-        for seed in range(first, first + count):
-            path = write(tmp_path / "sweep.toml", sweep_text(seed, "base.toml"))
-            try:
-                result = run_sweep(plan_sweep(load_sweep(path), time_limit_s=_LIMIT_S), tmp_path / f"{seed}.h5", pool)
-                statuses = StoredSweep(result.path).column("status")
-                outcomes.update(STATUSES[code] for code in statuses.tolist())
-                if result.lost or (statuses == MISSING).any():
-                    faults.append(f"seed {seed}: {'; '.join(result.lost)}")
-                result.path.unlink()
-            except InputError as exc:
-                outcomes["refused"] += 1
-                if not str(exc):
-                    faults.append(f"seed {seed}: refused without a reason")
-            except Exception as exc:
-                faults.append(f"seed {seed}: {type(exc).__name__}: {exc}")
-    print(tried(outcomes, faults))
-    assert not faults, tried(outcomes, faults)
+        try_all(seeds, sweep)

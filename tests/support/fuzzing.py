@@ -5,9 +5,10 @@ from __future__ import annotations
 import random
 import traceback
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Collection, Iterable, Sequence
 from pathlib import Path
 
+from rotor_mbs.errors import RotorError
 from rotor_mbs.scenario.scene import OUTPUTS
 from support.commands import rotor_mbs
 
@@ -111,24 +112,38 @@ def _damaged_line(chance: random.Random, lines: Sequence[str]) -> str:
     return "\n".join(found) + "\n"
 
 
-def answers(command: Sequence[str], allowed: Iterable[int] = (0, 1, 2)) -> tuple[int | None, str]:
-    """(exit status, fault) of a command in this process; fault: "" where its answer is in order, lines and all."""
-    words = " ".join(command)
+def try_all(seeds: Iterable[int], attempt: Callable[[int], Iterable[str]]) -> None:
+    """Calls `attempt` with every seed. It returns outcomes, which are counted, or raises, which is a fault."""
+    outcomes: Counter[str] = Counter()
+    faults = []
+    for seed in seeds:
+        try:
+            outcomes.update(attempt(seed))
+        except Exception:
+            faults.append(f"seed {seed}: {traceback.format_exc()[-900:]}")
+    counted = ", ".join(f"{count} {outcome}" for outcome, count in outcomes.most_common())
+    print(counted)
+    assert not faults, "\n".join([f"{counted}, {len(faults)} failed", *faults[:20]])
+
+
+def outcome(*words: object, allowed: Collection[int] = (0, 1, 2)) -> str:
+    """The exit status of a command in this process, whose answer must be in order."""
+    status, out, err = rotor_mbs(*words)
+    assert status in allowed, err
+    assert "Warning:" not in err
+    assert "\x1b" not in err + out
+    assert status != 2 or err.strip(), "status 2 without a reason"
+    return f"{words[0]}: status {status}"
+
+
+def outcome_of_call(call: Callable[[], str | None]) -> str:
+    """What a call returns; or that it is refused, for a reason."""
     try:
-        status, out, err = rotor_mbs(*command)
-    except BaseException:
-        return None, f"{words}: {traceback.format_exc()}"
-    if status not in allowed or "Warning:" in err or "\x1b" in err + out:
-        return status, f"{words}: status {status}: {err[-500:]}"
-    if status == 2 and not err.strip():
-        return status, f"{words}: status 2 without a reason"
-    return status, ""
-
-
-def tried(statuses: Counter[object], faults: Sequence[str]) -> str:
-    """For the end of a long test: what was tried and what failed."""
-    shown = ", ".join(f"{count} {status}" for status, count in statuses.most_common())
-    return f"{sum(statuses.values())} tried ({shown}), {len(faults)} failed\n" + "\n".join(faults[:20])
+        return call() or "done"
+    except RotorError as refusal:
+        if not str(refusal):
+            raise ValueError("refused without a reason") from refusal
+        return "refused"
 
 
 def write(path: Path, text: str) -> Path:
