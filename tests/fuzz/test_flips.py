@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 from support.data_files import FORMATS
-from support.fuzzing import outcome, outcome_of_call, try_all, write
+from support.fuzzing import contents, outcome, outcome_of_call, try_all, write
 from support.scenes import paper
 from support.sweeps import run_local
 
@@ -56,14 +56,6 @@ def resume(folder: Path, path: Path) -> None:
         run_local(load_sweep(folder / "s.toml"), path, 0)
     else:
         run_scenes([rm.load(folder / "a.toml")], {"a": [METHOD]}, path, workers=0, timeout_s=60.0)
-
-
-def contents(path: Path) -> dict[object, tuple[object, ...]]:
-    """By run: all but times, versions and the numbers of steps."""
-    return {
-        label: (run.status, run.message, run.time.tobytes(), run.angles.tobytes(), run.rates.tobytes())
-        for label, run in rm.open(path).items()
-    }
 
 
 def use_damaged(folder: Path, name: str, seed: int) -> list[str]:
