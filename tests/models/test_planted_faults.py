@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from support.checking import with_wrong_gravity, with_wrong_offset
+from support.checking import with_wrong_number
 from support.defect_tables import signatures
 from support.references import reference
 
@@ -37,7 +37,11 @@ def with_wrong_torque(scene: Scene, share: float) -> Scene:
     return replace(scene, rotor_torque=tuple((t, torque * (1.0 + share)) for t, torque in scene.rotor_torque))
 
 
-WRONG = {"c": with_wrong_offset, "gravity": with_wrong_gravity, "torque": with_wrong_torque}
+WRONG = {
+    "c": lambda scene, share: with_wrong_number(scene, "offset", share),
+    "gravity": lambda scene, share: with_wrong_number(scene, "gravity", share),
+    "torque": with_wrong_torque,
+}
 
 
 def near_the_end(scene: Scene) -> tuple[Scene, Trajectory]:

@@ -24,7 +24,7 @@ from rotor_mbs.analysis.work_precision import (
 from rotor_mbs.methods.solve import solve
 from rotor_mbs.report.build import write_report
 from rotor_mbs.report.looks import look_of
-from rotor_mbs.report.pages.bench import diagram, engine_tables, failure_table
+from rotor_mbs.report.pages.bench import diagram, engine_tables, failure_table, overview_table
 from rotor_mbs.runs.read import POINT_COLUMNS, Record, open_results, points_table, read_records
 from rotor_mbs.runs.table import TableFile, extend_file
 from rotor_mbs.scenario.catalogue import only_scene
@@ -92,6 +92,8 @@ def test_ratios_are_to_the_fastest() -> None:
     assert slow.seconds == pytest.approx(1e-2 * 10**0.5)
     assert (fast.ratio, slow.ratio) == (1.0, pytest.approx(slow.seconds / fast.seconds))
     assert [one.name for one, _ in fastest([SLOW, FAST], 1e-6)] == ["lagrange/taylor"]
+    ((_, *cells),) = overview_table({"paper/fig09": [SLOW]}).rows  # whose ladder the budget cut
+    assert [cell.text for cell in cells][1:] == ["not measured"] * 2
 
 
 def test_a_row_for_each_engine_with_dashes_for_what_the_file_does_not_say(tmp_path: Path) -> None:

@@ -9,6 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from support.checking import with_wrong_number
 from support.scenes import paper
 
 from rotor_mbs.methods.solve import solve
@@ -174,18 +175,13 @@ def test_faults_far_apart_are_named_each() -> None:
     assert found == ["a single wrong row: row 41, t = 0.4 s", "a single wrong row: row 61, t = 0.6 s"]
 
 
-def with_numbers(scene: Scene, mass: float, gravity: float) -> Scene:
-    blades = tuple(replace(blade, mass=blade.mass * (1.0 + mass)) for blade in scene.blades)
-    return replace(scene, blades=blades, gravity=scene.gravity * (1.0 + gravity))
-
-
 def test_parameters_that_are_off_are_named_together_with_estimate_and_uncertainty() -> None:
     """Mass, gravity and torque of driven point masses: of two wrong ones the motion tells two, whichever they are."""
-    found = causes(*run(with_numbers(SCENE, 0.01, -0.02))).explanations()
+    found = causes(*run(with_wrong_number(with_wrong_number(SCENE, "mass", 0.01), "gravity", -0.02))).explanations()
     assert "gravity off by -2 % (uncertainty " in found[0]
     assert any("blade.mass off by +1 % (uncertainty " in text for text in found)
     assert all(" and " in text for text in found)
-    (alone,) = causes(*run(with_numbers(SCENE, 0.0, 0.02))).explanations()
+    (alone,) = causes(*run(with_wrong_number(SCENE, "gravity", 0.02))).explanations()
     assert alone.startswith("gravity off by +2 % (uncertainty ")
 
 

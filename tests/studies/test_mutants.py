@@ -50,9 +50,9 @@ EXPLAINED = {
     r"taylor\.(_UNROLLED_BLADES|compiled|is_compact) |adapter\.(_settings .*|)(constraints|_OLD_JACOBIAN_FROM)": (
         "decides how long a run takes, not what comes out"
     ),
-    r"checks\._of_reference .*: 0 -> 1": "compared by its length: no shipped reference has a single sample",
+    r"checks\._of_reference .* 0 -> 1": "compared by its length: no shipped reference has a single sample",
     r"checks\._bent_columns .*0 -> 1": "one row is as much too short as none",
-    r"checks\._of_samples .*: 1 -> 2": "one zero or two: the largest is zero",
+    r"checks\._of_samples .* 1 -> 2": "one zero or two: the largest is zero",
     r"adapter\.linear_solver .*scaled|adapter\._SPARSE_FROM ": "sizes near the bound take as long by either solver",
     r"adapter\.linearized .*0 -> 1": "a column of zeros among the joints' directions hinders no motion",
     r"metrics\.energy_scale .*(if run\.|and, or in|0\.0 -> )": "nobody asks for the scale of a run without energies",

@@ -113,11 +113,6 @@ def decimal_commas(path: Path, scene: Scene, time: Array, angles: Array, rates: 
     path.write_text("\n".join([";".join(["Zeit [s]", *_names(scene)]), *rows]))
 
 
-def tabs(path: Path, scene: Scene, time: Array, angles: Array, rates: Array) -> None:
-    rows = np.column_stack([time, angles, rates])
-    np.savetxt(path, rows, delimiter="\t", header="\t".join(["time", *_names(scene)]), comments="", fmt="%.17g")
-
-
 Writer = Callable[[Path, Scene, Array, Array, Array], None]
 FORMATS: dict[str, Writer] = {
     "data.csv": comma_separated,
@@ -132,5 +127,4 @@ FORMATS: dict[str, Writer] = {
     "data3.nc": netcdf_3,
     "data.json": json_arrays,
     "commas.csv": decimal_commas,
-    "data.tsv": tabs,
 }
