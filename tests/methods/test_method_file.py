@@ -112,7 +112,7 @@ def test_a_run_is_keyed_by_the_code_of_its_file() -> None:
         ("mine.py", "a = 1\nb = (\n", "mine.py:2: SyntaxError: '(' was never closed"),
         ("mine.py", "raise SystemExit\n", "mine.py:1: SystemExit: no message"),
         ("mine.py", "import os\nos._exit(0)\n", "mine.py: ended the process that loaded it (exit code 0)"),
-        ("mine.py", "while True: pass\n", "mine.py: not loaded within 3 s"),
+        ("mine.py", "while True: pass\n", "mine.py: not loaded within 0.5 s"),
         ("mine.py", "METHOD = 1\n", "mine.py: defines no Method; allowed: at least one (docs/your-engine.md)"),
         ("lagrange.py", EXAMPLE, "lagrange.py: lagrange/taylor has this name; allowed: another file name"),
         ("none.py", "", "none.py: No such file or directory; allowed: a Python file"),
@@ -123,7 +123,7 @@ def test_a_run_is_keyed_by_the_code_of_its_file() -> None:
 def test_a_file_that_cannot_be_used_is_one_line(
     name: str, text: str, line: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(method_file, "_LOAD_S", 3.0 if "while" in text else 60.0)
+    monkeypatch.setattr(method_file, "_LOAD_S", 0.5 if "while" in text else 60.0)
     Path("other").mkdir()
     if text:
         Path(name).write_text(text)
