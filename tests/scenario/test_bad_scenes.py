@@ -52,6 +52,8 @@ ON_THE_AXIS = "[blade]\nmass = 2\ncentre_of_mass = [0, 0, 3]\ntip = [0.5, 0, 7]\
 # What to write for what, and the line and key of the one error, with a piece of its message.
 WRONG = {
     "title empty": ('"A good scene"', '"  "', 1, "title", "is empty"),
+    "title too long": ("A good scene", "x" * 201, 1, "title", "201 characters"),
+    "title a number": ('"A good scene"', "3", 1, "title", "3 is not text"),
     "title of two lines": ("good scene", "good\\nscene", 1, "title", "control character"),
     "unknown key": ("blades = 2", "blades = 2\nbaldes = 2", 3, "baldes", "perhaps blades"),
     "unknown quoted key": ("[hub]", '[hub]\n"in\\nertia" = 1', 25, 'hub."in\\\\nertia"', "is not a key here"),
@@ -67,6 +69,7 @@ WRONG = {
     "mass zero": ("mass = 2", "mass = 0", 9, r"blade\.mass", "0 is out of range"),
     "centre on lines": ("[0.5, 0, 3]", '[0.5, # x ]\n  0,\n  "z"]', 12, r"blade\.centre_of_mass\[2\]",
      "\"z\": 'z' is not a number"),
+    "centre too short": ("[0.5, 0, 3]", "[0.5, 0]", 10, r"blade\.centre_of_mass", "2 entries"),
     "inertia of no triangle": ("[1, 1, 1, 0, 0, 0]", "[1, 1, 2.1, 0, 0, 0]", 11, r"blade\.inertia", "no rigid body"),
     "tip missing where wanted": ("tip = [0.5, 0, 7]\n", "", 8, r"blade\.tip", "is missing"),
     "angles too few": ("angles = [0, 0, 0]", "angles = [0, 0]", 15, r"initial\.angles", "2 numbers for a rotor and 2"),
@@ -189,6 +192,7 @@ NO_NAMES = ("", "../paper/fig05", "/paper/fig05", "paper//fig05", "paper/fig05\n
         ("x" * 5000 + ".toml", "cannot be read"),
         ("\0.toml", "leads to no file"),
         ("empty", "no TOML file in this folder"),
+        ("text.txt", "is not a TOML file"),
         ("odd name.toml", "cannot name a scene"),
         ("bench.toml", "bench names a group of results"),
         ("circle.toml", "leads to no file"),
@@ -202,7 +206,7 @@ def test_arguments_that_name_no_scene(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     Path("empty").mkdir()
-    for name in ("odd name.toml", "bench.toml"):
+    for name in ("text.txt", "odd name.toml", "bench.toml"):
         Path(name).write_text(SCENE, encoding="utf-8")
     Path("circle.toml").symlink_to("circle.toml")
     os.mkfifo("pipe.toml")
