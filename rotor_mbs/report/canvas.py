@@ -143,7 +143,7 @@ def swatch(artist: Any) -> bytes:
     if not isinstance(artist, Line2D):
         return _swatch(None, tuple(np.atleast_2d(artist.get_facecolor())[0].tolist()), "", 0.0, "", "", 0.0, None)
     return _swatch(
-        artist.get_color(), None, artist.get_linestyle(), artist.get_linewidth(), artist.get_marker(),
+        artist.get_color(), None, artist.get_linestyle(), artist.get_linewidth(), str(artist.get_marker()),
         artist.get_markerfacecolor(), artist.get_markersize(), artist.get_alpha(),
     )  # fmt: skip
 
