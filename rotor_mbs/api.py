@@ -47,7 +47,7 @@ _SHOWN = 5  # lines of lost runs
 
 
 def scenes(folder: str = "") -> list[str]:
-    """Names of the shipped scenes, of one folder where it is named.
+    """List the names of the shipped scenes, or of those in one folder.
 
     Examples
     --------
@@ -63,7 +63,7 @@ def scenes(folder: str = "") -> list[str]:
 
 
 def scene(name: str) -> Scene:
-    """The shipped scene of that name. Raises InputError, with the nearest names, where there is none.
+    """Return a shipped scene. Raises InputError, with the most similar name, if there is none of that name.
 
     Examples
     --------
@@ -78,10 +78,10 @@ def scene(name: str) -> Scene:
 
 
 def load(path: str | os.PathLike[str]) -> Scene:
-    """The scene in a TOML file, named like the file.
+    """Read a scene from a TOML file. Its name is that of the file.
 
-    Implausible numbers, such as 30 rad, give a PlausibilityWarning. Raises InputError with every fault of the
-    file, a line each.
+    Implausible numbers, such as 30 rad, cause a PlausibilityWarning. Raises InputError with one line per error in
+    the file.
     """
     found = load_scene(Path(path), Path(path).stem)
     for doubt in doubts(found):
@@ -112,42 +112,40 @@ def run(
     workers: int = 0,
     **settings: object,
 ) -> Run | Runs:
-    """One scene by one method, or by several, judged from the samples.
+    """Simulate a scene with one or more methods, and determine the status from the samples.
 
     Parameters
     ----------
     scene : Scene or str
-        From `scene`, `load`, or made by `Scene.replace`; or its name, as in all functions here.
+        A scene from `scene`, `load` or `Scene.replace`, or the name of a shipped scene.
     method : str or sequence of str
-        "model/integrator"; `rotor-mbs show` lists those that can represent a scene; or a Python file that defines
-        methods ("mine.py"), see docs/your-engine.md. Of several, an empty list stands
-        for those that the selection rule takes for such a scene.
+        "model/integrator", as listed by `rotor-mbs show`, or a Python file that defines methods ("mine.py"), see
+        docs/your-engine.md. For an empty list, methods are selected by the same rule as in `rotor-mbs run`.
     timeout : float
-        s, for the run, the reference and the judging together, of several methods for each; what was reached by then
-        has the status "timed_out". Loading an engine and compiling come on top, and a second to judge what was reached.
+        Time limit in s for run, reference and assessment of a method. A run that exceeds it has the status "timed_out"
+        and the samples computed so far. Loading and compilation, and up to 1 s of assessment, are not included.
     reference : bool
-        Whether to compute the quad-precision reference of a scene that has no shipped one (up to some seconds), as is
-        always done for several methods. Without any, the status rests on the samples and the energy balance.
+        Whether to compute the quad-precision reference (up to some seconds) if none is shipped. With several methods
+        it is always computed. Without a reference the status follows from the samples and the energy balance.
     workers : int
-        Parallel processes for several methods; 0 runs everything in this process. In a script, processes need the
-        usual `if __name__ == "__main__":`.
+        Number of worker processes for several methods; 0: everything runs in this process. A script that uses worker
+        processes needs `if __name__ == "__main__":`.
     **settings
-        Of the methods that have them, in place of defaults; `rotor-mbs show METHOD` has names, units and ranges.
+        Settings of the methods. `rotor-mbs show METHOD` lists names, units, ranges and defaults.
 
     Returns
     -------
     Run
-        Of one method; of several, `Runs` by the names of the methods, the reference among them.
+        For one method. For several, `Runs` by method name, including the reference.
 
     Raises
     ------
     InputError
-        For an unknown method, a setting that no method has or that is out of its range, and for one of several methods
-        that cannot represent the scene.
+        For an unknown method, an unknown or invalid setting, or if one of several methods cannot represent the scene.
     MethodRefusal
-        Where one method cannot represent the scene, or is not installed.
+        If the method cannot represent the scene or is not installed.
     ResourceError
-        Where a worker process died, or the machine has no room for it.
+        If a worker process died or could not be started.
 
     Examples
     --------
@@ -187,15 +185,15 @@ def run(
 
 @dataclass(repr=False)
 class Run(Solution):
-    """A scene by one method.
+    """A run: a scene simulated with one method.
 
-    As `Solution`: samples (`time`, `angles`, `rates`, `run["tip"]`), `status`, `message`, `metrics`, `settings`, times,
-    `to_xarray()`. In addition:
+    In addition to the members of `Solution` (`time`, `angles`, `rates`, `run["tip"]`, `status`, `message`, `metrics`,
+    `settings`, `to_xarray()`):
 
     Attributes
     ----------
-    reference : the trajectory it was judged against; None where there was none.
-    defects : of its intervals between samples.
+    reference : the reference trajectory; None without a reference.
+    defects : interval defects, see `Defects`.
     plot : `run.plot()` draws the motion; `run.plot.energy()`, `.error()`, `.tips()`, `.loads("shaft_force")`.
     """
 
@@ -203,8 +201,9 @@ class Run(Solution):
 
     @property
     def defects(self) -> Defects | None:
-        """What the closed form makes of each sample by the next one, less what the run has there: signed vectors, and
-        the error that they add up to. None for fewer than two samples, or without angles and rates.
+        """Interval defects: the closed form integrated from each sample to the next, minus the run's next sample.
+
+        None for fewer than two samples, or without angles and rates.
 
         Examples
         --------
@@ -236,26 +235,25 @@ def sweep(
     fresh: bool = False,
     **options: object,
 ) -> Runs:
-    """One scene over all combinations of the values of its parameters, into one dataset.
+    """Run a parameter study: simulate a scene for all combinations of parameter values, into one dataset.
 
     Parameters
     ----------
-    parameters : by the key of a number in a scene file, such as "bearing.stiffness" or "initial.angles[1]": a list of
-        values, or a table as an [[axis]] of a sweep file has it, such as `{"uniform": [0.0, 1.0]}`.
-    output : the dataset's file, from which the same call continues after an interruption; a temporary one where it is
-        left out.
-    workers : parallel processes; 0 runs everything in this process. In a script, processes need the usual
-        `if __name__ == "__main__":`.
-    timeout : s, for each run.
-    fresh : whether runs that `output` has are computed again; by default also those of other versions are kept.
+    parameters : for each key of a number in a scene file, such as "bearing.stiffness" or "initial.angles[1]", a list
+        of values or a table as in an [[axis]] of a sweep file, such as `{"uniform": [0.0, 1.0]}`.
+    output : file of the dataset. A repeated call continues it after an interruption. Default: a temporary file.
+    workers : number of worker processes; 0: everything runs in this process. A script that uses worker processes
+        needs `if __name__ == "__main__":`.
+    timeout : time limit of each run (s).
+    fresh : whether stored runs are recomputed. By default they are kept, including those of other versions.
     **options : other keys of a sweep file: samples, outputs, draws, seed, combine, validation, settings, ...
 
     Raises
     ------
     InputError
-        For a key, value or option that is not allowed, or an output that holds something else.
+        For an invalid key, value or option, or if `output` is not the file of this sweep.
     ResourceError
-        Where worker processes died, or the machine has no room for them; the other runs are in `output`.
+        If worker processes died or could not be started; the other runs are stored in `output`.
 
     Examples
     --------
@@ -286,7 +284,7 @@ def sweep(
 
 
 def open(path: str | os.PathLike[str]) -> Runs:
-    """The runs in a file: of all its scenes, or of a sweep. Raises StoreError for other files.
+    """Open the runs in a results file or the file of a sweep. Raises StoreError for other files.
 
     Examples
     --------
@@ -326,22 +324,22 @@ class _TemporaryFolder:
 
 
 class Runs(Mapping[Any, Any]):
-    """Some runs in a file: a mapping from label to `Run`, which is read when it is asked for.
+    """Runs of a file: a mapping from label to `Run`. A run is read on access.
 
-    Labels are the names of methods (and "reference") where it is one scene's, "paper/fig11/lagrange/taylor" where the
-    file's, and numbers where it is a sweep's. `runs["paper/fig11"]` of a file's runs are that scene's.
+    Labels are method names (and "reference") for one scene, "paper/fig11/lagrange/taylor" for a file with several
+    scenes, and run numbers for a sweep. `runs["paper/fig11"]` returns the runs of one scene of a file.
 
     Parameters
     ----------
     path : Path
-        Of the file, which is open only while something is read.
+        The file. It is open only during reading.
     scene : str
-        The scene whose runs these are; "" for all that the file has.
+        The scene; "" for all scenes of the file.
 
     Attributes
     ----------
-    plot : of one scene, `runs.plot.error()`, `.rotor()`, `.energy_error()`.
-    statuses : how many runs have each status, of those that are stored.
+    plot : plots of the runs of one scene: `runs.plot.error()`, `.rotor()`, `.energy_error()`.
+    statuses : number of stored runs with each status.
     """
 
     def __init__(self, path: Path, scene: str = "", *, _folder: _TemporaryFolder | None = None) -> None:
@@ -397,7 +395,7 @@ class Runs(Mapping[Any, Any]):
                 yield from scene.runs.values()
 
     def table(self) -> TextTable:
-        """A row for each run: status, error (rad), energy drift (of the energy scale), run time (s)."""
+        """Table with a row per run: status, error (rad), energy drift (relative to the energy scale), run time (s)."""
         if self._is_sweep:
             counts: list[tuple[str, ...]] = [(status, str(count)) for status, count in self.statuses.items()]
             return TextTable(("status", "runs"), counts)
@@ -414,33 +412,33 @@ class Runs(Mapping[Any, Any]):
         return ComparisonPlots({name: self[name] for name in self if name != REFERENCE}, reference)
 
     def column(self, name: str) -> Any:
-        """(runs, ...) Of a sweep, an array whole, such as "status", "pitch_max" or "angles". Raises StoreError."""
+        """Return an array of a sweep, (runs, ...), such as "status", "pitch_max" or "angles". Raises StoreError."""
         return np.array(self._sweep.column(name))
 
     def at(self, name: str, sample: int) -> Any:
-        """(runs, ...) Of a sweep, a trajectory such as "angles" at one sample of all runs. Raises StoreError."""
+        """Return a trajectory of a sweep, such as "angles", at one sample of all runs. Raises StoreError."""
         return np.array(self._sweep.column(name)[:, sample])
 
     def to_xarray(self, *, unstack: bool = False) -> Any:
-        """The runs as xarray objects, with units, long names and labels.
+        """Return the runs as xarray objects with units, long names and labels.
 
         Parameters
         ----------
         unstack : bool
-            Of a grid sweep, whether each varied parameter becomes a dimension in place of `run`.
+            Whether each varied parameter of a grid sweep becomes a dimension in place of `run`.
 
         Returns
         -------
         xarray.Dataset
-            Of one scene, or of a sweep (opened lazily), with the dimension `run`. Select by label:
+            For one scene or a sweep (opened lazily), with the dimension `run`. Select by label:
             `data.angles.sel(run="lagrange/taylor", coordinate="pitch 1")`, `data.tip.sel(blade=1, axis="y")`.
         xarray.DataTree
-            Of a file with several scenes, opened lazily.
+            For a file with several scenes, opened lazily.
 
         Raises
         ------
         StoreError
-            Where a run of a sweep is not what was written.
+            If a run of a sweep is damaged.
         """
         xarray = need_xarray()
         if not self._is_sweep and not self.scene:
@@ -461,14 +459,14 @@ class Runs(Mapping[Any, Any]):
         return data.assign(status=("run", [run.status for run in self._runs()]))
 
     def save(self, path: str | os.PathLike[str]) -> Path:
-        """The file under another name, which `rotor-mbs report` and `rotor_mbs.open` read. Replaces a file of this
-        program; raises InputError for another one."""
+        """Save a copy of the file, which `rotor-mbs report` and `rotor_mbs.open` read. A file of this program is
+        replaced; raises InputError for other files."""
         target = Path(path)
         replace_file(target, self.path.read_bytes(), HDF5)
         return target
 
     def to_html(self, folder: str | os.PathLike[str]) -> Path:
-        """The report's pages into a folder; the path of its index."""
+        """Write the report pages into a folder. Returns the path of the index."""
         from rotor_mbs.report.build import write_report  # late: templates
 
         return write_report(self.path, Path(folder))

@@ -7,11 +7,11 @@ from collections.abc import Iterable
 
 
 class RotorError(Exception):
-    """Base of every error this package raises on purpose; its text is one readable line (or several)."""
+    """Base class of the errors that this package raises. The message has one line per error."""
 
 
 class InputError(RotorError):
-    """Bad input: one line per fault, each naming file (and line), key, what is wrong, what is allowed.
+    """Raised for invalid input. One line per error: file, line, key, what is wrong, what is allowed.
 
     The command line prints the lines and ends with exit status 2.
     """
@@ -22,11 +22,11 @@ class InputError(RotorError):
 
 
 class MethodRefusal(RotorError):
-    """A method that cannot represent this scene, or is not installed here; says what is allowed or how to get it."""
+    """Raised if a method cannot represent a scene or is not installed. The message says what is allowed."""
 
 
 class ResourceError(RotorError):
-    """The machine lacks what a run needs (memory, processes, open files); it says nothing about the run."""
+    """Raised if the system lacks memory, processes or open files, independently of the run."""
 
 
 # What the machine lacks: an error of these is no result of a run.
@@ -34,11 +34,11 @@ OF_THE_MACHINE = (MemoryError, OSError, ImportError, ResourceError)
 
 
 class StoreError(RotorError):
-    """A results file that cannot be read or written; names the file and the reason."""
+    """Raised if a results file cannot be read or written. The message has the file and the reason."""
 
 
 class PlausibilityWarning(UserWarning):
-    """A number that is allowed, and yet looks like a slip: degrees, millimetres, tonnes."""
+    """Issued for a number that is valid but implausible, such as degrees, millimetres or tonnes."""
 
 
 def one_line(error: BaseException) -> str:

@@ -12,19 +12,19 @@ from rotor_mbs.scenario.scene import Scene
 def assert_agrees(
     time: Any, angles: Any, *, scene: Scene | str, rates: Any = None, tolerance: float = 1e-6
 ) -> DataComparison:
-    """Raises AssertionError, with the table of the comparison, where the trajectory does not agree.
+    """Raise AssertionError, with the table of the comparison, if a trajectory does not agree with a scene.
 
     Parameters
     ----------
-    time : (n,) s, increasing; any times within the scene's duration, its start and end among them.
+    time : (n,) s, increasing; any times within the scene's duration, including its start and end.
     angles : (n, 1 + blades) rad: rotor, then the pitch of each blade, unwrapped.
     scene : the name of a shipped scene, a TOML file, or a `Scene`.
-    rates : (n, 1 + blades) rad/s; optional. With them the energy balance is examined, too.
-    tolerance : rad per unit of error growth.
+    rates : (n, 1 + blades) rad/s; optional. If given, the energy balance is also checked.
+    tolerance : bound on interval defects, and on errors divided by the error growth (rad).
 
     Returns
     -------
-    The comparison, with its numbers.
+    DataComparison
 
     Raises
     ------

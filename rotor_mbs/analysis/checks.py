@@ -214,7 +214,7 @@ def _of_run(
             known = np.isfinite(own_growth) & (own_growth < HORIZON_GROWTH)
             off = float(np.abs(np.log(growth[known] / own_growth[known])).max(initial=0.0))
             hint = "the horizon that follows from it is not that of its own samples"
-            yield Check("growth", Where(run.scene, run.method, "of its samples"), off, _OWN_GROWTH, hint, "log")
+            yield Check("growth", Where(run.scene, run.method, "of the samples"), off, _OWN_GROWTH, hint, "log")
 
 
 def _status(run: StoredRun, bounds: Bounds, judgement: Judgement) -> Check:

@@ -158,7 +158,8 @@ def _broken_off(scene: Scene, run: Solution) -> tuple[str, str]:
     if smallest_rotor_inertia_share(scene, run.trajectory) < _SINGULAR_SHARE:
         return "singular", f"every pitch at ±π/2 leaves the rotor almost no inertia, {reached}; {reported}"
     if integration.success:
-        return "diverged", f"no finite sample after the last one {reached}; {reported}"
+        end = f" after {reached.removeprefix('at ')}" if samples else ""
+        return "diverged", f"no finite sample{end}; {reported}"
     return "solver_failed", f"{reported}; {reached}"
 
 
@@ -178,7 +179,7 @@ def _inaccurate(scene: Scene, run: Solution, metrics: Metrics) -> tuple[str, str
     bounds = shipped_bounds().with_entries(run.bounds)
     energy = bounds.of("energy", run.method).value + energy_slack(scene, run.trajectory)
     if "energy_drift_max" in metrics and not metrics["energy_drift_max"] <= energy:
-        return "inaccurate", f"energy drift {metrics['energy_drift_max']:.1e} of its scale, allowed {energy:.0e}"
+        return "inaccurate", f"energy drift {metrics['energy_drift_max']:.1e} of the energy scale, allowed {energy:.0e}"
     for _, rule, error in quantity_errors(scene, metrics):
         bound = quantity_bound(rule, bounds, run.method)
         if bound is not None and not error <= bound:

@@ -372,7 +372,9 @@ def modes_summary(modes: SceneModes) -> list[str]:
     ]
     if compared:
         verdict = "agree" if modes.agrees else "DISAGREE"
-        lines.append(f"  {max(compared, key=len)} {verdict}: frequencies differ by {modes.disagreement:.1e} at most")
+        lines.append(
+            f"  {max(compared, key=len)} {verdict}: relative difference of frequencies up to {modes.disagreement:.1e}"
+        )
     if modes.floquet is not None:
         lines.append(f"  {floquet_sentence(modes.floquet)}")
     return [*lines, *(f"  {note}" for note in modes.notes)]
@@ -392,7 +394,7 @@ def floquet_sentence(table: FloquetTable) -> str:
     parts = [
         f"{n} {what}" for n, what in zip(counts, ("stable", "unstable", "without a periodic motion"), strict=True) if n
     ]
-    return f"turning under gravity, {len(table.speeds)} speeds: {', '.join(parts)}"
+    return f"rotation under gravity, {len(table.speeds)} speeds: {', '.join(parts)}"
 
 
 # Records of a results file
@@ -400,7 +402,7 @@ def floquet_sentence(table: FloquetTable) -> str:
 # By name: values, and what they are.
 Datasets: TypeAlias = Mapping[str, tuple[NDArray[Any], Column]]
 _SPEED = Column(("speed",), "rad/s", "rotor speed")
-_LARGEST = "largest modulus of a multiplier, those that are always 1 left out"
+_LARGEST = "largest modulus of a multiplier, without those that are always 1"
 
 
 def _linear_datasets(linear: LinearModes) -> Datasets:
@@ -412,25 +414,25 @@ def _linear_datasets(linear: LinearModes) -> Datasets:
     return {
         "speed": (linear.speeds, _SPEED),
         "mode": (n, Column(("mode",), "1", "number of the mode, names in the attribute labels")),
-        "coordinate": (n, Column(("coordinate",), "1", "coordinate that moves, names in the attribute labels")),
+        "coordinate": (n, Column(("coordinate",), "1", "coordinate with inertia, names in the attribute labels")),
         "component": (np.arange(shape.shape[2]), component),
         "equation": (n, Column(("equation",), "1", "equation of motion, of the coordinate with the same number")),
-        "root": (np.arange(2), Column(("root",), "1", "both eigenvalues of a mode")),
+        "root": (np.arange(2), Column(("root",), "1", "number of the eigenvalue of a mode, 0 or 1")),
         "steady_angle": (linear.angles, Column(("speed", "coordinate"), "rad", "angle at the steady state")),
         "undamped_frequency": (linear.undamped_frequencies, mode("rad/s", "undamped frequency, in the rotor's frame")),
         "damped_frequency": (linear.damped_frequencies, mode("rad/s", "damped frequency, in the rotor's frame")),
-        "damping_ratio": (linear.damping_ratios, mode("1", "share of critical damping")),
+        "damping_ratio": (linear.damping_ratios, mode("1", "damping ratio")),
         "growth_rate": (linear.growth_rates, mode("1/s", "largest real part of the mode's eigenvalues")),
-        "backward_whirl_frequency": (backward, mode("rad/s", "damped frequency less speed, in the base frame")),
-        "forward_whirl_frequency": (forward, mode("rad/s", "damped frequency plus speed, in the base frame")),
+        "backward_whirl_frequency": (backward, mode("rad/s", "damped frequency minus rotor speed, in the base frame")),
+        "forward_whirl_frequency": (forward, mode("rad/s", "damped frequency plus rotor speed, in the base frame")),
         "eigenvalue_real": (linear.eigenvalues.real, root("1/s", "eigenvalue, real part")),
         "eigenvalue_imag": (linear.eigenvalues.imag, root("1/s", "eigenvalue, imaginary part")),
         "shape_real": (linear.shapes.real, place("1", "mode shape, real part, largest entry 1")),
         "shape_imag": (linear.shapes.imag, place("1", "mode shape, imaginary part")),
         "multiblade_shape_real": (shape.real, part("1", "multiblade mode shape, real part")),
         "multiblade_shape_imag": (shape.imag, part("1", "multiblade mode shape, imaginary part")),
-        "stiffness": (linear.stiffness, entry("1/s^2", "stiffness, mass matrix divided out")),
-        "damping": (linear.damping, entry("1/s", "damping and gyroscopic terms, mass divided out")),
+        "stiffness": (linear.stiffness, entry("1/s^2", "stiffness matrix, times the inverse mass matrix")),
+        "damping": (linear.damping, entry("1/s", "damping and gyroscopic matrix, times the inverse mass matrix")),
     }
 
 
@@ -442,14 +444,14 @@ def _floquet_datasets(table: FloquetTable) -> Datasets:
         "multiplier": (np.arange(table.multipliers.shape[1]), count),
         "multiplier_real": (table.multipliers.real, each("1", "Floquet multiplier, real part")),
         "multiplier_imag": (table.multipliers.imag, each("1", "Floquet multiplier, imaginary part")),
-        "largest_multiplier": (table.largest, at("1", "largest modulus, multipliers that are always 1 left out")),
-        "growth_rate": (table.growth_rates, at("1/s", "its logarithm over the time of a turn")),
-        "stable": (table.stable, at("1", "1 where no multiplier is above 1, 0 where one is, -1 where not known")),
+        "largest_multiplier": (table.largest, at("1", "largest modulus, without multipliers that are always 1")),
+        "growth_rate": (table.growth_rates, at("1/s", "growth rate that follows from the largest multiplier")),
+        "stable": (table.stable, at("1", "1: no multiplier above 1, 0: a multiplier above 1, -1: unknown")),
         "product_error": (
-            table.product_error, at("1", "logarithm of the product of the multipliers less the integrated trace")
+            table.product_error, at("1", "logarithm of the product of the multipliers minus the integrated trace")
         ),
-        "torque": (table.torque, at("N m", "torque on the rotor that keeps its mean speed")),
-        "mismatch": (table.mismatch, at("rad", "what the periodic motion misses after a turn")),
+        "torque": (table.torque, at("N m", "torque on the rotor that maintains its mean speed")),
+        "mismatch": (table.mismatch, at("rad", "error of periodicity after a revolution")),
     }  # fmt: skip
 
 

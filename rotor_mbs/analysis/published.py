@@ -261,7 +261,7 @@ def finding(scenes: Mapping[str, StoredScene], claims: Iterable[Claim]) -> list[
     runs = [run for run in runs if "energy_gain_J" in run.attributes]
     rising = [run for run in runs if run.attributes["energy_gain_J"] > ENERGY_RISE * run.attributes["energy_scale_J"]]
     if runs:
-        result = f"Scenes in which energy rises by more than {ENERGY_RISE:g} of its scale without work"
+        result = f"Scenes with a spurious energy gain of more than {ENERGY_RISE:g} of the energy scale"
         rows.append(Finding(result, f"{len(rising)} of {len(runs)}", ""))
     gains = [run.attributes["energy_gain_J"] for run in rising if run.status in GOOD]
     if gains:

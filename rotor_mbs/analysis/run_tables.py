@@ -14,7 +14,7 @@ from rotor_mbs.methods.catalogue import REFERENCE, is_corrected
 from rotor_mbs.runs.read import Record, StoredRun, StoredScene
 from rotor_mbs.solution.status import GOOD
 
-RUN_HEAD = ("method", "status", "largest defect (rad)", "error (rad), ok to 0.01", "energy drift", "time (s)")
+RUN_HEAD = ("method", "status", "largest defect (rad)", "error (rad), limit 0.01", "energy drift", "time (s)")
 _MOST_ROWS = 40  # of a table with a row for each run
 
 
@@ -94,7 +94,7 @@ def bench_table(curves: Sequence[Record]) -> TextTable:
         best = _short(float(errors.min())) if len(errors) else ""
         rows.append((curve.scene, curve.name, count, best, *("" if t is None else f"{t:.2e}" for t in times)))
     return TextTable(
-        ("scene", "method", "ok", "best error (rad)", *(f"s to {target:.0e}" for target in TARGETS_RAD)), rows
+        ("scene", "method", "ok", "best error (rad)", *(f"s to {target:.0e} rad" for target in TARGETS_RAD)), rows
     )
 
 
@@ -110,7 +110,7 @@ def listed(texts: Sequence[str]) -> str:
 
 @dataclass(frozen=True)
 class TextTable:
-    """Rows of text under a heading; printed in columns, a table in a notebook."""
+    """Table of text with a heading. Prints in columns; an HTML table in a notebook."""
 
     head: tuple[str, ...]
     rows: list[tuple[str, ...]]

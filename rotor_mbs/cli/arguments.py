@@ -117,10 +117,10 @@ class _Parser(argparse.ArgumentParser):
     # What several commands have.
 
     def scenes(self, **options: Any) -> None:
-        text = "a name (paper/fig05), a folder (paper), a TOML file"
+        text = "a name (paper/fig05), a folder (paper) or a TOML file"
         self.add_argument("scenes", metavar="SCENE", **{"nargs": "+", "help": text} | options)
 
-    def method(self, help: str = "model/integrator, as in rotor-mbs list, or a Python file of methods") -> None:
+    def method(self, help: str = "method, as in rotor-mbs list, or a Python file of methods") -> None:
         self.add_argument("-m", "--method", action="append", metavar="METHOD", help=f"{help}; may be repeated")
 
     def settings(self) -> None:
@@ -144,7 +144,7 @@ class _Parser(argparse.ArgumentParser):
         self.add_argument("-j", "--jobs", type=JOBS, default=cores(), metavar="N", help=text)
 
     def timeout(self, seconds: float = 60.0) -> None:
-        text = "longer runs are stopped and recorded as timed_out (default: %(default)g)"
+        text = "time limit per run in s; longer runs have the status timed_out (default: %(default)g)"
         self.add_argument("--timeout", type=SECONDS, default=seconds, metavar="SECONDS", help=text)
 
 
@@ -155,7 +155,7 @@ class _Names(argparse.Action):
         from rotor_mbs.foreign.channels import KNOWN_NAMES, LOAD_AND_MODE_NAMES
 
         lines = [f"{channel}: {names}" for channel, names in KNOWN_NAMES + LOAD_AND_MODE_NAMES]
-        print(*lines, "upper or lower case, with or without blanks and underscores", sep="\n")
+        print(*lines, "case, blanks and underscores are ignored", sep="\n")
         parser.exit(0)
 
 
@@ -164,7 +164,7 @@ def parse(argv: Sequence[str]) -> argparse.Namespace:
     usage."""
     parser, commands = _parser()
     if argv and not argv[0].startswith("-") and argv[0] not in commands:
-        parser.error(f"no command {argv[0]!r}{nearest(argv[0], commands)}; allowed: {', '.join(commands)}")
+        parser.error(f"unknown command {argv[0]!r}{nearest(argv[0], commands)}; allowed: {', '.join(commands)}")
     arguments, unknown = parser.parse_known_args(argv or ["--help"])
     if unknown:
         commands.get(argv[0], parser).error(f"unrecognized arguments: {' '.join(unknown)}")
@@ -175,7 +175,7 @@ def _parser() -> tuple[_Parser, dict[str, _Parser]]:
     formatter = argparse.RawDescriptionHelpFormatter
     parser = _Parser(
         prog="rotor-mbs",
-        description="Simulate rotor scenes with independent models, and compare these with each other and a paper.",
+        description="Simulate rotor scenes with independent models; compare the models with each other and a paper.",
         epilog="start with:\n  rotor-mbs list\n  rotor-mbs show paper/fig11\n  rotor-mbs run paper/fig11\n"
         "rotor-mbs COMMAND --help shows the options of a command and an example.\n"
         "exit status: 0 success; 1 a check failed or a run did not succeed; 2 bad input; 130 interrupted",
@@ -200,7 +200,7 @@ def _parser() -> tuple[_Parser, dict[str, _Parser]]:
         "show", "show the data and methods of a scene, or the settings of a method", "commands:show",
         "paper/fig11", "paper/fig11 --build",
     )  # fmt: skip
-    own.add_argument("scene", metavar="SCENE", help="a name (paper/fig05), a TOML file, or a method (lagrange/taylor)")
+    own.add_argument("scene", metavar="SCENE", help="a scene (paper/fig05), a TOML file, or a method (lagrange/taylor)")
     own.flag("--build", help="also list the items that each model builds")
     own.flag("--json", help="print JSON")
 
@@ -236,14 +236,14 @@ def _parser() -> tuple[_Parser, dict[str, _Parser]]:
     text = "text with a header, .json, .npz, .mat, HDF5, netCDF, an Exudyn sensor file, OpenFAST .out or .outb"
     own.add_argument("data", type=Path, metavar="DATA", help=text)
     own.add_argument("--scene", required=True, metavar="SCENE", help="a name (paper/fig05) or a TOML file")
-    text = "column, unit, sign and zero of each channel (default: guessed)"
+    text = "mapping file: column, unit, sign and offset of each channel (default: identified by name)"
     own.add_argument("--columns", type=Path, metavar="MAP.toml", help=text)
     text = (
         "bound on defects, and on errors divided by error growth, rad; relative bound on loads and frequencies "
         "(default: %(default)g)"
     )
     own.add_argument("--tolerance", type=POSITIVE, default=1e-6, metavar="X", help=text)
-    text = "time limit for the reference (default: %(default)g)"
+    text = "time limit for the reference in s (default: %(default)g)"
     own.add_argument("--timeout", type=SECONDS, default=600.0, metavar="SECONDS", help=text)
     own.add_argument("--names", action=_Names, nargs=0, help="print the accepted column names and exit")
     own.output(folder, "DIR", Path("comparison"), "output folder (default: %(default)s)")
@@ -260,7 +260,7 @@ def _parser() -> tuple[_Parser, dict[str, _Parser]]:
     text = "timed runs per point (default: %(default)s; at most 5 for runs over 0.5 s)"
     own.add_argument("--repeats", type=COUNT, default=20, metavar="N", help=text)
     # At this default the paper's seventeen scenes take eight minutes.
-    text = "time budget per scene (default: %(default)g)"
+    text = "time budget per scene in s (default: %(default)g)"
     own.add_argument("--budget", type=SECONDS, default=28.0, metavar="SECONDS", help=text)
 
     own = command("reference", "recompute quad-precision references", "runs:reference", "paper/fig08 -o reference.h5")
@@ -294,13 +294,15 @@ def _parser() -> tuple[_Parser, dict[str, _Parser]]:
         "test-method", "test a method, your own or a built-in one, and report faults with their most likely causes",
         "commands:test_method", "./mine.py", "lagrange/dop853 --json -",
     )  # fmt: skip
-    own.add_argument("methods", nargs="+", metavar="METHOD", help="a Python file of methods, or model/integrator")
+    own.add_argument(
+        "methods", nargs="+", metavar="METHOD", help="a Python file of methods, or a name from rotor-mbs list"
+    )
     own.add_argument("--junit", type=file, metavar="XML", help="the checks as JUnit XML")
     own.add_argument("--json", type=file, metavar="FILE", help="the checks as JSON; - for standard output")
     own.timeout()
 
     own = command(
-        "sweep", "run a parameter study into one dataset", "commands:sweep",
+        "sweep", "run a parameter study and store it in one dataset", "commands:sweep",
         "sweeps/fig11-spread -o spread.h5", "my-sweep.toml --dry-run",
     )  # fmt: skip
     own.add_argument("file", type=Path, metavar="SWEEP.toml", help="a file, or a shipped sweep (sweeps/fig11-spread)")
@@ -322,7 +324,7 @@ def _parser() -> tuple[_Parser, dict[str, _Parser]]:
         "stability", "run stiff and extreme scenes with every method and report which are stable and accurate",
         "commands:stability", "", "stiff/bearing-1e8 -o stiff.h5",
     )  # fmt: skip
-    own.scenes(nargs="*", help="scenes or folders (default: stiff extreme)")
+    own.scenes(nargs="*", help="names of scenes, folders or TOML files (default: stiff extreme)")
     own.method()
     own.settings()
     own.output(file, "FILE", Path("stability.h5"))
@@ -346,7 +348,7 @@ def _parser() -> tuple[_Parser, dict[str, _Parser]]:
     own.jobs()
     own.timeout(600.0)
 
-    own = command("report", "write HTML pages from any file of this program", "commands:report", "my.h5 --open")
+    own = command("report", "write HTML pages from a file of this program", "commands:report", "my.h5 --open")
     own.results()
     own.pages("-o", "--output")
     own.flag("--open", help="open the index in a browser")

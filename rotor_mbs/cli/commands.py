@@ -26,6 +26,7 @@ from rotor_mbs.methods.base import Method
 from rotor_mbs.methods.catalogue import check_names, look_up, method_names, methods
 from rotor_mbs.runs import cores
 from rotor_mbs.scenario.catalogue import find_scenes, list_scenes, list_sweeps, only_scene
+from rotor_mbs.scenario.keys import counted
 from rotor_mbs.solution.status import GOOD
 
 if TYPE_CHECKING:
@@ -89,7 +90,7 @@ def _show_method(method: Method, arguments: argparse.Namespace) -> None:
     print(f"{method.name}: {method.label}\n")
     for name, rule in allowed.items():
         print(f"  {name:26} {defaults[name]!s:>16}  {rule}; {rule.doc}".rstrip("; "))
-    print(f"\nset one: rotor-mbs run SCENE -m {method.name} --set NAME=VALUE" if allowed else "no settings")
+    print(f"\nto change a setting: rotor-mbs run SCENE -m {method.name} --set NAME=VALUE" if allowed else "no settings")
 
 
 def _show_scene(arguments: argparse.Namespace) -> None:
@@ -165,7 +166,7 @@ def bench(arguments: argparse.Namespace) -> int:
         print(line, file=sys.stderr)
     names = {scene.name for scene in scenes}
     print_table(bench_table([curve for curve in read_records(output, "bench") if curve.scene in names]))
-    print(f"{output}: {measured} scenes measured, {len(scenes) - measured} already stored")
+    print(f"{output}: {counted(measured, 'scene')} measured, {len(scenes) - measured} already stored")
     _write_pages(output)
     return int(print_not_computed(made))
 
@@ -186,7 +187,7 @@ def stability(arguments: argparse.Namespace) -> int:
     runs = suite_runs(arguments.output)
     print_table(family_table(runs))
     seconds = time.monotonic() - start
-    print(f"{arguments.output}: {len(scenes)} scenes, {len(runs)} runs, {seconds:.0f} s in all")
+    print(f"{arguments.output}: {counted(len(scenes), 'scene')}, {counted(len(runs), 'run')}, {seconds:.0f} s")
     _write_pages(arguments.output, arguments.report)
     missing = unreached(runs)
     for scene in missing:
@@ -252,7 +253,7 @@ def check(arguments: argparse.Namespace) -> int:
             with Path(summary).open("a", encoding="utf-8") as file:
                 file.write(formats.summary(verdicts))
     runs = ", ".join(f"{count} {method}" for method, count in study.judged_runs(verdicts).items())
-    print(f"runs judged: {runs or 'none'}", file=stream)
+    print(f"runs checked: {runs or 'none'}", file=stream)
     print(f"{len(verdicts) - len(failures)} passed, {len(failures)} failed", file=stream)
     return 1 if failures else 0
 
@@ -296,7 +297,7 @@ def test_method(arguments: argparse.Namespace) -> int:
             number, bound = (f"{one.value:.1e}", f"{one.bound:.1e}") if one.unit else ("", "")
             outcome = "pass" if one.passed else "FAIL"
             rows.append((one.where.method, one.name, one.where.scene, number, bound, one.unit, outcome, note))
-        heads = ("method", "check", "scene", "seen", "allowed", "unit", "result", "reason")
+        heads = ("method", "check", "scene", "value", "allowed", "unit", "result", "reason")
         print_table(TextTable(heads, rows))
         failed = sum(not verdict.passed for verdict in verdicts)
         print(f"{len(verdicts) - failed} passed, {failed} failed")
@@ -377,7 +378,7 @@ def sweep(arguments: argparse.Namespace) -> int:
                 facts = {"runs": plan.runs, "methods": list(plan.methods), "seconds": seconds, "bytes": size}
                 print(json.dumps(facts))
             else:
-                print(f"{plan.runs:,} runs by {', '.join(plan.methods)}: about {span(seconds)} on {arguments.engine}")
+                print(f"{plan.runs:,} runs with {', '.join(plan.methods)}: about {span(seconds)} ({arguments.engine})")
                 print(f"{size / 1e6:,.3f} MB")
             return 0
         if plan.runs > _MANY_RUNS and not arguments.yes:
@@ -405,9 +406,10 @@ def sweep(arguments: argparse.Namespace) -> int:
         else:
             by_status = ", ".join(f"{count} {status}" for status, count in Counter(result.statuses).most_common())
             rate = f", {result.made / result.seconds:.4g} per s" if result.made else ""
-            print(f"{result.path}: {result.runs} runs: {by_status}; {result.made} made in {result.seconds:.1f} s{rate}")
+            computed = f"{result.made} computed in {result.seconds:.1f} s{rate}"
+            print(f"{result.path}: {counted(result.runs, 'run')}: {by_status}; {computed}")
         if result.older:
-            print_line(f"{result.older} runs were computed by other versions; --fresh computes them again", sys.stderr)
+            print_line(f"{result.older} stored runs are from other versions; --fresh recomputes them", sys.stderr)
         for line in result.lost:
             print_line(f"{line}; not computed; repeat the command to try again", sys.stderr)
         if plan.sweep.table.picture and arguments.part == (1, 1):

@@ -60,7 +60,7 @@ def reproduce(arguments: argparse.Namespace) -> int:
         if status == 0:
             replace_file(stamp, made_from(results, arguments.timeout).encode(), rb"\A[0-9a-f]{64}\Z")
     print_table(summary.read_text(encoding="utf-8"))
-    print(f"report: {index}\n{time.monotonic() - start:.1f} s in all")
+    print(f"report: {index}\n{time.monotonic() - start:.1f} s")
     return status
 
 

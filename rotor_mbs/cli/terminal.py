@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Self, TextIO
 
 from rotor_mbs.cli import printable
+from rotor_mbs.scenario.keys import counted
 from rotor_mbs.solution.status import GOOD, STATUSES
 
 if TYPE_CHECKING:  # a sweep's workers load their code meanwhile
@@ -142,7 +143,7 @@ def print_summary(report: RunReport, output: Path) -> int:
     is_lost = print_not_computed(report.made)
     counts = Counter(run.status if run.is_stored else "not computed" for run in report.made)
     parts = [f"{count} {status}" for status, count in counts.most_common()]
-    made = f"{len(report.made)} runs made ({', '.join(parts)})" if report.made else "nothing to do"
+    made = f"{counted(len(report.made), 'run')} computed ({', '.join(parts)})" if report.made else "nothing to do"
     print(f"{output}: {made}, {len(report.kept)} already stored")
     for line in report.stored_failures:
         print(f"stored: {line}", file=sys.stderr)

@@ -67,7 +67,7 @@ class DataTable:
     def __getitem__(self, name: str) -> DataColumn:
         """Raises InputError, with the columns that there are."""
         if name not in self.columns:
-            raise InputError(f"{self.source}: no column {name!r}; it has: {shown_names(list(self.columns))}")
+            raise InputError(f"{self.source}: no column {name!r}; available: {shown_names(list(self.columns))}")
         return self.columns[name]
 
 

@@ -60,8 +60,8 @@ class Ladder:
 
 
 def step_ladder(count: int, first: int = 0, **facts: Any) -> Ladder:
-    """Of the setting `step`: 0.5**first, ..., 0.5**(first + count - 1) of the sample interval; facts: of the
-    `Ladder`."""
+    """Return a ladder of steps: the sample interval times 0.5**first, ..., 0.5**(first + count - 1). `facts` are
+    other fields of the `Ladder`."""
     shares = tuple(0.5**k for k in range(first, first + count))
     return Ladder(STEP, shares, lambda step: {"step": step}, **facts)
 
@@ -80,7 +80,7 @@ def tolerance_pair(tolerance: float) -> Mapping[str, float]:
 
 @dataclass(frozen=True, slots=True)
 class BuiltItem:
-    """One thing a model builds for a scene: kind is node, object, marker, load, sensor, equation or term."""
+    """Item of a model of a scene. `kind` is node, object, marker, load, sensor, equation or term."""
 
     kind: str
     name: str
@@ -98,7 +98,7 @@ class Solver(Protocol):
 
 
 def no_items(_scene: Scene) -> list[BuiltItem]:
-    """Of a method that does not say what it builds."""
+    """Return no items, for methods that do not list them."""
     return []
 
 
@@ -109,30 +109,29 @@ class Method:
     Attributes
     ----------
     name : "model/integrator", as on the command line and in files.
-    label : how it is called in tables and figures: "model, integrator".
-    build : (scene, settings) -> Solver; settings is an instance of `settings`. Raises MethodRefusal where the method
+    label : name in tables and figures: "model, integrator".
+    build : (scene, settings) -> Solver; settings is an instance of `settings`. Raises MethodRefusal if the method
         cannot represent the scene.
-    items : (scene) -> what is built for it; raises MethodRefusal likewise.
+    items : (scene) -> list of BuiltItem, the items of the model; raises MethodRefusal like `build`.
     settings : class of its settings, with units, defaults and ranges.
-    is_corrected : whether it claims to solve the correct equations, so that any status but "ok" is a failure.
-    is_default : whether it belongs to the set that runs where no method is named.
-    erratum : "E1" ...: the one erratum of the printed equations it has; "" for others.
-    distributions : packages it needs, by the names they are installed by.
-    fallback : name of the method to take where these are not installed; "" for none.
-    order : order of convergence; None where it is not fixed.
+    is_corrected : whether it solves the correct equations, so that any status but "ok" is a failure.
+    is_default : whether it is in the default selection.
+    erratum : "E1" ...: the only erratum of the printed equations that it has; "" for others.
+    distributions : names of the packages it needs.
+    fallback : name of the method that replaces it if these are not installed; "" for none.
+    order : order of convergence; None if it is not fixed.
     fixed_step : whether the step is the setting `step`.
-    ladders : settings it is benched with.
-    relative_cost : run time as a multiple of the fastest method's, roughly: expensive methods are started first.
-    bounds : accuracy bounds of a method from outside; those of built-in ones are in reference/accuracy.toml.
-    solve_many : (scenes, settings) -> RunBlock: a vectorized path for sweeps that ask for angles, rates, tips and
-        energies alone, or None.
-    linearize : (scene, steady angles, rotor speed, rotor torque) -> the model linearized there, or None; one method of
-        a model has it. Raises MethodRefusal for a state that the model cannot be linearized about.
-    arrays : (settings) -> names of the quantities that not every method has and this one stores, such as
-        "constraint_error".
-    sources : of a method from outside, the files whose code decides its runs, or the code itself.
-    load : imports what it computes with, and prevents the use of compiled code from an earlier process: before
-        timings, which exclude both.
+    ladders : series of settings used by `bench`.
+    relative_cost : run time relative to the fastest method, roughly. Expensive methods are started first.
+    bounds : accuracy bounds of a method of another package; those of built-in methods are in reference/accuracy.toml.
+    solve_many : (scenes, settings) -> RunBlock: several runs of a sweep at once, for the outputs angles, rates, tip and
+        energy only; or None.
+    linearize : (scene, steady angles, rotor speed, rotor torque) -> Linearization, or None; for one method of each
+        model. Raises MethodRefusal for a state about which the model cannot be linearized.
+    arrays : (settings) -> names of optional quantities that it stores, such as "constraint_error".
+    sources : source files of a method of another package, or its code.
+    load : imports the packages it needs and disables compiled code of earlier processes; called before timings, which
+        exclude both.
     """
 
     name: str
@@ -168,12 +167,12 @@ class Method:
 
     @property
     def model(self) -> str:
-        """ "lagrange" of "lagrange/taylor"."""
+        """Name of the model, such as "lagrange" for "lagrange/taylor"."""
         return self.name.partition("/")[0]
 
     @property
     def model_label(self) -> str:
-        """ "closed form" of "closed form, Taylor"."""
+        """Label of the model, such as "closed form" for "closed form, Taylor"."""
         return self.label.partition(",")[0]
 
     @property
@@ -181,17 +180,17 @@ class Method:
         return self.settings().as_dict()
 
     def chosen(self, scene: Scene, given: Mapping[str, object]) -> Settings:
-        """The settings with the `given` values in place of defaults. Raises InputError for an unknown name, for a value
-        that is not allowed, and for a step that makes more than MAX_STEPS steps of the scene."""
+        """Return the settings: the `given` values, defaults for others. Raises InputError for an unknown name, an
+        invalid value, and a step that is less than the scene's duration divided by MAX_STEPS."""
         chosen = self.settings.of(self.name, given)
         step = getattr(chosen, STEP) if self.fixed_step else scene.duration
         if scene.duration / step > MAX_STEPS:
-            what = f"step = {step:g} makes more than {MAX_STEPS:g} steps of {scene.duration:g} s"
+            what = f"step = {step:g} requires more than {MAX_STEPS:g} steps for {scene.duration:g} s"
             raise InputError(f"{self.name}: {what}; allowed: a step of at least {scene.duration / MAX_STEPS:g} s")
         return chosen
 
     def finer(self, settings: Mapping[str, object], interval: float) -> dict[str, object]:
-        """The settings of the next finer rung of its ladder, {} at its end; interval: s, between samples."""
+        """Return the next finer settings of its ladder, {} at its end; interval: time between samples (s)."""
         for ladder in self.ladders:
             if ladder.variant:
                 continue

@@ -213,12 +213,12 @@ def _plug_ins() -> dict[str, Method]:
         try:
             loaded = _as_methods(point.load())
         except (Exception, SystemExit) as exc:  # whatever another package raises must not stop this one
-            _warn("plug-in %s of %s left out: %s: %s", point.name, point.value, type(exc).__name__, exc)
+            _warn("plug-in %s of %s omitted: %s: %s", point.name, point.value, type(exc).__name__, exc)
             continue
         package = (point.dist.name,) if point.dist else ()
         for method in loaded:
             if method.name in taken:
-                _warn("plug-in %s of %s: method %s left out: name taken", point.name, point.value, method.name)
+                _warn("plug-in %s of %s: method %s omitted: name already used", point.name, point.value, method.name)
                 continue
             taken.add(method.name)
             distributions = tuple(dict.fromkeys((*method.distributions, *package)))
@@ -252,25 +252,25 @@ def choose(scene: Scene, defaults: tuple[str, ...]) -> tuple[tuple[str, ...], st
     with the reason where no motion exists to be followed."""
     reason = singular_reason(scene)
     if reason:
-        raise MethodRefusal(f"{scene.name}: refused: {reason}; select a method with -m to run it anyway")
+        raise MethodRefusal(f"{scene.name}: rejected: {reason}; select a method with -m to run it anyway")
     closed_form = next((name for name in defaults if name.partition("/")[0] == "lagrange"), "lagrange/dop853")
     swing, decay = fastest_rates(scene)
     if decay * scene.duration > _MAX_EXPLICIT_DECAY and decay > 10.0 * swing:
-        reason = f"overdamped, fastest decay {decay:.2g} /s: an implicit method in addition"
+        reason = f"overdamped (largest decay rate {decay:.2g} 1/s): an implicit method in addition"
         return (closed_form, "lagrange/radau"), reason
     # One point-mass blade that may come to a quarter turn of its pitch, on a hub that is light beside it.
     is_alone = len(scene.blades) == 1 and scene.blades[0].is_point_mass and _leaves_zero_pitch(scene)
     if is_alone and scene.hub_inertia < _NO_STEP_PASSES * _rotor_inertia(scene):
-        return (closed_form,), "nearly singular at a pitch of ±π/2: no other method passes there"
+        return (closed_form,), "nearly singular at a pitch of ±π/2: other methods fail there"
     if is_alone and scene.hub_inertia < _NEARLY_SINGULAR * _rotor_inertia(scene):
-        return (closed_form, "lagrange/dop853"), "near the singular pitch of ±π/2: methods that choose their own step"
+        return (closed_form, "lagrange/dop853"), "near the singular pitch of ±π/2: methods with adaptive steps"
     if swing > _MAX_EXPLICIT_SWING:
-        reason = f"stiff or fast, fastest swing {swing:.2g} rad/s: methods that choose their own step"
+        reason = f"stiff or fast (highest angular frequency {swing:.2g} rad/s): methods with adaptive steps"
         return (closed_form, "exudyn_tree/dopri5"), reason
     if swing * scene.duration > _MAX_FIXED_STEP_TURN:
-        return (closed_form,), f"long, {swing * scene.duration:.2g} rad of the fastest swing: no fixed step"
+        return (closed_form,), f"long ({swing * scene.duration:.2g} rad of the fastest oscillation): no fixed step"
     others = (name for name in defaults if name != closed_form)
-    return (closed_form, *others), "neither stiff, singular nor long: the default set, the best method of each model"
+    return (closed_form, *others), "not stiff, singular or long: the default set, the best method of each model"
 
 
 def fastest_rates(scene: Scene) -> tuple[float, float]:
@@ -300,15 +300,15 @@ def _rotor_inertia(scene: Scene) -> float:
 def singular_reason(scene: Scene) -> str:
     """Why the mass matrix is, or must become, singular; "" where it need not. Point-mass blades on a massless hub."""
     if not _rotor_inertia(scene):
-        return "nothing has inertia about the shaft; give the hub or a blade some"
+        return "no inertia about the shaft; allowed: a hub or blade with inertia"
     if scene.hub_inertia or not all(blade.is_point_mass and blade.has_pitch_inertia for blade in scene.blades):
         return ""
     if all(abs(math.cos(angle)) < 1e-15 for angle in scene.initial_angles[1:]):
-        return "every blade stands at a pitch of ±π/2 on a massless hub: the mass matrix is singular at the start"
+        return "all pitches are ±π/2 and the hub has no inertia: the initial mass matrix is singular"
     if len(scene.blades) == 1 and _leaves_zero_pitch(scene):
         return (
-            "one point-mass blade on a massless hub: its mass matrix is singular at a pitch of ±π/2, where the motion "
-            "ends; give the hub some inertia"
+            "one point-mass blade on a hub without inertia: the mass matrix is singular at a pitch of ±π/2, where the "
+            "motion ends; allowed: a hub with inertia"
         )
     return ""
 

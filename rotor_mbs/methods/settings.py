@@ -13,7 +13,7 @@ from rotor_mbs.errors import InputError, nearest
 
 @dataclass(frozen=True)
 class Allowed:
-    """What a setting may be: one of `options`, or a finite number within the limits."""
+    """Allowed values of a setting: one of `options`, or a finite number within the limits."""
 
     unit: str = ""  # SI unit of a number, "" where it has none
     above: float = -math.inf  # exclusive lower limit
@@ -24,7 +24,7 @@ class Allowed:
     doc: str = ""  # one line on what the setting does
 
     def convert(self, value: object) -> object:
-        """The value as it is stored. Raises ValueError where it is not allowed."""
+        """Return the value in the form that is stored. Raises ValueError if it is not allowed."""
         if self.options:
             if value not in self.options or isinstance(value, bool) != isinstance(self.options[0], bool):
                 raise ValueError
@@ -59,7 +59,7 @@ def number(
     at_most: float = math.inf,
     doc: str = "",
 ) -> Any:
-    """A field of a `Settings` class that is a finite number; whole where `default` is an int."""
+    """Declare a field of a `Settings` class: a finite number, an integer if `default` is an int."""
     allowed = Allowed(unit, above, at_least, at_most, isinstance(default, int), (), doc)
     return field(default=default, metadata={"allowed": allowed})
 
@@ -74,9 +74,9 @@ def choice(default: object, options: Sequence[object], *, doc: str = "") -> Any:
 
 @dataclass(frozen=True)
 class Settings:
-    """Base of the settings of a method, and the settings of a method that has none.
+    """Base class of the settings of a method, and the class for methods without settings.
 
-    A method's own class is a frozen dataclass whose fields are declared by `number` and `choice`:
+    The settings of a method are a frozen dataclass whose fields are declared by `number` and `choice`:
 
     >>> @dataclass(frozen=True)
     ... class Euler(Settings):
@@ -87,8 +87,8 @@ class Settings:
 
     @classmethod
     def of(cls, method: str, given: Mapping[str, object]) -> Self:
-        """The settings of `method` with the `given` values in place of defaults. Raises InputError, one line that lists
-        all settings, for an unknown name or a value that is not allowed."""
+        """Return the settings of `method`: the `given` values, defaults for others. Raises InputError, one line with
+        all settings, for an unknown name or an invalid value."""
         known, values, problems = cls.allowed(), {}, []
         for name, value in given.items():
             if name not in known:

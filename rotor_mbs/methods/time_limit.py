@@ -13,7 +13,7 @@ from numbers import Real
 
 from rotor_mbs.errors import InputError
 
-MESSAGE = "ended by its time limit"  # of a run that was
+MESSAGE = "stopped at the time limit"  # of a run that was
 _MAX_LIMIT_S = 1e9  # the system's timers take no more than the seconds of its clock
 _SHORTEST_S = 1e-6  # 0 would switch the timer off
 

@@ -49,7 +49,7 @@ def write_animation(results: Path, name: str, output: Path, magnified: float | N
     """
     kind = output.suffix.lower()
     if kind not in SUFFIXES:
-        raise InputError(f"{output}: unknown kind of file {kind or '(none)'}; allowed: {', '.join(SUFFIXES)}")
+        raise InputError(f"{output}: unknown format {kind or '(none)'}; allowed: {', '.join(SUFFIXES)}")
     if kind == ".mp4" and shutil.which("ffmpeg") is None:
         raise InputError(
             f"{output}: MP4 needs ffmpeg, which is not found here; allowed: .webp, .gif, or install ffmpeg"
@@ -77,7 +77,7 @@ def frames(stored: StoredScene, magnified: float | None) -> Iterator[Image.Image
     scene = stored.scene
     runs = {label_of(run.method): run for run in run_selection.sides(stored).values() if "angles" in run}
     if not runs:
-        raise InputError(f"{stored.name}: nothing to draw: no angles")
+        raise InputError(f"{stored.name}: nothing to plot: no angles")
     end = max(float(run.array("time")[-1]) for run in runs.values())
     count = max(2, min(round(end * RATE) + 1, _MAX_FRAMES))
     at = np.linspace(0.0, end, (count - 1) * _PATH_POINTS + 1)
@@ -146,6 +146,4 @@ def _film(pictures: Iterator[Image.Image], output: Path) -> None:
         ffmpeg.stdin.close()
         message = ffmpeg.stderr.read().decode(errors="replace").strip()
     if ffmpeg.returncode:
-        raise StoreError(
-            f"{output}: ffmpeg could not make it: {message.splitlines()[-1] if message else 'no reason given'}"
-        )
+        raise StoreError(f"{output}: ffmpeg failed: {message.splitlines()[-1] if message else 'no reason given'}")

@@ -41,7 +41,7 @@ _PAGE_STYLE, _PRINT_STYLE = (  # without matplotlib's defaults
 
 @dataclass(frozen=True)
 class Panels:
-    """A figure and its axes, from top to bottom, to be changed at will; a notebook shows it."""
+    """A matplotlib figure and its axes, from top to bottom. Shown by a notebook."""
 
     figure: Figure
     axes: list[Any]
@@ -50,7 +50,7 @@ class Panels:
         return encoded(self.figure, "svg", for_print=False).decode()
 
     def labelled(self) -> dict[str, Any]:
-        """The first artist of each label, in the order in which they were drawn."""
+        """Return the first artist of each label, in drawing order."""
         artists: dict[str, Any] = {}
         for axes in self.figure.axes:
             for artist, label in zip(*axes.get_legend_handles_labels(), strict=True):
@@ -58,7 +58,7 @@ class Panels:
         return artists
 
     def with_legend(self) -> Panels:
-        """Itself, with a legend above: curves over decades leave no room on the axes."""
+        """Add a legend above the axes. Returns the same object."""
         artists = self.labelled()
         with style():
             self.axes[0].legend(
@@ -72,7 +72,7 @@ class Panels:
         """As PDF, SVG or PNG, by the ending of `path`. Raises InputError for another one, StoreError."""
         kind = Path(path).suffix.removeprefix(".")
         if kind not in KINDS:
-            raise InputError(f"{path}: no such kind of picture; allowed: a name that ends in .{', .'.join(KINDS)}")
+            raise InputError(f"{path}: unknown format; allowed: a name that ends in .{', .'.join(KINDS)}")
         replace_file(Path(path), encoded(self.figure, kind), MARK)
 
 

@@ -41,25 +41,26 @@ def compare(
     tolerance: float = DEFAULT_TOLERANCE,
     timeout: float = 600.0,
 ) -> DataComparison:
-    """A trajectory of another program, judged against the scene's reference at the times of the data; its loads, by
-    those of the closed form at its own states; or a table of its modes.
+    """Compare a trajectory, loads or modes of another program with a scene.
+
+    A trajectory is compared with the reference at the times of the data, loads with those of the closed form at the
+    states of the data, and a table of modes with the frequencies of the closed form.
 
     Parameters
     ----------
-    data : a file, or arrays by name: `time` (n,) s, `angles` and `rates` (n, 1 + blades) rad and rad/s, or a column
-        each, such as `rotor`, `pitch_1_deg`; any of them may be missing. Loads by their names (N, N m), see
-        docs/compare.md. Without time: `speed` (m,) rad/s, `frequencies` (m, modes) rad/s.
+    data : a file, or arrays by name: `time` (n,) s, `angles` and `rates` (n, 1 + blades) rad and rad/s, or single
+        columns such as `rotor`, `pitch_1_deg`; angles or rates may be missing. Loads by name (N, N m), see
+        docs/compare.md. For modes: `speed` (m,) rad/s, `frequencies` (m, modes) rad/s.
     columns : a mapping file, or a mapping with the same keys: column, unit, sign, offset of each channel, and whether
-        it is wrapped. Without it they are guessed from the names; `verdict.read` says how.
-    tolerance : rad that the defect of an interval may have beyond the rounding of the data; share of its largest that a
-        load may be off, of itself a frequency.
-    timeout : s, for the reference and the defects; a search for causes ends then, too.
+        it is wrapped. By default columns are identified by name, see `verdict.read`.
+    tolerance : bound on interval defects beyond rounding of the data (rad); relative bound on loads and frequencies.
+    timeout : time limit for the reference, the defects and the search for causes (s).
 
     Raises
     ------
     InputError
-        For data that cannot be read or compared: one line with the file, column or row, and what is allowed; and where
-        there is no reference by the time limit.
+        For data that cannot be read or compared, in one line with file, column or row, and what is allowed; or if the
+        reference takes longer than the time limit.
 
     Examples
     --------
@@ -88,14 +89,14 @@ def compare(
 
 @dataclass(frozen=True)
 class DataComparison:
-    """A comparison: see `rotor_mbs.compare`. Prints as a table.
+    """Result of `rotor_mbs.compare`. Prints as a table.
 
     Attributes
     ----------
-    study : data, reference and numbers.
-    verdict : the numbers, see `rotor_mbs.analysis.data_verdict.DataVerdict`.
-    status, message, agrees : "ok" and "", or another status and why in a line; whether it is "ok".
-    likely : what the difference looks like, of causes that were tried by running them.
+    study : data and reference.
+    verdict : errors and verdict, see `rotor_mbs.analysis.data_verdict.DataVerdict`.
+    status, message, agrees : status, the reason if it is not "ok", and whether it is "ok".
+    likely : probable causes of a difference.
     """
 
     study: DataStudy
@@ -106,18 +107,18 @@ class DataComparison:
     likely: tuple[str, ...]
 
     def table(self) -> TextTable:
-        """A row for each channel: errors (rad, rad/s), until when it agrees (s), lag (s), scale, offset."""
+        """Table with a row per channel: errors (rad, rad/s), end of agreement (s), lag (s), scale, offset."""
         return channel_table(self.verdict)
 
     def plot(self) -> Panels:
-        """The defects of each coordinate over time, and the tolerance; errors where there are no defects."""
+        """Plot the defects of each coordinate over time and the tolerance; without defects, the errors."""
         return defect_panels(self.study.record()) or error_panels(self.study.record())
 
     def to_xarray(self) -> Any:
-        """What `save` stores as an xarray.Dataset over time.
+        """Return data, reference, errors and defects as an xarray.Dataset over time.
 
         Variables by channel, with units: data `pitch_1`, then `pitch_1_reference`, `pitch_1_error`, and
-        `pitch_1_defect` of the interval before each row (rad). Raises InputError where xarray is missing.
+        `pitch_1_defect` of the interval before each row (rad). Raises InputError if xarray is not installed.
         """
         record = self.study.record()
         variables = {
@@ -128,11 +129,11 @@ class DataComparison:
         return need_xarray().Dataset(variables, attrs={"scene": record.scene} | facts)
 
     def to_html(self, folder: str | os.PathLike[str]) -> Path:
-        """The page into a folder; its path."""
+        """Write the page into a folder. Returns its path."""
         return write_page(folder, "data_comparison", comparison_page(self.study.record()), versions() | machine())
 
     def save(self, path: str | os.PathLike[str]) -> None:
-        """Data, reference, errors and verdict as a results file. Raises StoreError where it cannot be written."""
+        """Save data, reference, errors and verdict as a results file. Raises StoreError if it cannot be written."""
         write_records(Path(path), [self.study.record()])
 
     def __repr__(self) -> str:
@@ -144,13 +145,13 @@ class DataComparison:
         lines += ["", str(self.table()), ""]
         if verdict.axis == "time":
             lines.append(
-                f"compared until {verdict.compared_until:g} s, judged up to the horizon at {verdict.horizon_s:g} s"
+                f"compared to {verdict.compared_until:g} s; errors checked up to the horizon, {verdict.horizon_s:g} s"
             )
         if verdict.energy_drift is not None:
-            lines.append(f"energy balance: {verdict.energy_drift:.1e} of the energy scale")
+            lines.append(f"energy drift / energy scale: {verdict.energy_drift:.1e}")
         lines += verdict.notes
         lines.append(f"{verdict.status}{': ' * bool(verdict.message)}{verdict.message}")
-        lines += [f"looks like: {cause}" for cause in verdict.likely]
+        lines += [f"probable cause: {cause}" for cause in verdict.likely]
         return "\n".join(lines)
 
     def _repr_html_(self) -> str:
@@ -169,10 +170,10 @@ def comparison_page(record: Record) -> dict[str, object]:
     verdict = verdict_of(record)
     facts = [
         ("Channels compared", ", ".join(channel.name for channel in verdict.channels)),
-        ("Rows", f"{verdict.rows}, until {with_unit(verdict.compared_until, _axis_unit(verdict), 4)}"),
+        ("Rows", f"{verdict.rows}, up to {with_unit(verdict.compared_until, _axis_unit(verdict), 4)}"),
     ]
     if verdict.axis == "time":
-        facts.append(("Judged up to the horizon", with_unit(verdict.horizon_s, "s", 4)))
+        facts.append(("Errors checked up to the horizon", with_unit(verdict.horizon_s, "s", 4)))
     units = dict.fromkeys(channel.defect_unit for channel in verdict.channels)
     allowed = " or ".join("rad in an interval" if unit == "rad" else unit for unit in units)
     facts.append(("Tolerance", f"{number(verdict.tolerance)} {allowed}, beyond rounding"))
@@ -182,7 +183,7 @@ def comparison_page(record: Record) -> dict[str, object]:
         facts.append(("Reason", verdict.message))
     if verdict.energy_drift is not None:
         facts.append(("Energy balance of the data", f"{number(verdict.energy_drift)} of the energy scale"))
-    facts += [("The difference looks like", cause) for cause in verdict.likely]
+    facts += [("Probable cause", cause) for cause in verdict.likely]
     facts += [("Note", note) for note in verdict.notes]
     table = channel_table(verdict)
     rows: list[Row] = []
@@ -200,7 +201,7 @@ def comparison_page(record: Record) -> dict[str, object]:
 
 
 def channel_table(verdict: DataVerdict) -> TextTable:
-    head = ("channel", "largest error", "largest defect", *(f"to {level:g} until" for level in LEVELS))
+    head = ("channel", "largest error", "largest defect", *(f"within {level:g} up to" for level in LEVELS))
     rows = []
     for channel in verdict.channels:
         errors = (f"{channel.error_max:.1e} {channel.unit}", _defect(channel))
@@ -285,11 +286,11 @@ def _pictures(record: Record, verdict: DataVerdict) -> list[Picture]:
         plots.set_range(axes, np.stack(drawn, axis=1))
         axes.set_ylabel("frequency (rad/s)" if is_modes else plots.ANGLE_AXIS)
         what = "Frequencies" if is_modes else "Angles"
-        pictures.append(picture(panels, "motion", f"{what} of the data, upon those of the reference"))
+        pictures.append(picture(panels, "motion", f"{what} of the data and of the reference"))
     caption = "Error against the reference" + ("" if is_modes else "; vertical line: horizon")
     pictures.append(picture(error_panels(record), "errors-0", caption))
     defects = defect_panels(record)
     if defects is not None:
-        caption = "Interval defects, with the tolerance; the rounding of the data is in them"
+        caption = "Interval defects, including rounding of the data, and tolerance"
         pictures.append(picture(defects, "defects", caption))
     return pictures

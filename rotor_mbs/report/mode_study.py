@@ -44,15 +44,15 @@ MAX_GROWTH = 1e3
 
 
 def modes(scene: Scene | str, speeds: Sequence[float] = (), stiffnesses: Sequence[float] = ()) -> Modes:
-    """Natural frequencies, damping ratios and mode shapes of a scene, by every model that can be linearized.
+    """Compute natural frequencies, damping ratios and mode shapes of a scene with every model that can be linearized.
 
-    At rest under gravity; over `speeds` in steady rotation without gravity (Campbell diagram); under gravity by the
-    Floquet multipliers of a turn. The torque of the scene is left out: the drive keeps the speed.
+    At rest under gravity; over `speeds` in steady rotation without gravity (Campbell diagram); in rotation under
+    gravity, Floquet multipliers. The scene's torque is not included: a drive torque maintains the speed.
 
     Parameters
     ----------
-    speeds : rad/s of the rotor, increasing, from 0 up.
-    stiffnesses : N m/rad of every bearing, for the stability chart over speed and stiffness.
+    speeds : rotor speeds (rad/s), increasing, at least 0.
+    stiffnesses : stiffnesses of all bearings (N m/rad), for the stability chart over speed and stiffness.
 
     Raises
     ------
@@ -74,14 +74,15 @@ def modes(scene: Scene | str, speeds: Sequence[float] = (), stiffnesses: Sequenc
 
 @dataclass(frozen=True, kw_only=True)
 class Modes(SceneModes):
-    """The modes of a scene: see `rotor_mbs.modes`.
+    """Result of `rotor_mbs.modes`: the modes of a scene.
 
     Attributes
     ----------
-    rest, rotation : by model, its modes at rest under gravity, and over speed without; the closed form first.
-    floquet, chart : multipliers of a turn under gravity, and the largest over speed and stiffness; None without.
-    notes : what could not be done, and why.
-    agrees, disagreement : whether the models have the same frequencies, and their largest relative difference.
+    rest, rotation : modes by model, at rest under gravity, and over speed without gravity; the closed form first.
+    floquet, chart : Floquet multipliers under gravity, and the largest one over speed and stiffness; None if not
+        computed.
+    notes : results that could not be computed, with the reason.
+    agrees, disagreement : whether the frequencies of the models agree, and their largest relative difference.
     plot : `modes.plot()` draws the Campbell diagram; `.damping()`, `.multipliers()`, `.chart()`.
     """
 
@@ -92,7 +93,7 @@ class Modes(SceneModes):
         return ModePlots(self)
 
     def table(self) -> TextTable:
-        """A row for each state, speed and mode of the closed form: rad/s, damping ratio, 1/s."""
+        """Table with a row per state, speed and mode of the closed form: rad/s, damping ratio, 1/s."""
         rows = mode_rows(self)
         cells = [
             tuple("" if v is None else f"{v:.7g}" if isinstance(v, float) else str(v) for v in row.values())
@@ -101,16 +102,16 @@ class Modes(SceneModes):
         return TextTable(tuple(name.replace("_", " ") for name in rows[0]) if rows else (), cells)
 
     def to_xarray(self, state: str = "rotation") -> Any:
-        """The modes of one state, "rotation" or "rest", as an xarray.Dataset with the dimension `solver`."""
+        """Return the modes of one state, "rotation" or "rest", as an xarray.Dataset with the dimension `solver`."""
         return linear_dataset(self.rest if state == "rest" else self.rotation, need_xarray())
 
     def save(self, path: str | os.PathLike[str]) -> Path:
-        """A results file that `rotor-mbs report` reads. Replaces the file."""
+        """Save the modes in a file that `rotor-mbs report` reads. An existing file is replaced."""
         write_records(Path(path), to_records(self, {"scene_hash": self.hash}))
         return Path(path)
 
     def to_html(self, folder: str | os.PathLike[str]) -> Path:
-        """The page into a folder; its path."""
+        """Write the page into a folder. Returns its path."""
         return write_page(folder, "modes", modes_page([self]), versions() | machine())
 
     def _repr_html_(self) -> str:
@@ -119,13 +120,13 @@ class Modes(SceneModes):
 
 
 class ModePlots:
-    """Figures of the modes of one scene."""
+    """Plots of the modes of a scene."""
 
     def __init__(self, modes: SceneModes) -> None:
         self._modes = modes
 
     def __call__(self) -> Panels:
-        """Campbell diagram: damped frequencies (rad/s) over rotor speed, with multiples of the speed."""
+        """Plot the Campbell diagram: damped frequencies (rad/s) over rotor speed, with multiples of the speed."""
         modes = self._rotation()
         panel = panels((2.9, 1.7), SPEED_AXIS)
         frequencies, speeds = modes.damped_frequencies, modes.speeds
@@ -150,7 +151,7 @@ class ModePlots:
         return panel
 
     def damping(self) -> Panels:
-        """Damping ratios and growth rates (1/s) over rotor speed. Raises InputError without speeds."""
+        """Plot damping ratios and growth rates (1/s) over rotor speed. Raises InputError without speeds."""
         modes = self._rotation()
         panel = panels((2.0, 2.0), SPEED_AXIS)
         curves = {"damping ratio": modes.damping_ratios, "growth rate (1/s)": modes.growth_rates}
@@ -161,7 +162,7 @@ class ModePlots:
         return panel
 
     def multipliers(self) -> Panels:
-        """Moduli of the Floquet multipliers over rotor speed. Raises InputError where there are none."""
+        """Plot moduli of the Floquet multipliers over rotor speed. Raises InputError if there are none."""
         table = self._modes.floquet
         if table is None:
             raise InputError(f"{self._modes.scene}: no Floquet multipliers; they need gravity and speeds above 0")
@@ -183,18 +184,18 @@ class ModePlots:
         return panel
 
     def chart(self) -> Panels:
-        """Growth over a turn as colour over speed and bearing stiffness. Raises InputError where there is none."""
+        """Plot growth per revolution as colour over speed and bearing stiffness. Raises InputError without a chart."""
         table = self._modes.chart
         if table is None:
             raise InputError(f"{self._modes.scene}: no stability chart; it needs gravity, speeds and stiffnesses")
-        labels = (SPEED_AXIS, "bearing stiffness (N m/rad)", "growth over a turn (powers of ten)")
-        boundary = (1.0 + GROWTH, "boundary of what is stable")
+        labels = (SPEED_AXIS, "bearing stiffness (N m/rad)", "growth per revolution (powers of ten)")
+        boundary = (1.0 + GROWTH, "stability boundary")
         return growth_map(table.speeds, table.stiffnesses, table.largest, labels, MAX_GROWTH, boundary)
 
     def _rotation(self) -> LinearModes:
         for linear in self._modes.rotation.values():
             return linear
-        raise InputError(f"{self._modes.scene}: no modes over speed; ask for speeds")
+        raise InputError(f"{self._modes.scene}: no modes over speed; allowed: modes computed with speeds")
 
 
 def mode_look(index: int, name: str) -> Look:
@@ -228,7 +229,7 @@ def modes_page(modes: Sequence[SceneModes]) -> dict[str, object]:
                     campbell.append(picture(plots.damping(), f"{name}-damping", "Damping ratios and growth rates"))
         turning: list[Picture] = []
         if scene.floquet is not None and len(scene.floquet.speeds) > 1 and np.isfinite(scene.floquet.largest).any():
-            caption = "Floquet multipliers of a turn under gravity; above 1 a motion grows"
+            caption = "Floquet multipliers in rotation under gravity; above 1 the motion is unstable"
             turning.append(picture(plots.multipliers(), f"{name}-multipliers", caption))
         if scene.chart is not None:
             caption = "Stability chart: growth over a turn under gravity"
@@ -254,7 +255,7 @@ def _multipliers(scene: str, table: FloquetTable) -> PageTable:
         cell = TableCell(_shown(largest, 7), "bad" if table.stable[i] == 0 else "", note=table.messages[i])
         numbers = ((table.growth_rates, 4), (table.product_error, 2), (table.torque, 4))
         rows.append([number(speed, 4), cell, *(_shown(float(values[i]), digits) for values, digits in numbers)])
-    head = ("Speed (rad/s)", "largest multiplier", "growth rate (1/s)", "product less trace", "torque (N m)")
+    head = ("Speed (rad/s)", "largest multiplier", "growth rate (1/s)", "product minus trace", "torque (N m)")
     return PageTable(f"{scene}: multipliers", head, rows)
 
 

@@ -50,8 +50,8 @@ METRICS = {
         "message", "code", "crc32",
     )
 } | {
-    "rotor_angle_max": Column(("run",), "rad", "largest rotor angle, either way"),
-    "rotor_rate_max": Column(("run",), "rad/s", "largest rotor rate, either way"),
+    "rotor_angle_max": Column(("run",), "rad", "largest magnitude of the rotor angle"),
+    "rotor_rate_max": Column(("run",), "rad/s", "largest magnitude of the rotor rate"),
 }  # fmt: skip
 # Asked for by `amplification = true`: the variational equations cost a hundred times the run itself.
 AMPLIFICATION = {name: COLUMNS[name] for name in ("error_growth", "horizon_s")}
@@ -79,12 +79,12 @@ def sweep_table(sweep: Sweep, methods: Sequence[str], numbers: range) -> Table:
     for i, (key, unit) in enumerate(zip(sweep.keys, sweep.units, strict=True)):
         column = Column(("run",), unit, f"varied parameter {key}")
         known[parameter_name(key)] = column, np.ascontiguousarray(values[:, i])
-    known["variant"] = Column(("run",), "1", "row of the design, the same for every method"), runs % rows
-    column = Column(("run",), "1", "by which method", attributes=flags(methods))
+    known["variant"] = Column(("run",), "1", "number of the parameter combination"), runs % rows
+    column = Column(("run",), "1", "code of the method", attributes=flags(methods))
     known["method_code"] = column, (runs // rows).astype(np.int8)
     if options.validation or options.test:
         splits = split_rows(rows, options.validation, options.test, options.seed)
-        column = Column(("run",), "1", "for training, validation or testing", attributes=flags(SPLITS))
+        column = Column(("run",), "1", "split of the dataset", attributes=flags(SPLITS))
         known["split"] = column, splits[runs % rows]
     kind = {"float64": "<f8", "float32": "<f4"}[options.precision]
     asked = [quantity for quantity in quantities.quantities(sweep.outputs) if quantity.output and quantity.required]
@@ -117,7 +117,7 @@ def open_sweep(
         with files.open_file(path) as file, files.reading(path):
             if files.attribute(file, IDENTITY) != attributes[IDENTITY]:
                 raise InputError(
-                    f"{path}: holds something else than this sweep; allowed: another output file, or remove that one"
+                    f"{path}: not the file of this sweep; allowed: another output file, or remove that one"
                 )
             stored = stored_table(file)
         statuses = stored.statuses()

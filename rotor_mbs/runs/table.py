@@ -61,63 +61,63 @@ def flags(names: Sequence[str], first: int = 0) -> dict[str, Any]:
 COLUMNS = {
     name: Column(("run", CHARACTERS) if CHARACTER in kind else ("run",), units, long_name, kind[0] if kind else "<f8")
     for name, (units, long_name, *kind) in {
-        "status": ("1", "how the run ended, from its state; -1 while it is missing", "i1"),
-        "message": ("1", "reason why the run did not succeed", CHARACTER),
-        "samples": ("1", "finite samples", "<i8"),
+        "status": ("1", "outcome of the run, determined from its samples; -1: not computed yet", "i1"),
+        "message": ("1", "reason for a status other than ok", CHARACTER),
+        "samples": ("1", "number of samples stored", "<i8"),
         "time_reached": ("s", "time of the last sample"),
-        "time_limit_s": ("s", "time limit that ended the run, NaN where none did"),
-        "steps": ("1", "integration steps, -1 where not known", "<i8"),
-        "rhs_evaluations": ("1", "evaluations of the right-hand side, -1 where not known", "<i8"),
-        "setup_time_s": ("s", "building the model"),
-        "setup_again_time_s": ("s", "building the model a second time"),
-        "run_time_s": ("s", "median run time of the integration alone"),
-        "run_time_min_s": ("s", "shortest run time"),
+        "time_limit_s": ("s", "time limit that stopped the run; NaN if it was not stopped"),
+        "steps": ("1", "number of integration steps; -1: unknown", "<i8"),
+        "rhs_evaluations": ("1", "number of evaluations of the right-hand side; -1: unknown", "<i8"),
+        "setup_time_s": ("s", "time to build the model"),
+        "setup_again_time_s": ("s", "time to build the model a second time"),
+        "run_time_s": ("s", "median run time of the integration"),
+        "run_time_min_s": ("s", "shortest run time of the integration"),
         "run_time_q1_s": ("s", "lower quartile of the run times"),
         "run_time_q3_s": ("s", "upper quartile of the run times"),
-        "output_time_s": ("s", "reading out and computing the samples"),
-        "repeats": ("1", "timed runs", "<i8"),
-        "repeatable": ("1", "1 where the last run of every point of the curve was bit for bit its first", "i1"),
-        "engine_success": ("1", "1 where the engine reported success, -1 where there is no report", "i1"),
-        "engine_message": ("1", "what the engine reported", CHARACTER),
-        "false_success": ("1", "1 where the engine reported success and the state says otherwise", "i1"),
-        "energy_scale_J": ("J", "what energy errors are relative to"),
-        "energy_drift_max": ("1", "largest energy error over the run, of the energy scale"),
-        "energy_gain_J": ("J", "largest energy gained without work"),
+        "output_time_s": ("s", "time to read and compute the samples"),
+        "repeats": ("1", "number of timed runs", "<i8"),
+        "repeatable": ("1", "1 if the first and last run of every point of the curve are bitwise equal", "i1"),
+        "engine_success": ("1", "1 if the engine reported success, -1 without a report", "i1"),
+        "engine_message": ("1", "message of the engine", CHARACTER),
+        "false_success": ("1", "1 if the engine reported success although the samples are wrong", "i1"),
+        "energy_scale_J": ("J", "energy scale, to which energy errors are relative"),
+        "energy_drift_max": ("1", "largest energy error over the run, relative to the energy scale"),
+        "energy_gain_J": ("J", "largest energy gain beyond the work"),
         "angle_error_max": ("rad", "largest angle error up to the horizon"),
         "angle_error_predicted": ("rad", "largest angle error up to the horizon, predicted from the defects"),
         "defect_max": ("rad", "largest defect of an interval between samples"),
-        "defect_median": ("rad", "median of the intervals' defects"),
+        "defect_median": ("rad", "median of the interval defects"),
         "defect_time": ("s", "end of the interval of the largest defect"),
         "defect_judged": (
             "rad",
-            "largest defect beyond rounding, per 0.01 s and unit of growth in longer intervals",
+            "largest defect beyond rounding, scaled in intervals over 0.01 s; the value compared with the bound",
         ),
-        "defect_mean": ("rad", "signed mean of the defects, of the coordinate where it is largest"),
-        "defect_drift": ("rad", "largest sum of the defects of 100 intervals, each carried to their end"),
-        "defect_floor": ("rad", "what the rounding of the samples may make of a defect"),
-        "defects_not_judged": ("1", "intervals in which an error may grow by more than 1e5"),
-        "angle_error_whole": ("rad", "largest angle error over the run"),
+        "defect_mean": ("rad", "signed mean of the defects, of the coordinate with the largest one"),
+        "defect_drift": ("rad", "largest sum of the defects of 100 intervals, each propagated to their end"),
+        "defect_floor": ("rad", "largest defect that rounding of the samples can cause"),
+        "defects_not_judged": ("1", "number of intervals in which errors may grow by more than 1e5"),
+        "angle_error_whole": ("rad", "largest angle error over the whole run"),
         "angle_error_end": ("rad", "angle error at the last sample"),
         "tip_error_max": ("m", "largest distance of a tip from the reference up to the horizon"),
-        "error_growth": ("1", "largest amplification of a small error of the initial state"),
-        "horizon_s": ("s", "last sample before the error growth reaches 1e5, or the end"),
+        "error_growth": ("1", "amplification of a small error of the initial state"),
+        "horizon_s": ("s", "time of the last sample before the error growth reaches 1e5"),
         "uncertainty_rad": ("rad", "uncertainty of the reference up to the horizon"),
-        "angular_impulse_error_max": ("1", "error of the angular momentum balance, of its scale"),
-        "linear_impulse_error_max": ("1", "error of the linear momentum balance, of its scale"),
-        "zero_pitch_max": ("rad", "largest angle of a pitch that is zero in the reference"),
-        "zero_pitch_left_s": ("s", "when such a pitch left zero"),
-        "zero_pitch_growth_per_s": ("1/s", "growth rate of such a pitch"),
+        "angular_impulse_error_max": ("1", "largest error of the angular momentum balance, relative to its scale"),
+        "linear_impulse_error_max": ("1", "largest error of the linear momentum balance, relative to its scale"),
+        "zero_pitch_max": ("rad", "largest pitch angle among those that are zero in the reference"),
+        "zero_pitch_left_s": ("s", "time at which such a pitch angle becomes nonzero"),
+        "zero_pitch_growth_per_s": ("1/s", "growth rate of such a pitch angle"),
         "rotor_angle_min": ("rad", "smallest rotor angle, at the integrator's own output points"),
         "rotor_angle_max": ("rad", "largest rotor angle, at the integrator's own output points"),
-        "rotor_rate_max": ("rad/s", "largest rotor rate either way, at the integrator's own output points"),
-        "pitch_max": ("rad", "largest pitch angle of any blade, either way"),
-        "left_out": ("1", "1 where the time budget left the point out", "i1"),
-        "load_before": ("1", "load of the machine before the scene was timed"),
-        "pinned_core": ("1", "core that the runs were timed on, -1 for any", "<i8"),
+        "rotor_rate_max": ("rad/s", "largest magnitude of the rotor rate, at the integrator's own output points"),
+        "pitch_max": ("rad", "largest magnitude of a pitch angle"),
+        "left_out": ("1", "1 if the point was omitted because of the time budget", "i1"),
+        "load_before": ("1", "load average of the machine before the timing"),
+        "pinned_core": ("1", "number of the core used for timing; -1: any", "<i8"),
         "order": ("1", "order of convergence of the curve, fitted above its round-off floor"),
         "step_for_target_s": ("s", "step at which the ladder reaches 1e-6 rad"),
-        "code": ("1", "CRC-32 of the versions that computed the run", "<u4"),
-        "crc32": ("1", "CRC-32 of the row in all computed columns", "<u4"),
+        "code": ("1", "CRC-32 of the versions of package, libraries and code that computed the run", "<u4"),
+        "crc32": ("1", "CRC-32 of the row, over all computed columns", "<u4"),
     }.items()
 }
 COLUMNS["status"] = COLUMNS["status"]._replace(attributes=flags(("missing", *STATUSES), MISSING))
@@ -125,13 +125,13 @@ COLUMNS["status"] = COLUMNS["status"]._replace(attributes=flags(("missing", *STA
 KNOWN = {
     "scene": ("1", "scene"),
     "method_name": ("1", "method, model/integrator"),
-    "curve": ("1", "method with its fixed choices"),
-    "setting_kind": ("1", "what varies along the curve"),
+    "curve": ("1", "method with its fixed settings"),
+    "setting_kind": ("1", "setting that varies along the curve: step or tolerance"),
     "settings": ("1", "settings of the method, JSON"),
-    "options": ("1", "of the study, JSON"),
-    "versions": ("1", "versions of what computed the row, JSON"),
-    "scene_hash": ("1", "SHA-256 of the scene's numbers"),
-    "step": ("s", "fixed step"),
+    "options": ("1", "options of the study, JSON"),
+    "versions": ("1", "versions of package, libraries and code that computed the row, JSON"),
+    "scene_hash": ("1", "SHA-256 of the numbers of the scene"),
+    "step": ("s", "time step"),
     "tolerance": ("1", "tolerance"),
     "order_expected": ("1", "order of the method"),
 }
@@ -355,7 +355,7 @@ def _reserve(path: Path, size: int) -> None:
 def _put_table(file: Any, table: Table) -> None:
     group = files.new_group(file, table.group) if table.group else file
     files.put_attributes(group, table.attributes)
-    files.put(group, "run", table.runs, Column(("run",), "1", "run"))
+    files.put(group, "run", table.runs, Column(("run",), "1", "name or number of the run"))
     if table.characters:
         files.put_dimension(group, CHARACTERS, table.characters)
     for name, (column, values) in table.known.items():
@@ -587,14 +587,15 @@ def metric_columns(outputs: Iterable[str]) -> dict[str, Column]:
     """The computed columns of /runs for scenes that ask for these outputs."""
     columns = {name: COLUMNS[name] for name in _RUN_COLUMNS}
     for quantity in quantities(outputs):
+        name, long_name = quantity.name, quantity.long_name
         if quantity.judgement is not None:
             unit = "1" if quantity.judgement.scale_of else quantity.units
-            columns[quantity.judgement.metric] = Column(("run",), unit, f"largest error of {quantity.long_name}")
+            columns[quantity.judgement.metric] = Column(("run",), unit, f"{long_name}: largest error")
         if quantity.has_peak:
-            columns[f"{quantity.name}_max"] = Column(("run",), quantity.units, f"largest {quantity.long_name}")
-            columns[f"{quantity.name}_max_time_s"] = Column(("run",), "s", f"time of the largest {quantity.long_name}")
+            columns[f"{name}_max"] = Column(("run",), quantity.units, f"{long_name}: maximum")
+            columns[f"{name}_max_time_s"] = Column(("run",), "s", f"{long_name}: time of the maximum")
             if quantity.dimensions[1:2] == ("blade",):
-                columns[f"{quantity.name}_max_blade"] = Column(("run",), "1", "its blade, from 1")
+                columns[f"{name}_max_blade"] = Column(("run",), "1", f"{long_name}: blade of the maximum, from 1")
     return columns | {"crc32": COLUMNS["crc32"]}
 
 

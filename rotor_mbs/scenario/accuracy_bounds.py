@@ -24,13 +24,13 @@ CHECKS = (
 
 
 _BOUND = keys.where(keys.NUMBER, lambda value: value >= 0.0, f"a number from 0 to {keys.MAX_NUMBER:g}")
-_PATTERN = keys.Kind(keys.read_text, "a text, with patterns of *")
+_PATTERN = keys.Kind(keys.read_text, "a name; * matches any text")
 _SENTENCE = keys.Kind(keys.read_text, "a sentence")
 
 
 @dataclass(frozen=True, slots=True)
 class Bound:
-    """The largest value that passes, in the check's own unit, for methods that fit the pattern `method`."""
+    """Bound of a check: the largest value that passes, in the unit of the check, for methods that match `method`."""
 
     check: str = file_key("check", keys.choice(CHECKS))
     method: str = file_key("method", _PATTERN)

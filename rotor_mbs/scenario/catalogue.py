@@ -157,7 +157,7 @@ def _files(argument: str) -> list[Path]:
     else:
         names = {*shipped, *(name.rpartition("/")[0] for name in shipped)}
         hint = nearest(argument, natural_order(names))
-        wrong = f"no such scene{hint}; allowed: what `rotor-mbs list` names, or FILE.toml"
+        wrong = f"no such scene{hint}; allowed: a name from `rotor-mbs list`, or FILE.toml"
     quoted = f"'{argument if len(argument) <= 80 else argument[:77] + '...'}'"
     raise InputError(f"{quoted if argument.isprintable() else ascii(argument[:80])}: {wrong}")
 

@@ -349,7 +349,7 @@ def read_keys(
     for table, entries in inside.items():
         for name in entries:
             if name not in names[table]:
-                what = f"is not a key here{nearest(name, names[table])}"
+                what = f"unknown key{nearest(name, names[table])}"
                 path = (table, name) if table else (name,)
                 problems.append(KeyProblem(path, what, ", ".join(names[table]), is_of_key=True))
     return values, problems

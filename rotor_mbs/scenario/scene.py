@@ -153,7 +153,7 @@ def _check_bare_pitches(what: str, entries: Sequence[Any], scene: Mapping[str, A
         blades = f"{len(bare)} blades (number {bare[0]} first)"
         if len(bare) <= 5:
             blades = f"blade{'s' if len(bare) > 1 else ''} {', '.join(map(str, bare))}"
-        allowed = "0 there: a pitch without inertia is left out of the model"
+        allowed = "0 there: a pitch without inertia is not a coordinate of the model"
         raise wrong(f"{what} {blades}, whose pitch has no inertia", allowed)
 
 
@@ -179,7 +179,7 @@ def _read_blades(value: object, scene: Mapping[str, Any]) -> tuple[Blade, ...]:
     return read_each(read_blade, value)
 
 
-OUTPUT_NAMES = Kind(_read_outputs, "some of angles, rates, tip, energy, loads and packages' own")
+OUTPUT_NAMES = Kind(_read_outputs, "a list of angles, rates, tip, energy, loads, or outputs of installed packages")
 _OUTPUTS = where(OUTPUT_NAMES, bool, OUTPUT_NAMES.allowed, "0 entries")
 _POINT = list_of(keys.SIZE, "three numbers x, y, z{unit}, blade frame", 3, 3)
 _INERTIA = where(
@@ -188,18 +188,18 @@ _INERTIA = where(
     "six numbers xx yy zz xy xz yz{unit} that a rigid body can have",
     "no rigid body has this inertia: a principal moment is negative, or above the sum of the others",
 )
-_LOAD = Kind(_read_load, "a number{unit}, or rows [t, number] with t from 0 s up", over_time=True)
+_LOAD = Kind(_read_load, "a number{unit}, or rows [t, number] with t >= 0 s", over_time=True)
 _ANGLES = Kind(_read_angles, "1 + blades numbers{unit}: rotor, then a pitch per blade", in_context=True)
 _RATES = Kind(_read_rates, _ANGLES.allowed, in_context=True)
 _BLADES = Kind(_read_blades, "one [blade] table for all blades, or a [[blade]] table for each", in_context=True)
-_METHODS = list_of(keys.TEXT, "names of methods, as `rotor-mbs list` has them")
-_SETTINGS = keys.dict_of(keys.NUMBER_OR_TEXT, "a table of methods' settings, such as step = 1e-3")
+_METHODS = list_of(keys.TEXT, "a list of methods, as in `rotor-mbs list`")
+_SETTINGS = keys.dict_of(keys.NUMBER_OR_TEXT, "a table of settings of the methods, such as step = 1e-3")
 
 
 @dataclass(frozen=True, slots=True)
 class Blade:
-    """One rigid blade, in its own frame: origin on the shaft axis, z along the pitch axis. `inertia` has the elements
-    xx yy zz xy xz yz of its tensor about the centre of mass (xy = -∫xy dm); `tip` is the point whose path is drawn."""
+    """A rigid blade, in its own frame: origin on the shaft axis, z along the pitch axis. `inertia` has the elements xx
+    yy zz xy xz yz of the tensor about the centre of mass (xy = -∫xy dm); `tip` is the point whose path is stored."""
 
     mass: float = file_key("mass", keys.POSITIVE, "kg")
     centre_of_mass: tuple[float, float, float] = file_key("centre_of_mass", _POINT, "m", ": z along the pitch axis")
@@ -214,7 +214,7 @@ class Blade:
 
     @property
     def inertia_tensor(self) -> NDArray[np.float64]:
-        """(3, 3) kg m²."""
+        """Inertia tensor about the centre of mass, (3, 3) kg m²."""
         import numpy as np  # late: a scene is read without it
 
         xx, yy, zz, xy, xz, yz = self.inertia
@@ -222,13 +222,13 @@ class Blade:
 
     @property
     def pitch_inertia(self) -> float:
-        """kg m² about the pitch axis."""
+        """Moment of inertia about the pitch axis (kg m²)."""
         x, y, _ = self.centre_of_mass
         return self.inertia[2] + self.mass * (x * x + y * y)
 
     @property
     def has_pitch_inertia(self) -> bool:
-        """Whether the blade resists pitching at all: Jzz about the pitch axis is not exactly zero (paper, Fig. 4b)."""
+        """Whether the moment of inertia about the pitch axis is not exactly zero (as in the paper's Fig. 4b)."""
         x, y, _ = self.centre_of_mass
         return x != 0.0 or y != 0.0 or self.inertia[2] != 0.0
 
@@ -240,22 +240,22 @@ def _key(path: str, *declared: Any, part: Part = "rotor", added: bool = False, *
 
 @dataclass(frozen=True, slots=True)
 class Scene:
-    """A rotor and what happens to it. Blade i hangs at phase 2π(i-1)/len(blades) about the shaft (+y); z is up.
+    """A rotor with its loads and initial state. Blade i is mounted at 2π(i-1)/blades about the shaft (+y); z is up.
 
     Attributes
     ----------
     initial_angles, initial_rates : (1 + blades,) rad, rad/s: rotor, then a pitch per blade.
     rotor_torque : a table over time (see time_table), N m.
-    pitch_torque : (blades,) tables over time, N m, between hub and blade; positive as the pitch is.
-    bearing_stiffness, bearing_damping : (blades,) N m/rad, N m s/rad; of the pitch and of its rate.
+    pitch_torque : (blades,) tables over time, N m, between hub and blade; positive in the direction of the pitch.
+    bearing_stiffness, bearing_damping : (blades,) N m/rad, N m s/rad.
     bearing_rest : (blades,) tables over time, rad: pitch at which the spring is unloaded.
-    methods, settings : methods that `run` uses, and settings in place of their defaults; () for the default selection.
+    methods, settings : methods that `run` uses, and their settings; () for the default selection.
     text : the TOML text it was read from.
 
     Notes
     -----
-    Loads, springs and dampers that are zero throughout are (). The class takes any values: `load_scene`, `parse_scene`
-    and `replace` validate.
+    Loads, springs and dampers that are zero are stored as (). The constructor does not validate; `load`, `scene` and
+    `replace` do.
     """
 
     name: str = _key("", keys.TEXT, part="label")
@@ -263,7 +263,7 @@ class Scene:
     figures: tuple[str, ...] = _key("figures", list_of(keys.LINE, 'texts, such as ["5"]'), part="label", optional=())
     gravity: float = _key("gravity", keys.NOT_NEGATIVE, "m/s^2", ", along -z")
     duration: float = _key("duration", keys.POSITIVE, "s", part="run")
-    samples: int = _key("samples", keys.whole(2, MAX_SAMPLES), "1", ": equally spaced, with both ends", part="run")
+    samples: int = _key("samples", keys.whole(2, MAX_SAMPLES), "1", ": equally spaced, both ends included", part="run")
     outputs: tuple[str, ...] = _key("outputs", _OUTPUTS, part="run", optional=DEFAULT_OUTPUTS)
     blades: tuple[Blade, ...] = _key("blade", _BLADES)
     hub_inertia: float = _key("hub.inertia", keys.NOT_NEGATIVE, "kg m^2", ", about the shaft", optional=0.0)
@@ -285,7 +285,7 @@ class Scene:
 
     @property
     def phases(self) -> tuple[float, ...]:
-        """(blades,) rad: the angle about the shaft at which each blade is mounted."""
+        """Azimuths at which the blades are mounted, (blades,) rad."""
         return tuple(2.0 * math.pi * i / len(self.blades) for i in range(len(self.blades)))
 
     @property
@@ -298,7 +298,7 @@ class Scene:
 
     @property
     def load_tables(self) -> tuple[Table, ...]:
-        """Everything that may change over time: rotor torque, then the torque and the rest angle of each pitch."""
+        """Loads over time: rotor torque, then torque and rest angle of each pitch."""
         pitches = (self.pitch_load(blade) for blade in range(len(self.blades)))
         return (self.rotor_torque, *(table for pair in pitches for table in pair))
 
@@ -312,7 +312,7 @@ class Scene:
 
     @property
     def work_needs_path(self) -> bool:
-        """Whether the work has to be integrated along the path: it is exact for constant loads without dampers."""
+        """Whether the work must be integrated along the path: False for constant loads without dampers."""
         return self.has_damping or not self.has_constant_loads
 
     @property
@@ -321,35 +321,35 @@ class Scene:
 
     @property
     def moving_coordinates(self) -> list[int]:
-        """Columns of the angles that move: 0, the rotor, then 1 + i for each blade i whose pitch has inertia."""
+        """Columns of the coordinates with inertia: 0 (rotor), and 1 + i for each blade i with pitch inertia."""
         return [0, *(1 + i for i, blade in enumerate(self.blades) if blade.has_pitch_inertia)]
 
     def bearing(self, blade: int) -> tuple[float, float]:
-        """Stiffness (N m/rad) and damping (N m s/rad) of the pitch bearing of a blade, counted from 0."""
+        """Return stiffness (N m/rad) and damping (N m s/rad) of a pitch bearing; blades are counted from 0."""
         stiffness = self.bearing_stiffness[blade] if self.bearing_stiffness else 0.0
         return stiffness, self.bearing_damping[blade] if self.bearing_damping else 0.0
 
     @property
     def dampings(self) -> tuple[float, ...]:
-        """(1 + blades,) N m s/rad: of the shaft, then of each pitch bearing."""
+        """Damping of the shaft, then of each pitch bearing: (1 + blades,) N m s/rad."""
         return self.shaft_damping, *(self.bearing(i)[1] for i in range(len(self.blades)))
 
     def pitch_load(self, blade: int) -> tuple[Table, Table]:
-        """Torque (N m) and rest angle (rad; none without stiffness) over time of a pitch bearing, counted from 0."""
+        """Return torque (N m) and rest angle (rad; none without stiffness) over time of a pitch; counted from 0."""
         torque = self.pitch_torque[blade] if self.pitch_torque else ()
         return torque, self.bearing_rest[blade] if self.bearing_rest and self.bearing(blade)[0] else ()
 
     @property
     def rotor_key(self) -> tuple[object, ...]:
-        """The rotor's parameters and loads: equal for scenes that differ in start, run or label alone."""
+        """Parameters and loads, which are equal for scenes that differ only in initial state, duration or title."""
         return tuple(_rotor_values(self))
 
     def replace(self, **changes: Any) -> Scene:
-        """A scene with other values at some keys of the scene file, validated like a file.
+        """Return a scene with other values of some keys of the scene file, validated like a file.
 
-        A keyword is a key; one with dots or indices goes through a dict. Entries are counted from 0, so that
-        `initial.angles[1]` is the pitch of blade 1. A value is what the file may have: a number, a quoted expression, a
-        list (or tuple, or array). `text` is written anew from the numbers.
+        Each keyword is a key; keys with dots or indices are given as a dict. Entries are counted from 0:
+        `initial.angles[1]` is the pitch of blade 1. A value is a number, an expression in quotes, or a list (tuple,
+        array), as in a scene file. `text` is rewritten from the numbers.
 
         Raises InputError with a line for each error: the key, what is wrong, what is allowed, the most similar key.
 
@@ -371,7 +371,7 @@ class Scene:
         return output in self.outputs
 
     def torque_at(self, time: float) -> float:
-        """Rotor torque in N m at `time` in s; at a jump, the value after it."""
+        """Return the rotor torque (N m) at `time` (s); at a jump, the value after it."""
         return value_at(self.rotor_torque, time)
 
 

@@ -60,11 +60,11 @@ def _read_key(value: object) -> str:
     key: str = keys.LINE.read(value)
     table = parse_key(key)[0]
     if table in ("blades", "samples", "duration"):
-        raise wrong(f"all runs of a dataset share one {table}", "a sweep for each, or a key that keeps the shape")
+        raise wrong(f"all runs of a dataset have the same {table}", "separate sweeps, or another key")
     return key
 
 
-_COUNT = keys.whole(2, MAX_COUNT, "a whole number from 2 up")
+_COUNT = keys.whole(2, MAX_COUNT, "a whole number of at least 2")
 _PAIR = list_of(keys.NUMBER, "", 2, 2)
 _RANGE = where(
     _PAIR, lambda pair: pair[0] < pair[1], "two numbers [low, high]", "the first number is not below the second"
@@ -75,7 +75,7 @@ _NORMAL = where(
     "two numbers [mean, standard deviation], the second one above 0",
     "the standard deviation is not above 0",
 )
-_SHARE = where(keys.NUMBER, lambda share: 0.0 < share < 1.0, "a share between 0 and 1")
+_SHARE = where(keys.NUMBER, lambda share: 0.0 < share < 1.0, "a number between 0 and 1")
 _SCENE_NAME = Kind(keys.LINE.read, "a shipped scene's name (paper/fig11), or a TOML file beside this one")
 
 
@@ -101,7 +101,7 @@ _LOG = where(
 class Axis:
     """One [[axis]]: a key of the scene, and where its values come from: one of `VARIED`."""
 
-    key: str = file_key("key", Kind(_read_key, "the path of a number of the scene"))
+    key: str = file_key("key", Kind(_read_key, "a key of a number of the scene, such as blade.mass"))
     values: tuple[float, ...] | None = file_key("values", list_of(keys.NUMBER, "a list of numbers", 1), default=None)
     linear: Range | None = file_key("linear", _LINEAR, default=None)
     log: Range | None = file_key("log", _LOG, default=None)
@@ -216,9 +216,9 @@ def split_rows(count: int, validation: float, test: float, seed: int) -> NDArray
 
 
 _METHODS = list_of(keys.LINE, "a list of methods, model/integrator", 1)
-_SETTINGS = keys.dict_of(keys.NUMBER, "a table of a method's settings, such as tolerance = 1e-15")
-_CHANGE = keys.dict_of(keys.NUMBER, 'a table of keys of the scene and numbers, "blade.mass" = 1e4')
-_DRAWS = keys.whole(1, MAX_COUNT, "a whole number from 1 up, with random axes")
+_SETTINGS = keys.dict_of(keys.NUMBER, "a table of settings of the methods, such as tolerance = 1e-15")
+_CHANGE = keys.dict_of(keys.NUMBER, 'a table of scene keys with numbers, such as "blade.mass" = 1e4')
+_DRAWS = keys.whole(1, MAX_COUNT, "a whole number of at least 1, for random axes")
 _AXES = list_of(table_of(Axis), "one or more [[axis]] tables", 1)
 
 
@@ -230,15 +230,15 @@ class SweepTable:
     settings: Mapping[str, float] = file_key("settings", _SETTINGS, optional={})
     change: Mapping[str, float] = file_key("change", _CHANGE, optional={})
     samples: int | None = file_key("samples", _COUNT, default=None)
-    outputs: Sequence[str] | None = file_key("outputs", OUTPUT_NAMES, note=", or none: metrics alone", default=None)
+    outputs: Sequence[str] | None = file_key("outputs", OUTPUT_NAMES, note="; [] stores metrics only", default=None)
     precision: str = file_key("precision", keys.choice(("float64", "float32")), default="float64")
     amplification: bool = file_key("amplification", keys.FLAG, note=": error growth of every run", default=False)
-    defects: bool = file_key("defects", keys.FLAG, note=": of runs by lagrange/taylor, too", default=False)
+    defects: bool = file_key("defects", keys.FLAG, note=": also for runs with lagrange/taylor", default=False)
     combine: str = file_key("combine", keys.choice(("grid", "zip")), default="grid")
     draws: int | None = file_key("draws", _DRAWS, default=None)
-    seed: int = file_key("seed", keys.whole(0, 2**63 - 1, "a whole number from 0 up"), default=0)
+    seed: int = file_key("seed", keys.whole(0, 2**63 - 1, "a whole number of at least 0"), default=0)
     validation: float = file_key("validation", _SHARE, default=0.0)
-    test: float = file_key("test", _SHARE, note=", less than 1 with validation", default=0.0)
+    test: float = file_key("test", _SHARE, note="; validation + test < 1", default=0.0)
     picture: str | None = file_key("picture", keys.choice(("spread", "map")), default=None)
     axis: Sequence[Axis] = file_key("axis", _AXES)
 
@@ -248,8 +248,8 @@ class SweepTable:
         repeated = [key for key, count in Counter(axes).items() if count > 1]
         problems = []
         if self.test + self.validation >= 1.0:
-            allowed = "a share between 0 and 1, less than 1 with validation"
-            problems.append(KeyProblem(("test",), "validation and test leave no rows for training", allowed))
+            allowed = "a number between 0 and 1; validation + test < 1"
+            problems.append(KeyProblem(("test",), "no runs left for training", allowed))
         if repeated:
             what = f"{repeated[0]} is varied by more than one axis"
             problems.append(KeyProblem(("axis",), what, "one [[axis]] for a key"))

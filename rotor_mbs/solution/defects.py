@@ -1,4 +1,4 @@
-"""Interval defects of a run: what the closed form makes of each sample by the next one, less what the run has there.
+"""Interval defects of a run: the closed form integrated from each sample to the next, minus the run's next sample.
 
 Within one interval between samples no chaos can grow, so that defects need no horizon: every second of every run is
 judged, and a fault is located in time. Their signed sum, carried to the end by the transition matrices of the
@@ -34,22 +34,22 @@ DRIFT_ROWS = 100
 
 @dataclass(frozen=True)
 class Defects:
-    """Of the n - 1 intervals between n samples; coordinates: rotor, then the pitch of each blade.
+    """Interval defects of a run with n samples. Coordinates: rotor, then the pitch of each blade.
 
     Attributes
     ----------
-    time : (n,) s, of the samples.
-    angles, rates : (n - 1, 1 + blades) rad and rad/s, closed form less run; NaN where the closed form has no end.
-    rate_units : (1 + blades,) rad/s, what counts as 1 rad: the defect of a rate times the interval is an angle.
-    find_transitions : computes `transitions`.
-    moving : the coordinates that move.
-    resting : pitches that stay at zero by symmetry: there the error is the state itself.
-    own_loads : the loads of the closed form at the run's own states, as samples; without arrays where not asked for.
-    growth_rate : 1/s, in which an error grows e-fold at most, roughly: falling blades, and centrifugal forces.
-    growth_units : (m,) in which the error growth of the scene counts angles, then rates.
-    states : (n, m) angles, then rates, of the run, in the coordinates that move.
+    time : (n,) s, sample times.
+    angles, rates : (n - 1, 1 + blades) rad and rad/s, closed form minus run; NaN if its integration fails.
+    rate_units : (1 + blades,) rad/s, scale of the rates: a rate defect times the interval is an angle.
+    find_transitions : function that computes `transitions`.
+    moving : coordinates with inertia.
+    resting : pitches that stay at zero by symmetry, where the error is the state itself.
+    own_loads : loads of the closed form at the states of the run; without arrays if not requested.
+    growth_rate : 1/s, estimated largest growth rate of an error (gravity and centrifugal forces).
+    growth_units : (m,) scales of the error growth of the scene: angles, then rates.
+    states : (n, m) angles, then rates, of the moving coordinates of the run.
     rounding, time_rounding : (n, m), (n,) half a unit in the last place of each of these numbers, and of the times.
-    start : (m,) the scene's own start in these coordinates.
+    start : (m,) initial state of the scene in these coordinates.
     """
 
     time: Array
@@ -69,23 +69,23 @@ class Defects:
 
     @functools.cached_property
     def transitions(self) -> Array | None:
-        """(n - 1, m, m) of the angles, then rates, of the coordinates that move; None where they are not known."""
+        """State transition matrices of the moving coordinates, (n - 1, m, m): angles, then rates; None if unknown."""
         return self.find_transitions()
 
     @functools.cached_property
     def sizes(self) -> Array:
-        """(n - 1,) rad: the largest over the coordinates, of angles and of rates in `rate_units`; inf for NaN."""
+        """Largest defect over the coordinates, of angles and of rates in `rate_units`: (n - 1,) rad; inf for NaN."""
         both = np.hstack([np.abs(self.angles), np.abs(self.rates) / self.rate_units])
         return np.asarray(np.where(np.isfinite(both), both, np.inf).max(axis=1))
 
     @property
     def floor(self) -> Array:
-        """(n - 1,) rad: the largest of `floors` over the coordinates."""
+        """Largest of `floors` over the coordinates: (n - 1,) rad."""
         return np.asarray(self.floors.max(axis=1))
 
     @functools.cached_property
     def floors(self) -> Array:
-        """(n - 1, m) rad: what the rounding of the run's own numbers may add up to in an interval, of each number."""
+        """Largest defects that rounding of the samples can cause, per coordinate: (n - 1, m) rad."""
         units = self._units
         half = self.states.shape[1] // 2
         # The sample times are rounded, too: by as much the state goes on.
@@ -104,15 +104,15 @@ class Defects:
 
     @property
     def channel_sizes(self) -> Array:
-        """(n - 1, m) rad: of the angles, then rates, of the coordinates that move; inf where there is no end."""
+        """Magnitudes of the defects of the moving coordinates: (n - 1, m) rad, angles, then rates; inf for NaN."""
         columns = list(self.moving)
         both = np.abs(np.hstack([self.angles[:, columns], self.rates[:, columns]])) / self._units
         return np.asarray(np.where(np.isfinite(both), both, np.inf))
 
     @functools.cached_property
     def growth(self) -> Array:
-        """(n - 1,) how many times an error may grow over each interval, at most; by `growth_rate` where the transition
-        matrices are not known."""
+        """Error growth over each interval, (n - 1,); estimated from `growth_rate` if the transition matrices are
+        unknown."""
         if self.transitions is None:
             with np.errstate(over="ignore"):
                 return np.asarray(np.exp(self.growth_rate * np.diff(self.time)))
@@ -123,8 +123,8 @@ class Defects:
 
     @property
     def is_judged(self) -> NDArray[np.bool_]:
-        """(n - 1,) not where an error grows by more than `MAX_INTERVAL_GROWTH` within the interval; what is not finite
-        fails there, too, unless the interval is too long even for the transition matrix."""
+        """Whether each interval is assessed, (n - 1,): its error growth is at most `MAX_INTERVAL_GROWTH`, or its defect
+        is not finite although its transition matrix is known."""
         judged = ~(self.growth > MAX_INTERVAL_GROWTH)
         if self.transitions is not None:
             judged |= ~np.isfinite(self.sizes)
@@ -132,8 +132,8 @@ class Defects:
 
     @functools.cached_property
     def judged_size(self) -> float:
-        """rad: what a method's bound is for: the largest defect beyond rounding, in a longer interval or one with more
-        growth as many times smaller as a method's own errors add up to more there; 0 where none is judged."""
+        """Value that is compared with a method's bound (rad): the largest defect beyond rounding. For intervals over
+        0.01 s it is scaled to 0.01 s and divided by the error growth. 0 if no interval is assessed."""
         longer = np.maximum(np.diff(self.time) / _BOUND_INTERVAL, 1.0) * np.fmax(self.growth / _BOUND_GROWTH, 1.0)
         judged = self.is_judged
         sizes = self.sizes[judged]
@@ -144,8 +144,8 @@ class Defects:
 
     @functools.cached_property
     def predicted(self) -> Array | None:
-        """(n, 1 + blades) rad: the error of the angles that the start and the defects add up to; None where the
-        transition matrices are not known. Good while the error is small against a radian."""
+        """Error of the angles predicted from the initial state and the defects, (n, 1 + blades) rad; None if the
+        transition matrices are unknown. Valid for errors that are small compared with 1 rad."""
         if self._errors_over_rows is None:
             return None
         products, sums = self._errors_over_rows
@@ -161,8 +161,8 @@ class Defects:
 
     @functools.cached_property
     def error_growth(self) -> Array | None:
-        """(n,) how many times a small error of the start may have grown, along the run itself; 2-norms in the
-        coordinates that can move."""
+        """Error growth along the run, (n,): 2-norm of the state transition matrix from the start in the moving
+        coordinates."""
         if self.transitions is None:
             return None
         half = len(self.moving)
@@ -182,7 +182,7 @@ class Defects:
 
     @property
     def mean(self) -> float:
-        """rad: the largest signed mean over the judged intervals: what defects of one sign hide below the largest."""
+        """Largest signed mean of the defects over the assessed intervals (rad)."""
         judged = self.is_judged & np.isfinite(self.sizes)
         if not judged.any():
             return float("nan")
@@ -191,7 +191,7 @@ class Defects:
 
     @property
     def drift(self) -> float:
-        """rad: the largest sum of defects over `DRIFT_ROWS` rows, each carried to their end; NaN where not known."""
+        """Largest sum of defects over `DRIFT_ROWS` rows, each propagated to their end (rad); NaN if unknown."""
         if self._errors_over_rows is None:
             return float("nan")
         return float((np.abs(self._errors_over_rows[1]) / self._units).max(initial=0.0))
@@ -202,10 +202,10 @@ class Defects:
         return np.concatenate([np.ones(len(columns)), self.rate_units[columns]])
 
     def over_rows(self, rows: int) -> tuple[Array, Array]:
-        """Defects over longer stretches, of so many rows each, and what rounding may make of them; both (k, m) rad.
+        """Return sums of the defects over a number of rows, and the largest sums that rounding can cause: (k, m) rad.
 
-        A drift of one sign hides in every interval and shows over a hundred. Stretches over which an error may grow by
-        more than `MAX_INTERVAL_GROWTH` are left out; without transition matrices there is none.
+        They reveal a drift that is smaller than single defects. Sums over rows in which errors may grow by more than
+        `MAX_INTERVAL_GROWTH` are omitted; without transition matrices there are none.
         """
         empty = np.empty((0, len(self.start)))
         if self.transitions is None or len(self.time) <= rows:
@@ -222,7 +222,7 @@ class Defects:
         return error[kept] / units, floors[kept] / units
 
     def horizon_samples(self, limit: float) -> int:
-        """How many samples lie before the error growth along the run reaches `limit`."""
+        """Return the number of samples before the error growth along the run reaches `limit`."""
         growth = self.error_growth
         if growth is None:
             return len(self.time)
@@ -230,11 +230,11 @@ class Defects:
         return int(beyond[0]) if len(beyond) else len(growth)
 
     def samples_at_rest(self, limit: float) -> int:
-        """How many samples lie before the pitches that rest by symmetry are `limit` times as large as when they left
-        zero; all, where they rest, or where they are moved by other equations.
+        """Return the number of samples before pitches that are zero by symmetry exceed `limit` times the threshold at
+        which they count as nonzero; all samples if they stay zero, or if wrong equations move them.
 
-        The error growth is that of motions which keep them at zero; what rounding has moved them by grows faster. That
-        excuses no other equations: by these the pitches have defects of a share of what they are.
+        The error growth is that of motions that preserve the symmetry; a deviation from it by rounding grows faster.
+        Wrong equations are distinguished by defects proportional to the pitch.
         """
         places = [i for i, coordinate in enumerate(self.moving) if coordinate in self.resting]
         away = np.abs(self.states[:, places]).max(axis=1, initial=0.0)

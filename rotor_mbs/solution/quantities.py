@@ -32,9 +32,9 @@ class Samples(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class QuantityMetric:
-    """How a run's array becomes one number that is stored with the run, and the largest value that passes.
+    """Metric that is computed from a quantity and stored with the run, and the largest value that passes.
 
-    The number is the largest size over all samples (with the last dimension `axis`: of the vectors).
+    The metric is the largest magnitude over all samples (if the last dimension is `axis`: of the vectors).
     """
 
     metric: str  # name of the number among the run's metrics
@@ -55,7 +55,7 @@ class QuantityMetric:
 
 @dataclass(frozen=True, slots=True)
 class Plot:
-    """A panel over time: its heading, the label of its vertical axis, and whether that is logarithmic."""
+    """Plot of a quantity over time: title, label of the vertical axis, and whether that is logarithmic."""
 
     title: str
     axis: str
@@ -64,7 +64,7 @@ class Plot:
 
 @dataclass(frozen=True, slots=True)
 class Quantity:
-    """An array that a run may have.
+    """Output quantity: an array that is computed for a run.
 
     Examples
     --------
@@ -106,7 +106,7 @@ SCALES = {
         Quantity("time", ("time",), "s", "time"),
         Quantity("coordinate", ("coordinate",), "1", "joint coordinate: 0 rotor, i pitch of blade i"),
         Quantity("blade", ("blade",), "1", "blade number, from 1"),
-        Quantity("axis", ("axis",), "1", "axis: 0 x, 1 y, 2 z (in the base frame: y shaft, z up)"),
+        Quantity("axis", ("axis",), "1", "axis: 0 x, 1 y, 2 z (base frame: y along the shaft, z up)"),
         Quantity("refined_time", ("refined_time",), "s", "time of the integrator's own output points"),
     )
 }
@@ -243,22 +243,22 @@ BUILT_IN = (
     Quantity(
         "potential_energy", ("time",), "J", "potential energy of gravity (zero at the shaft) and springs", "energy",
     ),
-    Quantity("work", ("time",), "J", "work of the torque less what the dampers took", "energy"),
+    Quantity("work", ("time",), "J", "work of torques and commands minus the energy dissipated by dampers", "energy"),
     Quantity(
-        "energy_error", ("time",), "J", "total energy less work, less its value at the start", "energy",
+        "energy_error", ("time",), "J", "kinetic plus potential energy minus work, minus its initial value", "energy",
         producer=lambda _, samples: energy_error(samples),
     ),
     Quantity(
-        "constraint_error", ("time",), "m", "largest position gap in a joint", required=False, judgement=_JOINT_GAP,
+        "constraint_error", ("time",), "m", "largest position gap of the joints", required=False, judgement=_JOINT_GAP,
         plot=Plot("Largest gap in a joint", "gap (m)", logarithmic=True),
     ),
     *LOADS,
     Quantity(
         "angle_uncertainty", ("time",), "rad",
-        "bound on the error of the angles, before they are rounded to double precision (half a unit in the last place)",
+        "bound on the error of the angles, before rounding to double precision (half a unit in the last place)",
         required=False,
     ),
-    Quantity("error_growth", ("time",), "1", "largest growth of a small error of the initial state", required=False),
+    Quantity("error_growth", ("time",), "1", "amplification of a small error of the initial state", required=False),
     Quantity(
         "refined_angles", ("refined_time", "coordinate"), "rad", "angles at the integrator's own output points",
         "angles", required=False,

@@ -30,9 +30,10 @@ from rotor_mbs.solution.quantities import sample_times as sample_times
 
 
 class Trajectory:
-    """Samples at equally spaced times, as far as the run got (n rows; every row finite); angles are unwrapped.
-    Quantities beside angles and rates (n, 1 + blades) are in `quantities` by name; the built-in ones are attributes,
-    too, None where the scene does not ask for them or the model lacks them."""
+    """Samples of a run at equally spaced times, up to its end (n rows, all finite). Angles are unwrapped.
+
+    Angles and rates have the shape (n, 1 + blades). Other quantities are in `quantities` by name; built-in ones are
+    also attributes, None if the scene does not request them or the model does not compute them."""
 
     time: Array
     angles: Array
@@ -44,14 +45,14 @@ class Trajectory:
         self.quantities = {name: values for name, values in quantities.items() if values is not None}
 
     def get(self, name: str) -> Array | None:
-        """An array by its quantity's name, time among them; None where the run does not have it."""
+        """Return a quantity by name, or the time; None if the run does not have it."""
         if name in _FIELDS:
             values: Array = self.__dict__[name]
             return values
         return self.quantities.get(name)
 
     def replace(self, **changes: Array | None) -> Trajectory:
-        """A copy with other arrays; None removes one. The arrays themselves are shared."""
+        """Return a copy with other arrays; None removes an array. Arrays are not copied."""
         arrays: dict[str, Any] = {"time": self.time, "angles": self.angles, "rates": self.rates, **self.quantities}
         return Trajectory(**{**arrays, **changes})
 
@@ -91,7 +92,7 @@ def shape_fault(scene: Scene, run: Trajectory) -> str:
 
 @dataclass(slots=True)
 class Integration:
-    """One integration as the engine reports it: a claim, which `judgement` checks against the samples."""
+    """Report of the engine on an integration. The status of a run does not depend on it."""
 
     success: bool  # whether the engine says that it reached the end
     message: str = ""  # why it did not; "" where it did
@@ -103,7 +104,7 @@ class Integration:
 
 @dataclass
 class RunBlock:
-    """Many runs at once, of scenes with the same number of blades and samples and the same outputs."""
+    """Several runs, of scenes with the same number of blades and samples and the same outputs."""
 
     time: Array  # (runs, samples) s
     quantities: dict[str, Array]  # by name, what the scenes ask for: (runs, samples, ...), NaN after a run broke off
@@ -115,7 +116,7 @@ class RunBlock:
         return Trajectory(self.time[i, :n], **{name: values[i, :n] for name, values in self.quantities.items()})
 
     def end(self, i: int, integration: Integration, samples: int) -> None:
-        """Run i has so many samples, though a fixed pitch, or a term that vanishes, stays finite for longer."""
+        """Truncate run i to a number of samples; later values are set to NaN."""
         if samples < self.time.shape[1]:
             for values in self.quantities.values():
                 values[i, samples:] = np.nan
@@ -175,19 +176,20 @@ def limit_at_zero(quotients: Sequence[Array], ratio: float) -> Array:
 
 @dataclass
 class Solution:
-    """A method applied to a scene.
+    """Result of a method applied to a scene.
 
     Attributes
     ----------
-    scene, method : what was run; the method by its name, such as "lagrange/taylor".
+    scene, method : the scene, and the name of the method, such as "lagrange/taylor".
     trajectory : the samples.
-    integration : what the engine reports of itself.
-    settings : of the method, all of them.
-    setup_time_s, run_times_s, output_time_s : s, building the model, each integration, computing the samples.
-    status, message : from the samples, see `judgement`; "" where the run was not judged.
+    integration : report of the engine.
+    settings : all settings of the method.
+    setup_time_s, run_times_s, output_time_s : times (s) to build the model, for each integration, and to compute the
+        samples.
+    status, message : status determined from the samples, and its reason; "" if not assessed.
     metrics : numbers by their names in a results file, such as energy_drift_max.
-    is_corrected : whether the method claims to solve the corrected equations.
-    bounds : accuracy bounds that the method brings beside those of reference/accuracy.toml.
+    is_corrected : whether the method solves the corrected equations.
+    bounds : accuracy bounds defined by the method, in addition to reference/accuracy.toml.
 
     Quantities are attributes and items: `solution.tip`, `solution["tip"]`; (n, ...) arrays, n samples.
     """
@@ -208,22 +210,22 @@ class Solution:
 
     @property
     def time(self) -> Array:
-        """(n,) s"""
+        """Sample times, (n,) s."""
         return self.trajectory.time
 
     @property
     def angles(self) -> Array:
-        """(n, 1 + blades) rad: rotor, then the pitch of each blade."""
+        """Angles of the rotor, then the pitch of each blade: (n, 1 + blades) rad."""
         return self.trajectory.angles
 
     @property
     def rates(self) -> Array:
-        """(n, 1 + blades) rad/s: rotor, then the pitch of each blade."""
+        """Rates of the rotor, then the pitch of each blade: (n, 1 + blades) rad/s."""
         return self.trajectory.rates
 
     @property
     def quantities(self) -> dict[str, Array]:
-        """The arrays that the scene's `outputs` ask for, by name."""
+        """Arrays of the scene's `outputs`, by name."""
         return all_arrays(self.scene, self.trajectory)
 
     def __getitem__(self, name: str) -> Array:
@@ -246,8 +248,9 @@ class Solution:
         raise AttributeError(name)
 
     def to_xarray(self) -> Any:
-        """The samples as an xarray.Dataset with units, long names and labels: `data.angles.sel(coordinate="pitch 1")`,
-        `data.tip.sel(blade=1, axis="y")`. Raises InputError where xarray is not installed."""
+        """Return the samples as an xarray.Dataset with units, long names and labels:
+        `data.angles.sel(coordinate="pitch 1")`, `data.tip.sel(blade=1, axis="y")`. Raises InputError if xarray is not
+        installed."""
         xarray = need_xarray()
         labels = {"coordinate": list(self.scene.coordinate_labels), "axis": ["x", "y", "z"]}
         scales: dict[str, Any] = {**scale_values(self.scene), "time": self.time}

@@ -211,7 +211,7 @@ def _warm_all(ladders: Sequence[Sequence[PointTimer]], budget_s: float, clock: C
         left = min(_WARM_UP_SHARE * budget_s - warm_s, _BUILD_SHARE * budget_s - (clock() - start))
         if rung and expected > left:
             for point in ladder[rung:]:
-                point.left_out = f"not run: about {expected:.2g} s more than the budget allows"
+                point.left_out = f"not run: about {expected:.2g} s over the time budget"
             continue
         ladder[rung].warm_up()
         warm_s += ladder[rung].warm_s
@@ -506,7 +506,7 @@ def counts_of(rows: Sequence[Mapping[str, Any]]) -> str:
     statuses = [row["status"] for row in rows]
     ok, inaccurate, left_out = (statuses.count(status) for status in ("ok", "inaccurate", "left_out"))
     failed = len(statuses) - ok - inaccurate - left_out
-    return f"{len(statuses)} points: {ok} ok, {inaccurate} inaccurate, {failed} failed, {left_out} left out"
+    return f"{len(statuses)} points: {ok} ok, {inaccurate} inaccurate, {failed} failed, {left_out} omitted"
 
 
 def curve_order(curve: Curve, rows: Sequence[Mapping[str, Any]]) -> float:

@@ -56,7 +56,7 @@ def check_file(path: Path, bounds: Bounds, required: Sequence[str] = ()) -> list
     """
     checks = judge_file(path, bounds)
     if all(check.passed and check.where.method == REFERENCE for check in checks):
-        raise InputError(f"{path}: nothing to judge: it has no run of a method")
+        raise InputError(f"{path}: nothing to check: no run of a method")
     stored = {(check.where.scene, check.where.method) for check in checks}
     for scene in dict.fromkeys(check.where.scene for check in checks if check.name == _OF_EVERY_RUN):
         for method in required:

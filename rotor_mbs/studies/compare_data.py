@@ -65,7 +65,7 @@ class DataStudy:
         kinds = {
             "": ("", values),
             "_reference": (", reference", self.expected),
-            "_error": (", data less reference", values - self.expected),
+            "_error": (", data minus reference", values - self.expected),
         }
         for j, channel in enumerate(self.data.channels):
             for ending, (what, array) in kinds.items():
@@ -80,7 +80,7 @@ class DataStudy:
                 defect[1 : 1 + len(known[0])] = known[0]
             arrays[channel.key + "_defect"] = defect
             columns[channel.key + "_defect"] = Column(
-                ("time",), "rad", f"{channel.name}, defect of the interval before"
+                ("time",), "rad", f"{channel.name}, defect of the interval before the row"
             )
         verdict = replace(self.verdict, unused=self.verdict.unused[:_MOST_NAMES])  # an attribute has 64 kB
         facts = {
@@ -169,9 +169,9 @@ def compare_with_reference(
         notes.append(f"{len(data.time) - len(cut.time)} rows after the scene's {scene.duration:g} s are not compared")
     if data.digits < _FULL_DIGITS:
         rounding = 0.5 * 10.0 ** (1 - data.digits)
-        notes.append(f"numbers of {data.digits} digits: their rounding alone is {rounding:.0e} of their size")
+        notes.append(f"numbers of {data.digits} digits: relative rounding error {rounding:.0e}")
     if missing:
-        notes.append(f"no angle of: {', '.join(missing)}")
+        notes.append(f"missing angles: {', '.join(missing)}")
     if energy_note:
         notes.append(energy_note)
     likely: list[str] = []
@@ -186,14 +186,14 @@ def compare_with_reference(
             elif causes is not None:
                 likely = causes.explanations()
     except OutOfTimeError:
-        notes.append("the search for causes was ended by its time limit")
+        notes.append("the search for causes was stopped at the time limit")
     apart = [
         f"{channel.name} {value:.4g} (scene: {start:.4g})"
         for channel, value, start in zip(data.channels, cut.values[0], expected[0], strict=True)
         if abs(value - start) > _START
     ]
     if status != "ok" and not likely and apart and data.time[0] == 0.0:
-        start_text = f"the data start elsewhere, in rad and rad/s: {', '.join(apart)}"
+        start_text = f"initial state differs, in rad and rad/s: {', '.join(apart)}"
         notes.append(f"{start_text}; another scene, start or unit?")
     if status == "ok" and likely:
         notes.append(f"within {tolerance:g} rad an interval, but not random")
@@ -253,7 +253,7 @@ def _defects(scene: Scene, data: ForeignData, reference: Trajectory, until: int)
         # Of a slope through five rows.
         rounding[:, columns] = rounding[:, without_rates] / float(np.median(np.diff(time)))
         names = ", ".join(f"{scene.coordinate_labels[i]} rate" for i in without_rates)
-        note = f"found from the angles, by the equations through {FIT_ROWS} rows: {names}"
+        note = f"computed from the angles, by fitting the equations of motion to {FIT_ROWS} rows: {names}"
     if not np.isfinite(states).all():
         return None, ""
     with np.errstate(all="ignore"):
@@ -306,7 +306,7 @@ def _status(
             f"{largest.name}: error {largest.error_max:.1e} {largest.unit} up to the horizon, allowed {bound:.0e}",
         )
     if energy_drift is not None and not energy_drift <= _ENERGY_PER_ANGLE * (tolerance + rounding):
-        return "inaccurate", f"energy drift {energy_drift:.1e} of its scale"
+        return "inaccurate", f"energy drift {energy_drift:.1e} of the energy scale"
     if missed := [name for name in missing if name not in data.omitted]:
         listed = ", ".join(f'"{name.replace(" ", "_")}"' for name in missed)
         return "unchecked", f"no column for {', '.join(missed)}; a mapping with omit = [{listed}] does without"

@@ -69,7 +69,7 @@ def reference_csv(scene: Scene) -> str:
     solution = frozen_solution(scene) or solve(REFERENCE, scene, {})
     trajectory = solution.trajectory
     if not len(trajectory.time):
-        raise StoreError(f"{scene.name}: no reference: {solution.integration.message or 'no motion from its start'}")
+        raise StoreError(f"{scene.name}: no reference: {solution.integration.message or 'the motion does not start'}")
     blades = [f"{blade}" for blade in range(1, 1 + len(scene.blades))]
     labels = {"coordinate": scene.coordinate_labels, "blade": blades, "axis": "xyz"}
     columns = {"time [s]": trajectory.time}

@@ -176,7 +176,7 @@ class _Examination:
         if "energy_drift_max" in metrics:
             hint = "energies or work, where the defects pass; else as they say"
             bound = allowance * self._energy + energy_slack(scene, run)
-            self._add("energy", scene.name, metrics["energy_drift_max"], bound, hint, "of its scale")
+            self._add("energy", scene.name, metrics["energy_drift_max"], bound, hint, "of scale")
 
     def _cause(self, scene: Scene, run: Trajectory, defects: Defects | None, size: float) -> str:
         """Why the defects of a run are too large: its step, or what the search of `compare` finds."""

@@ -97,7 +97,7 @@ def modes_of_scenes(
                     records += to_records(modes, {"scene_hash": scene_hash(scene)})
                     status, message = "ok", "; ".join(modes.notes)
                     if not modes.agrees:
-                        differ = f"frequencies of two models differ by {modes.disagreement:.1e} of their size"
+                        differ = f"relative difference of frequencies up to {modes.disagreement:.1e}"
                         status, message = "inaccurate", differ
                     outcome = Outcome(label, "", status, message, share=share)
                 made.append(outcome)
@@ -261,5 +261,5 @@ def _increasing(values: Sequence[float] | Array, name: str) -> list[float]:
     if any(not 0.0 <= value < float("inf") for value in numbers) or any(
         later <= earlier for earlier, later in itertools.pairwise(numbers)
     ):
-        raise InputError(f"{name}: allowed: increasing numbers from 0 up")
+        raise InputError(f"{name}: allowed: increasing numbers of at least 0")
     return numbers

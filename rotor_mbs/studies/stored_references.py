@@ -107,7 +107,7 @@ def frozen_solution(scene: Scene) -> Solution | None:
         is_complete = len(trajectory.time) == scene.samples
         engine = Integration(
             is_complete,
-            "" if is_complete else "the frozen reference ends here",
+            "" if is_complete else "the frozen reference ends early",
             facts["time_reached"],
             facts["steps"],
             out_of_time=facts["status"] == "timed_out",

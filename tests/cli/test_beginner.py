@@ -22,7 +22,7 @@ MISTAKES: dict[str, tuple[dict[str, str], str, str]] = {
     "a setting out of range": (
         {}, "run {file} -m exudyn_tree/rk67 --set step=-1", "step (a number above 0, in s; default"
     ),
-    "a misspelt key": ({"[shaft]": "[shaf]"}, "run {file}", "shaf: is not a key here, perhaps shaft"),
+    "a misspelt key": ({"[shaft]": "[shaf]"}, "run {file}", "shaf: unknown key, perhaps shaft"),
     "arithmetic without quotes": ({'"deg(30)"': "pi/6"}, "run {file}", 'arithmetic in quotes: "pi/6"'),
     "a pitch too few": ({'"pi/4", 0]': "0]"}, "run {file}", "rotor, then a pitch per blade"),
     "no tip": ({"tip = [0.08, 0.0, 33.4]": ""}, "run {file}", 'needed for the output "tip"'),

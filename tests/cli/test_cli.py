@@ -124,7 +124,7 @@ def test_settings_are_stored_and_unknown_ones_refused(quick: Path, stored: Path)
     command = ("run", quick, "-m", "lagrange/dop853", "-o", stored, "-j", "1", "--set")
     ended = rotor_mbs(*command, "relative_tolerance=1e-6")
     assert ended.status == 1  # inaccurate
-    assert "1 runs made" in ended.out
+    assert "1 run computed" in ended.out
     with open_results(stored) as results:
         assert results.scenes["quick"].runs["lagrange/dop853"].settings["relative_tolerance"] == 1e-6
         notes = [str(cell.note) for cell, *_ in metrics_table(results.scenes["quick"]).rows]
@@ -137,13 +137,13 @@ def test_run_writes_every_run_and_a_second_one_has_nothing_to_do(
 ) -> None:
     first = first_run[1]
     assert first.status == 0, first.err
-    assert "3 runs made (3 ok)" in first.out
+    assert "3 runs computed (3 ok)" in first.out
     table = [line.split()[:3] for line in first.out.splitlines() if line.startswith("quick ")]
     assert table == [["quick", method, "ok"] for method in ("reference", "lagrange/dop853", "exudyn_tree/rk67")]
     before = stored.read_bytes()
     assert "nothing to do, 3 " in rotor_mbs("run", quick, *BOTH, "-o", stored, "-j", "1").out
     assert stored.read_bytes() == before
-    assert "1 runs made" in rotor_mbs("run", quick, "-m", "lagrange/radau", "-o", stored, "-j", "1").out
+    assert "1 run computed" in rotor_mbs("run", quick, "-m", "lagrange/radau", "-o", stored, "-j", "1").out
     with open_results(stored) as results:
         assert set(results.scenes["quick"].methods) == {"lagrange/dop853", "exudyn_tree/rk67", "lagrange/radau"}
     assert {path.name for path in Path().iterdir()} == {"quick.toml", "r.h5"}

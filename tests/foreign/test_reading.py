@@ -247,12 +247,12 @@ def test_wrong_arrays_are_refused(arrays: dict[str, object], message: str) -> No
 @pytest.mark.parametrize(
     ("mapping", "message"),
     [
-        ('time = "t"\nrotr = "a"', "map.toml:2: rotr: is not a key here, perhaps rotor; allowed: time, rotor, pitch_1"),
-        ('rotor = "c"', "no column 'c'; it has: t, a, b"),
+        ('time = "t"\nrotr = "a"', "map.toml:2: rotr: unknown key, perhaps rotor; allowed: time, rotor, pitch_1"),
+        ('rotor = "c"', "no column 'c'; available: t, a, b"),
         ('rotor = { column = "a", unit = "rpm" }', "'rpm'; allowed: rad, deg, turns"),
         ('rotor = { column = "a", sign = 2 }', "rotor.sign: 2 is not one of them; allowed: 1, -1"),
         ('rotor = { column = "a", offset = "x" }', "rotor.offset: .*x"),
-        ('rotor = { column = "a", zero = 1 }', "rotor.zero: is not a key here; allowed: column, unit"),
+        ('rotor = { column = "a", zero = 1 }', "rotor.zero: unknown key; allowed: column, unit"),
         ("rotor = 3", "rotor: 3 is not a table; allowed: a column's name, or a table with `column`"),
         ('time = "t"', "no channel to compare"),
         ("rotor", "not TOML"),

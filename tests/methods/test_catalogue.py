@@ -74,7 +74,7 @@ def test_plug_ins_that_cannot_be_used_are_left_out_with_one_line_each(
     install(site, "own_exit", "raise SystemExit(3)\n", GROUP, {"x": "own_exit:X"})
     assert "outside/rk4" in {method.name for method in methods()}
     assert find_method("outside/rk4").distributions == ("made_up",)
-    assert sorted(record.getMessage().partition(" left out")[0] for record in caplog.records) == [
+    assert sorted(record.getMessage().partition(" omitted")[0] for record in caplog.records) == [
         "plug-in a of no_such_module:METHOD", "plug-in b of made_up:MISSING", "plug-in c of made_up:np",
         "plug-in d of made_up:TAKEN: method lagrange/taylor", "plug-in x of own_exit:X",
     ]  # fmt: skip

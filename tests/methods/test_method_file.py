@@ -100,7 +100,7 @@ def test_a_run_is_keyed_by_the_code_of_its_file() -> None:
     Path("mine.py").write_text(EXAMPLE + "# the same\n")
     assert "2 already stored" in run("-m", "mine.py", "-o", "o.h5")
     Path("mine.py").write_text(EXAMPLE.replace("rtol=1e-12, atol=1e-13", "rtol=1e-6, atol=1e-7"))
-    assert "1 runs made" in run("-m", "mine.py", "-o", "o.h5")
+    assert "1 run computed" in run("-m", "mine.py", "-o", "o.h5")
     runs = rm.open("o.h5")["one"]
     assert list(runs) == ["reference", "lagrange/dop853", "mine/lsoda"]
     assert runs["mine/lsoda"].metrics["defect_max"] > 1e-9

@@ -280,7 +280,7 @@ def test_rates_are_found_from_the_angles(name: str) -> None:
     ("rows", "factor", "message"),
     [
         (slice(4), 1.0, "4 rows"),
-        (slice(10), 1e300, "not resolved finely enough"),
+        (slice(10), 1e300, "rounding errors are too large"),
         (slice(0, 101, 20), 1.0, "too far apart"),
     ],
 )

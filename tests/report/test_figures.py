@@ -126,7 +126,7 @@ def test_a_figure_shows_each_model_in_a_column_as_it_was_stored(drawn: Path) -> 
             "'paper/fig12': no such scene in it; allowed: paper/fig08",
         ),
         (["animate", "folder/mine.toml", "FILE", "-o", "a.webp"], "'mine': no such scene in it"),  # stored by its stem
-        (["animate", "paper/fig11", "FILE", "-o", "a.avi"], "unknown kind of file .avi; allowed: .webp, .gif, .mp4"),
+        (["animate", "paper/fig11", "FILE", "-o", "a.avi"], "unknown format .avi; allowed: .webp, .gif, .mp4"),
         (["animate", "paper/fig11", "none.h5", "-o", "a.webp"], "no such file"),
     ],
 )

@@ -82,7 +82,7 @@ def test_the_index_opens_with_what_was_found_and_pictures_and_folds_its_other_ta
     text = text_of(report, "index.html")
     rows = rows_of(text)
     assert rows["Published numbers reproduced"] == ["3 of 4", "0 of 4"]
-    assert rows["Scenes in which energy rises by more than 0.001 of its scale without work"] == ["2 of 4", ""]
+    assert rows["Scenes with a spurious energy gain of more than 0.001 of the energy scale"] == ["2 of 4", ""]
     assert rows["Largest spurious energy gain of a complete run"] == ["1 MJ", ""]  # not that of the broken run
     assert rows["closed form, Taylor"][:2] == ["1 of 1 ok", "1.0×10⁻¹¹"]  # 1e-12 per second over 10 s
     heat = text.index('id="scenes"')

@@ -56,7 +56,7 @@ WRONG = {
     "title a number": ('"A good scene"', "3", 1, "title", "3 is not text"),
     "title of two lines": ("good scene", "good\\nscene", 1, "title", "control character"),
     "unknown key": ("blades = 2", "blades = 2\nbaldes = 2", 3, "baldes", "perhaps blades"),
-    "unknown quoted key": ("[hub]", '[hub]\n"in\\nertia" = 1', 25, 'hub."in\\\\nertia"', "is not a key here"),
+    "unknown quoted key": ("[hub]", '[hub]\n"in\\nertia" = 1', 25, 'hub."in\\\\nertia"', "unknown key"),
     "blades astronomical": ("blades = 2", f"blades = 0x{'f' * 5000}", 2, "blades", "a number of over 30 digits"),
     "blades true": ("blades = 2", "blades = true", 2, "blades", "true is not a whole number"),
     "gravity NaN": ("gravity = 9.8", "gravity = nan", 3, "gravity", "nan is out of range"),
@@ -187,7 +187,7 @@ NO_NAMES = ("", "../paper/fig05", "/paper/fig05", "paper//fig05", "paper/fig05\n
     [
         *((argument, "is neither a scene's name nor a TOML file") for argument in NO_NAMES),
         ("paper/fig5", "no such scene, perhaps paper/fig05"),
-        ("nothing-like-it", "no such scene; allowed: what `rotor-mbs list` names"),
+        ("nothing-like-it", "no such scene; allowed: a name from `rotor-mbs list`"),
         ("missing.toml", "missing.toml: cannot be read: No such file"),
         ("x" * 5000 + ".toml", "cannot be read"),
         ("\0.toml", "leads to no file"),

@@ -10,7 +10,7 @@ from rotor_mbs.errors import InputError
 from rotor_mbs.scenario.accuracy_bounds import Bound, load_bounds, read_bounds, shipped_bounds
 
 BAD = {
-    'value = 1\nreason = "x"\nunit = "m"': (6, "unit: .* not a key"),
+    'value = 1\nreason = "x"\nunit = "m"': (6, "unit: unknown key"),
     'value = -1e-9\nreason = "x"': (4, "value: -1e-09 is out of range"),
     'reason = "x"': (1, "value: is missing; allowed: a number from 0"),
     'value = 1\nreason = " "': (5, "reason: is empty; allowed: a sentence"),

@@ -102,8 +102,8 @@ def test_the_number_of_blades_can_be_changed_with_what_depends_on_it() -> None:
 @pytest.mark.parametrize(
     ("key", "value", "message"),
     [
-        ("gravty", 9.81, "paper/fig11: gravty: is not a key here, perhaps gravity; allowed: title, "),
-        ("blade.mas", 1.0, "blade.mas: is not a key here, perhaps mass; allowed: mass"),
+        ("gravty", 9.81, "paper/fig11: gravty: unknown key, perhaps gravity; allowed: title, "),
+        ("blade.mas", 1.0, "blade.mas: unknown key, perhaps mass; allowed: mass"),
         ("initial.angles[4]", 1.0, r"initial.angles: has 4 entries; allowed: initial.angles\[0\] to "),
         ("initial.angles", 1.0, "initial.angles: 1.0 is not a list; allowed: 1 \\+ blades numbers"),
         ("gravity", None, "gravity: .* is not a number"),

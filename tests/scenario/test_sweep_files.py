@@ -124,13 +124,13 @@ def test_a_scene_is_no_sweep(tmp_path: Path) -> None:
 
 _BAD = {
     "no rows for training": ('validation = 0.5\ntest = 0.5\n[[axis]]\nkey = "gravity"\nvalues = [1, 2]', 4,
-     "test: .* leave no rows for training; allowed: a share"),
+     "test: .*no runs left for training; allowed: a number"),
     "an unknown key of two values, reported once": ('[[axis]]\nkey = "initial.angels[1]"\nvalues = [1, 2]', 4,
-     r"^[^\n]*: initial\.angels: is not a key here[^\n]*$"),
+     r"^[^\n]*: initial\.angels: unknown key[^\n]*$"),
     "an index too high": ('[[axis]]\nkey = "initial.angles[4]"\nvalues = [1]', 4, r"initial.angles\[3\]"),
     "a table there": ('[[axis]]\nkey = "initial"\nvalues = [1]', 4, "1.0 is not a table"),
     "no path": ('[[axis]]\nkey = "initial..x"\nvalues = [1]', 4, "is not the path of a key; allowed"),
-    "another shape": ('[[axis]]\nkey = "blades"\nvalues = [1, 2]', 4, "share one blades; allowed"),
+    "another shape": ('[[axis]]\nkey = "blades"\nvalues = [1, 2]', 4, "have the same blades; allowed"),
     "values not in a list": ('[[axis]]\nkey = "gravity"\nvalues = 3', 5, "is not a list; allowed: a list of numbers"),
     "no values": ('[[axis]]\nkey = "gravity"', 3, "has no values; allowed: exactly one of values"),
     "random without draws": ('[[axis]]\nkey = "gravity"\nuniform = [1, 2]', 3, "draws is missing"),

@@ -115,7 +115,8 @@ def test_a_solution_as_xarray_is_selected_by_label() -> None:
     data = run.to_xarray()
     np.testing.assert_array_equal(data.angles.sel(coordinate="pitch 2"), run.angles[:, 2])
     np.testing.assert_array_equal(data.tip.sel(blade=3, axis="z"), run.tip[:, 2, 2])
-    assert data.work.attrs == {"units": "J", "long_name": "work of the torque less what the dampers took"}
+    long_name = "work of torques and commands minus the energy dissipated by dampers"
+    assert data.work.attrs == {"units": "J", "long_name": long_name}
     assert data.attrs["method"] == "lagrange/dop853"
 
 

@@ -121,7 +121,7 @@ def test_a_row_for_each_engine_with_dashes_for_what_the_file_does_not_say(tmp_pa
         ["1 of 1", "adaptive", "1.0×10⁻¹³", "1.0×10⁻¹⁰", "1 of 1, × 1.0", "1 of 1, × 1.0", "1 of 1, × 1.0", "–", "kept",
          "no failure"],
         ["1 of 1", "5.9 of 6", "≤ 1.0×10⁻⁵", "≤ 1.0×10⁻⁴", *["not measured"] * 3, "–", "–", "1 of 2"],
-        ["1 of 1", "0.98 of 1", "1.0×10⁻⁵", "0.0010", *["0 of 1"] * 3, "–", "left", "no failure"],
+        ["1 of 1", "0.98 of 1", "1.0×10⁻⁵", "0.0010", *["0 of 1"] * 3, "–", "lost", "no failure"],
     ]  # fmt: skip
     assert [texts(row)[1:] for row in able.rows] == [
         ["–"] * 6, ["–"] * 6, ["–", "–", "–", "no", "pin 4.1.0", "99"]

@@ -175,7 +175,7 @@ def test_a_rung_that_does_not_fit_the_budget_is_told_and_those_after_it_too() ->
     timers, _ = run_conduct({point("a", rung): 2.0**rung for rung in range(6)}, budget=30.0)
     assert [bool(timer.times) for timer in timers] == [True] * 3 + [False] * 3
     assert [bool(timer.left_out) for timer in timers] == [False] * 3 + [True] * 3
-    assert timers[3].left_out == "not run: about 8 s more than the budget allows"
+    assert timers[3].left_out == "not run: about 8 s over the time budget"
     assert timers[3].row()["status"] == "left_out"
 
 
@@ -274,7 +274,7 @@ def test_curves_are_tried_alone_where_their_process_dies(tmp_path: Path, monkeyp
     assert [bench.is_measured(file, curve) for curve in curves] == [True, False, True]
     assert (ended["deadly"].status, ended["deadly"].is_stored) == ("worker_died", False)
     assert ended["deadly"].message.endswith("also when it was retried alone")
-    assert ended["first"].message.endswith(" 0 failed, 0 left out")
+    assert ended["first"].message.endswith(" 0 failed, 0 omitted")
 
 
 def test_a_setting_selects_the_curves_that_have_it() -> None:

@@ -81,7 +81,7 @@ def test_what_is_shipped_passes_in_short(good: Path, capsys: pytest.CaptureFixtu
         "integrity", "complete", "status", "metrics", "times", "start", "defect", "defect median", "error", "energy",
         "impulse", "energies", "tip", "reference", "growth", "uncertainty", "frozen", "copied", "settings", "steps",
     )  # fmt: skip
-    assert lines[-2] == f"runs judged: 2 {METHOD}, 2 exudyn_tree/rk67"
+    assert lines[-2] == f"runs checked: 2 {METHOD}, 2 exudyn_tree/rk67"
     assert {line.split(":")[0] for line in lines[:-2]} == {f"pass {name}" for name in names}
     assert not failed(check.judge_frozen(load_bounds()))
 
@@ -93,7 +93,7 @@ def test_where_there_is_nothing_to_judge_the_command_says_so(
     for path in (reference_folder() / "check.h5", tmp_path / "empty.h5"):
         capsys.readouterr()
         assert main(["check", str(path), "--require", METHOD]) == 2
-        assert capsys.readouterr().err == f"{path}: nothing to judge: it has no run of a method\n"
+        assert capsys.readouterr().err == f"{path}: nothing to check: no run of a method\n"
 
 
 @pytest.mark.full
@@ -281,9 +281,9 @@ def _known_faults() -> Iterator[tuple[Bound, str, str, float]]:
         own = load_bounds().for_scene("" if bound.scenes == "*" else scene)
         methods = [name for name in method_names(is_corrected=True) if own.find(bound.check, name) == bound]
         if methods and (bound.check in WRONG or bound.check == "gap"):
-            share = {"no gravity": -1.0, "every second sample left out": EVERY_SECOND_SAMPLE}.get(text)
+            share = {"no gravity": -1.0, "every second sample omitted": EVERY_SECOND_SAMPLE}.get(text)
             if share is None:
-                number, percent = re.findall(r" off by (\S+)( %)?", text)[0]
+                number, percent = re.findall(r"error of (\S+)( %)?", text)[0]
                 share = float(number) * (0.01 if percent else 1.0)
             yield bound, scene, METHOD if METHOD in methods else methods[0], share
 
@@ -314,7 +314,7 @@ def test_a_bound_below_what_is_seen_fails(good: Path) -> None:
     """The entries that the file's runs reach are in force: with all of them below what is seen, all fail."""
     largest: dict[Bound, float] = {}
     for found in judged(good):
-        if found.where.channel == "of its samples":  # whose bound is the accuracy of the transition matrices
+        if found.where.channel == "of the samples":  # whose bound is the accuracy of the transition matrices
             continue
         bound = load_bounds().for_scene(found.where.scene).of(found.name, found.where.method)
         largest[bound] = max(largest.get(bound, 0.0), found.value)

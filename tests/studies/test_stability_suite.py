@@ -95,7 +95,7 @@ def test_runs_are_counted_by_family_and_the_fastest_accurate_one_is_named() -> N
         made_run("c", "ok", seconds=2.0),
     ]
     table = family_table(runs, str.upper)
-    assert table.head == ("method", "STIFF", "LIGHT", "false successes")
+    assert table.head == ("method", "STIFF", "LIGHT", "reported as success")
     assert table.rows == [("a", "1+1 of 2", "0 of 1", "1"), ("b", "1 of 1", "", "0"), ("c", "1 of 1", "", "0")]
     assert fastest_to_target(runs) == {"stiff/a": "a", "stiff/b": None, "extreme/feather-1": None}
     assert unreached(runs) == ["extreme/feather-1"]

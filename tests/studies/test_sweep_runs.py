@@ -92,7 +92,7 @@ def test_a_finished_sweep_makes_nothing_again_and_another_one_is_refused(tmp_pat
     assert (end["event"], end["runs"], end["made"], end["statuses"]) == ("end", 8, 0, {"ok": 8})
     other = rotor_mbs("sweep", path, "-o", output, "-m", "lagrange/ode45", "-j", 1)
     assert other.status == 2
-    assert "holds something else than this sweep; allowed: another output file" in other.err
+    assert "not the file of this sweep; allowed: another output file" in other.err
     assert output.read_bytes() == before
 
 
@@ -129,7 +129,7 @@ def test_runs_of_other_versions_are_kept_and_counted(tmp_path: Path, monkeypatch
     assert swept("STEP = 0.2\n") == (0, 8)
     assert output.read_bytes() == before
     ended = rotor_mbs("sweep", tmp_path / "s.toml", "-o", output, "-j", 1)
-    assert "8 runs were computed by other versions; --fresh computes them again" in ended.err
+    assert "8 stored runs are from other versions; --fresh recomputes them" in ended.err
     assert swept("STEP = 0.2\n", fresh=True) == (8, 0)
     assert swept("STEP = 0.2\n") == (0, 0)
     assert output.read_bytes() != before  # the code of each row

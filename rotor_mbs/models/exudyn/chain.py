@@ -114,7 +114,7 @@ def _body(placed: Placed, node: str) -> list[Part]:
         "mass": body.mass,
         "inertia": [*np.diag(tensor), tensor[1, 2], tensor[0, 2], tensor[0, 1]],  # the engine's order
     }
-    what = f"{body.mass:g} kg" if body.mass else "no mass of its own"
+    what = f"{body.mass:g} kg" if body.mass else "massless"
     return [
         Part("node", name, type_, parameters, "at the centre of mass"),
         Part("object", name, "ObjectRigidBody", inertia, what),

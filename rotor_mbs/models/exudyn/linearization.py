@@ -42,7 +42,7 @@ def linearize_chain(scene: Scene, angles: Sequence[float] | Array, speed: float,
     multipliers = np.asarray(np.linalg.lstsq(linear.C, force, rcond=None)[0], dtype=np.float64)
     residual = np.abs(force - linear.C @ multipliers).max()
     if residual > 1e-7 * np.abs(force).max(initial=0.0) + 1e-12 * np.abs(linear.K).max():
-        raise MethodRefusal(f"exudyn_chain: not at rest: {residual:g} N of the forces are not balanced by the joints")
+        raise MethodRefusal(f"exudyn_chain: no equilibrium: unbalanced force {residual:g} N")
     # Orthonormal basis of the velocities with Cᵀ q̇ = 0.
     vectors, singular_values, _ = np.linalg.svd(linear.C)
     rank = int(np.count_nonzero(singular_values > 1e-10 * singular_values[0]))

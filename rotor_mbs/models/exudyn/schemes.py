@@ -60,8 +60,8 @@ class Dopri5Settings(Settings):
     """Dormand-Prince 5(4) with the engine's step control. It scales the error by absolute + relative · max(x, x_new),
     without the magnitude of x, which vanishes at x = -absolute/relative: hence a relative tolerance of 0."""
 
-    relative_tolerance: float = number(0.0, at_least=0.0, doc="of the local error")
-    absolute_tolerance: float = number(1e-11, above=0.0, doc="of the local error, rad and rad/s")
+    relative_tolerance: float = number(0.0, at_least=0.0, doc="relative tolerance of the local error")
+    absolute_tolerance: float = number(1e-11, above=0.0, doc="absolute tolerance of the local error, rad and rad/s")
     trial_steps: int = number(10_000, at_least=1, doc="largest number of trial steps between two samples")
 
     def scheme(self) -> Scheme:
@@ -81,8 +81,8 @@ class NewtonSettings(Settings):
     """The trapezoidal rule (Newmark), constraints at velocity level (index 2), order 2."""
 
     step: float = step(2.5e-4)
-    newton_relative_tolerance: float = number(1e-8, above=0.0, doc="of Newton's residual")
-    newton_absolute_tolerance: float = number(1e-10, above=0.0, doc="of Newton's residual")
+    newton_relative_tolerance: float = number(1e-8, above=0.0, doc="relative tolerance of Newton's residual")
+    newton_absolute_tolerance: float = number(1e-10, above=0.0, doc="absolute tolerance of Newton's residual")
 
     def scheme(self) -> Scheme:
         return self._implicit({"generalizedAlpha.useNewmark": True, "generalizedAlpha.useIndex2Constraints": True})
@@ -101,7 +101,7 @@ class NewtonSettings(Settings):
 class AlphaSettings(NewtonSettings):
     """Generalized-alpha, constraints at position level (index 3), order 2."""
 
-    spectral_radius: float = number(0.9, at_least=0.0, at_most=1.0, doc="damping of high frequencies: 1 is none")
+    spectral_radius: float = number(0.9, at_least=0.0, at_most=1.0, doc="1: no numerical damping, 0: largest")
 
     def scheme(self) -> Scheme:
         return self._implicit({"generalizedAlpha.spectralRadius": self.spectral_radius})
@@ -115,7 +115,7 @@ _NEWTON_SHARE, _LEAST_NEWTON_TOLERANCE = 0.1, 1e-12
 class ExtrapolatedSettings(Settings):
     """The trapezoidal rule, constraints at velocity level (index 2), extrapolated within every sample interval."""
 
-    tolerance: float = number(3e-8, above=0.0, at_most=1e-2, unit="rad", doc="of the estimated error of each interval")
+    tolerance: float = number(3e-8, above=0.0, at_most=1e-2, unit="rad", doc="bound on the error of each interval")
 
     def scheme(self) -> Scheme:
         """The engine's Jacobian leaves out how the constraints' directions turn, so that Newton's method converges

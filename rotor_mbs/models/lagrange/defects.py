@@ -111,9 +111,9 @@ def fitted_rates(scene: Scene, time: Array, angles: Array) -> Array:
     """
     count = len(time)
     if count < FIT_ROWS:
-        raise InputError(f"{count} rows; allowed: at least {FIT_ROWS} where the rates are to be found from the angles")
+        raise InputError(f"{count} rows; allowed: at least {FIT_ROWS} to compute rates from angles")
     if not np.abs(angles).max() <= ANGLE_LIMIT:
-        raise InputError(f"angles over {ANGLE_LIMIT:g} rad are not resolved finely enough to find rates from")
+        raise InputError(f"angles over {ANGLE_LIMIT:g} rad: their rounding errors are too large to compute rates")
     moving = scene.moving_coordinates
     half = len(moving)
     rates = np.zeros_like(angles)
@@ -128,7 +128,7 @@ def fitted_rates(scene: Scene, time: Array, angles: Array) -> Array:
         states = np.hstack([angles[:, moving], rates[:, moving]])
         transitions = _transitions(scene, time, states)
         if transitions is None:
-            raise InputError("the rates cannot be found from the angles: the rows are too far apart for this motion")
+            raise InputError("the rates cannot be computed from the angles: the rows are too far apart for this motion")
         jumps = interval_ends(scene, time[:-1], time[1:], states[:-1]) - states[1:]
         # Away from the data's own states: row by row matrix @ (at the first row) + offset.
         matrices = [np.broadcast_to(np.eye(2 * half), (len(firsts), 2 * half, 2 * half))]
@@ -140,7 +140,7 @@ def fitted_rates(scene: Scene, time: Array, angles: Array) -> Array:
         design = np.concatenate([matrix[:, :half] * scale for matrix in matrices], axis=1)
         residual = np.concatenate([offset[:, :half] for offset in offsets], axis=1)
         if not (np.isfinite(design).all() and np.isfinite(residual).all()):
-            raise InputError("the rates cannot be found from the angles: errors grow without bound between the rows")
+            raise InputError("the rates cannot be computed from the angles: errors grow without bound between the rows")
         at_first = -np.einsum("kij,kj->ki", np.linalg.pinv(design), residual) * scale
         all_rows = np.stack(
             [np.einsum("kij,kj->ki", m, at_first) + offset for m, offset in zip(matrices, offsets, strict=True)]

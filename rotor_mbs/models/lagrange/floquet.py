@@ -94,7 +94,7 @@ def periodic_turn(scene: Scene, speed: float, guess: Turn | None = None) -> Turn
             torque, state = torque + change[0], state + np.concatenate([[0.0], change[1:]])
         if best is None or best.mismatch > _ACCEPTED:
             left = math.inf if best is None else best.mismatch
-            raise InputError(f"no periodic motion found: a turn ends {left:.3g} rad away from its start")
+            raise InputError(f"no periodic motion found: the state changes by {left:.3g} rad in a revolution")
     except InputError as exc:
         size = 2 * len(scene.moving_coordinates)
         nothing, matrix = np.full(size, np.nan), np.full((size, size), np.nan)

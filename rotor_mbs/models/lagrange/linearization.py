@@ -129,7 +129,7 @@ def _stationary(scene: Scene, speed: float, *, fixed_rotor: bool) -> Array:
             linear = linearize(scene, angles, [speed, *(0.0 for _ in scene.blades)], holding_torque(scene, speed))
             if np.abs(linear.residual).max() > 1e-9 * np.abs(linear.stiffness).max():
                 raise InputError(
-                    f"{scene.name}: the steady state at {speed:g} rad/s is lost in the rounding of the energies"
+                    f"{scene.name}: the steady state at {speed:g} rad/s is not resolved: rounding of the energies"
                 )
             return angles
         trial = angles.copy()

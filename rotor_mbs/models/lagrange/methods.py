@@ -21,13 +21,13 @@ _SOLVE_MANY = "rotor_mbs.models.lagrange.ensemble:solve_many"
 
 @dataclass(frozen=True)
 class TaylorSettings(Settings):
-    tolerance: float = number(_EPS, above=0.0, doc="of the local error, absolute and relative")
+    tolerance: float = number(_EPS, above=0.0, doc="tolerance of the local error, absolute and relative")
 
 
 @dataclass(frozen=True)
 class ReferenceSettings(Settings):
-    tolerance: float = number(1e-33, above=0.0, doc="of the run that is kept")
-    check_tolerance: float = number(1e-30, above=0.0, doc="of the run whose distance the uncertainty follows from")
+    tolerance: float = number(1e-33, above=0.0, doc="tolerance of the stored run")
+    check_tolerance: float = number(1e-30, above=0.0, doc="tolerance of the run for comparison")
 
 
 def _relative(default: float) -> Any:

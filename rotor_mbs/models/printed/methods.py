@@ -99,10 +99,10 @@ class PrintedModel:
         # Where in the paper the rotor's row and a pitch's stand, in the form that is run.
         if self._errata:
             left = " ".join(name.upper() for name, is_left in asdict(self._errata).items() if is_left)
-            return equation_items(scene, (f"(24)-(38) derived anew, {left} left in",) * 2)
+            return equation_items(scene, (f"(24)-(38) rederived, with {left}",) * 2)
         if len(scene.blades) == 1:
             return equation_items(scene, ("(33), rotor row", "(33), pitch row"))
-        rows = "(42)-(45), (52), (56) with its factor multiplied in", "(46)-(51), (53)-(56)"
+        rows = "(42)-(45), (52), (56) with its factor expanded", "(46)-(51), (53)-(56)"
         return equation_items(scene, rows)
 
     def build(self, scene: Scene, settings: Ode45Settings) -> PrintedSolver:
@@ -121,8 +121,8 @@ class PrintedModel:
         blade, name, count = scene.blades[0], self._name, len(scene.blades)
         x, y, z = blade.centre_of_mass
         refusals = {
-            f"{name} is printed for 1 or 3 blades, the scene has {count}": not self._errata and count not in (1, 3),
-            f"{name} needs blades that are all alike": any(other != blade for other in scene.blades),
+            f"{name} is for 1 or 3 blades, the scene has {count}": not self._errata and count not in (1, 3),
+            f"{name} requires equal blades": any(other != blade for other in scene.blades),
             f"{name} needs point-mass blades: no inertia about the centre of mass": not blade.is_point_mass,
             f"{name} needs the centre of mass in the blade's x-z plane: y = 0, not {y:g}": y != 0.0,
             f"{name} has no hub inertia: it must be 0, not {scene.hub_inertia:g}": scene.hub_inertia != 0.0,

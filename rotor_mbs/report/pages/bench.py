@@ -53,13 +53,13 @@ def bench_page(results: OpenResults) -> dict[str, object]:
     parts = []
     for i, (name, curves) in enumerate(scenes.items()):
         pictures = [
-            picture(diagram(curves), f"bench-{i}", "Run time of the integration alone: lower left is best"),
+            picture(diagram(curves), f"bench-{i}", "Run time of the integration: lower left is best"),
             picture(
-                diagram(curves, error="defect_max"), f"bench-{i}-defect", "The same by the defects of its intervals"
+                diagram(curves, error="defect_max"), f"bench-{i}-defect", "Largest interval defect against run time"
             ),
         ]
         if "is_short" not in curves[0].attributes:  # workers there keep what runs before have compiled
-            caption = "With set-up (everything compiled anew) and reading out of samples"
+            caption = "Including set-up (with compilation) and output of samples"
             pictures.append(picture(diagram(curves, with_setup=True), f"bench-{i}-setup", caption))
         orders = []
         for curve in curves:
@@ -93,7 +93,7 @@ def cost_section(scene: StoredScene, curves: Sequence[Record]) -> Section:
     notes = (
         []
         if curves
-        else ["Each point is a run of this file, timed while others ran beside it: good to a factor of two."]
+        else ["Each point is a run of this file, timed while other runs were active: accurate to a factor of two."]
     )
     return Section(pictures, notes=notes)
 
@@ -201,7 +201,7 @@ def overview_table(scenes: Mapping[str, Sequence[Record]]) -> PageTable:
                 second, slower = ranked[1]
                 note = f"second: {label_of(second.name)}, {number(slower.ratio)} times as long"
             else:
-                note = "no other was measured to there" if is_cut else "no other gets there"
+                note = "no other method was measured to this accuracy" if is_cut else "no other method reaches it"
             label = label_of(first.name)
             name = label if label == first.name else f"{label} ({first.name})"
             row.append(TableCell(f"{name}: {prefixed(reach.seconds, 's', 2)}", note=note))
@@ -254,15 +254,15 @@ def engine_tables(results: OpenResults, scenes: Mapping[str, Sequence[Record]]) 
     drift = f"energy drift in {durations[long]:g} s" if long else "energy drift"
     targets = [f"to {power(round(math.log10(target)))} rad" for target in _ENGINE_TARGETS]
     head = [
-        "method", "ok on scenes", "order seen", "smallest defect (rad)", "smallest error (rad)", *targets, drift,
-        "zero pitch", "failures called ok",
+        "method", "ok on scenes", "measured order", "smallest defect (rad)", "smallest error (rad)", *targets, drift,
+        "zero pitch", "failures reported as success",
     ]  # fmt: skip
     able_head = [
         "method", "joint damping", "load over time", "loads", "linearization", "engine", "lines of its file",
     ]  # fmt: skip
     return [
         PageTable("Accuracy and cost over all scenes", head, reached),
-        PageTable("What it computes: the smallest angle error (rad) where a scene has it", able_head, able),
+        PageTable("Capabilities: smallest angle error (rad) on the scenes with each load", able_head, able),
     ]
 
 
@@ -330,7 +330,7 @@ def _zero_pitch_cell(own: Mapping[str, Sequence[Record]]) -> TableCell | str:
     known = [value for array in values for value in array.tolist() if math.isfinite(value)]
     if not known:
         return NOTHING
-    return "kept" if not any(known) else TableCell("left", "bad", note=f"up to {with_unit(max(known), 'rad')}")
+    return "kept" if not any(known) else TableCell("lost", "bad", note=f"up to {with_unit(max(known), 'rad')}")
 
 
 def _false_success_cell(own: Mapping[str, Sequence[Record]], suite: Sequence[SuiteRun]) -> TableCell | str:
@@ -344,7 +344,7 @@ def _false_success_cell(own: Mapping[str, Sequence[Record]], suite: Sequence[Sui
     else:
         curves = [curve for of_scene in own.values() for curve in of_scene]
         claimed = sum(int(curve.arrays["false_success"].sum()) for curve in curves)
-        count, note = sum(int(work_precision.failed(curve).sum()) for curve in curves), "of the settings here"
+        count, note = sum(int(work_precision.failed(curve).sum()) for curve in curves), "on this page"
     if not count:
         return TableCell("no failure", note=note)
     return TableCell(f"{claimed} of {count}", "bad" if claimed else "", note=note)
@@ -360,7 +360,7 @@ def reach_table(curves: Sequence[Record]) -> PageTable:
         )
         count = work_precision.left_out(curve)
         if count:
-            note = f"{count} finer {'setting' if count == 1 else 'settings'} left out"
+            note = f"{count} finer {'setting' if count == 1 else 'settings'} omitted"
             missing = TableCell("not measured", note=note)
         row = [method_cell(curve.name)]
         for target in work_precision.TARGETS_RAD:
@@ -412,7 +412,7 @@ def failure_table(curves: Sequence[Record], stored: StoredScene | None = None) -
             except MethodRefusal as exc:
                 rows.append([method_cell(name), "", "", "cannot represent the scene", "", str(exc)])
     head = ["method", "setting", "run time", "status", "engine reported ok", "reason"]
-    caption = "Runs that failed, found from their state, and settings that the budget left out."
+    caption = "Failed runs, and settings omitted because of the time budget."
     return PageTable(caption, head, rows)
 
 

@@ -132,8 +132,8 @@ def check_page(opened: OpenResults) -> dict[str, object]:
             largest[key] = check
     sections = {
         "failures": ("Checks that fail", worst_first(failed)),
-        "nearest": ("The checks that pass by least", measured[:WORST]),
-        "all": ("The largest number seen of every check, method and bound", [*largest.values()]),
+        "nearest": ("Checks with the smallest margins", measured[:WORST]),
+        "all": ("Largest value for every check, method and bound", [*largest.values()]),
     }
     page: dict[str, object] = {"count": len(checks), "failed": len(failed)}
     for section, (caption, shown) in sections.items():
@@ -148,6 +148,6 @@ def check_page(opened: OpenResults) -> dict[str, object]:
                 number(check.margin, 3) if math.isfinite(check.margin) else NOTHING,
                 TableCell("pass", "good") if check.passed else TableCell("fail", "bad", note=check.hint),
             ])  # fmt: skip
-        head = ("Check", "Method", "Where", "Seen", "Bound", "Margin", "Outcome")
+        head = ("Check", "Method", "Where", "Value", "Bound", "Margin", "Outcome")
         page[section] = Section(tables=[PageTable(caption, head, rows)])
     return page

@@ -260,7 +260,7 @@ def _energy_section(drawn: Runs, horizon: float | None) -> Section:
     runs = {name: run for name, run in drawn.items() if "energy_error" in run}
     curves = over_time(runs, {name: run.array("energy_error") for name, run in runs.items()})
     shown = error_picture(
-        curves, "|energy error| (J)", "energy", "Energy error: change of total energy less work", horizon,
+        curves, "|energy error| (J)", "energy", "Energy error: change of total energy minus work", horizon,
         notes=["Filled marks: energy gained. Open marks: energy lost."], signed=True,
     )  # fmt: skip
     if not shown:

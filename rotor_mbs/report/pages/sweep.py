@@ -115,15 +115,15 @@ def _asked_picture(sweep: StoredSweep) -> tuple[Panels, str, str]:
     if _picture_kind(sweep) == "spread":
         spread = spread_of(sweep)
         line = (
-            f"Nearby starts part with the largest Lyapunov exponent {_rate(spread)} ({spread.pairs} pairs, "
+            f"Neighbouring trajectories separate with the largest Lyapunov exponent {_rate(spread)} ({spread.pairs} pairs, "
             f"{spread.start:.2f} to {spread.end:.2f} s)."
         )
-        return spread_panels(spread), "Separation of nearby starts", line
+        return spread_panels(spread), "Separation of neighbouring trajectories", line
     start = parse_scene(str(sweep.attributes["scene_toml"]), str(sweep.attributes["base_scene"])).initial_angles
     growth = stability_map(sweep, max(map(abs, start[1:]), default=0.0))
     y_label, x_label = (_axis(field_name(key), sweep.columns[parameter_name(key)].units) for key in sweep.keys)
     line = f"The pitches grow {GROWN:g}-fold in {growth.unstable.sum()} of {growth.growth.size} runs."
-    caption = "Growth of the pitches: the largest pitch of a run, of the largest at its start"
+    caption = "Growth of the pitches: largest pitch of a run, divided by the largest initial pitch"
     return map_panels(growth, x_label, y_label), caption, line
 
 
@@ -265,7 +265,7 @@ def spread_of(sweep: StoredSweep) -> Spread:
         difference = angles[1 : 2 * pairs : 2].astype(float) - angles[0 : 2 * pairs : 2]
         parts.append(np.sqrt((difference[both] ** 2).sum(axis=2)))
     if not sum(map(len, parts)):
-        raise InputError("spread: no pair of runs ended well; allowed: a sweep with two or more such runs")
+        raise InputError("spread: no pair of complete runs; allowed: a sweep with two or more complete runs")
     separations = np.concatenate(parts)
     low, median, high = np.percentile(separations, [10.0, 50.0, 90.0], axis=0)
     growth = np.exp(np.log(np.maximum(separations, np.finfo(float).tiny)).mean(axis=0))
@@ -286,7 +286,7 @@ def lyapunov_exponent(time: Array, growth: Array) -> tuple[float, float, float, 
     if last - first < 2 * _BLOCKS:
         raise InputError(
             f"spread: the growth from {growth[0]:.1e} rad has {max(last - first, 0)} samples of exponential growth; "
-            f"allowed: at least {2 * _BLOCKS}, from {_TURNED:g} times the start to {_SMALL:g} rad"
+            f"allowed: at least {2 * _BLOCKS}, from {_TURNED:g} times the initial separation to {_SMALL:g} rad"
         )
     ends = np.linspace(first, last, _BLOCKS + 1).round().astype(int)
     rates = np.diff(np.log(growth[ends])) / np.diff(time[ends])
@@ -313,9 +313,9 @@ def stability_map(sweep: StoredSweep, start: float) -> StabilityMap:
     """start: the largest pitch at the start, rad. Raises InputError where the sweep is no grid of two axes."""
     shape = json.loads(sweep.attributes["shape"])  # values along every axis of the grid, slowest first
     if len(shape) != 2 or len(sweep.keys) != 2:
-        raise InputError(f"map: {len(sweep.keys)} axes; allowed: a grid of two axes, by one method")
+        raise InputError(f"map: {len(sweep.keys)} axes; allowed: a grid of two axes, with one method")
     if not start > 0.0:
-        raise InputError("map: every pitch starts at zero and nothing could grow; allowed: a small pitch at the start")
+        raise InputError("map: all initial pitches are zero and cannot grow; allowed: a small initial pitch")
     rows, columns = shape
     y, x = (sweep.column(parameter_name(key))[: rows * columns].reshape(rows, columns) for key in sweep.keys)
     largest = sweep.column("pitch_max")[: rows * columns].reshape(rows, columns)
