@@ -141,7 +141,7 @@ def _copies(scene: StoredScene, bounds: Bounds) -> list[Check]:
     if not pairs:
         where = Where(scene.name, "*", "all")
         return [make_check(bounds, "copied", where, 0.0, "columns", "no two runs are bitwise identical")]
-    hint = "{} is that of {} bit for bit: data stored, or read, under another method's name"
+    hint = "{} is bitwise equal to that of {}: data stored or read under the name of another method"
     return [
         _of(run, "copied", place, 1.0, bounds, "columns", hint.format(place, other))
         for (run, other), place in pairs.items()
@@ -213,7 +213,7 @@ def _of_run(
             growth = solution.trajectory.error_growth
             known = np.isfinite(own_growth) & (own_growth < HORIZON_GROWTH)
             off = float(np.abs(np.log(growth[known] / own_growth[known])).max(initial=0.0))
-            hint = "the horizon that follows from it is not that of its own samples"
+            hint = "the stored horizon is not that computed from the samples"
             yield Check("growth", Where(run.scene, run.method, "of the samples"), off, _OWN_GROWTH, hint, "log")
 
 
@@ -339,7 +339,7 @@ def steps_off(scene: Scene, run: StoredRun, name: str) -> tuple[float, str] | No
         if known is None or name not in known["steps"] or not same_settings(run.settings, known["settings"]):
             return None
         expected = known["steps"][name]
-    return abs(float(steps) / expected - 1.0), f"{steps} steps, {expected} by settings and duration"
+    return abs(float(steps) / expected - 1.0), f"{steps} steps, {expected} expected from settings and duration"
 
 
 def same_settings(settings: Mapping[str, object], expected: Mapping[str, object]) -> bool:
@@ -371,7 +371,7 @@ def _of_samples(run: StoredRun, bounds: Bounds, scene: Scene, recorded: Solution
     if trajectory.energy_error is not None:
         own = energy_error(trajectory)
         off = math.nan if own is None else float(np.abs(trajectory.energy_error - own).max())
-        hint = "the balance is not that of the stored energies"
+        hint = "differs from the balance of the stored energies"
         scale = energy_scale(scene, trajectory) or 1.0
         yield _of(run, "energies", "energy error", off / scale, bounds, "of scale", hint)
     if scene.wants("rates") and trajectory.kinetic_energy is not None:
@@ -385,7 +385,7 @@ def _of_samples(run: StoredRun, bounds: Bounds, scene: Scene, recorded: Solution
             "work at the start": (None if work is None else work[:1], np.zeros(1)),
         }
         scale = max(energy_scale(scene, trajectory), float(np.abs(kinetic).max())) or 1.0
-        hint = "its own angles and rates give another energy: a mass, an inertia, a spring"
+        hint = "its angles and rates give a different energy: a mass, an inertia, a spring"
         for name, (stored, own) in formulas.items():
             if stored is not None and own is not None:
                 off = float(np.abs(stored - own).max()) / scale
@@ -411,7 +411,7 @@ def _of_corrected_model(
         yield _of(run, "energy", "balance", drift, bounds, "of scale", hint)
     for channel in ("angular", "linear"):
         if (name := f"{channel}_impulse_error_max") in metrics:
-            hint = "momentum less the impulses of torque, weights and bearing: a force, an inertia, or too long a step"
+            hint = "momentum minus the impulses of torque, weights and bearing: a force, an inertia, or too long a step"
             yield _of(run, "impulse", channel, metrics[name], bounds, "of scale", hint)
     yield from _of_quantities(run, bounds, scene, metrics)
     exact = exact_rotor_angle(scene, trajectory.time) if scene.wants("angles") else None

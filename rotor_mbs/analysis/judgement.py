@@ -156,7 +156,7 @@ def _broken_off(scene: Scene, run: Solution) -> tuple[str, str]:
         return "timed_out", f"{integration.message}, {reached}"
     reported = integration.message or ("the engine reported success" if integration.success else "no reason given")
     if smallest_rotor_inertia_share(scene, run.trajectory) < _SINGULAR_SHARE:
-        return "singular", f"every pitch at ±π/2 leaves the rotor almost no inertia, {reached}; {reported}"
+        return "singular", f"with all pitches at ±π/2 the rotor has almost no inertia, {reached}; {reported}"
     if integration.success:
         end = f" after {reached.removeprefix('at ')}" if samples else ""
         return "diverged", f"no finite sample{end}; {reported}"
@@ -167,7 +167,7 @@ def _through_singularity(scene: Scene, run: Solution, reference: Trajectory | No
     """Complete runs of scenes without a solution: from a singular state, or past the time where the solution ends."""
     share = rotor_inertia_shares(scene, run.trajectory.angles[:1])[0]
     if share < _NO_INERTIA:
-        return "singular", "every pitch at ±π/2 leaves the rotor no inertia, from the start on"
+        return "singular", "with all pitches at ±π/2 the rotor has no inertia, from the start"
     if reference is None or not 0 < len(reference.time) < scene.samples:
         return "", ""
     if smallest_rotor_inertia_share(scene, reference) < _SINGULAR_SHARE:
@@ -192,7 +192,7 @@ def _inaccurate(scene: Scene, run: Solution, metrics: Metrics) -> tuple[str, str
     if "defect_max" in metrics and not metrics["defect_judged"] <= defect:
         largest = f"defect {metrics['defect_max']:.1e} rad in the interval up to t = {metrics['defect_time']:.6g} s"
         if metrics["defect_judged"] < 0.5 * metrics["defect_max"]:
-            largest += f", {metrics['defect_judged']:.1e} rad per 0.01 s without growth"
+            largest += f", {metrics['defect_judged']:.1e} rad per 0.01 s and unit of error growth"
         return "inaccurate", f"{largest}, allowed {defect:.0e}"
     error = largest_angle_error(metrics)
     if not error <= OK_ERROR + start_slack(scene):
@@ -200,7 +200,7 @@ def _inaccurate(scene: Scene, run: Solution, metrics: Metrics) -> tuple[str, str
         growth = (
             ", because the motion amplifies small errors" if error > _GROWN * metrics.get("defect_max", error) else ""
         )
-        return "inaccurate", f"{how} {error:.1e} rad up to the horizon{growth}; ok is up to {OK_ERROR:g} rad"
+        return "inaccurate", f"{how} {error:.1e} rad up to the horizon{growth}; allowed {OK_ERROR:g} rad"
     return "ok", ""
 
 
@@ -212,10 +212,13 @@ def _unchecked(run: Solution, metrics: Metrics) -> tuple[str, str]:
     """Complete runs with nothing to judge them by."""
     largest = float(np.abs(run.trajectory.angles).max())
     if largest > ANGLE_LIMIT:
-        return "unchecked", f"angles of {largest:.1e} rad; above {ANGLE_LIMIT:.0e} rad a double has too few digits"
+        return (
+            "unchecked",
+            f"angles of {largest:.1e} rad; above {ANGLE_LIMIT:.0e} rad double precision is not sufficient",
+        )
     if any(name in metrics for name in _CHECKS):
         return "ok", ""
-    return "unchecked", "cannot be judged: its outputs lack the energy, and angles or rates"
+    return "unchecked", "cannot be assessed: no energies, and no angles or rates"
 
 
 def start_slack(scene: Scene) -> float:

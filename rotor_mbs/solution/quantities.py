@@ -177,7 +177,7 @@ def _load(name: str, dimensions: tuple[str, ...], long_name: str, title: str, lo
         check="loads",
         channel=name.replace("_", " "),
         unit="of the largest",
-        fault=f"{name.replace('_', ' ')} off by {{value}} of the largest load from what its own motion gives",
+        fault=f"{name.replace('_', ' ')} differs by {{value}} of the largest load from the closed form at its state",
         look_at=look_at,
     )
     plot = Plot(title, "force (N)" if is_force else "moment (N m)")
@@ -228,7 +228,7 @@ _JOINT_GAP = QuantityMetric(
     bound=0.0,  # of a model without joints that can open
     channel="joints",
     unit="of arm",
-    fault="a joint opens by {value} of the longest arm",
+    fault="joint gap of {value} of the longest arm",
     look_at="a joint of the chain that is not constrained, or its marker",
 )
 

@@ -122,7 +122,7 @@ def compare_with_reference(
     if not len(place):
         raise InputError(
             f"{data.source}: no row within the {scene.duration:g} s of {scene.name}; allowed: times in s from its "
-            f"start; `offset = {-data.time[0]:.6g}` of the time, in a mapping file, makes the first row the start"
+            f"start; `offset = {-data.time[0]:.6g}` of the time in a mapping file shifts the first row to the start"
         )
     carried = carried_errors(run, exact.growth, exact.units)[place][:, data.columns]
     at_rows = Trajectory(run.time[place], run.angles[place], run.rates[place], error_growth=run.error_growth[place])
@@ -194,14 +194,14 @@ def compare_with_reference(
     ]
     if status != "ok" and not likely and apart and data.time[0] == 0.0:
         start_text = f"initial state differs, in rad and rad/s: {', '.join(apart)}"
-        notes.append(f"{start_text}; another scene, start or unit?")
+        notes.append(f"{start_text}; another scene, initial state or unit?")
     if status == "ok" and likely:
-        notes.append(f"within {tolerance:g} rad an interval, but not random")
+        notes.append(f"within {tolerance:g} rad per interval, but correlated")
     if loads.channels:
         loads = loads.rows(slice(rows))
         own = np.full((rows, len(loads.channels)), np.nan)
         if defects is None:
-            notes.append("no loads: the motion that they belong to is not known")
+            notes.append("loads are not compared: their motion is unknown")
             status, message = ("unchecked", notes[-1]) if status == "ok" else (status, message)
         else:
             found = compare_loads(scene, loads, defects, tolerance)
@@ -364,7 +364,7 @@ def _energy(scene: Scene, data: ForeignData, reference: Trajectory) -> tuple[flo
     if set(data.columns) != set(range(2 * count)):
         return None, "no energy balance: not all angles and rates are given"
     if work_is_integrated(scene):
-        return None, "no energy balance: the work of dampers or of loads that change is not known"
+        return None, "no energy balance: the work of dampers or changing loads is unknown"
     states = states_of(reference).copy()
     states[:, data.columns] = data.values
     moving = scene.moving_coordinates
@@ -381,13 +381,13 @@ def _uncovered(
     time, end = data.time, min(scene.duration, float(exact.trajectory.time[-1]))
     step = float(np.diff(time).max(initial=0.0))
     if time[-1] < end - 1.5 * step:
-        return "inaccurate", f"the data end at t = {time[-1]:.6g} s of {end:g} s: the rest is not known"
+        return "inaccurate", f"the data end at t = {time[-1]:.6g} s of {end:g} s"
     if time[0] > 1.5 * step:
-        return "inaccurate", f"the data begin at t = {time[0]:.6g} s: what was before is not known"
+        return "inaccurate", f"the data begin at t = {time[0]:.6g} s, not at 0"
     if until < _FEWEST:
         return "unchecked", f"{until} rows up to the horizon: too few to be compared"
     if defects is not None and not defects.is_judged[until - 1 :].all():
         long = until - 1 + int(np.argmin(defects.is_judged[until - 1 :]))
         since = f"the first after t = {defects.time[long]:.6g} s"
-        return "unchecked", f"beyond the horizon the rows are too far apart to be judged, {since}"
+        return "unchecked", f"after the horizon the rows are too far apart to be checked, {since}"
     return None

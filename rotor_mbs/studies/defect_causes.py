@@ -308,10 +308,10 @@ class DefectCauses:
             rest = float(np.linalg.norm(angles - share * rates))
             if -_NEARLY <= share <= 1.0 + _NEARLY and rest <= _NEARLY * float(np.linalg.norm(rates)):
                 return f"a jump of rates, or a load of one interval, before t = {end:.6g} s"
-            return f"the motion goes on from another state after t = {end:.6g} s"
+            return f"the motion continues from another state after t = {end:.6g} s"
         if acting:
             amounts = " and ".join(f"{loads[:, i].mean():+.3g} N m on the {self._label(i)}" for i in acting)
-            return f"a load that is wrong or missing from t = {start:.6g} to {end:.6g} s: on the average {amounts}"
+            return f"a load that is wrong or missing from t = {start:.6g} to {end:.6g} s: on average {amounts}"
         largest = int(np.abs(values).max(axis=0).argmax()) % half
         return f"a fault from t = {start:.6g} to {end:.6g} s, largest in the {self._label(largest)}"
 

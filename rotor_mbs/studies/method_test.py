@@ -125,7 +125,7 @@ class _Examination:
             scene = replace(only_scene(name), duration=duration, samples=samples, outputs=("angles", "rates", "energy"))
             self._scene(scene, allowance)
         able = [name for name in SCENES if name not in self._refused]
-        self._add("builds", "all", float(not able), 0.0, "refuses every scene")
+        self._add("builds", "all", float(not able), 0.0, "rejects every scene")
         for name in EXACT:
             self._exact(replace(only_scene(name), duration=1.0, samples=11, outputs=("angles", "rates")))
         if _SMOOTH in able:
@@ -163,7 +163,7 @@ class _Examination:
         if not self._add("samples", scene.name, float(bool(fault)), 0.0, fault):
             return
         if scene.name == _SMOOTH:
-            hint = "the same solver run again gives other numbers: state kept between runs, or chance"
+            hint = "a repeated run gives different numbers: state kept between runs, or randomness"
             self._add("determinism", scene.name, float(not answer.is_repeated), 0.0, hint)
         run = answer.trajectory
         defects = defects_of(scene, run)
@@ -174,7 +174,7 @@ class _Examination:
             self._reason = self._cause(scene, run, defects, size)
         self._add("defect", scene.name, size, allowance * self._bound, self._reason, "rad")
         if "energy_drift_max" in metrics:
-            hint = "energies or work, where the defects pass; else as they say"
+            hint = "energies or work, if the defects pass; otherwise see the defects"
             bound = allowance * self._energy + energy_slack(scene, run)
             self._add("energy", scene.name, metrics["energy_drift_max"], bound, hint, "of scale")
 
@@ -190,7 +190,7 @@ class _Examination:
                 # Where the order is lower in a few intervals alone, something is wrong there.
                 is_everywhere = float(defects.sizes.max()) < _STANDS_OUT * float(np.median(defects.sizes))
                 if seen > order - 0.5 or (seen > _FOLLOWS_STEP and is_everywhere):
-                    return f"its step of {step:g} s: half of it leaves {left:.1e} rad, order {seen:.1f}"
+                    return f"step of {step:g} s too large: half the step gives {left:.1e} rad, order {seen:.1f}"
         try:
             data = load_data({"time": run.time, "angles": run.angles, "rates": run.rates}, scene)
             likely = compare_with_reference(data, scene, _STRICT).verdict.likely
@@ -229,7 +229,7 @@ class _Examination:
             others = np.hstack([others[:, :1] + turn, others[:, 2:], others[:, 1:2]])
         for check, there in (("mirror image", image * sign if len(image) else image), ("renumbered", others)):
             error = np.abs(angles - there).max() if angles.shape == there.shape and len(angles) else np.inf
-            hint = self._reason or "blades or signs are not treated alike"
+            hint = self._reason or "blades or signs are treated differently"
             self._add(check, scene.name, error, 10.0 * scene.samples * self._bound, hint, "rad")
 
     def _order(self, scene: Scene) -> None:
@@ -245,7 +245,7 @@ class _Examination:
         order = fitted_order(np.array(steps), np.array(sizes)) if steps else None
         if order is not None:
             claimed = self._method.order
-            hint = f"order {order:.2f} seen, {claimed:g} claimed"
+            hint = f"measured order {order:.2f}, expected {claimed:g}"
             self._add("order", scene.name, max(claimed - order, 0.0), _ORDER_BAND, hint, "below")
 
     def _stops(self, scene: Scene) -> None:

@@ -78,7 +78,7 @@ def test_plug_ins_that_cannot_be_used_are_left_out_with_one_line_each(
         "plug-in a of no_such_module:METHOD", "plug-in b of made_up:MISSING", "plug-in c of made_up:np",
         "plug-in d of made_up:TAKEN: method lagrange/taylor", "plug-in x of own_exit:X",
     ]  # fmt: skip
-    assert "left out: SystemExit: 3" in caplog.text
+    assert "omitted: SystemExit: 3" in caplog.text
 
 
 def test_reading_a_built_in_method_imports_no_plug_in(site: Path) -> None:

@@ -173,7 +173,7 @@ def test_items_are_what_the_scene_needs():
     ("given", "word"),
     [
         (replace(FIG11, blades=(BLADE,) * 2, initial_angles=(0.0,) * 3, initial_rates=(0.0,) * 3), "1 or 3 blades"),
-        (replace(FIG11, blades=(BLADE, BLADE, replace(BLADE, mass=1.0))), "alike"),
+        (replace(FIG11, blades=(BLADE, BLADE, replace(BLADE, mass=1.0))), "equal"),
         (replace(FIG11, blades=(replace(BLADE, inertia=(1.0, 1.0, 1.0, 0.0, 0.0, 0.0)),) * 3), "point-mass"),
         (replace(FIG11, blades=(replace(BLADE, centre_of_mass=(C, 0.1, D)),) * 3), "y = 0"),
         (replace(FIG11, hub_inertia=1.0), "hub inertia"),

@@ -56,13 +56,13 @@ def test_models_are_compared_in_numbers(tmp_path: Path) -> None:
         table, _ = scene_table(opened.scenes, dict.fromkeys(opened.scenes, "x.html"), "Model")
     head = [cell if isinstance(cell, str) else cell.note for cell in table.head]
     row, same = (dict(zip(head, row, strict=True)) for row in table.rows)
-    assert row["Printed: 0.05 rad off from (s)"] == "2.50"
+    assert row["Printed: 0.05 rad apart at (s)"] == "2.50"
     assert row["Printed: largest difference (rad)"] == "0.20"
     assert str(row["Printed: energy gain"]).replace("\N{NO-BREAK SPACE}", " ") == "2.00 kJ"
     error = row["exudyn_tree/rk67"]
     assert isinstance(error, TableCell)
     assert (error.text, error.shade[:3]) == ("1.0×10⁻⁸", "n h")
-    assert (same["Printed: 0.05 rad off from (s)"], same["Printed: largest difference (rad)"]) == ("never", "0")
+    assert (same["Printed: 0.05 rad apart at (s)"], same["Printed: largest difference (rad)"]) == ("never", "0")
 
 
 def test_a_figure_has_three_pictures_its_scene_and_the_published_number(drawn: Path, tmp_path: Path) -> None:
@@ -72,7 +72,7 @@ def test_a_figure_has_three_pictures_its_scene_and_the_published_number(drawn: P
     assert section is not None
     assert section[0].count("<figure>") == section[0].count('role="img"') == 3
     assert ">2.7315<" in section[0]
-    assert "at the start pi/6, pi/4, pi/6, pi/2 rad and pi/10, 0, 0, 0 rad/s" in section[0]
+    assert "initial state pi/6, pi/4, pi/6, pi/2 rad and pi/10, 0, 0, 0 rad/s" in section[0]
     assert section[0].count('data-kind="svg"') == section[0].count('data-kind="png"') == 3
     # Fig. 13a is the same run; 13b is not in the file.
     figure_13 = re.search(r'<section id="figure-13".*?</section>', text, re.S)

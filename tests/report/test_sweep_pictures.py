@@ -132,7 +132,7 @@ def test_the_figures_show_what_was_found() -> None:
         found = StabilityMap(np.array([1.0, 2.0]), np.array([3.0, 4.0]), np.array(rows))
         panels = map_panels(found, "kx (rad)", "ky (N)")
         assert (panels.axes[0].get_xlabel(), panels.axes[0].get_ylabel()) == ("kx (rad)", "ky (N)")
-        assert list(panels.labelled()) == (["10 times its start"] if crosses else [])
+        assert list(panels.labelled()) == (["10 times the initial pitch"] if crosses else [])
 
 
 def test_a_distribution_rises_from_none_to_all_runs() -> None:

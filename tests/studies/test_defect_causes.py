@@ -131,14 +131,14 @@ PATTERNS: dict[str, tuple[Callable[[], Rows], str]] = {
     ),
     "missing": (
         driven((0.5, JUMP), (0.7, 0.0), (0.8, JUMP)),
-        "a load that is wrong or missing from t = 0.7 to 0.8 s: on the average -5e+04 N m on the rotor",
+        "a load that is wrong or missing from t = 0.7 to 0.8 s: on average -5e+04 N m on the rotor",
     ),
     "two loads at once": (
         lambda: run(replace(
             SCENE, rotor_torque=steps((0.5, JUMP), (0.7, 2.0 * JUMP), (0.8, JUMP)),
             pitch_torque=(steps(), steps(), BESIDE),
         )),
-        "a load that is wrong or missing from t = 0.7 to 0.8 s: on the average +5e+04 N m on the rotor and +100 N m on "
+        "a load that is wrong or missing from t = 0.7 to 0.8 s: on average +5e+04 N m on the rotor and +100 N m on "
         "the pitch 3",
     ),
 }  # fmt: skip

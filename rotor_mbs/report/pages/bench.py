@@ -119,7 +119,7 @@ def diagram(
     front = work_precision.pareto(errors, seconds)
     if len(front) > 1:
         axes.plot(
-            np.maximum(errors[front], _LOWEST_ERROR), seconds[front], label="best of all (Pareto front)",
+            np.maximum(errors[front], _LOWEST_ERROR), seconds[front], label="Pareto front of all methods",
             color=_FRONT_COLOUR, linewidth=6.0, solid_capstyle="round", zorder=0.5,
         )  # fmt: skip
     times = [seconds]
@@ -168,7 +168,7 @@ def diagram(
     known = known[np.isfinite(known) & (known > 0.0)]
     shortest, longest = (known.min(), known.max()) if len(known) else (1e-3, 1.0)
     canvas.log_axis(axes, 10.0 ** math.floor(math.log10(shortest)), longest)
-    axes.set_ylabel("set-up, run and read-out (s)" if with_setup else "run time (s)")
+    axes.set_ylabel("set-up, run and output (s)" if with_setup else "run time (s)")
     return panels
 
 
@@ -356,7 +356,7 @@ def reach_table(curves: Sequence[Record]) -> PageTable:
     for curve in curves:
         errors = curve.arrays["angle_error_max"][work_precision.succeeded(curve)]
         missing = TableCell(
-            NOTHING, note=f"{with_unit(errors.min(), 'rad')} at best" if len(errors) else "no run to the end"
+            NOTHING, note=f"{with_unit(errors.min(), 'rad')} at best" if len(errors) else "no complete run"
         )
         count = work_precision.left_out(curve)
         if count:

@@ -134,7 +134,7 @@ def scene_table(scenes: Scenes, files: Mapping[str, str], model: str) -> tuple[P
             if run.status not in GOOD:
                 mark = OUTCOMES[run.status][0]
                 marks[mark] = status_text(run)
-            title = f"{label_of(method)}: {'no error known' if error is None else number(error)}, {status_text(run)}"
+            title = f"{label_of(method)}: {'error unknown' if error is None else number(error)}, {status_text(run)}"
             row.append(TableCell(f"{number(error)} {mark}".rstrip(), shade=shade, title=title))
         sides = {side: run for side, run in run_selection.sides(scene).items() if "angles" in run}
         parted = largest = None
@@ -149,7 +149,7 @@ def scene_table(scenes: Scenes, files: Mapping[str, str], model: str) -> tuple[P
             row.append("" if run is None else number(float(np.abs(run.array("angles")[:, 1:]).max(initial=0.0))))
         rows.append(row)
     head = (
-        "Scene", "Figure", "Compared (s)", *map(method_cell, methods), f"Printed: {VISIBLE:g} rad off from (s)",
+        "Scene", "Figure", "Compared (s)", *map(method_cell, methods), f"Printed: {VISIBLE:g} rad apart at (s)",
         "Printed: largest difference (rad)", "Printed: energy gain", "Printed: largest pitch (rad)",
         f"{model}: largest pitch (rad)",
     )  # fmt: skip

@@ -143,7 +143,7 @@ def errata_page(report: Report) -> dict[str, object]:
     # What each erratum alone does.
     effects_head = ["Scene"]
     for erratum in errata_methods():
-        for what in ("angle change to the horizon (rad)", "whole run (rad)", "energy gain"):
+        for what in ("angle change up to the horizon (rad)", "whole run (rad)", "energy gain"):
             effects_head.append(f"{erratum}: {what}")
     effects: list[Row] = []
     for name, scene in report.scenes.items():

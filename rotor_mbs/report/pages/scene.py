@@ -32,7 +32,7 @@ from rotor_mbs.solution.trajectory import Array
 Runs = Mapping[str, StoredRun]
 VISIBLE = 0.05  # rad: what one can see in a figure of the paper's size
 MAX_PUBLISHED = 2  # published values on one picture
-COMMAND, TAKEN = Look(GREY, ":", "", "command"), Look(VERMILLION, "--", "", "taken by the shaft's damper")
+COMMAND, TAKEN = Look(GREY, ":", "", "command"), Look(VERMILLION, "--", "", "dissipated by the shaft damper")
 EXTREMES = ("rotor_angle_min", "rotor_angle_max", "rotor_rate_max")
 
 
@@ -246,7 +246,7 @@ def _difference_section(scene: StoredScene, drawn: Runs, horizon: float | None) 
     for method, run in {REFERENCE: reference, **runs}.items():
         if "angle_uncertainty" in run and run.array("angle_uncertainty").max() > LOWEST:
             colour, line = (GREY, "-") if method == REFERENCE else (look_of(method).colour, ":")
-            look = Look(colour, line, "", f"{label_of(method)}: its uncertainty")
+            look = Look(colour, line, "", f"{label_of(method)}: uncertainty")
             others.append(Series(run.array("time"), run.array("angle_uncertainty"), look))
     differences = {method: angle_difference(run, reference) for method, run in runs.items() if "angles" in run}
     return Section(error_picture(
@@ -294,7 +294,7 @@ def _drive_section(scene: Scene, run: StoredRun | None) -> Section:
         numbers += [("Torque on the rotor", torque, "N m"), ("Its power", powers[0].values, "W")]
         if scene.shaft_damping:
             powers.append(Series(time, scene.shaft_damping * rates[:, 0] ** 2, TAKEN))
-            numbers.append(("Taken by the shaft's damper", powers[1].values, "W"))
+            numbers.append(("Dissipated by the shaft damper", powers[1].values, "W"))
         torques = [Series(time, torque, look)]
         drawn["Rotor torque and its power"] = [("torque (N m)", torques), ("power (W)", powers)]
     driven = [i for i in range(len(scene.blades)) if any(scene.pitch_load(i))]

@@ -40,7 +40,7 @@ def stability_page(report: Report) -> dict[str, object]:
             run = own[method]
             symbol, text = OUTCOMES[run.outcome]
             if run.false_success:
-                symbol, text = f"{symbol}!", f"{text}; its engine claims success"
+                symbol, text = f"{symbol}!", f"{text}; the engine reported success"
             title = f"{label_of(method)}: {text}. {run.message}".strip()
             row.append(TableCell(symbol, shade=f"mark {run.outcome}", title=title))
         if scene not in fastest:

@@ -115,7 +115,7 @@ def _asked_picture(sweep: StoredSweep) -> tuple[Panels, str, str]:
     if _picture_kind(sweep) == "spread":
         spread = spread_of(sweep)
         line = (
-            f"Neighbouring trajectories separate with the largest Lyapunov exponent {_rate(spread)} ({spread.pairs} pairs, "
+            f"Neighbouring trajectories: largest Lyapunov exponent {_rate(spread)} ({spread.pairs} pairs, "
             f"{spread.start:.2f} to {spread.end:.2f} s)."
         )
         return spread_panels(spread), "Separation of neighbouring trajectories", line
@@ -191,8 +191,8 @@ def spread_panels(spread: Spread) -> Panels:
 
 def map_panels(growth: StabilityMap, x_label: str, y_label: str) -> Panels:
     """Growth of the pitches as colour over both axes, and the line where they grew tenfold, if there is one."""
-    labels = (x_label, y_label, "largest pitch, of its start (powers of ten)")
-    boundary = (GROWN, f"{GROWN:g} times its start")
+    labels = (x_label, y_label, "largest pitch / initial pitch (powers of ten)")
+    boundary = (GROWN, f"{GROWN:g} times the initial pitch")
     panels_of_map = growth_map(growth.x, growth.y, growth.growth, labels, _MAX_GROWTH, boundary)
     panels_of_map.axes[0].ticklabel_format(style="plain")
     return panels_of_map

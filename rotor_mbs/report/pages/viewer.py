@@ -55,7 +55,7 @@ def viewer(stored: StoredScene, runs: Mapping[str, StoredRun]) -> dict[str, Any]
         largest = float(np.abs(np.diff(angles_at(time, angles, step), axis=0)).max(initial=0.0))
         if largest > _COARSE:
             turned = f"{with_capital(name)} turns by up to {with_unit(largest, 'rad')} from one frame to the next"
-            notes.append(f"{turned}: in between the picture goes evenly.")
+            notes.append(f"{turned}: the animation interpolates linearly in between.")
     return {"data": script_json(data), "models": list(moves), "magnified": magnification(scene), "notes": notes}
 
 
