@@ -1,14 +1,14 @@
-"""rotor_mbs: scenes of a bladed rotor by independent models, compared with a reference, and with a published paper.
+"""Simulation of wind-turbine rotors with independent models, compared with a reference and a published paper.
 
-The Python API. Everything is loaded when it is first used: importing this package imports nothing else.
+This is the Python API. Modules are loaded on first use.
 
-    scenes, scene, load      names of the shipped scenes; one of them; a scene of one's own from a TOML file
-    run                      one scene by one method: a `Run`; by several, judged by its reference: `Runs`
-    sweep                    one scene over the values of its parameters: `Runs`
-    compare                  a trajectory of another program against a scene's reference: a `DataComparison`
-    export                   a scene for MuJoCo or Exudyn, or its reference as CSV
-    modes                    natural frequencies, damping and shapes over rotor speed: `Modes`
-    open                     the `Runs` in a file: of scenes, or of a sweep
+    scenes, scene, load      names of the shipped scenes; a shipped scene; a scene from a TOML file
+    run                      simulate a scene with one method (`Run`) or several (`Runs`)
+    sweep                    run a parameter study (`Runs`)
+    compare                  compare data of another program with a scene (`DataComparison`)
+    export                   export a scene for MuJoCo or Exudyn, or its reference as CSV
+    modes                    natural frequencies, damping and mode shapes over rotor speed (`Modes`)
+    open                     open the runs of a results file or a sweep (`Runs`)
 
 Examples
 --------

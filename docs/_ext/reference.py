@@ -94,7 +94,7 @@ def _pages_of_api() -> dict[str, str]:
             else:
                 directive = f".. autofunction:: {place}"
             pages[f"api/{name}"] = page(f"{name}", fenced(directive, "{eval-rst}"))
-        parts += [f"## {heading}", table(["name", "what"], rows)]
+        parts += [f"## {heading}", table(["name", "description"], rows)]
     toctree = fenced(":hidden:\n\n" + "\n".join(sorted(pages)), "{toctree}")
     pages["api"] = page("Python API", *parts, toctree)
     return pages
@@ -203,7 +203,7 @@ def _scene_file() -> str:
     return page(
         "Scene file",
         "A TOML file. `a.b` is the key `b` of the table `[a]`. "
-        f"A number may be arithmetic in quotes: {keys.ALLOWED}; it is parsed, never run as code.",
+        f"A number may be arithmetic in quotes: {keys.ALLOWED}; it is parsed, not executed as code.",
         "## Keys",
         _keys(top),
         "## Blades",
@@ -218,12 +218,12 @@ def _scene_file() -> str:
 def _sweep_file() -> str:
     return page(
         "Sweep file",
-        "A TOML file. Numbers as in a [scene file](scene-file.md); see [parameter studies](../sweeps.md) for its use.",
+        "A TOML file with numbers as in a [scene file](scene-file.md); see [parameter studies](../sweeps.md).",
         "## Keys",
         _keys(keys.declared_keys(SweepTable)),
         "## `[[axis]]`",
         _keys(keys.declared_keys(Axis), "axis."),
-        "Exactly one of them beside `key`. A table for `linear` and `log` has:",
+        "Exactly one of these is required beside `key`. A table for `linear` and `log` has:",
         _keys(keys.declared_keys(Range)),
     )
 
@@ -242,14 +242,14 @@ def _scenes() -> str:
 
 
 def _methods() -> str:
-    parts = ["`--set NAME=VALUE`, or `[settings]` in a scene file, changes a setting."]
+    parts = ["A setting is changed by `--set NAME=VALUE` or by `[settings]` in a scene file."]
     for method in methods():
         facts = [
             f"order {method.order:g}" if method.order else "",
             "fixed step" if method.fixed_step else "",
-            "run where no method is given" if method.is_default else "",
+            "in the default selection" if method.is_default else "",
             f"needs {', '.join(method.distributions)}" if method.distributions else "",
-            f"without it: `{method.fallback}`" if method.fallback else "",
+            f"replaced by `{method.fallback}` if this is missing" if method.fallback else "",
             "linearized by `modes`" if method.linearize else "",
         ]
         defaults = method.settings().as_dict()
@@ -268,7 +268,7 @@ def _bounds() -> str:
     by_check: dict[str, list[dict[str, Any]]] = {}
     for entry in entries:
         by_check.setdefault(entry["check"], []).append(entry)
-    parts = ["From `reference/accuracy.toml`; a pattern `*` stands for any name."]
+    parts = ["From `reference/accuracy.toml`; `*` matches any name. `fault` is the value that the known fault gives."]
     for check, own in by_check.items():
         shown = [name for name in names if name != "check" and any(name in entry for entry in own)]
         rows = [
@@ -392,7 +392,7 @@ def _contents(path: Path) -> list[str]:
                 ]
                 for item in datasets
             ]
-            parts += [table(["dataset", "dimensions", "type", "unit", "what"], rows)] if rows else []
+            parts += [table(["dataset", "dimensions", "type", "unit", "description"], rows)] if rows else []
     return parts
 
 

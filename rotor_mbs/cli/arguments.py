@@ -219,7 +219,7 @@ def _parser() -> tuple[_Parser, dict[str, _Parser]]:
     own.timeout()
 
     own = command(
-        "run", "run scenes with one or more methods and store them in a results file", "runs:run",
+        "run", "run scenes with one or more methods and store the results in a file", "runs:run",
         "my.toml -o my.h5", "paper/fig11 -m lagrange/taylor -m exudyn_tree/rk67 --set step=1e-3",
     )  # fmt: skip
     own.scenes()

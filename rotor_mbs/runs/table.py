@@ -836,7 +836,7 @@ def _write_tables(path: Path, tables: Sequence[Table], rows: Sequence[tuple[str,
     for made in tables:
         if made.group == RUNS:
             count, scenes = len(made.runs), set(made.known["scene"][1])
-    summary = f"{count} runs of {len(scenes)} scenes: trajectories, energies, status and errors of each"
+    summary = f"runs: {count}, scenes: {len(scenes)}; trajectories, energies, status and errors"
     if others:
         summary += f"; tables {', '.join(others)}"
     described = {"title": "Rotor models compared", "summary": summary, "keywords": KEYWORDS}  # as ACDD asks for them

@@ -39,14 +39,14 @@ TARGET = 1e-6  # rad: what a method must reach on the stiff and light scenes
 # What the map shows of a run: its status, or one of two that say more. Symbol, text; colour is the report's.
 OUTCOMES = {
     "ok": ("✓", "ok"),
-    "energy_alone": ("E", "ok by its energy; there is nothing else to compare it with"),
+    "energy_alone": ("E", "ok, assessed by its energy only"),
     "smaller_step": ("▾", "ok with a smaller step"),
-    "inaccurate": ("≈", "inaccurate: ends, but off its bound"),
+    "inaccurate": ("≈", "inaccurate: end reached, bound exceeded"),
     "diverged": ("↯", "diverged"),
     "singular": ("S", "singular"),
     "solver_failed": ("✗", "solver failed"),
     "timed_out": ("T", "timed out"),
-    "unchecked": ("?", "unchecked: ends; there is nothing to judge it by"),
+    "unchecked": ("?", "unchecked: end reached, accuracy cannot be assessed"),
 }
 
 
@@ -120,7 +120,7 @@ def _suite_run(run: StoredRun, reference: StoredRun | None, ladder: Record | Non
             reason = "there is no reference"
         elif len(reference.array("time")) < 2:
             reason = f"no reference ({reference.attributes['message']})"
-        outcome, message = "energy_alone", f"judged by its energy alone: {reason}"
+        outcome, message = "energy_alone", f"assessed by its energy only: {reason}"
     elif run.status != "ok" and ladder is not None and np.any(ladder.arrays["status"] == code_of("ok")):
         outcome = "smaller_step"
     return SuiteRun(

@@ -271,7 +271,7 @@ class SweepPlan:
         return {
             "title": table.title,
             "summary": (
-                f"{self.runs} runs of {sweep.base.name} by {', '.join(self.methods)}; varied: {', '.join(sweep.keys)}"
+                f"{self.runs} runs of {sweep.base.name} with {', '.join(self.methods)}; varied: {', '.join(sweep.keys)}"
             ),
             "keywords": KEYWORDS,
             "sweep_toml": sweep.text,

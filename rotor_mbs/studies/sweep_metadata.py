@@ -106,7 +106,7 @@ def _card(stored: StoredSweep, splits: list[str]) -> str:
     for name, meanings in {"status": STATUSES, "method_code": stored.methods, "split": SPLITS}.items():
         if name in stored.columns:
             lines.append(f"- `{name}`: {', '.join(meanings)}")
-    lines += ["", f"Made by `rotor-mbs sweep`: {KEYWORDS}.", ""]
+    lines += ["", f"Computed with `rotor-mbs sweep`: {KEYWORDS}.", ""]
     return "\n".join(lines)
 
 

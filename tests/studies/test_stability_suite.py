@@ -64,7 +64,7 @@ def test_a_run_judged_by_its_energy_alone_says_so(tmp_path: Path) -> None:
                settings={"tolerance": 1e-15})  # fmt: skip
     (cell,) = suite_runs(path)
     assert (cell.status, cell.outcome) == ("ok", "energy_alone")
-    assert cell.message == "judged by its energy alone: the horizon is before the second sample"
+    assert cell.message == "assessed by its energy only: the horizon is before the second sample"
     assert cell.angle_error is None
     assert not cell.reaches_target
     assert fastest_to_target([cell]) == {one.name: None}
