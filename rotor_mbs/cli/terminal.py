@@ -81,7 +81,7 @@ class ProgressLine:
             seconds = " (read, not computed)"
         reason = f": {outcome.message}" if outcome.message else ""
         text = f"[{done:{len(str(total))}d}/{total}] {outcome.label} {outcome.status}{seconds}{reason}"
-        keep = outcome.status not in GOOD  # a person must not miss it
+        keep = outcome.status not in (*GOOD, "measured")  # a person must not miss it
         self._show(text if keep else self._estimate(outcome.share) + text, keep=keep)
 
     def stage(self, name: str, done: int, total: int, note: str = "") -> None:

@@ -487,7 +487,7 @@ def _measure_scene(
                     continue
                 place, rows = file.place(curve.first_run, BENCH), end.value[i]
                 place.write(rows_of_curve(place, curve, rows, facts))
-                yield Outcome(curve.label, curve.ladder.method, "ok", counts_of(rows))
+                yield Outcome(curve.label, curve.ladder.method, "measured", counts_of(rows))
 
 
 def rows_of_curve(place: Place, curve: Curve, points: Sequence[Mapping[str, Any]], facts: Mapping[str, object]) -> Rows:

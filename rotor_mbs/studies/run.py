@@ -87,7 +87,8 @@ def work_of(scene: Scene, method: str) -> float:
 class Outcome:
     """A run, or other rows of a study, that this call computed or tried to.
 
-    seconds: run time; NaN where nothing was timed. is_stored: whether there is a row; else the same call tries again.
+    status: of a run; "measured" for other rows. seconds: run time; NaN where nothing was timed. is_stored: whether there is
+    a row; else the same call tries again.
     is_shipped: read from a shipped file and not computed. share: of the work of the call that was done when it ended.
     """
 
@@ -228,7 +229,7 @@ def _outcome(end: Finished[Task, Rows], share: float) -> Outcome:
     if row is None:
         return Outcome(task.label, task.method, end.failure, end.message, is_stored=False, share=share)
     if not isinstance(task, RunTask):
-        return Outcome(task.label, task.method, "ok", f"{len(row['status'])} points", share=share)
+        return Outcome(task.label, task.method, "measured", f"{len(row['status'])} points", share=share)
     is_shipped = task.asked.is_shipped
     return Outcome(
         task.label,
