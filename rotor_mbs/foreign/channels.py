@@ -318,12 +318,14 @@ def find_channels(
     shown = shown_names(list(table.columns))
     if known[0] not in chosen:
         raise InputError(
-            f"{table.source}: no column for the {known[0].name}; it has: {shown}; allowed: `{known[0].key}` in a "
+            f"{table.source}: no column for the {known[0].name}; available: {shown}; allowed: `{known[0].key}` in a "
             "mapping file"
         )
     if all(channel.is_load or channel == known[0] for channel in chosen):
         what = "a frequency" if known is other else "an angle or a rate"
-        raise InputError(f"{table.source}: no column for {what}; it has: {shown}; allowed: a mapping file (columns)")
+        raise InputError(
+            f"{table.source}: no column for {what}; available: {shown}; allowed: a mapping file (--columns)"
+        )
     return chosen, tuple(lines)
 
 

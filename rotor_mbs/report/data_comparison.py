@@ -145,7 +145,7 @@ class DataComparison:
         lines += ["", str(self.table()), ""]
         if verdict.axis == "time":
             lines.append(
-                f"compared to {verdict.compared_until:g} s; errors checked up to the horizon, {verdict.horizon_s:g} s"
+                f"compared up to {verdict.compared_until:g} s; errors up to the horizon at {verdict.horizon_s:g} s"
             )
         if verdict.energy_drift is not None:
             lines.append(f"energy drift / energy scale: {verdict.energy_drift:.1e}")
