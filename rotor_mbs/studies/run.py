@@ -88,8 +88,8 @@ class Outcome:
     """A run, or other rows of a study, that this call computed or tried to.
 
     status: of a run; "measured" for other rows. seconds: run time; NaN where nothing was timed. is_stored: whether
-    there is a row; else the same call tries again. is_shipped: read from a shipped file and not computed. share: of the work
-    of the call that was done when it ended.
+    there is a row; else the same call tries again. is_shipped: read from a shipped file and not computed. share: of the
+    work of the call that was done when it ended.
     """
 
     label: str
