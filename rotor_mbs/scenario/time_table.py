@@ -24,9 +24,9 @@ Time = TypeVar("Time", "float", "Array")
 
 # A kink closer to a sample than this share of the sample interval is taken to be on it.
 ALIGNMENT = 1e-6
-# Rows kept between two samples where a quadrature or the unwrapping of angles needs them: all steps, or about MIN_ROWS
-# of them where that makes more than MAX_ROWS.
-MIN_ROWS, MAX_ROWS = 10, 100
+# Rows kept between two samples where a quadrature or the unwrapping of angles needs them: all steps, or at least half
+# as many as this. Fewer rows of a finer step would make the work of dampers less accurate.
+MAX_ROWS = 100
 
 
 def value_at(table: Table, time: float) -> float:
@@ -159,6 +159,6 @@ def steps_and_rows(span: float, step: float, rows_between: bool) -> tuple[int, i
     steps = max(1, math.ceil(span / step * (1.0 - 1e-9)))
     if not rows_between:
         return steps, 1
-    per_row = math.ceil(steps / MIN_ROWS)
-    steps = per_row * math.ceil(steps / per_row)
-    return steps, steps if steps <= MAX_ROWS else steps // per_row
+    per_row = math.ceil(steps / MAX_ROWS)
+    rows = math.ceil(steps / per_row)
+    return per_row * rows, rows

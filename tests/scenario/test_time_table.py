@@ -90,5 +90,9 @@ def test_a_kink_that_is_off_a_sample_by_rounding_is_on_it() -> None:
 
 def test_rows_between_samples_are_a_divisor_of_the_steps() -> None:
     assert steps_and_rows(0.01, 0.01 / 15, False) == (15, 1)
-    assert steps_and_rows(0.01, 1e-4 / 1.37, True) == (140, 10)
     assert steps_and_rows(0.01, 1e-4, True) == (100, 100)
+    for steps in range(101, 1000, 37):  # a finer step has at least half as many rows as the coarser ones
+        taken, rows = steps_and_rows(0.01, 0.01 / steps, True)
+        assert taken >= steps
+        assert taken % rows == 0
+        assert 50 <= rows <= 100
