@@ -231,9 +231,9 @@ def _changed_metric(run: StoredRun, metrics: Metrics, solution: Solution) -> tup
     trajectory = solution.trajectory
     worst, hint, channel = 0.0, "stored numbers equal those of the samples", "stored numbers"
     if not any(name in run.attributes for name in metrics):
-        return channel, worst, hint  # a file of references keeps none
+        return channel, worst, hint  # a file of references keeps none, and a run without samples has none
     floor = FLOOR_SAFETY * metrics.get("defect_floor", 0.0)
-    growth = min(float(running_growth(trajectory)[-1]), HORIZON_GROWTH) if len(trajectory.time) else 1.0
+    growth = min(float(running_growth(trajectory)[-1]), HORIZON_GROWTH)
     # What the last bits of the samples decide, which other hardware rounds otherwise.
     allowances = {
         "defect_max": floor,

@@ -99,3 +99,5 @@ def test_steps_of_an_adaptive_method_are_those_on_file() -> None:
 def test_defaults_are_the_settings_that_the_bounds_were_found_with() -> None:
     for name, known in expected_settings().items():
         assert same_settings(find_method(name).defaults, known["settings"]), name
+        run: Any = Arrays(name, settings=known["settings"])
+        assert settings_faults(run) == []

@@ -15,9 +15,10 @@ from rotor_mbs.analysis import judgement as judgement_module
 from rotor_mbs.analysis import kinematics
 from rotor_mbs.analysis.judgement import OK_ERROR, judge, rotor_inertia_shares
 from rotor_mbs.methods.catalogue import is_corrected, method_names
-from rotor_mbs.scenario.accuracy_bounds import load_bounds
+from rotor_mbs.scenario.accuracy_bounds import Bound, load_bounds
 from rotor_mbs.scenario.catalogue import find_scenes
 from rotor_mbs.scenario.scene import Blade, Scene
+from rotor_mbs.solution.defects import Defects
 from rotor_mbs.solution.metrics import ANGLE_LIMIT, metrics_of
 from rotor_mbs.solution.trajectory import Integration, Solution, Trajectory
 
@@ -49,10 +50,14 @@ def _without_defects(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def status(
-    run: Trajectory, engine: Integration = DONE, reference: Trajectory | None = None, method: str = METHOD
+    run: Trajectory,
+    engine: Integration = DONE,
+    reference: Trajectory | None = None,
+    method: str = METHOD,
+    bounds: tuple[Bound, ...] = (),
 ) -> Any:
     """(status, whether the engine's claim of success is false)."""
-    solution = Solution(SCENE, method, run, engine, is_corrected=is_corrected(method))
+    solution = Solution(SCENE, method, run, engine, is_corrected=is_corrected(method), bounds=bounds)
     with np.errstate(all="ignore"):
         judgement = judge(SCENE, solution, reference)
     return judgement.status, judgement.false_success
@@ -125,10 +130,37 @@ def test_the_largest_defect_has_a_bound(method: str, monkeypatch: pytest.MonkeyP
         assert status(moving(), method=method)[0] == expected
 
 
-def test_a_defect_is_told_with_its_size_and_its_interval(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(judgement_module, "defects_of", lambda *_, **__: made_defects((0.0, 2e-6, -2e-6)))
-    message = judge(SCENE, Solution(SCENE, METHOD, moving(), DONE), None).message
-    assert message.startswith("defect 2.0e-06 rad in the interval up to t = 0.02 s, ")
+@pytest.mark.parametrize(("side", "expected"), [*SIDES, (math.nan, "ok")])
+def test_the_median_of_the_defects_has_a_bound_where_a_method_has_one(
+    side: float, expected: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A tenth of the bound of the largest one; without defects (NaN) nothing is asked."""
+    bound = Bound("defect median", METHOD, 0.1 * BOUNDS.of("defect", METHOD).value, "none")
+    defects = None if math.isnan(side) else made_defects((side * bound.value,) * 3, transitions=None)
+    monkeypatch.setattr(judgement_module, "defects_of", lambda *_, **__: defects)
+    assert status(moving(), bounds=(bound,))[0] == expected
+
+
+def grown(growth: float) -> Defects:
+    return made_defects((0.0, 2e-6, -2e-6), transitions=np.tile(growth * np.eye(2), (3, 1, 1)))
+
+
+@pytest.mark.parametrize(
+    ("defects", "run", "message"),
+    [
+        # The bound is for a growth of five: where errors grow by 12.5 a defect counts 0.4, less than half.
+        (grown(8.0), moving(), "defect 2.0e-06 rad in the interval up to t = 0.02 s, allowed"),
+        (grown(12.5), moving(), "defect 2.0e-06 rad in the interval up to t = 0.02 s, 8.0e-07 rad per 0.01 s without"),
+        (made_defects([1e-15] * 10), with_error(moving(), 0.1), "angle error 1.0e-01 rad up to the horizon, because"),
+        (None, with_error(moving(), 0.1), "angle error 1.0e-01 rad up to the horizon; ok is up to 0.01 rad"),
+        (None, with_gap(moving(), 1e-3), "a joint opens by 1.0e-03 of the longest arm, allowed"),
+    ],
+)
+def test_what_is_inaccurate_is_told_with_its_size(
+    defects: Defects | None, run: Trajectory, message: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(judgement_module, "defects_of", lambda *_, **__: defects)
+    assert judge(SCENE, Solution(SCENE, METHOD, run, DONE), moving()).message.startswith(message)
 
 
 NOTHING = Trajectory(np.empty(0), np.empty((0, 4)), np.empty((0, 4)))

@@ -120,9 +120,10 @@ def test_every_accepted_step_meets_the_tolerance(rel_tol):
     assert largest > 0.5 * rel_tol  # and is not held far below it
 
 
-def test_steps_without_failures_follow_from_the_errors_before_them():
+@pytest.mark.parametrize("amplitude", [1.0, 5e-4])  # below AbsTol / RelTol = 1e-3 an error is absolute
+def test_steps_without_failures_follow_from_the_errors_before_them(amplitude):
     """h / (1.25 (error / RelTol)^(1/5)), five times h at most: the rule that decides the digits of a chaotic run."""
-    result = ode45(harmonic, 10.0, [1.0, 0.0], 1e-8, 1e-11)
+    result = ode45(harmonic, 10.0, [amplitude, 0.0], 1e-8, 1e-11)
     assert result.evaluations == 1 + 6 * result.steps
     h = np.diff(result.time)
     shrink = 1.25 * (errors_of_steps(result)[:-2] / 1e-8) ** 0.2
