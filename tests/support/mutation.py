@@ -72,6 +72,7 @@ RUNS: dict[str, list[tuple[str, str]]] = {
         ("check/held", "exudyn_tree/generalized_alpha"),
         ("check/held", "exudyn_chain/generalized_alpha"),
         ("check/held", "exudyn_chain/newmark_index2"),
+        ("check/held", "exudyn_chain/extrapolated"),
         ("check/held", "lagrange/dop853"),
     ],
     "adapter": [
@@ -153,6 +154,7 @@ _TARGETS = (
            (_DEFAULTS, "methods/test_settings.py"), 0.5),
     Target(f"{_M}.adapter", "*", "adapter",
            (*_PARTS, "models/test_linearization.py",
+            "models/test_extrapolation.py::test_loads_at_every_sample_from_the_first_on",
             "models/test_exudyn_models.py::test_large_chains_alone_are_solved_by_a_sparse_factorization"), 0.5),
     Target(f"{_L}.ode_solvers", "*", "integration", ("models/test_segments.py",), 0.5),
     Target(f"{_L}.samples", "over_segments loads_at loads_at_start at_constant_rests", "integration", _SAMPLES, 0.5),
