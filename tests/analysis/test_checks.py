@@ -216,6 +216,8 @@ def test_a_stored_number_may_differ_by_what_rounding_or_other_points_decide(meth
         floor = 3.0 * metrics["defect_floor"]
         allowed = dict.fromkeys(("defect_max", "defect_judged", "defect_median", "defect_mean"), floor)
         allowed |= {"defect_drift": 100 * floor, "angle_error_predicted": 1e5 * floor}
+        # Where no interval is judged there is no floor.
+        assert of_stored(run, {"defect_drift": 1.0}, "defect_drift", 2.0)[0] == "defect_drift"
         # The time of the largest defect is no one's where all of them are rounding.
         for share, channel in ((0.9, "stored numbers"), (1.1, "defect_time")):
             assert of_stored(run, {**metrics, "defect_max": share * floor}, "defect_time", -1.0)[0] == channel
@@ -242,6 +244,18 @@ def test_extremes_are_compared_where_samples_give_them(method: str, changes: Any
     run = replace(run, scene=replace(run.scene, **changes))
     metrics = metrics_of(run.scene, run.trajectory, None)
     assert {name for name in ANGLES | RATE if of_stored(run, metrics, name, 9.0)[0] == name} == names
+
+
+@pytest.mark.parametrize(
+    ("method", "share", "passed"), [(METHOD, 2.0, []), (REFERENCE, 1.04, [True]), (REFERENCE, 1.06, [False])]
+)
+def test_the_growth_of_a_reference_is_that_of_its_samples(method: str, share: float, passed: list[bool]) -> None:
+    """To 5 %: the accuracy of the transition matrices."""
+    run = run_of()
+    growth = share * defects_of(run.scene, run.trajectory).error_growth
+    grown = replace(run, method=method, trajectory=run.trajectory.replace(error_growth=growth))
+    given = list(checks._of_run(stored(method), BOUNDS, grown, [], None, False))
+    assert [check.passed for check in given if check.name == "growth"] == passed
 
 
 @pytest.mark.parametrize(

@@ -56,11 +56,18 @@ EXPLAINED = {
     r"adapter\.linear_solver .*scaled|adapter\._SPARSE_FROM ": "sizes near the bound take as long by either solver",
     r"adapter\.linearized .*0 -> 1": "a column of zeros among the joints' directions hinders no motion",
     r"metrics\.energy_scale .*(if run\.|and, or in|0\.0 -> )": "nobody asks for the scale of a run without energies",
+    r"checks\._own_extremes .*(and, or in between|:20 2 -> 3$)": (
+        "runs of the printed equations have both or neither; samples of a part that are not read"
+    ),
     # Not the original, and not seen all the same: tolerances, first steps and counts that are not judged.
     r"sensor_samples\.work .*(1e-09 \* scene\.duration|scene\.samples - 1|slack scaled)": (
         "a tolerance in matching times: any between round-off and the distance of two rows does as well"
     ),
     r"time_table\.values_before .*1e-12 scaled": "keeps rounding from passing a jump: any size near it does",
+    r"judgement\._inaccurate .*right side of OK_ERROR": "of angles within the limit 2e-9 rad, beside 0.01",
+    r"judgement\._inaccurate .*_GROWN ": "an order of magnitude, for a message",
+    r"checks\._MOST_INTERVALS ": "how many peaks are looked at: their number decides how many a run may have",
+    r"adapter\.initial_values .*(time \+ 1\.0|1 -> 2)": "an interval that is not integrated: any does as well",
     r"time_table\.steps_and_rows .*(1e-09|span / step)": "a step more in an interval does as well",
     r"ode_solvers\.ode45_integrator .*end - start|adapter\.integrate .*(0\.1 / |1\.0 - )": (
         "keeps rounding from putting a sample past the end of its interval, in runs of thousands of intervals"
