@@ -55,7 +55,8 @@ def machine() -> dict[str, str]:
     if information.is_file():
         named = re.search(r"^model name\s*:\s*(.*?)\s*$", information.read_text(errors="replace"), re.MULTILINE)
         processor = named[1] if named else processor
-    return {"platform": platform.platform(), "cpu": f"{processor}, {cores()} cores"}
+    count = cores()
+    return {"platform": platform.platform(), "cpu": f"{processor}, {count} {'core' if count == 1 else 'cores'}"}
 
 
 @functools.cache

@@ -227,7 +227,7 @@ def test_a_sweep_has_a_page_from_its_dataset_alone(tmp_path: Path) -> None:
     folder = write_report(made_sweep(tmp_path), tmp_path / "out").parent
     text = text_of(folder, "index.html")
     assert "<h1>Speed &amp; stiffness</h1>" in text
-    assert "12 runs of paper/fig06 by lagrange/taylor" in text
+    assert "12 runs of paper/fig06 with lagrange/taylor" in text
     assert ">initial rotor speed (rad/s)<" in text  # the axes, named as in the field
     assert ">bearing stiffness (N m/rad)<" in text
     assert re.search(r"The pitches grow 10-fold in \d+ of 12 runs", text)
