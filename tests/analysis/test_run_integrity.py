@@ -57,6 +57,9 @@ def test_settings_are_all_of_the_methods_and_none_else() -> None:
     assert faults("exudyn_tree/rk44", step=1e-3) == []
     assert faults("exudyn_tree/rk44") == ["step is missing"]
     assert len(faults("exudyn_tree/rk44", step=-1.0, stride=2)) == 1
+    assert len(faults("exudyn_chain/extrapolated", tolerance=0.011)) == 1  # coarser than what is called ok
+    alpha = "exudyn_tree/generalized_alpha"  # which a spectral radius above 1 makes unstable
+    assert len(faults(alpha, **{**find_method(alpha).defaults, "spectral_radius": 1.1})) == 1
     assert faults("of/another", step=-1.0) == []  # a plug-in that is not installed
 
 

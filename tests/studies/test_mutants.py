@@ -67,6 +67,10 @@ EXPLAINED = {
     r"judgement\._inaccurate .*right side of OK_ERROR": "of angles within the limit 2e-9 rad, beside 0.01",
     r"judgement\._inaccurate .*_GROWN ": "an order of magnitude, for a message",
     r"checks\._MOST_INTERVALS ": "how many peaks are looked at: their number decides how many a run may have",
+    r"schemes\.scheme .*(_NEWTON_SHARE .* scaled|1e-10 -> |40 -> |2\.0 -> )": (
+        "where Newton's method stops, below what is kept, and when it begins anew"
+    ),
+    r"schemes\.scheme .* 0 -> 1$": "extrapolation takes the implicit solver whatever the scheme's stages are",
     r"adapter\.initial_values .*(time \+ 1\.0|1 -> 2)": "an interval that is not integrated: any does as well",
     r"time_table\.steps_and_rows .*(1e-09|span / step)": "a step more in an interval does as well",
     r"ode_solvers\.ode45_integrator .*end - start|adapter\.integrate .*(0\.1 / |1\.0 - )": (
@@ -76,7 +80,9 @@ EXPLAINED = {
     r"adapter\.integrate .*interval\.end - interval\.start scaled": (
         "the engine cuts a first step that is longer than its interval, with another rounding"
     ),
-    r"adapter\.linearized .*1\.0 -> ": "the size of a difference quotient's step: any near it does as well",
+    r"adapter\.(linearized|initial_values) .*(1\.0 -> |0\.01 \* 0\.5|3 -> 4)": (
+        "the size of a difference quotient's step, and how many are extrapolated: any near it does as well"
+    ),
     r"checks\.steps_off .*1e-09 scaled": "keeps rounding from adding a step: any size near it does",
     r"schemes\.trial_steps .*-> 2": "the least of a range: one trial step ends as soon as two",
     r"schemes\.scheme .*(1e-14|5\.0) -> ": "the smallest step, and how fast steps grow: no motion here comes near",

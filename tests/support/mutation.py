@@ -94,6 +94,7 @@ _SENSORS = (
     f"{_WORK}of_a_constant_torque_and_of_a_constant_rest_angle[exudyn_tree/rk44]",
     "models/test_exact_solutions.py::test_a_thousand_radians_a_second_are_counted_turn_by_turn",
 )
+_EXTRAPOLATION = "models/test_extrapolation.py::test_steps_are_those_of_all_columns"
 _MUJOCO = "models/test_mujoco.py::test_"
 _JUDGEMENT = "solution/test_judgement.py::test_"
 _RULES = (
@@ -147,9 +148,9 @@ _TARGETS = (
            "tests alone", (*_RULES, "solution/test_metrics.py::test_a_pitch_that_leaves_zero"), 0.5),
     # Of a tableau's fractions any may be changed.
     Target("rotor_mbs.models.ode45", "*", "ode45", (_DEFAULTS, "models/test_ode45.py"), 0.001),
-    Target(f"{_M}.schemes", "*", "schemes", (_DEFAULTS, *_PARTS), 0.5),
+    Target(f"{_M}.schemes", "*", "schemes", (_DEFAULTS, *_PARTS, _EXTRAPOLATION), 0.5),
     Target(f"{_M}.solvers", "_scheme build_tree build_chain __init__ integrate", "schemes",
-           (_DEFAULTS, *_PARTS, "models/test_extrapolation.py::test_steps_are_those_of_all_columns"), 0.5),
+           (_DEFAULTS, *_PARTS, _EXTRAPOLATION), 0.5),
     Target(f"{_L}.methods", "tolerance check_tolerance relative_tolerance absolute_tolerance", "schemes",
            (_DEFAULTS, "methods/test_settings.py"), 0.5),
     Target(f"{_M}.adapter", "*", "adapter",
