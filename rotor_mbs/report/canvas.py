@@ -132,7 +132,7 @@ def encoded(figure: Figure, kind: str, *, for_print: bool = True) -> bytes:
     metadata: dict[str, Any] = {"pdf": {"CreationDate": None}, "svg": {"Date": None}, "png": {"Software": None}}[kind]
     if for_print:
         metadata["Software" if kind == "png" else "Creator"] = MARK.decode()
-    with style(for_print=for_print):
+    with style(for_print=for_print), np.errstate(over="ignore", invalid="ignore"):  # numbers of a runaway
         stream = io.BytesIO()
         figure.savefig(stream, format=kind, metadata=metadata)
     return stream.getvalue()
