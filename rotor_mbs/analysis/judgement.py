@@ -192,7 +192,7 @@ def _inaccurate(scene: Scene, run: Solution, metrics: Metrics) -> tuple[str, str
     if "defect_max" in metrics and not metrics["defect_judged"] <= defect:
         largest = f"defect {metrics['defect_max']:.1e} rad in the interval up to t = {metrics['defect_time']:.6g} s"
         if metrics["defect_judged"] < 0.5 * metrics["defect_max"]:
-            largest += f", {metrics['defect_judged']:.1e} rad per 0.01 s and unit of error growth"
+            largest += f", {metrics['defect_judged']:.1e} rad scaled to 0.01 s and to a fivefold error growth"
         return "inaccurate", f"{largest}, allowed {defect:.0e}"
     error = largest_angle_error(metrics)
     if not error <= OK_ERROR + start_slack(scene):

@@ -133,7 +133,7 @@ class Defects:
     @functools.cached_property
     def judged_size(self) -> float:
         """Value that is compared with a method's bound (rad): the largest defect beyond rounding. For intervals over
-        0.01 s it is scaled to 0.01 s and divided by the error growth. 0 if no interval is assessed."""
+        0.01 s it is scaled to 0.01 s and to a fivefold error growth. 0 if no interval is assessed."""
         longer = np.maximum(np.diff(self.time) / _BOUND_INTERVAL, 1.0) * np.fmax(self.growth / _BOUND_GROWTH, 1.0)
         judged = self.is_judged
         sizes = self.sizes[judged]

@@ -119,13 +119,21 @@ def test_a_row_for_each_engine_with_dashes_for_what_the_file_does_not_say(tmp_pa
 
     assert [texts(row)[1:] for row in reached.rows] == [
         ["1 of 1", "adaptive", "1.0×10⁻¹³", "1.0×10⁻¹⁰", "1 of 1, × 1.0", "1 of 1, × 1.0", "1 of 1, × 1.0", "–", "kept",
-         "no failure"],
-        ["1 of 1", "5.9 of 6", "≤ 1.0×10⁻⁵", "≤ 1.0×10⁻⁴", *["not measured"] * 3, "–", "–", "1 of 2"],
-        ["1 of 1", "0.98 of 1", "1.0×10⁻⁵", "0.0010", *["0 of 1"] * 3, "–", "lost", "no failure"],
+         "none wrong"],
+        ["1 of 1", "5.9 of 6", "≤ 1.0×10⁻⁵", "≤ 1.0×10⁻⁴", *["not measured"] * 3, "–", "–", "1 of 2 wrong"],
+        ["1 of 1", "0.98 of 1", "1.0×10⁻⁵", "0.0010", *["0 of 1"] * 3, "–", "lost", "none wrong"],
     ]  # fmt: skip
     assert [texts(row)[1:] for row in able.rows] == [
         ["–"] * 6, ["–"] * 6, ["–", "–", "–", "no", "pin 4.1.0", "99"]
     ]  # fmt: skip
+
+
+def test_a_scene_on_which_no_setting_is_useful_is_counted_beside_the_error_of_the_others(tmp_path: Path) -> None:
+    useless = replace(FAST, arrays={**FAST.arrays, "angle_error_max": np.full(len(FAST.statuses), 2.0)})
+    with open_results(stored(tmp_path / "a.h5", FAST)) as results:
+        reached, _ = engine_tables(results, {"paper/fig09": [FAST], "paper/fig11": [useless]})
+    cell: Any = reached.rows[0][4]
+    assert (cell.tone, cell.note) == ("bad", "paper/fig09; fails on 1 of 2")
 
 
 def test_energy_drift_of_angles_and_rates_is_that_of_the_models_own_energies() -> None:

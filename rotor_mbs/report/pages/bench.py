@@ -252,10 +252,10 @@ def engine_tables(results: OpenResults, scenes: Mapping[str, Sequence[Record]]) 
             str(facts.get("lines") or NOTHING),
         ])  # fmt: skip
     drift = f"energy drift in {durations[long]:g} s" if long else "energy drift"
-    targets = [f"to {power(round(math.log10(target)))} rad" for target in _ENGINE_TARGETS]
+    targets = [f"time to {power(round(math.log10(target)))} rad" for target in _ENGINE_TARGETS]
     head = [
-        "method", "ok on scenes", "measured order", "smallest defect (rad)", "smallest error (rad)", *targets, drift,
-        "zero pitch", "failures reported as success",
+        "method", "ok on scenes", "measured order", "best defect (rad)", "best error (rad)", *targets, drift,
+        "zero pitch", "wrong runs reported as success",
     ]  # fmt: skip
     able_head = [
         "method", "joint damping", "load over time", "loads", "linearization", "engine", "lines of its file",
@@ -267,7 +267,7 @@ def engine_tables(results: OpenResults, scenes: Mapping[str, Sequence[Record]]) 
 
 
 def _worst_cell(own: Mapping[str, Sequence[Record]], column: str) -> TableCell | str:
-    """The smallest value on the scene where that is largest, of scenes that it can run to the end."""
+    """The smallest value on the scene where that is largest; on how many scenes no setting is useful."""
     values = {name: work_precision.best(curves, column) for name, curves in own.items()}
     known = {name: value for name, value in values.items() if value is not None}
     if not known:
@@ -275,7 +275,11 @@ def _worst_cell(own: Mapping[str, Sequence[Record]], column: str) -> TableCell |
         return (TableCell("not measured") if is_cut else TableCell("none", "bad")) if own else NOTHING
     worst = max(known, key=lambda name: known[name])
     bound = "≤ " if any(map(work_precision.left_out, own[worst])) else ""
-    return TableCell(bound + number(known[worst]), note=worst if len(own) > 1 else "")
+    note = worst if len(own) > 1 else ""
+    failed = sum(not any(map(work_precision.left_out, own[name])) for name in own.keys() - known.keys())
+    if failed:
+        note += f"; fails on {failed} of {len(own)}"
+    return TableCell(bound + number(known[worst]), "bad" if failed else "", note=note)
 
 
 def _reach_cell(
@@ -334,20 +338,20 @@ def _zero_pitch_cell(own: Mapping[str, Sequence[Record]]) -> TableCell | str:
 
 
 def _false_success_cell(own: Mapping[str, Sequence[Record]], suite: Sequence[SuiteRun]) -> TableCell | str:
-    """Of the runs of the stability suite that went wrong, where the file has them; else of the settings here."""
+    """Of the runs of the stability suite that are wrong, where the file has them; else of the settings here."""
     if suite:
-        # What the time limit ended is no failure of the engine.
-        failed = [run for run in suite if run.status not in ("ok", "unchecked", "timed_out")]
-        claimed, count, note = sum(run.false_success for run in failed), len(failed), f"{len(suite)} runs of the suite"
-        if late := sum(run.status == "timed_out" for run in suite):
-            note += f", {late} over the time limit"
+        # What the time limit ended is neither right nor wrong.
+        finished = [run for run in suite if run.status != "timed_out"]
+        wrong = [run for run in finished if run.status not in ("ok", "unchecked")]
+        claimed, count, late = sum(run.false_success for run in wrong), len(wrong), len(suite) - len(finished)
+        note = f"{len(finished)} finished" + (f", {late} over the time limit" if late else "")
     else:
         curves = [curve for of_scene in own.values() for curve in of_scene]
         claimed = sum(int(curve.arrays["false_success"].sum()) for curve in curves)
         count, note = sum(int(work_precision.failed(curve).sum()) for curve in curves), "on this page"
     if not count:
-        return TableCell("no failure", note=note)
-    return TableCell(f"{claimed} of {count}", "bad" if claimed else "", note=note)
+        return TableCell("none wrong", note=note)
+    return TableCell(f"{claimed} of {count} wrong", "bad" if claimed else "", note=note)
 
 
 def reach_table(curves: Sequence[Record]) -> PageTable:
