@@ -140,7 +140,7 @@ class _Parser(argparse.ArgumentParser):
         self.add_argument("file", nargs="?", type=Path, default=default_results(), metavar="FILE", help=text)
 
     def jobs(self) -> None:
-        text = "parallel processes (default: number of cores, %(default)s)"
+        text = "parallel processes (default: all %(default)s cores)"
         self.add_argument("-j", "--jobs", type=JOBS, default=cores(), metavar="N", help=text)
 
     def timeout(self, seconds: float = 60.0) -> None:
@@ -348,7 +348,7 @@ def _parser() -> tuple[_Parser, dict[str, _Parser]]:
     own.jobs()
     own.timeout(600.0)
 
-    own = command("report", "write HTML pages from a file of this program", "commands:report", "my.h5 --open")
+    own = command("report", "write HTML pages from a results, bench, sweep, modes or comparison file", "commands:report", "my.h5 --open")
     own.results()
     own.pages("-o", "--output")
     own.flag("--open", help="open the index in a browser")
