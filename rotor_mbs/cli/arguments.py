@@ -223,7 +223,7 @@ def _parser() -> tuple[_Parser, dict[str, _Parser]]:
         "my.toml -o my.h5", "paper/fig11 -m lagrange/taylor -m exudyn_tree/rk67 --set step=1e-3",
     )  # fmt: skip
     own.scenes()
-    own.method()
+    own.method("method, as in rotor-mbs list, or a Python file of methods (default: selected for each scene)")
     own.settings()
     own.output(file, "FILE", Path("results.h5"))
     own.jobs()
@@ -254,7 +254,7 @@ def _parser() -> tuple[_Parser, dict[str, _Parser]]:
         "paper/fig11", "paper/fig11 my.toml -m lagrange/taylor -m exudyn_tree/rk67 -o bench.h5",
     )  # fmt: skip
     own.scenes()
-    own.method()
+    own.method("method, as in rotor-mbs list, or a Python file of methods (default: all)")
     own.settings()
     own.output(file, "FILE", Path("bench.h5"))
     text = "timed runs per point (default: %(default)s; at most 5 for runs over 0.5 s)"
@@ -325,7 +325,7 @@ def _parser() -> tuple[_Parser, dict[str, _Parser]]:
         "commands:stability", "", "stiff/bearing-1e8 -o stiff.h5",
     )  # fmt: skip
     own.scenes(nargs="*", help="names of scenes, folders or TOML files (default: stiff extreme)")
-    own.method()
+    own.method("method, as in rotor-mbs list, or a Python file of methods (default: all)")
     own.settings()
     own.output(file, "FILE", Path("stability.h5"))
     own.pages("--report")
@@ -348,7 +348,10 @@ def _parser() -> tuple[_Parser, dict[str, _Parser]]:
     own.jobs()
     own.timeout(600.0)
 
-    own = command("report", "write HTML pages from a results, bench, sweep, modes or comparison file", "commands:report", "my.h5 --open")
+    own = command(
+        "report", "write HTML pages from a results, bench, sweep, modes or comparison file", "commands:report",
+        "my.h5 --open",
+    )  # fmt: skip
     own.results()
     own.pages("-o", "--output")
     own.flag("--open", help="open the index in a browser")
