@@ -146,7 +146,7 @@ def grown(growth: float) -> Defects:
     [
         # The bound is for a growth of five: where errors grow by 12.5 a defect counts 0.4, less than half.
         (grown(8.0), moving(), "defect 2.0e-06 rad in the interval up to t = 0.02 s, allowed"),
-        (grown(12.5), moving(), "defect 2.0e-06 rad in the interval up to t = 0.02 s, 8.0e-07 rad per 0.01 s "),
+        (grown(12.5), moving(), "defect 2.0e-06 rad in the interval up to t = 0.02 s, 8.0e-07 rad scaled to 0.01 s "),
         (made_defects([1e-15] * 10), with_error(moving(), 0.1), "angle error 1.0e-01 rad up to the horizon, because"),
         (None, with_error(moving(), 0.1), "angle error 1.0e-01 rad up to the horizon; "),
         (None, with_gap(moving(), 1e-3), "joint gap of 1.0e-03 "),
