@@ -16,7 +16,7 @@ import sys
 import threading
 import traceback
 from collections.abc import Iterable, Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager, redirect_stderr, redirect_stdout, suppress
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -59,7 +59,7 @@ class MethodFile:
         module = ModuleType(f"rotor_mbs_method_file_{self.model}")
         module.__file__ = self.path
         sys.modules[module.__name__] = module  # dataclasses look there
-        with self.located(), _without_folder(self.path):
+        with self.located(), _without_folder(self.path), _unprinted():
             exec(compile(self.text, self.path, "exec", dont_inherit=True), vars(module))
         methods: dict[str, Method] = {}
         values = (value if isinstance(value, list | tuple) else [value] for value in vars(module).values())
@@ -244,6 +244,13 @@ def _without_folder(path: str) -> Iterator[None]:
         yield
     finally:
         sys.path[:] = before
+
+
+@contextmanager
+def _unprinted() -> Iterator[None]:
+    """In any process, what Python code prints in the block goes nowhere."""
+    with Path(os.devnull).open("w", encoding="utf-8") as nowhere, redirect_stdout(nowhere), redirect_stderr(nowhere):
+        yield
 
 
 @contextmanager
