@@ -90,7 +90,7 @@ def make_inputs(name: str) -> None:
         rm.export("paper/fig11", "csv", "mine.csv")
     elif name == "sweeps.md":
         (sweep,) = re.findall(r"```toml\n(title.*?)```", TEXTS[name], re.DOTALL)
-        fewer = sweep.replace("draws = 100 ", "draws = 4 ").replace("amplification = true", "amplification = false")
+        fewer = sweep.replace("draws = 100 ", "draws = 4 ").replace("error_growth = true", "error_growth = false")
         assert fewer != sweep
         Path("sweep.toml").write_text(fewer)
         assert main(["sweep", "sweep.toml", "-o", "study.h5", "-j", "1"]) == 0

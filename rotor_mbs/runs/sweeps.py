@@ -53,8 +53,8 @@ METRICS = {
     "rotor_angle_max": Column(("run",), "rad", "largest magnitude of the rotor angle"),
     "rotor_rate_max": Column(("run",), "rad/s", "largest magnitude of the rotor rate"),
 }  # fmt: skip
-# Asked for by `amplification = true`: the variational equations cost a hundred times the run itself.
-AMPLIFICATION = {name: COLUMNS[name] for name in ("error_growth", "horizon_s")}
+# Asked for by `error_growth = true`: the variational equations cost a hundred times the run itself.
+GROWTH = {name: COLUMNS[name] for name in ("error_growth", "horizon_s")}
 
 
 def parameter_name(key: str) -> str:
@@ -92,7 +92,7 @@ def sweep_table(sweep: Sweep, methods: Sequence[str], numbers: range) -> Table:
         quantity.name: Column(("run", *quantity.dimensions), quantity.units, quantity.long_name, kind)
         for quantity in asked
     }
-    computed = METRICS | (AMPLIFICATION if options.amplification else {}) | trajectories
+    computed = METRICS | (GROWTH if options.error_growth else {}) | trajectories
     known = scene_scales(sweep.base, trajectories.values()) | known
     return Table("", runs, known, computed, characters=MESSAGE_LENGTH)
 

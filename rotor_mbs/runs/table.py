@@ -99,7 +99,7 @@ COLUMNS = {
         "angle_error_whole": ("rad", "largest angle error over the whole run"),
         "angle_error_end": ("rad", "angle error at the last sample"),
         "tip_error_max": ("m", "largest distance of a tip from the reference up to the horizon"),
-        "error_growth": ("1", "amplification of a small error of the initial state"),
+        "error_growth": ("1", "largest factor by which a small error of the initial state has grown"),
         "horizon_s": ("s", "time of the last sample before the error growth reaches 1e5"),
         "uncertainty_rad": ("rad", "uncertainty of the reference up to the horizon"),
         "angular_impulse_error_max": ("1", "largest error of the angular momentum balance, relative to its scale"),

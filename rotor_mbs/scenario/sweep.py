@@ -232,7 +232,9 @@ class SweepTable:
     samples: int | None = file_key("samples", _COUNT, default=None)
     outputs: Sequence[str] | None = file_key("outputs", OUTPUT_NAMES, note="; [] stores metrics only", default=None)
     precision: str = file_key("precision", keys.choice(("float64", "float32")), default="float64")
-    amplification: bool = file_key("amplification", keys.FLAG, note=": error growth of every run", default=False)
+    error_growth: bool = file_key(
+        "error_growth", keys.FLAG, note=": error growth and horizon of every run", default=False
+    )
     defects: bool = file_key("defects", keys.FLAG, note=": also for runs with lagrange/taylor", default=False)
     combine: str = file_key("combine", keys.choice(("grid", "zip")), default="grid")
     draws: int | None = file_key("draws", _DRAWS, default=None)

@@ -236,7 +236,7 @@ BUILT_IN = (
     Quantity("angles", ("time", "coordinate"), "rad", "rotor angle and pitch angles, unwrapped", "angles"),
     Quantity("rates", ("time", "coordinate"), "rad/s", "rotor rate and pitch rates", "rates"),
     Quantity(
-        "tip", ("time", "blade", "axis"), "m", "path of each blade's tip in the base frame", "tip",
+        "tip", ("time", "blade", "axis"), "m", "position of each blade tip in the base frame", "tip",
         judgement=QuantityMetric("tip_error_max"),
     ),
     Quantity("kinetic_energy", ("time",), "J", "kinetic energy", "energy"),
@@ -258,7 +258,7 @@ BUILT_IN = (
         "bound on the error of the angles, before rounding to double precision (half a unit in the last place)",
         required=False,
     ),
-    Quantity("error_growth", ("time",), "1", "amplification of a small error of the initial state", required=False),
+    Quantity("error_growth", ("time",), "1", "largest factor by which a small error of the initial state has grown", required=False),
     Quantity(
         "refined_angles", ("refined_time", "coordinate"), "rad", "angles at the integrator's own output points",
         "angles", required=False,

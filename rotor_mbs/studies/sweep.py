@@ -24,7 +24,7 @@ from rotor_mbs.models.lagrange.reference import error_growth
 from rotor_mbs.runs.files import KEYWORDS
 from rotor_mbs.runs.pool import TaskPool
 from rotor_mbs.runs.runner import Task, compute, perform
-from rotor_mbs.runs.sweeps import AMPLIFICATION, IDENTITY, METRICS, code_of_method, open_sweep, sweep_table
+from rotor_mbs.runs.sweeps import GROWTH, IDENTITY, METRICS, code_of_method, open_sweep, sweep_table
 from rotor_mbs.runs.table import MISSING, Place, Rows, Table, blank_rows, row_of_run
 from rotor_mbs.runs.versions import machine, versions
 from rotor_mbs.scenario.scene import Scene, scene_hash
@@ -124,7 +124,7 @@ def _judged_row(chunk: Chunk, run: Solution, time_reached: float) -> Rows:
 
 
 def _extremes(angles: Array, rates: Array) -> dict[str, Array]:
-    """(runs,) the largest angle and rate of the rotor, and the largest pitch of any blade, either way."""
+    """(runs,) the largest angle and rate of the rotor, and the largest magnitude of any pitch angle."""
     return {
         "rotor_angle_max": largest(angles[:, :, 0]),
         "rotor_rate_max": largest(rates[:, :, 0]),
@@ -151,7 +151,7 @@ def _side_by_side(chunk: Chunk, scenes: Sequence[Scene]) -> Rows:
         of_runs.append({"energy_drift_max": float(drifts[i]), **of_defects})
     ok = clearly_ok(scenes, method.name, block.integrations, block.samples, of_runs, angles, method.bounds)
     row = chunk.place.row
-    metrics = np.dtype([(name, row[name]) for name in row.names or () if name in METRICS | AMPLIFICATION])
+    metrics = np.dtype([(name, row[name]) for name in row.names or () if name in METRICS | GROWTH])
     rows = blank_rows(len(scenes), metrics)
     for name in row.names or ():
         if name not in rows:
@@ -257,7 +257,7 @@ class SweepPlan:
 
     def _identity(self) -> str:
         sweep, table = self.sweep, self.sweep.table
-        options = [table.combine, table.settings, table.precision, table.amplification, table.defects, table.seed]
+        options = [table.combine, table.settings, table.precision, table.error_growth, table.defects, table.seed]
         axes = [(axis.key, axis.is_drawn) for axis in sweep.design.axes]
         runs = [self.methods, self.first, self.last, table.validation, table.test]
         content = [scene_hash(sweep.base), sweep.outputs, axes, options, runs]

@@ -268,7 +268,7 @@ AMPLIFIED = """
 title = "fig11 and a neighbour"
 scene = "paper/fig11"
 methods = ["lagrange/taylor", "exudyn_tree/rk67"]
-amplification = true
+error_growth = true
 outputs = []
 [[axis]]
 key = "gravity"
