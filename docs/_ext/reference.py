@@ -319,8 +319,8 @@ _EXAMPLES = {
     ),
     "Sweeps": (
         "One flat table at the root: the run's numbers, the varied parameters, metrics and arrays. Unlike a results "
-        "file it has no references and no errors relative to them, no run times, a horizon only with `error_growth`, and "
-        "no texts per row: scene, methods and versions are attributes, `code` tells rows of other versions apart.",
+        "file it has no references and no errors relative to them, no run times, a horizon only with `error_growth`, "
+        "and no texts per row: scene, methods and versions are attributes, `code` tells rows of other versions apart.",
         "sweep study.toml -o sweep.h5 -j 1",
     ),
     "Modes": ("A group per scene, model and state.", "modes scene.toml --speeds 0.5:1:2 -o modes.h5 -j 1"),
@@ -346,8 +346,8 @@ def _file_format() -> str:
         "reads it as text. The attribute `digests` of a group has SHA-256 digests of everything that is not a row. "
         "`versions` of a row is a JSON text with the versions that computed it; the attributes of `/` have those that "
         "created the file. Signs and frames: [Reading results](../data.md).",
-        "`crc32` of row r is the CRC-32 of zlib (`zlib.crc32`), with r as its starting value, over the bytes of the row "
-        "in each computed dataset of `/runs` but `crc32`, then in each computed dataset of its scene's group, in the "
+        "`crc32` of row r is the CRC-32 of zlib (`zlib.crc32`), with r as its starting value, over the bytes of the "
+        "row in each computed dataset of `/runs` but `crc32`, then in each computed dataset of its scene's group, in the "
         "order of creation; of a reference then the whole of its datasets without the dimension `run`. Computed "
         "datasets are those whose key in `digests` is `attributes of NAME`. In a sweep the starting value is the "
         "number `run`.",

@@ -258,7 +258,10 @@ BUILT_IN = (
         "bound on the error of the angles, before rounding to double precision (half a unit in the last place)",
         required=False,
     ),
-    Quantity("error_growth", ("time",), "1", "largest factor by which a small error of the initial state has grown", required=False),
+    Quantity(
+        "error_growth", ("time",), "1", "largest factor by which a small error of the initial state has grown",
+        required=False,
+    ),
     Quantity(
         "refined_angles", ("refined_time", "coordinate"), "rad", "angles at the integrator's own output points",
         "angles", required=False,
