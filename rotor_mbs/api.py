@@ -24,7 +24,7 @@ import numpy as np
 from rotor_mbs.analysis.judgement import defects_of
 from rotor_mbs.analysis.run_tables import RUN_HEAD, TextTable, run_row
 from rotor_mbs.errors import InputError, MethodRefusal, PlausibilityWarning, ResourceError, StoreError
-from rotor_mbs.methods.catalogue import REFERENCE, check_names
+from rotor_mbs.methods.catalogue import REFERENCE, check_names, selected_methods
 from rotor_mbs.methods.method_file import ENDING
 from rotor_mbs.methods.time_limit import checked_seconds
 from rotor_mbs.runs.files import HDF5, replace_file
@@ -37,7 +37,7 @@ from rotor_mbs.solution.defects import Defects
 from rotor_mbs.solution.quantities import known_quantities
 from rotor_mbs.solution.status import STATUSES
 from rotor_mbs.solution.trajectory import Integration, Solution, Trajectory, need_xarray
-from rotor_mbs.studies.run import run_scenes, selected_methods, solve_judged
+from rotor_mbs.studies.run import run_scenes, solve_judged
 
 if TYPE_CHECKING:
     from rotor_mbs.report.plots import ComparisonPlots, RunPlots

@@ -12,7 +12,7 @@ from pathlib import Path
 from rotor_mbs.analysis.run_tables import run_table
 from rotor_mbs.cli import EXIT_BAD_INPUT
 from rotor_mbs.cli.terminal import ProgressLine, print_doubts, print_summary, print_table
-from rotor_mbs.methods.catalogue import method_names
+from rotor_mbs.methods.catalogue import method_names, selected_methods
 from rotor_mbs.runs.files import is_being_written, replace_file
 from rotor_mbs.runs.pool import local_pool
 from rotor_mbs.runs.read import open_results
@@ -20,7 +20,7 @@ from rotor_mbs.scenario.catalogue import find_scenes
 from rotor_mbs.studies.reference import compute_references
 from rotor_mbs.studies.reproduce import made_from, summary_of
 from rotor_mbs.studies.reproduce import reproduce as reproduce_paper
-from rotor_mbs.studies.run import run_scenes, selected_methods
+from rotor_mbs.studies.run import run_scenes
 
 
 def run(arguments: argparse.Namespace) -> int:

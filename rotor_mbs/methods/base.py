@@ -20,12 +20,6 @@ if TYPE_CHECKING:  # reading the catalogue needs none of them
     from rotor_mbs.solution.trajectory import Integration, Linearization, RunBlock, Trajectory
 
 
-from typing import TYPE_CHECKING
-
-if TYPE_CHECKING:
-    from rotor_mbs.scenario.scene import Scene
-
-
 STEP, TOLERANCE = "step", "tolerance"
 MAX_STEPS = 1e9  # of a run; the engines count them in 32 bits
 

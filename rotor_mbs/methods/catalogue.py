@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, TypeVar
 from rotor_mbs.errors import InputError, MethodRefusal, nearest
 from rotor_mbs.methods.base import Ladder, Method
 from rotor_mbs.methods.method_file import ENDING, MethodFile, located, quiet, read_file
+from rotor_mbs.scenario.toml_file import at_key
 
 if TYPE_CHECKING:  # `rotor-mbs list` reads no scene
     from rotor_mbs.scenario.scene import Scene
@@ -145,6 +146,14 @@ def settings_for(names: Sequence[str], given: Mapping[str, object]) -> dict[str,
     return settings
 
 
+def own_settings(scene: Scene, method: str) -> dict[str, object]:
+    """Those of the scene's settings that the method has. Raises InputError for one that no method at all has."""
+    if not scene.settings:
+        return {}
+    with at_key(scene.name, scene.text, "settings"):
+        return settings_for(method_names(), dict(scene.settings)).get(method, {})
+
+
 def is_corrected(name: str) -> bool:
     """Whether the method called `name` claims the corrected equations; one that is not known here is taken to."""
     method = look_up(name)
@@ -233,6 +242,43 @@ def _sources(module: str) -> tuple[Path, ...]:
     if folders:
         return tuple(path for folder in folders for path in sorted(folder.rglob("*.py")))
     return (Path(top.__file__),) if top.__file__ else ()
+
+
+def able_methods(scene: Scene, names: Iterable[str]) -> tuple[list[str], list[str]]:
+    """Those of `names` that can represent the scene, and a line for each that cannot."""
+    able, refused = [], []
+    for name in names:
+        try:
+            find_method(name).items(scene)
+            able.append(name)
+        except MethodRefusal as exc:
+            refused.append(f"{scene.name}: skipped {name}: {exc}")
+    return able, refused
+
+
+def selected_methods(scenes: Sequence[Scene], names: Sequence[str] = ()) -> tuple[dict[str, list[str]], list[str]]:
+    """The methods of each scene: `names`, else those that it names itself, else those that the rule selects, none where
+    it refuses; and the reasons. Raises InputError for a name that is unknown or cannot represent its scene."""
+    methods: dict[str, list[str]] = {}
+    reasons: list[str] = []
+    refused: list[str] = []
+    for scene in scenes:
+        named = check_names(names or scene.methods)
+        if named:
+            methods[scene.name], lines = able_methods(scene, named)
+            refused += lines
+            continue
+        try:
+            chosen, reason = choose(scene, default_methods())
+        except MethodRefusal as exc:
+            methods[scene.name] = []
+            reasons.append(str(exc))
+            continue
+        methods[scene.name], left_out = able_methods(scene, chosen)
+        reasons += [f"{scene.name}: {reason}: {', '.join(methods[scene.name])}", *left_out]
+    if refused:
+        raise InputError(refused)
+    return methods, reasons
 
 
 # Explicit fixed steps at their default (1e-3 s and below) follow a swing up to this rate, rad/s, within their bounds.

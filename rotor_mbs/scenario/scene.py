@@ -547,9 +547,6 @@ def _as_list(tables: Mapping[str, Any], value: Any, path: KeyPath, last: int) ->
     return [0.0] * (last + 1) if value is None else value
 
 
-__all__ = ["load_scene", "new_scene_text", "parse_scene", "scene_toml"]
-
-
 def load_scene(path: Path | str, name: str | None = None, known_methods: Sequence[str] = ()) -> Scene:
     """The scene in the TOML file `path`, under `name` or the file's own. known_methods: what its `methods` may name, ()
     for anything. Raises InputError with all errors of the file, a line each: `file:line: key: what is wrong; allowed:

@@ -22,7 +22,15 @@ from rotor_mbs.analysis.judgement import judge
 from rotor_mbs.analysis.work_precision import SMALLEST_ERROR, USELESS_RAD, fitted_order
 from rotor_mbs.errors import OF_THE_MACHINE, InputError, RotorError, one_line
 from rotor_mbs.methods.base import STEP, TOLERANCE, Ladder
-from rotor_mbs.methods.catalogue import REFERENCE, find_method, ladders, methods, settings_for, with_method_files
+from rotor_mbs.methods.catalogue import (
+    REFERENCE,
+    able_methods,
+    find_method,
+    ladders,
+    methods,
+    settings_for,
+    with_method_files,
+)
 from rotor_mbs.methods.time_limit import OutOfTimeError, time_limit
 from rotor_mbs.runs import last_core
 from rotor_mbs.runs.files import writing
@@ -34,7 +42,7 @@ from rotor_mbs.scenario.scene import Scene, scene_hash
 from rotor_mbs.solution.metrics import horizon, horizon_samples
 from rotor_mbs.solution.status import COMPLETE
 from rotor_mbs.solution.trajectory import Solution, Trajectory
-from rotor_mbs.studies.run import OnProgress, Outcome, able_methods, ignore_progress, run_scenes
+from rotor_mbs.studies.run import OnProgress, Outcome, ignore_progress, run_scenes
 from rotor_mbs.studies.stored_references import read_reference
 
 BENCH = "bench"

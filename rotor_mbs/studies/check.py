@@ -12,7 +12,7 @@ from pathlib import Path
 
 from rotor_mbs.analysis.checks import Check, Where, checks_of, make_check
 from rotor_mbs.errors import InputError, StoreError
-from rotor_mbs.methods.catalogue import REFERENCE, default_methods, find_method, method_names
+from rotor_mbs.methods.catalogue import REFERENCE, able_methods, default_methods, find_method, method_names
 from rotor_mbs.runs.read import is_sweep, open_results
 from rotor_mbs.runs.sweeps import StoredSweep
 from rotor_mbs.runs.table import MISSING, refuse_changed_layout
@@ -20,7 +20,7 @@ from rotor_mbs.scenario.accuracy_bounds import Bounds
 from rotor_mbs.scenario.catalogue import find_scenes
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.studies.reference import changed_arrays
-from rotor_mbs.studies.run import OnProgress, able_methods, ignore_progress, run_scenes
+from rotor_mbs.studies.run import OnProgress, ignore_progress, run_scenes
 from rotor_mbs.studies.stored_references import shipped_files, shipped_reference
 
 # The chain takes as long as all else together; four scenes of the paper cover what it can show.

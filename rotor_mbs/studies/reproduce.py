@@ -14,7 +14,7 @@ from pathlib import Path
 import rotor_mbs
 from rotor_mbs.analysis.published import claims, finding
 from rotor_mbs.analysis.run_tables import TextTable, method_table
-from rotor_mbs.methods.catalogue import REFERENCE, default_methods, errata_methods, ladders
+from rotor_mbs.methods.catalogue import REFERENCE, able_methods, default_methods, errata_methods, ladders
 from rotor_mbs.runs.files import writing
 from rotor_mbs.runs.pool import Workers
 from rotor_mbs.runs.read import open_results
@@ -36,7 +36,6 @@ from rotor_mbs.studies.bench import (
 from rotor_mbs.studies.run import (
     OnProgress,
     RunReport,
-    able_methods,
     asked_runs,
     compute_tasks,
     ignore_progress,

@@ -3,24 +3,22 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
 from rotor_mbs.analysis.judgement import judge
-from rotor_mbs.errors import OF_THE_MACHINE, InputError, MethodRefusal, RotorError
+from rotor_mbs.errors import OF_THE_MACHINE, RotorError
 from rotor_mbs.methods.catalogue import (
     REFERENCE,
-    check_names,
-    choose,
     default_methods,
     find_method,
     is_corrected,
     line_of,
     look_up,
-    method_names,
+    own_settings,
     settings_for,
 )
 from rotor_mbs.methods.solve import solve
@@ -31,7 +29,6 @@ from rotor_mbs.runs.runner import Task, compute_in_order
 from rotor_mbs.runs.table import Asked, Rows, TableFile, extend_file, results_tables, row_of_run, text_of
 from rotor_mbs.runs.versions import row_versions
 from rotor_mbs.scenario.scene import Scene, scene_hash
-from rotor_mbs.scenario.toml_file import at_key
 from rotor_mbs.solution.status import STATUSES
 from rotor_mbs.solution.trajectory import Integration, Solution, Trajectory
 from rotor_mbs.studies.stored_references import digest, frozen_solution, read_reference, shipped_reference
@@ -303,56 +300,8 @@ def next_to_try(scene: Scene, method: str, settings: Mapping[str, object], statu
     return f"; as fine as its ladder goes, next to try: {others[0]}" if others else ""
 
 
-def own_settings(scene: Scene, method: str) -> dict[str, object]:
-    """Those of the scene's settings that the method has. Raises InputError for one that no method at all has."""
-    if not scene.settings:
-        return {}
-    with at_key(scene.name, scene.text, "settings"):
-        return settings_for(method_names(), dict(scene.settings)).get(method, {})
-
-
 def without_samples(scene: Scene, method: str, settings: Mapping[str, object], status: str, message: str) -> Solution:
     columns = 1 + len(scene.blades)
     trajectory = Trajectory(np.empty(0), np.empty((0, columns)), np.empty((0, columns)))
     chosen = find_method(method).settings.of(method, settings).as_dict()
     return Solution(scene, method, trajectory, Integration(False, message), chosen, status=status, message=message)
-
-
-def able_methods(scene: Scene, names: Iterable[str]) -> tuple[list[str], list[str]]:
-    """Those of `names` that can represent the scene, and a line for each that cannot."""
-    able, refused = [], []
-    for name in names:
-        try:
-            find_method(name).items(scene)
-            able.append(name)
-        except MethodRefusal as exc:
-            refused.append(f"{scene.name}: skipped {name}: {exc}")
-    return able, refused
-
-
-def selected_methods(scenes: Sequence[Scene], names: Sequence[str] = ()) -> tuple[dict[str, list[str]], list[str]]:
-    """The methods of each scene: `names`, else those that it names itself, else those that the rule selects, none where
-    it refuses; and the reasons. Raises InputError for a name that is unknown or cannot represent its scene."""
-    methods: dict[str, list[str]] = {}
-    reasons: list[str] = []
-    refused: list[str] = []
-    for scene in scenes:
-        named = check_names(names)
-        if scene.methods and not named:
-            with at_key(scene.name, scene.text, "methods"):
-                named = check_names(scene.methods)
-        if named:
-            methods[scene.name], lines = able_methods(scene, named)
-            refused += lines
-            continue
-        try:
-            chosen, reason = choose(scene, default_methods())
-        except MethodRefusal as exc:
-            methods[scene.name] = []
-            reasons.append(str(exc))
-            continue
-        methods[scene.name], left_out = able_methods(scene, chosen)
-        reasons += [f"{scene.name}: {reason}: {', '.join(methods[scene.name])}", *left_out]
-    if refused:
-        raise InputError(refused)
-    return methods, reasons

@@ -12,7 +12,7 @@ import numpy as np
 
 from rotor_mbs.analysis.judgement import Judgement, judge
 from rotor_mbs.analysis.run_tables import TextTable
-from rotor_mbs.methods.catalogue import REFERENCE, find_method, method_names, settings_for
+from rotor_mbs.methods.catalogue import REFERENCE, able_methods, find_method, method_names, settings_for
 from rotor_mbs.methods.solve import solve
 from rotor_mbs.methods.time_limit import OutOfTimeError, time_limit
 from rotor_mbs.runs.files import writing
@@ -26,7 +26,6 @@ from rotor_mbs.solution.trajectory import Trajectory
 from rotor_mbs.studies.run import (
     OnProgress,
     Outcome,
-    able_methods,
     compute_tasks,
     ignore_progress,
     run_scenes,
