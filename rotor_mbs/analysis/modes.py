@@ -60,7 +60,7 @@ class ModeSet:
 
     @property
     def damping_ratios(self) -> Array:
-        """(..., n) fraction of critical damping, above 1 if overdamped; NaN where the undamped frequency is 0 or none."""
+        """(..., n) damping ratio, above 1 if overdamped; NaN where the undamped frequency is 0 or none."""
         frequencies = self.undamped_frequencies
         rate = -0.5 * (self.eigenvalues[..., 0] + self.eigenvalues[..., 1]).real
         ratios = np.divide(rate, frequencies, out=np.full_like(rate, np.nan), where=frequencies > 0.0)
