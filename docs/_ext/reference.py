@@ -347,8 +347,8 @@ def _file_format() -> str:
         "`versions` of a row is a JSON text with the versions that computed it; the attributes of `/` have those that "
         "created the file. Signs and frames: [Reading results](../data.md).",
         "`crc32` of row r is the CRC-32 of zlib (`zlib.crc32`), with r as its starting value, over the bytes of the "
-        "row in each computed dataset of `/runs` but `crc32`, then in each computed dataset of its scene's group, in the "
-        "order of creation; of a reference then the whole of its datasets without the dimension `run`. Computed "
+        "row in each computed dataset of `/runs` but `crc32`, then in each computed dataset of its scene's group, in "
+        "the order of creation; of a reference then the whole of its datasets without the dimension `run`. Computed "
         "datasets are those whose key in `digests` is `attributes of NAME`. In a sweep the starting value is the "
         "number `run`.",
         "## Status codes",
