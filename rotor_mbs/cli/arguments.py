@@ -308,7 +308,7 @@ def _parser() -> tuple[_Parser, dict[str, _Parser]]:
     own.add_argument("file", type=Path, metavar="SWEEP.toml", help="a file, or a shipped sweep (sweeps/fig11-spread)")
     own.method("method to use instead of those in the file")
     own.output(file, "FILE", help="output file (default: name of the sweep with .h5)")
-    own.flag("--metadata", help="also write Croissant metadata and normalization statistics beside FILE, as JSON")
+    own.flag("--metadata", help="also write Croissant metadata beside FILE, as JSON")
     text = "also write a folder for Hugging Face datasets: a file per split and a dataset card"
     own.add_argument("--datasets", type=Path, metavar="DIR", help=text)
     own.add_argument("--engine", default="local", metavar="ENGINE", help="local, or dask:tcp://host:port")

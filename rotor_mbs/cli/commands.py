@@ -420,8 +420,7 @@ def sweep(arguments: argparse.Namespace) -> int:
         if arguments.metadata:
             from rotor_mbs.studies.sweep_metadata import describe
 
-            names = ", ".join(place.name for place in describe(result.path))
-            print(f"{result.path}: described in {names}", file=stream)
+            print(f"{result.path}: described in {describe(result.path).name}", file=stream)
         if arguments.datasets:
             from rotor_mbs.studies.sweep_metadata import write_splits
 

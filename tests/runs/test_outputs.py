@@ -166,7 +166,7 @@ def test_a_link_under_a_temporary_name_is_not_followed(
     assert not place.exists()
 
 
-@pytest.mark.parametrize("name", ["x.svg", "x.croissant.json", "x.statistics.json"])
+@pytest.mark.parametrize("name", ["x.svg", "x.croissant.json"])
 def test_what_a_sweep_writes_beside_its_dataset_replaces_no_other_file(name: str, tmp_path: Path) -> None:
     made_sweep(tmp_path, MAP)
     command = ["sweep", tmp_path / "s.toml", "-j", "1", "--metadata", "-o", tmp_path / "x.h5"]
