@@ -1,4 +1,4 @@
-"""Cases and tasks, computed in this process, in worker processes of this machine, or on a cluster."""
+"""Tables of runs in HDF5 files, and what fills them: a runner, worker processes, a cluster."""
 
 import os
 
