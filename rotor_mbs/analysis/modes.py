@@ -75,7 +75,7 @@ class ModeSet:
 def multiblade(blades: int) -> tuple[tuple[str, ...], Array]:
     """Names of the multiblade (Coleman) coordinates, and the (blades, blades) matrix from them to the blades' pitches.
 
-    Pitch of blade i = collective + Σ_k (cosine_k cos k ψ_i + sine_k sin k ψ_i) [+ differential (-1)^i], with the
+    Pitch of blade i = collective + Σ_k (cosine_k cos k ψ_i + sine_k sin k ψ_i) [+ differential (-1)^(i-1)], with the
     blade's mounting angle ψ_i = 2π(i-1)/blades. Source: R. P. Coleman, A. M. Feingold, NACA Report 1351, 1958.
     """
     psi = 2.0 * np.pi * np.arange(blades) / blades

@@ -175,7 +175,7 @@ def _parser() -> tuple[_Parser, dict[str, _Parser]]:
     formatter = argparse.RawDescriptionHelpFormatter
     parser = _Parser(
         prog="rotor-mbs",
-        description="Simulate rotor scenes with independent models; compare the models with each other and a paper.",
+        description="Simulate rotors with independent models; compare them with each other and a published paper.",
         epilog="start with:\n  rotor-mbs list\n  rotor-mbs show paper/fig11\n  rotor-mbs run paper/fig11\n"
         "rotor-mbs COMMAND --help shows the options of a command and an example.\n"
         "exit status: 0 success; 1 a check failed or a run did not succeed; 2 bad input; 130 interrupted",
