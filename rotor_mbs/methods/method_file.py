@@ -7,7 +7,6 @@ process has read.
 from __future__ import annotations
 
 import atexit
-import multiprocessing
 import os
 import pickle
 import re
@@ -59,7 +58,7 @@ class MethodFile:
         module = ModuleType(f"rotor_mbs_method_file_{self.model}")
         module.__file__ = self.path
         sys.modules[module.__name__] = module  # dataclasses look there
-        with self.located(), _without_folder(self.path), _unprinted():
+        with self.located(), _without_folder(self.path), _loading, quiet():
             exec(compile(self.text, self.path, "exec", dont_inherit=True), vars(module))
         methods: dict[str, Method] = {}
         values = (value if isinstance(value, list | tuple) else [value] for value in vars(module).values())
@@ -185,6 +184,7 @@ class _Process:
         self._process.wait()
 
 
+_loading = threading.Lock()  # where files are loaded by several threads, their output is restored in order
 _processes: dict[str, tuple[MethodFile, _Process]] = {}
 
 
@@ -247,25 +247,17 @@ def _without_folder(path: str) -> Iterator[None]:
 
 
 @contextmanager
-def _unprinted() -> Iterator[None]:
-    """In any process, what Python code prints in the block goes nowhere."""
-    with Path(os.devnull).open("w", encoding="utf-8") as nowhere, redirect_stdout(nowhere), redirect_stderr(nowhere):
-        yield
-
-
-@contextmanager
 def quiet() -> Iterator[None]:
-    """In a worker process, what is printed in the block goes nowhere, also what compiled code prints."""
-    if multiprocessing.parent_process() is None:
-        yield
-        return
-    kept = [os.dup(1), os.dup(2)]
-    with open(os.devnull, "wb") as nowhere:  # noqa: PTH123  (a device)
-        os.dup2(nowhere.fileno(), 1)
-        os.dup2(nowhere.fileno(), 2)
-    try:
-        yield
-    finally:
-        for number, saved in enumerate(kept, 1):
-            os.dup2(saved, number)
-            os.close(saved)
+    """What is printed in the block goes nowhere, also what compiled code prints. For one thread at a time."""
+    with Path(os.devnull).open("w", encoding="utf-8") as nowhere, redirect_stdout(nowhere), redirect_stderr(nowhere):
+        kept: dict[int, int] = {}
+        for number in (1, 2):
+            with suppress(OSError):  # closed
+                kept[number] = os.dup(number)
+                os.dup2(nowhere.fileno(), number)
+        try:
+            yield
+        finally:
+            for number, saved in kept.items():
+                os.dup2(saved, number)
+                os.close(saved)

@@ -134,7 +134,7 @@ def test_a_file_that_cannot_be_used_is_one_line(
 
 
 def test_whatever_a_method_does_is_one_line_and_loses_nothing(capfd: pytest.CaptureFixture[str]) -> None:
-    Path("bad.py").write_text("print('x' * 10**6)\n" + BAD)
+    Path("bad.py").write_text("import os; print('x' * 10**6); os.write(1, b'x' * 10**6)\n" + BAD)
     ended = rotor_mbs("run", "one.toml", "-m", "bad.py", "-m", "mine.py", "-o", "o.h5", "-j", "1", "--timeout", "2")
     printed = "".join(capfd.readouterr())
     assert ended.status == 1
