@@ -6,7 +6,9 @@ from __future__ import annotations
 
 import functools
 import math
+import multiprocessing
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from contextlib import nullcontext
 from dataclasses import replace
 from functools import partial
 from importlib import import_module, metadata
@@ -117,9 +119,9 @@ def with_method_files(work: Callable[..., R]) -> Callable[..., R]:
 
 
 def _in_worker(files: Sequence[MethodFile], work: Callable[..., R], *arguments: object) -> R:
-    with quiet():
-        for file in files:
-            _add(file)
+    for file in files:
+        _add(file)
+    with quiet() if multiprocessing.parent_process() is not None else nullcontext():
         return work(*arguments)
 
 
@@ -263,7 +265,10 @@ def selected_methods(scenes: Sequence[Scene], names: Sequence[str] = ()) -> tupl
     reasons: list[str] = []
     refused: list[str] = []
     for scene in scenes:
-        named = check_names(names or scene.methods)
+        named = check_names(names)
+        if scene.methods and not named:
+            with at_key(scene.name, scene.text, "methods"):
+                named = check_names(scene.methods)
         if named:
             methods[scene.name], lines = able_methods(scene, named)
             refused += lines

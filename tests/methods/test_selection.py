@@ -11,8 +11,8 @@ from support.scenes import PAPER, paper
 
 from rotor_mbs.analysis.judgement import judge
 from rotor_mbs.cli import main
-from rotor_mbs.errors import MethodRefusal
-from rotor_mbs.methods.catalogue import choose, is_corrected, methods, singular_reason
+from rotor_mbs.errors import InputError, MethodRefusal
+from rotor_mbs.methods.catalogue import choose, is_corrected, methods, selected_methods, singular_reason
 from rotor_mbs.methods.solve import solve
 from rotor_mbs.scenario.catalogue import find_scenes
 
@@ -24,6 +24,12 @@ def test_scenes_of_the_paper_keep_the_default_set() -> None:
         methods = choose(paper(name), DEFAULT_METHODS)[0]
         assert methods[0] == "lagrange/taylor"  # not the printed model, which comes first in the paper's comparison
         assert set(methods) == set(DEFAULT_METHODS), name
+
+
+def test_an_unknown_method_of_a_scene_is_named_with_its_line() -> None:
+    text = 'methods = ["lagrange/tayler"]\n' + paper("fig05").text
+    with pytest.raises(InputError, match=r"^paper/fig05:1: methods: unknown method 'lagrange/tayler', perhaps"):
+        selected_methods([replace(paper("fig05"), methods=("lagrange/tayler",), text=text)])
 
 
 CHOOSE_THEIR_STEP, IMPLICIT = ("lagrange/taylor", "exudyn_tree/dopri5"), ("lagrange/taylor", "lagrange/radau")
