@@ -54,7 +54,7 @@ METRICS = {
     "rotor_rate_max": Column(("run",), "rad/s", "largest magnitude of the rotor rate"),
 }  # fmt: skip
 # Asked for by `error_growth = true`: the variational equations cost a hundred times the run itself.
-GROWTH = {name: COLUMNS[name] for name in ("error_growth", "horizon_s")}
+ERROR_GROWTH = {name: COLUMNS[name] for name in ("error_growth", "horizon_s")}
 
 
 def parameter_name(key: str) -> str:
@@ -92,7 +92,7 @@ def sweep_table(sweep: Sweep, methods: Sequence[str], numbers: range) -> Table:
         quantity.name: Column(("run", *quantity.dimensions), quantity.units, quantity.long_name, kind)
         for quantity in asked
     }
-    computed = METRICS | (GROWTH if options.error_growth else {}) | trajectories
+    computed = METRICS | (ERROR_GROWTH if options.error_growth else {}) | trajectories
     known = scene_scales(sweep.base, trajectories.values()) | known
     return Table("", runs, known, computed, characters=MESSAGE_LENGTH)
 

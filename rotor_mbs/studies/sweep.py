@@ -24,7 +24,7 @@ from rotor_mbs.models.lagrange.reference import error_growth
 from rotor_mbs.runs.files import KEYWORDS
 from rotor_mbs.runs.pool import TaskPool
 from rotor_mbs.runs.runner import Task, compute, perform
-from rotor_mbs.runs.sweeps import GROWTH, IDENTITY, METRICS, code_of_method, open_sweep, sweep_table
+from rotor_mbs.runs.sweeps import ERROR_GROWTH, IDENTITY, METRICS, code_of_method, open_sweep, sweep_table
 from rotor_mbs.runs.table import MISSING, Place, Rows, Table, blank_rows, row_of_run
 from rotor_mbs.runs.versions import machine, versions
 from rotor_mbs.scenario.scene import Scene, scene_hash
@@ -151,7 +151,7 @@ def _side_by_side(chunk: Chunk, scenes: Sequence[Scene]) -> Rows:
         of_runs.append({"energy_drift_max": float(drifts[i]), **of_defects})
     ok = clearly_ok(scenes, method.name, block.integrations, block.samples, of_runs, angles, method.bounds)
     row = chunk.place.row
-    metrics = np.dtype([(name, row[name]) for name in row.names or () if name in METRICS | GROWTH])
+    metrics = np.dtype([(name, row[name]) for name in row.names or () if name in METRICS | ERROR_GROWTH])
     rows = blank_rows(len(scenes), metrics)
     for name in row.names or ():
         if name not in rows:

@@ -47,11 +47,12 @@ def integral(time: Array, values: Array, ends: list[float]) -> Array:
 def momentum_errors(scene: Scene, run: Trajectory) -> dict[str, float]:
     """About the shaft, and in space where no force jumps: relative to the largest momentum."""
     time, states, shaft = run.time, np.hstack([run.angles, run.rates]), np.array([0.0, 1.0, 0.0])
+    pitch_axis = np.array([0.0, 0.0, 1.0])  # of every blade, in its frame
     ends = sorted({0.0, scene.duration, *(t for t, _ in scene.rotor_torque)})
     weights, moment, linear = np.zeros(3), np.zeros(len(time)), np.zeros((len(time), 3))
     for i, blade in enumerate(scene.blades):
         centre = blade_points(scene, states, i, blade.centre_of_mass)
-        omega = run.rates[:, :1] * shaft + run.rates[:, 1 + i, None] * blade_points(scene, states, i, shaft[[0, 2, 1]])
+        omega = run.rates[:, :1] * shaft + run.rates[:, 1 + i, None] * blade_points(scene, states, i, pitch_axis)
         linear += blade.mass * np.cross(omega, centre)
         moment += blade.mass * scene.gravity * centre[:, 0]
         weights[2] += blade.mass * scene.gravity

@@ -264,7 +264,7 @@ def test_a_dry_run_tells_runs_time_and_size_and_writes_nothing(tmp_path: Path) -
     assert not list(tmp_path.glob("o.h5*"))
 
 
-AMPLIFIED = """
+WITH_GROWTH = """
 title = "fig11 and a neighbour"
 scene = "paper/fig11"
 methods = ["lagrange/taylor", "exudyn_tree/rk67"]
@@ -281,7 +281,7 @@ def test_the_error_growth_is_that_of_the_frozen_reference(tmp_path: Path) -> Non
     (scene,) = find_scenes(["paper/fig11"])
     assert scene.gravity == 9.8
     frozen = frozen_solution(scene).trajectory
-    with h5py.File(made_sweep(tmp_path, AMPLIFIED)) as file:
+    with h5py.File(made_sweep(tmp_path, WITH_GROWTH)) as file:
         growth, until = file["error_growth"][()], file["horizon_s"][()]
         assert file["horizon_s"].attrs["units"] == "s"
     assert growth[1] == pytest.approx(np.maximum.accumulate(frozen.error_growth)[-1], rel=1e-3)
