@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import json
 import re
 import shutil
+import zlib
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
@@ -61,6 +63,38 @@ def reshape(group: h5py.Group, name: str, shape: tuple[int, ...]) -> None:
     del group[name]
     describe_as(group.create_dataset(name, data=np.zeros(shape, kind)), attributes)
     reseal(group)
+
+
+def test_checksums_are_as_the_documentation_says(written: Path, swept: Path) -> None:
+    """Computed with h5py and zlib alone, as the page of the file format describes it."""
+
+    def computed(group: h5py.Group) -> list[h5py.Dataset]:
+        digests = json.loads(group.attrs["digests"])
+        return [group[name] for name in group if name != "crc32" and f"attributes of {name}" in digests]
+
+    def is_of_runs(column: h5py.Dataset) -> bool:
+        return column.dims[0][0].name.endswith("/run")
+
+    with h5py.File(written) as file:
+        runs, scene = file["runs"], file[SCENE]
+        labels = scene["run"].asstr()[:].tolist()
+        assert labels == ["reference", METHOD]
+        for row, label in enumerate(runs["run"].asstr()[:]):
+            checksum, index = row, labels.index(label.removeprefix(f"{SCENE}/"))
+            for column in computed(runs):
+                checksum = zlib.crc32(column[row].tobytes(), checksum)
+            for column in filter(is_of_runs, computed(scene)):
+                checksum = zlib.crc32(column[index].tobytes(), checksum)
+            if label.endswith("/reference"):
+                for column in computed(scene):
+                    if not is_of_runs(column):
+                        checksum = zlib.crc32(column[()].tobytes(), checksum)
+            assert checksum == runs["crc32"][row]
+    with h5py.File(swept) as file:
+        for row, checksum in enumerate(file["run"][:].tolist()):
+            for column in computed(file):
+                checksum = zlib.crc32(column[row].tobytes(), checksum)
+            assert checksum == file["crc32"][row]
 
 
 def test_the_last_bit_of_every_column_of_a_run_is_found(copy: Path) -> None:
