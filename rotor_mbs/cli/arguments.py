@@ -239,7 +239,8 @@ def _parser() -> tuple[_Parser, dict[str, _Parser]]:
     text = "mapping file: column, unit, sign and offset of each channel (default: identified by name)"
     own.add_argument("--columns", type=Path, metavar="MAP.toml", help=text)
     text = (
-        "bound on defects, and on errors divided by error growth, rad; relative bound on loads and frequencies "
+        "bound in rad on interval defects (the equations of motion integrated from each row to the next, minus the "
+        "next row) and on errors divided by error growth; relative bound on loads and frequencies "
         "(default: %(default)g)"
     )
     own.add_argument("--tolerance", type=POSITIVE, default=1e-6, metavar="X", help=text)
