@@ -409,6 +409,10 @@ def _of_corrected_model(
         drift = max(metrics["energy_drift_max"] - energy_slack(scene, trajectory), 0.0)
         hint = "a force without its potential, a wrong mass matrix, or too long a step"
         yield _of(run, "energy", "balance", drift, bounds, "of scale", hint)
+    for channel in ("angular", "linear"):
+        if (name := f"{channel}_impulse_error_max") in metrics:
+            hint = "momentum minus the impulses of torque, weights and bearing: a force, an inertia, or too long a step"
+            yield _of(run, "impulse", channel, metrics[name], bounds, "of scale", hint)
     yield from _of_quantities(run, bounds, scene, metrics)
     exact = exact_rotor_angle(scene, trajectory.time) if scene.wants("angles") else None
     if exact is not None:

@@ -102,6 +102,8 @@ COLUMNS = {
         "error_growth": ("1", "largest factor by which a small error of the initial state has grown"),
         "horizon_s": ("s", "time of the last sample before the error growth reaches 1e5"),
         "uncertainty_rad": ("rad", "uncertainty of the reference up to the horizon"),
+        "angular_impulse_error_max": ("1", "largest error of the angular momentum balance, relative to its scale"),
+        "linear_impulse_error_max": ("1", "largest error of the linear momentum balance, relative to its scale"),
         "zero_pitch_max": ("rad", "largest pitch angle among those that are zero in the reference"),
         "zero_pitch_left_s": ("s", "time at which such a pitch angle becomes nonzero"),
         "zero_pitch_growth_per_s": ("1/s", "growth rate of such a pitch angle"),
@@ -539,6 +541,7 @@ _RUN_COLUMNS = (
     "energy_scale_J", "energy_drift_max", "energy_gain_J", "angle_error_max", "angle_error_predicted",
     "angle_error_whole", "angle_error_end", "horizon_s", "defect_max", "defect_median", "defect_time",
     "defect_judged", "defect_mean", "defect_drift", "defect_floor", "defects_not_judged",
+    "angular_impulse_error_max", "linear_impulse_error_max",
     "zero_pitch_max", "zero_pitch_left_s", "zero_pitch_growth_per_s", "rotor_angle_min", "rotor_angle_max",
     "rotor_rate_max",
 )  # fmt: skip

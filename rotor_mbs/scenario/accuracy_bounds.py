@@ -18,7 +18,7 @@ from rotor_mbs.scenario.toml_file import TableError, read_toml, shown_path
 
 CHECKS = (
     "complete", "status", "metrics", "times", "start", "defect", "defect median", "error", "tip", "energies", "energy",
-    "loads", "gap", "exact", "published", "reference", "growth", "integrity", "copied", "settings", "steps",
+    "impulse", "loads", "gap", "exact", "published", "reference", "growth", "integrity", "copied", "settings", "steps",
     "uncertainty", "frozen",
 )  # fmt: skip
 

@@ -95,7 +95,7 @@ def test_what_a_scene_does_not_ask_for_is_not_judged() -> None:
     without_rates = of_samples(run_of(outputs=("angles", "energy")))
     assert {channel for check, channel in without_rates if check == "energies"} <= {"energy error"}
     scene = paper("fig11", duration=0.1, samples=11, outputs=("angles", "rates"))
-    assert {check for check, _ in of_model(solve(METHOD, scene, {}), scene)} == {"defect", "error"}
+    assert {check for check, _ in of_model(solve(METHOD, scene, {}), scene)} == {"defect", "error", "impulse"}
 
 
 def test_a_balance_without_its_energies_fails_and_without_its_work_is_none() -> None:
@@ -143,6 +143,7 @@ def test_numbers_of_a_model_are_its_metrics_less_what_rounding_and_its_start_lea
         assert found["error", "angles"] == pytest.approx(metrics["angle_error_max"] - start_slack(one))
         drift = metrics["energy_drift_max"] - energy_slack(one, run.trajectory)
         assert found["energy", "balance"] == pytest.approx(drift, rel=1e-12)
+        assert found["impulse", "angular"] == metrics["angular_impulse_error_max"]
     assert 0.0 < start_slack(away) < found["error", "angles"]
     assert ("defect median", "median") not in found
     own = BOUNDS.for_scene("paper/fig11")
@@ -208,7 +209,7 @@ def of_stored(run: Solution, metrics: Any, name: str, stored_value: float) -> tu
 
 @pytest.mark.parametrize("method", [METHOD, PRINTED])
 def test_a_stored_number_may_differ_by_what_rounding_or_other_points_decide(method: str) -> None:
-    """And no other at all: errors, loads, the horizon, one for nothing."""
+    """And no other at all: errors, loads, impulses, the horizon, one for nothing."""
     short = paper("fig06", duration=5.0, samples=5) if method == PRINTED else replace(LOADED, duration=0.2, samples=41)
     run = solve(method, short, {})
     metrics = judge(short, run, run.trajectory).metrics

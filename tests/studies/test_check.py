@@ -75,7 +75,7 @@ def test_what_is_shipped_passes_in_short(good: Path, capsys: pytest.CaptureFixtu
     assert lines[-1].endswith(" passed, 0 failed")
     names = (
         "integrity", "complete", "status", "metrics", "times", "start", "defect", "defect median", "error", "energy",
-        "energies", "tip", "reference", "growth", "uncertainty", "frozen", "copied", "settings", "steps",
+        "impulse", "energies", "tip", "reference", "growth", "uncertainty", "frozen", "copied", "settings", "steps",
     )  # fmt: skip
     assert lines[-2] == f"runs checked: 2 {METHOD}, 2 exudyn_tree/rk67"
     assert {line.split(":")[0] for line in lines[:-2]} == {f"pass {name}" for name in names}
@@ -289,7 +289,7 @@ def _known_faults() -> Iterator[tuple[Bound, str, str, float]]:
     [
         pytest.param(
             *row, id=f"{row[0].check}-{row[2]}",
-            marks=() if row[2] == METHOD and row[0].check not in ("energy", "error") else pytest.mark.full,
+            marks=() if row[2] == METHOD and row[0].check not in ("energy", "impulse", "error") else pytest.mark.full,
         )
         for row in _known_faults()
     ],

@@ -90,17 +90,6 @@ def energies(scene: Scene, y):
     return kinetic, potential
 
 
-def angular_momentum(scene: Scene, angles, rates):
-    """(n,) kg m²/s about the shaft: J_hub q' + Σ e·(J ω), with the shaft's direction e and ω in the blade's frame."""
-    total = scene.hub_inertia * rates[:, 0]
-    for i, blade in enumerate(scene.blades):
-        theta = angles[:, 1 + i]
-        shaft = np.stack([np.sin(theta), np.cos(theta), np.zeros_like(theta)], axis=1)
-        omega = shaft * rates[:, :1] + rates[:, 1 + i, None] * [0.0, 0.0, 1.0]
-        total = total + np.einsum("ni,ij,nj->n", shaft, about_hub(blade), omega)
-    return total
-
-
 def blade_points(scene: Scene, y, index: int, point):
     """(n, 3) m: Ry(q + phase) Rz(θ) point."""
     psi, theta = y[:, 0] + scene.phases[index], y[:, 1 + index]

@@ -10,8 +10,8 @@ import numpy as np
 
 from rotor_mbs.methods.solve import solve
 from rotor_mbs.scenario.scene import Scene
+from rotor_mbs.solution.impulse import angular_momentum
 from rotor_mbs.solution.trajectory import Array, Trajectory
-from support.rotors import angular_momentum
 
 
 def symmetry_errors(scene: Scene, method: str) -> dict[str, float]:
