@@ -10,7 +10,7 @@ import pytest
 from support import other_code
 from support.scenes import paper
 
-from rotor_mbs.analysis.kinematics import exact_rotor_angle
+from rotor_mbs.analysis.kinematics import exact_rotor_angle, potential_energy
 from rotor_mbs.scenario.scene import Scene
 
 RIGID = replace(paper("fig03").blades[0], inertia=(3e5, 4e5, 2e5, 0.0, 0.0, 0.0))
@@ -32,6 +32,15 @@ def test_exact_solutions_are_those_of_the_equations(name: str) -> None:
     assert found[0] == name
     # DOP853 at a relative tolerance of 1e-11 over some hundred steps.
     assert found[1] == pytest.approx(other_code.trajectory(KNOWN[name], time)[0][:, 0], abs=1e-8)
+
+
+def test_a_spring_has_its_energy_from_its_rest_angle() -> None:
+    """k (θ - r)²/2, with different k and r in every bearing, r of blade 2 moving."""
+    rest = ((0.0, 0.3),), ((0.0, -0.2), (1.0, 0.4)), ((0.0, 0.1),)
+    sprung = replace(THREE, bearing_stiffness=(1e5, 2e5, 4e5), bearing_rest=rest)
+    time, angles = np.array([0.0, 0.5]), np.array([[0.2, 0.3, 0.8, 0.1], [0.2, 1.3, 0.1, 0.6]])
+    spring = potential_energy(sprung, time, angles) - potential_energy(THREE, time, angles)
+    assert spring == pytest.approx([0.5 * 2e5 * 1.0**2, 0.5 * 1e5 * 1.0**2 + 0.5 * 4e5 * 0.5**2])
 
 
 _BLADE = THREE.blades[0]
