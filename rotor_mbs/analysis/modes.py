@@ -305,6 +305,7 @@ class SceneModes:
     """The modes of a scene: by source, the closed form first; notes: what could not be done, and why."""
 
     scene: str
+    scene_hash: str
     title: str
     blades: int
     gravity: float
@@ -331,62 +332,58 @@ class SceneModes:
     def agrees(self) -> bool:
         return self.disagreement <= AGREEMENT
 
+    @property
+    def closed_form(self) -> list[LinearModes]:
+        """Its modes at rest and over speed, those that there are."""
+        return [next(iter(kind.values())) for kind in (self.rest, self.rotation) if kind]
+
 
 def mode_rows(modes: SceneModes) -> list[dict[str, object]]:
     """A row for each state, speed and mode of the closed form: speeds and frequencies in rad/s, growth in 1/s."""
     rows: list[dict[str, object]] = []
-    for kind in (modes.rest, modes.rotation):
-        for linear in list(kind.values())[:1]:
-            numbers = {
-                "undamped_frequency": linear.undamped_frequencies,
-                "damped_frequency": linear.damped_frequencies,
-                "damping_ratio": linear.damping_ratios,
-                "growth_rate": linear.growth_rates,
-            }
-            state = "at rest" if linear.kind == REST else "steady rotation without gravity"
-            for i, speed in enumerate(linear.speeds.tolist()):
-                for k, name in enumerate(linear.names):
-                    # None for what JSON has no number for.
-                    shown = {key: float(a[i, k]) if math.isfinite(a[i, k]) else None for key, a in numbers.items()}
-                    rows.append({"state": state, "speed": speed, "mode": name, **shown})
+    for linear in modes.closed_form:
+        numbers = {
+            "undamped_frequency": linear.undamped_frequencies,
+            "damped_frequency": linear.damped_frequencies,
+            "damping_ratio": linear.damping_ratios,
+            "growth_rate": linear.growth_rates,
+        }
+        state = "at rest" if linear.kind == REST else "steady rotation without gravity"
+        for i, speed in enumerate(linear.speeds.tolist()):
+            for k, name in enumerate(linear.names):
+                # None for what JSON has no number for.
+                shown = {key: float(a[i, k]) if math.isfinite(a[i, k]) else None for key, a in numbers.items()}
+                rows.append({"state": state, "speed": speed, "mode": name, **shown})
     return rows
 
 
 def modes_summary(modes: SceneModes) -> list[str]:
     """Lines for a terminal: modes at rest, at the lowest and the highest speed, agreement, multipliers."""
     lines = [f"{modes.scene}: {modes.title}"]
-    rows = mode_rows(modes)
-    for kind in (modes.rest, modes.rotation):
-        for linear in list(kind.values())[:1]:
-            own = rows[: len(linear.speeds) * len(linear.names)]
-            rows = rows[len(own) :]
-            for i in sorted({0, len(linear.speeds) - 1}):
-                state = "at rest" if linear.kind == REST else f"at {linear.speeds[i]:.4g} rad/s without gravity"
-                if linear.messages[i]:
-                    lines.append(f"  {state}: {linear.messages[i]}")
-                    continue
-                lines.append(f"  {state}")
-                lines += map(_mode_line, own[i * len(linear.names) : (i + 1) * len(linear.names)])
-    compared = [
-        f"{', '.join(s.label for s in kind.values())}" for kind in (modes.rest, modes.rotation) if len(kind) > 1
-    ]
-    if compared:
-        verdict = "agree" if modes.agrees else "DISAGREE"
-        lines.append(
-            f"  {max(compared, key=len)} {verdict}: relative difference of frequencies up to {modes.disagreement:.1e}"
-        )
+    for linear in modes.closed_form:
+        for i in sorted({0, len(linear.speeds) - 1}):
+            state = "at rest" if linear.kind == REST else f"at {linear.speeds[i]:.4g} rad/s without gravity"
+            if linear.messages[i]:
+                lines.append(f"  {state}: {linear.messages[i]}")
+                continue
+            lines.append(f"  {state}")
+            for k, name in enumerate(linear.names):
+                undamped, ratio = linear.undamped_frequencies[i, k], linear.damping_ratios[i, k]
+                line = f"    {name:18} {undamped:12.7g} rad/s {undamped / (2 * math.pi):12.7g} Hz"
+                line += f", damped {linear.damped_frequencies[i, k]:.7g}"
+                if math.isnan(undamped):
+                    line = f"    {name:18} grows without oscillating, {linear.growth_rates[i, k]:.5g} 1/s"
+                elif abs(ratio) > 1e-12:
+                    line += f", damping ratio {ratio:.4g}"
+                lines.append(line)
+    sources = max(modes.rest, modes.rotation, key=len)
+    if len(sources) > 1:
+        labels, verdict = (linear.label for linear in sources.values()), "agree" if modes.agrees else "DISAGREE"
+        off = f"relative difference of frequencies up to {modes.disagreement:.1e}"
+        lines.append(f"  {', '.join(labels)} {verdict}: {off}")
     if modes.floquet is not None:
         lines.append(f"  {floquet_sentence(modes.floquet)}")
     return [*lines, *(f"  {note}" for note in modes.notes)]
-
-
-def _mode_line(row: Mapping[str, Any]) -> str:
-    name, undamped, ratio = row["mode"], row["undamped_frequency"], row["damping_ratio"]
-    if undamped is None:
-        return f"    {name:18} grows without oscillating, {row['growth_rate']:.5g} 1/s"
-    shown = f", damping ratio {ratio:.4g}" if ratio is not None and abs(ratio) > 1e-12 else ""
-    damped = f"damped {row['damped_frequency']:.7g}"
-    return f"    {name:18} {undamped:12.7g} rad/s {undamped / (2 * math.pi):12.7g} Hz, {damped}{shown}"
 
 
 def floquet_sentence(table: FloquetTable) -> str:
@@ -464,10 +461,10 @@ def _chart_datasets(chart: StabilityChart) -> Datasets:
     }
 
 
-def to_records(modes: SceneModes, attributes: Mapping[str, Any]) -> list[Record]:
-    """The records of a results file; attributes: of every one of them, its key among them."""
-    common = {"title": modes.title, "blades": modes.blades, "gravity": modes.gravity, "notes": "\n".join(modes.notes)}
-    common |= attributes
+def to_records(modes: SceneModes) -> list[Record]:
+    """The records of a file of modes."""
+    common = {name: getattr(modes, name) for name in ("scene_hash", "title", "blades", "gravity")}
+    common["notes"] = "\n".join(modes.notes)
     linear = [*modes.rest.values(), *modes.rotation.values()]
     records = [_linear_record(modes.scene, source, common) for source in linear]
     if modes.floquet is not None:
@@ -518,57 +515,56 @@ def linear_dataset(sources: Mapping[str, LinearModes], xarray: Any) -> Any:
 
 
 def read_modes(path: Path) -> dict[str, SceneModes]:
-    """By scene, all modes in a results file. Raises StoreError where the file cannot be read or has none."""
+    """By scene, all modes in a file. Raises StoreError where the file cannot be read or has none."""
     by_scene: dict[str, dict[str, Record]] = {}
     for record in read_records(path, "modes"):
         by_scene.setdefault(record.scene, {})[record.name] = record
     if not by_scene:
         raise StoreError(f"{path}: no modes in it; allowed: a file that rotor-mbs modes has written")
-    return {scene: _from_records(scene, records) for scene, records in by_scene.items()}
-
-
-def _from_records(scene: str, records: Mapping[str, Record]) -> SceneModes:
-    facts = next(iter(records.values())).attributes
-    states: dict[str, dict[str, LinearModes]] = {REST: {}, ROTATION: {}}
-    for name in sorted(records, key=lambda name: name.partition("/")[0] != CLOSED_FORM):
-        source, _, kind = name.partition("/")
-        if kind in states:
-            states[kind][source] = _linear(records[name], source, kind)
-    floquet = chart = None
-    if FLOQUET in records:
-        arrays = records[FLOQUET].arrays
-        floquet = FloquetTable(
-            speeds=arrays["speed"],
-            multipliers=np.asarray(arrays["multiplier_real"] + 1j * arrays["multiplier_imag"]),
-            largest=arrays["largest_multiplier"],
-            stable=arrays["stable"],
-            product_error=arrays["product_error"],
-            torque=arrays["torque"],
-            mismatch=arrays["mismatch"],
-            messages=tuple(map(str, records[FLOQUET].attributes["messages"])),
+    modes_by_scene = {}
+    for scene, records in by_scene.items():
+        states: dict[str, dict[str, LinearModes]] = {REST: {}, ROTATION: {}}
+        floquet = chart = None
+        for name in sorted(records, key=lambda name: name.partition("/")[0] != CLOSED_FORM):
+            facts, arrays = records[name].attributes, records[name].arrays
+            source, _, kind = name.partition("/")
+            if name == FLOQUET:
+                floquet = FloquetTable(
+                    speeds=arrays["speed"],
+                    multipliers=np.asarray(arrays["multiplier_real"] + 1j * arrays["multiplier_imag"]),
+                    largest=arrays["largest_multiplier"],
+                    messages=tuple(map(str, facts["messages"])),
+                    **{column: arrays[column] for column in ("stable", "product_error", "torque", "mismatch")},
+                )
+            elif name == CHART:
+                chart = StabilityChart(arrays["speed"], arrays["bearing_stiffness"], arrays["largest_multiplier"])
+            elif kind in states:
+                states[kind][source] = LinearModes(
+                    eigenvalues=np.asarray(arrays["eigenvalue_real"] + 1j * arrays["eigenvalue_imag"]),
+                    shapes=np.asarray(arrays["shape_real"] + 1j * arrays["shape_imag"]),
+                    names=tuple(map(str, facts["mode_labels"])),
+                    source=source,
+                    label=str(facts["label"]),
+                    kind=kind,
+                    blades=int(facts["blades"]),
+                    speeds=arrays["speed"],
+                    coordinates=tuple(map(str, facts["coordinate_labels"])),
+                    angles=arrays["steady_angle"],
+                    stiffness=arrays["stiffness"],
+                    damping=arrays["damping"],
+                    messages=tuple(map(str, facts["messages"])),
+                )
+        facts = next(iter(records.values())).attributes
+        modes_by_scene[scene] = SceneModes(
+            scene=scene,
+            scene_hash=str(facts["scene_hash"]),
+            title=str(facts["title"]),
+            blades=int(facts["blades"]),
+            gravity=float(facts["gravity"]),
+            rest=states[REST],
+            rotation=states[ROTATION],
+            floquet=floquet,
+            chart=chart,
+            notes=tuple(str(facts["notes"]).splitlines()),
         )
-    if CHART in records:
-        arrays = records[CHART].arrays
-        chart = StabilityChart(arrays["speed"], arrays["bearing_stiffness"], arrays["largest_multiplier"])
-    title, blades, gravity = str(facts["title"]), int(facts["blades"]), float(facts["gravity"])
-    notes = tuple(str(facts["notes"]).splitlines())
-    return SceneModes(scene, title, blades, gravity, states[REST], states[ROTATION], floquet, chart, notes)
-
-
-def _linear(record: Record, source: str, kind: str) -> LinearModes:
-    facts, arrays = record.attributes, record.arrays
-    return LinearModes(
-        eigenvalues=np.asarray(arrays["eigenvalue_real"] + 1j * arrays["eigenvalue_imag"]),
-        shapes=np.asarray(arrays["shape_real"] + 1j * arrays["shape_imag"]),
-        names=tuple(map(str, facts["mode_labels"])),
-        source=source,
-        label=str(facts["label"]),
-        kind=kind,
-        blades=int(facts["blades"]),
-        speeds=arrays["speed"],
-        coordinates=tuple(map(str, facts["coordinate_labels"])),
-        angles=arrays["steady_angle"],
-        stiffness=arrays["stiffness"],
-        damping=arrays["damping"],
-        messages=tuple(map(str, facts["messages"])),
-    )
+    return modes_by_scene

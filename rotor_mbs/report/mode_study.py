@@ -34,7 +34,7 @@ from rotor_mbs.report.numbers import NOTHING, number
 from rotor_mbs.runs.read import OpenResults, write_records
 from rotor_mbs.runs.versions import machine, versions
 from rotor_mbs.scenario.catalogue import scene_of
-from rotor_mbs.scenario.scene import Scene, scene_hash
+from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.trajectory import need_xarray
 from rotor_mbs.studies.modes import compute_modes
 
@@ -68,11 +68,10 @@ def modes(scene: Scene | str, speeds: Sequence[float] = (), stiffnesses: Sequenc
     >>> study.rotation["lagrange"].names
     ('rotor', 'collective pitch', 'cosine pitch', 'sine pitch')
     """
-    scene = scene_of(scene)
-    return Modes(**vars(compute_modes(scene, speeds, stiffnesses)), hash=scene_hash(scene))
+    return Modes(**vars(compute_modes(scene_of(scene), speeds, stiffnesses)))
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True)
 class Modes(SceneModes):
     """Result of `rotor_mbs.modes`: the modes of a scene.
 
@@ -85,8 +84,6 @@ class Modes(SceneModes):
     agrees, disagreement : whether the frequencies of the models agree, and their largest relative difference.
     plot : `modes.plot()` draws the Campbell diagram; `.damping()`, `.multipliers()`, `.chart()`.
     """
-
-    hash: str
 
     @property
     def plot(self) -> ModePlots:
@@ -107,7 +104,7 @@ class Modes(SceneModes):
 
     def save(self, path: str | os.PathLike[str]) -> Path:
         """Save the modes in a file that `rotor-mbs report` reads. An existing file is replaced."""
-        write_records(Path(path), to_records(self, {"scene_hash": self.hash}))
+        write_records(Path(path), to_records(self))
         return Path(path)
 
     def to_html(self, folder: str | os.PathLike[str]) -> Path:

@@ -27,19 +27,17 @@ from rotor_mbs.analysis.modes import (
     floquet,
     isotropic_modes,
     modes_of,
-    read_modes,
     to_records,
     track,
 )
 from rotor_mbs.errors import InputError, MethodRefusal, RotorError
-from rotor_mbs.methods.base import Method
 from rotor_mbs.methods.catalogue import find_method, methods, with_method_files
 from rotor_mbs.runs.files import writing
 from rotor_mbs.runs.pool import local_pool, run_in
 from rotor_mbs.runs.read import Record, read_records, write_records
 from rotor_mbs.scenario.scene import Scene, scene_hash
 from rotor_mbs.scenario.time_table import value_at
-from rotor_mbs.solution.trajectory import Array, Linearization
+from rotor_mbs.solution.trajectory import Array
 from rotor_mbs.studies.run import OnProgress, Outcome, ignore_progress
 
 if TYPE_CHECKING:
@@ -77,38 +75,32 @@ def modes_of_scenes(
     with writing(output):
         records: list[Record] = []
         if output.exists():
-            hashes = {record.scene: record.attributes["scene_hash"] for record in read_records(output, "modes")}
-            if not hashes:
+            records = read_records(output, "modes")
+            if not records:
                 raise InputError(f"{output}: is no file of modes; allowed: another output file")
-            for name, modes in read_modes(output).items():
-                if name not in {scene.name for scene in scenes}:
-                    records += to_records(modes, {"scene_hash": hashes[name]})
+            asked = {scene.name for scene in scenes}
+            records = [record for record in records if record.scene not in asked]
+        work = with_method_files(partial(compute_modes, speeds=speeds, stiffnesses=stiffnesses, models=models))
         with local_pool(workers) as pool:
-            tasks = [(scene, tuple(speeds), tuple(stiffnesses), models) for scene in scenes]
-            for done, end in enumerate(run_in(pool, with_method_files(_perform), tasks, timeout_s), 1):
+            for done, end in enumerate(run_in(pool, work, scenes, timeout_s), 1):
                 if isinstance(end.error, RotorError):
                     raise end.error
-                scene, share = end.task[0], done / len(tasks)
-                label = f"{scene.name} modes"
+                label, share = f"{end.task.name} modes", done / len(scenes)
                 if end.value is None:
                     outcome = Outcome(label, "", end.failure, end.message, is_stored=False, share=share)
                 else:
                     modes = end.value
-                    records += to_records(modes, {"scene_hash": scene_hash(scene)})
+                    records += to_records(modes)
                     status, message = "ok", "; ".join(modes.notes)
                     if not modes.agrees:
                         differ = f"relative difference of frequencies up to {modes.disagreement:.1e}"
                         status, message = "inaccurate", differ
                     outcome = Outcome(label, "", status, message, share=share)
                 made.append(outcome)
-                on_progress(done, len(tasks), outcome)
+                on_progress(done, len(scenes), outcome)
         if any(outcome.is_stored for outcome in made):
             write_records(output, records)
     return made
-
-
-def _perform(task: tuple[Scene, tuple[float, ...], tuple[float, ...], tuple[str, ...]]) -> SceneModes:
-    return compute_modes(*task)
 
 
 def compute_modes(
@@ -127,6 +119,7 @@ def compute_modes(
         tuple(((0.0, value_at(table, 0.0)),) if table else () for table in tables)
         for tables in (scene.pitch_torque, scene.bearing_rest)
     )
+    facts = scene.name, scene_hash(scene), scene.title, len(scene.blades), scene.gravity
     scene = replace(scene, pitch_torque=torques, bearing_rest=rests)
     speeds = np.array(_increasing(speeds, "speeds"))
     rest = _linear(scene, REST, np.zeros(1), models, notes)
@@ -142,8 +135,7 @@ def compute_modes(
             chart = StabilityChart(turning, stiffness, np.array(rows)) if rows else None
         except MethodRefusal as exc:
             notes.append(f"no Floquet multipliers: {exc}")
-    title, blades = scene.title, len(scene.blades)
-    return SceneModes(scene.name, title, blades, scene.gravity, rest, rotation, table, chart, tuple(notes))
+    return SceneModes(*facts, rest, rotation, table, chart, tuple(notes))
 
 
 def _linear(scene: Scene, kind: str, speeds: Array, models: Sequence[str], notes: list[str]) -> dict[str, LinearModes]:
@@ -174,7 +166,14 @@ def _linear(scene: Scene, kind: str, speeds: Array, models: Sequence[str], notes
         if models and method.model not in (closed_form, *models):
             continue
         try:
-            made = [_linearized(method, point) for point in steady]
+            made = []
+            for point in steady:
+                assert method.linearize is not None
+                made.append(method.linearize(*point))
+                left = np.abs(made[-1].residual).max(initial=0.0)
+                if left > _STEADY * max(np.abs(made[-1].stiffness).max(), 1e-12):
+                    moves = f"accelerates by {left:.1e} rad/s^2 where the closed form is steady"
+                    raise MethodRefusal(f"{method.model}: {moves}")
         except MethodRefusal as exc:
             if kind == REST:
                 notes.append(str(exc))
@@ -220,15 +219,6 @@ def _steady_states(scene: Scene, kind: str, speeds: Array) -> list[_Point | str]
             start = replace(start, initial_angles=tuple(angles.tolist()))
             points.append((replace(at, rotor_torque=()), angles, speed, holding_torque(scene, speed)))
     return points[::-1]
-
-
-def _linearized(method: Method, point: _Point) -> Linearization:
-    assert method.linearize is not None  # the caller has asked
-    made = method.linearize(*point)
-    left = np.abs(made.residual).max(initial=0.0)
-    if left > _STEADY * max(np.abs(made.stiffness).max(), 1e-12):
-        raise MethodRefusal(f"{method.model}: accelerates by {left:.1e} rad/s^2 where the closed form is steady")
-    return made
 
 
 def _floquet_table(scene: Scene, speeds: Array) -> FloquetTable:

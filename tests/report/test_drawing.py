@@ -212,7 +212,7 @@ def test_powers_of_ten_are_labelled_within_the_axes_alone() -> None:
     picture.axes[0].plot([0.0, 1.0], [1e-16, 1e-13])
     canvas.log_axis(picture.axes[0], 1e-16, 1e-13)
     for shown, labels in (
-        (ModePlots(SceneModes("s", "t", 1, 9.8, floquet=table)).multipliers(), ["10⁻²", "10⁻¹", "10⁰"]),
+        (ModePlots(SceneModes("s", "0", "t", 1, 9.8, floquet=table)).multipliers(), ["10⁻²", "10⁻¹", "10⁰"]),
         (picture, ["10⁻¹⁶", "10⁻¹⁵", "10⁻¹⁴", "10⁻¹³"]),
     ):
         text = str(picture_in_page(shown, "n", "t").svg)

@@ -66,7 +66,7 @@ def test_blades_that_differ_have_numbered_modes_and_unknown_speeds_a_message():
 def test_records_keep_every_number(tmp_path):
     pytest.importorskip("heyoka")
     found = study.compute_modes(SOFT, [0.0, 1.2, 3.0], [5e4, 2e5])
-    write_records(tmp_path / "modes.h5", to_records(found, {"scene_hash": "0"}))
+    write_records(tmp_path / "modes.h5", to_records(found))
     read = read_modes(tmp_path / "modes.h5")["soft"]
     assert (read.title, read.blades, read.gravity, read.notes) == (found.title, 3, found.gravity, found.notes)
     assert set(read.rest) == set(found.rest)
