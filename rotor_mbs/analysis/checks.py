@@ -15,14 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rotor_mbs.analysis import kinematics
-from rotor_mbs.analysis.judgement import (
-    Judgement,
-    energy_slack,
-    judge,
-    quantity_bound,
-    quantity_errors,
-    start_slack,
-)
+from rotor_mbs.analysis.judgement import energy_slack, judge, quantity_bound, quantity_errors, start_slack
 from rotor_mbs.analysis.kinematics import exact_rotor_angle
 from rotor_mbs.analysis.published import claims
 from rotor_mbs.analysis.run_selection import PRINTED
@@ -95,26 +88,32 @@ def checks_of(results: OpenResults, frozen: Sequence[OpenResults], bounds: Bound
     Raises InputError where a stored scene is none.
     """
     bounds = bounds.with_entries(bound for method in methods() for bound in method.bounds)
-    shipped = {name: scene for file in frozen for name, scene in file.scenes.items()}
+    shipped = {name: scene.reference for file in frozen for name, scene in file.scenes.items()}
     checks: list[Check] = []
     with np.errstate(all="ignore"):  # a hostile file may hold any number; what overflows fails
         for scene in results.scenes.values():
             own = bounds.for_scene(scene.name if _is_shipped(scene) else "")
-            known = shipped.get(scene.name) if own.scene else None
+            # Whether the reference itself stops early: the motion does not exist beyond.
+            motion_ends = scene.reference is not None and scene.reference.status == "singular"
             for run in scene.runs.values():
                 hint = "its row changed after it was written" if run.is_damaged else "as written"
-                where = Where(scene.name, run.method, "row")
-                checks.append(make_check(bounds, "integrity", where, run.is_damaged, "rows", hint))
+                checks.append(_of(run, "integrity", "row", run.is_damaged, own, "rows", hint))
                 try:
                     # Whatever goes wrong with a run that is known to be damaged is that damage.
                     with reading(str(scene.name), run.method) if run.is_damaged else nullcontext():
                         faults, solution = run.faults(scene.scene), run.solution(scene.scene)
-                        checks += _of_run(run, own, solution, faults, scene.reference_trajectory, _motion_ends(scene))
+                        checks += _of_run(run, own, solution, faults, scene.reference_trajectory, motion_ends)
                 except StoreError as exc:
                     checks.append(_of(run, "complete", "all", math.nan, own, "faults", str(exc)))
-            checks += _copies(scene, own)
-            checks += _of_reference(scene, known.reference if known is not None else None, own)
-        checks += _of_paper(results, bounds)
+            checks += _of_copies(scene, own)
+            checks += _of_reference(scene, shipped.get(scene.name) if own.scene else None, own)
+        for claim in claims(results.scenes):  # the paper's numbers, in units of their last printed digit
+            item, value = claim.published, claim.printed.value
+            if item.of is not None and value is not None:
+                off = abs(round(value, item.decimals) - item.value) * 10**item.decimals
+                hint = f"the paper prints {item.value}, the run gives {value:.6f}: the printed entries, g, ode45"
+                where = Where(item.of.scene, PRINTED, item.id)
+                checks.append(make_check(bounds, "published", where, off, "last digits", hint))
     return checks
 
 
@@ -130,7 +129,7 @@ def _of(run: StoredRun, name: str, channel: str, value: float, bounds: Bounds, u
     return make_check(bounds, name, Where(run.scene, run.method, channel), value, unit, hint)
 
 
-def _copies(scene: StoredScene, bounds: Bounds) -> list[Check]:
+def _of_copies(scene: StoredScene, bounds: Bounds) -> list[Check]:
     """One check for a scene with several runs; where there are copies, one for each pair."""
     if len(scene.runs) < 2:
         return []
@@ -154,30 +153,21 @@ def copies(scene: StoredScene) -> Iterator[tuple[StoredRun, str, str]]:
     Methods round differently, so that equal bits are a copy. Columns that are zero, constant or a straight line do not
     count, nor short ones; nor two runs by MATLAB's ode45, whose steps are the same where an erratum has no effect.
     """
-    columns = {name: _bent_columns(run) for name, run in scene.runs.items()}
+    columns: dict[str, dict[tuple[str, int], bytes]] = {}
+    for method, run in scene.runs.items():
+        columns[method] = {}
+        for name in ("angles", "rates"):
+            values = run.array(name) if name in run else np.empty((0, 0))
+            if values.ndim == 2 and values.dtype.kind == "f" and len(values) >= _FEWEST:
+                for i, column in enumerate(values.T):
+                    if np.abs(np.diff(column, 2)).max() > _STRAIGHT * np.abs(column).max():
+                        columns[method][name, i] = column.tobytes()
     for first, second in itertools.combinations(scene.runs, 2):
         if first.endswith("/ode45") and second.endswith("/ode45"):
             continue
         for place in sorted(columns[first].keys() & columns[second].keys()):
             if columns[first][place] == columns[second][place]:
                 yield scene.runs[second], first, f"{place[0]} {place[1]}"
-
-
-def _bent_columns(run: StoredRun) -> dict[tuple[str, int], bytes]:
-    columns = {}
-    for name in ("angles", "rates"):
-        values = run.array(name) if name in run else np.empty((0, 0))
-        if values.ndim == 2 and values.dtype.kind == "f" and len(values) >= _FEWEST:
-            for i, column in enumerate(values.T):
-                if np.abs(np.diff(column, 2)).max() > _STRAIGHT * np.abs(column).max():
-                    columns[name, i] = column.tobytes()
-    return columns
-
-
-def _motion_ends(scene: StoredScene) -> bool:
-    """Whether the reference itself stops early: the motion does not exist beyond."""
-    reference = scene.reference
-    return reference is not None and "time" in reference and reference.status == "singular"
 
 
 def _of_run(
@@ -200,12 +190,21 @@ def _of_run(
         return
     scene = solution.scene
     judgement = judge(scene, solution, reference)
-    yield _status(run, bounds, judgement)
+    claimed = bool(run.attributes.get("false_success", 0))
+    wrong = (judgement.status != run.status) + (judgement.false_success != claimed)
+    hint = f"stored {run.status}, its samples give {judgement.status} {judgement.message}".rstrip()
+    if judgement.false_success != claimed:
+        hint += "; the engine's report of success is " + ("false" if judgement.false_success else "not false")
+    yield _of(run, "status", "status", float(wrong), bounds, "faults", hint)
     channel, worst, hint = _changed_metric(run, judgement.metrics, solution)
     yield _of(run, "metrics", channel, worst, bounds, "relative", hint)
-    yield from _of_settings(run, bounds, scene)
+    faults = settings_faults(run)
+    hint = "; ".join(faults) or "the method's, each within its range"
+    yield _of(run, "settings", "settings", float(len(faults)), bounds, "faults", hint)
+    if (steps := steps_off(scene, run, bounds.scene)) is not None:
+        yield _of(run, "steps", "steps", steps[0], bounds, "relative", steps[1])
     if len(solution.trajectory.time):
-        yield from _of_samples(run, bounds, scene, solution)
+        yield from _of_samples(run, bounds, scene, solution.trajectory)
         if is_corrected(run.method):
             yield from _of_corrected_model(run, bounds, scene, solution.trajectory, judgement.metrics)
         own_growth = judgement.defects.error_growth if judgement.defects is not None else None
@@ -215,15 +214,6 @@ def _of_run(
             off = float(np.abs(np.log(growth[known] / own_growth[known])).max(initial=0.0))
             hint = "the stored horizon is not that computed from the samples"
             yield Check("growth", Where(run.scene, run.method, "of the samples"), off, _OWN_GROWTH, hint, "log")
-
-
-def _status(run: StoredRun, bounds: Bounds, judgement: Judgement) -> Check:
-    claimed = bool(run.attributes.get("false_success", 0))
-    faults = (judgement.status != run.status) + (judgement.false_success != claimed)
-    hint = f"stored {run.status}, its samples give {judgement.status} {judgement.message}".rstrip()
-    if judgement.false_success != claimed:
-        hint += "; the engine's report of success is " + ("false" if judgement.false_success else "not false")
-    return _of(run, "status", "status", float(faults), bounds, "faults", hint)
 
 
 def _changed_metric(run: StoredRun, metrics: Metrics, solution: Solution) -> tuple[str, float, str]:
@@ -299,15 +289,6 @@ def _own_extremes(solution: Solution) -> dict[str, float]:
     return {name: float(value) for name, value in extremes.items()}
 
 
-def _of_settings(run: StoredRun, bounds: Bounds, scene: Scene) -> Iterator[Check]:
-    faults = settings_faults(run)
-    hint = "; ".join(faults) or "the method's, each within its range"
-    yield _of(run, "settings", "settings", float(len(faults)), bounds, "faults", hint)
-    steps = steps_off(scene, run, bounds.scene)
-    if steps is not None:
-        yield _of(run, "steps", "steps", steps[0], bounds, "relative", steps[1])
-
-
 def settings_faults(run: StoredRun) -> list[str]:
     """What is wrong with the stored settings: each of the method's must be there, none else, each within its range."""
     method = look_up(run.method)
@@ -347,9 +328,8 @@ def same_settings(settings: Mapping[str, object], expected: Mapping[str, object]
     return all(settings.get(name) == expected.get(name) for name in {**settings, **expected})
 
 
-def _of_samples(run: StoredRun, bounds: Bounds, scene: Scene, recorded: Solution) -> Iterator[Check]:
+def _of_samples(run: StoredRun, bounds: Bounds, scene: Scene, trajectory: Trajectory) -> Iterator[Check]:
     """What the samples say of each other, whatever equations moved them."""
-    trajectory = recorded.trajectory
     times = np.linspace(0.0, scene.duration, scene.samples)[: len(trajectory.time)]
     off = float(np.abs(trajectory.time - times).max()) / scene.duration
     yield _of(run, "times", "time", off, bounds, "of duration", "samples are equally spaced, both ends included")
@@ -413,22 +393,17 @@ def _of_corrected_model(
         if (name := f"{channel}_impulse_error_max") in metrics:
             hint = "momentum minus the impulses of torque, weights and bearing: a force, an inertia, or too long a step"
             yield _of(run, "impulse", channel, metrics[name], bounds, "of scale", hint)
-    yield from _of_quantities(run, bounds, scene, metrics)
-    exact = exact_rotor_angle(scene, trajectory.time) if scene.wants("angles") else None
-    if exact is not None:
-        name, angle = exact
-        off = float(np.abs(trajectory.angles[:, 0] - angle).max())
-        yield _of(run, "exact", "rotor angle", off, bounds, "rad", f"{name}, solved analytically")
-
-
-def _of_quantities(run: StoredRun, bounds: Bounds, scene: Scene, metrics: Metrics) -> Iterator[Check]:
-    """Every quantity that is judged by a rule of its declaration."""
     for quantity, rule, error in quantity_errors(scene, metrics):
         bound = quantity_bound(rule, bounds, run.method)
         if bound is not None:
             where = Where(run.scene, run.method, rule.channel or quantity.name)
             hint, unit = rule.look_at or quantity.long_name, rule.unit or quantity.units
             yield Check(rule.check or quantity.name, where, error, bound, hint, unit)
+    exact = exact_rotor_angle(scene, trajectory.time) if scene.wants("angles") else None
+    if exact is not None:
+        name, angle = exact
+        off = float(np.abs(trajectory.angles[:, 0] - angle).max())
+        yield _of(run, "exact", "rotor angle", off, bounds, "rad", f"{name}, solved analytically")
 
 
 def _of_reference(scene: StoredScene, shipped: StoredRun | None, bounds: Bounds) -> Iterator[Check]:
@@ -440,10 +415,12 @@ def _of_reference(scene: StoredScene, shipped: StoredRun | None, bounds: Bounds)
         yield make_check(bounds, "reference", Where(scene.name, REFERENCE, "all"), math.nan, "rad", hint)
     elif shipped is not None:
         if stored.is_frozen:  # it says that it was read from the shipped file
-            names = [name for name in ("angles", "rates", "error_growth", "angle_uncertainty") if name in shipped]
-            changed = [
-                name for name in names if name in stored and not _is_same(stored.array(name), shipped.array(name))
-            ]
+            changed = []
+            for name in ("angles", "rates", "error_growth", "angle_uncertainty"):
+                if name in shipped and name in stored:
+                    values, others = stored.array(name), shipped.array(name)
+                    if values.shape != others.shape or values.tobytes() != others.tobytes():
+                        changed.append(name)
             channel = ", ".join(changed) or "all"
             yield _of(stored, "frozen", channel, float(len(changed)), bounds, "arrays", "as in the shipped file")
         for name in ("angles", "rates"):
@@ -460,19 +437,3 @@ def _of_reference(scene: StoredScene, shipped: StoredRun | None, bounds: Bounds)
                     used = np.isfinite(first) & (first > 0.0)  # the ratio, as far as both are positive and finite
                     off = float(np.abs(np.log(second[used] / first[used])).max(initial=0.0))
                 yield _of(stored, check_name, name.replace("_", " "), off, bounds, "log", hint)
-
-
-def _is_same(values: Array, others: Array) -> bool:
-    return values.shape == others.shape and values.tobytes() == others.tobytes()
-
-
-def _of_paper(results: OpenResults, bounds: Bounds) -> Iterator[Check]:
-    """The paper's numbers, in units of their last printed digit."""
-    for claim in claims(results.scenes):
-        item, value = claim.published, claim.printed.value
-        if item.of is None or value is None:
-            continue
-        off = abs(round(value, item.decimals) - item.value) * 10**item.decimals
-        hint = f"the paper prints {item.value}, the run gives {value:.6f}: the printed entries, g, ode45"
-        where = Where(item.of.scene, PRINTED, item.id)
-        yield make_check(bounds, "published", where, off, "last digits", hint)

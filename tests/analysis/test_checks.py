@@ -27,6 +27,7 @@ from rotor_mbs.solution.trajectory import Solution
 
 METHOD, PRINTED, BOUNDS = "lagrange/dop853", "printed/ode45", load_bounds()
 LOADED = scene("check/loads")
+FIG11 = paper("fig11", samples=501)
 ANGLES, RATE = {"rotor_angle_min", "rotor_angle_max"}, {"rotor_rate_max"}
 
 
@@ -43,7 +44,7 @@ def values(found: Any) -> dict[tuple[str, str], float]:
 
 
 def of_samples(run: Solution) -> dict[tuple[str, str], float]:
-    return values(checks._of_samples(stored(), BOUNDS, run.scene, run))
+    return values(checks._of_samples(stored(), BOUNDS, run.scene, run.trajectory))
 
 
 def test_right_samples_are_off_by_rounding_alone() -> None:
@@ -265,17 +266,22 @@ def test_the_growth_of_a_reference_is_that_of_its_samples(method: str, share: fl
 @pytest.mark.parametrize(
     ("status", "claimed", "faults"), [("ok", 0, 1), ("unchecked", 0, 0), ("unchecked", 1, 1), ("ok", 1, 2)]
 )
-def test_a_status_and_a_claim_are_a_fault_each(status: str, claimed: int, faults: int) -> None:
+def test_a_status_and_a_claim_are_a_fault_each(
+    status: str, claimed: int, faults: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
     run = run_of(outputs=("angles",))  # nothing to compare it with
-    one = stored(status=status, attributes={"false_success": claimed})
-    judged = checks._status(one, BOUNDS, judge(run.scene, run, None))
-    assert judged.value == faults
-    assert ("the engine's report of success is not false" in judged.hint) == bool(claimed)
+
+    def judged(**attributes: int) -> checks.Check:
+        given = checks._of_run(stored(status=status, attributes=attributes), BOUNDS, run, [], None, False)
+        return next(check for check in given if check.name == "status")
+
+    assert judged(false_success=claimed).value == faults
+    assert ("the engine's report of success is not false" in judged(false_success=claimed).hint) == bool(claimed)
     # A run that says nothing of its engine's claim has made none that is false.
-    silent, verdict = stored(status="unchecked"), judge(run.scene, run, None)
-    assert checks._status(silent, BOUNDS, verdict).passed
-    given = checks._status(silent, BOUNDS, replace(verdict, false_success=True))
-    assert (given.value, given.hint.endswith("the engine's report of success is false")) == (1.0, True)
+    assert judged().passed == (status == "unchecked")
+    verdict = replace(judge(run.scene, run, None), false_success=True)
+    monkeypatch.setattr(checks, "judge", lambda *_: verdict)
+    assert judged().hint.endswith("the engine's report of success is false")
 
 
 def of_reference(own: Any, shipped: Any) -> dict[tuple[str, str], float]:
@@ -311,12 +317,13 @@ def test_a_reference_is_compared_with_the_shipped_one() -> None:
     assert set(of_reference(empty, empty).values()) == {0.0}
 
 
-@pytest.mark.parametrize(
-    ("status", "arrays", "ends"), [("singular", {"time": 1}, True), ("ok", {"time": 1}, False), ("singular", {}, False)]
-)
-def test_the_motion_ends_where_the_reference_does(status: str, arrays: Any, ends: bool) -> None:
-    assert checks._motion_ends(SimpleNamespace(reference=stored(REFERENCE, status=status, **arrays))) is ends
-    assert not checks._motion_ends(SimpleNamespace(reference=None))
+@pytest.mark.parametrize(("status", "ends"), [("singular", True), ("timed_out", False)])
+def test_the_motion_ends_where_the_reference_does(status: str, ends: bool, tmp_path: Path) -> None:
+    runs = {REFERENCE: status, METHOD: "singular"}
+    made = [Made(FIG11, name, rotor(np.sin), 0.5, attributes={"status": said}) for name, said in runs.items()]
+    with open_results(store(tmp_path / "r.h5", made)) as results:
+        found = [check.passed for check in checks.checks_of(results, [], BOUNDS) if check.name == "complete"]
+    assert found[1] is ends
 
 
 @pytest.mark.parametrize(
@@ -337,7 +344,7 @@ def test_a_damaged_row_fails_and_what_cannot_be_read_is_incomplete(
         raise KeyError("angles")
 
     monkeypatch.setattr(StoredRun, "solution", fail)
-    path = store(tmp_path / "r.h5", [Made(paper("fig11", samples=501), METHOD, rotor(np.zeros_like))])
+    path = store(tmp_path / "r.h5", [Made(FIG11, METHOD, rotor(np.zeros_like))])
     with open_results(path) as results, pytest.raises(KeyError):
         checks.checks_of(results, [], BOUNDS)
     damage(path, f"paper/fig11/{METHOD}", "angles")
@@ -350,11 +357,10 @@ def test_a_damaged_row_fails_and_what_cannot_be_read_is_incomplete(
 
 
 def test_a_file_is_judged_by_its_copies_and_by_the_papers_numbers_too(tmp_path: Path) -> None:
-    fig11 = paper("fig11", samples=501)
     curve = rotor(lambda t: 2.7313 * np.sin(np.pi * t / 10.0))
     made = [
-        Made(fig11, REFERENCE, rotor(np.zeros_like)),
-        *(Made(fig11, name, curve) for name in ("printed/ode45", METHOD)),
+        Made(FIG11, REFERENCE, rotor(np.zeros_like)),
+        *(Made(FIG11, name, curve) for name in ("printed/ode45", METHOD)),
     ]
     with open_results(store(tmp_path / "r.h5", made)) as results:
         found = values(checks.checks_of(results, [], BOUNDS))
@@ -363,7 +369,7 @@ def test_a_file_is_judged_by_its_copies_and_by_the_papers_numbers_too(tmp_path: 
 
 
 def test_a_scene_that_is_not_shipped_is_not_compared_with_the_shipped_one_of_its_name(tmp_path: Path) -> None:
-    made = store(tmp_path / "r.h5", [Made(paper("fig11", samples=501), REFERENCE, rotor(np.zeros_like))])
+    made = store(tmp_path / "r.h5", [Made(FIG11, REFERENCE, rotor(np.zeros_like))])
     with open_results(made) as results, open_results(reference_folder() / "paper.h5") as shipped:
         found = {check.name for check in checks.checks_of(results, [shipped], BOUNDS)}
     assert "complete" in found
@@ -376,7 +382,7 @@ def test_a_quantity_is_told_by_its_rule_or_by_its_own_words(monkeypatch: pytest.
     full = QuantityMetric("lift_error", bound=2.0, check="gap", channel="up", unit="kN", look_at="the wing")
     none = QuantityMetric("lift_error", check="nothing", bound=None)
     monkeypatch.setattr(checks, "quantity_errors", lambda *_: [(quantity, rule, 0.5) for rule in (bare, full, none)])
-    found = list(checks._of_quantities(stored(), BOUNDS, general(), {}))
+    found = list(checks._of_corrected_model(stored(), BOUNDS, replace(general(), outputs=()), None, {}))
     assert [(check.name, check.where.channel, check.unit, check.hint) for check in found] == [
         ("lift", "lift", "N", "force upwards"),
         ("gap", "up", "kN", "the wing"),

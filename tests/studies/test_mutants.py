@@ -51,7 +51,7 @@ EXPLAINED = {
         "decides how long a run takes, not what comes out"
     ),
     r"checks\._of_reference .* 0 -> 1": "compared by its length: no shipped reference has a single sample",
-    r"checks\._bent_columns .*0 -> 1": "one row is as much too short as none",
+    r"checks\.copies .*0 -> 1": "one row is as much too short as none",
     r"checks\._of_samples .* 1 -> 2": "one zero or two: the largest is zero",
     r"adapter\.linear_solver .*scaled|adapter\._SPARSE_FROM ": "sizes near the bound take as long by either solver",
     r"adapter\.linearized .*0 -> 1": "a column of zeros among the joints' directions hinders no motion",
