@@ -234,27 +234,21 @@ def energy_slack(scene: Scene, run: Trajectory) -> float:
 def energy_conditioning(scene: Scene, run: Trajectory) -> float:
     """By how much the energy magnifies round-off of the state, at least 1: near a pitch of π/2 its terms are 1/√share
     larger than it. A pitch that moves less than a right angle between samples is examined between them, too."""
-    steps = np.abs(np.diff(run.angles[:, 1:], axis=0)).max(initial=0.0)
-    shares = rotor_inertia_shares(scene, run.angles)
-    if steps < 0.5 * np.pi:
-        shares = np.concatenate([shares, _shares_at_quarter_turns(scene, run.angles)])
-    smallest = max(float(shares.min(initial=1.0)), _NO_INERTIA)
+    angles = run.angles
+    shares = [rotor_inertia_shares(scene, angles)]
+    if np.abs(np.diff(angles[:, 1:], axis=0)).max(initial=0.0) < 0.5 * np.pi:
+        for column in range(1, angles.shape[1]):
+            # Where the pitch passes ±π/2 between two samples, on the straight way.
+            quarter = np.floor(angles[:, column] / np.pi - 0.5)
+            rows = np.flatnonzero(np.diff(quarter))
+            before, after = angles[rows], angles[rows + 1]
+            target = np.pi * (np.maximum(quarter[rows], quarter[rows + 1]) + 0.5)
+            part = (target - before[:, column]) / (after[:, column] - before[:, column])
+            there = before + part[:, None] * (after - before)
+            there[:, column] = target
+            shares.append(rotor_inertia_shares(scene, there))
+    smallest = max(float(np.concatenate(shares).min(initial=1.0)), _NO_INERTIA)
     return max(1.0, float(np.sqrt(_SINGULAR_SHARE / smallest)))
-
-
-def _shares_at_quarter_turns(scene: Scene, angles: Array) -> Array:
-    """Where a pitch passes ±π/2 between two samples (straight way): the shares there."""
-    shares = [np.empty(0)]
-    for column in range(1, angles.shape[1]):
-        quarter = np.floor(angles[:, column] / np.pi - 0.5)
-        for k in np.flatnonzero(np.diff(quarter)):
-            before, after = angles[k], angles[k + 1]
-            target = np.pi * (max(quarter[k], quarter[k + 1]) + 0.5)
-            part = (target - before[column]) / (after[column] - before[column])
-            there = before + part * (after - before)
-            there[column] = target
-            shares.append(rotor_inertia_shares(scene, there[None, :]))
-    return np.concatenate(shares)
 
 
 def smallest_rotor_inertia_share(scene: Scene, run: Trajectory) -> float:

@@ -6,7 +6,6 @@ import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from html import escape
-from typing import NamedTuple
 
 from rotor_mbs.analysis.run_selection import in_catalogue_order
 from rotor_mbs.analysis.work_precision import TARGETS_RAD, points, time_to_reach
@@ -40,22 +39,9 @@ def run_table(scenes: Mapping[str, StoredScene], wanted: Mapping[str, Iterable[s
     return TextTable(("scene", *RUN_HEAD), [(run.scene, *run_row(run)) for run in runs])
 
 
-class Agreement(NamedTuple):
-    """A method's largest errors over its runs that ended well, and its longest run (s).
-
-    defect rad of an interval, angle_error rad up to each horizon, energy_drift of the energy scale; None without data.
-    """
-
-    method: str
-    runs: str  # "16 of 17 ok"; of equations that are not claimed to be correct "completed"
-    defect: float | None
-    angle_error: float | None
-    energy_drift: float | None
-    longest_s: float
-
-
-def agreement(runs: Iterable[StoredRun]) -> list[Agreement]:
-    """A row for each method, in the order of the catalogue."""
+def method_table(runs: Iterable[StoredRun]) -> TextTable:
+    """A row for each method: how many of its runs ended well, and the largest numbers among those."""
+    head = ("method", "runs", "largest defect (rad)", "largest error (rad)", "largest drift", "longest (s)")
     by_method: dict[str, list[StoredRun]] = {}
     for run in runs:
         by_method.setdefault(run.method, []).append(run)
@@ -64,23 +50,12 @@ def agreement(runs: Iterable[StoredRun]) -> list[Agreement]:
         own = by_method[method]
         ended_well = [run for run in own if run.status in GOOD]
         count = f"{len(ended_well)} of {len(own)} {'ok' if is_corrected(method) else 'completed'}"
-        names = ("defect_max", "angle_error_max", "energy_drift_max")
-        defect, error, drift = (_largest(ended_well, name) for name in names)
-        rows.append(Agreement(method, count, defect, error, drift, _largest(own, "run_time_s") or 0.0))
-    return rows
-
-
-def _largest(runs: Iterable[StoredRun], name: str) -> float | None:
-    return max((float(run.attributes[name]) for run in runs if name in run.attributes), default=None)
-
-
-def method_table(runs: Iterable[StoredRun]) -> TextTable:
-    """A row for each method: how many of its runs ended well, and the largest numbers among those."""
-    head = ("method", "runs", "largest defect (rad)", "largest error (rad)", "largest drift", "longest (s)")
-    rows = []
-    for row in agreement(runs):
-        numbers = map(_short, (row.defect, row.angle_error, row.energy_drift))
-        rows.append((row.method, row.runs, *numbers, f"{row.longest_s:.3g}"))
+        numbers = []
+        for name in ("defect_max", "angle_error_max", "energy_drift_max"):
+            known = [float(run.attributes[name]) for run in ended_well if name in run.attributes]
+            numbers.append(_short(max(known, default=None)))
+        longest_s = max((run.attributes.get("run_time_s", 0.0) for run in own), default=0.0)
+        rows.append((method, count, *numbers, f"{longest_s:.3g}"))
     return TextTable(head, rows)
 
 
@@ -100,12 +75,6 @@ def bench_table(curves: Sequence[Record]) -> TextTable:
 
 def _short(value: object) -> str:
     return f"{value:.1e}" if isinstance(value, float) and math.isfinite(value) else ""
-
-
-def listed(texts: Sequence[str]) -> str:
-    if len(texts) == 1:
-        return texts[0]
-    return f"{', '.join(texts[:-1])} and {texts[-1]}"
 
 
 @dataclass(frozen=True)

@@ -239,6 +239,7 @@ def one_by_one() -> Trajectory:
     [
         (one_by_one(), 2.0, "inaccurate"),
         *((passing(sign * 0.5, 1.5), 1e3, "ok") for sign in (1.0, -1.0)),
+        (passing(0.5, 0.7, others=QUARTER), 1e3, "ok"),  # a pitch that passes where the others stay
         *((passing(sign * 0.5, 0.1, others=0.5), 2.0, "inaccurate") for sign in (1.0, -1.0)),
         *((passing(sign * 0.5, 1.65), 2.0, "inaccurate") for sign in (1.0, -1.0)),  # in leaps
     ],

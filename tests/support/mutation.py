@@ -140,7 +140,7 @@ _TARGETS = (
             f"{_MUJOCO}full_inertia_springs_dampers_and_torque_follow_the_closed_form"), 0.001),
     Target(f"{_A}.judgement",
            "judge _is_close _broken_off _through_singularity _inaccurate _unchecked start_slack "
-           "energy_slack energy_conditioning _shares_at_quarter_turns smallest_rotor_inertia_share "
+           "energy_slack energy_conditioning smallest_rotor_inertia_share "
            "rotor_inertia_shares _shaft_inertia_forms _SINGULAR_SHARE _ROUND_OFF _RESEMBLES _NO_INERTIA",
            "tests alone", _RULES, 0.5),
     Target("rotor_mbs.solution.metrics",
