@@ -19,7 +19,8 @@ from typing import Any
 import numpy as np
 
 from rotor_mbs.analysis.judgement import judge
-from rotor_mbs.analysis.work_precision import SMALLEST_ERROR, USELESS_RAD, fitted_order
+from rotor_mbs.analysis.work_precision import fitted_order, succeeded
+from rotor_mbs.analysis.work_precision import points as points_of
 from rotor_mbs.errors import OF_THE_MACHINE, InputError, RotorError, one_line
 from rotor_mbs.methods.base import STEP, TOLERANCE, Ladder
 from rotor_mbs.methods.catalogue import (
@@ -35,7 +36,7 @@ from rotor_mbs.methods.time_limit import OutOfTimeError, time_limit
 from rotor_mbs.runs import last_core
 from rotor_mbs.runs.files import writing
 from rotor_mbs.runs.pool import WorkerPool, run_in
-from rotor_mbs.runs.read import points_table
+from rotor_mbs.runs.read import Record, points_table
 from rotor_mbs.runs.table import Place, Rows, Table, TableFile, extend_file
 from rotor_mbs.runs.versions import row_versions
 from rotor_mbs.scenario.scene import Scene, scene_hash
@@ -224,14 +225,10 @@ def _warm_all(ladders: Sequence[Sequence[PointTimer]], budget_s: float, clock: C
         ladder[rung].warm_up()
         warm_s += ladder[rung].warm_s
         if rung + 1 < len(ladder):
-            following = _expected([point.warm_s for point in ladder[: rung + 1]])
-            heapq.heappush(waiting, (following, rung + 1, number))
-
-
-def _expected(earlier: Sequence[float]) -> float:
-    """Expected time of the next rung in s: the last one's time, grown as from the one before it, at least doubled."""
-    growth = earlier[-1] / earlier[-2] if len(earlier) > 1 and earlier[-2] > 0.0 else 2.0
-    return earlier[-1] * min(max(growth, 2.0), 10.0)
+            # The next one's time is this one's, grown as from the one before it, at least doubled.
+            last, before = ladder[rung].warm_s, ladder[rung - 1].warm_s if rung else 0.0
+            growth = last / before if before > 0.0 else 2.0
+            heapq.heappush(waiting, (last * min(max(growth, 2.0), 10.0), rung + 1, number))
 
 
 def allot(seconds: Sequence[float], wanted: Sequence[int], budget_s: float) -> list[int]:
@@ -419,7 +416,15 @@ def run_bench(
     """
     chosen = with_settings(ladders(methods), settings or {})
     with writing(output):
-        changed = _complete_references(scenes, output, workers)
+        none: Mapping[str, Sequence[str]] = {scene.name: () for scene in scenes}
+        report = run_scenes(scenes, none, output, workers=workers, timeout_s=_REFERENCE_LIMIT_S)
+        failed = [*report.failures, *report.not_computed]
+        if failed:
+            raise InputError(
+                f"{run.label.partition(' ')[0]}: no usable reference ({run.status}: {run.message}); a bench needs one"
+                for run in failed
+            )
+        changed = {run.label.partition(" ")[0] for run in report.made}  # whose reference is another one now
         # Refused before the first is measured.
         places = {scene.name: TableFile(output).place(f"{scene.name}/{REFERENCE}") for scene in scenes}
         ready = {scene.name: prepared(scene, places[scene.name]) for scene in scenes}
@@ -464,19 +469,6 @@ def with_settings(chosen: Sequence[Ladder], settings: Mapping[str, object]) -> l
     return kept
 
 
-def _complete_references(scenes: Sequence[Scene], output: Path, workers: int) -> set[str]:
-    """The names of the scenes whose reference this call computed or read."""
-    none: Mapping[str, Sequence[str]] = {scene.name: () for scene in scenes}
-    report = run_scenes(scenes, none, output, workers=workers, timeout_s=_REFERENCE_LIMIT_S)
-    failed = [*report.failures, *report.not_computed]
-    if failed:
-        raise InputError(
-            f"{run.label.partition(' ')[0]}: no usable reference ({run.status}: {run.message}); a bench needs one"
-            for run in failed
-        )
-    return {run.label.partition(" ")[0] for run in report.made}
-
-
 def _measure_scene(
     file: TableFile, curves: Sequence[Curve], short: Scene, reference: Trajectory, repeats: int, budget_s: float
 ) -> Iterator[Outcome]:
@@ -495,40 +487,24 @@ def _measure_scene(
                     continue
                 place, rows = file.place(curve.first_run, BENCH), end.value[i]
                 place.write(rows_of_curve(place, curve, rows, facts))
-                yield Outcome(curve.label, curve.ladder.method, "measured", counts_of(rows))
+                statuses = [row["status"] for row in rows]
+                ok, inaccurate, left_out = (statuses.count(status) for status in ("ok", "inaccurate", "left_out"))
+                failed = len(statuses) - ok - inaccurate - left_out
+                counts = f"{ok} ok, {inaccurate} inaccurate, {failed} failed, {left_out} omitted"
+                yield Outcome(curve.label, curve.ladder.method, "measured", f"{len(statuses)} points: {counts}")
 
 
 def rows_of_curve(place: Place, curve: Curve, points: Sequence[Mapping[str, Any]], facts: Mapping[str, object]) -> Rows:
-    """The rows of a curve, with its fitted order. facts: columns that all its points have in common."""
-    facts = {
-        **facts,
-        "order": curve_order(curve, points),
-        "repeatable": int(all(point.get("same", True) for point in points)),
-    }
-    rows = [place.rows_of({**point, **facts, "left_out": int(point["status"] == "left_out")}) for point in points]
-    return {name: np.concatenate([row[name] for row in rows]) for name in rows[0]}
-
-
-def counts_of(rows: Sequence[Mapping[str, Any]]) -> str:
-    """How many points a curve has, in words."""
-    statuses = [row["status"] for row in rows]
-    ok, inaccurate, left_out = (statuses.count(status) for status in ("ok", "inaccurate", "left_out"))
-    failed = len(statuses) - ok - inaccurate - left_out
-    return f"{len(statuses)} points: {ok} ok, {inaccurate} inaccurate, {failed} failed, {left_out} omitted"
-
-
-def curve_order(curve: Curve, rows: Sequence[Mapping[str, Any]]) -> float:
-    """The order of convergence over the points on the curve; NaN where it cannot be fitted."""
-    if curve.ladder.kind != STEP:
-        return math.nan
-    on_curve = [
-        (point.setting, row["angle_error_max"])
-        for point, row in zip(curve.points, rows, strict=True)
-        if row["status"] in COMPLETE and row["angle_error_max"] < USELESS_RAD
-    ]
-    steps, errors = np.array(on_curve).reshape(-1, 2).T
-    order = fitted_order(steps, np.maximum(errors, SMALLEST_ERROR))
-    return math.nan if order is None else order
+    """The rows of a curve, with its order of convergence. facts: columns that all its points have in common."""
+    facts = {**facts, "repeatable": int(all(point.get("same", True) for point in points))}
+    each = [place.rows_of({**point, **facts, "left_out": int(point["status"] == "left_out")}) for point in points]
+    rows = {name: np.concatenate([row[name] for row in each]) for name in each[0]}
+    measured = Record(BENCH, curve.scene.name, curve.ladder.curve, arrays=rows)
+    if curve.ladder.kind == STEP:
+        steps = np.array([point.setting for point in curve.points])[succeeded(measured)]
+        order = fitted_order(steps, points_of(measured)[0])
+        rows["order"][:] = np.nan if order is None else order
+    return rows
 
 
 def facts_of(short: Scene, reference: Trajectory) -> dict[str, Any]:

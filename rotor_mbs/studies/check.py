@@ -85,8 +85,16 @@ def _required(scene: str, method: str, hint: str, *, is_missing: bool = True) ->
 def judge_file(path: Path, bounds: Bounds) -> list[Check]:
     """Check what is there, runs or a sweep; [] where nothing can be judged. Raises StoreError, InputError."""
     refuse_changed_layout(path)
-    if is_sweep(path):
-        return _judge_sweep(StoredSweep(path, allow_damaged_runs=True), bounds)
+    if is_sweep(path):  # all runs are there, and as written; their energies were judged when they were computed
+        sweep = StoredSweep(path, allow_damaged_runs=True)
+        where = Where(str(sweep.attributes.get("base_scene", "sweep")), "*", "runs")
+        missing, damaged = int((sweep.column("status") == MISSING).sum()), len(sweep.damaged_runs)
+        absent = f"{missing} runs missing; the sweep's own command computes them"
+        changed = f"{damaged} runs changed after they were written" if damaged else "every run as written"
+        return [
+            make_check(bounds, "complete", where, missing, "runs", absent),
+            make_check(bounds, "integrity", where, damaged, "runs", changed),
+        ]
     try:
         with ExitStack() as stack:
             results = stack.enter_context(open_results(path, verify=False))
@@ -101,19 +109,6 @@ def judge_file(path: Path, bounds: Bounds) -> list[Check]:
     if path.resolve() in shipped_files():  # their digests stand beside them
         checks = [check for check in checks if check.name != "integrity"] + judge_frozen(bounds, [path])
     return checks
-
-
-def _judge_sweep(sweep: StoredSweep, bounds: Bounds) -> list[Check]:
-    """Whether all runs are there, and as they were written; their energies were judged when they were computed."""
-    where = Where(str(sweep.attributes.get("base_scene", "sweep")), "*", "runs")
-    missing = int((sweep.column("status") == MISSING).sum())
-    damaged = len(sweep.damaged_runs)
-    absent = f"{missing} runs missing; the sweep's own command computes them"
-    changed = f"{damaged} runs changed after they were written" if damaged else "every run as written"
-    return [
-        make_check(bounds, "complete", where, missing, "runs", absent),
-        make_check(bounds, "integrity", where, damaged, "runs", changed),
-    ]
 
 
 def judged_runs(checks: Iterable[Check]) -> Counter[str]:
@@ -159,7 +154,12 @@ def regressions(new: Sequence[Check], old: Sequence[Check], factor: float) -> li
         if now is None:
             value, hint = math.nan, "was judged in the earlier file and is not in this one"
         else:
-            value = _shrinkage(now, check)
+            value = math.inf if check.passed else 1.0
+            if now.passed and check.passed:
+                before, after = max(check.value, _ROUNDING), max(now.value, _ROUNDING)
+                value = (after / before) * (check.bound / now.bound if now.bound and check.bound else 1.0)
+            elif now.passed:
+                value = 0.0
             hint = (
                 f"margin shrank {value:,.0f}-fold (limit {factor:g}): {check.value:.2e} before, {now.value:.2e} now, "
                 f"bound {now.bound:.2e} {now.unit}; {now.hint}"
@@ -167,12 +167,3 @@ def regressions(new: Sequence[Check], old: Sequence[Check], factor: float) -> li
         where = check.where._replace(channel=f"{check.name}: {check.where.channel}")
         changes.append(Check("against", where, value, factor, hint, "fold"))
     return changes
-
-
-def _shrinkage(new: Check, old: Check) -> float:
-    if not new.passed:
-        return math.inf if old.passed else 1.0
-    if not old.passed:
-        return 0.0
-    before, now = max(old.value, _ROUNDING), max(new.value, _ROUNDING)
-    return (now / before) * (old.bound / new.bound if new.bound and old.bound else 1.0)

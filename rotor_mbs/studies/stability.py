@@ -16,13 +16,12 @@ from rotor_mbs.methods.catalogue import REFERENCE, able_methods, find_method, me
 from rotor_mbs.methods.solve import solve
 from rotor_mbs.methods.time_limit import OutOfTimeError, time_limit
 from rotor_mbs.runs.files import writing
-from rotor_mbs.runs.read import Record, StoredRun, open_results, points_table, read_records
+from rotor_mbs.runs.read import open_results, points_table, read_records
 from rotor_mbs.runs.runner import Task
 from rotor_mbs.runs.table import Rows, extend_file
 from rotor_mbs.runs.versions import row_versions
 from rotor_mbs.scenario.scene import Scene, scene_hash
-from rotor_mbs.solution.status import COMPLETE, code_of
-from rotor_mbs.solution.trajectory import Trajectory
+from rotor_mbs.solution.status import COMPLETE
 from rotor_mbs.studies.run import (
     OnProgress,
     Outcome,
@@ -75,9 +74,7 @@ class SuiteRun:
         """What its scene stresses: stiff, or the first part of an extreme scene's name."""
         folder, _, name = self.scene.rpartition("/")
         first = name.split("-")[0]
-        if folder == "stiff":
-            return "stiff"
-        return next((family for family, names in _FAMILIES.items() if first in names), first)
+        return "stiff" if folder == "stiff" else _FAMILIES.get(first, first)
 
     @property
     def is_stiff_or_light(self) -> bool:
@@ -91,51 +88,50 @@ class SuiteRun:
 
 
 _FAMILIES = {  # of scenes whose names do not begin with that of their family
-    "light": ("feather",),
-    "singular": ("passage",),
-    "fast": ("spin", "tumbling", "rate", "rates", "torque"),
-    "long": ("hour", "pendulum"),
-    "scale": ("toy", "giant", "zero", "gravity"),
+    "feather": "light",
+    "passage": "singular",
+    **dict.fromkeys(("spin", "tumbling", "rate", "rates", "torque"), "fast"),
+    **dict.fromkeys(("hour", "pendulum"), "long"),
+    **dict.fromkeys(("toy", "giant", "zero", "gravity"), "scale"),
 }
 
 
 def suite_runs(path: Path) -> list[SuiteRun]:
     """Every run of a results file, in its order. Raises StoreError."""
     ladders = {(record.scene, record.name): record for record in read_records(path, "stability")}
+    runs = []
     with open_results(path) as results:
-        return [
-            _suite_run(run, scene.reference, ladders.get((scene.name, name)))
-            for scene in results.scenes.values()
-            for name, run in scene.methods.items()
-        ]
-
-
-def _suite_run(run: StoredRun, reference: StoredRun | None, ladder: Record | None) -> SuiteRun:
-    facts, time = run.attributes, run.array("time")
-    outcome, message = run.status, str(facts.get("message", ""))
-    if run.status == "ok" and "angle_error_max" not in facts:
-        reason = "the horizon is before the second sample"
-        if reference is None:
-            reason = "there is no reference"
-        elif len(reference.array("time")) < 2:
-            reason = f"no reference ({reference.attributes['message']})"
-        outcome, message = "energy_alone", f"assessed by its energy only: {reason}"
-    elif run.status != "ok" and ladder is not None and np.any(ladder.arrays["status"] == code_of("ok")):
-        outcome = "smaller_step"
-    return SuiteRun(
-        scene=run.scene,
-        method=run.method,
-        status=run.status,
-        outcome=outcome,
-        message=message,
-        false_success=bool(facts.get("false_success", 0)),
-        has_reference=reference is not None and reference.status == "ok",
-        angle_error=facts.get("angle_error_max"),
-        energy_drift=facts.get("energy_drift_max"),
-        run_time_s=float(facts["run_time_s"]),
-        time_reached=float(time[-1]) if len(time) else 0.0,
-        step=None if ladder is None else ladder.attributes.get("step_for_target_s"),
-    )
+        for scene in results.scenes.values():
+            reference = scene.reference
+            for name, run in scene.methods.items():
+                facts, time, ladder = run.attributes, run.array("time"), ladders.get((scene.name, name))
+                outcome, message = run.status, str(facts.get("message", ""))
+                if run.status == "ok" and "angle_error_max" not in facts:
+                    reason = "the horizon is before the second sample"
+                    if reference is None:
+                        reason = "there is no reference"
+                    elif len(reference.array("time")) < 2:
+                        reason = f"no reference ({reference.attributes['message']})"
+                    outcome, message = "energy_alone", f"assessed by its energy only: {reason}"
+                elif run.status != "ok" and ladder is not None and "ok" in ladder.statuses:
+                    outcome = "smaller_step"
+                runs.append(
+                    SuiteRun(
+                        scene=scene.name,
+                        method=name,
+                        status=run.status,
+                        outcome=outcome,
+                        message=message,
+                        false_success=bool(facts.get("false_success", 0)),
+                        has_reference=reference is not None and reference.status == "ok",
+                        angle_error=facts.get("angle_error_max"),
+                        energy_drift=facts.get("energy_drift_max"),
+                        run_time_s=float(facts["run_time_s"]),
+                        time_reached=float(time[-1]) if len(time) else 0.0,
+                        step=None if ladder is None else ladder.attributes.get("step_for_target_s"),
+                    )
+                )
+    return runs
 
 
 def fastest_to_target(runs: Iterable[SuiteRun]) -> dict[str, str | None]:
@@ -210,11 +206,16 @@ class LadderTask(Task):
         for step in steps:
             if expected > _LONGEST_RUN_S:
                 break
-            judgement, seconds = _judged(scene, method, {"step": step}, reference)
-            judgements.append(judgement)
-            if judgement.metrics.get("angle_error_max", np.inf) <= 0.1 * TARGET and judgement.status == "ok":
+            try:
+                with time_limit(2.0 * _LONGEST_RUN_S):
+                    run = solve(method, scene, {"step": step})
+            except OutOfTimeError as exc:
+                judgements.append(Judgement("timed_out", str(exc), False, {}, None))
                 break
-            expected = _FACTOR * seconds
+            judgements.append(judge(scene, run, reference))
+            if judgements[-1].metrics.get("angle_error_max", np.inf) <= 0.1 * TARGET and judgements[-1].status == "ok":
+                break
+            expected = _FACTOR * run.run_times_s[0]
         # A run that broke off has no error up to the horizon.
         errors = [
             judgement.metrics.get("angle_error_max", np.nan) if judgement.status in COMPLETE else np.nan
@@ -341,15 +342,3 @@ def step_for(target: float, steps: np.ndarray, errors: np.ndarray) -> float | No
         return float(steps[last + 1])
     slope = np.log(errors[last] / errors[last + 1]) / np.log(steps[last] / steps[last + 1])
     return float(steps[last + 1] * (target / errors[last + 1]) ** (1.0 / slope))
-
-
-def _judged(
-    scene: Scene, method: str, settings: Mapping[str, object], reference: Trajectory | None
-) -> tuple[Judgement, float]:
-    """The judgement and the run time in s; a run over twice the longest one ends itself."""
-    try:
-        with time_limit(2.0 * _LONGEST_RUN_S):
-            run = solve(method, scene, settings)
-    except OutOfTimeError as exc:
-        return Judgement("timed_out", str(exc), False, {}, None), 2.0 * _LONGEST_RUN_S
-    return judge(scene, run, reference), run.run_times_s[0]
