@@ -184,6 +184,8 @@ def test_an_early_end_is_excused_where_the_motion_ends(
     assert (f"stored as {status}: over π/2" in given[0].hint) == (complete == 1.0 and status != "ok")
     assert ("stored as" in given[0].hint) == (complete == 1.0 and status != "ok")
     assert (len(given) > 1) == has_run
+    missing = "relative_tolerance is missing; absolute_tolerance is missing"
+    assert [check.hint for check in given if check.name == "settings"] == [missing] * has_run
     assert (("energy", "balance") in values(given)) == (has_run and method == METHOD)
 
 
@@ -350,6 +352,7 @@ def test_a_damaged_row_fails_and_what_cannot_be_read_is_incomplete(
     damage(path, f"paper/fig11/{METHOD}", "angles")
     with open_results(path, verify=False) as results:
         failures = [check for check in checks.checks_of(results, [], BOUNDS) if not check.passed]
+    assert failures[0].hint == "its row changed after it was written"
     assert [(check.name, check.where.method, check.value) for check in failures[:2]] == [
         ("integrity", METHOD, 1.0),
         ("complete", METHOD, pytest.approx(np.nan, nan_ok=True)),

@@ -85,13 +85,15 @@ def test_the_reference_stands_for_right_and_without_it_the_closed_form(tmp_path:
 
 
 def test_the_finding_counts_what_was_put_in(tmp_path: Path) -> None:
-    fig12 = paper("fig12", samples=501)
+    fig12, fig08, fig09 = (paper(name, samples=501) for name in ("fig12", "fig08", "fig09"))
     still = rotor(np.zeros_like)
     off = rotor(lambda t: np.full_like(t, 1e-9))
     runs = [
         *(Made(scene, REFERENCE, still) for scene in (FIG11, fig12)),
         Made(FIG11, PRINTED, still, gain=3e5),
         Made(fig12, PRINTED, still, gain=9e9, until=0.5, attributes={"status": "solver_failed"}),
+        Made(fig08, PRINTED, still, gain=8.0e3),  # a thousandth of the energy scale is 7.8 kJ
+        Made(fig09, PRINTED, still, gain=7.6e3),
         Made(FIG11, TAYLOR, off),
         Made(fig12, TAYLOR, rotor(lambda t: np.full_like(t, 1.0)), attributes={"status": "inaccurate"}),
     ]
@@ -101,8 +103,8 @@ def test_the_finding_counts_what_was_put_in(tmp_path: Path) -> None:
             run for scene in results.scenes.values() for run in scene.methods.values()
         ).rows
     # The run that broke off made more, but what a runaway reaches is no measure.
-    assert [(row.printed, row.corrected) for row in rows] == [("2 of 2", ""), ("0.3 MJ", "")]
-    assert (printed[1], corrected[1]) == ("1 of 2 completed", "1 of 2 ok")
+    assert [(row.printed, row.corrected) for row in rows] == [("3 of 4", ""), ("0.3 MJ", "")]
+    assert (printed[1], corrected[1]) == ("3 of 4 completed", "1 of 2 ok")
     assert corrected[3] == "1.0e-09"
 
 

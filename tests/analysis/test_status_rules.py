@@ -19,7 +19,7 @@ from rotor_mbs.scenario.accuracy_bounds import Bound, load_bounds
 from rotor_mbs.scenario.catalogue import find_scenes
 from rotor_mbs.scenario.scene import Blade, Scene
 from rotor_mbs.solution.defects import Defects
-from rotor_mbs.solution.metrics import ANGLE_LIMIT, metrics_of
+from rotor_mbs.solution.metrics import ANGLE_LIMIT, metrics_of, running_growth
 from rotor_mbs.solution.trajectory import Integration, Solution, Trajectory
 
 Array = Any
@@ -264,6 +264,11 @@ def test_what_defects_add_up_to_is_the_error_where_there_is_no_reference(monkeyp
         monkeypatch.setattr(judgement_module, "defects_of", lambda *_, defects=defects, **__: defects)
         assert status(moving(), method="exudyn_chain/newmark_index2")[0] == expected
         assert status(moving(), reference=moving(), method="exudyn_chain/newmark_index2")[0] == "ok"
+
+
+def test_the_growth_so_far_is_at_least_one() -> None:
+    damped = moving().replace(error_growth=np.array([0.2, 0.1, 3.0, 2.0]))
+    assert running_growth(damped).tolist() == [1.0, 1.0, 3.0, 3.0]
 
 
 def test_past_the_horizon_no_error_counts(monkeypatch: pytest.MonkeyPatch) -> None:
