@@ -247,7 +247,7 @@ def energy_conditioning(scene: Scene, run: Trajectory) -> float:
             there = before + part[:, None] * (after - before)
             there[:, column] = target
             shares.append(rotor_inertia_shares(scene, there))
-    smallest = max(float(np.concatenate(shares).min(initial=1.0)), _NO_INERTIA)
+    smallest = max(float(np.concatenate(shares).min()), _NO_INERTIA)
     return max(1.0, float(np.sqrt(_SINGULAR_SHARE / smallest)))
 
 

@@ -22,16 +22,8 @@ from rotor_mbs.analysis.judgement import judge
 from rotor_mbs.analysis.work_precision import fitted_order, succeeded
 from rotor_mbs.analysis.work_precision import points as points_of
 from rotor_mbs.errors import OF_THE_MACHINE, InputError, RotorError, one_line
+from rotor_mbs.methods import catalogue
 from rotor_mbs.methods.base import STEP, TOLERANCE, Ladder
-from rotor_mbs.methods.catalogue import (
-    REFERENCE,
-    able_methods,
-    find_method,
-    ladders,
-    methods,
-    settings_for,
-    with_method_files,
-)
 from rotor_mbs.methods.time_limit import OutOfTimeError, time_limit
 from rotor_mbs.runs import last_core
 from rotor_mbs.runs.files import writing
@@ -110,7 +102,7 @@ class PointTimer:
         """Build twice, the first time with everything compiled, and run once."""
         start = self._clock()
         try:
-            method = find_method(self._point.method)
+            method = catalogue.find_method(self._point.method)
             settings = method.settings.of(self._point.method, dict(self._point.settings))
             for name in ("setup_time_s", "setup_again_time_s"):
                 begun = self._clock()
@@ -154,7 +146,7 @@ class PointTimer:
         trajectory = self._solver.observe()
         output = self._clock() - start
         point, scene, integration = self._point, self._scene, self._integration
-        method = find_method(point.method)
+        method = catalogue.find_method(point.method)
         run = Solution(scene, point.method, trajectory, integration, dict(point.settings))
         run.is_corrected, run.bounds = method.is_corrected, method.bounds
         with np.errstate(over="ignore", invalid="ignore"):  # a runaway's distances may overflow
@@ -271,7 +263,7 @@ def measure(task: Measurement) -> list[list[dict[str, Any]]]:
     collector is off.
     """
     for method in dict.fromkeys(own[0].method for own in task.points):
-        find_method(method).load()
+        catalogue.find_method(method).load()
     gc.disable()
     curves = [[PointTimer(point, task.scene, task.reference, _RUN_LIMIT_S) for point in own] for own in task.points]
     conduct(curves, task.budget_s, task.repeats, time.perf_counter)
@@ -346,11 +338,11 @@ class Curve:
     @property
     def rows(self) -> list[dict[str, object]]:
         """The known columns of its points."""
-        method = find_method(self.ladder.method)
+        method = catalogue.find_method(self.ladder.method)
         facts = {
             **self.options,
             "duration_s": self.scene.duration,
-            "linearizes": any(other.linearize for other in methods() if other.model == method.model),
+            "linearizes": any(other.linearize for other in catalogue.methods() if other.model == method.model),
             "lines": sum(len(text.splitlines()) for text in method.sources if isinstance(text, str)),
         }
         known: dict[str, object] = {
@@ -414,7 +406,7 @@ def run_bench(
     StoreError
         Where the file cannot be read or written.
     """
-    chosen = with_settings(ladders(methods), settings or {})
+    chosen = with_settings(catalogue.ladders(methods), settings or {})
     with writing(output):
         none: Mapping[str, Sequence[str]] = {scene.name: () for scene in scenes}
         report = run_scenes(scenes, none, output, workers=workers, timeout_s=_REFERENCE_LIMIT_S)
@@ -426,13 +418,13 @@ def run_bench(
             )
         changed = {run.label.partition(" ")[0] for run in report.made}  # whose reference is another one now
         # Refused before the first is measured.
-        places = {scene.name: TableFile(output).place(f"{scene.name}/{REFERENCE}") for scene in scenes}
+        places = {scene.name: TableFile(output).place(f"{scene.name}/{catalogue.REFERENCE}") for scene in scenes}
         ready = {scene.name: prepared(scene, places[scene.name]) for scene in scenes}
         curves: list[Curve] = []
         left_out: list[str] = []
         options = {"repeats": repeats, "budget_s": budget_s}
         for scene in scenes:
-            able, refused = able_methods(scene, dict.fromkeys(ladder.method for ladder in chosen))
+            able, refused = catalogue.able_methods(scene, dict.fromkeys(ladder.method for ladder in chosen))
             curves += [Curve(scene, ladder, options) for ladder in chosen if ladder.method in able]
             left_out += refused
         file = extend_file(output, [bench_table(curves)], [curve.key for curve in curves])
@@ -457,7 +449,7 @@ def with_settings(chosen: Sequence[Ladder], settings: Mapping[str, object]) -> l
     InputError
         For a setting that no method has, that is not allowed, or that a ladder varies.
     """
-    own = settings_for(list(dict.fromkeys(ladder.method for ladder in chosen)), settings)
+    own = catalogue.settings_for(list(dict.fromkeys(ladder.method for ladder in chosen)), settings)
     varied = {name for ladder in chosen for name in ladder.fill(1.0) if name in own[ladder.method]}
     if varied:
         raise InputError(f"bench varies {', '.join(sorted(varied))} itself; allowed: other settings of the methods")
@@ -479,7 +471,7 @@ def _measure_scene(
     task = Measurement(short, reference, [curve.points for curve in curves], repeats, budget_s)
     with WorkerPool(1, core=core) as pool:
         limit_s = _HANGING * budget_s + _LOADING_S
-        for end in run_in(pool, with_method_files(measure), [task], limit_s, Measurement.split):
+        for end in run_in(pool, catalogue.with_method_files(measure), [task], limit_s, Measurement.split):
             for i, points in enumerate(end.task.points):
                 curve = by_name[points[0].curve]
                 if end.value is None:

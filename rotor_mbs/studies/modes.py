@@ -16,20 +16,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from rotor_mbs.analysis.modes import (
-    GROWTH,
-    REST,
-    ROTATION,
-    FloquetTable,
-    LinearModes,
-    SceneModes,
-    StabilityChart,
-    floquet,
-    isotropic_modes,
-    modes_of,
-    to_records,
-    track,
-)
+from rotor_mbs.analysis import modes as modal
 from rotor_mbs.errors import InputError, MethodRefusal, RotorError
 from rotor_mbs.methods.catalogue import find_method, methods, with_method_files
 from rotor_mbs.runs.files import writing
@@ -90,7 +77,7 @@ def modes_of_scenes(
                     outcome = Outcome(label, "", end.failure, end.message, is_stored=False, share=share)
                 else:
                     modes = end.value
-                    records += to_records(modes)
+                    records += modal.to_records(modes)
                     status, message = "ok", "; ".join(modes.notes)
                     if not modes.agrees:
                         differ = f"relative difference of frequencies up to {modes.disagreement:.1e}"
@@ -108,7 +95,7 @@ def compute_modes(
     speeds: Sequence[float] | Array = (),
     stiffnesses: Sequence[float] | Array = (),
     models: Sequence[str] = (),
-) -> SceneModes:
+) -> modal.SceneModes:
     """All modes of `scene`: at rest under gravity; in steady rotation without gravity at `speeds` (rad/s); multipliers
     of a turn under gravity at those above 0; their stability chart over `stiffnesses` (N m/rad) of the bearings.
 
@@ -122,8 +109,8 @@ def compute_modes(
     facts = scene.name, scene_hash(scene), scene.title, len(scene.blades), scene.gravity
     scene = replace(scene, pitch_torque=torques, bearing_rest=rests)
     speeds = np.array(_increasing(speeds, "speeds"))
-    rest = _linear(scene, REST, np.zeros(1), models, notes)
-    rotation = _linear(scene, ROTATION, speeds, models, notes) if len(speeds) else {}
+    rest = _linear(scene, modal.REST, np.zeros(1), models, notes)
+    rotation = _linear(scene, modal.ROTATION, speeds, models, notes) if len(speeds) else {}
     turning = speeds[speeds > 0.0]
     stiffness = np.array(_increasing(stiffnesses, "stiffnesses"))
     table = chart = None
@@ -132,13 +119,15 @@ def compute_modes(
             table = _floquet_table(scene, turning)
             charted = [replace(scene, bearing_stiffness=(float(k),) * len(scene.blades)) for k in stiffness]
             rows = [_floquet_table(stiffer, turning).largest for stiffer in charted]
-            chart = StabilityChart(turning, stiffness, np.array(rows)) if rows else None
+            chart = modal.StabilityChart(turning, stiffness, np.array(rows)) if rows else None
         except MethodRefusal as exc:
             notes.append(f"no Floquet multipliers: {exc}")
-    return SceneModes(*facts, rest, rotation, table, chart, tuple(notes))
+    return modal.SceneModes(*facts, rest, rotation, table, chart, tuple(notes))
 
 
-def _linear(scene: Scene, kind: str, speeds: Array, models: Sequence[str], notes: list[str]) -> dict[str, LinearModes]:
+def _linear(
+    scene: Scene, kind: str, speeds: Array, models: Sequence[str], notes: list[str]
+) -> dict[str, modal.LinearModes]:
     """By model, the closed form first, then `models`, or all; one that cannot do any of the speeds is left out, with a
     note."""
     points = _steady_states(scene, kind, speeds)
@@ -175,15 +164,17 @@ def _linear(scene: Scene, kind: str, speeds: Array, models: Sequence[str], notes
                     moves = f"accelerates by {left:.1e} rad/s^2 where the closed form is steady"
                     raise MethodRefusal(f"{method.model}: {moves}")
         except MethodRefusal as exc:
-            if kind == REST:
+            if kind == modal.REST:
                 notes.append(str(exc))
             continue
         modes_at = (
-            isotropic_modes if symmetric else partial(modes_of, is_cyclic=kind == ROTATION or scene.gravity == 0.0)
+            modal.isotropic_modes
+            if symmetric
+            else partial(modal.modes_of, is_cyclic=kind == modal.ROTATION or scene.gravity == 0.0)
         )
-        sets = track([modes_at(linear.stiffness, linear.damping) for linear in made])
+        sets = modal.track([modes_at(linear.stiffness, linear.damping) for linear in made])
         names = (name if name == "rotor" else f"{name} pitch" for name in sets[0].names)
-        modes_by_model[method.model] = LinearModes(
+        modes_by_model[method.model] = modal.LinearModes(
             eigenvalues=over_speed([modes.eigenvalues for modes in sets], complex(np.nan, np.nan)),
             shapes=over_speed([modes.shapes for modes in sets]),
             names=tuple(names) or tuple(f"mode {k + 1}" for k in range(len(columns))),
@@ -205,12 +196,12 @@ def _steady_states(scene: Scene, kind: str, speeds: Array) -> list[_Point | str]
     """(scene as it is linearized, angles, speed, torque) at each speed; the reason where there is no such."""
     from rotor_mbs.models.lagrange.linearization import equilibrium, holding_torque, steady_rotation
 
-    at = scene if kind == REST else replace(scene, gravity=0.0)
+    at = scene if kind == modal.REST else replace(scene, gravity=0.0)
     start = scene  # of each slower speed: the pitches before, so that one branch is followed down to rest
     points: list[_Point | str] = []
     for speed in map(float, speeds[::-1]):
         try:
-            angles = equilibrium(start) if kind == REST else steady_rotation(start, speed)
+            angles = equilibrium(start) if kind == modal.REST else steady_rotation(start, speed)
         except InputError as exc:
             points.append(str(exc))
         except ZeroDivisionError:
@@ -221,7 +212,7 @@ def _steady_states(scene: Scene, kind: str, speeds: Array) -> list[_Point | str]
     return points[::-1]
 
 
-def _floquet_table(scene: Scene, speeds: Array) -> FloquetTable:
+def _floquet_table(scene: Scene, speeds: Array) -> modal.FloquetTable:
     """Multipliers of the periodic motion under gravity at `speeds` > 0, from the fastest down. Raises MethodRefusal."""
     from rotor_mbs.models.lagrange.floquet import periodic_turn
 
@@ -232,9 +223,9 @@ def _floquet_table(scene: Scene, speeds: Array) -> FloquetTable:
     turns.reverse()
     rows = []
     for turn in turns:
-        every, others = floquet(turn.transition, turn.flow, turn.gradient, turn.speed)
+        every, others = modal.floquet(turn.transition, turn.flow, turn.gradient, turn.speed)
         modulus = float(np.abs(others).max(initial=0.0))
-        is_stable = -1 if turn.message else int(modulus <= 1.0 + GROWTH)
+        is_stable = -1 if turn.message else int(modulus <= 1.0 + modal.GROWTH)
         sizes = np.abs(every)
         rounding = np.finfo(float).eps * np.linalg.norm(turn.transition)
         error = float("nan")  # where rounding leaves under six digits
@@ -243,7 +234,7 @@ def _floquet_table(scene: Scene, speeds: Array) -> FloquetTable:
         rows.append((every, modulus, is_stable, error, turn.torque, turn.mismatch))
     multipliers, largest, stable, errors, torques, mismatches = map(np.array, zip(*rows, strict=True))
     messages = tuple(turn.message for turn in turns)
-    return FloquetTable(speeds, multipliers, largest, stable, errors, torques, mismatches, messages)
+    return modal.FloquetTable(speeds, multipliers, largest, stable, errors, torques, mismatches, messages)
 
 
 def _increasing(values: Sequence[float] | Array, name: str) -> list[float]:

@@ -22,14 +22,7 @@ from rotor_mbs.runs.table import Rows, extend_file
 from rotor_mbs.runs.versions import row_versions
 from rotor_mbs.scenario.scene import Scene, scene_hash
 from rotor_mbs.solution.status import COMPLETE
-from rotor_mbs.studies.run import (
-    OnProgress,
-    Outcome,
-    compute_tasks,
-    ignore_progress,
-    run_scenes,
-    work_of,
-)
+from rotor_mbs.studies.run import OnProgress, Outcome, compute_tasks, ignore_progress, run_scenes, work_of
 from rotor_mbs.studies.stored_references import read_reference
 
 TARGET = 1e-6  # rad: what a method must reach on the stiff and light scenes

@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 
 from rotor_mbs.analysis.judgement import clearly_ok, defects_of, judge
 from rotor_mbs.errors import InputError
-from rotor_mbs.methods.base import Method
 from rotor_mbs.methods.catalogue import check_names, find_method, is_corrected, settings_for, with_method_files
 from rotor_mbs.methods.solve import solve
 from rotor_mbs.methods.time_limit import OutOfTimeError, time_limit
@@ -33,7 +32,7 @@ from rotor_mbs.scenario.toml_file import TableError, at_key, shown_path
 from rotor_mbs.solution.metrics import Metrics, defect_metrics, energy_drifts, horizon, largest, running_growth
 from rotor_mbs.solution.quantities import energy_balance, quantities
 from rotor_mbs.solution.status import STATUSES, code_of
-from rotor_mbs.solution.trajectory import Array, RunBlock, Solution, Trajectory
+from rotor_mbs.solution.trajectory import Array, Solution, Trajectory
 
 _SIDE_BY_SIDE = ("", "angles", "rates", "tip", "energy")  # outputs that every `Method.solve_many` computes
 _OF_DEFECTS = ("defect_max", "defect_median", "defect_time", "angle_error_predicted")
@@ -54,11 +53,25 @@ class Chunk(Task):
 
     def perform(self) -> Rows:
         """(runs, ...) columns of all its runs, failures of runs included. Raises InputError, MethodRefusal."""
-        scenes = _scenes(self)
-        if find_method(self.method).solve_many is not None and _has_all_of(scenes[0].outputs):
+        try:
+            scenes = [self.variants.scene(values) for values in self.values.tolist()]
+        except TableError as error:
+            keys, last = ", ".join(self.variants.keys), self.first + len(self.values) - 1
+            raise InputError(f"runs {self.first} to {last}: {keys}: {error}") from error
+        # Runs side by side have what is asked for, or it follows from their samples.
+        asked = quantities(scenes[0].outputs)
+        is_there = all(known.output in _SIDE_BY_SIDE or known.producer or not known.required for known in asked)
+        if is_there and find_method(self.method).solve_many is not None:
             rows = _side_by_side(self, scenes)
         else:
-            rows = _one_by_one(self, scenes)
+            each = []
+            for i, scene in enumerate(scenes):
+                try:
+                    run = solve(self.method, scene, self.settings, time_limit_s=self.time_limit_s)
+                    each.append(_judged_row(self, run, float(run.time[-1]) if len(run.time) else 0.0))
+                except OutOfTimeError as exc:
+                    each.append(self.part(i, i + 1).failed("timed_out", str(exc)))
+            rows = {name: np.concatenate([row[name] for row in each]) for name in each[0]}
         if "error_growth" in rows:  # of the motion, from the variational equations of the closed form, by any method
             for i, scene in enumerate(scenes):
                 angles = np.empty((scene.samples, 0))
@@ -87,31 +100,6 @@ class Chunk(Task):
 def limit_of(runs: int, time_limit_s: float) -> float:
     """When the worker of so many runs is ended: a method may compute them one after the other."""
     return time_limit_s * runs + _GRACE_S
-
-
-def _has_all_of(outputs: Sequence[str]) -> bool:
-    """Whether runs side by side have what is asked for, or it follows from their samples."""
-    return all(one.output in _SIDE_BY_SIDE or one.producer or not one.required for one in quantities(outputs))
-
-
-def _scenes(chunk: Chunk) -> list[Scene]:
-    try:
-        return [chunk.variants.scene(values) for values in chunk.values.tolist()]
-    except TableError as error:
-        keys = ", ".join(chunk.variants.keys)
-        last = chunk.first + len(chunk.values) - 1
-        raise InputError(f"runs {chunk.first} to {last}: {keys}: {error}") from error
-
-
-def _one_by_one(chunk: Chunk, scenes: Sequence[Scene]) -> Rows:
-    rows = []
-    for i, scene in enumerate(scenes):
-        try:
-            run = solve(chunk.method, scene, chunk.settings, time_limit_s=chunk.time_limit_s)
-            rows.append(_judged_row(chunk, run, float(run.time[-1]) if len(run.time) else 0.0))
-        except OutOfTimeError as exc:
-            rows.append(chunk.part(i, i + 1).failed("timed_out", str(exc)))
-    return {name: np.concatenate([row[name] for row in rows]) for name in rows[0]}
 
 
 def _judged_row(chunk: Chunk, run: Solution, time_reached: float) -> Rows:
@@ -155,7 +143,13 @@ def _side_by_side(chunk: Chunk, scenes: Sequence[Scene]) -> Rows:
     rows = blank_rows(len(scenes), metrics)
     for name in row.names or ():
         if name not in rows:
-            values = errors if name == "energy_error" else _quantity(block, scenes, method, name)
+            values = errors if name == "energy_error" else block.quantities.get(name)
+            if values is None:  # what a plug-in's quantity makes of each run; NaN after a run broke off
+                runs = enumerate(scenes)
+                made = [Solution(one, method.name, block.trajectory(i), block.integrations[i])[name] for i, one in runs]
+                values = np.full((len(scenes), scenes[0].samples, *made[0].shape[1:]), np.nan)
+                for run_values, samples in zip(values, made, strict=True):
+                    run_values[: len(samples)] = samples
             rows[name] = np.ascontiguousarray(values, row[name].base)
     rows["status"][ok] = code_of("ok")
     for name in ("energy_drift_max", *_OF_DEFECTS):
@@ -176,18 +170,6 @@ def _side_by_side(chunk: Chunk, scenes: Sequence[Scene]) -> Rows:
         for name in ("status", "message", "energy_drift_max", *_OF_DEFECTS):
             rows[name][i] = judged[name][0]
     return rows
-
-
-def _quantity(block: RunBlock, scenes: Sequence[Scene], method: Method, name: str) -> Array:
-    """(runs, samples, ...) of a quantity: the block's own, or its producer's of each run; NaN after a run broke off."""
-    values: Array | None = block.quantities.get(name)
-    if values is None:
-        runs = enumerate(scenes)
-        made = [Solution(scene, method.name, block.trajectory(i), block.integrations[i])[name] for i, scene in runs]
-        values = np.full((len(scenes), scenes[0].samples, *made[0].shape[1:]), np.nan)
-        for row, found in zip(values, made, strict=True):
-            row[: len(found)] = found
-    return values
 
 
 # Runs handed to a worker at once where the method computes many side by side: by the fastest one an eighth of a second
@@ -255,19 +237,15 @@ class SweepPlan:
                 )
                 first, left = end, left - (end - first)
 
-    def _identity(self) -> str:
+    def attributes(self) -> dict[str, object]:
         sweep, table = self.sweep, self.sweep.table
         options = [table.combine, table.settings, table.precision, table.error_growth, table.defects, table.seed]
         axes = [(axis.key, axis.is_drawn) for axis in sweep.design.axes]
         runs = [self.methods, self.first, self.last, table.validation, table.test]
         content = [scene_hash(sweep.base), sweep.outputs, axes, options, runs]
-        digest = hashlib.sha256(json.dumps(content, sort_keys=True).encode())
+        identity = hashlib.sha256(json.dumps(content, sort_keys=True).encode())
         for values in sweep.design.values:
-            digest.update(values.tobytes())
-        return digest.hexdigest()
-
-    def attributes(self) -> dict[str, object]:
-        sweep, table = self.sweep, self.sweep.table
+            identity.update(values.tobytes())
         return {
             "title": table.title,
             "summary": (
@@ -285,7 +263,7 @@ class SweepPlan:
             "test_share": table.test,
             "settings": json.dumps(table.settings, sort_keys=True),
             "runs_of_all_parts": self.rows * len(self.methods),
-            IDENTITY: self._identity(),
+            IDENTITY: identity.hexdigest(),
             "methods": list(self.methods),
             "runs": self.runs,
             "parameter_keys": list(sweep.keys),
@@ -352,7 +330,10 @@ def run_sweep(
         is_older = stored.column("code") != now[np.arange(plan.first, plan.last) // plan.rows]
         older = int((is_older & (statuses != MISSING)).sum())
         on_progress(done, plan.runs, Counter())
-        for end in compute(pool, plan.chunks(place, _gaps(plan, statuses), pool.workers)):
+        # First and last of every span of missing runs.
+        edges = plan.first + np.flatnonzero(np.diff(statuses == MISSING, prepend=False, append=False))
+        gaps = [(int(first), int(last)) for first, last in edges.reshape(-1, 2)]
+        for end in compute(pool, plan.chunks(place, gaps, pool.workers)):
             chunk = end.task
             assert isinstance(chunk, Chunk)
             if end.value is None:  # nothing is known of these runs: they stay missing
@@ -372,12 +353,6 @@ def run_sweep(
 
 def _counted(statuses: NDArray[np.int8]) -> Counter[str]:
     return Counter(STATUSES[code] for code in statuses.tolist() if code != MISSING)
-
-
-def _gaps(plan: SweepPlan, statuses: NDArray[np.int8]) -> list[tuple[int, int]]:
-    """(first, last) of every span of missing runs."""
-    edges = np.flatnonzero(np.diff(statuses == MISSING, prepend=False, append=False))
-    return [(int(first), int(last)) for first, last in plan.first + edges.reshape(-1, 2)]
 
 
 def estimate_seconds(plan: SweepPlan, pool: TaskPool) -> float:

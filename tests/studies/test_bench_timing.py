@@ -80,7 +80,7 @@ def point(curve: str = "a", rung: int = 0) -> Point:
 
 
 def timer_of(fake: FakeMethod, monkeypatch: pytest.MonkeyPatch) -> PointTimer:
-    monkeypatch.setattr(bench, "find_method", lambda _name: fake)
+    monkeypatch.setattr(bench.catalogue, "find_method", lambda _name: fake)
     monkeypatch.setattr(judgement, "defects_of", lambda *_, **__: None)  # of a motion that is none
     return PointTimer(point(), SCENE, still(), clock=fake.clock)
 
