@@ -27,10 +27,11 @@ from rotor_mbs.errors import InputError, MethodRefusal, PlausibilityWarning, Res
 from rotor_mbs.methods.catalogue import REFERENCE, check_names, selected_methods
 from rotor_mbs.methods.method_file import ENDING
 from rotor_mbs.methods.time_limit import checked_seconds
-from rotor_mbs.runs.files import HDF5, replace_file
+from rotor_mbs.runs.design import MISSING, RUNS
+from rotor_mbs.runs.outputs import replace_file
 from rotor_mbs.runs.read import StoredRun, StoredScene, is_sweep, open_results
 from rotor_mbs.runs.sweeps import StoredSweep, parameter_name
-from rotor_mbs.runs.table import MISSING, RUNS, table_groups, text_of
+from rotor_mbs.runs.table import is_of_this_program, table_groups, text_of
 from rotor_mbs.scenario.catalogue import list_scenes, only_scene, scene_of
 from rotor_mbs.scenario.scene import Scene, doubts, load_scene, parse_scene
 from rotor_mbs.solution.defects import Defects
@@ -462,7 +463,7 @@ class Runs(Mapping[Any, Any]):
         """Save a copy of the file, which `rotor-mbs report` and `rotor_mbs.open` read. A file of this program is
         replaced; raises InputError for other files."""
         target = Path(path)
-        replace_file(target, self.path.read_bytes(), HDF5)
+        replace_file(target, self.path.read_bytes(), is_of_this_program)
         return target
 
     def to_html(self, folder: str | os.PathLike[str]) -> Path:

@@ -22,8 +22,8 @@ from rotor_mbs.analysis.run_selection import PRINTED
 from rotor_mbs.errors import InputError, StoreError
 from rotor_mbs.methods.catalogue import REFERENCE, is_corrected, look_up, methods
 from rotor_mbs.methods.solve import solve
-from rotor_mbs.runs.files import reading
 from rotor_mbs.runs.read import OpenResults, StoredRun, StoredScene
+from rotor_mbs.runs.table import reading
 from rotor_mbs.scenario.accuracy_bounds import Bounds, expected_settings
 from rotor_mbs.scenario.catalogue import find_scenes
 from rotor_mbs.scenario.scene import Scene, scene_hash

@@ -23,7 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor_mbs.errors import InputError, StoreError
-from rotor_mbs.runs.files import Column
+from rotor_mbs.runs.design import Column
 from rotor_mbs.runs.read import Record, read_records
 from rotor_mbs.solution.trajectory import Array
 

@@ -261,7 +261,7 @@ def check(arguments: argparse.Namespace) -> int:
 def _refuse_foreign(arguments: argparse.Namespace) -> None:
     """Before anything is computed: files of --junit and --json that hold something else."""
     from rotor_mbs.report.pages import check as formats
-    from rotor_mbs.runs.files import refuse_foreign
+    from rotor_mbs.runs.outputs import refuse_foreign
 
     if arguments.junit is not None:
         refuse_foreign(arguments.junit, formats.JUNIT)
@@ -271,7 +271,7 @@ def _refuse_foreign(arguments: argparse.Namespace) -> None:
 
 def _write_verdicts(arguments: argparse.Namespace, verdicts: Sequence[Check]) -> None:
     from rotor_mbs.report.pages import check as formats
-    from rotor_mbs.runs.files import replace_file
+    from rotor_mbs.runs.outputs import replace_file
 
     if arguments.junit is not None:
         replace_file(arguments.junit, formats.junit(verdicts), formats.JUNIT)

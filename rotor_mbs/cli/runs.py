@@ -13,7 +13,7 @@ from rotor_mbs.analysis.run_tables import run_table
 from rotor_mbs.cli import EXIT_BAD_INPUT
 from rotor_mbs.cli.terminal import ProgressLine, print_doubts, print_summary, print_table
 from rotor_mbs.methods.catalogue import method_names, selected_methods
-from rotor_mbs.runs.files import is_being_written, replace_file
+from rotor_mbs.runs.outputs import is_being_written, replace_file
 from rotor_mbs.runs.pool import local_pool
 from rotor_mbs.runs.read import open_results
 from rotor_mbs.scenario.catalogue import find_scenes

@@ -19,9 +19,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor_mbs.errors import InputError, ResourceError, RotorError
-from rotor_mbs.runs import files
+from rotor_mbs.runs import table
+from rotor_mbs.runs.design import RUNS
 from rotor_mbs.runs.read import run_arrays
-from rotor_mbs.runs.table import RUNS, table_groups
+from rotor_mbs.runs.table import table_groups
 
 # By dimension: factor to s, rad or rad/s.
 _ANGLES = {
@@ -142,7 +143,7 @@ Lines = Sequence[tuple[int, str]]  # number of the line in the file, its text
 
 
 def read_table(path: str | os.PathLike[str], group: str = "", scene: str = "") -> DataTable:
-    """The columns of numbers in a file; `group`, `scene`: see `runs.files.read_arrays`.
+    """The columns of numbers in a file; `group`, `scene`: see `runs.table.read_arrays`.
 
     Raises InputError or StoreError, in one line, for what cannot be read.
     """
@@ -239,9 +240,9 @@ def _binary_arrays(path: Path, group: str, scene: str) -> tuple[Mapping[str, Any
             return {name: np.array(variable[:]) for name, variable in file.variables.items()}, units
     if path.suffix.lower() == ".outb":
         return _openfast(path)
-    if files.is_of_this_program(path) and RUNS in table_groups(path):
+    if table.is_of_this_program(path) and RUNS in table_groups(path):
         return run_arrays(path, group, scene), {}
-    return files.read_arrays(path, group, scene)
+    return table.read_arrays(path, group, scene)
 
 
 def _openfast(path: Path) -> tuple[dict[str, Any], dict[str, str]]:

@@ -25,23 +25,9 @@ from numpy.typing import NDArray
 
 from rotor_mbs.errors import StoreError
 from rotor_mbs.methods.catalogue import REFERENCE, look_up
-from rotor_mbs.runs import files
-from rotor_mbs.runs.files import Column
-from rotor_mbs.runs.table import (
-    COLUMNS,
-    FROZEN,
-    MISSING,
-    OF_METHODS,
-    REPEATED,
-    RUNS,
-    Place,
-    Rows,
-    Table,
-    TableFile,
-    checksums,
-    known_columns,
-    text_of,
-)
+from rotor_mbs.runs import table
+from rotor_mbs.runs.design import FROZEN, MISSING, OF_METHODS, POINT_COLUMNS, REPEATED, RUNS, Column
+from rotor_mbs.runs.table import Place, Rows, Table, TableFile, checksums, known_columns, text_of
 from rotor_mbs.runs.versions import machine, versions
 from rotor_mbs.scenario.catalogue import natural_order
 from rotor_mbs.scenario.scene import Scene, coordinate_labels, parse_scene
@@ -73,7 +59,7 @@ class StoredRun:
     @functools.cached_property
     def _stored(self) -> Rows:
         """The columns of its row as they are in the file."""
-        with files.reading(self._name):
+        with table.reading(self._name):
             return self._place.read(file=self._file)
 
     @functools.cached_property
@@ -250,14 +236,14 @@ class OpenResults:
 def open_results(path: Path, *, verify: bool = True, only: Collection[str] | None = None) -> Iterator[OpenResults]:
     """An open results file; of a file that replaces it meanwhile nothing is seen. A run is compared with its checksum
     when it is read, but for verify=False; only: names of scenes, by default all. Raises StoreError."""
-    with files.open_file(path) as h5, files.reading(path):
-        attributes = files.attributes_of(h5)
+    with table.open_file(path) as h5, table.reading(path):
+        attributes = table.attributes_of(h5)
     for _ in range(_ATTEMPTS):
         with path.open("rb") as file:
             stored = TableFile(path)
             if stored.groups and stored.table(stored.groups[0]).inode != os.fstat(file.fileno()).st_ino:
                 continue
-            with files.reading(path):
+            with table.reading(path):
                 scenes = {scene.name: scene for scene in _scenes(stored, file, verify, only)}
             yield OpenResults(path, attributes, {name: scenes[name] for name in natural_order(scenes)})
             return
@@ -265,16 +251,16 @@ def open_results(path: Path, *, verify: bool = True, only: Collection[str] | Non
 
 
 def run_arrays(path: Path, group: str = "", scene: str = "") -> dict[str, NDArray[Any]]:
-    """The arrays of one run of a results file; group, scene: as for `files.read_arrays`, the run "scene/method"."""
+    """The arrays of one run of a results file; group, scene: as for `table.read_arrays`, the run "scene/method"."""
     with open_results(path) as results:
         runs = {f"{name}/{run.method}": run for name, known in results.scenes.items() for run in known.runs.values()}
-        run = runs[files.chosen_group(path, list(runs), group.strip("/"), scene)]
+        run = runs[table.chosen_group(path, list(runs), group.strip("/"), scene)]
         return {name: run.array(name) for name in run.names if run.array(name).ndim <= 3}
 
 
 def is_sweep(path: Path) -> bool:
     """Whether a file of this program is the dataset of a sweep. Raises StoreError where it cannot be read."""
-    with files.open_file(path) as file, files.reading(path):
+    with table.open_file(path) as file, table.reading(path):
         return "run" in file
 
 
@@ -300,19 +286,6 @@ def _scenes(stored: TableFile, file: IO[bytes], verify: bool, only: Collection[s
 
 
 _MESSAGE_LENGTH = 300
-
-
-# The computed columns of each table of points.
-POINT_COLUMNS: Mapping[str, Mapping[str, Column]] = {
-    table: {name: COLUMNS[name] for name in names.split()}
-    for table, names in {
-        "bench": "status message angle_error_max angle_error_end tip_error_max energy_drift_max defect_max "
-        "defect_median zero_pitch_max run_time_s run_time_min_s run_time_q1_s run_time_q3_s setup_time_s "
-        "setup_again_time_s output_time_s repeats steps "
-        "false_success left_out horizon_s uncertainty_rad samples load_before pinned_core repeatable order crc32",
-        "stability": "status message angle_error_max energy_drift_max false_success step_for_target_s crc32",
-    }.items()
-}
 _NUMBERS = ("step", "tolerance", "order_expected")  # that the design says of a point
 
 
@@ -357,7 +330,7 @@ def points_table(group: str, points: Sequence[Mapping[str, object]]) -> Table:
 
 def read_records(path: Path, *kinds: str) -> list[Record]:
     """The records of these kinds, in the order of the file; no curve of which a point is missing. Raises StoreError."""
-    with files.open_file(path) as file, files.reading(path):
+    with table.open_file(path) as file, table.reading(path):
         there = [kind for kind in kinds if kind in file]
         tables = [kind for kind in there if kind in POINT_COLUMNS]
         groups = [record for kind in there if kind not in tables for record in _group_records(file, kind)]
@@ -404,29 +377,29 @@ def _point_records(file: TableFile, kind: str) -> Iterator[Record]:
 
 def write_records(path: Path, records: Sequence[Record]) -> None:
     """A file with these records alone, atomically. Raises StoreError."""
-    with files.new_file(path) as file:
-        files.put_attributes(file, {**versions(), **machine()})
+    with table.new_file(path) as file:
+        table.put_attributes(file, {**versions(), **machine()})
         for record in records:
-            group = files.new_group(file, "/".join((record.kind, record.scene, record.name)))
-            files.put_attributes(group, {"record": 1, **record.attributes})
+            group = table.new_group(file, "/".join((record.kind, record.scene, record.name)))
+            table.put_attributes(group, {"record": 1, **record.attributes})
             for name, column in record.columns.items():
-                dataset = files.put(group, name, np.asarray(record.arrays[name]), column)
+                dataset = table.put(group, name, np.asarray(record.arrays[name]), column)
                 if f"{name}_labels" in record.attributes:
-                    files.put_attributes(dataset, {"labels": record.attributes[f"{name}_labels"]})
-        files.seal_all(file)
+                    table.put_attributes(dataset, {"labels": record.attributes[f"{name}_labels"]})
+        table.seal_all(file)
 
 
 def _group_records(file: Any, kind: str) -> Iterator[Record]:
-    for group in files.groups_in(file[kind]):
+    for group in table.groups_in(file[kind]):
         if "record" not in group.attrs:
             continue
-        damages = [part for part in files.damages_of(group) if part != files.DIGESTS]
+        damages = [part for part in table.damages_of(group) if part != table.DIGESTS]
         path = str(group.name).strip("/")
         if damages:
             raise StoreError(f"{file.filename}: {path}: {', '.join(damages)} changed after they were written")
         parts = path.removeprefix(f"{kind}/").split("/")
-        columns = files.columns_of(group)
-        arrays = {name: files.values_of(group[name]) for name in columns}
+        columns = table.columns_of(group)
+        arrays = {name: table.values_of(group[name]) for name in columns}
         scales_first = dict(sorted(columns.items(), key=lambda column: column[1].dimensions != (column[0],)))
         scene, name = "/".join(parts[:-2]), "/".join(parts[-2:])
-        yield Record(kind, scene, name, files.attributes_of(group), arrays, scales_first)
+        yield Record(kind, scene, name, table.attributes_of(group), arrays, scales_first)

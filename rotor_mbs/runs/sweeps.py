@@ -22,15 +22,17 @@ from numpy.typing import NDArray
 
 from rotor_mbs.errors import InputError, StoreError
 from rotor_mbs.methods.catalogue import find_method
-from rotor_mbs.runs import files
-from rotor_mbs.runs.files import Column, writing
+from rotor_mbs.runs.design import COLUMNS, MISSING, Column, flags
+from rotor_mbs.runs.outputs import writing
 from rotor_mbs.runs.table import (
-    COLUMNS,
-    MISSING,
     StoredTable,
     Table,
-    flags,
+    attribute,
+    attributes_of,
+    columns_of,
     laid_out,
+    open_file,
+    reading,
     scene_scales,
     stored_table,
 )
@@ -114,8 +116,8 @@ def open_sweep(
         if is_new:
             with laid_out(path, [table], attributes):
                 pass
-        with files.open_file(path) as file, files.reading(path):
-            if files.attribute(file, IDENTITY) != attributes[IDENTITY]:
+        with open_file(path) as file, reading(path):
+            if attribute(file, IDENTITY) != attributes[IDENTITY]:
                 raise InputError(
                     f"{path}: not the file of this sweep; allowed: another output file, or remove that one"
                 )
@@ -143,17 +145,17 @@ class StoredSweep:
 
     def __init__(self, path: Path, *, allow_damaged_runs: bool = False) -> None:
         self._path = path
-        with files.open_file(path) as file, files.reading(path):
-            self.attributes = files.attributes_of(file)
+        with open_file(path) as file, reading(path):
+            self.attributes = attributes_of(file)
             if IDENTITY not in self.attributes:
                 raise StoreError(f"{path}: no sweep's dataset; allowed: a file that `rotor-mbs sweep` wrote")
             self._table: StoredTable = stored_table(file)
-            columns = files.columns_of(file)
+            columns = columns_of(file)
         table = self._table
         del columns["run"]
         self.columns = {"run": Column(("run",), "1", "run number, from 0"), **columns}
         self.keys: list[str] = self.attributes["parameter_keys"]
-        with files.reading(path):
+        with reading(path):
             is_damaged = (table.column("status") != MISSING) & (table.statuses() == MISSING)
         self.damaged_runs = table.runs[is_damaged]
         if len(self.damaged_runs) and not allow_damaged_runs:

@@ -18,126 +18,72 @@ from __future__ import annotations
 
 import errno
 import functools
+import hashlib
 import json
 import math
 import os
+import threading
 import zlib
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager, nullcontext
+from contextlib import contextmanager, nullcontext, suppress
 from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import IO, Any, NamedTuple
 
+import h5py
 import numpy as np
 from numpy.typing import NDArray
 
 from rotor_mbs.errors import InputError, StoreError
-from rotor_mbs.methods.catalogue import REFERENCE, find_method, method_names
-from rotor_mbs.runs import files
-from rotor_mbs.runs.files import CHARACTERS, KEYWORDS, Column, saving
-from rotor_mbs.runs.versions import machine, row_versions, versions
+from rotor_mbs.methods.catalogue import REFERENCE, method_names
+from rotor_mbs.runs.design import (
+    CHARACTER,
+    CHARACTERS,
+    COLUMNS,
+    KNOWN,
+    MISSING,
+    OF_METHODS,
+    REPEATED,
+    RUNS,
+    Asked,
+    Column,
+    arrays_of,
+    metric_columns,
+)
+from rotor_mbs.runs.outputs import replace_file, replacing, saving, sync_folder
+from rotor_mbs.runs.versions import machine, versions
 from rotor_mbs.scenario.catalogue import natural_key
 from rotor_mbs.scenario.scene import Scene, scene_hash
-from rotor_mbs.solution.quantities import LOADS, SCALES, quantities, scale_values
+from rotor_mbs.solution.quantities import SCALES, scale_values
 from rotor_mbs.solution.status import STATUSES, code_of
 from rotor_mbs.solution.trajectory import Solution
 
-# (rows, ...) arrays by the name of their dataset.
-Rows = dict[str, NDArray[Any]]
+FORMAT = "rotor_mbs"
+FORMAT_VERSION = 2
+CONVENTIONS = "CF-1.11, ACDD-1.3"
+# What every file is about: the attribute `keywords` of the ACDD conventions.
+KEYWORDS = "multibody dynamics, wind turbine rotor, Euler-Lagrange equations, model verification"
+DIGESTS = "digests"  # the attribute with the digests of a group
+_NOT_ATTRIBUTES = (DIGESTS, "CLASS", "NAME", "REFERENCE_LIST", "DIMENSION_LIST", "_Netcdf4Dimid", "_Netcdf4Coordinates")
+# The netCDF-4 library's name for the scale of a dimension without values.
+_WITHOUT_VALUES = "This is a netCDF dimension but not a netCDF variable."
 
-MISSING = -1  # status of a row that is not stored
-# What the table of a scene's arrays repeats of the run's row in another table; in a row it has this name.
-REPEATED = {"status": "status_repeated", "samples": "samples_repeated"}
-CHARACTER = "S1"  # kind of a column of texts that are computed: (run, characters), UTF-8, then zeros
+# What h5py and HDF5 raise on damaged files, and what plain code does with what they return.
+_DAMAGE = (
+    KeyError, OSError, RuntimeError, ValueError, TypeError, AttributeError, IndexError, OverflowError, MemoryError,
+    NotImplementedError,
+)  # fmt: skip
 
-
-def flags(names: Sequence[str], first: int = 0) -> dict[str, Any]:
-    """The attributes of a column of codes, as CF has them: what each code from `first` on means."""
-    return {"flag_values": np.arange(first, first + len(names), dtype=np.int8), "flag_meanings": " ".join(names)}
-
-
-# What a computed column with a value a row is, whichever table has it: units, long name, type where it is no double.
-COLUMNS = {
-    name: Column(("run", CHARACTERS) if CHARACTER in kind else ("run",), units, long_name, kind[0] if kind else "<f8")
-    for name, (units, long_name, *kind) in {
-        "status": ("1", "outcome of the run, determined from its samples; -1: not computed yet", "i1"),
-        "message": ("1", "reason for a status other than ok", CHARACTER),
-        "samples": ("1", "number of samples stored", "<i8"),
-        "time_reached": ("s", "time of the last sample"),
-        "time_limit_s": ("s", "time limit that stopped the run; NaN if it was not stopped"),
-        "steps": ("1", "number of integration steps; -1: unknown", "<i8"),
-        "rhs_evaluations": ("1", "number of evaluations of the right-hand side; -1: unknown", "<i8"),
-        "setup_time_s": ("s", "time to build the model"),
-        "setup_again_time_s": ("s", "time to build the model a second time"),
-        "run_time_s": ("s", "median run time of the integration"),
-        "run_time_min_s": ("s", "shortest run time of the integration"),
-        "run_time_q1_s": ("s", "lower quartile of the run times"),
-        "run_time_q3_s": ("s", "upper quartile of the run times"),
-        "output_time_s": ("s", "time to read and compute the samples"),
-        "repeats": ("1", "number of timed runs", "<i8"),
-        "repeatable": ("1", "1 if the first and last run of every point of the curve are bitwise equal", "i1"),
-        "engine_success": ("1", "1 if the engine reported success, -1 without a report", "i1"),
-        "engine_message": ("1", "message of the engine", CHARACTER),
-        "false_success": ("1", "1 if the engine reported success although the samples are wrong", "i1"),
-        "energy_scale_J": ("J", "energy scale, to which energy errors are relative"),
-        "energy_drift_max": ("1", "largest energy error over the run, relative to the energy scale"),
-        "energy_gain_J": ("J", "largest energy gain beyond the work"),
-        "angle_error_max": ("rad", "largest angle error up to the horizon"),
-        "angle_error_predicted": ("rad", "largest angle error up to the horizon, predicted from the defects"),
-        "defect_max": ("rad", "largest defect of an interval between samples"),
-        "defect_median": ("rad", "median of the interval defects"),
-        "defect_time": ("s", "end of the interval of the largest defect"),
-        "defect_judged": (
-            "rad",
-            "largest defect beyond rounding, scaled in intervals over 0.01 s; the value compared with the bound",
-        ),
-        "defect_mean": ("rad", "signed mean of the defects, of the coordinate with the largest one"),
-        "defect_drift": ("rad", "largest sum of the defects of 100 intervals, each propagated to their end"),
-        "defect_floor": ("rad", "largest defect that rounding of the samples can cause"),
-        "defects_not_judged": ("1", "number of intervals in which errors may grow by more than 1e5"),
-        "angle_error_whole": ("rad", "largest angle error over the whole run"),
-        "angle_error_end": ("rad", "angle error at the last sample"),
-        "tip_error_max": ("m", "largest distance of a tip from the reference up to the horizon"),
-        "error_growth": ("1", "largest factor by which a small error of the initial state has grown"),
-        "horizon_s": ("s", "time of the last sample before the error growth reaches 1e5"),
-        "uncertainty_rad": ("rad", "uncertainty of the reference up to the horizon"),
-        "angular_impulse_error_max": ("1", "largest error of the angular momentum balance, relative to its scale"),
-        "linear_impulse_error_max": ("1", "largest error of the linear momentum balance, relative to its scale"),
-        "zero_pitch_max": ("rad", "largest pitch angle among those that are zero in the reference"),
-        "zero_pitch_left_s": ("s", "time at which such a pitch angle becomes nonzero"),
-        "zero_pitch_growth_per_s": ("1/s", "growth rate of such a pitch angle"),
-        "rotor_angle_min": ("rad", "smallest rotor angle, at the integrator's own output points"),
-        "rotor_angle_max": ("rad", "largest rotor angle, at the integrator's own output points"),
-        "rotor_rate_max": ("rad/s", "largest magnitude of the rotor rate, at the integrator's own output points"),
-        "pitch_max": ("rad", "largest magnitude of a pitch angle"),
-        "left_out": ("1", "1 if the point was omitted because of the time budget", "i1"),
-        "load_before": ("1", "load average of the machine before the timing"),
-        "pinned_core": ("1", "number of the core used for timing; -1: any", "<i8"),
-        "order": ("1", "order of convergence of the curve, fitted above its round-off floor"),
-        "step_for_target_s": ("s", "step at which the ladder reaches 1e-6 rad"),
-        "code": ("1", "CRC-32 of the versions of package, libraries and code that computed the run", "<u4"),
-        "crc32": ("1", "CRC-32 of the row, over all computed columns", "<u4"),
-    }.items()
-}
-COLUMNS["status"] = COLUMNS["status"]._replace(attributes=flags(("missing", *STATUSES), MISSING))
-# What the design says of each row of a table, in this order: units, long name. What has no entry is no column.
-KNOWN = {
-    "scene": ("1", "scene"),
-    "method_name": ("1", "method, model/integrator"),
-    "curve": ("1", "method with its fixed settings"),
-    "setting_kind": ("1", "setting that varies along the curve: step or tolerance"),
-    "settings": ("1", "settings of the method, JSON"),
-    "options": ("1", "options of the study, JSON"),
-    "versions": ("1", "versions of package, libraries and code that computed the row, JSON"),
-    "scene_hash": ("1", "SHA-256 of the numbers of the scene"),
-    "step": ("s", "time step"),
-    "tolerance": ("1", "tolerance"),
-    "order_expected": ("1", "order of the method"),
-}
+# An array may be larger than its bytes in the file, where it is compressed: up to a factor, and a size in any case.
+_UNPACKED, _UNPACKED_BYTES = 100, 1 << 26
 _HEAD_BYTES = 1 << 17  # of a file beside its rows, at most: descriptions and texts
 _OF_REFERENCE = "columns_of_the_reference"  # the attribute with the names of those that have no value a run
 _READ_BYTES = 1 << 25  # read at once when checksums are verified
+_TEXT_LENGTH = 600  # characters of a message
+
+# (rows, ...) arrays by the name of their dataset.
+Rows = dict[str, NDArray[Any]]
 
 
 @dataclass(frozen=True)
@@ -196,6 +142,44 @@ def scene_scales(scene: Scene, columns: Iterable[Column]) -> dict[str, tuple[Col
         for name, scale in SCALES.items()
         if name in used
     }
+
+
+def runs_table(asked: Sequence[Asked]) -> Table:
+    outputs = dict.fromkeys(output for run in asked for output in run.scene.outputs)
+    known = known_columns([run.known for run in asked])
+    return Table(RUNS, [run.run for run in asked], known, metric_columns(outputs), characters=_TEXT_LENGTH)
+
+
+def scene_table(runs: Sequence[Asked], arrays: Collection[str] | None = None) -> Table:
+    """The table of the arrays of one scene's runs. arrays: names of those that are stored, by default all."""
+    scene = runs[0].scene
+    computed = {
+        name: column for run in runs for name, column in arrays_of(run).items() if arrays is None or name in arrays
+    }
+    attributes = {
+        "title": scene.title,
+        "figures": ", ".join(scene.figures),
+        "blades": len(scene.blades),
+        "scene_toml": scene.text,
+        "scene_hash": scene_hash(scene),
+        "NX_class": "NXdata",
+        "signal": "angles",
+        "axes": ["run", "time", "coordinate"],
+    }
+    scales = scene_scales(scene, computed.values())
+    repeated = {name: COLUMNS[name] for name in REPEATED}
+    return Table(scene.name, [run.method for run in runs], scales, repeated | computed, attributes)
+
+
+def results_tables(asked: Sequence[Asked]) -> list[Table]:
+    asked = sorted(asked, key=lambda run: _order(run.run))
+    by_scene: dict[str, list[Asked]] = {}
+    for run in asked:
+        by_scene.setdefault(run.scene.name, []).append(run)
+    return [
+        runs_table(asked),
+        *(scene_table(runs) for runs in by_scene.values()),
+    ]
 
 
 @dataclass(frozen=True)
@@ -318,6 +302,39 @@ def text_of(values: NDArray[np.bytes_]) -> str:
     return values.tobytes().rstrip(b"\0").decode(errors="ignore")
 
 
+# The rows of a run
+
+
+def row_of_run(run: Solution, place: Place, facts: Mapping[str, object]) -> Rows:
+    """The row of a run: status, metrics, times, arrays. facts: further columns by name."""
+    integration = run.integration
+    arrays = dict(run.quantities)
+    if run.method == REFERENCE:
+        arrays |= {"angles": run.angles, "rates": run.rates}
+    else:
+        arrays = {OF_METHODS.get(name, name): array for name, array in arrays.items()}
+    return place.rows_of(
+        {
+            "status": run.status,
+            "message": run.message,
+            "engine_message": integration.message,
+            "samples": len(run.time),
+            "time_reached": integration.time_reached,
+            "steps": -1 if integration.steps is None else integration.steps,
+            "rhs_evaluations": -1 if integration.rhs_evaluations is None else integration.rhs_evaluations,
+            "engine_success": int(integration.success),
+            "setup_time_s": run.setup_time_s,
+            "run_time_s": float(np.median(run.run_times_s)),
+            "run_time_min_s": min(run.run_times_s),
+            "output_time_s": run.output_time_s,
+            "repeats": len(run.run_times_s),
+            **run.metrics,
+            **facts,
+            **arrays,
+        }
+    )
+
+
 # Laying out
 
 
@@ -326,17 +343,17 @@ def laid_out(path: Path, tables: Sequence[Table], attributes: Mapping[str, objec
     """A new file with room for all rows, under a temporary name; after the block it is complete under its name, or not
     there. Its space is reserved twice: HDF5 does not survive a disk that fills up under it, and truncates the file it
     begins. Raises StoreError."""
-    with files.replacing(path) as temporary:
+    with replacing(path) as temporary:
         rows = sum(len(table.runs) * (table.row_type.itemsize + 8 * (4 + len(table.known))) for table in tables)
         _reserve(temporary, _HEAD_BYTES + rows)
-        with files.begin_file(temporary) as file:
-            files.put_attributes(file, attributes)
+        with begin_file(temporary) as file:
+            put_attributes(file, attributes)
             for table in tables:
                 _put_table(file, table)
-            files.seal_all(file)
+            seal_all(file)
         _reserve(temporary, temporary.stat().st_size)
         yield temporary
-    files.sync_folder(path.parent)
+    sync_folder(path.parent)
 
 
 def _reserve(path: Path, size: int) -> None:
@@ -353,25 +370,138 @@ def _reserve(path: Path, size: int) -> None:
 
 
 def _put_table(file: Any, table: Table) -> None:
-    group = files.new_group(file, table.group) if table.group else file
-    files.put_attributes(group, table.attributes)
-    files.put(group, "run", table.runs, Column(("run",), "1", "name or number of the run"))
+    group = new_group(file, table.group) if table.group else file
+    put_attributes(group, table.attributes)
+    put(group, "run", table.runs, Column(("run",), "1", "name or number of the run"))
     if table.characters:
-        files.put_dimension(group, CHARACTERS, table.characters)
+        put_dimension(group, CHARACTERS, table.characters)
     for name, (column, values) in table.known.items():
-        files.put(group, name, values, column)
+        put(group, name, values, column)
     row = table.row_type
     for name, column in table.computed.items():
         kind = row[name].base
         shape = (len(table.runs), *row[name].shape) if "run" in column.dimensions else row[name].shape
-        files.put_empty(group, name, shape, kind, column, MISSING if name == "status" else None)
+        put_empty(group, name, shape, kind, column, MISSING if name == "status" else None)
     of_reference = [name for name, column in table.computed.items() if "run" not in column.dimensions]
     if of_reference:
-        files.put_attributes(group, {_OF_REFERENCE: of_reference})
-    files.seal(group, later=table.computed.keys())
+        put_attributes(group, {_OF_REFERENCE: of_reference})
+    seal(group, later=table.computed.keys())
+
+
+def begin_file(place: Path | str, **driver: object) -> Any:
+    """A new HDF5 file with the attributes of the format; on the disk, where it must not fill up, without a `driver`."""
+    file = h5py.File(place, "w", libver=("earliest", "v108"), track_order=True, **driver)
+    file.attrs["Conventions"] = CONVENTIONS
+    file.attrs["format"] = FORMAT
+    file.attrs["format_version"] = FORMAT_VERSION
+    return file
+
+
+def new_group(parent: Any, name: str) -> Any:
+    """A group, and those above it, that list their members in the order of writing."""
+    for part in name.split("/"):
+        parent = parent[part] if part in parent else parent.create_group(part, track_order=True)
+    return parent
+
+
+def put(group: Any, name: str, values: Any, column: Column) -> Any:
+    """A dataset of numbers or texts. The scales of its dimensions must be there; a scale is its own dimension."""
+    is_text = len(values) > 0 and isinstance(values[0], str)
+    data = np.array(list(values), dtype=h5py.string_dtype()) if is_text else np.asarray(values)
+    return _described(group.create_dataset(name, data=data), group, column)
+
+
+def _described(dataset: Any, group: Any, column: Column) -> Any:
+    put_attributes(dataset, {"units": column.units, "long_name": column.long_name, **column.attributes})
+    for axis, dimension in enumerate(column.dimensions):
+        if group[dimension] == dataset:
+            dataset.make_scale(dimension)
+        else:
+            dataset.dims[axis].attach_scale(group[dimension])
+    return dataset
+
+
+def put_dimension(group: Any, name: str, length: int) -> None:
+    """A dimension without values, as the netCDF-4 library has them."""
+    scale = group.create_dataset(name, (length,), ">f4")
+    scale.make_scale(f"{_WITHOUT_VALUES}{length:10d}")
+
+
+def is_dimension_only(dataset: Any) -> bool:
+    """Whether a dataset is a dimension without values."""
+    return str(attribute(dataset, "NAME", "")).startswith(_WITHOUT_VALUES)
+
+
+def put_empty(group: Any, name: str, shape: tuple[int, ...], kind: Any, column: Column, fill: int | None = None) -> Any:
+    """A contiguous dataset that has its place in the file now and is written by others; fill: its first value, by
+    default what the file system makes of a new file, zeros."""
+    layout = h5py.h5p.create(h5py.h5p.DATASET_CREATE)
+    layout.set_layout(h5py.h5d.CONTIGUOUS)
+    layout.set_obj_track_times(False)  # the same call gives the same bytes
+    layout.set_alloc_time(h5py.h5d.ALLOC_TIME_EARLY)
+    layout.set_fill_time(h5py.h5d.FILL_TIME_NEVER if fill is None else h5py.h5d.FILL_TIME_ALLOC)
+    if fill is not None:
+        layout.set_fill_value(np.array(fill, kind))
+    dataset = _described(group.create_dataset(name, shape, kind, dcpl=layout), group, column)
+    if np.dtype(kind).kind == "S":
+        dataset.attrs["_Encoding"] = "utf-8"
+    return dataset
+
+
+def put_attributes(target: Any, values: Mapping[str, object]) -> None:
+    """Numbers as float64 or int64, truth as int8 (netCDF-4 has no booleans), lists of names as strings."""
+    for name, value in values.items():
+        if isinstance(value, bool):
+            target.attrs[name] = np.int8(value)
+        elif isinstance(value, (list, tuple)):
+            target.attrs.create(name, list(value), dtype=h5py.string_dtype())
+        else:
+            target.attrs[name] = value
 
 
 # Reading
+
+
+@contextmanager
+def open_file(path: Path) -> Iterator[Any]:
+    """An existing results file, read only. Raises StoreError where it is missing, damaged or another program's."""
+    if not path.is_file():
+        found = "is a folder" if path.is_dir() else "no such file"
+        raise StoreError(f"{path}: {found}; allowed: a results file, as rotor-mbs run or reproduce writes it")
+    try:
+        path.open("rb").close()
+    except OSError as exc:
+        raise StoreError(f"{path}: cannot be read: {exc.strerror}") from exc
+    try:
+        file = h5py.File(path, "r")
+    except OSError as exc:
+        raise StoreError(
+            f"{path}: not a readable HDF5 file ({_reason(exc)}); allowed: a file that rotor-mbs wrote"
+        ) from exc
+    with file:
+        with reading(path):
+            written_by, version = (attribute(file, name) for name in ("format", "format_version"))
+        if written_by != FORMAT:
+            raise StoreError(f"{path}: its attribute format is {written_by!r}; allowed: a file that rotor-mbs wrote")
+        if version != FORMAT_VERSION:
+            raise StoreError(
+                f"{path}: format_version {version!r}, this program reads {FORMAT_VERSION}; allowed: a file of this "
+                "version, with its runs recomputed"
+            )
+        yield file
+
+
+@contextmanager
+def reading(path: Path | str, what: str = "") -> Iterator[None]:
+    """Whatever goes wrong in reading a file that may be damaged is a StoreError that names the place."""
+    try:
+        yield
+    except StoreError:
+        raise
+    except _DAMAGE as exc:
+        place = f"{path}: {what}" if what else f"{path}"
+        reason = str(exc).splitlines()[0][:150] if str(exc) else type(exc).__name__
+        raise StoreError(f"{place}: damaged or incomplete ({reason})") from exc
 
 
 class StoredColumn(NamedTuple):
@@ -411,7 +541,7 @@ class StoredTable:
         stored = self.computed[name]
         if not all(stored.shape):
             return np.empty(stored.shape, stored.kind)
-        with files.reading(self.path, name):
+        with reading(self.path, name):
             values: NDArray[Any] = np.memmap(self.path, stored.kind, "r", stored.offset, stored.shape)
         return values
 
@@ -443,13 +573,13 @@ def stored_table(file: Any, group: str = "") -> StoredTable:
     """A table in an open file. Raises StoreError where what was laid out has changed since."""
     path, item = Path(file.filename), file[group] if group else file
     _refuse_changes(item, group)
-    computed_names = files.computed_in(files.stored_digests(item))
-    attributes = files.attributes_of(item)
+    computed_names = computed_in(stored_digests(item))
+    attributes = attributes_of(item)
     of_reference = attributes.pop(_OF_REFERENCE, [])
     known: dict[str, NDArray[Any]] = {}
     computed: dict[str, StoredColumn] = {}
     for name, dataset in item.items():
-        if files.is_group(dataset):
+        if is_group(dataset):
             continue
         if name in computed_names:
             if dataset.shape is None or dataset.dtype.kind not in "fiuS":
@@ -459,7 +589,7 @@ def stored_table(file: Any, group: str = "") -> StoredTable:
                 raise StoreError(f"{path}: {dataset.name} is not contiguous; allowed: a file as it was laid out")
             computed[name] = StoredColumn(dataset.dtype, dataset.shape, offset or 0, name not in of_reference)
         elif name != CHARACTERS:
-            known[name] = files.values_of(dataset)
+            known[name] = values_of(dataset)
     runs = known.pop("run")
     _refuse_shapes(path, runs, known, computed, str(item.name))
     return StoredTable(path, path.stat().st_ino, group, runs, known, computed, attributes)
@@ -497,13 +627,13 @@ def refuse_changed_layout(path: Path) -> None:
     """Raises StoreError where what is said of a table, its units too, is not what was laid out. Reading a table
     compares all of this but the attributes of computed columns, which take most of the time."""
     groups = table_groups(path)
-    with files.open_file(path) as file, files.reading(path):
+    with open_file(path) as file, reading(path):
         for group in groups:
             _refuse_changes(file[group] if group else file, group, with_columns=True)
 
 
 def _refuse_changes(item: Any, group: str, *, with_columns: bool = False) -> None:
-    changed = files.damages_of(item, with_columns=with_columns)
+    changed = damages_of(item, with_columns=with_columns)
     if changed:
         place = f"{item.file.filename}: {group or 'file'}"
         raise StoreError(f"{place}: {', '.join(changed)} changed after the file was laid out")
@@ -512,7 +642,7 @@ def _refuse_changes(item: Any, group: str, *, with_columns: bool = False) -> Non
 def as_table(file: Any, group: str) -> Table:
     """What would lay out a table of an open file anew."""
     stored, item = stored_table(file, group), file[group] if group else file
-    columns = files.columns_of(item)
+    columns = columns_of(item)
     known = {name: (columns[name], values) for name, values in stored.known.items()}
     computed = {name: columns[name] for name in stored.computed}
     attributes = {name: value for name, value in stored.attributes.items() if group}
@@ -522,138 +652,121 @@ def as_table(file: Any, group: str) -> Table:
 
 def table_groups(path: Path) -> list[str]:
     """The groups of a file that are tables. Raises StoreError where it is another program's."""
-    with files.open_file(path) as file, files.reading(path):
+    with open_file(path) as file, reading(path):
         _refuse_changes(file, "")
-        return [str(group.name).strip("/") for group in files.groups_in(file) if "run" in group]
+        return [str(group.name).strip("/") for group in groups_in(file) if "run" in group]
 
 
-RUNS = "runs"
-# What a frozen reference stores: it cannot be computed again from angles and rates as precisely.
-FROZEN = ("angles", "rates", "work", *(load.name for load in LOADS), "angle_uncertainty", "error_growth")
-_ONCE_A_SCENE = ("angle_uncertainty", "error_growth")  # stored once a scene, over time
-# What a method that is no reference says of itself under such a name: its name in the file.
-OF_METHODS = {"angle_uncertainty": "own_uncertainty"}
-_TEXT_LENGTH = 600  # characters of a message
-
-_RUN_COLUMNS = (
-    "status", "message", "samples", "time_reached", "time_limit_s", "steps", "rhs_evaluations", "setup_time_s",
-    "run_time_s", "run_time_min_s", "output_time_s", "repeats", "engine_success", "engine_message", "false_success",
-    "energy_scale_J", "energy_drift_max", "energy_gain_J", "angle_error_max", "angle_error_predicted",
-    "angle_error_whole", "angle_error_end", "horizon_s", "defect_max", "defect_median", "defect_time",
-    "defect_judged", "defect_mean", "defect_drift", "defect_floor", "defects_not_judged",
-    "angular_impulse_error_max", "linear_impulse_error_max",
-    "zero_pitch_max", "zero_pitch_left_s", "zero_pitch_growth_per_s", "rotor_angle_min", "rotor_angle_max",
-    "rotor_rate_max",
-)  # fmt: skip
+def member(group: Any, name: str) -> Any:
+    """A member of a group. Raises KeyError where there is none, StoreError at a link."""
+    if is_link(group, name):
+        raise StoreError(
+            f"{group.file.filename}: {group.name}/{name} is a link; allowed: groups and arrays of this file"
+        )
+    return group[name]
 
 
-@dataclass(frozen=True)
-class Asked:
-    """A run as it is asked for: a row of the design.
+def values_of(dataset: Any) -> NDArray[Any]:
+    """An array of numbers, or of texts, whole. Raises StoreError where it is not in the file, or claims far more than
+    the file holds."""
+    place = f"{dataset.file.filename}: {dataset.name}"
+    if not isinstance(dataset, h5py.Dataset) or dataset.shape is None:
+        raise StoreError(f"{place} is no array")
+    layout = dataset.id.get_create_plist()
+    if layout.get_external_count() or layout.get_layout() == h5py.h5d.VIRTUAL:
+        raise StoreError(f"{place} is stored in another file; allowed: arrays of this file")
+    if dataset.dtype.kind == "O":
+        if h5py.check_string_dtype(dataset.dtype) is None:
+            raise StoreError(f"{place} is no array")
+        return np.array([plain(text) for text in dataset[()]], dtype=object)
+    kept = dataset.id.get_storage_size()
+    if kept > dataset.file.id.get_filesize() or dataset.nbytes > max(_UNPACKED_BYTES, _UNPACKED * kept):
+        raise StoreError(f"{place} claims {dataset.nbytes:.2g} bytes and has {kept:.2g}")
+    values: NDArray[Any] = dataset[()]
+    return values
 
-    versions: of what computes it, by default those of this installation; of a reference that is read from a shipped
-    file also who computed it (`frozen_with`).
+
+def plain(value: Any) -> Any:
+    """An attribute as a plain Python value."""
+    if isinstance(value, np.ndarray):
+        return [plain(item) for item in value]
+    if isinstance(value, bytes):
+        return value.decode()
+    return value.item() if isinstance(value, np.generic) else value
+
+
+def attributes_of(target: Any) -> dict[str, Any]:
+    """As plain Python values, without those that the library writes and changes by itself, and the digests."""
+    return {name: attribute(target, name) for name in target.attrs if name not in _NOT_ATTRIBUTES}
+
+
+def attribute(target: Any, name: str, default: Any = None) -> Any:
+    """As a plain Python value; the default where there is none. Raises ValueError for a type that no attribute has.
+
+    In a damaged file a text may have become a list of any type: reading it ends the process.
     """
-
-    scene: Scene
-    method: str
-    settings: Mapping[str, object] = field(default_factory=dict)
-    versions: Mapping[str, str] | None = None
-
-    @property
-    def is_shipped(self) -> bool:
-        return self.versions is not None and "frozen_with" in self.versions
-
-    @property
-    def run(self) -> str:
-        """The label of its row, "paper/fig11/lagrange/taylor"."""
-        return f"{self.scene.name}/{self.method}"
-
-    @property
-    def known(self) -> dict[str, str]:
-        """The columns of /runs that follow from the design."""
-        method = find_method(self.method)
-        settings = method.chosen(self.scene, self.settings).as_dict()
-        return {
-            "scene": self.scene.name,
-            "method_name": self.method,
-            "settings": json.dumps(settings, sort_keys=True),
-            "versions": json.dumps(dict(self.versions or row_versions(method)), sort_keys=True),
-            "scene_hash": scene_hash(self.scene),
-        }
+    if name not in target.attrs:
+        return default
+    if isinstance(h5py.h5a.open(target.id, name.encode()).get_type(), h5py.h5t.TypeVlenID):
+        raise ValueError(f"attribute {name} is neither a number nor a text")
+    return plain(target.attrs[name])
 
 
-def metric_columns(outputs: Iterable[str]) -> dict[str, Column]:
-    """The computed columns of /runs for scenes that ask for these outputs."""
-    columns = {name: COLUMNS[name] for name in _RUN_COLUMNS}
-    for quantity in quantities(outputs):
-        name, long_name = quantity.name, quantity.long_name
-        if quantity.judgement is not None:
-            unit = "1" if quantity.judgement.scale_of else quantity.units
-            extreme = "largest error" if quantity.judgement.with_reference else "maximum"
-            columns[quantity.judgement.metric] = Column(("run",), unit, f"{long_name}: {extreme}")
-        if quantity.has_peak:
-            columns[f"{name}_max"] = Column(("run",), quantity.units, f"{long_name}: maximum")
-            columns[f"{name}_max_time_s"] = Column(("run",), "s", f"{long_name}: time of the maximum")
-            if quantity.dimensions[1:2] == ("blade",):
-                columns[f"{name}_max_blade"] = Column(("run",), "1", f"{long_name}: blade of the maximum, from 1")
-    return columns | {"crc32": COLUMNS["crc32"]}
+def dimensions_of(dataset: Any) -> list[str]:
+    """The names of its scales; "" where a dimension has none.
+
+    By the attribute of the scale: the library would look for its path through the whole file, and its own way to the
+    name ends the process where that is damaged.
+    """
+    names = [str(attribute(dimension[0], "NAME")) if len(dimension) else "" for dimension in dataset.dims]
+    return [CHARACTERS if name.startswith(_WITHOUT_VALUES) else name for name in names]
 
 
-def runs_table(asked: Sequence[Asked]) -> Table:
-    outputs = dict.fromkeys(output for run in asked for output in run.scene.outputs)
-    known = known_columns([run.known for run in asked])
-    return Table(RUNS, [run.run for run in asked], known, metric_columns(outputs), characters=_TEXT_LENGTH)
-
-
-def arrays_of(run: Asked) -> dict[str, Column]:
-    """The arrays over time that a run stores, by their name in the file."""
-    method = find_method(run.method)
-    own = method.arrays(method.settings.of(run.method, run.settings))
-    # A reference is read back by its angles and rates, whatever the scene asks for.
-    outputs = (*run.scene.outputs, "angles", "rates") if run.method == REFERENCE else run.scene.outputs
+def columns_of(group: Any) -> dict[str, Column]:
+    """What the datasets of a group are, by name."""
     columns = {}
-    for quantity in quantities(outputs):
-        if not quantity.is_over_time or not (quantity.required or quantity.name in own):
-            continue
-        if quantity.name in _ONCE_A_SCENE and run.method == REFERENCE:
-            columns[quantity.name] = Column(quantity.dimensions, quantity.units, quantity.long_name)
-        else:
-            name = OF_METHODS.get(quantity.name, quantity.name)
-            columns[name] = Column(("run", *quantity.dimensions), quantity.units, quantity.long_name)
+    for name, dataset in group.items():
+        if not is_group(dataset) and not is_dimension_only(dataset):
+            dimensions = tuple(dimension or name for dimension in dimensions_of(dataset))
+            # Lists of texts as such; numbers as they are, whose type belongs to the attribute.
+            attributes = {
+                name: dataset.attrs[name] if isinstance(value, list) and not isinstance(value[0], str) else value
+                for name, value in attributes_of(dataset).items()
+                if name != "_Encoding"
+            }
+            units, long_name = (str(attributes.pop(name)) for name in ("units", "long_name"))
+            columns[name] = Column(dimensions, units, long_name, dataset.dtype.str, attributes)
     return columns
 
 
-def scene_table(runs: Sequence[Asked], arrays: Collection[str] | None = None) -> Table:
-    """The table of the arrays of one scene's runs. arrays: names of those that are stored, by default all."""
-    scene = runs[0].scene
-    computed = {
-        name: column for run in runs for name, column in arrays_of(run).items() if arrays is None or name in arrays
-    }
-    attributes = {
-        "title": scene.title,
-        "figures": ", ".join(scene.figures),
-        "blades": len(scene.blades),
-        "scene_toml": scene.text,
-        "scene_hash": scene_hash(scene),
-        "NX_class": "NXdata",
-        "signal": "angles",
-        "axes": ["run", "time", "coordinate"],
-    }
-    scales = scene_scales(scene, computed.values())
-    repeated = {name: COLUMNS[name] for name in REPEATED}
-    return Table(scene.name, [run.method for run in runs], scales, repeated | computed, attributes)
+def groups_in(group: Any, seen: set[Any] | None = None) -> Iterator[Any]:
+    """A group and every one below it, but for those below a table. Raises StoreError at a link or a second name."""
+    seen = set() if seen is None else seen
+    if group in seen:
+        raise StoreError(
+            f"{group.file.filename}: {group.name} is a second name of a group; allowed: one name for each group"
+        )
+    seen.add(group)
+    yield group
+    for name in () if "run" in group else group:
+        item = member(group, name)
+        if is_group(item):
+            yield from groups_in(item, seen)
 
 
-def results_tables(asked: Sequence[Asked]) -> list[Table]:
-    asked = sorted(asked, key=lambda run: _order(run.run))
-    by_scene: dict[str, list[Asked]] = {}
-    for run in asked:
-        by_scene.setdefault(run.scene.name, []).append(run)
-    return [
-        runs_table(asked),
-        *(scene_table(runs) for runs in by_scene.values()),
-    ]
+def is_link(group: Any, name: str) -> bool:
+    """Whether a member of a group stands elsewhere, in this file or another one."""
+    return not isinstance(group.get(name, getlink=True), h5py.HardLink)
+
+
+def is_group(item: Any) -> bool:
+    return isinstance(item, h5py.Group)
+
+
+def _reason(error: Exception) -> str:
+    """What HDF5 says in brackets, "file signature not found", without the name of its function."""
+    text = str(error).splitlines()[0]
+    return text.partition("(")[2].rpartition(")")[0] or text
 
 
 # Making a file fit what is asked
@@ -669,7 +782,7 @@ class TableFile:
     def table(self, group: str) -> StoredTable:
         """A table. Raises StoreError where the file has none of that name, or what was laid out has changed."""
         if group not in self._tables:
-            with files.open_file(self.path) as file, files.reading(self.path):
+            with open_file(self.path) as file, reading(self.path):
                 self._tables[group] = stored_table(file, group)
         return self._tables[group]
 
@@ -746,7 +859,7 @@ def extend_file(path: Path, wanted: Sequence[Table], replaced: Collection[tuple[
     old, new = TableFile(path), {made.group: made for made in wanted}
     if "" in old.groups:
         raise StoreError(f"{path}: holds the dataset of a sweep; allowed: another output file")
-    with files.open_file(path) as file, files.reading(path):
+    with open_file(path) as file, reading(path):
         stored = {group: as_table(file, group) for group in old.groups}
     wanted_runs = _known_rows(new.get(RUNS))
     hashes = {row["scene"]: row["scene_hash"] for row in wanted_runs.values()}
@@ -856,34 +969,172 @@ def _write_tables(path: Path, tables: Sequence[Table], rows: Sequence[tuple[str,
                     place.write({name: values.get(name, blank[name]) for name in place.row.names or ()})
 
 
-# The rows of a run
+# Digests: the attribute `digests` of a group is a JSON object, SHA-256 by the name of each dataset, over values and
+# attributes, and by "attributes" over the group's own. Of columns that are filled later it covers the attributes alone.
+
+ATTRIBUTES = "attributes"
+_COMPUTED = "attributes of "
 
 
-def row_of_run(run: Solution, place: Place, facts: Mapping[str, object]) -> Rows:
-    """The row of a run: status, metrics, times, arrays. facts: further columns by name."""
-    integration = run.integration
-    arrays = dict(run.quantities)
-    if run.method == REFERENCE:
-        arrays |= {"angles": run.angles, "rates": run.rates}
+def array_digest(values: NDArray[Any], attributes: str = "") -> str:
+    """Over shape and values as little-endian numbers: the same on every machine and for every HDF5 layout; attributes:
+    their digest, where it is over these, too."""
+    if values.dtype.kind == "O":  # texts
+        digest = hashlib.sha256("\0".join(map(str, values.tolist())).encode())
     else:
-        arrays = {OF_METHODS.get(name, name): array for name, array in arrays.items()}
-    return place.rows_of(
-        {
-            "status": run.status,
-            "message": run.message,
-            "engine_message": integration.message,
-            "samples": len(run.time),
-            "time_reached": integration.time_reached,
-            "steps": -1 if integration.steps is None else integration.steps,
-            "rhs_evaluations": -1 if integration.rhs_evaluations is None else integration.rhs_evaluations,
-            "engine_success": int(integration.success),
-            "setup_time_s": run.setup_time_s,
-            "run_time_s": float(np.median(run.run_times_s)),
-            "run_time_min_s": min(run.run_times_s),
-            "output_time_s": run.output_time_s,
-            "repeats": len(run.run_times_s),
-            **run.metrics,
-            **facts,
-            **arrays,
-        }
-    )
+        values = np.ascontiguousarray(values)
+        digest = hashlib.sha256(f"{values.dtype.kind}{values.dtype.itemsize}{values.shape}".encode())
+        digest.update(values.astype(values.dtype.newbyteorder("<"), copy=False).tobytes())
+    digest.update(attributes.encode())
+    return digest.hexdigest()
+
+
+def attributes_digest(target: Any) -> str:
+    """Over names and values, in any order."""
+    return hashlib.sha256(json.dumps(attributes_of(target), sort_keys=True).encode()).hexdigest()
+
+
+def seal(group: Any, later: Collection[str] = ()) -> None:
+    """Store the digests of a group; of the datasets `later`, which are computed later, those of their attributes."""
+    sums = {ATTRIBUTES: attributes_digest(group)}
+    for name, item in group.items():
+        if name in later:
+            sums[f"{_COMPUTED}{name}"] = attributes_digest(item)
+        elif not is_group(item) and not is_dimension_only(item):
+            sums[name] = _digest_of(item)
+    group.attrs[DIGESTS] = json.dumps(sums)
+
+
+def _digest_of(dataset: Any) -> str:
+    """Over values, units, long name and further attributes."""
+    return array_digest(values_of(dataset), attributes_digest(dataset))
+
+
+def seal_all(group: Any) -> None:
+    """Store the digests of every group that has none yet."""
+    if DIGESTS not in group.attrs:
+        seal(group)
+    for name in group:
+        if is_group(group.get(name)):
+            seal_all(group[name])
+
+
+def damages_of(group: Any, *, with_columns: bool = True) -> list[str]:
+    """The parts of a group, "attributes" or names of datasets, that are not what was written, are new or are gone.
+
+    "digests" where it has none. Links, and arrays that cannot be read, count too. with_columns: the attributes of
+    datasets that are computed, too, which takes most of the time.
+    """
+    try:
+        known = stored_digests(group)
+    except ValueError:
+        known = {}
+    if not known:
+        return [DIGESTS]
+    sums = {ATTRIBUTES: attributes_digest(group)}
+    for name in group:
+        is_computed = f"{_COMPUTED}{name}" in known
+        label = f"{_COMPUTED}{name}" if is_computed else name
+        if is_computed and not with_columns and not is_link(group, name):
+            sums[label] = known[label]
+            continue
+        sums[label] = ""
+        with suppress(StoreError), reading(""):
+            item = member(group, name)
+            if is_group(item) or is_dimension_only(item):
+                del sums[label]
+            else:
+                sums[label] = attributes_digest(item) if is_computed else _digest_of(item)
+    return [name for name in {**known, **sums} if known.get(name) != sums.get(name)]
+
+
+def stored_digests(group: Any) -> dict[str, str]:
+    """By name; {} where there are none. Raises ValueError where they cannot be read."""
+    found = json.loads(str(attribute(group, DIGESTS, "{}")))
+    if not isinstance(found, dict):
+        raise ValueError("no object of digests")
+    return found
+
+
+def computed_in(digests: Mapping[str, str]) -> list[str]:
+    """The datasets whose attributes alone are covered."""
+    return [name.removeprefix(_COMPUTED) for name in digests if name.startswith(_COMPUTED)]
+
+
+# Other HDF5 files
+
+
+@contextmanager
+def new_file(path: Path) -> Iterator[Any]:
+    """A new HDF5 file, put in the place of `path` when all of it is written and on the disk.
+
+    It is made in memory: HDF5 does not survive a disk that fills up under it, a plain write does. Raises StoreError
+    where the file cannot be written; what stood at `path` before then still stands.
+    """
+    memory = {"driver": "core", "backing_store": False, "block_size": 1 << 20}
+    with begin_file(f"{path.name}.{threading.get_ident()}", **memory) as file:
+        yield file
+        file.flush()
+        image = file.id.get_file_image()
+    replace_file(path, image, is_of_this_program)
+
+
+def is_of_this_program(path: Path) -> bool:
+    try:
+        with h5py.File(path, "r") as file:
+            return bool(attribute(file, "format") == FORMAT)
+    except (OSError, RuntimeError, ValueError):
+        return False
+
+
+def read_arrays(path: Path, group: str = "", scene: str = "") -> tuple[dict[str, NDArray[Any]], dict[str, str]]:
+    """Arrays of numbers of up to three dimensions and their units by name, of any HDF5 file: those of one group.
+
+    group: its path, or the end of it; may be left out where one group alone has arrays, or one alone but the reference
+    below `scene`. Raises StoreError with the groups that there are.
+    """
+    try:
+        with h5py.File(path, "r") as file:
+            places = _array_places(file)
+            name = chosen_group(path, list(places), group.strip("/"), scene)
+            chosen = file[name or "/"]
+            arrays = {name: chosen[name][()] for name in places[name]}
+            units = {name: str(attribute(chosen[name], "units", "")) for name in arrays}
+    except (OSError, RuntimeError, KeyError, ValueError, TypeError) as exc:
+        raise StoreError(f"{path}: not a readable HDF5 file ({_reason(exc)})") from exc
+    return arrays, {name: unit for name, unit in units.items() if unit}
+
+
+def chosen_group(path: Path, places: Sequence[str], group: str, scene: str) -> str:
+    """The one of `places` that is meant, see `read_arrays`. Raises StoreError."""
+    inside = [place for place in places if place.startswith(f"{scene}/")] or list(places)
+    if group:
+        fitting = [place for place in inside if place == group]
+        fitting = fitting or [place for place in inside if f"/{place}".endswith(f"/{group}")]
+    else:
+        fitting = [place for place in inside if not place.endswith("/reference")]
+    if len(fitting) == 1:
+        return fitting[0]
+    if not places:
+        raise StoreError(f"{path}: no arrays of numbers in it; allowed: a time and angles")
+    shown = ", ".join(place or "/" for place in inside[:12]) + (", ..." if len(inside) > 12 else "")
+    problem = f"no group {group!r}" if group else "arrays in several groups"
+    raise StoreError(f"{path}: {problem}; allowed: a mapping file with group = one of {shown}")
+
+
+def _array_places(file: Any) -> dict[str, list[str]]:
+    """Names of the arrays of numbers by their group; groups without any are left out."""
+    places: dict[str, list[str]] = {}
+
+    def note(path: str, item: Any) -> None:
+        if (
+            isinstance(item, h5py.Dataset)
+            and item.dtype.kind in "fiu"
+            and 0 < len(item.shape or ()) <= 3
+            and item.size > 1
+        ):
+            folder, _, name = path.rpartition("/")
+            places.setdefault(folder, []).append(name)
+
+    file.visititems(note)
+    return places

@@ -26,7 +26,7 @@ from rotor_mbs.methods import catalogue
 from rotor_mbs.methods.base import STEP, TOLERANCE, Ladder
 from rotor_mbs.methods.time_limit import OutOfTimeError, time_limit
 from rotor_mbs.runs import last_core
-from rotor_mbs.runs.files import writing
+from rotor_mbs.runs.outputs import writing
 from rotor_mbs.runs.pool import WorkerPool, run_in
 from rotor_mbs.runs.read import Record, points_table
 from rotor_mbs.runs.table import Place, Rows, Table, TableFile, extend_file

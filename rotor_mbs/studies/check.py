@@ -13,9 +13,10 @@ from pathlib import Path
 from rotor_mbs.analysis.checks import Check, Where, checks_of, make_check
 from rotor_mbs.errors import InputError, StoreError
 from rotor_mbs.methods.catalogue import REFERENCE, able_methods, default_methods, find_method, method_names
+from rotor_mbs.runs.design import MISSING
 from rotor_mbs.runs.read import is_sweep, open_results
 from rotor_mbs.runs.sweeps import StoredSweep
-from rotor_mbs.runs.table import MISSING, refuse_changed_layout
+from rotor_mbs.runs.table import refuse_changed_layout
 from rotor_mbs.scenario.accuracy_bounds import Bounds
 from rotor_mbs.scenario.catalogue import find_scenes
 from rotor_mbs.scenario.scene import Scene

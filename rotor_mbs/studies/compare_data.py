@@ -21,7 +21,7 @@ from rotor_mbs.models.lagrange.defects import FIT_ROWS, fitted_rates, interval_d
 from rotor_mbs.models.lagrange.heyoka_adapter import is_available
 from rotor_mbs.models.lagrange.parameters import work_is_integrated
 from rotor_mbs.models.lagrange.reference import TimedReference, reference_at
-from rotor_mbs.runs.files import Column
+from rotor_mbs.runs.design import Column
 from rotor_mbs.runs.read import Record
 from rotor_mbs.runs.versions import versions
 from rotor_mbs.scenario.scene import Scene, scene_hash

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from rotor_mbs.analysis import modes as modal
 from rotor_mbs.errors import InputError, MethodRefusal, RotorError
 from rotor_mbs.methods.catalogue import find_method, methods, with_method_files
-from rotor_mbs.runs.files import writing
+from rotor_mbs.runs.outputs import writing
 from rotor_mbs.runs.pool import local_pool, run_in
 from rotor_mbs.runs.read import Record, read_records, write_records
 from rotor_mbs.scenario.scene import Scene, scene_hash

@@ -11,9 +11,10 @@ from pathlib import Path
 
 from rotor_mbs.errors import InputError, StoreError
 from rotor_mbs.methods.catalogue import REFERENCE
-from rotor_mbs.runs.files import array_digest, replace_file, writing
+from rotor_mbs.runs.design import FROZEN, Asked
+from rotor_mbs.runs.outputs import replace_file, writing
 from rotor_mbs.runs.read import OpenResults, open_results
-from rotor_mbs.runs.table import FROZEN, Asked, extend_file, runs_table, scene_table
+from rotor_mbs.runs.table import array_digest, extend_file, runs_table, scene_table
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.studies.run import OnProgress, RunReport, ignore_progress, run_scenes
 

@@ -15,7 +15,7 @@ import rotor_mbs
 from rotor_mbs.analysis.published import claims, finding
 from rotor_mbs.analysis.run_tables import TextTable, method_table
 from rotor_mbs.methods.catalogue import REFERENCE, able_methods, default_methods, errata_methods, ladders
-from rotor_mbs.runs.files import writing
+from rotor_mbs.runs.outputs import writing
 from rotor_mbs.runs.pool import Workers
 from rotor_mbs.runs.read import open_results
 from rotor_mbs.runs.runner import Task

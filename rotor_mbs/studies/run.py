@@ -23,10 +23,11 @@ from rotor_mbs.methods.catalogue import (
 )
 from rotor_mbs.methods.solve import solve
 from rotor_mbs.methods.time_limit import OutOfTimeError, time_limit
-from rotor_mbs.runs.files import writing
+from rotor_mbs.runs.design import Asked
+from rotor_mbs.runs.outputs import writing
 from rotor_mbs.runs.pool import Finished, Workers, pool_of
 from rotor_mbs.runs.runner import Task, compute_in_order
-from rotor_mbs.runs.table import Asked, Rows, TableFile, extend_file, results_tables, row_of_run, text_of
+from rotor_mbs.runs.table import Rows, TableFile, extend_file, results_tables, row_of_run, text_of
 from rotor_mbs.runs.versions import row_versions
 from rotor_mbs.scenario.scene import Scene, scene_hash
 from rotor_mbs.solution.status import STATUSES

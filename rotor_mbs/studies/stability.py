@@ -15,7 +15,7 @@ from rotor_mbs.analysis.run_tables import TextTable
 from rotor_mbs.methods.catalogue import REFERENCE, able_methods, find_method, method_names, settings_for
 from rotor_mbs.methods.solve import solve
 from rotor_mbs.methods.time_limit import OutOfTimeError, time_limit
-from rotor_mbs.runs.files import writing
+from rotor_mbs.runs.outputs import writing
 from rotor_mbs.runs.read import open_results, points_table, read_records
 from rotor_mbs.runs.runner import Task
 from rotor_mbs.runs.table import Rows, extend_file

@@ -13,8 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor_mbs.methods.catalogue import REFERENCE
+from rotor_mbs.runs.design import FROZEN, MISSING, RUNS
 from rotor_mbs.runs.read import open_results
-from rotor_mbs.runs.table import FROZEN, MISSING, RUNS, Place, TableFile
+from rotor_mbs.runs.table import Place, TableFile
 from rotor_mbs.scenario.catalogue import reference_folder
 from rotor_mbs.scenario.scene import Scene, scene_hash
 from rotor_mbs.solution.quantities import sample_times

@@ -15,9 +15,10 @@ from pathlib import Path
 import jinja2
 import numpy as np
 
-from rotor_mbs.runs.files import KEYWORDS, Column, new_file, replace_file
+from rotor_mbs.runs.design import MISSING, Column
+from rotor_mbs.runs.outputs import replace_file
 from rotor_mbs.runs.sweeps import StoredSweep
-from rotor_mbs.runs.table import MISSING
+from rotor_mbs.runs.table import KEYWORDS, new_file
 from rotor_mbs.scenario.sweep import SPLITS
 from rotor_mbs.solution.status import STATUSES
 

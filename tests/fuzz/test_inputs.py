@@ -15,8 +15,8 @@ from support.scenes import paper
 
 import rotor_mbs as rm
 from rotor_mbs.runs.cluster import open_task_pool
+from rotor_mbs.runs.design import MISSING
 from rotor_mbs.runs.sweeps import StoredSweep
-from rotor_mbs.runs.table import MISSING
 from rotor_mbs.scenario.scene import parse_scene, scene_toml
 from rotor_mbs.scenario.sweep import load_sweep
 from rotor_mbs.solution.status import STATUSES

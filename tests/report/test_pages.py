@@ -27,9 +27,9 @@ from rotor_mbs.report.looks import COLOURS, COORDINATES
 from rotor_mbs.report.pages import METRICS, compared_time
 from rotor_mbs.report.pages.paper import claim_table, matrices, trial_tables
 from rotor_mbs.report.pages.scene import quantity_sections, range_table
-from rotor_mbs.runs import table as table_module
+from rotor_mbs.runs import design
+from rotor_mbs.runs.design import metric_columns
 from rotor_mbs.runs.read import open_results
-from rotor_mbs.runs.table import metric_columns
 from rotor_mbs.scenario.accuracy_bounds import load_bounds
 from rotor_mbs.scenario.catalogue import find_scenes
 from rotor_mbs.scenario.scene import known_outputs
@@ -331,7 +331,7 @@ def test_the_uncertainty_that_a_method_gives_of_its_run_is_drawn(
     """No built-in method stores one; a plug-in may."""
     storing = replace(find_method("exudyn_chain/newmark_index2"), arrays=lambda _: ("angle_uncertainty",))
     monkeypatch.setattr(
-        "rotor_mbs.runs.table.find_method", lambda name: storing if name == storing.name else find_method(name)
+        "rotor_mbs.runs.design.find_method", lambda name: storing if name == storing.name else find_method(name)
     )
     path, (scene,) = results_file(tmp_path / "r.h5", ["check/held"], []), find_scenes(["check/held"])
     run = solve("exudyn_chain/newmark_index2", scene, {"step": 5e-3})
@@ -360,7 +360,7 @@ def test_the_page_of_a_driven_scene_shows_power_pitch_and_command_and_no_other_d
 
 def test_texts_from_the_file_are_escaped(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Of a method that is not installed, too."""
-    monkeypatch.setattr(table_module, "find_method", lambda name: look_up(name) or find_method(TAYLOR))
+    monkeypatch.setattr(design, "find_method", lambda name: look_up(name) or find_method(TAYLOR))
     evil = "<script>alert(1)</script>"
     scene = replace(FIG11, name="a b/<i>", title=f"{evil}\x1b[2J", text=f"# {evil}\n{FIG11.text}\n# </pre>{evil}")
     failed = {"status": "singular", "message": evil}

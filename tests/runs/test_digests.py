@@ -20,7 +20,7 @@ from support.sweeps import THREE_RUNS, made_sweep
 
 import rotor_mbs as rm
 from rotor_mbs.errors import StoreError
-from rotor_mbs.runs import files
+from rotor_mbs.runs import table
 from rotor_mbs.runs.read import open_results
 from rotor_mbs.runs.sweeps import StoredSweep
 from rotor_mbs.runs.table import Rows, TableFile
@@ -47,9 +47,9 @@ def swept(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def reseal(group: h5py.Group) -> None:
     """Gives a group the digests of what it holds now, as someone who changes a file on purpose could."""
-    later = files.computed_in(files.stored_digests(group))
-    del group.attrs[files.DIGESTS]
-    files.seal(group, later=later)
+    later = table.computed_in(table.stored_digests(group))
+    del group.attrs[table.DIGESTS]
+    table.seal(group, later=later)
 
 
 def describe_as(column: h5py.Dataset, attributes: dict[str, object]) -> None:
@@ -246,7 +246,7 @@ def test_files_that_are_not_ours_are_refused_with_one_line(
         raise PermissionError(13, "Permission denied")
 
     monkeypatch.setattr(Path, "open", refuse)
-    with pytest.raises(StoreError, match="cannot be read: Permission denied"), files.open_file(written):
+    with pytest.raises(StoreError, match="cannot be read: Permission denied"), table.open_file(written):
         pass
 
 

@@ -15,7 +15,7 @@ from support.sweeps import MAP, THREE_RUNS, made_sweep
 
 import rotor_mbs as rm
 from rotor_mbs.errors import InputError
-from rotor_mbs.runs.files import replace_file, writing
+from rotor_mbs.runs.outputs import replace_file, writing
 from rotor_mbs.runs.read import open_results
 
 RUN = ["run", "check/held", "-m", "lagrange/dop853", "-j", "1", "-o"]

@@ -13,14 +13,11 @@ import pytest
 from support.scenes import paper
 
 from rotor_mbs.errors import InputError, StoreError
-from rotor_mbs.runs import files
-from rotor_mbs.runs.files import CHARACTERS, Column, writing
+from rotor_mbs.runs import table
+from rotor_mbs.runs.design import CHARACTER, CHARACTERS, COLUMNS, MISSING, Asked, Column
+from rotor_mbs.runs.outputs import writing
 from rotor_mbs.runs.read import points_table
 from rotor_mbs.runs.table import (
-    CHARACTER,
-    COLUMNS,
-    MISSING,
-    Asked,
     Place,
     Rows,
     StoredTable,
@@ -54,7 +51,7 @@ def _table() -> Table:
 
 
 def _stored(path: Path) -> StoredTable:
-    with files.open_file(path) as file, files.reading(path):
+    with table.open_file(path) as file, table.reading(path):
         return stored_table(file)
 
 
@@ -248,7 +245,7 @@ def test_a_results_file_opens_in_one_call_and_methods_are_told_by_label(results:
 def test_no_other_process_writes_a_locked_output(path: Path) -> None:
     program = (
         "import sys, pathlib\n"
-        "from rotor_mbs.runs.files import writing\n"
+        "from rotor_mbs.runs.outputs import writing\n"
         "with writing(pathlib.Path(sys.argv[1])):\n"
         "    print('locked', flush=True)\n"
         "    sys.stdin.read()\n"

@@ -25,7 +25,8 @@ from rotor_mbs.methods.solve import solve
 from rotor_mbs.report.build import write_report
 from rotor_mbs.report.looks import look_of
 from rotor_mbs.report.pages.bench import diagram, engine_tables, failure_table, overview_table
-from rotor_mbs.runs.read import POINT_COLUMNS, Record, open_results, points_table, read_records
+from rotor_mbs.runs.design import POINT_COLUMNS
+from rotor_mbs.runs.read import Record, open_results, points_table, read_records
 from rotor_mbs.runs.table import TableFile, extend_file
 from rotor_mbs.scenario.catalogue import only_scene
 from rotor_mbs.solution.metrics import metrics_of

@@ -14,8 +14,9 @@ from support.symmetries import symmetry_errors
 
 from rotor_mbs.analysis.judgement import judge
 from rotor_mbs.methods.catalogue import find_method
+from rotor_mbs.runs.design import Asked
 from rotor_mbs.runs.read import points_table
-from rotor_mbs.runs.table import Asked, extend_file, results_tables
+from rotor_mbs.runs.table import extend_file, results_tables
 from rotor_mbs.solution.metrics import metrics_of
 from rotor_mbs.solution.status import STATUSES
 from rotor_mbs.studies.stability import STEPS, LadderTask, ladder_points, step_for

@@ -17,9 +17,10 @@ from support.commands import rotor_mbs
 from support.sweeps import made_sweep, run_local
 
 from rotor_mbs.methods.catalogue import find_method
+from rotor_mbs.runs.design import MISSING
 from rotor_mbs.runs.pool import SerialPool
 from rotor_mbs.runs.sweeps import StoredSweep
-from rotor_mbs.runs.table import MISSING, Rows, TableFile
+from rotor_mbs.runs.table import Rows, TableFile
 from rotor_mbs.runs.versions import code_digest
 from rotor_mbs.scenario.catalogue import find_scenes
 from rotor_mbs.scenario.sweep import load_sweep

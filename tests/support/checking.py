@@ -14,7 +14,8 @@ from rotor_mbs.analysis.judgement import judge
 from rotor_mbs.methods.catalogue import REFERENCE
 from rotor_mbs.methods.solve import solve
 from rotor_mbs.models.exudyn import chain
-from rotor_mbs.runs.table import Asked, extend_file, results_tables, row_of_run
+from rotor_mbs.runs.design import Asked
+from rotor_mbs.runs.table import extend_file, results_tables, row_of_run
 from rotor_mbs.scenario.accuracy_bounds import Bounds, load_bounds
 from rotor_mbs.scenario.catalogue import find_scenes
 from rotor_mbs.scenario.scene import Scene

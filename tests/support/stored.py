@@ -10,7 +10,8 @@ from typing import Any
 import numpy as np
 
 from rotor_mbs.errors import StoreError
-from rotor_mbs.runs.table import RUNS, Asked, Rows, TableFile, extend_file, results_tables, row_of_run
+from rotor_mbs.runs.design import RUNS, Asked
+from rotor_mbs.runs.table import Rows, TableFile, extend_file, results_tables, row_of_run
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.metrics import metrics_of
 from rotor_mbs.solution.trajectory import Integration, Solution, Trajectory

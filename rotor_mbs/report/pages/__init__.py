@@ -17,8 +17,8 @@ from rotor_mbs.report.elements import PageTable, Row, TableCell
 from rotor_mbs.report.files import page_names
 from rotor_mbs.report.looks import label_of, with_capital
 from rotor_mbs.report.numbers import number, with_unit
+from rotor_mbs.runs.design import metric_columns
 from rotor_mbs.runs.read import OpenResults, Record, StoredRun, StoredScene, read_records
-from rotor_mbs.runs.table import metric_columns
 from rotor_mbs.solution.status import GOOD
 from rotor_mbs.studies.stability import OUTCOMES, SuiteRun, suite_runs
 

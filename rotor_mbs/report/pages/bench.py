@@ -22,8 +22,8 @@ from rotor_mbs.report.files import BENCH_CSV
 from rotor_mbs.report.looks import COORDINATES, GREY, Look, label_of, look_of
 from rotor_mbs.report.numbers import NOTHING, number, power, prefixed, with_unit
 from rotor_mbs.report.pages import method_cell, words_of
+from rotor_mbs.runs.design import COLUMNS
 from rotor_mbs.runs.read import OpenResults, Record, StoredRun, StoredScene, read_records
-from rotor_mbs.runs.table import COLUMNS
 from rotor_mbs.scenario.catalogue import natural_order
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.status import COMPLETE

@@ -1,0 +1,161 @@
+"""Output files of every kind: under a temporary name until they are complete, never in place of another program's file,
+and written by one process at a time."""
+
+from __future__ import annotations
+
+import os
+import re
+import secrets
+import socket
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import TYPE_CHECKING, TypeAlias
+
+from rotor_mbs.errors import InputError, StoreError
+
+if TYPE_CHECKING:
+    from _typeshed import ReadableBuffer as Buffer
+
+Mark: TypeAlias = bytes | Callable[[Path], bool]  # see `refuse_foreign`
+_LARGEST_REPLACED = 1 << 28  # bytes, of an output that is not HDF5
+# What a lock file holds, unless its process was killed before it wrote.
+_OWNER = rb"(process [0-9]+ on [!-~]*)?\Z"
+
+
+# The lock: a file beside an output that no other process may write, which goes afterwards.
+
+
+@contextmanager
+def writing(output: Path) -> Iterator[None]:
+    """No other process writes `output` in the block; its thread may enter it again. Raises InputError, StoreError."""
+    from filelock import FileLock, Timeout
+
+    place = _resolved(output)
+    path = _lock_of(place)
+    lock = FileLock(path, timeout=0, is_singleton=True)
+    if lock.is_locked:  # by this thread: a study takes the lock, and so does what it calls
+        yield
+        return
+    owner = b""
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        if path.is_file():
+            with suppress(OSError):
+                owner = path.read_bytes()
+        if path.is_symlink() or (path.exists() and not path.is_file()) or not re.match(_OWNER, owner):
+            raise InputError(f"{path}: was not written by rotor-mbs; allowed: another output, or remove it")
+        lock.acquire()
+    except Timeout:
+        writer = f"another process is writing it now{f' ({owner.decode()})' if owner else ''}"
+        raise InputError(f"{output}: {writer}; allowed: wait for its end, or another output") from None
+    except OSError as exc:
+        raise StoreError(f"{output}: cannot be written: {exc.strerror}") from exc
+    try:
+        # Half-written files of processes that were killed: nobody else writes this output now.
+        temporary = re.compile(rf"\.{re.escape(place.name)}\.([0-9]+\.)?tmp")
+        for beside in place.parent.iterdir():
+            if temporary.fullmatch(beside.name):
+                with suppress(OSError):
+                    beside.unlink()
+        with suppress(OSError):  # a full disk is reported by what is written to the output
+            path.write_text(f"process {os.getpid()} on {socket.gethostname()}")
+        yield
+    finally:
+        with suppress(OSError):
+            path.unlink()
+        lock.release()
+
+
+def is_being_written(output: Path) -> bool:
+    """Whether another process writes it now, or was killed while it did."""
+    return _lock_of(_resolved(output)).exists()
+
+
+def _lock_of(place: Path) -> Path:
+    return place.with_name(f".{place.name}.lock")
+
+
+def _resolved(output: Path) -> Path:
+    """The file itself where the output is a symbolic link: both names are one output."""
+    try:
+        return output.resolve() if output.is_symlink() else Path(os.path.abspath(output))  # noqa: PTH100  (links stay)
+    except (OSError, RuntimeError) as exc:  # links in a circle, a working folder that is gone
+        reason = getattr(exc, "strerror", None) or "leads to no file"
+        raise StoreError(f"{output}: cannot be written: {reason}") from exc
+
+
+@contextmanager
+def saving(path: object) -> Iterator[None]:
+    """What the system refuses in the block is a StoreError about `path`."""
+    try:
+        yield
+    except OSError as exc:
+        raise StoreError(f"{path}: cannot be written: {exc.strerror or exc}; nothing stored before is lost") from exc
+
+
+def replace_file(path: Path, content: Buffer, mark: Mark) -> None:
+    """`content` under a temporary name beside `path`, forced to the disk, then renamed.
+
+    Of a symbolic link the file that it points to is replaced; a device or a pipe is written to. mark: see
+    `refuse_foreign`. Raises InputError where `path` is a file of another kind, StoreError where it cannot be written.
+    """
+    refuse_foreign(path, mark)
+    if path.exists() and not path.is_file() and not path.is_dir():
+        with saving(path):
+            path.write_bytes(content)
+        return
+    with replacing(path.resolve() if path.is_symlink() else path) as temporary, temporary.open("wb") as file:
+        file.write(content)
+        file.flush()
+        os.fsync(file.fileno())
+
+
+def refuse_foreign(path: Path, mark: Mark) -> None:
+    """Raises InputError where `path` is a file that this program did not write as an output of the same kind.
+
+    mark: a regular expression that is found in every output of the kind, or a function that tells them. An empty file
+    may be replaced.
+    """
+    if not path.is_file():
+        return
+    with saving(path):
+        size = path.stat().st_size
+        if size == 0:
+            return
+        if isinstance(mark, bytes):
+            is_own = size <= _LARGEST_REPLACED and re.search(mark, path.read_bytes()) is not None
+        else:
+            is_own = mark(path)
+    if not is_own:
+        raise InputError(
+            f"{path}: is not an output of this command and is not replaced; allowed: another name, or remove that file"
+        )
+
+
+@contextmanager
+def replacing(path: Path) -> Iterator[Path]:
+    """The name of a new, empty file beside `path`, which takes its place after the block. Raises StoreError.
+
+    The name cannot be guessed, and a file or link of that name is not opened.
+    """
+    temporary = path.with_name(f".{path.name}.{secrets.randbits(60)}.tmp")
+    with saving(path):
+        path.parent.mkdir(parents=True, exist_ok=True)
+        temporary.open("xb").close()
+        try:
+            yield temporary
+            temporary.replace(path)
+        finally:
+            with suppress(OSError):
+                temporary.unlink()
+
+
+def sync_folder(folder: Path) -> None:
+    """Makes a new or replaced name in `folder` durable, where the system can."""
+    with suppress(OSError):
+        handle = os.open(folder, os.O_RDONLY)
+        try:
+            os.fsync(handle)
+        finally:
+            os.close(handle)
