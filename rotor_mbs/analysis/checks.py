@@ -108,7 +108,7 @@ def checks_of(results: OpenResults, frozen: Sequence[OpenResults], bounds: Bound
             checks += _of_copies(scene, own)
             checks += _of_reference(scene, shipped.get(scene.name) if own.scene else None, own)
         for claim in claims(results.scenes):  # the paper's numbers, in units of their last printed digit
-            item, value = claim.published, claim.printed.value
+            item, value = claim.published, claim.printed
             if item.of is not None and value is not None:
                 off = abs(round(value, item.decimals) - item.value) * 10**item.decimals
                 hint = f"the paper prints {item.value}, the run gives {value:.6f}: the printed entries, g, ode45"

@@ -192,23 +192,13 @@ STATISTICS = {
 ENERGY_RISE = 1e-3
 
 
-class NumberResult(NamedTuple):
-    """A published number by one model, in rad or rad/s, and whether it has the printed digits; None without a run."""
-
-    holds: bool | None = None
-    value: float | None = None
-
-
-_UNKNOWN = NumberResult()
-
-
 @dataclass(frozen=True)
 class Claim:
-    """A number or claim of the paper; of a number the results of the printed and of the corrected model."""
+    """A number or claim of the paper; of a number what the printed and the corrected model give, rad or rad/s."""
 
     published: Published
-    printed: NumberResult = _UNKNOWN
-    corrected: NumberResult = _UNKNOWN
+    printed: float | None = None
+    corrected: float | None = None
 
 
 def claims(scenes: Mapping[str, StoredScene], items: Iterable[Published] | None = None) -> list[Claim]:
@@ -222,12 +212,10 @@ def claims(scenes: Mapping[str, StoredScene], items: Iterable[Published] | None 
             continue
         metric, _ = STATISTICS[item.of.quantity, item.of.statistic]
         scene = scenes[item.of.scene]
-        sides = []
-        for run in (run_selection.printed_run(scene), run_selection.reference_or_corrected_run(scene)):
-            value = None if run is None else run.attributes.get(metric)
-            sides.append(_UNKNOWN if value is None else NumberResult(rounds_to(value, item), value))
-        if sides != [_UNKNOWN, _UNKNOWN]:
-            results.append(Claim(item, *sides))
+        runs = run_selection.printed_run(scene), run_selection.reference_or_corrected_run(scene)
+        values = [None if run is None else run.attributes.get(metric) for run in runs]
+        if values != [None, None]:
+            results.append(Claim(item, *values))
     return results
 
 
@@ -249,8 +237,9 @@ def finding(scenes: Mapping[str, StoredScene], claims: Iterable[Claim]) -> list[
     claims = list(claims)
     numbers = [claim for claim in claims if claim.published.is_number]
     counts = []
-    for results in ([claim.printed for claim in numbers], [claim.corrected for claim in numbers]):
-        known = [result.holds for result in results if result.holds is not None]
+    for values in ([claim.printed for claim in numbers], [claim.corrected for claim in numbers]):
+        pairs = zip(values, numbers, strict=True)
+        known = [rounds_to(value, claim.published) for value, claim in pairs if value is not None]
         counts.append(f"{sum(known)} of {len(known)}" if known else "")
     rows = [Finding("Published numbers reproduced", *counts)]
     if claims:

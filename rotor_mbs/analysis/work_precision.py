@@ -9,13 +9,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from rotor_mbs.analysis import kinematics
 from rotor_mbs.analysis.run_selection import corrected_runs
-from rotor_mbs.runs.read import Record, StoredRun, StoredScene
-from rotor_mbs.scenario.scene import Scene
-from rotor_mbs.solution.metrics import energy_scale
+from rotor_mbs.runs.read import Record, StoredScene
 from rotor_mbs.solution.status import COMPLETE, code_of
-from rotor_mbs.solution.trajectory import Array, Trajectory
+from rotor_mbs.solution.trajectory import Array
 
 TARGETS_RAD = (1e-3, 1e-6, 1e-9)
 
@@ -133,24 +130,7 @@ def best(curves: Sequence[Record], column: str) -> float | None:
     return min(known, default=None)
 
 
-def energy_drift(scene: Scene, run: StoredRun) -> float | None:
-    """Largest change of the energy less the work, of the energy scale, both by plain rotation of the bodies: also of a
-    run that has angles and rates alone. None where it has not, or the work is no function of the angles."""
-    if not {"angles", "rates"} <= set(run.names) or len(run.array("time")) < 2:
-        return None
-    time, angles, rates = (run.array(name) for name in ("time", "angles", "rates"))
-    work = kinematics.work_of_constant_loads(scene, angles)
-    if work is None:
-        return None
-    kinetic = kinematics.kinetic_energy(scene, angles, rates)
-    error = kinetic + kinematics.potential_energy(scene, time, angles) - work
-    scale = energy_scale(scene, Trajectory(time, angles, rates, kinetic_energy=kinetic, work=work))
-    return float(np.abs(error - error[0]).max()) / (scale or 1.0)
-
-
 def by_scene(curves: Sequence[Record]) -> Mapping[str, list[Record]]:
     """The curves of each scene, in order."""
-    curves_by_scene: dict[str, list[Record]] = {}
-    for curve in curves:
-        curves_by_scene.setdefault(curve.scene, []).append(curve)
-    return curves_by_scene
+    names = dict.fromkeys(curve.scene for curve in curves)
+    return {name: [curve for curve in curves if curve.scene == name] for name in names}

@@ -5,7 +5,6 @@ from __future__ import annotations
 import csv
 from dataclasses import replace
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -13,7 +12,6 @@ import pytest
 from numpy.typing import NDArray
 
 from rotor_mbs.analysis.work_precision import (
-    energy_drift,
     failed,
     fastest,
     fitted_order,
@@ -21,15 +19,12 @@ from rotor_mbs.analysis.work_precision import (
     succeeded,
     time_to_reach,
 )  # fmt: skip
-from rotor_mbs.methods.solve import solve
 from rotor_mbs.report.build import write_report
 from rotor_mbs.report.looks import look_of
 from rotor_mbs.report.pages.bench import diagram, engine_tables, failure_table, overview_table
 from rotor_mbs.runs.design import POINT_COLUMNS
 from rotor_mbs.runs.read import Record, open_results, points_table, read_records
 from rotor_mbs.runs.table import TableFile, extend_file
-from rotor_mbs.scenario.catalogue import only_scene
-from rotor_mbs.solution.metrics import metrics_of
 from rotor_mbs.solution.status import STATUSES
 
 
@@ -135,17 +130,6 @@ def test_a_scene_on_which_no_setting_is_useful_is_counted_beside_the_error_of_th
         reached, _ = engine_tables(results, {"paper/fig09": [FAST], "paper/fig11": [useless]})
     cell: Any = reached.rows[0][4]
     assert (cell.tone, cell.note) == ("bad", "paper/fig09; fails on 1 of 2")
-
-
-def test_energy_drift_of_angles_and_rates_is_that_of_the_models_own_energies() -> None:
-    scene = only_scene("paper/fig11").replace(duration=2.0, samples=51)
-    run = solve("lagrange/ode45", scene, {})
-    stub: Any = SimpleNamespace(names=["time", "angles", "rates"], array=run.trajectory.get)
-    drift = metrics_of(scene, run.trajectory, None)["energy_drift_max"]
-    assert drift > 1e-9
-    assert energy_drift(scene, stub) == pytest.approx(drift, rel=1e-4)
-    stub.names.remove("rates")
-    assert energy_drift(scene, stub) is None
 
 
 @pytest.mark.parametrize("order", [2, 4, 6])

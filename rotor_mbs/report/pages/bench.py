@@ -25,7 +25,6 @@ from rotor_mbs.report.pages import method_cell, words_of
 from rotor_mbs.runs.design import COLUMNS
 from rotor_mbs.runs.read import OpenResults, Record, StoredRun, StoredScene, read_records
 from rotor_mbs.scenario.catalogue import natural_order
-from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.status import COMPLETE
 from rotor_mbs.studies.stability import SuiteRun, suite_runs
 
@@ -231,7 +230,7 @@ def engine_tables(results: OpenResults, scenes: Mapping[str, Sequence[Record]]) 
             _worst_cell(own, "defect_max"),
             _worst_cell(own, work_precision.ANGLE_ERROR),
             *(_reach_cell(scenes, own, target) for target in _ENGINE_TARGETS),
-            _drift_cell(parsed[long], results.scenes[long].methods.get(method)) if long else NOTHING,
+            _drift_cell(results.scenes[long].methods.get(method)) if long else NOTHING,
             _zero_pitch_cell(own),
             _false_success_cell(own, [run for run in suite if run.method == method]),
         ])  # fmt: skip
@@ -315,14 +314,14 @@ def _order_cell(curves: Sequence[Record]) -> str:
     return f"{number(float(np.median(seen)) if seen else None)} of {claimed[0]:g}"
 
 
-def _drift_cell(scene: Scene, run: StoredRun | None) -> TableCell | str:
+def _drift_cell(run: StoredRun | None) -> TableCell | str:
     if run is None:
         return NOTHING
     if run.status == "timed_out":
         return "not measured"
     if run.status not in COMPLETE:
         return TableCell(words_of(run.status), "bad")
-    return number(work_precision.energy_drift(scene, run))
+    return number(run.attributes.get("energy_drift_max"))
 
 
 def _zero_pitch_cell(own: Mapping[str, Sequence[Record]]) -> TableCell | str:

@@ -23,6 +23,7 @@ from rotor_mbs.analysis.published import (
     Published,
     checked_entries,
     published,
+    rounds_to,
 )
 from rotor_mbs.errors import InputError
 from rotor_mbs.methods.catalogue import errata_methods, look_up
@@ -48,8 +49,8 @@ def number_table(claims: Iterable[Claim]) -> PageTable:
         item, printed, corrected = claim.published, claim.printed, claim.corrected
         if item.of is None:
             continue
-        verdict = _verdict(printed.holds)
-        if item.rounding and printed.holds:
+        verdict = _verdict(printed, item)
+        if item.rounding and verdict.tone == "good":
             verdict = replace(verdict, note=ROUNDING)
         body = "rotor" if item.of.coordinate == 0 else f"pitch {item.of.coordinate}"
         _, words = STATISTICS[item.of.quantity, item.of.statistic]
@@ -58,10 +59,10 @@ def number_table(claims: Iterable[Claim]) -> PageTable:
             item.figure,
             TableCell(description, note=f"«{item.quote}»", note_language="es"),
             fixed(item.value, item.decimals),
-            fixed(printed.value, item.decimals + 2),
+            fixed(printed, item.decimals + 2),
             verdict,
-            fixed(corrected.value, item.decimals + 2),
-            _verdict(corrected.holds),
+            fixed(corrected, item.decimals + 2),
+            _verdict(corrected, item),
         ])  # fmt: skip
     return PageTable("Published numbers", head, rows)
 
@@ -92,9 +93,11 @@ def claim_table(claims: Iterable[Claim], study: ClaimStudy) -> PageTable:
     return PageTable("Published claims", head, rows)
 
 
-def _verdict(holds: bool | None) -> TableCell:
-    if holds is None:
+def _verdict(value: float | None, item: Published) -> TableCell:
+    """Whether a value has the printed digits."""
+    if value is None:
         return TableCell(NOTHING)
+    holds = rounds_to(value, item)
     return TableCell("yes" if holds else "no", tone="good" if holds else "bad")
 
 
