@@ -177,7 +177,6 @@ def _side_by_side(chunk: Chunk, scenes: Sequence[Scene]) -> Rows:
 _MAX_RUNS = 128
 _MIN_RUNS = 8
 _CHUNK_BYTES = 1 << 23
-_TIMED_SAMPLES = 20_001  # of a run, for an estimate
 
 
 # From (runs stored, runs in all, statuses of those that have just been stored).
@@ -356,21 +355,14 @@ def _counted(statuses: NDArray[np.int8]) -> Counter[str]:
 
 
 def estimate_seconds(plan: SweepPlan, pool: TaskPool) -> float:
-    """How long all runs will take, from one chunk of each method; infinite where one did not end in its time. Of runs
-    with very many samples, the first ones are timed."""
-    base, timed = plan.sweep.base, plan
-    samples = min(base.samples, _TIMED_SAMPLES)
-    share = (samples - 1) / (base.samples - 1)
-    if share < 1.0:
-        short = base.replace(samples=samples, duration=share * base.duration)
-        timed = replace(plan, sweep=replace(plan.sweep, base=short))
-    nowhere = Place(Path(), 0, plan.first, {}, timed.table().row_type)  # only its columns count: nothing is stored
+    """How long all runs will take, from one chunk of each method; infinite where one did not end in its time."""
+    nowhere = Place(Path(), 0, plan.first, {}, plan.table().row_type)  # only its columns count: nothing is stored
     work, seconds = with_method_files(partial(perform, stores=False)), 0.0
     for first in range(0, plan.rows * len(plan.methods), plan.rows):
         runs = min(plan.last, first + plan.rows) - max(plan.first, first)
         if runs <= 0:
             continue
-        chunk = next(timed.chunks(nowhere, [(first, first + min(plan.rows, _MAX_RUNS))]))
+        chunk = next(plan.chunks(nowhere, [(first, first + min(plan.rows, _MAX_RUNS))]))
         try:
             # The first one loads and compiles, which all others find done.
             pool.submit(work, chunk.part(0, 1), plan.time_limit_s).result()
@@ -380,5 +372,5 @@ def estimate_seconds(plan: SweepPlan, pool: TaskPool) -> float:
             if pool.failure(error) == "error":
                 raise
             return float("inf")
-        seconds += runs * (time.perf_counter() - start) / len(chunk.values) / share / pool.workers
+        seconds += runs * (time.perf_counter() - start) / len(chunk.values) / pool.workers
     return seconds

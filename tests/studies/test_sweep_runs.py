@@ -26,7 +26,7 @@ from rotor_mbs.scenario.catalogue import find_scenes
 from rotor_mbs.scenario.sweep import load_sweep
 from rotor_mbs.solution.metrics import horizon
 from rotor_mbs.studies.stored_references import frozen_solution
-from rotor_mbs.studies.sweep import Chunk, estimate_seconds, plan_sweep, run_sweep
+from rotor_mbs.studies.sweep import Chunk, plan_sweep, run_sweep
 
 _SWEEP = """
 title = "starts and springs"
@@ -289,24 +289,3 @@ def test_the_error_growth_is_that_of_the_frozen_reference(tmp_path: Path) -> Non
     assert until[1] == horizon(frozen)
     assert growth[0] < growth[1]
     assert np.array_equal(growth[:2], growth[2:])  # of the motion, not of the method
-
-
-def test_an_estimate_times_the_beginning_of_runs_with_very_many_samples(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    path = _file(tmp_path)
-    path.write_text("samples = 1_000_001\n" + path.read_text().replace("samples = 21\n", ""))
-    timed = []
-
-    def record(chunk: Chunk) -> Rows:
-        timed.append(chunk.variants.scene(chunk.values[0].tolist()))
-        time.sleep(0.01)
-        return {}
-
-    monkeypatch.setattr(Chunk, "perform", record)
-    plan = plan_sweep(load_sweep(path))
-    seconds = estimate_seconds(plan, SerialPool())
-    interval = plan.sweep.base.duration / 1_000_000
-    assert {scene.samples for scene in timed} == {20_001}
-    assert [scene.duration for scene in timed] == pytest.approx([20_000 * interval] * len(timed))
-    assert seconds >= 0.01 * 1_000_000 / 20_000

@@ -22,34 +22,26 @@ _WINDOW_RADIANS = 5e3
 _GROWTH = 100.0
 _INTERVALS = 10
 
-# R(z) of explicit Runge-Kutta methods.
-RK44 = Polynomial([1, 1, 1 / 2, 1 / 6, 1 / 24])
-FUNCTIONS = {
-    "exudyn_tree/rk44": RK44,
-    # To order 6 the exponential's; of the seventh stage b7 a76 a65 a54 a43 a32 a21 = -1/2160
-    # (J. C. Butcher, J. Austral. Math. Soc. 4 (1964), 179-194).
-    "exudyn_tree/rk67": Polynomial([1, 1, 1 / 2, 1 / 6, 1 / 24, 1 / 120, 1 / 720, -1 / 2160]),
-    "mujoco/rk4": RK44,
-}
+RK44 = Polynomial([1, 1, 1 / 2, 1 / 6, 1 / 24])  # R(z) of the classical Runge-Kutta method
+METHOD = "exudyn_tree/rk44"
 
 
-def step_limit(scene: Scene, method: str) -> dict[str, float]:
-    """The largest stable step by bisection on what becomes of the pitches, beside that of the theory."""
-    function = FUNCTIONS[method]
+def step_limit(scene: Scene) -> dict[str, float]:
+    """The largest stable step of rk44 by bisection on what becomes of the pitches, beside that of the theory."""
     # Of a pitch about zero, the rotor fixed: gravity and rotation are negligible beside such a spring.
     inertias = [(blade.pitch_inertia, *scene.bearing(i)) for i, blade in enumerate(scene.blades)]
     modes = [mode for numbers in inertias for mode in oscillator_modes(*numbers)]
     window = _WINDOW_RADIANS / max(abs(mode) for mode in modes)
     short = replace(scene, duration=window, samples=_INTERVALS + 1, outputs=("angles", "rates"))
-    theory = largest_stable_step(function, modes, window, _GROWTH)
+    theory = largest_stable_step(RK44, modes, window, _GROWTH)
     low = max(1, int(0.5 * window / theory / _INTERVALS))  # steps per interval: too few, enough
     high = 4 * low + 1
-    if not _stays(short, method, high) or _stays(short, method, low):
+    if not _stays(short, high) or _stays(short, low):
         stable = float("nan")
     else:
         while high - low > 1:
             middle = (low + high) // 2
-            low, high = (low, middle) if _stays(short, method, middle) else (middle, high)
+            low, high = (low, middle) if _stays(short, middle) else (middle, high)
         stable = window / (_INTERVALS * high)
     return {
         "largest_stable_step_s": stable,
@@ -59,10 +51,10 @@ def step_limit(scene: Scene, method: str) -> dict[str, float]:
     }
 
 
-def _stays(scene: Scene, method: str, steps: int) -> bool:
+def _stays(scene: Scene, steps: int) -> bool:
     """Whether every pitch keeps within `_GROWTH` times the largest one at the start, to the end."""
     step = scene.duration / (_INTERVALS * steps)
-    run = solve(method, scene, {"step": step}, time_limit_s=20.0)
+    run = solve(METHOD, scene, {"step": step}, time_limit_s=20.0)
     pitches = np.abs(run.trajectory.angles[:, 1:])
     complete = len(pitches) == scene.samples
     return complete and float(pitches.max()) <= _GROWTH * max(map(abs, scene.initial_angles[1:]))
@@ -79,8 +71,7 @@ def largest_stable_step(
 ) -> float:
     """s: where the first range of steps ends on which no mode grows more than `growth`-fold in `window` s.
 
-    Growth within a window, not |R| <= 1 itself, is what a run can show: RK67 has |R| > 1 on the whole imaginary axis,
-    by so little at small steps that nothing comes of it.
+    Growth within a window, not |R| <= 1 itself, is what a run can show.
     """
     steps = np.arange(1.0, 1e5) * 1e-4 / max(abs(mode) for mode in modes)
     largest = np.abs(stability_function(np.outer(modes, steps))).max(axis=0)
