@@ -59,17 +59,77 @@ ERRORS = (
 )  # fmt: skip
 
 
-# A point: one method at one setting
+@dataclass(frozen=True, eq=False)
+class Point:
+    """One method at one setting, a step (s) or tolerance. known: its columns that are known before it is measured."""
+
+    method: str
+    setting: float
+    settings: Mapping[str, object]
+    known: Mapping[str, object]
 
 
 @dataclass(frozen=True)
-class Point:
-    """One method at one setting: a rung of a curve. settings as (name, value) pairs."""
+class Curve:
+    """A method over its ladder of settings on one scene, coarse to fine: consecutive rows of the table.
 
-    curve: str
-    method: str
-    setting: float
-    settings: tuple[tuple[str, object], ...]
+    Attributes
+    ----------
+    name : the method's, with its fixed settings where they are not the default ones.
+    kind : STEP or TOLERANCE.
+    """
+
+    scene: Scene
+    name: str
+    kind: str
+    points: Sequence[Point]
+
+    @property
+    def method(self) -> str:
+        return self.points[0].method
+
+    @property
+    def label(self) -> str:
+        return f"{self.scene.name} {self.name} bench"
+
+    @property
+    def key(self) -> tuple[str, str, str]:
+        """By which its rows are found: table, scene, curve."""
+        return BENCH, self.scene.name, self.name
+
+    def place(self, file: TableFile) -> Place:
+        """Where its first row is."""
+        return file.place(str(self.points[0].known["run"]), BENCH)
+
+
+def curve_of(scene: Scene, ladder: Ladder, options: Mapping[str, object]) -> Curve:
+    """The curve of a ladder. options: of the study, stored with each point, with facts of the method that a page may
+    want."""
+    method, (short, _) = catalogue.find_method(ladder.method), thinned(scene)
+    facts = {
+        **options,
+        "duration_s": scene.duration,
+        "linearizes": any(other.linearize for other in catalogue.methods() if other.model == method.model),
+        "lines": sum(len(text.splitlines()) for text in method.sources if isinstance(text, str)),
+    }
+    of_all: dict[str, object] = {
+        "scene": scene.name,
+        "method_name": method.name,
+        "curve": ladder.curve,
+        "setting_kind": ladder.kind,
+        "versions": json.dumps(row_versions(method), sort_keys=True),
+        "scene_hash": scene_hash(scene),
+        "options": json.dumps(facts, sort_keys=True),
+        "order_expected": math.nan if ladder.order is None else ladder.order,
+    }
+    points = []
+    for setting, chosen in ladder.rungs(short.duration / (short.samples - 1)).items():
+        settings = method.settings.of(method.name, chosen).as_dict()
+        known = of_all | {"settings": json.dumps(settings, sort_keys=True)}
+        known |= {kind: setting if kind == ladder.kind else math.nan for kind in (STEP, TOLERANCE)}
+        known["run"] = f"{scene.name}/{ladder.curve} {ladder.kind}={setting:.6g}"
+        points.append(Point(method.name, setting, dict(sorted(chosen.items())), known))
+    return Curve(scene, ladder.curve, ladder.kind, points)
 
 
 class PointTimer:
@@ -103,7 +163,7 @@ class PointTimer:
         start = self._clock()
         try:
             method = catalogue.find_method(self._point.method)
-            settings = method.settings.of(self._point.method, dict(self._point.settings))
+            settings = method.settings.of(self._point.method, self._point.settings)
             for name in ("setup_time_s", "setup_again_time_s"):
                 begun = self._clock()
                 self._solver = method.build(self._scene, settings)
@@ -239,21 +299,20 @@ def allot(seconds: Sequence[float], wanted: Sequence[int], budget_s: float) -> l
 
 @dataclass(frozen=True)
 class Measurement:
-    """Points of a scene that are timed together, in one process.
+    """Curves of a scene that are timed together, in one process.
 
-    points : by curve, each coarse to fine.
     repeats, budget_s : timed runs of a point at most, and s for all of them.
     """
 
     scene: Scene
     reference: Trajectory | None
-    points: Sequence[Sequence[Point]]
+    curves: Sequence[Curve]
     repeats: int
     budget_s: float
 
     def split(self) -> list[Measurement]:
         """Its curves one by one; [] where it is one."""
-        return [replace(self, points=[own]) for own in self.points] if len(self.points) > 1 else []
+        return [replace(self, curves=[curve]) for curve in self.curves] if len(self.curves) > 1 else []
 
 
 def measure(task: Measurement) -> list[list[dict[str, Any]]]:
@@ -262,12 +321,14 @@ def measure(task: Measurement) -> list[list[dict[str, Any]]]:
     For a process that does nothing else: engines are loaded beforehand, which is part of no run's time, and the garbage
     collector is off.
     """
-    for method in dict.fromkeys(own[0].method for own in task.points):
+    for method in dict.fromkeys(curve.method for curve in task.curves):
         catalogue.find_method(method).load()
     gc.disable()
-    curves = [[PointTimer(point, task.scene, task.reference, _RUN_LIMIT_S) for point in own] for own in task.points]
-    conduct(curves, task.budget_s, task.repeats, time.perf_counter)
-    return [[timer.row() for timer in own] for own in curves]
+    timers = [
+        [PointTimer(point, task.scene, task.reference, _RUN_LIMIT_S) for point in curve.points] for curve in task.curves
+    ]
+    conduct(timers, task.budget_s, task.repeats, time.perf_counter)
+    return [[timer.row() for timer in own] for own in timers]
 
 
 def prepared(scene: Scene, place: Place) -> tuple[Scene, Trajectory]:
@@ -294,84 +355,14 @@ def thinned(scene: Scene) -> tuple[Scene, int]:
 # Curves in a results file
 
 
-@dataclass(frozen=True)
-class Curve:
-    """A method over its ladder of settings on one scene: consecutive rows of the table.
-
-    Attributes
-    ----------
-    scene, ladder : what is measured.
-    options : of the study, stored with each point, with facts of the method that a page may want.
-    """
-
-    scene: Scene
-    ladder: Ladder
-    options: Mapping[str, object]
-
-    @property
-    def label(self) -> str:
-        return f"{self.scene.name} {self.ladder.curve} bench"
-
-    @property
-    def key(self) -> tuple[str, str, str]:
-        """By which its rows are found: table, scene, curve."""
-        return BENCH, self.scene.name, self.ladder.curve
-
-    @property
-    def first_run(self) -> str:
-        """The label of its first row."""
-        return str(self.rows[0]["run"])
-
-    @property
-    def _rungs(self) -> dict[float, dict[str, object]]:
-        short, _ = thinned(self.scene)
-        return self.ladder.rungs(short.duration / (short.samples - 1))
-
-    @property
-    def points(self) -> list[Point]:
-        """A point per rung."""
-        return [
-            Point(self.ladder.curve, self.ladder.method, setting, tuple(sorted(settings.items())))
-            for setting, settings in self._rungs.items()
-        ]
-
-    @property
-    def rows(self) -> list[dict[str, object]]:
-        """The known columns of its points."""
-        method = catalogue.find_method(self.ladder.method)
-        facts = {
-            **self.options,
-            "duration_s": self.scene.duration,
-            "linearizes": any(other.linearize for other in catalogue.methods() if other.model == method.model),
-            "lines": sum(len(text.splitlines()) for text in method.sources if isinstance(text, str)),
-        }
-        known: dict[str, object] = {
-            "scene": self.scene.name,
-            "method_name": method.name,
-            "curve": self.ladder.curve,
-            "setting_kind": self.ladder.kind,
-            "versions": json.dumps(row_versions(method), sort_keys=True),
-            "scene_hash": scene_hash(self.scene),
-            "options": json.dumps(facts, sort_keys=True),
-            "order_expected": math.nan if self.ladder.order is None else self.ladder.order,
-        }
-        rows = []
-        for setting, chosen in self._rungs.items():
-            settings = method.settings.of(method.name, chosen).as_dict()
-            row = known | {"settings": json.dumps(settings, sort_keys=True)}
-            row |= {kind: setting if kind == self.ladder.kind else math.nan for kind in (STEP, TOLERANCE)}
-            rows.append(row | {"run": f"{self.scene.name}/{self.ladder.curve} {self.ladder.kind}={setting:.6g}"})
-        return rows
-
-
 def bench_table(curves: Sequence[Curve]) -> Table:
     """The table of the points of these curves."""
-    return points_table(BENCH, [row for curve in curves for row in curve.rows])
+    return points_table(BENCH, [point.known for curve in curves for point in curve.points])
 
 
 def is_measured(file: TableFile, curve: Curve) -> bool:
     """Whether every point of the curve is stored."""
-    return all(file.place(str(row["run"]), BENCH).is_stored for row in curve.rows)
+    return all(file.place(str(point.known["run"]), BENCH).is_stored for point in curve.points)
 
 
 def run_bench(
@@ -425,7 +416,7 @@ def run_bench(
         options = {"repeats": repeats, "budget_s": budget_s}
         for scene in scenes:
             able, refused = catalogue.able_methods(scene, dict.fromkeys(ladder.method for ladder in chosen))
-            curves += [Curve(scene, ladder, options) for ladder in chosen if ladder.method in able]
+            curves += [curve_of(scene, ladder, options) for ladder in chosen if ladder.method in able]
             left_out += refused
         file = extend_file(output, [bench_table(curves)], [curve.key for curve in curves])
         missing = [curve for curve in curves if curve.scene.name in changed or not is_measured(file, curve)]
@@ -465,25 +456,23 @@ def _measure_scene(
     file: TableFile, curves: Sequence[Curve], short: Scene, reference: Trajectory, repeats: int, budget_s: float
 ) -> Iterator[Outcome]:
     """Time, judge and store every point of the curves of one scene."""
-    by_name = {curve.ladder.curve: curve for curve in curves}
     core = last_core()
     facts = facts_of(short, reference) | {"pinned_core": -1 if core is None else core}
-    task = Measurement(short, reference, [curve.points for curve in curves], repeats, budget_s)
+    task = Measurement(short, reference, curves, repeats, budget_s)
     with WorkerPool(1, core=core) as pool:
         limit_s = _HANGING * budget_s + _LOADING_S
         for end in run_in(pool, catalogue.with_method_files(measure), [task], limit_s, Measurement.split):
-            for i, points in enumerate(end.task.points):
-                curve = by_name[points[0].curve]
+            for i, curve in enumerate(end.task.curves):
                 if end.value is None:
-                    yield Outcome(curve.label, curve.ladder.method, end.failure, end.message, is_stored=False)
+                    yield Outcome(curve.label, curve.method, end.failure, end.message, is_stored=False)
                     continue
-                place, rows = file.place(curve.first_run, BENCH), end.value[i]
+                place, rows = curve.place(file), end.value[i]
                 place.write(rows_of_curve(place, curve, rows, facts))
                 statuses = [row["status"] for row in rows]
                 ok, inaccurate, left_out = (statuses.count(status) for status in ("ok", "inaccurate", "left_out"))
                 failed = len(statuses) - ok - inaccurate - left_out
                 counts = f"{ok} ok, {inaccurate} inaccurate, {failed} failed, {left_out} omitted"
-                yield Outcome(curve.label, curve.ladder.method, "measured", f"{len(statuses)} points: {counts}")
+                yield Outcome(curve.label, curve.method, "measured", f"{len(statuses)} points: {counts}")
 
 
 def rows_of_curve(place: Place, curve: Curve, points: Sequence[Mapping[str, Any]], facts: Mapping[str, object]) -> Rows:
@@ -491,8 +480,8 @@ def rows_of_curve(place: Place, curve: Curve, points: Sequence[Mapping[str, Any]
     facts = {**facts, "repeatable": int(all(point.get("same", True) for point in points))}
     each = [place.rows_of({**point, **facts, "left_out": int(point["status"] == "left_out")}) for point in points]
     rows = {name: np.concatenate([row[name] for row in each]) for name in each[0]}
-    measured = Record(BENCH, curve.scene.name, curve.ladder.curve, arrays=rows)
-    if curve.ladder.kind == STEP:
+    measured = Record(BENCH, curve.scene.name, curve.name, arrays=rows)
+    if curve.kind == STEP:
         steps = np.array([point.setting for point in curve.points])[succeeded(measured)]
         order = fitted_order(steps, points_of(measured)[0])
         rows["order"][:] = np.nan if order is None else order

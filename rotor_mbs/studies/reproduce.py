@@ -24,10 +24,10 @@ from rotor_mbs.runs.versions import versions
 from rotor_mbs.scenario.catalogue import find_scenes, reference_folder, scenarios_folder
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.studies.bench import (
-    BENCH,
     Curve,
     PointTimer,
     bench_table,
+    curve_of,
     facts_of,
     is_measured,
     prepared,
@@ -50,13 +50,13 @@ _LONGEST_S = 0.25  # a run longer than this is the last of its curve: the next o
 
 @dataclass(frozen=True, kw_only=True)
 class CurveTask(Task):
-    """A short curve on its way to a worker process, which looks its ladder up: consecutive rows of the table /bench."""
+    """A short curve on its way to a worker process: consecutive rows of the table /bench."""
 
-    scene: Scene
+    curve: Curve
 
     def perform(self) -> Rows:
         """Run and judge the points of one curve; their rows."""
-        (curve,) = curves_of(self.scene, self.method)
+        curve = self.curve
         assert self.reference is not None  # every curve has one
         short, reference = prepared(curve.scene, self.reference)
         longest, rows = 0.0, []
@@ -91,12 +91,12 @@ def reproduce(
         of_curves = [
             CurveTask(
                 label=curve.label,
-                method=curve.ladder.method,
-                place=file.place(curve.first_run, BENCH),
+                method=curve.method,
+                place=curve.place(file),
                 reference=file.place(reference),
                 kill_after_s=1.2 * timeout_s + 10.0,
-                work=work_of(benched, curve.ladder.method),
-                scene=benched,
+                work=work_of(benched, curve.method),
+                curve=curve,
             )
             for curve in curves
             if is_new or not is_measured(file, curve)
@@ -129,9 +129,5 @@ def summary_of(path: Path) -> str:
 def short_curves(scene: Scene) -> list[Curve]:
     """A short curve of each method on `scene`."""
     able, _ = able_methods(scene, list(dict.fromkeys(ladder.method for ladder in ladders())))
-    return [curve for name in able for curve in curves_of(scene, name)]
-
-
-def curves_of(scene: Scene, method: str) -> list[Curve]:
     options = {"budget_s": _LONGEST_S, "is_short": True}
-    return [Curve(scene, ladder.short, options) for ladder in ladders([method]) if not ladder.variant]
+    return [curve_of(scene, ladder.short, options) for ladder in ladders(able) if not ladder.variant]

@@ -21,7 +21,7 @@ from rotor_mbs.runs.runner import Task
 from rotor_mbs.runs.table import Rows, extend_file
 from rotor_mbs.runs.versions import row_versions
 from rotor_mbs.scenario.scene import Scene, scene_hash
-from rotor_mbs.solution.status import COMPLETE
+from rotor_mbs.solution.status import COMPLETE, code_of
 from rotor_mbs.studies.run import OnProgress, Outcome, compute_tasks, ignore_progress, run_scenes, work_of
 from rotor_mbs.studies.stored_references import read_reference
 
@@ -191,45 +191,38 @@ class LadderTask(Task):
 
     def perform(self) -> Rows:
         """Errors in rad over steps in s, and the step that the target needs; steps that are not needed are left out."""
-        scene, method = self.scene, self.method
-        reference = read_reference(self.reference, scene) if self.reference is not None else None
-        steps = ladder_steps(scene)
-        judgements: list[Judgement] = []
-        expected = 0.0
+        reference = read_reference(self.reference, self.scene) if self.reference is not None else None
+        steps, is_over = ladder_steps(self.scene), False
+        each = []
         for step in steps:
-            if expected > _LONGEST_RUN_S:
-                break
+            if is_over:
+                each.append(self.place.rows_of({"status": "left_out", "false_success": 0}))
+                continue
             try:
                 with time_limit(2.0 * _LONGEST_RUN_S):
-                    run = solve(method, scene, {"step": step})
+                    run = solve(self.method, self.scene, {"step": step})
             except OutOfTimeError as exc:
-                judgements.append(Judgement("timed_out", str(exc), False, {}, None))
-                break
-            judgements.append(judge(scene, run, reference))
-            if judgements[-1].metrics.get("angle_error_max", np.inf) <= 0.1 * TARGET and judgements[-1].status == "ok":
-                break
-            expected = _FACTOR * run.run_times_s[0]
-        # A run that broke off has no error up to the horizon.
-        errors = [
-            judgement.metrics.get("angle_error_max", np.nan) if judgement.status in COMPLETE else np.nan
-            for judgement in judgements
-        ]
-        needed = step_for(TARGET, np.array(steps[: len(errors)]), np.array(errors))
-        rows = []
-        for i in range(len(steps)):
-            if i >= len(judgements):
-                rows.append(self.place.rows_of({"status": "left_out", "false_success": 0}))
-                continue
+                judgement, seconds = Judgement("timed_out", str(exc), False, {}, None), 2.0 * _LONGEST_RUN_S
+            else:
+                judgement, seconds = judge(self.scene, run, reference), run.run_times_s[0]
+            # A run that broke off has no error up to the horizon.
+            metrics, is_complete = judgement.metrics, judgement.status in COMPLETE
+            error = metrics.get("angle_error_max", np.nan) if is_complete else np.nan
             values = {
-                "status": judgements[i].status,
-                "message": judgements[i].message,
-                "angle_error_max": errors[i],
-                "energy_drift_max": judgements[i].metrics.get("energy_drift_max", np.nan),
-                "false_success": int(judgements[i].false_success),
-                "step_for_target_s": np.nan if needed is None else needed,
+                "status": judgement.status,
+                "message": judgement.message,
+                "angle_error_max": error,
+                "energy_drift_max": metrics.get("energy_drift_max", np.nan),
+                "false_success": int(judgement.false_success),
             }
-            rows.append(self.place.rows_of(values))
-        return {name: np.concatenate([row[name] for row in rows]) for name in rows[0]}
+            each.append(self.place.rows_of(values))
+            is_accurate = judgement.status == "ok" and error <= 0.1 * TARGET
+            is_over = is_accurate or _FACTOR * seconds > _LONGEST_RUN_S
+        rows = {name: np.concatenate([row[name] for row in each]) for name in each[0]}
+        tried = rows["status"] != code_of("left_out")
+        needed = step_for(TARGET, np.array(steps)[tried], rows["angle_error_max"][tried])
+        rows["step_for_target_s"][tried] = np.nan if needed is None else needed
+        return rows
 
 
 def run_suite(

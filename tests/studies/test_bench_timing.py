@@ -76,7 +76,7 @@ def still(rows: int = SCENE.samples) -> Trajectory:
 
 
 def point(curve: str = "a", rung: int = 0) -> Point:
-    return Point(curve, curve, float(rung), ())
+    return Point(curve, float(rung), {}, {})
 
 
 def timer_of(fake: FakeMethod, monkeypatch: pytest.MonkeyPatch) -> PointTimer:
@@ -149,8 +149,8 @@ def run_conduct(
     clock = Clock()
     order: list[Point] = []
     timers = [FakeTimer(one, taken, order, clock, one == hanging) for one, taken in seconds.items()]
-    names = dict.fromkeys(one.curve for one in seconds)
-    conduct([[timer for timer in timers if timer.point.curve == name] for name in names], budget, repeats, clock)
+    names = dict.fromkeys(one.method for one in seconds)
+    conduct([[timer for timer in timers if timer.point.method == name] for name in names], budget, repeats, clock)
     return timers, order
 
 
@@ -183,7 +183,7 @@ def test_a_cheap_ladder_is_not_cut_by_a_dear_one() -> None:
     seconds = {point("dear", rung): 4.0 * 2**rung for rung in range(3)}
     seconds |= {point("cheap", rung): 0.01 for rung in range(9)}
     timers, _ = run_conduct(seconds, budget=30.0)
-    assert sum(timer.point.curve == "cheap" and bool(timer.times) for timer in timers) == 9
+    assert sum(timer.point.method == "cheap" and bool(timer.times) for timer in timers) == 9
     assert [timer.point.setting for timer in timers if timer.left_out] == [1, 2]
 
 
@@ -254,7 +254,7 @@ AT_REST = paper("fig05", duration=0.1, samples=3)
 
 def measure_dying(task: Measurement) -> Any:
     """As the timing worker, which one curve kills."""
-    if any(own[0].curve.endswith("deadly") for own in task.points):
+    if any(curve.name.endswith("deadly") for curve in task.curves):
         os.kill(os.getpid(), signal.SIGKILL)
     return measure(task)
 
@@ -264,7 +264,7 @@ def test_curves_are_tried_alone_where_their_process_dies(tmp_path: Path, monkeyp
     monkeypatch.setattr(bench, "measure", measure_dying)
     (ladder,) = ladders(["lagrange/ode45"])
     short = replace(ladder, values=(1e-3,))
-    curves = [bench.Curve(AT_REST, replace(short, variant=f" {name}"), {}) for name in ("first", "deadly", "last")]
+    curves = [bench.curve_of(AT_REST, replace(short, variant=f" {name}"), {}) for name in ("first", "deadly", "last")]
     file = extend_file(tmp_path / "b.h5", [bench.bench_table(curves)])
     still = np.zeros((3, 4))
     reference = Trajectory(np.linspace(0.0, 0.1, 3), still, still, error_growth=np.ones(3))
