@@ -47,6 +47,9 @@ _RESEMBLING_ANGLE = 1.0
 # after such a sample follows from round-off alone, whatever an engine reports.
 _NO_INERTIA = 1e-30
 
+# Steps of a run: an error that is this many times the largest defect has not only been added up, but has grown.
+_GROWN = 1e4
+
 # Of the rotor's inertia at the start: above it, no start is singular.
 _CLEAR_SHARE = 1e-6
 
@@ -76,18 +79,10 @@ def quantity_bound(rule: QuantityMetric, bounds: Bounds, method: str) -> float |
 
 @np.errstate(over="ignore", invalid="ignore", divide="ignore")  # of a runaway: what is not finite is judged
 def judge(scene: Scene, run: Solution, reference: Trajectory | None) -> Judgement:
-    """Finite? End reached? Through a singularity? Energy, quantities, defects, error? The first no names the status."""
+    """The status of a run, the numbers that it follows from, and whether its engine claims a success that it is not."""
     defects = defects_of(scene, run.trajectory, is_corrected=run.is_corrected)
     metrics = metrics_of(scene, run.trajectory, reference, defects)
-    status, message = _broken_off(scene, run)
-    if not status and not run.is_corrected:
-        status = "completed"
-    if not status:
-        status, message = _through_singularity(scene, run, reference)
-    if not status:
-        status, message = _inaccurate(scene, run, metrics)
-    if status == "ok":
-        status, message = _unchecked(run, metrics)
+    status, message = _status(scene, run, reference, metrics)
     false_success = run.integration.success and not _is_close(scene, status, metrics)
     return Judgement(status, message, false_success, metrics, defects)
 
@@ -145,37 +140,35 @@ def quantity_errors(scene: Scene, metrics: Metrics) -> Iterator[tuple[Quantity, 
             yield quantity, rule, metrics[rule.metric] / (rule.relative_to(scene) if rule.relative_to else 1.0)
 
 
-def _broken_off(scene: Scene, run: Solution) -> tuple[str, str]:
-    """Runs that did not reach the end, or that their engine calls failed; ("", "") for the others."""
+def _status(scene: Scene, run: Solution, reference: Trajectory | None, metrics: Metrics) -> tuple[str, str]:
+    """Finite? End reached? Through a singularity? Energy, quantities, defects, error? The first no names the status,
+    with a message."""
+    # Runs that did not reach the end, or that their engine calls failed.
     integration, samples = run.integration, len(run.trajectory.time)
-    complete = samples == scene.samples
-    if complete and integration.success:
-        return "", ""
-    reached = f"at t = {run.trajectory.time[-1]:.6g} s of {scene.duration:g} s" if samples else "at the start"
-    if integration.out_of_time:
-        return "timed_out", f"{integration.message}, {reached}"
-    reported = integration.message or ("the engine reported success" if integration.success else "no reason given")
-    if smallest_rotor_inertia_share(scene, run.trajectory) < _SINGULAR_SHARE:
-        return "singular", f"with all pitches at ±π/2 the rotor has almost no inertia, {reached}; {reported}"
-    if integration.success:
-        end = f" after {reached.removeprefix('at ')}" if samples else ""
-        return "diverged", f"no finite sample{end}; {reported}"
-    return "solver_failed", f"{reported}; {reached}"
+    if samples != scene.samples or not integration.success:
+        reached = f"at t = {run.trajectory.time[-1]:.6g} s of {scene.duration:g} s" if samples else "at the start"
+        if integration.out_of_time:
+            return "timed_out", f"{integration.message}, {reached}"
+        reported = integration.message or ("the engine reported success" if integration.success else "no reason given")
+        if smallest_rotor_inertia_share(scene, run.trajectory) < _SINGULAR_SHARE:
+            return "singular", f"with all pitches at ±π/2 the rotor has almost no inertia, {reached}; {reported}"
+        if integration.success:
+            end = f" after {reached.removeprefix('at ')}" if samples else ""
+            return "diverged", f"no finite sample{end}; {reported}"
+        return "solver_failed", f"{reported}; {reached}"
+    if not run.is_corrected:
+        return "completed", ""
 
-
-def _through_singularity(scene: Scene, run: Solution, reference: Trajectory | None) -> tuple[str, str]:
-    """Complete runs of scenes without a solution: from a singular state, or past the time where the solution ends."""
-    share = rotor_inertia_shares(scene, run.trajectory.angles[:1])[0]
-    if share < _NO_INERTIA:
+    # Complete runs of scenes without a solution: from a singular state, or past the time where the solution ends.
+    if rotor_inertia_shares(scene, run.trajectory.angles[:1])[0] < _NO_INERTIA:
         return "singular", "with all pitches at ±π/2 the rotor has no inertia, from the start"
-    if reference is None or not 0 < len(reference.time) < scene.samples:
-        return "", ""
-    if smallest_rotor_inertia_share(scene, reference) < _SINGULAR_SHARE:
+    if (
+        reference is not None
+        and 0 < len(reference.time) < scene.samples
+        and smallest_rotor_inertia_share(scene, reference) < _SINGULAR_SHARE
+    ):
         return "singular", f"the motion ends in a singularity after t = {reference.time[-1]:.6g} s; the run continued"
-    return "", ""
 
-
-def _inaccurate(scene: Scene, run: Solution, metrics: Metrics) -> tuple[str, str]:
     bounds = shipped_bounds().with_entries(run.bounds)
     energy = bounds.of("energy", run.method).value + energy_slack(scene, run.trajectory)
     if "energy_drift_max" in metrics and not metrics["energy_drift_max"] <= energy:
@@ -197,25 +190,15 @@ def _inaccurate(scene: Scene, run: Solution, metrics: Metrics) -> tuple[str, str
     error = largest_angle_error(metrics)
     if not error <= OK_ERROR + start_slack(scene):
         how = "angle error" if "angle_error_max" in metrics else "predicted angle error"
-        growth = (
-            ", because the motion amplifies small errors" if error > _GROWN * metrics.get("defect_max", error) else ""
-        )
+        has_grown = error > _GROWN * metrics.get("defect_max", error)
+        growth = ", because the motion amplifies small errors" if has_grown else ""
         return "inaccurate", f"{how} {error:.1e} rad up to the horizon{growth}; allowed {OK_ERROR:g} rad"
-    return "ok", ""
 
-
-# Steps of a run: an error that is this many times the largest defect has not only been added up, but has grown.
-_GROWN = 1e4
-
-
-def _unchecked(run: Solution, metrics: Metrics) -> tuple[str, str]:
-    """Complete runs with nothing to judge them by."""
-    largest = float(np.abs(run.trajectory.angles).max())
-    if largest > ANGLE_LIMIT:
-        return (
-            "unchecked",
-            f"angles of {largest:.1e} rad; above {ANGLE_LIMIT:.0e} rad double precision is not sufficient",
-        )
+    # Complete runs with nothing to judge them by.
+    angle = float(np.abs(run.trajectory.angles).max())
+    if angle > ANGLE_LIMIT:
+        limit = f"above {ANGLE_LIMIT:.0e} rad double precision is not sufficient"
+        return "unchecked", f"angles of {angle:.1e} rad; {limit}"
     if any(name in metrics for name in _CHECKS):
         return "ok", ""
     return "unchecked", "cannot be assessed: no energies, and no angles or rates"

@@ -115,8 +115,18 @@ def modes_of(stiffness: Array, damping: Array, *, is_cyclic: bool) -> ModeSet:
         positions, rates = vector[: n - first], vector[n - first :]
         slow = np.linalg.norm(rates) <= 1e-7 * np.linalg.norm(positions)
         shapes.append(_normalized(np.concatenate([np.zeros(first), positions]) if slow else rates))
-    pairs = _pairs(values, shapes, is_cyclic)
-    modes = ModeSet(np.array([pair for pair, _ in pairs]), np.array([shape for _, shape in pairs]))
+    # Both eigenvalues of each mode, and its shape.
+    pairs = [((value, value.conjugate()), shapes[k]) for k, value in enumerate(values) if value.imag > 0.0]
+    single = sorted((k for k, value in enumerate(values) if value.imag == 0.0), key=lambda k: abs(values[k]))
+    if is_cyclic:
+        slowest = single.pop(0)
+        pairs.append(((values[slowest], 0j), shapes[slowest]))
+    while single:
+        last = single.pop()
+        partner = max(single, key=lambda k: float(_assurance(shapes[last][None], shapes[k][None])[0, 0]))
+        single.remove(partner)
+        pairs.append(((values[last], values[partner]), shapes[partner]))
+    modes = ModeSet(np.array([pair for pair, _ in pairs], dtype=complex), np.array([shape for _, shape in pairs]))
     order = np.argsort(np.nan_to_num(modes.undamped_frequencies), kind="stable")
     return ModeSet(modes.eigenvalues[order], modes.shapes[order])
 
@@ -193,23 +203,6 @@ def floquet(transition: Array, flow: Array, gradient: Array, speed: float) -> tu
 def _normalized(shape: Complex | Array) -> Complex:
     largest = shape[int(np.argmax(np.abs(shape)))]
     return np.asarray(shape / largest if largest != 0.0 else shape, dtype=complex)
-
-
-def _pairs(
-    values: Complex, shapes: Sequence[Complex], is_cyclic: bool
-) -> list[tuple[tuple[complex, complex], Complex]]:
-    """Both eigenvalues of each mode, and its shape."""
-    pairs = [((value, value.conjugate()), shapes[k]) for k, value in enumerate(values) if value.imag > 0.0]
-    single = sorted((k for k, value in enumerate(values) if value.imag == 0.0), key=lambda k: abs(values[k]))
-    if is_cyclic:
-        slowest = single.pop(0)
-        pairs.append(((values[slowest], 0j), shapes[slowest]))
-    while single:
-        last = single.pop()
-        partner = max(single, key=lambda k: float(_assurance(shapes[last][None], shapes[k][None])[0, 0]))
-        single.remove(partner)
-        pairs.append(((values[last], values[partner]), shapes[partner]))
-    return [((complex(a), complex(b)), shape) for (a, b), shape in pairs]
 
 
 def _assurance(first: Complex, second: Complex) -> Array:

@@ -64,8 +64,8 @@ EXPLAINED = {
         "a tolerance in matching times: any between round-off and the distance of two rows does as well"
     ),
     r"time_table\.values_before .*1e-12 scaled": "keeps rounding from passing a jump: any size near it does",
-    r"judgement\._inaccurate .*right side of OK_ERROR": "of angles within the limit 2e-9 rad, beside 0.01",
-    r"judgement\._inaccurate .*_GROWN ": "an order of magnitude, for a message",
+    r"judgement\._status .*right side of OK_ERROR": "of angles within the limit 2e-9 rad, beside 0.01",
+    r"judgement\._status .*_GROWN ": "an order of magnitude, for a message",
     r"checks\._MOST_INTERVALS ": "how many peaks are looked at: their number decides how many a run may have",
     r"schemes\.scheme .*(_NEWTON_SHARE .* scaled|1e-10 -> |40 -> |2\.0 -> )": (
         "where Newton's method stops, below what is kept, and when it begins anew"
