@@ -2,7 +2,7 @@
 
     python tests/support/cost_scaling.py [METHOD...]
 
-Each method runs at one setting; sizes after one that took longer than BUDGET_S are left out.
+Each method runs at its default settings; sizes after one that took longer than BUDGET_S are left out.
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from rotor_mbs.methods.catalogue import method_names
 from rotor_mbs.methods.solve import solve
 from rotor_mbs.scenario.catalogue import find_scenes
 from rotor_mbs.scenario.scene import Scene
@@ -19,19 +20,6 @@ from rotor_mbs.scenario.scene import Scene
 BUDGET_S = 30.0
 BLADES = (1, 2, 3, 6, 12, 24, 48, 96)
 DURATIONS = (1.0, 10.0, 60.0, 600.0, 3600.0)  # s
-SETTINGS: dict[str, dict[str, object]] = {
-    "lagrange/taylor": {"tolerance": 1e-9},
-    "lagrange/dop853": {"relative_tolerance": 1e-9, "absolute_tolerance": 1e-11},
-    "lagrange/ode45": {"relative_tolerance": 1e-6, "absolute_tolerance": 1e-8},
-    "exudyn_tree/rk44": {"step": 5e-3},
-    "exudyn_tree/rk67": {"step": 1e-2},
-    "exudyn_tree/dopri5": {"relative_tolerance": 0.0, "absolute_tolerance": 1e-7},
-    "exudyn_tree/generalized_alpha": {"step": 1e-2},
-    "exudyn_chain/generalized_alpha": {"step": 1e-2, "node": "rotation_vector"},
-    "exudyn_chain/newmark_index2": {"step": 1e-2, "node": "rotation_vector"},
-    "mujoco/rk4": {"step": 5e-3},
-    "mujoco/implicitfast": {"step": 1e-3},
-}
 
 
 def with_blades(scene: Scene, count: int) -> Scene:
@@ -56,10 +44,10 @@ def main() -> None:
         "blades": {float(count): with_blades(many, count) for count in BLADES},
         "simulated s": {t: replace(one, duration=t, samples=round(10 * t) + 1) for t in DURATIONS},
     }
-    for method in sys.argv[1:] or SETTINGS:
+    for method in sys.argv[1:] or method_names(is_corrected=True):
         for kind, scenes in studies.items():
             for size, scene in scenes.items():
-                seconds = min(solve(method, scene, SETTINGS[method], repeats=3).run_times_s)
+                seconds = min(solve(method, scene, {}, repeats=3).run_times_s)
                 print(f"{method:32s} {size:8g} {kind:12s} {seconds:.3e} s", flush=True)
                 if seconds > BUDGET_S:
                     break

@@ -8,44 +8,16 @@ halves and its root multiplied in or left outside; the last is the sum over the 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 from rotor_mbs.models.printed.literal import ROOT3
 from support.formulas import value
 
 _PHASES = (0.0, 2.0 * math.pi / 3.0, 4.0 * math.pi / 3.0)  # (34)-(36), rad
-_SUM = "(32), row 1, summed over the blades at q2, q2 + 2π/3, q2 + 4π/3"
-
-
-@dataclass(frozen=True)
-class GravityRow:
-    """One way of writing the row, in the paper's notation."""
-
-    formula: str
-
-    @property
-    def is_of_56(self) -> bool:
-        return self.formula != _SUM
-
-    def moment(self, m: float, c: float, d: float, g: float, q2: float, c3: float, c4: float, c5: float) -> float:
-        """N m at the rotor angle q2 (rad) and the cosines of the pitches."""
-        if not self.is_of_56:
-            return _summed_over_blades(m, c, d, g, q2, c3, c4, c5)
-        sines = {"s2": math.sin(q2), "c2": math.cos(q2), "c3": c3, "c4": c4, "c5": c5}
-        return value(self.formula, {"m": m, "c": c, "g": g, "√3": ROOT3, **sines})
-
-
-def _summed_over_blades(m: float, c: float, d: float, g: float, q2: float, *cosines: float) -> float:
-    """First row of (32) summed by (34)-(36), before d cancels out of it: rounded to some 1e-9 N m."""
-    turns = [q2 + phase for phase in _PHASES]
-    moments = [
-        m * g * (c * math.cos(turn) * cosine + d * math.sin(turn)) for turn, cosine in zip(turns, cosines, strict=True)
-    ]
-    return -(moments[0] + moments[1] + moments[2])
-
 
 DEFAULT_ROW = "multiplied_in"  # as `literal.rotor_gravity` has it
-_FORMULAS = {
+SUMMED = "summed_over_blades"  # the one that is not of (56)
+# By name, in the paper's notation.
+GRAVITY_ROWS = {
     "multiplied_in": "-c m g c2 c3 + c m g (c2/2 + √3/2 s2) c4 + c m g (c2/2 - √3/2 s2) c5",
     "factor_outside": "c m g (-c2 c3 + (c2/2 + √3/2 s2) c4 + (c2/2 - √3/2 s2) c5)",
     "reversed": "c m g (c2/2 - √3/2 s2) c5 + c m g (c2/2 + √3/2 s2) c4 - c m g c2 c3",
@@ -57,6 +29,19 @@ _FORMULAS = {
     "gravity_last": "-c m c2 c3 g + c m (c2/2 + √3/2 s2) c4 g + c m (c2/2 - √3/2 s2) c5 g",
     "mass_first": "-m g c c2 c3 + m g c (c2/2 + √3/2 s2) c4 + m g c (c2/2 - √3/2 s2) c5",
     "gravity_first": "-g m c c2 c3 + g m c (c2/2 + √3/2 s2) c4 + g m c (c2/2 - √3/2 s2) c5",
-    "summed_over_blades": _SUM,
+    SUMMED: "(32), row 1, summed over the blades at q2, q2 + 2π/3, q2 + 4π/3",
 }
-GRAVITY_ROWS = {name: GravityRow(formula) for name, formula in _FORMULAS.items()}
+
+
+def moment(row: str, m: float, c: float, d: float, g: float, q2: float, c3: float, c4: float, c5: float) -> float:
+    """N m at the rotor angle q2 (rad) and the cosines of the pitches."""
+    if row != SUMMED:
+        sines = {"s2": math.sin(q2), "c2": math.cos(q2), "c3": c3, "c4": c4, "c5": c5}
+        return value(GRAVITY_ROWS[row], {"m": m, "c": c, "g": g, "√3": ROOT3, **sines})
+    # First row of (32) summed by (34)-(36), before d cancels out of it: rounded to some 1e-9 N m.
+    turns = [q2 + phase for phase in _PHASES]
+    moments = [
+        m * g * (c * math.cos(turn) * cosine + d * math.sin(turn))
+        for turn, cosine in zip(turns, (c3, c4, c5), strict=True)
+    ]
+    return -(moments[0] + moments[1] + moments[2])
