@@ -392,7 +392,6 @@ def floquet_sentence(table: FloquetTable) -> str:
 # By name: values, and what they are.
 Datasets: TypeAlias = Mapping[str, tuple[NDArray[Any], Column]]
 _SPEED = Column(("speed",), "rad/s", "rotor speed")
-_LARGEST = "largest modulus of a multiplier, without those that are always 1"
 
 
 def _linear_datasets(linear: LinearModes) -> Datasets:
@@ -426,34 +425,6 @@ def _linear_datasets(linear: LinearModes) -> Datasets:
     }
 
 
-def _floquet_datasets(table: FloquetTable) -> Datasets:
-    at, each = partial(Column, ("speed",)), partial(Column, ("speed", "multiplier"))
-    count = Column(("multiplier",), "1", "number of the multiplier, the largest first")
-    return {
-        "speed": (table.speeds, _SPEED),
-        "multiplier": (np.arange(table.multipliers.shape[1]), count),
-        "multiplier_real": (table.multipliers.real, each("1", "Floquet multiplier, real part")),
-        "multiplier_imag": (table.multipliers.imag, each("1", "Floquet multiplier, imaginary part")),
-        "largest_multiplier": (table.largest, at("1", "largest modulus, without multipliers that are always 1")),
-        "growth_rate": (table.growth_rates, at("1/s", "growth rate that follows from the largest multiplier")),
-        "stable": (table.stable, at("1", "1: no multiplier above 1, 0: a multiplier above 1, -1: unknown")),
-        "product_error": (
-            table.product_error, at("1", "logarithm of the product of the multipliers minus the integrated trace")
-        ),
-        "torque": (table.torque, at("N m", "torque on the rotor that maintains its mean speed")),
-        "mismatch": (table.mismatch, at("rad", "error of periodicity after a revolution")),
-    }  # fmt: skip
-
-
-def _chart_datasets(chart: StabilityChart) -> Datasets:
-    stiffness = Column(("bearing_stiffness",), "N m/rad", "stiffness of every pitch bearing")
-    return {
-        "bearing_stiffness": (chart.stiffnesses, stiffness),
-        "speed": (chart.speeds, _SPEED),
-        "largest_multiplier": (chart.largest, Column(("bearing_stiffness", "speed"), "1", _LARGEST)),
-    }
-
-
 def to_records(modes: SceneModes) -> list[Record]:
     """The records of a file of modes."""
     common = {name: getattr(modes, name) for name in ("scene_hash", "title", "blades", "gravity")}
@@ -461,10 +432,34 @@ def to_records(modes: SceneModes) -> list[Record]:
     linear = [*modes.rest.values(), *modes.rotation.values()]
     records = [_linear_record(modes.scene, source, common) for source in linear]
     if modes.floquet is not None:
-        facts = {**common, "messages": list(modes.floquet.messages)}
-        records.append(_record(modes.scene, FLOQUET, facts, _floquet_datasets(modes.floquet)))
+        table = modes.floquet
+        at, each = partial(Column, ("speed",)), partial(Column, ("speed", "multiplier"))
+        count = Column(("multiplier",), "1", "number of the multiplier, the largest first")
+        floquet = {
+            "speed": (table.speeds, _SPEED),
+            "multiplier": (np.arange(table.multipliers.shape[1]), count),
+            "multiplier_real": (table.multipliers.real, each("1", "Floquet multiplier, real part")),
+            "multiplier_imag": (table.multipliers.imag, each("1", "Floquet multiplier, imaginary part")),
+            "largest_multiplier": (table.largest, at("1", "largest modulus, without multipliers that are always 1")),
+            "growth_rate": (table.growth_rates, at("1/s", "growth rate that follows from the largest multiplier")),
+            "stable": (table.stable, at("1", "1: no multiplier above 1, 0: a multiplier above 1, -1: unknown")),
+            "product_error": (
+                table.product_error, at("1", "logarithm of the product of the multipliers minus the integrated trace")
+            ),
+            "torque": (table.torque, at("N m", "torque on the rotor that maintains its mean speed")),
+            "mismatch": (table.mismatch, at("rad", "error of periodicity after a revolution")),
+        }  # fmt: skip
+        facts = {**common, "messages": list(table.messages)}
+        records.append(_record(modes.scene, FLOQUET, facts, floquet))
     if modes.chart is not None:
-        records.append(_record(modes.scene, CHART, common, _chart_datasets(modes.chart)))
+        largest = "largest modulus of a multiplier, without those that are always 1"
+        stiffness = Column(("bearing_stiffness",), "N m/rad", "stiffness of every pitch bearing")
+        chart = {
+            "bearing_stiffness": (modes.chart.stiffnesses, stiffness),
+            "speed": (modes.chart.speeds, _SPEED),
+            "largest_multiplier": (modes.chart.largest, Column(("bearing_stiffness", "speed"), "1", largest)),
+        }
+        records.append(_record(modes.scene, CHART, common, chart))
     return records
 
 

@@ -45,8 +45,8 @@ OUTCOMES = {
 class SuiteRun:
     """A run of the suite: a scene by a method.
 
-    outcome: a key of OUTCOMES. angle_error: rad up to the horizon, None where nothing is compared. time_reached: s, of
-    the last finite sample. step: s, that 1e-6 rad needs, where a ladder found it.
+    outcome: a key of OUTCOMES. angle_error: rad up to the horizon, None where nothing is compared. step: s, that 1e-6
+    rad needs, where a ladder found it.
     """
 
     scene: str
@@ -57,9 +57,7 @@ class SuiteRun:
     false_success: bool
     has_reference: bool
     angle_error: float | None
-    energy_drift: float | None
     run_time_s: float
-    time_reached: float
     step: float | None
 
     @property
@@ -97,7 +95,7 @@ def suite_runs(path: Path) -> list[SuiteRun]:
         for scene in results.scenes.values():
             reference = scene.reference
             for name, run in scene.methods.items():
-                facts, time, ladder = run.attributes, run.array("time"), ladders.get((scene.name, name))
+                facts, ladder = run.attributes, ladders.get((scene.name, name))
                 outcome, message = run.status, str(facts.get("message", ""))
                 if run.status == "ok" and "angle_error_max" not in facts:
                     reason = "the horizon is before the second sample"
@@ -118,9 +116,7 @@ def suite_runs(path: Path) -> list[SuiteRun]:
                         false_success=bool(facts.get("false_success", 0)),
                         has_reference=reference is not None and reference.status == "ok",
                         angle_error=facts.get("angle_error_max"),
-                        energy_drift=facts.get("energy_drift_max"),
                         run_time_s=float(facts["run_time_s"]),
-                        time_reached=float(time[-1]) if len(time) else 0.0,
                         step=None if ladder is None else ladder.attributes.get("step_for_target_s"),
                     )
                 )

@@ -181,6 +181,7 @@ KNOWN = {
     "last singular start": (moving(QUARTER - 4 * math.ulp(1.0)), DONE, None, "singular", True),
     "first regular start": (moving(QUARTER - 5 * math.ulp(1.0)), DONE, None, "ok", False),
     "past the end of the motion": (moving(), DONE, cut(NEAR, 5), "singular", True),
+    "past the end of a motion that ends at its start": (moving(), DONE, cut(NEAR, 1), "singular", True),
     "past the end of a reference that merely stops": (FAR, DONE, cut(FAR, 5), "ok", False),
     # A hundredth of the scale, or a radian, parts a coarse run from one that is another motion.
     "coarse by its energy": (with_drift(moving(), (1.0 - JUST) * 1e-2), DONE, None, "inaccurate", False),
