@@ -346,7 +346,7 @@ def _of_samples(run: StoredRun, bounds: Bounds, scene: Scene, trajectory: Trajec
     if trajectory.tip is not None:
         away = np.linalg.norm(trajectory.tip - kinematics.tip_paths(scene, trajectory.angles), axis=2).max()
         length = max(float(np.linalg.norm(blade.tip)) for blade in scene.blades) or 1.0
-        hint = "the tip point, a phase, or the rotation of a blade"
+        hint = "the tip point, the azimuth or the rotation of a blade"
         yield _of(run, "tip", "tip", float(away) / length, bounds, "of length", hint)
     if trajectory.energy_error is not None:
         own = energy_error(trajectory)

@@ -151,7 +151,7 @@ def _status(scene: Scene, run: Solution, reference: Trajectory | None, metrics: 
             return "timed_out", f"{integration.message}, {reached}"
         reported = integration.message or ("the engine reported success" if integration.success else "no reason given")
         if smallest_rotor_inertia_share(scene, run.trajectory) < _SINGULAR_SHARE:
-            return "singular", f"with all pitches at ±π/2 the rotor has almost no inertia, {reached}; {reported}"
+            return "singular", f"with all pitches at ±π/2 the mass matrix is nearly singular, {reached}; {reported}"
         if integration.success:
             end = f" after {reached.removeprefix('at ')}" if samples else ""
             return "diverged", f"no finite sample{end}; {reported}"
@@ -161,7 +161,7 @@ def _status(scene: Scene, run: Solution, reference: Trajectory | None, metrics: 
 
     # Complete runs of scenes without a solution: from a singular state, or past the time where the solution ends.
     if rotor_inertia_shares(scene, run.trajectory.angles[:1])[0] < _NO_INERTIA:
-        return "singular", "with all pitches at ±π/2 the rotor has no inertia, from the start"
+        return "singular", "with all pitches at ±π/2 the initial mass matrix is singular"
     if (
         reference is not None
         and 0 < len(reference.time) < scene.samples

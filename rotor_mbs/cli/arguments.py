@@ -120,7 +120,7 @@ class _Parser(argparse.ArgumentParser):
         text = "a name (paper/fig05), a folder (paper) or a TOML file"
         self.add_argument("scenes", metavar="SCENE", **{"nargs": "+", "help": text} | options)
 
-    def method(self, help: str = "method, as in rotor-mbs list, or a Python file of methods") -> None:
+    def method(self, help: str = "method (see rotor-mbs list), or a Python file that defines methods") -> None:
         self.add_argument("-m", "--method", action="append", metavar="METHOD", help=f"{help}; may be repeated")
 
     def settings(self) -> None:
@@ -136,7 +136,7 @@ class _Parser(argparse.ArgumentParser):
         self.add_argument(*names, type=folder, metavar="DIR", help=text)
 
     def results(self) -> None:
-        text = "results file (default: results.h5, or else rotor-mbs-out/results.h5)"
+        text = "file written by rotor-mbs (default: results.h5 if it exists, else rotor-mbs-out/results.h5)"
         self.add_argument("file", nargs="?", type=Path, default=default_results(), metavar="FILE", help=text)
 
     def jobs(self) -> None:
@@ -175,7 +175,7 @@ def _parser() -> tuple[_Parser, dict[str, _Parser]]:
     formatter = argparse.RawDescriptionHelpFormatter
     parser = _Parser(
         prog="rotor-mbs",
-        description="Simulate rotors with independent models; compare them with each other and a published paper.",
+        description="Simulate wind-turbine rotors with independent models, and compare these with each other.",
         epilog="start with:\n  rotor-mbs list\n  rotor-mbs show paper/fig11\n  rotor-mbs run paper/fig11\n"
         "rotor-mbs COMMAND --help shows the options of a command and an example.\n"
         "exit status: 0 success; 1 a check failed or a run did not succeed; 2 bad input; 130 interrupted",
@@ -200,7 +200,7 @@ def _parser() -> tuple[_Parser, dict[str, _Parser]]:
         "show", "show the data and methods of a scene, or the settings of a method", "commands:show",
         "paper/fig11", "paper/fig11 --build",
     )  # fmt: skip
-    own.add_argument("scene", metavar="SCENE", help="a scene (paper/fig05), a TOML file, or a method (lagrange/taylor)")
+    own.add_argument("scene", metavar="NAME", help="a scene (paper/fig05), a TOML file, or a method (lagrange/taylor)")
     own.flag("--build", help="also list the items that each model builds")
     own.flag("--json", help="print JSON")
 
@@ -209,7 +209,7 @@ def _parser() -> tuple[_Parser, dict[str, _Parser]]:
 
     own = command(
         "reproduce",
-        "run every scene of the paper with every model and write the report",
+        "run every scene of the paper with the default methods, and write the report",
         "runs:reproduce",
         "",
         "-o out -j 4",
@@ -223,7 +223,7 @@ def _parser() -> tuple[_Parser, dict[str, _Parser]]:
         "my.toml -o my.h5", "paper/fig11 -m lagrange/taylor -m exudyn_tree/rk67 --set step=1e-3",
     )  # fmt: skip
     own.scenes()
-    own.method("method, as in rotor-mbs list, or a Python file of methods (default: selected for each scene)")
+    own.method("method (see rotor-mbs list), or a Python file that defines methods (default: selected for each scene)")
     own.settings()
     own.output(file, "FILE", Path("results.h5"))
     own.jobs()
@@ -239,8 +239,8 @@ def _parser() -> tuple[_Parser, dict[str, _Parser]]:
     text = "mapping file: column, unit, sign and offset of each channel (default: identified by name)"
     own.add_argument("--columns", type=Path, metavar="MAP.toml", help=text)
     text = (
-        "bound in rad on interval defects (the equations of motion integrated from each row to the next, minus the "
-        "next row) and on errors divided by error growth; relative bound on loads and frequencies "
+        "bound (rad) on interval defects (the equations of motion integrated from each row to the next, minus the "
+        "next row) and on errors divided by the error growth; for loads and frequencies a relative bound "
         "(default: %(default)g)"
     )
     own.add_argument("--tolerance", type=POSITIVE, default=1e-6, metavar="X", help=text)
@@ -255,7 +255,7 @@ def _parser() -> tuple[_Parser, dict[str, _Parser]]:
         "paper/fig11", "paper/fig11 my.toml -m lagrange/taylor -m exudyn_tree/rk67 -o bench.h5",
     )  # fmt: skip
     own.scenes()
-    own.method("method, as in rotor-mbs list, or a Python file of methods (default: all)")
+    own.method("method (see rotor-mbs list), or a Python file that defines methods (default: all)")
     own.settings()
     own.output(file, "FILE", Path("bench.h5"))
     text = "timed runs per point (default: %(default)s; at most 5 for runs over 0.5 s)"
@@ -274,19 +274,21 @@ def _parser() -> tuple[_Parser, dict[str, _Parser]]:
         "check", "check the accuracy of stored runs; exit status 1 if a check fails", "commands:check",
         "", "rotor-mbs-out/results.h5 --junit check.xml",
     )  # fmt: skip
-    own.add_argument("file", nargs="?", type=Path, metavar="FILE", help="results file (default: compute a set of runs)")
-    own.method("method, or Python file of methods, for the default set")
+    own.add_argument(
+        "file", nargs="?", type=Path, metavar="FILE", help="file to check (default: compute a set of runs)"
+    )
+    own.method("method, or a Python file that defines methods, to compute without FILE")
     own.add_argument(
         "--bounds", type=Path, metavar="TOML", help="bounds that take precedence over reference/accuracy.toml"
     )
     text = "fail if a scene of FILE has no run with this method; may be repeated"
     own.add_argument("--require", action="append", metavar="METHOD", help=text)
-    text = "also fail if the margin of a check has shrunk, or its run is missing, relative to this earlier results file"
+    text = "also fail if, compared with this earlier file, a margin has shrunk or a run is missing"
     own.add_argument("--against", type=Path, metavar="OLD", help=text)
     text = "with --against: factor by which a margin may shrink (default: %(default)g)"
     own.add_argument("--shrink", type=POSITIVE, default=10.0, metavar="FACTOR", help=text)
-    own.add_argument("--junit", type=file, metavar="XML", help="verdicts as JUnit XML")
-    own.add_argument("--json", type=file, metavar="FILE", help="verdicts as JSON; - for standard output")
+    own.add_argument("--junit", type=file, metavar="XML", help="write the verdicts as JUnit XML")
+    own.add_argument("--json", type=file, metavar="FILE", help="write the verdicts as JSON; - for standard output")
     own.flag("--github", help="write the ten worst failures as annotations and a table as job summary")
     own.flag("-v", "--verbose", help="print verdicts that pass, too")
     own.jobs()
@@ -295,11 +297,9 @@ def _parser() -> tuple[_Parser, dict[str, _Parser]]:
         "test-method", "test a method, your own or a built-in one, and report faults with their most likely causes",
         "commands:test_method", "./mine.py", "lagrange/dop853 --json -",
     )  # fmt: skip
-    own.add_argument(
-        "methods", nargs="+", metavar="METHOD", help="a Python file of methods, or a name from rotor-mbs list"
-    )
-    own.add_argument("--junit", type=file, metavar="XML", help="the checks as JUnit XML")
-    own.add_argument("--json", type=file, metavar="FILE", help="the checks as JSON; - for standard output")
+    own.add_argument("methods", nargs="+", metavar="METHOD", help="a method (see rotor-mbs list), or a Python file")
+    own.add_argument("--junit", type=file, metavar="XML", help="write the checks as JUnit XML")
+    own.add_argument("--json", type=file, metavar="FILE", help="write the checks as JSON; - for standard output")
     own.timeout()
 
     own = command(
@@ -312,10 +312,10 @@ def _parser() -> tuple[_Parser, dict[str, _Parser]]:
     own.flag("--metadata", help="also write Croissant metadata beside FILE, as JSON")
     text = "also write a folder for Hugging Face datasets: a file per split and a dataset card"
     own.add_argument("--datasets", type=Path, metavar="DIR", help=text)
-    own.add_argument("--engine", default="local", metavar="ENGINE", help="local, or dask:tcp://host:port")
+    own.add_argument("--engine", default="local", metavar="ENGINE", help="local (default), or dask:tcp://HOST:PORT")
     own.add_argument("--part", type=part, default=(1, 1), metavar="K/N", help="compute part K of N, for a job array")
-    own.flag("--fresh", help="recompute stored runs")
-    own.flag("--dry-run", help="print run count, estimated time, disk space")
+    own.flag("--fresh", help="recompute all stored runs")
+    own.flag("--dry-run", help="only print run count, estimated time and disk space")
     own.flag("--yes", help="confirm a sweep of more than a million runs")
     own.flag("--json", help="print the summary or the estimate as JSON")
     own.jobs()
@@ -326,7 +326,7 @@ def _parser() -> tuple[_Parser, dict[str, _Parser]]:
         "commands:stability", "", "stiff/bearing-1e8 -o stiff.h5",
     )  # fmt: skip
     own.scenes(nargs="*", help="names of scenes, folders or TOML files (default: stiff extreme)")
-    own.method("method, as in rotor-mbs list, or a Python file of methods (default: all)")
+    own.method("method (see rotor-mbs list), or a Python file that defines methods (default: all)")
     own.settings()
     own.output(file, "FILE", Path("stability.h5"))
     own.pages("--report")
@@ -338,7 +338,7 @@ def _parser() -> tuple[_Parser, dict[str, _Parser]]:
         "commands:modes", "stiff/nrel-5mw --speeds 0:3:31",
     )  # fmt: skip
     own.scenes()
-    own.method("method whose model is compared with the closed form (default: all), or a Python file")
+    own.method("method, or a Python file, whose model is compared with the closed form (default: all)")
     text = "rotor speeds in rad/s, equally spaced, such as 0:3:31 (default: only at rest)"
     own.add_argument("--speeds", type=span, default=(), metavar="FROM:TO:COUNT", help=text)
     text = "bearing stiffnesses in N m/rad, for a stability chart over speed and stiffness"
@@ -363,7 +363,7 @@ def _parser() -> tuple[_Parser, dict[str, _Parser]]:
     )  # fmt: skip
     own.results()
     own.output(folder, "DIR", Path("figures"))
-    own.add_argument("--format", choices=("pdf", "svg", "png"), default="pdf", help="(default: %(default)s)")
+    own.add_argument("--format", choices=("pdf", "svg", "png"), default="pdf", help="format (default: %(default)s)")
     own.add_argument("--figure", action="append", metavar="N", help="only this figure; may be repeated")
 
     own = command(
@@ -384,6 +384,6 @@ def _parser() -> tuple[_Parser, dict[str, _Parser]]:
     own.add_argument("scene", metavar="SCENE", help="a name (paper/fig05) or a TOML file")
     text = "mjcf: MuJoCo model; exudyn: stand-alone Exudyn script; csv: reference trajectory"
     own.add_argument("--to", required=True, choices=EXPORT_FORMATS, metavar="FORMAT", help=text)
-    own.output(file, "FILE", help="output file (default: name of the scene with a suffix)")
+    own.output(file, "FILE", help="output file (default: name of the scene with .xml, .py or .csv)")
 
     return parser, dict(commands.choices)

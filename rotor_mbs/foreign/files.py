@@ -195,11 +195,11 @@ def _read_apart(path: Path, group: str, scene: str) -> tuple[dict[str, NDArray[A
                 env=os.environ | {"PYTHONPATH": folders},
             )  # fmt: skip
         except subprocess.TimeoutExpired:
-            raise InputError(f"{path}: cannot be read: its reader does not end; allowed: {FORMATS}") from None
+            raise InputError(f"{path}: cannot be read within {_LIMIT_S:g} s; allowed: {FORMATS}") from None
         except OSError as exc:
-            raise ResourceError(f"{path}: cannot be read: no process for its reader: {exc}") from exc
+            raise ResourceError(f"{path}: cannot be read: the reading process could not be started: {exc}") from exc
         if ended.returncode not in (0, 1):
-            raise InputError(f"{path}: cannot be read: its reader ended; allowed: {FORMATS}")
+            raise InputError(f"{path}: cannot be read: the reading process died; allowed: {FORMATS}")
         if ended.returncode:
             raise InputError(ended.stderr.strip().splitlines()[-1])
         with np.load(output, allow_pickle=False) as archive:
@@ -294,9 +294,7 @@ def _first_row(source: str, lines: Lines) -> tuple[int, str | None]:
                 nearest = len(fields) - len(others), f"; line {number} has {others[0][:40]!a}"
     if any(_is_number(line, decimal_comma=True) for _, line in lines):
         raise InputError(f"{source}: one column of numbers; allowed: a column of times, and others beside it")
-    raise InputError(
-        f"{source}: no row of numbers in it{nearest[1]}; allowed: columns of numbers under a line of names"
-    )
+    raise InputError(f"{source}: no row of numbers in it{nearest[1]}; allowed: columns of numbers below a header line")
 
 
 def _fields(line: str, divider: str | None) -> list[str]:
@@ -334,7 +332,7 @@ def _numbers(source: str, rows: Lines, divider: str | None) -> NDArray[np.float6
 def _names(source: str, head: Sequence[str], width: int, divider: str | None) -> list[tuple[str, str]]:
     """Name and unit of each column from the last line of the head, or from the last two, where one has the units."""
     if not head:
-        raise InputError(f"{source}: no line of names above the numbers; allowed: one such as: time [s],rotor [rad]")
+        raise InputError(f"{source}: no header line above the numbers; allowed: a line such as: time [s],rotor [rad]")
     last = _words(head[-1], divider, width)
     units = [word.strip("[]() ") for word in last]
     above = _words(head[-2], divider, width) if len(head) > 1 else []

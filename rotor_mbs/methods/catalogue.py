@@ -254,7 +254,8 @@ def able_methods(scene: Scene, names: Iterable[str]) -> tuple[list[str], list[st
             find_method(name).items(scene)
             able.append(name)
         except MethodRefusal as exc:
-            refused.append(f"{scene.name}: skipped {name}: {exc}")
+            reason = str(exc) if str(exc).startswith(name) else f"{name}: {exc}"
+            refused.append(f"{scene.name}: {reason}")
     return able, refused
 
 
@@ -280,7 +281,8 @@ def selected_methods(scenes: Sequence[Scene], names: Sequence[str] = ()) -> tupl
             reasons.append(str(exc))
             continue
         methods[scene.name], left_out = able_methods(scene, chosen)
-        reasons += [f"{scene.name}: {reason}: {', '.join(methods[scene.name])}", *left_out]
+        reasons.append(f"{scene.name}: {reason}: {', '.join(methods[scene.name])}")
+        reasons += [f"{line}; skipped" for line in left_out]
     if refused:
         raise InputError(refused)
     return methods, reasons
@@ -321,7 +323,7 @@ def choose(scene: Scene, defaults: tuple[str, ...]) -> tuple[tuple[str, ...], st
     if swing * scene.duration > _MAX_FIXED_STEP_TURN:
         return (closed_form,), f"long ({swing * scene.duration:.2g} rad of the fastest oscillation): no fixed step"
     others = (name for name in defaults if name != closed_form)
-    return (closed_form, *others), "not stiff, singular or long: the default set, the best method of each model"
+    return (closed_form, *others), "not stiff, nearly singular or long: the default methods, the best of each model"
 
 
 def fastest_rates(scene: Scene) -> tuple[float, float]:

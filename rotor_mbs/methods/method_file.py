@@ -154,7 +154,7 @@ class _Process:
 
     def ask(self, name: str, scene: Scene) -> Any:
         """What the method builds for the scene. Raises MethodRefusal, InputError."""
-        late = f"{name}: builds nothing for {scene.name} within {_LOAD_S:g} s"
+        late = f"{name}: not built for {scene.name} within {_LOAD_S:g} s"
         answer = self._ask((name, scene), late, f"{name}: ended the process that built it for {scene.name}")
         if isinstance(answer, RotorError):
             raise answer

@@ -114,7 +114,7 @@ class Cluster(TaskPool):
             with suppress(Exception):  # the scheduler is gone, which ends the futures, too; or this client is closed
                 if self._client.nthreads():
                     without_since = time.monotonic()
-        error = StoreError(f"engine dask: no workers for {self._patience_s:g} s; what is stored is kept")
+        error = StoreError(f"engine dask: no workers for {self._patience_s:g} s; stored runs are kept")
         for future in list(self._waiting):
             with suppress(Exception):  # one that has just ended
                 future.set_exception(error)

@@ -81,7 +81,7 @@ def _resolved(output: Path) -> Path:
     try:
         return output.resolve() if output.is_symlink() else Path(os.path.abspath(output))  # noqa: PTH100  (links stay)
     except (OSError, RuntimeError) as exc:  # links in a circle, a working folder that is gone
-        reason = getattr(exc, "strerror", None) or "leads to no file"
+        reason = getattr(exc, "strerror", None) or "cannot be resolved to a file"
         raise StoreError(f"{output}: cannot be written: {reason}") from exc
 
 

@@ -537,7 +537,7 @@ class StoredTable:
         if name in self.known:
             return self.known[name]
         if name not in self.computed:
-            raise StoreError(f"{self.path}: does not hold {name}; allowed: a sweep whose outputs have it")
+            raise StoreError(f"{self.path}: has no {name}; allowed: a sweep whose outputs have it")
         stored = self.computed[name]
         if not all(stored.shape):
             return np.empty(stored.shape, stored.kind)

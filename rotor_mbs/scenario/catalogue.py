@@ -79,7 +79,7 @@ def find_scenes(arguments: Sequence[str], known_methods: Sequence[str] = ()) -> 
                 try:
                     real = path.resolve()
                 except (OSError, RuntimeError, ValueError) as error:  # links in a circle, a NUL in the name
-                    wrong = "leads to no file; allowed: a readable TOML file"
+                    wrong = "cannot be resolved to a file; allowed: a readable TOML file"
                     raise InputError(f"{shown_path(path)}: {wrong}") from error
                 files.setdefault(real, (path, _scene_name(path, real)))
         except InputError as error:
@@ -173,5 +173,5 @@ def _scene_name(path: Path, real: Path) -> str:
     if stem in RESERVED_GROUPS or any(name.startswith(stem + "/") for name in _shipped()):
         shown = shown_path(path)
         hint = f"; of a sweep: rotor-mbs sweep {shown}" if stem == "sweep" else ""
-        raise InputError(f"{shown}: {stem} names a group of results; allowed: another file name{hint}")
+        raise InputError(f"{shown}: {stem} is a reserved name in results files; allowed: another file name{hint}")
     return stem

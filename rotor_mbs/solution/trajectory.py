@@ -92,7 +92,7 @@ def shape_fault(scene: Scene, run: Trajectory) -> str:
 
 @dataclass(slots=True)
 class Integration:
-    """Report of the engine on an integration. The status of a run does not depend on it."""
+    """Report of the engine on an integration. A reported success alone does not make a run ok; a failure excludes it."""
 
     success: bool  # whether the engine says that it reached the end
     message: str = ""  # why it did not; "" where it did
@@ -274,7 +274,7 @@ class Solution:
         reached = f"{self.time[-1]:g} s of {self.scene.duration:g} s" if len(self.time) else "no sample"
         rows = {
             "method": self.method,
-            "status": self.status or "not judged",
+            "status": self.status or "not assessed",
             "message": self.message,
             "reached": f"{reached}, {len(self.time)} samples",
             "steps": "" if self.integration.steps is None else str(self.integration.steps),

@@ -153,7 +153,7 @@ def regressions(new: Sequence[Check], old: Sequence[Check], factor: float) -> li
     for check in [*kept, *lost]:
         now = present.get((check.name, check.where))
         if now is None:
-            value, hint = math.nan, "was judged in the earlier file and is not in this one"
+            value, hint = math.nan, "checked in the earlier file, missing in this one"
         else:
             value = math.inf if check.passed else 1.0
             if now.passed and check.passed:

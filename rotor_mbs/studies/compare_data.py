@@ -201,7 +201,7 @@ def compare_with_reference(
         loads = loads.rows(slice(rows))
         own = np.full((rows, len(loads.channels)), np.nan)
         if defects is None:
-            notes.append("loads are not compared: their motion is unknown")
+            notes.append("loads are not compared: the motion is unknown")
             status, message = ("unchecked", notes[-1]) if status == "ok" else (status, message)
         else:
             found = compare_loads(scene, loads, defects, tolerance)
@@ -309,7 +309,7 @@ def _status(
         return "inaccurate", f"energy drift {energy_drift:.1e} of the energy scale"
     if missed := [name for name in missing if name not in data.omitted]:
         listed = ", ".join(f'"{name.replace(" ", "_")}"' for name in missed)
-        return "unchecked", f"no column for {', '.join(missed)}; a mapping with omit = [{listed}] does without"
+        return "unchecked", f"no column for {', '.join(missed)}; allowed: omit = [{listed}] in a mapping file"
     if until < 2:
         return "unchecked", "a single row"
     return "ok", ""

@@ -121,7 +121,7 @@ def compare_loads(scene: Scene, loads: ForeignData, defects: Defects, tolerance:
             wrong.append(j)
         if not worst <= max(tolerance, largest):
             largest, at = worst, f"at t = {time[int(excess.argmax())]:.6g} s, allowed {tolerance:.0e}"
-            message = f"{channel.name}: off by {worst:.1e} of its largest beyond rounding, {at}"
+            message = f"{channel.name}: difference of {worst:.1e} of its largest magnitude beyond rounding, {at}"
     likely = search.causes(wrong) if len(time) >= _FEWEST else []
     return LoadComparison(expected, tuple(errors), message, tuple(likely))
 

@@ -62,7 +62,7 @@ def compare_modes(data: ForeignData, scene: Scene, tolerance: float) -> DataStud
         )
         if not worst <= tolerance:
             at = f"at {data.time[known][int(size.argmax())]:.6g} rad/s, allowed {tolerance:.0e}"
-            messages.append((worst, f"{channel.name}: off by {worst:.1e} of its size beyond rounding, {at}"))
+            messages.append((worst, f"{channel.name}: relative difference of {worst:.1e} beyond rounding, {at}"))
     status, message = ("inaccurate", max(messages)[1]) if messages else ("ok", "")
     if not known.all():
         status = "unchecked" if status == "ok" else status

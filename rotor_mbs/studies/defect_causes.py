@@ -287,8 +287,8 @@ class DefectCauses:
         along = max((_cosine(values[0], flow) for flow in (self._flow(first), motion)), key=abs)
         if len(group) == 1 and abs(along) >= _PARALLEL:
             # The defect is closed form less data: along the motion where the data are behind it.
-            row, clock = ("repeated", "late") if along > 0.0 else ("left out and the others renumbered", "early")
-            return f"a row {row}, or the clock {clock} by a part of an interval, at t = {end:.6g} s"
+            row, clock = ("repeated", "late") if along > 0.0 else ("omitted and the others renumbered", "early")
+            return f"a row {row}, or times {clock} by less than an interval, at t = {end:.6g} s"
         if len(group) == 2 and self._defects.transitions is not None and last == first + 1:
             carried = self._defects.transitions[first + 1] @ (values[0] * self._units) / self._units
             if _cosine(values[1], -carried) >= _PARALLEL:

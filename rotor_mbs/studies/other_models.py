@@ -59,7 +59,7 @@ def other_models(scene: Scene) -> Iterator[tuple[str, Model]]:
         yield text, Model(scene, tuple(azimuths))
     for terms, equations in LEFT_OUT.items():
         yield f"without the {terms}", Model(scene, equations=equations)
-    yield "angles taken as small: sin x = x, cos x = 1", Model(scene, equations=_small_angles)
+    yield "small-angle approximation: sin x = x, cos x = 1", Model(scene, equations=_small_angles)
     # E3 is the power of a term that is zero without E2.
     for names in ("E1", "E2", "E1 and E2", "E2 and E3", "E1 and E2 and E3"):
         errata = Errata(*(name in names for name in ("E1", "E2", "E3")))
@@ -98,11 +98,11 @@ def _scenes(scene: Scene) -> Iterator[tuple[str, Scene]]:
     for text, others in {
         "blade mass on the pitch axis": [replace(b, centre_of_mass=(0.0, 0.0, b.centre_of_mass[2])) for b in blades],
         "blades without inertia, as point masses": [replace(b, inertia=_inertia([0.0] * 6)) for b in blades],
-        "products of inertia with the other sign": [
+        "products of inertia with opposite sign": [
             replace(b, inertia=_inertia([*b.inertia[:3], *(-x for x in b.inertia[3:])])) for b in blades
         ],
-        "the tip in place of the centre of mass": [replace(b, centre_of_mass=b.tip) for b in blades],
-        "inertia about the root taken as about the centre of mass": [_with_steiner(b) for b in blades],
+        "tip used as centre of mass": [replace(b, centre_of_mass=b.tip) for b in blades],
+        "inertia about the root used as inertia about the centre of mass": [_with_steiner(b) for b in blades],
         **{
             f"numbers of blades {i + 1} and {j + 1} exchanged": [blades[{i: j, j: i}.get(k, k)] for k in few]
             for i in few
@@ -145,7 +145,7 @@ def _azimuths(scene: Scene) -> Iterator[tuple[str, Sequence[float]]]:
         yield "all blades at the azimuth of blade 1", (0.0,) * n
         yield "azimuths of the blades in degrees taken as rad", [math.degrees(phase) for phase in right]
     if n > 2:
-        yield "blades numbered the other way round", (right[0], *right[:0:-1])
+        yield "blades numbered in the opposite sense", (right[0], *right[:0:-1])
     for i in range(n if 2 < n <= _MOST_BLADES else 0):
         for other in ((i + 1) % n, (i - 1) % n):
             text = f"blade {i + 1} at an azimuth of {360 * other / n:g} degrees in place of {360 * i / n:g}"

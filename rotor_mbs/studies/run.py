@@ -283,7 +283,7 @@ def _judged(run: Solution, reference: Trajectory | None, end: float) -> tuple[So
         with time_limit(max(end - time.monotonic(), _JUDGING_S)):
             judgement = judge(run.scene, run, reference)
     except OutOfTimeError as exc:
-        return replace(run, status="timed_out", message=f"{exc}, while its samples were judged"), False
+        return replace(run, status="timed_out", message=f"{exc}, while its samples were assessed"), False
     message = judgement.message + next_to_try(run.scene, run.method, run.settings, judgement.status)
     judged = replace(run, status=judgement.status, message=message, metrics=judgement.metrics)
     return judged, judgement.false_success

@@ -30,7 +30,7 @@ TARGET = 1e-6  # rad: what a method must reach on the stiff and light scenes
 # What the map shows of a run: its status, or one of two that say more. Symbol, text; colour is the report's.
 OUTCOMES = {
     "ok": ("✓", "ok"),
-    "energy_alone": ("E", "ok, assessed by its energy only"),
+    "energy_alone": ("E", "ok, without an angle error: no reference, or horizon before the second sample"),
     "smaller_step": ("▾", "ok with a smaller step"),
     "inaccurate": ("≈", "inaccurate: end reached, bound exceeded"),
     "diverged": ("↯", "diverged"),
@@ -103,7 +103,7 @@ def suite_runs(path: Path) -> list[SuiteRun]:
                         reason = "there is no reference"
                     elif len(reference.array("time")) < 2:
                         reason = f"no reference ({reference.attributes['message']})"
-                    outcome, message = "energy_alone", f"assessed by its energy only: {reason}"
+                    outcome, message = "energy_alone", f"no angle error: {reason}"
                 elif run.status != "ok" and ladder is not None and "ok" in ladder.statuses:
                     outcome = "smaller_step"
                 runs.append(

@@ -165,7 +165,7 @@ def _side_by_side(chunk: Chunk, scenes: Sequence[Scene]) -> Rows:
         try:
             judged = _judged_row(chunk, run, run.integration.time_reached)
         except OutOfTimeError as exc:
-            judged = chunk.place.rows_of({"status": "timed_out", "message": f"{exc}, while its samples were judged"})
+            judged = chunk.place.rows_of({"status": "timed_out", "message": f"{exc}, while its samples were assessed"})
             judged |= {name: rows[name][i : i + 1] for name in ("energy_drift_max", *_OF_DEFECTS)}
         for name in ("status", "message", "energy_drift_max", *_OF_DEFECTS):
             rows[name][i] = judged[name][0]

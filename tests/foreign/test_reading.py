@@ -192,7 +192,7 @@ WRONG: dict[str, tuple[Callable[[Path], object], str]] = {
     "nothing": (lambda path: path.touch(), "empty"),
     "names alone": (_write(HEAD), "no row of numbers"),
     "one column": (_write("rotor\n0\n1\n2\n"), "one column of numbers; allowed: a column of times"),
-    "no header": (_write("0,1\n1,2\n2,3\n"), "no line of names"),
+    "no header": (_write("0,1\n1,2\n2,3\n"), "no header line"),
     "2 GB": (_sparse, "2.0 GB; allowed: up to 0.5 GB"),
     "wrong unit": (_write("time [s],rotor [kg]\n0,1\n1,2\n2,3\n"), "'kg'; allowed: rad, deg, turns"),
     "wrong unit of time": (_write("time [rad],rotor [rad]\n0,1\n1,2\n2,3\n"), "'rad'; allowed: s, ms"),
@@ -282,5 +282,5 @@ def test_a_reader_that_ends_its_process_is_a_line(name: str, tmp_path: Path, mon
     FORMATS[name](tmp_path / name, SCENE, TIME, ANGLES, RATES)
     (tmp_path / "h5py.py").write_text("import os\nos.abort()\n")
     monkeypatch.syspath_prepend(tmp_path)
-    with pytest.raises(InputError, match="cannot be read: its reader ended"):
+    with pytest.raises(InputError, match="cannot be read: the reading process died"):
         rm.compare(tmp_path / name, SCENE)

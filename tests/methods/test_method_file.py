@@ -154,7 +154,7 @@ def test_whatever_a_method_does_is_one_line_and_loses_nothing(capfd: pytest.Capt
     ("act", "line"),
     [
         ("os._exit(3)", "bad/bad: ended the process that built it for one (exit code 3)"),
-        ("time.sleep(1e3)", "bad/bad: builds nothing for one within 5 s"),
+        ("time.sleep(1e3)", "bad/bad: not built for one within 5 s"),
         ("print('x' * 10**6); os.write(1, b'x' * 10**6); 1 / 0", "bad.py:6: ZeroDivisionError: division by zero"),
     ],
 )

@@ -101,7 +101,7 @@ def test_a_run_names_every_method_it_took_first_the_one_it_stands_by(
     scene_file.write_text(paper("fig03").text.replace("duration = 10.0", "duration = 0.1"))
     assert main(["run", str(scene_file), "-o", str(tmp_path / "r.h5"), "-j", "1"]) == 0
     told = capsys.readouterr().err.splitlines()[0]
-    assert told.startswith("own: not stiff, singular or long: ")
+    assert told.startswith("own: not stiff, nearly singular or long: ")
     assert told.index("lagrange/") < told.index("exudyn_tree/") < told.index("exudyn_chain/")
 
 

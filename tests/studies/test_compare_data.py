@@ -251,7 +251,7 @@ def test_channels_may_be_missing_and_rates_alone_are_judged() -> None:
     run = rm.run(rm.scene("paper/fig03"), "lagrange/dop853")
     alone = rm.compare({"t": run.time, "pitch_1": run.angles[:, 1]}, run.scene)
     assert (alone.status, len(alone.verdict.channels)) == ("unchecked", 1)
-    assert alone.message == 'no column for rotor; a mapping with omit = ["rotor"] does without'
+    assert alone.message == 'no column for rotor; allowed: omit = ["rotor"] in a mapping file'
     assert "missing angles: rotor" in alone.verdict.notes
     assert rm.compare({"t": run.time, "pitch_1": run.angles[:, 1]}, run.scene, columns={"omit": ["rotor"]}).agrees
     without = {"omit": ["rotor", "pitch_1"]}

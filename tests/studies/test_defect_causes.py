@@ -101,18 +101,18 @@ PATTERNS: dict[str, tuple[Callable[[], Rows], str]] = {
     "an outlier": (wrong, "a single wrong row: row 41, t = 0.4 s"),
     "a row repeated": (
         lambda: taken(*range(31), *range(30, 100)),
-        "a row repeated, or the clock late by a part of an interval, at t = 0.31 s",
+        "a row repeated, or times late by less than an interval, at t = 0.31 s",
     ),
     "a clock that goes on": (
-        lambda: clock(0.004), "a row repeated, or the clock late by a part of an interval, at t = 0.314 s",
+        lambda: clock(0.004), "a row repeated, or times late by less than an interval, at t = 0.314 s",
     ),
     "a row left out": (
         lambda: taken(*range(31), *range(32, 51)),
-        "a row left out and the others renumbered, or the clock early by a part of an interval, at t = 0.31 s",
+        "a row omitted and the others renumbered, or times early by less than an interval, at t = 0.31 s",
     ),
     "a clock that stands": (
         lambda: clock(-0.004),
-        "a row left out and the others renumbered, or the clock early by a part of an interval, at t = 0.306 s",
+        "a row omitted and the others renumbered, or times early by less than an interval, at t = 0.306 s",
     ),
     "a wrong rate": (kicked, "a jump of rates, or a load of one interval, before t = 0.3 s"),
     "a load of an interval": (

@@ -93,7 +93,7 @@ BROKEN = {
     ),
     "a step too few": (
         "for i in range(count)", "for i in range(count - (stop.end == self.scene.duration))",
-        "clock late|row repeated|row left out|its step",
+        "times late|row repeated|row omitted|its step",
     ),
     "angles wrapped": (
         "return Trajectory(self.time[: len(self.states)], *np.split(np.array(self.states), 2, axis=1))",

@@ -97,7 +97,7 @@ PLANTS = {
     "another zero": Plant("rotor: zero off by 1.5708", spoilt=lambda t, q, w: (t, q + QUARTER, w)),
     "a factor": Plant("too large by a factor: rotor by 1.001", spoilt=lambda t, q, w: (t, 1.001 * q, 1.001 * w)),
     "blade order": Plant("columns exchanged: pitch 1 is pitch 3", spoilt=columns(0, 3, 1, 2)),
-    "phase": Plant("blades numbered the other way round", mistakes=Mistakes(phases=(0.0, 2.0 * THIRD, THIRD))),
+    "phase": Plant("blades numbered in the opposite sense", mistakes=Mistakes(phases=(0.0, 2.0 * THIRD, THIRD))),
     "blade 2 a little off": Plant(
         "azimuth of blade 2 off by +0.05 rad", mistakes=Mistakes(phases=(0.0, THIRD + 0.05, 2.0 * THIRD))
     ),

@@ -152,7 +152,7 @@ class ExtrapolatedSolver:
                     state, gained = state[:-1], float(state[-1])
                 self._keep(end, interval, self._consistent(state), self.system.turns(), self._works[-1] + gained)
                 return ""
-        return f"near t = {start:.6g} s the error of {end - start:.3g} s stays above the tolerance"
+        return f"near t = {start:.6g} s the error of an interval of {end - start:.3g} s remains above the tolerance"
 
     def _work(self, interval: Interval) -> float:
         """J, of loads and dampers over the substeps of one column: by the trapezoidal rule, whose error is a power

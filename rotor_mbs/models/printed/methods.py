@@ -121,15 +121,15 @@ class PrintedModel:
         blade, name, count = scene.blades[0], self._name, len(scene.blades)
         x, y, z = blade.centre_of_mass
         refusals = {
-            f"{name} is for 1 or 3 blades, the scene has {count}": not self._errata and count not in (1, 3),
+            f"{name} requires 1 or 3 blades; the scene has {count}": not self._errata and count not in (1, 3),
             f"{name} requires equal blades": any(other != blade for other in scene.blades),
-            f"{name} needs point-mass blades: no inertia about the centre of mass": not blade.is_point_mass,
-            f"{name} needs the centre of mass in the blade's x-z plane: y = 0, not {y:g}": y != 0.0,
-            f"{name} has no hub inertia: it must be 0, not {scene.hub_inertia:g}": scene.hub_inertia != 0.0,
-            f"{name} has no bearing stiffness or damping: they must be 0": (
+            f"{name} requires point-mass blades, without inertia about the centre of mass": not blade.is_point_mass,
+            f"{name} requires the centre of mass in the blade's x-z plane: y = 0, not {y:g}": y != 0.0,
+            f"{name} does not include hub inertia; it must be 0": scene.hub_inertia != 0.0,
+            f"{name} does not include bearing stiffness or damping; both must be 0": (
                 any(scene.bearing_stiffness) or any(scene.bearing_damping)
             ),
-            f"{name} has no shaft damping: it must be 0, not {scene.shaft_damping:g}": scene.shaft_damping != 0.0,
+            f"{name} does not include shaft damping; it must be 0": scene.shaft_damping != 0.0,
         }
         for sentence, refused in refusals.items():
             if refused:

@@ -257,7 +257,7 @@ def engine_tables(results: OpenResults, scenes: Mapping[str, Sequence[Record]]) 
         "zero pitch", "wrong runs reported as success",
     ]  # fmt: skip
     able_head = [
-        "method", "joint damping", "load over time", "loads", "linearization", "engine", "lines of its file",
+        "method", "joint damping", "load over time", "loads", "linearization", "engine", "lines of code",
     ]  # fmt: skip
     return [
         PageTable("Accuracy and cost over all scenes", head, reached),

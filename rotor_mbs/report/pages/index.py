@@ -149,8 +149,8 @@ def scene_table(scenes: Scenes, files: Mapping[str, str], model: str) -> tuple[P
             row.append("" if run is None else number(float(np.abs(run.array("angles")[:, 1:]).max(initial=0.0))))
         rows.append(row)
     head = (
-        "Scene", "Figure", "Compared (s)", *map(method_cell, methods), f"Printed: {VISIBLE:g} rad apart at (s)",
-        "Printed: largest difference (rad)", "Printed: energy gain", "Printed: largest pitch (rad)",
+        "Scene", "Figure", "Compared (s)", *map(method_cell, methods), f"As printed: differs by {VISIBLE:g} rad at (s)",
+        "As printed: largest difference (rad)", "As printed: energy gain", "As printed: largest pitch (rad)",
         f"{model}: largest pitch (rad)",
     )  # fmt: skip
     return PageTable("Largest angle error up to the horizon (rad), by method", head, rows), marks

@@ -17,7 +17,7 @@ from rotor_mbs.solution.trajectory import Array
 from rotor_mbs.studies.stability import OUTCOMES, TARGET, family_table, fastest_to_target
 
 NOT_COMPARED = "horizon before the second sample"
-_FAMILIES = {"needle": "on a needle", "scale": "out of scale"}  # headings that are not the family's name
+_FAMILIES = {"needle": "unstable equilibrium", "scale": "extreme scale"}  # headings that are not the family's name
 
 
 def stability_page(report: Report) -> dict[str, object]:
