@@ -10,7 +10,7 @@ sys.path.insert(0, str(Path(__file__).parent / "_ext"))
 project = "rotor_mbs"
 author = copyright = "The rotor_mbs developers"
 release = version = rotor_mbs.__version__
-extensions = ["sphinx.ext.autodoc", "sphinx.ext.napoleon", "sphinx.ext.mathjax", "myst_nb", "reference", "root_pages"]
+extensions = ["sphinx.ext.autodoc", "sphinx.ext.mathjax", "myst_nb", "docstrings", "reference", "root_pages"]
 exclude_patterns = ["_ext"]
 
 html_theme = "furo"
@@ -29,5 +29,3 @@ nb_merge_streams = True
 default_role = "literal"  # docstrings write `name`
 autodoc_typehints = "none"
 autodoc_member_order = "bysource"
-napoleon_google_docstring = False
-napoleon_use_ivar = True

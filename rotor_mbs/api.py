@@ -118,9 +118,9 @@ def run(
     Parameters
     ----------
     scene : Scene or str
-        A scene from `scene`, `load` or `Scene.replace`, or the name of a shipped scene.
+        A Scene, the name of a shipped scene, or a TOML file.
     method : str or sequence of str
-        "model/integrator", as listed by `rotor-mbs show`, or a Python file that defines methods ("mine.py"), see
+        "model/integrator", as listed by `rotor-mbs list`, or a Python file that defines methods ("mine.py"), see
         docs/your-engine.md. For an empty list, methods are selected by the same rule as in `rotor-mbs run`.
     timeout : float
         Time limit in s for run, reference and assessment of a method. A run that exceeds it has the status "timed_out"
@@ -240,6 +240,7 @@ def sweep(
 
     Parameters
     ----------
+    scene : a Scene, the name of a shipped scene, or a TOML file.
     parameters : for each key of a number in a scene file, such as "bearing.stiffness" or "initial.angles[1]", a list
         of values or a table as in an [[axis]] of a sweep file, such as `{"uniform": [0.0, 1.0]}`.
     output : file of the dataset. A repeated call continues it after an interruption. Default: a temporary file.

@@ -26,6 +26,7 @@ import rotor_mbs
 import rotor_mbs.testing
 from rotor_mbs.cli import arguments, main
 from rotor_mbs.methods.catalogue import methods
+from rotor_mbs.runs.versions import versions
 from rotor_mbs.scenario import catalogue, keys
 from rotor_mbs.scenario.scene import BLADE_KEYS, SCENE_KEYS, new_scene_text
 from rotor_mbs.scenario.sweep import Axis, Range, SweepTable
@@ -33,6 +34,7 @@ from rotor_mbs.solution.quantities import BUILT_IN
 from rotor_mbs.solution.status import STATUSES
 
 ROOT = Path(__file__).parents[2]
+VERSIONED = versions().keys()
 
 
 def page(title: str, *parts: str) -> str:
@@ -90,7 +92,7 @@ def _pages_of_api() -> dict[str, str]:
             first = " ".join((inspect.getdoc(item) or "").split("\n\n")[0].split())
             rows.append([f"[`{name}`](api/{name}.md)", first.split(". ")[0].rstrip(".:").replace("*", r"\*")])
             if inspect.isclass(item):
-                directive = f".. autoclass:: {place}\n   :members:"
+                directive = f".. autoclass:: {place}\n   :members:\n   :show-inheritance:"
             else:
                 directive = f".. autofunction:: {place}"
             pages[f"api/{name}"] = page(f"{name}", fenced(directive, "{eval-rst}"))
@@ -106,16 +108,17 @@ def _object(place: str) -> Any:
 
 
 def _returned(public: set[int]) -> list[type]:
-    """Classes of this package that public functions and properties return."""
+    """Classes of this package that public functions and properties return, and their base classes."""
     found: dict[type, None] = {}
     todo = [_object(f"rotor_mbs.{name}") for name in rotor_mbs.__all__]
     for item in todo:
-        members = [item]
+        members, bases = [item], []
         if inspect.isclass(item):
             members = [member for name, member in vars(item).items() if not name.startswith("_")]
+            bases = [base for base in item.__bases__ if base.__module__.startswith("rotor_mbs.")]
         for member in members:
             function = member.fget if isinstance(member, property) else getattr(member, "func", member)
-            for kind in _classes(function):
+            for kind in [*_classes(function), *bases]:
                 if kind not in found and id(kind) not in public:
                     found[kind] = None
                     todo.append(kind)
@@ -298,9 +301,9 @@ _MEANINGS = {
     "missing": "not computed yet",
     "ok": "defects, energy balance and error up to the horizon within the bounds",
     "inaccurate": "end reached, but one of these bounds is exceeded",
-    "diverged": "end not reached: values grew without limit",
-    "singular": "end not reached, or not reliable: the motion passes a singularity of the mass matrix",
-    "solver_failed": "end not reached: the integrator failed",
+    "diverged": "values that are not finite, although the engine reports success",
+    "singular": "the mass matrix is singular at the start or becomes singular; what follows is not determined",
+    "solver_failed": "end not reached: the engine reports a failure",
     "timed_out": "end not reached: time limit",
     "left_out": "point of a benchmark that was not computed because of the time budget",
     "worker_died": "the worker process died",
@@ -310,21 +313,82 @@ _MEANINGS = {
 _EXAMPLES = {
     "Results": (
         "`run`, `reproduce` and `reference` write one row per run into `/runs`, and the arrays over time into a group "
-        "of the scene's name.",
+        "that has the name of the scene. Both have the same runs: the label in `/runs` is `SCENE/METHOD`, that in the "
+        "scene's group `METHOD`.",
         "run scene.toml -m lagrange/dop853 -m exudyn_chain/extrapolated -o results.h5 -j 1",
     ),
     "Benchmarks": (
-        "`bench` writes a row per point (a method with one setting on a scene) into `/bench`, references into `/runs`.",
+        "`bench` writes a row per point (a method with one setting on a scene) into `/bench`, and the references into "
+        "`/runs` and the groups of the scenes.",
         "bench scene.toml -m lagrange/dop853 --budget 1 --repeats 1 -o bench.h5",
     ),
     "Sweeps": (
-        "One flat table at the root: the run's numbers, the varied parameters, metrics and arrays. Unlike a results "
-        "file it has no references and no errors relative to them, no run times, a horizon only with `error_growth`, "
-        "and no texts per row: scene, methods and versions are attributes, `code` tells rows of other versions apart.",
+        "`sweep` writes one flat table at the root. `run` is a number; each varied parameter is a variable. Compared "
+        "with a results file there is no reference and no error relative to one, there are no run times, "
+        "`error_growth` and `horizon_s` only with `error_growth = true`, and scene, methods and versions are "
+        "attributes instead of columns. `code` distinguishes rows of other versions.",
         "sweep study.toml -o sweep.h5 -j 1",
     ),
-    "Modes": ("A group per scene, model and state.", "modes scene.toml --speeds 0.5:1:2 -o modes.h5 -j 1"),
-    "Comparisons": ("The data and the reference at their times.", "compare data.csv --scene scene.toml -o ."),
+    "Modes": (
+        "`modes` writes a group per scene, model and state (`rest`, `rotation`); Floquet multipliers and the stability "
+        "chart are in groups of `lagrange`. All models have the same variables.",
+        "modes scene.toml --speeds 0.5:1:2 --stiffness 1e3:2e3:2 -o modes.h5 -j 1",
+    ),
+    "Comparisons": (
+        "`compare` writes the data, the reference and their differences at the times of the data. Shown are the "
+        "variables of one channel of each kind.",
+        "compare data.csv --scene scene.toml -o .",
+    ),
+}
+# Of the attributes that are no versions of packages.
+_ATTRIBUTES = {
+    "Conventions": "conventions that the file follows",
+    "format": "rotor_mbs in every file of this program",
+    "format_version": "version of this format",
+    "title": "title",
+    "summary": "content in words",
+    "keywords": "keywords",
+    "platform": "operating system of the process that created the file",
+    "cpu": "processor, number of cores",
+    "created": "time of creation (UTC); not in sweeps, which are reproduced byte by byte",
+    "date_created": "the same, as ACDD names it",
+    "digests": "JSON: SHA-256 of the attributes and of every dataset that is not computed",
+    "figures": "figures of the paper",
+    "blades": "number of blades",
+    "gravity": "m/s^2",
+    "scene_toml": "text of the scene file",
+    "scene_hash": "SHA-256 of the numbers of the scene, in hexadecimal",
+    "NX_class": "for viewers of NeXus files",
+    "signal": "for viewers of NeXus files",
+    "axes": "for viewers of NeXus files",
+    "columns_of_the_reference": "computed datasets without the dimension run: they belong to the reference",
+    "sweep_toml": "text of the sweep file",
+    "base_scene": "name of the scene that is varied",
+    "combine": "grid or zip",
+    "shape": "JSON: number of values of each axis",
+    "seed": "seed of the random draws",
+    "validation_share": "fraction of the runs marked as validation",
+    "test_share": "fraction of the runs marked as test",
+    "settings": "JSON: settings of the methods that are not defaults",
+    "runs_of_all_parts": "number of runs of the whole sweep",
+    "sweep_identity": "SHA-256 of the definition; a file with another one is not continued",
+    "methods": "names of the methods",
+    "runs": "number of runs in this file",
+    "parameter_keys": "keys of the varied parameters",
+    "record": "1: the group is complete when the file is written, without rows",
+    "notes": "results that could not be computed, with the reason",
+    "label": "label of the model",
+    "symmetric": "1 if the modes are named after multiblade coordinates",
+    "mode_labels": "names of the modes",
+    "coordinate_labels": "names of the coordinates",
+    "component_labels": "names of the multiblade coordinates",
+    "messages": "reason for each speed without a result",
+    "source": "name of the file with the data",
+    "status": "ok, inaccurate or unchecked",
+    "message": "reason for a status other than ok",
+    "tolerance": "tolerance of the comparison",
+    "horizon_s": "horizon (s)",
+    "verdict": "JSON: the result of the comparison, as `compare --json` prints it",
 }
 _WRITTEN = {"Comparisons": "comparison.h5"}
 
@@ -335,25 +399,35 @@ def _statuses() -> list[list[object]]:
 
 def _file_format() -> str:
     parts = [
-        "All files are HDF5, readable by netCDF-4, xarray, MATLAB and h5py, without links or compression. Numbers are "
-        "little-endian; every dataset has `units` and `long_name`, and every dimension a dataset of its name (a "
-        "dimension scale). Arrays are contiguous, so that a row lies at a fixed offset. The tables below list the "
-        "content of files that were written when these pages were built.",
-        "A row is complete if its `status` is not -1 and its `crc32` is correct; a file is complete if all rows are. "
-        "All values of a missing row are NaN, -1 or empty text. Arrays over time are NaN after the last sample of a "
-        "run; `samples` is the number of samples. Text that is known when the file is created is of variable length, "
-        "UTF-8. Computed text, such as `message`, is UTF-8 in an array of single characters, padded with zeros; xarray "
-        "reads it as text. The attribute `digests` of a group has SHA-256 digests of everything that is not a row. "
-        "`versions` of a row is a JSON text with the versions that computed it; the attributes of `/` have those that "
-        "created the file. Signs and frames: [Reading results](../data.md).",
-        "`crc32` of row r is the CRC-32 of zlib (`zlib.crc32`), with r as its starting value, over the bytes of the "
-        "row in each computed dataset of `/runs` but `crc32`, then in each computed dataset of its scene's group, in "
-        "the order of creation; of a reference then the whole of its datasets without the dimension `run`. Computed "
-        "datasets are those whose key in `digests` is `attributes of NAME`. In a sweep the starting value is the "
+        "All files are HDF5 and readable as netCDF-4, without links or compression. Numbers are little-endian. Every "
+        "dataset has the attributes `units` and `long_name`, and every dimension a dataset of its name (a dimension "
+        "scale); `characters` is a dimension without values. The tables list the content of files that were written "
+        "when these pages were built; signs, frames and units are explained in [Reading results](../data.md).",
+        "**Rows.** A row is complete if its `status` is not -1 and its `crc32` is correct; a file is complete if all "
+        "rows are. Of a missing row only the columns that are known in advance (`run`, `scene`, `method_name`, "
+        "`settings`, varied parameters) are valid; its other values have no meaning. In a complete row a value that "
+        "does not exist or was not computed is NaN, -1 (integers) or an empty text.",
+        "**Arrays over time** have one entry per sample. `samples` (in a sweep `time_reached`) tells where a run "
+        "ended; later entries are NaN, as is the whole array if the method does not compute it.",
+        "**Text** that is known when the file is created is a string of variable length, UTF-8. Computed text, such as "
+        "`message`, is an array of single characters (run, characters), UTF-8, padded with zeros; xarray reads it as "
+        "text, h5py and MATLAB as [described here](../data.md).",
+        "**Versions.** The column `versions` is a JSON text with the versions of this package, Python, the libraries "
+        "and the code that computed the row; a sweep has the column `code` instead, a CRC-32 of that text's content. "
+        "The attributes of `/` have the versions of the process that created the file.",
+        "**Layout.** Datasets are contiguous, so that a row lies at a fixed offset and is written there when it is "
+        "computed. *Computed* datasets are those that are filled in this way; in `digests` their key is "
+        "`attributes of NAME`, because the digest covers their attributes only.",
+        "**Checksum.** `crc32` of row r is the CRC-32 of zlib (`zlib.crc32`), with r, counted from 0, as its starting "
+        "value, over the bytes of the row in each computed dataset of `/runs` except `crc32`, in the order of "
+        "creation, then in each computed dataset of its scene's group that has the dimension `run`. For a reference "
+        "the computed datasets without the dimension `run` follow as a whole. In a sweep the starting value is the "
         "number `run`.",
         "## Status codes",
         table(["code", "status", "meaning"], [[-1, "missing", _MEANINGS["missing"]], *_statuses()]),
     ]
+    shown: dict[str, list[str]] = {}
+    attributes: set[str] = set()
     with tempfile.TemporaryDirectory() as folder, contextlib.chdir(folder):
         scene = rotor_mbs.scene("check/general").replace(
             duration=0.5, samples=11, outputs=["angles", "rates", "tip", "energy", "loads"]
@@ -364,8 +438,13 @@ def _file_format() -> str:
         for heading, (text, command) in _EXAMPLES.items():
             _call(command)
             name = _WRITTEN.get(heading) or command.partition(" -o ")[2].split()[0]
-            parts += [f"## {heading}", text, fenced(f"rotor-mbs {command}", "sh"), *_contents(Path(name))]
-    text = page("File format", *parts)
+            parts += [
+                f"## {heading}",
+                text,
+                fenced(f"rotor-mbs {command}", "sh"),
+                *_contents(Path(name), shown, attributes),
+            ]
+    text = page("File format", *parts, "## Attributes", _attributes(attributes))
     missing = [quantity.name for quantity in BUILT_IN if quantity.is_over_time and f"| `{quantity.name}` |" not in text]
     if missing:
         raise RuntimeError(f"no file of the examples has {', '.join(missing)}")
@@ -380,30 +459,57 @@ def _call(command: str) -> None:
         raise RuntimeError(f"rotor-mbs {command}: status {status}: {output.getvalue()}")
 
 
-def _contents(path: Path) -> list[str]:
+def _contents(path: Path, shown: dict[str, list[str]], attributes: set[str]) -> list[str]:
+    """The groups of a file. shown: rows of the tables of the page, by their place, which are not repeated; attributes:
+    receives the names of all attributes."""
     parts = []
     with h5py.File(path) as file:
         groups = ["/"]
         file.visititems(lambda name, item: groups.append(f"/{name}") if isinstance(item, h5py.Group) else None)
         for name in groups:
             group = file[name]
-            datasets = [item for item in group.values() if isinstance(item, h5py.Dataset)]
+            datasets = [item for item in group.values() if isinstance(item, h5py.Dataset) and _is_shown(item)]
             if not datasets and name != "/":
                 continue
-            attributes = [[code(key), code(_short(value))] for key, value in group.attrs.items()]
-            parts += [f"### `{name}` of {path.name}", table(["attribute", "as in this file"], attributes)]
             rows = [
                 [
                     code(Path(item.name).name),
                     ", ".join(Path(dimension[0].name).name for dimension in item.dims if len(dimension)) or _own(item),
                     _kind(item),
                     _text(item.attrs.get("units", "")),
-                    _text(item.attrs.get("long_name", "length of texts")) + _flags(item),
+                    _text(item.attrs.get("long_name", "")) + _flags(item),
                 ]
                 for item in datasets
             ]
-            parts += [table(["dataset", "dimensions", "type", "unit", "description"], rows)] if rows else []
+            attributes |= set(group.attrs)
+            content = table(["dataset", "dimensions", "type", "unit", "description"], rows) if rows else ""
+            lines = content.splitlines()
+            if known := next((place for place in shown if rows and set(lines) <= set(shown[place])), ""):
+                if name.startswith("/modes/"):  # another model
+                    continue
+                fewer = [line.split("|")[1].strip() for line in shown[known] if line not in lines]
+                content = f"As {known}{', without ' if fewer else ''}{', '.join(fewer)}."
+            place = f"`{name}` of {path.name}"
+            shown[place] = lines
+            names = [code(name) for name in group.attrs if name not in VERSIONED]
+            names += ["versions of packages"] if len(names) < len(group.attrs) else []
+            parts += [f"### {place}", f"Attributes: {', '.join(names)}.", content]
     return parts
+
+
+def _is_shown(item: Any) -> bool:
+    """Whether a dataset is listed: of the channels of a comparison the first one of each kind, no dimension alone."""
+    name = Path(item.name).name
+    is_channel = item.name.startswith("/comparison/")
+    return name != "characters" and not (is_channel and re.search(r"_[2-9](_|$)|_[yz](_|$)", name))
+
+
+def _attributes(used: set[str]) -> str:
+    """The meaning of every attribute; raises RuntimeError where one has none, or none has it."""
+    names = used - VERSIONED
+    if names != set(_ATTRIBUTES):
+        raise RuntimeError(f"attributes without a meaning, or without a file: {names ^ set(_ATTRIBUTES)}")
+    return table(["attribute", "meaning"], ([code(name), meaning] for name, meaning in _ATTRIBUTES.items()))
 
 
 def _own(item: Any) -> str:
@@ -429,11 +535,6 @@ def _flags(item: Any) -> str:
     if "labels" in item.attrs:
         flags.append(f"names in the attribute `labels`: {', '.join(map(_text, item.attrs['labels']))}")
     return "".join(f"; {flag}" for flag in flags)
-
-
-def _short(value: Any) -> str:
-    text = " ".join(_text(value).split()).replace("`", "'")
-    return text if len(text) <= 80 else text[:77] + "..."
 
 
 def declared_pages() -> dict[str, str]:

@@ -396,14 +396,14 @@ _SPEED = Column(("speed",), "rad/s", "rotor speed")
 
 def _linear_datasets(linear: LinearModes) -> Datasets:
     mode, shape = partial(Column, ("speed", "mode")), linear.multiblade_shapes
-    component = Column(("component",), "1", "rotor and multiblade coordinate, names in the attribute labels")
+    component = Column(("component",), "1", "rotor and multiblade coordinates")
     n, (backward, forward) = np.arange(len(linear.coordinates)), linear.whirl
     entry, part = partial(Column, ("speed", "equation", "coordinate")), partial(Column, ("speed", "mode", "component"))
     root, place = partial(Column, ("speed", "mode", "root")), partial(Column, ("speed", "mode", "coordinate"))
     return {
         "speed": (linear.speeds, _SPEED),
-        "mode": (n, Column(("mode",), "1", "number of the mode, names in the attribute labels")),
-        "coordinate": (n, Column(("coordinate",), "1", "coordinate with inertia, names in the attribute labels")),
+        "mode": (n, Column(("mode",), "1", "number of the mode")),
+        "coordinate": (n, Column(("coordinate",), "1", "coordinate with inertia")),
         "component": (np.arange(shape.shape[2]), component),
         "equation": (n, Column(("equation",), "1", "equation of motion, of the coordinate with the same number")),
         "root": (np.arange(2), Column(("root",), "1", "number of the eigenvalue of a mode, 0 or 1")),
@@ -420,8 +420,8 @@ def _linear_datasets(linear: LinearModes) -> Datasets:
         "shape_imag": (linear.shapes.imag, place("1", "mode shape, imaginary part")),
         "multiblade_shape_real": (shape.real, part("1", "multiblade mode shape, real part")),
         "multiblade_shape_imag": (shape.imag, part("1", "multiblade mode shape, imaginary part")),
-        "stiffness": (linear.stiffness, entry("1/s^2", "stiffness matrix, times the inverse mass matrix")),
-        "damping": (linear.damping, entry("1/s", "damping and gyroscopic matrix, times the inverse mass matrix")),
+        "stiffness": (linear.stiffness, entry("1/s^2", "inverse mass matrix times stiffness matrix")),
+        "damping": (linear.damping, entry("1/s", "inverse mass matrix times damping and gyroscopic matrix")),
     }
 
 

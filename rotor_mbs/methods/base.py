@@ -74,7 +74,7 @@ def tolerance_pair(tolerance: float) -> Mapping[str, float]:
 
 @dataclass(frozen=True, slots=True)
 class BuiltItem:
-    """Item of a model of a scene. `kind` is node, object, marker, load, sensor, equation or term."""
+    """Item of a model: its `kind` (node, object, marker, load, sensor, equation or term), name and details."""
 
     kind: str
     name: str
@@ -108,9 +108,9 @@ class Method:
         cannot represent the scene.
     items : (scene) -> list of BuiltItem, the items of the model; raises MethodRefusal like `build`.
     settings : class of its settings, with units, defaults and ranges.
-    is_corrected : whether it solves the correct equations, so that any status but "ok" is a failure.
+    is_corrected : whether it solves the corrected equations; if not, the accuracy of its runs is not assessed.
     is_default : whether it is in the default selection.
-    erratum : "E1" ...: the only erratum of the printed equations that it has; "" for others.
+    erratum : "E1", "E2" or "E3" if it has this erratum of the printed equations only; else "".
     distributions : names of the packages it needs.
     fallback : name of the method that replaces it if these are not installed; "" for none.
     order : order of convergence; None if it is not fixed.
@@ -124,8 +124,7 @@ class Method:
         model. Raises MethodRefusal for a state about which the model cannot be linearized.
     arrays : (settings) -> names of optional quantities that it stores, such as "constraint_error".
     sources : source files of a method of another package, or its code.
-    load : imports the packages it needs and disables compiled code of earlier processes; called before timings, which
-        exclude both.
+    load : imports the packages it needs, and ignores code compiled by earlier processes; called before a timing.
     """
 
     name: str

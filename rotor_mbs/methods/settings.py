@@ -13,15 +13,24 @@ from rotor_mbs.errors import InputError, nearest
 
 @dataclass(frozen=True)
 class Allowed:
-    """Allowed values of a setting: one of `options`, or a finite number within the limits."""
+    """Allowed values of a setting: one of `options`, or a finite number within the limits.
 
-    unit: str = ""  # SI unit of a number, "" where it has none
-    above: float = -math.inf  # exclusive lower limit
-    at_least: float = -math.inf  # inclusive limits
+    Attributes
+    ----------
+    unit : SI unit of a number; "" for none.
+    above, at_least, at_most : limits of a number: exclusive lower, inclusive lower and inclusive upper one.
+    whole : whether only whole numbers are allowed.
+    options : allowed values of a choice; () for a number.
+    doc : description in one line.
+    """
+
+    unit: str = ""
+    above: float = -math.inf
+    at_least: float = -math.inf
     at_most: float = math.inf
-    whole: bool = False  # whole numbers only
-    options: tuple[object, ...] = ()  # the allowed values of a choice; () for a number
-    doc: str = ""  # one line on what the setting does
+    whole: bool = False
+    options: tuple[object, ...] = ()
+    doc: str = ""
 
     def convert(self, value: object) -> object:
         """Return the value in the form that is stored. Raises ValueError if it is not allowed."""

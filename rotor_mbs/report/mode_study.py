@@ -46,11 +46,12 @@ MAX_GROWTH = 1e3
 def modes(scene: Scene | str, speeds: Sequence[float] = (), stiffnesses: Sequence[float] = ()) -> Modes:
     """Compute natural frequencies, damping ratios and mode shapes of a scene with every model that can be linearized.
 
-    At rest under gravity; over `speeds` in steady rotation without gravity (Campbell diagram); in rotation under
-    gravity, Floquet multipliers. The scene's torque is not included: a drive torque maintains the speed.
+    Modes at rest under gravity, and over `speeds` in steady rotation without gravity (Campbell diagram); Floquet
+    multipliers in rotation under gravity. The scene's torque is not included: a drive torque maintains the speed.
 
     Parameters
     ----------
+    scene : a Scene, the name of a shipped scene, or a TOML file.
     speeds : rotor speeds (rad/s), increasing, at least 0.
     stiffnesses : stiffnesses of all bearings (N m/rad), for the stability chart over speed and stiffness.
 
@@ -99,7 +100,7 @@ class Modes(SceneModes):
         return TextTable(tuple(name.replace("_", " ") for name in rows[0]) if rows else (), cells)
 
     def to_xarray(self, state: str = "rotation") -> Any:
-        """Return the modes of one state, "rotation" or "rest", as an xarray.Dataset with the dimension `solver`."""
+        """Return the modes of one state, "rotation" or "rest", as an xarray.Dataset; dimension `solver`: the models."""
         return linear_dataset(self.rest if state == "rest" else self.rotation, need_xarray())
 
     def save(self, path: str | os.PathLike[str]) -> Path:

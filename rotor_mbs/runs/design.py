@@ -190,7 +190,8 @@ def metric_columns(outputs: Iterable[str]) -> dict[str, Column]:
         name, long_name = quantity.name, quantity.long_name
         if quantity.judgement is not None:
             unit = "1" if quantity.judgement.scale_of else quantity.units
-            extreme = "largest error" if quantity.judgement.with_reference else "maximum"
+            error = "largest relative error" if quantity.judgement.scale_of else "largest error"
+            extreme = error if quantity.judgement.with_reference else "maximum"
             columns[quantity.judgement.metric] = Column(("run",), unit, f"{long_name}: {extreme}")
         if quantity.has_peak:
             columns[f"{name}_max"] = Column(("run",), quantity.units, f"{long_name}: maximum")

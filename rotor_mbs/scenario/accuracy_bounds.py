@@ -30,17 +30,22 @@ _SENTENCE = keys.Kind(keys.read_text, "a sentence")
 
 @dataclass(frozen=True, slots=True)
 class Bound:
-    """Bound of a check: the largest value that passes, in the unit of the check, for methods that match `method`."""
+    """Bound of a check: the largest value that passes, in the unit of the check.
+
+    Attributes
+    ----------
+    check, method : names; * in the method's name matches any text.
+    value, reason : the bound, and why it has this value.
+    fault, known_fault : the value that a known fault causes, and the description of that fault.
+    scenes : shipped scenes to which it applies, patterns separated by |; "*" for any scene.
+    """
 
     check: str = file_key("check", keys.choice(CHECKS))
     method: str = file_key("method", _PATTERN)
     value: float = file_key("value", _BOUND)
     reason: str = file_key("reason", _SENTENCE)
-    # the value that a known fault gives, and which one: what the bound must stay below; a user's bound may leave them
-    # out (infinity, "")
     fault: float = file_key("fault", _BOUND, default=math.inf)
     known_fault: str = file_key("known_fault", _SENTENCE, default="")
-    # the shipped scenes it is for, patterns with | between them; "*" for any scene, a user's own too
     scenes: str = file_key("scenes", _PATTERN, default="*")
 
 

@@ -34,23 +34,34 @@ class Samples(Protocol):
 class QuantityMetric:
     """Metric that is computed from a quantity and stored with the run, and the largest value that passes.
 
-    The metric is the largest magnitude over all samples (if the last dimension is `axis`: of the vectors).
+    The metric is the largest magnitude over all samples (of the vectors, if the last dimension is `axis`).
+
+    Attributes
+    ----------
+    metric : name of the metric.
+    with_reference : whether it is that of the difference from the reference's array, up to the horizon.
+    relative_to : (scene) -> number by which the metric is divided for the check; None for 1.
+    at_own_state : whether it is that of the difference from the array of the closed form at the run's own state, over
+        all samples.
+    scale_of : (scene, samples) -> number by which the metric is divided before it is stored; None for 1.
+    check : name of a check in reference/accuracy.toml that has the bound; "" if `bound` is used.
+    bound : largest value that passes, unless a check has one; None if the metric is not checked.
+    channel, unit : name and unit of the value in verdicts.
+    fault : message for a value that does not pass, with the field {value}.
+    look_at : probable cause of a failure.
     """
 
-    metric: str  # name of the number among the run's metrics
-    with_reference: bool = True  # the size is that of the difference from the reference's array, up to the horizon
-    # from the scene to what the number is divided by before it is judged; None for 1
+    metric: str
+    with_reference: bool = True
     relative_to: Callable[[Scene], float] | None = None
-    # the size is that of the difference from what the closed form has at the run's own state: judged at every sample
     at_own_state: bool = False
-    scale_of: Callable[[Scene, Samples], float] | None = None  # of a run, what the number is divided by; None for 1
-    # name of the check in reference/accuracy.toml, whose bound then counts; "" where the bound is given here
+    scale_of: Callable[[Scene, Samples], float] | None = None
     check: str = ""
-    bound: float | None = None  # largest value that passes where no check has one; None where the number is not judged
-    channel: str = ""  # what the judged number is called in a verdict, and its unit in words
+    bound: float | None = None
+    channel: str = ""
     unit: str = ""
-    fault: str = ""  # sentence for a number that does not pass, with the field {value}
-    look_at: str = ""  # where a failure would come from
+    fault: str = ""
+    look_at: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,6 +77,19 @@ class Plot:
 class Quantity:
     """Output quantity: an array that is computed for a run.
 
+    Attributes
+    ----------
+    name : name of the dataset, and of the attribute of a `Run`.
+    dimensions : names of the axes: "time", then any of "coordinate", "blade" and "axis".
+    units, long_name : as stored.
+    output : entry of a scene's `outputs` that requests it; "" if it is stored whenever the model computes it.
+    producer : (scene, samples) -> array, a formula for all methods; returns None if it lacks input. None if each model
+        computes the quantity from its own state.
+    required : whether every run of a scene that requests it must have it.
+    judgement : how it is checked; None if it is not, or by a rule of its own.
+    plot : how it is plotted; None if it has no plot of its own.
+    has_peak : whether its largest magnitude and the time of that are metrics of a run.
+
     Examples
     --------
     >>> angular_momentum = Quantity(
@@ -76,21 +100,16 @@ class Quantity:
     True
     """
 
-    name: str  # name of the dataset, and of the attribute of a solution
-    # names of its axes, see `SCALES`; the first is `time` but for an integrator's own output points
+    name: str
     dimensions: tuple[str, ...]
-    units: str  # as stored
+    units: str
     long_name: str
-    # the entry of a scene's `outputs` that asks for it; "" where it is stored whenever the model has it
     output: str = ""
-    # from (scene, samples) to the array, where one formula serves all methods; None where each model computes it from
-    # its own state. Returns None where the samples lack what it needs
     producer: Callable[[Scene, Samples], Array | None] | None = None
-    required: bool = True  # whether every run has it whose scene asks for it; else some methods alone have it
-    # how a run's array is judged; None where it is not, or where `metrics` has a rule of its own for it
+    required: bool = True
     judgement: QuantityMetric | None = None
-    plot: Plot | None = None  # how it is drawn; None where it is not drawn by itself
-    has_peak: bool = False  # whether its largest size, and the time of it, are among a run's metrics
+    plot: Plot | None = None
+    has_peak: bool = False
 
     @property
     def is_over_time(self) -> bool:

@@ -92,24 +92,40 @@ def shape_fault(scene: Scene, run: Trajectory) -> str:
 
 @dataclass(slots=True)
 class Integration:
-    """Report of the engine on an integration. A reported success alone does not make a run ok; a failure excludes it."""
+    """Report of the engine on an integration. A reported success is not relied on; a reported failure is.
 
-    success: bool  # whether the engine says that it reached the end
-    message: str = ""  # why it did not; "" where it did
-    time_reached: float = 0.0  # s
-    steps: int | None = None  # how many; None where they are not counted
+    Attributes
+    ----------
+    success, message : whether the engine reports that it reached the end, and the reason if not.
+    time_reached : s.
+    steps, rhs_evaluations : number of steps, and of evaluations of the right-hand side; None if unknown.
+    out_of_time : whether the integration was stopped by its time limit.
+    """
+
+    success: bool
+    message: str = ""
+    time_reached: float = 0.0
+    steps: int | None = None
     rhs_evaluations: int | None = None
-    out_of_time: bool = False  # it was ended by its time limit; what it reached is kept
+    out_of_time: bool = False
 
 
 @dataclass
 class RunBlock:
-    """Several runs, of scenes with the same number of blades and samples and the same outputs."""
+    """Several runs, of scenes with the same number of blades and samples and the same outputs.
 
-    time: Array  # (runs, samples) s
-    quantities: dict[str, Array]  # by name, what the scenes ask for: (runs, samples, ...), NaN after a run broke off
-    integrations: list[Integration]  # the engine's report of each run
-    samples: list[int]  # how many rows of each are finite
+    Attributes
+    ----------
+    time : (runs, samples) s.
+    quantities : requested arrays by name, (runs, samples, ...); NaN after the end of a run.
+    integrations : report of the engine on each run.
+    samples : number of finite samples of each run.
+    """
+
+    time: Array
+    quantities: dict[str, Array]
+    integrations: list[Integration]
+    samples: list[int]
 
     def trajectory(self, i: int) -> Trajectory:
         n = self.samples[i]

@@ -32,6 +32,7 @@ def export(scene: Scene | str, to: str, output: str | os.PathLike[str]) -> list[
 
     Parameters
     ----------
+    scene : a Scene, the name of a shipped scene, or a TOML file.
     to : "mjcf", "exudyn" or "csv" (the reference trajectory, with units).
     output : the file; an earlier one of the same format is replaced.
 
@@ -42,9 +43,9 @@ def export(scene: Scene | str, to: str, output: str | os.PathLike[str]) -> list[
     Raises
     ------
     InputError
-        For an unknown format, or where `output` is another file.
+        For an unknown format, or if `output` exists and is not an earlier file of this format.
     StoreError
-        Where a file cannot be written, or a reference is needed that the scene does not have.
+        If a file cannot be written, or the reference of the scene cannot be computed.
 
     Examples
     --------
