@@ -19,7 +19,6 @@ from rotor_mbs.runs.sweeps import StoredSweep
 from rotor_mbs.runs.table import refuse_changed_layout
 from rotor_mbs.scenario.accuracy_bounds import Bounds
 from rotor_mbs.scenario.catalogue import find_scenes
-from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.studies.reference import changed_arrays
 from rotor_mbs.studies.run import OnProgress, ignore_progress, run_scenes
 from rotor_mbs.studies.stored_references import shipped_files, shipped_reference
@@ -30,24 +29,6 @@ _TIMEOUT_S = 60.0
 _OF_EVERY_RUN = "status"  # the name of a check that each run has one of
 # A value below a few units in the last place of a double is rounding: its change says nothing.
 _ROUNDING = 2.0**-50
-
-
-def default_set(names: Sequence[str] = ()) -> tuple[list[Scene], dict[str, Sequence[str]]]:
-    """The scenes, and the methods by scene name, that are computed where no file is given.
-
-    Every scene of the paper by the fast models, the chain on some; the scenes made for checking by every method; or all
-    by the methods that are named, where they can represent them.
-    """
-    paper, own = find_scenes(["paper"]), find_scenes(["check"])
-    if names:
-        return [*paper, *own], {scene.name: able_methods(scene, names)[0] for scene in (*paper, *own)}
-    corrected = [name for name in method_names(is_corrected=True) if find_method(name).is_installed]
-    methods: dict[str, Sequence[str]] = {
-        scene.name: [name for name in default_methods() if name != _CHAIN or scene.name in _CHAIN_SCENES]
-        for scene in paper
-    }
-    methods |= {scene.name: corrected for scene in own}
-    return [*paper, *own], methods
 
 
 def check_file(path: Path, bounds: Bounds, required: Sequence[str] = ()) -> list[Check]:
@@ -68,12 +49,25 @@ def check_file(path: Path, bounds: Bounds, required: Sequence[str] = ()) -> list
 def check_default_set(
     bounds: Bounds, workers: int, on_progress: OnProgress = ignore_progress, methods: Sequence[str] = ()
 ) -> list[Check]:
-    """Compute the default set, by `methods` where they are named, and check it, and the frozen references that it is
-    judged by."""
+    """Compute the default set, check it, and the frozen references that it is judged by.
+
+    It is every scene of the paper by the fast models, the chain on some; the scenes made for checking by every method;
+    or all by the `methods` that are named, where they can represent them.
+    """
+    paper, own = find_scenes(["paper"]), find_scenes(["check"])
+    corrected = [name for name in method_names(is_corrected=True) if find_method(name).is_installed]
+    asked: dict[str, Sequence[str]] = {}
+    for scene in (*paper, *own):
+        if methods:
+            asked[scene.name] = able_methods(scene, methods)[0]
+        elif scene in own:
+            asked[scene.name] = corrected
+        else:
+            asked[scene.name] = [name for name in default_methods() if name != _CHAIN or scene.name in _CHAIN_SCENES]
     checks = judge_frozen(bounds)
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "check.h5"
-        report = run_scenes(*default_set(methods), path, workers=workers, timeout_s=_TIMEOUT_S, on_progress=on_progress)
+        report = run_scenes([*paper, *own], asked, path, workers=workers, timeout_s=_TIMEOUT_S, on_progress=on_progress)
         checks += [_required(run.label.partition(" ")[0], run.method, run.message) for run in report.not_computed]
         checks += judge_file(path, bounds)
     return checks

@@ -324,8 +324,9 @@ def test_the_motion_ends_where_the_reference_does(status: str, ends: bool, tmp_p
     runs = {REFERENCE: status, METHOD: "singular"}
     made = [Made(FIG11, name, rotor(np.sin), 0.5, attributes={"status": said}) for name, said in runs.items()]
     with open_results(store(tmp_path / "r.h5", made)) as results:
-        found = [check.passed for check in checks.checks_of(results, [], BOUNDS) if check.name == "complete"]
-    assert found[1] is ends
+        found = checks.checks_of(results, [], BOUNDS)
+    assert [check.passed for check in found if check.name == "complete"][1] is ends
+    assert "copied" in {check.name for check in found}  # of two runs
 
 
 @pytest.mark.parametrize(
