@@ -224,16 +224,11 @@ def rounds_to(value: float, item: Published) -> bool:
     return f"{value:.{item.decimals}f}" == f"{item.value:.{item.decimals}f}"
 
 
-class Finding(NamedTuple):
-    """A result with what the equations as printed and the corrected model give; "" where nothing is known."""
+def finding(scenes: Mapping[str, StoredScene], claims: Iterable[Claim]) -> list[tuple[str, str, str]]:
+    """How much of the paper is reproduced, and the energy that its equations gain; empty for other scenes.
 
-    result: str
-    printed: str
-    corrected: str
-
-
-def finding(scenes: Mapping[str, StoredScene], claims: Iterable[Claim]) -> list[Finding]:
-    """How much of the paper is reproduced, and the energy that its equations gain; empty for other scenes."""
+    A row has a result, and what the equations as printed and the corrected model give; "" where nothing is known.
+    """
     claims = list(claims)
     numbers = [claim for claim in claims if claim.published.is_number]
     counts = []
@@ -241,18 +236,18 @@ def finding(scenes: Mapping[str, StoredScene], claims: Iterable[Claim]) -> list[
         pairs = zip(values, numbers, strict=True)
         known = [rounds_to(value, claim.published) for value, claim in pairs if value is not None]
         counts.append(f"{sum(known)} of {len(known)}" if known else "")
-    rows = [Finding("Published numbers reproduced", *counts)]
+    rows = [("Published numbers reproduced", counts[0], counts[1])]
     if claims:
         study = claim_study()
         printed, corrected = (f"{study.count(name, HOLDS)} of {len(study.verdicts)}" for name in study.methods)
-        rows.append(Finding("Published claims that hold", printed, corrected))
+        rows.append(("Published claims that hold", printed, corrected))
     runs = [run for scene in scenes.values() if (run := run_selection.printed_run(scene)) is not None]
     runs = [run for run in runs if "energy_gain_J" in run.attributes]
     rising = [run for run in runs if run.attributes["energy_gain_J"] > ENERGY_RISE * run.attributes["energy_scale_J"]]
     if runs:
         result = f"Scenes with a spurious energy gain of more than {ENERGY_RISE:g} of the energy scale"
-        rows.append(Finding(result, f"{len(rising)} of {len(runs)}", ""))
+        rows.append((result, f"{len(rising)} of {len(runs)}", ""))
     gains = [run.attributes["energy_gain_J"] for run in rising if run.status in GOOD]
     if gains:
-        rows.append(Finding("Largest spurious energy gain of a complete run", f"{1e-6 * max(gains):.3g} MJ", ""))
-    return [row for row in rows if row.printed or row.corrected]
+        rows.append(("Largest spurious energy gain of a complete run", f"{1e-6 * max(gains):.3g} MJ", ""))
+    return [row for row in rows if any(row[1:])]
