@@ -198,7 +198,7 @@ def _keys(declared: Mapping[str, Mapping[str, Any]], prefix: str = "") -> str:
             empty = value is None or (isinstance(value, tuple | dict | list) and not value)
             default = "none" if empty else code(value if not isinstance(value, tuple) else list(value))
         rows.append([code(prefix + key["key"]), key["allowed"], default])
-    return table(["key", "allowed", "default"], rows)
+    return table(["key", "allowed values, meaning", "default"], rows)
 
 
 def _scene_file() -> str:
@@ -265,20 +265,29 @@ def _methods() -> str:
     return page("Methods and their settings", *parts)
 
 
+_BOUND_HEADS = {"value": "bound", "fault": "value with the known fault", "known_fault": "known fault"}
+
+
 def _bounds() -> str:
     entries = tomllib.loads((ROOT / "reference" / "accuracy.toml").read_text(encoding="utf-8"))["bound"]
     names = list(dict.fromkeys(name for entry in entries for name in entry))
     by_check: dict[str, list[dict[str, Any]]] = {}
     for entry in entries:
         by_check.setdefault(entry["check"], []).append(entry)
-    parts = ["From `reference/accuracy.toml`; `*` matches any name. `fault` is the value that the known fault gives."]
+    parts = [
+        "From `reference/accuracy.toml`. Of the entries that match check, method and scene the first one applies; `*` "
+        "matches any text, `|` separates patterns, and an entry without scenes applies to any scene. Bounds of "
+        "`defect`, "
+        "`defect median`, `error` and `exact` are in rad; the others are relative, or counts. What is compared: "
+        "[check](../check.md)."
+    ]
     for check, own in by_check.items():
         shown = [name for name in names if name != "check" and any(name in entry for entry in own)]
         rows = [
             [code(entry.get(name, "")) if name in ("method", "scenes") else entry.get(name, "") for name in shown]
             for entry in own
         ]
-        parts += [f"## {check}", table([name.replace("_", " ") for name in shown], rows)]
+        parts += [f"## {check}", table([_BOUND_HEADS.get(name, name) for name in shown], rows)]
     return page("Accuracy bounds", *parts)
 
 

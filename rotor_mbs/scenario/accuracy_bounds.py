@@ -34,10 +34,10 @@ class Bound:
 
     Attributes
     ----------
-    check, method : names; * in the method's name matches any text.
+    check, method : names; `*` in the name of a method matches any text.
     value, reason : the bound, and why it has this value.
     fault, known_fault : the value that a known fault causes, and the description of that fault.
-    scenes : shipped scenes to which it applies, patterns separated by |; "*" for any scene.
+    scenes : shipped scenes to which it applies: patterns separated by `|`; `*` for any scene.
     """
 
     check: str = file_key("check", keys.choice(CHECKS))

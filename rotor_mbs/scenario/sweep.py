@@ -76,7 +76,7 @@ _NORMAL = where(
     "the standard deviation is not above 0",
 )
 _SHARE = where(keys.NUMBER, lambda share: 0.0 < share < 1.0, "a number between 0 and 1")
-_SCENE_NAME = Kind(keys.LINE.read, "a shipped scene's name (paper/fig11), or a TOML file beside this one")
+_SCENE_NAME = Kind(keys.LINE.read, "the name of a shipped scene (paper/fig11), or a TOML file beside this one")
 
 
 @dataclass(frozen=True)
@@ -105,9 +105,9 @@ class Axis:
     values: tuple[float, ...] | None = file_key("values", list_of(keys.NUMBER, "a list of numbers", 1), default=None)
     linear: Range | None = file_key("linear", _LINEAR, default=None)
     log: Range | None = file_key("log", _LOG, default=None)
-    uniform: tuple[float, float] | None = file_key("uniform", _RANGE, default=None)
-    normal: tuple[float, float] | None = file_key("normal", _NORMAL, default=None)
-    sobol: tuple[float, float] | None = file_key("sobol", _RANGE, default=None)
+    uniform: tuple[float, float] | None = file_key("uniform", _RANGE, note=": random values", default=None)
+    normal: tuple[float, float] | None = file_key("normal", _NORMAL, note=": random values", default=None)
+    sobol: tuple[float, float] | None = file_key("sobol", _RANGE, note=": Sobol sequence", default=None)
 
     def __post_init__(self) -> None:
         given = [name for name in VARIED if getattr(self, name) is not None]
@@ -218,8 +218,9 @@ def split_rows(count: int, validation: float, test: float, seed: int) -> NDArray
 _METHODS = list_of(keys.LINE, "a list of methods, model/integrator", 1)
 _SETTINGS = keys.dict_of(keys.NUMBER, "a table of settings of the methods, such as tolerance = 1e-15")
 _CHANGE = keys.dict_of(keys.NUMBER, 'a table of scene keys with numbers, such as "blade.mass" = 1e4')
-_DRAWS = keys.whole(1, MAX_COUNT, "a whole number of at least 1, for random axes")
+_DRAWS = keys.whole(1, MAX_COUNT, "a whole number of at least 1: number of random values")
 _AXES = list_of(table_of(Axis), "one or more [[axis]] tables", 1)
+_PICTURES = ": plot in the report, the separation of trajectories, or the growth of pitch angles over two parameters"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -229,19 +230,25 @@ class SweepTable:
     methods: Sequence[str] = file_key("methods", _METHODS, default=("lagrange/taylor",))
     settings: Mapping[str, float] = file_key("settings", _SETTINGS, optional={})
     change: Mapping[str, float] = file_key("change", _CHANGE, optional={})
-    samples: int | None = file_key("samples", _COUNT, default=None)
-    outputs: Sequence[str] | None = file_key("outputs", OUTPUT_NAMES, note="; [] stores metrics only", default=None)
+    samples: int | None = file_key("samples", _COUNT, note="; by default those of the scene", default=None)
+    outputs: Sequence[str] | None = file_key(
+        "outputs", OUTPUT_NAMES, note="; [] stores metrics only; by default those of the scene", default=None
+    )
     precision: str = file_key("precision", keys.choice(("float64", "float32")), default="float64")
     error_growth: bool = file_key(
-        "error_growth", keys.FLAG, note=": error growth and horizon of every run", default=False
+        "error_growth", keys.FLAG, note=": whether error growth and horizon of every run are computed", default=False
     )
-    defects: bool = file_key("defects", keys.FLAG, note=": also for runs with lagrange/taylor", default=False)
-    combine: str = file_key("combine", keys.choice(("grid", "zip")), default="grid")
+    defects: bool = file_key(
+        "defects", keys.FLAG, note=": whether interval defects are computed also for lagrange/taylor", default=False
+    )
+    combine: str = file_key(
+        "combine", keys.choice(("grid", "zip")), note=": every combination, or the i-th values", default="grid"
+    )
     draws: int | None = file_key("draws", _DRAWS, default=None)
     seed: int = file_key("seed", keys.whole(0, 2**63 - 1, "a whole number of at least 0"), default=0)
-    validation: float = file_key("validation", _SHARE, default=0.0)
+    validation: float = file_key("validation", _SHARE, note=": fraction of the runs", default=0.0)
     test: float = file_key("test", _SHARE, note="; validation + test < 1", default=0.0)
-    picture: str | None = file_key("picture", keys.choice(("spread", "map")), default=None)
+    picture: str | None = file_key("picture", keys.choice(("spread", "map")), note=_PICTURES, default=None)
     axis: Sequence[Axis] = file_key("axis", _AXES)
 
     def __post_init__(self) -> None:
