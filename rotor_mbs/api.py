@@ -194,7 +194,6 @@ class Run(Solution):
     Attributes
     ----------
     reference : the reference trajectory; None without a reference.
-    defects : interval defects, see `Defects`.
     plot : `run.plot()` draws the motion; `run.plot.energy()`, `.error()`, `.tips()`, `.loads("shaft_force")`.
     """
 

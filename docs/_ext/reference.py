@@ -92,7 +92,8 @@ def _pages_of_api() -> dict[str, str]:
             first = " ".join((inspect.getdoc(item) or "").split("\n\n")[0].split())
             rows.append([f"[`{name}`](api/{name}.md)", first.split(". ")[0].rstrip(".:").replace("*", r"\*")])
             if inspect.isclass(item):
-                directive = f".. autoclass:: {place}\n   :members:\n   :show-inheritance:"
+                own = any(base.__module__.startswith("rotor_mbs.") for base in item.__bases__)
+                directive = f".. autoclass:: {place}\n   :members:" + "\n   :show-inheritance:" * own
             else:
                 directive = f".. autofunction:: {place}"
             pages[f"api/{name}"] = page(f"{name}", fenced(directive, "{eval-rst}"))

@@ -295,7 +295,7 @@ class StabilityChart:
 
 @dataclass(frozen=True)
 class SceneModes:
-    """The modes of a scene: by source, the closed form first; notes: what could not be done, and why."""
+    """The modes of a scene by model, the closed form first; `notes` has the reason for missing results."""
 
     scene: str
     scene_hash: str
@@ -310,7 +310,7 @@ class SceneModes:
 
     @property
     def disagreement(self) -> float:
-        """Largest relative difference between the frequencies of two sources; 0 where there is one source alone."""
+        """Largest relative difference between the frequencies of two models; 0 for one model."""
         largest = 0.0
         for kind in (self.rest, self.rotation):
             # Modes in the order of their size.
@@ -327,7 +327,7 @@ class SceneModes:
 
     @property
     def closed_form(self) -> list[LinearModes]:
-        """Its modes at rest and over speed, those that there are."""
+        """Modes of the closed form at rest and over speed, as far as they were computed."""
         return [next(iter(kind.values())) for kind in (self.rest, self.rotation) if kind]
 
 
