@@ -414,7 +414,7 @@ def failure_table(curves: Sequence[Record], stored: StoredScene | None = None) -
                 find_method(name).items(stored.scene)
             except MethodRefusal as exc:
                 rows.append([method_cell(name), "", "", "cannot represent the scene", "", str(exc)])
-    head = ["method", "setting", "run time", "status", "engine reported ok", "reason"]
+    head = ["method", "setting", "run time", "status", "engine reported success", "reason"]
     caption = "Failed runs, and settings omitted because of the time budget."
     return PageTable(caption, head, rows)
 
