@@ -17,7 +17,6 @@ from rotor_mbs.errors import InputError
 from rotor_mbs.foreign.channels import ForeignData
 from rotor_mbs.methods.time_limit import OutOfTimeError, stop_in_time, time_limit
 from rotor_mbs.models.lagrange import samples
-from rotor_mbs.models.lagrange.defects import FIT_ROWS, fitted_rates, interval_defects
 from rotor_mbs.models.lagrange.heyoka_adapter import is_available
 from rotor_mbs.models.lagrange.parameters import work_is_integrated
 from rotor_mbs.models.lagrange.reference import TimedReference, reference_at
@@ -28,7 +27,7 @@ from rotor_mbs.scenario.scene import Scene, scene_hash
 from rotor_mbs.solution.defects import FLOOR_SAFETY, Defects
 from rotor_mbs.solution.metrics import horizon, horizon_samples, metrics_of, running_growth
 from rotor_mbs.solution.trajectory import Array, Trajectory
-from rotor_mbs.studies.data_causes import CauseSearch, carried_errors, likely_causes, states_of
+from rotor_mbs.studies.data_causes import CauseSearch, carried_errors, defects_of_data, likely_causes, states_of
 from rotor_mbs.studies.data_loads import compare_loads
 from rotor_mbs.studies.defect_causes import DefectCauses
 
@@ -135,7 +134,7 @@ def compare_with_reference(
         until = max(int(np.searchsorted(at_rows.time, horizon_s, side="right")), 1)
     compared = cut.rows(slice(rows))
     with _limited(ends, time_limit_s):
-        defects, note = _defects(scene, compared, at_rows, until)
+        defects, note = defects_of_data(scene, compared, at_rows, until)
     errors = _channel_errors(scene, compared, at_rows, run, until, defects)
     missing = [label for i, label in enumerate(scene.coordinate_labels) if i not in data.columns]
     notes = [note] if note else []
@@ -176,12 +175,12 @@ def compare_with_reference(
         notes.append(energy_note)
     likely: list[str] = []
     try:
-        with np.errstate(all="ignore"), time_limit(max(ends - monotonic(), 0.0)):  # data may be of any size
+        with time_limit(max(ends - monotonic(), 0.0)):
             causes = DefectCauses(scene, defects, tolerance) if defects is not None and not missing else None
             if status != "ok":
                 whole = replace(data, values=data.values + (cut.values[0] - data.values[0]))  # the turns that `cut` has
                 largest = float((np.abs(compared.values - expected) / carried)[:until].max())
-                search = CauseSearch(scene, whole, exact, tolerance, largest, lambda *found: _defects(scene, *found)[0])
+                search = CauseSearch(scene, whole, exact, tolerance, largest)
                 likely = likely_causes(search, causes)
             elif causes is not None:
                 likely = causes.explanations()
@@ -226,41 +225,6 @@ def _limited(ends: float, time_limit_s: float) -> Iterator[None]:
             stop_in_time()
     except OutOfTimeError:
         raise InputError(f"timeout: no reference after {time_limit_s:g} s; allowed: a longer time limit") from None
-
-
-def _defects(scene: Scene, data: ForeignData, reference: Trajectory, until: int) -> tuple[Defects | None, str]:
-    """The defects of the data, and what a reader must know of them. Angles that the data lack are the reference's, and
-    then only as far as the horizon; rates that they lack are found from the angles."""
-    count = len(scene.initial_angles)
-    states, rounding = states_of(reference).copy(), np.zeros((len(data.time), 2 * count))
-    states[:, data.columns], rounding[:, data.columns] = data.values, data.rounding
-    rows, note = len(data.time), ""
-    lacking = [i for i in scene.moving_coordinates if i not in data.columns]
-    without_rates = [i for i in scene.moving_coordinates if count + i not in data.columns]
-    if lacking:
-        rows = until
-    if rows < 2:
-        return None, ""
-    time, states, rounding = data.time[:rows], states[:rows], rounding[:rows]
-    if without_rates and not lacking:
-        try:
-            with np.errstate(all="ignore"):
-                rates = fitted_rates(scene, time, states[:, :count])
-        except InputError as exc:
-            return None, f"no defects: {exc}"
-        columns = [count + i for i in without_rates]
-        states[:, columns] = rates[:, without_rates]
-        # Of a slope through five rows.
-        rounding[:, columns] = rounding[:, without_rates] / float(np.median(np.diff(time)))
-        names = ", ".join(f"{scene.coordinate_labels[i]} rate" for i in without_rates)
-        note = f"computed from the angles, by fitting the equations of motion to {FIT_ROWS} rows: {names}"
-    if not np.isfinite(states).all():
-        return None, ""
-    with np.errstate(all="ignore"):
-        defects = interval_defects(
-            scene, time, states[:, :count], states[:, count:], rounding, data.time_rounding[:rows]
-        )
-        return defects, note
 
 
 def _status(

@@ -8,15 +8,15 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
 
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 
+from rotor_mbs.errors import InputError
 from rotor_mbs.foreign.channels import ForeignData, channels
-from rotor_mbs.models.lagrange.defects import interval_ends
+from rotor_mbs.models.lagrange.defects import FIT_ROWS, fitted_rates, interval_defects, interval_ends
 from rotor_mbs.models.lagrange.reference import TimedReference
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.defects import Defects
@@ -57,12 +57,41 @@ def states_of(run: Trajectory) -> Array:
     return np.hstack([run.angles, run.rates])
 
 
+def defects_of_data(scene: Scene, data: ForeignData, reference: Trajectory, until: int) -> tuple[Defects | None, str]:
+    """The defects of the data, and what a reader must know of them. Angles that the data lack are the reference's, and
+    then only as far as the horizon; rates that they lack are found from the angles."""
+    count = len(scene.initial_angles)
+    states, rounding = states_of(reference).copy(), np.zeros((len(data.time), 2 * count))
+    states[:, data.columns], rounding[:, data.columns] = data.values, data.rounding
+    lacking = [i for i in scene.moving_coordinates if i not in data.columns]
+    without_rates = [i for i in scene.moving_coordinates if count + i not in data.columns]
+    rows, note = until if lacking else len(data.time), ""
+    if rows < 2:
+        return None, ""
+    time, states, rounding = data.time[:rows], states[:rows], rounding[:rows]
+    if without_rates and not lacking:
+        try:
+            rates = fitted_rates(scene, time, states[:, :count])
+        except InputError as exc:
+            return None, f"no defects: {exc}"
+        columns = [count + i for i in without_rates]
+        states[:, columns] = rates[:, without_rates]
+        # Of a slope through five rows.
+        rounding[:, columns] = rounding[:, without_rates] / float(np.median(np.diff(time)))
+        names = ", ".join(f"{scene.coordinate_labels[i]} rate" for i in without_rates)
+        note = f"computed from the angles, by fitting the equations of motion to {FIT_ROWS} rows: {names}"
+    if not np.isfinite(states).all():
+        return None, ""
+    return interval_defects(
+        scene, time, states[:, :count], states[:, count:], rounding, data.time_rounding[:rows]
+    ), note
+
+
 @dataclass(frozen=True)
 class CauseSearch:
     """Data, all rows, against a scene's reference at the times of the data and at the scene's samples.
 
     worst : the largest error per unit of error growth.
-    find_defects : (data, reference at their rows, how many rows lie up to the horizon) -> defects, where known.
     """
 
     scene: Scene
@@ -70,7 +99,6 @@ class CauseSearch:
     exact: TimedReference
     tolerance: float
     worst: float
-    find_defects: Callable[[ForeignData, Trajectory, int], Defects | None]
 
     def states_at(self, time: Array) -> Array:
         """(n, 2 (1 + blades)) The motion at any increasing times up to the horizon, from the reference's row before."""
@@ -86,11 +114,9 @@ class CauseSearch:
 
     def carried(self, time: Array) -> Array:
         """(n, 2 (1 + blades)) as `carried_errors`, at any times up to the horizon."""
-        return np.stack([np.interp(time, self.exact.trajectory.time, column) for column in self._carried.T], axis=1)
-
-    @cached_property
-    def _carried(self) -> Array:
-        return carried_errors(self.exact.trajectory, self.exact.growth, self.exact.units)
+        run = self.exact.trajectory
+        carried = carried_errors(run, self.exact.growth, self.exact.units)
+        return np.stack([np.interp(time, run.time, column) for column in carried.T], axis=1)
 
     @property
     def fitting(self) -> float:
@@ -107,7 +133,7 @@ class CauseSearch:
         states = np.tile([*self.scene.initial_angles, *self.scene.initial_rates], (len(data.time), 1))
         states[: len(inside.time)] = self.states_at(inside.time)
         reference = Trajectory(data.time, states[:, :count], states[:, count:])
-        defects = self.find_defects(data, reference, len(inside.time))
+        defects, _ = defects_of_data(self.scene, data, reference, len(inside.time))
         return None if defects is None else DefectCauses(self.scene, defects, self.tolerance)
 
     def is_right(self, data: ForeignData) -> bool:
@@ -120,7 +146,10 @@ def likely_causes(search: CauseSearch, defects: DefectCauses | None) -> list[str
     """What fits, in words: mistakes in columns and times; else another model, parameters, or faults at a time; else
     these and a mistake in the columns."""
     first = search.up_to_horizon(search.data)
-    is_elsewhere = not len(first.time) or not _starts_right(search, first)
+    is_elsewhere = True
+    if len(first.time):
+        start = search.states_at(first.time[:1])[0, first.columns]
+        is_elsewhere = not np.abs(first.values[0] - start).max() <= _SAME_START
     is_different = defects is not None and not defects.is_rounding
     if search.worst <= search.tolerance and not is_different and search.data.time[-1] <= 2.0 * search.scene.duration:
         return []
@@ -143,11 +172,6 @@ def likely_causes(search: CauseSearch, defects: DefectCauses | None) -> list[str
     if not found and is_different and defects is not None and is_elsewhere:
         found = defects.explanations() or defects.faults()
     return found
-
-
-def _starts_right(search: CauseSearch, data: ForeignData) -> bool:
-    expected = search.states_at(data.time[:1])[0, data.columns]
-    return bool(np.abs(data.values[0] - expected).max() <= _SAME_START)
 
 
 def _times(search: CauseSearch) -> Iterator[tuple[str, ForeignData]]:
@@ -219,7 +243,8 @@ def _corrected(search: CauseSearch, data: ForeignData, inside: ForeignData) -> I
     own[range(len(columns)), columns] = -1e-3  # of equal ones, its own
     _, chosen = linear_sum_assignment(np.log10(np.clip(errors, 1e-16, 1e16)) + own)
     if errors[range(len(columns)), chosen].max() <= search.fitting and list(chosen) != columns:
-        yield [_exchanged(search.scene, data, list(chosen))], _as_columns(search.scene, data, list(chosen))
+        text, exchanged = _exchanged(search.scene, data, list(chosen))
+        yield [text], exchanged
 
 
 def _factors(search: CauseSearch) -> list[str]:
@@ -261,17 +286,12 @@ def _corrections(kind: str, values: Array, begin: int, start: float) -> Iterator
                 yield ", ".join([*parts, "wrapped, taken as unwrapped"]), factor, unwrapped
 
 
-def _exchanged(scene: Scene, data: ForeignData, chosen: Sequence[int]) -> str:
-    labels = scene.coordinate_labels
-    names = [*labels, *(f"{label} rate" for label in labels)]
-    moved = [(channel.name, names[c]) for channel, c in zip(data.channels, chosen, strict=True)]
-    return "columns exchanged: " + ", ".join(f"{name} is {other}" for name, other in moved if name != other)
-
-
-def _as_columns(scene: Scene, data: ForeignData, chosen: Sequence[int]) -> ForeignData:
-    """The data with their columns taken as those of other channels."""
+def _exchanged(scene: Scene, data: ForeignData, chosen: Sequence[int]) -> tuple[str, ForeignData]:
+    """In words, and the data with their columns taken as those of other channels."""
     known = channels(scene)[1:]
-    return replace(data, channels=tuple(known[c] for c in chosen))
+    others = tuple(known[c] for c in chosen)
+    moved = [f"{own.name} is {other.name}" for own, other in zip(data.channels, others, strict=True) if own != other]
+    return f"columns exchanged: {', '.join(moved)}", replace(data, channels=others)
 
 
 def _scatter(search: CauseSearch, data: ForeignData) -> list[str]:
@@ -331,6 +351,6 @@ def _columns_by_first_row(search: CauseSearch) -> Iterator[tuple[str, ForeignDat
         taken = [0, *order]
         columns = [taken[c % count] + count * (c // count) for c in data.columns]
         if columns != data.columns:
-            corrected = _as_columns(search.scene, data, columns)
+            text, corrected = _exchanged(search.scene, data, columns)
             if starts_right(corrected):
-                yield _exchanged(search.scene, data, columns), corrected
+                yield text, corrected
