@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import itertools
 from collections import Counter
-from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -105,124 +104,99 @@ def compare_loads(scene: Scene, loads: ForeignData, defects: Defects, tolerance:
     time, values, rounding = time[judged], values[judged], rounding[judged]
     matrices = {frame: matrix[judged] for frame, matrix in matrices.items()}
     least = _SMALL * arms * float(largest_force.max(initial=0.0))
-    before = np.abs(values - expected[judged]).max(axis=0, initial=0.0)
-    search = _LoadCauses(scene, known, matrices, loads.channels, time, values, rounding, before, least, tolerance)
+    own = expected[judged]
+    least = _SMALL * arms * float(largest_force.max(initial=0.0))  # (channels,) the smallest scale of an error
+    before = np.abs(values - own).max(axis=0, initial=0.0)
+
+    def scale(j: int, component: Array) -> float:
+        return float(max(np.abs(component).max(initial=0.0), least[j])) or 1.0
+
+    def fits(j: int, factor: float, candidate: Array, *, may_vanish: bool = False) -> bool:
+        """Whether a component is `factor` times another one, which is not next to nothing unless it may be."""
+        left = np.abs(values[:, j] / factor - candidate) - FLOOR_SAFETY * rounding[:, j] / min(abs(factor), 1)
+        allowed = min(min(tolerance, _MOST_LEFT) * scale(j, candidate), _LEFT * before[j])
+        return float(left.max()) <= allowed and (may_vanish or float(np.abs(candidate).max()) > 100.0 * allowed)
+
     errors, wrong = [], []
     message, largest = "" if judged.any() else "no row in which the loads are known", 0.0
     for j, channel in enumerate(loads.channels):
-        own = expected[judged, j]
-        scale, error = search.scale(j, own), np.abs(values[:, j] - own)
-        excess = np.maximum(error - FLOOR_SAFETY * rounding[:, j], 0.0) / scale
-        worst, floor, size = (float(x.max(initial=0.0)) for x in (excess, rounding[:, j] / scale, error))
-        until = agrees_until(time, error / scale)
-        verdict = ChannelErrors(channel.name, channel.unit, size, size, worst, floor, until)
+        size, error = scale(j, own[:, j]), np.abs(values[:, j] - own[:, j])
+        excess = np.maximum(error - FLOOR_SAFETY * rounding[:, j], 0.0) / size
+        worst, floor, most = (float(x.max(initial=0.0)) for x in (excess, rounding[:, j] / size, error))
+        until = agrees_until(time, error / size)
+        verdict = ChannelErrors(channel.name, channel.unit, most, most, worst, floor, until)
         errors.append(replace(verdict, defect_unit="of the largest"))
         if not worst <= tolerance:
             wrong.append(j)
         if not worst <= max(tolerance, largest):
             largest, at = worst, f"at t = {time[int(excess.argmax())]:.6g} s, allowed {tolerance:.0e}"
             message = f"{channel.name}: difference of {worst:.1e} of its largest magnitude beyond rounding, {at}"
-    likely = search.causes(wrong) if len(time) >= _FEWEST else []
-    return LoadComparison(expected, tuple(errors), message, tuple(likely))
+    if len(time) < _FEWEST:
+        return LoadComparison(expected, tuple(errors), message, ())
 
-
-@dataclass(frozen=True)
-class _LoadCauses:
-    """known : the components of the scene's loads. matrices : by frame (n, known) of the closed form. channels, values,
-    rounding : of the data, (n, channels), and what they may differ by; before : (channels,) the largest difference;
-    least : (channels,) the smallest scale of an error."""
-
-    scene: Scene
-    known: list[Channel]
-    matrices: dict[str, Array]
-    channels: tuple[Channel, ...]
-    time: Array
-    values: Array
-    rounding: Array
-    before: Array
-    least: Array
-    tolerance: float
-
-    def scale(self, j: int, values: Array) -> float:
-        return float(max(np.abs(values).max(initial=0.0), self.least[j])) or 1.0
-
-    def fits(self, j: int, factor: float, candidate: Array, *, may_vanish: bool = False) -> bool:
-        """Whether a component is `factor` times another one, which is not next to nothing unless it may be."""
-        scale = self.scale(j, candidate)
-        left = np.abs(self.values[:, j] / factor - candidate) - FLOOR_SAFETY * self.rounding[:, j] / min(abs(factor), 1)
-        allowed = min(min(self.tolerance, _MOST_LEFT) * scale, _LEFT * self.before[j])
-        return float(left.max()) <= allowed and (may_vanish or float(np.abs(candidate).max()) > 100.0 * allowed)
-
-    def causes(self, wrong: list[int]) -> list[str]:
-        """For each wrong component the simplest of: unit, sign, axis, frame, another load, the torque on the rotor in
-        it; for moments that are left another point. Components with one cause are named together."""
-        simplest: dict[int, dict[str, str]] = {}  # by component, then by what is wrong: which column it is
-        groups: dict[tuple[str, str], list[int]] = {}  # what is left, of one load
-        for j in wrong:
-            found = list(self._explanations(j))
-            least = min([cost for cost, _, _ in found], default=0)
-            simplest[j] = {text: other for cost, other, text in found[::-1] if cost == least}
-            if not found and self.channels[j].kind == "moment" and "actuator" not in self.channels[j].name:
-                groups.setdefault((_load(self.channels[j]), self.channels[j].frame), []).append(j)
-        # Of texts that are alike for a component the one that most components have.
-        common = Counter(text for texts in simplest.values() for text in texts)
-        named: dict[str, list[str]] = {}
-        for j, texts in simplest.items():
-            if texts:
-                text = max(reversed(texts), key=lambda text: common[text])
-                named.setdefault(text, []).append(f"{self.channels[j].name}{texts[text]}")
-        for (load, frame), group in groups.items():
-            if text := self._other_point(load, frame, group):
-                named.setdefault(text, []).extend(self.channels[j].name for j in group)
-        exchanged = named.pop("", [])
-        lines = [f"{', '.join(names)}: {text}" for text, names in named.items()]
-        return [*lines, f"columns exchanged: {', '.join(exchanged)}"] if exchanged else lines
-
-    def _explanations(self, j: int) -> Iterator[tuple[int, str, str]]:
-        """(mistakes that it takes, which column it is, what is wrong)."""
-        channel, name = self.channels[j], self.channels[j].name.partition(",")[0]
-        torque = values_before(load_segments(self.scene), self.time)[0]
-        for (frame, matrix), (i, other), factor in itertools.product(
-            self.matrices.items(), enumerate(self.known), _FACTORS
-        ):
+    # For each wrong component the simplest of: unit, sign, axis, frame, another load, the torque on the rotor in it.
+    torque = values_before(load_segments(scene), time)[0]
+    simplest: dict[int, dict[str, str]] = {}  # by component, then by what is wrong: which column it is
+    groups: dict[tuple[str, str], list[int]] = {}  # what is left, of one load
+    for j in wrong:
+        channel, name = loads.channels[j], loads.channels[j].name.partition(",")[0]
+        found: list[tuple[int, str, str]] = []  # mistakes that it takes, what is wrong, which column it is
+        for (frame, matrix), (i, other), factor in itertools.product(matrices.items(), enumerate(known), _FACTORS):
             if other.kind != channel.kind:
                 continue
             parts = [f"in the {_frame_name(other, frame)} frame" if frame != channel.frame else "", *_mistakes(factor)]
-            cost = (_load(other) != _load(channel)) + (other.name != name) + sum(map(bool, parts))
+            parts = [part for part in parts if part]
+            cost = (_load(other) != _load(channel)) + (other.name != name) + len(parts)
             shown = f" is {other.name}" if other.name != name else ""
-            if self.fits(j, factor, matrix[:, i]):
-                yield cost, shown, ", ".join(filter(None, parts))
-            if other.name == "shaft moment y" and self.fits(j, factor, matrix[:, i] + torque):
-                yield cost + 1, shown, ", ".join(["with the torque on the rotor in it", *filter(None, parts)])
-
-    def _other_point(self, load: str, frame: str, group: list[int]) -> str:
-        """About which point a moment is, M - p × F = M + F × p, by least squares over its wrong components; "" where it
-        is about none."""
+            if fits(j, factor, matrix[:, i]):
+                found.append((cost, ", ".join(parts), shown))
+            if other.name == "shaft moment y" and fits(j, factor, matrix[:, i] + torque):
+                found.append((cost + 1, ", ".join(["with the torque on the rotor in it", *parts]), shown))
+        fewest = min(found)[0] if found else 0
+        simplest[j] = {text: shown for cost, text, shown in found[::-1] if cost == fewest}
+        if not found and channel.kind == "moment" and "actuator" not in channel.name:
+            groups.setdefault((_load(channel), channel.frame), []).append(j)
+    # Of texts that are alike for a component the one that most components have.
+    common = Counter(text for texts in simplest.values() for text in texts)
+    named: dict[str, list[str]] = {}
+    for j, texts in simplest.items():
+        if texts:
+            text = max(reversed(texts), key=lambda text: common[text])
+            named.setdefault(text, []).append(f"{loads.channels[j].name}{texts[text]}")
+    # Moments about another point: M - p × F = M + F × p, by least squares over the wrong components.
+    for (load, frame), group in groups.items():
         moment, force = (
-            self.matrices[frame][:, [i for i, channel in enumerate(self.known) if _load(channel) == name]]
+            matrices[frame][:, [i for i, channel in enumerate(known) if _load(channel) == name]]
             for name in (load, load.replace("moment", "force"))
         )
-        axes = ["xyz".index(self.channels[j].name.partition(",")[0][-1]) for j in group]
+        axes = ["xyz".index(loads.channels[j].name.partition(",")[0][-1]) for j in group]
         moment = moment[:, axes]
         matrix = np.cross(force[:, None, :], np.eye(3)[None]).transpose(0, 2, 1)[:, axes]  # (n, axes, 3): F × p
+        is_root = load.startswith("blade root")
         points: list[tuple[str, Array, float]] = []
-        if load.startswith("blade root") and not frame:
-            blade = self.scene.blades[int(load.split()[-1]) - 1]
+        if is_root and not frame:
+            blade = scene.blades[int(load.split()[-1]) - 1]
             for name, place in (("the centre of mass", blade.centre_of_mass), ("the tip", blade.tip)):
                 points += [(name, np.array(place), factor) for factor in _FACTORS]
         for factor in _FACTORS:
-            arms = (self.values[:, group] / factor - moment).ravel()
-            point = np.asarray(np.linalg.lstsq(matrix.reshape(-1, 3), arms, rcond=1e-9)[0], float)
+            difference = (values[:, group] / factor - moment).ravel()
+            point = np.asarray(np.linalg.lstsq(matrix.reshape(-1, 3), difference, rcond=1e-9)[0], float)
             point[np.abs(point) < 1e-9 * np.abs(point).max()] = 0.0
             shown = ", ".join(f"{x:.6g}" for x in point)
-            name = f"the point ({shown}) m of the {_frame_name(self.channels[group[0]], frame)} frame"
+            name = f"the point ({shown}) m of the {_frame_name(loads.channels[group[0]], frame)} frame"
             points.append((name, point, factor))
-        origin = "the root" if load.startswith("blade root") else "the hub centre"
         for name, point, factor in points:
             candidates = moment + matrix @ point
-            if all(self.fits(j, factor, candidates[:, k], may_vanish=True) for k, j in enumerate(group)):
-                return ", ".join(filter(None, (f"about {name} in place of {origin}", *_mistakes(factor))))
-        return ""
+            if all(fits(j, factor, candidates[:, k], may_vanish=True) for k, j in enumerate(group)):
+                origin = "the root" if is_root else "the hub centre"
+                text = ", ".join(filter(None, (f"about {name} in place of {origin}", *_mistakes(factor))))
+                named.setdefault(text, []).extend(loads.channels[j].name for j in group)
+                break
+    exchanged = named.pop("", [])
+    likely = [f"{', '.join(names)}: {text}" for text, names in named.items()]
+    if exchanged:
+        likely.append(f"columns exchanged: {', '.join(exchanged)}")
+    return LoadComparison(expected, tuple(errors), message, tuple(likely))
 
 
 def _load(channel: Channel) -> str:
