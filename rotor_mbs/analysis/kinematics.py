@@ -73,7 +73,11 @@ def exact_rotor_angle(scene: Scene, time: Array) -> tuple[str, Array] | None:
     One blade let go at rest: a pendulum (elliptic functions; Abramowitz & Stegun 22.2). Equal blades in balance:
     gravity cancels, a constant torque gives q0 + Ω0 t + τ t² / (2 I).
     """
-    if not _stays_at_zero_pitch(scene):
+    # Zero pitch is invariant for blades that their own x-z plane mirrors; nothing may damp the rotor.
+    mirrored = all(b.centre_of_mass[1] == 0.0 and b.inertia[3] == 0.0 and b.inertia[5] == 0.0 for b in scene.blades)
+    at_zero = not any(scene.initial_angles[1:]) and not any(scene.initial_rates[1:])
+    driven = any(table for i in range(len(scene.blades)) for table in scene.pitch_load(i))
+    if not mirrored or not at_zero or driven or scene.shaft_damping:
         return None
     if len(scene.blades) == 1:
         return _pendulum(scene, time)
@@ -83,14 +87,6 @@ def exact_rotor_angle(scene: Scene, time: Array) -> tuple[str, Array] | None:
     torque = scene.torque_at(0.0)
     angle = scene.initial_angles[0] + scene.initial_rates[0] * time + torque * time**2 / (2.0 * inertia)
     return ("constant torque" if torque else "uniform rotation" if scene.initial_rates[0] else "rest"), angle
-
-
-def _stays_at_zero_pitch(scene: Scene) -> bool:
-    """Zero pitch is invariant for blades that their own x-z plane mirrors; nothing may damp the rotor."""
-    mirrored = all(b.centre_of_mass[1] == 0.0 and b.inertia[3] == 0.0 and b.inertia[5] == 0.0 for b in scene.blades)
-    at_zero = not any(scene.initial_angles[1:]) and not any(scene.initial_rates[1:])
-    driven = any(table for i in range(len(scene.blades)) for table in scene.pitch_load(i))
-    return mirrored and at_zero and not driven and scene.shaft_damping == 0.0
 
 
 def _about_shaft(blade: Blade) -> float:

@@ -424,13 +424,17 @@ def load_data(
             raise InputError(f"{table.source}: a speed below 0, or one that repeats; allowed: a row for each speed")
     else:
         _refuse_wrong_times(table.source, arrays[0])
+        intervals = np.diff(arrays[0])
+        # Equal intervals are meant as they are written, though the times have few digits.
+        if np.ptp(intervals) <= _EQUAL * float(intervals.mean()):
+            last_digits[0] = np.abs(arrays[0]) * 2.0**-53
     return ForeignData(
         table.source,
         arrays[0],
         np.stack(arrays[1:], axis=1),
         tuple(chosen)[1:],
         np.stack(last_digits[1:], axis=1),
-        last_digits[0] if is_modes else _time_rounding(arrays[0], last_digits[0]),
+        last_digits[0],
         lines,
         tuple(name for name in table.columns if name not in lengths),
         tuple(entry.wrapped for entry in chosen.values())[1:],
@@ -438,14 +442,6 @@ def load_data(
         omitted,
         is_modes,
     )
-
-
-def _time_rounding(time: Array, last_digits: Array) -> Array:
-    """(n,) s: equal intervals are meant as they are written, though the times have few digits."""
-    intervals = np.diff(time)
-    if np.ptp(intervals) <= _EQUAL * float(intervals.mean()):
-        return np.asarray(np.abs(time) * 2.0**-53)
-    return last_digits
 
 
 def half_last_digits(values: Array) -> Array:

@@ -5,9 +5,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from functools import cached_property
 
 import numpy as np
 from scipy.optimize import linear_sum_assignment
@@ -124,32 +122,26 @@ class _ModeCauses:
     def causes(self) -> list[str]:
         """The least that explains all: a wrong unit, of frequencies or speeds, another kind of frequency, or missing
         stiffening; several texts for one table where they are alike."""
-        before = self.errors(self.data.values, self.data.rounding, self._families[1.0][0][1])[0]
+        families = {factor: self.families(factor) for factor in _UNITS}
+        before = self.errors(self.data.values, self.data.rounding, families[1.0][0][1])[0]
         allowed = min(self.tolerance, _MOST_LEFT, _LEFT * float(np.nanmax(before, initial=0.0)))
-        found = [(cost, text) for cost, text, left in self._explanations() if left <= allowed]
-        least = min(found, default=(0, ""))[0]
-        return [text for cost, text in found if cost == least]
-
-    def _explanations(self) -> Iterator[tuple[int, str, float]]:
-        """(mistakes, in words, the largest error that they leave)."""
+        found: list[tuple[int, str]] = []  # mistakes that it takes, in words
         for (speed, of_speeds), (unit, of_frequencies) in itertools.product(_UNITS.items(), _UNITS.items()):
             if speed != 1.0 and not self.data.time.any():
                 continue
             values, rounding = self.data.values * unit, self.data.rounding * unit
             texts = [f"frequencies in {of_frequencies}"] if of_frequencies else []
             texts += [f"speeds in {of_speeds}"] if of_speeds else []
-            for text, frequencies in self._families[speed]:
+            for text, frequencies in families[speed]:
                 parts = [*texts, text] if text else texts
-                if parts:
-                    left = float(np.nanmax(self.errors(values, rounding, frequencies)[0], initial=0.0))
-                    yield len(parts), "; and ".join(parts), left
+                if parts and np.nanmax(self.errors(values, rounding, frequencies)[0], initial=0.0) <= allowed:
+                    found.append((len(parts), "; and ".join(parts)))
             if speed == 1.0:
                 left, text = self._without_stiffening(values, rounding)
-                yield len(texts) + 1, "; and ".join([*texts, text]), left
-
-    @cached_property
-    def _families(self) -> dict[float, list[tuple[str, Array]]]:
-        return {factor: self.families(factor) for factor in _UNITS}
+                if left <= allowed:
+                    found.append((len(texts) + 1, "; and ".join([*texts, text])))
+        least = min(found, default=(0, ""))[0]
+        return [text for cost, text in found if cost == least]
 
     def _without_stiffening(self, values: Array, rounding: Array) -> tuple[float, str]:
         """(what is left, in words) f² = f0² - α Ω², with the scene's f0 and an α of 0 or more, where the scene's own f²

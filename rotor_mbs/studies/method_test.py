@@ -103,9 +103,8 @@ def _arrays(run: Trajectory) -> dict[str, Array]:
 
 def examine(name: str, timeout_s: float = 60.0) -> list[Check]:
     """The checks of a method, each with the most likely reason where it fails. Raises InputError for an unknown one."""
-    method = find_method(name)
     with WorkerPool(1) as pool:
-        return _Examination(method, pool, timeout_s).checks()
+        return _Examination(find_method(name), pool, timeout_s).checks()
 
 
 class _Examination:
