@@ -103,22 +103,19 @@ class DefectCauses:
         """Whether no defect is larger than what rounding explains."""
         return not self.largest
 
-    @property
-    def is_known(self) -> bool:
-        """Whether other models can be tried: not where the motion is too stiff for explicit steps between the rows."""
-        return self._steps is not None
-
     def explanations(self) -> list[str]:
         """Other scenes and equations, else parameters, as many at once as it takes up to three; of those that are alike
-        all. None where the defects follow nothing that was tried."""
-        if not self.is_known:
+        all. None where the defects follow nothing that was tried, or the motion is too stiff for explicit steps between
+        the rows."""
+        if self._steps is None:
             return []
         explained: list[Explanation] = []
         models = itertools.chain(other_models(self._scene), scenes_with_start(self._scene, self._first_row()))
         for text, model in () if self.is_rounding else models:
-            if self._share(self._residual(model)) <= _PERHAPS and self._is_explained(
-                residual := self._residual(model, _FINE)
-            ):
+            if self._share(self._residual(model)) > _PERHAPS:
+                continue
+            residual = self._residual(model, _FINE)
+            if self._left(residual) <= self._allowed:
                 explained.append(Explanation(self._share(residual), text))
         # What has a name of its own is named, unless numbers of the scene explain far more.
         least = min([e.left for e in explained], default=np.inf)
@@ -133,14 +130,11 @@ class DefectCauses:
 
     def scenes(self) -> list[str]:
         """Those of the catalogue that start as the data do, and of which they may be."""
-        if not self.is_known:
+        if self._steps is None:
             return []
-        found = scenes_with_start(self._scene, self._first_row())
-        return [
-            text
-            for text, model in found
-            if self._left(self._residual(model, _FINE)) <= max(self._tolerance, self._allowed)
-        ]
+        allowed = max(self._tolerance, self._allowed)
+        models = scenes_with_start(self._scene, self._first_row())
+        return [text for text, model in models if self._left(self._residual(model, _FINE)) <= allowed]
 
     def _first_row(self) -> Array:
         """(2 (1 + blades),) of the data; of coordinates that are fixed the scene's."""
@@ -204,7 +198,7 @@ class DefectCauses:
                 break
         residual = self._residual(_changed(self._scene, chosen, change), _FINE)
         weighted = residual * self._weights
-        if not (self.is_rounding or self._is_explained(residual)) or not np.isfinite(weighted).all():
+        if not (self.is_rounding or self._left(residual) <= self._allowed) or not np.isfinite(weighted).all():
             return None
         spread = float(np.sqrt((weighted**2).mean()))
         if self.is_rounding:
@@ -213,7 +207,12 @@ class DefectCauses:
         deviation = np.maximum(deviation, _QUICK * np.abs(change))
         if (np.abs(change) < _SIGNIFICANT * deviation).any():
             return None
-        texts = [_off(*item) for item in zip(chosen, change.tolist(), deviation.tolist(), strict=True)]
+        texts = []
+        for parameter, amount, uncertainty in zip(chosen, change.tolist(), deviation.tolist(), strict=True):
+            factor, unit = (1.0, parameter.unit) if parameter.unit else (100.0, "%")
+            texts.append(
+                f"{parameter.key} off by {factor * amount:+.4g} {unit} (uncertainty {factor * uncertainty:.1g})"
+            )
         return Explanation(self._share(residual), " and ".join(texts))
 
     def _residual(self, model: Model, steps: int = 1) -> Array:
@@ -221,18 +220,15 @@ class DefectCauses:
         many times as many as for transition matrices."""
         if model.scene.moving_coordinates != list(self._defects.moving):
             return np.full_like(self._tried, np.inf)
+        assert self._steps is not None
+        intervals = self._begins, self._ends, self._states, steps * self._steps
         try:
-            ends = self._quick_ends(model, steps)
+            ends = quick_ends(model.scene, *intervals, model.accelerations())
         except RotorError:
             return np.full_like(self._tried, np.inf)
         if steps not in self._own_ends:
-            self._own_ends[steps] = self._quick_ends(Model(self._scene), steps)
+            self._own_ends[steps] = quick_ends(self._scene, *intervals)
         return np.asarray(self._tried + (ends - self._own_ends[steps]).T / self._units)
-
-    def _quick_ends(self, model: Model, steps: int) -> Array:
-        assert self._steps is not None
-        count = steps * self._steps
-        return quick_ends(model.scene, self._begins, self._ends, self._states, count, model.accelerations())
 
     def _slope(self, chosen: Sequence[Parameter], at: Sequence[float] | Array, which: int) -> Array:
         """Weighted, by one of the parameters' share, or per rad, where they are changed already."""
@@ -243,9 +239,6 @@ class DefectCauses:
             sides.append(self._residual(_changed(self._scene, chosen, change)))
         with np.errstate(invalid="ignore"):
             return np.asarray((sides[0] - sides[1]) * self._weights / (2.0 * _DIFFERENCE))
-
-    def _is_explained(self, residual: Array) -> bool:
-        return self._left(residual) <= self._allowed
 
     def _left(self, residual: Array) -> float:
         """rad, the largest beyond rounding."""
@@ -264,7 +257,12 @@ class DefectCauses:
         usual = float(np.median(excess[self._judged])) if self._judged.any() else 0.0
         wrong = np.flatnonzero(excess > max(_STANDS_OUT * usual, _FAINT * self.largest))
         # What is wrong everywhere is no fault at a time, though it shows in some places more than in others.
-        if not len(wrong) or len(wrong) > 0.6 * len(excess) or _is_smooth(excess, wrong):
+        if not len(wrong) or len(wrong) > 0.6 * len(excess):
+            return []
+        # Nor is one whose size comes down gradually beside what stands out: a fault at a time has edges.
+        edges = np.concatenate([wrong - 1, wrong + 1])
+        edges = edges[~np.isin(edges, wrong) & (edges >= 0) & (edges < len(excess))]
+        if len(edges) and float(np.median(excess[edges])) > 0.1 * float(np.median(excess[wrong])):
             return []
         groups = np.split(wrong, np.flatnonzero(np.diff(wrong) > _GAP) + 1)
         # A filter, or differences in place of rates, are wrong in all rows, and most at the ends.
@@ -391,18 +389,6 @@ def _changed(scene: Scene, chosen: Sequence[Parameter], change: Array) -> Model:
     return model
 
 
-def _off(parameter: Parameter, change: float, deviation: float) -> str:
-    if parameter.unit:
-        return f"{parameter.key} off by {change:+.4g} {parameter.unit} (uncertainty {deviation:.1g})"
-    return f"{parameter.key} off by {100.0 * change:+.4g} % (uncertainty {100.0 * deviation:.1g})"
-
-
 def _cosine(first: Array, second: Array) -> float:
     size = float(np.linalg.norm(first) * np.linalg.norm(second))
     return float(first @ second) / size if size else 0.0
-
-
-def _is_smooth(size: Array, wrong: NDArray[np.int64]) -> bool:
-    """Whether the sizes come down gradually beside what stands out: a fault at a time has edges."""
-    edges = [i for i in (*(wrong - 1), *(wrong + 1)) if 0 <= i < len(size) and i not in set(wrong.tolist())]
-    return bool(edges) and float(np.median(size[edges])) > 0.1 * float(np.median(size[wrong]))
