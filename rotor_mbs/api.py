@@ -10,7 +10,6 @@ import json
 import os
 import shutil
 import tempfile
-import warnings
 import weakref
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -23,8 +22,8 @@ import numpy as np
 
 from rotor_mbs.analysis.judgement import defects_of
 from rotor_mbs.analysis.run_tables import RUN_HEAD, TextTable, run_row
-from rotor_mbs.errors import InputError, MethodRefusal, PlausibilityWarning, ResourceError, StoreError
-from rotor_mbs.methods.catalogue import REFERENCE, check_names, selected_methods
+from rotor_mbs.errors import InputError, MethodRefusal, ResourceError, StoreError
+from rotor_mbs.methods.catalogue import REFERENCE, check_names, problems_of_file, selected_methods
 from rotor_mbs.methods.method_file import ENDING
 from rotor_mbs.methods.time_limit import checked_seconds
 from rotor_mbs.runs.design import MISSING, RUNS
@@ -33,7 +32,7 @@ from rotor_mbs.runs.read import StoredRun, StoredScene, is_sweep, open_results
 from rotor_mbs.runs.sweeps import StoredSweep, parameter_name
 from rotor_mbs.runs.table import is_of_this_program, table_groups, text_of
 from rotor_mbs.scenario.catalogue import list_scenes, only_scene, scene_of
-from rotor_mbs.scenario.scene import Scene, doubts, load_scene, parse_scene
+from rotor_mbs.scenario.scene import Scene, load_scene, parse_scene
 from rotor_mbs.solution.defects import Defects
 from rotor_mbs.solution.quantities import known_quantities
 from rotor_mbs.solution.status import STATUSES
@@ -84,10 +83,7 @@ def load(path: str | os.PathLike[str]) -> Scene:
     Implausible numbers, such as 30 rad, cause a PlausibilityWarning. Raises InputError with one line per error in
     the file.
     """
-    found = load_scene(Path(path), Path(path).stem)
-    for doubt in doubts(found):
-        warnings.warn(f"{path}: {doubt}", PlausibilityWarning, stacklevel=2)
-    return found
+    return load_scene(Path(path), check=problems_of_file, stacklevel=3)
 
 
 @overload

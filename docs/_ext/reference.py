@@ -29,7 +29,7 @@ from rotor_mbs.methods.catalogue import methods
 from rotor_mbs.runs.versions import versions
 from rotor_mbs.scenario import catalogue, keys
 from rotor_mbs.scenario.scene import BLADE_KEYS, SCENE_KEYS, new_scene_text
-from rotor_mbs.scenario.sweep import Axis, Range, SweepTable
+from rotor_mbs.scenario.sweep import DESIGN_KEYS, Axis, Range
 from rotor_mbs.solution.quantities import BUILT_IN
 from rotor_mbs.solution.status import STATUSES
 
@@ -224,7 +224,7 @@ def _sweep_file() -> str:
         "Sweep file",
         "A TOML file with numbers as in a [scene file](scene-file.md); see [parameter studies](../sweeps.md).",
         "## Keys",
-        _keys(keys.declared_keys(SweepTable)),
+        _keys(DESIGN_KEYS),
         "## `[[axis]]`",
         _keys(keys.declared_keys(Axis), "axis."),
         "Exactly one of these is required beside `key`. A table for `linear` and `log` has:",

@@ -12,11 +12,12 @@ import os
 import signal
 import sys
 import threading
+import warnings
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager, suppress
 from typing import Any, TextIO
 
-from rotor_mbs.errors import InputError, MethodRefusal, RotorError, StoreError
+from rotor_mbs.errors import InputError, MethodRefusal, PlausibilityWarning, RotorError, StoreError
 
 EXIT_OK, EXIT_FAILED, EXIT_BAD_INPUT, EXIT_INTERRUPTED = 0, 1, 2, 130
 # Commands that only print: a reader who has seen enough (`rotor-mbs list | head`) has missed nothing.
@@ -37,7 +38,9 @@ def main(argv: Sequence[str] | None = None) -> int:
     words = sys.argv[1:] if argv is None else list(argv)
     with plain_streams():
         try:
-            with _signals_as_interrupts():
+            with _signals_as_interrupts(), warnings.catch_warnings():
+                warnings.simplefilter("always", PlausibilityWarning)
+                warnings.showwarning = _print_warning
                 from rotor_mbs.cli.arguments import parse
 
                 arguments = parse(words)
@@ -66,6 +69,21 @@ def main(argv: Sequence[str] | None = None) -> int:
             discard_output()
             print_line(f"{exc.filename or 'standard output'}: {exc.strerror or exc}", sys.stderr)
             return EXIT_BAD_INPUT if exc.filename else EXIT_FAILED
+
+
+def _print_warning(
+    message: Warning | str,
+    category: type[Warning],
+    filename: str,
+    lineno: int,
+    file: TextIO | None = None,
+    line: str | None = None,
+) -> None:
+    """Doubts about numbers of a file in a line, other warnings as Python shows them."""
+    text = f"warning: {message}"
+    if not issubclass(category, PlausibilityWarning):
+        text = warnings.formatwarning(message, category, filename, lineno, line)
+    print_line(text.rstrip(), file or sys.stderr)
 
 
 def _is_interrupt(error: BaseException) -> bool:

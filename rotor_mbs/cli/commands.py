@@ -20,10 +20,10 @@ from typing import TYPE_CHECKING, Any
 
 from rotor_mbs.cli import EXIT_BAD_INPUT, EXIT_FAILED, print_line
 from rotor_mbs.cli.arguments import pages_beside
-from rotor_mbs.cli.terminal import ProgressLine, print_doubts, print_not_computed, print_table, span
+from rotor_mbs.cli.terminal import ProgressLine, print_not_computed, print_table, span
 from rotor_mbs.errors import InputError, MethodRefusal, StoreError
 from rotor_mbs.methods.base import Method
-from rotor_mbs.methods.catalogue import check_names, look_up, method_names, methods
+from rotor_mbs.methods.catalogue import check_names, look_up, methods, problems_of_file
 from rotor_mbs.runs import cores
 from rotor_mbs.scenario.catalogue import find_scenes, list_scenes, list_sweeps, only_scene
 from rotor_mbs.scenario.keys import counted
@@ -94,7 +94,6 @@ def _show_method(method: Method, arguments: argparse.Namespace) -> None:
 
 
 def _show_scene(arguments: argparse.Namespace) -> None:
-    from rotor_mbs.cli.terminal import print_doubts
     from rotor_mbs.scenario.scene import scene_tables, unit_of
 
     scene = only_scene(arguments.scene)
@@ -113,7 +112,6 @@ def _show_scene(arguments: argparse.Namespace) -> None:
     if arguments.json:
         print(json.dumps({"name": scene.name, "scene": tables, "models": models}, ensure_ascii=False, indent=1))
         return
-    print_doubts([scene])
     print(f"{scene.name}\n")
     for path, value in _keys(tables):
         name = "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in path)[1:]
@@ -155,7 +153,6 @@ def bench(arguments: argparse.Namespace) -> int:
     from rotor_mbs.studies.bench import run_bench
 
     scenes, output = find_scenes(arguments.scenes), arguments.output
-    print_doubts(scenes)
     with ProgressLine() as progress:
         made, left_out = run_bench(
             scenes, check_names(arguments.method or ()), output, workers=cores(), settings=dict(arguments.set or ()),
@@ -370,7 +367,7 @@ def sweep(arguments: argparse.Namespace) -> int:
         from rotor_mbs.scenario.sweep import load_sweep
         from rotor_mbs.studies.sweep import estimate_seconds, plan_sweep, run_sweep
 
-        study = load_sweep(arguments.file, method_names())
+        study = load_sweep(arguments.file, problems_of_file)
         plan = plan_sweep(study, arguments.method or (), arguments.part, arguments.timeout)
         if arguments.dry_run:
             size, seconds = plan.runs * plan.table().row_type.itemsize, estimate_seconds(plan, pool)
@@ -412,7 +409,7 @@ def sweep(arguments: argparse.Namespace) -> int:
             print_line(f"{result.older} stored runs are from other versions; --fresh recomputes them", sys.stderr)
         for line in result.lost:
             print_line(f"{line}; not computed; repeat the command to try again", sys.stderr)
-        if plan.sweep.table.picture and arguments.part == (1, 1):
+        if plan.sweep.design.picture and arguments.part == (1, 1):
             from rotor_mbs.report.pages.sweep import save_picture  # late: matplotlib
             from rotor_mbs.runs.sweeps import StoredSweep
 

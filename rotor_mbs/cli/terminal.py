@@ -20,7 +20,6 @@ from rotor_mbs.solution.status import GOOD, STATUSES
 
 if TYPE_CHECKING:  # a sweep's workers load their code meanwhile
     from rotor_mbs.analysis.run_tables import TextTable
-    from rotor_mbs.scenario.scene import Scene
     from rotor_mbs.studies.run import Outcome, RunReport
 
 
@@ -148,15 +147,6 @@ def print_summary(report: RunReport, output: Path) -> int:
     for line in report.stored_failures:
         print(f"stored: {line}", file=sys.stderr)
     return 1 if report.failures or is_lost or report.stored_failures else 0
-
-
-def print_doubts(scenes: Sequence[Scene]) -> None:
-    """A line for each number that looks like a slip; none for shipped scenes, which have a folder in their name."""
-    from rotor_mbs.scenario.scene import doubts
-
-    for scene in scenes:
-        for doubt in () if "/" in scene.name else doubts(scene):
-            print(f"warning: {scene.name}: {doubt}", file=sys.stderr)
 
 
 def print_not_computed(made: Sequence[Outcome]) -> bool:

@@ -248,16 +248,16 @@ def read_mapping(
     omit = keys.list_of(keys.choice(tuple(names)), f"a list of {', '.join(names)}")
     declared["group"] = file_key("group", _GROUP, default="").metadata
     declared["omit"] = file_key("omit", omit, default=()).metadata
-    text: str | None = None
-    name, tables = "columns", columns
-    if not isinstance(columns, Mapping):
-        name, (text, tables) = str(columns), read_toml(Path(columns))
-    assert isinstance(tables, Mapping)
-    found, problems = keys.read_keys(declared, tables)
-    if problems and text is not None:
-        raise TableError(problems).in_file(text, name)
-    if problems:
-        raise InputError(f"columns: {problem.message}" for problem in problems)
+    name = "columns"
+    if isinstance(columns, Mapping):
+        try:
+            found = keys.read_keys(declared, columns)
+        except TableError as error:
+            raise InputError(f"columns: {problem}" for problem in error.problems) from error
+    else:
+        file, name = read_toml(Path(columns)), str(columns)
+        with file.located():
+            found = keys.read_keys(declared, file.tables)
     group = found.pop("group")
     omitted = tuple(names[key] for key in found.pop("omit"))
     entries = {key: entry for key, entry in found.items() if entry is not None}

@@ -13,12 +13,12 @@ from dataclasses import replace
 from functools import partial
 from importlib import import_module, metadata
 from pathlib import Path
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from rotor_mbs.errors import InputError, MethodRefusal, nearest
 from rotor_mbs.methods.base import Ladder, Method
 from rotor_mbs.methods.method_file import ENDING, MethodFile, located, quiet, read_file
-from rotor_mbs.scenario.toml_file import at_key
+from rotor_mbs.scenario.toml_file import KeyProblem
 
 if TYPE_CHECKING:  # `rotor-mbs list` reads no scene
     from rotor_mbs.scenario.scene import Scene
@@ -152,8 +152,23 @@ def own_settings(scene: Scene, method: str) -> dict[str, object]:
     """Those of the scene's settings that the method has. Raises InputError for one that no method at all has."""
     if not scene.settings:
         return {}
-    with at_key(scene.name, scene.text, "settings"):
+    try:
         return settings_for(method_names(), dict(scene.settings)).get(method, {})
+    except InputError as error:
+        raise InputError(f"{scene.name}: settings: {problem}" for problem in error.problems) from error
+
+
+def problems_of_file(values: Mapping[str, Any]) -> list[KeyProblem]:
+    """What is wrong with the `methods` and `settings` that a scene file or a sweep file names."""
+    names, settings = values.get("methods", ()), dict(values.get("settings", ()))
+    known = method_names() if names or settings else ()
+    problems = [KeyProblem(("methods",), _unknown(name)) for name in names if name not in known]
+    if settings:
+        try:
+            settings_for(known, settings)
+        except InputError as error:
+            problems += [KeyProblem(("settings",), problem) for problem in error.problems]
+    return problems
 
 
 def is_corrected(name: str) -> bool:
@@ -265,11 +280,12 @@ def selected_methods(scenes: Sequence[Scene], names: Sequence[str] = ()) -> tupl
     methods: dict[str, list[str]] = {}
     reasons: list[str] = []
     refused: list[str] = []
+    names = check_names(names)
     for scene in scenes:
-        named = check_names(names)
-        if scene.methods and not named:
-            with at_key(scene.name, scene.text, "methods"):
-                named = check_names(scene.methods)
+        try:
+            named = names or check_names(scene.methods)
+        except InputError as error:
+            raise InputError(f"{scene.name}: methods: {problem}" for problem in error.problems) from error
         if named:
             methods[scene.name], lines = able_methods(scene, named)
             refused += lines

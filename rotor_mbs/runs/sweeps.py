@@ -75,7 +75,7 @@ def code_of_method(method: str) -> int:
 
 def sweep_table(sweep: Sweep, methods: Sequence[str], numbers: range) -> Table:
     """The table of the runs `numbers` of a sweep; run r is row r mod rows of the design, by method r div rows."""
-    runs, rows, options = np.arange(numbers.start, numbers.stop), sweep.design.count, sweep.table
+    runs, rows, options = np.arange(numbers.start, numbers.stop), sweep.design.count, sweep.design
     known: dict[str, tuple[Column, Any]] = {}
     values = sweep.design.rows(numbers.start, numbers.stop)
     for i, (key, unit) in enumerate(zip(sweep.keys, sweep.units, strict=True)):

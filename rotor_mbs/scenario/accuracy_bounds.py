@@ -14,7 +14,7 @@ from rotor_mbs.errors import InputError
 from rotor_mbs.scenario import keys
 from rotor_mbs.scenario.catalogue import reference_folder
 from rotor_mbs.scenario.keys import file_key
-from rotor_mbs.scenario.toml_file import TableError, read_toml, shown_path
+from rotor_mbs.scenario.toml_file import read_toml
 
 CHECKS = (
     "complete", "status", "metrics", "times", "start", "defect", "defect median", "error", "tip", "energies", "energy",
@@ -89,7 +89,7 @@ class Bounds:
 @functools.cache
 def expected_settings() -> dict[str, dict[str, Any]]:
     """By method, `settings` and `steps` by scene, of reference/settings.toml. Raises InputError where it is no TOML."""
-    return read_toml(reference_folder() / "settings.toml")[1]
+    return read_toml(reference_folder() / "settings.toml").tables
 
 
 @functools.cache
@@ -105,9 +105,7 @@ def load_bounds(own: Path | None = None) -> Bounds:
 
 def read_bounds(path: Path) -> Bounds:
     """The bounds of one TOML file of [[bound]] tables. Raises InputError with every error of the file."""
-    text, tables = read_toml(path)
-    try:
-        file: _BoundsFile = keys.table_of(_BoundsFile).read(tables)
-    except TableError as error:
-        raise error.in_file(text, shown_path(path)) from error
-    return Bounds(file.bound)
+    file = read_toml(path)
+    with file.located():
+        bounds: _BoundsFile = keys.table_of(_BoundsFile).read(file.tables)
+    return Bounds(bounds.bound)

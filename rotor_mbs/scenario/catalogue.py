@@ -11,7 +11,7 @@ from rotor_mbs.errors import InputError, RotorError, nearest
 from rotor_mbs.scenario.toml_file import parse_toml, shown_path
 
 if TYPE_CHECKING:  # `rotor-mbs list` reads no scene
-    from rotor_mbs.scenario.scene import Scene
+    from rotor_mbs.scenario.scene import Check, Scene
 
 # Groups at the top of a results file that are not scenes: no scene may take such a name.
 RESERVED_GROUPS = ("bench", "claims", "comparison", "errata", "modes", "stability", "summary", "sweep")
@@ -65,36 +65,50 @@ def list_sweeps() -> list[tuple[str, str]]:
     return [(f"{sweeps_folder().name}/{path.stem}", _title(path)) for path in paths]
 
 
-def find_scenes(arguments: Sequence[str], known_methods: Sequence[str] = ()) -> list[Scene]:
+def find_scenes(arguments: Sequence[str], check: Check | None = None) -> list[Scene]:
     """The scenes that names, folders and paths of TOML files mean, in their order, each once; a shipped name goes
-    before a path (write ./paper for a folder of one's own). known_methods: what a file may name, () for anything.
-    Raises InputError with all errors of all arguments and files."""
-    from rotor_mbs.scenario.scene import load_scene
+    before a path (write ./paper for a folder of one's own). check: what else is wrong with the values of a file. A
+    shipped file is called `folder/stem`, any other by its stem. Raises InputError with all errors of all arguments and
+    files."""
+    from rotor_mbs.scenario.scene import load_scene, no_check
 
     problems: list[str] = []
-    files: dict[Path, tuple[Path, str]] = {}  # by where it leads to: the path that was given, the scene's name
+    paths: list[Path] = []
     for argument in arguments:
         try:
-            for path in _files(argument):
-                try:
-                    real = path.resolve()
-                except (OSError, RuntimeError, ValueError) as error:  # links in a circle, a NUL in the name
-                    wrong = "cannot be resolved to a file; allowed: a readable TOML file"
-                    raise InputError(f"{shown_path(path)}: {wrong}") from error
-                files.setdefault(real, (path, _scene_name(path, real)))
+            paths += _files(argument)
         except InputError as error:
-            problems.extend(error.problems)
-    scenes = []
+            problems += error.problems
+    names: dict[Path, str] = {}  # of files, by where their paths lead to
     by_name: dict[str, Path] = {}
-    for path, name in files.values():
+    scenes = []
+    shipped = {path.resolve(): name for name, path in _shipped().items()}
+    for path in paths:
+        try:
+            real = path.resolve()
+        except (OSError, RuntimeError, ValueError):  # links in a circle, a NUL in the name
+            problems.append(f"{shown_path(path)}: cannot be resolved to a file; allowed: a readable TOML file")
+            continue
+        if real in names:
+            continue
+        names[real] = name = shipped.get(real, path.stem)
+        wrong = ""
         if name in by_name:
             clash = f"its scene would be named {name}, as that of {shown_path(by_name[name])}"
-            problems.append(f"{shown_path(path)}: {clash}; allowed: different names")
-        by_name.setdefault(name, path)
+            wrong = f"{clash}; allowed: different names"
+        elif not _NAME.fullmatch(name):
+            wrong = f"the file's name cannot name a scene; allowed: a name {_NAME_RULE}"
+        elif name in RESERVED_GROUPS or any(known.startswith(name + "/") for known in shipped.values()):
+            hint = f"; of a sweep: rotor-mbs sweep {shown_path(path)}" if name == "sweep" else ""
+            wrong = f"{name} is a reserved name in results files; allowed: another file name{hint}"
+        if wrong:
+            problems.append(f"{shown_path(path)}: {wrong}")
+            continue
+        by_name[name] = path
         try:
-            scenes.append(load_scene(path, name, known_methods))
+            scenes.append(load_scene(path, name, check or no_check))
         except InputError as error:
-            problems.extend(error.problems)
+            problems += error.problems
     if problems:
         raise InputError(problems)
     return scenes
@@ -123,7 +137,8 @@ def _shipped() -> dict[str, Path]:
 def _title(path: Path) -> str:
     """Of a shipped file: all of its tables come after the title, and reading them would take most of the time."""
     try:
-        title = parse_toml(path.read_text(encoding="utf-8").partition("\n[")[0], shown_path(path)).get("title")
+        text = path.read_text(encoding="utf-8")
+        title = parse_toml(text.partition("\n[")[0], shown_path(path)).tables.get("title")
     except (InputError, OSError, UnicodeDecodeError) as error:
         return f"(broken file: {error})"
     return title if isinstance(title, str) else "(broken file: no title)"
@@ -160,18 +175,3 @@ def _files(argument: str) -> list[Path]:
         wrong = f"no such scene{hint}; allowed: a name from `rotor-mbs list`, or FILE.toml"
     quoted = f"'{argument if len(argument) <= 80 else argument[:77] + '...'}'"
     raise InputError(f"{quoted if argument.isprintable() else ascii(argument[:80])}: {wrong}")
-
-
-def _scene_name(path: Path, real: Path) -> str:
-    """`folder/stem` for a shipped file, the stem for any other."""
-    folder = scenarios_folder().resolve()
-    if real.is_relative_to(folder):
-        return real.relative_to(folder).with_suffix("").as_posix()
-    stem = path.stem
-    if not re.fullmatch(_PIECE, stem):
-        raise InputError(f"{shown_path(path)}: the file's name cannot name a scene; allowed: a name {_NAME_RULE}")
-    if stem in RESERVED_GROUPS or any(name.startswith(stem + "/") for name in _shipped()):
-        shown = shown_path(path)
-        hint = f"; of a sweep: rotor-mbs sweep {shown}" if stem == "sweep" else ""
-        raise InputError(f"{shown}: {stem} is a reserved name in results files; allowed: another file name{hint}")
-    return stem

@@ -294,10 +294,7 @@ def table_of(cls: type, allowed: str = "") -> Kind:
     def read(value: object) -> Any:
         if not isinstance(value, dict):
             raise wrong(f"{shown(value)} is not a table")
-        values, problems = read_keys(keys, value)
-        if problems:
-            raise TableError(problems)
-        return cls(**values)
+        return cls(**read_keys(keys, value))
 
     return Kind(read, allowed)
 
@@ -308,9 +305,12 @@ def declared_keys(cls: Any) -> dict[str, Mapping[str, Any]]:
 
 
 def read_keys(
-    keys: Mapping[str, Mapping[str, Any]], tables: Mapping[str, Any]
-) -> tuple[dict[str, Any], list[KeyProblem]]:
-    """The values by field, without those that have an error, and everything that is wrong."""
+    keys: Mapping[str, Mapping[str, Any]],
+    tables: Mapping[str, Any],
+    also: Callable[[dict[str, Any]], Iterable[KeyProblem]] = lambda _: (),
+) -> dict[str, Any]:
+    """The values by field. Raises TableError with everything that is wrong, also with what `also` finds in the values
+    that could be read."""
     values: dict[str, Any] = {}
     problems: list[KeyProblem] = []
     names: dict[str, list[str]] = {"": []}  # of the keys by table, "" for the top
@@ -352,4 +352,7 @@ def read_keys(
                 what = f"unknown key{nearest(name, names[table])}"
                 path = (table, name) if table else (name,)
                 problems.append(KeyProblem(path, what, ", ".join(names[table]), is_of_key=True))
-    return values, problems
+    problems += also(values)
+    if problems:
+        raise TableError(problems)
+    return values

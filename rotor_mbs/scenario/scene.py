@@ -10,14 +10,15 @@ import hashlib
 import json
 import math
 import textwrap
-from collections.abc import Iterator, Mapping, Sequence
+import warnings
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import Field, dataclass, fields
 from itertools import pairwise
 from operator import attrgetter
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
-from rotor_mbs.errors import InputError
+from rotor_mbs.errors import InputError, PlausibilityWarning
 from rotor_mbs.scenario import keys
 from rotor_mbs.scenario.keys import Kind, counted, file_key, list_of, read_each, shown, where, wrong
 from rotor_mbs.scenario.time_table import Table, is_constant, is_one_table, value_at
@@ -31,10 +32,8 @@ from rotor_mbs.scenario.toml_file import (
     plain_value,
     read_toml,
     shown_key,
-    shown_path,
     toml_lines,
     toml_value,
-    unknown_methods,
 )
 
 if TYPE_CHECKING:
@@ -53,8 +52,15 @@ MAX_SAMPLE_BYTES = 2 << 30
 # for a flat body, whose inequality is an equality. It is far above the round-off of the eigenvalues (1e-15).
 INERTIA_TOLERANCE = 1e-9
 
+# What another layer finds wrong with the values of a file by field: its methods and their settings.
+Check = Callable[[Mapping[str, Any]], list[KeyProblem]]
+
 # label: no number of the scene; run: what is computed; start: initial state; rotor: parameters and loads
 Part = Literal["label", "run", "start", "rotor"]
+
+
+def no_check(_values: Mapping[str, Any]) -> list[KeyProblem]:
+    return []
 
 
 @functools.cache
@@ -163,11 +169,10 @@ def _read_blades(value: object, scene: Mapping[str, Any]) -> tuple[Blade, ...]:
     def read_blade(table: object) -> Blade:
         if not isinstance(table, dict):
             raise wrong(f"{shown(table)} is not a table")
-        values, problems = keys.read_keys(BLADE_KEYS, table)
+        missing = []
         if "tip" not in table and "tip" in scene.get("outputs", ()):
-            problems.append(KeyProblem(("tip",), "is missing", BLADE_KEYS["tip"]["allowed"]))
-        if problems:
-            raise TableError(problems)
+            missing.append(KeyProblem(("tip",), "is missing", BLADE_KEYS["tip"]["allowed"]))
+        values = keys.read_keys(BLADE_KEYS, table, lambda _: missing)
         values["tip"] = values["tip"] or values["centre_of_mass"]
         return Blade(**values)
 
@@ -364,7 +369,7 @@ class Scene:
                 put_value(tables, parse_key(path), plain_value(value))
             changed = scene_from_tables(tables, self.name)
         except TableError as error:
-            raise InputError(f"{self.name}: {problem.message}" for problem in error.problems) from error
+            raise InputError(f"{self.name}: {problem}" for problem in error.problems) from error
         return dataclasses.replace(changed, text=scene_toml(changed))
 
     def wants(self, output: str) -> bool:
@@ -430,17 +435,20 @@ def values_per_sample(blades: int, outputs: Sequence[str]) -> int:
     return 1 + 2 * (1 + blades) + asked
 
 
-def scene_from_tables(tables: Mapping[str, Any], name: str, text: str = "") -> Scene:
+def scene_from_tables(tables: Mapping[str, Any], name: str, text: str = "", check: Check = no_check) -> Scene:
     """The scene in the tables of a scene file. Raises TableError with every error."""
-    values, problems = keys.read_keys(SCENE_KEYS, tables)
-    if {"blade_count", "samples", "outputs"} <= values.keys():
-        of_sample = values_per_sample(values["blade_count"], values["outputs"])
-        total = values["samples"] * of_sample * 8
-        if total > MAX_SAMPLE_BYTES:
-            what = f"{values['samples']} samples of {of_sample} values of 8 bytes are {total / 2**30:.4g} GiB"
-            problems.append(KeyProblem(("samples",), what, f"at most {MAX_SAMPLE_BYTES >> 30} GiB"))
-    if problems:
-        raise TableError(problems)
+
+    def also(values: Mapping[str, Any]) -> list[KeyProblem]:
+        problems = check(values)
+        if {"blade_count", "samples", "outputs"} <= values.keys():
+            of_sample = values_per_sample(values["blade_count"], values["outputs"])
+            total = values["samples"] * of_sample * 8
+            if total > MAX_SAMPLE_BYTES:
+                what = f"{values['samples']} samples of {of_sample} values of 8 bytes are {total / 2**30:.4g} GiB"
+                problems.append(KeyProblem(("samples",), what, f"at most {MAX_SAMPLE_BYTES >> 30} GiB"))
+        return problems
+
+    values = keys.read_keys(SCENE_KEYS, tables, also)
     del values["blade_count"]
     values["settings"] = tuple(dict(values["settings"]).items())
     return Scene(name=name, text=text, **values)
@@ -547,32 +555,27 @@ def _as_list(tables: Mapping[str, Any], value: Any, path: KeyPath, last: int) ->
     return [0.0] * (last + 1) if value is None else value
 
 
-def load_scene(path: Path | str, name: str | None = None, known_methods: Sequence[str] = ()) -> Scene:
-    """The scene in the TOML file `path`, under `name` or the file's own. known_methods: what its `methods` may name, ()
-    for anything. Raises InputError with all errors of the file, a line each: `file:line: key: what is wrong; allowed:
-    ...`; entries are counted from 0."""
+def load_scene(path: Path | str, name: str | None = None, check: Check = no_check, stacklevel: int = 2) -> Scene:
+    """The scene in the TOML file `path`, under `name` or the file's own. check: what else is wrong with its values.
+    Raises InputError with all errors of the file, a line each: `file:line: key: what is wrong; allowed: ...`; entries
+    are counted from 0. Issues a PlausibilityWarning for each number that looks like a slip, but not of shipped scenes,
+    whose names have a folder."""
     path = Path(path)
-    text, tables = read_toml(path)
-    if "axis" in tables and "scene" in tables:
-        shown = shown_path(path)
-        raise InputError(f"{shown}: is a sweep; allowed: a scene, or: rotor-mbs sweep {shown}")
-    return _scene(text, tables, path.stem if name is None else name, shown_path(path), known_methods)
+    file = read_toml(path)
+    if "axis" in file.tables and "scene" in file.tables:
+        raise InputError(f"{file.source}: is a sweep; allowed: a scene, or: rotor-mbs sweep {file.source}")
+    with file.located():
+        scene = scene_from_tables(file.tables, path.stem if name is None else name, file.text, check)
+    for doubt in doubts(scene) if "/" not in scene.name else ():
+        warnings.warn(f"{file.source}: {doubt}", PlausibilityWarning, stacklevel)
+    return scene
 
 
 def parse_scene(text: str, name: str) -> Scene:
     """The scene in a TOML text, as it is stored with results. Raises InputError as `load_scene`."""
-    return _scene(text, parse_toml(text, name), name, name)
-
-
-def _scene(text: str, tables: dict[str, Any], name: str, source: str, known_methods: Sequence[str] = ()) -> Scene:
-    problems = unknown_methods(tables, known_methods)
-    try:
-        scene = scene_from_tables(tables, name, text)
-    except TableError as error:
-        problems += error.problems
-    if problems:
-        raise TableError(problems).in_file(text, source)
-    return scene
+    file = parse_toml(text, name)
+    with file.located():
+        return scene_from_tables(file.tables, name, text)
 
 
 _HEADER = """\

@@ -21,7 +21,9 @@ from rotor_mbs.scenario.catalogue import list_scenes, only_scene, scenarios_fold
 from rotor_mbs.scenario.keys import Kind, file_key, list_of, table_of, where, wrong
 from rotor_mbs.scenario.scene import (
     OUTPUT_NAMES,
+    Check,
     Scene,
+    no_check,
     put_value,
     scene_fields,
     scene_from_tables,
@@ -32,15 +34,12 @@ from rotor_mbs.scenario.toml_file import (
     KeyPath,
     KeyProblem,
     TableError,
-    at_key,
-    find_lines,
-    line_of,
+    TomlFile,
     parse_key,
+    parse_toml,
     plain_value,
     read_toml,
-    shown_path,
     toml_lines,
-    unknown_methods,
 )
 
 Array = NDArray[np.float64]
@@ -120,16 +119,70 @@ class Axis:
         return any(getattr(self, name) is not None for name in DRAWN)
 
 
-@dataclass(frozen=True)
-class Design:
-    """All rows of a sweep: axes, how they are combined, the seed and the number of draws. In a "grid" the last axis is
-    the fastest, and all random axes together are one digit, the draw; "zip" takes all axes together. Every row follows
-    from its number alone, so that any part of a sweep can be computed on any computer."""
+_METHODS = list_of(keys.LINE, "a list of methods, model/integrator", 1)
+_SETTINGS = keys.dict_of(keys.NUMBER, "a table of settings of the methods, such as tolerance = 1e-15")
+_CHANGE = keys.dict_of(keys.NUMBER, 'a table of scene keys with numbers, such as "blade.mass" = 1e4')
+_DRAWS = keys.whole(1, MAX_COUNT, "a whole number of at least 1: number of random values")
+_AXES = list_of(table_of(Axis), "one or more [[axis]] tables", 1)
+_PICTURES = ": plot in the report, the separation of trajectories, or the growth of pitch angles over two parameters"
 
-    axes: tuple[Axis, ...]
-    combine: str
-    seed: int
-    draws: int = 0
+
+@dataclass(frozen=True, kw_only=True)
+class Design:
+    """What a sweep file says, and the rows that follow from it. In a "grid" the last axis is the fastest, and all
+    random axes together are one digit, the draw; "zip" takes all axes together. Every row follows from its number
+    alone, so that any part of a sweep can be computed on any computer."""
+
+    title: str = file_key("title", keys.LINE)
+    scene: str = file_key("scene", _SCENE_NAME)
+    methods: Sequence[str] = file_key("methods", _METHODS, default=("lagrange/taylor",))
+    settings: Mapping[str, float] = file_key("settings", _SETTINGS, optional={})
+    change: Mapping[str, float] = file_key("change", _CHANGE, optional={})
+    samples: int | None = file_key("samples", _COUNT, note="; by default those of the scene", default=None)
+    outputs: Sequence[str] | None = file_key(
+        "outputs", OUTPUT_NAMES, note="; [] stores metrics only; by default those of the scene", default=None
+    )
+    precision: str = file_key("precision", keys.choice(("float64", "float32")), default="float64")
+    error_growth: bool = file_key(
+        "error_growth", keys.FLAG, note=": whether error growth and horizon of every run are computed", default=False
+    )
+    defects: bool = file_key(
+        "defects", keys.FLAG, note=": whether interval defects are computed also for lagrange/taylor", default=False
+    )
+    combine: str = file_key(
+        "combine", keys.choice(("grid", "zip")), note=": every combination, or the i-th values", default="grid"
+    )
+    draws: int = file_key("draws", _DRAWS, default=0)
+    seed: int = file_key("seed", keys.whole(0, 2**63 - 1, "a whole number of at least 0"), default=0)
+    validation: float = file_key("validation", _SHARE, note=": fraction of the runs", default=0.0)
+    test: float = file_key("test", _SHARE, note="; validation + test < 1", default=0.0)
+    picture: str | None = file_key("picture", keys.choice(("spread", "map")), note=_PICTURES, default=None)
+    axes: tuple[Axis, ...] = file_key("axis", _AXES)
+
+    def __post_init__(self) -> None:
+        axes = [axis.key for axis in self.axes]
+        drawn = [axis.key for axis in self.axes if axis.is_drawn]
+        repeated = [key for key, count in Counter(axes).items() if count > 1]
+        problems = []
+        if self.test + self.validation >= 1.0:
+            allowed = "a number between 0 and 1; validation + test < 1"
+            problems.append(KeyProblem(("test",), "no runs left for training", allowed))
+        if repeated:
+            what = f"{repeated[0]} is varied by more than one axis"
+            problems.append(KeyProblem(("axis",), what, "one [[axis]] for a key"))
+        if drawn and not self.draws:
+            what = f"{drawn[0]} is random, and draws is missing"
+            problems.append(KeyProblem(("axis",), what, "draws = N at the top of the file"))
+        if self.draws and not drawn:
+            what, allowed = "draws is given, but no axis is random", f"draws with an axis of {', '.join(DRAWN)}"
+            problems.append(KeyProblem(("axis",), what, allowed))
+        if self.combine == "zip" and len(set(self.counts)) > 1:
+            counts = ", ".join(f"{key} has {count}" for key, count in zip(axes, self.counts, strict=True))
+            problems.append(KeyProblem(("combine",), counts, "with zip as many values in every axis"))
+        if self.count > MAX_ROWS:
+            problems.append(KeyProblem(("axis",), f"{self.count:,} runs", f"at most {MAX_ROWS:,}"))
+        if problems:
+            raise TableError(problems)
 
     @functools.cached_property
     def _digits(self) -> list[list[int]]:
@@ -206,6 +259,9 @@ class Design:
         return columns
 
 
+DESIGN_KEYS = keys.declared_keys(Design)
+
+
 def split_rows(count: int, validation: float, test: float, seed: int) -> NDArray[np.int8]:
     """(count,) numbers of `SPLITS`; shares to the nearest row, rows drawn by `seed`."""
     drawn = np.random.default_rng([seed, 2**32]).permutation(count)
@@ -213,63 +269,6 @@ def split_rows(count: int, validation: float, test: float, seed: int) -> NDArray
     codes = np.zeros(count, np.int8)
     codes[drawn[:first]], codes[drawn[first:second]] = 1, 2
     return codes
-
-
-_METHODS = list_of(keys.LINE, "a list of methods, model/integrator", 1)
-_SETTINGS = keys.dict_of(keys.NUMBER, "a table of settings of the methods, such as tolerance = 1e-15")
-_CHANGE = keys.dict_of(keys.NUMBER, 'a table of scene keys with numbers, such as "blade.mass" = 1e4')
-_DRAWS = keys.whole(1, MAX_COUNT, "a whole number of at least 1: number of random values")
-_AXES = list_of(table_of(Axis), "one or more [[axis]] tables", 1)
-_PICTURES = ": plot in the report, the separation of trajectories, or the growth of pitch angles over two parameters"
-
-
-@dataclass(frozen=True, kw_only=True)
-class SweepTable:
-    title: str = file_key("title", keys.LINE)
-    scene: str = file_key("scene", _SCENE_NAME)
-    methods: Sequence[str] = file_key("methods", _METHODS, default=("lagrange/taylor",))
-    settings: Mapping[str, float] = file_key("settings", _SETTINGS, optional={})
-    change: Mapping[str, float] = file_key("change", _CHANGE, optional={})
-    samples: int | None = file_key("samples", _COUNT, note="; by default those of the scene", default=None)
-    outputs: Sequence[str] | None = file_key(
-        "outputs", OUTPUT_NAMES, note="; [] stores metrics only; by default those of the scene", default=None
-    )
-    precision: str = file_key("precision", keys.choice(("float64", "float32")), default="float64")
-    error_growth: bool = file_key(
-        "error_growth", keys.FLAG, note=": whether error growth and horizon of every run are computed", default=False
-    )
-    defects: bool = file_key(
-        "defects", keys.FLAG, note=": whether interval defects are computed also for lagrange/taylor", default=False
-    )
-    combine: str = file_key(
-        "combine", keys.choice(("grid", "zip")), note=": every combination, or the i-th values", default="grid"
-    )
-    draws: int | None = file_key("draws", _DRAWS, default=None)
-    seed: int = file_key("seed", keys.whole(0, 2**63 - 1, "a whole number of at least 0"), default=0)
-    validation: float = file_key("validation", _SHARE, note=": fraction of the runs", default=0.0)
-    test: float = file_key("test", _SHARE, note="; validation + test < 1", default=0.0)
-    picture: str | None = file_key("picture", keys.choice(("spread", "map")), note=_PICTURES, default=None)
-    axis: Sequence[Axis] = file_key("axis", _AXES)
-
-    def __post_init__(self) -> None:
-        axes = [axis.key for axis in self.axis]
-        drawn = [axis.key for axis in self.axis if axis.is_drawn]
-        repeated = [key for key, count in Counter(axes).items() if count > 1]
-        problems = []
-        if self.test + self.validation >= 1.0:
-            allowed = "a number between 0 and 1; validation + test < 1"
-            problems.append(KeyProblem(("test",), "no runs left for training", allowed))
-        if repeated:
-            what = f"{repeated[0]} is varied by more than one axis"
-            problems.append(KeyProblem(("axis",), what, "one [[axis]] for a key"))
-        if drawn and self.draws is None:
-            what = f"{drawn[0]} is random, and draws is missing"
-            problems.append(KeyProblem(("axis",), what, "draws = N at the top of the file"))
-        if self.draws is not None and not drawn:
-            what, allowed = "draws is given, but no axis is random", f"draws with an axis of {', '.join(DRAWN)}"
-            problems.append(KeyProblem(("axis",), what, allowed))
-        if problems:
-            raise TableError(problems)
 
 
 # Field by table and name of the key.
@@ -328,10 +327,9 @@ def _is_of_start(path: KeyPath) -> bool:
 
 @dataclass(frozen=True)
 class Sweep:
-    table: SweepTable  # what the sweep's file says
-    base: Scene  # the scene with the sweep's own changes, before any axis
     design: Design
-    text: str  # the TOML text it was read from
+    base: Scene  # the scene with the sweep's own changes, before any axis
+    file: TomlFile
     path: Path
 
     @property
@@ -349,7 +347,7 @@ class Sweep:
     @property
     def outputs(self) -> tuple[str, ...]:
         """What is stored of each run's samples; () for metrics alone."""
-        return self.base.outputs if self.table.outputs is None else tuple(self.table.outputs)
+        return self.base.outputs if self.design.outputs is None else tuple(self.design.outputs)
 
     def variants(self) -> Variants:
         """From rows to scenes. They always ask for the energy: every run's balance is checked."""
@@ -357,89 +355,66 @@ class Sweep:
         return Variants(self.name, {**scene_tables(self.base), "outputs": wanted}, self.keys)
 
 
-def load_sweep(path: Path, known_methods: Sequence[str] = ()) -> Sweep:
-    """The sweep in the TOML file `path`; sweeps/NAME means a shipped one. known_methods: what the file may name, () for
-    anything. Raises InputError with all errors of the file."""
+def load_sweep(path: Path, check: Check = no_check) -> Sweep:
+    """The sweep in the TOML file `path`; sweeps/NAME means a shipped one. check: what else is wrong with its values.
+    Raises InputError with all errors of the file."""
     shipped = (sweeps_folder().parent / path).with_suffix(".toml")
     if not path.exists() and path.parts[:1] == ("sweeps",) and shipped.is_file():
         path = shipped
     if not path.exists() and str(path) in dict(list_scenes()):
         raise InputError(f"{path}: is a scene; allowed: a sweep of scenes (rotor-mbs list), or: rotor-mbs run {path}")
-    text, tables = read_toml(path)
-    if "initial" in tables and "blade" in tables:
-        shown = shown_path(path)
-        raise InputError(f"{shown}: is a scene; allowed: a sweep of scenes, or: rotor-mbs run {shown}")
-    return _sweep(path, text, tables, known_methods=known_methods)
+    file = read_toml(path)
+    if "initial" in file.tables and "blade" in file.tables:
+        raise InputError(f"{file.source}: is a scene; allowed: a sweep of scenes, or: rotor-mbs run {file.source}")
+    return _sweep(path, file, check)
 
 
 def sweep_of(scene: Scene, axes: Mapping[str, object], **options: object) -> Sweep:
     """A sweep made without a file. By key of a number of the scene, `axes` have a list of values or a table as an
     [[axis]] has it; `options` are the other keys of a sweep file. Raises InputError; line numbers are those of the
-    sweep's `text`."""
+    sweep's text."""
     if not isinstance(axes, Mapping):
         raise InputError(f"parameters: {axes!r}; allowed: a dictionary from keys to lists of values")
     given = {key: plain_value(value) for key, value in options.items()}
-    tables: dict[str, object] = {"title": scene.title, "scene": scene.name, **given}
-    listed: list[dict[str, object]] = []
+    text = toml_lines({"title": scene.title, "scene": scene.name, **given})
     for key, values in axes.items():
         plain = plain_value(values)
-        listed.append({"key": key, **(plain if isinstance(plain, dict) else {"values": plain})})
-    text = "".join([toml_lines(tables), *("\n[[axis]]\n" + toml_lines(axis) for axis in listed)])
-    tables["axis"] = listed
-    return _sweep(Path("sweep"), text, tables, scene)
+        text += "\n[[axis]]\n" + toml_lines({"key": key, **(plain if isinstance(plain, dict) else {"values": plain})})
+    return _sweep(Path("sweep"), parse_toml(text, "sweep"), no_check, scene)
 
 
-def _sweep(
-    path: Path,
-    text: str,
-    tables: Mapping[str, object],
-    base: Scene | None = None,
-    known_methods: Sequence[str] = (),
-) -> Sweep:
-    """The sweep in the tables of a file; its base is the scene that it names, where none is given."""
-    source, problems = shown_path(path), unknown_methods(tables, known_methods)
-    try:
-        table: SweepTable = table_of(SweepTable).read(tables)
-    except TableError as error:
-        problems += error.problems
-    if problems:
-        raise TableError(problems).in_file(text, source)
+def _sweep(path: Path, file: TomlFile, check: Check, base: Scene | None = None) -> Sweep:
+    """The sweep that a file describes; its base is the scene that it names, where none is given."""
+    with file.located():
+        design = Design(**keys.read_keys(DESIGN_KEYS, file.tables, check))
     if base is None:
-        is_shipped = (scenarios_folder() / f"{table.scene}.toml").is_file()
-        is_beside = table.scene.endswith(".toml") and not is_shipped
-        with at_key(source, text, "scene"):
-            base = only_scene(str(path.parent / table.scene) if is_beside else table.scene)
-    changes: dict[str, object] = dict(table.change)
-    if table.samples is not None:
-        changes["samples"] = table.samples
-    if table.outputs:
-        changes["outputs"] = table.outputs
+        is_shipped = (scenarios_folder() / f"{design.scene}.toml").is_file()
+        is_beside = design.scene.endswith(".toml") and not is_shipped
+        with file.located("scene"):
+            base = only_scene(str(path.parent / design.scene) if is_beside else design.scene)
+    changes: dict[str, object] = dict(design.change)
+    if design.samples is not None:
+        changes["samples"] = design.samples
+    if design.outputs:
+        changes["outputs"] = design.outputs
     if changes:
-        with at_key(source, text, next(key for key in ("change", "samples", "outputs") if getattr(table, key))):
+        with file.located(next(key for key in ("change", "samples", "outputs") if getattr(design, key))):
             base = base.replace(**changes)
-    design = Design(tuple(table.axis), table.combine, table.seed, table.draws or 0)
-    if table.combine == "zip" and len(set(design.counts)) > 1:
-        counts = ", ".join(f"{axis.key} has {count}" for axis, count in zip(design.axes, design.counts, strict=True))
-        with at_key(source, text, "combine"):
-            raise InputError(f"{counts}; allowed with zip: as many values in every axis")
-    if design.count > MAX_ROWS:
-        with at_key(source, text, "axis"):
-            raise InputError(f"{design.count:,} runs; allowed: at most {MAX_ROWS:,}")
-    sweep = Sweep(table, base, design, text, path)
-    faults: dict[str, None] = {}
+    sweep = Sweep(design, base, file, path)
+    faults: dict[KeyProblem, None] = {}
     for i, variants, row in _rows_to_check(sweep):
         try:
             variants.scene(row)
         except TableError as error:
             values = ", ".join(f"{key} = {value:g}" for key, value in zip(variants.keys, row, strict=True))
-            start = "" if all(problem.is_of_key for problem in error.problems) else f"{values}: "
-            for problem in error.problems:
-                line = line_of(find_lines(text), ("axis", i, "key"))
-                faults.setdefault(f"{source}:{line}: {start}{problem.message}")
+            for fault in error.faults:
+                what = fault.message if fault.is_of_key else f"{values}: {fault.message}"
+                faults.setdefault(KeyProblem(("axis", i, "key"), what))
             if len(faults) >= _MAX_ROW_ERRORS:
                 break
-    if faults:
-        raise InputError(list(faults))
+    with file.located():
+        if faults:
+            raise TableError(faults)
     return sweep
 
 

@@ -7,10 +7,12 @@ import re
 import tomllib
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass
+from operator import itemgetter
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from rotor_mbs.errors import InputError, nearest
+from rotor_mbs.errors import InputError
 
 KeyPath = tuple[str | int, ...]
 
@@ -44,41 +46,43 @@ class KeyProblem(NamedTuple):
     @property
     def message(self) -> str:
         where = f"{shown_key(self.path)}: " if self.path else ""
-        return f"{where}{self.wrong}; allowed: {self.allowed}"
+        return f"{where}{self.wrong}; allowed: {self.allowed}" if self.allowed else f"{where}{self.wrong}"
 
 
-class TableError(ValueError):
-    """Tables of a file, or a value in them, that are not as they should be."""
+class TableError(InputError):
+    """Tables of a file, or a value in them, that are not as they should be; where they stand is not known yet."""
 
-    def __init__(self, problems: Sequence[KeyProblem]) -> None:
-        self.problems = tuple(problems)
-        super().__init__("; ".join(problem.message for problem in problems))
+    def __init__(self, faults: Iterable[KeyProblem]) -> None:
+        self.faults = tuple(faults)
+        super().__init__(fault.message for fault in self.faults)
 
     def below(self, *path: str | int, allowed: str = "") -> list[KeyProblem]:
-        """The problems of a value that stands at `path`, where `allowed` is what its key allows."""
-        return [
-            problem._replace(path=(*path, *problem.path), allowed=problem.allowed or allowed)
-            for problem in self.problems
-        ]
-
-    def in_file(self, text: str, source: str) -> InputError:
-        """The error as lines `source:line: key: what is wrong; allowed: ...`, sorted, for tables read from `text`."""
-        lines = find_lines(text)
-        messages = sorted((line_of(lines, problem.path), problem.message) for problem in self.problems)
-        shown = [f"{source}:{line}: {message}" for line, message in messages[:MAX_PROBLEMS]]
-        if len(messages) > MAX_PROBLEMS:
-            shown.append(f"{source}: {len(messages) - MAX_PROBLEMS} more errors")
-        return InputError(shown)
+        """The faults of a value that stands at `path`, where `allowed` is what its key allows."""
+        return [fault._replace(path=(*path, *fault.path), allowed=fault.allowed or allowed) for fault in self.faults]
 
 
-def unknown_methods(tables: Mapping[str, Any], known: Sequence[str]) -> list[KeyProblem]:
-    """A problem for each name in the `methods` of a file that is not `known`; none where any is allowed, ()."""
-    names = tables.get("methods")
-    return [
-        KeyProblem(("methods",), f"unknown method {name!r}{nearest(name, known)}", ", ".join(known))
-        for name in (names if isinstance(names, list) and known else ())
-        if isinstance(name, str) and name not in known
-    ]
+@dataclass(frozen=True)
+class TomlFile:
+    source: str  # what messages call it
+    text: str
+    tables: dict[str, Any]
+
+    @contextmanager
+    def located(self, *path: str) -> Iterator[None]:
+        """What is wrong with the key at `path`, an InputError of the block, gets lines `source:line: key: what is
+        wrong; allowed: ...`, in the order of the file."""
+        try:
+            yield
+        except InputError as error:
+            faults = [KeyProblem(path, problem) for problem in error.problems]
+            if isinstance(error, TableError):
+                faults = error.below(*path)
+            lines = find_lines(self.text)
+            messages = sorted(((line_of(lines, fault.path), fault.message) for fault in faults), key=itemgetter(0))
+            shown = [f"{self.source}:{line}: {message}" for line, message in messages[:MAX_PROBLEMS]]
+            if len(messages) > MAX_PROBLEMS:
+                shown.append(f"{self.source}: {len(messages) - MAX_PROBLEMS} more errors")
+            raise InputError(shown) from error
 
 
 def shown_path(path: Path) -> str:
@@ -109,8 +113,8 @@ def parse_key(text: str) -> KeyPath:
 _TOML_ALLOWED = 'allowed: TOML 1.0, with arithmetic in quotes: "pi/6"'
 
 
-def read_toml(path: Path) -> tuple[str, dict[str, Any]]:
-    """The text of the file and its tables. Raises InputError with one line."""
+def read_toml(path: Path) -> TomlFile:
+    """Raises InputError with one line."""
     shown = shown_path(path)
     try:
         if path.exists() and not path.is_file():  # a pipe or a device would block, or never end
@@ -133,17 +137,17 @@ def read_toml(path: Path) -> tuple[str, dict[str, Any]]:
     if "\0" in text:
         line = text.count("\n", 0, text.index("\0")) + 1
         raise InputError(f"{shown}:{line}: contains a NUL byte; allowed: TOML text in UTF-8")
-    return text, parse_toml(text, shown)
+    return parse_toml(text, shown)
 
 
-def parse_toml(text: str, source: str) -> dict[str, Any]:
-    """The tables in a text. Raises InputError with one line that begins with `source`."""
+def parse_toml(text: str, source: str) -> TomlFile:
+    """A text as a file that messages call `source`. Raises InputError with one line."""
     too_long = _LONG_KEY.search(text)
     if too_long:
         line = text.count("\n", 0, too_long.start()) + 1
         raise InputError(f"{source}:{line}: key of over {_MAX_KEY_PARTS} parts; allowed: at most that")
     try:
-        return tomllib.loads(text)
+        return TomlFile(source, text, tomllib.loads(text))
     except tomllib.TOMLDecodeError as error:
         raise InputError(f"{source}:{_syntax_error(str(error), text)}; {_TOML_ALLOWED}") from error
     except RecursionError as error:
@@ -252,13 +256,3 @@ def _number_entries(path: KeyPath, value: Sequence[tuple[str, int]], lines: dict
 def line_of(lines: Mapping[KeyPath, int], path: KeyPath) -> int:
     """The line of `path`, else of the nearest key that encloses it, else 1."""
     return next((lines[path[:n]] for n in range(len(path), 0, -1) if path[:n] in lines), 1)
-
-
-@contextmanager
-def at_key(source: str, text: str, key: str) -> Iterator[None]:
-    """An InputError of the block names the file, the line of the key, and the key."""
-    try:
-        yield
-    except InputError as exc:
-        place = f"{source}:{line_of(find_lines(text), (key,))}: {key}"
-        raise InputError(f"{place}: {problem}" for problem in exc.problems) from exc

@@ -28,7 +28,7 @@ from rotor_mbs.runs.table import KEYWORDS, Place, Rows, Table, blank_rows, row_o
 from rotor_mbs.runs.versions import machine, versions
 from rotor_mbs.scenario.scene import Scene, scene_hash
 from rotor_mbs.scenario.sweep import Sweep, Variants
-from rotor_mbs.scenario.toml_file import TableError, at_key, shown_path
+from rotor_mbs.scenario.toml_file import TableError
 from rotor_mbs.solution.metrics import Metrics, defect_metrics, energy_drifts, horizon, largest, running_growth
 from rotor_mbs.solution.quantities import energy_balance, quantities
 from rotor_mbs.solution.status import STATUSES, code_of
@@ -232,12 +232,12 @@ class SweepPlan:
                     settings=settings,
                     time_limit_s=self.time_limit_s,
                     code=code,
-                    with_defects=self.sweep.table.defects,
+                    with_defects=self.sweep.design.defects,
                 )
                 first, left = end, left - (end - first)
 
     def attributes(self) -> dict[str, object]:
-        sweep, table = self.sweep, self.sweep.table
+        sweep, table = self.sweep, self.sweep.design
         options = [table.combine, table.settings, table.precision, table.error_growth, table.defects, table.seed]
         axes = [(axis.key, axis.is_drawn) for axis in sweep.design.axes]
         runs = [self.methods, self.first, self.last, table.validation, table.test]
@@ -251,7 +251,7 @@ class SweepPlan:
                 f"{self.runs} runs of {sweep.base.name} with {', '.join(self.methods)}; varied: {', '.join(sweep.keys)}"
             ),
             "keywords": KEYWORDS,
-            "sweep_toml": sweep.text,
+            "sweep_toml": sweep.file.text,
             "base_scene": sweep.base.name,
             "scene_toml": sweep.base.text,
             "scene_hash": scene_hash(sweep.base),
@@ -275,10 +275,9 @@ def plan_sweep(
     sweep: Sweep, methods: Sequence[str] = (), part: tuple[int, int] = (1, 1), time_limit_s: float = 60.0
 ) -> SweepPlan:
     """The runs of part k of n by `methods`, else by those of the file. Raises InputError, MethodRefusal."""
-    file = shown_path(sweep.path), sweep.text
-    chosen = check_names(methods or sweep.table.methods)
-    with at_key(*file, "settings"):
-        settings = settings_for(chosen, sweep.table.settings)
+    chosen = check_names(methods or sweep.design.methods)
+    with sweep.file.located("settings"):
+        settings = settings_for(chosen, sweep.design.settings)
     for method in chosen:
         find_method(method).items(sweep.base)
     total = sweep.design.count * len(chosen)

@@ -80,7 +80,7 @@ def test_a_number_that_looks_like_a_slip_is_warned_of_and_not_refused(slip: str,
     shown = rotor_mbs("show", path)
     assert shown.status == 0
     (line,) = shown.err.splitlines()
-    assert line.startswith("warning: mine: ")
+    assert line.startswith(f"warning: {path}: ")
     assert says in line
     with pytest.warns(PlausibilityWarning, match="mine.toml"):
         rm.load(path)
@@ -130,4 +130,4 @@ def test_a_scene_names_its_methods_and_settings(folder: Path) -> None:
     assert set(runs["mine"]) == {"reference", "exudyn_tree/rk67", "lagrange/dop853"}
     assert runs["mine/exudyn_tree/rk67"].settings["step"] == 0.001
     scene_file(folder, edits | {"# step = 1e-3": "stp = 0.002"})
-    assert "mine:38: settings: no setting 'stp', perhaps step" in refusal("run", path, "-o", "r.h5")
+    assert "mine.toml:38: settings: no setting 'stp', perhaps step" in refusal("run", path, "-o", "r.h5")

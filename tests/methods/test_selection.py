@@ -12,7 +12,14 @@ from support.scenes import PAPER, paper
 from rotor_mbs.analysis.judgement import judge
 from rotor_mbs.cli import main
 from rotor_mbs.errors import InputError, MethodRefusal
-from rotor_mbs.methods.catalogue import choose, is_corrected, methods, selected_methods, singular_reason
+from rotor_mbs.methods.catalogue import (
+    choose,
+    is_corrected,
+    methods,
+    problems_of_file,
+    selected_methods,
+    singular_reason,
+)
 from rotor_mbs.methods.solve import solve
 from rotor_mbs.scenario.catalogue import find_scenes
 
@@ -26,10 +33,13 @@ def test_scenes_of_the_paper_keep_the_default_set() -> None:
         assert set(methods) == set(DEFAULT_METHODS), name
 
 
-def test_an_unknown_method_of_a_scene_is_named_with_its_line() -> None:
-    text = 'methods = ["lagrange/tayler"]\n' + paper("fig05").text
-    with pytest.raises(InputError, match=r"^paper/fig05:1: methods: unknown method 'lagrange/tayler', perhaps"):
-        selected_methods([replace(paper("fig05"), methods=("lagrange/tayler",), text=text)])
+def test_an_unknown_method_of_a_scene_is_named_with_its_line(tmp_path: Path) -> None:
+    path = tmp_path / "mine.toml"
+    path.write_text('methods = ["lagrange/tayler"]\n' + paper("fig05").text)
+    with pytest.raises(InputError, match=r"mine.toml:1: methods: unknown method 'lagrange/tayler', perhaps"):
+        find_scenes([str(path)], problems_of_file)
+    with pytest.raises(InputError, match=r"^paper/fig05: methods: unknown method 'lagrange/tayler', perhaps"):
+        selected_methods([paper("fig05").replace(methods=["lagrange/tayler"])])
 
 
 CHOOSE_THEIR_STEP, IMPLICIT = ("lagrange/taylor", "exudyn_tree/dopri5"), ("lagrange/taylor", "lagrange/radau")

@@ -9,6 +9,7 @@ import pytest
 from hypothesis import assume, example, given
 from hypothesis import strategies as st
 
+from rotor_mbs.errors import InputError
 from rotor_mbs.scenario.keys import ALLOWED, MAX_DEPTH, MAX_LENGTH, evaluate, read_number
 
 
@@ -34,7 +35,7 @@ def test_value(text: str, value: float) -> None:
     ],
 )  # fmt: skip
 def test_refused_with_one_sentence_that_says_what_is_allowed(text: str) -> None:
-    with pytest.raises(ValueError, match=r"; allowed: ") as caught:
+    with pytest.raises(InputError, match=r"; allowed: ") as caught:
         read_number(text)
     assert str(caught.value).endswith(ALLOWED)
     assert str(caught.value).isprintable()

@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 import math
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -24,31 +25,35 @@ def _load(folder: Path, text: str) -> Sweep:
     return load_sweep(path)
 
 
+def _design(axes: tuple[Axis, ...], **options: Any) -> Design:
+    return Design(title="t", scene="paper/fig11", settings={}, change={}, axes=axes, **options)
+
+
 def test_a_grid_runs_through_its_axes_the_last_one_fastest_and_zip_through_all_at_once() -> None:
     axes = (Axis("a", (1.0, 2.0)), Axis("b", linear=Range(0.0, 1.0, 3)), Axis("c", log=Range(1.0, 100.0, 3)))
-    design = Design(axes, "grid", 0)
+    design = _design(axes)
     expected = list(itertools.product([1.0, 2.0], [0.0, 0.5, 1.0], [1.0, 10.0, 100.0]))
     assert design.count == 18
     # log goes through a power: equal to round-off
     np.testing.assert_allclose(design.rows(0, 18), expected, rtol=1e-15)
     np.testing.assert_array_equal(design.rows(7, 11), design.rows(0, 18)[7:11])
-    zipped = Design((Axis("a", (1.0, 2.0)), Axis("b", (3.0, 4.0))), "zip", 0)
+    zipped = _design((Axis("a", (1.0, 2.0)), Axis("b", (3.0, 4.0))), combine="zip")
     np.testing.assert_array_equal(zipped.rows(0, 2), [[1.0, 3.0], [2.0, 4.0]])
 
 
 def test_random_axes_are_drawn_together_by_their_seed_and_combined_with_the_others() -> None:
     axes = (Axis("a", (1.0, 2.0)), Axis("b", normal=(0.0, 1.0)), Axis("c", sobol=(5.0, 6.0)))
-    rows = Design(axes, "grid", 7, 4).rows(0, 8)
+    rows = _design(axes, seed=7, draws=4).rows(0, 8)
     assert rows[:, 0].tolist() == [1.0] * 4 + [2.0] * 4
     np.testing.assert_array_equal(rows[:4, 1:], rows[4:, 1:])
     assert len(np.unique(rows[:4, 1])) == 4
-    np.testing.assert_array_equal(rows, Design(axes, "grid", 7, 4).rows(0, 8))
-    assert not np.isin(rows[:, 1:], Design(axes, "grid", 8, 4).rows(0, 8)).any()
+    np.testing.assert_array_equal(rows, _design(axes, seed=7, draws=4).rows(0, 8))
+    assert not np.isin(rows[:, 1:], _design(axes, seed=8, draws=4).rows(0, 8)).any()
 
 
 def test_draws_have_the_distribution_that_was_asked_for() -> None:
     axes = (Axis("u", uniform=(2.0, 3.0)), Axis("n", normal=(2.0, 3.0)), Axis("s", sobol=(2.0, 3.0)))
-    uniform, normal, sobol = Design(axes, "grid", 0, 4096).rows(0, 4096).T
+    uniform, normal, sobol = _design(axes, draws=4096).rows(0, 4096).T
     for values in (uniform, sobol):
         assert 2.0 <= values.min() < 2.01 < 2.99 < values.max() < 3.0
     # five standard errors of a mean of 4096 draws
@@ -71,9 +76,9 @@ def test_a_sweep_without_a_file_is_that_of_its_text(tmp_path: Path) -> None:
     scene = find_scenes(["paper/fig11"])[0]
     axes = {"gravity": np.array([9.0, 10.0]), "initial.angles[1]": {"linear": {"start": 0, "end": 1, "count": 3}}}
     made = sweep_of(scene, axes, samples=21, outputs=["angles"], validation=0.5)
-    (tmp_path / "s.toml").write_text(made.text)
+    (tmp_path / "s.toml").write_text(made.file.text)
     read = load_sweep(tmp_path / "s.toml")
-    assert (made.base, made.design, made.outputs, made.text) == (read.base, read.design, read.outputs, read.text)
+    assert (made.base, made.design, made.file.text) == (read.base, read.design, read.file.text)
     with pytest.raises(InputError, match=r"sweep:.*gravitas"):
         sweep_of(scene, {"gravitas": [1.0]})
     with pytest.raises(InputError, match=r"sweep:.*values"):
@@ -143,7 +148,7 @@ _BAD = {
     "numbers that do not fit": ('[[axis]]\nkey = "blade.inertia[0]"\nvalues = [0, 1]', 4, "no rigid body"),
     "unequal lists zipped": (
      'combine = "zip"\n[[axis]]\nkey = "gravity"\nvalues = [1]\n[[axis]]\nkey = "hub.inertia"\nvalues = [1, 2]',
-     3, "gravity has 1, hub.inertia has 2; allowed with zip"),
+     3, "gravity has 1, hub.inertia has 2; allowed: with zip"),
     "1e12 runs": ('[[axis]]\nkey = "gravity"\nlinear = {start = 0, end = 1, count = 1000000000000}', 3,
      "1,000,000,000,000 runs; allowed: at most"),
     "a change of no key": ('change = {"gravty" = 1}\n[[axis]]\nkey = "hub.inertia"\nvalues = [1]', 3,
