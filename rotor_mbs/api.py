@@ -23,7 +23,7 @@ import numpy as np
 from rotor_mbs.analysis.judgement import defects_of
 from rotor_mbs.analysis.run_tables import RUN_HEAD, TextTable, run_row
 from rotor_mbs.errors import InputError, MethodRefusal, ResourceError, StoreError
-from rotor_mbs.methods.catalogue import REFERENCE, check_names, problems_of_file, selected_methods
+from rotor_mbs.methods.catalogue import REFERENCE, check_names, problems_of_scene, selected_methods
 from rotor_mbs.methods.method_file import ENDING
 from rotor_mbs.methods.time_limit import checked_seconds
 from rotor_mbs.runs.design import MISSING, RUNS
@@ -83,7 +83,7 @@ def load(path: str | os.PathLike[str]) -> Scene:
     Implausible numbers, such as 30 rad, cause a PlausibilityWarning. Raises InputError with one line per error in
     the file.
     """
-    return load_scene(Path(path), check=problems_of_file, stacklevel=3)
+    return load_scene(Path(path), check=problems_of_scene, stacklevel=3)
 
 
 @overload

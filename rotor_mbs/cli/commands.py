@@ -23,7 +23,7 @@ from rotor_mbs.cli.arguments import pages_beside
 from rotor_mbs.cli.terminal import ProgressLine, print_not_computed, print_table, span
 from rotor_mbs.errors import InputError, MethodRefusal, StoreError
 from rotor_mbs.methods.base import Method
-from rotor_mbs.methods.catalogue import check_names, look_up, methods, problems_of_file
+from rotor_mbs.methods.catalogue import check_names, look_up, methods, problems_of_methods
 from rotor_mbs.runs import cores
 from rotor_mbs.scenario.catalogue import find_scenes, list_scenes, list_sweeps, only_scene
 from rotor_mbs.scenario.keys import counted
@@ -367,7 +367,7 @@ def sweep(arguments: argparse.Namespace) -> int:
         from rotor_mbs.scenario.sweep import load_sweep
         from rotor_mbs.studies.sweep import estimate_seconds, plan_sweep, run_sweep
 
-        study = load_sweep(arguments.file, problems_of_file)
+        study = load_sweep(arguments.file, problems_of_methods)
         plan = plan_sweep(study, arguments.method or (), arguments.part, arguments.timeout)
         if arguments.dry_run:
             size, seconds = plan.runs * plan.table().row_type.itemsize, estimate_seconds(plan, pool)

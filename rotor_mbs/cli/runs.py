@@ -12,7 +12,7 @@ from pathlib import Path
 from rotor_mbs.analysis.run_tables import run_table
 from rotor_mbs.cli import EXIT_BAD_INPUT
 from rotor_mbs.cli.terminal import ProgressLine, print_summary, print_table
-from rotor_mbs.methods.catalogue import problems_of_file, selected_methods
+from rotor_mbs.methods.catalogue import problems_of_scene, selected_methods
 from rotor_mbs.runs.outputs import is_being_written, replace_file
 from rotor_mbs.runs.pool import local_pool
 from rotor_mbs.runs.read import open_results
@@ -25,7 +25,7 @@ from rotor_mbs.studies.run import run_scenes
 
 def run(arguments: argparse.Namespace) -> int:
     """Methods named with -m, or by a scene's file, must represent it; without, a rule selects them."""
-    scenes = find_scenes(arguments.scenes, problems_of_file)
+    scenes = find_scenes(arguments.scenes, problems_of_scene)
     methods, reasons = selected_methods(scenes, arguments.method or ())
     for reason in reasons:
         print(reason, file=sys.stderr)

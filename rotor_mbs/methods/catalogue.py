@@ -158,14 +158,21 @@ def own_settings(scene: Scene, method: str) -> dict[str, object]:
         raise InputError(f"{scene.name}: settings: {problem}" for problem in error.problems) from error
 
 
-def problems_of_file(values: Mapping[str, Any]) -> list[KeyProblem]:
-    """What is wrong with the `methods` and `settings` that a scene file or a sweep file names."""
-    names, settings = values.get("methods", ()), dict(values.get("settings", ()))
-    known = method_names() if names or settings else ()
-    problems = [KeyProblem(("methods",), _unknown(name)) for name in names if name not in known]
+def problems_of_methods(values: Mapping[str, Any]) -> list[KeyProblem]:
+    """What is wrong with the `methods` that a scene file or a sweep file names."""
+    names = values.get("methods", ())
+    known = method_names() if names else ()
+    return [KeyProblem(("methods",), _unknown(name)) for name in names if name not in known]
+
+
+def problems_of_scene(values: Mapping[str, Any]) -> list[KeyProblem]:
+    """What is wrong with the `methods` and `settings` of a scene file. A sweep's settings have to be those of the
+    methods that it is run with."""
+    problems = problems_of_methods(values)
+    settings = dict(values.get("settings", ()))
     if settings:
         try:
-            settings_for(known, settings)
+            settings_for(method_names(), settings)
         except InputError as error:
             problems += [KeyProblem(("settings",), problem) for problem in error.problems]
     return problems

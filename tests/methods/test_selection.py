@@ -16,7 +16,7 @@ from rotor_mbs.methods.catalogue import (
     choose,
     is_corrected,
     methods,
-    problems_of_file,
+    problems_of_scene,
     selected_methods,
     singular_reason,
 )
@@ -37,7 +37,7 @@ def test_an_unknown_method_of_a_scene_is_named_with_its_line(tmp_path: Path) -> 
     path = tmp_path / "mine.toml"
     path.write_text('methods = ["lagrange/tayler"]\n' + paper("fig05").text)
     with pytest.raises(InputError, match=r"mine.toml:1: methods: unknown method 'lagrange/tayler', perhaps"):
-        find_scenes([str(path)], problems_of_file)
+        find_scenes([str(path)], problems_of_scene)
     with pytest.raises(InputError, match=r"^paper/fig05: methods: unknown method 'lagrange/tayler', perhaps"):
         selected_methods([paper("fig05").replace(methods=["lagrange/tayler"])])
 
