@@ -155,7 +155,7 @@ class _Names(argparse.Action):
         from rotor_mbs.foreign.channels import KNOWN_NAMES, LOAD_AND_MODE_NAMES
 
         lines = [f"{channel}: {names}" for channel, names in KNOWN_NAMES + LOAD_AND_MODE_NAMES]
-        print(*lines, "case, blanks and underscores are ignored", sep="\n")
+        print(*lines, "case, spaces and underscores are ignored", sep="\n")
         parser.exit(0)
 
 
@@ -277,7 +277,7 @@ def _parser() -> tuple[_Parser, dict[str, _Parser]]:
     own.add_argument(
         "file", nargs="?", type=Path, metavar="FILE", help="file to check (default: compute a set of runs)"
     )
-    own.method("method, or a Python file that defines methods, to compute without FILE")
+    own.method("method to compute if no FILE is given, or a Python file that defines methods")
     own.add_argument(
         "--bounds", type=Path, metavar="TOML", help="bounds that take precedence over reference/accuracy.toml"
     )
