@@ -184,7 +184,7 @@ def _read_blades(value: object, scene: Mapping[str, Any]) -> tuple[Blade, ...]:
     return read_each(read_blade, value)
 
 
-OUTPUT_NAMES = Kind(_read_outputs, "any of angles, rates, tip, energy, loads, or outputs of installed packages")
+OUTPUT_NAMES = Kind(_read_outputs, "any of angles, rates, tip, energy, loads, outputs of packages")
 _OUTPUTS = where(OUTPUT_NAMES, bool, OUTPUT_NAMES.allowed, "0 entries")
 _POINT = list_of(keys.SIZE, "three numbers x, y, z{unit}, blade frame", 3, 3)
 _INERTIA = where(

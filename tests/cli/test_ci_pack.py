@@ -56,7 +56,7 @@ def test_a_run_that_is_gone_is_found(earlier: Path, folder: Path) -> None:
     assert compared.status == 1
     (line,) = [line for line in compared.out.splitlines() if line.startswith(f"FAIL against: {SCENE} {METHOD}")]
     assert "run: all: nan" in line
-    assert "not in this one" in line
+    assert "missing in this one" in line
     assert rotor_mbs("check", earlier, "--against", folder / "none.h5").status == 2
 
 

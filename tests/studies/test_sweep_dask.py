@@ -130,4 +130,4 @@ def test_a_cluster_without_workers_ends_in_one_line() -> None:
     pool = dask_cluster.Cluster(_WithoutWorkers(), patience_s=0.2)
     (end,) = run_in(pool, abs, [-3], 60.0)
     assert isinstance(end.error, StoreError)  # which ends a sweep
-    assert str(end.error) == "engine dask: no workers for 0.2 s; what is stored is kept"
+    assert str(end.error) == "engine dask: no workers for 0.2 s; stored runs are kept"
