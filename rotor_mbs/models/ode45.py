@@ -17,7 +17,6 @@ from fractions import Fraction
 
 import numpy as np
 
-from rotor_mbs.models import Ode45Settings as Ode45Settings
 from rotor_mbs.solution.trajectory import Array
 
 RightHandSide = Callable[[float, Sequence[float]], list[float]]

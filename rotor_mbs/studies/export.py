@@ -18,7 +18,7 @@ from rotor_mbs.methods.catalogue import REFERENCE
 from rotor_mbs.methods.solve import solve
 from rotor_mbs.models.exudyn import tree
 from rotor_mbs.models.exudyn.geometry import LISTS, Ref, pitching
-from rotor_mbs.models.exudyn.moments import Loads, Moment
+from rotor_mbs.models.exudyn.loads import Loads, Moment
 from rotor_mbs.models.mujoco.mjcf import mjcf_file
 from rotor_mbs.runs.outputs import refuse_foreign, replace_file
 from rotor_mbs.scenario.catalogue import scene_of

@@ -16,7 +16,7 @@ from rotor_mbs.methods.catalogue import find_method, method_names
 from rotor_mbs.methods.solve import solve
 from rotor_mbs.methods.time_limit import OutOfTimeError, is_over, polled, time_limit
 from rotor_mbs.models.exudyn import adapter, chain, sensor_samples, tree
-from rotor_mbs.models.exudyn.moments import Loads
+from rotor_mbs.models.exudyn.loads import Loads
 from rotor_mbs.models.exudyn.schemes import Scheme
 from rotor_mbs.models.exudyn.solvers import MultibodySolver
 from rotor_mbs.scenario.accuracy_bounds import Bound

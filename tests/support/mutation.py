@@ -94,7 +94,10 @@ _SENSORS = (
     f"{_WORK}of_a_constant_torque_and_of_a_constant_rest_angle[exudyn_tree/rk44]",
     "models/test_exact_solutions.py::test_a_thousand_radians_a_second_are_counted_turn_by_turn",
 )
-_EXTRAPOLATION = "models/test_extrapolation.py::test_steps_are_those_of_all_columns"
+_EXTRAPOLATION = (
+    "models/test_extrapolation.py::test_steps_are_those_of_all_columns",
+    "models/test_extrapolation.py::test_the_work_of_loads_and_dampers_along_the_substeps",
+)
 _MUJOCO = "models/test_mujoco.py::test_"
 _JUDGEMENT = "solution/test_judgement.py::test_"
 _RULES = (
@@ -107,7 +110,7 @@ _CHECK = "studies/test_check.py::test_"
 _TIME_TABLE = ("scenario/test_time_table.py",)
 _SAMPLES = ("models/test_segments.py", f"{_WORK}and_energy_of_a_step_of_the_command[lagrange/dop853]")
 _TARGETS = (
-    Target(f"{_L}.closed_form", "accelerations power rest_energy energies _kinetic point_path", "lagrange", _PRINTED),
+    Target(f"{_L}.closed_form", "accelerations power rest_energy energies point_path", "lagrange", _PRINTED),
     Target(f"{_L}.parameters", "rotor_form _inertia_about_hub _rotor_inertia _coefficients _cosine_of_turn",
            "lagrange", _PRINTED),
     # What all but the printed equations share.
@@ -125,7 +128,7 @@ _TARGETS = (
     Target(f"{_M}.geometry", "_joined", "tree", _PARTS, 0.001),
     Target(f"{_M}.tree", "_tree", "tree", (f"{_JUDGEMENT}the_tree_is_listed_with_what_it_has",)),
     Target(f"{_M}.sensor_samples", "springs work cumulative_integral _fields", "tree", _SENSORS),
-    Target(f"{_M}.moments", "at drives moment_on", "tree", ()),
+    Target(f"{_M}.loads", "at drives moment_on", "tree", ()),
     Target(f"{_M}.geometry", "quaternion quaternion_rate", "chain", _PARTS, 0.01),
     Target(f"{_M}.chain", "rotation placed_bodies _body _marker _on_body _pitch_spring _spring_torque", "chain",
            _PARTS, 0.01),
@@ -148,9 +151,9 @@ _TARGETS = (
            "tests alone", (*_RULES, "solution/test_metrics.py::test_a_pitch_that_leaves_zero"), 0.5),
     # Of a tableau's fractions any may be changed.
     Target("rotor_mbs.models.ode45", "*", "ode45", (_DEFAULTS, "models/test_ode45.py"), 0.001),
-    Target(f"{_M}.schemes", "*", "schemes", (_DEFAULTS, *_PARTS, _EXTRAPOLATION), 0.5),
+    Target(f"{_M}.schemes", "*", "schemes", (_DEFAULTS, *_PARTS, *_EXTRAPOLATION), 0.5),
     Target(f"{_M}.solvers", "_scheme build_tree build_chain __init__ integrate", "schemes",
-           (_DEFAULTS, *_PARTS, _EXTRAPOLATION), 0.5),
+           (_DEFAULTS, *_PARTS, *_EXTRAPOLATION), 0.5),
     Target(f"{_L}.methods", "tolerance check_tolerance relative_tolerance absolute_tolerance", "schemes",
            (_DEFAULTS, "methods/test_settings.py"), 0.5),
     Target(f"{_M}.adapter", "*", "adapter",

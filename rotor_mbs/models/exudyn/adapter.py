@@ -157,15 +157,7 @@ class System:
             period = span / rows * (1.0 - 0.1 / integration.numberOfSteps)
             settings.solution.sensors.writePeriod = 0.0 if every_step else period
             solver = _engine.MainSolverExplicit() if scheme.stages else _engine.MainSolverImplicitSecondOrder()
-            failure = self._solve(solver, settings)
-            # The engine's index is one ahead of the steps it took, and two where the last one failed; an implicit step
-            # evaluates its residual once more than it iterates.
-            it = solver.it
-            taken = max(0, it.currentStepIndex - (2 if failure else 1))
-            tried = taken + it.rejectedAutomaticStepSizeSteps
-            total.steps = (total.steps or 0) + taken
-            evaluations = tried * scheme.stages if scheme.stages else it.newtonStepsCount + taken
-            total.rhs_evaluations = (total.rhs_evaluations or 0) + evaluations
+            failure, it = self._solve(solver, settings, scheme.stages, total), solver.it
             total.success, total.message = not failure, failure
             total.out_of_time = failure == MESSAGE
             total.time_reached = max(interval.start, it.currentTime - it.currentStepSize) if failure else interval.end
@@ -224,12 +216,7 @@ class System:
         integration = self._settings.timeIntegration
         integration.startTime, integration.endTime, integration.numberOfSteps = start, end, steps
         integration.initialStepSize = (end - start) / steps
-        failure = self._solve(self._solver, self._settings)
-        it = self._solver.it
-        taken = max(0, it.currentStepIndex - (2 if failure else 1))
-        total.steps = (total.steps or 0) + taken
-        total.rhs_evaluations = (total.rhs_evaluations or 0) + it.newtonStepsCount + taken
-        return failure
+        return self._solve(self._solver, self._settings, 0, total)
 
     def values(self) -> Array:
         """Coordinates, rates, accelerations, multipliers where the last integration ended."""
@@ -269,19 +256,30 @@ class System:
             for name in self.sensors
         }
 
-    def _solve(self, solver: Any, settings: Any) -> str:
+    def _solve(self, solver: Any, settings: Any, stages: int, total: Integration) -> str:
+        """Run the solver from start to end time, its work counted in `total`; why it failed, or "". stages: evaluations
+        in an explicit step, 0 of an implicit solver."""
+        failure = ""
         try:
-            if solver.SolveSystem(self._mbs, settings):
-                return ""
-            reason = ""
+            if not solver.SolveSystem(self._mbs, settings):
+                failure = _one_line(solver.GetErrorString()) or _NO_REASON
         except (_engine.ExudynError, RuntimeError, SystemError) as exc:
             if _caused_by(exc, KeyboardInterrupt):
                 raise KeyboardInterrupt from exc
-            if _caused_by(exc, OutOfTimeError):
-                return MESSAGE
-            reason = _one_line(str(exc))
-        return reason or _one_line(solver.GetErrorString()) or "the engine gave no reason"
+            failure = MESSAGE
+            if not _caused_by(exc, OutOfTimeError):
+                failure = _one_line(str(exc)) or _one_line(solver.GetErrorString()) or _NO_REASON
+        # The engine's index is one ahead of the steps it took, and two where the last one failed; an implicit step
+        # evaluates its residual once more than it iterates.
+        it = solver.it
+        taken = max(0, it.currentStepIndex - (2 if failure else 1))
+        evaluations = stages * (taken + it.rejectedAutomaticStepSizeSteps) if stages else it.newtonStepsCount + taken
+        total.steps = (total.steps or 0) + taken
+        total.rhs_evaluations = (total.rhs_evaluations or 0) + evaluations
+        return failure
 
+
+_NO_REASON = "the engine gave no reason"
 
 # Coordinates and constraints of a chain of twelve blades, from which on a sparse factorization costs less than a dense
 # one: its cost grows with their number, that of a dense one with a power of 2.5.

@@ -10,8 +10,7 @@ import numpy as np
 
 from rotor_mbs.models.exudyn import geometry
 from rotor_mbs.models.exudyn.geometry import Part, Ref, sensor
-from rotor_mbs.models.exudyn.loads import chain_sensors
-from rotor_mbs.models.exudyn.moments import Loads, Moment, is_driven, moment_on
+from rotor_mbs.models.exudyn.loads import Loads, Moment, chain_sensors, is_driven, moment_on
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.scenario.time_table import constant_value, is_constant
 from rotor_mbs.solution.trajectory import Array

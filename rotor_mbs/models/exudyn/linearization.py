@@ -12,7 +12,7 @@ from rotor_mbs.errors import MethodRefusal
 from rotor_mbs.models.exudyn import chain, tree
 from rotor_mbs.models.exudyn.adapter import Linearized, System
 from rotor_mbs.models.exudyn.geometry import quaternion
-from rotor_mbs.models.exudyn.moments import Loads
+from rotor_mbs.models.exudyn.loads import Loads
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.trajectory import Array, Linearization, limit_at_zero, scene_at
 

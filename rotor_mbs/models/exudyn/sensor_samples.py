@@ -9,8 +9,7 @@ from numpy.typing import NDArray
 
 from rotor_mbs.models.exudyn import chain, tree
 from rotor_mbs.models.exudyn.geometry import Body, mounting, pitching
-from rotor_mbs.models.exudyn.loads import chain_loads, matrices, tree_loads
-from rotor_mbs.models.exudyn.moments import ROTOR, drives
+from rotor_mbs.models.exudyn.loads import ROTOR, chain_loads, drives, matrices, tree_loads
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.scenario.time_table import Segment, is_constant, values_at
 from rotor_mbs.solution.trajectory import Array, Trajectory, all_coordinates, finite_rows, finite_samples, sample_times

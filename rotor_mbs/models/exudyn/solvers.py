@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -13,7 +13,7 @@ from rotor_mbs.methods.base import BuiltItem, Solver
 from rotor_mbs.methods.time_limit import MESSAGE, is_over, polled
 from rotor_mbs.models.exudyn import chain, geometry, sensor_samples, tree
 from rotor_mbs.models.exudyn.geometry import Part
-from rotor_mbs.models.exudyn.moments import Loads
+from rotor_mbs.models.exudyn.loads import Loads
 from rotor_mbs.models.exudyn.schemes import ExtrapolatedSettings, Scheme, SchemeSettings
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.scenario.time_table import Interval, Segment, intervals
@@ -58,6 +58,16 @@ def neville(previous: Sequence[Array], values: Array) -> list[Array]:
 # constraints changes its sign with every step, and only after an even number of steps is it the same in all columns.
 
 
+class _Kept(NamedTuple):
+    """The state at the end of a part of an interval, under the loads of that interval."""
+
+    time: float  # s
+    interval: Interval
+    values: Array  # as of `System.values`
+    turns: Array  # of the springs
+    work: float  # J
+
+
 class ExtrapolatedSolver:
     """See `methods.base.Solver`; `tolerance` (rad) is for the estimated error of each part of an interval."""
 
@@ -87,21 +97,16 @@ class ExtrapolatedSolver:
         self._total = Integration(True)
         self._halvings = 0
         self.columns: list[int] = []  # of each part
-        self._works: list[float] = []  # J
-        self._times: list[float] = []
-        self._states: list[Array] = []
-        self._turns: list[Array] = []  # of the springs
-        self._within: list[Interval] = []
+        self.kept: list[_Kept] = []
 
     def integrate(self) -> Integration:
         """From sample to sample. Where a load has a kink, accelerations and multipliers are calculated anew."""
-        self._total = Integration(True, steps=0, rhs_evaluations=0)
-        self._halvings, self.columns = 0, []
-        self._times, self._states, self._turns, self._within, self._works = [], [], [], [], []
+        self._total = Integration(True)
+        self._halvings, self.columns, self.kept = 0, [], []
         first = self._intervals[0]
         self._loads.enter(first)
         self.system.begin(self._scheme, with_rows=self._integrates_work)
-        self._keep(0.0, first, *self.system.initial_values(0.0), 0.0)
+        self._keep(first.start, first, *self.system.initial_values(first.start), 0.0)
         failure = ""
         with polled():
             for interval in self._intervals:
@@ -113,7 +118,7 @@ class ExtrapolatedSolver:
                     break
         self._total.success, self._total.message = not failure, failure
         self._total.out_of_time = failure == MESSAGE
-        self._total.time_reached = self._times[-1]
+        self._total.time_reached = self.kept[-1].time
         return self._total
 
     def _cross(self, interval: Interval, start: float, end: float, halvings: int) -> str:
@@ -150,7 +155,7 @@ class ExtrapolatedSolver:
                 state, gained = row[-1], 0.0
                 if self._integrates_work:
                     state, gained = state[:-1], float(state[-1])
-                self._keep(end, interval, self._consistent(state), self.system.turns(), self._works[-1] + gained)
+                self._keep(end, interval, self._consistent(state), self.system.turns(), self.kept[-1].work + gained)
                 return ""
         return f"near t = {start:.6g} s the error of an interval of {end - start:.3g} s remains above the tolerance"
 
@@ -195,21 +200,17 @@ class ExtrapolatedSolver:
 
     def _keep(self, time: float, interval: Interval, values: Array, turns: Array, work: float) -> None:
         self.system.start_from(values, turns)
-        self._works.append(work)
-        self._times.append(time)
-        self._states.append(values)
-        self._turns.append(turns)
-        self._within.append(interval)
+        self.kept.append(_Kept(time, interval, values, turns, work))
 
     def observe(self) -> Trajectory:
         """What the sensors read of each state, under the load before a jump."""
         tables: dict[str, list[Array]] = {name: [] for name in self.system.sensors}
-        for time, values, turns, interval in zip(self._times, self._states, self._turns, self._within, strict=True):
-            self._loads.enter(interval)
-            for name, read in self.system.read(time, values, turns).items():
-                tables[name].append(np.concatenate([[time], read]))
+        for kept in self.kept:
+            self._loads.enter(kept.interval)
+            for name, read in self.system.read(kept.time, kept.values, kept.turns).items():
+                tables[name].append(np.concatenate([[kept.time], read]))
         rows = {name: np.array(table) for name, table in tables.items()}
-        rows["work"] = np.stack([self._times, self._works], axis=1)
+        rows["work"] = np.array([[kept.time, kept.work] for kept in self.kept])
         # A diverging state may overflow in its energies; the rows are cut where they stop being finite.
         with np.errstate(over="ignore", invalid="ignore"):
             return sensor_samples.chain_trajectory(

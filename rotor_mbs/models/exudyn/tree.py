@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from rotor_mbs.models.exudyn.geometry import Body, Part, Ref, blade_body, hub_body, mounting, on_body, pitching, sensor
-from rotor_mbs.models.exudyn.loads import tree_sensors
-from rotor_mbs.models.exudyn.moments import Loads, moment_on
+from rotor_mbs.models.exudyn.loads import Loads, moment_on, tree_sensors
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.scenario.time_table import constant_value, is_constant
 from rotor_mbs.solution.trajectory import Array

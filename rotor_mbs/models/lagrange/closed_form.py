@@ -115,18 +115,15 @@ def energies(
         potential = potential + weight * (cos_q * cos_phase - sin_q * sin_phase)
     for blade, theta, rate, _, rest in pitches(form, angles, rates, loads):
         s, c = sin(theta), cos(theta)
-        kinetic = kinetic + _kinetic(blade, s, c, spin, rate)
+        inertia = blade.inertia_ss * (s * s) + blade.inertia_cc * (c * c) + blade.inertia_sc * (s * c)
+        coupling = blade.coupling_s * s + blade.coupling_c * c
+        of_blade = 0.5 * inertia * (spin * spin) + coupling * spin * rate + 0.5 * blade.pitch_inertia * (rate * rate)
+        kinetic = kinetic + of_blade
         sin_phi = sin_q * blade.cos_phase + cos_q * blade.sin_phase
         cos_phi = cos_q * blade.cos_phase - sin_q * blade.sin_phase
         height = cos_phi * blade.weight_z - sin_phi * (blade.weight_x * c - blade.weight_y * s)
         potential = potential + height + 0.5 * blade.stiffness * ((theta - rest) * (theta - rest))
     return kinetic, potential
-
-
-def _kinetic(blade: BladeForm, s: Number, c: Number, spin: Number, rate: Number) -> Number:
-    inertia = blade.inertia_ss * (s * s) + blade.inertia_cc * (c * c) + blade.inertia_sc * (s * c)
-    coupling = blade.coupling_s * s + blade.coupling_c * c
-    return 0.5 * inertia * (spin * spin) + coupling * spin * rate + 0.5 * blade.pitch_inertia * (rate * rate)
 
 
 def point_path(

@@ -9,7 +9,6 @@ from fractions import Fraction
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rotor_mbs.methods.solve import solve
 from rotor_mbs.models.lagrange import closed_form, hamilton, taylor
@@ -30,7 +29,14 @@ _SAMPLES_PER_CHUNK = 4096
 _OBSERVED_PER_CALL = 1024
 
 
-def empty_block(scenes: Sequence[Scene]) -> RunBlock:
+def lanes() -> int:
+    """Runs side by side: one vector register's. Two are a fifth slower, and take three times as long to compile."""
+    return int(heyoka().recommended_simd_size())
+
+
+def solve_many(scenes: Sequence[Scene], tolerance: float) -> RunBlock:
+    """Run all scenes, with the same number of blades and samples and the same outputs, loads not among them; a run that
+    breaks off is in the result, cut and with its reason. Raises MethodRefusal where heyoka is not installed."""
     first, runs = scenes[0], len(scenes)
     time = np.linspace(0.0, np.array([scene.duration for scene in scenes]), first.samples, axis=1)
     blades = len(first.blades)
@@ -40,24 +46,11 @@ def empty_block(scenes: Sequence[Scene]) -> RunBlock:
     if first.wants("energy"):
         shapes |= dict.fromkeys(_ENERGIES, ())
     arrays = {name: np.empty((*time.shape, *shape)) for name, shape in shapes.items()}
-    return RunBlock(time, arrays, [Integration(False)] * runs, [0] * runs)
+    block = RunBlock(time, arrays, [Integration(False)] * runs, [0] * runs)
 
-
-# What runs of one rotor share: (parameters,) of the equations, then of the tips; the structure, in which rotors agree
-# that share compiled code.
-_RotorNumbers = tuple[Array, tuple[int, ...]]
-
-
-def lanes() -> int:
-    """Runs side by side: one vector register's. Two are a fifth slower, and take three times as long to compile."""
-    return int(heyoka().recommended_simd_size())
-
-
-def solve_many(scenes: Sequence[Scene], tolerance: float) -> RunBlock:
-    """Run all scenes, with the same number of blades and samples and the same outputs, loads not among them; a run that
-    breaks off is in the result, cut and with its reason. Raises MethodRefusal where heyoka is not installed."""
-    block = empty_block(scenes)
-    rotors: dict[tuple[object, ...], _RotorNumbers] = {}
+    # What runs of one rotor share: (parameters,) of the equations, then of the tips; the structure, in which rotors
+    # agree that share compiled code.
+    rotors: dict[tuple[object, ...], tuple[Array, tuple[int, ...]]] = {}
     groups: dict[tuple[int, ...], list[int]] = {}
     for i, scene in enumerate(scenes):
         if not scene.has_constant_loads:
@@ -76,20 +69,11 @@ def solve_many(scenes: Sequence[Scene], tolerance: float) -> RunBlock:
             structure = (*parameters.structure, work_is_integrated(scene), *scene.moving_coordinates)
             rotors[key] = array_of(parameters.values, quad=False), structure
         groups.setdefault(rotors[key][1], []).append(i)
-    for places in groups.values():
+    for structure, places in groups.items():
         of_group = [scenes[i] for i in places]
-        _propagate(block, _Group(places, of_group, [rotors[scene.rotor_key] for scene in of_group], tolerance))
+        numbers = np.stack([rotors[scene.rotor_key][0] for scene in of_group], axis=1)
+        _Group(places, of_group, structure, numbers, tolerance).run(block)
     return block
-
-
-def _integrator(structure: tuple[int, ...], tolerance: float, example: Scene) -> Any:
-
-    def make() -> Any:
-        equations, _ = taylor.build_system(example, in_momenta=True)
-        options = {"tol": tolerance, "compact_mode": taylor.is_compact(example), "high_accuracy": True}
-        return heyoka().taylor_adaptive_batch(equations, state=np.zeros((len(equations), lanes())), **options)
-
-    return taylor.compiled(("batch", tolerance, structure), make)
 
 
 def _tip_numbers(scene: Scene, parameters: Parameters) -> list[list[Any]]:
@@ -97,6 +81,14 @@ def _tip_numbers(scene: Scene, parameters: Parameters) -> list[list[Any]]:
     if not scene.wants("tip"):
         return []
     return [[parameters(Fraction(x)) for x in blade.tip] for blade in scene.blades]
+
+
+def _momenta(example: Scene) -> Any:
+    """The momenta as compiled code from angles and rates."""
+    form, _ = taylor.equation_numbers(example, Parameters())
+    angles, rates = taylor.state_symbols(form)
+    rows = hamilton.momenta(angles, rates, form, heyoka().sin, heyoka().cos)
+    return _compiled_rows(example, rows, [*angles, *rates])
 
 
 def _observables(example: Scene) -> Any:
@@ -115,9 +107,13 @@ def _observables(example: Scene) -> Any:
         observables += closed_form.point_path(azimuth, pitches[i], point, engine.sin, engine.cos)
     if example.wants("energy"):
         observables += closed_form.energies(angles, rates, form, loads, engine.sin, engine.cos)
+    return _compiled_rows(example, observables, [*angles, *momenta])
+
+
+def _compiled_rows(example: Scene, rows: Sequence[Any], variables: Sequence[Any]) -> Any:
     # Where all terms of a row vanish, the closed form gives the number zero: the engine asks for an expression.
-    rows = [engine.expression(0.0) + row for row in observables]
-    return engine.cfunc(rows, [*angles, *momenta], compact_mode=taylor.is_compact(example))
+    expressions = [heyoka().expression(0.0) + row for row in rows]
+    return heyoka().cfunc(expressions, variables, compact_mode=taylor.is_compact(example))
 
 
 def _observed(function: Any, states: Array, numbers: Array) -> Array:
@@ -135,26 +131,24 @@ def _observed(function: Any, states: Array, numbers: Array) -> Array:
 
 
 class _Group:
-    """Runs of one structure, and the compiled code for them; places: of each run in the block."""
+    """Runs of one structure, and the compiled code for them; places: of each run in the block; numbers: (parameters,
+    runs) of their rotors."""
 
     def __init__(
-        self, places: list[int], scenes: list[Scene], rotors: Sequence[_RotorNumbers], tolerance: float
+        self, places: list[int], scenes: list[Scene], structure: tuple[int, ...], numbers: Array, tolerance: float
     ) -> None:
-        example, structure = scenes[0], rotors[0][1]
+        example = scenes[0]
         self.places, self.scenes = places, scenes
-        self.integrator = _integrator(structure, tolerance, example)
+
+        def integrator() -> Any:
+            equations, _ = taylor.build_system(example, in_momenta=True)
+            options = {"tol": tolerance, "compact_mode": taylor.is_compact(example), "high_accuracy": True}
+            return heyoka().taylor_adaptive_batch(equations, state=np.zeros((len(equations), lanes())), **options)
+
+        self.integrator = taylor.compiled(("batch", tolerance, structure), integrator)
         outputs = example.wants("tip"), example.wants("energy")
         self.observables = taylor.compiled(("observables", *outputs, structure), lambda: _observables(example))
-
-        def momenta() -> Any:
-            engine, parameters = heyoka(), Parameters()
-            form, _ = taylor.equation_numbers(example, parameters)
-            symbols, speeds = taylor.state_symbols(form)
-            rows = hamilton.momenta(symbols, speeds, form, engine.sin, engine.cos)
-            rows = [engine.expression(0.0) + row for row in rows]
-            return engine.cfunc(rows, [*symbols, *speeds], compact_mode=taylor.is_compact(example))
-
-        self.momenta = taylor.compiled(("momenta", structure), momenta)
+        self.momenta = taylor.compiled(("momenta", structure), lambda: _momenta(example))
         self.moving = example.moving_coordinates
         fixed = [i for i in range(len(example.initial_angles)) if i not in self.moving]
         angles = np.array([scene.initial_angles for scene in scenes]).T
@@ -162,8 +156,30 @@ class _Group:
         self.initial = np.zeros((self.integrator.state.shape[0], len(scenes)))
         self.initial[: 2 * len(self.moving)] = np.concatenate([angles[self.moving], rates[self.moving]])
         self.times = np.linspace(0.0, np.array([scene.duration for scene in scenes]), example.samples)
-        # (parameters, k) of the rotor, then the pitches that are fixed
-        self.numbers = np.concatenate([np.stack([numbers for numbers, _ in rotors], axis=1), angles[fixed]])
+        self.numbers = np.concatenate([numbers, angles[fixed]])  # of the rotor, then the pitches that are fixed
+
+    def run(self, block: RunBlock) -> None:
+        """All runs into the block, as many at once as stay near the processor."""
+        width = self.integrator.state.shape[1]
+        runs = len(self.scenes)
+        chunk = max(_SAMPLES_PER_CHUNK // len(self.times) // width, 1) * width
+        for start in range(0, runs, chunk):
+            columns = list(range(start, min(start + chunk, runs)))
+            padded = columns + [columns[-1]] * (-len(columns) % width)
+            states, observed, integrations = self.solve(padded)
+            self.put(block, padded, states, observed, integrations[: len(columns)])
+            # A run whose angles are huge, or that failed, may have had an effect on other lanes.
+            sizes = np.maximum(states.max(axis=2), -states.min(axis=2))  # NaN where a sample is
+            angles = sizes[: len(sizes) // 2]
+            independent = (angles < _HUGE).all(axis=0) & np.isfinite(sizes).all(axis=0)
+            independent &= [integration.success for integration in integrations]
+            affected = {i // width for i in np.flatnonzero(~independent).tolist()}
+            for i in [i for i in range(len(columns)) if i // width in affected]:
+                # One lane's failure ends all lanes: each runs again with itself alone in every lane.
+                alone = [columns[i]] * width
+                states, observed, integrations = self.solve(alone)
+                states[:, np.maximum.accumulate(~np.isfinite(states).all(axis=0), axis=1)] = np.nan
+                self.put(block, alone, states, observed, integrations[:1])
 
     def solve(self, columns: Sequence[int]) -> tuple[Array, Array, list[Integration]]:
         """(variables, columns, samples) states in rates, (rows, columns, samples) tips and energies, and the engine's
@@ -220,30 +236,3 @@ class _Group:
         samples = states.shape[2] - np.isnan(states[0]).sum(axis=1)
         for i, integration, n in zip(places, integrations, samples.tolist(), strict=True):
             block.end(i, integration, n)
-
-
-def _propagate(block: RunBlock, group: _Group) -> None:
-    width = group.integrator.state.shape[1]
-    runs = len(group.scenes)
-    chunk = max(_SAMPLES_PER_CHUNK // len(group.times) // width, 1) * width
-    for start in range(0, runs, chunk):
-        columns = list(range(start, min(start + chunk, runs)))
-        padded = columns + [columns[-1]] * (-len(columns) % width)
-        states, observed, integrations = group.solve(padded)
-        group.put(block, padded, states, observed, integrations[: len(columns)])
-        affected = {i // width for i in np.flatnonzero(~_are_independent(states, integrations)).tolist()}
-        for i in [i for i in range(len(columns)) if i // width in affected]:
-            # One lane's failure ends all lanes: each runs again with itself alone in every lane.
-            alone = [columns[i]] * width
-            states, observed, integrations = group.solve(alone)
-            states[:, np.maximum.accumulate(~np.isfinite(states).all(axis=0), axis=1)] = np.nan
-            group.put(block, alone, states, observed, integrations[:1])
-
-
-def _are_independent(states: Array, integrations: Sequence[Integration]) -> NDArray[np.bool_]:
-    """(columns,) whether a run can have had no effect on another lane's."""
-    sizes = np.maximum(states.max(axis=2), -states.min(axis=2))  # NaN where a sample is
-    angles = sizes[: len(sizes) // 2]
-    independent = (angles < _HUGE).all(axis=0) & np.isfinite(sizes).all(axis=0)
-    succeeded = np.array([integration.success for integration in integrations])
-    return np.asarray(independent & succeeded)

@@ -16,7 +16,7 @@ from rotor_mbs.models.lagrange.heyoka_adapter import Parameters, array_of, failu
 from rotor_mbs.models.lagrange.linearization import Jet, cosine, holding_torque, linearize, sine, steady_rotation
 from rotor_mbs.models.lagrange.parameters import load_tables, rotor_form
 from rotor_mbs.models.lagrange.samples import loads_at_start
-from rotor_mbs.models.lagrange.taylor import compiled
+from rotor_mbs.models.lagrange.taylor import compiled, state_symbols
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.scenario.time_table import value_at
 from rotor_mbs.solution.trajectory import Array
@@ -109,13 +109,13 @@ class _Variational:
         engine = heyoka()
         parameters = Parameters()
         form = rotor_form(scene, parameters)
-        n = self.coordinates = 1 + len(form.blades)
+        self.coordinates = 1 + len(form.blades)
         pitch_loads = [parameters(Fraction(value_at(table, 0.0))) for table in load_tables(scene)[1:]]
         torque = parameters.own(Fraction(0))
-        symbols = engine.make_vars(*(f"q{i}" for i in range(n)), *(f"w{i}" for i in range(n)))
-        angles, rates = symbols[:n], symbols[n:]
+        angles, rates = state_symbols(form)
         loads = load_values([torque, *pitch_loads])
         accelerations = closed_form.accelerations(angles, rates, form, loads, engine.sin, engine.cos)
+        symbols = [*angles, *rates]
         equations = [*zip(symbols, [*rates, *accelerations], strict=True)]
 
         def make() -> object:

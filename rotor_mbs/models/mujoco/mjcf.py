@@ -10,7 +10,7 @@ angle is its `springref` where it is constant; where it changes, it is the activ
 the spring's stiffness.
 
 MuJoCo compiles no moving body whose mass or one of whose principal moments is 1e-15 or less: in this text a point mass,
-and a hub without inertia, have `LEAST`. `adapter.Engine` sets them to zero in the compiled model. A file that MuJoCo
+and a hub without inertia, have `LEAST`. `solver.Engine` sets them to zero in the compiled model. A file that MuJoCo
 itself loads keeps them, an error of LEAST / J for a blade's moment J about its pitch axis: below round-off for the
 paper's blade (J = 110 kg m²), but 1e-5 for a toy of 1 g with J = 2.5e-10 kg m².
 """
