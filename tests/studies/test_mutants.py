@@ -86,7 +86,7 @@ EXPLAINED = {
     r"checks\.steps_off .*1e-09 scaled": "keeps rounding from adding a step: any size near it does",
     r"schemes\.trial_steps .*-> 2": "the least of a range: one trial step ends as soon as two",
     r"schemes\.scheme .*(1e-14|5\.0) -> ": "the smallest step, and how fast steps grow: no motion here comes near",
-    r"adapter\.(integrate|advance) .*(rejected|newtonSteps).* scaled": "evaluations of rejected steps are not judged",
+    r"adapter\._solve .*(rejected|newtonSteps).* scaled": "evaluations of rejected steps are not judged",
     r"adapter\.integrate .*1 -> 2": "a scheme that chooses its own steps makes the first one of the interval anyway",
     r"adapter\.integrate .*(step is None|every_step)": "rows at every step or at every sample carry the work as well",
     r"(ode_solvers|taylor)\..*deadline\.is_over": "the time limit of a run, which a run within it does not show",

@@ -215,7 +215,6 @@ class System:
         """Integrate from the state set last in equal steps, counted in `total`; why it failed, or ""."""
         integration = self._settings.timeIntegration
         integration.startTime, integration.endTime, integration.numberOfSteps = start, end, steps
-        integration.initialStepSize = (end - start) / steps
         return self._solve(self._solver, self._settings, 0, total)
 
     def values(self) -> Array:
