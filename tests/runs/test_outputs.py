@@ -9,8 +9,11 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import h5py
+import numpy as np
 import pytest
 from support.commands import refusal, rotor_mbs
+from support.scenes import paper
+from support.stored import Made, rotor, store
 from support.sweeps import MAP, THREE_RUNS, made_sweep
 
 import rotor_mbs as rm
@@ -178,18 +181,29 @@ def test_what_a_sweep_writes_beside_its_dataset_replaces_no_other_file(name: str
         assert rotor_mbs(*command).status == 0
 
 
-def test_pages_figures_and_saved_runs_replace_no_other_file(results: Path, tmp_path: Path) -> None:
-    for command, names in {"report": ["paper-fig08.html", "index.html"], "figures": ["fig08.pdf"]}.items():
-        folder = tmp_path / command
+def test_pages_and_figures_replace_no_other_file(tmp_path: Path) -> None:
+    scene = paper("fig08", samples=101)
+    path = store(tmp_path / "r.h5", [Made(scene, name, rotor(np.sin)) for name in ("reference", "lagrange/dop853")])
+
+    def figures(folder: Path) -> None:
+        if (ended := rotor_mbs("figures", path, "-o", folder)).status:
+            raise InputError(ended.err)
+
+    for write, names in ((rm.open(path).to_html, ["paper-fig08.html", "index.html"]), (figures, ["fig08.pdf"])):
+        folder = tmp_path / names[-1]
         folder.mkdir()
         for name in names:
             (folder / name).write_text("<title>mine</title>")
-            assert name in refusal(command, results, "-o", folder)
+            with pytest.raises(InputError, match=name):
+                write(folder)
             assert (folder / name).read_text() == "<title>mine</title>"
             assert [path.name for path in folder.iterdir()] == [name]
             (folder / name).unlink()
         for _ in range(2):
-            assert rotor_mbs(command, results, "-o", folder).status == 0
+            write(folder)
+
+
+def test_saved_runs_replace_no_other_file(results: Path, tmp_path: Path) -> None:
     (tmp_path / "mine.h5").write_text("mine")
     with pytest.raises(InputError, match="is not an output of this command"):
         rm.open(results).save(tmp_path / "mine.h5")

@@ -143,24 +143,27 @@ def test_the_command_prints_a_table_and_writes_a_page(tmp_path: Path, capsys: py
     scene = rm.scene("paper/fig03").replace(duration=1.0, samples=101)
     (tmp_path / "own.toml").write_text(scene.text)
     run = rm.run(scene, "lagrange/dop853")
+    data, page = tmp_path / "d.csv", tmp_path / "page" / "index.html"
+    call = ["compare", str(data), "--scene", str(tmp_path / "own.toml"), "-o", str(page.parent)]
+    until = []
     for factor, status in ((1.0, 0), (1.001, 1)):
-        FORMATS["data.csv"](tmp_path / "d.csv", scene, run.time, factor * run.angles, run.rates)
-        call = ["compare", str(tmp_path / "d.csv"), "--scene", str(tmp_path / "own.toml"), "-o", str(tmp_path / "page")]
-        assert main(call) == status
-        shown = capsys.readouterr().out
-        assert "rotor = 'rotor' [deg]" in shown
-        assert ("\nok\n" in shown) == (status == 0)
-        page = (tmp_path / "page" / "index.html").read_text()
-        assert page.count("<svg role") + page.count('role="img"') >= 2
-        assert ("inaccurate" in page) == (status == 1)
-        assert main(["report", str(tmp_path / "page" / "comparison.h5"), "-o", str(tmp_path / "again")]) == 0
-        assert (tmp_path / "again" / "index.html").read_text() == page
-        capsys.readouterr()
+        FORMATS["data.csv"](data, scene, run.time, factor * run.angles, run.rates)
         assert main([*call, "--json"]) == status
         found = json.loads(capsys.readouterr().out)
         assert found["agrees"] == (status == 0)
-        assert (found["channels"][0]["agrees_until"]["0.001"] == 1.0) == (status == 0)
-    assert main([*call, "--tolerance", "0.1"]) == 0
+        until.append(found["channels"][0]["agrees_until"]["0.001"])
+        text = page.read_text()
+        assert text.count("<svg role") + text.count('role="img"') >= 2
+        assert ("inaccurate" in text) == (status == 1)
+    assert until[0] == 1.0 != until[1]
+    assert main(["report", str(tmp_path / "page" / "comparison.h5"), "-o", str(tmp_path / "again")]) == 0
+    assert (tmp_path / "again" / "index.html").read_text() == text
+    capsys.readouterr()
+    for more, status in (([], 1), (["--tolerance", "0.1"], 0)):
+        assert main([*call, *more]) == status
+        shown = capsys.readouterr().out
+        assert "rotor = 'rotor' [deg]" in shown
+        assert ("\nok\n" in shown) == (status == 0)
 
 
 def test_the_stored_comparison_has_data_reference_and_errors_in_si(tmp_path: Path) -> None:

@@ -113,10 +113,16 @@ def test_the_command_reads_a_table_in_rpm_and_hz_and_few_digits(
     """Rows in any order; a mapping with omit; the page again from the stored file."""
     damped, _ = tables(UNEQUAL)
     rows = np.column_stack([SPEEDS * 30.0 / math.pi, damped[:, 1:] / (2.0 * math.pi)])[::-1]
-    for digits, factor, status in (("%.17g", 1.0, 0), ("%.5e", 1.0, 0), ("%.17g", 1.001, 1)):
+
+    def write(name: str, digits: str, factor: float) -> Path:
         head = "speed [rpm],f1 [Hz],f2 [Hz],freq_3_Hz"
-        np.savetxt(tmp_path / "m.csv", rows * [1.0, factor, 1.0, 1.0], digits, ",", header=head, comments="")
-        call = ["compare", str(tmp_path / "m.csv"), "--scene", UNEQUAL, "-o", str(tmp_path / "page")]
+        np.savetxt(tmp_path / name, rows * [1.0, factor, 1.0, 1.0], digits, ",", header=head, comments="")
+        return tmp_path / name
+
+    assert rm.compare(write("exact.csv", "%.17g", 1.0), UNEQUAL).agrees
+    few, wrong = write("few.csv", "%.5e", 1.0), write("wrong.csv", "%.17g", 1.001)
+    for path, status in ((few, 0), (wrong, 1)):
+        call = ["compare", str(path), "--scene", UNEQUAL, "-o", str(tmp_path / "page")]
         assert main(call) == status
         shown = capsys.readouterr().out
         assert "frequency 3 = 'freq_3_Hz' [hz]" in shown
@@ -124,13 +130,12 @@ def test_the_command_reads_a_table_in_rpm_and_hz_and_few_digits(
         page = (tmp_path / "page" / "index.html").read_text()
         assert ("inaccurate" in page) == (status == 1)
         assert "of its size" in page
-        assert main(["report", str(tmp_path / "page" / "comparison.h5"), "-o", str(tmp_path / "again")]) == 0
-        assert (tmp_path / "again" / "index.html").read_text() == page
-        capsys.readouterr()
-    assert main([*call, "--json"]) == 1
-    assert '"axis": "speed"' in capsys.readouterr().out
+    assert main(["report", str(tmp_path / "page" / "comparison.h5"), "-o", str(tmp_path / "again")]) == 0
+    assert (tmp_path / "again" / "index.html").read_text() == page
+    capsys.readouterr()
     (tmp_path / "map.toml").write_text('omit = ["frequency_1"]\n')
-    assert main([*call, "--columns", str(tmp_path / "map.toml")]) == 0
+    assert main([*call, "--columns", str(tmp_path / "map.toml"), "--json"]) == 0
+    assert '"axis": "speed"' in capsys.readouterr().out
 
 
 def test_the_programs_own_file_of_modes_is_data_too(tmp_path: Path) -> None:
