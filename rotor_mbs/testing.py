@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import Any
 
 from rotor_mbs.report.data_comparison import DataComparison, compare
-from rotor_mbs.scenario.catalogue import only_scene
 from rotor_mbs.scenario.scene import Scene
 
 
@@ -39,9 +38,8 @@ def assert_agrees(
     >>> assert_agrees(run.time, run.angles, scene="paper/fig03").status
     'ok'
     """
-    chosen = only_scene(scene) if isinstance(scene, str) else scene
     arrays = {"time": time, "angles": angles} | ({} if rates is None else {"rates": rates})
-    found = compare(arrays, chosen, tolerance=tolerance)
+    found = compare(arrays, scene, tolerance=tolerance)
     if not found.agrees:
         raise AssertionError(str(found))
     return found

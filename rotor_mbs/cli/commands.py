@@ -22,7 +22,6 @@ from rotor_mbs.cli import EXIT_BAD_INPUT, EXIT_FAILED, print_line
 from rotor_mbs.cli.arguments import pages_beside
 from rotor_mbs.cli.terminal import ProgressLine, print_not_computed, print_table, span
 from rotor_mbs.errors import InputError, MethodRefusal, StoreError
-from rotor_mbs.methods.base import Method
 from rotor_mbs.methods.catalogue import check_names, look_up, methods, problems_of_methods
 from rotor_mbs.runs import cores
 from rotor_mbs.scenario.catalogue import find_scenes, list_scenes, list_sweeps, only_scene
@@ -75,22 +74,18 @@ def show(arguments: argparse.Namespace) -> int:
     method = look_up(arguments.scene)
     if method is None:
         _show_scene(arguments)
-    else:
-        _show_method(method, arguments)
-    return 0
-
-
-def _show_method(method: Method, arguments: argparse.Namespace) -> None:
+        return 0
     allowed, defaults = method.settings.allowed(), method.defaults
     if arguments.json:
         rules = {name: {"allowed": str(rule), "doc": rule.doc} for name, rule in allowed.items()}
         facts = {"name": method.name, "label": method.label, "settings": defaults, "allowed": rules}
         print(json.dumps(facts, ensure_ascii=False, indent=1))
-        return
+        return 0
     print(f"{method.name}: {method.label}\n")
     for name, rule in allowed.items():
         print(f"  {name:26} {defaults[name]!s:>16}  {rule}; {rule.doc}".rstrip("; "))
     print(f"\nto change a setting: rotor-mbs run SCENE -m {method.name} --set NAME=VALUE" if allowed else "no settings")
+    return 0
 
 
 def _show_scene(arguments: argparse.Namespace) -> None:
