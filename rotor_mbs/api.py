@@ -30,7 +30,7 @@ from rotor_mbs.runs.design import MISSING, RUNS
 from rotor_mbs.runs.outputs import replace_file
 from rotor_mbs.runs.read import StoredRun, StoredScene, is_sweep, open_results
 from rotor_mbs.runs.sweeps import StoredSweep, parameter_name
-from rotor_mbs.runs.table import is_of_this_program, table_groups, text_of
+from rotor_mbs.runs.table import TableFile, is_of_this_program, text_of
 from rotor_mbs.scenario.catalogue import list_scenes, only_scene, scene_of
 from rotor_mbs.scenario.scene import Scene, load_scene, parse_scene
 from rotor_mbs.solution.defects import Defects
@@ -292,7 +292,7 @@ def open(path: str | os.PathLike[str]) -> Runs:
     (1001, 4)
     """
     file = Path(path)
-    if not is_sweep(file) and RUNS not in table_groups(file):
+    if not is_sweep(file) and RUNS not in TableFile(file, ()).groups:
         raise StoreError(f"{file}: has no runs; allowed: a file that `rotor-mbs run`, `reproduce` or `sweep` wrote")
     return Runs(file)
 

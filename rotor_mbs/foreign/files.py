@@ -22,7 +22,6 @@ from rotor_mbs.errors import InputError, ResourceError, RotorError
 from rotor_mbs.runs import table
 from rotor_mbs.runs.design import RUNS
 from rotor_mbs.runs.read import run_arrays
-from rotor_mbs.runs.table import table_groups
 
 # By dimension: factor to s, rad or rad/s.
 _ANGLES = {
@@ -240,7 +239,7 @@ def _binary_arrays(path: Path, group: str, scene: str) -> tuple[Mapping[str, Any
             return {name: np.array(variable[:]) for name, variable in file.variables.items()}, units
     if path.suffix.lower() == ".outb":
         return _openfast(path)
-    if table.is_of_this_program(path) and RUNS in table_groups(path):
+    if table.is_of_this_program(path) and RUNS in table.TableFile(path, ()).groups:
         return run_arrays(path, group, scene), {}
     return table.read_arrays(path, group, scene)
 

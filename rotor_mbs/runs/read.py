@@ -25,9 +25,30 @@ from numpy.typing import NDArray
 
 from rotor_mbs.errors import StoreError
 from rotor_mbs.methods.catalogue import REFERENCE, look_up
-from rotor_mbs.runs import table
 from rotor_mbs.runs.design import FROZEN, MISSING, OF_METHODS, POINT_COLUMNS, REPEATED, RUNS, Column
-from rotor_mbs.runs.table import Place, Rows, Table, TableFile, checksums, known_columns, text_of
+from rotor_mbs.runs.table import (
+    DIGESTS,
+    Place,
+    Rows,
+    Table,
+    TableFile,
+    attributes_of,
+    checksums,
+    chosen_group,
+    columns_of,
+    damages_of,
+    groups_in,
+    known_columns,
+    new_file,
+    new_group,
+    open_file,
+    put,
+    put_attributes,
+    reading,
+    seal_all,
+    text_of,
+    values_of,
+)
 from rotor_mbs.runs.versions import machine, versions
 from rotor_mbs.scenario.catalogue import natural_order
 from rotor_mbs.scenario.scene import Scene, coordinate_labels, parse_scene
@@ -59,7 +80,7 @@ class StoredRun:
     @functools.cached_property
     def _stored(self) -> Rows:
         """The columns of its row as they are in the file."""
-        with table.reading(self._name):
+        with reading(self._name):
             return self._place.read(file=self._file)
 
     @functools.cached_property
@@ -236,53 +257,48 @@ class OpenResults:
 def open_results(path: Path, *, verify: bool = True, only: Collection[str] | None = None) -> Iterator[OpenResults]:
     """An open results file; of a file that replaces it meanwhile nothing is seen. A run is compared with its checksum
     when it is read, but for verify=False; only: names of scenes, by default all. Raises StoreError."""
-    with table.open_file(path) as h5, table.reading(path):
-        attributes = table.attributes_of(h5)
     for _ in range(_ATTEMPTS):
+        stored = TableFile(path, None if only is None else {RUNS, *only})
         with path.open("rb") as file:
-            stored = TableFile(path)
-            if stored.groups and stored.table(stored.groups[0]).inode != os.fstat(file.fileno()).st_ino:
+            if any(table.inode != os.fstat(file.fileno()).st_ino for table in stored.tables.values()):
                 continue
-            with table.reading(path):
+            with reading(path):
                 scenes = {scene.name: scene for scene in _scenes(stored, file, verify, only)}
-            yield OpenResults(path, attributes, {name: scenes[name] for name in natural_order(scenes)})
+            yield OpenResults(path, stored.attributes, {name: scenes[name] for name in natural_order(scenes)})
             return
     raise StoreError(f"{path}: is being replaced by another process")
 
 
 def run_arrays(path: Path, group: str = "", scene: str = "") -> dict[str, NDArray[Any]]:
-    """The arrays of one run of a results file; group, scene: as for `table.read_arrays`, the run "scene/method"."""
+    """The arrays of one run of a results file; group, scene: as for `read_arrays`, the run "scene/method"."""
     with open_results(path) as results:
         runs = {f"{name}/{run.method}": run for name, known in results.scenes.items() for run in known.runs.values()}
-        run = runs[table.chosen_group(path, list(runs), group.strip("/"), scene)]
+        run = runs[chosen_group(path, list(runs), group.strip("/"), scene)]
         return {name: run.array(name) for name in run.names if run.array(name).ndim <= 3}
 
 
 def is_sweep(path: Path) -> bool:
     """Whether a file of this program is the dataset of a sweep. Raises StoreError where it cannot be read."""
-    with table.open_file(path) as file, table.reading(path):
+    with open_file(path) as file, reading(path):
         return "run" in file
 
 
 def _scenes(stored: TableFile, file: IO[bytes], verify: bool, only: Collection[str] | None) -> Iterator[StoredScene]:
-    if RUNS not in stored.groups:
+    if RUNS not in stored.tables:
         return
-    runs = stored.table(RUNS)
-    file.seek(runs.computed["status"].offset)
+    runs = stored.tables[RUNS]
+    file.seek(runs.offsets["status"])
     statuses = np.frombuffer(file.read(len(runs.runs)), np.int8)
-    by_scene: dict[str, list[StoredRun]] = {str(scene): [] for scene in runs.known["scene"]}
-    for i, run in enumerate(runs.runs.tolist()):
-        if statuses[i] == MISSING:
+    by_scene: dict[str, dict[str, StoredRun]] = {}
+    for status, (run, known) in zip(statuses, runs.known_rows().items(), strict=True):
+        scene, method = str(known["scene"]), str(known["method_name"])
+        if status == MISSING or (only is not None and scene not in only):
             continue
-        known = stored.known(RUNS, i)
-        scene = str(known["scene"])
-        if only is not None and scene not in only:
-            continue
-        method, scales = str(known["method_name"]), stored.table(scene).known
-        by_scene[scene].append(StoredRun(scene, method, known, scales, stored.place(run), file, verify))
-    for scene, found in by_scene.items():
-        if found:
-            yield StoredScene(scene, dict(stored.table(scene).attributes), {run.method: run for run in found})
+        scales = {name: values for name, (_, values) in stored.tables[scene].known.items()}
+        stored_run = StoredRun(scene, method, known, scales, stored.place(run), file, verify)
+        by_scene.setdefault(scene, {})[method] = stored_run
+    for scene, methods in by_scene.items():
+        yield StoredScene(scene, dict(stored.tables[scene].attributes), methods)
 
 
 _MESSAGE_LENGTH = 300
@@ -330,31 +346,29 @@ def points_table(group: str, points: Sequence[Mapping[str, object]]) -> Table:
 
 def read_records(path: Path, *kinds: str) -> list[Record]:
     """The records of these kinds, in the order of the file; no curve of which a point is missing. Raises StoreError."""
-    with table.open_file(path) as file, table.reading(path):
+    with open_file(path) as file, reading(path):
         there = [kind for kind in kinds if kind in file]
         tables = [kind for kind in there if kind in POINT_COLUMNS]
         groups = [record for kind in there if kind not in tables for record in _group_records(file, kind)]
         has_points = {kind for kind in tables if "run" in file[kind]}
     if not has_points:
         return groups
-    stored = TableFile(path)
-    return [record for kind in kinds if kind in has_points for record in _point_records(stored, kind)] + groups
+    points = TableFile(path, has_points)
+    return [record for kind in kinds if kind in has_points for record in _point_records(points.tables[kind])] + groups
 
 
-def _point_records(file: TableFile, kind: str) -> Iterator[Record]:
+def _point_records(stored: Table) -> Iterator[Record]:
     """The rows of a table that belong to one curve or one ladder."""
-    stored = file.table(kind)
-    statuses = stored.statuses()
+    kind, statuses, rows = stored.group, stored.statuses(), list(stored.known_rows().values())
     columns = stored.place().read(len(stored.runs)) | {
-        name: stored.known[name] for name in _NUMBERS if name in stored.known
+        name: stored.column(name) for name in _NUMBERS if name in stored.known
     }
-    names = stored.known.get("curve", stored.known["method_name"])
-    owners = list(zip(stored.known["scene"], names, strict=True))
+    owners = [(row["scene"], row.get("curve", row["method_name"])) for row in rows]
     for scene, name in dict.fromkeys(owners):
         own = [i for i, owner in enumerate(owners) if owner == (scene, name)]
         if (statuses[own] == MISSING).any():
             continue
-        known = file.known(kind, own[0])
+        known = rows[own[0]]
         arrays = {column: values[own] for column, values in columns.items()}
         setting_kind = str(known.get("setting_kind", "step"))
         arrays["setting"] = arrays[setting_kind]
@@ -377,29 +391,29 @@ def _point_records(file: TableFile, kind: str) -> Iterator[Record]:
 
 def write_records(path: Path, records: Sequence[Record]) -> None:
     """A file with these records alone, atomically. Raises StoreError."""
-    with table.new_file(path) as file:
-        table.put_attributes(file, {**versions(), **machine()})
+    with new_file(path) as file:
+        put_attributes(file, {**versions(), **machine()})
         for record in records:
-            group = table.new_group(file, "/".join((record.kind, record.scene, record.name)))
-            table.put_attributes(group, {"record": 1, **record.attributes})
+            group = new_group(file, "/".join((record.kind, record.scene, record.name)))
+            put_attributes(group, {"record": 1, **record.attributes})
             for name, column in record.columns.items():
-                dataset = table.put(group, name, np.asarray(record.arrays[name]), column)
+                dataset = put(group, name, np.asarray(record.arrays[name]), column)
                 if f"{name}_labels" in record.attributes:
-                    table.put_attributes(dataset, {"labels": record.attributes[f"{name}_labels"]})
-        table.seal_all(file)
+                    put_attributes(dataset, {"labels": record.attributes[f"{name}_labels"]})
+        seal_all(file)
 
 
 def _group_records(file: Any, kind: str) -> Iterator[Record]:
-    for group in table.groups_in(file[kind]):
+    for group in groups_in(file[kind]):
         if "record" not in group.attrs:
             continue
-        damages = [part for part in table.damages_of(group) if part != table.DIGESTS]
+        damages = [part for part in damages_of(group) if part != DIGESTS]
         path = str(group.name).strip("/")
         if damages:
             raise StoreError(f"{file.filename}: {path}: {', '.join(damages)} changed after they were written")
         parts = path.removeprefix(f"{kind}/").split("/")
-        columns = table.columns_of(group)
-        arrays = {name: table.values_of(group[name]) for name in columns}
+        columns = columns_of(group)
+        arrays = {name: values_of(group[name]) for name in columns}
         scales_first = dict(sorted(columns.items(), key=lambda column: column[1].dimensions != (column[0],)))
         scene, name = "/".join(parts[:-2]), "/".join(parts[-2:])
-        yield Record(kind, scene, name, table.attributes_of(group), arrays, scales_first)
+        yield Record(kind, scene, name, attributes_of(group), arrays, scales_first)

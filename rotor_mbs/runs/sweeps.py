@@ -24,18 +24,7 @@ from rotor_mbs.errors import InputError, StoreError
 from rotor_mbs.methods.catalogue import find_method
 from rotor_mbs.runs.design import COLUMNS, MISSING, Column, flags
 from rotor_mbs.runs.outputs import writing
-from rotor_mbs.runs.table import (
-    StoredTable,
-    Table,
-    attribute,
-    attributes_of,
-    columns_of,
-    laid_out,
-    open_file,
-    reading,
-    scene_scales,
-    stored_table,
-)
+from rotor_mbs.runs.table import Table, TableFile, laid_out, reading, scene_scales
 from rotor_mbs.runs.versions import row_versions
 from rotor_mbs.scenario.sweep import SPLITS, Sweep, split_rows
 from rotor_mbs.solution import quantities
@@ -102,7 +91,7 @@ def sweep_table(sweep: Sweep, methods: Sequence[str], numbers: range) -> Table:
 @contextmanager
 def open_sweep(
     output: Path, table: Table, attributes: Mapping[str, object], time_limit_s: float = 0.0, *, fresh: bool = False
-) -> Iterator[tuple[StoredTable, NDArray[np.int8]]]:
+) -> Iterator[tuple[Table, NDArray[np.int8]]]:
     """The file `output`, laid out where it is not there, which no other process writes in the block: its table, and
     (runs,) their statuses, MISSING where they are to be computed.
 
@@ -116,12 +105,10 @@ def open_sweep(
         if is_new:
             with laid_out(path, [table], attributes):
                 pass
-        with open_file(path) as file, reading(path):
-            if attribute(file, IDENTITY) != attributes[IDENTITY]:
-                raise InputError(
-                    f"{path}: not the file of this sweep; allowed: another output file, or remove that one"
-                )
-            stored = stored_table(file)
+        file = TableFile(path, [""])
+        if file.attributes.get(IDENTITY) != attributes[IDENTITY]:
+            raise InputError(f"{path}: not the file of this sweep; allowed: another output file, or remove that one")
+        stored = file.tables[""]
         statuses = stored.statuses()
         statuses[(statuses == code_of("timed_out")) & (stored.column("time_limit_s") < time_limit_s)] = MISSING
         taken_back = np.flatnonzero((stored.column("status") != MISSING) & (statuses == MISSING))
@@ -145,19 +132,17 @@ class StoredSweep:
 
     def __init__(self, path: Path, *, allow_damaged_runs: bool = False) -> None:
         self._path = path
-        with open_file(path) as file, reading(path):
-            self.attributes = attributes_of(file)
-            if IDENTITY not in self.attributes:
-                raise StoreError(f"{path}: no sweep's dataset; allowed: a file that `rotor-mbs sweep` wrote")
-            self._table: StoredTable = stored_table(file)
-            columns = columns_of(file)
-        table = self._table
-        del columns["run"]
-        self.columns = {"run": Column(("run",), "1", "run number, from 0"), **columns}
+        file = TableFile(path, [""])
+        self.attributes = file.attributes
+        if IDENTITY not in self.attributes:
+            raise StoreError(f"{path}: no sweep's dataset; allowed: a file that `rotor-mbs sweep` wrote")
+        self._table = table = file.tables[""]
+        known = {name: column for name, (column, _) in table.known.items()}
+        self.columns = {"run": Column(("run",), "1", "run number, from 0"), **known, **table.computed}
         self.keys: list[str] = self.attributes["parameter_keys"]
         with reading(path):
             is_damaged = (table.column("status") != MISSING) & (table.statuses() == MISSING)
-        self.damaged_runs = table.runs[is_damaged]
+        self.damaged_runs = table.column("run")[is_damaged]
         if len(self.damaged_runs) and not allow_damaged_runs:
             which = ", ".join(map(str, self.damaged_runs[:5])) + (" ..." if len(self.damaged_runs) > 5 else "")
             raise StoreError(

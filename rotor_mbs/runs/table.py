@@ -29,7 +29,7 @@ from contextlib import contextmanager, nullcontext, suppress
 from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import IO, Any, NamedTuple
+from typing import IO, Any
 
 import h5py
 import numpy as np
@@ -88,26 +88,31 @@ Rows = dict[str, NDArray[Any]]
 
 @dataclass(frozen=True)
 class Table:
-    """A table before its rows are computed.
+    """A table: as it is to be laid out, or as it lies in a file.
 
     Attributes
     ----------
     group : where it stands in the file; "" for the root.
     runs : (rows,) the scale `run`: texts that tell the rows apart, or their numbers.
     known : by name, column and values of the other dimensions' scales, and of what the design says of each row.
-    computed : columns that are computed. One without the dimension `run` belongs to the reference.
+    computed : columns that are computed, in the order in which the checksum of a row covers them. One without the
+        dimension `run` belongs to the reference.
     attributes : of the group.
     characters : of each computed text.
+    path, inode, offsets : of a table in a file: the file, and where each computed column begins in it, in bytes.
     """
 
     group: str
-    runs: Sequence[str] | NDArray[np.int64]
+    runs: Sequence[str] | NDArray[Any]
     known: Mapping[str, tuple[Column, Any]]
     computed: Mapping[str, Column]
-    attributes: Mapping[str, object] = field(default_factory=dict)
+    attributes: Mapping[str, Any] = field(default_factory=dict)
     characters: int = 0
+    path: Path = Path()
+    inode: int = 0
+    offsets: Mapping[str, int] = field(default_factory=dict)
 
-    @property
+    @functools.cached_property
     def row_type(self) -> np.dtype[np.void]:
         """The computed columns of one row, in the order in which its checksum covers them."""
         lengths = {name: len(values) for name, (_, values) in self.known.items()} | {CHARACTERS: self.characters}
@@ -116,6 +121,54 @@ class Table:
             for name, column in self.computed.items()
         }
         return np.dtype([(name, column.kind, shapes[name]) for name, column in self.computed.items()])
+
+    def shape(self, name: str) -> tuple[int, ...]:
+        """Of a computed column."""
+        rows = (len(self.runs),) if "run" in self.computed[name].dimensions else ()
+        return (*rows, *self.row_type[name].shape)
+
+    def known_rows(self) -> dict[str, dict[str, Any]]:
+        """By run, what the design says of it."""
+        columns = {name: list(values) for name, (_, values) in self.known.items()}
+        return {str(run): {name: values[i] for name, values in columns.items()} for i, run in enumerate(self.runs)}
+
+    def column(self, name: str) -> NDArray[Any]:
+        """(rows, ...) A column, or a scale, of a table in a file; a computed one as it lies there, read where it is
+        indexed. Raises StoreError where there is none of that name."""
+        if name == "run":
+            return np.asarray(self.runs)
+        if name in self.known:
+            return np.asarray(self.known[name][1])
+        if name not in self.computed:
+            raise StoreError(f"{self.path}: has no {name}; allowed: a sweep whose outputs have it")
+        kind, shape = self.row_type[name].base, self.shape(name)
+        if not all(shape):
+            return np.empty(shape, kind)
+        with reading(self.path, name):
+            values: NDArray[Any] = np.memmap(self.path, kind, "r", self.offsets[name], shape)
+        return values
+
+    def statuses(self) -> NDArray[np.int8]:
+        """(rows,) of those that are there as they were written; MISSING for the others."""
+        marked, place = np.array(self.column("status")), self.place()
+        statuses = np.full_like(marked, MISSING)
+        step = max(_READ_BYTES // place.row.itemsize, 1)
+        for start in range(0, len(marked), step):
+            status, part = marked[start : start + step], place.at(start)
+            if (status == MISSING).all():
+                continue
+            rows = part.read(len(status))
+            is_right = checksums(part.first, rows, part.row) == rows["crc32"]
+            statuses[start : start + step] = np.where(is_right & (status < len(STATUSES)), status, MISSING)
+        return statuses
+
+    def place(self, row: int = 0) -> Place:
+        """Where the rows from `row` on are. Their checksums begin with the run where that is a number, else the row."""
+        is_numbered = isinstance(self.runs, np.ndarray) and self.runs.dtype.kind == "i" and len(self.runs) > 0
+        names = [name for name, column in self.computed.items() if "run" in column.dimensions]
+        kinds = np.dtype([(name, self.row_type[name]) for name in names])
+        offsets = {name: self.offsets[name] for name in names}
+        return Place(self.path, self.inode, int(self.runs[0]) if is_numbered else 0, offsets, kinds).at(row)
 
 
 def known_columns(rows: Sequence[Mapping[str, object]]) -> dict[str, tuple[Column, Any]]:
@@ -258,7 +311,7 @@ class Place:
 
     def clear(self) -> None:
         """Write a blank row, which a reader of an unfinished file sees; its status stays as it is."""
-        with saving(self.path), self.path.open("r+b") as file:
+        with self.path.open("r+b") as file:
             for name, values in blank_rows(1, self.row).items():
                 if name != "status":
                     file.seek(self.offsets[name])
@@ -504,157 +557,113 @@ def reading(path: Path | str, what: str = "") -> Iterator[None]:
         raise StoreError(f"{place}: damaged or incomplete ({reason})") from exc
 
 
-class StoredColumn(NamedTuple):
-    """A computed column in a file: the type of its values, its shape, where it begins; whether it has a value a run."""
+class TableFile:
+    """The tables of a file, by their groups; rows are read and written by their places.
 
-    kind: np.dtype[Any]
-    shape: tuple[int, ...]
-    offset: int
-    is_of_runs: bool
-
-
-@dataclass(frozen=True)
-class StoredTable:
-    """A table in a file as it was laid out; rows are read by their `Place`.
-
-    runs: (rows,) texts or numbers. known: by name, the values of scales and of what the design says of each row.
-    computed: the computed columns by name, in the order of the checksum.
+    only: groups of the tables that are read, by default all. Raises StoreError where the file cannot be read, or what
+    was laid out has changed since.
     """
 
-    path: Path
-    inode: int
-    group: str
-    runs: NDArray[Any]
-    known: Mapping[str, NDArray[Any]]
-    computed: Mapping[str, StoredColumn]
-    attributes: Mapping[str, Any]
+    def __init__(self, path: Path, only: Collection[str] | None = None) -> None:
+        self.path = path
+        with open_file(path) as file, reading(path):
+            self.attributes = attributes_of(file)
+            if "run" not in file:
+                _refuse_changes(file, "")
+            self.groups = [str(group.name).strip("/") for group in groups_in(file) if "run" in group]
+            self.tables = {group: _read_table(file, group) for group in self.groups if only is None or group in only}
 
-    def column(self, name: str) -> NDArray[Any]:
-        """(rows, ...) A column, or a scale; a computed one as it lies in the file, read where it is indexed. Raises
-        StoreError where there is none of that name."""
-        if name == "run":
-            return self.runs
-        if name in self.known:
-            return self.known[name]
-        if name not in self.computed:
-            raise StoreError(f"{self.path}: has no {name}; allowed: a sweep whose outputs have it")
-        stored = self.computed[name]
-        if not all(stored.shape):
-            return np.empty(stored.shape, stored.kind)
-        with reading(self.path, name):
-            values: NDArray[Any] = np.memmap(self.path, stored.kind, "r", stored.offset, stored.shape)
-        return values
+    def place(self, run: str, group: str = RUNS) -> Place:
+        """Where a row is; of a run, together with its arrays."""
+        stored = self.tables[group]
+        row = list(stored.runs).index(run)
+        place = stored.place(row)
+        if group != RUNS:
+            return place
+        scene = str(stored.column("scene")[row])
+        arrays = self.tables[scene]
+        label = run.removeprefix(f"{scene}/")
+        others = arrays.place(list(arrays.runs).index(label))
+        offsets = {REPEATED.get(name, name): offset for name, offset in others.offsets.items()}
+        kinds = [(REPEATED.get(name, name), others.row[name]) for name in others.row.names or ()]
+        for name, column in arrays.computed.items():
+            if label == REFERENCE and "run" not in column.dimensions:
+                offsets[name] = arrays.offsets[name]
+                kinds.append((name, arrays.row_type[name]))
+        own = [(name, place.row[name]) for name in place.row.names or ()]
+        return replace(place, offsets={**place.offsets, **offsets}, row=np.dtype([*own, *kinds]))
 
-    def statuses(self) -> NDArray[np.int8]:
-        """(rows,) of those that are there as they were written; MISSING for the others."""
-        marked, place = np.array(self.column("status")), self.place()
-        statuses = np.full_like(marked, MISSING)
-        step = max(_READ_BYTES // place.row.itemsize, 1)
-        for start in range(0, len(marked), step):
-            status, part = marked[start : start + step], place.at(start)
-            if (status == MISSING).all():
-                continue
-            rows = part.read(len(status))
-            is_right = checksums(part.first, rows, part.row) == rows["crc32"]
-            statuses[start : start + step] = np.where(is_right & (status < len(STATUSES)), status, MISSING)
-        return statuses
+    def take_back_missing(
+        self, asked: Sequence[Asked], time_limit_s: float
+    ) -> tuple[list[Asked], list[tuple[Asked, str, str]]]:
+        """The runs that are to be computed, and those that are stored with their status and message; of `asked` runs,
+        of each scene the reference first.
 
-    def place(self, row: int = 0) -> Place:
-        """Where the rows from `row` on are. Their checksums begin with the run where that is a number, else the row."""
-        first = int(self.runs[0]) if self.runs.dtype.kind == "i" and len(self.runs) else 0
-        columns = {name: stored for name, stored in self.computed.items() if stored.is_of_runs}
-        kinds = np.dtype([(name, stored.kind, stored.shape[1:]) for name, stored in columns.items()])
-        return Place(self.path, self.inode, first, {name: stored.offset for name, stored in columns.items()}, kinds).at(
-            row
-        )
+        To be computed are those that the file lacks, that a shorter time limit ended, or whose reference is one of
+        these; what is stored of them is taken back.
+        """
+        missing: dict[str, Asked] = {}
+        kept: list[tuple[Asked, str, str]] = []
+        for run in asked:
+            place = self.place(run.run)
+            row = place.read()
+            status = STATUSES[row["status"][0]] if place.is_stored else ""
+            # A shipped reference may end early itself; it has a limit only where reading it was over one.
+            limit = row["time_limit_s"][0]
+            is_short = limit < time_limit_s if run.is_shipped else not limit >= time_limit_s
+            is_over = status == "timed_out" and is_short
+            if status and not is_over and f"{run.scene.name}/{REFERENCE}" not in missing:
+                kept.append((run, status, text_of(row["message"][0])))
+            else:
+                missing[run.run] = run
+                place.mark_missing([0])
+        return list(missing.values()), kept
 
 
-def stored_table(file: Any, group: str = "") -> StoredTable:
-    """A table in an open file. Raises StoreError where what was laid out has changed since."""
+def _read_table(file: Any, group: str) -> Table:
+    """A table in an open file. Raises StoreError where it is not what was laid out, or is no table."""
     path, item = Path(file.filename), file[group] if group else file
     _refuse_changes(item, group)
-    computed_names = computed_in(stored_digests(item))
     attributes = attributes_of(item)
     of_reference = attributes.pop(_OF_REFERENCE, [])
-    known: dict[str, NDArray[Any]] = {}
-    computed: dict[str, StoredColumn] = {}
-    for name, dataset in item.items():
-        if is_group(dataset):
-            continue
-        if name in computed_names:
-            if dataset.shape is None or dataset.dtype.kind not in "fiuS":
-                raise StoreError(f"{path}: {dataset.name} is no array of numbers or characters")
+    digests = stored_digests(item)
+    known: dict[str, tuple[Column, Any]] = {}
+    computed: dict[str, Column] = {}
+    offsets: dict[str, int] = {}
+    for name, column in columns_of(item).items():
+        dataset = item[name]
+        if f"{_COMPUTED}{name}" in digests:
             offset = dataset.id.get_offset()
             if offset is None and dataset.size:
                 raise StoreError(f"{path}: {dataset.name} is not contiguous; allowed: a file as it was laid out")
-            computed[name] = StoredColumn(dataset.dtype, dataset.shape, offset or 0, name not in of_reference)
-        elif name != CHARACTERS:
-            known[name] = values_of(dataset)
-    runs = known.pop("run")
-    _refuse_shapes(path, runs, known, computed, str(item.name))
-    return StoredTable(path, path.stat().st_ino, group, runs, known, computed, attributes)
-
-
-def _refuse_shapes(
-    path: Path,
-    runs: NDArray[Any],
-    known: Mapping[str, NDArray[Any]],
-    computed: Mapping[str, StoredColumn],
-    place: str,
-) -> None:
-    """Raises StoreError where a column has not the shape of its dimensions, which its digest does not cover, or not the
-    type of its name, or reaches beyond the file."""
+            computed[name], offsets[name] = column, offset or 0
+        else:
+            known[name] = column, values_of(dataset)
+    _, runs = known.pop("run")
+    characters = len(item[CHARACTERS]) if CHARACTERS in item else 0
+    table = Table(group, runs, known, computed, attributes, characters, path, path.stat().st_ino, offsets)
+    # What the digests do not cover: shapes and types, and where the values are.
     size = path.stat().st_size
     for name, column in computed.items():
-        head: tuple[int, ...] = (len(runs),) if column.is_of_runs else ()
-        is_scalar = column.is_of_runs and name in COLUMNS and CHARACTERS not in COLUMNS[name].dimensions
-        is_wrong = column.shape[: len(head)] != head or (is_scalar and column.shape != head)
-        if is_scalar and column.kind != np.dtype(COLUMNS[name].kind):
-            is_wrong = True
-        lengths = {len(known[scale]) for scale in known if known[scale].ndim} | {3}
-        if name not in COLUMNS and not set(column.shape[len(head) :]) <= lengths:
-            is_wrong = True
-        if column.offset + math.prod(column.shape) * column.kind.itemsize > size:
-            is_wrong = True
-        if is_wrong:
-            raise StoreError(f"{path}: {place.rstrip('/')}/{name} has shape {column.shape} of {column.kind}; damaged")
-    for name, values in known.items():
+        kind, shape, dataset = np.dtype(column.kind), table.shape(name), item[name]
+        is_wrong = dataset.shape != shape or kind.kind not in "fiuS"
+        is_wrong = is_wrong or ("run" in column.dimensions) == (name in of_reference)
+        if name in COLUMNS and "run" in column.dimensions:
+            usual = COLUMNS[name]
+            is_wrong = is_wrong or kind != np.dtype(usual.kind) or column.dimensions != usual.dimensions
+        if is_wrong or offsets[name] + math.prod(shape) * kind.itemsize > size:
+            raise StoreError(f"{path}: {dataset.name} has shape {dataset.shape} of {kind}; damaged")
+    for name, (_, values) in known.items():
         if values.ndim == 0:
-            raise StoreError(f"{path}: {place.rstrip('/')}/{name} is a single value; damaged")
+            raise StoreError(f"{path}: {group or 'file'}/{name} is a single value; damaged")
+    return table
 
 
-def refuse_changed_layout(path: Path) -> None:
-    """Raises StoreError where what is said of a table, its units too, is not what was laid out. Reading a table
-    compares all of this but the attributes of computed columns, which take most of the time."""
-    groups = table_groups(path)
-    with open_file(path) as file, reading(path):
-        for group in groups:
-            _refuse_changes(file[group] if group else file, group, with_columns=True)
-
-
-def _refuse_changes(item: Any, group: str, *, with_columns: bool = False) -> None:
-    changed = damages_of(item, with_columns=with_columns)
+def _refuse_changes(item: Any, group: str) -> None:
+    changed = damages_of(item)
     if changed:
         place = f"{item.file.filename}: {group or 'file'}"
         raise StoreError(f"{place}: {', '.join(changed)} changed after the file was laid out")
-
-
-def as_table(file: Any, group: str) -> Table:
-    """What would lay out a table of an open file anew."""
-    stored, item = stored_table(file, group), file[group] if group else file
-    columns = columns_of(item)
-    known = {name: (columns[name], values) for name, values in stored.known.items()}
-    computed = {name: columns[name] for name in stored.computed}
-    attributes = {name: value for name, value in stored.attributes.items() if group}
-    characters = len(item[CHARACTERS]) if CHARACTERS in item else 0
-    return Table(group, stored.runs.tolist(), known, computed, attributes, characters)
-
-
-def table_groups(path: Path) -> list[str]:
-    """The groups of a file that are tables. Raises StoreError where it is another program's."""
-    with open_file(path) as file, reading(path):
-        _refuse_changes(file, "")
-        return [str(group.name).strip("/") for group in groups_in(file) if "run" in group]
 
 
 def member(group: Any, name: str) -> Any:
@@ -772,74 +781,6 @@ def _reason(error: Exception) -> str:
 # Making a file fit what is asked
 
 
-class TableFile:
-    """A file of tables whose rows are read and written by their places. Tables are read when they are asked for."""
-
-    def __init__(self, path: Path) -> None:
-        self.path = path
-        self._tables: dict[str, StoredTable] = {}
-
-    def table(self, group: str) -> StoredTable:
-        """A table. Raises StoreError where the file has none of that name, or what was laid out has changed."""
-        if group not in self._tables:
-            with open_file(self.path) as file, reading(self.path):
-                self._tables[group] = stored_table(file, group)
-        return self._tables[group]
-
-    @functools.cached_property
-    def groups(self) -> list[str]:
-        return table_groups(self.path)
-
-    def place(self, run: str, group: str = RUNS) -> Place:
-        """Where a row is; of a run, together with its arrays."""
-        stored = self.table(group)
-        row = stored.runs.tolist().index(run)
-        place = stored.place(row)
-        if group != RUNS:
-            return place
-        scene = str(stored.known["scene"][row])
-        arrays = self.table(scene)
-        label = run.removeprefix(f"{scene}/")
-        others = arrays.place(arrays.runs.tolist().index(label))
-        offsets = {REPEATED.get(name, name): offset for name, offset in others.offsets.items()}
-        kinds = [(REPEATED.get(name, name), others.row[name]) for name in others.row.names or ()]
-        for name, column in arrays.computed.items():
-            if label == REFERENCE and not column.is_of_runs:
-                offsets[name] = column.offset
-                kinds.append((name, np.dtype((column.kind, column.shape))))
-        own = [(name, place.row[name]) for name in place.row.names or ()]
-        return replace(place, offsets={**place.offsets, **offsets}, row=np.dtype([*own, *kinds]))
-
-    def known(self, group: str, row: int) -> dict[str, Any]:
-        return {name: values[row] for name, values in self.table(group).known.items()}
-
-    def take_back_missing(
-        self, asked: Sequence[Asked], time_limit_s: float
-    ) -> tuple[list[Asked], list[tuple[Asked, str, str]]]:
-        """The runs that are to be computed, and those that are stored with their status and message; of `asked` runs,
-        of each scene the reference first.
-
-        To be computed are those that the file lacks, that a shorter time limit ended, or whose reference is one of
-        these; what is stored of them is taken back.
-        """
-        missing: dict[str, Asked] = {}
-        kept: list[tuple[Asked, str, str]] = []
-        for run in asked:
-            place = self.place(run.run)
-            row = place.read()
-            status = STATUSES[row["status"][0]] if place.is_stored else ""
-            # A shipped reference may end early itself; it has a limit only where reading it was over one.
-            limit = row["time_limit_s"][0]
-            is_short = limit < time_limit_s if run.is_shipped else not limit >= time_limit_s
-            is_over = status == "timed_out" and is_short
-            if status and not is_over and f"{run.scene.name}/{REFERENCE}" not in missing:
-                kept.append((run, status, text_of(row["message"][0])))
-            else:
-                missing[run.run] = run
-                place.mark_missing([0])
-        return list(missing.values()), kept
-
-
 def extend_file(path: Path, wanted: Sequence[Table], replaced: Collection[tuple[str, str, str]] = ()) -> TableFile:
     """Make the file hold the rows of `wanted` tables, beside those that it has.
 
@@ -859,8 +800,7 @@ def extend_file(path: Path, wanted: Sequence[Table], replaced: Collection[tuple[
     old, new = TableFile(path), {made.group: made for made in wanted}
     if "" in old.groups:
         raise StoreError(f"{path}: holds the dataset of a sweep; allowed: another output file")
-    with open_file(path) as file, reading(path):
-        stored = {group: as_table(file, group) for group in old.groups}
+    stored = old.tables
     wanted_runs = _known_rows(new.get(RUNS))
     hashes = {row["scene"]: row["scene_hash"] for row in wanted_runs.values()}
     lost = [
@@ -911,12 +851,8 @@ def extend_file(path: Path, wanted: Sequence[Table], replaced: Collection[tuple[
     return TableFile(path)
 
 
-def _known_rows(made: Table | None) -> dict[str, dict[str, Any]]:
-    """By run, what the design says of it."""
-    if made is None:
-        return {}
-    columns = {name: list(values) for name, (_, values) in made.known.items()}
-    return {str(run): {name: values[i] for name, values in columns.items()} for i, run in enumerate(made.runs)}
+def _known_rows(table: Table | None) -> dict[str, dict[str, Any]]:
+    return {} if table is None else table.known_rows()
 
 
 def _is_same(stored: Mapping[str, Any], asked: Mapping[str, Any]) -> bool:
@@ -1019,11 +955,10 @@ def seal_all(group: Any) -> None:
             seal_all(group[name])
 
 
-def damages_of(group: Any, *, with_columns: bool = True) -> list[str]:
+def damages_of(group: Any) -> list[str]:
     """The parts of a group, "attributes" or names of datasets, that are not what was written, are new or are gone.
 
-    "digests" where it has none. Links, and arrays that cannot be read, count too. with_columns: the attributes of
-    datasets that are computed, too, which takes most of the time.
+    "digests" where it has none. Links, and arrays that cannot be read, count too.
     """
     try:
         known = stored_digests(group)
@@ -1035,9 +970,6 @@ def damages_of(group: Any, *, with_columns: bool = True) -> list[str]:
     for name in group:
         is_computed = f"{_COMPUTED}{name}" in known
         label = f"{_COMPUTED}{name}" if is_computed else name
-        if is_computed and not with_columns and not is_link(group, name):
-            sums[label] = known[label]
-            continue
         sums[label] = ""
         with suppress(StoreError), reading(""):
             item = member(group, name)
@@ -1054,11 +986,6 @@ def stored_digests(group: Any) -> dict[str, str]:
     if not isinstance(found, dict):
         raise ValueError("no object of digests")
     return found
-
-
-def computed_in(digests: Mapping[str, str]) -> list[str]:
-    """The datasets whose attributes alone are covered."""
-    return [name.removeprefix(_COMPUTED) for name in digests if name.startswith(_COMPUTED)]
 
 
 # Other HDF5 files

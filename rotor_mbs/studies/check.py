@@ -16,7 +16,6 @@ from rotor_mbs.methods.catalogue import REFERENCE, able_methods, default_methods
 from rotor_mbs.runs.design import MISSING
 from rotor_mbs.runs.read import is_sweep, open_results
 from rotor_mbs.runs.sweeps import StoredSweep
-from rotor_mbs.runs.table import refuse_changed_layout
 from rotor_mbs.scenario.accuracy_bounds import Bounds
 from rotor_mbs.scenario.catalogue import find_scenes
 from rotor_mbs.studies.reference import changed_arrays
@@ -79,7 +78,6 @@ def _required(scene: str, method: str, hint: str, *, is_missing: bool = True) ->
 
 def judge_file(path: Path, bounds: Bounds) -> list[Check]:
     """Check what is there, runs or a sweep; [] where nothing can be judged. Raises StoreError, InputError."""
-    refuse_changed_layout(path)
     if is_sweep(path):  # all runs are there, and as written; their energies were judged when they were computed
         sweep = StoredSweep(path, allow_damaged_runs=True)
         where = Where(str(sweep.attributes.get("base_scene", "sweep")), "*", "runs")

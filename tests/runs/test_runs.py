@@ -46,7 +46,7 @@ def made(report: RunReport) -> list[str]:
 
 def stored(path: Path) -> list[str]:
     file = TableFile(path)
-    return [label for label in file.table("runs").runs.tolist() if file.place(label).is_stored]
+    return [label for label in list(file.tables["runs"].runs) if file.place(label).is_stored]
 
 
 # What a file has

@@ -13,14 +13,12 @@ import pytest
 from support.scenes import paper
 
 from rotor_mbs.errors import InputError, StoreError
-from rotor_mbs.runs import table
 from rotor_mbs.runs.design import CHARACTER, CHARACTERS, COLUMNS, MISSING, Asked, Column
 from rotor_mbs.runs.outputs import writing
 from rotor_mbs.runs.read import points_table
 from rotor_mbs.runs.table import (
     Place,
     Rows,
-    StoredTable,
     Table,
     TableFile,
     blank_rows,
@@ -28,7 +26,6 @@ from rotor_mbs.runs.table import (
     extend_file,
     laid_out,
     results_tables,
-    stored_table,
     text_of,
 )
 from rotor_mbs.solution.status import STATUSES
@@ -50,9 +47,8 @@ def _table() -> Table:
     return Table("", np.arange(ROWS), known, computed, characters=40)
 
 
-def _stored(path: Path) -> StoredTable:
-    with table.open_file(path) as file, table.reading(path):
-        return stored_table(file)
+def _stored(path: Path) -> Table:
+    return TableFile(path).tables[""]
 
 
 def _rows(place: Place, first: int, count: int) -> Rows:
@@ -171,7 +167,7 @@ def _write(file: TableFile, run: str, value: float) -> None:
 
 def _runs(path: Path) -> list[str]:
     file = TableFile(path)
-    return [run for run in file.table("runs").runs.tolist() if file.place(run).is_stored]
+    return [run for run in list(file.tables["runs"].runs) if file.place(run).is_stored]
 
 
 def test_more_rows_keep_those_that_are_stored(tmp_path: Path) -> None:
@@ -180,7 +176,7 @@ def test_more_rows_keep_those_that_are_stored(tmp_path: Path) -> None:
     file = extend_file(path, results_tables(_asked("exudyn_chain/generalized_alpha", "lagrange/taylor")))
     assert _runs(path) == [first]
     assert (file.place(first).read()["angles"] == 1.0).all()
-    assert file.table("paper/fig08").runs.tolist() == [
+    assert file.tables["paper/fig08"].runs.tolist() == [
         "reference", "lagrange/taylor", "exudyn_chain/generalized_alpha",
     ]  # fmt: skip
     assert np.isnan(file.place(first).read()["constraint_error"]).all()  # a column that it does not have

@@ -136,7 +136,7 @@ def test_runs_of_other_versions_are_kept_and_counted(tmp_path: Path, monkeypatch
     assert output.read_bytes() != before  # the code of each row
     monkeypatch.undo()
     code_digest.cache_clear()
-    TableFile(output).table("").place().mark_missing([3])
+    TableFile(output).tables[""].place().mark_missing([3])
     result = run_local(sweep, output, 0)
     assert (result.made, result.older) == (1, 7)
 
