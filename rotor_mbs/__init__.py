@@ -37,9 +37,9 @@ if TYPE_CHECKING:
     from rotor_mbs.errors import RotorError as RotorError
     from rotor_mbs.errors import StoreError as StoreError
     from rotor_mbs.methods.base import Method as Method
-    from rotor_mbs.report.data_comparison import DataComparison as DataComparison
-    from rotor_mbs.report.data_comparison import compare as compare
-    from rotor_mbs.report.mode_study import modes as modes
+    from rotor_mbs.report.pages.comparison import DataComparison as DataComparison
+    from rotor_mbs.report.pages.comparison import compare as compare
+    from rotor_mbs.report.pages.modes import modes as modes
     from rotor_mbs.scenario.scene import Blade as Blade
     from rotor_mbs.scenario.scene import Scene as Scene
     from rotor_mbs.studies.export import export as export
@@ -48,8 +48,8 @@ _MODULES = {
     "rotor_mbs.api": "Run Runs load open run scene scenes sweep",
     "rotor_mbs.errors": "InputError MethodRefusal RotorError StoreError",
     "rotor_mbs.methods.base": "Method",
-    "rotor_mbs.report.data_comparison": "DataComparison compare",
-    "rotor_mbs.report.mode_study": "modes",
+    "rotor_mbs.report.pages.comparison": "DataComparison compare",
+    "rotor_mbs.report.pages.modes": "modes",
     "rotor_mbs.scenario.scene": "Blade Scene",
     "rotor_mbs.studies.export": "export",
 }

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from rotor_mbs.report.data_comparison import DataComparison, compare
+from rotor_mbs.report.pages.comparison import DataComparison, compare
 from rotor_mbs.scenario.scene import Scene
 
 

@@ -11,7 +11,7 @@ from rotor_mbs.errors import StoreError
 from rotor_mbs.report import files
 from rotor_mbs.report.files import Pairs, render
 from rotor_mbs.report.pages import Report
-from rotor_mbs.report.pages.bench import bench_page, csv_text
+from rotor_mbs.report.pages.bench import bench_page
 from rotor_mbs.report.pages.index import index_page
 from rotor_mbs.report.pages.paper import available, errata_page, figures_page
 from rotor_mbs.report.pages.scene import scene_page
@@ -71,8 +71,6 @@ def write_report(
                 raise finished.error or StoreError(f"{results}: a page was not made: {finished.message}")
             pages |= finished.value
             on_page(len(pages), len(planned))
-    if bench := read_records(results, "bench"):
-        pages[files.BENCH_CSV] = csv_text(bench)
     files.write_pages(output, pages)
     return output / files.INDEX
 
@@ -102,14 +100,14 @@ def _plan(report: Report, checked: bool) -> list[Page]:
     if bench:
         pages.append(Page("bench", "Error against run time", bench_page))
     if modes:
-        from rotor_mbs.report.mode_study import stored_modes_page  # late, as above
+        from rotor_mbs.report.pages.modes import stored_modes_page  # late, as above
 
         pages.append(Page("modes", "Modes", stored_modes_page))
     for place, record in enumerate(compared):
-        from rotor_mbs.report.data_comparison import stored_comparison_page
+        from rotor_mbs.report.pages.comparison import stored_comparison_page
 
         content, file = partial(stored_comparison_page, place), f"data--{place + 1}.html"
-        pages.append(Page("data_comparison", f"Data against {record.scene}", content, file))
+        pages.append(Page("comparison", f"Data against {record.scene}", content, file))
     if has_runs and checked:
         from rotor_mbs.report.pages.check import check_page
 

@@ -7,7 +7,6 @@ import math
 from collections.abc import Mapping
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
-from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -18,13 +17,11 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.markers import MarkerStyle
-from matplotlib.patches import PathPatch, Rectangle
 from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
-from matplotlib.transforms import Affine2D, IdentityTransform
 from numpy.typing import NDArray
 
 from rotor_mbs.errors import InputError
-from rotor_mbs.report.looks import VERMILLION, Look
+from rotor_mbs.report.looks import PAPER, VERMILLION, Look
 from rotor_mbs.report.numbers import power
 from rotor_mbs.runs.outputs import replace_file
 
@@ -33,6 +30,7 @@ TIME_AXIS, SPEED_AXIS = "time (s)", "rotor speed (rad/s)"
 PRINT_WIDTH = 174.0 / 25.4  # in; two columns of a journal
 MARK = b"rotor_mbs pictures"  # in the metadata of every picture that is a file
 KINDS = ("pdf", "svg", "png")
+_DASHES = {"--": "dashed", "-.": "dashdot", ":": "dotted"}  # names of their patterns in a style
 _PAGE_STYLE, _PRINT_STYLE = (  # without matplotlib's defaults
     matplotlib.rc_params_from_file(Path(__file__).with_name(f"{name}.mplstyle"), use_default_template=False)
     for name in ("page", "print")
@@ -138,35 +136,27 @@ def encoded(figure: Figure, kind: str, *, for_print: bool = True) -> bytes:
     return stream.getvalue()
 
 
-def swatch(artist: Any) -> bytes:
-    """A piece of a curve with its marker, or of an area, for a legend: an SVG file, 24 by 8 points."""
+def swatch(artist: Any) -> str:
+    """A piece of a curve with its marker, or of an area, for a legend: what is inside an `svg` of 24 by 8 points."""
     if not isinstance(artist, Line2D):
-        return _swatch(None, tuple(np.atleast_2d(artist.get_facecolor())[0].tolist()), "", 0.0, "", "", 0.0, None)
-    return _swatch(
-        artist.get_color(), None, artist.get_linestyle(), artist.get_linewidth(), str(artist.get_marker()),
-        artist.get_markerfacecolor(), artist.get_markersize(), artist.get_alpha(),
-    )  # fmt: skip
-
-
-@cache
-def _swatch(
-    colour: Any, area: Any, line: Any, width: float, marker: str, inside: Any, size: float, alpha: float | None
-) -> bytes:
-    with style():
-        figure = Figure(figsize=(24.0 / 72.0, 8.0 / 72.0), dpi=72)
-        figure.patch.set_visible(False)
-    if area is not None:
-        figure.add_artist(Rectangle((0.0, 0.1), 1.0, 0.8, facecolor=area, linewidth=0.0))
-    elif line not in ("", "None"):
-        figure.add_artist(Line2D((0.0, 1.0), (0.5, 0.5), color=colour, linestyle=line, linewidth=width, alpha=alpha))
-    if marker not in ("", "None"):  # as a path: a marker would be referred to by a name
-        form = MarkerStyle(marker)
-        place = form.get_transform() + Affine2D().scale(size).translate(12.0, 4.0)
-        path = place.transform_path(form.get_path())
-        figure.add_artist(
-            PathPatch(path, transform=IdentityTransform(), edgecolor=colour, facecolor=inside, linewidth=1.0)
-        )
-    return encoded(figure, "svg", for_print=False)
+        *colour, opacity = np.atleast_2d(artist.get_facecolor())[0]
+        area = matplotlib.colors.to_hex(colour)
+        return f'<path d="M0 1H24V7H0z" style="fill: {area}; fill-opacity: {opacity:g}"/>'
+    drawn, colour, line, marker = "", artist.get_color(), artist.get_linestyle(), str(artist.get_marker())
+    if line not in ("", "None"):
+        width, opacity = artist.get_linewidth(), artist.get_alpha() or 1.0
+        style_of_line = f"stroke: {colour}; stroke-width: {width:g}; stroke-opacity: {opacity:g}"
+        if line in _DASHES:
+            dashes = matplotlib.rcParams[f"lines.{_DASHES[line]}_pattern"]
+            style_of_line += f"; stroke-dasharray: {' '.join(f'{width * dash:.2f}' for dash in dashes)}"
+        drawn += f'<path d="M0 4H24" style="{style_of_line}"/>'
+    if marker not in ("", "None"):
+        form, size = MarkerStyle(marker), artist.get_markersize()
+        outline = ""
+        for polygon in form.get_path().transformed(form.get_transform()).to_polygons(closed_only=False):
+            outline += "M" + "L".join(f"{12.0 + size * x:.1f} {4.0 - size * y:.1f}" for x, y in polygon)
+        drawn += f'<path d="{outline}" style="stroke: {colour}; fill: {artist.get_markerfacecolor()}"/>'
+    return drawn
 
 
 def log_axis(axes: Any, lowest: float, highest: float, which: str = "y") -> None:
@@ -190,7 +180,7 @@ def curve(axes: Any, x: Any, y: Any, look: Look, width: float = 1.2, **more: Any
     """A line with markers that are white inside, as far as the look has them; its label stands in the legend."""
     axes.plot(
         x, y, color=look.colour, linestyle=look.line, linewidth=width, marker=look.marker, label=look.label or "_",
-        **{"markersize": 4.2, "markerfacecolor": "white"} | more,
+        **{"markersize": 4.2, "markerfacecolor": PAPER} | more,
     )  # fmt: skip
 
 

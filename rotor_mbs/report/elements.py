@@ -104,7 +104,7 @@ def picture(panels: Panels, name: str, caption: str, notes: Sequence[str] = ()) 
     )
     items = []
     for label, artist in panels.labelled().items():
-        shown = _inside(swatch(artist), "")
+        shown = _with_variables(swatch(artist))
         items.append(f'<li><svg viewBox="0 0 24 8" width="34" height="12" aria-hidden="true">{shown}</svg> ')
         items.append(f"{markupsafe.escape(label)}</li>")
     legend = f'<ul class="legend">{"".join(items)}</ul>' if items else ""
@@ -118,8 +118,17 @@ def _inside(file: bytes, name: str) -> str:
     text = _SUPERFLUOUS.sub("", text.rpartition("</svg>")[0])
     text = _EMPTY.sub("", text).replace("\n", "")
     text = _PLACES.sub(lambda places: re.sub(r"\.(\d)\d+", r".\1", places[0]), text)
-    text = _COLOUR.sub(lambda colour: f"var(--{name})" if (name := name_of_colour(colour[0])) else colour[0], text)
-    return _NAME.sub(rf"\g<1>{name}", text)
+    return _NAME.sub(rf"\g<1>{name}", _with_variables(text))
+
+
+def _with_variables(drawing: str) -> str:
+    """The drawing with variables of the style sheet in place of the palette's colours."""
+
+    def variable(colour: re.Match[str]) -> str:
+        name = name_of_colour(colour[0])
+        return f"var(--{name})" if name else colour[0]
+
+    return _COLOUR.sub(variable, drawing)
 
 
 def _cursor(panels: Panels) -> str:
@@ -136,19 +145,13 @@ def _cursor(panels: Panels) -> str:
 
 
 def _with_factor(axis: Any) -> str:
-    """The axis' label, with what its tick labels leave out: "rate − 0.3 (10⁻³ rad/s)" for 0.3 and times 1e-3."""
+    """The axis' label, with the power of ten that its tick labels leave out: "rate (10⁻³ rad/s)"."""
     label, formatter = str(axis.get_label_text()), axis.get_major_formatter()
     formatter.format_ticks(axis.get_majorticklocs())
-    offset = str(formatter.get_offset()).replace("−", "-")
-    parts = re.fullmatch(r"(?:1e(-?\d+))?([-+].+)?", offset)
-    if not offset or parts is None:
-        return f"{label} {offset}".strip()
+    factor = re.fullmatch(r"1e(-?\d+)", str(formatter.get_offset()).replace("−", "-"))
+    if factor is None:
+        return label
     axis.offsetText.set_visible(False)
-    exponent, shift = parts.groups()
     name, _, unit = label.partition(" (")
-    if shift:
-        name += f" {'−' if float(shift) > 0.0 else '+'} {abs(float(shift)):g}"
-    unit = unit.rstrip(")")
-    if exponent:
-        unit = SPACE.join(filter(None, [power(int(exponent)), unit]))
-    return f"{name} ({unit})" if unit else name
+    unit = SPACE.join(filter(None, [power(int(factor[1])), unit.rstrip(")")]))
+    return f"{name} ({unit})"

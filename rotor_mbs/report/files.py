@@ -21,7 +21,6 @@ from rotor_mbs.runs.outputs import refuse_foreign, replace_file
 GENERATOR = "rotor_mbs report"
 _MARK = f'<meta name="generator" content="{GENERATOR}">'.encode()  # of every page
 INDEX = "index.html"
-BENCH_CSV = "bench.csv"
 _TEMPLATES = Path(__file__).resolve().parent / "templates"
 _LONGEST = 100  # characters; file systems allow 255 bytes
 _OTHERS = "data--"  # the beginning of the names of other pages than those of scenes
@@ -70,20 +69,15 @@ def write_pages(folder: Path, pages: Mapping[str, str]) -> None:
     try:
         folder.mkdir(parents=True, exist_ok=True)
         for name in pages:  # all of them before the first is written
-            refuse_foreign(folder / name, _mark_of(name))
+            refuse_foreign(folder / name, _MARK)
         for name, text in pages.items():
             content = _UNPRINTABLE.sub("\N{REPLACEMENT CHARACTER}", text).encode("utf-8")
-            replace_file(folder / name, content, _mark_of(name))
+            replace_file(folder / name, content, _MARK)
         for old in folder.glob("*.html"):
             if old.name not in pages and old.is_file() and re.search(_MARK, old.read_bytes()[:2000]):
                 old.unlink()
     except OSError as exc:
         raise StoreError(f"{folder}: the report cannot be written: {exc.strerror or exc}") from exc
-
-
-def _mark_of(name: str) -> bytes:
-    """What a page, or a table of numbers beside it, begins with."""
-    return rb"\Ascene,method," if name.endswith(".csv") else _MARK
 
 
 def render(

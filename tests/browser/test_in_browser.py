@@ -26,7 +26,7 @@ from support.sweeps import made_sweep
 
 from rotor_mbs.report.build import write_report
 from rotor_mbs.report.files import write_page
-from rotor_mbs.report.mode_study import modes_page
+from rotor_mbs.report.pages.modes import modes_page
 from rotor_mbs.studies.modes import compute_modes
 
 pytestmark = [pytest.mark.browser, pytest.mark.skipif(not PROGRAM, reason="no Chromium here")]

@@ -17,9 +17,9 @@ from rotor_mbs.report import plots as figures
 from rotor_mbs.report.canvas import panels
 from rotor_mbs.report.elements import picture as picture_in_page
 from rotor_mbs.report.looks import COLOURS, GREY, Look, coordinate_look, look_of, name_of_colour
-from rotor_mbs.report.mode_study import ModePlots
 from rotor_mbs.report.pages import scene as scene_page
 from rotor_mbs.report.pages.index import energy_of_scenes
+from rotor_mbs.report.pages.modes import ModePlots
 from rotor_mbs.report.plots import Series, paths, projected
 
 LOOK = Look("#0072b2", "-", "o")

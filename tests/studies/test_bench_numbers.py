@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -201,20 +200,13 @@ def test_curves_survive_storing_bit_by_bit_and_one_without_a_point_is_not_shown(
     assert [curve.name for curve in read_records(tmp_path / "a.h5", "bench")] == ["exudyn_tree/rk67"]
 
 
-def test_pages_and_csv_are_written(tmp_path: Path) -> None:
+def test_pages_are_written(tmp_path: Path) -> None:
     stored(tmp_path / "a.h5", FAST, SLOW)
     index = write_report(tmp_path / "a.h5", tmp_path / "report")
-    names = {path.name for path in index.parent.iterdir()}
-    assert names == {"index.html", "bench.csv"}
+    assert [path.name for path in index.parent.iterdir()] == ["index.html"]
     page = index.read_text()
-    assert 'href="bench.csv"' in page
     assert "ended after 10 s" in page
     assert "horizon at 6.00" in page
     assert page.count("<svg viewBox") >= 2
     assert '<a href="#scene-0">paper/fig09</a>' in page
     assert page.index('id="fastest"') < page.index('id="scene-0"')
-    with (index.parent / "bench.csv").open(newline="") as file:
-        rows = {(row["method"], float(row["setting"])): row for row in csv.DictReader(file)}
-    assert len(rows) == 8
-    assert float(rows[FAST.name, 0.05]["angle_error_max"]) == 1e-6  # unrounded
-    assert [rows[SLOW.name, step]["status"] for step in SLOW.arrays["setting"].tolist()] == SLOW.statuses

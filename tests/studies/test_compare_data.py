@@ -18,7 +18,7 @@ from rotor_mbs.cli import main
 from rotor_mbs.foreign.channels import half_last_digits
 from rotor_mbs.models.lagrange import reference
 from rotor_mbs.report.build import write_report
-from rotor_mbs.report.data_comparison import verdict_of
+from rotor_mbs.report.pages.comparison import verdict_of
 from rotor_mbs.runs.read import read_records, write_records
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.testing import assert_agrees

@@ -13,7 +13,7 @@ import pytest
 
 import rotor_mbs as rm
 from rotor_mbs.cli import main
-from rotor_mbs.report.data_comparison import DataComparison
+from rotor_mbs.report.pages.comparison import DataComparison
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.studies.modes import compute_modes
 

@@ -78,8 +78,9 @@ class Report(OpenResults):
 
 METRICS = (
     "defect_max", "defect_median", "defect_time", "angle_error_max", "angle_error_predicted", "angle_error_whole",
-    "tip_error_max", "energy_drift_max", "angular_impulse_error_max", "zero_pitch_max", "zero_pitch_left_s",
-    "zero_pitch_growth_per_s", "steps", "rhs_evaluations", "setup_time_s", "run_time_s",
+    "tip_error_max", "energy_gain_J", "energy_drift_max", "angular_impulse_error_max",
+    "zero_pitch_max", "zero_pitch_left_s", "zero_pitch_growth_per_s", "steps", "rhs_evaluations", "setup_time_s",
+    "run_time_s",
 )  # fmt: skip
 # Against the reference, which has none itself.
 _ERRORS_OF_RUNS = ("angle_error_max", "angle_error_predicted", "angle_error_whole", "tip_error_max")

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import json
 import math
 from collections.abc import Mapping, Sequence
@@ -18,7 +16,6 @@ from rotor_mbs.methods.catalogue import find_method, ladders
 from rotor_mbs.report import canvas
 from rotor_mbs.report.canvas import Panels
 from rotor_mbs.report.elements import PageTable, Picture, Row, Section, TableCell, picture
-from rotor_mbs.report.files import BENCH_CSV
 from rotor_mbs.report.looks import COORDINATES, GREY, Look, label_of, look_of
 from rotor_mbs.report.numbers import NOTHING, number, power, prefixed, with_unit
 from rotor_mbs.report.pages import method_cell, words_of
@@ -60,29 +57,18 @@ def bench_page(results: OpenResults) -> dict[str, object]:
         if "is_short" not in curves[0].attributes:  # workers there keep what runs before have compiled
             caption = "Including set-up (with compilation) and output of samples"
             pictures.append(picture(diagram(curves, with_setup=True), f"bench-{i}-setup", caption))
-        orders = []
-        for curve in curves:
-            if "order_expected" in curve.attributes:
-                order = number(curve.attributes.get("order"), 3)
-                orders.append([method_cell(curve.name), order, f"{curve.attributes['order_expected']:g}"])
-        caption = "Order of convergence, fitted on the finest points above the round-off floor"
         parts.append({
             "id": f"scene-{i}",
             "name": name,
             "facts": curves[0].attributes,
             "diagram": Section(pictures),
-            "tables": [
-                reach_table(curves),
-                PageTable(caption, ["method", "order", "expected"], orders),
-                failure_table(curves, results.scenes.get(name)),
-            ],
+            "tables": [reach_table(curves), failure_table(curves, results.scenes.get(name))],
             "points": _point_table(curves),
         })  # fmt: skip
     return {
         "engines": engine_tables(results, scenes),
         "fastest": overview_table(scenes),
         "scenes": parts,
-        "csv": BENCH_CSV,
     }
 
 
@@ -169,19 +155,6 @@ def diagram(
     canvas.log_axis(axes, 10.0 ** math.floor(math.log10(shortest)), longest)
     axes.set_ylabel("set-up, run and output (s)" if with_setup else "run time (s)")
     return panels
-
-
-def csv_text(curves: Sequence[Record]) -> str:
-    """Every point, unrounded, with a heading line; units are those of the results file (s, rad, m)."""
-    stream = io.StringIO()
-    columns = [name for name in (curves[0].arrays if curves else ()) if name != "status"]
-    writer = csv.writer(stream, lineterminator="\n")
-    writer.writerow(["scene", "method", "setting_kind", *columns, "status", "message"])
-    for curve in curves:
-        for i, (status, message) in enumerate(zip(curve.statuses, curve.messages, strict=True)):
-            values = [curve.arrays[column][i].item() for column in columns]
-            writer.writerow([curve.scene, curve.name, curve.attributes["setting_kind"], *values, status, message])
-    return stream.getvalue()
 
 
 def overview_table(scenes: Mapping[str, Sequence[Record]]) -> PageTable:

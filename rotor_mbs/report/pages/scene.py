@@ -14,10 +14,10 @@ from rotor_mbs.methods.catalogue import REFERENCE, is_corrected
 from rotor_mbs.models.lagrange.defects import interval_defects
 from rotor_mbs.report import plots
 from rotor_mbs.report.canvas import Panels
-from rotor_mbs.report.elements import PageTable, Picture, Row, Section, picture
+from rotor_mbs.report.elements import PageTable, Picture, Section, picture
 from rotor_mbs.report.looks import GREY, VERMILLION, Look, coordinate_look, label_of, look_of, with_capital
 from rotor_mbs.report.numbers import fixed, number, prefixed, with_unit
-from rotor_mbs.report.pages import Report, failure_table, horizon_of, method_cell, metric, metrics_table, paper
+from rotor_mbs.report.pages import Report, failure_table, horizon_of, metric, metrics_table, paper
 from rotor_mbs.report.pages.bench import cost_section
 from rotor_mbs.report.pages.stability import step_section
 from rotor_mbs.report.pages.viewer import viewer
@@ -206,30 +206,13 @@ def range_table(runs: Sequence[StoredRun]) -> PageTable:
 
 
 def _tips_section(sides: Sequence[StoredRun]) -> Section:
-    """Paths in space as the paper draws them; how far the tips go, and the printed ones from the corrected ones."""
-    runs = [run for run in sides if "tip" in run]
-    if not runs:
-        return Section()
-    pictures = [
-        picture(plots.paths(run.array("tip")), f"paths-{i}", with_capital(label_of(run.method)))
-        for i, run in enumerate(runs)
-    ]
-    blades = range(1, 1 + runs[0].array("tip").shape[1])
-    head = ["Blade"]
-    rows = [[str(i)] for i in blades]
-    for run in runs:
-        tip = run.array("tip")
-        head += [f"{with_capital(label_of(run.method))}: length of path", "farthest out of plane"]
-        lengths = np.linalg.norm(np.diff(tip, axis=0), axis=2).sum(axis=0)
-        for row, length, off in zip(rows, lengths, np.abs(tip[:, :, 1]).max(axis=0), strict=True):
-            row += [prefixed(length, "m"), prefixed(off, "m")]
-    if len(runs) > 1:
-        first, second = (run.array("tip") for run in runs)
-        count = min(len(first), len(second))
-        head.append("largest distance between both")
-        for row, gap in zip(rows, np.linalg.norm(first[:count] - second[:count], axis=2).max(axis=0), strict=True):
-            row.append(prefixed(float(gap), "m"))
-    return Section(pictures, [PageTable("Paths of the tips", head, rows)])
+    """Paths in space as the paper draws them."""
+    pictures = []
+    for run in sides:
+        if "tip" in run:
+            caption = with_capital(label_of(run.method))
+            pictures.append(picture(plots.paths(run.array("tip")), f"paths-{len(pictures)}", caption))
+    return Section(pictures)
 
 
 def _difference_section(scene: StoredScene, drawn: Runs, horizon: float | None) -> Section:
@@ -256,25 +239,13 @@ def _difference_section(scene: StoredScene, drawn: Runs, horizon: float | None) 
 
 
 def _energy_section(drawn: Runs, horizon: float | None) -> Section:
-    """Energy less work from its start, of every run; what each run has and how well it conserves it."""
+    """Energy less work from its start, of every run."""
     runs = {name: run for name, run in drawn.items() if "energy_error" in run}
     curves = over_time(runs, {name: run.array("energy_error") for name, run in runs.items()})
-    shown = error_picture(
+    return Section(error_picture(
         curves, "|energy error| (J)", "energy", "Energy error: change of total energy minus work", horizon,
         notes=["Filled marks: energy gained. Open marks: energy lost."], signed=True,
-    )  # fmt: skip
-    if not shown:
-        return Section()
-    head = (
-        "Method", "Largest kinetic energy (J)", "Work at the end (J)", "Largest gain (J)", "Drift (relative)",
-    )  # fmt: skip
-    rows: list[Row] = []
-    for name, run in runs.items():
-        kinetic = float(run.array("kinetic_energy").max()) if "kinetic_energy" in run else None
-        work = float(run.array("work")[-1]) if "work" in run and run.array("work").any() else None
-        gain, drift = metric(run, "energy_gain_J"), metric(run, "energy_drift_max")
-        rows.append([method_cell(name), number(kinetic, 3), number(work, 3), number(gain, 3), number(drift)])
-    return Section(shown, [PageTable("", head, rows)])
+    ))  # fmt: skip
 
 
 def _drive_section(scene: Scene, run: StoredRun | None) -> Section:

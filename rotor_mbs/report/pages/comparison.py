@@ -131,7 +131,7 @@ class DataComparison:
 
     def to_html(self, folder: str | os.PathLike[str]) -> Path:
         """Write the page into a folder. Returns its path."""
-        return write_page(folder, "data_comparison", comparison_page(self.study.record()), versions() | machine())
+        return write_page(folder, "comparison", comparison_page(self.study.record()), versions() | machine())
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Save data, reference, errors and verdict as a results file. Raises StoreError if it cannot be written."""
