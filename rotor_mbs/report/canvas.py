@@ -14,6 +14,7 @@ import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.markers import MarkerStyle
@@ -139,8 +140,8 @@ def encoded(figure: Figure, kind: str, *, for_print: bool = True) -> bytes:
 def swatch(artist: Any) -> str:
     """A piece of a curve with its marker, or of an area, for a legend: what is inside an `svg` of 24 by 8 points."""
     if not isinstance(artist, Line2D):
-        *colour, opacity = np.atleast_2d(artist.get_facecolor())[0]
-        area = matplotlib.colors.to_hex(colour)
+        red, green, blue, opacity = np.reshape(artist.get_facecolor(), -1)[:4].tolist()
+        area = to_hex((red, green, blue))
         return f'<path d="M0 1H24V7H0z" style="fill: {area}; fill-opacity: {opacity:g}"/>'
     drawn, colour, line, marker = "", artist.get_color(), artist.get_linestyle(), str(artist.get_marker())
     if line not in ("", "None"):

@@ -207,7 +207,7 @@ def range_table(runs: Sequence[StoredRun]) -> PageTable:
 
 def _tips_section(sides: Sequence[StoredRun]) -> Section:
     """Paths in space as the paper draws them."""
-    pictures = []
+    pictures: list[Picture] = []
     for run in sides:
         if "tip" in run:
             caption = with_capital(label_of(run.method))
