@@ -31,7 +31,11 @@ TIME_AXIS, SPEED_AXIS = "time (s)", "rotor speed (rad/s)"
 PRINT_WIDTH = 174.0 / 25.4  # in; two columns of a journal
 MARK = b"rotor_mbs pictures"  # in the metadata of every picture that is a file
 KINDS = ("pdf", "svg", "png")
-_DASHES = {"--": "dashed", "-.": "dashdot", ":": "dotted"}  # names of their patterns in a style
+_DASHES = {  # matplotlib's patterns, in widths of the line
+    "--": matplotlib.rcParamsDefault["lines.dashed_pattern"],
+    "-.": matplotlib.rcParamsDefault["lines.dashdot_pattern"],
+    ":": matplotlib.rcParamsDefault["lines.dotted_pattern"],
+}
 _PAGE_STYLE, _PRINT_STYLE = (  # without matplotlib's defaults
     matplotlib.rc_params_from_file(Path(__file__).with_name(f"{name}.mplstyle"), use_default_template=False)
     for name in ("page", "print")
@@ -140,21 +144,22 @@ def encoded(figure: Figure, kind: str, *, for_print: bool = True) -> bytes:
 def swatch(artist: Any) -> str:
     """A piece of a curve with its marker, or of an area, for a legend: what is inside an `svg` of 24 by 8 points."""
     if not isinstance(artist, Line2D):
-        red, green, blue, opacity = np.reshape(artist.get_facecolor(), -1)[:4].tolist()
-        area = to_hex((red, green, blue))
+        rgba: list[float] = np.ravel(artist.get_facecolor()).tolist()
+        area, opacity = to_hex((rgba[0], rgba[1], rgba[2])), rgba[3]
         return f'<path d="M0 1H24V7H0z" style="fill: {area}; fill-opacity: {opacity:g}"/>'
-    drawn, colour, line, marker = "", artist.get_color(), artist.get_linestyle(), str(artist.get_marker())
+    colour, line, marker = str(artist.get_color()), str(artist.get_linestyle()), str(artist.get_marker())
+    drawn = ""
     if line not in ("", "None"):
         width, opacity = artist.get_linewidth(), artist.get_alpha() or 1.0
         style_of_line = f"stroke: {colour}; stroke-width: {width:g}; stroke-opacity: {opacity:g}"
         if line in _DASHES:
-            dashes = matplotlib.rcParams[f"lines.{_DASHES[line]}_pattern"]
-            style_of_line += f"; stroke-dasharray: {' '.join(f'{width * dash:.2f}' for dash in dashes)}"
+            style_of_line += f"; stroke-dasharray: {' '.join(f'{width * dash:.2f}' for dash in _DASHES[line])}"
         drawn += f'<path d="M0 4H24" style="{style_of_line}"/>'
     if marker not in ("", "None"):
         form, size = MarkerStyle(marker), artist.get_markersize()
         outline = ""
-        for polygon in form.get_path().transformed(form.get_transform()).to_polygons(closed_only=False):
+        polygons: list[Any] = form.get_path().transformed(form.get_transform()).to_polygons(closed_only=False)
+        for polygon in polygons:
             outline += "M" + "L".join(f"{12.0 + size * x:.1f} {4.0 - size * y:.1f}" for x, y in polygon)
         drawn += f'<path d="{outline}" style="stroke: {colour}; fill: {artist.get_markerfacecolor()}"/>'
     return drawn
