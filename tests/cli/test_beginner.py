@@ -130,5 +130,5 @@ def test_a_scene_names_its_methods_and_settings(folder: Path) -> None:
     assert set(runs["mine"]) == {"reference", "exudyn_tree/rk67", "lagrange/dop853"}
     assert runs["mine/exudyn_tree/rk67"].settings["step"] == 0.001
     scene_file(folder, edits | {"# step = 1e-3": "stp = 0.002"})
-    (line,) = (number for number, text in enumerate(path.read_text().splitlines(), 1) if text.startswith("stp"))
+    (line,) = (number for number, text in enumerate(path.read_text().splitlines(), 1) if text.startswith("[settings]"))
     assert f"mine.toml:{line}: settings: no setting 'stp', perhaps step" in refusal("run", path, "-o", "r.h5")
