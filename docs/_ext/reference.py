@@ -415,8 +415,8 @@ def _file_format() -> str:
         "when these pages were built; signs, frames and units are explained in [Reading results](../data.md).",
         "**Rows.** A row is complete if its `status` is not -1 and its `crc32` is correct; a file is complete if all "
         "rows are. Of a missing row only the columns that are known in advance (`run`, `scene`, `method_name`, "
-        "`settings`, varied parameters) are valid; its other values have no meaning. In a complete row a value that "
-        "does not exist or was not computed is NaN, -1 (integers) or an empty text.",
+        "`settings`, `versions`, `scene_hash`, varied parameters, `split`) are valid; its other values have no meaning. "
+        "In a complete row a value that does not exist or was not computed is NaN, -1 (integers) or an empty text.",
         "**Arrays over time** have one entry per sample. `samples` (in a sweep `time_reached`) tells where a run "
         "ended; later entries are NaN, as is the whole array if the method does not compute it.",
         "**Text** that is known when the file is created is a string of variable length, UTF-8. Computed text, such as "
@@ -424,16 +424,19 @@ def _file_format() -> str:
         "text, h5py and MATLAB as [described here](../data.md).",
         "**Versions.** The column `versions` is a JSON text with the versions of this package, Python, the libraries "
         "and the code that computed the row; a sweep has the column `code` instead, a CRC-32 of that text's content. "
-        "The attributes of `/` have the versions of the process that created the file.",
+        f"The attributes {', '.join(map(code, VERSIONED))} of `/` are of the process that created the file. Rows of "
+        "other versions are recomputed by the next `run`, `reproduce`, `bench` or `stability`; a sweep keeps them.",
         "**Layout.** Datasets are contiguous, so that a row lies at a fixed offset and is written there when it is "
         "computed. *Computed* datasets are those that are filled in this way; in `digests` their key is "
         "`attributes of NAME`, because the digest covers their attributes only.",
         "**Checksum.** `crc32` of row r is the CRC-32 of zlib (`zlib.crc32`), with r, counted from 0, as its starting "
-        "value, over the bytes of the row in each computed dataset of `/runs` except `crc32`, in the order of "
-        "creation, then in each computed dataset of its scene's group that has the dimension `run`. For a reference "
-        "the computed datasets without the dimension `run` follow as a whole. In a sweep the starting value is the "
-        "number `run`.",
+        "value, over the bytes of the row in each computed dataset of `/runs` except `crc32`, in the order in which "
+        "the file lists them, then of the method's row in each computed dataset of its scene's group that has the "
+        "dimension `run`. For a reference the computed datasets without the dimension `run` follow as a whole. In "
+        "`/bench` and `/stability` only the table's own datasets are covered, in a sweep those of `/`, where the "
+        "starting value is the number `run`. [Reading results](../data.md) has this as a program.",
         "## Status codes",
+        "The attributes `flag_values` and `flag_meanings` of every dataset `status` list the codes and their names.",
         table(["code", "status", "meaning"], [[-1, "missing", _MEANINGS["missing"]], *_statuses()]),
     ]
     shown: dict[str, list[str]] = {}
