@@ -415,7 +415,7 @@ def _file_format() -> str:
         "when these pages were built; signs, frames and units are explained in [Reading results](../data.md).",
         "**Rows.** A row is complete if its `status` is not -1 and its `crc32` is correct; a file is complete if all "
         "rows are. Of a missing row only the columns that are known in advance (`run`, `scene`, `method_name`, "
-        "`settings`, `versions`, `scene_hash`, varied parameters, `split`) are valid; its other values have no meaning. "
+        "`settings`, `versions`, `scene_hash`, varied parameters, `split`) are valid; its other values are undefined. "
         "In a complete row a value that does not exist or was not computed is NaN, -1 (integers) or an empty text.",
         "**Arrays over time** have one entry per sample. `samples` (in a sweep `time_reached`) tells where a run "
         "ended; later entries are NaN, as is the whole array if the method does not compute it.",
