@@ -41,7 +41,7 @@ def run_table(scenes: Mapping[str, StoredScene], wanted: Mapping[str, Iterable[s
 
 def method_table(runs: Iterable[StoredRun]) -> TextTable:
     """A row for each method: how many of its runs ended well, and the largest numbers among those."""
-    head = ("method", "runs", "largest defect (rad)", "largest error (rad)", "largest drift", "longest (s)")
+    head = ("method", "runs", "largest defect (rad)", "largest error (rad)", "energy drift", "longest run time (s)")
     by_method: dict[str, list[StoredRun]] = {}
     for run in runs:
         by_method.setdefault(run.method, []).append(run)

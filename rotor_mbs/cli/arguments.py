@@ -140,7 +140,7 @@ class _Parser(argparse.ArgumentParser):
         self.add_argument("file", nargs="?", type=Path, default=default_results(), metavar="FILE", help=text)
 
     def jobs(self) -> None:
-        text = "parallel processes (default: all %(default)s cores)"
+        text = "parallel processes (default: number of cores, here %(default)s)"
         self.add_argument("-j", "--jobs", type=JOBS, default=cores(), metavar="N", help=text)
 
     def timeout(self, seconds: float = 60.0) -> None:
@@ -209,7 +209,7 @@ def _parser() -> tuple[_Parser, dict[str, _Parser]]:
 
     own = command(
         "reproduce",
-        "run every scene of the paper with the default methods, and write the report",
+        "run every scene of the paper with the default methods and with each erratum alone, and write the report",
         "runs:reproduce",
         "",
         "-o out -j 4",
@@ -368,7 +368,7 @@ def _parser() -> tuple[_Parser, dict[str, _Parser]]:
 
     own = command(
         "animate", "animate a scene from a results file", "commands:animate",
-        "paper/fig11", "mine my.h5 -o mine.gif",
+        "paper/fig11", "my my.h5 -o my.gif",
     )  # fmt: skip
     own.add_argument("scene", metavar="SCENE", help="name of a scene in the results file")
     own.results()
