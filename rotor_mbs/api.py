@@ -21,13 +21,13 @@ from typing import TYPE_CHECKING, Any, overload
 import numpy as np
 
 from rotor_mbs.analysis.judgement import defects_of
-from rotor_mbs.analysis.run_tables import RUN_HEAD, TextTable, run_row
+from rotor_mbs.analysis.text_tables import RUN_HEAD, TextTable, run_row
 from rotor_mbs.errors import InputError, MethodRefusal, ResourceError, StoreError
 from rotor_mbs.methods.catalogue import REFERENCE, check_names, problems_of_scene, selected_methods
 from rotor_mbs.methods.method_file import ENDING
 from rotor_mbs.methods.time_limit import checked_seconds
 from rotor_mbs.runs.design import MISSING, RUNS
-from rotor_mbs.runs.outputs import replace_file
+from rotor_mbs.runs.output_files import replace_file
 from rotor_mbs.runs.read import StoredRun, StoredScene, is_sweep, open_results
 from rotor_mbs.runs.sweeps import StoredSweep, parameter_name
 from rotor_mbs.runs.table import TableFile, is_of_this_program, text_of

@@ -143,7 +143,7 @@ _DISK_IS_FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 
 def bench(arguments: argparse.Namespace) -> int:
     """Error against run time, and its pages. 0 also where points failed: they are what is measured."""
-    from rotor_mbs.analysis.run_tables import bench_table
+    from rotor_mbs.analysis.text_tables import bench_table
     from rotor_mbs.runs.read import read_records
     from rotor_mbs.studies.bench import run_bench
 
@@ -253,7 +253,7 @@ def check(arguments: argparse.Namespace) -> int:
 def _refuse_foreign(arguments: argparse.Namespace) -> None:
     """Before anything is computed: files of --junit and --json that hold something else."""
     from rotor_mbs.report.pages import check as formats
-    from rotor_mbs.runs.outputs import refuse_foreign
+    from rotor_mbs.runs.output_files import refuse_foreign
 
     if arguments.junit is not None:
         refuse_foreign(arguments.junit, formats.JUNIT)
@@ -263,7 +263,7 @@ def _refuse_foreign(arguments: argparse.Namespace) -> None:
 
 def _write_verdicts(arguments: argparse.Namespace, verdicts: Sequence[Check]) -> None:
     from rotor_mbs.report.pages import check as formats
-    from rotor_mbs.runs.outputs import replace_file
+    from rotor_mbs.runs.output_files import replace_file
 
     if arguments.junit is not None:
         replace_file(arguments.junit, formats.junit(verdicts), formats.JUNIT)
@@ -275,7 +275,7 @@ def _write_verdicts(arguments: argparse.Namespace, verdicts: Sequence[Check]) ->
 
 def test_method(arguments: argparse.Namespace) -> int:
     """What holds of each method, and the most likely reason where something does not; 1 where something does not."""
-    from rotor_mbs.analysis.run_tables import TextTable
+    from rotor_mbs.analysis.text_tables import TextTable
     from rotor_mbs.studies.method_test import examine
 
     names = check_names(arguments.methods)

@@ -9,11 +9,11 @@ from functools import partial
 from importlib import import_module
 from pathlib import Path
 
-from rotor_mbs.analysis.run_tables import run_table
+from rotor_mbs.analysis.text_tables import table_of_runs
 from rotor_mbs.cli import EXIT_BAD_INPUT
 from rotor_mbs.cli.terminal import ProgressLine, print_summary, print_table
 from rotor_mbs.methods.catalogue import problems_of_scene, selected_methods
-from rotor_mbs.runs.outputs import is_being_written, replace_file
+from rotor_mbs.runs.output_files import is_being_written, replace_file
 from rotor_mbs.runs.pool import local_pool
 from rotor_mbs.runs.read import open_results
 from rotor_mbs.scenario.catalogue import find_scenes
@@ -38,7 +38,7 @@ def run(arguments: argparse.Namespace) -> int:
             settings=dict(arguments.set or ()), on_progress=progress,
         )  # fmt: skip
     with open_results(arguments.output) as results:
-        print_table(run_table(results.scenes, methods))
+        print_table(table_of_runs(results.scenes, methods))
     return print_summary(report, arguments.output)
 
 

@@ -19,7 +19,7 @@ from rotor_mbs.scenario.keys import counted
 from rotor_mbs.solution.status import GOOD, STATUSES
 
 if TYPE_CHECKING:  # a sweep's workers load their code meanwhile
-    from rotor_mbs.analysis.run_tables import TextTable
+    from rotor_mbs.analysis.text_tables import TextTable
     from rotor_mbs.studies.run import Outcome, RunReport
 
 

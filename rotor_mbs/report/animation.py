@@ -19,7 +19,7 @@ from rotor_mbs.report import canvas
 from rotor_mbs.report.looks import GREY, INK, coordinate_look, label_of
 from rotor_mbs.report.pages.viewer import magnification
 from rotor_mbs.report.plots import projected
-from rotor_mbs.runs.outputs import refuse_foreign, replace_file, replacing
+from rotor_mbs.runs.output_files import refuse_foreign, replace_file, replacing
 from rotor_mbs.runs.read import StoredScene, open_results
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.trajectory import Array

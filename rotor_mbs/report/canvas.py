@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 from rotor_mbs.errors import InputError
 from rotor_mbs.report.looks import PAPER, VERMILLION, Look
 from rotor_mbs.report.numbers import power
-from rotor_mbs.runs.outputs import replace_file
+from rotor_mbs.runs.output_files import replace_file
 
 WIDTH = 5.2  # in; on a telephone's 360 px a text of 9.5 points is then 9 px high
 TIME_AXIS, SPEED_AXIS = "time (s)", "rotor speed (rad/s)"

@@ -16,7 +16,7 @@ from markupsafe import Markup, escape
 from rotor_mbs.errors import StoreError
 from rotor_mbs.report import numbers
 from rotor_mbs.report.looks import light_palette_css, palette_css
-from rotor_mbs.runs.outputs import refuse_foreign, replace_file
+from rotor_mbs.runs.output_files import refuse_foreign, replace_file
 
 GENERATOR = "rotor_mbs report"
 _MARK = f'<meta name="generator" content="{GENERATOR}">'.encode()  # of every page

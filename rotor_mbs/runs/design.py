@@ -165,9 +165,13 @@ class Asked:
         return self.versions is not None and "frozen_with" in self.versions
 
     @property
-    def run(self) -> str:
-        """The label of its row, "paper/fig11/lagrange/taylor"."""
+    def label(self) -> str:
+        """Of its row: "paper/fig11/lagrange/taylor"."""
         return f"{self.scene.name}/{self.method}"
+
+    @property
+    def reference_label(self) -> str:
+        return f"{self.scene.name}/{REFERENCE}"
 
     @property
     def known(self) -> dict[str, str]:

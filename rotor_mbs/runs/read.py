@@ -87,7 +87,7 @@ class StoredRun:
     def is_damaged(self) -> bool:
         """Whether its row is not what was written."""
         row = self._stored
-        return bool((checksums(self._place.first, row, self._place.row) != row["crc32"]).any())
+        return bool((checksums(self._place.first, row, self._place.row_type) != row["crc32"]).any())
 
     @functools.cached_property
     def _row(self) -> Rows:

@@ -1,4 +1,8 @@
-"""The one loop that computes rows of a table: tasks to worker processes, their rows to the file."""
+"""The one loop that computes rows of a table: tasks to worker processes, their rows to the file.
+
+A run passes through `compute_in_order`, `compute`, `pool.run_in` and `TaskPool.submit` here, and in the worker process
+through `perform` and `RunTask.perform`.
+"""
 
 from __future__ import annotations
 
@@ -58,9 +62,10 @@ T = TypeVar("T", bound=Task)
 def compute(pool: TaskPool, tasks: Iterable[T]) -> Iterator[Finished[T, Rows]]:
     """Compute tasks in a pool that is open, and store their rows: by the worker where it sees the file.
 
-    However the loop ends, the rows of what has ended are in the file. The `value` of a finished task is status, message
-    and run_time_s of its rows as they are stored; None where nothing is, and its failure and message say why. Raises
-    what a task raised of InputError, MethodRefusal and StoreError.
+    However the loop ends, the rows of what has ended are in the file. The `value` of a finished task has at least the
+    status and message of its stored rows, also where they are those of a failure, and the run time where there is one;
+    None where nothing is stored, and its failure and message say why. Raises what a task raised of InputError,
+    MethodRefusal and StoreError.
     """
     work = with_method_files(partial(perform, stores=pool.shares_disk))
     for end in run_in(pool, work, tasks, lambda task: task.kill_after_s, lambda task: task.split()):
@@ -89,7 +94,7 @@ def perform(task: Task, *, stores: bool) -> Rows:
 
 
 def compute_in_order(pool: TaskPool, tasks: Sequence[Task]) -> Iterator[Finished[Task, Rows]]:
-    """As `compute`, references first; then, if their references are there, the other rows, the slowest first."""
+    """As `compute`, references first; then the other rows whose reference is stored, slow and fast ones in turn."""
     yield from compute(pool, [task for task in tasks if task.reference is None])
     waiting = [task for task in tasks if task.reference is not None]
     ready = [task for task in waiting if task.reference is not None and task.reference.is_stored]

@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from rotor_mbs.errors import InputError, StoreError
 from rotor_mbs.methods.catalogue import find_method
 from rotor_mbs.runs.design import COLUMNS, MISSING, Column, flags
-from rotor_mbs.runs.outputs import writing
+from rotor_mbs.runs.output_files import locked
 from rotor_mbs.runs.table import Table, TableFile, laid_out, reading, scene_scales
 from rotor_mbs.runs.versions import row_versions
 from rotor_mbs.scenario.sweep import SPLITS, Sweep, split_rows
@@ -99,7 +99,7 @@ def open_sweep(
     stays until it is. Raises InputError where the output holds something else, or another process is writing it,
     StoreError where it cannot be read or written, or the disk has no room for all runs.
     """
-    with writing(output):
+    with locked(output):
         path = output.resolve() if output.is_symlink() else output  # a link stays one
         is_new = not path.exists()
         if is_new:

@@ -51,7 +51,7 @@ from rotor_mbs.runs.design import (
     arrays_of,
     metric_columns,
 )
-from rotor_mbs.runs.outputs import replace_file, replacing, saving, sync_folder
+from rotor_mbs.runs.output_files import replace_file, replacing, store_errors, sync_folder
 from rotor_mbs.runs.versions import machine, versions
 from rotor_mbs.scenario.catalogue import natural_key
 from rotor_mbs.scenario.scene import Scene, scene_hash
@@ -152,13 +152,13 @@ class Table:
         """(rows,) of those that are there as they were written; MISSING for the others."""
         marked, place = np.array(self.column("status")), self.place()
         statuses = np.full_like(marked, MISSING)
-        step = max(_READ_BYTES // place.row.itemsize, 1)
+        step = max(_READ_BYTES // place.row_type.itemsize, 1)
         for start in range(0, len(marked), step):
             status, part = marked[start : start + step], place.at(start)
             if (status == MISSING).all():
                 continue
             rows = part.read(len(status))
-            is_right = checksums(part.first, rows, part.row) == rows["crc32"]
+            is_right = checksums(part.first, rows, part.row_type) == rows["crc32"]
             statuses[start : start + step] = np.where(is_right & (status < len(STATUSES)), status, MISSING)
         return statuses
 
@@ -198,9 +198,10 @@ def scene_scales(scene: Scene, columns: Iterable[Column]) -> dict[str, tuple[Col
 
 
 def runs_table(asked: Sequence[Asked]) -> Table:
+    """The table /runs of a file with these runs."""
     outputs = dict.fromkeys(output for run in asked for output in run.scene.outputs)
     known = known_columns([run.known for run in asked])
-    return Table(RUNS, [run.run for run in asked], known, metric_columns(outputs), characters=_TEXT_LENGTH)
+    return Table(RUNS, [run.label for run in asked], known, metric_columns(outputs), characters=_TEXT_LENGTH)
 
 
 def scene_table(runs: Sequence[Asked], arrays: Collection[str] | None = None) -> Table:
@@ -225,7 +226,8 @@ def scene_table(runs: Sequence[Asked], arrays: Collection[str] | None = None) ->
 
 
 def results_tables(asked: Sequence[Asked]) -> list[Table]:
-    asked = sorted(asked, key=lambda run: _order(run.run))
+    """All tables of a file with these runs: /runs, then the arrays of each scene."""
+    asked = sorted(asked, key=lambda run: _order(run.label))
     by_scene: dict[str, list[Asked]] = {}
     for run in asked:
         by_scene.setdefault(run.scene.name, []).append(run)
@@ -240,20 +242,20 @@ class Place:
     """Where consecutive rows lie in a file. Worker processes that see the file write them by it.
 
     inode: of the file; another file of that name is not written to. first: number of the first row; its checksum begins
-    with it. offsets: bytes from the beginning of the file to the first row, by column. row: type of a row, its columns
-    in the order in which the checksum covers them.
+    with it. offsets: bytes from the beginning of the file to the first row, by column. row_type: its columns
+    are in the order in which the checksum covers them.
     """
 
     path: Path
     inode: int
     first: int
     offsets: Mapping[str, int]
-    row: np.dtype[np.void]
+    row_type: np.dtype[np.void]
 
     def rows_of(self, values: Mapping[str, object], count: int = 1) -> Rows:
         """Rows with these values, the same in each, by the name of their column: numbers, a text, the name of a status,
         the first samples of an array. The other columns are blank; what is no column here is left out."""
-        rows = blank_rows(count, self.row)
+        rows = blank_rows(count, self.row_type)
         for name, value in values.items():
             if name == "status":
                 rows[name][:] = code_of(str(value))
@@ -270,14 +272,14 @@ class Place:
 
     def at(self, row: int) -> Place:
         """The place of a later row, counted from the first."""
-        offsets = {name: offset + row * self.row[name].itemsize for name, offset in self.offsets.items()}
+        offsets = {name: offset + row * self.row_type[name].itemsize for name, offset in self.offsets.items()}
         return replace(self, first=self.first + row, offsets=offsets)
 
     def write(self, rows: Rows) -> None:
         """Store consecutive rows, their statuses last; meanwhile they are missing. Raises StoreError."""
-        columns = rows | {"crc32": checksums(self.first, rows, self.row)}
+        columns = rows | {"crc32": checksums(self.first, rows, self.row_type)}
         statuses = {name: columns.pop(name) for name in (REPEATED["status"], "status") if name in columns}
-        with saving(self.path), self.path.open("r+b") as file:
+        with store_errors(self.path), self.path.open("r+b") as file:
             if os.fstat(file.fileno()).st_ino != self.inode:
                 raise StoreError(f"{self.path}: has been replaced by another file")
             for name, status in statuses.items():
@@ -296,8 +298,8 @@ class Place:
         """(count, ...) The columns of so many rows; file: one that is open. Raises OSError, ValueError."""
         with nullcontext(file) if file is not None else self.path.open("rb") as source:
             rows = {}
-            for name in self.row.names or ():
-                kind = self.row[name]
+            for name in self.row_type.names or ():
+                kind = self.row_type[name]
                 source.seek(self.offsets[name])
                 content = source.read(count * kind.itemsize)
                 rows[name] = np.frombuffer(content, kind.base).reshape(count, *kind.shape)
@@ -307,19 +309,19 @@ class Place:
     def is_stored(self) -> bool:
         """Whether the first row is there as it was written."""
         row = self.read()
-        return bool(row["status"][0] != MISSING and checksums(self.first, row, self.row)[0] == row["crc32"][0])
+        return bool(row["status"][0] != MISSING and checksums(self.first, row, self.row_type)[0] == row["crc32"][0])
 
     def clear(self) -> None:
         """Write a blank row, which a reader of an unfinished file sees; its status stays as it is."""
         with self.path.open("r+b") as file:
-            for name, values in blank_rows(1, self.row).items():
+            for name, values in blank_rows(1, self.row_type).items():
                 if name != "status":
                     file.seek(self.offsets[name])
                     file.write(values.data)
 
     def mark_missing(self, rows: Collection[int]) -> None:
         """Take back the statuses of some rows, counted from the first, before they are computed again."""
-        with saving(self.path), self.path.open("r+b") as file:
+        with store_errors(self.path), self.path.open("r+b") as file:
             for row in rows:
                 for name in ("status", REPEATED["status"]):
                     if name in self.offsets:
@@ -585,37 +587,36 @@ class TableFile:
         label = run.removeprefix(f"{scene}/")
         others = arrays.place(list(arrays.runs).index(label))
         offsets = {REPEATED.get(name, name): offset for name, offset in others.offsets.items()}
-        kinds = [(REPEATED.get(name, name), others.row[name]) for name in others.row.names or ()]
+        kinds = [(REPEATED.get(name, name), others.row_type[name]) for name in others.row_type.names or ()]
         for name, column in arrays.computed.items():
             if label == REFERENCE and "run" not in column.dimensions:
                 offsets[name] = arrays.offsets[name]
                 kinds.append((name, arrays.row_type[name]))
-        own = [(name, place.row[name]) for name in place.row.names or ()]
-        return replace(place, offsets={**place.offsets, **offsets}, row=np.dtype([*own, *kinds]))
+        own = [(name, place.row_type[name]) for name in place.row_type.names or ()]
+        return replace(place, offsets={**place.offsets, **offsets}, row_type=np.dtype([*own, *kinds]))
 
-    def take_back_missing(
+    def split_missing(
         self, asked: Sequence[Asked], time_limit_s: float
     ) -> tuple[list[Asked], list[tuple[Asked, str, str]]]:
-        """The runs that are to be computed, and those that are stored with their status and message; of `asked` runs,
-        of each scene the reference first.
+        """Split `asked`, of each scene the reference first, into runs to compute and runs that stay as they are stored.
 
         To be computed are those that the file lacks, that a shorter time limit ended, or whose reference is one of
-        these; what is stored of them is taken back.
+        these; their rows are marked as missing. Those that stay are returned with status and message.
         """
         missing: dict[str, Asked] = {}
         kept: list[tuple[Asked, str, str]] = []
         for run in asked:
-            place = self.place(run.run)
+            place = self.place(run.label)
             row = place.read()
             status = STATUSES[row["status"][0]] if place.is_stored else ""
             # A shipped reference may end early itself; it has a limit only where reading it was over one.
             limit = row["time_limit_s"][0]
             is_short = limit < time_limit_s if run.is_shipped else not limit >= time_limit_s
             is_over = status == "timed_out" and is_short
-            if status and not is_over and f"{run.scene.name}/{REFERENCE}" not in missing:
+            if status and not is_over and run.reference_label not in missing:
                 kept.append((run, status, text_of(row["message"][0])))
             else:
-                missing[run.run] = run
+                missing[run.label] = run
                 place.mark_missing([0])
         return list(missing.values()), kept
 
@@ -901,8 +902,8 @@ def _write_tables(path: Path, tables: Sequence[Table], rows: Sequence[tuple[str,
                 if values is None:
                     place.clear()
                 else:
-                    blank = blank_rows(1, place.row)
-                    place.write({name: values.get(name, blank[name]) for name in place.row.names or ()})
+                    blank = blank_rows(1, place.row_type)
+                    place.write({name: values.get(name, blank[name]) for name in place.row_type.names or ()})
 
 
 # Digests: the attribute `digests` of a group is a JSON object, SHA-256 by the name of each dataset, over values and

@@ -26,7 +26,7 @@ from rotor_mbs.methods import catalogue
 from rotor_mbs.methods.base import STEP, TOLERANCE, Ladder
 from rotor_mbs.methods.time_limit import OutOfTimeError, time_limit
 from rotor_mbs.runs import last_core
-from rotor_mbs.runs.outputs import writing
+from rotor_mbs.runs.output_files import locked
 from rotor_mbs.runs.pool import WorkerPool, run_in
 from rotor_mbs.runs.read import Record, points_table
 from rotor_mbs.runs.table import Place, Rows, Table, TableFile, extend_file
@@ -398,7 +398,7 @@ def run_bench(
         Where the file cannot be read or written.
     """
     chosen = with_settings(catalogue.ladders(methods), settings or {})
-    with writing(output):
+    with locked(output):
         none: Mapping[str, Sequence[str]] = {scene.name: () for scene in scenes}
         report = run_scenes(scenes, none, output, workers=workers, timeout_s=_REFERENCE_LIMIT_S)
         failed = [*report.failures, *report.not_computed]

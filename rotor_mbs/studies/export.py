@@ -20,7 +20,7 @@ from rotor_mbs.models.exudyn import tree
 from rotor_mbs.models.exudyn.geometry import LISTS, Ref, pitching
 from rotor_mbs.models.exudyn.loads import Loads, Moment
 from rotor_mbs.models.mujoco.mjcf import mjcf_file
-from rotor_mbs.runs.outputs import refuse_foreign, replace_file
+from rotor_mbs.runs.output_files import refuse_foreign, replace_file
 from rotor_mbs.scenario.catalogue import scene_of
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution import quantities

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from rotor_mbs.analysis import modes as modal
 from rotor_mbs.errors import InputError, MethodRefusal, RotorError
 from rotor_mbs.methods.catalogue import find_method, methods, with_method_files
-from rotor_mbs.runs.outputs import writing
+from rotor_mbs.runs.output_files import locked
 from rotor_mbs.runs.pool import local_pool, run_in
 from rotor_mbs.runs.read import Record, read_records, write_records
 from rotor_mbs.scenario.scene import Scene, scene_hash
@@ -59,7 +59,7 @@ def modes_of_scenes(
             raise InputError(f"{name}: its model has no linearization; allowed: a model with `linearize`")
     speeds, stiffnesses = _increasing(speeds, "speeds"), _increasing(stiffnesses, "stiffnesses")
     made: list[Outcome] = []
-    with writing(output):
+    with locked(output):
         records: list[Record] = []
         if output.exists():
             records = read_records(output, "modes")

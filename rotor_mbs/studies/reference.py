@@ -12,7 +12,7 @@ from pathlib import Path
 from rotor_mbs.errors import InputError, StoreError
 from rotor_mbs.methods.catalogue import REFERENCE
 from rotor_mbs.runs.design import FROZEN, Asked
-from rotor_mbs.runs.outputs import replace_file, writing
+from rotor_mbs.runs.output_files import locked, replace_file
 from rotor_mbs.runs.read import OpenResults, open_results
 from rotor_mbs.runs.table import array_digest, extend_file, runs_table, scene_table
 from rotor_mbs.scenario.scene import Scene
@@ -35,7 +35,7 @@ def compute_references(
     """
     full = output.with_name(f"{output.name}.full.h5")
     none: dict[str, Sequence[str]] = {scene.name: () for scene in scenes}
-    with writing(output):
+    with locked(output):
         _refuse_other_contents(output, {scene.name for scene in scenes})
         report = run_scenes(
             scenes, none, full, workers=workers, timeout_s=timeout_s, use_frozen=False, on_progress=on_progress
@@ -59,7 +59,7 @@ def _freeze(scenes: Sequence[Scene], results: OpenResults, target: Path) -> None
     tables = [scene_table([asked], arrays=[name for name in FROZEN if name in run]) for asked, run in references]
     file = extend_file(target, [runs_table([asked for asked, _ in references]), *tables])
     for asked, run in references:
-        place = file.place(asked.run)
+        place = file.place(asked.label)
         values: dict[str, object] = {"status": run.status, "samples": run.samples}
         values |= {name: run.attributes[name] for name in _FACTS}
         values |= {name: run.array(name) for name in FROZEN if name in run}

@@ -13,9 +13,9 @@ from pathlib import Path
 
 import rotor_mbs
 from rotor_mbs.analysis.published import claims, finding
-from rotor_mbs.analysis.run_tables import TextTable, method_table
+from rotor_mbs.analysis.text_tables import TextTable, method_table
 from rotor_mbs.methods.catalogue import REFERENCE, able_methods, default_methods, errata_methods, ladders
-from rotor_mbs.runs.outputs import writing
+from rotor_mbs.runs.output_files import locked
 from rotor_mbs.runs.pool import Workers
 from rotor_mbs.runs.read import open_results
 from rotor_mbs.runs.runner import Task
@@ -82,12 +82,12 @@ def reproduce(
     methods = {scene.name: able_methods(scene, names)[0] for scene in scenes}
     curves = short_curves(benched)
     asked = asked_runs(scenes, methods, {})
-    with writing(output):
+    with locked(output):
         file = extend_file(output, [*results_tables(asked), bench_table(curves)], [curve.key for curve in curves])
-        missing, kept = file.take_back_missing(asked, timeout_s)
+        missing, kept = file.split_missing(asked, timeout_s)
         runs: list[Task] = [*run_tasks(file, missing, timeout_s)]
         reference = f"{benched.name}/{REFERENCE}"
-        is_new = reference in [run.run for run in missing]
+        is_new = reference in [run.label for run in missing]
         of_curves = [
             CurveTask(
                 label=curve.label,

@@ -24,7 +24,7 @@ from rotor_mbs.methods.catalogue import (
 from rotor_mbs.methods.solve import solve
 from rotor_mbs.methods.time_limit import OutOfTimeError, time_limit
 from rotor_mbs.runs.design import Asked
-from rotor_mbs.runs.outputs import writing
+from rotor_mbs.runs.output_files import locked
 from rotor_mbs.runs.pool import Finished, Workers, pool_of
 from rotor_mbs.runs.runner import Task, compute_in_order
 from rotor_mbs.runs.table import Rows, TableFile, extend_file, results_tables, row_of_run, text_of
@@ -161,9 +161,9 @@ def run_scenes(
         The same call then goes on where it stopped.
     """
     asked = asked_runs(scenes, methods, settings or {}, use_frozen=use_frozen)
-    with writing(output):
+    with locked(output):
         file = extend_file(output, results_tables(asked))
-        missing, kept = file.take_back_missing(asked, timeout_s)
+        missing, kept = file.split_missing(asked, timeout_s)
         made = compute_tasks(run_tasks(file, missing, timeout_s), workers, on_progress)
         return RunReport(made, kept)
 
@@ -195,8 +195,8 @@ def run_tasks(file: TableFile, asked: Sequence[Asked], timeout_s: float) -> list
         RunTask(
             label=f"{run.scene.name} {run.method}",
             method=run.method,
-            place=file.place(run.run),
-            reference=None if run.method == REFERENCE else file.place(f"{run.scene.name}/{REFERENCE}"),
+            place=file.place(run.label),
+            reference=None if run.method == REFERENCE else file.place(run.reference_label),
             # What ends itself at its time limit needs a while before, to load its engine and compile, and to write
             # after.
             kill_after_s=1.2 * timeout_s + 10.0,

@@ -11,11 +11,11 @@ from pathlib import Path
 import numpy as np
 
 from rotor_mbs.analysis.judgement import Judgement, judge
-from rotor_mbs.analysis.run_tables import TextTable
+from rotor_mbs.analysis.text_tables import TextTable
 from rotor_mbs.methods.catalogue import REFERENCE, able_methods, find_method, method_names, settings_for
 from rotor_mbs.methods.solve import solve
 from rotor_mbs.methods.time_limit import OutOfTimeError, time_limit
-from rotor_mbs.runs.outputs import writing
+from rotor_mbs.runs.output_files import locked
 from rotor_mbs.runs.read import open_results, points_table, read_records
 from rotor_mbs.runs.runner import Task
 from rotor_mbs.runs.table import Rows, extend_file
@@ -273,7 +273,7 @@ def complete_ladders(
     ]
     points = {(scene.name, method): ladder_points(scene, method) for scene, method in wanted}
     tables = [points_table(STEPS, [point for own in points.values() for point in own])] if points else []
-    with writing(output):
+    with locked(output):
         # Ladders of these scenes and methods that the runs no longer call for go.
         replaced = [(STEPS, scene, method) for scene, able in methods.items() for method in able]
         file = extend_file(output, tables, replaced)

@@ -138,7 +138,7 @@ def _side_by_side(chunk: Chunk, scenes: Sequence[Scene]) -> Rows:
         of_defects = {} if defects is None else defect_metrics(defects, None)
         of_runs.append({"energy_drift_max": float(drifts[i]), **of_defects})
     ok = clearly_ok(scenes, method.name, block.integrations, block.samples, of_runs, angles, method.bounds)
-    row = chunk.place.row
+    row = chunk.place.row_type
     metrics = np.dtype([(name, row[name]) for name in row.names or () if name in METRICS | ERROR_GROWTH])
     rows = blank_rows(len(scenes), metrics)
     for name in row.names or ():
@@ -217,7 +217,7 @@ class SweepPlan:
                 number = first // self.rows
                 method, size = find_method(self.methods[number]), 1
                 if method.solve_many is not None:
-                    most = min(_CHUNK_BYTES // place.row.itemsize, left // (2 * workers), _MAX_RUNS)
+                    most = min(_CHUNK_BYTES // place.row_type.itemsize, left // (2 * workers), _MAX_RUNS)
                     size = max(most // _MIN_RUNS, 1) * _MIN_RUNS
                 end = min(first + size, last, (number + 1) * self.rows)
                 values, settings = design.rows(first, end), self.settings[method.name]

@@ -16,7 +16,7 @@ import jinja2
 import numpy as np
 
 from rotor_mbs.runs.design import MISSING, Column
-from rotor_mbs.runs.outputs import replace_file
+from rotor_mbs.runs.output_files import replace_file
 from rotor_mbs.runs.sweeps import StoredSweep
 from rotor_mbs.runs.table import KEYWORDS, new_file
 from rotor_mbs.scenario.sweep import SPLITS

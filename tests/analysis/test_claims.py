@@ -25,7 +25,7 @@ from rotor_mbs.analysis.published import (
     published,
     rounds_to,
 )
-from rotor_mbs.analysis.run_tables import method_table
+from rotor_mbs.analysis.text_tables import method_table
 from rotor_mbs.runs.read import open_results
 from rotor_mbs.scenario.catalogue import natural_order
 

@@ -20,7 +20,7 @@ from support.scenes import paper
 from support.stored import Made, rotor, store
 from support.sweeps import THREE_RUNS
 
-from rotor_mbs.analysis.run_tables import bench_table, run_table
+from rotor_mbs.analysis.text_tables import bench_table, table_of_runs
 from rotor_mbs.cli.terminal import ProgressLine, coloured
 from rotor_mbs.errors import MethodRefusal
 from rotor_mbs.runs.read import Record, open_results
@@ -174,8 +174,8 @@ def test_a_row_for_each_run_and_of_many_runs_one_for_each_method(tmp_path: Path)
         runs += [Made(scene, GOOD, rotor(lambda t: np.sin(t) + 1e-9), attributes={"defect_max": 3e-12})]
         runs += [Made(scene, BAD, rotor(lambda t: np.sin(t) + 0.25), attributes={"status": "inaccurate"})]
     with open_results(store(tmp_path / "r.h5", runs)) as results:
-        few = run_table(results.scenes, {"paper/s0": [GOOD, BAD], "not there": [GOOD]})
-        many = run_table(results.scenes, {name: [GOOD, BAD] for name in results.scenes})
+        few = table_of_runs(results.scenes, {"paper/s0": [GOOD, BAD], "not there": [GOOD]})
+        many = table_of_runs(results.scenes, {name: [GOOD, BAD] for name in results.scenes})
     assert few.rows == [
         ("paper/s0", "reference", "ok", "", "", "0.0e+00", "read"),  # shipped, and no error against itself
         ("paper/s0", GOOD, "ok", "3.0e-12", "1.0e-09", "0.0e+00", "0.002"),

@@ -99,7 +99,7 @@ def test_checksums_are_as_the_documentation_says(written: Path, swept: Path) -> 
 
 
 def test_the_last_bit_of_every_column_of_a_run_is_found(copy: Path) -> None:
-    columns = TableFile(copy).place(RUN).row.names or ()
+    columns = TableFile(copy).place(RUN).row_type.names or ()
     assert {"angles", "rates", "tip", "kinetic_energy", "energy_error", "energy_drift_max", "message"} <= {*columns}
     before = copy.read_bytes()
     for column in columns:

@@ -18,7 +18,7 @@ from support.sweeps import MAP, THREE_RUNS, made_sweep
 
 import rotor_mbs as rm
 from rotor_mbs.errors import InputError
-from rotor_mbs.runs.outputs import replace_file, writing
+from rotor_mbs.runs.output_files import locked, replace_file
 from rotor_mbs.runs.read import open_results
 
 RUN = ["run", "check/held", "-m", "lagrange/dop853", "-j", "1", "-o"]
@@ -38,7 +38,7 @@ def dataset(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_no_command_writes_what_another_process_is_writing(command: list[str], tmp_path: Path) -> None:
     """The lock of a process that has begun with an output which is not there yet."""
     output = tmp_path / "results.h5"
-    with ThreadPoolExecutor(1) as other, writing(output):
+    with ThreadPoolExecutor(1) as other, locked(output):
         given = tmp_path if command == ["reproduce"] else output
         ended = other.submit(rotor_mbs, *command, "-o", given).result()
     assert ended.status == 2
@@ -60,7 +60,7 @@ def test_a_lock_that_is_no_file_of_ours_is_refused(make: Callable[[Path], object
     """A link would be written through, a pipe waited for."""
     (tmp_path / "another").write_text("kept")
     make(tmp_path / ".r.h5.lock")
-    with pytest.raises(InputError, match="was not written by rotor-mbs"), writing(tmp_path / "r.h5"):
+    with pytest.raises(InputError, match="was not written by rotor-mbs"), locked(tmp_path / "r.h5"):
         pass
     assert (tmp_path / "another").read_text() == "kept"
 

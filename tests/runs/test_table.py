@@ -14,7 +14,7 @@ from support.scenes import paper
 
 from rotor_mbs.errors import InputError, StoreError
 from rotor_mbs.runs.design import CHARACTER, CHARACTERS, COLUMNS, MISSING, Asked, Column
-from rotor_mbs.runs.outputs import writing
+from rotor_mbs.runs.output_files import locked
 from rotor_mbs.runs.read import points_table
 from rotor_mbs.runs.table import (
     Place,
@@ -52,7 +52,7 @@ def _stored(path: Path) -> Table:
 
 
 def _rows(place: Place, first: int, count: int) -> Rows:
-    rows = blank_rows(count, place.row)
+    rows = blank_rows(count, place.row_type)
     rows["status"][:], rows["steps"][:] = 0, 7
     rows["angles"][:] = np.arange(first, first + count)[:, None]
     rows["message"][:] = characters("αβγ", 40)
@@ -160,7 +160,7 @@ def _asked(*methods: str, **changes: object) -> list[Asked]:
 
 def _write(file: TableFile, run: str, value: float) -> None:
     place = file.place(run)
-    row = blank_rows(1, place.row)
+    row = blank_rows(1, place.row_type)
     row["status"][0], row["samples"][0], row["angles"][:] = 0, 11, value
     place.write(row)
 
@@ -241,8 +241,8 @@ def test_a_results_file_opens_in_one_call_and_methods_are_told_by_label(results:
 def test_no_other_process_writes_a_locked_output(path: Path) -> None:
     program = (
         "import sys, pathlib\n"
-        "from rotor_mbs.runs.outputs import writing\n"
-        "with writing(pathlib.Path(sys.argv[1])):\n"
+        "from rotor_mbs.runs.output_files import locked\n"
+        "with locked(pathlib.Path(sys.argv[1])):\n"
         "    print('locked', flush=True)\n"
         "    sys.stdin.read()\n"
     )
@@ -251,10 +251,10 @@ def test_no_other_process_writes_a_locked_output(path: Path) -> None:
     )
     assert other.stdout is not None
     assert other.stdout.readline() == "locked\n"
-    with pytest.raises(InputError, match=f"another process is writing it now .process {other.pid}"), writing(path):
+    with pytest.raises(InputError, match=f"another process is writing it now .process {other.pid}"), locked(path):
         pass
     other.send_signal(signal.SIGKILL)
     other.communicate()
-    with writing(path), writing(path):  # its lock ended with it; the same thread may enter it again
+    with locked(path), locked(path):  # its lock ended with it; the same thread may enter it again
         pass
     assert {entry.name for entry in path.parent.iterdir()} == {path.name}

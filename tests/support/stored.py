@@ -100,7 +100,7 @@ def damage(path: Path, run: str, column: str, at: int = 0) -> None:
     """Change a byte of a stored row: of the column, `at` bytes from its end."""
     place = TableFile(path).place(run)
     with path.open("r+b") as file:
-        file.seek(place.offsets[column] + place.row[column].itemsize - 1 - at)
+        file.seek(place.offsets[column] + place.row_type[column].itemsize - 1 - at)
         byte = file.read(1)[0]
         file.seek(-1, 1)
         file.write(bytes([byte ^ 1]))

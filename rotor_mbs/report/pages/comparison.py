@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from rotor_mbs.analysis.data_verdict import DEFAULT_TOLERANCE, LEVELS, ChannelErrors, DataVerdict, from_dictionary
-from rotor_mbs.analysis.run_tables import TextTable
+from rotor_mbs.analysis.text_tables import TextTable
 from rotor_mbs.errors import InputError
 from rotor_mbs.foreign.channels import load_data
 from rotor_mbs.methods.time_limit import checked_seconds

@@ -10,7 +10,7 @@ import numpy as np
 
 from rotor_mbs.analysis import run_selection
 from rotor_mbs.analysis.published import finding
-from rotor_mbs.analysis.run_tables import method_table
+from rotor_mbs.analysis.text_tables import method_table
 from rotor_mbs.report import canvas, plots
 from rotor_mbs.report.canvas import Panels
 from rotor_mbs.report.elements import PageTable, Picture, Row, Section, TableCell, picture

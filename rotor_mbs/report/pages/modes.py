@@ -24,7 +24,7 @@ from rotor_mbs.analysis.modes import (
     read_modes,
     to_records,
 )
-from rotor_mbs.analysis.run_tables import TextTable
+from rotor_mbs.analysis.text_tables import TextTable
 from rotor_mbs.errors import InputError
 from rotor_mbs.report.canvas import SPEED_AXIS, Panels, curve, growth_map, log_axis, panels
 from rotor_mbs.report.elements import PageTable, Picture, Row, Section, TableCell, picture

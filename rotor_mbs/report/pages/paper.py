@@ -32,7 +32,7 @@ from rotor_mbs.report.elements import PageTable, Row, Section, TableCell, pictur
 from rotor_mbs.report.looks import COLOURS, Look, label_of, with_capital
 from rotor_mbs.report.numbers import NOTHING, SPACE, fixed, formula, number, prefixed
 from rotor_mbs.report.pages import Report, metric, status_text
-from rotor_mbs.runs.outputs import replace_file
+from rotor_mbs.runs.output_files import replace_file
 from rotor_mbs.runs.read import StoredRun, StoredScene, open_results
 from rotor_mbs.solution.status import GOOD
 

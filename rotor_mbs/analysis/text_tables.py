@@ -25,7 +25,7 @@ def run_row(run: StoredRun) -> tuple[str, ...]:
     return run.method, run.status, _short(facts.get("defect_max")), error, _short(facts.get("energy_drift_max")), time
 
 
-def run_table(scenes: Mapping[str, StoredScene], wanted: Mapping[str, Iterable[str]]) -> TextTable:
+def table_of_runs(scenes: Mapping[str, StoredScene], wanted: Mapping[str, Iterable[str]]) -> TextTable:
     """A row for each of the `wanted` runs and their references; of many runs, one for each method."""
     runs = [
         scenes[name].runs[method]

@@ -27,7 +27,7 @@ _OWNER = rb"(process [0-9]+ on [!-~]*)?\Z"
 
 
 @contextmanager
-def writing(output: Path) -> Iterator[None]:
+def locked(output: Path) -> Iterator[None]:
     """No other process writes `output` in the block; its thread may enter it again. Raises InputError, StoreError."""
     from filelock import FileLock, Timeout
 
@@ -86,7 +86,7 @@ def _resolved(output: Path) -> Path:
 
 
 @contextmanager
-def saving(path: object) -> Iterator[None]:
+def store_errors(path: object) -> Iterator[None]:
     """What the system refuses in the block is a StoreError about `path`."""
     try:
         yield
@@ -102,7 +102,7 @@ def replace_file(path: Path, content: Buffer, mark: Mark) -> None:
     """
     refuse_foreign(path, mark)
     if path.exists() and not path.is_file() and not path.is_dir():
-        with saving(path):
+        with store_errors(path):
             path.write_bytes(content)
         return
     with replacing(path.resolve() if path.is_symlink() else path) as temporary, temporary.open("wb") as file:
@@ -119,7 +119,7 @@ def refuse_foreign(path: Path, mark: Mark) -> None:
     """
     if not path.is_file():
         return
-    with saving(path):
+    with store_errors(path):
         size = path.stat().st_size
         if size == 0:
             return
@@ -140,7 +140,7 @@ def replacing(path: Path) -> Iterator[Path]:
     The name cannot be guessed, and a file or link of that name is not opened.
     """
     temporary = path.with_name(f".{path.name}.{secrets.randbits(60)}.tmp")
-    with saving(path):
+    with store_errors(path):
         path.parent.mkdir(parents=True, exist_ok=True)
         temporary.open("xb").close()
         try:
