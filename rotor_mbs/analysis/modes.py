@@ -412,8 +412,14 @@ def _linear_datasets(linear: LinearModes) -> Datasets:
         "damped_frequency": (linear.damped_frequencies, mode("rad/s", "damped frequency, in the rotor's frame")),
         "damping_ratio": (linear.damping_ratios, mode("1", "damping ratio")),
         "growth_rate": (linear.growth_rates, mode("1/s", "largest real part of the mode's eigenvalues")),
-        "backward_whirl_frequency": (backward, mode("rad/s", "damped frequency minus rotor speed, in the base frame")),
-        "forward_whirl_frequency": (forward, mode("rad/s", "damped frequency plus rotor speed, in the base frame")),
+        "backward_whirl_frequency": (
+            backward,
+            mode("rad/s", "damped frequency minus k times rotor speed, of cosine_k, sine_k"),
+        ),
+        "forward_whirl_frequency": (
+            forward,
+            mode("rad/s", "damped frequency plus k times rotor speed, of cosine_k, sine_k"),
+        ),
         "eigenvalue_real": (linear.eigenvalues.real, root("1/s", "eigenvalue, real part")),
         "eigenvalue_imag": (linear.eigenvalues.imag, root("1/s", "eigenvalue, imaginary part")),
         "shape_real": (linear.shapes.real, place("1", "mode shape, real part, largest entry 1")),

@@ -143,8 +143,8 @@ class _Parser(argparse.ArgumentParser):
         text = "parallel processes (default: number of cores, here %(default)s)"
         self.add_argument("-j", "--jobs", type=JOBS, default=cores(), metavar="N", help=text)
 
-    def timeout(self, seconds: float = 60.0) -> None:
-        text = "time limit per run in s; longer runs have the status timed_out (default: %(default)g)"
+    def timeout(self, seconds: float = 60.0, exception: str = "") -> None:
+        text = f"time limit per run in s; longer runs have the status timed_out (default: %(default)g{exception})"
         self.add_argument("--timeout", type=SECONDS, default=seconds, metavar="SECONDS", help=text)
 
 
@@ -331,7 +331,9 @@ def _parser() -> tuple[_Parser, dict[str, _Parser]]:
     own.output(file, "FILE", Path("stability.h5"))
     own.pages("--report")
     own.jobs()
-    own.timeout(8.0)  # many runs of the suite would reach any limit: with a short one it ends in minutes
+    own.timeout(
+        8.0, "; at least 120 for lagrange/taylor"
+    )  # many runs of the suite would reach any limit: with a short one it ends in minutes
 
     own = command(
         "modes", "compute natural frequencies at rest and over rotor speed, and Floquet multipliers under gravity",
