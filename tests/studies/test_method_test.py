@@ -74,7 +74,7 @@ PAST = "np.array([value_at(table, {}) for table in self.scene.load_tables])"
 BROKEN = {
     "Coriolis sign": ("rotor -= 2 *", "rotor -= -2 *", "Coriolis"),
     "inertia about the wrong point": (
-        "+= np.array([m *", "+= np.array([2 * m *", "inertia about the root taken as about"
+        "+= np.array([m *", "+= np.array([2 * m *", "inertia about the root used as inertia about"
     ),
     "damping ignored": (" - self.d * v[1:]", "", "without the dampers of the bearings|damping off by -100 %"),
     "torque late by a step": ("np.array(part.loads_at(t))", PAST.format("t - self.step"), "load|torque"),
