@@ -54,8 +54,8 @@ DECIDING = 0.5  # share of the runs that must decide
 RULE = (
     f"A claim holds if it is true in at least {100 * SURE:.0f} % of the deciding runs for every duration, fails if it "
     f"is true in at most {100 * (1 - SURE):.0f} % for every duration, and is undecided otherwise, or if fewer than "
-    f"{100 * DECIDING:.0f} % of the runs are deciding. A run that ended early or whose energy rose a thousandfold is "
-    "not deciding."
+    f"{100 * DECIDING:.0f} % of the runs are deciding. A run that ended early, or whose energy rose by a thousand times "
+    "the energy scale, is not deciding."
 )
 Row = dict[str, Any]  # of a table of claim_runs.json
 
@@ -150,7 +150,7 @@ def moved_starts(scene: Scene, runs: int, seed: int) -> np.ndarray[Any, Any]:
 
 
 def values_of_run(scene: Scene, asked: Sequence[TrajectoryNumber], method: str, start: Sequence[float]) -> NumberValues:
-    """The numbers read off the samples; none of a run that ended early or gained a thousandfold energy."""
+    """The numbers read off the samples; none of a run that ended early or gained a thousand times the energy scale."""
     run = solve(method, replace(scene, initial_angles=tuple(start)), {})
     with np.errstate(all="ignore"):
         judgement = judge(scene, run, None)
