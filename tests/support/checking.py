@@ -42,7 +42,7 @@ def add_run(path: Path, scene: Scene, run: Solution) -> None:
     file = extend_file(path, results_tables([asked]))
     judgement = judge(scene, run, read_reference(file.place(f"{scene.name}/{REFERENCE}"), scene))
     run = replace(run, scene=scene, status=judgement.status, message=judgement.message, metrics=judgement.metrics)
-    place = file.place(asked.run)
+    place = file.place(asked.label)
     place.write(row_of_run(run, place, {"false_success": int(judgement.false_success)}))
 
 
