@@ -31,7 +31,7 @@ class Step(Settings):
 class Solver:
     def __init__(self, scene, settings):
         if not all(blade.has_pitch_inertia for blade in scene.blades):
-            raise MethodRefusal("dart: no blade without inertia about its pitch axis")
+            raise MethodRefusal("dart: blades without inertia about the pitch axis are not supported")
         self.scene, self.settings, self.rotor = scene, settings, dart.dynamics.Skeleton("rotor")
         shaft, hub = self.rotor.createRevoluteJointAndBodyNodePair()
         shaft.setAxis([0.0, 1.0, 0.0])

@@ -48,7 +48,7 @@ class Loads(LeafSystem):
 class Solver:
     def __init__(self, scheme, scene, settings):
         if not all(blade.has_pitch_inertia for blade in scene.blades):
-            raise MethodRefusal("drake: no blade without inertia about its pitch axis")
+            raise MethodRefusal("drake: blades without inertia about the pitch axis are not supported")
         self.scene, builder, interval = scene, DiagramBuilder(), scene.duration / (scene.samples - 1)
         period = 0.0 if scheme else interval / np.ceil(interval / settings.step * (1.0 - 1e-9))
         self.plant = plant = builder.AddSystem(MultibodyPlant(period))

@@ -53,7 +53,7 @@ def of_a_blade():
 class Solver:
     def __init__(self, scene, settings):
         if not all(blade.has_pitch_inertia for blade in scene.blades):
-            raise MethodRefusal("kane: no blade without inertia about its pitch axis")
+            raise MethodRefusal("kane: blades without inertia about the pitch axis are not supported")
         self.scene, self.tolerance, self.of_a_blade = scene, settings.relative_tolerance, of_a_blade()
         self.numbers = [(blade.mass, *blade.centre_of_mass, *blade.inertia) for blade in scene.blades]
         self.stiffness = np.array([scene.bearing(i)[0] for i in range(len(scene.blades))])

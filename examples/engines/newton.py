@@ -26,7 +26,7 @@ class Step(Settings):
 class Solver:
     def __init__(self, scene, settings):
         if not all(blade.has_pitch_inertia for blade in scene.blades):
-            raise MethodRefusal("newton: no blade without inertia about its pitch axis")
+            raise MethodRefusal("newton: blades without inertia about the pitch axis are not supported")
         self.scene, self.step = scene, settings.step
         builder = newton.ModelBuilder(gravity=(0.0, 0.0, -scene.gravity))
         # A body needs a mass, which on the shaft has no effect.

@@ -33,7 +33,7 @@ class Step(Settings):
 class Solver:
     def __init__(self, scene, settings):
         if not all(blade.has_pitch_inertia for blade in scene.blades):
-            raise MethodRefusal("pinocchio: no blade without inertia about its pitch axis")
+            raise MethodRefusal("pinocchio: blades without inertia about the pitch axis are not supported")
         self.scene, self.settings = scene, settings
         self.model = model = pin.Model()
         model.gravity.linear = np.array([0.0, 0.0, -scene.gravity])

@@ -195,8 +195,8 @@ def metric_columns(outputs: Iterable[str]) -> dict[str, Column]:
         if quantity.judgement is not None:
             unit = "1" if quantity.judgement.scale_of else quantity.units
             error = "largest relative error" if quantity.judgement.scale_of else "largest error"
-            extreme = error if quantity.judgement.with_reference else "maximum"
-            columns[quantity.judgement.metric] = Column(("run",), unit, f"{long_name}: {extreme}")
+            text = f"{long_name}: {error}" if quantity.judgement.with_reference else f"{long_name} over the run"
+            columns[quantity.judgement.metric] = Column(("run",), unit, text)
         if quantity.has_peak:
             columns[f"{name}_max"] = Column(("run",), quantity.units, f"{long_name}: maximum")
             columns[f"{name}_max_time_s"] = Column(("run",), "s", f"{long_name}: time of the maximum")

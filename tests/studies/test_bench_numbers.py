@@ -206,7 +206,7 @@ def test_pages_are_written(tmp_path: Path) -> None:
     assert [path.name for path in index.parent.iterdir()] == ["index.html"]
     page = index.read_text()
     assert "ended after 10 s" in page
-    assert "horizon at 6.00" in page
+    assert "evaluated up to 6.00" in page
     assert page.count("<svg viewBox") >= 2
     assert '<a href="#scene-0">paper/fig09</a>' in page
     assert page.index('id="fastest"') < page.index('id="scene-0"')

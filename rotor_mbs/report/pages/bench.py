@@ -178,7 +178,7 @@ def overview_table(scenes: Mapping[str, Sequence[Record]]) -> PageTable:
             name = label if label == first.name else f"{label} ({first.name})"
             row.append(TableCell(f"{name}: {prefixed(reach.seconds, 's', 2)}", note=note))
         rows.append(row)
-    caption = "Run time of the fastest method for an angle error, and run time of the second fastest relative to it."
+    caption = "Shortest run time to reach an angle error, and that of the second fastest method relative to it."
     return PageTable(caption, ["scene", *_TARGETS], rows)
 
 
@@ -332,7 +332,7 @@ def reach_table(curves: Sequence[Record]) -> PageTable:
     for curve in curves:
         errors = curve.arrays["angle_error_max"][work_precision.succeeded(curve)]
         missing = TableCell(
-            NOTHING, note=f"{with_unit(errors.min(), 'rad')} at best" if len(errors) else "no complete run"
+            NOTHING, note=f"{with_unit(errors.min(), 'rad')} at best" if len(errors) else "no error below 1 rad"
         )
         count = work_precision.left_out(curve)
         if count:
@@ -348,7 +348,7 @@ def reach_table(curves: Sequence[Record]) -> PageTable:
                 row.append(missing)
         rows.append(row)
     head = ["method", *_TARGETS]
-    return PageTable("Run time to an angle error, and its ratio to the fastest", head, rows)
+    return PageTable("Run time to reach an angle error, and its ratio to that of the fastest method", head, rows)
 
 
 def _point_table(curves: Sequence[Record]) -> PageTable:
@@ -360,7 +360,12 @@ def _point_table(curves: Sequence[Record]) -> PageTable:
     for curve in curves:
         for i, status in enumerate(curve.statuses):
             if status != "left_out":
-                values = [number(_finite(curve.arrays[name][i]), 3) for name in columns]
+                values = [
+                    str(int(curve.arrays[name][i]))
+                    if column.kind == "<i8"
+                    else number(_finite(curve.arrays[name][i]), 3)
+                    for name, column in columns.items()
+                ]
                 outcome = TableCell(words_of(status), tone="" if status == "ok" else "bad")
                 rows.append([method_cell(curve.name), _setting(curve, i), *values, outcome])
     return PageTable("Every setting measured.", ("method", "setting", *names, "status"), rows)
