@@ -340,9 +340,9 @@ _EXAMPLES = {
         "sweep study.toml -o sweep.h5 -j 1",
     ),
     "Modes": (
-        "`modes` writes a group per scene, model and state (`rest`, `rotation`); Floquet multipliers and the stability "
-        "chart are in groups of `lagrange`. All models have the same variables.",
-        "modes scene.toml --speeds 0.5:1:2 --stiffness 1e3:2e3:2 -o modes.h5 -j 1",
+        "`modes` writes a group per scene, model and state (`rest`, `rotation`); Floquet multipliers are "
+        "in a group of `lagrange`. All models have the same variables.",
+        "modes scene.toml --speeds 0.5:1:2 -o modes.h5 -j 1",
     ),
     "Comparisons": (
         "`compare` writes the data, the reference and their differences at the times of the data. Shown are the "

@@ -7,7 +7,6 @@ Symbols: λ eigenvalue (1/s) of d/dt (δq, δq̇); ω0 = |λ| undamped and ωd =
 /modes/<scene>/<model>/rest        equilibrium under gravity, one row of `speed`
 /modes/<scene>/<model>/rotation    steady rotation without gravity: the Campbell diagram
 /modes/<scene>/lagrange/floquet    multipliers of a turn under gravity
-/modes/<scene>/lagrange/chart      the largest of them over speed and bearing stiffness
 """
 
 from __future__ import annotations
@@ -214,7 +213,7 @@ def _assurance(first: Complex, second: Complex) -> Array:
 
 REST, ROTATION = "rest", "rotation"
 CLOSED_FORM = "lagrange"  # the source that others are compared with
-FLOQUET, CHART = f"{CLOSED_FORM}/floquet", f"{CLOSED_FORM}/chart"  # names of records
+FLOQUET = f"{CLOSED_FORM}/floquet"  # name of a record
 # Sources agree where their frequencies differ by no more than this share.
 AGREEMENT = 1e-8
 # Frequencies below this share of the largest are not compared: they are roots of what is left when stiffnesses cancel,
@@ -285,15 +284,6 @@ class FloquetTable:
 
 
 @dataclass(frozen=True)
-class StabilityChart:
-    """(stiffnesses, speeds) largest multipliers; NaN where no periodic motion was found."""
-
-    speeds: Array
-    stiffnesses: Array
-    largest: Array
-
-
-@dataclass(frozen=True)
 class SceneModes:
     """The modes of a scene by model, the closed form first; `notes` has the reason for missing results."""
 
@@ -305,7 +295,6 @@ class SceneModes:
     rest: Mapping[str, LinearModes] = field(default_factory=dict)
     rotation: Mapping[str, LinearModes] = field(default_factory=dict)
     floquet: FloquetTable | None = None
-    chart: StabilityChart | None = None
     notes: tuple[str, ...] = ()
 
     @property
@@ -457,15 +446,6 @@ def to_records(modes: SceneModes) -> list[Record]:
         }  # fmt: skip
         facts = {**common, "messages": list(table.messages)}
         records.append(_record(modes.scene, FLOQUET, facts, floquet))
-    if modes.chart is not None:
-        largest = "largest modulus of a multiplier, without those that are always 1"
-        stiffness = Column(("bearing_stiffness",), "N m/rad", "stiffness of every pitch bearing")
-        chart = {
-            "bearing_stiffness": (modes.chart.stiffnesses, stiffness),
-            "speed": (modes.chart.speeds, _SPEED),
-            "largest_multiplier": (modes.chart.largest, Column(("bearing_stiffness", "speed"), "1", largest)),
-        }
-        records.append(_record(modes.scene, CHART, common, chart))
     return records
 
 
@@ -518,7 +498,7 @@ def read_modes(path: Path) -> dict[str, SceneModes]:
     modes_by_scene = {}
     for scene, records in by_scene.items():
         states: dict[str, dict[str, LinearModes]] = {REST: {}, ROTATION: {}}
-        floquet = chart = None
+        floquet = None
         for name in sorted(records, key=lambda name: name.partition("/")[0] != CLOSED_FORM):
             facts, arrays = records[name].attributes, records[name].arrays
             source, _, kind = name.partition("/")
@@ -530,8 +510,6 @@ def read_modes(path: Path) -> dict[str, SceneModes]:
                     messages=tuple(map(str, facts["messages"])),
                     **{column: arrays[column] for column in ("stable", "product_error", "torque", "mismatch")},
                 )
-            elif name == CHART:
-                chart = StabilityChart(arrays["speed"], arrays["bearing_stiffness"], arrays["largest_multiplier"])
             elif kind in states:
                 states[kind][source] = LinearModes(
                     eigenvalues=np.asarray(arrays["eigenvalue_real"] + 1j * arrays["eigenvalue_imag"]),
@@ -558,7 +536,6 @@ def read_modes(path: Path) -> dict[str, SceneModes]:
             rest=states[REST],
             rotation=states[ROTATION],
             floquet=floquet,
-            chart=chart,
             notes=tuple(str(facts["notes"]).splitlines()),
         )
     return modes_by_scene

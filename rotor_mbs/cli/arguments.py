@@ -343,8 +343,6 @@ def _parser() -> tuple[_Parser, dict[str, _Parser]]:
     own.method("method, or a Python file, whose model is compared with the closed form (default: all)")
     text = "rotor speeds in rad/s, equally spaced, such as 0:3:31 (default: only at rest)"
     own.add_argument("--speeds", type=span, default=(), metavar="FROM:TO:COUNT", help=text)
-    text = "bearing stiffnesses in N m/rad, for a stability chart over speed and stiffness"
-    own.add_argument("--stiffness", type=span, default=(), metavar="FROM:TO:COUNT", help=text)
     own.output(file, "FILE", Path("modes.h5"))
     own.pages("--report")
     own.flag("--json", help="print the table as JSON")

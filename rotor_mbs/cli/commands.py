@@ -195,7 +195,7 @@ def modes(arguments: argparse.Namespace) -> int:
     scenes = find_scenes(arguments.scenes)
     with ProgressLine() as progress:
         made = modes_of_scenes(
-            scenes, arguments.output, speeds=arguments.speeds, stiffnesses=arguments.stiffness,
+            scenes, arguments.output, speeds=arguments.speeds,
             names=check_names(arguments.method or ()), workers=arguments.jobs, timeout_s=arguments.timeout,
             on_progress=progress,
         )  # fmt: skip
@@ -404,11 +404,6 @@ def sweep(arguments: argparse.Namespace) -> int:
             print_line(f"{result.older} stored runs are from other versions; --fresh recomputes them", sys.stderr)
         for line in result.lost:
             print_line(f"{line}; not computed; repeat the command to try again", sys.stderr)
-        if plan.sweep.design.picture and arguments.part == (1, 1):
-            from rotor_mbs.report.pages.sweep import save_picture  # late: matplotlib
-            from rotor_mbs.runs.sweeps import StoredSweep
-
-            print(save_picture(StoredSweep(result.path), output.with_suffix(".svg")), file=stream)
         if arguments.metadata:
             from rotor_mbs.studies.sweep_metadata import describe
 

@@ -22,7 +22,7 @@ from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
 from numpy.typing import NDArray
 
 from rotor_mbs.errors import InputError
-from rotor_mbs.report.looks import PAPER, VERMILLION, Look
+from rotor_mbs.report.looks import PAPER, Look
 from rotor_mbs.report.numbers import power
 from rotor_mbs.runs.output_files import replace_file
 
@@ -190,30 +190,15 @@ def curve(axes: Any, x: Any, y: Any, look: Look, width: float = 1.2, **more: Any
     )  # fmt: skip
 
 
-def colour_map(
-    x: Any, y: Any, values: Any, labels: tuple[str, str, str], limits: tuple[float, float] | None = None
-) -> Panels:
-    """`values` (y, x) as colour, with a scale on the right; labels: of x, y and the colours, which span the limits."""
-    low, high = (None, None) if limits is None else limits
+def colour_map(x: Any, y: Any, values: Any, labels: tuple[str, str, str], *, logarithmic: bool) -> Panels:
+    """`values` (y, x) as colour, with a scale on the right; labels: of x, y and the colours."""
     map_panels = panels((3.8,), labels[0])
     axes = map_panels.axes[0]
-    mesh = axes.pcolormesh(x, y, values, cmap="cividis", shading="nearest", vmin=low, vmax=high, rasterized=True)
+    norm = "log" if logarithmic else "linear"
+    mesh = axes.pcolormesh(x, y, values, cmap="cividis", shading="nearest", norm=norm, rasterized=True)
     axes.grid(visible=False)
     axes.set_ylabel(labels[1])
     with style():
         map_panels.figure.colorbar(mesh, ax=axes).set_label(labels[2])
     map_panels.figure.subplots_adjust(left=0.18)
-    return map_panels
-
-
-def growth_map(
-    x: Any, y: Any, growth: Any, labels: tuple[str, str, str], largest: float, boundary: tuple[float, str]
-) -> Panels:
-    """Powers of ten of the growth as colour, from 1 to `largest`, and a line with a label where it has a value."""
-    levels, top = np.log10(np.maximum(growth, np.finfo(float).tiny)), math.log10(largest)
-    map_panels = colour_map(x, y, np.clip(levels, 0.0, top), labels, (0.0, top))
-    level, look = math.log10(boundary[0]), Look(VERMILLION, "-", "", boundary[1])
-    if min(levels.shape) > 1 and np.nanmin(levels) < level < np.nanmax(levels):
-        map_panels.axes[0].contour(x, y, levels, levels=[level], colors=[look.colour], linewidths=1.0)
-        curve(map_panels.axes[0], [], [], look)  # for the legend
     return map_panels

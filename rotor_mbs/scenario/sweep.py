@@ -124,7 +124,6 @@ _SETTINGS = keys.dict_of(keys.NUMBER, "a table of settings of the methods, such 
 _CHANGE = keys.dict_of(keys.NUMBER, 'a table of scene keys with numbers, such as "blade.mass" = 1e4')
 _DRAWS = keys.whole(1, MAX_COUNT, "a whole number of at least 1: number of random values")
 _AXES = list_of(table_of(Axis), "one or more [[axis]] tables", 1)
-_PICTURES = ": plot in the report, the separation of trajectories, or the growth of pitch angles over two parameters"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -156,7 +155,6 @@ class Design:
     seed: int = file_key("seed", keys.whole(0, 2**63 - 1, "a whole number of at least 0"), default=0)
     validation: float = file_key("validation", _SHARE, note=": fraction of the runs", default=0.0)
     test: float = file_key("test", _SHARE, note="; validation + test < 1", default=0.0)
-    picture: str | None = file_key("picture", keys.choice(("spread", "map")), note=_PICTURES, default=None)
     axes: tuple[Axis, ...] = file_key("axis", _AXES)
 
     def __post_init__(self) -> None:

@@ -41,7 +41,6 @@ def modes_of_scenes(
     output: Path,
     *,
     speeds: Sequence[float] = (),
-    stiffnesses: Sequence[float] = (),
     names: Sequence[str] = (),
     workers: int,
     timeout_s: float,
@@ -49,15 +48,15 @@ def modes_of_scenes(
 ) -> list[Outcome]:
     """The modes of every scene into the file `output`; those of other scenes that it has are kept.
 
-    speeds: rad/s, of the Campbell diagram and the Floquet multipliers. stiffnesses: N m/rad, of every bearing, for the
-    stability chart over speed. names: of methods whose models stand beside the closed form; by default all. Raises
-    InputError for a negative or repeated speed or stiffness, and for a method that is not linearized; StoreError.
+    speeds: rad/s, of the Campbell diagram and the Floquet multipliers. names: of methods whose models stand beside the
+    closed form; by default all. Raises InputError for a negative or repeated speed, and for a method that is not
+    linearized; StoreError.
     """
     models = tuple(find_method(name).model for name in names)
     for name, model in zip(names, models, strict=True):
         if not any(method.linearize for method in methods() if method.model == model):
             raise InputError(f"{name}: its model has no linearization; allowed: a model with `linearize`")
-    speeds, stiffnesses = _increasing(speeds, "speeds"), _increasing(stiffnesses, "stiffnesses")
+    speeds = _increasing(speeds)
     made: list[Outcome] = []
     with locked(output):
         records: list[Record] = []
@@ -67,7 +66,7 @@ def modes_of_scenes(
                 raise InputError(f"{output}: is no file of modes; allowed: another output file")
             asked = {scene.name for scene in scenes}
             records = [record for record in records if record.scene not in asked]
-        work = with_method_files(partial(compute_modes, speeds=speeds, stiffnesses=stiffnesses, models=models))
+        work = with_method_files(partial(compute_modes, speeds=speeds, models=models))
         with local_pool(workers) as pool:
             for done, end in enumerate(run_in(pool, work, scenes, timeout_s), 1):
                 if isinstance(end.error, RotorError):
@@ -90,14 +89,9 @@ def modes_of_scenes(
     return made
 
 
-def compute_modes(
-    scene: Scene,
-    speeds: Sequence[float] | Array = (),
-    stiffnesses: Sequence[float] | Array = (),
-    models: Sequence[str] = (),
-) -> modal.SceneModes:
+def compute_modes(scene: Scene, speeds: Sequence[float] | Array = (), models: Sequence[str] = ()) -> modal.SceneModes:
     """All modes of `scene`: at rest under gravity; in steady rotation without gravity at `speeds` (rad/s); multipliers
-    of a turn under gravity at those above 0; their stability chart over `stiffnesses` (N m/rad) of the bearings.
+    of a turn under gravity at those above 0.
 
     The torque on the rotor is left out: the drive holds its speed. Pitch torques and rest angles are those at t = 0.
     """
@@ -108,21 +102,17 @@ def compute_modes(
     )
     facts = scene.name, scene_hash(scene), scene.title, len(scene.blades), scene.gravity
     scene = replace(scene, pitch_torque=torques, bearing_rest=rests)
-    speeds = np.array(_increasing(speeds, "speeds"))
+    speeds = np.array(_increasing(speeds))
     rest = _linear(scene, modal.REST, np.zeros(1), models, notes)
     rotation = _linear(scene, modal.ROTATION, speeds, models, notes) if len(speeds) else {}
     turning = speeds[speeds > 0.0]
-    stiffness = np.array(_increasing(stiffnesses, "stiffnesses"))
-    table = chart = None
+    table = None
     if scene.gravity and len(turning):
         try:
             table = _floquet_table(scene, turning)
-            charted = [replace(scene, bearing_stiffness=(float(k),) * len(scene.blades)) for k in stiffness]
-            rows = [_floquet_table(stiffer, turning).largest for stiffer in charted]
-            chart = modal.StabilityChart(turning, stiffness, np.array(rows)) if rows else None
         except MethodRefusal as exc:
             notes.append(f"no Floquet multipliers: {exc}")
-    return modal.SceneModes(*facts, rest, rotation, table, chart, tuple(notes))
+    return modal.SceneModes(*facts, rest, rotation, table, tuple(notes))
 
 
 def _linear(
@@ -237,10 +227,10 @@ def _floquet_table(scene: Scene, speeds: Array) -> modal.FloquetTable:
     return modal.FloquetTable(speeds, multipliers, largest, stable, errors, torques, mismatches, messages)
 
 
-def _increasing(values: Sequence[float] | Array, name: str) -> list[float]:
-    numbers = [float(value) for value in values]
+def _increasing(speeds: Sequence[float] | Array) -> list[float]:
+    numbers = [float(value) for value in speeds]
     if any(not 0.0 <= value < float("inf") for value in numbers) or any(
         later <= earlier for earlier, later in itertools.pairwise(numbers)
     ):
-        raise InputError(f"{name}: allowed: increasing numbers of at least 0")
+        raise InputError("speeds: allowed: increasing numbers of at least 0")
     return numbers

@@ -14,7 +14,7 @@ import pytest
 from support.commands import refusal, rotor_mbs
 from support.scenes import paper
 from support.stored import Made, rotor, store
-from support.sweeps import MAP, THREE_RUNS, made_sweep
+from support.sweeps import THREE_RUNS, made_sweep
 
 import rotor_mbs as rm
 from rotor_mbs.errors import InputError
@@ -169,14 +169,14 @@ def test_a_link_under_a_temporary_name_is_not_followed(
     assert not place.exists()
 
 
-@pytest.mark.parametrize("name", ["x.svg", "x.croissant.json"])
-def test_what_a_sweep_writes_beside_its_dataset_replaces_no_other_file(name: str, tmp_path: Path) -> None:
-    made_sweep(tmp_path, MAP)
+def test_what_a_sweep_writes_beside_its_dataset_replaces_no_other_file(tmp_path: Path) -> None:
+    made_sweep(tmp_path)
     command = ["sweep", tmp_path / "s.toml", "-j", "1", "--metadata", "-o", tmp_path / "x.h5"]
-    (tmp_path / name).write_text("mine")
+    other = tmp_path / "x.croissant.json"
+    other.write_text("mine")
     assert rotor_mbs(*command).status == 2
-    assert (tmp_path / name).read_text() == "mine"
-    (tmp_path / name).unlink()
+    assert other.read_text() == "mine"
+    other.unlink()
     for _ in range(2):
         assert rotor_mbs(*command).status == 0
 

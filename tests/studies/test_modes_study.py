@@ -65,7 +65,7 @@ def test_blades_that_differ_have_numbered_modes_and_unknown_speeds_a_message():
 
 def test_records_keep_every_number(tmp_path):
     pytest.importorskip("heyoka")
-    found = study.compute_modes(SOFT, [0.0, 1.2, 3.0], [5e4, 2e5])
+    found = study.compute_modes(SOFT, [0.0, 1.2, 3.0])
     write_records(tmp_path / "modes.h5", to_records(found))
     read = read_modes(tmp_path / "modes.h5")["soft"]
     assert (read.title, read.blades, read.gravity, read.notes) == (found.title, 3, found.gravity, found.notes)
@@ -78,8 +78,6 @@ def test_records_keep_every_number(tmp_path):
             np.testing.assert_array_equal(getattr(other, name), getattr(one, name))
     for name in ("speeds", "multipliers", "largest", "stable", "torque", "mismatch"):
         np.testing.assert_array_equal(getattr(read.floquet, name), getattr(found.floquet, name))
-    np.testing.assert_array_equal(read.chart.largest, found.chart.largest)
-    assert found.chart.largest.shape == (2, 2)
     assert np.nanmax(np.abs(found.floquet.product_error)) < 1e-9
     write_records(tmp_path / "none.h5", [])
     with pytest.raises(StoreError, match="no modes"):
@@ -130,10 +128,9 @@ def test_other_speeds_take_the_place_of_all_that_was_stored_for_the_scene(tmp_pa
 
 
 @pytest.mark.parametrize("span", ["3", "0:3", "3:0:4", "0:3:1", "-1:3:4", "0:nan:4", "0:3:x", "0:1e300:3", "0:inf:3"])
-@pytest.mark.parametrize("option", ["--speeds", "--stiffness"])
-def test_a_span_that_means_nothing_is_bad_usage(option, span, capsys):
+def test_a_span_that_means_nothing_is_bad_usage(span, capsys):
     with pytest.raises(SystemExit) as ended:
-        main(["modes", "stiff/nrel-5mw", f"{option}={span}"])
+        main(["modes", "stiff/nrel-5mw", f"--speeds={span}"])
     assert ended.value.code == 2
     assert "FROM:TO:COUNT" in capsys.readouterr().err
 

@@ -17,7 +17,6 @@ MAP = """title = "Speed & stiffness"
 scene = "paper/fig06"
 samples = 51
 outputs = []
-picture = "map"
 [change]
 "initial.angles[1]" = 1e-6
 duration = 2

@@ -26,7 +26,7 @@ from rotor_mbs.analysis.modes import (
 )
 from rotor_mbs.analysis.text_tables import TextTable
 from rotor_mbs.errors import InputError
-from rotor_mbs.report.canvas import SPEED_AXIS, Panels, curve, growth_map, log_axis, panels
+from rotor_mbs.report.canvas import SPEED_AXIS, Panels, curve, log_axis, panels
 from rotor_mbs.report.elements import PageTable, Picture, Row, Section, TableCell, picture
 from rotor_mbs.report.files import write_page
 from rotor_mbs.report.looks import BLUE, GREY, VERMILLION, Look, coordinate_look, with_capital
@@ -39,11 +39,9 @@ from rotor_mbs.solution.trajectory import need_xarray
 from rotor_mbs.studies.modes import compute_modes
 
 _MARKS = ("o", "s", "^", "D", "v", "P", "x")
-# Growth over a turn beyond which the colours of the chart end.
-MAX_GROWTH = 1e3
 
 
-def modes(scene: Scene | str, speeds: Sequence[float] = (), stiffnesses: Sequence[float] = ()) -> Modes:
+def modes(scene: Scene | str, speeds: Sequence[float] = ()) -> Modes:
     """Compute natural frequencies, damping ratios and mode shapes of a scene with every model that can be linearized.
 
     Modes at rest under gravity, and over `speeds` in steady rotation without gravity (Campbell diagram); Floquet
@@ -53,12 +51,11 @@ def modes(scene: Scene | str, speeds: Sequence[float] = (), stiffnesses: Sequenc
     ----------
     scene : a Scene, the name of a shipped scene, or a TOML file.
     speeds : rotor speeds (rad/s), increasing, at least 0.
-    stiffnesses : stiffnesses of all bearings (N m/rad), for the stability chart over speed and stiffness.
 
     Raises
     ------
     InputError
-        For speeds or stiffnesses that do not increase, or are negative.
+        For speeds that do not increase, or are negative.
 
     Examples
     --------
@@ -69,7 +66,7 @@ def modes(scene: Scene | str, speeds: Sequence[float] = (), stiffnesses: Sequenc
     >>> study.rotation["lagrange"].names
     ('rotor', 'collective pitch', 'cosine pitch', 'sine pitch')
     """
-    return Modes(**vars(compute_modes(scene_of(scene), speeds, stiffnesses)))
+    return Modes(**vars(compute_modes(scene_of(scene), speeds)))
 
 
 @dataclass(frozen=True)
@@ -79,11 +76,10 @@ class Modes(SceneModes):
     Attributes
     ----------
     rest, rotation : modes by model, at rest under gravity, and over speed without gravity; the closed form first.
-    floquet, chart : Floquet multipliers under gravity, and the largest one over speed and stiffness; None if not
-        computed.
+    floquet : Floquet multipliers under gravity; None if not computed.
     notes : results that could not be computed, with the reason.
     agrees, disagreement : whether the frequencies of the models agree, and their largest relative difference.
-    plot : `modes.plot()` draws the Campbell diagram; `.damping()`, `.multipliers()`, `.chart()`.
+    plot : `modes.plot()` draws the Campbell diagram; `.damping()`, `.multipliers()`.
     """
 
     @property
@@ -181,15 +177,6 @@ class ModePlots:
         axes.set_ylabel("modulus of the multipliers")
         return panel
 
-    def chart(self) -> Panels:
-        """Plot growth per revolution as colour over speed and bearing stiffness. Raises InputError without a chart."""
-        table = self._modes.chart
-        if table is None:
-            raise InputError(f"{self._modes.scene}: no stability chart; it needs gravity, speeds and stiffnesses")
-        labels = (SPEED_AXIS, "bearing stiffness (N m/rad)", "growth per revolution (powers of ten)")
-        boundary = (1.0 + GROWTH, "stability boundary")
-        return growth_map(table.speeds, table.stiffnesses, table.largest, labels, MAX_GROWTH, boundary)
-
     def _rotation(self) -> LinearModes:
         for linear in self._modes.rotation.values():
             return linear
@@ -229,9 +216,6 @@ def modes_page(modes: Sequence[SceneModes]) -> dict[str, object]:
         if scene.floquet is not None and len(scene.floquet.speeds) > 1 and np.isfinite(scene.floquet.largest).any():
             caption = "Floquet multipliers in rotation under gravity; above 1 the motion is unstable"
             turning.append(picture(plots.multipliers(), f"{name}-multipliers", caption))
-        if scene.chart is not None:
-            caption = "Stability chart: growth over a turn under gravity"
-            turning.append(picture(plots.chart(), f"{name}-chart", caption))
         sources = max((list(kind.values()) for kind in (scene.rest, scene.rotation)), key=len)
         parts.append({
             "id": name,
