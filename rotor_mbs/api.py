@@ -170,7 +170,7 @@ def run(
                 )
         solution, exact = solve_judged(scene, method, settings, compute_reference=reference, time_limit_s=timeout)
         return Run(**vars(solution), reference=exact)
-    chosen, reasons = selected_methods([scene], listed("method", method))
+    chosen, reasons = selected_methods([scene], check_names(listed("method", method)))
     if not chosen[scene.name]:
         raise MethodRefusal("; ".join(reasons))
     folder = _TemporaryFolder()

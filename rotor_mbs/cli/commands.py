@@ -22,7 +22,7 @@ from rotor_mbs.cli import EXIT_BAD_INPUT, EXIT_FAILED, print_line
 from rotor_mbs.cli.arguments import pages_beside
 from rotor_mbs.cli.terminal import ProgressLine, print_not_computed, print_table, span
 from rotor_mbs.errors import InputError, MethodRefusal, StoreError
-from rotor_mbs.methods.catalogue import check_names, look_up, methods, problems_of_methods
+from rotor_mbs.methods.catalogue import look_up, methods, problems_of_methods
 from rotor_mbs.runs import cores
 from rotor_mbs.scenario.catalogue import find_scenes, list_scenes, list_sweeps, only_scene
 from rotor_mbs.scenario.keys import counted
@@ -150,7 +150,7 @@ def bench(arguments: argparse.Namespace) -> int:
     scenes, output = find_scenes(arguments.scenes), arguments.output
     with ProgressLine() as progress:
         made, left_out = run_bench(
-            scenes, check_names(arguments.method or ()), output, workers=cores(), settings=dict(arguments.set or ()),
+            scenes, arguments.method, output, workers=cores(), settings=dict(arguments.set or ()),
             on_progress=progress, repeats=arguments.repeats, budget_s=arguments.budget,
         )  # fmt: skip
     measured = len({outcome.label.partition(" ")[0] for outcome in made})
@@ -174,7 +174,7 @@ def stability(arguments: argparse.Namespace) -> int:
     with ProgressLine() as progress:
         made = run_suite(
             scenes, arguments.output, workers=arguments.jobs, timeout_s=arguments.timeout,
-            methods=check_names(arguments.method or ()), settings=dict(arguments.set or ()), on_progress=progress,
+            methods=arguments.method, settings=dict(arguments.set or ()), on_progress=progress,
         )  # fmt: skip
     runs = suite_runs(arguments.output)
     print_table(family_table(runs))
@@ -195,9 +195,8 @@ def modes(arguments: argparse.Namespace) -> int:
     scenes = find_scenes(arguments.scenes)
     with ProgressLine() as progress:
         made = modes_of_scenes(
-            scenes, arguments.output, speeds=arguments.speeds,
-            names=check_names(arguments.method or ()), workers=arguments.jobs, timeout_s=arguments.timeout,
-            on_progress=progress,
+            scenes, arguments.output, speeds=arguments.speeds, names=arguments.method, workers=arguments.jobs,
+            timeout_s=arguments.timeout, on_progress=progress,
         )  # fmt: skip
     is_lost = print_not_computed(made)
     lost = {outcome.label.partition(" ")[0] for outcome in made if not outcome.is_stored}
@@ -220,16 +219,15 @@ def check(arguments: argparse.Namespace) -> int:
     from rotor_mbs.studies import check as study
 
     _refuse_foreign(arguments)
-    bounds, methods = load_bounds(arguments.bounds), check_names(arguments.method or ())
-    required = check_names(arguments.require or ())
+    bounds = load_bounds(arguments.bounds)
     earlier = None if arguments.against is None else study.check_file(arguments.against, bounds)
     if earlier is not None and arguments.file is not None and is_sweep(arguments.against) != is_sweep(arguments.file):
         raise InputError(f"--against {arguments.against}: a file of another kind than {arguments.file}")
     if arguments.file is not None:
-        verdicts = study.check_file(arguments.file, bounds, required)
+        verdicts = study.check_file(arguments.file, bounds, arguments.require)
     else:
         with ProgressLine() as progress:
-            verdicts = study.check_default_set(bounds, arguments.jobs, progress, methods)
+            verdicts = study.check_default_set(bounds, arguments.jobs, progress, arguments.method)
     if verdicts and earlier is not None:
         verdicts += study.regressions(verdicts, earlier, arguments.shrink)
 
@@ -278,9 +276,8 @@ def test_method(arguments: argparse.Namespace) -> int:
     from rotor_mbs.analysis.text_tables import TextTable
     from rotor_mbs.studies.method_test import examine
 
-    names = check_names(arguments.methods)
     _refuse_foreign(arguments)
-    verdicts = [verdict for name in names for verdict in examine(name, arguments.timeout)]
+    verdicts = [verdict for name in arguments.methods for verdict in examine(name, arguments.timeout)]
     _write_verdicts(arguments, verdicts)
     if arguments.json != Path("-"):
         rows: list[tuple[str, ...]] = []
@@ -363,7 +360,7 @@ def sweep(arguments: argparse.Namespace) -> int:
         from rotor_mbs.studies.sweep import estimate_seconds, plan_sweep, run_sweep
 
         study = load_sweep(arguments.file, problems_of_methods)
-        plan = plan_sweep(study, arguments.method or (), arguments.part, arguments.timeout)
+        plan = plan_sweep(study, arguments.method, arguments.part, arguments.timeout)
         if arguments.dry_run:
             size, seconds = plan.runs * plan.table().row_type.itemsize, estimate_seconds(plan, pool)
             if arguments.json:

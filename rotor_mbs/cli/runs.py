@@ -26,7 +26,7 @@ from rotor_mbs.studies.run import run_scenes
 def run(arguments: argparse.Namespace) -> int:
     """Methods named with -m, or by a scene's file, must represent it; without, a rule selects them."""
     scenes = find_scenes(arguments.scenes, problems_of_scene)
-    methods, reasons = selected_methods(scenes, arguments.method or ())
+    methods, reasons = selected_methods(scenes, arguments.method)
     for reason in reasons:
         print(reason, file=sys.stderr)
     scenes = [scene for scene in scenes if methods[scene.name]]
@@ -38,7 +38,8 @@ def run(arguments: argparse.Namespace) -> int:
             settings=dict(arguments.set or ()), on_progress=progress,
         )  # fmt: skip
     with open_results(arguments.output) as results:
-        print_table(table_of_runs(results.scenes, methods))
+        table = table_of_runs(results.scenes, methods)
+    print_table(table)
     return print_summary(report, arguments.output)
 
 

@@ -20,7 +20,8 @@ from rotor_mbs.solution.status import GOOD, STATUSES
 
 if TYPE_CHECKING:  # a sweep's workers load their code meanwhile
     from rotor_mbs.analysis.text_tables import TextTable
-    from rotor_mbs.studies.run import Outcome, RunReport
+    from rotor_mbs.runs.runner import Outcome
+    from rotor_mbs.studies.run import RunReport
 
 
 # How a status is coloured on a terminal: well; open to doubt; anything else went wrong.

@@ -158,6 +158,18 @@ def own_settings(scene: Scene, method: str) -> dict[str, object]:
         raise InputError(f"{scene.name}: settings: {problem}" for problem in error.problems) from error
 
 
+def settings_of_runs(
+    scenes: Sequence[Scene], methods: Mapping[str, Sequence[str]], given: Mapping[str, object]
+) -> dict[str, dict[str, dict[str, object]]]:
+    """By scene and method, the settings in place of defaults: the `given` ones, then the scene's own. methods: by
+    scene. Raises InputError."""
+    of_call = settings_for(list(dict.fromkeys(name for scene in scenes for name in methods[scene.name])), given)
+    return {
+        scene.name: {name: own_settings(scene, name) | of_call[name] for name in methods[scene.name]}
+        for scene in scenes
+    }
+
+
 def problems_of_methods(values: Mapping[str, Any]) -> list[KeyProblem]:
     """What is wrong with the `methods` that a scene file or a sweep file names."""
     names = values.get("methods", ())
@@ -283,16 +295,16 @@ def able_methods(scene: Scene, names: Iterable[str]) -> tuple[list[str], list[st
 
 def selected_methods(scenes: Sequence[Scene], names: Sequence[str] = ()) -> tuple[dict[str, list[str]], list[str]]:
     """The methods of each scene: `names`, else those that it names itself, else those that the rule selects, none where
-    it refuses; and the reasons. Raises InputError for a name that is unknown or cannot represent its scene."""
+    it refuses; and the reasons. names: checked ones. Raises InputError for a method of a scene that is unknown, and for
+    a named one that cannot represent its scene."""
     methods: dict[str, list[str]] = {}
     reasons: list[str] = []
     refused: list[str] = []
-    names = check_names(names)
     for scene in scenes:
-        try:
-            named = names or check_names(scene.methods)
-        except InputError as error:
-            raise InputError(f"{scene.name}: methods: {problem}" for problem in error.problems) from error
+        unknown = [name for name in scene.methods if name not in method_names()]
+        if unknown and not names:
+            raise InputError(f"{scene.name}: methods: {_unknown(name)}" for name in unknown)
+        named = names or tuple(dict.fromkeys(scene.methods))
         if named:
             methods[scene.name], lines = able_methods(scene, named)
             refused += lines
@@ -354,16 +366,17 @@ def fastest_rates(scene: Scene) -> tuple[float, float]:
     swing = abs(scene.initial_rates[0])
     driven = max((abs(torque) for _, torque in scene.rotor_torque), default=0.0) / _rotor_inertia(scene)
     decay = scene.shaft_damping / _rotor_inertia(scene) if scene.shaft_damping else 0.0
+    stiffnesses = scene.bearing_stiffness or (0.0,) * len(scene.blades)
+    torques = scene.pitch_torque or ((),) * len(scene.blades)
     for i, blade in enumerate(scene.blades):
         if not blade.has_pitch_inertia:
             continue
         x, y, z = blade.centre_of_mass
         inertia = blade.pitch_inertia
-        stiffness, damping = scene.bearing(i)
-        torque = max((abs(value) for _, value in scene.pitch_load(i)[0]), default=0.0)
-        moment = stiffness + torque + blade.mass * (scene.gravity + driven * abs(z)) * math.hypot(x, y)
+        torque = max((abs(value) for _, value in torques[i]), default=0.0)
+        moment = stiffnesses[i] + torque + blade.mass * (scene.gravity + driven * abs(z)) * math.hypot(x, y)
         swing = max(swing, math.sqrt(moment / inertia), abs(scene.initial_rates[1 + i]))
-        decay = max(decay, damping / inertia)
+        decay = max(decay, scene.dampings[1 + i] / inertia)
     return swing, decay
 
 

@@ -146,16 +146,12 @@ def replacing(path: Path) -> Iterator[Path]:
         try:
             yield temporary
             temporary.replace(path)
+            with suppress(OSError):  # the new name is durable, where the system can make it so
+                folder = os.open(path.parent, os.O_RDONLY)
+                try:
+                    os.fsync(folder)
+                finally:
+                    os.close(folder)
         finally:
             with suppress(OSError):
                 temporary.unlink()
-
-
-def sync_folder(folder: Path) -> None:
-    """Makes a new or replaced name in `folder` durable, where the system can."""
-    with suppress(OSError):
-        handle = os.open(folder, os.O_RDONLY)
-        try:
-            os.fsync(handle)
-        finally:
-            os.close(handle)

@@ -1,14 +1,14 @@
 """The one loop that computes rows of a table: tasks to worker processes, their rows to the file.
 
-A run passes through `compute_in_order`, `compute`, `pool.run_in` and `TaskPool.submit` here, and in the worker process
+A run passes through `compute_tasks`, `compute`, `pool.run_in` and `TaskPool.submit` here, and in the worker process
 through `perform` and `RunTask.perform`.
 """
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Self, TypeVar
 
@@ -21,6 +21,32 @@ from rotor_mbs.runs.table import Place, Rows
 
 # Columns that a worker returns of rows that it has written.
 _REPORTED = ("status", "message", "run_time_s")
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """A run, or other rows of a study, that this call computed or tried to.
+
+    status: of a run; "measured" for other rows. seconds: run time; NaN where nothing was timed. is_stored: whether
+    there is a row; else the same call tries again. is_shipped: read from a shipped file and not computed. share: of the
+    work of the call that was done when it ended.
+    """
+
+    label: str
+    method: str
+    status: str
+    message: str = ""
+    seconds: float = float("nan")
+    is_stored: bool = True
+    is_shipped: bool = False
+    share: float = 0.0
+
+
+OnProgress = Callable[[int, int, Outcome], None]
+
+
+def ignore_progress(_done: int, _total: int, _outcome: Outcome) -> None:
+    """For calls that report no progress."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -54,6 +80,10 @@ class Task(ABC):
     def failed(self, status: str, message: str) -> Rows | None:  # noqa: ARG002
         """The rows of a task that was ended or raised; None where nothing is stored, so that it is tried again."""
         return None
+
+    def outcome(self, rows: Rows) -> Outcome:
+        """What became of it, by what `compute` gives of its rows."""
+        return Outcome(self.label, self.method, "measured", f"{len(rows['status'])} points")
 
 
 T = TypeVar("T", bound=Task)
@@ -93,9 +123,26 @@ def perform(task: Task, *, stores: bool) -> Rows:
     return {name: np.asarray(rows[name]) for name in _REPORTED if name in rows}
 
 
-def compute_in_order(pool: TaskPool, tasks: Sequence[Task]) -> Iterator[Finished[Task, Rows]]:
-    """As `compute`, references first; then the other rows whose reference is stored, slow and fast ones in turn."""
-    yield from compute(pool, [task for task in tasks if task.reference is None])
+def compute_tasks(tasks: Sequence[Task], pool: TaskPool, on_progress: OnProgress = ignore_progress) -> list[Outcome]:
+    """As `compute`, references first; then the other rows whose reference is stored, slow and fast ones in turn.
+
+    Returns what became of each task, in the order in which they ended.
+    """
+    made: list[Outcome] = []
+    total, done = sum(task.work for task in tasks), 0.0
+
+    def note(end: Finished[Task, Rows]) -> None:
+        nonlocal done
+        done += end.task.work
+        if end.value is None:
+            outcome = Outcome(end.task.label, end.task.method, end.failure, end.message, is_stored=False)
+        else:
+            outcome = end.task.outcome(end.value)
+        made.append(replace(outcome, share=done / total))
+        on_progress(len(made), len(tasks), made[-1])
+
+    for end in compute(pool, [task for task in tasks if task.reference is None]):
+        note(end)
     waiting = [task for task in tasks if task.reference is not None]
     ready = [task for task in waiting if task.reference is not None and task.reference.is_stored]
     # Slowest first, so that no long one starts last and keeps one process busy while the others wait; between them the
@@ -103,7 +150,9 @@ def compute_in_order(pool: TaskPool, tasks: Sequence[Task]) -> Iterator[Finished
     ready.sort(key=lambda task: -task.work)
     quarter, count = len(ready) // 4, len(ready)
     turns = [task for pair in zip(ready[:quarter], ready[count - quarter :], strict=True) for task in pair]
-    yield from compute(pool, [*turns, *ready[quarter : count - quarter]])
+    for end in compute(pool, [*turns, *ready[quarter : count - quarter]]):
+        note(end)
     for task in waiting:
         if task not in ready:
-            yield Finished(task, None, "no_reference", "its reference was not computed")
+            note(Finished(task, None, "no_reference", "its reference was not computed"))
+    return made

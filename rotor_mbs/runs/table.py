@@ -51,7 +51,7 @@ from rotor_mbs.runs.design import (
     arrays_of,
     metric_columns,
 )
-from rotor_mbs.runs.output_files import replace_file, replacing, store_errors, sync_folder
+from rotor_mbs.runs.output_files import replace_file, replacing, store_errors
 from rotor_mbs.runs.versions import machine, versions
 from rotor_mbs.scenario.catalogue import natural_key
 from rotor_mbs.scenario.scene import Scene, scene_hash
@@ -408,7 +408,6 @@ def laid_out(path: Path, tables: Sequence[Table], attributes: Mapping[str, objec
             seal_all(file)
         _reserve(temporary, temporary.stat().st_size)
         yield temporary
-    sync_folder(path.parent)
 
 
 def _reserve(path: Path, size: int) -> None:
@@ -597,28 +596,36 @@ class TableFile:
 
     def split_missing(
         self, asked: Sequence[Asked], time_limit_s: float
-    ) -> tuple[list[Asked], list[tuple[Asked, str, str]]]:
+    ) -> tuple[list[tuple[Asked, Place, Place | None]], list[tuple[Asked, str, str]]]:
         """Split `asked`, of each scene the reference first, into runs to compute and runs that stay as they are stored.
 
         To be computed are those that the file lacks, that a shorter time limit ended, or whose reference is one of
-        these; their rows are marked as missing. Those that stay are returned with status and message.
+        these; their rows are marked as missing. They are returned with their place and that of the reference they are
+        judged by; those that stay, with status and message.
         """
-        missing: dict[str, Asked] = {}
+        missing: list[tuple[Asked, Place, Place | None]] = []
+        references: dict[str, Place] = {}  # by label
+        new_references = set[str]()
         kept: list[tuple[Asked, str, str]] = []
         for run in asked:
-            place = self.place(run.label)
+            place, reference = self.place(run.label), references.get(run.reference_label)
             row = place.read()
             status = STATUSES[row["status"][0]] if place.is_stored else ""
             # A shipped reference may end early itself; it has a limit only where reading it was over one.
             limit = row["time_limit_s"][0]
             is_short = limit < time_limit_s if run.is_shipped else not limit >= time_limit_s
             is_over = status == "timed_out" and is_short
-            if status and not is_over and run.reference_label not in missing:
-                kept.append((run, status, text_of(row["message"][0])))
-            else:
-                missing[run.label] = run
+            is_missing = not status or is_over or run.reference_label in new_references
+            if run.method == REFERENCE:
+                references[run.label] = place
+                if is_missing:
+                    new_references.add(run.label)
+            if is_missing:
+                missing.append((run, place, reference))
                 place.mark_missing([0])
-        return list(missing.values()), kept
+            else:
+                kept.append((run, status, text_of(row["message"][0])))
+        return missing, kept
 
 
 def _read_table(file: Any, group: str) -> Table:

@@ -29,13 +29,14 @@ from rotor_mbs.runs import last_core
 from rotor_mbs.runs.output_files import locked
 from rotor_mbs.runs.pool import WorkerPool, run_in
 from rotor_mbs.runs.read import Record, points_table
+from rotor_mbs.runs.runner import OnProgress, Outcome, ignore_progress
 from rotor_mbs.runs.table import Place, Rows, Table, TableFile, extend_file
 from rotor_mbs.runs.versions import row_versions
 from rotor_mbs.scenario.scene import Scene, scene_hash
 from rotor_mbs.solution.metrics import horizon, horizon_samples
 from rotor_mbs.solution.status import COMPLETE
 from rotor_mbs.solution.trajectory import Solution, Trajectory
-from rotor_mbs.studies.run import OnProgress, Outcome, ignore_progress, run_scenes
+from rotor_mbs.studies.run import run_scenes
 from rotor_mbs.studies.stored_references import read_reference
 
 BENCH = "bench"

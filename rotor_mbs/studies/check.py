@@ -15,11 +15,12 @@ from rotor_mbs.errors import InputError, StoreError
 from rotor_mbs.methods.catalogue import REFERENCE, able_methods, default_methods, find_method, method_names
 from rotor_mbs.runs.design import MISSING
 from rotor_mbs.runs.read import is_sweep, open_results
+from rotor_mbs.runs.runner import OnProgress, ignore_progress
 from rotor_mbs.runs.sweeps import StoredSweep
 from rotor_mbs.scenario.accuracy_bounds import Bounds
 from rotor_mbs.scenario.catalogue import find_scenes
 from rotor_mbs.studies.reference import changed_arrays
-from rotor_mbs.studies.run import OnProgress, ignore_progress, run_scenes
+from rotor_mbs.studies.run import run_scenes
 from rotor_mbs.studies.stored_references import shipped_files, shipped_reference
 
 # The chain takes as long as all else together; four scenes of the paper cover what it can show.

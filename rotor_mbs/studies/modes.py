@@ -22,10 +22,10 @@ from rotor_mbs.methods.catalogue import find_method, methods, with_method_files
 from rotor_mbs.runs.output_files import locked
 from rotor_mbs.runs.pool import local_pool, run_in
 from rotor_mbs.runs.read import Record, read_records, write_records
+from rotor_mbs.runs.runner import OnProgress, Outcome, ignore_progress
 from rotor_mbs.scenario.scene import Scene, scene_hash
 from rotor_mbs.scenario.time_table import value_at
 from rotor_mbs.solution.trajectory import Array
-from rotor_mbs.studies.run import OnProgress, Outcome, ignore_progress
 
 if TYPE_CHECKING:
     from rotor_mbs.models.lagrange.floquet import Turn

@@ -14,9 +14,10 @@ from rotor_mbs.methods.catalogue import REFERENCE
 from rotor_mbs.runs.design import FROZEN, Asked
 from rotor_mbs.runs.output_files import locked, replace_file
 from rotor_mbs.runs.read import OpenResults, open_results
+from rotor_mbs.runs.runner import OnProgress, ignore_progress
 from rotor_mbs.runs.table import array_digest, extend_file, runs_table, scene_table
 from rotor_mbs.scenario.scene import Scene
-from rotor_mbs.studies.run import OnProgress, RunReport, ignore_progress, run_scenes
+from rotor_mbs.studies.run import RunReport, run_scenes
 
 _FACTS = ("steps", "time_reached", "setup_time_s", "run_time_s", "output_time_s")
 

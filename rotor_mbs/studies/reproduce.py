@@ -16,9 +16,9 @@ from rotor_mbs.analysis.published import claims, finding
 from rotor_mbs.analysis.text_tables import TextTable, method_table
 from rotor_mbs.methods.catalogue import REFERENCE, able_methods, default_methods, errata_methods, ladders
 from rotor_mbs.runs.output_files import locked
-from rotor_mbs.runs.pool import Workers
+from rotor_mbs.runs.pool import Workers, pool_of
 from rotor_mbs.runs.read import open_results
-from rotor_mbs.runs.runner import Task
+from rotor_mbs.runs.runner import OnProgress, Task, compute_tasks, ignore_progress
 from rotor_mbs.runs.table import Rows, extend_file, results_tables
 from rotor_mbs.runs.versions import versions
 from rotor_mbs.scenario.catalogue import find_scenes, reference_folder, scenarios_folder
@@ -33,15 +33,7 @@ from rotor_mbs.studies.bench import (
     prepared,
     rows_of_curve,
 )
-from rotor_mbs.studies.run import (
-    OnProgress,
-    RunReport,
-    asked_runs,
-    compute_tasks,
-    ignore_progress,
-    run_tasks,
-    work_of,
-)
+from rotor_mbs.studies.run import RunReport, asked_runs, run_tasks, work_of
 
 # The scene whose error against run time is measured by all methods: the paper's own crest, and a horizon of 6 s.
 BENCHED = "paper/fig11"
@@ -82,12 +74,12 @@ def reproduce(
     methods = {scene.name: able_methods(scene, names)[0] for scene in scenes}
     curves = short_curves(benched)
     asked = asked_runs(scenes, methods, {})
-    with locked(output):
+    with locked(output), pool_of(workers) as pool:
         file = extend_file(output, [*results_tables(asked), bench_table(curves)], [curve.key for curve in curves])
         missing, kept = file.split_missing(asked, timeout_s)
-        runs: list[Task] = [*run_tasks(file, missing, timeout_s)]
+        runs: list[Task] = [*run_tasks(missing, timeout_s)]
         reference = f"{benched.name}/{REFERENCE}"
-        is_new = reference in [run.label for run in missing]
+        is_new = any(run.label == reference for run, _, _ in missing)
         of_curves = [
             CurveTask(
                 label=curve.label,
@@ -101,7 +93,7 @@ def reproduce(
             for curve in curves
             if is_new or not is_measured(file, curve)
         ]
-        made = compute_tasks([*runs, *of_curves], workers, on_progress)
+        made = compute_tasks([*runs, *of_curves], pool, on_progress)
         labels = {task.label for task in runs}
         return RunReport([outcome for outcome in made if outcome.label in labels], kept)
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -19,15 +19,15 @@ from rotor_mbs.methods.catalogue import (
     line_of,
     look_up,
     own_settings,
-    settings_for,
+    settings_of_runs,
 )
 from rotor_mbs.methods.solve import solve
 from rotor_mbs.methods.time_limit import OutOfTimeError, time_limit
 from rotor_mbs.runs.design import Asked
 from rotor_mbs.runs.output_files import locked
-from rotor_mbs.runs.pool import Finished, Workers, pool_of
-from rotor_mbs.runs.runner import Task, compute_in_order
-from rotor_mbs.runs.table import Rows, TableFile, extend_file, results_tables, row_of_run, text_of
+from rotor_mbs.runs.pool import Workers, pool_of
+from rotor_mbs.runs.runner import OnProgress, Outcome, Task, compute_tasks, ignore_progress
+from rotor_mbs.runs.table import Place, Rows, extend_file, results_tables, row_of_run, text_of
 from rotor_mbs.runs.versions import row_versions
 from rotor_mbs.scenario.scene import Scene, scene_hash
 from rotor_mbs.solution.status import STATUSES
@@ -75,36 +75,15 @@ class RunTask(Task):
         limit = self.time_limit_s if run.status == "timed_out" and shipped is None else np.nan
         return row_of_run(run, self.place, {"false_success": int(false_success), "time_limit_s": limit})
 
+    def outcome(self, rows: Rows) -> Outcome:
+        seconds = float("nan") if self.asked.is_shipped else float(rows["run_time_s"][0])
+        status, message = STATUSES[int(rows["status"][0])], text_of(rows["message"][0])
+        return Outcome(self.label, self.method, status, message, seconds=seconds, is_shipped=self.asked.is_shipped)
+
 
 def work_of(scene: Scene, method: str) -> float:
     """Roughly how much there is to compute: 1 is 10 s of a scene by the fastest method."""
     return _FIXED_WORK + find_method(method).relative_cost * scene.duration / 10.0
-
-
-@dataclass(frozen=True)
-class Outcome:
-    """A run, or other rows of a study, that this call computed or tried to.
-
-    status: of a run; "measured" for other rows. seconds: run time; NaN where nothing was timed. is_stored: whether
-    there is a row; else the same call tries again. is_shipped: read from a shipped file and not computed. share: of the
-    work of the call that was done when it ended.
-    """
-
-    label: str
-    method: str
-    status: str
-    message: str = ""
-    seconds: float = float("nan")
-    is_stored: bool = True
-    is_shipped: bool = False
-    share: float = 0.0
-
-
-OnProgress = Callable[[int, int, Outcome], None]
-
-
-def ignore_progress(_done: int, _total: int, _outcome: Outcome) -> None:
-    """For calls that report no progress."""
 
 
 @dataclass(frozen=True)
@@ -161,11 +140,10 @@ def run_scenes(
         The same call then goes on where it stopped.
     """
     asked = asked_runs(scenes, methods, settings or {}, use_frozen=use_frozen)
-    with locked(output):
+    with locked(output), pool_of(workers) as pool:
         file = extend_file(output, results_tables(asked))
         missing, kept = file.split_missing(asked, timeout_s)
-        made = compute_tasks(run_tasks(file, missing, timeout_s), workers, on_progress)
-        return RunReport(made, kept)
+        return RunReport(compute_tasks(run_tasks(missing, timeout_s), pool, on_progress), kept)
 
 
 def asked_runs(
@@ -177,7 +155,7 @@ def asked_runs(
 ) -> list[Asked]:
     """The rows of these scenes by their `methods`, the reference of each scene first: the shipped one, where there is
     one and it may be used, or one to be computed. Raises InputError."""
-    given = settings_for(list(dict.fromkeys(name for scene in scenes for name in methods[scene.name])), settings)
+    own = settings_of_runs(scenes, methods, settings)
     asked: list[Asked] = []
     for scene in scenes:
         versions = None
@@ -186,17 +164,18 @@ def asked_runs(
             source = {"frozen_with": shipped.frozen_with, "frozen_file": digest(shipped.path)[:12]}
             versions = row_versions(find_method(REFERENCE)) | source
         asked.append(Asked(scene, REFERENCE, versions=versions))
-        asked += [Asked(scene, name, own_settings(scene, name) | given[name]) for name in methods[scene.name]]
+        asked += [Asked(scene, name, given) for name, given in own[scene.name].items()]
     return asked
 
 
-def run_tasks(file: TableFile, asked: Sequence[Asked], timeout_s: float) -> list[RunTask]:
+def run_tasks(missing: Sequence[tuple[Asked, Place, Place | None]], timeout_s: float) -> list[RunTask]:
+    """The tasks of runs, each given with its place and that of its reference."""
     return [
         RunTask(
             label=f"{run.scene.name} {run.method}",
             method=run.method,
-            place=file.place(run.label),
-            reference=None if run.method == REFERENCE else file.place(run.reference_label),
+            place=place,
+            reference=reference,
             # What ends itself at its time limit needs a while before, to load its engine and compile, and to write
             # after.
             kill_after_s=1.2 * timeout_s + 10.0,
@@ -204,40 +183,8 @@ def run_tasks(file: TableFile, asked: Sequence[Asked], timeout_s: float) -> list
             asked=run,
             time_limit_s=timeout_s,
         )
-        for run in asked
+        for run, place, reference in missing
     ]
-
-
-def compute_tasks(tasks: Sequence[Task], workers: Workers, on_progress: OnProgress) -> list[Outcome]:
-    """What became of each task, in the order in which they end."""
-    made: list[Outcome] = []
-    if not tasks:
-        return made
-    with pool_of(workers) as pool:
-        work, done = sum(task.work for task in tasks), 0.0
-        for end in compute_in_order(pool, tasks):
-            done += end.task.work
-            made.append(_outcome(end, done / work))
-            on_progress(len(made), len(tasks), made[-1])
-    return made
-
-
-def _outcome(end: Finished[Task, Rows], share: float) -> Outcome:
-    task, row = end.task, end.value
-    if row is None:
-        return Outcome(task.label, task.method, end.failure, end.message, is_stored=False, share=share)
-    if not isinstance(task, RunTask):
-        return Outcome(task.label, task.method, "measured", f"{len(row['status'])} points", share=share)
-    is_shipped = task.asked.is_shipped
-    return Outcome(
-        task.label,
-        task.method,
-        STATUSES[int(row["status"][0])],
-        text_of(row["message"][0]),
-        seconds=float("nan") if is_shipped else float(row["run_time_s"][0]),
-        is_shipped=is_shipped,
-        share=share,
-    )
 
 
 def solve_judged(

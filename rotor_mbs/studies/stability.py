@@ -16,13 +16,14 @@ from rotor_mbs.methods.catalogue import REFERENCE, able_methods, find_method, me
 from rotor_mbs.methods.solve import solve
 from rotor_mbs.methods.time_limit import OutOfTimeError, time_limit
 from rotor_mbs.runs.output_files import locked
+from rotor_mbs.runs.pool import Workers, pool_of
 from rotor_mbs.runs.read import open_results, points_table, read_records
-from rotor_mbs.runs.runner import Task
+from rotor_mbs.runs.runner import OnProgress, Outcome, Task, compute_tasks, ignore_progress
 from rotor_mbs.runs.table import Rows, extend_file
 from rotor_mbs.runs.versions import row_versions
 from rotor_mbs.scenario.scene import Scene, scene_hash
 from rotor_mbs.solution.status import COMPLETE, code_of
-from rotor_mbs.studies.run import OnProgress, Outcome, compute_tasks, ignore_progress, run_scenes, work_of
+from rotor_mbs.studies.run import run_scenes, work_of
 from rotor_mbs.studies.stored_references import read_reference
 
 TARGET = 1e-6  # rad: what a method must reach on the stiff and light scenes
@@ -244,20 +245,21 @@ def run_suite(
     every = dict.fromkeys(method for able in asked.values() for method in able)
     chosen_settings = settings_for(list(every), settings or {})
     made: list[Outcome] = []
-    for chosen, limit_s in ((none, timeout_s), (patient, max(timeout_s, _PATIENT_S)), (asked, timeout_s)):
-        own = {k: v for able in chosen.values() for method in able for k, v in chosen_settings[method].items()}
-        report = run_scenes(
-            scenes, chosen, output, workers=workers, timeout_s=limit_s, settings=own, on_progress=on_progress
-        )
-        made += report.made
-    return made + complete_ladders(scenes, asked, output, workers, on_progress)
+    with pool_of(workers) as pool:
+        for chosen, limit_s in ((none, timeout_s), (patient, max(timeout_s, _PATIENT_S)), (asked, timeout_s)):
+            own = {k: v for able in chosen.values() for method in able for k, v in chosen_settings[method].items()}
+            report = run_scenes(
+                scenes, chosen, output, workers=pool, timeout_s=limit_s, settings=own, on_progress=on_progress
+            )
+            made += report.made
+        return made + complete_ladders(scenes, asked, output, pool, on_progress)
 
 
 def complete_ladders(
     scenes: Sequence[Scene],
     methods: Mapping[str, Sequence[str]],
     output: Path,
-    workers: int,
+    workers: Workers,
     on_progress: OnProgress = ignore_progress,
 ) -> list[Outcome]:
     """The ladders of steps of these scenes, where the runs in `output` call for them."""
@@ -273,7 +275,7 @@ def complete_ladders(
     ]
     points = {(scene.name, method): ladder_points(scene, method) for scene, method in wanted}
     tables = [points_table(STEPS, [point for own in points.values() for point in own])] if points else []
-    with locked(output):
+    with locked(output), pool_of(workers) as pool:
         # Ladders of these scenes and methods that the runs no longer call for go.
         replaced = [(STEPS, scene, method) for scene, able in methods.items() for method in able]
         file = extend_file(output, tables, replaced)
@@ -292,7 +294,7 @@ def complete_ladders(
                         scene=scene,
                     )
                 )
-        return compute_tasks(tasks, workers, on_progress)
+        return compute_tasks(tasks, pool, on_progress)
 
 
 def ladder_points(scene: Scene, method: str) -> list[dict[str, object]]:

@@ -24,8 +24,8 @@ from rotor_mbs.analysis.text_tables import bench_table, table_of_runs
 from rotor_mbs.cli.terminal import ProgressLine, coloured
 from rotor_mbs.errors import MethodRefusal
 from rotor_mbs.runs.read import Record, open_results
+from rotor_mbs.runs.runner import Outcome
 from rotor_mbs.runs.sweeps import StoredSweep
-from rotor_mbs.studies.run import Outcome
 
 
 class Terminal(io.StringIO):

@@ -19,10 +19,11 @@ from rotor_mbs.errors import StoreError
 from rotor_mbs.methods.catalogue import find_method
 from rotor_mbs.runs.pool import SerialPool
 from rotor_mbs.runs.read import open_results
+from rotor_mbs.runs.runner import Outcome
 from rotor_mbs.runs.table import Rows, TableFile
 from rotor_mbs.runs.versions import code_digest, row_versions
 from rotor_mbs.scenario.catalogue import find_scenes
-from rotor_mbs.studies.run import Outcome, RunReport, RunTask, run_scenes
+from rotor_mbs.studies.run import RunReport, RunTask, run_scenes
 
 SCENE = paper("fig08")
 METHODS = ("lagrange/dop853", "exudyn_tree/rk67", "lagrange/ode45")
