@@ -91,12 +91,6 @@ def test_pitches_at_rest_stay_at_zero() -> None:
     assert solve("exudyn_chain/generalized_alpha", given, {}).angles[:, 2].any()
 
 
-def test_euler_parameters_keep_their_length() -> None:
-    solver = integrated(SHORT)
-    last = solver.kept[-1].values[: solver._coordinates].reshape(-1, 7) + solver._reference
-    assert np.abs(np.linalg.norm(last[:, 3:], axis=1) - 1.0).max() < 1e-15
-
-
 def test_loads_at_every_sample_from_the_first_on() -> None:
     """The first multipliers are exact but for rounding; later ones keep what Newton's method leaves: a tenth of the
     tolerance, of forces, over the smallest substep."""

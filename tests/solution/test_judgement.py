@@ -15,7 +15,7 @@ from rotor_mbs.analysis.judgement import Judgement, judge
 from rotor_mbs.methods.catalogue import find_method, method_names
 from rotor_mbs.methods.solve import solve
 from rotor_mbs.methods.time_limit import OutOfTimeError, is_over, polled, time_limit
-from rotor_mbs.models.exudyn import adapter, chain, sensor_samples, tree
+from rotor_mbs.models.exudyn import adapter, chain, sensor_samples
 from rotor_mbs.models.exudyn.loads import Loads
 from rotor_mbs.models.exudyn.schemes import Scheme
 from rotor_mbs.models.exudyn.solvers import MultibodySolver
@@ -36,7 +36,6 @@ def caught(chosen: Scene, result: Solution, exact: Trajectory | None = None) -> 
 RK44, ALPHA = "exudyn_tree/rk44", "exudyn_tree/generalized_alpha"
 CLAIMS = {
     "a bearing of 1e12": (scene("stiff/bearing-1e12"), RK44, {}),
-    "a rate of 1e200": (scene("extreme/rate-1e200"), RK44, {}),
     "an angle that is no number": (replace(paper("fig05"), initial_angles=(np.nan, 0.0, 0.0, 0.0)), RK44, {}),
     "the singular pitch": (scene("extreme/singular-one-blade"), RK44, {}),
     "ten steps a second": (paper("fig14c", samples=101), RK44, {"step": 0.1}),
@@ -96,14 +95,20 @@ def test_a_body_that_falls_free_of_its_joints() -> None:
     assert verdict.metrics["constraint_error_max"] == pytest.approx(0.5 * chosen.gravity, rel=1e-9)
 
 
-def test_nobody_gets_through_a_singularity() -> None:
-    """One blade without hub inertia: whatever a method makes of it, it is not ok; the implicit ones step over it."""
-    chosen = scene("extreme/singular-one-blade")
-    exact = reference(chosen.name)
-    assert len(exact.time) < chosen.samples
-    for method in method_names(is_corrected=True):
+@pytest.mark.parametrize(
+    ("name", "whose", "limit_s"),
+    [("extreme/singular-one-blade", "", 20.0), ("extreme/rate-1e200", "lagrange/", 1.0)],
+)
+def test_nobody_gets_through_a_singularity_or_an_overflow(name: str, whose: str, limit_s: float) -> None:
+    """One blade without hub inertia, or rates whose squares overflow: whatever a method makes of it, it is not ok; the
+    implicit ones step over it. Nothing is written to the terminal: warnings are errors here."""
+    chosen = scene(name)
+    exact = reference(name) if "singular" in name else None
+    assert exact is None or len(exact.time) < chosen.samples
+    methods = [method for method in method_names(is_corrected=True) if method.startswith(whose)]
+    for method in methods:
         if method != "exudyn_tree/dopri5" and find_method(method).is_installed:  # that one does not end: below
-            result = solve(method, chosen, {}, time_limit_s=20.0)
+            result = solve(method, chosen, {}, time_limit_s=limit_s)
             assert judge(chosen, result, exact).status not in ("ok", "inaccurate"), method
 
 
@@ -132,19 +137,6 @@ def test_a_long_run_keeps_its_samples_when_ended(method: str) -> None:
     trajectory = solver.observe()
     assert 1 < len(trajectory.time) < chosen.samples
     assert np.isfinite(trajectory.angles).all()
-
-
-def test_a_limit_costs_no_look_at_the_clock_after_every_step(monkeypatch: pytest.MonkeyPatch) -> None:
-    """And changes no bit of the run."""
-    method = find_method("lagrange/taylor")
-    solver = method.build(scene("paper/fig11"), method.settings())
-    solver.integrate()
-    free, looks, monotonic = solver.observe(), [], time.monotonic
-    monkeypatch.setattr(time, "monotonic", lambda: looks.append(1) or monotonic())
-    with time_limit(60.0):
-        steps = solver.integrate().steps
-    assert len(looks) < 5 < steps
-    assert np.array_equal(solver.observe().angles, free.angles)
 
 
 def test_the_limit_reaches_plain_python() -> None:
@@ -246,18 +238,3 @@ def test_a_run_that_broke_off_names_time_and_reason(
     run = Solution(AT_REST, "lagrange/dop853", trajectory, Integration(success, reported))
     message = judge(AT_REST, run, None).message
     assert all(text in message for text in expected), message
-
-
-@pytest.mark.parametrize(
-    ("changes", "words"),
-    [
-        ({"gravity": 0.0}, "4 links"),
-        ({}, "4 links, gravity"),
-        ({"gravity": 0.0, "bearing_stiffness": (1.0, 0.0, 0.0)}, "4 links, bearing stiffness"),
-        ({"gravity": 0.0, "shaft_damping": 1.0}, "4 links, damping"),
-    ],
-)
-def test_the_tree_is_listed_with_what_it_has(changes: dict[str, object], words: str) -> None:
-    scene = paper("fig08", **changes)
-    parts = tree.parts(scene, Loads(scene))
-    assert next(part.detail for part in parts if part.type == "ObjectKinematicTree") == words

@@ -44,6 +44,7 @@ def make_scene(angles, rates, blades=None, gravity=9.8, duration=1.0, samples=10
 
 FIG08 = make_scene([0, pi / 4, 0, 0], [0] * 4, duration=10.0, samples=1001)
 FIG11 = make_scene([pi / 6, pi / 4, pi / 6, pi / 2], [pi / 10, 0, 0, 0], duration=10.0, samples=1001)
+# Every load at once, constant, with ramps and with jumps between samples, on unlike blades of full inertia.
 MIXED = make_scene(
     [0.3, 0.4, -0.2, 1.0],
     [1.0, 0.5, -0.3, 0.2],
@@ -55,6 +56,8 @@ MIXED = make_scene(
     bearing_damping=(5.0, 8.0, 1.0),
     shaft_damping=200.0,
     rotor_torque=((0.1234, 0.0), (0.777, 2000.0), (0.777, -1000.0), (1.5, -1000.0), (1.5, 500.0)),
+    pitch_torque=(((0.0, 40.0),), ((0.2, 0.0), (0.55, 90.0), (0.55, -60.0)), ()),
+    bearing_rest=(((0.0, 0.2),), ((0.4, 0.0), (0.9, 0.3)), ((0.777, 0.1), (0.777, -0.5), (1.3, 0.4))),
 )
 
 
