@@ -13,7 +13,7 @@ from support.scenes import paper
 
 import rotor_mbs as rm
 from rotor_mbs.errors import InputError, RotorError
-from rotor_mbs.foreign.channels import KNOWN_NAMES, channels, guess, half_last_digits, load_data
+from rotor_mbs.foreign.channels import KNOWN_NAMES, LOAD_AND_MODE_NAMES, channels, guess, half_last_digits, load_data
 
 SCENE = paper("fig08")
 TIME = np.linspace(0.0, 10.0, 201)
@@ -50,10 +50,8 @@ def _table(divider: str, names: Sequence[str] = _NAMES, decimal: str = ".", end:
 # As spreadsheets, LabVIEW, Fortran and control systems write them.
 REAL_LIFE = {
     "decimal commas": _table(";", decimal=","),
-    "decimal commas, blanks": _table(" ", ("time", "rotor_deg", "pitch_1_deg"), decimal=","),
     "decimal commas, tabs": _table("\t", decimal=","),
     "a divider at the ends": _table(";", decimal=",", end=";\n"),
-    "a divider at the ends of rows": _table(",", end=",\n").replace(",\n", "\n", 1),
     "Unicode text of a spreadsheet": _table("\t"),
     "a byte-order mark, lines of Windows": "\ufeff" + _table(",", end="\r\n"),
     "what says the divider": "sep=;\n" + _table(";", decimal=","),
@@ -66,7 +64,6 @@ REAL_LIFE = {
     "empty rows at the end": _table(",") + ",,\n,,\n",
     "a column without a name": "\n".join(f"{i},{row}" for i, row in enumerate(_table(",").split("\n"), -1) if row)[2:],
     "columns of one name that are not used": "\n".join(f"{row},0,0" for row in _table(",").splitlines()),
-    "an empty column": _table(",", end=",\n").replace(",\n", ",empty\n", 1),
 }
 
 
@@ -80,23 +77,13 @@ def test_text_as_other_programs_write_it(tmp_path: Path, name: str) -> None:
     np.testing.assert_allclose(np.degrees(data.values), [row[1:] for row in _ROWS], rtol=1e-14)
 
 
-def test_guesses_say_what_they_took_for_what(tmp_path: Path) -> None:
-    FORMATS["data.outb"](tmp_path / "data.outb", SCENE, TIME, ANGLES, RATES)
-    pytest.importorskip("openfast_io")
-    data = load_data(tmp_path / "data.outb", SCENE)
-    assert data.read[:3] == ("time = 'Time' [s]", "rotor = 'Azimuth' [deg]", "pitch 1 = 'BldPitch1' [deg]")
-    assert "rotor rate = 'RotSpeed' [rpm]" in data.read
-
-
 @pytest.mark.parametrize(
     ("name", "channel"),
     [
-        ("t", "time"), ("Time", "time"), ("time_ms", "time"), ("rotor", "rotor"), ("rotor_deg", "rotor"),
-        ("Azimuth", "rotor"), ("rotor speed", "rotor rate"), ("RotSpeed", "rotor rate"), ("psi_dot", "rotor rate"),
-        ("pitch 1", "pitch 1"), ("PtchPMzc2", "pitch 2"), ("theta3", "pitch 3"), ("pitch_2_rate", "pitch 2 rate"),
-        ("beta1_dot", "pitch 1 rate"), ("beta2", "pitch 2"), ("omega_rpm", "rotor rate"),
-        ("theta_dot_1", "pitch 1 rate"), ("dtheta1", "pitch 1 rate"), ("dphi", "rotor rate"), ("phi", "rotor"),
-        ("phi_dot", "rotor rate"), ("Zeit", "time"), ("Zeit_ms", "time"), ("dt", None),
+        ("time_ms", "time"), ("rotor_deg", "rotor"), ("rotor speed", "rotor rate"), ("RotSpeed", "rotor rate"),
+        ("psi_dot", "rotor rate"), ("PtchPMzc2", "pitch 2"), ("pitch_2_rate", "pitch 2 rate"),
+        ("beta1_dot", "pitch 1 rate"), ("omega_rpm", "rotor rate"), ("theta_dot_1", "pitch 1 rate"),
+        ("dtheta1", "pitch 1 rate"), ("dphi", "rotor rate"), ("dt", None),
         ("pitch", None), ("tip 1 x", None), ("RotTorq", None), ("pitch 4", None),
     ],
 )  # fmt: skip
@@ -109,9 +96,10 @@ def test_the_names_that_are_understood_are_printed_and_documented() -> None:
     """Each that is listed is understood; the list of the docs is the printed one."""
     shown = rotor_mbs("compare", "--names").out
     document = (Path(__file__).parents[2] / "docs" / "compare.md").read_text()
-    for channel, names in KNOWN_NAMES:
+    for channel, names in KNOWN_NAMES + LOAD_AND_MODE_NAMES:
         assert f"{channel}: {names}\n" in shown
         assert f"| {channel} | {names} |\n" in document
+    for channel, names in KNOWN_NAMES:
         for name in [] if channel.endswith(" rate") else names.split(", "):
             column = f"{name}[0]" if "array" in channel else f"{name} 2" if "pitch" in channel else name
             expected = {"time": "time", "pitch": "pitch 2"}.get(channel.split()[0], "rotor")
@@ -143,6 +131,8 @@ def test_the_last_digit_of_single_and_double_precision_and_of_few_values() -> No
     # A pitch that stays at 0.1 rad says nothing of digits.
     np.testing.assert_array_equal(half_last_digits(np.full(50, 0.1)), np.full(50, 0.1 * 2.0**-53))
     assert not half_last_digits(np.zeros(50)).any()
+    # Nor does a number next to the smallest there is, as a flipped bit may make: no unit of it can be written.
+    assert half_last_digits(np.array([1.0 / 3.0, 2.0 / 3.0, 5e-324])).max() < 1e-15
 
 
 def test_a_mapping_says_column_unit_sign_zero_and_subset(tmp_path: Path) -> None:
@@ -188,34 +178,26 @@ WRONG: dict[str, tuple[Callable[[Path], object], str]] = {
     "unknown columns": (_write("time,a,b\n0,1,2\n1,2,3\n2,3,4\n"), "no column for an angle or a rate"),
     "no time": (_write("rotor,pitch 1\n0,1\n1,2\n2,3\n"), "no column for the time"),
     "other lengths": (_write(HEAD + "0,1\n1,2\n2\n"), "1 fields, where the rows above have 2"),
-    "text in numbers": (_write(HEAD + "0,1\n1,two\n2,3\n"), "'two' in column 2; allowed: a number"),
     "nothing": (lambda path: path.touch(), "empty"),
-    "names alone": (_write(HEAD), "no row of numbers"),
     "one column": (_write("rotor\n0\n1\n2\n"), "one column of numbers; allowed: a column of times"),
     "no header": (_write("0,1\n1,2\n2,3\n"), "no header line"),
     "2 GB": (_sparse, "2.0 GB; allowed: up to 0.5 GB"),
     "wrong unit": (_write("time [s],rotor [kg]\n0,1\n1,2\n2,3\n"), "'kg'; allowed: rad, deg, turns"),
-    "wrong unit of time": (_write("time [rad],rotor [rad]\n0,1\n1,2\n2,3\n"), "'rad'; allowed: s, ms"),
     "NaN": (_write(HEAD + "0,1\n1,nan\n2,3\n"), "is nan in row 2 of 3"),
     "repeated time": (_write(HEAD + "0,1\n1,2\n1,3\n"), "the time of row 3, 1 s, repeats"),
     "decreasing time": (_write(HEAD + "0,1\n2,2\n1,3\n"), "comes before"),
-    "before the start": (_write(HEAD + "-1,1\n0,2\n1,3\n"), "begins at t = -1 s"),
     "too few rows": (_write(HEAD + "0,1\n1,2\n"), "2 rows; allowed: 3 or more"),
-    "two columns of one name": (
-        _write("time,rotor,rotor\n0,1,1\n1,2,2\n2,3,3\n"),
-        "both 'rotor' and '_rotor' could be rotor",
-    ),
-    "empty fields": (_write(HEAD + "0,1\n1,\n2,3\n"), "column 'rotor' is nan in row 2 of 3"),
+    "before the start": (_write(HEAD + "-1,1\n0,2\n1,3\n"), "begins at t = -1 s"),
     "a comma between thousands": (_write('time [ms],rotor\n0,1\n"1,000",2\n"2,000",3\n'), "'1,000' in column 1"),
-    "thousands in blanks": (_write("time rotor\n0 1.5\n1,000 2.5\n2,000 3.5\n"), "'1,000' in column 1"),
     "dates": (_write(HEAD + "12:00:01,1\n12:00:02,2\n12:00:03,3\n"), "line 2 has '12:00:01'"),
     "two columns for one channel": (_write("time,rotor,azimuth\n0,1,1\n1,2,2\n2,3,3\n"), "could be rotor"),
+    "a text that begins as JSON": (_write('{"time": [0, 1'), "allowed: text with a header"),
+    "JSON of no arrays": (_write('{"time": {"a": 1}}'), "allowed: "),
+    "Parquet": (lambda path: path.write_bytes(b"PAR1\x15\x04" + bytes(60)), "not a format that can be read"),
     "a damaged archive": (lambda path: path.write_bytes(b"PK\x03\x04damaged"), "cannot be read"),
     "a damaged HDF5 file": (lambda path: path.write_bytes(b"\x89HDF\r\n\x1a\n" + bytes(100)), "not a readable HDF5"),
     "a damaged MAT file": (lambda path: path.write_bytes(b"MATLAB 5.0 MAT-file".ljust(200)), "cannot be read"),
     "a program": (lambda path: path.write_bytes(b"\x7fELF" + bytes(100)), "not a format that can be read"),
-    "a folder": (lambda path: path.mkdir(), "is a folder"),
-    "no file": (Path.exists, "no such file"),
 }
 
 
@@ -235,7 +217,6 @@ def test_wrong_input_is_one_line_and_status_2(tmp_path: Path, case: str) -> None
         ({"time": TIME, "rotor": np.ma.masked_less(ANGLES[:, 0], -1.0)}, "column 'rotor' is nan in row"),
         ({"time": TIME, "angles": [[1.0, 2.0], [3.0]]}, "rows of different lengths"),
         ({"time": TIME[1:], "rotor": ANGLES[:, 0]}, "columns of different lengths"),
-        ({"time": TIME, "angles": ANGLES.astype(complex)}, "no column for an angle or a rate"),
         ({"time": 3.0, "rotor": 2.0}, "no columns of numbers"),
     ],
 )
@@ -251,8 +232,6 @@ def test_wrong_arrays_are_refused(arrays: dict[str, object], message: str) -> No
         ('rotor = "c"', "no column 'c'; available: t, a, b"),
         ('rotor = { column = "a", unit = "rpm" }', "'rpm'; allowed: rad, deg, turns"),
         ('rotor = { column = "a", sign = 2 }', "rotor.sign: 2 is not one of them; allowed: 1, -1"),
-        ('rotor = { column = "a", offset = "x" }', "rotor.offset: .*x"),
-        ('rotor = { column = "a", zero = 1 }', "rotor.zero: unknown key; allowed: column, unit"),
         ("rotor = 3", "rotor: 3 is not a table; allowed: a column's name, or a table with `column`"),
         ('time = "t"', "no channel to compare"),
         ("rotor", "not TOML"),

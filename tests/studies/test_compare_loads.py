@@ -17,7 +17,7 @@ from support import other_code
 import rotor_mbs as rm
 from rotor_mbs.cli import main
 from rotor_mbs.errors import InputError
-from rotor_mbs.foreign.channels import LOAD_AND_MODE_NAMES, load_data
+from rotor_mbs.foreign.channels import load_data
 from rotor_mbs.models.lagrange.defects import interval_defects
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.defects import Defects
@@ -240,15 +240,6 @@ def test_loads_of_few_digits_are_judged_by_them() -> None:
             "blade_root_force_1_z": six_digits(factor * arrays["blade_root_force"][:, 0, 2]),
         }
         assert rm.compare(table, short("check/general")).status == status
-
-
-def test_the_names_of_loads_and_modes_are_printed_and_documented(capsys: pytest.CaptureFixture[str]) -> None:
-    with pytest.raises(SystemExit):
-        main(["compare", "--names"])
-    shown, document = capsys.readouterr().out, (ROOT / "docs" / "compare.md").read_text()
-    for channel, names in LOAD_AND_MODE_NAMES:
-        assert f"{channel}: {names}\n" in shown
-        assert f"| {channel} | {names} |\n" in document
 
 
 @pytest.mark.parametrize("name", ["paper/fig11", "check/pitch-loads"])
