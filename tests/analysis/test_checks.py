@@ -11,23 +11,22 @@ import numpy as np
 import pytest
 from support.references import reference, scene
 from support.scenes import general, paper
-from support.stored import Arrays, Made, damage, rotor, store
+from support.stored import Arrays, Made, rotor, store
 
 from rotor_mbs.analysis import checks
 from rotor_mbs.analysis.judgement import defects_of, energy_slack, judge, start_slack
 from rotor_mbs.methods.catalogue import REFERENCE
 from rotor_mbs.methods.solve import solve
-from rotor_mbs.runs.read import StoredRun, open_results
+from rotor_mbs.runs.read import open_results
 from rotor_mbs.scenario.accuracy_bounds import load_bounds
 from rotor_mbs.scenario.catalogue import reference_folder
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.metrics import energy_scale, metrics_of
-from rotor_mbs.solution.quantities import Quantity, QuantityMetric
 from rotor_mbs.solution.trajectory import Solution
 
 METHOD, PRINTED, BOUNDS = "lagrange/dop853", "printed/ode45", load_bounds()
 LOADED = scene("check/loads")
-FIG11 = paper("fig11", samples=501)
+FIG11 = paper("fig11", samples=101)
 ANGLES, RATE = {"rotor_angle_min", "rotor_angle_max"}, {"rotor_rate_max"}
 
 
@@ -99,30 +98,10 @@ def test_what_a_scene_does_not_ask_for_is_not_judged() -> None:
     assert {check for check, _ in of_model(solve(METHOD, scene, {}), scene)} == {"defect", "error", "impulse"}
 
 
-def test_a_balance_without_its_energies_fails_and_without_its_work_is_none() -> None:
-    run = run_of()
-    run.trajectory.energy_error, run.trajectory.kinetic_energy = np.zeros(5), None
-    assert np.isnan(of_samples(run)["energies", "energy error"])
-    run = run_of()
-    run.trajectory.work = None
-    assert {channel for _, channel in of_samples(run)}.isdisjoint({"work", "work at the start"})
-
-
 def test_the_rate_of_a_pitch_without_inertia_is_no_start() -> None:
     scene = paper("fig04b", initial_rates=(0.0, 7.0), duration=0.2, samples=3)
     assert not scene.blades[0].has_pitch_inertia
     assert of_samples(solve(METHOD, scene, {}))["start", "angles, rates"] == 0.0
-
-
-def test_energies_of_rest_are_absolute() -> None:
-    """Without weight and motion there is no scale; without a tip no length."""
-    blades = tuple(replace(blade, tip=(0.0, 0.0, 0.0)) for blade in general().blades)
-    run = run_of(gravity=0.0, bearing_stiffness=(), initial_rates=(0.0,) * 4, blades=blades)
-    assert energy_scale(run.scene, run.trajectory) == 0.0
-    run.trajectory.energy_error = np.array([0.0, 3.0, 0.0, 0.0, 0.0])
-    run.trajectory.tip[2, 1, 0] += 2.0
-    found = of_samples(run)
-    assert (found["energies", "energy error"], found["tip", "tip"]) == (3.0, 2.0)
 
 
 def of_model(run: Solution, scene: Scene, bounds: Any = BOUNDS, method: str = METHOD) -> dict[tuple[str, str], float]:
@@ -146,11 +125,8 @@ def test_numbers_of_a_model_are_its_metrics_less_what_rounding_and_its_start_lea
         assert found["energy", "balance"] == pytest.approx(drift, rel=1e-12)
         assert found["impulse", "angular"] == metrics["angular_impulse_error_max"]
     assert 0.0 < start_slack(away) < found["error", "angles"]
-    assert ("defect median", "median") not in found
     own = BOUNDS.for_scene("paper/fig11")
     assert 0.0 < of_model(run, scene, own, "lagrange/taylor")["defect median", "median"] < 1e-12
-    without = of_model(run, replace(scene, outputs=("rates",))).keys()
-    assert without.isdisjoint({("defect", "largest"), ("error", "angles"), ("exact", "x")})
 
 
 def test_a_turn_of_a_pendulum_is_off_by_what_was_added() -> None:
@@ -159,34 +135,25 @@ def test_a_turn_of_a_pendulum_is_off_by_what_was_added() -> None:
     run.trajectory.angles[7, 0] += 1e-3
     judged = values(checks._of_corrected_model(stored(), BOUNDS, scene, run.trajectory, {}))
     assert judged["exact", "rotor angle"] == pytest.approx(1e-3, rel=1e-6)
-    blind = replace(scene, outputs=("rates", "energy"))
-    judged = values(checks._of_corrected_model(stored(), BOUNDS, blind, run.trajectory, {}))
-    assert ("exact", "rotor angle") not in judged
 
 
 @pytest.mark.parametrize(
     ("method", "status", "motion_ends", "has_run", "complete"),
     [
-        (METHOD, "ok", True, True, 1.0),  # says that it got to the end
-        (METHOD, "singular", True, True, 0.0),
-        (METHOD, "singular", False, True, 1.0),
-        ("printed/ode45", "diverged", False, True, 0.0),
-        ("printed/ode45", "diverged", False, False, 1.0),  # arrays that cannot be used are no early end
+        (METHOD, "ok", True, True, False),  # says that it got to the end
+        (METHOD, "singular", True, True, True),
+        (METHOD, "singular", False, True, False),
+        ("printed/ode45", "diverged", False, True, True),
+        ("printed/ode45", "diverged", False, False, False),  # arrays that cannot be used are no early end
     ],
 )
 def test_an_early_end_is_excused_where_the_motion_ends(
-    method: str, status: str, motion_ends: bool, has_run: bool, complete: float
+    method: str, status: str, motion_ends: bool, has_run: bool, complete: bool
 ) -> None:
-    run = replace(run_of(), method=method)
-    one, faults = stored(method, status=status, attributes={"message": "over π/2"}), ["angles has 4 rows, not 5"]
-    given = list(checks._of_run(one, BOUNDS, run if has_run else None, faults, None, motion_ends))
-    assert values(given)["complete", "all"] == complete
-    assert (f"stored as {status}: over π/2" in given[0].hint) == (complete == 1.0 and status != "ok")
-    assert ("stored as" in given[0].hint) == (complete == 1.0 and status != "ok")
-    assert (len(given) > 1) == has_run
-    missing = "relative_tolerance is missing; absolute_tolerance is missing"
-    assert [check.hint for check in given if check.name == "settings"] == [missing] * has_run
-    assert (("energy", "balance") in values(given)) == (has_run and method == METHOD)
+    run, one = replace(run_of(), method=method), stored(method, status=status)
+    given = list(checks._of_run(one, BOUNDS, run if has_run else None, ["4 rows, not 5"], None, motion_ends))
+    assert given[0].name == "complete"
+    assert given[0].passed == complete
 
 
 @pytest.mark.parametrize(
@@ -253,39 +220,6 @@ def test_extremes_are_compared_where_samples_give_them(method: str, changes: Any
     assert {name for name in ANGLES | RATE if of_stored(run, metrics, name, 9.0)[0] == name} == names
 
 
-@pytest.mark.parametrize(
-    ("method", "share", "passed"), [(METHOD, 2.0, []), (REFERENCE, 1.04, [True]), (REFERENCE, 1.06, [False])]
-)
-def test_the_growth_of_a_reference_is_that_of_its_samples(method: str, share: float, passed: list[bool]) -> None:
-    """To 5 %: the accuracy of the transition matrices."""
-    run = run_of()
-    growth = share * defects_of(run.scene, run.trajectory).error_growth
-    grown = replace(run, method=method, trajectory=run.trajectory.replace(error_growth=growth))
-    given = list(checks._of_run(stored(method), BOUNDS, grown, [], None, False))
-    assert [check.passed for check in given if check.name == "growth"] == passed
-
-
-@pytest.mark.parametrize(
-    ("status", "claimed", "faults"), [("ok", 0, 1), ("unchecked", 0, 0), ("unchecked", 1, 1), ("ok", 1, 2)]
-)
-def test_a_status_and_a_claim_are_a_fault_each(
-    status: str, claimed: int, faults: int, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    run = run_of(outputs=("angles",))  # nothing to compare it with
-
-    def judged(**attributes: int) -> checks.Check:
-        given = checks._of_run(stored(status=status, attributes=attributes), BOUNDS, run, [], None, False)
-        return next(check for check in given if check.name == "status")
-
-    assert judged(false_success=claimed).value == faults
-    assert ("the engine's report of success is not false" in judged(false_success=claimed).hint) == bool(claimed)
-    # A run that says nothing of its engine's claim has made none that is false.
-    assert judged().passed == (status == "unchecked")
-    verdict = replace(judge(run.scene, run, None), false_success=True)
-    monkeypatch.setattr(checks, "judge", lambda *_: verdict)
-    assert judged().hint.endswith("the engine's report of success is false")
-
-
 def of_reference(own: Any, shipped: Any) -> dict[tuple[str, str], float]:
     scene: Any = SimpleNamespace(name="scene", reference=own)
     return values(checks._of_reference(scene, shipped, BOUNDS))
@@ -310,13 +244,8 @@ def test_a_reference_is_compared_with_the_shipped_one() -> None:
     assert found["growth", "error growth"] == pytest.approx(1.0)
     assert found["uncertainty", "angle uncertainty"] == pytest.approx(3.0)
     assert np.isnan(of_reference(stored(REFERENCE, angles=two), shipped)["growth", "error growth"])
-    whole = of_reference(stored(REFERENCE, angles=two.astype(int), error_growth=np.ones(4, int)), shipped)
-    assert np.isnan([whole["reference", "angles"], whole["growth", "error growth"]]).all()
-    assert ("reference", "rates") not in whole
     assert of_reference(own, None) == {}
     assert np.isnan(of_reference(None, shipped)["reference", "all"])
-    empty = stored(REFERENCE, angles=np.empty((0, 2)), rates=np.empty((0, 2)), error_growth=np.empty(0))
-    assert set(of_reference(empty, empty).values()) == {0.0}
 
 
 @pytest.mark.parametrize(("status", "ends"), [("singular", True), ("timed_out", False)])
@@ -338,28 +267,6 @@ def test_the_margin_is_bound_over_value(value: float, passed: bool, margin: floa
     assert (one.passed, one.margin) == (passed, pytest.approx(margin))
 
 
-def test_a_damaged_row_fails_and_what_cannot_be_read_is_incomplete(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Of a row that is as written, the same error is a fault of the program."""
-
-    def fail(*_: object) -> None:
-        raise KeyError("angles")
-
-    monkeypatch.setattr(StoredRun, "solution", fail)
-    path = store(tmp_path / "r.h5", [Made(FIG11, METHOD, rotor(np.zeros_like))])
-    with open_results(path) as results, pytest.raises(KeyError):
-        checks.checks_of(results, [], BOUNDS)
-    damage(path, f"paper/fig11/{METHOD}", "angles")
-    with open_results(path, verify=False) as results:
-        failures = [check for check in checks.checks_of(results, [], BOUNDS) if not check.passed]
-    assert failures[0].hint == "its row changed after it was written"
-    assert [(check.name, check.where.method, check.value) for check in failures[:2]] == [
-        ("integrity", METHOD, 1.0),
-        ("complete", METHOD, pytest.approx(np.nan, nan_ok=True)),
-    ]
-
-
 def test_a_file_is_judged_by_its_copies_and_by_the_papers_numbers_too(tmp_path: Path) -> None:
     curve = rotor(lambda t: 2.7313 * np.sin(np.pi * t / 10.0))
     made = [
@@ -378,17 +285,3 @@ def test_a_scene_that_is_not_shipped_is_not_compared_with_the_shipped_one_of_its
         found = {check.name for check in checks.checks_of(results, [shipped], BOUNDS)}
     assert "complete" in found
     assert not found & {"reference", "uncertainty"}
-
-
-def test_a_quantity_is_told_by_its_rule_or_by_its_own_words(monkeypatch: pytest.MonkeyPatch) -> None:
-    quantity = Quantity("lift", ("time",), "N", "force upwards")
-    bare = QuantityMetric("lift_error", bound=2.0)
-    full = QuantityMetric("lift_error", bound=2.0, check="gap", channel="up", unit="kN", look_at="the wing")
-    none = QuantityMetric("lift_error", check="nothing", bound=None)
-    monkeypatch.setattr(checks, "quantity_errors", lambda *_: [(quantity, rule, 0.5) for rule in (bare, full, none)])
-    found = list(checks._of_corrected_model(stored(), BOUNDS, replace(general(), outputs=()), None, {}))
-    assert [(check.name, check.where.channel, check.unit, check.hint) for check in found] == [
-        ("lift", "lift", "N", "force upwards"),
-        ("gap", "up", "kN", "the wing"),
-    ]
-    assert (found[0].value, found[0].bound) == (0.5, 2.0)

@@ -151,15 +151,13 @@ def test_a_mapping_says_column_unit_sign_zero_and_subset(tmp_path: Path) -> None
     assert data.read[1] == "rotor = -'a' +90 [deg]"
 
 
-def test_results_of_this_program_are_data_too(tmp_path: Path) -> None:
-    scene = rm.scene("paper/fig03")
-    rm.run(scene, ["lagrange/dop853", "exudyn_tree/rk67"]).save(tmp_path / "r.h5")
-    with pytest.raises(RotorError, match=r"several groups; .*paper/fig03/exudyn_tree/rk67"):
-        load_data(tmp_path / "r.h5", scene)
-    stored = rm.open(tmp_path / "r.h5")["paper/fig03/exudyn_tree/rk67"]
-    for columns, count in (('rotor = "angles[0]"\n', 1), ("", 4)):  # a group alone: columns are guessed
+def test_results_of_this_program_are_data_too(results: Path, tmp_path: Path) -> None:
+    with pytest.raises(RotorError, match=r"several groups; .*paper/fig08/exudyn_tree/rk67"):
+        load_data(results, SCENE)
+    stored = rm.open(results)["paper/fig08/exudyn_tree/rk67"]
+    for columns, count in (('rotor = "angles[0]"\n', 1), ("", 8)):  # a group alone: columns are guessed
         (tmp_path / "map.toml").write_text(f'group = "exudyn_tree/rk67"\n{columns}')
-        data = load_data(tmp_path / "r.h5", scene, tmp_path / "map.toml")
+        data = load_data(results, SCENE, tmp_path / "map.toml")
         assert len(data.columns) == count
         assert data.values[:, 0].tobytes() == stored.angles[:, 0].tobytes()
 

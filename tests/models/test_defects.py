@@ -93,7 +93,7 @@ def test_half_the_step_divides_the_defects_by_two_to_the_order(method: str, orde
 
 
 # ---- Faults: a wrong load, a wrong row, a wrong start. Wrong numbers of a model are those of test_planted_faults.py,
-# patterns that are named those of studies/test_defect_causes.py.
+# patterns that are named those of studies/test_planted_mistakes.py.
 
 
 def test_a_wrong_torque_is_seen_in_its_intervals_alone_in_proportion() -> None:

@@ -16,7 +16,7 @@ from rotor_mbs.methods import catalogue
 from rotor_mbs.methods.catalogue import find_method, method_names
 from rotor_mbs.scenario.catalogue import only_scene
 from rotor_mbs.solution.trajectory import Integration, Trajectory
-from rotor_mbs.studies.method_test import NOT_FOUND, SCENES, examine, protocol_fault
+from rotor_mbs.studies.method_test import NOT_FOUND, examine, protocol_fault
 
 DOCUMENT = (Path(__file__).parents[2] / "docs" / "your-engine.md").read_text()
 (EXAMPLE,) = re.findall(r"```python\n(.*?)METHOD", DOCUMENT, re.DOTALL)
@@ -183,16 +183,3 @@ def test_what_is_wrong_with_the_form_of_a_run_is_said(change: dict[str, object],
     scene = only_scene("paper/fig03").replace(duration=1.0, samples=5)
     run = Trajectory(np.linspace(0.0, 1.0, 5), np.zeros((5, 2)), np.zeros((5, 2))).replace(**change)
     assert protocol_fault(scene, run, Integration(success)) == fault
-
-
-def test_the_scenes_have_every_term_between_them() -> None:
-    scenes = [only_scene(name) for name in SCENES]
-    assert len(scenes) == 6
-    for name in (
-        "gravity", "hub_inertia", "rotor_torque", "pitch_torque", "bearing_stiffness", "bearing_damping",
-        "bearing_rest", "shaft_damping",
-    ):  # fmt: skip
-        assert any(getattr(scene, name) for scene in scenes), name
-    assert any(any(blade.inertia) for scene in scenes for blade in scene.blades)
-    assert any(not blade.has_pitch_inertia for scene in scenes for blade in scene.blades)
-    assert any(not scene.has_constant_loads for scene in scenes)

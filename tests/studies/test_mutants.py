@@ -166,26 +166,25 @@ def wrong_scenes(scene: Scene, share: float) -> Iterator[tuple[str, Scene]]:
             yield place, replace(scene, **{name: new if is_allowed else other})
 
 
-# A scene, what the names of its numbers begin with and how many these are, a method, the share, and each how many-th.
+# A scene, what the names of its numbers begin with and how many these are.
 _GENERAL, _PITCH_LOADS = ("check/general", "", 63), ("check/pitch-loads", ("pitch_torque", "bearing_rest"), 20)
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(
-    ("scene", "names", "count", "method", "share", "every"),
+    ("scene", "names", "count", "method", "share"),
     [
-        (*_GENERAL, "lagrange/dop853", 1e-6, 31),
-        pytest.param(*_GENERAL, "lagrange/dop853", 1e-6, 1, marks=pytest.mark.full),
-        pytest.param(*_GENERAL, "exudyn_tree/rk67", 1e-6, 1, marks=pytest.mark.full),
-        pytest.param(*_GENERAL, "mujoco/rk4", 1e-3, 1, marks=pytest.mark.nightly),
+        (*_GENERAL, "lagrange/dop853", 1e-6),
+        (*_GENERAL, "exudyn_tree/rk67", 1e-6),
+        pytest.param(*_GENERAL, "mujoco/rk4", 1e-3, marks=pytest.mark.nightly),
         # Of second order: a product of inertia of 25 beside 4000 kg m² shows from 3 % on.
-        pytest.param(*_GENERAL, "exudyn_chain/generalized_alpha", 5e-2, 1, marks=pytest.mark.nightly),
-        (*_PITCH_LOADS, "lagrange/dop853", 1e-4, 10),  # times of jumps and kinks, too
-        pytest.param(*_PITCH_LOADS, "lagrange/dop853", 1e-4, 1, marks=pytest.mark.full),
-        pytest.param(*_PITCH_LOADS, "exudyn_tree/rk67", 1e-4, 1, marks=pytest.mark.full),
+        pytest.param(*_GENERAL, "exudyn_chain/generalized_alpha", 5e-2, marks=pytest.mark.nightly),
+        (*_PITCH_LOADS, "lagrange/dop853", 1e-4),  # times of jumps and kinks, too
+        (*_PITCH_LOADS, "exudyn_tree/rk67", 1e-4),
     ],
 )
 def test_every_number_of_a_scene_counts(
-    scene: str, names: str | tuple[str, ...], count: int, method: str, share: float, every: int, tmp_path: Path
+    scene: str, names: str | tuple[str, ...], count: int, method: str, share: float, tmp_path: Path
 ) -> None:
     if method.startswith("mujoco"):
         pytest.importorskip("mujoco")
@@ -193,7 +192,7 @@ def test_every_number_of_a_scene_counts(
     path = results_file(tmp_path / "numbers.h5", [scene], [])
     wrong = [(name, other) for name, other in wrong_scenes(right, share) if name.startswith(names)]
     unnoticed = []
-    for name, other in wrong[::every]:
+    for name, other in wrong:
         add_run(path, right, solve(method, other, {}))
         if not failed(judged(path)):
             unnoticed.append(name)

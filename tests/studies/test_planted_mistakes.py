@@ -21,9 +21,28 @@ DURATION = 2.0
 ROWS = 201
 
 
+JUMP = 5e4  # N m, at 0.5 s
+
+
+def steps(*rows: tuple[float, float]) -> tuple[tuple[float, float], ...]:
+    """A table that jumps to each value at its time, from 0 on."""
+    value, table = 0.0, [(0.0, 0.0)]
+    for time, following in rows:
+        table += [(time, value), (time, following)]
+        value = following
+    return tuple(table)
+
+
 @functools.cache
 def short(name: str) -> Scene:
-    return replace(rm.scene(name), duration=DURATION, samples=ROWS)
+    """A shipped scene; "driven": fig. 11 with a torque that jumps; "sprung": that with three different bearings."""
+    shipped = {"driven": "paper/fig11", "sprung": "paper/fig11"}.get(name, name)
+    scene = replace(rm.scene(shipped), duration=DURATION, samples=ROWS)
+    if name in ("driven", "sprung"):
+        scene = replace(scene, rotor_torque=steps((0.5, JUMP)))
+    if name == "sprung":
+        scene = replace(scene, bearing_stiffness=(6e3, 5e3, 8e3), bearing_damping=(300.0, 500.0, 400.0))
+    return scene
 
 
 @dataclass(frozen=True)
@@ -84,6 +103,39 @@ def wrapped(angles: Array) -> Array:
 def noise(size: float) -> Callable[[Array, Array, Array], tuple[Array, Array, Array]]:
     drawn = np.random.default_rng(15).normal(0.0, size, (2, ROWS, 4))
     return lambda time, angles, rates: (time, angles + drawn[0], rates + drawn[1])
+
+
+# Faults at a time
+
+
+def with_row(row: int, angles: int, off: float = 0.0) -> Callable[[Array, Array, Array], tuple[Array, Array, Array]]:
+    """The numbers of a row are those of another, its second pitch off."""
+
+    def spoilt(time: Array, q: Array, w: Array) -> tuple[Array, Array, Array]:
+        q[row], w[row] = q[angles], w[angles]
+        q[row, 2] += off
+        return time, q, w
+
+    return spoilt
+
+
+def rows(*chosen: int) -> Callable[[Array, Array, Array], tuple[Array, Array, Array]]:
+    """These rows at the times of the first ones."""
+    return lambda time, q, w: (time[: len(chosen)], q[[*chosen]], w[[*chosen]])
+
+
+def kicked(time: Array, q: Array, w: Array) -> tuple[Array, Array, Array]:
+    """From row 30 on the motion from a rate that is wrong there."""
+    start = w[30] + [0.0, 0.0, 1e-3, 0.0]
+    after = replace(
+        short("driven"), rotor_torque=steps((0.2, JUMP)), initial_angles=tuple(q[30]), initial_rates=tuple(start)
+    )
+    then, rates = other_code.trajectory(after, time[30:] - time[30])
+    return time, np.vstack([q[:30], then]), np.vstack([w[:30], rates])
+
+
+def driven(*table: tuple[float, float]) -> Callable[[Scene], Scene]:
+    return lambda scene: replace(scene, rotor_torque=steps(*table))
 
 
 THIRD = 2.0 * np.pi / 3.0
@@ -158,12 +210,63 @@ PLANTS = {
         spoilt=lambda t, q, w: (t, q[::-1], -w[::-1]),
     ),
     "a second late": Plant("`offset = -1` of the time", spoilt=lambda t, q, w: (t + 1.0, q, w)),
+    "a stuck row": Plant("a stuck row, or one at a wrong time: row 41, t = 0.4 s", "driven", spoilt=with_row(40, 39)),
+    "an outlier": Plant("a single wrong row: row 41, t = 0.4 s", "driven", spoilt=with_row(40, 40, 1e-3)),
+    "two outliers": Plant(
+        "a single wrong row: row 61, t = 0.6 s", "driven",
+        spoilt=lambda *arrays: with_row(60, 60, 1e-3)(*with_row(40, 40, 1e-3)(*arrays)),
+    ),
+    "a row repeated": Plant(
+        "a row repeated, or times late by less than an interval, at t = 0.31 s", "driven",
+        spoilt=rows(*range(31), *range(30, 200)),
+    ),
+    "a clock that goes on": Plant(
+        "a row repeated, or times late by less than an interval, at t = 0.314 s", "driven",
+        spoilt=lambda t, q, w: (t + 0.004 * (np.arange(ROWS) > 30), q, w),
+    ),
+    "a row left out": Plant(
+        "a row omitted and the others renumbered, or times early by less than an interval, at t = 0.31 s", "driven",
+        spoilt=rows(*range(31), *range(32, 101)),
+    ),
+    "a wrong rate": Plant("a jump of rates, or a load of one interval, before t = 0.3 s", "driven", spoilt=kicked),
+    "a load of an interval": Plant(
+        "a jump of rates, or a load of one interval, before t = 0.31 s", "driven",
+        changed=driven((0.3, JUMP), (0.31, 0.0), (0.5, JUMP)),
+    ),
+    "a late edge": Plant(
+        "the load on the rotor jumps a row late at t = 0.5 s, or has a wrong value in this row", "driven",
+        changed=driven((0.51, JUMP)),
+    ),
+    "smoothed over three rows": Plant(
+        "the load on the rotor is smoothed over its jump at t = 0.5 s", "driven",
+        changed=driven((0.49, JUMP / 3.0), (0.5, 2.0 * JUMP / 3.0), (0.51, JUMP)),
+    ),
+    "missing": Plant(
+        "a load that is wrong or missing from t = 0.7 to 0.8 s: on average -5e+04 N m on the rotor", "driven",
+        changed=driven((0.5, JUMP), (0.7, 0.0), (0.8, JUMP)),
+    ),
+    "two loads at once": Plant(
+        "wrong or missing from t = 0.7 to 0.8 s: on average +5e+04 N m on the rotor and +100 N m on the pitch 3",
+        "driven",
+        changed=lambda scene: replace(
+            driven((0.5, JUMP), (0.7, 2.0 * JUMP), (0.8, JUMP))(scene),
+            pitch_torque=(steps(), steps(), steps((0.7, 100.0), (0.8, 0.0))),
+        ),
+    ),
+    "damping of one bearing": Plant(
+        "bearing.damping[0] off by +10 % (uncertainty ", "sprung",
+        changed=lambda scene: replace(scene, bearing_damping=(330.0, 500.0, 400.0)),
+    ),
+    "rest angle": Plant(
+        "bearing.rest off by -0.1 rad (uncertainty ", "sprung",
+        changed=lambda scene: replace(scene, bearing_rest=(((0.0, -0.1),),) * 3),
+    ),
     "gravity and c": Plant(
         "gravity off by -1 % (uncertainty", changed=lambda scene: off("offset", 0.01)(off("gravity", -0.01)(scene))
     ),
 }  # fmt: skip
-# One of each kind: in the columns, in time, in the scene, in the equations. The others carry the mark full.
-FAST = {"degrees", "blade order", "truncated", "late", "one sample late", "gravity"}
+# One of each kind: in the columns, in time, in the scene, at a time. The others carry the mark full.
+FAST = {"degrees", "blade order", "truncated", "one sample late", "gravity", "missing"}
 
 
 @pytest.mark.parametrize(
@@ -197,6 +300,26 @@ def test_data_of_another_time_are_refused() -> None:
 def test_a_true_run_with_the_noise_of_rounding_is_ok(scene: str) -> None:
     comparison = rm.compare(Plant("", scene, spoilt=noise(1e-12)).data(), short(scene))
     assert (comparison.status, comparison.likely) == ("ok", ())
+
+
+def averaged(time: Array, *arrays: Array) -> tuple[Array, Array, Array]:
+    """A filter leaves the first and the last two rows as they were: the largest defects are there."""
+    angles, rates = (np.vstack([a[:2], sum(a[i : len(a) - 4 + i] for i in range(5)) / 5.0, a[-2:]]) for a in arrays)
+    return time, angles, rates
+
+
+WRONG_IN_ALL_ROWS = {
+    "averaged": averaged,
+    "rates by differences": lambda t, q, _: (t, q, np.gradient(q, t, axis=0)),
+    "a sine": lambda t, q, w: (t, q + 1e-3 * np.sin(7.0 * t)[:, None], w),
+}
+
+
+@pytest.mark.parametrize("name", WRONG_IN_ALL_ROWS)
+def test_what_is_wrong_in_all_rows_is_no_fault_at_a_time(name: str) -> None:
+    comparison = rm.compare(Plant("", "driven", spoilt=WRONG_IN_ALL_ROWS[name]).data(), short("driven"))
+    assert comparison.status == "inaccurate"
+    assert not any(" t = " in text for text in comparison.likely), comparison.likely
 
 
 @pytest.mark.full

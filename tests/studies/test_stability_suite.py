@@ -74,9 +74,6 @@ def test_a_run_judged_by_its_energy_alone_says_so(tmp_path: Path) -> None:
     assert cell.message in page
     assert NOT_COMPARED in page
     assert "unstable equilibrium" in page
-    own = (tmp_path / "report" / "extreme-needle-fig05-1e-15.html").read_text(encoding="utf-8")
-    assert cell.message in own
-    assert "lagrange/taylor, tolerance = 10⁻¹⁵" in own.replace("<wbr>", "")
 
 
 def made_run(method: str, outcome: str, scene: str = "stiff/a", seconds: float = 1.0, **facts: object) -> SuiteRun:
@@ -108,21 +105,13 @@ def test_an_interrupted_suite_goes_on_where_it_stopped(tmp_path: Path) -> None:
     scenes, methods = find_scenes([name]), ["exudyn_tree/generalized_alpha", "exudyn_tree/rk67", "exudyn_tree/rk44"]
     run_scenes(scenes, {name: methods}, path, workers=0, timeout_s=60.0)
 
-    def interrupt(done: int, total: int, _outcome: Outcome) -> None:
-        assert (done, total) == (1, 3)
+    def interrupt(*_: object) -> None:
         raise KeyboardInterrupt
-
-    def stored() -> set[str]:
-        return {record.method for record in read_records(path, STEPS)}
 
     with pytest.raises(KeyboardInterrupt):
         complete_ladders(scenes, {name: methods}, path, 0, interrupt)
-    begun = stored()
-    assert 1 <= len(begun) <= 2
-    made = complete_ladders(scenes, {name: methods}, path, 0)
-    assert {outcome.method for outcome in made} == {*methods} - begun
-    assert all(outcome.is_stored for outcome in made)
+    begun = {record.method for record in read_records(path, STEPS)}
+    assert len(begun) in (1, 2)  # one more may have ended
+    assert {outcome.method for outcome in complete_ladders(scenes, {name: methods}, path, 0)} == {*methods} - begun
     assert complete_ladders(scenes, {name: methods}, path, 0) == []
-    assert complete_ladders(scenes, {name: methods[:2]}, path, 0) == []  # of one method alone: the others' stay
-    assert stored() == {*methods}
     assert [file.name for file in tmp_path.iterdir()] == ["s.h5"]

@@ -22,7 +22,8 @@ ROOT = Path(__file__).parents[2]
 SWEEP = """
 title = "Stiffness and start"
 scene = "paper/fig11"
-change = { duration = 1.0 }
+methods = ["lagrange/dop853"]
+change = { duration = 0.2 }
 samples = 11
 validation = 0.2
 test = 0.2
