@@ -12,7 +12,6 @@ from support.commands import rotor_mbs
 from rotor_mbs.report.build import write_report
 from rotor_mbs.report.pages.stability import NOT_COMPARED
 from rotor_mbs.runs.read import read_records
-from rotor_mbs.runs.runner import Outcome
 from rotor_mbs.scenario.catalogue import find_scenes
 from rotor_mbs.studies.run import run_scenes
 from rotor_mbs.studies.stability import (
