@@ -18,7 +18,7 @@ def assert_agrees(
     time : (n,) s, increasing; any times within the scene's duration, including its start and end.
     angles : (n, 1 + blades) rad: rotor, then the pitch of each blade, unwrapped.
     scene : the name of a shipped scene, a TOML file, or a `Scene`.
-    rates : (n, 1 + blades) rad/s; optional. If given, the energy balance is also checked.
+    rates : (n, 1 + blades) rad/s; optional.
     tolerance : bound on interval defects, and on errors divided by the error growth (rad).
 
     Returns

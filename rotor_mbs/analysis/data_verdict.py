@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
@@ -24,9 +23,7 @@ class ChannelErrors:
         a rate (times the interval) the largest over all intervals, rad; of a load the largest error, of the load's
         largest size; of a frequency the largest error, of its size.
     floor : the largest that rounding explains, likewise.
-    agrees_until : s (rad/s of a table of modes), for each of `LEVELS`, of the last row before the error is larger; NaN
-        where the first row is.
-    lag_s, scale, offset : least squares of data = scale * reference(t - lag) + offset up to the horizon, of a state.
+    agrees_until : see the function of this name.
     """
 
     name: str
@@ -35,18 +32,19 @@ class ChannelErrors:
     error_whole: float
     defect: float | None
     floor: float | None
-    agrees_until: tuple[float, ...]
-    lag_s: float | None = None
-    scale: float | None = None
-    offset: float | None = None
+    agrees_until: Mapping[str, float | None]
     defect_unit: str = "rad"
 
 
-def agrees_until(rows: Array, error: Array) -> tuple[float, ...]:
-    """For each of `LEVELS` the last of (n,) times, or speeds, before the error is larger; NaN where the first is."""
-    beyond = [np.flatnonzero(~(error <= level)) for level in LEVELS]
-    ends = [int(places[0]) if len(places) else len(rows) for places in beyond]
-    return tuple(float(rows[end - 1]) if end else math.nan for end in ends)
+def agrees_until(rows: Array, error: Array) -> dict[str, float | None]:
+    """For each of `LEVELS` the last of (n,) times, s, or speeds, rad/s, before the error is larger; None where the
+    first is."""
+    until: dict[str, float | None] = {}
+    for level in LEVELS:
+        beyond = ~(error <= level)
+        end = int(np.argmax(beyond)) if beyond.any() else len(rows)
+        until[str(level)] = float(rows[end - 1]) if end else None
+    return until
 
 
 @dataclass(frozen=True)
@@ -56,10 +54,9 @@ class DataVerdict:
     source : name of the file.
     status, message : as of a run: "ok", or another one and why in a line.
     tolerance : rad, of an interval's defect.
-    rows, compared_until, horizon_s : rows compared, time of the last one (s), horizon of the scene (s).
+    rows, compared_until, horizon_s : rows compared, time of the last one (s), horizon of the scene (s); None of modes.
     defect_time, predicted : s, end of the interval of the largest defect; rad, the error up to the horizon that the
         defects add up to; None where they are not known.
-    energy_drift : largest change of the energy of the data, of its scale; None where it cannot be known.
     read, unused, notes : how columns were read; columns that were not; what else there is to know.
     likely : what the difference looks like, of what was tried; empty where nothing fits, or nothing was tried.
     axis : "time", or "speed" of a table of modes, whose `compared_until` is in rad/s.
@@ -73,10 +70,9 @@ class DataVerdict:
     channels: tuple[ChannelErrors, ...]
     rows: int
     compared_until: float
-    horizon_s: float
+    horizon_s: float | None = None
     defect_time: float | None = None
     predicted: float | None = None
-    energy_drift: float | None = None
     read: tuple[str, ...] = ()
     unused: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
@@ -88,24 +84,16 @@ class DataVerdict:
         return self.status == "ok"
 
 
+def as_dictionary(verdict: DataVerdict) -> dict[str, Any]:
+    """For JSON."""
+    return asdict(verdict) | {"agrees": verdict.agrees}
+
+
 def from_dictionary(stored: Mapping[str, Any]) -> DataVerdict:
     """The verdict of which `as_dictionary` made this, also where it has been JSON since."""
-    values = {item.name: stored[item.name] for item in fields(DataVerdict)}
-    values = {name: tuple(value) if isinstance(value, list) else value for name, value in values.items()}
-    values["horizon_s"] = math.nan if values["horizon_s"] is None else values["horizon_s"]
-    channels = [
-        channel
-        | {"agrees_until": tuple(math.nan if time is None else time for time in channel["agrees_until"].values())}
-        for channel in stored["channels"]
-    ]
-    return DataVerdict(**values | {"channels": tuple(ChannelErrors(**channel) for channel in channels)})
-
-
-def as_dictionary(verdict: DataVerdict) -> dict[str, object]:
-    """For JSON: NaN as None."""
-    values = asdict(verdict) | {"agrees": verdict.agrees}
-    values["horizon_s"] = None if math.isnan(verdict.horizon_s) else verdict.horizon_s
-    for channel in values["channels"]:
-        times = dict(zip(map(str, LEVELS), channel["agrees_until"], strict=True))
-        channel["agrees_until"] = {level: None if math.isnan(time) else time for level, time in times.items()}
-    return values
+    values: dict[str, Any] = {
+        name: tuple(value) if isinstance(value, list) else value for name, value in stored.items()
+    }
+    values["channels"] = tuple(ChannelErrors(**channel) for channel in values["channels"])
+    del values["agrees"]
+    return DataVerdict(**values)

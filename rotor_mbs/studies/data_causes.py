@@ -1,7 +1,7 @@
 """What data that do not agree look like: mistakes in their columns and times, then another model, parameters, faults.
 
 A mistake in the columns or times is looked for by the reference, at most carried on from one of its rows, and named
-where the data so corrected have no defects; with another model or parameter beside it where that explains the rest.
+where the data so corrected have no defects.
 """
 
 from __future__ import annotations
@@ -42,7 +42,6 @@ _LEAST_LAG = 1e-4  # of an interval between rows: less is rounding
 _LAG_ROW = 50  # by which a lag is found
 _LAG_ROUNDS = 8
 _SAME_START = 1e-3  # rad, rad/s: data that start farther off are no run of the scene as they are
-_TRIED = 3  # corrections of the columns that are tried with another model, those that leave the smallest defects
 
 
 def carried_errors(reference: Trajectory, growth: Array, units: Array) -> Array:
@@ -123,28 +122,23 @@ class CauseSearch:
         """The largest error per unit of growth that a mistake may leave."""
         return max(self.tolerance, min(_LEFT * self.worst, _MOST_LEFT))
 
-    def causes_of(self, data: ForeignData) -> DefectCauses | None:
-        """By the defects of data, corrected ones, say; None where they are not known."""
+    def is_right(self, data: ForeignData) -> bool:
+        """Whether corrected data have no defects, as far as any are known."""
         data = data.rows((data.time >= 0.0) & (data.time <= self.scene.duration * (1.0 + 1e-9)))
         inside = self.up_to_horizon(data)
         if len(data.time) < 2 or not len(inside.time):
-            return None
+            return True
         count = len(self.scene.initial_angles)
         states = np.tile([*self.scene.initial_angles, *self.scene.initial_rates], (len(data.time), 1))
         states[: len(inside.time)] = self.states_at(inside.time)
         reference = Trajectory(data.time, states[:, :count], states[:, count:])
         defects, _ = defects_of_data(self.scene, data, reference, len(inside.time))
-        return None if defects is None else DefectCauses(self.scene, defects, self.tolerance)
-
-    def is_right(self, data: ForeignData) -> bool:
-        """Whether corrected data have no defects, as far as any are known."""
-        causes = self.causes_of(data)
-        return causes is None or causes.largest <= self.fitting
+        return defects is None or DefectCauses(self.scene, defects, self.tolerance).largest <= self.fitting
 
 
 def likely_causes(search: CauseSearch, defects: DefectCauses | None) -> list[str]:
     """What fits, in words: mistakes in columns and times; else another model, parameters, or faults at a time; else
-    these and a mistake in the columns."""
+    scatter, or a factor of a channel."""
     first = search.up_to_horizon(search.data)
     is_elsewhere = True
     if len(first.time):
@@ -154,24 +148,30 @@ def likely_causes(search: CauseSearch, defects: DefectCauses | None) -> list[str
     if search.worst <= search.tolerance and not is_different and search.data.time[-1] <= 2.0 * search.scene.duration:
         return []
     for text, data in itertools.chain([("", search.data)], _times(search)):
-        inside = search.up_to_horizon(data)
-        if len(inside.time) < _FEWEST:
-            continue
-        for mistakes, corrected in _corrected(search, data, inside):
-            texts = [text, *mistakes] if text else mistakes
-            if texts and search.is_right(corrected):
-                return ["; and ".join([text, "; and ".join(mistakes)])] if text and mistakes else texts
+        if texts := _column_mistakes(search, text, data):
+            return texts
     found: list[str] = []
     if defects is not None and is_elsewhere:
         found = defects.scenes()
     elif defects is not None and is_different:
         found = defects.explanations() or defects.faults()
-    found = found or _scatter(search, first) or _factors(search)
-    if not found and (is_different or is_elsewhere):
-        found = _with_columns(search)
+    found = found or _scatter(search, first) or _column_mistakes(search, "", search.data, with_factor=True)
     if not found and is_different and defects is not None and is_elsewhere:
         found = defects.explanations() or defects.faults()
     return found
+
+
+def _column_mistakes(search: CauseSearch, text: str, data: ForeignData, *, with_factor: bool = False) -> list[str]:
+    """What is wrong with the columns of data whose times are corrected, which `text` says, beside it; [] where no
+    mistakes explain the data."""
+    inside = search.up_to_horizon(data)
+    if len(inside.time) < _FEWEST:
+        return []
+    for mistakes, corrected in _corrected(search, data, inside, with_factor):
+        texts = [text, *mistakes] if text else mistakes
+        if texts and search.is_right(corrected):
+            return ["; and ".join([text, "; and ".join(mistakes)])] if text and mistakes else texts
+    return []
 
 
 def _times(search: CauseSearch) -> Iterator[tuple[str, ForeignData]]:
@@ -211,9 +211,11 @@ def _lag(search: CauseSearch) -> float:
     return float(data.time[row]) - time
 
 
-def _corrected(search: CauseSearch, data: ForeignData, inside: ForeignData) -> Iterator[tuple[list[str], ForeignData]]:
+def _corrected(
+    search: CauseSearch, data: ForeignData, inside: ForeignData, with_factor: bool
+) -> Iterator[tuple[list[str], ForeignData]]:
     """What may be wrong with the columns of data whose times are right, and the data so corrected; inside: the rows up
-    to the horizon."""
+    to the horizon. with_factor: whether any factor of a channel may be wrong."""
     states, carried = search.states_at(inside.time), search.carried(inside.time)
     columns, values = data.columns, inside.values
     if float(np.abs((values - states[:, columns]) / carried[:, columns]).max()) <= search.fitting:
@@ -226,6 +228,8 @@ def _corrected(search: CauseSearch, data: ForeignData, inside: ForeignData) -> I
     for j, channel in enumerate(data.channels):
         expected, scale = states[:, channel.column], carried[:, channel.column]
         whole = list(_corrections(channel.kind, data.values[:, j], begin, float(expected[0])))
+        if with_factor and (factor := float(values[:, j] @ expected / (expected @ expected))):
+            whole.append((f"too large by a factor of {factor:.6g}", 1.0 / factor, data.values[:, j] / factor))
         left = [float(np.abs((v[begin : begin + len(values)] - expected) / scale).max()) for _, _, v in whole]
         least = max(min(left), 1e-3 * search.tolerance)
         if not least <= search.fitting:
@@ -245,27 +249,6 @@ def _corrected(search: CauseSearch, data: ForeignData, inside: ForeignData) -> I
     if errors[range(len(columns)), chosen].max() <= search.fitting and list(chosen) != columns:
         text, exchanged = _exchanged(search.scene, data, list(chosen))
         yield [text], exchanged
-
-
-def _factors(search: CauseSearch) -> list[str]:
-    """A factor of each channel, where that explains every channel."""
-    data = search.data
-    inside = search.up_to_horizon(data)
-    if len(inside.time) < _FEWEST:
-        return []
-    values, expected = inside.values, search.states_at(inside.time)[:, data.columns]
-    carried = search.carried(inside.time)[:, data.columns]
-    sizes = (expected**2).sum(axis=0)
-    factors = np.where(sizes > 0.0, (values * expected).sum(axis=0) / np.where(sizes > 0.0, sizes, 1.0), 1.0)
-    if not factors.all() or not float(np.abs((values / factors - expected) / carried).max()) <= search.fitting:
-        return []
-    wrong = [
-        f"{channel.name} by {factor:.6g}"
-        for channel, factor in zip(data.channels, factors, strict=True)
-        if abs(factor - 1.0) > search.tolerance
-    ]
-    corrected = replace(data, values=data.values / factors, rounding=data.rounding / np.abs(factors))
-    return [f"too large by a factor: {', '.join(wrong)}"] if wrong and search.is_right(corrected) else []
 
 
 def _corrections(kind: str, values: Array, begin: int, start: float) -> Iterator[tuple[str, float, Array]]:
@@ -311,46 +294,3 @@ def _scatter(search: CauseSearch, data: ForeignData) -> list[str]:
     if (common > 3.0 / math.sqrt(len(errors))).any() or (late > 2.0 * early).any() or (early > 2.0 * late).any():
         return []
     return [f"scatter from row to row, standard deviation {math.sqrt(float(sizes.max())):.1e}"]
-
-
-def _with_columns(search: CauseSearch) -> list[str]:
-    """Another model, or parameters, and a mistake in the columns beside it that the first row allows."""
-    corrected = [(text, search.causes_of(data)) for text, data in _columns_by_first_row(search)]
-    tried = [(causes, text) for text, causes in corrected if causes is not None and not causes.is_rounding]
-    for causes, text in sorted(tried, key=lambda item: item[0].typical)[:_TRIED]:
-        if found := [f"{cause}; and {text}" for cause in causes.explanations()]:
-            return found
-    return []
-
-
-def _columns_by_first_row(search: CauseSearch) -> Iterator[tuple[str, ForeignData]]:
-    data, count = search.data, len(search.scene.initial_angles)
-    start = search.states_at(np.maximum(data.time[:1], 0.0))[0]
-    expected = start[data.columns]
-
-    def starts_right(corrected: ForeignData) -> bool:
-        return bool(np.abs(corrected.values[0] - start[corrected.columns]).max() <= _SAME_START)
-
-    zero = np.where(np.abs(data.values[0] - expected) > _SAME_START, data.values[0] - expected, 0.0)
-    off = [(channel.name, z) for channel, z in zip(data.channels, zero.tolist(), strict=True) if z]
-    if off and all(channel.kind == "angle" for channel, z in zip(data.channels, zero, strict=True) if z):
-        texts = ", ".join(f"{name}: zero off by {z:.6g}" for name, z in off)
-        yield texts, replace(data, values=data.values - zero)
-    coordinates, rates = np.array(data.columns) % count, np.array(data.columns) >= count
-    for chosen in (coordinates == 0, coordinates > 0, coordinates >= 0, rates):  # rotor, pitches, all, rates
-        names = ", ".join(channel.name for channel, c in zip(data.channels, chosen, strict=True) if c)
-        degrees = "deg/s taken as rad/s" if chosen is rates else "degrees taken as rad"
-        for text, factor in (("sign reversed", -1.0), (degrees, _DEGREE)):
-            factors = np.where(chosen, factor, 1.0)
-            corrected = replace(data, values=data.values * factors, rounding=data.rounding * np.abs(factors))
-            if chosen.any() and starts_right(corrected):
-                yield f"{names}: {text}", corrected
-    blades = range(1, count)
-    orders = itertools.permutations(blades) if count <= 4 else [[*blades][::-1]]
-    for order in orders:
-        taken = [0, *order]
-        columns = [taken[c % count] + count * (c // count) for c in data.columns]
-        if columns != data.columns:
-            text, corrected = _exchanged(search.scene, data, columns)
-            if starts_right(corrected):
-                yield text, corrected

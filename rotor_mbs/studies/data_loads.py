@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import itertools
 from collections import Counter
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -124,8 +124,8 @@ def compare_loads(scene: Scene, loads: ForeignData, defects: Defects, tolerance:
         excess = np.maximum(error - FLOOR_SAFETY * rounding[:, j], 0.0) / size
         worst, floor, most = (float(x.max(initial=0.0)) for x in (excess, rounding[:, j] / size, error))
         until = agrees_until(time, error / size)
-        verdict = ChannelErrors(channel.name, channel.unit, most, most, worst, floor, until)
-        errors.append(replace(verdict, defect_unit="of the largest"))
+        unit = "of the largest"
+        errors.append(ChannelErrors(channel.name, channel.unit, most, most, worst, floor, until, unit))
         if not worst <= tolerance:
             wrong.append(j)
         if not worst <= max(tolerance, largest):

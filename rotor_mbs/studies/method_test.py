@@ -192,7 +192,7 @@ class _Examination:
                     return f"step of {step:g} s too large: half the step gives {left:.1e} rad, order {seen:.1f}"
         try:
             data = load_data({"time": run.time, "angles": run.angles, "rates": run.rates}, scene)
-            likely = compare_with_reference(data, scene, _STRICT).verdict.likely
+            likely = compare_with_reference(data, scene, _STRICT)[0].likely
         except RotorError:
             likely = ()
         return " or ".join(likely) or NOT_FOUND

@@ -138,7 +138,7 @@ def test_the_stored_comparison_has_data_reference_and_errors_in_si(tmp_path: Pat
     for engine in ("h5netcdf", "netcdf4"):
         with xarray.open_datatree(tmp_path / "c.h5", engine=engine) as tree:
             data = tree["comparison/paper/fig03/data/trajectory"].to_dataset()
-        np.testing.assert_array_equal(data.time, found.study.data.time)
+        np.testing.assert_array_equal(data.time, found.record.arrays["time"])
         np.testing.assert_allclose(data.pitch_1, run.angles[late, 1] + np.radians(1e-3), atol=1e-15)
         np.testing.assert_allclose(data.pitch_1_reference, run.reference.angles[late, 1], atol=1e-12)
         np.testing.assert_array_equal(data.pitch_1_error, data.pitch_1 - data.pitch_1_reference)
@@ -162,17 +162,13 @@ def test_a_test_of_another_project() -> None:
 
 
 @pytest.mark.full
-def test_a_row_far_beyond_the_horizon_is_judged_by_its_energy_alone() -> None:
-    """From 6 to 20 s in one interval errors grow over 1e5-fold, so that no angle there says anything; a rotor that is
-    slower by a tenth has lost energy."""
+def test_a_row_far_beyond_the_horizon_is_not_ok() -> None:
+    """From 6 to 20 s in one interval errors grow over 1e5-fold, so that no angle there says anything."""
     scene = rm.scene("paper/fig11").replace(duration=20.0, samples=201)
     run = rm.run(scene, "lagrange/dop853")
     rows = np.r_[0:61, 200]
-    for factor, status, message in ((1.0, "unchecked", "after the horizon"), (0.9, "inaccurate", "energy drift")):
-        rates = run.rates * np.where(run.time < 20.0, 1.0, factor)[:, None]
-        found = rm.compare({"time": run.time[rows], "angles": run.angles[rows], "rates": rates[rows]}, scene)
-        assert found.status == status
-        assert found.message.startswith(message)
+    found = rm.compare({"time": run.time[rows], "angles": run.angles[rows], "rates": run.rates[rows]}, scene)
+    assert (found.status, found.message[:17]) == ("unchecked", "after the horizon")
 
 
 @pytest.mark.full
@@ -190,7 +186,7 @@ def test_rows_that_are_far_apart_are_judged() -> None:
 def test_numbers_without_sense_are_inaccurate() -> None:
     run = rm.run(rm.scene("paper/fig03"), "lagrange/dop853")
     found = rm.compare({"time": run.time, "rotor": 1e300 * run.angles[:, 0]}, run.scene)
-    assert (found.status, found.likely) == ("inaccurate", ("too large by a factor: rotor by 1e+300",))
+    assert (found.status, found.likely) == ("inaccurate", ("rotor: too large by a factor of 1e+300",))
 
 
 def test_channels_may_be_missing_and_rates_alone_are_judged() -> None:
@@ -204,7 +200,7 @@ def test_channels_may_be_missing_and_rates_alone_are_judged() -> None:
     assert rm.compare({"t": run.time, "rotor_rate": run.rates[:, 0]}, run.scene, columns=without).agrees
     wrong = rm.compare({"t": run.time, "rotor_rate": 1.001 * run.rates[:, 0]}, run.scene, columns=without)
     assert wrong.message.startswith("rotor")
-    assert wrong.verdict.channels[0].scale == pytest.approx(1.001, abs=1e-9)
+    assert wrong.likely == ("rotor rate: too large by a factor of 1.001",)
 
 
 def test_data_without_a_likely_cause_are_told_where_they_start() -> None:
@@ -231,15 +227,3 @@ def test_numbers_of_few_digits_are_noticed(tmp_path: Path) -> None:
     assert "numbers of 4 digits: relative rounding error 5e-04" in found.verdict.notes
     heavier = run.scene.replace(gravity=9.0)
     assert not rm.compare(tmp_path / "low.out", heavier).agrees
-
-
-def test_lag_scale_and_offset_are_those_that_were_put_in() -> None:
-    """A smooth scene; the lag's own curvature error is of second order, 1e-6."""
-    scene = rm.scene("paper/fig03")
-    run = rm.run(replace(scene, samples=10001), "lagrange/dop853")
-    late = 0.25 + 0.999 * run.angles[10:-1:10, 0]  # 0.01 s late of the rows' times, from the second on
-    found = rm.compare({"t": run.time[10:-1:10] - 0.001, "rotor": late}, scene)
-    (channel,) = found.verdict.channels
-    assert channel.lag_s == pytest.approx(-0.001, rel=0.01)
-    assert channel.scale == pytest.approx(0.999, abs=1e-5)
-    assert channel.offset == pytest.approx(0.25, abs=1e-4)

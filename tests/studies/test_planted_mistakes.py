@@ -147,7 +147,7 @@ PLANTS = {
         "sign reversed", spoilt=lambda t, q, w: (t, q * [1, -1, -1, -1], w * [1, -1, -1, -1]),
     ),
     "another zero": Plant("rotor: zero off by 1.5708", spoilt=lambda t, q, w: (t, q + QUARTER, w)),
-    "a factor": Plant("too large by a factor: rotor by 1.001", spoilt=lambda t, q, w: (t, 1.001 * q, 1.001 * w)),
+    "a factor": Plant("too large by a factor of 1.001", spoilt=lambda t, q, w: (t, 1.001 * q, 1.001 * w)),
     "blade order": Plant("columns exchanged: pitch 1 is pitch 3", spoilt=columns(0, 3, 1, 2)),
     "phase": Plant("blades numbered in the opposite sense", mistakes=Mistakes(phases=(0.0, 2.0 * THIRD, THIRD))),
     "blade 2 a little off": Plant(
@@ -189,18 +189,6 @@ PLANTS = {
     "truncated": Plant("the data end at t = 1.49 s of 2 s", spoilt=lambda t, q, w: (t[:150], q[:150], w[:150])),
     "late": Plant("begin at t = 0.6 s", spoilt=lambda t, q, w: (t[60:], q[60:], w[60:])),
     "another scene": Plant("the scene paper/fig09", changed=lambda _: short("paper/fig09")),
-    "gravity, and another zero": Plant(
-        "gravity of 9.81 m/s^2; and rotor: zero off by 1.5708", changed=with_gravity(9.81),
-        spoilt=lambda t, q, w: (t, q + QUARTER, w),
-    ),
-    "gravity, and blade order": Plant(
-        "gravity of 9.81 m/s^2; and columns exchanged: pitch 1 is pitch 3", changed=with_gravity(9.81),
-        spoilt=columns(0, 3, 1, 2),
-    ),
-    "E1, and sign of pitch": Plant(
-        "erratum E1 of the paper's equations; and pitch 1, pitch 2, pitch 3, pitch 1 rate", mistakes=Mistakes(e1=True),
-        spoilt=lambda t, q, w: (t, q * [1, -1, -1, -1], w * [1, -1, -1, -1]),
-    ),
     "time in ms, and degrees": Plant(
         "time in ms taken as s; and rotor, pitch 1, pitch 2, pitch 3: degrees taken as rad",
         spoilt=lambda t, q, w: (1e3 * t, np.degrees(q), np.degrees(w)),

@@ -29,7 +29,7 @@ from rotor_mbs.runs.versions import machine, versions
 from rotor_mbs.scenario.catalogue import scene_of
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.trajectory import need_xarray
-from rotor_mbs.studies.compare_data import DataStudy, compare_with_reference
+from rotor_mbs.studies.compare_data import compare_with_reference
 from rotor_mbs.studies.data_modes import compare_modes
 
 
@@ -81,39 +81,36 @@ def compare(
     scene, timeout = scene_of(scene), checked_seconds(timeout)
     foreign = load_data(data, scene, columns)
     if foreign.is_modes:
-        study = compare_modes(foreign, scene, tolerance)
-    else:
-        study = compare_with_reference(foreign, scene, tolerance, timeout)
-    verdict = study.verdict
-    return DataComparison(study, verdict, verdict.status, verdict.message, verdict.agrees, verdict.likely)
+        return DataComparison(*compare_modes(foreign, scene, tolerance))
+    return DataComparison(*compare_with_reference(foreign, scene, tolerance, timeout))
 
 
-@dataclass(frozen=True)
+@dataclass(repr=False)
 class DataComparison:
     """Result of `rotor_mbs.compare`. Prints as a table.
 
     Attributes
     ----------
-    study : data and reference.
     verdict : errors and verdict, see `rotor_mbs.analysis.data_verdict.DataVerdict`.
+    record : data, reference, errors and defects, as `save` stores them.
     status, message, agrees : status, the reason if it is not "ok", and whether it is "ok".
     likely : probable causes of a difference.
     """
 
-    study: DataStudy
     verdict: DataVerdict
-    status: str
-    message: str
-    agrees: bool
-    likely: tuple[str, ...]
+    record: Record
+
+    def __post_init__(self) -> None:
+        self.status, self.message = self.verdict.status, self.verdict.message
+        self.agrees, self.likely = self.verdict.agrees, self.verdict.likely
 
     def table(self) -> TextTable:
-        """Table with a row per channel: errors (rad, rad/s), end of agreement (s), lag (s), scale, offset."""
+        """Table with a row per channel: errors (rad, rad/s), end of agreement (s)."""
         return channel_table(self.verdict)
 
     def plot(self) -> Panels:
         """Plot the defects of each coordinate over time and the tolerance; without defects, the errors."""
-        return defect_panels(self.study.record()) or error_panels(self.study.record())
+        return defect_panels(self.record) or error_panels(self.record)
 
     def to_xarray(self) -> Any:
         """Return data, reference, errors and defects as an xarray.Dataset over time.
@@ -121,7 +118,7 @@ class DataComparison:
         Variables by channel, with units: data `pitch_1`, then `pitch_1_reference`, `pitch_1_error`, and
         `pitch_1_defect` of the interval before each row (rad). Raises InputError if xarray is not installed.
         """
-        record = self.study.record()
+        record = self.record
         variables = {
             name: (column.dimensions, record.arrays[name], {"units": column.units, "long_name": column.long_name})
             for name, column in record.columns.items()
@@ -131,11 +128,11 @@ class DataComparison:
 
     def to_html(self, folder: str | os.PathLike[str]) -> Path:
         """Write the page into a folder. Returns its path."""
-        return write_page(folder, "comparison", comparison_page(self.study.record()), versions() | machine())
+        return write_page(folder, "comparison", comparison_page(self.record), versions() | machine())
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Save data, reference, errors and verdict as a results file. Raises StoreError if it cannot be written."""
-        write_records(Path(path), [self.study.record()])
+        write_records(Path(path), [self.record])
 
     def __repr__(self) -> str:
         """Says how columns were read, numbers by channel, and the verdict."""
@@ -144,12 +141,10 @@ class DataComparison:
         if verdict.unused:
             lines.append(f"  not used: {', '.join(verdict.unused[:12])}{', ...' * (len(verdict.unused) > 12)}")
         lines += ["", str(self.table()), ""]
-        if verdict.axis == "time":
+        if verdict.horizon_s is not None:
             lines.append(
                 f"compared up to {verdict.compared_until:g} s; errors up to the horizon at {verdict.horizon_s:g} s"
             )
-        if verdict.energy_drift is not None:
-            lines.append(f"energy drift / energy scale: {verdict.energy_drift:.1e}")
         lines += verdict.notes
         lines.append(f"{verdict.status}{': ' * bool(verdict.message)}{verdict.message}")
         lines += [f"probable cause: {cause}" for cause in verdict.likely]
@@ -173,7 +168,7 @@ def comparison_page(record: Record) -> dict[str, object]:
         ("Channels compared", ", ".join(channel.name for channel in verdict.channels)),
         ("Rows", f"{verdict.rows}, up to {with_unit(verdict.compared_until, _axis_unit(verdict), 4)}"),
     ]
-    if verdict.axis == "time":
+    if verdict.horizon_s is not None:
         facts.append(("Errors checked up to the horizon", with_unit(verdict.horizon_s, "s", 4)))
     units = dict.fromkeys(channel.defect_unit for channel in verdict.channels)
     allowed = " or ".join("rad in an interval" if unit == "rad" else unit for unit in units)
@@ -182,8 +177,6 @@ def comparison_page(record: Record) -> dict[str, object]:
         facts.append(("Columns not used", ", ".join(verdict.unused)))
     if verdict.message:
         facts.append(("Reason", verdict.message))
-    if verdict.energy_drift is not None:
-        facts.append(("Energy balance of the data", f"{number(verdict.energy_drift)} of the energy scale"))
     facts += [("Probable cause", cause) for cause in verdict.likely]
     facts += [("Note", note) for note in verdict.notes]
     table = channel_table(verdict)
@@ -206,11 +199,10 @@ def channel_table(verdict: DataVerdict) -> TextTable:
     rows = []
     for channel in verdict.channels:
         errors = (f"{channel.error_max:.1e} {channel.unit}", _defect(channel))
-        until = ("never" if np.isnan(x) else f"{x:.6g} {_axis_unit(verdict)}" for x in channel.agrees_until)
-        numbers = channel.lag_s, channel.scale and channel.scale - 1.0, channel.offset
-        fit = ("" if x is None else f"{x:.1e}" for x in numbers)
-        rows.append((channel.name, *errors, *until, *fit))
-    return TextTable((*head, "lag (s)", "scale - 1", "offset"), rows)
+        ends = channel.agrees_until.values()
+        until = ("never" if end is None else f"{end:.6g} {_axis_unit(verdict)}" for end in ends)
+        rows.append((channel.name, *errors, *until))
+    return TextTable(head, rows)
 
 
 def _axis_unit(verdict: DataVerdict) -> str:
