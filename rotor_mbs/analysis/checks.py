@@ -5,9 +5,8 @@ Every number is computed again from the stored samples; a stored metric or statu
 
 from __future__ import annotations
 
-import itertools
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import nullcontext
 from dataclasses import dataclass, replace
 from typing import NamedTuple
@@ -24,7 +23,7 @@ from rotor_mbs.methods.catalogue import REFERENCE, is_corrected, look_up, method
 from rotor_mbs.methods.solve import solve
 from rotor_mbs.runs.read import OpenResults, StoredRun, StoredScene
 from rotor_mbs.runs.table import reading
-from rotor_mbs.scenario.accuracy_bounds import Bounds, expected_settings
+from rotor_mbs.scenario.accuracy_bounds import Bounds
 from rotor_mbs.scenario.catalogue import find_scenes
 from rotor_mbs.scenario.scene import Scene, scene_hash
 from rotor_mbs.solution.defects import DRIFT_ROWS, FLOOR_SAFETY
@@ -38,10 +37,6 @@ _READ_OFF = 1e-3
 _MOST_INTERVALS = 12  # in which a peak of the printed equations' rate is looked for
 # |ln| of the ratio: the transition matrices of a run's intervals are good to 1e-5 each.
 _OWN_GROWTH = 0.05
-# Of a column's largest value: below it a column is a straight line, which methods of any kind may give exactly.
-_STRAIGHT = 1e-12
-# Few samples of a short motion may be rounded alike by two methods that are right: fig11 over 0.1 s, 6 samples.
-_FEWEST = 100
 
 
 class Where(NamedTuple):
@@ -105,7 +100,6 @@ def checks_of(results: OpenResults, frozen: Sequence[OpenResults], bounds: Bound
                         checks += _of_run(run, own, solution, faults, scene.reference_trajectory, motion_ends)
                 except StoreError as exc:
                     checks.append(_of(run, "complete", "all", math.nan, own, "faults", str(exc)))
-            checks += _of_copies(scene, own)
             checks += _of_reference(scene, shipped.get(scene.name) if own.scene else None, own)
         for claim in claims(results.scenes):  # the paper's numbers, in units of their last printed digit
             item, value = claim.published, claim.printed
@@ -127,47 +121,6 @@ def _is_shipped(scene: StoredScene) -> bool:
 
 def _of(run: StoredRun, name: str, channel: str, value: float, bounds: Bounds, unit: str, hint: str) -> Check:
     return make_check(bounds, name, Where(run.scene, run.method, channel), value, unit, hint)
-
-
-def _of_copies(scene: StoredScene, bounds: Bounds) -> list[Check]:
-    """One check for a scene with several runs; where there are copies, one for each pair."""
-    if len(scene.runs) < 2:
-        return []
-    try:
-        pairs = {(run, other): place for run, other, place in copies(scene)}
-    except StoreError:
-        return []  # the run that cannot be read has failed already
-    if not pairs:
-        where = Where(scene.name, "*", "all")
-        return [make_check(bounds, "copied", where, 0.0, "columns", "no two runs are bitwise identical")]
-    hint = "{} is bitwise equal to that of {}: data stored or read under the name of another method"
-    return [
-        _of(run, "copied", place, 1.0, bounds, "columns", hint.format(place, other))
-        for (run, other), place in pairs.items()
-    ]
-
-
-def copies(scene: StoredScene) -> Iterator[tuple[StoredRun, str, str]]:
-    """(run, other method, array and column) of every column that two runs of a scene have bit for bit.
-
-    Methods round differently, so that equal bits are a copy. Columns that are zero, constant or a straight line do not
-    count, nor short ones; nor two runs by MATLAB's ode45, whose steps are the same where an erratum has no effect.
-    """
-    columns: dict[str, dict[tuple[str, int], bytes]] = {}
-    for method, run in scene.runs.items():
-        columns[method] = {}
-        for name in ("angles", "rates"):
-            values = run.array(name) if name in run else np.empty((0, 0))
-            if values.ndim == 2 and values.dtype.kind == "f" and len(values) >= _FEWEST:
-                for i, column in enumerate(values.T):
-                    if np.abs(np.diff(column, 2)).max() > _STRAIGHT * np.abs(column).max():
-                        columns[method][name, i] = column.tobytes()
-    for first, second in itertools.combinations(scene.runs, 2):
-        if first.endswith("/ode45") and second.endswith("/ode45"):
-            continue
-        for place in sorted(columns[first].keys() & columns[second].keys()):
-            if columns[first][place] == columns[second][place]:
-                yield scene.runs[second], first, f"{place[0]} {place[1]}"
 
 
 def _of_run(
@@ -201,8 +154,6 @@ def _of_run(
     faults = settings_faults(run)
     hint = "; ".join(faults) or "the method's, each within its range"
     yield _of(run, "settings", "settings", float(len(faults)), bounds, "faults", hint)
-    if (steps := steps_off(scene, run, bounds.scene)) is not None:
-        yield _of(run, "steps", "steps", steps[0], bounds, "relative", steps[1])
     if len(solution.trajectory.time):
         yield from _of_samples(run, bounds, scene, solution.trajectory)
         if is_corrected(run.method):
@@ -301,31 +252,6 @@ def settings_faults(run: StoredRun) -> list[str]:
     except InputError as exc:
         faults += exc.problems
     return faults
-
-
-def steps_off(scene: Scene, run: StoredRun, name: str) -> tuple[float, str] | None:
-    """(relative, text) how far the number of steps is from what settings and duration make it; None where not known.
-
-    A fixed step is shortened to fit the interval between samples. Of an adaptive method the number is known where the
-    scene's is on file, for the settings on file; `name` is that of the shipped scene, "" for any other.
-    """
-    method, steps = look_up(run.method), run.attributes.get("steps")
-    if method is None or steps is None or len(run.array("time")) < scene.samples:
-        return None
-    if method.fixed_step and "step" in run.settings:
-        interval = scene.duration / (scene.samples - 1)
-        expected = (scene.samples - 1) * math.ceil(interval / float(run.settings["step"]) - 1e-9)
-    else:
-        known = expected_settings().get(run.method)
-        if known is None or name not in known["steps"] or not same_settings(run.settings, known["settings"]):
-            return None
-        expected = known["steps"][name]
-    return abs(float(steps) / expected - 1.0), f"{steps} steps, {expected} expected from settings and duration"
-
-
-def same_settings(settings: Mapping[str, object], expected: Mapping[str, object]) -> bool:
-    """Compare settings; one that is not there is None, which TOML has no word for."""
-    return all(settings.get(name) == expected.get(name) for name in {**settings, **expected})
 
 
 def _of_samples(run: StoredRun, bounds: Bounds, scene: Scene, trajectory: Trajectory) -> Iterator[Check]:

@@ -289,10 +289,8 @@ def _parser() -> tuple[_Parser, dict[str, _Parser]]:
     )
     text = "fail if a scene of FILE has no run with this method; may be repeated"
     own.add_argument("--require", action="append", metavar="METHOD", help=text)
-    text = "also fail if, compared with this earlier file, a margin has shrunk or a run is missing"
+    text = "also fail if, compared with this earlier file, a margin has shrunk more than tenfold or a run is missing"
     own.add_argument("--against", type=Path, metavar="OLD", help=text)
-    text = "with --against: factor by which a margin may shrink (default: %(default)g)"
-    own.add_argument("--shrink", type=POSITIVE, default=10.0, metavar="FACTOR", help=text)
     own.add_argument("--junit", type=file, metavar="XML", help="write the verdicts as JUnit XML")
     own.add_argument("--json", type=file, metavar="FILE", help="write the verdicts as JSON; - for standard output")
     own.flag("--github", help="write the ten worst failures as annotations and a table as job summary")

@@ -229,7 +229,7 @@ def check(arguments: argparse.Namespace) -> int:
         with ProgressLine() as progress:
             verdicts = study.check_default_set(bounds, arguments.jobs, progress, arguments.method)
     if verdicts and earlier is not None:
-        verdicts += study.regressions(verdicts, earlier, arguments.shrink)
+        verdicts += study.regressions(verdicts, earlier)
 
     _write_verdicts(arguments, verdicts)
     stream = sys.stderr if arguments.json == Path("-") else sys.stdout  # standard output is the JSON's alone

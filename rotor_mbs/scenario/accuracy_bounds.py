@@ -8,7 +8,6 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from fnmatch import fnmatchcase
 from pathlib import Path
-from typing import Any
 
 from rotor_mbs.errors import InputError
 from rotor_mbs.scenario import keys
@@ -18,8 +17,8 @@ from rotor_mbs.scenario.toml_file import read_toml
 
 CHECKS = (
     "complete", "status", "metrics", "times", "start", "defect", "defect median", "error", "tip", "energies", "energy",
-    "impulse", "loads", "gap", "exact", "published", "reference", "growth", "integrity", "copied", "settings", "steps",
-    "uncertainty", "frozen",
+    "impulse", "loads", "gap", "exact", "published", "reference", "growth", "integrity", "settings", "uncertainty",
+    "frozen",
 )  # fmt: skip
 
 
@@ -84,12 +83,6 @@ class Bounds:
     def with_entries(self, entries: Iterable[Bound]) -> Bounds:
         """Bounds that try `entries` first, then these."""
         return replace(self, entries=[*entries, *self.entries])
-
-
-@functools.cache
-def expected_settings() -> dict[str, dict[str, Any]]:
-    """By method, `settings` and `steps` by scene, of reference/settings.toml. Raises InputError where it is no TOML."""
-    return read_toml(reference_folder() / "settings.toml").tables
 
 
 @functools.cache

@@ -19,9 +19,8 @@ from rotor_mbs.runs.runner import OnProgress, ignore_progress
 from rotor_mbs.runs.sweeps import StoredSweep
 from rotor_mbs.scenario.accuracy_bounds import Bounds
 from rotor_mbs.scenario.catalogue import find_scenes
-from rotor_mbs.studies.reference import changed_arrays
 from rotor_mbs.studies.run import run_scenes
-from rotor_mbs.studies.stored_references import shipped_files, shipped_reference
+from rotor_mbs.studies.stored_references import shipped_reference
 
 # The chain takes as long as all else together; four scenes of the paper cover what it can show.
 _CHAIN, _CHAIN_SCENES = "exudyn_chain/extrapolated", ("paper/fig03", "paper/fig04b", "paper/fig08", "paper/fig11")
@@ -29,6 +28,7 @@ _TIMEOUT_S = 60.0
 _OF_EVERY_RUN = "status"  # the name of a check that each run has one of
 # A value below a few units in the last place of a double is rounding: its change says nothing.
 _ROUNDING = 2.0**-50
+_SHRINK = 10.0  # times by which a margin may be smaller than in an earlier file
 
 
 def check_file(path: Path, bounds: Bounds, required: Sequence[str] = ()) -> list[Check]:
@@ -49,7 +49,7 @@ def check_file(path: Path, bounds: Bounds, required: Sequence[str] = ()) -> list
 def check_default_set(
     bounds: Bounds, workers: int, on_progress: OnProgress = ignore_progress, methods: Sequence[str] = ()
 ) -> list[Check]:
-    """Compute the default set, check it, and the frozen references that it is judged by.
+    """Compute the default set, and check it.
 
     It is every scene of the paper by the fast models, the chain on some; the scenes made for checking by every method;
     or all by the `methods` that are named, where they can represent them.
@@ -64,13 +64,11 @@ def check_default_set(
             asked[scene.name] = corrected
         else:
             asked[scene.name] = [name for name in default_methods() if name != _CHAIN or scene.name in _CHAIN_SCENES]
-    checks = judge_frozen(bounds)
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "check.h5"
         report = run_scenes([*paper, *own], asked, path, workers=workers, timeout_s=_TIMEOUT_S, on_progress=on_progress)
-        checks += [_required(run.label.partition(" ")[0], run.method, run.message) for run in report.not_computed]
-        checks += judge_file(path, bounds)
-    return checks
+        checks = [_required(run.label.partition(" ")[0], run.method, run.message) for run in report.not_computed]
+        return checks + judge_file(path, bounds)
 
 
 def _required(scene: str, method: str, hint: str, *, is_missing: bool = True) -> Check:
@@ -97,12 +95,9 @@ def judge_file(path: Path, bounds: Bounds) -> list[Check]:
                 stack.enter_context(open_results(file, only=[known.scene for known in frozen if known is not None]))
                 for file in {known.path for known in frozen if known is not None}
             ]
-            checks = checks_of(results, shipped, bounds)
+            return checks_of(results, shipped, bounds)
     except (RuntimeError, OSError) as exc:  # what HDF5 finds wrong, at whatever place
         raise StoreError(f"{path}: damaged or incomplete ({' '.join(str(exc).split())[:150]})") from exc
-    if path.resolve() in shipped_files():  # their digests stand beside them
-        checks = [check for check in checks if check.name != "integrity"] + judge_frozen(bounds, [path])
-    return checks
 
 
 def judged_runs(checks: Iterable[Check]) -> Counter[str]:
@@ -112,28 +107,10 @@ def judged_runs(checks: Iterable[Check]) -> Counter[str]:
     )
 
 
-def judge_frozen(bounds: Bounds, paths: Sequence[Path] = ()) -> list[Check]:
-    """Compare the shipped references, or those of `paths`, with the digests beside their files: a check per scene."""
-    checks = []
-    for path in paths or shipped_files():
-        with open_results(path) as results:
-            try:
-                scenes = changed_arrays(results)
-            except StoreError as exc:
-                where = Where(path.stem, REFERENCE, "all")
-                checks.append(make_check(bounds, "frozen", where, math.nan, "arrays", str(exc)))
-                continue
-        for scene, names in scenes.items():
-            hint = f"{path.name}: {', '.join(names)} not as frozen" if names else "as frozen"
-            where = Where(scene, REFERENCE, ", ".join(names) or "all")
-            checks.append(make_check(bounds, "frozen", where, len(names), "arrays", hint))
-    return checks
+def regressions(new: Sequence[Check], old: Sequence[Check]) -> list[Check]:
+    """Compare margins: a check "against" for every earlier one, how many times its margin has shrunk, which may be ten.
 
-
-def regressions(new: Sequence[Check], old: Sequence[Check], factor: float) -> list[Check]:
-    """Compare margins: a check "against" for every earlier one, how many times its margin has shrunk.
-
-    The allowed `factor` is at least 1. A check for every one of `old`, and one for a run that is gone. The value is
+    A check for every one of `old`, and one for a run that is gone. The value is
     NaN, which fails, where `new` lacks the check or the run, and infinite where a check that passed fails. What failed
     before and fails now is no regression.
     """
@@ -155,9 +132,9 @@ def regressions(new: Sequence[Check], old: Sequence[Check], factor: float) -> li
             elif now.passed:
                 value = 0.0
             hint = (
-                f"margin shrank {value:,.0f}-fold (limit {factor:g}): {check.value:.2e} before, {now.value:.2e} now, "
+                f"margin shrank {value:,.0f}-fold (limit {_SHRINK:g}): {check.value:.2e} before, {now.value:.2e} now, "
                 f"bound {now.bound:.2e} {now.unit}; {now.hint}"
             )
         where = check.where._replace(channel=f"{check.name}: {check.where.channel}")
-        changes.append(Check("against", where, value, factor, hint, "fold"))
+        changes.append(Check("against", where, value, _SHRINK, hint, "fold"))
     return changes

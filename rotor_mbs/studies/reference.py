@@ -1,7 +1,4 @@
-"""References in quad precision, recomputed and stored as they are frozen: without what follows from them.
-
-The digests of their arrays stand in a text file beside each file of references: a changed number is found and located.
-"""
+"""References in quad precision, recomputed and stored as they are frozen: without what follows from them."""
 
 from __future__ import annotations
 
@@ -9,13 +6,13 @@ from collections.abc import Sequence
 from datetime import UTC, datetime
 from pathlib import Path
 
-from rotor_mbs.errors import InputError, StoreError
+from rotor_mbs.errors import InputError
 from rotor_mbs.methods.catalogue import REFERENCE
 from rotor_mbs.runs.design import FROZEN, Asked
-from rotor_mbs.runs.output_files import locked, replace_file
+from rotor_mbs.runs.output_files import locked
 from rotor_mbs.runs.read import OpenResults, open_results
 from rotor_mbs.runs.runner import OnProgress, ignore_progress
-from rotor_mbs.runs.table import array_digest, extend_file, runs_table, scene_table
+from rotor_mbs.runs.table import extend_file, runs_table, scene_table
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.studies.run import RunReport, run_scenes
 
@@ -30,7 +27,7 @@ def compute_references(
     timeout_s: float,
     on_progress: OnProgress = ignore_progress,
 ) -> RunReport:
-    """The reference of every scene into the file `output`, which is replaced as a whole, and its digests beside it.
+    """The reference of every scene into the file `output`, which is replaced as a whole.
 
     Raises InputError where `output` has something else, StoreError where it cannot be read or written.
     """
@@ -49,7 +46,7 @@ def compute_references(
 
 
 def _freeze(scenes: Sequence[Scene], results: OpenResults, target: Path) -> None:
-    """The arrays of every reference that are `FROZEN` into the file `target`, and the digests beside it."""
+    """The arrays of every reference that are `FROZEN` into the file `target`."""
     target.unlink(missing_ok=True)
     versions = {"frozen_with": f"heyoka {results.attributes['heyoka']}, {datetime.now(UTC).date().isoformat()}"}
     references = []
@@ -65,36 +62,6 @@ def _freeze(scenes: Sequence[Scene], results: OpenResults, target: Path) -> None
         values |= {name: run.attributes[name] for name in _FACTS}
         values |= {name: run.array(name) for name in FROZEN if name in run}
         place.write(place.rows_of(values))
-    with open_results(target) as frozen:
-        lines = [f"{digest}  {scene} {name}\n" for (scene, name), digest in _digests(frozen).items()]
-    replace_file(target.with_suffix(".sha256"), "".join(lines).encode(), rb"\A[0-9a-f]{64}  \S+ \w+\n")
-
-
-def changed_arrays(results: OpenResults) -> dict[str, list[str]]:
-    """By scene, the arrays of its reference that are not what was frozen, are new or are gone; [] where all is well.
-
-    Raises StoreError where there is no digest file.
-    """
-    path = results.path.with_suffix(".sha256")
-    try:
-        rows = [line.split() for line in path.read_text().splitlines()]
-    except (OSError, UnicodeDecodeError) as exc:
-        raise StoreError(f"{path}: cannot be read ({exc}); `rotor-mbs reference` writes it") from exc
-    frozen = {(row[1], row[2]): row[0] for row in rows if len(row) == 3}
-    present = _digests(results)
-    scenes: dict[str, list[str]] = {}
-    for scene, name in {**present, **frozen}:
-        changed = scenes.setdefault(scene, [])
-        if frozen.get((scene, name)) != present.get((scene, name)):
-            changed.append(name)
-    return scenes
-
-
-def _digests(results: OpenResults) -> dict[tuple[str, str], str]:
-    references = [scene.reference for scene in results.scenes.values()]
-    return {
-        (run.scene, name): array_digest(run.array(name)) for run in references if run is not None for name in run.names
-    }
 
 
 def _refuse_other_contents(path: Path, wanted: set[str]) -> None:

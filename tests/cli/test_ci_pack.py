@@ -48,7 +48,6 @@ def test_a_loosened_run_that_passes_its_bounds_is_found(earlier: Path, loosened:
     compared = rotor_mbs("check", loosened, "--against", earlier)
     assert compared.status == 1
     assert f"FAIL against: {SCENE} {METHOD} energy: balance" in compared.out
-    assert rotor_mbs("check", loosened, "--against", earlier, "--shrink", "1e9").status == 0
 
 
 def test_a_run_that_is_gone_is_found(earlier: Path, folder: Path) -> None:
@@ -73,9 +72,9 @@ def test_a_run_that_is_gone_is_found(earlier: Path, folder: Path) -> None:
         (0.5, float("nan"), False),
     ],
 )
-def test_a_margin_may_shrink_by_the_factor(before: float, now: float, passes: bool, earlier: Path) -> None:
+def test_a_margin_may_shrink_tenfold(before: float, now: float, passes: bool, earlier: Path) -> None:
     verdict = replace(judge_file(earlier, load_bounds())[0], bound=1.0)
-    (compared,) = regressions([replace(verdict, value=now)], [replace(verdict, value=before)], 10.0)
+    (compared,) = regressions([replace(verdict, value=now)], [replace(verdict, value=before)])
     assert compared.passed == passes
 
 

@@ -51,7 +51,6 @@ EXPLAINED = {
         "decides how long a run takes, not what comes out"
     ),
     r"checks\._of_reference .* 0 -> 1": "compared by its length: no shipped reference has a single sample",
-    r"checks\.copies .*0 -> 1": "one row is as much too short as none",
     r"checks\._of_samples .* 1 -> 2": "one zero or two: the largest is zero",
     r"adapter\.linear_solver .*scaled|adapter\._SPARSE_FROM ": "sizes near the bound take as long by either solver",
     r"adapter\.linearized .*0 -> 1": "a column of zeros among the joints' directions hinders no motion",
@@ -83,7 +82,6 @@ EXPLAINED = {
     r"adapter\.(linearized|initial_values) .*(1\.0 -> |0\.01 \* 0\.5|3 -> 4)": (
         "the size of a difference quotient's step, and how many are extrapolated: any near it does as well"
     ),
-    r"checks\.steps_off .*1e-09 scaled": "keeps rounding from adding a step: any size near it does",
     r"schemes\.trial_steps .*-> 2": "the least of a range: one trial step ends as soon as two",
     r"schemes\.scheme .*(1e-14|5\.0) -> ": "the smallest step, and how fast steps grow: no motion here comes near",
     r"adapter\._solve .*(rejected|newtonSteps).* scaled": "evaluations of rejected steps are not judged",
