@@ -238,10 +238,9 @@ def test_the_shipped_references_are_bit_for_bit_those_that_were_frozen(own_refer
         row["angles"][900, 2] = np.nextafter(row["angles"][900, 2], np.inf)
 
     change_row(own_references / "paper.h5", "paper/fig12/reference", touch)
-    lines = zip(
-        digests(own_references / "paper.h5").split("\n"), (own_references / "paper.sha256").open(), strict=False
-    )
-    assert [now.split()[1:] for now, frozen in lines if now != frozen.strip()] == [["paper/fig12", "angles"]]
+    path = own_references / "paper.sha256"
+    now, frozen = digests(own_references / "paper.h5").splitlines(), path.read_text().splitlines()
+    assert [new.split()[1:] for new, old in zip(now, frozen, strict=True) if new != old] == [["paper/fig12", "angles"]]
 
 
 # Bounds
