@@ -109,6 +109,18 @@ def fitted_order(steps: Array, errors: Array) -> float | None:
     return float(np.polyfit(np.log(h), np.log(e), 1)[0]) if len(e) >= 2 else None
 
 
+def step_for(target: float, steps: Array, errors: Array) -> float | None:
+    """s: where the error crosses `target` for good, by a straight line in logarithms; None where it does not."""
+    below = errors <= target
+    if not below.any() or not below[-1]:
+        return None
+    last = len(errors) - 1 - int(np.argmin(below[::-1])) if not below.all() else -1
+    if last < 0 or not np.isfinite(errors[last]) or errors[last + 1] == 0.0:
+        return float(steps[last + 1])
+    slope = np.log(errors[last] / errors[last + 1]) / np.log(steps[last] / steps[last + 1])
+    return float(steps[last + 1] * (target / errors[last + 1]) ** (1.0 / slope))
+
+
 def own_points(scene: StoredScene) -> list[Record]:
     """The scene's runs of corrected models that reached the end, each as a curve of one point."""
     curves = []

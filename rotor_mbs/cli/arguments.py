@@ -18,7 +18,7 @@ from rotor_mbs.runs import MAX_WORKERS, cores
 REPRODUCED = Path("rotor-mbs-out")  # where `reproduce` writes
 EXPORT_FORMATS = ("mjcf", "exudyn", "csv")
 
-_MAX_SPEED = 1e25  # rad/s or N m/rad, as of numbers in a scene
+_MAX_SPEED = 1e25  # rad/s, as of numbers in a scene
 _MAX_SPAN = 10_000  # numbers of FROM:TO:COUNT
 _MAX_NUMBER = 1e9  # of a count; of seconds: thirty years
 

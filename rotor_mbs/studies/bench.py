@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 
 from rotor_mbs.analysis.judgement import judge
-from rotor_mbs.analysis.work_precision import fitted_order, succeeded
+from rotor_mbs.analysis.work_precision import fitted_order, step_for, succeeded
 from rotor_mbs.analysis.work_precision import points as points_of
 from rotor_mbs.errors import OF_THE_MACHINE, InputError, RotorError, one_line
 from rotor_mbs.methods import catalogue
@@ -29,14 +29,14 @@ from rotor_mbs.runs import last_core
 from rotor_mbs.runs.output_files import locked
 from rotor_mbs.runs.pool import WorkerPool, run_in
 from rotor_mbs.runs.read import Record, points_table
-from rotor_mbs.runs.runner import OnProgress, Outcome, ignore_progress
+from rotor_mbs.runs.runner import OnProgress, Outcome, Task, ignore_progress
 from rotor_mbs.runs.table import Place, Rows, Table, TableFile, extend_file
 from rotor_mbs.runs.versions import row_versions
 from rotor_mbs.scenario.scene import Scene, scene_hash
 from rotor_mbs.solution.metrics import horizon, horizon_samples
-from rotor_mbs.solution.status import COMPLETE
+from rotor_mbs.solution.status import COMPLETE, code_of
 from rotor_mbs.solution.trajectory import Solution, Trajectory
-from rotor_mbs.studies.run import run_scenes
+from rotor_mbs.studies.run import run_scenes, work_of
 from rotor_mbs.studies.stored_references import read_reference
 
 BENCH = "bench"
@@ -78,12 +78,16 @@ class Curve:
     ----------
     name : the method's, with its fixed settings where they are not the default ones.
     kind : STEP or TOLERANCE.
+    table : of its rows.
+    target : rad; the step that makes this error is looked for; 0 where none is.
     """
 
     scene: Scene
     name: str
     kind: str
     points: Sequence[Point]
+    table: str = BENCH
+    target: float = 0.0
 
     @property
     def method(self) -> str:
@@ -91,16 +95,19 @@ class Curve:
 
     @property
     def label(self) -> str:
-        return f"{self.scene.name} {self.name} bench"
+        return f"{self.scene.name} {self.name} {self.table}"
 
     @property
     def key(self) -> tuple[str, str, str]:
         """By which its rows are found: table, scene, curve."""
-        return BENCH, self.scene.name, self.name
+        return self.table, self.scene.name, self.name
 
-    def place(self, file: TableFile) -> Place:
-        """Where its first row is."""
-        return file.place(str(self.points[0].known["run"]), BENCH)
+    def places(self, file: TableFile) -> list[Place]:
+        """Where its rows are."""
+        return [file.place(str(point.known["run"]), self.table) for point in self.points]
+
+    def is_stored(self, file: TableFile) -> bool:
+        return all(place.is_stored for place in self.places(file))
 
 
 def curve_of(scene: Scene, ladder: Ladder, options: Mapping[str, object]) -> Curve:
@@ -114,12 +121,9 @@ def curve_of(scene: Scene, ladder: Ladder, options: Mapping[str, object]) -> Cur
         "lines": sum(len(text.splitlines()) for text in method.sources if isinstance(text, str)),
     }
     of_all: dict[str, object] = {
-        "scene": scene.name,
-        "method_name": method.name,
+        **known_of(scene, method.name),
         "curve": ladder.curve,
         "setting_kind": ladder.kind,
-        "versions": json.dumps(row_versions(method), sort_keys=True),
-        "scene_hash": scene_hash(scene),
         "options": json.dumps(facts, sort_keys=True),
         "order_expected": math.nan if ladder.order is None else ladder.order,
     }
@@ -133,13 +137,23 @@ def curve_of(scene: Scene, ladder: Ladder, options: Mapping[str, object]) -> Cur
     return Curve(scene, ladder.curve, ladder.kind, points)
 
 
+def known_of(scene: Scene, method: str) -> dict[str, object]:
+    """What is known of every point of a method on a scene."""
+    return {
+        "scene": scene.name,
+        "method_name": method,
+        "versions": json.dumps(row_versions(catalogue.find_method(method)), sort_keys=True),
+        "scene_hash": scene_hash(scene),
+    }
+
+
 class PointTimer:
     """Builds a point, runs it as often as asked, and judges the last run.
 
     Attributes
     ----------
     warm_s : s, of the warm-up run; of a point that failed until then.
-    is_repeatable : whether the warm-up run came back.
+    is_repeatable, is_stopped : whether the warm-up run came back; whether it was ended at its limit.
     times : s, of the timed runs.
     left_out : why it was not run.
     """
@@ -156,7 +170,7 @@ class PointTimer:
         self._warm_up_limit_s, self._clock = warm_up_limit_s, clock
         self._setup: dict[str, float] = {}
         self._failure = "", ""  # status and message
-        self.warm_s, self.is_repeatable, self.left_out = math.nan, False, ""
+        self.warm_s, self.is_repeatable, self.is_stopped, self.left_out = math.nan, False, False, ""
         self.times: list[float] = []
 
     def warm_up(self) -> None:
@@ -181,7 +195,7 @@ class PointTimer:
         except OF_THE_MACHINE:
             raise
         except OutOfTimeError as exc:
-            self._failure = "timed_out", str(exc)
+            self._failure, self.is_stopped = ("timed_out", str(exc)), True
         except Exception as exc:
             self._failure = "solver_failed", str(exc) if isinstance(exc, RotorError) else one_line(exc)
         if not self.is_repeatable:
@@ -356,14 +370,69 @@ def thinned(scene: Scene) -> tuple[Scene, int]:
 # Curves in a results file
 
 
-def bench_table(curves: Sequence[Curve]) -> Table:
-    """The table of the points of these curves."""
-    return points_table(BENCH, [point.known for curve in curves for point in curve.points])
+def curve_tables(curves: Sequence[Curve]) -> list[Table]:
+    """The table of the points of these curves, which are all of one; [] of none."""
+    return [points_table(curves[0].table, [p.known for curve in curves for p in curve.points])] if curves else []
 
 
-def is_measured(file: TableFile, curve: Curve) -> bool:
-    """Whether every point of the curve is stored."""
-    return all(file.place(str(point.known["run"]), BENCH).is_stored for point in curve.points)
+@dataclass(frozen=True, kw_only=True)
+class CurveTask(Task):
+    """A curve on its way to a worker process, each of its points run once.
+
+    longest_s : a run over this is the last: the next one takes several times as long. So is one whose error is a tenth
+        of the curve's target.
+    limit_s : a run over this is ended.
+    """
+
+    curve: Curve
+    longest_s: float
+    limit_s: float
+
+    def perform(self) -> Rows:
+        """Run and judge the points of one curve; their rows."""
+        curve, facts = self.curve, dict[str, Any]()
+        scene, reference = curve.scene, None
+        if curve.table == BENCH:
+            assert self.reference is not None  # every curve of a bench has one
+            scene, reference = prepared(scene, self.reference)
+            facts = facts_of(scene, reference)
+        elif self.reference is not None:
+            reference = read_reference(self.reference, scene)
+        reason, points = "", []
+        for point in curve.points:
+            timer = PointTimer(point, scene, reference, self.limit_s)
+            if reason:
+                timer.left_out = reason
+            else:
+                timer.warm_up()
+            if timer.is_repeatable:
+                timer.times.append(timer.warm_s)
+            points.append(timer.row())
+            if points[-1]["status"] == "ok" and points[-1]["angle_error_max"] < 0.1 * curve.target:
+                reason = "not run: the setting before is accurate"
+            elif (timer.is_repeatable or timer.is_stopped) and timer.warm_s > self.longest_s:
+                reason = f"not run: the setting before took {timer.warm_s:.2g} s"
+        return rows_of_curve(self.place, curve, points, facts)
+
+
+def curve_tasks(
+    file: TableFile, curves: Sequence[Curve], kill_after_s: float, longest_s: float, limit_s: float = math.inf
+) -> list[CurveTask]:
+    """kill_after_s : of a whole curve."""
+    return [
+        CurveTask(
+            label=curve.label,
+            method=curve.method,
+            place=curve.places(file)[0],
+            reference=file.place(f"{curve.scene.name}/{catalogue.REFERENCE}"),
+            kill_after_s=kill_after_s,
+            work=work_of(curve.scene, curve.method),
+            curve=curve,
+            longest_s=longest_s,
+            limit_s=limit_s,
+        )
+        for curve in curves
+    ]
 
 
 def run_bench(
@@ -419,8 +488,8 @@ def run_bench(
             able, refused = catalogue.able_methods(scene, dict.fromkeys(ladder.method for ladder in chosen))
             curves += [curve_of(scene, ladder, options) for ladder in chosen if ladder.method in able]
             left_out += refused
-        file = extend_file(output, [bench_table(curves)], [curve.key for curve in curves])
-        missing = [curve for curve in curves if curve.scene.name in changed or not is_measured(file, curve)]
+        file = extend_file(output, curve_tables(curves), [curve.key for curve in curves])
+        missing = [curve for curve in curves if curve.scene.name in changed or not curve.is_stored(file)]
         made: list[Outcome] = []
         for scene in scenes:
             own = [curve for curve in missing if curve.scene.name == scene.name]
@@ -467,7 +536,7 @@ def _measure_scene(
                 if end.value is None:
                     yield Outcome(curve.label, curve.method, end.failure, end.message, is_stored=False)
                     continue
-                place, rows = curve.place(file), end.value[i]
+                place, rows = curve.places(file)[0], end.value[i]
                 place.write(rows_of_curve(place, curve, rows, facts))
                 statuses = [row["status"] for row in rows]
                 ok, inaccurate, left_out = (statuses.count(status) for status in ("ok", "inaccurate", "left_out"))
@@ -477,12 +546,20 @@ def _measure_scene(
 
 
 def rows_of_curve(place: Place, curve: Curve, points: Sequence[Mapping[str, Any]], facts: Mapping[str, object]) -> Rows:
-    """The rows of a curve, with its order of convergence. facts: columns that all its points have in common."""
+    """The rows of a curve, with its order of convergence, or the step for its target.
+
+    facts: columns that all its points have in common.
+    """
     facts = {**facts, "repeatable": int(all(point.get("same", True) for point in points))}
     each = [place.rows_of({**point, **facts, "left_out": int(point["status"] == "left_out")}) for point in points]
     rows = {name: np.concatenate([row[name] for row in each]) for name in each[0]}
-    measured = Record(BENCH, curve.scene.name, curve.name, arrays=rows)
-    if curve.kind == STEP:
+    measured = Record(curve.table, curve.scene.name, curve.name, arrays=rows)
+    if curve.target:
+        tried = rows["status"] != code_of("left_out")
+        steps = np.array([point.setting for point in curve.points])[tried]
+        step = step_for(curve.target, steps, rows["angle_error_max"][tried])
+        rows["step_for_target_s"][tried] = np.nan if step is None else step
+    elif curve.kind == STEP:
         steps = np.array([point.setting for point in curve.points])[succeeded(measured)]
         order = fitted_order(steps, points_of(measured)[0])
         rows["order"][:] = np.nan if order is None else order

@@ -8,7 +8,6 @@ those of a bench, its times are good to a factor.
 from __future__ import annotations
 
 import hashlib
-from dataclasses import dataclass
 from pathlib import Path
 
 import rotor_mbs
@@ -19,50 +18,16 @@ from rotor_mbs.runs.output_files import locked
 from rotor_mbs.runs.pool import Workers, pool_of
 from rotor_mbs.runs.read import open_results
 from rotor_mbs.runs.runner import OnProgress, Task, compute_tasks, ignore_progress
-from rotor_mbs.runs.table import Rows, extend_file, results_tables
+from rotor_mbs.runs.table import extend_file, results_tables
 from rotor_mbs.runs.versions import versions
 from rotor_mbs.scenario.catalogue import find_scenes, reference_folder, scenarios_folder
 from rotor_mbs.scenario.scene import Scene
-from rotor_mbs.studies.bench import (
-    Curve,
-    PointTimer,
-    bench_table,
-    curve_of,
-    facts_of,
-    is_measured,
-    prepared,
-    rows_of_curve,
-)
-from rotor_mbs.studies.run import RunReport, asked_runs, run_tasks, work_of
+from rotor_mbs.studies.bench import Curve, curve_of, curve_tables, curve_tasks
+from rotor_mbs.studies.run import RunReport, asked_runs, run_tasks
 
 # The scene whose error against run time is measured by all methods: the paper's own crest, and a horizon of 6 s.
 BENCHED = "paper/fig11"
 _LONGEST_S = 0.25  # a run longer than this is the last of its curve: the next one takes up to eight times as long
-
-
-@dataclass(frozen=True, kw_only=True)
-class CurveTask(Task):
-    """A short curve on its way to a worker process: consecutive rows of the table /bench."""
-
-    curve: Curve
-
-    def perform(self) -> Rows:
-        """Run and judge the points of one curve; their rows."""
-        curve = self.curve
-        assert self.reference is not None  # every curve has one
-        short, reference = prepared(curve.scene, self.reference)
-        longest, rows = 0.0, []
-        for point in curve.points:
-            timer = PointTimer(point, short, reference)
-            if longest > _LONGEST_S:
-                timer.left_out = f"not run: the setting before took {longest:.2g} s"
-            else:
-                timer.warm_up()
-            if timer.is_repeatable:
-                longest = timer.warm_s
-                timer.times.append(longest)
-            rows.append(timer.row())
-        return rows_of_curve(self.place, curve, rows, facts_of(short, reference))
 
 
 def reproduce(
@@ -75,24 +40,12 @@ def reproduce(
     curves = short_curves(benched)
     asked = asked_runs(scenes, methods, {})
     with locked(output), pool_of(workers) as pool:
-        file = extend_file(output, [*results_tables(asked), bench_table(curves)], [curve.key for curve in curves])
+        file = extend_file(output, [*results_tables(asked), *curve_tables(curves)], [curve.key for curve in curves])
         missing, kept = file.split_missing(asked, timeout_s)
         runs: list[Task] = [*run_tasks(missing, timeout_s)]
-        reference = f"{benched.name}/{REFERENCE}"
-        is_new = any(run.label == reference for run, _, _ in missing)
-        of_curves = [
-            CurveTask(
-                label=curve.label,
-                method=curve.method,
-                place=curve.place(file),
-                reference=file.place(reference),
-                kill_after_s=1.2 * timeout_s + 10.0,
-                work=work_of(benched, curve.method),
-                curve=curve,
-            )
-            for curve in curves
-            if is_new or not is_measured(file, curve)
-        ]
+        is_new = f"{benched.name}/{REFERENCE}" in [run.label for run, _, _ in missing]
+        unmeasured = [curve for curve in curves if is_new or not curve.is_stored(file)]
+        of_curves = curve_tasks(file, unmeasured, 1.2 * timeout_s + 10.0, _LONGEST_S)
         made = compute_tasks([*runs, *of_curves], pool, on_progress)
         labels = {task.label for task in runs}
         return RunReport([outcome for outcome in made if outcome.label in labels], kept)

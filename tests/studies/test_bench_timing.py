@@ -258,13 +258,13 @@ def test_curves_are_tried_alone_where_their_process_dies(tmp_path: Path, monkeyp
     (ladder,) = ladders(["lagrange/ode45"])
     short = replace(ladder, values=(1e-3,))
     curves = [bench.curve_of(AT_REST, replace(short, variant=f" {name}"), {}) for name in ("first", "deadly", "last")]
-    file = extend_file(tmp_path / "b.h5", [bench.bench_table(curves)])
+    file = extend_file(tmp_path / "b.h5", [*bench.curve_tables(curves)])
     still = np.zeros((3, 4))
     reference = Trajectory(np.linspace(0.0, 0.1, 3), still, still, error_growth=np.ones(3))
     ended = {
         outcome.label.split()[-2]: outcome for outcome in bench._measure_scene(file, curves, AT_REST, reference, 2, 5.0)
     }
-    assert [bench.is_measured(file, curve) for curve in curves] == [True, False, True]
+    assert [curve.is_stored(file) for curve in curves] == [True, False, True]
     assert (ended["deadly"].status, ended["deadly"].is_stored) == ("worker_died", False)
     assert ended["deadly"].message.endswith("also when it was retried alone")
     assert ended["first"].message.endswith(" 0 failed, 0 omitted")

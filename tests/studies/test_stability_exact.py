@@ -12,12 +12,13 @@ from support.references import TAYLOR, reference, run, scene
 from support.symmetries import symmetry_errors
 
 from rotor_mbs.analysis.judgement import judge
+from rotor_mbs.analysis.work_precision import step_for
 from rotor_mbs.runs.design import Asked
-from rotor_mbs.runs.read import points_table
 from rotor_mbs.runs.table import extend_file, results_tables
 from rotor_mbs.solution.metrics import metrics_of
 from rotor_mbs.solution.status import STATUSES
-from rotor_mbs.studies.stability import STEPS, LadderTask, ladder_points, step_for
+from rotor_mbs.studies.bench import curve_tables, curve_tasks
+from rotor_mbs.studies.stability import ladder_curve
 
 
 @pytest.mark.parametrize(
@@ -93,12 +94,12 @@ def test_a_step_for_a_target_is_read_off_a_ladder() -> None:
 
 def test_a_ladder_of_runs_that_fail_at_once_ends(tmp_path: Path) -> None:
     light, method = scene("extreme/light-1e-8"), "exudyn_chain/generalized_alpha"
-    points = ladder_points(light, method)
-    file = extend_file(tmp_path / "s.h5", [*results_tables([Asked(light, "reference")]), points_table(STEPS, points)])
-    place = file.place(str(points[0]["run"]), STEPS)
-    rows = LadderTask(label="", method=method, place=place, scene=light).perform()
+    curve = ladder_curve(light, method)
+    file = extend_file(tmp_path / "s.h5", [*results_tables([Asked(light, "reference")]), *curve_tables([curve])])
+    (task,) = curve_tasks(file, [curve], 60.0, 0.5, 3.0)
+    rows = task.perform()
     statuses = [STATUSES[code] for code in rows["status"]]
-    assert len(statuses) == len(points)
+    assert len(statuses) == len(curve.points)
     assert "ok" not in statuses
     assert np.isnan(rows["step_for_target_s"]).all()
 

@@ -14,10 +14,9 @@ from rotor_mbs.report.pages import Report, method_cell
 from rotor_mbs.report.plots import HIGHEST, LOWEST
 from rotor_mbs.runs.read import Record
 from rotor_mbs.solution.trajectory import Array
-from rotor_mbs.studies.stability import OUTCOMES, TARGET, family_table, fastest_to_target
+from rotor_mbs.studies.stability import OUTCOMES, TARGET, fastest_to_target, suite_table
 
 NOT_COMPARED = "horizon before the second sample"
-_FAMILIES = {"needle": "unstable equilibrium", "scale": "extreme scale"}  # headings that are not the family's name
 
 
 def stability_page(report: Report) -> dict[str, object]:
@@ -28,11 +27,7 @@ def stability_page(report: Report) -> dict[str, object]:
     rows: list[Row] = []
     for scene, file in report.files.items():
         own = {run.method: run for run in runs if run.scene == scene}
-        family = next(iter(own.values())).family
-        row: list[TableCell | str] = [
-            TableCell(scene, href=file, note=report.scenes[scene].title),
-            _FAMILIES.get(family, family),
-        ]
+        row: list[TableCell | str] = [TableCell(scene, href=file, note=report.scenes[scene].title)]
         for method in methods:
             if method not in own:
                 row.append("")
@@ -52,10 +47,10 @@ def stability_page(report: Report) -> dict[str, object]:
             row.append("no method" if name is None else method_cell(name))
         rows.append(row)
     used = {run.outcome for run in runs}
-    counts = family_table(runs, lambda family: _FAMILIES.get(family, family))
+    counts = suite_table(runs)
     count_rows = [(method_cell(method), *cells) for method, *cells in counts.rows]
     return {
-        "map": PageTable("", ("Scene", "Kind", *map(method_cell, methods), "Fastest to 10⁻⁶ rad"), rows),
+        "map": PageTable("", ("Scene", *map(method_cell, methods), "Fastest to 10⁻⁶ rad"), rows),
         "key": [(outcome, symbol, text) for outcome, (symbol, text) in OUTCOMES.items() if outcome in used],
         "summary": Section(tables=[PageTable("", counts.head, count_rows)]),
         "false_successes": sum(run.false_success for run in runs),
