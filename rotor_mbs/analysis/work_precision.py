@@ -9,8 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from rotor_mbs.analysis.run_selection import corrected_runs
-from rotor_mbs.runs.read import Record, StoredScene
+from rotor_mbs.runs.read import Record
 from rotor_mbs.solution.status import COMPLETE, code_of
 from rotor_mbs.solution.trajectory import Array
 
@@ -119,20 +118,6 @@ def step_for(target: float, steps: Array, errors: Array) -> float | None:
         return float(steps[last + 1])
     slope = np.log(errors[last] / errors[last + 1]) / np.log(steps[last] / steps[last + 1])
     return float(steps[last + 1] * (target / errors[last + 1]) ** (1.0 / slope))
-
-
-def own_points(scene: StoredScene) -> list[Record]:
-    """The scene's runs of corrected models that reached the end, each as a curve of one point."""
-    curves = []
-    for name, run in corrected_runs(scene).items():
-        columns = ("angle_error_max", "run_time_s", "setup_time_s", "output_time_s")
-        arrays = {column: np.array([run.attributes.get(column, math.nan)]) for column in columns}
-        if run.status in ("ok", "inaccurate") and arrays["run_time_s"][0] > 0.0:
-            for quartile in ("min", "q1", "q3"):
-                arrays[f"run_time_{quartile}_s"] = arrays["run_time_s"]
-            arrays["status"] = np.array([code_of(run.status)])
-            curves.append(Record("bench", scene.name, name, arrays=arrays))
-    return curves
 
 
 def best(curves: Sequence[Record], column: str) -> float | None:

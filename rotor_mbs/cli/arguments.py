@@ -262,7 +262,6 @@ def _parser() -> tuple[_Parser, dict[str, _Parser]]:
     )  # fmt: skip
     own.scenes()
     own.method("method (see rotor-mbs list), or a Python file that defines methods (default: all)")
-    own.settings()
     own.output(file, "FILE", Path("bench.h5"))
     text = "timed runs per point (default: %(default)s; at most 5 for runs over 0.5 s)"
     own.add_argument("--repeats", type=COUNT, default=20, metavar="N", help=text)
@@ -319,7 +318,7 @@ def _parser() -> tuple[_Parser, dict[str, _Parser]]:
     own.add_argument("--engine", default="local", metavar="ENGINE", help="local (default), or dask:tcp://HOST:PORT")
     own.add_argument("--part", type=part, default=(1, 1), metavar="K/N", help="compute part K of N, for a job array")
     own.flag("--fresh", help="recompute all stored runs")
-    own.flag("--dry-run", help="only print run count, estimated time and disk space")
+    own.flag("--dry-run", help="only print number of runs and disk space")
     own.flag("--yes", help="confirm a sweep of more than a million runs")
     own.flag("--json", help="print the summary or the estimate as JSON")
     own.jobs()

@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, Any
 
 from rotor_mbs.cli import EXIT_BAD_INPUT, EXIT_FAILED, print_line
 from rotor_mbs.cli.arguments import pages_beside
-from rotor_mbs.cli.terminal import ProgressLine, print_not_computed, print_table, span
+from rotor_mbs.cli.terminal import ProgressLine, print_not_computed, print_table
 from rotor_mbs.errors import InputError, MethodRefusal, StoreError
 from rotor_mbs.methods.catalogue import look_up, methods, problems_of_methods
 from rotor_mbs.runs import cores
@@ -150,8 +150,8 @@ def bench(arguments: argparse.Namespace) -> int:
     scenes, output = find_scenes(arguments.scenes), arguments.output
     with ProgressLine() as progress:
         made, left_out = run_bench(
-            scenes, arguments.method, output, workers=cores(), settings=dict(arguments.set or ()),
-            on_progress=progress, repeats=arguments.repeats, budget_s=arguments.budget,
+            scenes, arguments.method, output, repeats=arguments.repeats, budget_s=arguments.budget, workers=cores(),
+            on_progress=progress,
         )  # fmt: skip
     measured = len({outcome.label.partition(" ")[0] for outcome in made})
     for line in left_out:
@@ -351,18 +351,17 @@ def sweep(arguments: argparse.Namespace) -> int:
 
     with open_task_pool(arguments.engine, arguments.jobs) as pool:  # its workers load their code meanwhile
         from rotor_mbs.scenario.sweep import load_sweep
-        from rotor_mbs.studies.sweep import estimate_seconds, plan_sweep, run_sweep
+        from rotor_mbs.studies.sweep import plan_sweep, run_sweep
 
         study = load_sweep(arguments.file, problems_of_methods)
         plan = plan_sweep(study, arguments.method, arguments.part, arguments.timeout)
         if arguments.dry_run:
-            size, seconds = plan.runs * plan.table().row_type.itemsize, estimate_seconds(plan, pool)
+            size = plan.runs * plan.table().row_type.itemsize
             if arguments.json:
-                facts = {"runs": plan.runs, "methods": list(plan.methods), "seconds": seconds, "bytes": size}
+                facts = {"runs": plan.runs, "methods": list(plan.methods), "bytes": size}
                 print(json.dumps(facts))
             else:
-                print(f"{plan.runs:,} runs with {', '.join(plan.methods)}: about {span(seconds)} ({arguments.engine})")
-                print(f"{size / 1e6:,.3f} MB")
+                print(f"{plan.runs:,} runs with {', '.join(plan.methods)}: {size / 1e6:,.3f} MB")
             return 0
         if plan.runs > _MANY_RUNS and not arguments.yes:
             raise InputError(f"{arguments.file}: {plan.runs:,} runs; allowed without --yes: at most {_MANY_RUNS:,}")

@@ -443,7 +443,6 @@ def run_bench(
     repeats: int,
     budget_s: float,
     workers: int,
-    settings: Mapping[str, object] | None = None,
     on_progress: OnProgress = ignore_progress,
 ) -> tuple[list[Outcome], list[str]]:
     """The curves of every scene into the results file `output`; what it has already is kept.
@@ -454,7 +453,6 @@ def run_bench(
     repeats : timed runs of each point at most.
     budget_s : s, for all curves of a scene.
     workers : processes that compute references before the first curve is timed.
-    settings : of the methods that have them, the same at every point.
 
     Returns
     -------
@@ -467,7 +465,7 @@ def run_bench(
     StoreError
         Where the file cannot be read or written.
     """
-    chosen = with_settings(catalogue.ladders(methods), settings or {})
+    chosen = catalogue.ladders(methods)
     with locked(output):
         none: Mapping[str, Sequence[str]] = {scene.name: () for scene in scenes}
         report = run_scenes(scenes, none, output, workers=workers, timeout_s=_REFERENCE_LIMIT_S)
@@ -497,29 +495,6 @@ def run_bench(
                 made.append(replace(outcome, share=(len(made) + 1) / len(missing)))
                 on_progress(len(made), len(missing), made[-1])
         return made, left_out
-
-
-def with_settings(chosen: Sequence[Ladder], settings: Mapping[str, object]) -> list[Ladder]:
-    """The ladders with these settings fixed, where their methods have them.
-
-    Of a method whose ladders differ by such a setting, those with the given value are kept; where none has it, its
-    first ladder with the given value.
-
-    Raises
-    ------
-    InputError
-        For a setting that no method has, that is not allowed, or that a ladder varies.
-    """
-    own = catalogue.settings_for(list(dict.fromkeys(ladder.method for ladder in chosen)), settings)
-    varied = {name for ladder in chosen for name in ladder.fill(1.0) if name in own[ladder.method]}
-    if varied:
-        raise InputError(f"bench varies {', '.join(sorted(varied))} itself; allowed: other settings of the methods")
-    kept = []
-    for method, given in own.items():
-        of_method = [ladder for ladder in chosen if ladder.method == method]
-        fitting = [ladder for ladder in of_method if all(ladder.choices.get(k, given[k]) == given[k] for k in given)]
-        kept += [replace(ladder, choices={**ladder.choices, **given}) for ladder in fitting or of_method[:1]]
-    return kept
 
 
 def _measure_scene(

@@ -1,9 +1,9 @@
 """The stability suite: every corrected method on the stiff and extreme scenes, and ladders of steps for some. As a map:
-how each method ends on every scene, whether a smaller step helps, which is fastest."""
+how each method ends on every scene, and whether a smaller step helps."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -39,8 +39,7 @@ OUTCOMES = {
 class SuiteRun:
     """A run of the suite: a scene by a method.
 
-    outcome: a key of OUTCOMES. angle_error: rad up to the horizon, None where nothing is compared. step: s, that 1e-6
-    rad needs, where a ladder found it.
+    outcome: a key of OUTCOMES. step: s, that 1e-6 rad needs, where a ladder found it.
     """
 
     scene: str
@@ -50,19 +49,11 @@ class SuiteRun:
     message: str
     false_success: bool
     has_reference: bool
-    angle_error: float | None
-    run_time_s: float
     step: float | None
 
     @property
     def folder(self) -> str:
         return self.scene.partition("/")[0]
-
-    @property
-    def reaches_target(self) -> bool:
-        """Whether it is ok within 1e-6 rad, or a smaller step is."""
-        is_close = self.status == "ok" and self.angle_error is not None and self.angle_error <= TARGET
-        return is_close or self.step is not None
 
 
 def suite_runs(path: Path) -> list[SuiteRun]:
@@ -93,26 +84,10 @@ def suite_runs(path: Path) -> list[SuiteRun]:
                         message=message,
                         false_success=bool(facts.get("false_success", 0)),
                         has_reference=reference is not None and reference.status == "ok",
-                        angle_error=facts.get("angle_error_max"),
-                        run_time_s=float(facts["run_time_s"]),
                         step=None if ladder is None else ladder.attributes.get("step_for_target_s"),
                     )
                 )
     return runs
-
-
-def fastest_to_target(runs: Iterable[SuiteRun]) -> dict[str, str | None]:
-    """By scene with a reference, the method that is ok within 1e-6 rad, or with a smaller step, in the least time; None
-    where none is."""
-    fastest: dict[str, SuiteRun | None] = {}
-    for run in runs:
-        if not run.has_reference:
-            continue
-        before = fastest.setdefault(run.scene, None)
-        is_able = run.status == "ok" and run.reaches_target
-        if is_able and (before is None or run.run_time_s < before.run_time_s):
-            fastest[run.scene] = run
-    return {scene: None if run is None else run.method for scene, run in fastest.items()}
 
 
 def suite_table(runs: Sequence[SuiteRun]) -> TextTable:

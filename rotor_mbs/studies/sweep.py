@@ -8,7 +8,6 @@ import time
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -16,13 +15,13 @@ from numpy.typing import NDArray
 
 from rotor_mbs.analysis.judgement import clearly_ok, defects_of, judge
 from rotor_mbs.errors import InputError
-from rotor_mbs.methods.catalogue import check_names, find_method, is_corrected, settings_for, with_method_files
+from rotor_mbs.methods.catalogue import check_names, find_method, is_corrected, settings_for
 from rotor_mbs.methods.solve import solve
 from rotor_mbs.methods.time_limit import OutOfTimeError, time_limit
 from rotor_mbs.models.lagrange.reference import error_growth
 from rotor_mbs.runs.design import MISSING
 from rotor_mbs.runs.pool import TaskPool
-from rotor_mbs.runs.runner import Task, compute, perform
+from rotor_mbs.runs.runner import Task, compute
 from rotor_mbs.runs.sweeps import ERROR_GROWTH, IDENTITY, METRICS, code_of_method, open_sweep, sweep_table
 from rotor_mbs.runs.table import KEYWORDS, Place, Rows, Table, blank_rows, row_of_run
 from rotor_mbs.runs.versions import machine, versions
@@ -351,25 +350,3 @@ def run_sweep(
 
 def _counted(statuses: NDArray[np.int8]) -> Counter[str]:
     return Counter(STATUSES[code] for code in statuses.tolist() if code != MISSING)
-
-
-def estimate_seconds(plan: SweepPlan, pool: TaskPool) -> float:
-    """How long all runs will take, from one chunk of each method; infinite where one did not end in its time."""
-    nowhere = Place(Path(), 0, plan.first, {}, plan.table().row_type)  # only its columns count: nothing is stored
-    work, seconds = with_method_files(partial(perform, stores=False)), 0.0
-    for first in range(0, plan.rows * len(plan.methods), plan.rows):
-        runs = min(plan.last, first + plan.rows) - max(plan.first, first)
-        if runs <= 0:
-            continue
-        chunk = next(plan.chunks(nowhere, [(first, first + min(plan.rows, _MAX_RUNS))]))
-        try:
-            # The first one loads and compiles, which all others find done.
-            pool.submit(work, chunk.part(0, 1), plan.time_limit_s).result()
-            start = time.perf_counter()
-            pool.submit(work, chunk, plan.time_limit_s).result()
-        except Exception as error:
-            if pool.failure(error) == "error":
-                raise
-            return float("inf")
-        seconds += runs * (time.perf_counter() - start) / len(chunk.values) / pool.workers
-    return seconds

@@ -268,14 +268,3 @@ def test_curves_are_tried_alone_where_their_process_dies(tmp_path: Path, monkeyp
     assert (ended["deadly"].status, ended["deadly"].is_stored) == ("worker_died", False)
     assert ended["deadly"].message.endswith("also when it was retried alone")
     assert ended["first"].message.endswith(" 0 failed, 0 omitted")
-
-
-def test_a_setting_selects_the_curves_that_have_it() -> None:
-    every = ladders(["exudyn_tree/generalized_alpha", "lagrange/radau"])
-    for radius, names in (
-        (0.7, ["lagrange/radau", "exudyn_tree/generalized_alpha_rho0.7"]),
-        (0.5, ["lagrange/radau", "exudyn_tree/generalized_alpha"]),  # of no ladder
-    ):
-        chosen = bench.with_settings(every, {"spectral_radius": radius})
-        assert [ladder.curve for ladder in chosen] == names
-        assert chosen[1].choices["spectral_radius"] == radius

@@ -188,12 +188,11 @@ def test_bad_usage_is_one_line_status_2_and_no_file(tmp_path: Path, head: str, o
     assert not list(tmp_path.glob("o.h5*"))
 
 
-def test_a_dry_run_tells_runs_time_and_size_and_writes_nothing(tmp_path: Path) -> None:
+def test_a_dry_run_tells_runs_and_size_and_writes_nothing(tmp_path: Path) -> None:
     ended = rotor_mbs("sweep", _file(tmp_path), "-o", tmp_path / "o.h5", "--dry-run", "--json", "-j", 1)
     assert ended.status == 0
     facts = json.loads(ended.out)
     assert facts["runs"] == 8
-    assert 0.0 < facts["seconds"] < 60.0
     assert facts["bytes"] >= 8 * 21 * 4 * 8
     assert not list(tmp_path.glob("o.h5*"))
 

@@ -72,17 +72,6 @@ def bench_page(results: OpenResults) -> dict[str, object]:
     }
 
 
-def cost_section(scene: StoredScene, curves: Sequence[Record]) -> Section:
-    """The curves measured on the scene, else its own runs, a point each; empty where no run has an error."""
-    pictures = cost_picture(curves or work_precision.own_points(scene), f"Error against run time, {scene.name}")
-    notes = (
-        []
-        if curves
-        else ["Each point is a run of this file, timed while other runs were active: accurate to a factor of two."]
-    )
-    return Section(pictures, notes=notes)
-
-
 def cost_picture(curves: Sequence[Record], caption: str) -> list[Picture]:
     """The diagram; none where no point stands on it."""
     if not any(work_precision.succeeded(curve).any() for curve in curves):

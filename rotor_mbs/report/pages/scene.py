@@ -18,7 +18,7 @@ from rotor_mbs.report.elements import PageTable, Picture, Section, picture
 from rotor_mbs.report.looks import GREY, VERMILLION, Look, coordinate_look, label_of, look_of, with_capital
 from rotor_mbs.report.numbers import fixed, number, prefixed, with_unit
 from rotor_mbs.report.pages import Report, failure_table, horizon_of, metric, metrics_table, paper
-from rotor_mbs.report.pages.bench import cost_section
+from rotor_mbs.report.pages.bench import cost_picture
 from rotor_mbs.report.pages.stability import step_section
 from rotor_mbs.report.pages.viewer import viewer
 from rotor_mbs.report.plots import LOWEST, Series
@@ -74,7 +74,7 @@ def scene_page(name: str, report: Report) -> dict[str, object]:
         "defects": Section(error_picture(defects(scene.scene, drawn), "defect (rad)", "defects", "Interval defects")),
         "energy": _energy_section(drawn, horizon),
         "drive": _drive_section(scene.scene, sides.get("corrected")),
-        "cost": cost_section(scene, report.curves.get(name, ())),
+        "cost": Section(cost_picture(report.curves.get(name, ()), f"Error against run time, {name}")),
         "steps": step_section(name, report.ladders),
         "quantities": quantity_sections(scene, drawn, horizon),
         "metrics": Section(tables=[metrics_table(scene)]),

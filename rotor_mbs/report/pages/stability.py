@@ -14,16 +14,13 @@ from rotor_mbs.report.pages import Report, method_cell
 from rotor_mbs.report.plots import HIGHEST, LOWEST
 from rotor_mbs.runs.read import Record
 from rotor_mbs.solution.trajectory import Array
-from rotor_mbs.studies.stability import OUTCOMES, TARGET, fastest_to_target, suite_table
-
-NOT_COMPARED = "horizon before the second sample"
+from rotor_mbs.studies.stability import OUTCOMES, TARGET, suite_table
 
 
 def stability_page(report: Report) -> dict[str, object]:
     """The content of the map, which is the index of the suite."""
     runs = report.suite_runs
     methods = list(dict.fromkeys(run.method for run in runs))
-    fastest = fastest_to_target(runs)
     rows: list[Row] = []
     for scene, file in report.files.items():
         own = {run.method: run for run in runs if run.scene == scene}
@@ -38,19 +35,12 @@ def stability_page(report: Report) -> dict[str, object]:
                 symbol, text = f"{symbol}!", f"{text}; the engine reported success"
             title = f"{label_of(method)}: {text}. {run.message}".strip()
             row.append(TableCell(symbol, shade=f"mark {run.outcome}", title=title))
-        if scene not in fastest:
-            row.append("no reference")
-        elif all(run.angle_error is None for run in own.values()):
-            row.append(NOT_COMPARED)
-        else:
-            name = fastest[scene]
-            row.append("no method" if name is None else method_cell(name))
         rows.append(row)
     used = {run.outcome for run in runs}
     counts = suite_table(runs)
     count_rows = [(method_cell(method), *cells) for method, *cells in counts.rows]
     return {
-        "map": PageTable("", ("Scene", *map(method_cell, methods), "Fastest to 10⁻⁶ rad"), rows),
+        "map": PageTable("", ("Scene", *map(method_cell, methods)), rows),
         "key": [(outcome, symbol, text) for outcome, (symbol, text) in OUTCOMES.items() if outcome in used],
         "summary": Section(tables=[PageTable("", counts.head, count_rows)]),
         "false_successes": sum(run.false_success for run in runs),
