@@ -11,7 +11,6 @@ import json
 import os
 import sys
 import time
-import webbrowser
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict
@@ -324,6 +323,8 @@ def report(arguments: argparse.Namespace) -> int:
     index = write_report(arguments.file, output, jobs=cores(), checked=True)
     print(index)
     if arguments.open:
+        import webbrowser  # late, as above
+
         webbrowser.open(index.resolve().as_uri())
     return 0
 

@@ -6,7 +6,6 @@ from __future__ import annotations
 
 import functools
 import math
-import multiprocessing
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import nullcontext
 from dataclasses import replace
@@ -119,6 +118,8 @@ def with_method_files(work: Callable[..., R]) -> Callable[..., R]:
 
 
 def _in_worker(files: Sequence[MethodFile], work: Callable[..., R], *arguments: object) -> R:
+    import multiprocessing  # late: `rotor-mbs list` need not wait for it
+
     for file in files:
         _add(file)
     with quiet() if multiprocessing.parent_process() is not None else nullcontext():
