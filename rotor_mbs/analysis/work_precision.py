@@ -1,4 +1,4 @@
-"""What a diagram of error against run time says in numbers: Pareto front, time to an accuracy, orders."""
+"""What a work-precision diagram says in numbers: Pareto front, time to an accuracy, orders."""
 
 from __future__ import annotations
 

@@ -41,9 +41,10 @@ def main(argv: Sequence[str] | None = None) -> int:
             with _signals_as_interrupts(), warnings.catch_warnings():
                 warnings.simplefilter("always", PlausibilityWarning)
                 warnings.showwarning = _print_warning
-                from rotor_mbs.cli.arguments import parse
+                from rotor_mbs.cli.arguments import load_methods, parse
 
                 arguments = parse(words)
+                load_methods(arguments)
                 module, _, function = arguments.command.partition(":")
                 command = getattr(importlib.import_module(f"rotor_mbs.cli.{module}"), function)
                 status = int(command(arguments))

@@ -160,21 +160,25 @@ class _Names(argparse.Action):
 
 
 def parse(argv: Sequence[str]) -> argparse.Namespace:
-    """The arguments; `command` is the place of the function to call, "module:function"; in place of a Python file stand
-    the names of its methods. Ends with status 2 on bad usage; raises InputError for methods that are unknown."""
+    """The arguments; `command` is the place of the function to call, "module:function". Ends with status 2 on bad
+    usage."""
     parser, commands = _parser()
     if argv and not argv[0].startswith("-") and argv[0] not in commands:
         parser.error(f"unknown command {argv[0]!r}{nearest(argv[0], commands)}; allowed: {', '.join(commands)}")
     arguments, unknown = parser.parse_known_args(argv or ["--help"])
     if unknown:
         commands.get(argv[0], parser).error(f"unrecognized arguments: {' '.join(unknown)}")
+    return arguments
+
+
+def load_methods(arguments: argparse.Namespace) -> None:
+    """In place of a Python file the names of its methods. Raises InputError for methods that are unknown."""
     given = [name for name in ("method", "methods", "require") if name in arguments]
     if given:
-        from rotor_mbs.methods.catalogue import check_names  # late: --help need not wait for it
+        from rotor_mbs.methods.catalogue import check_names  # late: other commands need not wait for it
 
         for name in given:
             setattr(arguments, name, check_names(getattr(arguments, name) or ()))
-    return arguments
 
 
 def _parser() -> tuple[_Parser, dict[str, _Parser]]:

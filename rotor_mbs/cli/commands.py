@@ -141,7 +141,7 @@ _DISK_IS_FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 
 
 def bench(arguments: argparse.Namespace) -> int:
-    """Error against run time, and its pages. 0 also where points failed: they are what is measured."""
+    """Error and run time, and their pages. 0 also where points failed: they are what is measured."""
     from rotor_mbs.analysis.text_tables import bench_table
     from rotor_mbs.runs.read import read_records
     from rotor_mbs.studies.bench import run_bench

@@ -98,7 +98,7 @@ def _plan(report: Report, checked: bool) -> list[Page]:
         if report.errata:
             pages.append(Page("errata", "Errata", errata_page))
     if bench:
-        pages.append(Page("bench", "Error against run time", bench_page))
+        pages.append(Page("bench", "Error and run time", bench_page))
     if modes:
         from rotor_mbs.report.pages.modes import stored_modes_page  # late, as above
 

@@ -247,7 +247,7 @@ _JOINT_GAP = QuantityMetric(
     bound=0.0,  # of a model without joints that can open
     channel="joints",
     unit="of arm",
-    fault="joint gap of {value} of the longest arm",
+    fault="joint gap of {value} of the largest distance of a centre of mass from the hub centre",
     look_at="a joint of the chain that is not constrained, or its marker",
 )
 

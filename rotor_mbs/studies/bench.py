@@ -1,4 +1,4 @@
-"""Error against run time: curves of methods over ladders of settings, a row per point in the table /bench.
+"""Error and run time: curves of methods over ladders of settings, a row per point in the table /bench.
 
 The curves of a scene are timed together, in rounds over all their points, by one worker process on one core.
 """

@@ -1,6 +1,6 @@
 """The main job: every scene of the paper by the default methods and with each erratum alone.
 
-And error against run time of all methods on one scene, at a few settings each, in seconds: a bench takes one process on
+And error and run time of all methods on one scene, at a few settings each, in seconds: a bench takes one process on
 one core and rounds over all points; here each curve is a task beside the runs, and a point is run once. Its errors are
 those of a bench, its times are good to a factor.
 """
@@ -25,7 +25,7 @@ from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.studies.bench import Curve, curve_of, curve_tables, curve_tasks
 from rotor_mbs.studies.run import RunReport, asked_runs, run_tasks
 
-# The scene whose error against run time is measured by all methods: the paper's own crest, and a horizon of 6 s.
+# The scene whose error and run time are measured by all methods: the paper's own crest, and a horizon of 6 s.
 BENCHED = "paper/fig11"
 _LONGEST_S = 0.25  # a run longer than this is the last of its curve: the next one takes up to eight times as long
 

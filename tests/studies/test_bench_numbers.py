@@ -114,9 +114,9 @@ def test_a_row_for_each_engine_with_dashes_for_what_the_file_does_not_say(tmp_pa
 
     assert [texts(row)[1:] for row in reached.rows] == [
         ["1 of 1", "adaptive", "1.0×10⁻¹³", "1.0×10⁻¹⁰", "1 of 1, × 1.0", "1 of 1, × 1.0", "1 of 1, × 1.0", "–", "kept",
-         "none wrong"],
-        ["1 of 1", "5.9 of 6", "≤ 1.0×10⁻⁵", "≤ 1.0×10⁻⁴", *["not measured"] * 3, "–", "–", "1 of 2 wrong"],
-        ["1 of 1", "0.98 of 1", "1.0×10⁻⁵", "0.0010", *["0 of 1"] * 3, "–", "lost", "none wrong"],
+         "none failed"],
+        ["1 of 1", "5.9 (nominal 6)", "≤ 1.0×10⁻⁵", "≤ 1.0×10⁻⁴", *["not measured"] * 3, "–", "–", "1 of 2 failed"],
+        ["1 of 1", "0.98 (nominal 1)", "1.0×10⁻⁵", "0.0010", *["0 of 1"] * 3, "–", "lost", "none failed"],
     ]  # fmt: skip
     assert [texts(row)[1:] for row in able.rows] == [
         ["–"] * 6, ["–"] * 6, ["–", "–", "–", "no", "pin 4.1.0", "99"]

@@ -115,7 +115,9 @@ _NEWTON_SHARE, _LEAST_NEWTON_TOLERANCE = 0.1, 1e-12
 class ExtrapolatedSettings(Settings):
     """The trapezoidal rule, constraints at velocity level (index 2), extrapolated within every sample interval."""
 
-    tolerance: float = number(3e-8, above=0.0, at_most=1e-2, unit="rad", doc="bound on the error of each interval")
+    tolerance: float = number(
+        3e-8, above=0.0, at_most=1e-2, unit="rad", doc="tolerance for the estimated error of each interval"
+    )
 
     def scheme(self) -> Scheme:
         """The engine's Jacobian leaves out how the constraints' directions turn, so that Newton's method converges

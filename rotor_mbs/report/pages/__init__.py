@@ -62,7 +62,7 @@ class Report(OpenResults):
 
     @cached_property
     def curves(self) -> Mapping[str, Sequence[Record]]:
-        """Error against run time, by scene."""
+        """Error and run time, by scene."""
         return by_scene(read_records(self.path, "bench"))
 
     @cached_property
@@ -157,7 +157,7 @@ def metrics_table(scene: StoredScene) -> PageTable:
     names = []
     for name, column in shown.items():
         unit = f"{column.units}, at most {OK_ERROR:g}" if name == "angle_error_max" else column.units
-        names.append(with_capital(column.long_name) + (f" ({unit})" if unit != "1" else ""))
+        names.append(with_capital(column.long_name.partition("; -1")[0]) + (f" ({unit})" if unit != "1" else ""))
     return PageTable("", ("Method", "Status", *names), rows)
 
 

@@ -1,4 +1,4 @@
-"""Error against run time: its page, its section on other pages; diagram, tables, CSV."""
+"""Error and run time: its page, its section on other pages; diagram, tables, CSV."""
 
 from __future__ import annotations
 
@@ -50,9 +50,7 @@ def bench_page(results: OpenResults) -> dict[str, object]:
     for i, (name, curves) in enumerate(scenes.items()):
         pictures = [
             picture(diagram(curves), f"bench-{i}", "Run time of the integration: lower left is best"),
-            picture(
-                diagram(curves, error="defect_max"), f"bench-{i}-defect", "Largest interval defect against run time"
-            ),
+            picture(diagram(curves, error="defect_max"), f"bench-{i}-defect", "Largest interval defect and run time"),
         ]
         if "is_short" not in curves[0].attributes:  # workers there keep what runs before have compiled
             caption = "Including set-up (with compilation) and output of samples"
@@ -216,14 +214,15 @@ def engine_tables(results: OpenResults, scenes: Mapping[str, Sequence[Record]]) 
     targets = [f"time to {power(round(math.log10(target)))} rad" for target in _ENGINE_TARGETS]
     head = [
         "method", "ok on scenes", "measured order", "best defect (rad)", "best error (rad)", *targets, drift,
-        "zero pitch", "wrong runs reported as success",
+        "zero pitch", "reported as success although far from the motion",
     ]  # fmt: skip
     able_head = [
-        "method", "joint damping", "load over time", "loads", "linearization", "engine", "lines of code",
+        "method", "joint damping: best error (rad)", "load over time: best error (rad)", "loads", "linearization",
+        "engine", "lines of code",
     ]  # fmt: skip
     return [
         PageTable("Accuracy and cost over all scenes", head, reached),
-        PageTable("Capabilities: smallest angle error (rad) on the scenes with each load", able_head, able),
+        PageTable("Capabilities", able_head, able),
     ]
 
 
@@ -273,7 +272,7 @@ def _order_cell(curves: Sequence[Record]) -> str:
     seen = [curve.attributes["order"] for curve in curves if claimed and "order" in curve.attributes]
     if not claimed:
         return "adaptive"
-    return f"{number(float(np.median(seen)) if seen else None)} of {claimed[0]:g}"
+    return f"{number(float(np.median(seen)) if seen else None)} (nominal {claimed[0]:g})"
 
 
 def _drift_cell(run: StoredRun | None) -> TableCell | str:
@@ -299,7 +298,7 @@ def _zero_pitch_cell(own: Mapping[str, Sequence[Record]]) -> TableCell | str:
 
 
 def _false_success_cell(own: Mapping[str, Sequence[Record]], suite: Sequence[SuiteRun]) -> TableCell | str:
-    """Of the runs of the stability suite that are wrong, where the file has them; else of the settings here."""
+    """Of the runs of the stability suite that are not ok, where the file has them; else of the settings here."""
     if suite:
         # What the time limit ended is neither right nor wrong.
         finished = [run for run in suite if run.status != "timed_out"]
@@ -311,8 +310,9 @@ def _false_success_cell(own: Mapping[str, Sequence[Record]], suite: Sequence[Sui
         claimed = sum(int(curve.arrays["false_success"].sum()) for curve in curves)
         count, note = sum(int(work_precision.failed(curve).sum()) for curve in curves), "on this page"
     if not count:
-        return TableCell("none wrong", note=note)
-    return TableCell(f"{claimed} of {count} wrong", "bad" if claimed else "", note=note)
+        return TableCell("all ok" if suite else "none failed", note=note)
+    what = "not ok" if suite else "failed"
+    return TableCell(f"{claimed} of {count} {what}", "bad" if claimed else "", note=note)
 
 
 def reach_table(curves: Sequence[Record]) -> PageTable:
@@ -344,7 +344,9 @@ def _point_table(curves: Sequence[Record]) -> PageTable:
     """A row per point that was run."""
     columns = {name: COLUMNS[name] for name in _POINT_COLUMNS}
     units = [f" ({column.units})" if column.units != "1" else "" for column in columns.values()]
-    names = [f"{column.long_name}{unit}" for column, unit in zip(columns.values(), units, strict=True)]
+    names = [
+        f"{column.long_name.partition('; -1')[0]}{unit}" for column, unit in zip(columns.values(), units, strict=True)
+    ]
     rows: list[Row] = []
     for curve in curves:
         for i, status in enumerate(curve.statuses):

@@ -85,7 +85,7 @@ def index_page(report: Report) -> dict[str, object]:
                 f"{shown}: interval defects",
             ),
             *_energy(scenes, model),
-            *cost_picture(report.curves.get(benched, ()), f"Error against run time of all methods, {benched}"),
+            *cost_picture(report.curves.get(benched, ()), f"Error and run time of all methods, {benched}"),
         ],
         "methods": Section(tables=[PageTable("", methods.head, method_rows)], notes=notes),
         "scenes": table,

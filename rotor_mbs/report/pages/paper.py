@@ -130,7 +130,7 @@ def errata_page(report: Report) -> dict[str, object]:
     differing_table = PageTable(
         f"{len(differing)} of {len(entries)} printed entries differ from what follows from (3); the errata explain "
         f"{sum(bool(entry.explained_by) for entry in differing)}",
-        ("Equation", "Entry", "Printed", "Correct", "Relative difference", "Explained by"),
+        ("Equation", "Entry", "Printed", "Correct", "Difference / max(1, |printed|, |correct|)", "Explained by"),
         [
             (
                 e.equation,
@@ -167,7 +167,9 @@ def errata_page(report: Report) -> dict[str, object]:
         "errata": [(erratum, matrices(entries, erratum.stands_in)) for erratum in report.errata],
         "differing": Section(tables=[differing_table]),
         "effects": Section(tables=[effects_table]),
-        "agreeing": PageTable("", ("Equation", "Entry", "Printed", "Relative difference"), agreeing_rows),
+        "agreeing": PageTable(
+            "", ("Equation", "Entry", "Printed", "Difference / max(1, |printed|, |correct|)"), agreeing_rows
+        ),
         "largest_agreeing": max((entry.difference for entry in agreeing), default=0.0),
     }
 
