@@ -74,7 +74,7 @@ def scene_page(name: str, report: Report) -> dict[str, object]:
         "defects": Section(error_picture(defects(scene.scene, drawn), "defect (rad)", "defects", "Interval defects")),
         "energy": _energy_section(drawn, horizon),
         "drive": _drive_section(scene.scene, sides.get("corrected")),
-        "cost": Section(cost_picture(report.curves.get(name, ()), f"Error against run time, {name}")),
+        "cost": Section(cost_picture(report.curves.get(name, ()), f"Error and run time, {name}")),
         "steps": step_section(name, report.ladders),
         "quantities": quantity_sections(scene, drawn, horizon),
         "metrics": Section(tables=[metrics_table(scene)]),
