@@ -1,19 +1,21 @@
-"""The paper's figures, on their page and as files for a manuscript; bad input of `animate`, too."""
+"""The paper's figures, on their page and as files for a manuscript; animations."""
 
 from __future__ import annotations
 
 import re
+import shutil
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
-from support.commands import refusal
+from PIL import Image
+from support.commands import refusal, rotor_mbs
 from support.scenes import paper
 from support.stored import Made, rotor, store
 
 from rotor_mbs.cli import main
-from rotor_mbs.report.build import write_report
+from rotor_mbs.report.animation import wires
 from rotor_mbs.report.elements import TableCell
 from rotor_mbs.report.pages.index import scene_table
 from rotor_mbs.report.pages.paper import FIGURES, available, composed
@@ -66,9 +68,8 @@ def test_models_are_compared_in_numbers(tmp_path: Path) -> None:
     assert same["As printed: largest difference (rad)"] == "0"
 
 
-def test_a_figure_has_three_pictures_its_scene_and_the_published_number(drawn: Path, tmp_path: Path) -> None:
-    folder = write_report(drawn, tmp_path / "out").parent
-    text = (folder / "figures.html").read_text(encoding="utf-8").replace("\N{NO-BREAK SPACE}", " ")
+def test_a_figure_has_three_pictures_its_scene_and_the_published_number(report: Path) -> None:
+    text = (report / "figures.html").read_text(encoding="utf-8").replace("\N{NO-BREAK SPACE}", " ")
     section = re.search(r'<section id="figure-11".*?</section>', text, re.S)
     assert section is not None
     assert section[0].count("<figure>") == section[0].count('role="img"') == 3
@@ -118,15 +119,16 @@ def test_a_figure_shows_each_model_in_a_column_as_it_was_stored(drawn: Path) -> 
             np.testing.assert_array_equal(line.get_xydata(), np.column_stack([time, column]))
 
 
+def test_paths_without_tips_are_no_figure(tmp_path: Path) -> None:
+    path = store(tmp_path / "r.h5", [Made(paper("fig08", samples=11, outputs=("angles", "rates")), "reference", RIGHT)])
+    assert "figure 10: not in the file; allowed: 8" in refusal("figures", path, "--figure", "10", "-o", tmp_path)
+
+
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
         (["figures", "FILE", "--figure", "2", "-o", "out"], "figure 2: not in the file; allowed: 8, 9"),
-        (
-            ["animate", "paper/fig12", "FILE", "-o", "a.webp"],
-            "'paper/fig12': no such scene in it; allowed: paper/fig08",
-        ),
-        (["animate", "folder/mine.toml", "FILE", "-o", "a.webp"], "'mine': no such scene in it"),  # stored by its stem
+        (["animate", "a/mine.toml", "FILE", "-o", "a.webp"], "'mine': no such scene in it; allowed: paper/fig08"),
         (["animate", "paper/fig11", "FILE", "-o", "a.avi"], "unknown format .avi; allowed: .webp, .gif, .mp4"),
         (["animate", "paper/fig11", "none.h5", "-o", "a.webp"], "no such file"),
     ],
@@ -137,3 +139,64 @@ def test_bad_input_is_one_line_and_status_2(
     monkeypatch.chdir(tmp_path)
     assert message in refusal(*(drawn if word == "FILE" else word for word in arguments))
     assert not list(tmp_path.iterdir())
+
+
+# Animations
+
+SHORT = paper("fig11", duration=1.0, samples=101)
+TURNING = rotor(lambda t: 2.0 * t, np.sin)
+
+
+@pytest.fixture(scope="module")
+def moving(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    scene = replace(SHORT, text=SHORT.text.replace("duration = 10.0", "duration = 1.0"))
+    runs = [Made(scene, "reference", TURNING), Made(scene, "printed/ode45", TURNING, until=0.5)]
+    return store(tmp_path_factory.mktemp("animate") / "r.h5", runs)
+
+
+@pytest.mark.parametrize("suffix", ["webp", "gif"])
+def test_an_animation_moves_for_as_long_as_the_scene(moving: Path, tmp_path: Path, suffix: str) -> None:
+    output = tmp_path / f"new/a.{suffix}"
+    assert rotor_mbs("animate", "paper/fig11", moving, "-o", output).status == 0
+    with Image.open(output) as image:
+        assert image.n_frames == 21  # 1 s at 20 frames a second, both ends
+        assert image.size[0] > image.size[1]  # two models side by side
+        seen = []
+        for frame in (0, 10, 20):
+            image.seek(frame)
+            seen.append(np.asarray(image.convert("RGB"), dtype=int))
+            if frame:
+                assert image.info["duration"] == 50
+    halves = [np.hsplit(picture, 2) for picture in seen]
+    assert (halves[0][1] != halves[1][1]).any()
+    assert (halves[1][1] != halves[2][1]).any()
+    # The printed run ends at half time: its rotor stands still from then on, only the text above changes.
+    still = np.abs(halves[1][0][60:] - halves[2][0][60:])
+    assert np.count_nonzero(still > 64) < 0.002 * still.size  # compression may move a pixel's shade
+
+
+def test_wires_stand_where_the_rotor_is() -> None:
+    scene = replace(SHORT, blades=SHORT.blades[:1])
+    time = np.array([0.0, 1.0])
+    angles = np.array([[0.0, 0.0], [0.0, np.pi / 2]])
+    corners = wires(scene, time, angles, np.array([0.0, 1.0]), magnified=1.0)
+    x, _, z = scene.blades[0].tip
+    # Blade 1 up: z is seen as cos(elevation); x as cos(28°) to the right and, from above, sin(14°) sin(28°) up.
+    up, right = np.cos(np.radians(14.0)), np.sin(np.radians(62.0))
+    np.testing.assert_allclose(corners[0, 0, 0], [0.0, up * z], atol=1e-12)
+    np.testing.assert_allclose(corners[0, 0, 1, 0], right * x)
+    # Pitched by 90°, the tip's offset points along +y: seen as cos(62°) to the right.
+    np.testing.assert_allclose(corners[1, 0, 1, 0], np.cos(np.radians(62.0)) * x)
+
+
+def test_without_ffmpeg_a_film_is_refused_with_what_to_do(
+    moving: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(shutil, "which", lambda _: None)
+    assert "MP4 needs ffmpeg" in refusal("animate", "paper/fig11", moving, "-o", tmp_path / "a.mp4")
+
+
+@pytest.mark.skipif(shutil.which("ffmpeg") is None, reason="no ffmpeg here")
+def test_a_film_is_made_where_ffmpeg_is(moving: Path, tmp_path: Path) -> None:
+    assert rotor_mbs("animate", "paper/fig11", moving, "-o", tmp_path / "a.mp4").status == 0
+    assert (tmp_path / "a.mp4").read_bytes()[4:8] == b"ftyp"

@@ -299,11 +299,11 @@ def write_figures(results: Path, folder: Path, kind: str, numbers: Iterable[str]
         Where the file cannot be read or the folder cannot be written.
     """
     with open_results(results) as opened:
-        have = {figure.number: figure for figure in available(opened.scenes)}
+        have = {figure.number: figure for figure in available(opened.scenes) if panel_runs(figure, opened.scenes)}
         asked = list(dict.fromkeys(numbers)) or list(have)
         unknown = [number for number in asked if number not in have]
         if not have:
-            raise InputError(f"{results}: no scene of the paper in the file; allowed: a file of rotor-mbs reproduce")
+            raise InputError(f"{results}: no figure of the paper in the file; allowed: a file of rotor-mbs reproduce")
         if unknown:
             raise InputError(f"{results}: figure {', '.join(unknown)}: not in the file; allowed: {', '.join(have)}")
         made = {f"fig{int(n):02d}.{kind}": canvas.encoded(composed(have[n], opened.scenes).figure, kind) for n in asked}
