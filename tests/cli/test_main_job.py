@@ -1,4 +1,4 @@
-"""The main job, `reproduce`: on two scenes, a second call, on all; and when a call has something to do."""
+"""The main job, `reproduce`: on two scenes, a second call, when there is something to do. All scenes: `.ci/wheel`."""
 
 from __future__ import annotations
 
@@ -10,7 +10,6 @@ from typing import NamedTuple
 
 import pytest
 from support.commands import Ended, rotor_mbs
-from support.scenes import PAPER
 
 from rotor_mbs.cli import runs
 from rotor_mbs.methods.catalogue import is_corrected
@@ -20,31 +19,29 @@ from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.studies import reproduce
 
 SCENES = ["paper/fig08", reproduce.BENCHED]
-ALL = [f"paper/{name}" for name in PAPER]
 PRINTED, RIGHT = "printed/ode45", ("lagrange/taylor", "exudyn_tree/rk67")
 
 
 class Calls(NamedTuple):
-    """Two calls of `reproduce` for the same scenes, and the folder of their output."""
+    """Two calls of `reproduce`, and the folder of their output."""
 
-    scenes: list[str]
     folder: Path
     first: Ended
     second: Ended
 
 
-@pytest.fixture(scope="module", params=[SCENES, pytest.param(ALL, marks=pytest.mark.full)], ids=["two", "all"])
-def calls(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Calls:
+@pytest.fixture(scope="module")
+def calls(tmp_path_factory: pytest.TempPathFactory) -> Calls:
     pytest.importorskip("heyoka")
 
     def only_some(names: Sequence[str]) -> list[Scene]:
-        return find_scenes(request.param if names == ["paper"] else names)
+        return find_scenes(SCENES if names == ["paper"] else names)
 
     folder = tmp_path_factory.mktemp("main-job")
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(reproduce, "find_scenes", only_some)
         first, second = rotor_mbs("reproduce", "-o", folder), rotor_mbs("reproduce", "-o", folder)
-    return Calls(request.param, folder, first, second)
+    return Calls(folder, first, second)
 
 
 def test_every_method_has_run_and_those_of_the_correct_equations_are_ok(calls: Calls) -> None:
@@ -52,7 +49,7 @@ def test_every_method_has_run_and_those_of_the_correct_equations_are_ok(calls: C
     assert calls.first.status == 0, calls.first.err
     printed_drifts = []
     with open_results(calls.folder / "results.h5") as results:
-        assert set(results.scenes) == set(calls.scenes)
+        assert set(results.scenes) == set(SCENES)
         for scene in results.scenes.values():
             assert scene.reference is not None
             assert set(scene.methods) >= {PRINTED, *RIGHT, "exudyn_chain/extrapolated"}
@@ -66,11 +63,9 @@ def test_every_method_has_run_and_those_of_the_correct_equations_are_ok(calls: C
 def test_the_report_is_whole_and_needs_no_network(calls: Calls) -> None:
     pages = {path.name: path.read_text() for path in (calls.folder / "report").glob("*.html")}
     assert {"index.html", "errata.html"} <= set(pages)
-    assert len(pages) == len(calls.scenes) + 4  # index, errata, the figures one by one, the benches
+    assert len(pages) == len(SCENES) + 4  # index, errata, the figures one by one, the benches
     for page in pages.values():
         assert not re.search(r'(?:src|href)="(?:https?:)?//(?!doi\.org/)', page)  # a link to the paper asks for nothing
-    if calls.scenes == ALL:
-        assert 'Published numbers reproduced</th><td class="n">4 of 4</td>' in pages["index.html"]
 
 
 def test_the_second_call_has_nothing_to_do_and_shows_the_same(calls: Calls) -> None:
