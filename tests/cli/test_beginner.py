@@ -23,36 +23,26 @@ MISTAKES: dict[str, tuple[dict[str, str], str, str]] = {
         {}, "run {file} -m exudyn_tree/rk67 --set step=-1", "step (a number above 0, in s; default"
     ),
     "a misspelt key": ({"[shaft]": "[shaf]"}, "run {file}", "shaf: unknown key, perhaps shaft"),
-    "arithmetic without quotes": ({'"deg(30)"': "pi/6"}, "run {file}", 'arithmetic in quotes: "pi/6"'),
-    "a pitch too few": ({'"pi/4", 0]': "0]"}, "run {file}", "rotor, then a pitch per blade"),
     "no tip": ({"tip = [0.08, 0.0, 33.4]": ""}, "run {file}", 'needed for the output "tip"'),
     "a sweep that is run": ({}, "run sweeps/fig11-spread", "rotor-mbs sweep sweeps/fig11-spread"),
     "a scene that is swept": ({}, "sweep paper/fig11", "rotor-mbs run paper/fig11"),
     "a report of a scene file": ({}, "report {file}", "allowed: a file that rotor-mbs wrote"),
-    "a report of nothing": ({}, "report missing.h5", "as rotor-mbs run or reproduce writes it"),
-    "a folder as the output": ({}, "run {file} -o .", "a file's name, not a folder"),
     "a method of the file": (
         {"methods = []": 'methods = ["rk67"]'}, "run {file}", "methods: unknown method"
     ),
-    "an option that is none": ({}, "run {file} --stiff", "rotor-mbs run: unrecognized arguments: --stiff; see"),
     "a new file that would not run": ({}, "new mine.txt", "allowed: a name that ends in .toml"),
     "a time limit that is none": ({}, "run {file} --timeout nan", "allowed: seconds, more than 0"),
     "a bench of nothing": ({}, "bench", "required: SCENE"),
-    "a folder of scenes to show": ({}, "show paper", "one scene"),
-    "a report of a folder": ({}, "report .", "is a folder"),
     "an option in front": ({}, "--frobnicate list", "unrecognized arguments: --frobnicate"),
     "a method that cannot": ({"inertia = 0.0": "inertia = 3.0"}, "run {file} -m printed/ode45", "hub"),
-    "an output below a file": ({}, "run {file} -m lagrange/dop853 -o {file}/r.h5", "mine.toml"),
     "a new file over an old one": ({}, "new {file}", "allowed: a file that does not exist yet"),
     "too many processes": ({}, "run {file} -j 1025", "allowed: a whole number from 1 to 1024"),
     "no process": ({}, "run {file} -j 0", "allowed: a whole number from 1 to 1024"),
-    "half a process": ({}, "run {file} -j 1.5", "allowed: a whole number from 1 to 1024"),
 }  # fmt: skip
 SLIPS: dict[str, tuple[str, str, str]] = {
     "degrees": ('"deg(30)"', "30", '30 rad are 4.8 turns; degrees? write "deg(30)"'),
     "degrees per second": ("rates = [0,", "rates = [360,", 'write "deg(360)"'),
     "millimetres": ("33.4]", "24000]", "24000 m from the shaft; is it in m?"),
-    "tonnes": ("15000.0", "1e-3", "0.001 kg; is it in kg?"),
     "gravity in cm": ("9.81", "981", "9.81 is usual"),
 }
 
@@ -97,8 +87,6 @@ def test_all_angles_in_degrees_are_named_and_rest_angles_and_inertias_in_other_u
     assert line.startswith("bearing.rest[0]: 5 rad are 0.8 turns")
     (line,) = doubts(rm.scene("paper/fig11").replace(**{"blade.inertia": [9e7, 9e7, 1e3, 0, 0, 0]}))
     assert line.startswith("blade.inertia: a radius of gyration of 77.5 m")  # sqrt(9e7 / 15000)
-    (line,) = doubts(rm.scene("paper/fig11").replace(**{"initial.angles[0]": 1e100}))
-    assert "1e+100 rad are 1.59155e+99 turns" in line
     for name, _ in list_scenes():
         assert not [line for line in doubts(rm.scene(name)) if "gyration" in line or "rest" in line], name
 
@@ -106,13 +94,10 @@ def test_all_angles_in_degrees_are_named_and_rest_angles_and_inertias_in_other_u
 def test_an_inaccurate_run_names_the_next_step_to_try_until_it_is_accurate() -> None:
     scene = rm.scene("check/general")
     step, steps = 0.1, [0.1]
-    for _ in range(12):
-        run = rm.run(scene, "exudyn_tree/rk44", step=step)
-        if run.status == "ok":
-            break
-        assert run.status == "inaccurate"
+    while (run := rm.run(scene, "exudyn_tree/rk44", step=step)).status == "inaccurate":
         step = float(run.message.rpartition("next to try: step=")[2])
         steps.append(step)
+        assert len(steps) < 12
     assert run.status == "ok", run.message
     assert len(steps) > 1
     assert steps == sorted(set(steps), reverse=True)

@@ -7,7 +7,6 @@ from itertools import combinations
 
 import numpy as np
 import pytest
-from matplotlib.lines import Line2D
 from support.stored import rotor
 
 from rotor_mbs.analysis.modes import FloquetTable, SceneModes
@@ -20,7 +19,7 @@ from rotor_mbs.report.looks import COLOURS, GREY, Look, coordinate_look, look_of
 from rotor_mbs.report.pages import scene as scene_page
 from rotor_mbs.report.pages.index import energy_of_scenes
 from rotor_mbs.report.pages.modes import ModePlots
-from rotor_mbs.report.plots import Series, paths, projected
+from rotor_mbs.report.plots import Series, paths
 
 LOOK = Look("#0072b2", "-", "o")
 PRINTED, CORRECTED = look_of("printed/ode45"), look_of("lagrange/taylor")
@@ -76,14 +75,8 @@ def test_a_runaway_is_cut_a_jolt_is_not_and_rounding_is_not_magnified() -> None:
     assert figures.motion(TIME, None, jolt).axes[0].get_ylim()[1] >= 1.6
     low, high = figures.motion(TIME, 1e-13 * np.sin(TIME)[:, None], None).axes[0].get_ylim()
     assert high - low > 0.1
-
-
-@pytest.mark.parametrize("value", [0.0, 1e17])
-def test_a_constant_has_a_range_that_holds_it(value: float) -> None:
-    axes = panels((1.0,), "").axes[0]
-    figures.set_range(axes, np.full((3, 1), value))
-    low, high = axes.get_ylim()
-    assert low < value < high
+    low, high = figures.motion(TIME, np.full((len(TIME), 1), 1e17), None).axes[0].get_ylim()
+    assert low < 1e17 < high
 
 
 def test_energies_of_very_different_size_are_all_readable() -> None:
@@ -106,38 +99,21 @@ def test_paths_have_equal_scales_and_an_axis_of_stated_length() -> None:
     (space,) = paths(tip).axes
     assert space.get_aspect() == 1.0
     assert "10 m" in [text.get_text() for text in space.texts]
-    axis = next(line.get_xydata() for line in space.get_lines() if len(line.get_xdata()) == 2 and _is_vertical(line))
-    np.testing.assert_allclose(np.ptp(axis[:, 1]), 10.0 * np.cos(np.radians(14.0)))
-
-
-def test_an_area_stands_in_the_legend_in_its_colour() -> None:
-    picture = panels((2.0,), "time (s)")
-    picture.axes[0].fill_between(TIME, 0.0, TIME, color=COLOURS[2], label="between")
-    picture.axes[0].axvspan(1.0, 2.0, color=COLOURS[3], label="span")
-    legend = str(picture_in_page(picture, "n", "t").legend)
-    assert re.findall(r"fill: var\(--(\w+)\)", legend) == [name_of_colour(colour) for colour in COLOURS[2:4]]
+    # A vertical line of 10 m, seen from 14° above.
+    spans = [np.ptp(line.get_xydata(), axis=0) for line in space.get_lines() if len(line.get_xdata()) == 2]
+    assert any(np.allclose(span, [0.0, 10.0 * np.cos(np.radians(14.0))]) for span in spans)
 
 
 def test_the_legend_of_a_picture_has_what_is_labelled_once_as_it_is_drawn() -> None:
     series = [Series(TIME, 1e-9 + TIME, CORRECTED), Series(TIME, 2.0 + TIME, CORRECTED), Series(TIME, 3.0 + TIME, LOOK)]
-    legend = str(picture_in_page(figures.errors(series, "error (rad)", horizon=6.0), "n", "t").legend)
-    entries = re.findall(r"<li>(.*?)</svg> (.*?)</li>", legend)
-    assert [label.replace(numbers.SPACE, " ") for _, label in entries] == ["closed form, Taylor", "horizon 6.00 s"]
-    assert f"stroke: var(--{name_of_colour(CORRECTED.colour)})" in entries[0][0]
-    assert "stroke-dasharray" in entries[1][0]
-
-
-def _is_vertical(line: Line2D) -> bool:
-    x, y = line.get_xydata().T
-    return bool(x[0] == x[1] and y[0] != y[1] and x[0] < 0.0)
-
-
-def test_the_view_keeps_what_lies_across_it_and_drops_what_lies_along_it() -> None:
-    azimuth, elevation = np.radians((-62.0, 14.0))
-    across = np.array([-np.sin(azimuth), np.cos(azimuth), 0.0])
-    along = np.array([np.cos(elevation) * np.cos(azimuth), np.cos(elevation) * np.sin(azimuth), np.sin(elevation)])
-    up = np.cross(along, across)
-    np.testing.assert_allclose(projected(np.stack([across, up, along])), [[1, 0], [0, 1], [0, 0]], atol=1e-15)
+    picture = figures.errors(series, "error (rad)", horizon=6.0)
+    picture.axes[0].fill_between(TIME, 1.0, 2.0, color=COLOURS[2], label="between")
+    legend = str(picture_in_page(picture, "n", "t").legend).replace(numbers.SPACE, " ")
+    entries = {label: mark for mark, label in re.findall(r"<li>(.*?)</svg> (.*?)</li>", legend)}
+    assert set(entries) == {"closed form, Taylor", "horizon 6.00 s", "between"}
+    assert f"stroke: var(--{name_of_colour(CORRECTED.colour)})" in entries["closed form, Taylor"]
+    assert "stroke-dasharray" in entries["horizon 6.00 s"]
+    assert f"fill: var(--{name_of_colour(COLOURS[2])})" in entries["between"]
 
 
 def test_a_published_value_stands_in_the_plot_at_its_height() -> None:
@@ -225,15 +201,11 @@ def test_powers_of_ten_are_labelled_within_the_axes_alone() -> None:
     [
         (numbers.number(1.2345e-10), "1.2×10⁻¹⁰"),
         (numbers.number(0.9999), "1.0"),
-        (numbers.number(-12.34, 3), "−12.3"),
         (numbers.number(0.0), "0"),
         (numbers.number(float("nan")), "not finite"),
         (numbers.number(None), "–"),
         (numbers.fixed(-0.00001, 4), "0.0000"),
-        (numbers.prefixed(1.1234e6, "J"), "1.12 MJ"),
         (numbers.prefixed(999.9, "J"), "1.00 kJ"),
-        (numbers.prefixed(150.0, "J", 2), "150 J"),
-        (numbers.prefixed(3e-12, "J"), "3.00 pJ"),
         (numbers.prefixed(3e-13, "J"), "3.0×10⁻¹³ J"),
         (
             numbers.typeset("off by 8.1e+00 rad, 1e-06 of it, -5.3e-06 s, in stiff/torque-1e9"),

@@ -8,18 +8,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
-from support.scenes import ARM, GRAVITY, MASS, OFFSET
+from support.scenes import GRAVITY, MASS, OFFSET
 from support.sweeps import made_sweep
 
 from rotor_mbs.report.elements import Section
 from rotor_mbs.report.pages.sweep import response, sweep_page
 from rotor_mbs.runs.sweeps import StoredSweep
 
-# Stiffness (N m/rad) and speed (rad/s): quiet, near the static bound, in the first tongue, in the second, slow.
-_POINTS = [(30000.0, 5.0), (13000.0, 6.0), (9000.0, 7.5), (6000.0, 9.0), (15000.0, 2.0), (2000.0, 15.0)]
 
-
-@pytest.mark.parametrize(("stiffness", "speed"), _POINTS)
+# Stiffness (N m/rad) and speed (rad/s): quiet, in the first tongue, in the second.
+@pytest.mark.parametrize(("stiffness", "speed"), [(30000.0, 5.0), (9000.0, 7.5), (6000.0, 9.0)])
 def test_the_map_is_that_of_mathieus_equation(tmp_path: Path, stiffness: float, speed: float) -> None:
     """x'' + (W² + k/(m c²) + (g/c) sin(W t + phase)) x = 0 for each blade's small pitch, the rotor's speed steady."""
     output = made_sweep(
@@ -44,7 +42,6 @@ def test_the_map_is_that_of_mathieus_equation(tmp_path: Path, stiffness: float, 
         largest = max(largest, float(np.abs(x).max()))
     # Terms of second order in the pitch: its size (1e-8 times the growth), and the rotor's speed that it disturbs by
     # m c d/(3 m d²) of that.
-    assert ARM > OFFSET
     assert growth == pytest.approx(largest, rel=1e-6 + 1e-7 * largest)
 
 
@@ -71,12 +68,3 @@ def test_a_sweep_shows_the_pitch_over_what_was_varied(tmp_path: Path) -> None:
     assert [float(str(cell)) for cell in row[2:]] == pytest.approx(
         np.quantile(pitch, (0, 0.05, 0.5, 0.95, 1)), rel=1e-5
     )
-
-
-def test_a_grid_of_two_parameters_is_a_map(tmp_path: Path) -> None:
-    page = sweep_page(StoredSweep(made_sweep(tmp_path)))
-    section = page["plots"]
-    assert isinstance(section, Section)
-    (shown,) = section.pictures
-    assert "bearing stiffness (N m/rad)" in str(shown.svg)
-    assert "initial rotor speed (rad/s)" in str(shown.svg)

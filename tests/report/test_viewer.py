@@ -85,15 +85,6 @@ def test_an_offset_is_drawn_as_a_tenth_of_the_blade_and_never_smaller(offset: fl
     assert magnification(scene) == factor
 
 
-@pytest.mark.parametrize(("offset", "is_explained"), [("0.1", True), ("5", False)])
-def test_the_viewer_explains_an_offset_too_small_to_be_seen(tmp_path: Path, offset: str, is_explained: bool) -> None:
-    text = re.sub(r"tip = .*", f"tip = [{offset}, 0, 11]", FIG11.text)
-    path = store(tmp_path / "r.h5", [Made(replace(FIG11, text=text), "reference", TURNING)])
-    page = (write_report(path, tmp_path / "out").parent / "paper-fig11.html").read_text(encoding="utf-8")
-    assert 'data-part="offset"' in page
-    assert ("so close to the pitch axis that pitch motion would be invisible" in page) == is_explained
-
-
 def test_data_cannot_end_the_script_element() -> None:
     evil = "</script><script>alert(1)</script><!-- &amp;"
     text = str(script_json({"name": evil}))

@@ -8,6 +8,7 @@ import shutil
 import zlib
 from collections.abc import Callable
 from functools import partial
+from itertools import islice
 from pathlib import Path
 
 import h5py
@@ -15,7 +16,7 @@ import numpy as np
 import pytest
 from support.checking import failed, judged, results_file
 from support.commands import refusal, rotor_mbs
-from support.stored import change_row, damage
+from support.stored import change_byte, change_row, damage
 from support.sweeps import THREE_RUNS, made_sweep
 
 import rotor_mbs as rm
@@ -99,17 +100,13 @@ def test_checksums_are_as_the_documentation_says(written: Path, swept: Path) -> 
 
 
 def test_the_last_bit_of_every_column_of_a_run_is_found(copy: Path) -> None:
-    columns = TableFile(copy).place(RUN).row_type.names or ()
+    place = TableFile(copy).place(RUN)
+    columns = place.row_type.names or ()
     assert {"angles", "rates", "tip", "kinetic_energy", "energy_error", "energy_drift_max", "message"} <= {*columns}
-    before = copy.read_bytes()
     for column in columns:
-        damage(copy, RUN, column)
-        with open_results(copy) as results:
-            run = results.scenes[SCENE].runs[METHOD]
-            assert run.is_damaged, column
-            with pytest.raises(StoreError, match=f"{RUN} changed after it was written"):
-                run.array("angles")
-        copy.write_bytes(before)
+        change_byte(place, column)
+        assert not place.is_stored, column
+        change_byte(place, column)  # the same bit again: as before
     with open_results(copy) as results:
         assert not any(run.is_damaged for run in results.scenes[SCENE].runs.values())
 
@@ -123,10 +120,8 @@ def test_a_damaged_run_is_neither_reported_nor_read(copy: Path, tmp_path: Path) 
 
 LAID_OUT: dict[str, Callable[[h5py.File], object]] = {
     "a setting": lambda file: file["runs/settings"].__setitem__(1, "{}"),
-    "a version": lambda file: file["runs/versions"].__setitem__(1, "{}"),
     "a time": lambda file: file[SCENE]["time"].__setitem__(1, 0.5),
     "a unit": lambda file: file[SCENE]["angles"].attrs.modify("units", "deg"),
-    "a title": lambda file: file[SCENE].attrs.modify("title", "another"),
     "the version of a library": lambda file: file.attrs.modify("numpy", "0.0"),
     "no digests": lambda file: file[SCENE].attrs.__delitem__("digests"),
     "an array more": lambda file: file[SCENE].create_dataset("more", data=np.zeros(3)),
@@ -135,14 +130,11 @@ LAID_OUT: dict[str, Callable[[h5py.File], object]] = {
 
 
 @pytest.mark.parametrize("change", LAID_OUT)
-def test_a_change_of_what_was_laid_out_is_refused_in_one_line(change: str, copy: Path, tmp_path: Path) -> None:
+def test_a_change_of_what_was_laid_out_is_refused_in_one_line(change: str, copy: Path) -> None:
     with h5py.File(copy, "r+") as file:
         LAID_OUT[change](file)
     before = copy.read_bytes()
-    commands = [["check", copy]]
-    if change == "a setting":  # all commands read a file by the same function
-        commands += [["report", copy, "-o", tmp_path / "report"], ["run", SCENE, "-m", METHOD, "-o", copy, "-j", "1"]]
-    for words in commands:
+    for words in (["check", copy], ["run", SCENE, "-m", METHOD, "-o", copy, "-j", "1"]):
         assert "changed after the file was laid out" in refusal(*words)
         assert copy.read_bytes() == before
 
@@ -178,11 +170,7 @@ FOREIGN: dict[str, Callable[[h5py.Group, Path], object]] = {
         "angles", (2, 151, 4), "f8", external=[(str(place), 0, 2 * 151 * 32)]
     ),
     "30 GB that are not there": lambda scene, _: scene.create_dataset("angles", (10**9, 4), "f8", chunks=(1000, 4)),
-    "a compressed bomb": lambda scene, _: scene.create_dataset(
-        "angles", data=np.zeros((1_000_000, 4)), compression="gzip"
-    ),
     "a group": lambda scene, _: scene.create_group("angles"),
-    "a text": lambda scene, _: scene.create_dataset("angles", data="text"),
     "an array of nothing": lambda scene, _: scene.create_dataset("angles", data=h5py.Empty("f8")),
 }
 
@@ -199,25 +187,29 @@ def test_what_is_not_an_array_of_the_file_is_refused(kind: str, copy: Path, tmp_
         if kind not in ("an external link", "a group"):
             describe_as(scene["angles"], attributes)
             reseal(scene)
-    for words in (["report", copy, "-o", tmp_path / "report"], ["check", copy]):
-        ended = rotor_mbs(*words)
-        assert ended.status == 2 or (words[0] == "check" and ended.status == 1)
-        if ended.status == 2:
-            (line,) = ended.err.splitlines()
-            assert str(copy) in line
+    assert str(copy) in refusal("report", copy, "-o", tmp_path / "report")
+    assert rotor_mbs("check", copy).status in (1, 2)
 
 
 @pytest.mark.parametrize(
     ("group", "name", "shape"),
-    [(SCENE, "angles", (0, 3)), (SCENE, "time", (2, 2)), ("runs", "samples", ()), ("runs", "status", (1,))],
-)
+    [
+        (SCENE, "angles", (0, 3)), (SCENE, "time", (2, 2)), ("runs", "samples", ()), ("runs", "status", (1,)),
+        ("/", "status", (0,)), ("/", "angles", (0, 3)), ("/", "crc32", ()),
+    ],
+)  # fmt: skip
 def test_a_column_of_another_shape_is_a_line(
-    group: str, name: str, shape: tuple[int, ...], copy: Path, tmp_path: Path
+    group: str, name: str, shape: tuple[int, ...], copy: Path, swept: Path, tmp_path: Path
 ) -> None:
-    with h5py.File(copy, "r+") as file:
+    path = Path(shutil.copy(swept, tmp_path / "s.h5")) if group == "/" else copy
+    with h5py.File(path, "r+") as file:
         reshape(file[group], name, shape)
-    for command in (["check", copy], ["report", copy, "-o", tmp_path / "pages"]):
+    before = path.read_bytes()
+    for command in (["check", path], ["report", path, "-o", tmp_path / "pages"]):
         assert rotor_mbs(*command).status in (1, 2)
+    if group == "/":
+        assert str(path) in refusal("sweep", swept.with_name("s.toml"), "-o", path, "-j", "1")
+    assert path.read_bytes() == before
 
 
 def test_a_group_that_holds_itself_ends(copy: Path) -> None:
@@ -231,13 +223,12 @@ def test_files_that_are_not_ours_are_refused_with_one_line(
     written: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     (tmp_path / "cut.h5").write_bytes(written.read_bytes()[:3000])
-    (tmp_path / "half.h5").write_bytes(written.read_bytes()[: written.stat().st_size // 2])
     (tmp_path / "text.h5").write_text("no HDF5")
     with h5py.File(tmp_path / "other.h5", "w") as file:
         file["x"] = 1
     with h5py.File(tmp_path / "newer.h5", "w") as file:
         file.attrs["format"], file.attrs["format_version"] = "rotor_mbs", 99
-    for name in ("cut.h5", "half.h5", "text.h5", "other.h5", "newer.h5", "missing.h5", "."):
+    for name in ("cut.h5", "text.h5", "other.h5", "newer.h5", "missing.h5", "."):
         with pytest.raises(StoreError) as caught, open_results(tmp_path / name):
             pass
         assert "\n" not in str(caught.value)
@@ -254,7 +245,7 @@ def test_files_that_are_not_ours_are_refused_with_one_line(
 def test_an_attribute_that_became_a_list_is_not_read(copy: Path) -> None:
     """One bit makes a list of a text, at which the HDF5 library ends the process that reads it."""
     content, refused = copy.read_bytes(), 0
-    for found in re.finditer(rb"\x19\x01", content):
+    for found in islice(re.finditer(rb"\x19\x01", content), 0, None, 5):
         copy.write_bytes(content[: found.start()] + b"\x19\x00" + content[found.end() :])
         try:
             with open_results(copy) as results:
@@ -286,15 +277,3 @@ def test_a_changed_number_of_a_finished_sweep_is_found(column: str, swept: Path,
     for read in (partial(rm.Runs.column, name="time"), partial(rm.Runs.at, name="angles", sample=0), rm.Runs.to_xarray):
         with pytest.raises(StoreError, match="runs 0 changed"):
             read(rm.open(copy))
-
-
-@pytest.mark.parametrize(("name", "shape"), [("status", (0,)), ("steps", (2,)), ("angles", (0, 3)), ("crc32", ())])
-def test_a_sweeps_column_of_another_shape_is_a_line(
-    name: str, shape: tuple[int, ...], swept: Path, tmp_path: Path
-) -> None:
-    path = Path(shutil.copy(swept, tmp_path / "s.h5"))
-    with h5py.File(path, "r+") as file:
-        reshape(file, name, shape)
-    before = path.read_bytes()
-    assert str(path) in refusal("sweep", swept.with_name("s.toml"), "-o", path, "-j", "1")
-    assert path.read_bytes() == before

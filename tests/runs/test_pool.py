@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import gc
-import multiprocessing
 import os
 import resource
 import signal
@@ -166,13 +165,6 @@ def test_a_system_without_room_for_a_thread_is_told(monkeypatch: pytest.MonkeyPa
         pool.submit(_pid, None, _LONG_S)
     with pytest.raises(ResourceError, match=told):
         WorkerPool(1, gc.collect)
-
-
-def test_no_more_processes_are_started_than_there_are_tasks() -> None:
-    before = set(multiprocessing.active_children())
-    with WorkerPool(4) as pool:
-        pool.submit(_pid, None, _LONG_S).result(_LONG_S)
-        assert len({*multiprocessing.active_children()} - before) == 1
 
 
 def _ends(work: Callable[[Any], Any], tasks: Iterable[Any], pool: TaskPool) -> list[Finished[Any, Any]]:

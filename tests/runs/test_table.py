@@ -7,7 +7,6 @@ import subprocess
 import sys
 from pathlib import Path
 
-import h5py
 import numpy as np
 import pytest
 from support.scenes import paper
@@ -94,22 +93,6 @@ def test_xarray_opens_it_at_every_moment(path: Path, engine: str) -> None:
         assert data.stiffness.attrs["units"] == "N m/rad"
         assert data.status.attrs["flag_meanings"].split() == ["missing", *STATUSES]
         assert "method" not in {*data.dims, *data.variables}
-
-
-def test_every_dimension_has_its_scale_and_every_array_is_contiguous(path: Path) -> None:
-    with h5py.File(path) as file:
-        for dataset in file.values():
-            assert dataset.is_scale or all(len(dimension) == 1 for dimension in dataset.dims), dataset.name
-            assert dataset.chunks is None
-
-
-def test_the_order_of_writing_does_not_show(path: Path, tmp_path: Path) -> None:
-    other = tmp_path / "o.h5"
-    with laid_out(other, [_table()], {"title": "t"}):
-        pass
-    _fill(path, range(0, ROWS, 4))
-    _fill(other, range(0, ROWS, 4)[::-1])
-    assert path.read_bytes() == other.read_bytes()
 
 
 def test_rows_without_their_status_are_missing(path: Path) -> None:

@@ -1,8 +1,7 @@
-"""Seeded random scene files and sweep files, and what a command may answer to them."""
+"""Seeded random scene files, and what a command may answer to them."""
 
 from __future__ import annotations
 
-import json
 import random
 import re
 import traceback
@@ -20,10 +19,6 @@ from support.commands import rotor_mbs
 SCENES = (
     "check/general", "check/pitch-loads", "check/point-masses", "extreme/toy", "extreme/tumbling", "paper/fig04b",
     "paper/fig11", "stiff/torque-steps", "turbine/pitch-step",
-)  # fmt: skip
-KEYS = (
-    "gravity", "blade.mass", "blade.centre_of_mass[0]", "blade.inertia[2]", "hub.inertia", "initial.angles[0]",
-    "initial.angles[1]", "initial.angles[9]", "initial.rates[0]", "bearing.stiffness", "torque.rotor", "no.such",
 )  # fmt: skip
 USUAL = (0.0, 0.1, 1.0, 2.5, 9.8, 1000.0)
 # What a value may be replaced by.
@@ -51,29 +46,6 @@ def scene_text(seed: int) -> str:
         is_linked = line.startswith("inertia") or " = [[" in line  # numbers that depend on one another
         if not is_linked or chance.random() < 0.1:
             lines[i] = re.sub(r"\b\d+\.\d+(e[+-]?\d+)?\b", change, line)
-    text = "\n".join(lines) + "\n"
-    return damaged_line(chance, text) if chance.random() < 0.25 else text
-
-
-def sweep_text(seed: int, scene: str) -> str:
-    """A sweep of a few runs of `scene`; of every fourth one a line is damaged."""
-    chance = random.Random(seed)
-
-    def numbers(count: int) -> list[float]:
-        decades = chance.choice([1.0, 5.0, 30.0])
-        return [chance.choice([*USUAL, -1.0, 10.0 ** chance.uniform(-decades, decades)]) for _ in range(count)]
-
-    kinds = [chance.choice(["values", "linear", "log", "uniform", "sobol"]) for _ in range(chance.randint(1, 2))]
-    lines = ['title = "fuzz"', f'scene = "{scene}"', f"samples = {chance.choice([2, 5, 11])}"]
-    lines.append(f"outputs = {json.dumps(chance.sample(OUTPUTS, chance.randint(0, 3)))}")
-    lines.append(f'methods = ["{chance.choice(["lagrange/taylor", "lagrange/dop853", "exudyn_tree/rk44"])}"]')
-    if {"uniform", "sobol"} & set(kinds):
-        lines.append(f"draws = {chance.randint(1, 4)}")
-    for kind, key in zip(kinds, chance.sample(KEYS, len(kinds)), strict=True):
-        low, high = sorted(map(abs, numbers(2)))
-        spaced = f"{{start = {low}, end = {high}, count = {chance.randint(2, 4)}}}"
-        given = {"values": numbers(chance.randint(1, 3)), "linear": spaced, "log": spaced}
-        lines += ["[[axis]]", f'key = "{key}"', f"{kind} = {given.get(kind, [low, high])}"]
     text = "\n".join(lines) + "\n"
     return damaged_line(chance, text) if chance.random() < 0.25 else text
 

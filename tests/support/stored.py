@@ -11,7 +11,7 @@ import numpy as np
 
 from rotor_mbs.errors import StoreError
 from rotor_mbs.runs.design import RUNS, Asked
-from rotor_mbs.runs.table import Rows, TableFile, extend_file, results_tables, row_of_run
+from rotor_mbs.runs.table import Place, Rows, TableFile, extend_file, results_tables, row_of_run
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.metrics import metrics_of
 from rotor_mbs.solution.trajectory import Integration, Solution, Trajectory
@@ -98,8 +98,11 @@ class Arrays:
 
 def damage(path: Path, run: str, column: str, at: int = 0) -> None:
     """Change a byte of a stored row: of the column, `at` bytes from its end."""
-    place = TableFile(path).place(run)
-    with path.open("r+b") as file:
+    change_byte(TableFile(path).place(run), column, at)
+
+
+def change_byte(place: Place, column: str, at: int = 0) -> None:
+    with place.path.open("r+b") as file:
         file.seek(place.offsets[column] + place.row_type[column].itemsize - 1 - at)
         byte = file.read(1)[0]
         file.seek(-1, 1)
