@@ -12,7 +12,6 @@ from support.rotors import AXIAL, acceleration, make_scene
 from support.scenes import general
 
 from rotor_mbs.analysis.modes import modes_of
-from rotor_mbs.errors import InputError
 from rotor_mbs.methods.catalogue import find_method
 from rotor_mbs.models.exudyn import linearization as engine
 from rotor_mbs.models.lagrange import linearization as closed
@@ -114,16 +113,3 @@ def test_closed_form_tree_chain_and_mujoco_have_the_same_frequencies(scene, spee
         np.testing.assert_allclose(other.stiffness, ours.stiffness, atol=1e-8 * size)
         np.testing.assert_allclose(other.damping, ours.damping, atol=1e-8 * max(1.0, np.abs(ours.damping).max()))
         assert np.abs(other.residual).max() < 1e-8 * size
-
-
-def test_joint_forces_stiffen_the_chain(monkeypatch):
-    """Without the geometric stiffness the same comparison fails, by percents."""
-    monkeypatch.setattr(engine, "_geometric_stiffness", lambda _system, _forces, N, _step: np.zeros_like(N))
-    result = frequencies(engine.linearize_chain(DAMPED, state(DAMPED, 0.0), 0.0, 0.0), DAMPED, 0.0)
-    assert np.abs(result[1:] / frequencies(linear(DAMPED, 0.0), DAMPED, 0.0)[1:] - 1.0).max() > 0.01
-
-
-def test_no_steady_state_is_an_input_error():
-    # Lighter than the rounding of its energies can show.
-    with pytest.raises(InputError, match="steady state"):
-        closed.steady_rotation(shipped("extreme/light-1e-8"), 1.2)
