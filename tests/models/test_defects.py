@@ -22,12 +22,10 @@ from rotor_mbs.models.lagrange.reference import _variational_matrices
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.defects import FLOOR_SAFETY, MAX_INTERVAL_GROWTH, Defects
 from rotor_mbs.solution.metrics import defect_metrics, horizon_samples, running_growth
-from rotor_mbs.solution.trajectory import Array, Trajectory
+from rotor_mbs.solution.trajectory import Trajectory
 
 TAYLOR, DOP853 = "lagrange/taylor", "lagrange/dop853"
 ULP = float(np.finfo(float).eps)
-# rad: what dop853, at 3e-14 a step, leaves in an interval of fig11; a fault is looked for above it.
-NOISE = 1e-12
 FIG11 = paper("fig11", duration=1.0, samples=101, outputs=("angles", "rates"))
 
 
@@ -38,15 +36,6 @@ def defects_of(scene: Scene, run: Trajectory) -> Defects:
 @functools.cache
 def fig11_run() -> Trajectory:
     return solve(DOP853, FIG11, {}).trajectory
-
-
-def signed(defects: Defects) -> Array:
-    return np.hstack([defects.angles, defects.rates])
-
-
-def intervals(defects: Defects) -> list[int]:
-    """Those whose defect is no error of dop853."""
-    return np.flatnonzero(defects.sizes > NOISE).tolist()
 
 
 # ---- Of a right run
@@ -92,36 +81,8 @@ def test_half_the_step_divides_the_defects_by_two_to_the_order(method: str, orde
     assert np.log2(medians[0] / medians[1]) == pytest.approx(order, abs=0.2)
 
 
-# ---- Faults: a wrong load, a wrong row, a wrong start. Wrong numbers of a model are those of test_planted_faults.py,
-# patterns that are named those of studies/test_planted_mistakes.py.
-
-
-def test_a_wrong_torque_is_seen_in_its_intervals_alone_in_proportion() -> None:
-    """For half a second; linear in the torque but for what the motion itself makes of it, 1e-3 within a second."""
-    largest = []
-    for torque in (1e3, 2e3):
-        table = ((0.0, 0.0), (0.3, 0.0), (0.3, torque), (0.8, torque), (0.8, 0.0), (1.0, 0.0))
-        run = solve(DOP853, replace(FIG11, rotor_torque=table), {}).trajectory
-        defects = defects_of(FIG11, run)
-        assert intervals(defects) == list(range(30, 80))
-        largest.append(signed(defects)[30:80])
-    off = np.abs(largest[1] - 2.0 * largest[0]).max(axis=0)
-    assert (off <= 1e-2 * np.abs(largest[1]).max(axis=0)).all()
-
-
-def test_one_wrong_row_gives_two_defects_of_which_the_second_undoes_the_first() -> None:
-    run = fig11_run()
-    row, error = 40, 1e-6 * np.array([1.0, -2.0, 3.0, 0.5, 20.0, 10.0, -30.0, 5.0])
-    angles, rates = run.angles.copy(), run.rates.copy()
-    angles[row] += error[:4]
-    rates[row] += error[4:]
-    defects = interval_defects(FIG11, run.time, angles, rates)
-    assert intervals(defects) == [row - 1, row]
-    first, second = signed(defects)[[row - 1, row]]
-    np.testing.assert_allclose(first, -error, rtol=0, atol=1e-10)
-    assert defects.transitions is not None
-    # Beyond the linear part: squares of the error.
-    np.testing.assert_allclose(second, -defects.transitions[row] @ first, rtol=1e-4, atol=1e-9)
+# ---- Wrong numbers of a model are seen in test_planted_faults.py; a wrong load, a wrong row and others in
+# studies/test_planted_mistakes.py.
 
 
 def test_a_wrong_start_has_no_defect_but_is_in_the_predicted_error() -> None:
@@ -129,7 +90,7 @@ def test_a_wrong_start_has_no_defect_but_is_in_the_predicted_error() -> None:
     angles = (FIG11.initial_angles[0] + 1e-6, *FIG11.initial_angles[1:])
     run = solve(DOP853, replace(FIG11, initial_angles=angles), {}).trajectory
     defects = defects_of(FIG11, run)
-    assert intervals(defects) == []
+    assert defects.sizes.max() < 1e-12  # what dop853 leaves in an interval
     assert defects.predicted is not None
     np.testing.assert_allclose(defects.predicted, run.angles - fig11_run().angles, rtol=0, atol=1e-9)
 
@@ -226,7 +187,7 @@ def test_an_interval_of_huge_growth_is_counted_and_not_judged(growth: float, lef
     assert defect_metrics(endless, None)["defect_max"] == np.inf
 
 
-@pytest.mark.parametrize("rate", [1e200, 1e20, 1e4])
+@pytest.mark.parametrize("rate", [1e200, 1e4])
 def test_a_row_that_is_no_motion_is_inaccurate(rate: float) -> None:
     """Where the closed form has no end, and where it has one somewhere else."""
     solution = solve(DOP853, FIG11, {})

@@ -48,19 +48,27 @@ POLE = replace(PAPER, centre_of_mass=(0.0, 0.0, D))
 K_PITCH, D_PITCH, J_PITCH = 40.0, 3.0, 7.0  # with AXIAL, of which rotor and pitch do not feel each other
 
 
-def oscillator(start, t):
-    """Pitch of a damped torsion oscillator that starts with 0.5 rad/s."""
-    decay = D_PITCH / (2 * J_PITCH)
+def oscillator(start, rate, t, damping=D_PITCH):
+    """Pitch of a damped torsion oscillator, from its angle of rest."""
+    decay = damping / (2 * J_PITCH)
     w = np.sqrt(K_PITCH / J_PITCH - decay**2)
-    return np.exp(-decay * t) * (start * np.cos(w * t) + (0.5 + decay * start) / w * np.sin(w * t))
+    return np.exp(-decay * t) * (start * np.cos(w * t) + (rate + decay * start) / w * np.sin(w * t))
+
+
+def axial(pitch, rate, damping=D_PITCH, **loads):
+    springs = {"bearing_stiffness": (K_PITCH,), "bearing_damping": (damping,)}
+    return make_scene([0.1, pitch], [1.0, rate], (AXIAL,), gravity=0.0, **springs, **loads)
 
 
 def torsion(start):
-    springs = {"bearing_stiffness": (K_PITCH,), "bearing_damping": (D_PITCH,)}
-    scene = make_scene([0.1, start], [1.0, 0.5], (AXIAL,), gravity=0.0, **springs)
-    return scene, lambda t: 0.1 + t, lambda t: oscillator(start, t)
+    return axial(start, 0.5), lambda t: 0.1 + t, lambda t: oscillator(start, 0.5, t)
 
 
+CONSTANT_LOADS = {
+    "rotor_torque": ((0.0, 5.0),),
+    "pitch_torque": (((0.0, 12.0),),),
+    "bearing_rest": (((0.0, 0.7),),),
+}
 CASES = {
     "pendulum": (
         make_scene([11 * pi / 12, 0], [0, 0], duration=2.5, samples=251),
@@ -80,6 +88,16 @@ CASES = {
         make_scene([0.2, 0, 0, 0], [2, 0, 0, 0], gravity=0.0, shaft_damping=1.5 * INERTIA),
         lambda t: 0.2 + 2 / 1.5 * (1 - np.exp(-1.5 * t)), None,
     ),
+    # About 12/k beside the angle of rest; the rotor's inertia is 12 + 50·9 kg m².
+    "constant torques and angle of rest": (
+        axial(0.2, -0.5, damping=0.0, **CONSTANT_LOADS),
+        lambda t: 0.1 + t + 2.5 * t**2 / 462.0,
+        lambda t: 0.7 + 12.0 / K_PITCH + oscillator(-0.5 - 12.0 / K_PITCH, -0.5, t, 0.0),
+    ),
+    "a step of the command between samples": (
+        axial(0.0, 0.0, duration=2.0, bearing_rest=(((0.43, 0.0), (0.43, 0.3)),)), lambda t: 0.1 + t,
+        lambda t: np.where(t < 0.43, 0.0, 0.3 + oscillator(-0.3, 0.0, t - 0.43)),
+    ),
     **{f"torsion from {start:.1f} rad": torsion(start) for start in (0.7, -9.0, 3 * pi + 0.3)},
 }  # fmt: skip
 
@@ -89,7 +107,7 @@ def bound_of(name, case):
         # order 2 leaves λ³h²t/12, 1e-7; Newton's relative tolerance of 1e-8 on positions is 1e-8/h, some 1e-5, on rates
         return 2e-5
     # Euler parameters turn too little by h²θ'³/12 a second: 1.7e-4 rad/s at 20 rad/s and 5e-4 s
-    return 2e-4 if case.startswith("torsion") and name not in FINE else BOUND[name]
+    return 2e-4 if CASES[case][2] and name not in FINE else BOUND[name]
 
 
 @pytest.mark.parametrize("case", CASES)

@@ -86,12 +86,14 @@ RUNS: dict[str, list[tuple[str, str]]] = {
 _M, _L, _P = "rotor_mbs.models.exudyn", "rotor_mbs.models.lagrange", "rotor_mbs.models.printed"
 _J, _A = "rotor_mbs.models.mujoco", "rotor_mbs.analysis"
 _PARTS = ("models/test_exudyn_parts.py",)
+_ALL_LOADS = "models/test_pitch_loads.py::test_every_load_at_once_follows_the_equations_written_anew"
+_EXACT = "models/test_exact_solutions.py::test_every_model_has_the_exact_motion"
+_CONSTANT = "constant torques and angle of rest"
 _PRINTED = ("models/test_printed.py", "analysis/test_errata.py")
 _DEFAULTS = "analysis/test_run_integrity.py"
-_WORK = "models/test_pitch_loads.py::test_work_"
 _SENSORS = (
     *_PARTS,
-    f"{_WORK}of_a_constant_torque_and_of_a_constant_rest_angle[exudyn_tree/rk44]",
+    f"{_EXACT}[exudyn_tree/rk44-{_CONSTANT}]",
     "models/test_exact_solutions.py::test_a_thousand_radians_a_second_are_counted_turn_by_turn",
 )
 _EXTRAPOLATION = (
@@ -99,7 +101,6 @@ _EXTRAPOLATION = (
     "models/test_extrapolation.py::test_the_work_of_loads_and_dampers_along_the_substeps",
 )
 _MUJOCO = "models/test_mujoco.py::test_"
-_ALL_LOADS = "models/test_pitch_loads.py::test_every_load_at_once_follows_the_equations_written_anew"
 _JUDGEMENT = "solution/test_judgement.py::test_"
 _RULES = (
     "analysis/test_status_rules.py",
@@ -109,7 +110,7 @@ _RULES = (
 )
 _CHECK = "studies/test_check.py::test_"
 _TIME_TABLE = ("scenario/test_time_table.py",)
-_SAMPLES = ("models/test_segments.py", f"{_WORK}and_energy_of_a_step_of_the_command[lagrange/dop853]")
+_SAMPLES = ("models/test_segments.py", f"{_ALL_LOADS}[lagrange/dop853]", f"{_EXACT}[lagrange/dop853-{_CONSTANT}]")
 _TARGETS = (
     Target(f"{_L}.closed_form", "accelerations power rest_energy energies point_path", "lagrange", _PRINTED),
     Target(f"{_L}.parameters", "rotor_form _inertia_about_hub _rotor_inertia _coefficients _cosine_of_turn",
