@@ -10,7 +10,7 @@ from rotor_mbs.methods.solve import solve
 from rotor_mbs.runs.read import open_results
 from rotor_mbs.scenario.catalogue import find_scenes, reference_folder
 from rotor_mbs.scenario.scene import Scene
-from rotor_mbs.solution.trajectory import Solution, Trajectory
+from rotor_mbs.solution.trajectory import Array, Solution, Trajectory
 from rotor_mbs.studies.stored_references import rebuilt_reference
 
 TAYLOR = "lagrange/taylor"
@@ -22,12 +22,16 @@ def scene(name: str) -> Scene:
 
 
 @functools.cache
+def _arrays(group: str) -> dict[str, dict[str, Array]]:
+    """Of every reference in a file: to open and verify it takes a second, to read all of it no more."""
+    with open_results(reference_folder() / f"{group}.h5") as results:
+        runs = {name: stored.reference for name, stored in results.scenes.items()}
+        return {name: {array: run.array(array) for array in run.names} for name, run in runs.items() if run}
+
+
+@functools.cache
 def reference(name: str) -> Trajectory:
-    with open_results(reference_folder() / f"{name.split('/')[0]}.h5") as results:
-        stored = results.scenes[name].reference
-        assert stored is not None
-        arrays = {array: stored.array(array) for array in stored.names}
-        return rebuilt_reference(scene(name), arrays)
+    return rebuilt_reference(scene(name), _arrays(name.split("/")[0])[name])
 
 
 def run(one: Scene, method: str = TAYLOR, **settings: object) -> Solution:
