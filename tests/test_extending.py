@@ -168,6 +168,6 @@ def test_bench_measures_its_ladder_and_its_order() -> None:
 
 @pytest.mark.full
 def test_stability_takes_it_with_its_label() -> None:
-    command("stability", "one.toml", "-o", "stable.h5", "--report", "stable", "--timeout", "4")
+    command("stability", "one.toml", "-o", "stable.h5", "--timeout", "4")
     assert rm.open("stable.h5")["one/outside/rk4"].status == "ok"
-    assert "from outside, RK4" in Path("stable/index.html").read_text()
+    assert "from outside, RK4" in Path("stable-report/index.html").read_text()

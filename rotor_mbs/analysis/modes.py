@@ -21,6 +21,7 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from rotor_mbs.analysis.text_tables import TextTable
 from rotor_mbs.errors import InputError, StoreError
 from rotor_mbs.runs.design import Column
 from rotor_mbs.runs.read import Record, read_records
@@ -339,41 +340,12 @@ def mode_rows(modes: SceneModes) -> list[dict[str, object]]:
     return rows
 
 
-def modes_summary(modes: SceneModes) -> list[str]:
-    """Lines for a terminal: modes at rest, at the lowest and the highest speed, agreement, multipliers."""
-    lines = [f"{modes.scene}: {modes.title}"]
-    for linear in modes.closed_form:
-        for i in sorted({0, len(linear.speeds) - 1}):
-            state = "at rest" if linear.kind == REST else f"at {linear.speeds[i]:.4g} rad/s without gravity"
-            if linear.messages[i]:
-                lines.append(f"  {state}: {linear.messages[i]}")
-                continue
-            lines.append(f"  {state}")
-            for k, name in enumerate(linear.names):
-                undamped, ratio = linear.undamped_frequencies[i, k], linear.damping_ratios[i, k]
-                line = f"    {name:18} {undamped:12.7g} rad/s {undamped / (2 * math.pi):12.7g} Hz"
-                line += f", damped {linear.damped_frequencies[i, k]:.7g}"
-                if math.isnan(undamped):
-                    line = f"    {name:18} grows without oscillating, {linear.growth_rates[i, k]:.5g} 1/s"
-                elif abs(ratio) > 1e-12:
-                    line += f", damping ratio {ratio:.4g}"
-                lines.append(line)
-    sources = max(modes.rest, modes.rotation, key=len)
-    if len(sources) > 1:
-        labels, verdict = (linear.label for linear in sources.values()), "agree" if modes.agrees else "DISAGREE"
-        off = f"relative difference of frequencies up to {modes.disagreement:.1e}"
-        lines.append(f"  {', '.join(labels)} {verdict}: {off}")
-    if modes.floquet is not None:
-        lines.append(f"  {floquet_sentence(modes.floquet)}")
-    return [*lines, *(f"  {note}" for note in modes.notes)]
-
-
-def floquet_sentence(table: FloquetTable) -> str:
-    counts = [int(np.count_nonzero(table.stable == code)) for code in (1, 0, -1)]
-    parts = [
-        f"{n} {what}" for n, what in zip(counts, ("stable", "unstable", "without a periodic motion"), strict=True) if n
+def mode_table(rows: Sequence[Mapping[str, object]]) -> TextTable:
+    """Table of such rows."""
+    cells = [
+        tuple("" if v is None else f"{v:.7g}" if isinstance(v, float) else str(v) for v in row.values()) for row in rows
     ]
-    return f"rotation under gravity, {len(table.speeds)} speeds: {', '.join(parts)}"
+    return TextTable(tuple(name.replace("_", " ") for name in rows[0]) if rows else (), cells)
 
 
 # Records of a results file

@@ -12,7 +12,7 @@ import functools
 import json
 import tomllib
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import Any, Literal, NamedTuple
 
 from rotor_mbs.analysis import run_selection
@@ -128,40 +128,21 @@ def checked_entries() -> list[CheckedEntry]:
 HOLDS, FAILS, UNDECIDED = "holds", "fails", "undecided"
 
 
-class TrialTable(NamedTuple):
-    """The published numbers under other conditions: captions, and a row for each condition.
-
-    rows: texts of the condition; the numbers in rad or rad/s, None where there is none; whether each has the printed
-    digits.
-    """
-
-    caption: str
-    head: Sequence[str]
-    rows: Sequence[tuple[Sequence[str], Sequence[float | None], Sequence[bool]]]
-
-
 @dataclass(frozen=True)
 class ClaimStudy:
-    """The claims in words tested on many runs, and the numbers under other conditions.
+    """The claims in words tested on many runs.
 
     rule : of the verdicts, in words.
     runs, spread : of each scene; rad, by which their starts were moved at most.
-    methods, durations : the printed and the corrected equations; s.
+    methods : the printed and the corrected equations.
     verdicts : "holds", "fails" or "undecided" of each claim by method.
-    shares : of each claim by method, for each duration: the share of the deciding runs in which it holds (None
-        where none decides), and how many decide.
-    numbers : ids of those in `trials`.
     """
 
     rule: str
     runs: int
     spread: float
     methods: Sequence[str]
-    durations: Sequence[float]
     verdicts: Mapping[str, Mapping[str, str]]
-    shares: Mapping[str, Mapping[str, Sequence[tuple[float | None, int]]]]
-    numbers: Sequence[str]
-    trials: Sequence[TrialTable]
 
     def count(self, method: str, verdict: str) -> int:
         """How many claims have this verdict by the method."""
@@ -176,8 +157,7 @@ def claim_study() -> ClaimStudy:
     'holds'
     """
     stored = json.loads((reference_folder() / "claims.json").read_text(encoding="utf-8"))
-    stored["trials"] = [TrialTable(**table) for table in stored["trials"]]
-    return ClaimStudy(**stored)
+    return ClaimStudy(**{field.name: stored[field.name] for field in fields(ClaimStudy)})
 
 
 # The metric of a run that a published number is, and its words. Of the rotor, over the integrator's own output points.

@@ -53,13 +53,10 @@ def left_out(curve: Record) -> int:
     return curve.statuses.count("left_out")
 
 
-def points(curve: Record, error: str = ANGLE_ERROR, *, with_setup: bool = False) -> tuple[Array, Array]:
-    """(errors in rad, times in s) of the points on the curve; with_setup: what one run costs, building included."""
+def points(curve: Record, error: str = ANGLE_ERROR) -> tuple[Array, Array]:
+    """(errors in rad, times in s) of the points on the curve."""
     chosen = succeeded(curve, error)
-    seconds = curve.arrays["run_time_s"][chosen]
-    if with_setup:
-        seconds = seconds + curve.arrays["setup_time_s"][chosen] + curve.arrays["output_time_s"][chosen]
-    return np.maximum(curve.arrays[error][chosen], SMALLEST_ERROR), seconds
+    return np.maximum(curve.arrays[error][chosen], SMALLEST_ERROR), curve.arrays["run_time_s"][chosen]
 
 
 def pareto(errors: Array, seconds: Array) -> NDArray[np.intp]:

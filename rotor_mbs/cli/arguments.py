@@ -131,10 +131,6 @@ class _Parser(argparse.ArgumentParser):
         help = help or f"output {kind.__name__} (default: %(default)s)"
         self.add_argument("-o", "--output", type=kind, default=default, metavar=metavar, help=help)
 
-    def pages(self, *names: str) -> None:
-        text = "folder for the pages (default: NAME-report beside NAME.h5; report beside results.h5)"
-        self.add_argument(*names, type=folder, metavar="DIR", help=text)
-
     def results(self) -> None:
         text = "file written by rotor-mbs (default: results.h5 if it exists, else rotor-mbs-out/results.h5)"
         self.add_argument("file", nargs="?", type=Path, default=default_results(), metavar="FILE", help=text)
@@ -296,7 +292,7 @@ def _parser() -> tuple[_Parser, dict[str, _Parser]]:
     own.add_argument("--against", type=Path, metavar="OLD", help=text)
     own.add_argument("--junit", type=file, metavar="XML", help="write the verdicts as JUnit XML")
     own.add_argument("--json", type=file, metavar="FILE", help="write the verdicts as JSON; - for standard output")
-    own.flag("--github", help="write the ten worst failures as annotations and a table as job summary")
+    own.flag("--github", help="print the ten worst failures as annotations")
     own.flag("-v", "--verbose", help="print verdicts that pass, too")
     own.jobs()
 
@@ -323,7 +319,6 @@ def _parser() -> tuple[_Parser, dict[str, _Parser]]:
     own.add_argument("--part", type=part, default=(1, 1), metavar="K/N", help="compute part K of N, for a job array")
     own.flag("--fresh", help="recompute all stored runs")
     own.flag("--dry-run", help="only print number of runs and disk space")
-    own.flag("--yes", help="confirm a sweep of more than a million runs")
     own.flag("--json", help="print the summary or the estimate as JSON")
     own.jobs()
     own.timeout()
@@ -336,7 +331,6 @@ def _parser() -> tuple[_Parser, dict[str, _Parser]]:
     own.method("method (see rotor-mbs list), or a Python file that defines methods (default: all)")
     own.settings()
     own.output(file, "FILE", Path("stability.h5"))
-    own.pages("--report")
     own.jobs()
     own.timeout(
         8.0, "; at least 120 for lagrange/taylor"
@@ -351,7 +345,6 @@ def _parser() -> tuple[_Parser, dict[str, _Parser]]:
     text = "rotor speeds in rad/s, equally spaced, such as 0:3:31 (default: only at rest)"
     own.add_argument("--speeds", type=span, default=(), metavar="FROM:TO:COUNT", help=text)
     own.output(file, "FILE", Path("modes.h5"))
-    own.pages("--report")
     own.flag("--json", help="print the table as JSON")
     own.jobs()
     own.timeout(600.0)
@@ -361,7 +354,8 @@ def _parser() -> tuple[_Parser, dict[str, _Parser]]:
         "my.h5 --open",
     )  # fmt: skip
     own.results()
-    own.pages("-o", "--output")
+    text = "folder for the pages (default: NAME-report beside NAME.h5; report beside results.h5)"
+    own.output(folder, "DIR", help=text)
     own.flag("--open", help="open the index in a browser")
 
     own = command(
@@ -379,7 +373,7 @@ def _parser() -> tuple[_Parser, dict[str, _Parser]]:
     )  # fmt: skip
     own.add_argument("scene", metavar="SCENE", help="name of a scene in the results file")
     own.results()
-    text = "FILE.gif, FILE.webp, or FILE.mp4 (requires ffmpeg) (default: name of the scene with .webp)"
+    text = "FILE.gif or FILE.webp (default: name of the scene with .webp)"
     own.output(file, "FILE", help=text)
     text = "magnification of the tip's distance from its pitch axis (default: scaled to 10 %% of blade length)"
     own.add_argument("--offset", type=POSITIVE, metavar="TIMES", help=text)

@@ -8,7 +8,6 @@ from __future__ import annotations
 import argparse
 import errno
 import json
-import os
 import sys
 import time
 from collections import Counter
@@ -136,7 +135,6 @@ def _keys(value: Any, path: tuple[str | int, ...] = ()) -> Iterator[tuple[tuple[
         yield path, value
 
 
-_MANY_RUNS = 1_000_000  # that a sweep does not start without --yes
 _DISK_IS_FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 
 
@@ -176,13 +174,13 @@ def stability(arguments: argparse.Namespace) -> int:
     print_table(suite_table(runs))
     seconds = time.monotonic() - start
     print(f"{arguments.output}: {counted(len(scenes), 'scene')}, {counted(len(runs), 'run')}, {seconds:.0f} s")
-    _write_pages(arguments.output, arguments.report)
+    _write_pages(arguments.output)
     return int(print_not_computed(made))
 
 
 def modes(arguments: argparse.Namespace) -> int:
     """The modes of every scene; 1 where two models disagree on a frequency or a scene could not be computed."""
-    from rotor_mbs.analysis.modes import mode_rows, modes_summary, read_modes
+    from rotor_mbs.analysis.modes import mode_rows, mode_table, read_modes
     from rotor_mbs.studies.modes import modes_of_scenes
 
     scenes = find_scenes(arguments.scenes)
@@ -196,17 +194,27 @@ def modes(arguments: argparse.Namespace) -> int:
     found = read_modes(arguments.output) if len(lost) < len(scenes) else {}
     chosen = [found[scene.name] for scene in scenes if scene.name in found]
     if arguments.json:
-        print(json.dumps({one.scene: mode_rows(one) for one in chosen}, ensure_ascii=False, indent=1))
+        print(json.dumps({modes.scene: mode_rows(modes) for modes in chosen}, ensure_ascii=False, indent=1))
     else:
-        for one in chosen:
-            print(*modes_summary(one), sep="\n")
-        _write_pages(arguments.output, arguments.report)
-    return int(is_lost or not all(one.agrees for one in chosen))
+        for modes in chosen:
+            rows = mode_rows(modes)
+            ends = {rows[place]["speed"] for place in (0, -1) if rows}
+            print(f"{modes.scene}: {modes.title}")
+            print_table(mode_table([row for row in rows if row["speed"] in ends]))
+            if modes.floquet is not None:
+                unstable = int((modes.floquet.stable == 0).sum())
+                print(f"unstable in rotation under gravity at {unstable} of {len(modes.floquet.speeds)} speeds")
+            verdict = "agree" if modes.agrees else "DISAGREE"
+            print(
+                f"{verdict}: relative difference of frequencies up to {modes.disagreement:.1e}", *modes.notes, sep="\n"
+            )
+        _write_pages(arguments.output)
+    return int(is_lost or not all(modes.agrees for modes in chosen))
 
 
 def check(arguments: argparse.Namespace) -> int:
     """Prints every verdict that fails (with --verbose all), then a count; status 1 where one fails."""
-    from rotor_mbs.report.pages import check as formats
+    from rotor_mbs.cli import verdicts as formats
     from rotor_mbs.runs.read import is_sweep
     from rotor_mbs.scenario.accuracy_bounds import load_bounds
     from rotor_mbs.studies import check as study
@@ -232,9 +240,6 @@ def check(arguments: argparse.Namespace) -> int:
     if arguments.github:
         for verdict in formats.worst_first(failures)[: formats.WORST]:
             print(formats.github(verdict), file=stream)
-        if summary := os.environ.get("GITHUB_STEP_SUMMARY"):  # where GitHub takes a job's summary from
-            with Path(summary).open("a", encoding="utf-8") as file:
-                file.write(formats.summary(verdicts))
     runs = ", ".join(f"{count} {method}" for method, count in study.judged_runs(verdicts).items())
     print(f"runs checked: {runs or 'none'}", file=stream)
     print(f"{len(verdicts) - len(failures)} passed, {len(failures)} failed", file=stream)
@@ -243,7 +248,7 @@ def check(arguments: argparse.Namespace) -> int:
 
 def _refuse_foreign(arguments: argparse.Namespace) -> None:
     """Before anything is computed: files of --junit and --json that hold something else."""
-    from rotor_mbs.report.pages import check as formats
+    from rotor_mbs.cli import verdicts as formats
     from rotor_mbs.runs.output_files import refuse_foreign
 
     if arguments.junit is not None:
@@ -253,7 +258,7 @@ def _refuse_foreign(arguments: argparse.Namespace) -> None:
 
 
 def _write_verdicts(arguments: argparse.Namespace, verdicts: Sequence[Check]) -> None:
-    from rotor_mbs.report.pages import check as formats
+    from rotor_mbs.cli import verdicts as formats
     from rotor_mbs.runs.output_files import replace_file
 
     if arguments.junit is not None:
@@ -320,7 +325,7 @@ def report(arguments: argparse.Namespace) -> int:
     from rotor_mbs.report.build import write_report
 
     output = arguments.output or pages_beside(arguments.file)
-    index = write_report(arguments.file, output, jobs=cores(), checked=True)
+    index = write_report(arguments.file, output, jobs=cores())
     print(index)
     if arguments.open:
         import webbrowser  # late, as above
@@ -364,8 +369,6 @@ def sweep(arguments: argparse.Namespace) -> int:
             else:
                 print(f"{plan.runs:,} runs with {', '.join(plan.methods)}: {size / 1e6:,.3f} MB")
             return 0
-        if plan.runs > _MANY_RUNS and not arguments.yes:
-            raise InputError(f"{arguments.file}: {plan.runs:,} runs; allowed without --yes: at most {_MANY_RUNS:,}")
         output = arguments.output or Path(f"{plan.sweep.name}.h5")
         made: Counter[str] = Counter()
 
@@ -407,7 +410,7 @@ def sweep(arguments: argparse.Namespace) -> int:
         return 0 if result.is_ok else 1
 
 
-def _write_pages(results: Path, folder: Path | None = None) -> None:
+def _write_pages(results: Path) -> None:
     from rotor_mbs.report.build import write_report
 
-    print(f"report: {write_report(results, folder or pages_beside(results))}")
+    print(f"report: {write_report(results, pages_beside(results))}")

@@ -1,10 +1,8 @@
-"""A scene as an animated WebP or GIF, or as MP4 with ffmpeg: the printed model beside the corrected one."""
+"""A scene as an animated WebP or GIF: the printed model beside the corrected one."""
 
 from __future__ import annotations
 
 import io
-import shutil
-import subprocess
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -14,17 +12,17 @@ from PIL import Image
 
 from rotor_mbs.analysis import run_selection
 from rotor_mbs.analysis.kinematics import tip_paths
-from rotor_mbs.errors import InputError, StoreError
+from rotor_mbs.errors import InputError
 from rotor_mbs.report import canvas
 from rotor_mbs.report.looks import GREY, INK, coordinate_look, label_of
 from rotor_mbs.report.pages.viewer import magnification
 from rotor_mbs.report.plots import projected
-from rotor_mbs.runs.output_files import refuse_foreign, replace_file, replacing
+from rotor_mbs.runs.output_files import refuse_foreign, replace_file
 from rotor_mbs.runs.read import StoredScene, open_results
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.trajectory import Array
 
-SUFFIXES = (".webp", ".gif", ".mp4")
+SUFFIXES = (".webp", ".gif")
 RATE = 20  # frames a second, in real time
 _MARK = b"rotor_mbs animation"  # in the metadata of every file
 _MAX_FRAMES = 600  # a longer scene is shown faster
@@ -50,20 +48,12 @@ def write_animation(results: Path, name: str, output: Path, magnified: float | N
     kind = output.suffix.lower()
     if kind not in SUFFIXES:
         raise InputError(f"{output}: unknown format {kind or '(none)'}; allowed: {', '.join(SUFFIXES)}")
-    if kind == ".mp4" and shutil.which("ffmpeg") is None:
-        raise InputError(
-            f"{output}: MP4 needs ffmpeg, which is not found here; allowed: .webp, .gif, or install ffmpeg"
-        )
     refuse_foreign(output, _MARK)  # before anything is drawn
     name = Path(name).stem if name.endswith(".toml") else name  # a scene of one's own is stored by the stem of its file
     with open_results(results) as opened:
         if name not in opened.scenes:
             raise InputError(f"{results}: {name!r}: no such scene in it; allowed: {', '.join(opened.scenes) or 'none'}")
         pictures = frames(opened.scenes[name], magnified)
-    if kind == ".mp4":
-        with replacing(output) as temporary:
-            _film(pictures, temporary)
-        return output
     options = {"quality": 50, "method": 0, "xmp": _MARK} if kind == ".webp" else {"optimize": False, "comment": _MARK}
     stream = io.BytesIO()
     first, name_of_kind = next(pictures), kind.removeprefix(".")
@@ -128,22 +118,3 @@ def wires(scene: Scene, time: Array, angles: Array, at: Array, magnified: float)
         paths = tip_paths(replace(scene, blades=tuple(blades)), moved)
         corners.append(projected(paths.reshape(-1, 3)).reshape(*paths.shape[:2], 2))
     return np.stack(corners, axis=2)
-
-
-def _film(pictures: Iterator[Image.Image], output: Path) -> None:
-    first = next(pictures)
-    size = f"{first.width}x{first.height}"
-    command = [
-        "ffmpeg", "-y", "-loglevel", "error", "-f", "rawvideo", "-pix_fmt", "rgb24", "-s", size, "-r", str(RATE),
-        "-i", "-", "-c:v", "libx264", "-pix_fmt", "yuv420p", "-movflags", "+faststart",
-        "-metadata", f"comment={_MARK.decode()}", "-f", "mp4", str(output.absolute()),
-    ]  # fmt: skip
-    with subprocess.Popen(command, stdin=subprocess.PIPE, stderr=subprocess.PIPE) as ffmpeg:
-        assert ffmpeg.stdin is not None
-        assert ffmpeg.stderr is not None
-        for picture in (first, *pictures):
-            ffmpeg.stdin.write(picture.tobytes())
-        ffmpeg.stdin.close()
-        message = ffmpeg.stderr.read().decode(errors="replace").strip()
-    if ffmpeg.returncode:
-        raise StoreError(f"{output}: ffmpeg failed: {message.splitlines()[-1] if message else 'no reason given'}")

@@ -28,6 +28,7 @@ from rotor_mbs.runs.output_files import replace_file
 
 WIDTH = 5.2  # in; on a telephone's 360 px a text of 9.5 points is then 9 px high
 TIME_AXIS, SPEED_AXIS = "time (s)", "rotor speed (rad/s)"
+WIDE = 11.0  # in; a picture as wide as a page
 PRINT_WIDTH = 174.0 / 25.4  # in; two columns of a journal
 MARK = b"rotor_mbs pictures"  # in the metadata of every picture that is a file
 KINDS = ("pdf", "svg", "png")
@@ -95,14 +96,15 @@ def panels(heights: tuple[float, ...], x_label: str) -> Panels:
     return Panels(figure, axes)
 
 
-def print_grid(rows: int, columns: int, height: float) -> Panels:
-    """Axes row by row, `height` inches each, at a journal's page width, in the style for manuscripts."""
-    with style(for_print=True):
-        whole = rows * height + 1.25
-        figure = Figure(figsize=(PRINT_WIDTH, whole), facecolor="white")
+def grid(rows: int, columns: int, height: float, *, for_print: bool) -> Panels:
+    """Axes row by row, `height` inches each: in the style for manuscripts at a journal's page width, or for a page."""
+    width, margin = (PRINT_WIDTH, 0.75) if for_print else (WIDE, 0.45)
+    with style(for_print=for_print):
+        whole = rows * height + margin + 0.5
+        figure = Figure(figsize=(width, whole), facecolor="white")
         made = figure.subplots(rows, columns, squeeze=False)
         figure.subplots_adjust(
-            left=0.8 / PRINT_WIDTH, right=1.0 - 0.12 / PRINT_WIDTH, bottom=0.75 / whole, top=1.0 - 0.5 / whole,
+            left=0.8 / width, right=1.0 - 0.12 / width, bottom=margin / whole, top=1.0 - 0.5 / whole,
             hspace=0.26 / height, wspace=0.34,
         )  # fmt: skip
     return Panels(figure, list(made.flat))
@@ -188,17 +190,3 @@ def curve(axes: Any, x: Any, y: Any, look: Look, width: float = 1.2, **more: Any
         x, y, color=look.colour, linestyle=look.line, linewidth=width, marker=look.marker, label=look.label or "_",
         **{"markersize": 4.2, "markerfacecolor": PAPER} | more,
     )  # fmt: skip
-
-
-def colour_map(x: Any, y: Any, values: Any, labels: tuple[str, str, str], *, logarithmic: bool) -> Panels:
-    """`values` (y, x) as colour, with a scale on the right; labels: of x, y and the colours."""
-    map_panels = panels((3.8,), labels[0])
-    axes = map_panels.axes[0]
-    norm = "log" if logarithmic else "linear"
-    mesh = axes.pcolormesh(x, y, values, cmap="cividis", shading="nearest", norm=norm, rasterized=True)
-    axes.grid(visible=False)
-    axes.set_ylabel(labels[1])
-    with style():
-        map_panels.figure.colorbar(mesh, ax=axes).set_label(labels[2])
-    map_panels.figure.subplots_adjust(left=0.18)
-    return map_panels

@@ -15,7 +15,7 @@ from markupsafe import Markup, escape
 
 from rotor_mbs.errors import StoreError
 from rotor_mbs.report import numbers
-from rotor_mbs.report.looks import light_palette_css, palette_css
+from rotor_mbs.report.looks import palette_css
 from rotor_mbs.runs.output_files import refuse_foreign, replace_file
 
 GENERATOR = "rotor_mbs report"
@@ -116,21 +116,16 @@ def _environment() -> jinja2.Environment:
         lstrip_blocks=True,
         keep_trailing_newline=True,
     )
-    style, picture = ((_TEMPLATES / f"{name}.css").read_text(encoding="utf-8") for name in ("style", "picture"))
-    scripts = {}
-    for path in sorted(_TEMPLATES.glob("*.js")):  # without indentation and without lines that are comments
-        lines = (line.strip() for line in path.read_text(encoding="utf-8").splitlines())
-        scripts[path.stem] = Markup("\n".join(line for line in lines if line and not line.startswith("//")))
-    # For the content security policy of a page, which allows its script alone.
-    digests = {name: hashlib.sha256(text.encode()).digest() for name, text in scripts.items()}
-    hashes = {name: base64.b64encode(digest).decode("ascii") for name, digest in digests.items()}
-    alone = light_palette_css() + picture.replace("figure>svg", ":root")  # of a picture that is saved as a file
+    style = (_TEMPLATES / "style.css").read_text(encoding="utf-8")
+    # Without indentation and without lines that are comments.
+    lines = (line.strip() for line in (_TEMPLATES / "viewer.js").read_text(encoding="utf-8").splitlines())
+    script = "\n".join(line for line in lines if line and not line.startswith("//"))
     environment.globals.update(
-        picture_style=alone,
         generator=GENERATOR,
-        style=Markup(palette_css() + style + picture.strip()),
-        scripts=scripts,
-        hashes=hashes,
+        style=Markup(palette_css() + style),
+        script=Markup(script),
+        # For the content security policy of a page, which allows its script alone.
+        script_digest=base64.b64encode(hashlib.sha256(script.encode()).digest()).decode("ascii"),
     )
     environment.filters.update(
         number=numbers.number,

@@ -47,9 +47,8 @@ _OTHERS = {
 }
 PALETTE = {**_METHODS, **_COORDINATES, **_OTHERS}
 COLOURS, COORDINATES = tuple(_METHODS), tuple(_COORDINATES)
-# Of the style sheet, by name: the light and the dark colour.
+# The variables of the style sheet.
 _NAMES = {colour: f"k{place}" for place, colour in enumerate(PALETTE)} | {INK: "ink", PAPER: "sheet", GRID: "grid"}
-_VARIABLES = {name: (colour, PALETTE[colour]) for colour, name in _NAMES.items()}
 
 # Of the printed equations, then of the other models in the order of the catalogue; those of other packages are grey.
 _MODEL_COLOURS = ((INK,), (BLUE, LIGHT_BLUE), (VERMILLION, ORANGE), (GREEN,), (PURPLE,))
@@ -88,13 +87,9 @@ def name_of_colour(colour: str) -> str:
 
 def palette_css() -> str:
     """The palette as variables of a style sheet, light and, where the page is dark, dark."""
-    light, dark = (";".join(f"--{name}:{pair[i]}" for name, pair in _VARIABLES.items()) for i in (0, 1))
+    light = ";".join(f"--{name}:{colour}" for colour, name in _NAMES.items())
+    dark = ";".join(f"--{name}:{PALETTE[colour]}" for colour, name in _NAMES.items())
     return f":root{{{light}}}\n@media screen and (prefers-color-scheme:dark){{:root{{{dark}}}}}\n"
-
-
-def light_palette_css() -> str:
-    """The light colours alone, of a picture that is a file."""
-    return f":root{{{';'.join(f'--{name}:{light}' for name, (light, _) in _VARIABLES.items())}}}\n"
 
 
 def with_capital(text: str) -> str:

@@ -5,14 +5,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from rotor_mbs.errors import InputError
 from rotor_mbs.models.lagrange.defects import interval_defects
-from rotor_mbs.report import canvas, plots
+from rotor_mbs.report import canvas
 from rotor_mbs.report.canvas import TIME_AXIS, Panels
 from rotor_mbs.report.looks import BLUE, GREY, INK, VERMILLION, Look, coordinate_look, look_of
 from rotor_mbs.report.numbers import scaled, with_unit
@@ -23,7 +22,7 @@ from rotor_mbs.solution.trajectory import Array, Solution, Trajectory
 ANGLE_AXIS, RATE_AXIS = "angle (rad)", "rate (rad/s)"
 # Smallest value that is drawn on a logarithmic axis: a hundredth of the rounding error of a double of order one.
 LOWEST = 1e-18
-HIGHEST = 1e4
+HIGHEST = 1e15  # rad, or J: beyond it is a divergence alone
 # Values larger than this many times the 90 % quantile are cut off.
 _RUNAWAY = 8.0
 _STILL = 10.0  # times what it is in the last samples, at most, where it has not passed
@@ -113,8 +112,8 @@ def components(quantity: Quantity, values: Array, labels: Sequence[str] = ()) ->
     return [(axis, look, values[:, i, k]) for i, look in enumerate(looks) for k, axis in enumerate("xyz")]
 
 
-def errors(series: Sequence[Series], label: str, horizon: float | None = None, *, signed: bool = False) -> Panels:
-    """Magnitudes on a logarithmic axis from 1 or less; signed: markers are filled where a value is above zero."""
+def errors(series: Sequence[Series], label: str, horizon: float | None = None) -> Panels:
+    """Magnitudes on a logarithmic axis from 1 or less."""
     panels = canvas.panels((2.9,), TIME_AXIS)
     axes, known = panels.axes[0], []
     for curve in series:
@@ -123,13 +122,9 @@ def errors(series: Sequence[Series], label: str, horizon: float | None = None, *
             intervals = np.array_split(np.arange(len(time)), _BINS)
             index = [interval[np.abs(values[interval]).argmax()] for interval in intervals]
             time, values = time[index], values[index]
-        sizes = np.where(np.abs(values) > LOWEST, np.minimum(np.abs(values), np.inf if signed else HIGHEST), np.nan)
+        sizes = np.where(np.abs(values) > LOWEST, np.minimum(np.abs(values), HIGHEST), np.nan)
         first, step = len(time) // 30, max(1, len(time) // 8)
         canvas.curve(axes, time, sizes, curve.look, 1.0 if curve.look.marker else 1.8, markevery=(first, step))
-        if signed:
-            above = np.arange(first, len(time), step)[values[first::step] > 0.0]
-            look = replace(curve.look, line="", label="")
-            canvas.curve(axes, time[above], sizes[above], look, markerfacecolor=curve.look.colour)
         known += sizes[np.isfinite(sizes)].tolist()
     # A little below, so that a curve at a power of ten does not lie on the axis.
     lowest = 0.7 * max(min([*known, 1.0] if known else [LOWEST]), LOWEST)
@@ -221,7 +216,7 @@ class ComparisonPlots:
         if self._reference is None:
             raise InputError("no reference to compare with; allowed: run(..., reference=True) computes one")
         series = self._series([angle_error(run.trajectory, self._reference) for run in self._runs])
-        return plots.errors(series, "largest angle error (rad)", horizon(self._reference)).with_legend()
+        return errors(series, "largest angle error (rad)", horizon(self._reference)).with_legend()
 
     def defects(self) -> Panels:
         """Plot the interval defects (rad) of each run over time. Raises InputError for fewer than two samples."""
@@ -231,20 +226,20 @@ class ComparisonPlots:
                 raise InputError("the run has fewer than two samples; no interval to plot")
             sizes = interval_defects(run.scene, run.time, run.angles, run.rates).sizes
             series.append(Series(run.time[1:], sizes, look_of(run.method)))
-        return plots.errors(series, "defect (rad)").with_legend()
+        return errors(series, "defect (rad)").with_legend()
 
     def rotor(self) -> Panels:
         """Plot the rotor angle (rad) of each run over time."""
         series = self._series([run.angles[:, 0] for run in self._runs])
-        return plots.lines([("rotor angle (rad)", series)]).with_legend()
+        return lines([("rotor angle (rad)", series)]).with_legend()
 
     def energy_error(self) -> Panels:
         """Plot the energy error relative to the energy scale over time. Raises InputError for runs without energies."""
-        errors = []
+        shares = []
         for run in self._runs:
             scale = energy_scale(run.scene, run.trajectory)
-            errors.append(np.abs(_quantity(run, "energy_error")) / (scale or 1.0))
-        return plots.errors(self._series(errors), "energy error / energy scale").with_legend()
+            shares.append(np.abs(_quantity(run, "energy_error")) / (scale or 1.0))
+        return errors(self._series(shares), "energy error / energy scale").with_legend()
 
     def _series(self, values: Sequence[Array]) -> list[Series]:
         pairs = zip(self._runs, values, strict=True)
@@ -262,7 +257,7 @@ class RunPlots(ComparisonPlots):
         """Plot angles (rad) and rates (rad/s) of rotor and pitches over time (s)."""
         run = self._run
         horizon_s = None if self._reference is None else horizon(self._reference)
-        return plots.motion(_some(run.time), run.angles, run.rates, horizon_s)
+        return motion(_some(run.time), run.angles, run.rates, horizon_s)
 
     def energy(self) -> Panels:
         """Plot kinetic and potential energy, and their sum minus the work (J). Raises InputError without energies."""
@@ -273,7 +268,7 @@ class RunPlots(ComparisonPlots):
             (potential, Look(BLUE, "--", "", "potential")),
             (kinetic + potential - work, Look(INK, "-", "", "total minus work")),
         )
-        return plots.lines([("energy (J)", [Series(run.time, *curve) for curve in curves])]).with_legend()
+        return lines([("energy (J)", [Series(run.time, *curve) for curve in curves])]).with_legend()
 
     def loads(self, name: str = "blade_root_force") -> Panels:
         """Plot a load over time: a panel per axis with a line per blade, or one panel with a line per axis (or blade).
@@ -285,12 +280,12 @@ class RunPlots(ComparisonPlots):
         values, load = _quantity(self._run, name), next((load for load in LOADS if load.name == name), None)
         if load is None or load.plot is None:
             raise InputError(f"no load {name!r}; allowed: {', '.join(load.name for load in LOADS)}")
-        return plots.component_panels(load, load.plot, self._run.time, values).with_legend()
+        return component_panels(load, load.plot, self._run.time, values).with_legend()
 
     def tips(self) -> Panels:
         """Plot the paths of the blade tips (m). Raises InputError if the run does not have them."""
         _some(self._run.time)
-        return plots.paths(_quantity(self._run, "tip"))
+        return paths(_quantity(self._run, "tip"))
 
 
 def _some(time: Array) -> Array:

@@ -266,6 +266,7 @@ BUILT_IN = (
     Quantity(
         "energy_error", ("time",), "J", "kinetic plus potential energy minus work, minus its initial value", "energy",
         producer=lambda _, samples: energy_error(samples),
+        plot=Plot("Energy error: change of total energy minus work", "|energy error| (J)", logarithmic=True),
     ),
     Quantity(
         "constraint_error", ("time",), "m", "largest position gap of the joints", required=False, judgement=_JOINT_GAP,

@@ -284,24 +284,3 @@ def test_without_scripts_and_in_print_the_still_picture_stands(page: Page, repor
     page.call("Emulation.setEmulatedMedia", media="print")
     assert (page.run(viewer), page.run(still)) == (False, True)
     page.call("Emulation.setEmulatedMedia", media="")
-
-
-def test_a_picture_can_be_saved_at_print_size(page: Page, report: Path) -> None:
-    page.open(report / "figures.html", 1440)
-    page.run(
-        "window.saved = []; URL.createObjectURL = (blob) => { saved.push(blob); return 'blob:none'; };"
-        "HTMLAnchorElement.prototype.click = function () { saved.push(this.download); }; 0"
-    )
-    for kind in ("svg", "png"):
-        page.run(f"document.querySelector('.downloads [data-kind={kind}]').click()")
-    until = time.monotonic() + 20.0
-    while page.run("saved.length") < 4 and time.monotonic() < until:
-        time.sleep(0.1)
-    text = page.run("saved[0].text()")
-    assert text.startswith("<svg")
-    assert 'width="132.08mm"' in text
-    assert page.run("saved[2].type") == "image/png"
-    # 132.08 mm at 600 dots an inch: the width stands in bytes 16 to 19 of a PNG.
-    assert page.run("saved[2].arrayBuffer().then(b => new DataView(b).getUint32(16))") == 3120
-    assert page.run("[saved[1], saved[3]].join()").endswith(".png")
-    assert page.faults == []

@@ -25,9 +25,9 @@ from support.scenes import paper
 from support.stored import Made, change_row, damage, drop, rotor, store
 
 from rotor_mbs.cli import main
+from rotor_mbs.cli import verdicts as formats
 from rotor_mbs.methods.catalogue import REFERENCE, method_names
 from rotor_mbs.methods.solve import solve
-from rotor_mbs.report.pages import check as formats
 from rotor_mbs.runs.table import Rows, characters, extend_file
 from rotor_mbs.scenario import catalogue
 from rotor_mbs.scenario.accuracy_bounds import Bound, load_bounds

@@ -173,7 +173,6 @@ NO_SUCH_SETTING = 'methods = ["lagrange/taylor"]\nsettings = { tolerence = 1e-15
         ),
         (TAYLOR_MISSPELT, [], "s.toml:1: methods: unknown method 'lagrange/tailor', perhaps lagrange/taylor; "),
         (NO_SUCH_SETTING, [], "s.toml:2: settings: lagrange/taylor: no setting 'tolerence', perhaps tolerance; allow"),
-        ("draws = 600_000", [], "1,200,000 runs; allowed without --yes: at most 1,000,000"),
     ],
 )  # fmt: skip
 def test_bad_usage_is_one_line_status_2_and_no_file(tmp_path: Path, head: str, options: list[str], words: str) -> None:

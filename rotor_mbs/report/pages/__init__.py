@@ -6,8 +6,6 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from functools import cached_property
 
-import numpy as np
-
 from rotor_mbs.analysis import published, run_selection
 from rotor_mbs.analysis.judgement import OK_ERROR
 from rotor_mbs.analysis.published import Claim, ClaimStudy, Erratum, claims
@@ -69,18 +67,12 @@ class Report(OpenResults):
     def suite_runs(self) -> Sequence[SuiteRun]:
         return suite_runs(self.path) if self.is_suite else ()
 
-    @cached_property
-    def ladders(self) -> Sequence[Record]:
-        """Errors over steps that were measured for the suite."""
-        records = read_records(self.path, "stability")
-        return [record for record in records if np.isfinite(record.arrays["angle_error_max"]).any()]
-
 
 METRICS = (
     "defect_max", "defect_median", "defect_time", "angle_error_max", "angle_error_predicted", "angle_error_whole",
     "tip_error_max", "energy_gain_J", "energy_drift_max", "angular_impulse_error_max",
-    "zero_pitch_max", "zero_pitch_left_s", "zero_pitch_growth_per_s", "steps", "rhs_evaluations", "setup_time_s",
-    "run_time_s",
+    "zero_pitch_max", "zero_pitch_left_s", "zero_pitch_growth_per_s", "time_reached", "steps",
+    "rhs_evaluations", "setup_time_s", "run_time_s",
 )  # fmt: skip
 # Against the reference, which has none itself.
 _ERRORS_OF_RUNS = ("angle_error_max", "angle_error_predicted", "angle_error_whole", "tip_error_max")
@@ -95,9 +87,15 @@ def words_of(status: str) -> str:
     return status.replace("_", " ")
 
 
-def status_cell(run: StoredRun) -> TableCell:
-    text = status_text(run)
-    return TableCell(text, tone="good" if text == "ok" else "" if run.status in GOOD else "bad")
+def status_cell(run: StoredRun, suite_run: SuiteRun | None = None) -> TableCell:
+    """The status, and below it the reason where it is not ok; of a run of the suite also what its ladder found."""
+    text, message = status_text(run), str(run.attributes.get("message", ""))
+    tone = "good" if text == "ok" else "" if run.status in GOOD else "bad"
+    if suite_run is not None and suite_run.outcome != run.status:
+        text, message = OUTCOMES[suite_run.outcome][1], suite_run.message
+        if suite_run.step is not None:
+            message += f"; step for 10⁻⁶ rad: {with_unit(suite_run.step, 's')}"
+    return TableCell(text, tone, note="" if text == "ok" else message)
 
 
 def method_cell(name: str) -> TableCell | str:
@@ -138,14 +136,15 @@ def compared_time(scenes: Iterable[StoredScene]) -> tuple[float, float]:
     return compared, whole
 
 
-def metrics_table(scene: StoredScene) -> PageTable:
-    """Every run of the scene, with the metrics that its file describes."""
+def metrics_table(scene: StoredScene, suite_runs: Sequence[SuiteRun] = ()) -> PageTable:
+    """Every run of the scene: how it ended, and the metrics that its file describes."""
+    of_suite = {run.method: run for run in suite_runs}
     columns = metric_columns(scene.scene.outputs)
     judged = [name for name in columns if name.endswith("_error_max") and name not in METRICS]
     shown = {name: columns[name] for name in (*METRICS, *judged) if name in columns}
     rows: list[Row] = []
     for run in run_selection.in_order(scene).values():
-        row = [run_cell(run), status_cell(run)]
+        row = [run_cell(run), status_cell(run, of_suite.get(run.method))]
         for name in shown:
             value = metric(run, name)
             is_over = name == "angle_error_max" and value is not None and not value <= OK_ERROR
@@ -159,20 +158,3 @@ def metrics_table(scene: StoredScene) -> PageTable:
         unit = f"{column.units}, at most {OK_ERROR:g}" if name == "angle_error_max" else column.units
         names.append(with_capital(column.long_name.partition("; -1")[0]) + (f" ({unit})" if unit != "1" else ""))
     return PageTable("", ("Method", "Status", *names), rows)
-
-
-def failure_table(scene: StoredScene, suite_runs: Sequence[SuiteRun] = ()) -> PageTable:
-    """The runs that are not ok, or are for a reason that should be known; with the steps that the suite has found."""
-    judged = {run.method: run for run in suite_runs}
-    rows: list[Row] = []
-    for run in run_selection.in_order(scene).values():
-        status, message, step = status_cell(run), str(run.attributes.get("message", "")), ""
-        if run.method in judged:
-            suite_run = judged[run.method]
-            message, step = suite_run.message, with_unit(suite_run.step, "s")
-            if suite_run.outcome != run.status:
-                status = TableCell(OUTCOMES[suite_run.outcome][1])
-        if run.status not in GOOD or status.text != status_text(run):
-            reached = float(run.array("time")[-1]) if run_selection.has_samples(run) else 0.0
-            rows.append([run_cell(run), status, message, with_unit(reached, "s", 4), step])
-    return PageTable("", ("Method", "Status", "Message", "Samples up to", "Step for 10⁻⁶ rad"), rows)

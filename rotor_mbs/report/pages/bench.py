@@ -1,4 +1,4 @@
-"""Error and run time: its page, its section on other pages; diagram, tables, CSV."""
+"""Error and run time: its page, and its diagram on other pages."""
 
 from __future__ import annotations
 
@@ -11,16 +11,14 @@ from itertools import cycle
 import numpy as np
 
 from rotor_mbs.analysis import work_precision
-from rotor_mbs.errors import MethodRefusal
-from rotor_mbs.methods.catalogue import find_method, ladders
 from rotor_mbs.report import canvas
 from rotor_mbs.report.canvas import Panels
 from rotor_mbs.report.elements import PageTable, Picture, Row, Section, TableCell, picture
-from rotor_mbs.report.looks import COORDINATES, GREY, Look, label_of, look_of
+from rotor_mbs.report.looks import COORDINATES, GREY, Look, look_of
 from rotor_mbs.report.numbers import NOTHING, number, power, prefixed, with_unit
 from rotor_mbs.report.pages import method_cell, words_of
 from rotor_mbs.runs.design import COLUMNS
-from rotor_mbs.runs.read import OpenResults, Record, StoredRun, StoredScene, read_records
+from rotor_mbs.runs.read import OpenResults, Record, StoredRun, read_records
 from rotor_mbs.scenario.catalogue import natural_order
 from rotor_mbs.solution.status import COMPLETE
 from rotor_mbs.studies.stability import SuiteRun, suite_runs
@@ -50,24 +48,16 @@ def bench_page(results: OpenResults) -> dict[str, object]:
     for i, (name, curves) in enumerate(scenes.items()):
         pictures = [
             picture(diagram(curves), f"bench-{i}", "Run time of the integration: lower left is best"),
-            picture(diagram(curves, error="defect_max"), f"bench-{i}-defect", "Largest interval defect and run time"),
+            picture(diagram(curves, "defect_max"), f"bench-{i}-defect", "Largest interval defect and run time"),
         ]
-        if "is_short" not in curves[0].attributes:  # workers there keep what runs before have compiled
-            caption = "Including set-up (with compilation) and output of samples"
-            pictures.append(picture(diagram(curves, with_setup=True), f"bench-{i}-setup", caption))
         parts.append({
             "id": f"scene-{i}",
             "name": name,
             "facts": curves[0].attributes,
-            "diagram": Section(pictures),
-            "tables": [reach_table(curves), failure_table(curves, results.scenes.get(name))],
-            "points": _point_table(curves),
+            "diagram": Section(pictures, [reach_table(curves)]),
+            "points": point_table(curves),
         })  # fmt: skip
-    return {
-        "engines": engine_tables(results, scenes),
-        "fastest": overview_table(scenes),
-        "scenes": parts,
-    }
+    return {"engines": engine_tables(results, scenes), "scenes": parts}
 
 
 def cost_picture(curves: Sequence[Record], caption: str) -> list[Picture]:
@@ -77,16 +67,14 @@ def cost_picture(curves: Sequence[Record], caption: str) -> list[Picture]:
     return [picture(diagram(curves, height=3.4), "cost", f"{caption}: lower left is best")]
 
 
-def diagram(
-    curves: Sequence[Record], *, error: str = work_precision.ANGLE_ERROR, with_setup: bool = False, height: float = 3.9
-) -> Panels:
+def diagram(curves: Sequence[Record], error: str = work_precision.ANGLE_ERROR, height: float = 3.9) -> Panels:
     """All curves of a scene over one of their errors, Pareto front, quartiles, and failed runs on a strip at the right.
 
     As work-precision diagrams are drawn in the field: the error falls to the left, the time downwards.
     """
     panels = canvas.panels((height,), _ERRORS[error])
     axes = panels.axes[0]
-    points = [work_precision.points(curve, error, with_setup=with_setup) for curve in curves]
+    points = [work_precision.points(curve, error) for curve in curves]
     errors, seconds = np.concatenate(points, axis=1) if points else np.empty((2, 0))
     front = work_precision.pareto(errors, seconds)
     if len(front) > 1:
@@ -107,15 +95,11 @@ def diagram(
         shown = np.maximum(own_errors, _LOWEST_ERROR)
         if len(shown):
             canvas.curve(axes, shown, own_seconds, look, 1.0)
-        if not with_setup:
-            chosen = work_precision.succeeded(curve, error)
-            low, high = curve.arrays["run_time_q1_s"][chosen], curve.arrays["run_time_q3_s"][chosen]
-            axes.vlines(shown, low, high, color=look.colour, linewidth=2.2, alpha=0.6)
-        is_failed = work_precision.failed(curve)
-        failed = curve.arrays["run_time_s"][is_failed]
+        chosen = work_precision.succeeded(curve, error)
+        low, high = curve.arrays["run_time_q1_s"][chosen], curve.arrays["run_time_q3_s"][chosen]
+        axes.vlines(shown, low, high, color=look.colour, linewidth=2.2, alpha=0.6)
+        failed = curve.arrays["run_time_s"][work_precision.failed(curve)]
         times.append(failed)
-        if with_setup:
-            failed = failed + np.nan_to_num(curve.arrays["setup_time_s"][is_failed])
         if len(failed):
             marks = Look(look.colour, "", "x", "" if len(shown) else look.label)
             canvas.curve(axes, np.full(len(failed), _FAILED), failed, marks, markersize=4.0)
@@ -140,33 +124,8 @@ def diagram(
     known = known[np.isfinite(known) & (known > 0.0)]
     shortest, longest = (known.min(), known.max()) if len(known) else (1e-3, 1.0)
     canvas.log_axis(axes, 10.0 ** math.floor(math.log10(shortest)), longest)
-    axes.set_ylabel("set-up, run and output (s)" if with_setup else "run time (s)")
+    axes.set_ylabel("run time (s)")
     return panels
-
-
-def overview_table(scenes: Mapping[str, Sequence[Record]]) -> PageTable:
-    """A row per scene: for each target the fastest method with its time, and the next one with its ratio."""
-    rows: list[Row] = []
-    for i, (scene, curves) in enumerate(scenes.items()):
-        is_cut = any(work_precision.left_out(curve) for curve in curves)
-        row = [TableCell(scene, href=f"#scene-{i}")]
-        for target in work_precision.TARGETS_RAD:
-            ranked = work_precision.fastest(curves, target)
-            if not ranked:
-                row.append(TableCell("not measured" if is_cut else NOTHING))
-                continue
-            first, reach = ranked[0]
-            if len(ranked) > 1:
-                second, slower = ranked[1]
-                note = f"second: {label_of(second.name)}, {number(slower.ratio)} times as long"
-            else:
-                note = "no other method was measured to this accuracy" if is_cut else "no other method reaches it"
-            label = label_of(first.name)
-            name = label if label == first.name else f"{label} ({first.name})"
-            row.append(TableCell(f"{name}: {prefixed(reach.seconds, 's', 2)}", note=note))
-        rows.append(row)
-    caption = "Shortest run time to reach an angle error, and that of the second fastest method relative to it."
-    return PageTable(caption, ["scene", *_TARGETS], rows)
 
 
 def engine_tables(results: OpenResults, scenes: Mapping[str, Sequence[Record]]) -> list[PageTable]:
@@ -340,8 +299,8 @@ def reach_table(curves: Sequence[Record]) -> PageTable:
     return PageTable("Run time to reach an angle error, and its ratio to that of the fastest method", head, rows)
 
 
-def _point_table(curves: Sequence[Record]) -> PageTable:
-    """A row per point that was run."""
+def point_table(curves: Sequence[Record]) -> PageTable:
+    """A row per point that was run, with the reason where it is not ok; one for all that the budget left out."""
     columns = {name: COLUMNS[name] for name in _POINT_COLUMNS}
     units = [f" ({column.units})" if column.units != "1" else "" for column in columns.values()]
     names = [
@@ -349,49 +308,27 @@ def _point_table(curves: Sequence[Record]) -> PageTable:
     ]
     rows: list[Row] = []
     for curve in curves:
-        for i, status in enumerate(curve.statuses):
-            if status != "left_out":
-                values = [
-                    str(int(curve.arrays[name][i]))
-                    if column.kind == "<i8"
-                    else number(_finite(curve.arrays[name][i]), 3)
-                    for name, column in columns.items()
-                ]
-                outcome = TableCell(words_of(status), tone="" if status == "ok" else "bad")
-                rows.append([method_cell(curve.name), _setting(curve, i), *values, outcome])
-    return PageTable("Every setting measured.", ("method", "setting", *names, "status"), rows)
-
-
-def failure_table(curves: Sequence[Record], stored: StoredScene | None = None) -> PageTable:
-    """Every point that is not on a curve, with the reason; one row for all that the budget left out of a curve."""
-    rows: list[Row] = []
-    for curve in curves:
         left_out = [i for i, status in enumerate(curve.statuses) if status == "left_out"]
-        on_curve = work_precision.succeeded(curve)
-        for i, (status, message) in enumerate(zip(curve.statuses, curve.messages, strict=True)):
-            if on_curve[i] or i in left_out[1:]:
+        for i, status in enumerate(curve.statuses):
+            if i in left_out[1:]:
                 continue
-            setting = _setting(curve, i)
-            if i in left_out and len(left_out) > 1:
-                setting += f" and {len(left_out) - 1} finer"
-            claimed = "yes" if curve.arrays["false_success"][i] else ""
-            seconds = prefixed(_finite(curve.arrays["run_time_s"][i]), "s")
-            rows.append([method_cell(curve.name), setting, seconds, words_of(status), claimed, message])
-    if stored is not None:
-        for name in dict.fromkeys(ladder.method for ladder in ladders()):
-            try:
-                find_method(name).items(stored.scene)
-            except MethodRefusal as exc:
-                rows.append([method_cell(name), "", "", "cannot represent the scene", "", str(exc)])
-    head = ["method", "setting", "run time", "status", "engine reported success", "reason"]
-    caption = "Failed runs, and settings omitted because of the time budget."
-    return PageTable(caption, head, rows)
+            values = []
+            for name, column in columns.items():
+                value = curve.arrays[name][i]
+                if i in left_out:
+                    values.append("")
+                elif column.kind == "<i8":
+                    values.append(str(int(value)))
+                else:
+                    values.append(number(float(value) if np.isfinite(value) else None, 3))
+            setting = _setting(curve, i) + (f" and {len(left_out) - 1} finer" if i in left_out[:-1] else "")
+            claim = "the engine reported success" if curve.arrays["false_success"][i] else ""
+            message = "; ".join(filter(None, (curve.messages[i], claim)))
+            outcome = TableCell(words_of(status), tone="" if status == "ok" else "bad", note=message)
+            rows.append([method_cell(curve.name), setting, outcome, *values])
+    return PageTable("Every setting", ("method", "setting", "status", *names), rows)
 
 
 def _setting(curve: Record, i: int) -> str:
     value = float(curve.arrays["setting"][i])
     return prefixed(value, "s", 3) if curve.attributes["setting_kind"] == "step" else number(value, 2)
-
-
-def _finite(value: float) -> float | None:
-    return float(value) if np.isfinite(value) else None

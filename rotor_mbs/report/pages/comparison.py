@@ -24,7 +24,7 @@ from rotor_mbs.report.files import write_page
 from rotor_mbs.report.looks import GREY, Look, coordinate_look
 from rotor_mbs.report.numbers import number, typeset, with_unit
 from rotor_mbs.report.plots import Series
-from rotor_mbs.runs.read import OpenResults, Record, read_records, write_records
+from rotor_mbs.runs.read import Record, write_records
 from rotor_mbs.runs.versions import machine, versions
 from rotor_mbs.scenario.catalogue import scene_of
 from rotor_mbs.scenario.scene import Scene
@@ -156,11 +156,6 @@ class DataComparison:
         )
 
 
-def stored_comparison_page(place: int, opened: OpenResults) -> dict[str, object]:
-    """The content of the page of the comparison at this place of a results file."""
-    return comparison_page(read_records(opened.path, "comparison")[place])
-
-
 def comparison_page(record: Record) -> dict[str, object]:
     """The content of the page: verdict, pictures, tables."""
     verdict = verdict_of(record)
@@ -226,18 +221,16 @@ def error_panels(record: Record) -> Panels:
 
 
 def defect_panels(record: Record) -> Panels | None:
-    """The defects of each coordinate over time, the larger of angle and rate, with the tolerance; None without any."""
+    """The defects of each channel over time, with the tolerance; None without any."""
     verdict = verdict_of(record)
-    time = record.arrays[verdict.axis]
-    sizes: dict[Look, Any] = {}
-    for channel in verdict.channels:
+    time = record.arrays[verdict.axis][1:]
+    series = []
+    for channel in _drawn(verdict):
         if channel.defect is not None and channel.defect_unit == "rad":
-            values, look = _array(record, channel, "_defect")[1:], _look(channel)
-            sizes[look] = np.fmax(sizes[look], values) if look in sizes else values
-    if not sizes:
+            series.append(Series(time, np.nan_to_num(_array(record, channel, "_defect")[1:]), _look(channel)))
+    if not series:
         return None
-    series = [Series(time[1:], np.nan_to_num(values), look) for look, values in sizes.items()]
-    series.append(Series(time[1:], np.full(len(time) - 1, verdict.tolerance), Look(GREY, ":", "", "tolerance")))
+    series.append(Series(time, np.full(len(time), verdict.tolerance), Look(GREY, ":", "", "tolerance")))
     return plots.errors(series, "defect of an interval (rad)")
 
 

@@ -1,20 +1,16 @@
-"""The index: the rotor, the published crest, energy and errors of all methods; then numbers, claims and all scenes."""
+"""The index: the rotor, the published crest, defects of all methods; then numbers, claims and all scenes."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
-from dataclasses import replace
-
-import numpy as np
+from collections.abc import Mapping
 
 from rotor_mbs.analysis import run_selection
 from rotor_mbs.analysis.published import finding
 from rotor_mbs.analysis.text_tables import method_table
-from rotor_mbs.report import canvas, plots
-from rotor_mbs.report.canvas import Panels
-from rotor_mbs.report.elements import PageTable, Picture, Row, Section, TableCell, picture
-from rotor_mbs.report.looks import Look, label_of, look_of
+from rotor_mbs.report import plots
+from rotor_mbs.report.elements import PageTable, Row, Section, TableCell, picture
+from rotor_mbs.report.looks import label_of
 from rotor_mbs.report.numbers import SPACE, number, power, prefixed
 from rotor_mbs.report.pages import (
     Report,
@@ -35,7 +31,6 @@ from rotor_mbs.studies.stability import OUTCOMES
 Scenes = Mapping[str, StoredScene]
 # Errors: a shade for each of these powers of ten and below, the last for all that is larger.
 _SHADES = (-12, -10, -8, -6, -4, -2, 0)
-_LOWEST_ENERGY = 1e-16  # relative: smaller errors are drawn there
 
 
 def index_page(report: Report) -> dict[str, object]:
@@ -69,7 +64,7 @@ def index_page(report: Report) -> dict[str, object]:
             f"Compared with the reference over {number(compared, 3)} of {number(whole, 3)} s of simulated time, "
             f"{100.0 * compared / whole:.0f}{SPACE}%: each scene up to its horizon."
         )
-    table, marks = scene_table(scenes, report.files, model)
+    table, marks = scene_table(scenes, report.files)
     shades = [*(f"≤{SPACE}{power(exponent)}" for exponent in _SHADES), f">{SPACE}{power(_SHADES[-1])}"]
     return {
         "paper": PageTable("", ("Result", "As printed", model), finding(scenes, claims)),
@@ -84,7 +79,6 @@ def index_page(report: Report) -> dict[str, object]:
                 "defects",
                 f"{shown}: interval defects",
             ),
-            *_energy(scenes, model),
             *cost_picture(report.curves.get(benched, ()), f"Error and run time of all methods, {benched}"),
         ],
         "methods": Section(tables=[PageTable("", methods.head, method_rows)], notes=notes),
@@ -92,10 +86,7 @@ def index_page(report: Report) -> dict[str, object]:
         "marks": sorted(marks.items()),
         "shades": shades if compared else [],
         "numbers": Section(
-            tables=[
-                paper.number_table(claims),
-                *(paper.trial_tables(study) if study is not None else ()),
-            ],
+            tables=[paper.number_table(claims)],
             notes=[text for key, text in report.conditions.items() if not key.startswith("fig")],
         ),
         "claims": Section(tables=[] if study is None else [paper.claim_table(claims, study)]),
@@ -104,8 +95,8 @@ def index_page(report: Report) -> dict[str, object]:
     }
 
 
-def scene_table(scenes: Scenes, files: Mapping[str, str], model: str) -> tuple[PageTable, dict[str, str]]:
-    """A row per scene: errors of all methods, how far the printed model is from the corrected one, called `model`.
+def scene_table(scenes: Scenes, files: Mapping[str, str]) -> tuple[PageTable, dict[str, str]]:
+    """A row per scene: errors of all methods, how far the printed model is from the corrected one.
 
     Returns the table, and what its marks stand for.
     """
@@ -144,49 +135,9 @@ def scene_table(scenes: Scenes, files: Mapping[str, str], model: str) -> tuple[P
         row.append("" if largest is None else number(largest))
         printed = scene.methods.get(run_selection.PRINTED)
         row.append("" if printed is None else prefixed(metric(printed, "energy_gain_J"), "J"))
-        for side in ("printed", "corrected"):
-            run = sides.get(side)
-            row.append("" if run is None else number(float(np.abs(run.array("angles")[:, 1:]).max(initial=0.0))))
         rows.append(row)
     head = (
         "Scene", "Figure", "Compared (s)", *map(method_cell, methods), f"As printed: differs by {VISIBLE:g} rad at (s)",
-        "As printed: largest difference (rad)", "As printed: energy gain", "As printed: largest pitch (rad)",
-        f"{model}: largest pitch (rad)",
+        "As printed: largest difference (rad)", "As printed: energy gain",
     )  # fmt: skip
     return PageTable("Largest angle error up to the horizon (rad), by method", head, rows), marks
-
-
-def _energy(scenes: Scenes, model: str) -> list[Picture]:
-    """A mark per scene for the printed model's gain, and for the drift of each corrected one, called `model`."""
-    rows: dict[str, list[tuple[float, Look]]] = {}
-    has_printed = False
-    for name, scene in scenes.items():
-        corrected = run_selection.corrected_runs(scene)
-        for run in scene.methods.values():
-            gain, scale = metric(run, "energy_gain_J"), metric(run, "energy_scale_J")
-            value = None
-            if run.method == run_selection.PRINTED and gain is not None and scale:
-                value, has_printed = gain / scale, True
-            elif run.method in corrected and scale:
-                value = metric(run, "energy_drift_max")
-            if value is not None and math.isfinite(value):
-                look = replace(look_of(run.method), line="")
-                rows.setdefault(name.removeprefix("paper/"), []).append((value, look))
-    if not has_printed:
-        return []
-    caption = f"Spurious energy gain as printed, and energy drift of each {model.lower()}, by scene"
-    return [picture(energy_of_scenes(rows), "energy-scenes", caption)]
-
-
-def energy_of_scenes(rows: Mapping[str, Sequence[tuple[float, Look]]]) -> Panels:
-    """A row per scene, a mark per model: its energy error, of the scene's energy scale, logarithmic."""
-    panels = canvas.panels((0.19 * len(rows) + 0.25,), "energy error / energy scale of the scene")
-    axes = panels.axes[0]
-    for row, marks in enumerate(rows.values()):
-        for value, look in marks:
-            canvas.curve(axes, [min(max(value, _LOWEST_ENERGY), 1e3)], [row], look, markersize=5.5)
-    axes.set(xscale="log", xlim=(_LOWEST_ENERGY / 3.0, 3e3), ylim=(len(rows) - 0.4, -0.6))
-    canvas.ticks(axes.xaxis, {10.0**e: power(e) for e in range(round(math.log10(_LOWEST_ENERGY)), 4, 3)})
-    canvas.ticks(axes.yaxis, dict(enumerate(rows)))
-    panels.figure.subplots_adjust(left=0.25)
-    return panels

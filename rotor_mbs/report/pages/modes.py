@@ -17,11 +17,10 @@ from rotor_mbs.analysis.modes import (
     FloquetTable,
     LinearModes,
     SceneModes,
-    floquet_sentence,
     linear_dataset,
     mode_rows,
+    mode_table,
     multiblade,
-    read_modes,
     to_records,
 )
 from rotor_mbs.analysis.text_tables import TextTable
@@ -29,9 +28,9 @@ from rotor_mbs.errors import InputError
 from rotor_mbs.report.canvas import SPEED_AXIS, Panels, curve, log_axis, panels
 from rotor_mbs.report.elements import PageTable, Picture, Row, Section, TableCell, picture
 from rotor_mbs.report.files import write_page
-from rotor_mbs.report.looks import BLUE, GREY, VERMILLION, Look, coordinate_look, with_capital
+from rotor_mbs.report.looks import BLUE, GREY, VERMILLION, Look, coordinate_look
 from rotor_mbs.report.numbers import NOTHING, number
-from rotor_mbs.runs.read import OpenResults, write_records
+from rotor_mbs.runs.read import write_records
 from rotor_mbs.runs.versions import machine, versions
 from rotor_mbs.scenario.catalogue import scene_of
 from rotor_mbs.scenario.scene import Scene
@@ -88,12 +87,7 @@ class Modes(SceneModes):
 
     def table(self) -> TextTable:
         """Table with a row per state, speed and mode of the closed form: rad/s, damping ratio, 1/s."""
-        rows = mode_rows(self)
-        cells = [
-            tuple("" if v is None else f"{v:.7g}" if isinstance(v, float) else str(v) for v in row.values())
-            for row in rows
-        ]
-        return TextTable(tuple(name.replace("_", " ") for name in rows[0]) if rows else (), cells)
+        return mode_table(mode_rows(self))
 
     def to_xarray(self, state: str = "rotation") -> Any:
         """Return the modes of one state, "rotation" or "rest", as an xarray.Dataset; dimension `solver`: the models."""
@@ -188,11 +182,6 @@ def mode_look(index: int, name: str) -> Look:
     return replace(coordinate_look(index, name), marker=_MARKS[index % len(_MARKS)])
 
 
-def stored_modes_page(opened: OpenResults) -> dict[str, object]:
-    """The content of the page, from a results file."""
-    return modes_page(list(read_modes(opened.path).values()))
-
-
 def modes_page(modes: Sequence[SceneModes]) -> dict[str, object]:
     """The content of the page: a part for each scene, of which each id is unique on the page."""
     parts = []
@@ -221,8 +210,7 @@ def modes_page(modes: Sequence[SceneModes]) -> dict[str, object]:
             "id": name,
             "modes": scene,
             "models": [f"{linear.label} ({linear.source})" for linear in sources],
-            "notes": ([with_capital(floquet_sentence(scene.floquet))] if scene.floquet is not None else [])
-            + list(scene.notes),
+            "notes": scene.notes,
             "rest": Section(tables=[] if rest is None else _tables(rest, 0, f"{scene.scene}, at rest")),
             "campbell": Section(campbell),
             "fastest": Section(tables=fastest),

@@ -22,15 +22,14 @@ from rotor_mbs.analysis.published import (
     ClaimStudy,
     Published,
     checked_entries,
-    published,
     rounds_to,
 )
 from rotor_mbs.errors import InputError
 from rotor_mbs.methods.catalogue import errata_methods, look_up
 from rotor_mbs.report import canvas, plots
 from rotor_mbs.report.elements import PageTable, Row, Section, TableCell, picture
-from rotor_mbs.report.looks import COLOURS, Look, label_of, with_capital
-from rotor_mbs.report.numbers import NOTHING, SPACE, fixed, formula, number, prefixed
+from rotor_mbs.report.looks import COLOURS, Look, label_of
+from rotor_mbs.report.numbers import NOTHING, fixed, formula, number, prefixed
 from rotor_mbs.report.pages import Report, metric, status_text
 from rotor_mbs.runs.output_files import replace_file
 from rotor_mbs.runs.read import StoredRun, StoredScene, open_results
@@ -72,10 +71,7 @@ def _unit(item: Published) -> str:
 
 
 def claim_table(claims: Iterable[Claim], study: ClaimStudy) -> PageTable:
-    """The claims in words, a row each: verdicts by the shares of many runs."""
-    head = ["Figure", "Claim"]
-    for side in ("As printed", "Corrected model"):
-        head += [side, *(f"over {duration:g}{SPACE}s" for duration in study.durations)]
+    """The claims in words, a row each, with their verdicts."""
     rows: list[Row] = []
     for claim in claims:
         item = claim.published
@@ -86,11 +82,8 @@ def claim_table(claims: Iterable[Claim], study: ClaimStudy) -> PageTable:
         for method in study.methods:
             verdict = study.verdicts[item.id][method]
             row.append(TableCell(verdict, tone=_TONES[verdict]))
-            for share, deciding in study.shares[item.id][method]:
-                percent = NOTHING if share is None else f"{100.0 * share:.0f}{SPACE}%"
-                row.append(TableCell(percent, note=f"of {deciding}"))
         rows.append(row)
-    return PageTable("Published claims", head, rows)
+    return PageTable("Published claims", ("Figure", "Claim", "As printed", "Corrected model"), rows)
 
 
 def _verdict(value: float | None, item: Published) -> TableCell:
@@ -101,23 +94,6 @@ def _verdict(value: float | None, item: Published) -> TableCell:
     return TableCell("yes" if holds else "no", tone="good" if holds else "bad")
 
 
-def trial_tables(study: ClaimStudy) -> list[PageTable]:
-    """The published numbers for other durations, other tolerances and other ways of writing the first row of (56)."""
-    items = [item for item in published() if item.id in study.numbers]
-    heads = [f"Fig. {item.figure}: {fixed(item.value, item.decimals)} {_unit(item)}" for item in items]
-    tables = []
-    for table in study.trials:
-        rows: list[Row] = []
-        for labels, values, reproduced in table.rows:
-            cells = [
-                TableCell(fixed(value, item.decimals), tone="good" if is_reproduced else "")
-                for value, is_reproduced, item in zip(values, reproduced, items, strict=True)
-            ]
-            rows.append([*labels, *cells])
-        tables.append(PageTable(table.caption, (*table.head, *heads), rows))
-    return tables
-
-
 _PLACE = re.compile(r"row (\d) column (\d)")
 Cell = tuple[Markup, Markup | None]  # an entry as printed; the correct one where it is faulty
 
@@ -125,11 +101,11 @@ Cell = tuple[Markup, Markup | None]  # an entry as printed; the correct one wher
 def errata_page(report: Report) -> dict[str, object]:
     """The content of the page of errata."""
     entries = checked_entries()
-    agreeing = [entry for entry in entries if entry.agrees]
+    largest_agreeing = max((entry.difference for entry in entries if entry.agrees), default=0.0)
     differing = [entry for entry in entries if not entry.agrees]
     differing_table = PageTable(
         f"{len(differing)} of {len(entries)} printed entries differ from what follows from (3); the errata explain "
-        f"{sum(bool(entry.explained_by) for entry in differing)}",
+        f"{sum(bool(entry.explained_by) for entry in differing)}; the others agree to {number(largest_agreeing)}",
         ("Equation", "Entry", "Printed", "Correct", "Difference / max(1, |printed|, |correct|)", "Explained by"),
         [
             (
@@ -162,15 +138,10 @@ def errata_page(report: Report) -> dict[str, object]:
         if any(run is not None for run in runs):
             effects.append(row)
     effects_table = PageTable("", effects_head, effects)
-    agreeing_rows = [(e.equation, e.entry, formula(e.printed), number(e.difference)) for e in agreeing]
     return {
         "errata": [(erratum, matrices(entries, erratum.stands_in)) for erratum in report.errata],
         "differing": Section(tables=[differing_table]),
         "effects": Section(tables=[effects_table]),
-        "agreeing": PageTable(
-            "", ("Equation", "Entry", "Printed", "Difference / max(1, |printed|, |correct|)"), agreeing_rows
-        ),
-        "largest_agreeing": max((entry.difference for entry in agreeing), default=0.0),
     }
 
 
@@ -312,14 +283,17 @@ def write_figures(results: Path, folder: Path, kind: str, numbers: Iterable[str]
     return [folder / name for name in made]
 
 
-def composed(figure: PaperFigure, scenes: Mapping[str, StoredScene]) -> canvas.Panels:
-    """The whole figure, a column per model: position above velocity, or a row per panel where paths are shown."""
+def composed(figure: PaperFigure, scenes: Mapping[str, StoredScene], *, for_print: bool = True) -> canvas.Panels:
+    """The whole figure, a column per model: position above velocity, or a row per panel where paths are shown.
+
+    for_print: for a manuscript, with its legend; else for a page, which has the legend beside the picture.
+    """
     pictures = panel_runs(figure, scenes)
     keys = [key for key in HEADINGS if any(key in row for row in pictures.values())]
     is_paths = figure.kind == PATHS
-    with canvas.style(for_print=True):
+    with canvas.style(for_print=for_print):
         rows, height, heading = (len(pictures), 1.8, 1.02) if is_paths else (2, 1.55, 1.16)
-        panels = canvas.print_grid(rows, len(keys), height)
+        panels = canvas.grid(rows, len(keys), height if for_print else 1.4 * height, for_print=for_print)
         table = [panels.axes[i : i + len(keys)] for i in range(0, len(panels.axes), len(keys))]
         for i, row_of_runs in enumerate(pictures.values()):
             for key, runs in row_of_runs.items():
@@ -334,9 +308,10 @@ def composed(figure: PaperFigure, scenes: Mapping[str, StoredScene]) -> canvas.P
                 axes.set_ylabel("")
         for row, letter in zip(table, pictures if is_paths else (), strict=False):
             row[0].text(-0.08, 0.94, f"({letter})", transform=row[0].transAxes)
-        labelled = panels.labelled()
-        columns = min(len(labelled), 5)
-        panels.figure.legend(labelled.values(), labelled, loc="lower center", ncols=columns, handlelength=2.6)
+        if for_print:
+            labelled = panels.labelled()
+            columns = min(len(labelled), 5)
+            panels.figure.legend(labelled.values(), labelled, loc="lower center", ncols=columns, handlelength=2.6)
     return panels
 
 
@@ -344,31 +319,23 @@ def figures_page(report: Report) -> dict[str, object]:
     """The content of the page that goes through the figures."""
     figures = []
     for figure in available(report.scenes):
-        runs_of_panels = panel_runs(figure, report.scenes)
+        labels: dict[str, str] = {}  # by key of HEADINGS
+        for row_of_runs in panel_runs(figure, report.scenes).values():
+            for key, runs in row_of_runs.items():
+                labels.setdefault(key, label_of(next(iter(runs.values())).method))
+        if not labels:  # neither angles nor rates
+            continue
+        caption = f"Columns: {'; '.join(labels[key] for key in HEADINGS if key in labels)}"
         panels = []
-        # Torques are all in one picture per model.
-        for letter, scene in [("", figure.panels[0][1])] if figure.kind == TORQUES else figure.panels:
-            pictures = []
-            for key, runs in runs_of_panels.get(letter, {}).items():
-                drawn = canvas.panels((4.1,) if figure.kind == PATHS else (1.7, 1.7), "")
-                if figure.kind != PATHS:
-                    drawn.figure.subplots_adjust(top=0.93, hspace=0.2)  # room for headings
-                draw(figure, drawn.axes, runs)
-                heading, label = HEADINGS[key], label_of(next(iter(runs.values())).method)
-                is_named = label.lower().startswith(heading.lower())
-                caption = with_capital(label) if is_named else f"{heading}: {label}"
-                pictures.append(picture(drawn, f"f{figure.number}{letter}-{key}", caption))
-
-            panels.append({
-                "letter": letter,
-                "scene": scene,
-                "title": report.scenes[scene].title,
-                "initial": tomllib.loads(report.scenes[scene].scene.text)["initial"],  # pi/6 as it is written
-                "href": report.files[scene],
-                "pictures": pictures,
-            })  # fmt: skip
-        claims = [claim for claim in report.claims if claim.published.figure == figure.number]
+        for letter, name in figure.panels:
+            stored = report.scenes[name]
+            initial = tomllib.loads(stored.scene.text)["initial"]  # pi/6 as it is written
+            panels.append((letter, name, stored.title, initial, report.files[name]))
         figures.append({
-            "number": figure.number, "kind": figure.kind, "panels": panels, "numbers": number_table(claims),
+            "number": figure.number,
+            "kind": figure.kind,
+            "panels": panels,
+            "picture": picture(composed(figure, report.scenes, for_print=False), f"f{figure.number}", caption),
+            "numbers": number_table([claim for claim in report.claims if claim.published.figure == figure.number]),
         })  # fmt: skip
     return {"figures": figures}

@@ -17,9 +17,8 @@ from rotor_mbs.report.canvas import Panels
 from rotor_mbs.report.elements import PageTable, Picture, Section, picture
 from rotor_mbs.report.looks import GREY, VERMILLION, Look, coordinate_look, label_of, look_of, with_capital
 from rotor_mbs.report.numbers import fixed, number, prefixed, with_unit
-from rotor_mbs.report.pages import Report, failure_table, horizon_of, metric, metrics_table, paper
+from rotor_mbs.report.pages import Report, horizon_of, metric, metrics_table, paper
 from rotor_mbs.report.pages.bench import cost_picture
-from rotor_mbs.report.pages.stability import step_section
 from rotor_mbs.report.pages.viewer import viewer
 from rotor_mbs.report.plots import LOWEST, Series
 from rotor_mbs.runs.read import StoredRun, StoredScene
@@ -31,7 +30,6 @@ from rotor_mbs.solution.trajectory import Array
 
 Runs = Mapping[str, StoredRun]
 VISIBLE = 0.05  # rad: what one can see in a figure of the paper's size
-MAX_PUBLISHED = 2  # published values on one picture
 COMMAND, TAKEN = Look(GREY, ":", "", "command"), Look(VERMILLION, "--", "", "dissipated by the shaft damper")
 EXTREMES = ("rotor_angle_min", "rotor_angle_max", "rotor_rate_max")
 
@@ -54,30 +52,31 @@ def scene_page(name: str, report: Report) -> dict[str, object]:
     tables = [paper.number_table(claims)]
     if study is not None:
         tables.append(paper.claim_table(claims, study))
-    # Where a number is rounding error, what it is under other conditions.
-    if study is not None and any(claim.published.rounding for claim in claims):
-        tables += paper.trial_tables(study)
     condition = report.conditions.get(name.rpartition("/")[2])
     suite_runs = [run for run in report.suite_runs if run.scene == name]
     has_zero_pitch = any("zero_pitch_max" in run.attributes for run in scene.runs.values())
+    motion, paths = [], []
+    for i, run in enumerate(runs):
+        caption = with_capital(label_of(run.method))
+        if "angles" in run or "rates" in run:
+            drawn_motion = plots.motion(run.array("time"), run.get("angles"), run.get("rates"), horizon)
+            motion.append(picture(drawn_motion, f"motion-{i}", caption))
+        if "tip" in run:
+            paths.append(picture(plots.paths(run.array("tip")), f"paths-{i}", caption))
     return {
         "scene": scene,
-        "source": opening_comment(scene),
-        "failures": Section(tables=[failure_table(scene, suite_runs)]),
         "claims": Section(tables=[table for table in tables if table.rows], notes=[condition] if condition else []),
         "study": study if any(not claim.published.is_number for claim in claims) else None,
         "viewer": viewer(scene, {label_of(run.method): run for run in runs}),
         "key": key_picture(runs, claims, horizon),
-        "paths": _tips_section(runs),
-        "motion": _motion_section(runs, horizon),
+        "paths": Section(paths),
+        "motion": Section(motion, [range_table(runs)] if motion else []),
         "difference": _difference_section(scene, drawn, horizon),
         "defects": Section(error_picture(defects(scene.scene, drawn), "defect (rad)", "defects", "Interval defects")),
-        "energy": _energy_section(drawn, horizon),
         "drive": _drive_section(scene.scene, sides.get("corrected")),
         "cost": Section(cost_picture(report.curves.get(name, ()), f"Error and run time, {name}")),
-        "steps": step_section(name, report.ladders),
         "quantities": quantity_sections(scene, drawn, horizon),
-        "metrics": Section(tables=[metrics_table(scene)]),
+        "metrics": Section(tables=[metrics_table(scene, suite_runs)]),
         "has_horizon": horizon is not None,
         "has_printed": any(run.status in GOOD and not is_corrected(run.method) for run in scene.runs.values()),
         "has_zero_pitch": has_zero_pitch,
@@ -85,17 +84,6 @@ def scene_page(name: str, report: Report) -> dict[str, object]:
         "previous": pages[place - 1],
         "next": pages[place + 1],
     }
-
-
-def opening_comment(scene: StoredScene) -> str:
-    """The comment at the start of the scene's file, as running text; "" where there is none."""
-    lines = []
-    for line in str(scene.attributes.get("scene_toml", "")).splitlines():
-        if not line.startswith("#"):
-            break
-        if "doi " not in line:  # the index names the paper
-            lines.append(line.lstrip("#").strip())
-    return " ".join(lines).strip()
 
 
 def key_picture(
@@ -120,65 +108,37 @@ def key_picture(
         if largest.size and largest.max() > 1e-6:
             shown.append(1 + int(largest.argmax()))
             break
-    panels_of = []
-    for i in shown:
+    rows, marks = [], []
+    for place, i in enumerate(shown):
         series = []
         for run, line in zip(reversed(runs), ("-", "--"), strict=True):  # the printed model is dashed upon the other
             look = replace(look_of(run.method), line=line, marker="")
             series.append(Series(run.array("time"), run.array("angles")[:, i], look))
-        panels_of.append((f"{runs[0].labels[i]} angle (rad)", series))
-    marks = []
-    for claim in claims:
-        item, of = claim.published, claim.published.of
-        if item.is_number and of is not None and of.quantity == "angle" and of.coordinate in shown:
-            text = f"published {fixed(item.value, item.decimals)} rad"
-            marks.append((shown.index(of.coordinate), item.value, text))
+        rows.append((f"{runs[0].labels[i]} angle (rad)", series))
+        for claim in claims:
+            item, of = claim.published, claim.published.of
+            if item.is_number and of is not None and of.quantity == "angle" and of.coordinate == i:
+                marks.append((place, item.value, f"published {fixed(item.value, item.decimals)} rad"))
     parted, difference = parting(*runs)
     caption = f"Rotor and pitch angles of both models; largest difference {with_unit(difference, 'rad')}"
-    return [picture(departure(panels_of, marks[:MAX_PUBLISHED], horizon, parted), name, caption)]
+    if parted is not None:
+        caption += f"; {VISIBLE:g} rad apart at {with_unit(parted, 's')}"
+    return [picture(departure(rows, marks, horizon), name, caption)]
 
 
 def departure(
-    panels_of: Sequence[tuple[str, Sequence[Series]]],
-    marks: Sequence[tuple[int, float, str]] = (),
-    horizon: float | None = None,
-    parted: float | None = None,
+    rows: Sequence[tuple[str, Sequence[Series]]], marks: Sequence[tuple[int, float, str]], horizon: float | None
 ) -> Panels:
-    """A panel per (axis label, curves), with published values (panel, value, text) and the time of parting (s)."""
-    panels = plots.lines(panels_of, heights=[1.75] * len(panels_of))
-    for place, (axes, (_, series)) in enumerate(zip(panels.axes, panels_of, strict=True)):
+    """A panel per (axis label, curves), with published values (panel, value, text)."""
+    panels = plots.lines(rows, horizon, [1.75] * len(rows))
+    for axes in panels.axes:
         for line in axes.get_lines():  # a dashed curve lies upon a wide one
             line.set_linewidth(2.4 if line.get_linestyle() == "-" else 1.3)
-        end = max(float(curve.time[-1]) for curve in series)
-        for panel, value, text in marks:
-            if panel == place:
-                low, high = axes.get_ylim()
-                axes.set_ylim(min(low, value), max(high, value + 0.12 * (high - low)))
-                axes.axhline(value, color=GREY, linewidth=1.0, linestyle=":", label="published")
-                beside = parted if parted is not None and parted < 0.1 * end else 0.0  # not across its line
-                axes.text(beside + 0.01 * end, value, text, color=GREY, ha="left", va="bottom", fontsize=8.5)
-        plots.mark_time(axes, end, horizon)
-        if parted is not None and 0.0 < parted < end:
-            axes.axvline(parted, color=GREY, linewidth=1.0, linestyle="-")
-            if not place:
-                text = f"{VISIBLE:g} rad apart at {parted:.2g} s"
-                low, high = axes.get_ylim()
-                high += 0.14 * (high - low)  # above the curves
-                axes.set_ylim(low, high)
-                axes.text(parted + 0.01 * end, high, text, color=GREY, ha="left", va="top", fontsize=8.5)
+    for place, value, text in marks:
+        low, high = panels.axes[place].get_ylim()
+        panels.axes[place].set_ylim(min(low, value), max(high, value))
+        panels.axes[place].axhline(value, color=GREY, linewidth=1.0, linestyle=":", label=text)
     return panels
-
-
-def _motion_section(sides: Sequence[StoredRun], horizon: float | None) -> Section:
-    """Angles above rates, as the paper plots them; the printed model beside the corrected one."""
-    runs = [run for run in sides if "angles" in run or "rates" in run]
-    if not runs:
-        return Section()
-    pictures = []
-    for i, run in enumerate(runs):
-        panels = plots.motion(run.array("time"), run.get("angles"), run.get("rates"), horizon)
-        pictures.append(picture(panels, f"motion-{i}", with_capital(label_of(run.method))))
-    return Section(pictures, [range_table(runs)])
 
 
 def range_table(runs: Sequence[StoredRun]) -> PageTable:
@@ -205,16 +165,6 @@ def range_table(runs: Sequence[StoredRun]) -> PageTable:
     return PageTable("Extremes", head, rows)
 
 
-def _tips_section(sides: Sequence[StoredRun]) -> Section:
-    """Paths in space as the paper draws them."""
-    pictures: list[Picture] = []
-    for run in sides:
-        if "tip" in run:
-            caption = with_capital(label_of(run.method))
-            pictures.append(picture(plots.paths(run.array("tip")), f"paths-{len(pictures)}", caption))
-    return Section(pictures)
-
-
 def _difference_section(scene: StoredScene, drawn: Runs, horizon: float | None) -> Section:
     """Each run's largest angle difference from the reference, and the uncertainties that are known."""
     reference = scene.reference
@@ -235,16 +185,6 @@ def _difference_section(scene: StoredScene, drawn: Runs, horizon: float | None) 
     return Section(error_picture(
         over_time(runs, differences), "largest angle difference (rad)", "difference",
         "Largest difference from the reference, over all angles", horizon, others,
-    ))  # fmt: skip
-
-
-def _energy_section(drawn: Runs, horizon: float | None) -> Section:
-    """Energy less work from its start, of every run."""
-    runs = {name: run for name, run in drawn.items() if "energy_error" in run}
-    curves = over_time(runs, {name: run.array("energy_error") for name, run in runs.items()})
-    return Section(error_picture(
-        curves, "|energy error| (J)", "energy", "Energy error: change of total energy minus work", horizon,
-        notes=["Filled marks: energy gained. Open marks: energy lost."], signed=True,
     ))  # fmt: skip
 
 
@@ -298,19 +238,12 @@ def _drive_section(scene: Scene, run: StoredRun | None) -> Section:
     return Section(pictures, [table] if rows else [])
 
 
-def plotted_quantities(scene: StoredScene) -> list[tuple[Quantity, Plot]]:
-    """The quantities of the scene with a plot: built in, or of an installed package that its outputs name."""
-
-    quantities = known_quantities(scene.scene.outputs)
-    return [(quantity, quantity.plot) for quantity in quantities if quantity.plot is not None and quantity.is_over_time]
-
-
 def quantity_sections(scene: StoredScene, runs: Runs, horizon: float | None) -> list[tuple[str, str, Section]]:
-    """(id, heading, section) of each such quantity that one of `runs` has."""
+    """(id, heading, section) of each quantity with a plot that one of `runs` has."""
     sections = []
-    for quantity, plot in plotted_quantities(scene):
-        own = {method: run for method, run in runs.items() if quantity.name in run}
-        if not own:
+    for quantity in known_quantities(scene.scene.outputs):
+        plot, own = quantity.plot, {method: run for method, run in runs.items() if quantity.name in run}
+        if plot is None or not quantity.is_over_time or not own:
             continue
         name = f"quantity-{quantity.name}"
         if plot.logarithmic:
@@ -371,18 +304,18 @@ def _largest(values: Array) -> Array:
 
 def error_picture(
     curves: Sequence[Series], axis: str, name: str, caption: str, horizon: float | None = None,
-    others: Sequence[Series] = (), notes: Sequence[str] = (), *, signed: bool = False,
+    others: Sequence[Series] = (),
 ) -> list[Picture]:  # fmt: skip
     """A picture of the curves and of `others`, which have no marker; none where there is no curve."""
-    shown, exact = [], []
+    shown, exact, notes = [], [], []
     for curve in curves:
         if np.abs(curve.values).max() > LOWEST:
             shown.append(curve)
         else:
             exact.append(curve.look.label)
     if exact:
-        notes = [*notes, f"Below 10⁻¹⁸ everywhere, not plotted: {'; '.join(exact)}."]
-    panels = plots.errors([*others, *shown], axis, horizon, signed=signed)
+        notes.append(f"Below 10⁻¹⁸ everywhere, not plotted: {'; '.join(exact)}.")
+    panels = plots.errors([*others, *shown], axis, horizon)
     return [picture(panels, name, caption, notes)] if curves else []
 
 

@@ -8,7 +8,7 @@ import re
 import numpy as np
 from numpy.typing import NDArray
 
-from rotor_mbs.report.canvas import Panels, colour_map, curve, log_axis, panels
+from rotor_mbs.report.canvas import Panels, curve, log_axis, panels, style
 from rotor_mbs.report.elements import PageTable, Picture, Section, picture
 from rotor_mbs.report.looks import BLUE, Look, with_capital
 from rotor_mbs.report.numbers import SPACE
@@ -92,8 +92,16 @@ def _responses(sweep: StoredSweep, ok: NDArray[np.bool_]) -> list[Picture]:
         rows, columns = shape
         y, x, grid = (numbers[: rows * columns].reshape(rows, columns) for numbers in (*axes.values(), values))
         y_label, x_label = labels.values()
-        drawn = colour_map(x[0], y[:, 0], grid, (x_label, y_label, label), logarithmic=_is_wide(grid))
-        drawn.axes[0].set(xscale="log" if _is_wide(x) else "linear", yscale="log" if _is_wide(y) else "linear")
+        drawn = panels((3.8,), x_label)
+        scales = ["log" if _is_wide(numbers) else "linear" for numbers in (x, y, grid)]
+        drawn.axes[0].set(xscale=scales[0], yscale=scales[1], ylabel=y_label)
+        drawn.axes[0].grid(visible=False)
+        mesh = drawn.axes[0].pcolormesh(
+            x[0], y[:, 0], grid, cmap="cividis", shading="nearest", norm=scales[2], rasterized=True
+        )
+        with style():
+            drawn.figure.colorbar(mesh, ax=drawn.axes[0]).set_label(label)
+        drawn.figure.subplots_adjust(left=0.18)
         return [picture(drawn, "grid", with_capital(quantity))]
     pictures = []
     known = np.isfinite(values)
