@@ -22,7 +22,8 @@ def test_every_combination_runs_is_checked_and_reported(tmp_path: Path) -> None:
     for chosen in ALL:
         scene = paper("fig11", samples=6, duration=0.1, outputs=chosen)
         (folder / f"{'-'.join(chosen)}.toml").write_text(scene_toml(scene))
-    ended = rotor_mbs("run", folder, "-m", "lagrange/taylor", "-m", "exudyn_tree/rk67", "-o", results, "-j", 1)
+    methods = ("-m", "lagrange/taylor", "-m", "exudyn_tree/rk67", "-m", "printed/ode45")
+    ended = rotor_mbs("run", folder, *methods, "-o", results, "-j", 1)
     assert ended.status in (0, 1), ended.err
     with open_results(results) as stored:
         for chosen in ALL:
