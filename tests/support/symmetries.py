@@ -1,4 +1,4 @@
-"""What an exact run conserves, without dampers and changing loads: the scene, its images, itself backwards in time."""
+"""The rotor with its blades numbered otherwise: the same motion under other names."""
 
 from __future__ import annotations
 
@@ -8,53 +8,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from rotor_mbs.methods.solve import solve
 from rotor_mbs.scenario.scene import Scene
-from rotor_mbs.solution.impulse import angular_momentum
-from rotor_mbs.solution.trajectory import Array, Trajectory
-
-
-def symmetry_errors(scene: Scene, method: str) -> dict[str, float]:
-    """Of a scene without gravity and torque: errors in rad, of the angular momentum relative."""
-
-    def run(scene: Scene) -> Trajectory:
-        return solve(method, scene, {}).trajectory
-
-    there = run(scene)
-    # From the last sample on with all rates reversed it runs back to its start.
-    end = {"initial_angles": tuple(there.angles[-1].tolist()), "initial_rates": tuple((-there.rates[-1]).tolist())}
-    back = run(replace(scene, **end))
-    momentum = angular_momentum(scene, there.angles, there.rates)
-    return {
-        "mirror_error": mirror_error(there.angles, run(mirrored(scene)).angles),
-        "relabelling_error": relabelling_error(there.angles, run(relabelled(scene)).angles),
-        "reversal_error": float(np.abs(back.angles[-1] - np.array(scene.initial_angles)).max()),
-        "angular_momentum_drift": float(np.abs(momentum - momentum[0]).max() / abs(momentum[0])),
-    }
-
-
-def mirrored(scene: Scene) -> Scene:
-    """The mirror image in the plane of rotation: pitches and the blades' y change sign, the rotor angle does not.
-
-    Of a scene without loads on its pitches.
-    """
-    blades = []
-    for blade in scene.blades:
-        x, y, z = blade.centre_of_mass
-        xx, yy, zz, xy, xz, yz = blade.inertia
-        blades.append(replace(blade, centre_of_mass=(x, -y, z), inertia=(xx, yy, zz, -xy, xz, -yz)))
-    return replace(
-        scene,
-        blades=tuple(blades),
-        initial_angles=(scene.initial_angles[0], *(-angle for angle in scene.initial_angles[1:])),
-        initial_rates=(scene.initial_rates[0], *(-rate for rate in scene.initial_rates[1:])),
-    )
-
-
-def mirror_error(angles: Array, other: Array) -> float:
-    """rad: of (n, 1 + blades) angles of a scene and of its mirror image."""
-    sign = np.array([1.0, *([-1.0] * (angles.shape[1] - 1))])
-    return float(np.abs(angles - sign * other).max())
+from rotor_mbs.solution.trajectory import Array
 
 
 def relabelled(scene: Scene) -> Scene:
