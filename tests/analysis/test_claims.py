@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 from dataclasses import replace
 from pathlib import Path
@@ -26,7 +25,6 @@ from rotor_mbs.analysis.published import (
 )
 from rotor_mbs.analysis.text_tables import method_table
 from rotor_mbs.runs.read import open_results
-from rotor_mbs.scenario.catalogue import natural_order
 
 FIG11 = paper("fig11", samples=101)
 PRINTED, REFERENCE, TAYLOR = "printed/ode45", "reference", "lagrange/taylor"
@@ -120,20 +118,3 @@ def test_escape_rate_of_a_pendulum_upside_down() -> None:
     uneven = replace(FIG11, blades=(replace(near, centre_of_mass=(0.02, 0.0, 15.0)), *others))
     assert escape_rate(uneven) == pytest.approx(math.sqrt(9.8 / 0.02), rel=1e-14)  # the fastest
     assert escape_rate(FIG11.replace(**{"bearing.stiffness": 5.0})) is None
-
-
-def test_scenes_come_in_natural_order() -> None:
-    names = ["paper/fig15-100kNm", "paper/fig15-1kNm", "paper/fig06-tenth", "paper/fig15-10kNm", "paper/fig06"]
-    assert natural_order(names) == [names[4], names[2], names[1], names[3], names[0]]
-
-
-def test_the_numbers_of_fig_5_need_12_s_and_come_with_most_ways_of_writing() -> None:
-    """As docs/findings.md says, of the conditions in reference/claims.json."""
-    stored = json.loads((Path(__file__).parents[2] / "reference/claims.json").read_text(encoding="utf-8"))
-
-    def reproduced(table: dict[str, list[list[list[bool]]]]) -> list[bool]:
-        return [all(flags) for *_, flags in table["rows"]]
-
-    by_duration, by_tolerance, by_row = map(reproduced, stored["trials"])
-    assert by_duration == [False, False, False, False, True, False]
-    assert (sum(by_tolerance), sum(by_row), len(by_row)) == (1, 8, 12)

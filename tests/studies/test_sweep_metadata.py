@@ -6,6 +6,7 @@ import hashlib
 import json
 import re
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -35,6 +36,7 @@ values = [0, 1e3, 1e4]
 key = "initial.angles[1]"
 linear = { start = 0, end = 1, count = 6 }
 """
+COLUMNS = ("run", "bearing_stiffness", "status", "angles", "tip")
 
 
 @pytest.fixture(scope="module")
@@ -47,12 +49,19 @@ def dataset(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
-def _json(path: Path) -> Any:
-    return json.loads(path.read_text(), parse_constant=pytest.fail)
+def splits(dataset: Path) -> Iterator[tuple[str, dict[str, np.ndarray]]]:
+    """Each split, and what the whole dataset has of its runs."""
+    with h5py.File(dataset) as whole:
+        for code, split in enumerate(("train", "validation", "test")):
+            rows = np.flatnonzero(whole["split"][()] == code)
+            yield (
+                split,
+                {name: whole[name][()][rows] for name in ("run", "bearing_stiffness", "status", "angles", "tip")},
+            )
 
 
 def test_croissant_names_every_variable_and_the_content(dataset: Path) -> None:
-    croissant = _json(dataset.with_suffix(".croissant.json"))
+    croissant = json.loads(dataset.with_suffix(".croissant.json").read_text(), parse_constant=pytest.fail)
     assert croissant["distribution"][0]["sha256"] == hashlib.sha256(dataset.read_bytes()).hexdigest()
     with h5py.File(dataset) as file:
         along_runs = {name for name, item in file.items() if item.shape[0] == 18 and name != "message_byte"}
@@ -67,15 +76,12 @@ def test_croissant_is_valid(dataset: Path) -> None:
 
 
 def test_a_split_has_its_runs_bit_for_bit(dataset: Path) -> None:
-    folder = dataset.parents[1] / "splits"
-    with h5py.File(dataset) as whole:
-        for code, split in enumerate(("train", "validation", "test")):
-            rows = np.flatnonzero(whole["split"][()] == code)
-            with h5py.File(folder / f"{split}.h5") as file:
-                assert {len(item) for item in file.values()} == {len(rows)} != {0}
-                for name in ("run", "bearing_stiffness", "status", "angles", "tip"):
-                    assert file[name][()].tobytes() == whole[name][()][rows].tobytes()
-                    assert file[name].attrs["units"] == whole[name].attrs["units"]
+    for split, columns in splits(dataset):
+        with h5py.File(dataset.parents[1] / "splits" / f"{split}.h5") as file:
+            assert {len(item) for item in file.values()} == {len(columns["run"])} != {0}
+            assert file["tip"].attrs["units"] == "m"
+            for name, values in columns.items():
+                assert file[name][()].tobytes() == values.tobytes()
 
 
 def test_a_dataset_card_replaces_its_own_kind_only(dataset: Path, tmp_path: Path) -> None:
@@ -94,14 +100,11 @@ def test_a_dataset_card_replaces_its_own_kind_only(dataset: Path, tmp_path: Path
 def test_hugging_face_reads_the_folder_bit_for_bit(dataset: Path, tmp_path: Path) -> None:
     datasets = pytest.importorskip("datasets")
     loaded = datasets.load_dataset(str(dataset.parents[1] / "splits"), cache_dir=str(tmp_path))
-    with h5py.File(dataset) as file:
-        for code, split in enumerate(("train", "validation", "test")):
-            rows = np.flatnonzero(file["split"][()] == code)
-            assert loaded[split].num_rows == len(rows)
-            for name in ("run", "bearing_stiffness", "status", "angles", "tip"):
-                values = file[name][()][rows]
-                there = np.array(loaded[split].data.column(name).to_pylist(), values.dtype)
-                assert (there.shape, there.tobytes()) == (values.shape, values.tobytes())
+    for split, columns in splits(dataset):
+        assert loaded[split].num_rows == len(columns["run"])
+        for name, values in columns.items():
+            there = np.array(loaded[split].data.column(name).to_pylist(), values.dtype)
+            assert (there.shape, there.tobytes()) == (values.shape, values.tobytes())
 
 
 def test_the_loader_of_the_documentation(dataset: Path, monkeypatch: pytest.MonkeyPatch) -> None:

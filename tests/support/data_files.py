@@ -105,14 +105,6 @@ def json_arrays(path: Path, scene: Scene, time: Array, angles: Array, rates: Arr
     path.write_text(json.dumps({"time": time.tolist(), "angles": angles.tolist(), "rates": rates.tolist()}))
 
 
-def decimal_commas(path: Path, scene: Scene, time: Array, angles: Array, rates: Array) -> None:
-    """As a German spreadsheet saves it."""
-    rows = [
-        ";".join(f"{x!r}".replace(".", ",") for x in row) for row in np.column_stack([time, angles, rates]).tolist()
-    ]
-    path.write_text("\n".join([";".join(["Zeit [s]", *_names(scene)]), *rows]))
-
-
 Writer = Callable[[Path, Scene, Array, Array, Array], None]
 FORMATS: dict[str, Writer] = {
     "data.csv": comma_separated,
@@ -126,5 +118,4 @@ FORMATS: dict[str, Writer] = {
     "data.nc": netcdf_variables,
     "data3.nc": netcdf_3,
     "data.json": json_arrays,
-    "commas.csv": decimal_commas,
 }

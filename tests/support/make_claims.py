@@ -98,11 +98,9 @@ STATISTICS: Mapping[str, Callable[[Array, Array], float | None]] = {
 }
 
 
-def measure(time: Array | None, angles: Array | None, rates: Array | None, asked: TrajectoryNumber) -> float | None:
-    """The number in rad or rad/s (reversals and growth: 1); None where the run has no such data or it is undefined."""
+def measure(time: Array, angles: Array, rates: Array, asked: TrajectoryNumber) -> float | None:
+    """The number in rad or rad/s (reversals and growth: 1); None where it is undefined."""
     values = {"angle": angles, "rate": rates}[asked.quantity]
-    if time is None or values is None or not len(values) or asked.coordinate >= values.shape[1]:
-        return None
     return STATISTICS[asked.statistic](time, values[:, asked.coordinate])
 
 
