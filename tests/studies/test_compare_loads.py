@@ -194,11 +194,9 @@ def test_only_columns_that_are_there_are_judged_and_omit_leaves_out(tmp_path: Pa
     assert (wrong.status, wrong.likely) == ("inaccurate", (f"shaft moment y: {REVERSED}",))
     assert "blade root force 1 y = -'RootFxb1' [kN]" in wrong.verdict.read
     assert "blade root moment 2 x, rotor frame = 'RootMyc2' [kN-m]" in wrong.verdict.read
-    for omit in ("shaft_moment_y", "shaft_moment"):
-        found = rm.compare(tmp_path / "d.csv", scene, columns={"omit": [omit]}, tolerance=1e-9)
-        assert (found.status, found.message) == ("ok", "")
-        assert len(found.verdict.channels) == 13
-        assert "shaft_moment_y_kNm" in found.verdict.unused
+    found = rm.compare(tmp_path / "d.csv", scene, columns={"omit": ["shaft_moment"]}, tolerance=1e-9)
+    assert (found.status, found.message, len(found.verdict.channels)) == ("ok", "", 13)
+    assert "shaft_moment_y_kNm" in found.verdict.unused
     (tmp_path / "own.toml").write_text(rm.scene("check/pitch-loads").replace(duration=0.3, samples=61).text)
     call = ["compare", str(tmp_path / "d.csv"), "--scene", str(tmp_path / "own.toml"), "-o", str(tmp_path / "page")]
     assert main(call) == 1
