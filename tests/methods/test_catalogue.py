@@ -71,10 +71,3 @@ def test_plug_ins_that_cannot_be_used_are_left_out_with_one_line_each(
 def test_reading_a_built_in_method_imports_no_plug_in(site: Path) -> None:
     install(site, "made_up", "raise SystemExit('imported')", GROUP, {"own": "made_up:METHOD"})
     assert find_method("exudyn_tree/rk67").label
-
-
-def test_the_next_finer_rung_is_not_the_one_that_was_told_in_three_digits() -> None:
-    method, interval = find_method("exudyn_tree/rk67"), 1.0 / 150.0
-    told = float(f"{method.finer({'step': 6.7e-4}, interval)['step']:.3g}")
-    assert told == 4.17e-4
-    assert method.finer({"step": told}, interval) == {"step": pytest.approx(interval / 32.0)}

@@ -264,15 +264,3 @@ def test_defects_over_rows_are_those_of_every_tenth_row() -> None:
     np.testing.assert_allclose(sizes * units, raw, rtol=2e-2, atol=1e-3 * raw.max())
     assert sizes.shape == floors.shape == (10, 2 * half)
     assert (sizes.max(axis=1) > 5.0 * defects_of(FIG11, run).channel_sizes.max()).any()  # a drift adds up
-
-
-def test_rounding_over_rows_is_within_its_floor() -> None:
-    """Angles of six decimals: what is rounded at both ends of a stretch, and nothing between."""
-    run = fig11_run()
-    angles, rates = np.round(run.angles, 6), np.round(run.rates, 6)
-    defects = interval_defects(FIG11, run.time, angles, rates, np.full(8, 0.5e-6))
-    for rows in (10, 100):
-        sizes, floors = defects.over_rows(rows)
-        assert (sizes <= FLOOR_SAFETY * floors).all()
-        assert (sizes > 0.03 * floors).any()
-    assert defects.over_rows(101)[0].shape == (0, 8)

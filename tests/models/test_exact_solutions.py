@@ -7,27 +7,24 @@ from math import hypot, pi
 
 import numpy as np
 import pytest
-from support.exudyn_runs import CHAIN, EXPLICIT, METHODS, energy_error
-from support.exudyn_runs import run as solved
 from support.rotors import AXIAL, PAPER, SLIM, STOUT, C, D, make_scene, pendulum
+from support.runs import energy_error, run
 from support.symmetries import relabelled, relabelling_error
 
 from rotor_mbs.methods.catalogue import find_method
+from rotor_mbs.models.exudyn import methods
 
 # Explicit schemes resolve these slow motions to round-off; order 2 at 2.5e-4 to 5e-4 s leaves h² times the fourth
 # derivative, some 1e-8, and the constraints of the chain their Newton tolerance.
+EXUDYN = [method.name for method in methods.METHODS]
+CHAIN = [name for name in EXUDYN if name.startswith("exudyn_chain")]
+EXPLICIT = ["exudyn_tree/rk44", "exudyn_tree/rk67", "exudyn_tree/dopri5"]
 FINE = ["lagrange/taylor", "lagrange/dop853", "mujoco/rk4", *EXPLICIT]
-NAMES = [*FINE, *(name for name in METHODS if name not in EXPLICIT)]
+NAMES = [*FINE, *(name for name in EXUDYN if name not in FINE)]
 BOUND = {name: 1e-10 if name in FINE else 2e-7 for name in NAMES}
 INERTIA = 3 * 15000 * (C**2 + D**2)  # of the paper's rotor at zero pitch, kg m²
 
 every_method = pytest.mark.parametrize("name", NAMES)
-
-
-def run(name, scene, **settings):
-    if not find_method(name).is_installed:
-        pytest.skip(f"{name} is not installed")
-    return solved(name, scene, **settings)
 
 
 RAMP = ((0.1234, 0.0), (0.5, 4e6), (0.5, -2e6), (0.777, -2e6))
@@ -127,7 +124,7 @@ def test_every_model_has_the_exact_motion(name, case) -> None:
     assert energy_error(got) < bound * (got.kinetic_energy + np.abs(got.potential_energy)).max()
 
 
-@pytest.mark.parametrize("name", METHODS)
+@pytest.mark.parametrize("name", EXUDYN)
 def test_a_thousand_radians_a_second_are_counted_turn_by_turn(name) -> None:
     scene = make_scene([0.0, -50.0], [0.0, 1000.0], (AXIAL,), gravity=0.0, duration=1.0)
     # the rotation vector turns uniformly without error, and 5 rad a step; a turn missed would show as 6.28 rad
@@ -141,7 +138,7 @@ def test_a_thousand_radians_a_second_are_counted_turn_by_turn(name) -> None:
     assert np.abs(got.rates[:, 1] - 1000.0).max() < bound
 
 
-@every_method
+@pytest.mark.parametrize("name", NAMES[1:])  # Taylor's with other symmetries: studies/test_stability_exact.py
 def test_turning_the_rotor_by_a_third_and_renaming_blades_changes_nothing(name) -> None:
     scene = make_scene([0.2, 0.3, -0.6, 0.9], [0.5, 0.1, 0.2, -0.3], (STOUT, SLIM, PAPER), duration=0.3, samples=31)
     error = relabelling_error(run(name, scene).angles, run(name, relabelled(scene)).angles)

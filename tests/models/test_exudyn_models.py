@@ -6,12 +6,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from support.exudyn_runs import run
 from support.rotors import FIG11, SLIM, STOUT, closed_form, make_scene
+from support.runs import run
 from support.scenes import paper
 
 from rotor_mbs.analysis.kinematics import exact_rotor_angle
-from rotor_mbs.methods.catalogue import find_method
 from rotor_mbs.models.exudyn.adapter import linear_solver
 
 SHORT = replace(FIG11, duration=1.0, samples=101)
@@ -45,8 +44,6 @@ def unlike_blades(count, duration, samples):
      ("mujoco/rk4", 1e-10)],
 )  # fmt: skip
 def test_any_number_of_blades(name, bound, count) -> None:
-    if not find_method(name).is_installed:
-        pytest.skip(f"{name} is not installed")
     scene = unlike_blades(count, duration=0.5, samples=51)
     assert angle_error(run(name, scene), closed_form(scene)) < bound
 

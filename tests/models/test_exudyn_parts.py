@@ -10,12 +10,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from support.exudyn_runs import KINDS, METHODS, engine_counts
 from support.rotors import FIG08, FIG11, MIXED, PAPER, make_scene
 
 from rotor_mbs.errors import InputError, MethodRefusal
 from rotor_mbs.methods.solve import solve
-from rotor_mbs.models.exudyn import adapter, sensor_samples
+from rotor_mbs.models.exudyn import adapter, methods, sensor_samples
 from rotor_mbs.scenario.time_table import segments
 
 POLE = replace(PAPER, centre_of_mass=(0.0, 0.0, 15.42))
@@ -35,6 +34,14 @@ SCENES = {
     "all": MIXED,
 }
 TREE, CHAIN = "exudyn_tree/rk67", "exudyn_chain/generalized_alpha"
+METHODS = {method.name: method for method in methods.METHODS}
+KINDS = ("node", "object", "marker", "load", "sensor")
+
+
+def engine_counts(solver):
+    """How many nodes, objects, markers, loads and sensors the engine holds."""
+    data = solver.system._mbs.systemData
+    return {kind: getattr(data, f"NumberOf{kind.capitalize()}s")() for kind in KINDS}
 
 
 def listed(name, scene):

@@ -2,32 +2,22 @@
 
 from __future__ import annotations
 
-import functools
 import math
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from support.runs import run
 from support.scenes import general, paper
 
-from rotor_mbs.methods.solve import solve
 from rotor_mbs.models.lagrange import closed_form, reference
 from rotor_mbs.models.lagrange.closed_form import LoadValues
 from rotor_mbs.models.lagrange.parameters import rotor_form
 from rotor_mbs.scenario.scene import Scene
-from rotor_mbs.solution.trajectory import Trajectory
 
 heyoka = pytest.importorskip("heyoka")
 
 TWO = {"initial_angles": (0.1, 0.3, -0.2), "initial_rates": (0.2, 0.1, 0.4)}
-
-
-@functools.cache
-def run(scene: Scene, method: str = "lagrange/taylor", **settings: float) -> Trajectory:
-    result = solve(method, scene, settings)
-    assert result.integration.success, result.integration.message
-    assert len(result.trajectory.time) == scene.samples
-    return result.trajectory
 
 
 def machine_derivation(scene: Scene):
@@ -97,16 +87,16 @@ def test_equals_lagranges_equations_derived_by_machine(scene: Scene) -> None:
 def test_error_growth_is_that_of_neighbouring_runs() -> None:
     """The largest singular value bounds what any perturbation does, and some direction comes near it."""
     scene = paper("fig11", duration=3.0, samples=31)
-    growth = run(scene, "reference").error_growth
+    growth = run("reference", scene).error_growth
     assert growth is not None
-    base = run(scene)
+    base = run("lagrange/taylor", scene)
     largest = np.zeros(31)
     for i in range(4):
         angles, rates = list(scene.initial_angles), list(scene.initial_rates)
         angles[i] += 1e-7
         rates[i] += 1e-7
         for near in (replace(scene, initial_angles=tuple(angles)), replace(scene, initial_rates=tuple(rates))):
-            other = run(near)
+            other = run("lagrange/taylor", near)
             state = np.hstack([other.angles - base.angles, other.rates - base.rates])
             largest = np.maximum(largest, np.linalg.norm(state, axis=1) / 1e-7)
     assert (largest <= growth * 1.001).all()
@@ -116,9 +106,9 @@ def test_error_growth_is_that_of_neighbouring_runs() -> None:
 @pytest.mark.full
 def test_the_fallback_reference_states_its_uncertainty(monkeypatch: pytest.MonkeyPatch) -> None:
     scene = paper("fig11", duration=7.0, samples=701)
-    true = run(scene, "reference")
+    true = run("reference", scene)
     monkeypatch.setattr(reference, "is_available", lambda: False)
-    computed = solve("reference", scene, {}).trajectory
+    computed = run("reference", scene)
     assert computed.angle_uncertainty is not None
     assert computed.angle_uncertainty[-1] > 1e6 * true.angle_uncertainty[-1]
     assert computed.error_growth is not None

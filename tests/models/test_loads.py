@@ -12,6 +12,7 @@ from support import other_code
 from support.other_code import about
 from support.references import scene as shipped
 from support.rotors import make_scene
+from support.runs import run
 from support.scenes import general, paper
 
 from rotor_mbs.methods.solve import solve
@@ -46,15 +47,7 @@ def beam(angles: tuple[float, ...], rates: tuple[float, ...], **changes) -> Scen
     params=[pytest.param(name, marks=pytest.mark.full) if name == "reference" else name for name in METHODS]
 )
 def method(request: pytest.FixtureRequest) -> str:
-    if request.param == "mujoco/rk4":
-        pytest.importorskip("mujoco")
     return request.param
-
-
-def loads(method: str, scene: Scene, **settings: object):
-    run = solve(method, scene, settings).trajectory
-    assert len(run.time) == scene.samples
-    return run
 
 
 def off(result, expected) -> float:
@@ -63,13 +56,13 @@ def off(result, expected) -> float:
 
 def test_horizontal_blade_at_the_moment_of_its_release(method: str) -> None:
     """It falls with m g l / J; the root carries the rest of the weight, m g (1 - m l²/J), and no moment about y."""
-    run = loads(method, beam((math.pi / 2, 0.0), (0.0, 0.0)))
+    result = run(method, beam((math.pi / 2, 0.0), (0.0, 0.0)))
     about_shaft = MOMENTS[1] + MASS * ARM**2
     rest = MASS * GRAVITY * (1.0 - MASS * ARM**2 / about_shaft)
-    assert off(run.shaft_force[0], [0.0, 0.0, rest]) < METHODS[method]
+    assert off(result.shaft_force[0], [0.0, 0.0, rest]) < METHODS[method]
     # The blade's x axis points down there.
-    assert off(run.blade_root_force[0, 0], [-rest, 0.0, 0.0]) < METHODS[method]
-    assert off(run.shaft_moment, 0.0) < METHODS[method]
+    assert off(result.blade_root_force[0, 0], [-rest, 0.0, 0.0]) < METHODS[method]
+    assert off(result.shaft_moment, 0.0) < METHODS[method]
 
 
 def test_centrifugal_force_and_gyroscopic_moment_of_a_pitching_blade(method: str) -> None:
@@ -81,16 +74,16 @@ def test_centrifugal_force_and_gyroscopic_moment_of_a_pitching_blade(method: str
     speed, rate, C = 2.0, 5.0, 150.0
     blade = replace(BEAM, inertia=(900.0, 900.0, C, 0.0, 0.0, 0.0))
     scene = replace(beam((0.0, 0.4), (speed, rate), gravity=0.0), blades=(blade,))
-    run = loads(method, scene)
-    pitch, azimuth = run.angles[:, 1], run.angles[:, 0]
-    assert off(run.rates, [speed, rate]) < 1e-6
+    result = run(method, scene)
+    pitch, azimuth = result.angles[:, 1], result.angles[:, 0]
+    assert off(result.rates, [speed, rate]) < 1e-6
     in_blade = C * speed * rate * np.stack([np.cos(pitch), -np.sin(pitch), np.zeros_like(pitch)], axis=1)
     in_base = C * speed * rate * np.stack([np.cos(azimuth), np.zeros_like(pitch), -np.sin(azimuth)], axis=1)
     inwards = -np.stack([np.sin(azimuth), np.zeros_like(pitch), np.cos(azimuth)], axis=1)
-    assert off(run.blade_root_force, [0.0, 0.0, -MASS * ARM * speed**2]) < METHODS[method]
-    assert off(run.shaft_force, MASS * ARM * speed**2 * inwards) < METHODS[method]
-    assert off(run.blade_root_moment[:, 0], in_blade) < METHODS[method]
-    assert off(run.shaft_moment, in_base) < METHODS[method]
+    assert off(result.blade_root_force, [0.0, 0.0, -MASS * ARM * speed**2]) < METHODS[method]
+    assert off(result.shaft_force, MASS * ARM * speed**2 * inwards) < METHODS[method]
+    assert off(result.blade_root_moment[:, 0], in_blade) < METHODS[method]
+    assert off(result.shaft_moment, in_base) < METHODS[method]
 
 
 # Three unlike blades of full inertia on springs and dampers, torques on rotor and pitches, and pitch commands.
@@ -108,11 +101,11 @@ DRIVEN = general(
 
 def test_loads_are_those_of_newtons_and_eulers_laws_written_anew(method: str) -> None:
     """At the run's own states; of the chain to the errors of its steps."""
-    run = loads(method, DRIVEN, **({"tolerance": 1e-10} if method == "exudyn_chain/extrapolated" else {}))
-    exact = other_code.loads(DRIVEN, run.time, run.angles, run.rates)
+    result = run(method, DRIVEN, **({"tolerance": 1e-10} if method == "exudyn_chain/extrapolated" else {}))
+    exact = other_code.loads(DRIVEN, result.time, result.angles, result.rates)
     allowed = 1e-5 if method.startswith("exudyn_chain") else 1e-13
     for name in LOADS:
-        assert off(run.get(name), exact[name]) < allowed * np.abs(exact[name]).max(), name
+        assert off(result.get(name), exact[name]) < allowed * np.abs(exact[name]).max(), name
 
 
 # The chain against the closed form.
@@ -148,22 +141,22 @@ def test_chain_and_closed_form_agree_at_second_order_and_by_extrapolation(name: 
     """Multipliers against Newton and Euler: errors a quarter at half the step (ratios seen: 3.94 to 4.01); by
     extrapolation within each interval 1e-6 of the largest load."""
     scene, step = AGREEING[name]
-    exact = loads("lagrange/dop853", scene)
+    exact = run("lagrange/dop853", scene)
     steps = (step, step / 2, step / 4)
-    runs = [loads("exudyn_chain/newmark_index2", scene, step=step, **TIGHT) for step in steps]
-    for larger, smaller in itertools.pairwise(load_error(scene, run, exact) for run in runs):
+    results = [run("exudyn_chain/newmark_index2", scene, step=step, **TIGHT) for step in steps]
+    for larger, smaller in itertools.pairwise(load_error(scene, result, exact) for result in results):
         assert larger / smaller == pytest.approx(4.0, abs=0.2)
-    assert load_error(scene, loads("exudyn_chain/extrapolated", scene, tolerance=1e-10), exact) < 1e-6
+    assert load_error(scene, run("exudyn_chain/extrapolated", scene, tolerance=1e-10), exact) < 1e-6
 
 
 def test_at_a_jump_of_the_torque_stands_the_load_before_it(method: str) -> None:
     """Two blades that balance, at rest: until the jump at a sample, and in it, no force along the arms' way."""
     scene = beam((0.3, 0.0, 0.0), (0.0, 0.0, 0.0), gravity=0.0, rotor_torque=((0.0, 0.0), (0.1, 0.0), (0.1, 5000.0)))
-    run = loads(method, scene)
+    result = run(method, scene)
     about_shaft = 2.0 * (MOMENTS[1] + MASS * ARM**2)
     across = MASS * ARM * 5000.0 / about_shaft
-    assert off(run.blade_root_force[:11], 0.0) < METHODS[method]
-    assert off(run.blade_root_force[12:, :, 0], across) < 1e-5 * across
+    assert off(result.blade_root_force[:11], 0.0) < METHODS[method]
+    assert off(result.blade_root_force[12:, :, 0], across) < 1e-5 * across
 
 
 # The printed model.
@@ -175,19 +168,19 @@ def test_printed_loads_are_what_its_own_motion_needs() -> None:
     No part of the rotor can transmit those: they are what the errata add to the equations.
     """
     scene = paper("fig11", duration=1.0, samples=201, outputs=OUTPUTS)
-    run = loads("printed/ode45", scene, relative_tolerance=1e-12, absolute_tolerance=1e-14)
-    blade, h = scene.blades[0], run.time[1] - run.time[0]
+    result = run("printed/ode45", scene, relative_tolerance=1e-12, absolute_tolerance=1e-14)
+    blade, h = scene.blades[0], result.time[1] - result.time[0]
     weights = np.array([2, -27, 270, -490, 270, -27, 2]) / 180.0  # of a second derivative, sixth order
     for i, phase in enumerate(scene.phases):
-        frames = (about("y", run.angles[:, 0] + phase) * about("z", run.angles[:, 1 + i])).as_matrix()
+        frames = (about("y", result.angles[:, 0] + phase) * about("z", result.angles[:, 1 + i])).as_matrix()
         place = frames @ np.array(blade.centre_of_mass)
         acceleration = sum(w * place[k : len(place) - 6 + k] for k, w in enumerate(weights)) / h**2
         force = blade.mass * (acceleration + np.array([0.0, 0.0, scene.gravity]))
-        result = np.einsum("nij,nj->ni", frames, run.blade_root_force[:, i])[3:-3]
-        assert off(result, force) < 1e-6 * np.abs(force).max()
-        assert off(np.cross(blade.centre_of_mass, run.blade_root_force[:, i]), run.blade_root_moment[:, i]) < 1e-6
-    assert np.abs(run.pitch_actuator_moment).max() > 100.0
-    assert np.abs(run.shaft_moment[:, 1]).max() > 1e4
+        in_base = np.einsum("nij,nj->ni", frames, result.blade_root_force[:, i])[3:-3]
+        assert off(in_base, force) < 1e-6 * np.abs(force).max()
+        assert off(np.cross(blade.centre_of_mass, result.blade_root_force[:, i]), result.blade_root_moment[:, i]) < 1e-6
+    assert np.abs(result.pitch_actuator_moment).max() > 100.0
+    assert np.abs(result.shaft_moment[:, 1]).max() > 1e4
 
 
 # Loads are computed where they are asked for, and change nothing else.

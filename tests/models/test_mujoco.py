@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from support import references
 from support.rotors import MIXED, STOUT, closed_form, make_scene
+from support.runs import run
 from support.scenes import paper
 
 from rotor_mbs.analysis.judgement import judge
@@ -17,8 +18,6 @@ from rotor_mbs.errors import InputError, MethodRefusal
 from rotor_mbs.methods.catalogue import find_method
 from rotor_mbs.methods.solve import solve
 from rotor_mbs.models.lagrange.defects import interval_defects
-from rotor_mbs.scenario.scene import Scene
-from rotor_mbs.solution.trajectory import Trajectory
 
 pytest.importorskip("mujoco")
 
@@ -28,27 +27,18 @@ from rotor_mbs.models.mujoco.solver import Engine, MujocoSolver
 RK4_STEP = 2.5e-4
 
 
-def run(scene: Scene, integrator: str = "rk4", step: float = RK4_STEP) -> Trajectory:
-    solver = MujocoSolver(scene, integrator, step)
-    integration = solver.integrate()
-    assert integration.success, integration.message
-    result = solver.observe()
-    assert len(result.time) == scene.samples
-    return result
-
-
 @pytest.mark.parametrize(
-    ("integrator", "order", "steps"),
+    ("method", "order", "steps"),
     [
-        ("rk4", 4, [2e-3, 1e-3, 5e-4]),
-        ("implicitfast", 1, [1e-3, 5e-4, 2.5e-4]),
-        pytest.param("implicit", 1, [1e-3, 5e-4, 2.5e-4], marks=pytest.mark.full),
+        ("mujoco/rk4", 4, [2e-3, 1e-3, 5e-4]),
+        ("mujoco/implicitfast", 1, [1e-3, 5e-4, 2.5e-4]),
+        pytest.param("mujoco/implicit", 1, [1e-3, 5e-4, 2.5e-4], marks=pytest.mark.full),
     ],
 )
-def test_order_of_convergence(integrator: str, order: int, steps: list[float]) -> None:
+def test_order_of_convergence(method: str, order: int, steps: list[float]) -> None:
     """With loads over time and jumps between samples: no step runs over a kink or with a frozen load."""
     motion = closed_form(MIXED)
-    errors = [np.abs(run(MIXED, integrator, step).angles - motion[:, :4]).max() for step in steps]
+    errors = [np.abs(run(method, MIXED, step=step).angles - motion[:, :4]).max() for step in steps]
     assert np.polyfit(np.log(steps), np.log(errors), 1)[0] == pytest.approx(order, abs=0.2)
 
 
@@ -61,7 +51,7 @@ def test_point_masses_have_no_inertia_that_the_scene_does_not_give() -> None:
     scene = references.scene("extreme/toy")
     coarse, fine = (
         interval_defects(scene, result.time, result.angles, result.rates).sizes.max()
-        for result in (run(scene, step=1e-4), run(scene, step=5e-5))
+        for result in (run("mujoco/rk4", scene, step=1e-4), run("mujoco/rk4", scene, step=5e-5))
     )
     assert coarse / fine == pytest.approx(16.0, rel=0.2)
     assert fine < 1e-8
@@ -76,7 +66,7 @@ def test_an_inertia_at_the_limit_of_the_triangle_inequality() -> None:
     ):
         blade = replace(STOUT, inertia=(*moments, 0.0, 0.0, 0.0))
         scene = make_scene([0.4, 0.3], [1.0, 0.5], (blade,), duration=0.5, samples=51)
-        assert np.abs(run(scene).angles - closed_form(scene)[:, :2]).max() < bound
+        assert np.abs(run("mujoco/rk4", scene).angles - closed_form(scene)[:, :2]).max() < bound
 
 
 @pytest.mark.parametrize(
@@ -116,6 +106,6 @@ def test_only_what_the_scene_asks_for_is_built() -> None:
     assert {kind: kinds.count(kind) for kind in kinds} == {"object": 4, "node": 4, "marker": 3, "load": 5}
     less = replace(MIXED, outputs=("angles", "rates"), rotor_torque=(), pitch_torque=(), bearing_rest=())
     assert {item.kind for item in mjcf.items(less)} == {"object", "node"}
-    result = run(less)
+    result = run("mujoco/rk4", less)
     assert result.tip is None
     assert result.work is None

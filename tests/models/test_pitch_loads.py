@@ -7,23 +7,13 @@ import functools
 import numpy as np
 import pytest
 from support.rotors import ALL, MIXED, PAPER, blade_points, closed_form, energies, make_scene
+from support.runs import run
 
 from rotor_mbs.analysis import kinematics
-from rotor_mbs.methods.catalogue import REFERENCE, find_method
-from rotor_mbs.methods.solve import solve
+from rotor_mbs.methods.catalogue import REFERENCE
 from rotor_mbs.models.printed import literal
 from rotor_mbs.models.printed.methods import METHODS as PRINTED
-from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.scenario.time_table import value_at
-from rotor_mbs.solution.trajectory import Trajectory
-
-
-def run(method: str, scene: Scene, **settings: object) -> Trajectory:
-    if not find_method(method).is_installed:
-        pytest.skip(f"{method} is not installed")
-    solution = solve(method, scene, settings)
-    assert solution.integration.success
-    return solution.trajectory
 
 
 @functools.cache
