@@ -1,4 +1,4 @@
-"""Every model against exact solutions: pendulum, rotation, torque, dampers, springs, many turns; and its symmetries."""
+"""Every model: exact solutions, symmetries, and one scene with every load beside equations written anew."""
 
 from __future__ import annotations
 
@@ -7,11 +7,25 @@ from math import hypot, pi
 
 import numpy as np
 import pytest
-from support.rotors import AXIAL, PAPER, SLIM, STOUT, C, D, make_scene, pendulum
+from support.rotors import (
+    AXIAL,
+    MIXED,
+    PAPER,
+    SLIM,
+    STOUT,
+    C,
+    D,
+    blade_points,
+    closed_form,
+    energies,
+    make_scene,
+    pendulum,
+)
 from support.runs import energy_error, run
 from support.symmetries import relabelled, relabelling_error
 
-from rotor_mbs.methods.catalogue import find_method
+from rotor_mbs.analysis import kinematics
+from rotor_mbs.methods.catalogue import REFERENCE, find_method
 from rotor_mbs.models.exudyn import methods
 
 # Explicit schemes resolve these slow motions to round-off; order 2 at 2.5e-4 to 5e-4 s leaves h² times the fourth
@@ -157,3 +171,38 @@ def test_repeats_are_bit_identical(name) -> None:
     assert first_report == second_report
     for quantity in ("angles", "rates", "tip", "kinetic_energy", "potential_energy", "work"):
         assert np.array_equal(first.get(quantity), second.get(quantity)), quantity
+
+
+# rad, of the scene with every load, at these settings.
+ALL_LOADS_BOUND = {
+    "lagrange/dop853": 1e-10, "lagrange/taylor": 1e-10, REFERENCE: 1e-10, "exudyn_tree/rk67": 1e-10,
+    "exudyn_tree/rk44": 1e-9, "exudyn_tree/dopri5": 1e-9, "mujoco/rk4": 1e-9, "exudyn_chain/extrapolated": 1e-9,
+    "exudyn_tree/generalized_alpha": 5e-5, "exudyn_chain/generalized_alpha": 5e-5, "exudyn_chain/newmark_index2": 5e-5,
+    "lagrange/ode45": 1e-10, "lagrange/radau": 1e-10,
+}  # fmt: skip
+SETTINGS = {
+    "lagrange/ode45": {"relative_tolerance": 1e-13, "absolute_tolerance": 1e-13},
+    "lagrange/radau": {"relative_tolerance": 1e-12, "absolute_tolerance": 1e-14},
+}
+SLOW = ("lagrange/taylor", REFERENCE, "exudyn_chain/newmark_index2", "lagrange/radau")
+
+
+@pytest.mark.parametrize(
+    "method", [pytest.param(name, marks=pytest.mark.full) if name in SLOW else name for name in ALL_LOADS_BOUND]
+)
+def test_every_load_at_once_follows_the_equations_written_anew(method: str) -> None:
+    """Angles, tips, energies and work; those of low order to what their steps leave."""
+    result, exact = run(method, MIXED, **SETTINGS.get(method, {})), closed_form(MIXED)
+    bound = ALL_LOADS_BOUND[method]
+    assert np.abs(result.angles - exact[:, :4]).max() < bound
+    for i, blade in enumerate(MIXED.blades):
+        assert np.abs(result.tip[:, i] - blade_points(MIXED, exact, i, blade.tip)).max() < 10 * bound
+    kinetic, potential = energies(MIXED, exact)
+    scale = np.abs(kinetic).max()
+    assert np.abs(result.kinetic_energy - kinetic).max() < 10 * bound * scale
+    assert np.abs(result.potential_energy - potential).max() < 10 * bound * scale
+    balance = result.kinetic_energy + result.potential_energy - result.work
+    assert np.abs(balance - balance[0]).max() < 10 * bound * scale
+    own = kinematics.potential_energy(MIXED, result.time, result.angles)
+    gap = 1e-7 if method.startswith("exudyn_chain") else 1e-12  # its bodies leave the joints by some 1e-9 m
+    assert np.abs(result.potential_energy - own).max() < gap * scale

@@ -14,7 +14,7 @@ from support.rotors import FIG08, FIG11, MIXED, PAPER, make_scene
 
 from rotor_mbs.errors import InputError, MethodRefusal
 from rotor_mbs.methods.solve import solve
-from rotor_mbs.models.exudyn import adapter, methods, sensor_samples
+from rotor_mbs.models.exudyn import methods, sensor_samples
 from rotor_mbs.scenario.time_table import segments
 
 POLE = replace(PAPER, centre_of_mass=(0.0, 0.0, 15.42))
@@ -145,16 +145,6 @@ def test_counts_of_steps_and_evaluations() -> None:
     linear = replace(BARE, blades=(POLE,) * 3, initial_rates=(1.0, 0.0, 0.0, 0.0), duration=0.1, samples=11)
     turning = solve("exudyn_tree/generalized_alpha", linear, {"step": 1e-3}).integration
     assert (turning.steps, turning.rhs_evaluations) == (100, 200)  # an iteration a step, and the residual once more
-
-
-def test_the_cause_of_a_failure_is_found_behind_others() -> None:
-    outer, inner = RuntimeError(), KeyboardInterrupt()
-    assert adapter._caused_by(inner, KeyboardInterrupt)
-    outer.__context__ = inner
-    assert adapter._caused_by(outer, KeyboardInterrupt)
-    outer.__cause__, outer.__context__ = inner, None
-    assert adapter._caused_by(outer, KeyboardInterrupt)
-    assert not adapter._caused_by(outer, ValueError)
 
 
 def test_loads_and_rotation_vectors_are_refused_together_alone() -> None:

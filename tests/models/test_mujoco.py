@@ -14,7 +14,7 @@ from support.runs import run
 from support.scenes import paper
 
 from rotor_mbs.analysis.judgement import judge
-from rotor_mbs.errors import InputError, MethodRefusal
+from rotor_mbs.errors import InputError
 from rotor_mbs.methods.catalogue import find_method
 from rotor_mbs.methods.solve import solve
 from rotor_mbs.models.lagrange.defects import interval_defects
@@ -22,7 +22,7 @@ from rotor_mbs.models.lagrange.defects import interval_defects
 pytest.importorskip("mujoco")
 
 from rotor_mbs.models.mujoco import mjcf
-from rotor_mbs.models.mujoco.solver import Engine, MujocoSolver
+from rotor_mbs.models.mujoco.solver import MujocoSolver
 
 RK4_STEP = 2.5e-4
 
@@ -94,11 +94,6 @@ def test_an_overflow_ends_the_run_and_leaves_no_file(tmp_path: Path, monkeypatch
     assert re.match(r"MuJoCo: Nan, Inf or huge value in Q\w+ at DOF 0", integration.message)
     assert len(solver.observe().time) == 1
     assert not list(tmp_path.iterdir())
-
-
-def test_what_the_engine_does_not_compile_is_refused_with_its_reason() -> None:
-    with pytest.raises(MethodRefusal, match=r"MuJoCo rejected this model: .*unrecognized element"):
-        Engine("<mujoco><rotor/></mujoco>", 0.0)
 
 
 def test_only_what_the_scene_asks_for_is_built() -> None:

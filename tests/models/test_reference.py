@@ -12,7 +12,7 @@ from support import multiprecision
 from support.references import reference as frozen_reference
 from support.references import scene as shipped_scene
 from support.rotors import AXIAL, make_scene
-from support.scenes import PAPER, general, paper
+from support.scenes import PAPER, paper
 
 from rotor_mbs.methods.solve import solve
 from rotor_mbs.models.lagrange import reference as reference_module
@@ -20,8 +20,6 @@ from rotor_mbs.models.lagrange.methods import ReferenceSettings
 from rotor_mbs.models.lagrange.reference import ReferenceSolver, build, reference_at, uncertainty
 from rotor_mbs.models.lagrange.samples import sampled_loads
 from rotor_mbs.models.lagrange.taylor import Propagation
-from rotor_mbs.runs.pool import WorkerPool, run_in
-from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.trajectory import Integration
 
 
@@ -49,20 +47,6 @@ def test_uncertainty_bounds_the_true_error_at_every_sample(name: str) -> None:
     uncertainty, rounding = frozen.angle_uncertainty, 0.5 * np.spacing(np.abs(stored)).max(axis=1)
     assert (multiprecision.distance(_propagated(name, 1e-33)[:rows], exact[:rows]) <= uncertainty).all()
     assert (multiprecision.distance(stored, exact[:rows]) <= uncertainty + rounding).all()
-
-
-def _limited(duration: float) -> tuple[bool, list[float]]:
-    run = solve("reference", general(duration=duration, samples=3), {}, time_limit_s=0.2)
-    growth = run.trajectory.error_growth
-    assert growth is not None
-    return run.integration.out_of_time, growth.tolist()
-
-
-def test_a_reference_that_its_time_limit_ends_is_ended() -> None:
-    """Springs keep the errors from growing to where that breaks off: over the rest it would take hours."""
-    with WorkerPool(1) as pool:
-        (end,) = run_in(pool, _limited, [1e6], 60.0)
-    assert end.value == (True, [1.0])
 
 
 def test_the_uncertainty_is_ten_times_difference_and_rounding_and_never_falls() -> None:
@@ -117,25 +101,6 @@ def test_a_reference_of_which_one_run_ends_early(
     np.testing.assert_allclose(result.error_growth, whole.error_growth[:rows], rtol=1e-6)
 
 
-@pytest.mark.parametrize("is_perturbed", [True, False])
-def test_quotients_are_known_as_far_as_both_runs_went(is_perturbed: bool, monkeypatch: pytest.MonkeyPatch) -> None:
-    scene, solver_of = paper("fig03", duration=0.1, samples=4), reference_module._in_doubles
-
-    def ends_early(start: Scene, tolerances: tuple[float, float], times: Any) -> Any:
-        run = solver_of(start, tolerances, times)
-        run.integrate()
-        rows = 2 if (start != scene) is is_perturbed else 4
-        return SimpleNamespace(integrate=lambda: None, states=run.states[:rows])
-
-    times = np.linspace(0.0, 0.1, 4)
-    whole = reference_module._matrices_by_quotients(scene, times)
-    monkeypatch.setattr(reference_module, "_in_doubles", ends_early)
-    result = reference_module._matrices_by_quotients(scene, times)
-    assert result[:2].tobytes() == whole[:2].tobytes()
-    assert np.all(np.isposinf(result[2:]))
-    assert len(result) == (4 if is_perturbed else 2)
-
-
 @pytest.mark.parametrize(("known", "finite"), [(2, [True, True, False]), (3, [True] * 3), (4, [True] * 3)])
 def test_growth_is_known_as_far_as_the_variational_equations_went(
     known: int, finite: list[bool], monkeypatch: pytest.MonkeyPatch
@@ -148,15 +113,6 @@ def test_growth_is_known_as_far_as_the_variational_equations_went(
     assert result.growth.tolist() == [[6.0 if is_finite else np.inf] * 4 for is_finite in finite]
     assert result.trajectory.error_growth is not None
     assert np.isfinite(result.trajectory.error_growth).tolist() == finite
-
-
-def test_growth_over_one_interval_is_that_over_its_halves() -> None:
-    pytest.importorskip("heyoka")
-    given, halves = (solve("reference", paper("fig03", duration=0.1, samples=n), {}).trajectory for n in (2, 3))
-    assert given.error_growth is not None
-    assert halves.error_growth is not None
-    assert given.error_growth[-1] == pytest.approx(halves.error_growth[-1], rel=1e-9)
-    assert given.error_growth[-1] > 1.01
 
 
 def test_a_pitch_that_is_fixed_has_no_growth_and_no_unit(monkeypatch: pytest.MonkeyPatch) -> None:

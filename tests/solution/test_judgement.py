@@ -15,7 +15,7 @@ from rotor_mbs.analysis.judgement import Judgement, judge
 from rotor_mbs.methods.catalogue import find_method, method_names
 from rotor_mbs.methods.solve import solve
 from rotor_mbs.methods.time_limit import OutOfTimeError, is_over, polled, time_limit
-from rotor_mbs.models.exudyn import adapter, chain, sensor_samples
+from rotor_mbs.models.exudyn import chain, sensor_samples
 from rotor_mbs.models.exudyn.loads import Loads
 from rotor_mbs.models.exudyn.schemes import Scheme
 from rotor_mbs.models.exudyn.solvers import MultibodySolver
@@ -52,18 +52,6 @@ def test_an_engines_claim_of_success_that_is_false(name: str) -> None:
     given, method, settings = CLAIMS[name]
     exact = reference(given.name) if name == "the singular pitch" else None
     caught(given, solve(method, given, settings), exact)
-
-
-@pytest.mark.parametrize("method", [RK44, ALPHA])
-def test_a_solver_stopped_by_its_own_time_out(method: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    """It returns True before the end: what counts is the last sample."""
-    monkeypatch.setattr(adapter.exudyn.special.solver, "timeout", 0.05)
-    chosen = paper("fig08", duration=1000.0, samples=10_001)
-    result = solve(method, chosen, {})
-    assert len(result.trajectory.time) < chosen.samples
-    verdict = caught(chosen, result)
-    assert verdict.status == "diverged"
-    assert verdict.message.startswith("no finite sample after t = ")
 
 
 def test_a_body_that_falls_free_of_its_joints() -> None:
