@@ -181,9 +181,10 @@ def test_wires_stand_where_the_rotor_is() -> None:
     angles = np.array([[0.0, 0.0], [0.0, np.pi / 2]])
     corners = wires(scene, time, angles, np.array([0.0, 1.0]), magnified=1.0)
     x, _, z = scene.blades[0].tip
-    # Blade 1 up: z is seen as cos(elevation); x as cos(28°) to the right and, from above, sin(14°) sin(28°) up.
+    # Blade 1 up: z is seen as cos(elevation); x as cos(28°) to the right and, from above, lower.
     up, right = np.cos(np.radians(14.0)), np.sin(np.radians(62.0))
     np.testing.assert_allclose(corners[0, 0, 0], [0.0, up * z], atol=1e-12)
-    np.testing.assert_allclose(corners[0, 0, 1, 0], right * x)
+    lower = np.sin(np.radians(14.0)) * np.cos(np.radians(62.0)) * x
+    np.testing.assert_allclose(corners[0, 0, 1], [right * x, up * z - lower], atol=1e-12)
     # Pitched by 90°, the tip's offset points along +y: seen as cos(62°) to the right.
     np.testing.assert_allclose(corners[1, 0, 1, 0], np.cos(np.radians(62.0)) * x)

@@ -122,6 +122,7 @@ LAID_OUT: dict[str, Callable[[h5py.File], object]] = {
     "a setting": lambda file: file["runs/settings"].__setitem__(1, "{}"),
     "a time": lambda file: file[SCENE]["time"].__setitem__(1, 0.5),
     "a unit": lambda file: file[SCENE]["angles"].attrs.modify("units", "deg"),
+    "a title": lambda file: file[SCENE].attrs.modify("title", "another"),
     "the version of a library": lambda file: file.attrs.modify("numpy", "0.0"),
     "no digests": lambda file: file[SCENE].attrs.__delitem__("digests"),
     "an array more": lambda file: file[SCENE].create_dataset("more", data=np.zeros(3)),
