@@ -183,7 +183,7 @@ def test_what_a_sweep_writes_beside_its_dataset_replaces_no_other_file(tmp_path:
 
 def test_pages_figures_and_saved_runs_replace_no_other_file(tmp_path: Path) -> None:
     scene = paper("fig08", samples=11)
-    path = store(tmp_path / "r.h5", [Made(scene, name, rotor(np.sin)) for name in ("reference", "lagrange/dop853")])
+    path = store(tmp_path / "r.h5", [Made(scene, "lagrange/dop853", rotor(np.sin))])
 
     def figures(folder: Path) -> None:
         if (ended := rotor_mbs("figures", path, "-o", folder, "--format", "svg")).status:
