@@ -145,7 +145,6 @@ def test_a_change_of_what_was_laid_out_is_refused_in_one_line(change: str, copy:
 EDITS: dict[str, tuple[str, Callable[[Rows], object]]] = {
     "growth": (f"{SCENE}/reference", lambda row: row["error_growth"].__setitem__(1, 1e6)),
     "energies": (RUN, lambda row: row["energy_error"].__setitem__(5, row["energy_error"][5] + 1.0)),
-    "steps": (RUN, lambda row: row["steps"].fill(1)),
 }
 
 
