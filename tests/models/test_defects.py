@@ -227,14 +227,10 @@ def test_a_run_that_left_the_symmetry_has_one_horizon_with_and_without_a_referen
 
 @pytest.mark.parametrize("name", ["fig03", "fig04b", "fig11"])
 def test_rates_are_found_from_the_angles(name: str) -> None:
-    """To the rounding of five angles: a slope through five rows has some 0.3 of their errors an interval."""
+    """To the rounding of five angles."""
     scene = paper(name, duration=1.0, samples=101, outputs=("angles", "rates"))
     run = solve(DOP853, scene, {}).trajectory
     np.testing.assert_allclose(fitted_rates(scene, run.time, run.angles), run.rates, rtol=0, atol=1e-10)
-    noise = 1e-6 * np.random.default_rng(3).standard_normal(run.angles.shape)
-    noise[:, [i for i in range(run.angles.shape[1]) if i not in scene.moving_coordinates]] = 0.0
-    off = fitted_rates(scene, run.time, run.angles + noise) - run.rates
-    assert 0.1e-4 < off[2:-2].std() < 0.5e-4  # 1e-6 / sqrt(10) an interval of 0.01 s, of all coordinates alike
 
 
 @pytest.mark.parametrize(

@@ -12,8 +12,8 @@ import pytest
 
 from rotor_mbs.errors import InputError
 from rotor_mbs.scenario.catalogue import find_scenes, list_scenes, sweeps_folder
-from rotor_mbs.scenario.scene import scene_tables, unit_of
-from rotor_mbs.scenario.sweep import Axis, Design, Range, Sweep, Variants, load_sweep, split_rows, sweep_of
+from rotor_mbs.scenario.scene import unit_of
+from rotor_mbs.scenario.sweep import Axis, Design, Range, Sweep, load_sweep, split_rows, sweep_of
 from rotor_mbs.scenario.toml_file import parse_key
 
 _HEAD = 'title = "t"\nscene = "paper/fig11"\n'
@@ -110,15 +110,6 @@ def test_a_row_is_the_scene_with_its_numbers_in_place(tmp_path: Path) -> None:
     assert (scene.gravity, scene.samples, sweep.base.gravity) == (1.5, 11, 1.5)
     assert scene.initial_angles == sweep.base.initial_angles
     assert sweep.units == ("N m/rad", "rad/s", "kg")
-
-
-def test_initial_states_put_in_alone_make_the_same_scene_as_the_whole_file_would(tmp_path: Path) -> None:
-    sweep = _load(tmp_path, '[[axis]]\nkey = "initial.angles[2]"\nvalues = [0.1, 0.2]\n')
-    tables = scene_tables(sweep.base)
-    variants = Variants("s", tables, sweep.keys)
-    variants.scene([0.1])
-    tables = {**tables, "initial": {**tables["initial"], "angles": ["pi/6", "pi/4", 0.2, "pi/2"]}}
-    assert variants.scene([0.2]) == Variants("s", tables, ()).scene(())
 
 
 def test_a_scene_is_no_sweep(tmp_path: Path) -> None:

@@ -77,16 +77,6 @@ def test_a_producer_of_another_shape_is_refused() -> None:
         quantities.array_of(wrong, SCENE, moved(SCENE, 0.0))
 
 
-def test_a_trajectory_refuses_names_that_are_not_declared() -> None:
-    run = moved(SCENE, 0.0)
-    run.tip = np.zeros((11, 3, 3))
-    assert run.replace(tip=None).tip is None
-    with pytest.raises(AttributeError, match="tpi"):
-        run.tpi = run.tip
-    with pytest.raises(AttributeError, match="tpi"):
-        assert run.tpi is None
-
-
 def test_a_solution_has_its_quantities_status_and_metrics() -> None:
     run, _ = solve_judged(SCENE, "lagrange/dop853")
     assert (run.status, run.message) == ("ok", "")
