@@ -80,12 +80,6 @@ def test_a_motion_that_ends_is_a_run_that_says_why(name: str) -> None:
     assert "step size" in result.message
 
 
-def test_a_start_that_is_no_number_is_a_run_without_steps() -> None:
-    result = INTEGRATORS["DOP853"](lambda _, y: [-y[0]], 0.0, 1.0, np.array([np.nan]), np.array([1.0]))
-    assert (result.steps, result.evaluations, len(result.states)) == (0, 0, 0)
-    assert result.message.startswith("SciPy: ")
-
-
 @pytest.mark.parametrize("engine", ["scipy", "heyoka"])
 def test_a_solver_at_chosen_times_has_those(engine: str) -> None:
     """A rotor that turns uniformly."""
