@@ -342,16 +342,16 @@ class Runs(Mapping[Any, Any]):
     def __init__(self, path: Path, scene: str = "", *, _folder: _TemporaryFolder | None = None) -> None:
         self.path, self.scene, self._folder = path, scene, _folder
         self._is_sweep = is_sweep(path)
-        self._labels = self._stored_labels()
+        self._labels: list[Any]
+        if self._is_sweep:
+            stored = self._sweep.column("status") != MISSING
+            self._labels = self._sweep.column("run")[stored].tolist()
+        else:
+            self._labels = [run.method if scene else f"{run.scene}/{run.method}" for run in self._runs()]
 
     def __reduce__(self) -> tuple[Any, ...]:
         """A copy, or what another process unpickles, has a file of its own in place of a temporary one."""
         return _restored, (self.path, self.scene, self.path.read_bytes() if self._folder is not None else None)
-
-    def _stored_labels(self) -> list[Any]:
-        if self._is_sweep:
-            return [int(run) for run in self._sweep.column("run")[self._sweep.column("status") != MISSING]]
-        return [run.method if self.scene else f"{run.scene}/{run.method}" for run in self._runs()]
 
     def __getitem__(self, label: Any) -> Any:
         """Raises KeyError for what the file does not have, StoreError for samples that cannot be read."""

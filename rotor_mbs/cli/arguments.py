@@ -276,7 +276,7 @@ def _parser() -> tuple[_Parser, dict[str, _Parser]]:
     own.timeout()
 
     own = command(
-        "check", "check the accuracy of stored runs; exit status 1 if a check fails", "commands:check",
+        "check", "check the accuracy of stored runs; exit status 1 if a check fails", "verdicts:check",
         "", "rotor-mbs-out/results.h5 --junit check.xml",
     )  # fmt: skip
     own.add_argument(
@@ -298,7 +298,7 @@ def _parser() -> tuple[_Parser, dict[str, _Parser]]:
 
     own = command(
         "test-method", "test a method, your own or a built-in one, and report faults with their most likely causes",
-        "commands:test_method", "./mine.py", "lagrange/dop853 --json -",
+        "verdicts:test_method", "./mine.py", "lagrange/dop853 --json -",
     )  # fmt: skip
     own.add_argument("methods", nargs="+", metavar="METHOD", help="a method (see rotor-mbs list), or a Python file")
     own.add_argument("--junit", type=file, metavar="XML", help="write the checks as JUnit XML")

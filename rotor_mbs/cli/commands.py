@@ -1,4 +1,4 @@
-"""The commands but for `run`, `reproduce` and `reference`: what is available, a study each, pages and pictures.
+"""The commands but for `run`, `reproduce`, `reference`, `check` and `test-method`: what is available, studies, pages.
 
 Each loads what it needs, and not what the others need: `list` reads no scene, and pages load no model.
 """
@@ -11,10 +11,10 @@ import json
 import sys
 import time
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from rotor_mbs.cli import EXIT_BAD_INPUT, EXIT_FAILED, print_line
 from rotor_mbs.cli.arguments import pages_beside
@@ -25,9 +25,6 @@ from rotor_mbs.runs import cores
 from rotor_mbs.scenario.catalogue import find_scenes, list_scenes, list_sweeps, only_scene
 from rotor_mbs.scenario.keys import counted
 from rotor_mbs.solution.status import GOOD
-
-if TYPE_CHECKING:
-    from rotor_mbs.analysis.checks import Check
 
 
 def list_all(arguments: argparse.Namespace) -> int:
@@ -210,85 +207,6 @@ def modes(arguments: argparse.Namespace) -> int:
             )
         _write_pages(arguments.output)
     return int(is_lost or not all(modes.agrees for modes in chosen))
-
-
-def check(arguments: argparse.Namespace) -> int:
-    """Prints every verdict that fails (with --verbose all), then a count; status 1 where one fails."""
-    from rotor_mbs.cli import verdicts as formats
-    from rotor_mbs.runs.read import is_sweep
-    from rotor_mbs.scenario.accuracy_bounds import load_bounds
-    from rotor_mbs.studies import check as study
-
-    _refuse_foreign(arguments)
-    bounds = load_bounds(arguments.bounds)
-    earlier = None if arguments.against is None else study.check_file(arguments.against, bounds)
-    if earlier is not None and arguments.file is not None and is_sweep(arguments.against) != is_sweep(arguments.file):
-        raise InputError(f"--against {arguments.against}: a file of another kind than {arguments.file}")
-    if arguments.file is not None:
-        verdicts = study.check_file(arguments.file, bounds, arguments.require)
-    else:
-        with ProgressLine() as progress:
-            verdicts = study.check_default_set(bounds, arguments.jobs, progress, arguments.method)
-    if verdicts and earlier is not None:
-        verdicts += study.regressions(verdicts, earlier)
-
-    _write_verdicts(arguments, verdicts)
-    stream = sys.stderr if arguments.json == Path("-") else sys.stdout  # standard output is the JSON's alone
-    failures = [verdict for verdict in verdicts if not verdict.passed]
-    for verdict in verdicts if arguments.verbose else failures:
-        print(formats.line(verdict), file=stream)
-    if arguments.github:
-        for verdict in formats.worst_first(failures)[: formats.WORST]:
-            print(formats.github(verdict), file=stream)
-    runs = ", ".join(f"{count} {method}" for method, count in study.judged_runs(verdicts).items())
-    print(f"runs checked: {runs or 'none'}", file=stream)
-    print(f"{len(verdicts) - len(failures)} passed, {len(failures)} failed", file=stream)
-    return 1 if failures else 0
-
-
-def _refuse_foreign(arguments: argparse.Namespace) -> None:
-    """Before anything is computed: files of --junit and --json that hold something else."""
-    from rotor_mbs.cli import verdicts as formats
-    from rotor_mbs.runs.output_files import refuse_foreign
-
-    if arguments.junit is not None:
-        refuse_foreign(arguments.junit, formats.JUNIT)
-    if arguments.json is not None and arguments.json != Path("-"):
-        refuse_foreign(arguments.json, formats.JSON)
-
-
-def _write_verdicts(arguments: argparse.Namespace, verdicts: Sequence[Check]) -> None:
-    from rotor_mbs.cli import verdicts as formats
-    from rotor_mbs.runs.output_files import replace_file
-
-    if arguments.junit is not None:
-        replace_file(arguments.junit, formats.junit(verdicts), formats.JUNIT)
-    if arguments.json == Path("-"):
-        print(formats.as_json(verdicts))
-    elif arguments.json is not None:
-        replace_file(arguments.json, formats.as_json(verdicts).encode(), formats.JSON)
-
-
-def test_method(arguments: argparse.Namespace) -> int:
-    """What holds of each method, and the most likely reason where something does not; 1 where something does not."""
-    from rotor_mbs.analysis.text_tables import TextTable
-    from rotor_mbs.studies.method_test import examine
-
-    _refuse_foreign(arguments)
-    verdicts = [verdict for name in arguments.methods for verdict in examine(name, arguments.timeout)]
-    _write_verdicts(arguments, verdicts)
-    if arguments.json != Path("-"):
-        rows: list[tuple[str, ...]] = []
-        for one in verdicts:
-            note = "" if one.passed and one.name != "refusal" else one.hint
-            number, bound = (f"{one.value:.1e}", f"{one.bound:.1e}") if one.unit else ("", "")
-            outcome = "pass" if one.passed else "FAIL"
-            rows.append((one.where.method, one.name, one.where.scene, number, bound, one.unit, outcome, note))
-        heads = ("method", "check", "scene", "value", "allowed", "unit", "result", "reason")
-        print_table(TextTable(heads, rows))
-        failed = sum(not verdict.passed for verdict in verdicts)
-        print(f"{len(verdicts) - failed} passed, {failed} failed")
-    return int(not all(verdict.passed for verdict in verdicts))
 
 
 def compare(arguments: argparse.Namespace) -> int:

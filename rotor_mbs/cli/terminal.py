@@ -6,7 +6,6 @@ import os
 import re
 import shutil
 import sys
-import threading
 import time
 from collections import Counter
 from collections.abc import Sequence
@@ -48,8 +47,7 @@ def print_table(table: TextTable | str) -> None:
 class ProgressLine:
     """One line that renews itself on a terminal, plain lines in a log. A context manager that clears it.
 
-    Called after each run. What is left is estimated from the work done, not from the number of runs. On a terminal the
-    line is renewed every second, so that a long run is no silence.
+    Called after each run. What is left is estimated from the work done, not from the number of runs.
     """
 
     def __init__(self, stream: TextIO | None = None) -> None:
@@ -57,20 +55,15 @@ class ProgressLine:
         self._is_terminal = self._stream.isatty()
         self._start = self._last = self._stage_start = time.monotonic()
         self._stage, self._share_before = "", 0.0
-        self._text = "starting"
-        self._lock = threading.Lock()
-        self._ended = threading.Event()
 
     def __enter__(self) -> Self:
         if self._is_terminal:
-            threading.Thread(target=self._renew, daemon=True).start()
+            self._print_over("starting")
         return self
 
     def __exit__(self, *_: object) -> None:
-        self._ended.set()
-        with self._lock:
-            if self._is_terminal:
-                self._print("\r\x1b[K", end="")
+        if self._is_terminal:
+            self._print("\r\x1b[K", end="")
 
     def __call__(self, done: int, total: int, outcome: Outcome) -> None:
         if done == 1:
@@ -101,24 +94,15 @@ class ProgressLine:
         left = (self._last - self._stage_start) / (share - self._share_before) * (1.0 - share)
         return f"{share:4.0%}, about {span(left)} left  "
 
-    def _renew(self) -> None:
-        while not self._ended.is_set():
-            with self._lock:
-                if self._text and not self._ended.is_set():
-                    self._print_over(self._text)
-            self._ended.wait(1.0)
-
     def _show(self, text: str, *, keep: bool = False) -> None:
         """keep: it stays on the terminal, whole."""
-        with self._lock:
-            text = printable(text)
-            self._text = "" if keep else text
-            if not self._is_terminal:
-                self._print(text)
-            elif keep:
-                self._print(f"\r\x1b[K{coloured(text, self._stream)}")
-            else:
-                self._print_over(text)
+        text = printable(text)
+        if not self._is_terminal:
+            self._print(text)
+        elif keep:
+            self._print(f"\r\x1b[K{coloured(text, self._stream)}")
+        else:
+            self._print_over(text)
 
     def _print_over(self, text: str) -> None:
         elapsed = f"  {span(time.monotonic() - self._start)}"

@@ -1,13 +1,23 @@
-"""Checks as lines of text, JSON, JUnit XML and annotations of GitHub."""
+"""`check` and `test-method`: checks as lines of text, JSON, JUnit XML and annotations of GitHub."""
 
 from __future__ import annotations
 
+import argparse
 import json
 import math
+import sys
 from collections.abc import Sequence
+from pathlib import Path
 from xml.etree import ElementTree
 
 from rotor_mbs.analysis.checks import Check
+from rotor_mbs.analysis.text_tables import TextTable
+from rotor_mbs.cli.terminal import ProgressLine, print_table
+from rotor_mbs.errors import InputError
+from rotor_mbs.runs.output_files import refuse_foreign, replace_file
+from rotor_mbs.runs.read import is_sweep
+from rotor_mbs.scenario.accuracy_bounds import load_bounds
+from rotor_mbs.studies import check as study
 
 WORST = 10  # annotations: GitHub shows as many of a step and drops the others silently
 
@@ -15,6 +25,73 @@ WORST = 10  # annotations: GitHub shows as many of a step and drops the others s
 # What is found in every output of a kind.
 JUNIT = rb'<testsuites name="rotor-mbs check"'
 JSON = rb'\A\[\]\Z|\A\[\n \{\n  "check": "'
+
+
+def check(arguments: argparse.Namespace) -> int:
+    """Prints every verdict that fails (with --verbose all), then a count; status 1 where one fails."""
+    _refuse_foreign(arguments)
+    bounds = load_bounds(arguments.bounds)
+    earlier = None if arguments.against is None else study.check_file(arguments.against, bounds)
+    if earlier is not None and arguments.file is not None and is_sweep(arguments.against) != is_sweep(arguments.file):
+        raise InputError(f"--against {arguments.against}: a file of another kind than {arguments.file}")
+    if arguments.file is not None:
+        verdicts = study.check_file(arguments.file, bounds, arguments.require)
+    else:
+        with ProgressLine() as progress:
+            verdicts = study.check_default_set(bounds, arguments.jobs, progress, arguments.method)
+    if verdicts and earlier is not None:
+        verdicts += study.regressions(verdicts, earlier)
+
+    _write_verdicts(arguments, verdicts)
+    stream = sys.stderr if arguments.json == Path("-") else sys.stdout  # standard output is the JSON's alone
+    failures = [verdict for verdict in verdicts if not verdict.passed]
+    for verdict in verdicts if arguments.verbose else failures:
+        print(line(verdict), file=stream)
+    if arguments.github:
+        for verdict in sorted(failures, key=lambda verdict: verdict.margin)[:WORST]:  # NaN before all others
+            print(github(verdict), file=stream)
+    runs = ", ".join(f"{count} {method}" for method, count in study.judged_runs(verdicts).items())
+    print(f"runs checked: {runs or 'none'}", file=stream)
+    print(f"{len(verdicts) - len(failures)} passed, {len(failures)} failed", file=stream)
+    return 1 if failures else 0
+
+
+def test_method(arguments: argparse.Namespace) -> int:
+    """What holds of each method, and the most likely reason where something does not; 1 where something does not."""
+    from rotor_mbs.studies.method_test import examine  # late: `check` needs no models
+
+    _refuse_foreign(arguments)
+    verdicts = [verdict for name in arguments.methods for verdict in examine(name, arguments.timeout)]
+    _write_verdicts(arguments, verdicts)
+    if arguments.json != Path("-"):
+        rows: list[tuple[str, ...]] = []
+        for one in verdicts:
+            note = "" if one.passed and one.name != "refusal" else one.hint
+            number, bound = (f"{one.value:.1e}", f"{one.bound:.1e}") if one.unit else ("", "")
+            outcome = "pass" if one.passed else "FAIL"
+            rows.append((one.where.method, one.name, one.where.scene, number, bound, one.unit, outcome, note))
+        heads = ("method", "check", "scene", "value", "allowed", "unit", "result", "reason")
+        print_table(TextTable(heads, rows))
+        failed = sum(not verdict.passed for verdict in verdicts)
+        print(f"{len(verdicts) - failed} passed, {failed} failed")
+    return int(not all(verdict.passed for verdict in verdicts))
+
+
+def _refuse_foreign(arguments: argparse.Namespace) -> None:
+    """Before anything is computed: files of --junit and --json that hold something else."""
+    if arguments.junit is not None:
+        refuse_foreign(arguments.junit, JUNIT)
+    if arguments.json is not None and arguments.json != Path("-"):
+        refuse_foreign(arguments.json, JSON)
+
+
+def _write_verdicts(arguments: argparse.Namespace, verdicts: Sequence[Check]) -> None:
+    if arguments.junit is not None:
+        replace_file(arguments.junit, junit(verdicts), JUNIT)
+    if arguments.json == Path("-"):
+        print(as_json(verdicts))
+    elif arguments.json is not None:
+        replace_file(arguments.json, as_json(verdicts).encode(), JSON)
 
 
 def line(check: Check) -> str:
@@ -34,11 +111,6 @@ def github(check: Check) -> str:
     title = printable(f"rotor-mbs {check.name} {check.where.scene} {check.where.method}").replace("%", "%25")
     title = title.replace(":", "%3A").replace(",", "%2C")
     return f"::error title={title}::{line(check).replace('%', '%25')}"  # neither has a line break
-
-
-def worst_first(checks: Sequence[Check]) -> list[Check]:
-    """By share of the bound, the largest first; not a number before all others."""
-    return sorted(checks, key=lambda check: check.margin)
 
 
 def as_json(checks: Sequence[Check]) -> str:

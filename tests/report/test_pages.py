@@ -236,7 +236,7 @@ def test_formulas_are_typeset_and_the_faulty_entry_of_a_matrix_is_marked_and_cor
     assert equation == "(8)"
     assert formula == "<i>c</i>² <i>m</i> <i>c</i><sub>3</sub>²"
     assert text == "what &lt;is&gt; this?"
-    others = {"differing": Section(), "effects": Section()}
+    others = {"differing": Section()}
     page = render("errata", {"errata": [(errata()[0], shown)], **others})
     matrix = page[page.index('<figure class="matrix">') : page.index("</figure>")]
     assert (matrix.count("<td"), matrix.count('<td class="fault">')) == (3, 1)

@@ -18,9 +18,7 @@ from rotor_mbs.report.numbers import number, with_unit
 from rotor_mbs.runs.design import metric_columns
 from rotor_mbs.runs.read import OpenResults, Record, StoredRun, StoredScene, read_records
 from rotor_mbs.solution.status import GOOD
-from rotor_mbs.studies.stability import OUTCOMES, SuiteRun, suite_runs
-
-_SUITE_FOLDERS = {"stiff", "extreme"}
+from rotor_mbs.studies.stability import OUTCOMES, SUITE, SuiteRun, suite_runs
 
 
 class Report(OpenResults):
@@ -30,7 +28,7 @@ class Report(OpenResults):
     def is_suite(self) -> bool:
         """Whether the file is of the stability suite: it has ladders of steps, or all its scenes are of the suite."""
         folders = {name.partition("/")[0] for name, scene in self.scenes.items() if scene.methods}
-        return bool(read_records(self.path, "stability")) or (bool(folders) and folders <= _SUITE_FOLDERS)
+        return bool(read_records(self.path, "stability")) or (bool(folders) and folders <= {*SUITE})
 
     @cached_property
     def files(self) -> Mapping[str, str]:

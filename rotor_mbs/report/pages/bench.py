@@ -321,14 +321,12 @@ def point_table(curves: Sequence[Record]) -> PageTable:
                     values.append(str(int(value)))
                 else:
                     values.append(number(float(value) if np.isfinite(value) else None, 3))
-            setting = _setting(curve, i) + (f" and {len(left_out) - 1} finer" if i in left_out[:-1] else "")
+            size = float(curve.arrays["setting"][i])
+            setting = prefixed(size, "s", 3) if curve.attributes["setting_kind"] == "step" else number(size)
+            if i in left_out[:-1]:
+                setting += f" and {len(left_out) - 1} finer"
             claim = "the engine reported success" if curve.arrays["false_success"][i] else ""
             message = "; ".join(filter(None, (curve.messages[i], claim)))
             outcome = TableCell(words_of(status), tone="" if status == "ok" else "bad", note=message)
             rows.append([method_cell(curve.name), setting, outcome, *values])
     return PageTable("Every setting", ("method", "setting", "status", *names), rows)
-
-
-def _setting(curve: Record, i: int) -> str:
-    value = float(curve.arrays["setting"][i])
-    return prefixed(value, "s", 3) if curve.attributes["setting_kind"] == "step" else number(value, 2)

@@ -8,6 +8,7 @@ from collections.abc import Mapping
 from rotor_mbs.analysis import run_selection
 from rotor_mbs.analysis.published import finding
 from rotor_mbs.analysis.text_tables import method_table
+from rotor_mbs.methods.catalogue import REFERENCE
 from rotor_mbs.report import plots
 from rotor_mbs.report.elements import PageTable, Row, Section, TableCell, picture
 from rotor_mbs.report.looks import label_of
@@ -22,7 +23,7 @@ from rotor_mbs.report.pages import (
     status_text,
 )
 from rotor_mbs.report.pages.bench import cost_picture
-from rotor_mbs.report.pages.scene import VISIBLE, defects, error_picture, key_picture, parting
+from rotor_mbs.report.pages.scene import defects, error_picture, key_picture
 from rotor_mbs.report.pages.viewer import viewer
 from rotor_mbs.runs.read import StoredScene
 from rotor_mbs.solution.status import GOOD
@@ -96,14 +97,12 @@ def index_page(report: Report) -> dict[str, object]:
 
 
 def scene_table(scenes: Scenes, files: Mapping[str, str]) -> tuple[PageTable, dict[str, str]]:
-    """A row per scene: errors of all methods, how far the printed model is from the corrected one.
+    """A row per scene: errors of all methods, and the energy gain of the printed model.
 
     Returns the table, and what its marks stand for.
     """
-    names = dict.fromkeys(name for scene in scenes.values() for name in run_selection.corrected_runs(scene))
-    methods = run_selection.in_catalogue_order(names)
-    if any(run_selection.PRINTED in scene.methods for scene in scenes.values()):
-        methods.insert(0, run_selection.PRINTED)
+    names = dict.fromkeys(name for scene in scenes.values() for name in run_selection.in_order(scene))
+    methods = [name for name in names if name != REFERENCE]
     marks: dict[str, str] = {}
     rows: list[Row] = []
     for name, scene in scenes.items():
@@ -127,17 +126,8 @@ def scene_table(scenes: Scenes, files: Mapping[str, str]) -> tuple[PageTable, di
                 marks[mark] = status_text(run)
             title = f"{label_of(method)}: {'error unknown' if error is None else number(error)}, {status_text(run)}"
             row.append(TableCell(f"{number(error)} {mark}".rstrip(), shade=shade, title=title))
-        sides = {side: run for side, run in run_selection.sides(scene).items() if "angles" in run}
-        parted = largest = None
-        if len(sides) == 2:
-            parted, largest = parting(*sides.values())
-        row.append("" if largest is None else "never" if parted is None else number(parted, 3))
-        row.append("" if largest is None else number(largest))
         printed = scene.methods.get(run_selection.PRINTED)
         row.append("" if printed is None else prefixed(metric(printed, "energy_gain_J"), "J"))
         rows.append(row)
-    head = (
-        "Scene", "Figure", "Compared (s)", *map(method_cell, methods), f"As printed: differs by {VISIBLE:g} rad at (s)",
-        "As printed: largest difference (rad)", "As printed: energy gain",
-    )  # fmt: skip
+    head = ("Scene", "Figure", "Compared (s)", *map(method_cell, methods), "As printed: energy gain")
     return PageTable("Largest angle error up to the horizon (rad), by method", head, rows), marks

@@ -25,15 +25,14 @@ from rotor_mbs.analysis.published import (
     rounds_to,
 )
 from rotor_mbs.errors import InputError
-from rotor_mbs.methods.catalogue import errata_methods, look_up
+from rotor_mbs.methods.catalogue import look_up
 from rotor_mbs.report import canvas, plots
 from rotor_mbs.report.elements import PageTable, Row, Section, TableCell, picture
 from rotor_mbs.report.looks import COLOURS, Look, label_of
-from rotor_mbs.report.numbers import NOTHING, fixed, formula, number, prefixed
-from rotor_mbs.report.pages import Report, metric, status_text
+from rotor_mbs.report.numbers import NOTHING, fixed, formula, number
+from rotor_mbs.report.pages import Report
 from rotor_mbs.runs.output_files import replace_file
 from rotor_mbs.runs.read import StoredRun, StoredScene, open_results
-from rotor_mbs.solution.status import GOOD
 
 ROUNDING = "amplified rounding error, which depends on how the equations are written"
 _UNITS = {"angle": "rad", "rate": "rad/s"}
@@ -53,7 +52,7 @@ def number_table(claims: Iterable[Claim]) -> PageTable:
             verdict = replace(verdict, note=ROUNDING)
         body = "rotor" if item.of.coordinate == 0 else f"pitch {item.of.coordinate}"
         _, words = STATISTICS[item.of.quantity, item.of.statistic]
-        description = f"{words} {body} {item.of.quantity} ({_unit(item)})"
+        description = f"{words} {body} {item.of.quantity} ({_UNITS[item.of.quantity]})"
         rows.append([
             item.figure,
             TableCell(description, note=f"«{item.quote}»", note_language="es"),
@@ -64,10 +63,6 @@ def number_table(claims: Iterable[Claim]) -> PageTable:
             _verdict(corrected, item),
         ])  # fmt: skip
     return PageTable("Published numbers", head, rows)
-
-
-def _unit(item: Published) -> str:
-    return _UNITS[item.of.quantity] if item.of is not None else ""
 
 
 def claim_table(claims: Iterable[Claim], study: ClaimStudy) -> PageTable:
@@ -119,29 +114,9 @@ def errata_page(report: Report) -> dict[str, object]:
             for e in differing
         ],
     )
-    # What each erratum alone does.
-    effects_head = ["Scene"]
-    for erratum in errata_methods():
-        for what in ("angle change up to the horizon (rad)", "whole run (rad)", "energy gain"):
-            effects_head.append(f"{erratum}: {what}")
-    effects: list[Row] = []
-    for name, scene in report.scenes.items():
-        runs = [scene.methods.get(method) for method in errata_methods().values()]
-        row: list[TableCell | str] = [TableCell(name, href=report.files[name], note=scene.title)]
-        for run in runs:
-            if run is None:
-                row += ["", "", ""]
-                continue
-            status = "" if run.status in GOOD else status_text(run)
-            row.append(TableCell(number(metric(run, "angle_error_max")), note=status))
-            row += [number(metric(run, "angle_error_whole")), prefixed(metric(run, "energy_gain_J"), "J")]
-        if any(run is not None for run in runs):
-            effects.append(row)
-    effects_table = PageTable("", effects_head, effects)
     return {
         "errata": [(erratum, matrices(entries, erratum.stands_in)) for erratum in report.errata],
         "differing": Section(tables=[differing_table]),
-        "effects": Section(tables=[effects_table]),
     }
 
 

@@ -166,7 +166,7 @@ def range_table(runs: Sequence[StoredRun]) -> PageTable:
 
 
 def _difference_section(scene: StoredScene, drawn: Runs, horizon: float | None) -> Section:
-    """Each run's largest angle difference from the reference, and the uncertainties that are known."""
+    """Each run's largest angle difference from the reference, and the reference's uncertainty."""
     reference = scene.reference
     if reference is None or "angles" not in reference or not len(reference.array("time")):
         return Section()
@@ -176,11 +176,9 @@ def _difference_section(scene: StoredScene, drawn: Runs, horizon: float | None) 
         growth = np.maximum(np.maximum.accumulate(reference.array("error_growth")), 1.0)
         look = Look(GREY, ":", "", "rounding error of the initial state times error growth")
         others.append(Series(reference.array("time"), float(np.finfo(float).eps) * growth, look))
-    for method, run in {REFERENCE: reference, **runs}.items():
-        if "angle_uncertainty" in run and run.array("angle_uncertainty").max() > LOWEST:
-            colour, line = (GREY, "-") if method == REFERENCE else (look_of(method).colour, ":")
-            look = Look(colour, line, "", f"{label_of(method)}: uncertainty")
-            others.append(Series(run.array("time"), run.array("angle_uncertainty"), look))
+    if "angle_uncertainty" in reference and reference.array("angle_uncertainty").max() > LOWEST:
+        look = Look(GREY, "-", "", f"{label_of(REFERENCE)}: uncertainty")
+        others.append(Series(reference.array("time"), reference.array("angle_uncertainty"), look))
     differences = {method: angle_difference(run, reference) for method, run in runs.items() if "angles" in run}
     return Section(error_picture(
         over_time(runs, differences), "largest angle difference (rad)", "difference",
