@@ -136,6 +136,8 @@ class ClaimStudy:
     runs, spread : of each scene; rad, by which their starts were moved at most.
     methods : the printed and the corrected equations.
     verdicts : "holds", "fails" or "undecided" of each claim by method.
+    shares : of each claim by method, for 8, 10 and 12 s: the share of the deciding runs in which it holds (None where
+        none decides), and how many decide.
     """
 
     rule: str
@@ -143,6 +145,7 @@ class ClaimStudy:
     spread: float
     methods: Sequence[str]
     verdicts: Mapping[str, Mapping[str, str]]
+    shares: Mapping[str, Mapping[str, Sequence[tuple[float | None, int]]]]
 
     def count(self, method: str, verdict: str) -> int:
         """How many claims have this verdict by the method."""
