@@ -171,6 +171,7 @@ FOREIGN: dict[str, Callable[[h5py.Group, Path], object]] = {
     ),
     "30 GB that are not there": lambda scene, _: scene.create_dataset("angles", (10**9, 4), "f8", chunks=(1000, 4)),
     "a group": lambda scene, _: scene.create_group("angles"),
+    "a text": lambda scene, _: scene.create_dataset("angles", data="text"),
     "an array of nothing": lambda scene, _: scene.create_dataset("angles", data=h5py.Empty("f8")),
 }
 
