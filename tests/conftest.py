@@ -1,4 +1,4 @@
-"""For all tests: Ctrl-C arrives, compiled code stays out of the user's cache; a results file to read."""
+"""For all tests: signals arrive, compiled code stays out of the user's cache; a results file to read."""
 
 from __future__ import annotations
 
@@ -8,9 +8,11 @@ from pathlib import Path
 
 import pytest
 
-# A CI runner or `nohup ... &` may have it ignored, which processes inherit: a test of interrupts would wait in vain.
-if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
-    signal.signal(signal.SIGINT, signal.default_int_handler)
+# A CI runner or `nohup ... &` may have them ignored, which processes inherit: a test of signals would wait in vain.
+for name, default in {"SIGINT": signal.default_int_handler, "SIGHUP": signal.SIG_DFL}.items():
+    number = getattr(signal, name, None)  # SIGHUP: not on Windows
+    if number is not None and signal.getsignal(number) is signal.SIG_IGN:
+        signal.signal(number, default)
 
 # The mutants alone leave hundreds of integrators, and every process that compiles reads through all that is there:
 # 0.08 s with 240 MB. heyoka looks for its cache here when it is first imported.
