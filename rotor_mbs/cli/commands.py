@@ -211,8 +211,8 @@ def modes(arguments: argparse.Namespace) -> int:
 
 def compare(arguments: argparse.Namespace) -> int:
     """Data of another program against a scene's reference: a table, its page, the numbers as a results file."""
-    from rotor_mbs.analysis.data_verdict import as_dictionary
     from rotor_mbs.report.pages.comparison import compare as compare_data
+    from rotor_mbs.studies.compare_data import as_dictionary
 
     found = compare_data(
         arguments.data, only_scene(arguments.scene), columns=arguments.columns, tolerance=arguments.tolerance,

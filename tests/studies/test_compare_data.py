@@ -13,12 +13,12 @@ from support import other_code, references
 from support.data_files import FORMATS
 
 import rotor_mbs as rm
-from rotor_mbs.analysis.data_verdict import as_dictionary
 from rotor_mbs.cli import main
 from rotor_mbs.models.lagrange import reference
 from rotor_mbs.report.pages.comparison import verdict_of
 from rotor_mbs.runs.read import read_records
 from rotor_mbs.scenario.scene import Scene
+from rotor_mbs.studies.compare_data import as_dictionary
 from rotor_mbs.testing import assert_agrees
 
 

@@ -21,7 +21,7 @@ from rotor_mbs.foreign.channels import load_data
 from rotor_mbs.models.lagrange.defects import interval_defects
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.defects import Defects
-from rotor_mbs.studies.data_loads import LoadComparison, compare_loads
+from rotor_mbs.studies.compare_data import LoadComparison, compare_loads
 
 Array = Any
 Arrays = dict[str, Array]

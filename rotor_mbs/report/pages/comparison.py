@@ -12,7 +12,6 @@ from typing import Any
 
 import numpy as np
 
-from rotor_mbs.analysis.data_verdict import DEFAULT_TOLERANCE, LEVELS, ChannelErrors, DataVerdict, from_dictionary
 from rotor_mbs.analysis.text_tables import TextTable
 from rotor_mbs.errors import InputError
 from rotor_mbs.foreign.channels import load_data
@@ -29,8 +28,15 @@ from rotor_mbs.runs.versions import machine, versions
 from rotor_mbs.scenario.catalogue import scene_of
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.trajectory import need_xarray
-from rotor_mbs.studies.compare_data import compare_with_reference
-from rotor_mbs.studies.data_modes import compare_modes
+from rotor_mbs.studies.compare_data import (
+    DEFAULT_TOLERANCE,
+    LEVELS,
+    ChannelErrors,
+    DataVerdict,
+    compare_modes,
+    compare_with_reference,
+    from_dictionary,
+)
 
 
 def compare(
@@ -91,7 +97,7 @@ class DataComparison:
 
     Attributes
     ----------
-    verdict : errors and verdict, see `rotor_mbs.analysis.data_verdict.DataVerdict`.
+    verdict : errors and verdict, see `rotor_mbs.studies.compare_data.DataVerdict`.
     record : data, reference, errors and defects, as `save` stores them.
     status, message, agrees : status, the reason if it is not "ok", and whether it is "ok".
     likely : probable causes of a difference.
