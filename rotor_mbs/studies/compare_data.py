@@ -452,7 +452,6 @@ def compare_loads(scene: Scene, loads: ForeignData, defects: Defects, tolerance:
             judged &= (t0 != t1) | (np.abs(time - t0) > ALIGNMENT * float(np.median(np.diff(time))))
     time, values, rounding = time[judged], values[judged], rounding[judged]
     matrices = {frame: matrix[judged] for frame, matrix in matrices.items()}
-    least = _SMALL * arms * float(largest_force.max(initial=0.0))
     own = expected[judged]
     least = _SMALL * arms * float(largest_force.max(initial=0.0))  # (channels,) the smallest scale of an error
     before = np.abs(values - own).max(axis=0, initial=0.0)

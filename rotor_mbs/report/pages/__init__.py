@@ -47,7 +47,7 @@ class Report(OpenResults):
 
     @cached_property
     def study(self) -> ClaimStudy | None:
-        """The claims on many runs, and the numbers under other conditions."""
+        """The claims on many runs."""
         return published.claim_study() if self.claims else None
 
     @cached_property
