@@ -110,17 +110,3 @@ def _pendulum(scene: Scene, time: Array) -> tuple[str, Array] | None:
     modulus = math.sin(amplitude / 2.0)
     sn = ellipj(ellipk(modulus**2) - frequency * time, modulus**2)[0]
     return "pendulum", math.pi - 2.0 * np.arcsin(modulus * sn) - lead
-
-
-def escape_rate(scene: Scene) -> float | None:
-    """1/s: sqrt(g/c) of the fastest blade, a pendulum about its pitch axis that stands upside down (below the shaft).
-
-    c is a point mass' distance from the pitch axis, g gravity. None for blades with inertia of their own, for bearings
-    with springs, dampers or torques, and where nothing makes the pitch unstable.
-    """
-    arms = [arm for blade in scene.blades if (arm := math.hypot(*blade.centre_of_mass[:2])) > 0.0]
-    is_rigid = not all(blade.is_point_mass for blade in scene.blades)
-    in_bearing = scene.bearing_stiffness or scene.bearing_damping or scene.pitch_torque
-    if is_rigid or in_bearing or scene.gravity <= 0.0 or not arms:
-        return None
-    return math.sqrt(scene.gravity / min(arms))

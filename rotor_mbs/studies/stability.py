@@ -144,13 +144,11 @@ def run_suite(
     StoreError.
     """
     asked = {scene.name: able_methods(scene, methods or method_names(is_corrected=True))[0] for scene in scenes}
-    none: Mapping[str, Sequence[str]] = dict.fromkeys(asked, ())  # references, some of which take long, first
     patient = {name: [method for method in able if method == _PATIENT_METHOD] for name, able in asked.items()}
-    every = dict.fromkeys(method for able in asked.values() for method in able)
-    chosen_settings = settings_for(list(every), settings or {})
+    chosen_settings = settings_for(list(dict.fromkeys(m for able in asked.values() for m in able)), settings or {})
     made: list[Outcome] = []
     with pool_of(workers) as pool:
-        for chosen, limit_s in ((none, timeout_s), (patient, max(timeout_s, _PATIENT_S)), (asked, timeout_s)):
+        for chosen, limit_s in ((patient, max(timeout_s, _PATIENT_S)), (asked, timeout_s)):
             own = {k: v for able in chosen.values() for method in able for k, v in chosen_settings[method].items()}
             report = run_scenes(
                 scenes, chosen, output, workers=pool, timeout_s=limit_s, settings=own, on_progress=on_progress

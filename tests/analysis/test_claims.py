@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +10,6 @@ from support.scenes import paper
 from support.stored import Made, rotor, store
 
 from rotor_mbs.analysis import run_selection
-from rotor_mbs.analysis.kinematics import escape_rate
 from rotor_mbs.analysis.published import (
     HOLDS,
     Claim,
@@ -110,11 +107,3 @@ def test_the_finding_counts_numbers_that_are_known_and_the_claims_of_the_study()
         ("Published claims that hold", printed, corrected),
     ]
     assert finding({}, []) == []
-
-
-def test_escape_rate_of_a_pendulum_upside_down() -> None:
-    assert escape_rate(FIG11) == pytest.approx(math.sqrt(9.8 / math.hypot(0.08, 0.03)), rel=1e-14)
-    near, *others = FIG11.blades
-    uneven = replace(FIG11, blades=(replace(near, centre_of_mass=(0.02, 0.0, 15.0)), *others))
-    assert escape_rate(uneven) == pytest.approx(math.sqrt(9.8 / 0.02), rel=1e-14)  # the fastest
-    assert escape_rate(FIG11.replace(**{"bearing.stiffness": 5.0})) is None

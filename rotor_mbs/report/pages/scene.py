@@ -8,7 +8,6 @@ from dataclasses import replace
 import numpy as np
 
 from rotor_mbs.analysis import run_selection
-from rotor_mbs.analysis.kinematics import escape_rate
 from rotor_mbs.analysis.published import Claim
 from rotor_mbs.methods.catalogue import REFERENCE, is_corrected
 from rotor_mbs.models.lagrange.defects import interval_defects
@@ -80,7 +79,6 @@ def scene_page(name: str, report: Report) -> dict[str, object]:
         "has_horizon": horizon is not None,
         "has_printed": any(run.status in GOOD and not is_corrected(run.method) for run in scene.runs.values()),
         "has_zero_pitch": has_zero_pitch,
-        "escape_rate": escape_rate(scene.scene) if has_zero_pitch else None,
         "previous": pages[place - 1],
         "next": pages[place + 1],
     }
