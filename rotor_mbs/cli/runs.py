@@ -17,7 +17,6 @@ from rotor_mbs.runs.output_files import is_being_written, replace_file
 from rotor_mbs.runs.pool import local_pool
 from rotor_mbs.runs.read import open_results
 from rotor_mbs.scenario.catalogue import find_scenes
-from rotor_mbs.studies.reference import compute_references
 from rotor_mbs.studies.reproduce import made_from, summary_of
 from rotor_mbs.studies.reproduce import reproduce as reproduce_paper
 from rotor_mbs.studies.run import run_scenes
@@ -77,9 +76,10 @@ def _reproduce(arguments: argparse.Namespace, results: Path, pages: Path) -> tup
 
 def reference(arguments: argparse.Namespace) -> int:
     """References are recomputed, also those that are shipped."""
+    scenes = find_scenes(arguments.scenes)
     with ProgressLine() as progress:
-        report = compute_references(
-            find_scenes(arguments.scenes), arguments.output, workers=arguments.jobs, timeout_s=arguments.timeout,
-            on_progress=progress,
+        report = run_scenes(
+            scenes, {scene.name: () for scene in scenes}, arguments.output, workers=arguments.jobs,
+            timeout_s=arguments.timeout, use_frozen=False, on_progress=progress,
         )  # fmt: skip
     return print_summary(report, arguments.output)

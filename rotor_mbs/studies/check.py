@@ -22,8 +22,6 @@ from rotor_mbs.scenario.catalogue import find_scenes
 from rotor_mbs.studies.run import run_scenes
 from rotor_mbs.studies.stored_references import shipped_reference
 
-# The chain takes as long as all else together; four scenes of the paper cover what it can show.
-_CHAIN, _CHAIN_SCENES = "exudyn_chain/extrapolated", ("paper/fig03", "paper/fig04b", "paper/fig08", "paper/fig11")
 _TIMEOUT_S = 60.0
 _OF_EVERY_RUN = "status"  # the name of a check that each run has one of
 # A value below a few units in the last place of a double is rounding: its change says nothing.
@@ -51,7 +49,7 @@ def check_default_set(
 ) -> list[Check]:
     """Compute the default set, and check it.
 
-    It is every scene of the paper by the fast models, the chain on some; the scenes made for checking by every method;
+    It is every scene of the paper by the default methods; the scenes made for checking by every method;
     or all by the `methods` that are named, where they can represent them.
     """
     paper, own = find_scenes(["paper"]), find_scenes(["check"])
@@ -60,10 +58,8 @@ def check_default_set(
     for scene in (*paper, *own):
         if methods:
             asked[scene.name] = able_methods(scene, methods)[0]
-        elif scene in own:
-            asked[scene.name] = corrected
         else:
-            asked[scene.name] = [name for name in default_methods() if name != _CHAIN or scene.name in _CHAIN_SCENES]
+            asked[scene.name] = corrected if scene in own else default_methods()
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "check.h5"
         report = run_scenes([*paper, *own], asked, path, workers=workers, timeout_s=_TIMEOUT_S, on_progress=on_progress)

@@ -107,7 +107,7 @@ OUTPUTS = {
     "bench": (["bench", "check/held", "-m", "lagrange/dop853", "--budget", "1", "-o"], "results"),
     "modes": (["modes", "check/held", "-j", "1", "-o"], ""),
     "stability": (["stability", "check/held", "-m", "lagrange/dop853", "-j", "1", "-o"], "results"),
-    "reference": (["reference", "check/held", "-j", "1", "-o"], ""),
+    "reference": (["reference", "check/held", "-j", "1", "-o"], "results"),
     "sweep": (["sweep", "{sweep}", "-j", "1", "-o"], "sweep"),
 }
 _QUICK_OUTPUTS = {"export csv", "check json", "run", "sweep"}  # one of each kind of file

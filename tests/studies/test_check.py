@@ -19,8 +19,8 @@ import pytest
 from support import other_code
 from support.checking import EVERY_SECOND_SAMPLE, WRONG, add_run, failed, faulty_run, judged, results_file, shipped
 from support.commands import PROGRAM
+from support.frozen_references import digests, freeze
 from support.other_code import Mistakes
-from support.reference_digests import digests
 from support.scenes import paper
 from support.stored import Made, change_row, damage, drop, rotor, store
 
@@ -227,6 +227,14 @@ def own_references(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     right = catalogue._folder
     monkeypatch.setattr(catalogue, "_folder", lambda name: folder if name == "reference" else right(name))
     return folder
+
+
+def test_references_of_a_results_file_are_frozen_bit_for_bit(good: Path, tmp_path: Path) -> None:
+    """Those of `good` were read from the shipped file."""
+    freeze(good, tmp_path / "again.h5")
+    lines = (tmp_path / "again.sha256").read_text().splitlines()
+    assert lines
+    assert {*lines} <= {*(reference_folder() / "check.sha256").read_text().splitlines()}
 
 
 def test_the_shipped_references_are_bit_for_bit_those_that_were_frozen(own_references: Path) -> None:

@@ -1,0 +1,50 @@
+"""Freezes references: of the file that `rotor-mbs reference` writes the arrays that are shipped, and their digests.
+
+python tests/support/frozen_references.py references.h5 reference/paper.h5
+"""
+
+from __future__ import annotations
+
+import sys
+from datetime import UTC, datetime
+from pathlib import Path
+
+from rotor_mbs.methods.catalogue import REFERENCE
+from rotor_mbs.runs.design import FROZEN, Asked
+from rotor_mbs.runs.read import open_results
+from rotor_mbs.runs.table import array_digest, extend_file, runs_table, scene_table
+
+_FACTS = ("steps", "time_reached", "setup_time_s", "run_time_s", "output_time_s")
+
+
+def freeze(source: Path, target: Path) -> None:
+    """The arrays of a results file's references that are `FROZEN` into the file `target`, their digests beside it."""
+    target.unlink(missing_ok=True)
+    with open_results(source) as results:
+        versions = {"frozen_with": f"heyoka {results.attributes['heyoka']}, {datetime.now(UTC).date().isoformat()}"}
+        references = [
+            (Asked(stored.scene, REFERENCE, versions=versions), stored.reference)
+            for stored in results.scenes.values()
+            if stored.reference is not None
+        ]
+        tables = [scene_table([asked], arrays=[name for name in FROZEN if name in run]) for asked, run in references]
+        file = extend_file(target, [runs_table([asked for asked, _ in references]), *tables])
+        for asked, run in references:
+            place = file.place(asked.label)
+            values: dict[str, object] = {"status": run.status, "samples": run.samples}
+            values |= {name: run.attributes[name] for name in _FACTS}
+            values |= {name: run.array(name) for name in FROZEN if name in run}
+            place.write(place.rows_of(values))
+    target.with_suffix(".sha256").write_text(digests(target))
+
+
+def digests(path: Path) -> str:
+    """A line for each array of a file of references: SHA-256, scene, name. A number that changed is located."""
+    with open_results(path, verify=False) as results:
+        references = [scene.reference for scene in results.scenes.values()]
+        lines = [f"{array_digest(run.array(name))}  {run.scene} {name}\n" for run in references for name in run.names]
+    return "".join(lines)
+
+
+if __name__ == "__main__":
+    freeze(*map(Path, sys.argv[1:]))
