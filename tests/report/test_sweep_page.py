@@ -12,7 +12,7 @@ from support.scenes import GRAVITY, MASS, OFFSET
 from support.sweeps import made_sweep
 
 from rotor_mbs.report.elements import Section
-from rotor_mbs.report.pages.sweep import response, sweep_page
+from rotor_mbs.report.pages.sweep import _edges, response, sweep_page
 from rotor_mbs.runs.sweeps import StoredSweep
 
 
@@ -68,3 +68,8 @@ def test_a_sweep_shows_the_pitch_over_what_was_varied(tmp_path: Path) -> None:
     assert [float(str(cell)) for cell in row[2:]] == pytest.approx(
         np.quantile(pitch, (0, 0.05, 0.5, 0.95, 1)), rel=1e-5
     )
+    for values, edges in (
+        ([0.0, 10.0, 20.0], [-5, 5, 15, 25]),
+        ([1.0, 10.0, 100.0], [0.1**0.5, 10**0.5, 1e3**0.5, 1e5**0.5]),
+    ):
+        np.testing.assert_allclose(_edges(np.array(values))[0], edges)  # no cell is cut off

@@ -93,12 +93,11 @@ def _responses(sweep: StoredSweep, ok: NDArray[np.bool_]) -> list[Picture]:
         y, x, grid = (numbers[: rows * columns].reshape(rows, columns) for numbers in (*axes.values(), values))
         y_label, x_label = labels.values()
         drawn = panels((3.8,), x_label)
-        scales = ["log" if _is_wide(numbers) else "linear" for numbers in (x, y, grid)]
-        drawn.axes[0].set(xscale=scales[0], yscale=scales[1], ylabel=y_label)
+        (x_edges, x_scale), (y_edges, y_scale) = _edges(x[0]), _edges(y[:, 0])
+        norm = "log" if _is_wide(grid) else "linear"
+        drawn.axes[0].set(xscale=x_scale, yscale=y_scale, ylabel=y_label)
         drawn.axes[0].grid(visible=False)
-        mesh = drawn.axes[0].pcolormesh(
-            x[0], y[:, 0], grid, cmap="cividis", shading="nearest", norm=scales[2], rasterized=True
-        )
+        mesh = drawn.axes[0].pcolormesh(x_edges, y_edges, grid, cmap="cividis", norm=norm, rasterized=True)
         with style():
             drawn.figure.colorbar(mesh, ax=drawn.axes[0]).set_label(label)
         drawn.figure.subplots_adjust(left=0.18)
@@ -122,6 +121,15 @@ def _is_wide(values: Array) -> bool:
     """Whether a logarithmic axis shows more."""
     low, high = np.nanmin(values), np.nanmax(values)
     return bool(low > 0.0 and high > _SPAN * low)
+
+
+def _edges(values: Array) -> tuple[Array, str]:
+    """(n + 1,) Edges of the cells about values, and the scale of their axis: logarithmic where ratios are equal."""
+    is_geometric = _is_wide(values) and np.ptp(np.diff(np.log(values))) < 0.01 * np.log(values[-1] / values[0])
+    places = np.log(values) if is_geometric else values
+    middles = 0.5 * (places[1:] + places[:-1])
+    edges = np.concatenate([[2.0 * places[0] - middles[0]], middles, [2.0 * places[-1] - middles[-1]]])
+    return (np.exp(edges), "log") if is_geometric else (edges, "linear")
 
 
 def response(parameter: Array, values: Array, x_label: str, y_label: str) -> Panels:
