@@ -13,7 +13,6 @@ from dataclasses import replace
 from pathlib import Path
 from xml.etree import ElementTree
 
-import h5py
 import numpy as np
 import pytest
 from support import other_code
@@ -22,7 +21,7 @@ from support.commands import PROGRAM
 from support.frozen_references import digests, freeze
 from support.other_code import Mistakes
 from support.scenes import paper
-from support.stored import Made, change_row, damage, drop, rotor, store
+from support.stored import Made, change_row, drop, rotor, store
 
 from rotor_mbs.cli import main
 from rotor_mbs.cli import verdicts as formats
@@ -160,19 +159,6 @@ def test_a_run_that_was_changed_together_with_its_checksum_fails(
     lines = lines_of(capsys, copy, status=1)
     named(lines, f": check/general {METHOD} ", *words)
     assert not any("exudyn_tree" in line for line in lines[:-2])  # and nobody else
-
-
-def test_a_changed_byte_is_of_its_run_and_a_changed_layout_of_the_file(
-    copy: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    damage(copy, f"{SCENE}/{METHOD}", "tip")
-    line = named(lines_of(capsys, copy, status=1), "FAIL integrity")
-    assert f"check/general {METHOD} row" in line
-    assert "changed after it was written" in line
-    with h5py.File(copy, "r+") as file:
-        file[f"{SCENE}/time"][20] = 0.2000001
-    assert main(["check", str(copy)]) == 2
-    assert capsys.readouterr().err == f"{copy}: check/general: time changed after the file was laid out\n"
 
 
 def test_a_false_success_and_an_edited_status_fail(copy: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -18,7 +18,7 @@ from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.studies.modes import compute_modes
 
 Array = Any
-SPEEDS = np.linspace(0.0, 3.0, 7)
+SPEEDS = np.linspace(0.0, 3.0, 5)
 DAMPED, SPRUNG, UNEQUAL = "stiff/nrel-5mw-damped", "stiff/nrel-5mw", "check/general"
 
 
@@ -110,29 +110,19 @@ def test_what_nothing_explains_has_no_cause() -> None:
 def test_the_command_reads_a_table_in_rpm_and_hz_and_few_digits(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """Rows in any order; a mapping with omit; the page again from the stored file."""
+    """Rows in any order; a mapping with omit."""
     damped, _ = tables(UNEQUAL)
     rows = np.column_stack([SPEEDS * 30.0 / math.pi, damped[:, 1:] / (2.0 * math.pi)])[::-1]
-
-    def write(name: str, digits: str, factor: float) -> Path:
+    page, data = tmp_path / "page" / "index.html", tmp_path / "modes.csv"
+    call = ["compare", str(data), "--scene", UNEQUAL, "-o", str(page.parent)]
+    for digits, factor, status in (("%.5e", 1.0, 0), ("%.17g", 1.001, 1)):
         head = "speed [rpm],f1 [Hz],f2 [Hz],freq_3_Hz"
-        np.savetxt(tmp_path / name, rows * [1.0, factor, 1.0, 1.0], digits, ",", header=head, comments="")
-        return tmp_path / name
-
-    assert rm.compare(write("exact.csv", "%.17g", 1.0), UNEQUAL).agrees
-    few, wrong = write("few.csv", "%.5e", 1.0), write("wrong.csv", "%.17g", 1.001)
-    for path, status in ((few, 0), (wrong, 1)):
-        call = ["compare", str(path), "--scene", UNEQUAL, "-o", str(tmp_path / "page")]
+        np.savetxt(data, rows * [1.0, factor, 1.0, 1.0], digits, ",", header=head, comments="")
         assert main(call) == status
         shown = capsys.readouterr().out
         assert "frequency 3 = 'freq_3_Hz' [hz]" in shown
         assert "horizon" not in shown
-        page = (tmp_path / "page" / "index.html").read_text()
-        assert ("inaccurate" in page) == (status == 1)
-        assert "of its size" in page
-    assert main(["report", str(tmp_path / "page" / "comparison.h5"), "-o", str(tmp_path / "again")]) == 0
-    assert (tmp_path / "again" / "index.html").read_text() == page
-    capsys.readouterr()
+        assert ("inaccurate" in page.read_text()) == (status == 1)
     (tmp_path / "map.toml").write_text('omit = ["frequency_1"]\n')
     assert main([*call, "--columns", str(tmp_path / "map.toml"), "--json"]) == 0
     assert '"axis": "speed"' in capsys.readouterr().out

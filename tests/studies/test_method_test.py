@@ -173,10 +173,7 @@ def test_the_command_prints_a_table_and_writes_what_a_script_reads() -> None:
         ({}, False, "reports a failure: no reason given"),
         ({"angles": np.zeros((5, 4))}, True, "angles has the shape (5, 4); allowed: (5, 2)"),
         ({"time": np.linspace(0.0, 0.9, 5)}, True, "its times are not the scene's sample times"),
-        ({"rates": np.full((5, 2), np.nan)}, True, "row 1 is not finite; a run ends before it"),
         ({"work": np.zeros(4)}, True, "work has the shape (4,); allowed: (5,)"),
-        ({"angles": np.outer([3.0, 3.1, -3.1, -3.0, -2.9], [1, 0])}, True,
-         "rotor jumps by a turn at t = 0.5 s: angles are wrapped"),
     ],
 )  # fmt: skip
 def test_what_is_wrong_with_the_form_of_a_run_is_said(change: dict[str, object], success: bool, fault: str) -> None:

@@ -200,10 +200,6 @@ PLANTS = {
     "a second late": Plant("`offset = -1` of the time", spoilt=lambda t, q, w: (t + 1.0, q, w)),
     "a stuck row": Plant("a stuck row, or one at a wrong time: row 41, t = 0.4 s", "driven", spoilt=with_row(40, 39)),
     "an outlier": Plant("a single wrong row: row 41, t = 0.4 s", "driven", spoilt=with_row(40, 40, 1e-3)),
-    "two outliers": Plant(
-        "a single wrong row: row 61, t = 0.6 s", "driven",
-        spoilt=lambda *arrays: with_row(60, 60, 1e-3)(*with_row(40, 40, 1e-3)(*arrays)),
-    ),
     "a row repeated": Plant(
         "a row repeated, or times late by less than an interval, at t = 0.31 s", "driven",
         spoilt=rows(*range(31), *range(30, 200)),
