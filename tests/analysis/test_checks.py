@@ -168,6 +168,13 @@ def test_a_reference_is_compared_with_the_shipped_one() -> None:
     assert np.isnan(of_reference(None, shipped)["reference", "all"])
 
 
+def test_a_turn_of_a_pendulum_is_off_by_what_was_added() -> None:
+    run = solve(METHOD, paper("fig03", duration=0.5, samples=51), {})
+    run.trajectory.angles[7, 0] += 1e-3
+    judged = values(checks._of_corrected_model(stored(), BOUNDS, run.scene, run.trajectory, {}))
+    assert judged["exact", "rotor angle"] == pytest.approx(1e-3, rel=1e-6)
+
+
 @pytest.mark.parametrize(
     ("end", "method", "status", "complete"),
     [

@@ -21,7 +21,7 @@ from support.commands import PROGRAM
 from support.frozen_references import digests, freeze
 from support.other_code import Mistakes
 from support.scenes import paper
-from support.stored import Made, change_row, drop, rotor, store
+from support.stored import Made, change_row, damage, drop, rotor, store
 
 from rotor_mbs.cli import main
 from rotor_mbs.cli import verdicts as formats
@@ -159,6 +159,11 @@ def test_a_run_that_was_changed_together_with_its_checksum_fails(
     lines = lines_of(capsys, copy, status=1)
     named(lines, f": check/general {METHOD} ", *words)
     assert not any("exudyn_tree" in line for line in lines[:-2])  # and nobody else
+
+
+def test_a_changed_byte_is_of_its_run(copy: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    damage(copy, f"{SCENE}/{METHOD}", "tip")
+    named(lines_of(capsys, copy, status=1), f"FAIL integrity: {SCENE} {METHOD} row", "changed after it was written")
 
 
 def test_a_false_success_and_an_edited_status_fail(copy: Path, capsys: pytest.CaptureFixture[str]) -> None:

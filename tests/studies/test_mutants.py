@@ -42,6 +42,7 @@ EXPLAINED = {
     r"tree\._tree .*0\.0 -> ": "the offset of a spring of no stiffness: the rotor's",
     r"kinematics\.(work_of_constant_loads|exact_rotor_angle) .*0\.0 -> ": ("a constant load is the same at any time"),
     r"checks\._of_reference .* 0 -> 1": "compared by its length: no shipped reference has a single sample",
+    r"checks\._of_run .*(judgement\.status != run\.status\) \+|'; '\.join)": "more faults than none; a text",
     r"checks\._of_samples .* 1 -> 2": "one zero or two: the largest is zero",
     r"metrics\.energy_scale .*(if run\.|and, or in|0\.0 -> )": "nobody asks for the scale of a run without energies",
     r"checks\._own_extremes .*(and, or in between|:20 2 -> 3$)": (

@@ -22,8 +22,7 @@ def test_every_combination_runs_is_checked_and_reported(tmp_path: Path) -> None:
     for chosen in ALL:
         scene = paper("fig11", samples=6, duration=0.1, outputs=chosen)
         (folder / f"{'-'.join(chosen)}.toml").write_text(scene_toml(scene))
-    methods = ("-m", "lagrange/taylor", "-m", "exudyn_tree/rk67", "-m", "printed/ode45")
-    ended = rotor_mbs("run", folder, *methods, "-o", results, "-j", 1)
+    ended = rotor_mbs("run", folder, "-m", "lagrange/taylor", "-m", "exudyn_tree/rk67", "-o", results, "-j", 1)
     assert ended.status in (0, 1), ended.err
     with open_results(results) as stored:
         for chosen in ALL:
@@ -35,5 +34,6 @@ def test_every_combination_runs_is_checked_and_reported(tmp_path: Path) -> None:
                 "rates",
                 "tip",
             }
-    assert rotor_mbs("check", results).status == 0
     assert rotor_mbs("report", results, "-o", tmp_path / "report").status == 0
+    assert rotor_mbs("run", folder, "-m", "printed/ode45", "-o", results, "-j", 1).status in (0, 1)
+    assert rotor_mbs("check", results).status == 0
