@@ -135,6 +135,7 @@ def test_every_model_has_the_exact_motion(name, case) -> None:
     if not pitch and name not in CHAIN:  # an exact zero has nothing to grow from, though the equilibrium is unstable
         assert np.array_equal(got.angles[:, 1:], exact[:, 1:])
         assert not got.rates[:, 1:].any()
+    assert got.work[0] == 0.0
     assert energy_error(got) < bound * (got.kinetic_energy + np.abs(got.potential_energy)).max()
 
 
