@@ -34,6 +34,6 @@ def test_every_combination_runs_is_checked_and_reported(tmp_path: Path) -> None:
                 "rates",
                 "tip",
             }
-    assert rotor_mbs("report", results, "-o", tmp_path / "report").status == 0
     assert rotor_mbs("run", folder, "-m", "printed/ode45", "-o", results, "-j", 1).status in (0, 1)
+    assert rotor_mbs("report", results, "-o", tmp_path / "report").status == 0
     assert rotor_mbs("check", results).status == 0

@@ -141,9 +141,9 @@ def departure(
 
 def range_table(runs: Sequence[StoredRun]) -> PageTable:
     """Extremes of each coordinate in each of the runs; of the rotor at the integrator's own points, if stored."""
-    labels = runs[0].labels
     head = ["Coordinate"]
-    rows = [[label] for label in labels]
+    # A reference has angles and rates also where the scene does not ask for them.
+    rows = [[label] for label in max((run.labels for run in runs), key=len)]
     for run in runs:
         lowest, highest, fastest = (metric(run, name) for name in EXTREMES)
         if "angles" in run:
