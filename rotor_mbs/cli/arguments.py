@@ -139,8 +139,9 @@ class _Parser(argparse.ArgumentParser):
         text = "parallel processes (default: number of cores, here %(default)s)"
         self.add_argument("-j", "--jobs", type=JOBS, default=cores(), metavar="N", help=text)
 
-    def timeout(self, seconds: float = 60.0, exception: str = "") -> None:
-        text = f"time limit per run in s; longer runs have the status timed_out (default: %(default)g{exception})"
+    def timeout(self, seconds: float = 60.0, exception: str = "", text: str = "") -> None:
+        text = text or "time limit per run in s; longer runs have the status timed_out"
+        text += f" (default: %(default)g{exception})"
         self.add_argument("--timeout", type=SECONDS, default=seconds, metavar="SECONDS", help=text)
 
 
@@ -347,7 +348,7 @@ def _parser() -> tuple[_Parser, dict[str, _Parser]]:
     own.output(file, "FILE", Path("modes.h5"))
     own.flag("--json", help="print the table as JSON")
     own.jobs()
-    own.timeout(600.0)
+    own.timeout(600.0, text="time limit per scene in s; the modes of a scene that takes longer are not stored")
 
     own = command(
         "report", "write HTML pages from a results, bench, sweep, modes or comparison file", "commands:report",

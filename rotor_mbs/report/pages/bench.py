@@ -177,7 +177,7 @@ def engine_tables(results: OpenResults, scenes: Mapping[str, Sequence[Record]]) 
     ]  # fmt: skip
     able_head = [
         "method", "joint damping: best error (rad)", "load over time: best error (rad)", "loads", "linearization",
-        "engine", "lines of code",
+        "software", "lines of code",
     ]  # fmt: skip
     return [
         PageTable("Accuracy and cost over all scenes", head, reached),
