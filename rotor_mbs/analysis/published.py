@@ -133,15 +133,16 @@ class ClaimStudy:
     """The claims in words tested on many runs.
 
     rule : of the verdicts, in words.
-    runs, spread : of each scene; rad, by which their starts were moved at most.
+    runs, durations, spread : of each scene for each duration in s; rad, by which their starts were moved at most.
     methods : the printed and the corrected equations.
     verdicts : "holds", "fails" or "undecided" of each claim by method.
-    shares : of each claim by method, for 8, 10 and 12 s: the share of the deciding runs in which it holds (None where
+    shares : of each claim by method, for each duration: the share of the deciding runs in which it holds (None where
         none decides), and how many decide.
     """
 
     rule: str
     runs: int
+    durations: Sequence[float]
     spread: float
     methods: Sequence[str]
     verdicts: Mapping[str, Mapping[str, str]]
