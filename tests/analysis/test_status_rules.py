@@ -18,7 +18,6 @@ from rotor_mbs.methods.catalogue import is_corrected, method_names
 from rotor_mbs.scenario.accuracy_bounds import Bound, load_bounds
 from rotor_mbs.scenario.catalogue import find_scenes
 from rotor_mbs.scenario.scene import Blade, Scene
-from rotor_mbs.solution.defects import Defects
 from rotor_mbs.solution.metrics import ANGLE_LIMIT, metrics_of, running_growth
 from rotor_mbs.solution.trajectory import Integration, Solution, Trajectory
 
@@ -135,18 +134,6 @@ def test_the_median_of_the_defects_has_the_bound_of_a_methods_own(monkeypatch: p
         defects = made_defects([side * own.value] * 3, transitions=None)
         monkeypatch.setattr(judgement_module, "defects_of", lambda *_, defects=defects, **__: defects)
         assert judge(SCENE, run, None).status == expected
-
-
-def grown(growth: float) -> Defects:
-    return made_defects((0.0, 2e-6, -2e-6), transitions=np.tile(growth * np.eye(2), (3, 1, 1)))
-
-
-def test_a_defect_counts_less_where_errors_grow_more_than_five_fold(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Where errors grow by 12.5 in an interval, 0.4 of it; more than half is told as it is."""
-    for growth, told in ((8.0, "allowed"), (12.5, "8.0e-07 rad scaled to 0.01 s ")):
-        monkeypatch.setattr(judgement_module, "defects_of", lambda *_, growth=growth, **__: grown(growth))
-        message = judge(SCENE, Solution(SCENE, METHOD, moving(), DONE), moving()).message
-        assert message.startswith(f"defect 2.0e-06 rad in the interval up to t = 0.02 s, {told}")
 
 
 NOTHING = Trajectory(np.empty(0), np.empty((0, 4)), np.empty((0, 4)))

@@ -13,7 +13,6 @@ from support.references import scene as shipped
 from support.scenes import PAPER, paper
 
 from rotor_mbs.analysis.judgement import judge
-from rotor_mbs.errors import InputError
 from rotor_mbs.methods.solve import solve
 from rotor_mbs.models.lagrange import defects as defects_module
 from rotor_mbs.models.lagrange.defects import fitted_rates, interval_defects
@@ -231,21 +230,6 @@ def test_rates_are_found_from_the_angles(name: str) -> None:
     scene = paper(name, duration=1.0, samples=101, outputs=("angles", "rates"))
     run = solve(DOP853, scene, {}).trajectory
     np.testing.assert_allclose(fitted_rates(scene, run.time, run.angles), run.rates, rtol=0, atol=1e-10)
-
-
-@pytest.mark.parametrize(
-    ("rows", "factor", "message"),
-    [
-        (slice(4), 1.0, "4 rows"),
-        (slice(10), 1e300, "rounding errors are too large"),
-        (slice(0, 101, 20), 1.0, "too far apart"),
-    ],
-)
-def test_rates_that_cannot_be_found_are_refused(rows: slice, factor: float, message: str) -> None:
-    run = fig11_run()
-    time = 1e4 * run.time[rows] if message == "too far apart" else run.time[rows]
-    with pytest.raises(InputError, match=message):
-        fitted_rates(FIG11, time, factor * run.angles[rows])
 
 
 def test_defects_over_rows_are_those_of_every_tenth_row() -> None:

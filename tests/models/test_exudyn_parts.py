@@ -14,7 +14,7 @@ from support.rotors import FIG08, FIG11, MIXED, PAPER, make_scene
 
 from rotor_mbs.errors import InputError, MethodRefusal
 from rotor_mbs.methods.solve import solve
-from rotor_mbs.models.exudyn import adapter, methods, sensor_samples
+from rotor_mbs.models.exudyn import methods, sensor_samples
 from rotor_mbs.scenario.time_table import segments
 
 POLE = replace(PAPER, centre_of_mass=(0.0, 0.0, 15.42))
@@ -54,35 +54,6 @@ def listed(name, scene):
 def test_the_list_is_what_the_engine_holds(name, scene) -> None:
     solver = METHODS[name].build(SCENES[scene], METHODS[name].settings())
     assert engine_counts(solver) == listed(name, SCENES[scene])
-
-
-def extra(name, scene):
-    bare, more = listed(name, BARE), listed(name, SCENES[scene])
-    return {kind: more[kind] - bare[kind] for kind in KINDS if more[kind] != bare[kind]}
-
-
-@pytest.mark.parametrize(
-    ("scene", "tree", "chain"),
-    [
-        ("gravity", {}, {"marker": 3, "load": 3}),  # one for each blade; the tree has it in its one object
-        ("tip", {"sensor": 3}, {"sensor": 3}),
-        ("energy", {"sensor": 6}, {"sensor": 3}),  # position and velocity; the chain reads positions anyhow
-        ("torque", {"marker": 1, "load": 1}, {"load": 1}),
-        ("torque over time", {"marker": 1, "load": 1}, {"load": 1}),
-        ("springs", {}, {"node": 2, "object": 2}),  # a spring and its turn counter where there is stiffness
-        ("dampers", {}, {"object": 2}),
-        ("hub", {}, {}),
-    ],
-)
-def test_a_scene_builds_what_it_needs_and_no_more(scene, tree, chain) -> None:
-    assert extra(TREE, scene) == tree
-    assert extra(CHAIN, scene) == chain
-
-
-def test_the_tree_is_listed_with_what_it_has() -> None:
-    for scene, words in (("gravity", "gravity"), ("springs", "bearing stiffness"), ("dampers", "damping")):
-        details = [item.detail for item in METHODS[TREE].items(SCENES[scene])]
-        assert f"ObjectKinematicTree: 4 links, {words}" in details
 
 
 def test_a_pitch_without_inertia_is_left_out() -> None:
@@ -151,13 +122,6 @@ def test_counts_of_steps_and_evaluations() -> None:
     linear = replace(BARE, blades=(POLE,) * 3, initial_rates=(1.0, 0.0, 0.0, 0.0), duration=0.1, samples=11)
     turning = solve("exudyn_tree/generalized_alpha", linear, {"step": 1e-3}).integration
     assert (turning.steps, turning.rhs_evaluations) == (100, 200)  # an iteration a step, and the residual once more
-
-
-def test_the_cause_of_a_failure_is_found_behind_others() -> None:
-    outer, inner = RuntimeError(), KeyboardInterrupt()
-    outer.__context__ = inner
-    assert adapter._caused_by(outer, KeyboardInterrupt)
-    assert not adapter._caused_by(outer, ValueError)
 
 
 def test_loads_and_rotation_vectors_are_refused_together_alone() -> None:

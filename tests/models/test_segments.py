@@ -11,42 +11,26 @@ import numpy as np
 import pytest
 from support.scenes import ARM, MASS, OFFSET, paper
 
-from rotor_mbs.methods import time_limit
-from rotor_mbs.methods.catalogue import find_method
+from rotor_mbs.methods.solve import solve
 from rotor_mbs.models.lagrange.closed_form import load_values
 from rotor_mbs.models.lagrange.heyoka_adapter import array_of
 from rotor_mbs.models.lagrange.ode_solvers import OdeSolver, ode45_integrator, scipy_integrator, work_unit
-from rotor_mbs.models.lagrange.samples import Advance, at_constant_rests, over_segments
+from rotor_mbs.models.lagrange.samples import at_constant_rests
 from rotor_mbs.models.lagrange.taylor import Propagation
-from rotor_mbs.scenario.time_table import Segment
-
-TIMES = np.linspace(0.0, 3.0, 7)
-SEGMENTS = [Segment(start, start + 1.0, ()) for start in (0.0, 1.0, 2.0)]
 
 
-def advanced(message: str = "", evaluations: int | None = 5) -> tuple[Any, Any]:
-    """A run of which every segment takes two steps and ends one higher; `message`: why the second one fails."""
-
-    def advance(segment: Segment, state: Any, times: Any) -> Advance:
-        failed = message if segment.start == 1.0 else ""
-        rows = (state + times[:, None] - segment.start)[: 1 if failed else None]
-        return Advance(rows, state + 1.0, 2, evaluations, failed)
-
-    return over_segments(TIMES, SEGMENTS, np.zeros(1), advance)
-
-
-def test_a_run_has_the_steps_and_evaluations_of_all_its_segments() -> None:
-    states, result = advanced()
-    assert states[:, 0].tolist() == TIMES.tolist()
-    assert (result.success, result.time_reached, result.steps, result.rhs_evaluations) == (True, 3.0, 6, 15)
-    assert advanced(evaluations=None)[1].rhs_evaluations is None
-
-
-def test_a_run_ends_in_the_segment_that_fails() -> None:
-    states, result = advanced("no step is short enough")
-    assert (result.success, result.out_of_time, result.time_reached, result.steps) == (False, False, 1.5, 4)
-    assert len(states) == 4
-    assert advanced(time_limit.MESSAGE)[1].out_of_time
+@pytest.mark.parametrize("method", ["lagrange/dop853", "lagrange/taylor"])
+def test_a_run_counts_all_its_segments_and_ends_in_the_one_that_fails(method: str) -> None:
+    """One more of 0.1 s after a second; a blade that runs into its singularity in the second of three."""
+    one = paper("fig03", duration=1.0, samples=11, rotor_torque=((0.0, 0.0), (1.0, 10.0), (2.0, 0.0)))
+    reports = [solve(method, scene, {}).integration for scene in (one, replace(one, duration=1.1, samples=12))]
+    assert [report.time_reached for report in reports] == [1.0, 1.1]
+    assert reports[1].steps > reports[0].steps > 0
+    failing = replace(one, gravity=0.0, initial_angles=(1.0, 1.2), initial_rates=(0.0, 1.0), duration=3.0, samples=301)
+    failed = solve(method, replace(failing, rotor_torque=((0.0, 0.0), (0.05, 10.0), (2.0, 0.0))), {}).integration
+    assert not failed.success
+    assert failed.message
+    assert 0.05 < failed.time_reached < 2.0
 
 
 INTEGRATORS = {
@@ -112,18 +96,6 @@ def test_constant_rest_angles_do_no_work() -> None:
     """Of three pitches, loads 1 to 3 are their torques, 4 to 6 their rest angles."""
     loads = load_values([0.0, 1.0, 2.0, 3.0, 0.1, 0.2, 0.3])
     assert at_constant_rests((0, 1, 5), loads).rests == [0.0, 0.2, 0.0]
-
-
-@pytest.mark.parametrize("tolerance", [None, 1e-13, 1e-9])
-def test_the_order_of_taylors_series_is_that_of_its_tolerance(tolerance: float | None) -> None:
-    """⌈1 - ln(tol) / 2⌉: A. Jorba, M. Zou, Exp. Math. 14 (2005). At round-off neither errors nor steps show it."""
-    pytest.importorskip("heyoka")
-    method = find_method("lagrange/taylor")
-    solver: Any = method.build(
-        paper("fig03"), method.settings.of(method.name, {"tolerance": tolerance} if tolerance else {})
-    )
-    expected = math.ceil(1.0 - 0.5 * math.log(tolerance or np.finfo(float).eps))
-    assert solver.integrator.order == expected
 
 
 @pytest.mark.parametrize(

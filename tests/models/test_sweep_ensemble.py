@@ -121,6 +121,7 @@ def test_any_chunks_give_the_same_bytes(scene: Scene, keys: list[str], values: l
         variants=variants, settings={}, time_limit_s=60.0, code=0,
     )  # fmt: skip
     expected = whole.perform()
+    assert expected["pitch_max"] == pytest.approx(np.nanmax(np.abs(expected["angles"][:, :, 1:]), axis=(1, 2)))
     for size in (1, LANES - 1, LANES):
         for start in range(0, len(values), size):
             part = whole.part(start, min(start + size, len(values))).perform()

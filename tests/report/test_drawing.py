@@ -15,7 +15,7 @@ from rotor_mbs.report import canvas, numbers
 from rotor_mbs.report import plots as figures
 from rotor_mbs.report.canvas import panels
 from rotor_mbs.report.elements import picture as picture_in_page
-from rotor_mbs.report.looks import COLOURS, GREY, Look, coordinate_look, look_of, name_of_colour
+from rotor_mbs.report.looks import COLOURS, Look, coordinate_look, look_of, name_of_colour
 from rotor_mbs.report.pages import scene as scene_page
 from rotor_mbs.report.pages.modes import ModePlots
 from rotor_mbs.report.plots import Series, paths
@@ -133,13 +133,6 @@ def test_every_method_and_every_curve_of_a_bench_has_a_look_of_its_own() -> None
         a, b = looks[first], looks[second]
         assert (a.colour != b.colour) + (a.line != b.line) + (a.marker != b.marker) >= 2, (first, second)
     assert {look.colour for look in looks.values()} <= set(COLOURS)
-
-
-def test_a_method_of_another_package_is_grey_and_looks_the_same_every_time() -> None:
-    looks = [look_of(f"package{i}/rk4") for i in range(20)]
-    assert looks == [look_of(f"package{i}/rk4") for i in range(20)]
-    assert {look.colour for look in looks} == {GREY}
-    assert len(set(looks)) > 10
 
 
 # Pictures as SVG

@@ -14,7 +14,7 @@ from support.scenes import paper
 from support.stored import Made, rotor, store
 
 from rotor_mbs.report.build import write_report
-from rotor_mbs.report.pages.viewer import MAX_FRAMES, magnification, packed, script_json, viewer
+from rotor_mbs.report.pages.viewer import MAX_FRAMES, packed, script_json, viewer
 from rotor_mbs.runs.read import open_results
 
 FIG11 = paper("fig11", samples=301)
@@ -77,12 +77,6 @@ def test_a_run_is_drawn_up_to_its_first_sample_that_is_not_finite(tmp_path: Path
     made = viewer_of(tmp_path, Made(replace(FIG11, outputs=("angles",)), "lagrange/taylor", broken))
     data = json.loads(str(made["data"]))
     assert (len(unpacked(data["models"][0])) - 1) * data["step"] == pytest.approx(4.0, abs=0.05)
-
-
-@pytest.mark.parametrize(("offset", "factor"), [(0.11, 10), (0.5, 2), (2.0, 1), (0.0, None)])
-def test_an_offset_is_drawn_as_a_tenth_of_the_blade_and_never_smaller(offset: float, factor: int | None) -> None:
-    scene = replace(FIG11, blades=tuple(replace(blade, tip=(offset, 0.0, 11.0)) for blade in FIG11.blades))
-    assert magnification(scene) == factor
 
 
 def test_data_cannot_end_the_script_element() -> None:

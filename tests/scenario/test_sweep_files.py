@@ -12,9 +12,7 @@ import pytest
 
 from rotor_mbs.errors import InputError
 from rotor_mbs.scenario.catalogue import find_scenes, list_scenes, sweeps_folder
-from rotor_mbs.scenario.scene import unit_of
 from rotor_mbs.scenario.sweep import Axis, Design, Range, Sweep, load_sweep, split_rows, sweep_of
-from rotor_mbs.scenario.toml_file import parse_key
 
 _HEAD = 'title = "t"\nscene = "paper/fig11"\n'
 
@@ -83,17 +81,6 @@ def test_a_sweep_without_a_file_is_that_of_its_text(tmp_path: Path) -> None:
         sweep_of(scene, {"gravitas": [1.0]})
     with pytest.raises(InputError, match=r"sweep:.*values"):
         sweep_of(scene, {"gravity": [float("nan")]})
-
-
-def test_units_of_keys() -> None:
-    units = {
-        "rad": ("initial.angles[1]", "bearing.rest", "bearing.rest[1][0][1]"),
-        "s": ("torque.rotor[1][0]", "torque.pitch[1][0][0]"),
-        "N m": ("torque.rotor[1][1]", "torque.pitch[1]"),
-        "kg": ("blade[2].mass",),
-        "N m/rad": ("bearing.stiffness",),
-    }
-    assert all(unit_of(parse_key(key)) == unit for unit, keys in units.items() for key in keys)
 
 
 def test_a_row_is_the_scene_with_its_numbers_in_place(tmp_path: Path) -> None:

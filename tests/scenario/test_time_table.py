@@ -10,7 +10,6 @@ import pytest
 
 from rotor_mbs.scenario.time_table import (
     Table,
-    constant_value,
     intervals,
     segments,
     steps_and_rows,
@@ -54,10 +53,6 @@ def test_a_sample_on_a_jump_has_the_value_before_it() -> None:
     exact = np.where(np.arange(101) == 47, 2.0, values_at(RAMP, times))
     assert values[0] == pytest.approx(exact, abs=1e-14)
     assert (values[1] == 7.0).all()
-
-
-def test_a_load_that_changes_has_no_constant_value() -> None:
-    assert (constant_value(CONSTANT), constant_value(RAMP), constant_value(())) == (7.0, 0.0, 0.0)
 
 
 def test_intervals_meet_samples_and_kinks() -> None:
