@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 from support.stored import rotor
 
-from rotor_mbs.analysis.modes import FloquetTable, SceneModes
 from rotor_mbs.methods.catalogue import ladders, method_names
 from rotor_mbs.report import canvas, numbers
 from rotor_mbs.report import plots as figures
@@ -17,7 +16,6 @@ from rotor_mbs.report.canvas import panels
 from rotor_mbs.report.elements import picture as picture_in_page
 from rotor_mbs.report.looks import COLOURS, Look, coordinate_look, look_of, name_of_colour
 from rotor_mbs.report.pages import scene as scene_page
-from rotor_mbs.report.pages.modes import ModePlots
 from rotor_mbs.report.plots import Series, paths
 
 LOOK = Look("#0072b2", "-", "o")
@@ -159,21 +157,6 @@ def test_a_factor_of_the_tick_labels_stands_with_the_unit() -> None:
     assert ">pitch angle (10⁻⁴ rad)<" in text
     assert ">3.0<" in text
     assert "1e" not in text
-
-
-def test_powers_of_ten_are_labelled_within_the_axes_alone() -> None:
-    ones, small = np.ones(2), np.array([0.02, 0.5])
-    table = FloquetTable(np.array([0.1, 3.0]), np.stack([ones, small], 1), small, np.ones(2, int), ones, ones, ones)
-    picture = panels((2.0,), "time (s)")
-    picture.axes[0].plot([0.0, 1.0], [1e-16, 1e-13])
-    canvas.log_axis(picture.axes[0], 1e-16, 1e-13)
-    for shown, labels in (
-        (ModePlots(SceneModes("s", "0", "t", 1, 9.8, floquet=table)).multipliers(), ["10⁻²", "10⁻¹", "10⁰"]),
-        (picture, ["10⁻¹⁶", "10⁻¹⁵", "10⁻¹⁴", "10⁻¹³"]),
-    ):
-        text = str(picture_in_page(shown, "n", "t").svg)
-        assert re.findall(r">(10[⁻\d⁰¹²³⁴-⁹]+)<", text) == labels
-        assert "$" not in text
 
 
 @pytest.mark.parametrize(

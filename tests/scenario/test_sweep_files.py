@@ -110,7 +110,6 @@ _BAD = {
      "test: .*no runs left for training; allowed: a number"),
     "an unknown key of two values, reported once": ('[[axis]]\nkey = "initial.angels[1]"\nvalues = [1, 2]', 4,
      r"^[^\n]*: initial\.angels: unknown key[^\n]*$"),
-    "an index too high": ('[[axis]]\nkey = "initial.angles[4]"\nvalues = [1]', 4, r"initial.angles\[3\]"),
     "no path": ('[[axis]]\nkey = "initial..x"\nvalues = [1]', 4, "is not the path of a key; allowed"),
     "another shape": ('[[axis]]\nkey = "blades"\nvalues = [1, 2]', 4, "have the same blades; allowed"),
     "random without draws": ('[[axis]]\nkey = "gravity"\nuniform = [1, 2]', 3, "draws is missing"),
@@ -119,14 +118,11 @@ _BAD = {
     "a key twice": ('[[axis]]\nkey = "gravity"\nvalues = [1]\n[[axis]]\nkey = "gravity"\nvalues = [1]', 3,
      "more than one"),
     "a value out of range": ('[[axis]]\nkey = "blade.mass"\nlinear = {start = 9, end = -9, count = 5}', 4, "above 0"),
-    "numbers that do not fit": ('[[axis]]\nkey = "blade.inertia[0]"\nvalues = [0, 1]', 4, "no rigid body"),
     "unequal lists zipped": (
      'combine = "zip"\n[[axis]]\nkey = "gravity"\nvalues = [1]\n[[axis]]\nkey = "hub.inertia"\nvalues = [1, 2]',
      3, "gravity has 1, hub.inertia has 2; allowed: with zip"),
     "1e12 runs": ('[[axis]]\nkey = "gravity"\nlinear = {start = 0, end = 1, count = 1000000000000}', 3,
      "1,000,000,000,000 runs; allowed: at most"),
-    "a change of no key": ('change = {"gravty" = 1}\n[[axis]]\nkey = "hub.inertia"\nvalues = [1]', 3,
-     "perhaps gravity"),
 }  # fmt: skip
 
 
@@ -139,12 +135,6 @@ def test_errors_name_file_line_key_and_what_is_allowed(tmp_path: Path, text: str
         assert "\n" not in problem
         assert "allowed" in problem
     assert int(caught.value.problems[0].removeprefix(f"{tmp_path / 's.toml'}:").split(":")[0]) == line
-
-
-def test_all_errors_at_once(tmp_path: Path) -> None:
-    with pytest.raises(InputError) as caught:
-        _load(tmp_path, 'precision = "half"\n[[axis]]\nkey = "gravity"\nvalues = ["x"]\nlog = {start = 1, count = 1}\n')
-    assert len(caught.value.problems) == 4  # precision, values, log.end, log.count
 
 
 @pytest.mark.parametrize("path", sorted(sweeps_folder().glob("*.toml")), ids=lambda path: path.stem)
