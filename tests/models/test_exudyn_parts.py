@@ -56,6 +56,29 @@ def test_the_list_is_what_the_engine_holds(name, scene) -> None:
     assert engine_counts(solver) == listed(name, SCENES[scene])
 
 
+def extra(name, scene):
+    bare, more = listed(name, BARE), listed(name, SCENES[scene])
+    return {kind: more[kind] - bare[kind] for kind in KINDS if more[kind] != bare[kind]}
+
+
+@pytest.mark.parametrize(
+    ("scene", "tree", "chain"),
+    [
+        ("gravity", {}, {"marker": 3, "load": 3}),  # one for each blade; the tree has it in its one object
+        ("tip", {"sensor": 3}, {"sensor": 3}),
+        ("energy", {"sensor": 6}, {"sensor": 3}),  # position and velocity; the chain reads positions anyhow
+        ("torque", {"marker": 1, "load": 1}, {"load": 1}),
+        ("torque over time", {"marker": 1, "load": 1}, {"load": 1}),
+        ("springs", {}, {"node": 2, "object": 2}),  # a spring and its turn counter where there is stiffness
+        ("dampers", {}, {"object": 2}),
+        ("hub", {}, {}),
+    ],
+)
+def test_a_scene_builds_what_it_needs_and_no_more(scene, tree, chain) -> None:
+    assert extra(TREE, scene) == tree
+    assert extra(CHAIN, scene) == chain
+
+
 def test_a_pitch_without_inertia_is_left_out() -> None:
     assert listed(TREE, SCENES["fixed pitch"])["node"] == 1
     assert "1 coordinates" in METHODS[TREE].items(SCENES["fixed pitch"])[0].detail

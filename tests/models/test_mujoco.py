@@ -21,6 +21,7 @@ from rotor_mbs.models.lagrange.defects import interval_defects
 
 pytest.importorskip("mujoco")
 
+from rotor_mbs.models.mujoco import mjcf
 from rotor_mbs.models.mujoco.solver import MujocoSolver
 
 RK4_STEP = 2.5e-4
@@ -93,3 +94,13 @@ def test_an_overflow_ends_the_run_and_leaves_no_file(tmp_path: Path, monkeypatch
     assert re.match(r"MuJoCo: Nan, Inf or huge value in Q\w+ at DOF 0", integration.message)
     assert len(solver.observe().time) == 1
     assert not list(tmp_path.iterdir())
+
+
+def test_only_what_the_scene_asks_for_is_built() -> None:
+    kinds = [item.kind for item in mjcf.items(MIXED)]
+    assert {kind: kinds.count(kind) for kind in kinds} == {"object": 4, "node": 4, "marker": 3, "load": 5}
+    less = replace(MIXED, outputs=("angles", "rates"), rotor_torque=(), pitch_torque=(), bearing_rest=())
+    assert {item.kind for item in mjcf.items(less)} == {"object", "node"}
+    result = run("mujoco/rk4", less)
+    assert result.tip is None
+    assert result.work is None
