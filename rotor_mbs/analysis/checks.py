@@ -147,7 +147,7 @@ def _of_run(
     wrong = (judgement.status != run.status) + (judgement.false_success != claimed)
     hint = f"stored {run.status}, its samples give {judgement.status} {judgement.message}".rstrip()
     if judgement.false_success != claimed:
-        hint += "; the engine's report of success is " + ("false" if judgement.false_success else "not false")
+        hint += "; whether the engine's report of success is false differs from what is stored"
     yield _of(run, "status", "status", float(wrong), bounds, "faults", hint)
     channel, worst, hint = _changed_metric(run, judgement.metrics, solution)
     yield _of(run, "metrics", channel, worst, bounds, "relative", hint)
