@@ -135,9 +135,9 @@ def _of_run(
     reports_it = solution is not None and run.status not in COMPLETE
     if reports_it and (motion_ends or not is_corrected(run.method)):
         faults = []
-    hint = "; ".join(faults) or "every channel, row and number is present"
-    if faults and run.status != "ok":
-        hint += f"; stored as {run.status}: {run.attributes.get('message', '')}"
+    hint = "every channel, row and number is present"
+    if faults:
+        hint = f"{'; '.join(faults)}; stored as {run.status} {run.attributes.get('message', '')}".rstrip()
     yield _of(run, "complete", "all", float(len(faults)), bounds, "faults", hint)
     if solution is None:
         return

@@ -76,6 +76,11 @@ def test_a_sample_off_is_seen_in_its_channel(array: str, place: Any, off: float,
     assert before[channel] < 1e-6 * after[channel]
 
 
+@pytest.mark.parametrize("outputs", [("angles", "energy"), ("angles", "rates")])
+def test_energies_are_checked_against_angles_and_rates_alone(outputs: tuple[str, ...]) -> None:
+    assert ("energies", "kinetic energy") not in of_samples(run_of(outputs=outputs))
+
+
 def test_numbers_of_a_model_are_its_metrics_less_what_rounding_and_its_start_leave_open() -> None:
     """Whole turns away and past π/2 in pitch, digits are lost that no model has."""
     one = paper("fig11", duration=0.5, samples=51)
@@ -166,6 +171,22 @@ def test_a_reference_is_compared_with_the_shipped_one() -> None:
     assert np.isnan(of_reference(stored(REFERENCE, angles=two), shipped)["growth", "error growth"])
     assert of_reference(own, None) == {}
     assert np.isnan(of_reference(None, shipped)["reference", "all"])
+
+
+def test_the_growth_of_a_reference_is_that_of_its_samples() -> None:
+    """To the factor by which it was changed; of no other method."""
+    reference_run = solve(REFERENCE, general(duration=0.2, samples=5), {})
+    reference_run.trajectory.error_growth[1:] *= np.e
+    for method, growth in ((REFERENCE, {("growth", "of the samples"): pytest.approx(1.0, rel=0.05)}), (METHOD, {})):
+        found = values(checks._of_run(stored(method), BOUNDS, reference_run, [], None, False))
+        assert {place: value for place, value in found.items() if place[0] == "growth"} == growth
+
+
+def test_loads_are_checked_under_one_name() -> None:
+    run = solve(METHOD, replace(LOADED, duration=0.2, samples=41), {})
+    metrics = judge(run.scene, run, run.trajectory).metrics
+    found = values(checks._of_corrected_model(stored(), BOUNDS, run.scene, run.trajectory, metrics))
+    assert {"blade root force", "shaft moment"} < {channel for check, channel in found if check == "loads"}
 
 
 def test_a_turn_of_a_pendulum_is_off_by_what_was_added() -> None:

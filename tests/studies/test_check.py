@@ -190,7 +190,7 @@ def test_a_run_that_gave_up_early_is_not_excused(copy: Path, capsys: pytest.Capt
 
     change_row(copy, f"{SCENE}/{METHOD}", give_up)
     line = named(lines_of(capsys, copy, status=1), "FAIL complete: check/general", "not 151")
-    assert "stored as solver_failed: gave up" in line
+    assert "stored as solver_failed gave up" in line
 
 
 def test_a_model_that_is_not_there_is_missed_where_it_is_required(

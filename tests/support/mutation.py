@@ -65,6 +65,22 @@ RUNS: dict[str, list[tuple[str, str]]] = {
     "chain": [(_CHECKED, "exudyn_chain/generalized_alpha")],
     "mujoco": [(_CHECKED, "mujoco/rk4")],
     "ode45": [("check/held check/general", "lagrange/ode45"), ("paper/fig05", "printed/ode45")],
+    "schemes": [
+        ("check/loads", "exudyn_tree/rk67"),
+        ("check/held", "exudyn_tree/rk44"),
+        ("check/held", "exudyn_tree/dopri5"),
+        ("check/held", "exudyn_tree/generalized_alpha"),
+        ("check/held", "exudyn_chain/generalized_alpha"),
+        ("check/held", "exudyn_chain/newmark_index2"),
+        ("check/held", "exudyn_chain/extrapolated"),
+        ("check/held", "lagrange/dop853"),
+    ],
+    "adapter": [
+        ("check/held check/loads", "exudyn_tree/rk67"),
+        ("check/pitch-loads", "exudyn_tree/dopri5"),
+        ("check/held check/loads", "exudyn_chain/generalized_alpha"),
+    ],
+    "integration": [(_CHECKED, "lagrange/taylor"), (_CHECKED, "lagrange/dop853"), (_CHECKED, "lagrange/ode45")],
 }
 
 _M, _L, _P = "rotor_mbs.models.exudyn", "rotor_mbs.models.lagrange", "rotor_mbs.models.printed"
@@ -79,6 +95,13 @@ _SENSORS = (
     *_PARTS,
     f"{_EXACT}[exudyn_tree/rk44-{_CONSTANT}]",
     "models/test_exact_solutions.py::test_a_thousand_radians_a_second_are_counted_turn_by_turn",
+)
+_EXTRAPOLATION = (
+    "models/test_extrapolation.py::test_steps_are_those_of_all_columns",
+    "models/test_extrapolation.py::test_the_work_of_loads_and_dampers_along_the_substeps",
+)
+_SIXTEEN_BLADES = (
+    "models/test_exudyn_models.py::test_sixteen_blades_take_another_path_through_the_engine_to_the_same_motion"
 )
 _MUJOCO = "models/test_mujoco.py::test_"
 _JUDGEMENT = "solution/test_judgement.py::test_"
@@ -132,6 +155,19 @@ _TARGETS = (
            "tests alone", (*_RULES, "solution/test_metrics.py::test_a_pitch_that_leaves_zero"), 0.5),
     # Of a tableau's fractions any may be changed.
     Target("rotor_mbs.models.ode45", "*", "ode45", (_DEFAULTS, "models/test_ode45.py"), 0.001),
+    Target(f"{_M}.schemes", "*", "schemes", (_DEFAULTS, *_PARTS, *_EXTRAPOLATION), 0.5),
+    Target(f"{_M}.solvers", "_scheme build_tree build_chain __init__ integrate", "schemes",
+           (_DEFAULTS, *_PARTS, *_EXTRAPOLATION), 0.5),
+    Target(f"{_L}.methods", "tolerance check_tolerance relative_tolerance absolute_tolerance", "schemes",
+           (_DEFAULTS, "methods/test_settings.py"), 0.5),
+    Target(f"{_M}.adapter", "*", "adapter",
+           (*_PARTS, "models/test_linearization.py",
+            "models/test_extrapolation.py::test_loads_at_every_sample_from_the_first_on",
+            f"{_SIXTEEN_BLADES}[exudyn_chain/generalized_alpha]"), 0.5),
+    Target(f"{_L}.ode_solvers", "*", "integration", ("models/test_segments.py",), 0.5),
+    Target(f"{_L}.samples", "over_segments loads_at loads_at_start at_constant_rests", "integration", _SAMPLES, 0.5),
+    Target(f"{_L}.taylor", "*", "integration",
+           ("models/test_segments.py", "models/test_lagrange.py", "models/test_sweep_ensemble.py"), 0.5),
     # What the causes of a defect leave out of the equations is in test_planted_mistakes.py.
     Target(f"{_L}.reference",
            "__init__ integrate observe uncertainty build _in_quad _in_doubles error_growth _transition_matrices "
