@@ -341,11 +341,22 @@ def mode_rows(modes: SceneModes) -> list[dict[str, object]]:
 
 
 def mode_table(rows: Sequence[Mapping[str, object]]) -> TextTable:
-    """Table of such rows."""
-    cells = [
-        tuple("" if v is None else f"{v:.7g}" if isinstance(v, float) else str(v) for v in row.values()) for row in rows
-    ]
-    return TextTable(tuple(name.replace("_", " ") for name in rows[0]) if rows else (), cells)
+    """Table of such rows, damped frequencies in Hz too."""
+    head = (
+        "state", "speed (rad/s)", "mode", "undamped (rad/s)", "damped (rad/s)", "damped (Hz)", "damping ratio",
+        "growth (1/s)",
+    )  # fmt: skip
+
+    def cell(value: object) -> str:
+        return f"{value:.6g}" if isinstance(value, float) else "" if value is None else str(value)
+
+    cells = []
+    for row in rows:
+        damped = row["damped_frequency"]
+        hertz = damped / math.tau if isinstance(damped, float) else None
+        shown = row["state"], row["speed"], row["mode"], row["undamped_frequency"], damped, hertz
+        cells.append(tuple(map(cell, (*shown, row["damping_ratio"], row["growth_rate"]))))
+    return TextTable(head, cells)
 
 
 # Records of a results file

@@ -195,16 +195,17 @@ def modes(arguments: argparse.Namespace) -> int:
     else:
         for modes in chosen:
             rows = mode_rows(modes)
-            ends = {rows[place]["speed"] for place in (0, -1) if rows}
+            ends = {modes.rotation[model].speeds[place] for model in modes.rotation for place in (0, -1)}
             print(f"{modes.scene}: {modes.title}")
-            print_table(mode_table([row for row in rows if row["speed"] in ends]))
+            print_table(mode_table([row for row in rows if row["state"] == "at rest" or row["speed"] in ends]))
             if modes.floquet is not None:
                 unstable = int((modes.floquet.stable == 0).sum())
                 print(f"unstable in rotation under gravity at {unstable} of {len(modes.floquet.speeds)} speeds")
-            verdict = "agree" if modes.agrees else "DISAGREE"
-            print(
-                f"{verdict}: relative difference of frequencies up to {modes.disagreement:.1e}", *modes.notes, sep="\n"
-            )
+            models = [*dict.fromkeys((*modes.rest, *modes.rotation))]
+            if len(models) > 1:
+                verdict = "agree" if modes.agrees else "DISAGREE"
+                print(f"{', '.join(models)} {verdict}: frequencies differ by at most {modes.disagreement:.1e} (relative)")
+            print(*modes.notes, sep="\n", end="\n" if modes.notes else "")
         _write_pages(arguments.output)
     return int(is_lost or not all(modes.agrees for modes in chosen))
 
