@@ -100,7 +100,7 @@ def line(check: Check) -> str:
     margin = "inf" if math.isinf(check.margin) else f"{check.margin:.3g}"
     unit = f" {check.unit}" if check.unit else ""
     hint = "" if check.passed else f"; {check.hint}"
-    return printable(
+    return escaped(
         f"{outcome} {check.name}: {' '.join(check.where)}: {check.value:.2e}, "
         f"bound {check.bound:.2e}{unit}, margin {margin}{hint}"
     )
@@ -108,7 +108,7 @@ def line(check: Check) -> str:
 
 def github(check: Check) -> str:
     """A workflow command that GitHub shows as an error annotation."""
-    title = printable(f"rotor-mbs {check.name} {check.where.scene} {check.where.method}").replace("%", "%25")
+    title = escaped(f"rotor-mbs {check.name} {check.where.scene} {check.where.method}").replace("%", "%25")
     title = title.replace(":", "%3A").replace(",", "%2C")
     return f"::error title={title}::{line(check).replace('%', '%25')}"  # neither has a line break
 
@@ -136,15 +136,15 @@ def junit(checks: Sequence[Check]) -> bytes:
     root = ElementTree.Element("testsuites", {"name": "rotor-mbs check", **_counts(checks)})
     for scene in dict.fromkeys(check.where.scene for check in checks):
         of_scene = [check for check in checks if check.where.scene == scene]
-        suite = ElementTree.SubElement(root, "testsuite", {"name": printable(scene), **_counts(of_scene)})
+        suite = ElementTree.SubElement(root, "testsuite", {"name": escaped(scene), **_counts(of_scene)})
         for check in of_scene:
-            name = printable(f"{check.name} {check.where.method} {check.where.channel}")
+            name = escaped(f"{check.name} {check.where.method} {check.where.channel}")
             case = ElementTree.SubElement(
-                suite, "testcase", classname=printable(f"rotor_mbs.{scene}"), name=name, time="0"
+                suite, "testcase", classname=escaped(f"rotor_mbs.{scene}"), name=name, time="0"
             )
             properties = ElementTree.SubElement(case, "properties")
             for key in ("value", "bound", "margin", "unit"):
-                ElementTree.SubElement(properties, "property", name=key, value=printable(str(getattr(check, key))))
+                ElementTree.SubElement(properties, "property", name=key, value=escaped(str(getattr(check, key))))
             if not check.passed:
                 failure = ElementTree.SubElement(case, "failure", message=line(check), type=check.name)
                 failure.text = line(check)
@@ -158,6 +158,6 @@ def _counts(checks: Sequence[Check]) -> dict[str, str]:
     return {"tests": str(len(checks)), "failures": str(failed), "errors": "0"}
 
 
-def printable(text: str) -> str:
+def escaped(text: str) -> str:
     """`text` with escapes for what controls a terminal or is not allowed in XML: control characters, surrogates."""
     return "".join(char if char.isprintable() else ascii(char)[1:-1] for char in text)

@@ -159,18 +159,6 @@ def own_settings(scene: Scene, method: str) -> dict[str, object]:
         raise InputError(f"{scene.name}: settings: {problem}" for problem in error.problems) from error
 
 
-def settings_of_runs(
-    scenes: Sequence[Scene], methods: Mapping[str, Sequence[str]], given: Mapping[str, object]
-) -> dict[str, dict[str, dict[str, object]]]:
-    """By scene and method, the settings in place of defaults: the `given` ones, then the scene's own. methods: by
-    scene. Raises InputError."""
-    of_call = settings_for(list(dict.fromkeys(name for scene in scenes for name in methods[scene.name])), given)
-    return {
-        scene.name: {name: own_settings(scene, name) | of_call[name] for name in methods[scene.name]}
-        for scene in scenes
-    }
-
-
 def problems_of_methods(values: Mapping[str, Any]) -> list[KeyProblem]:
     """What is wrong with the `methods` that a scene file or a sweep file names."""
     names = values.get("methods", ())
@@ -367,17 +355,16 @@ def fastest_rates(scene: Scene) -> tuple[float, float]:
     swing = abs(scene.initial_rates[0])
     driven = max((abs(torque) for _, torque in scene.rotor_torque), default=0.0) / _rotor_inertia(scene)
     decay = scene.shaft_damping / _rotor_inertia(scene) if scene.shaft_damping else 0.0
-    stiffnesses = scene.bearing_stiffness or (0.0,) * len(scene.blades)
-    torques = scene.pitch_torque or ((),) * len(scene.blades)
     for i, blade in enumerate(scene.blades):
         if not blade.has_pitch_inertia:
             continue
         x, y, z = blade.centre_of_mass
         inertia = blade.pitch_inertia
-        torque = max((abs(value) for _, value in torques[i]), default=0.0)
-        moment = stiffnesses[i] + torque + blade.mass * (scene.gravity + driven * abs(z)) * math.hypot(x, y)
+        stiffness, damping = scene.bearing(i)
+        torque = max((abs(value) for _, value in scene.pitch_load(i)[0]), default=0.0)
+        moment = stiffness + torque + blade.mass * (scene.gravity + driven * abs(z)) * math.hypot(x, y)
         swing = max(swing, math.sqrt(moment / inertia), abs(scene.initial_rates[1 + i]))
-        decay = max(decay, scene.dampings[1 + i] / inertia)
+        decay = max(decay, damping / inertia)
     return swing, decay
 
 

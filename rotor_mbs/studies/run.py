@@ -19,7 +19,7 @@ from rotor_mbs.methods.catalogue import (
     line_of,
     look_up,
     own_settings,
-    settings_of_runs,
+    settings_for,
 )
 from rotor_mbs.methods.solve import solve
 from rotor_mbs.methods.time_limit import OutOfTimeError, time_limit
@@ -155,7 +155,7 @@ def asked_runs(
 ) -> list[Asked]:
     """The rows of these scenes by their `methods`, the reference of each scene first: the shipped one, where there is
     one and it may be used, or one to be computed. Raises InputError."""
-    own = settings_of_runs(scenes, methods, settings)
+    of_call = settings_for(list(dict.fromkeys(name for scene in scenes for name in methods[scene.name])), settings)
     asked: list[Asked] = []
     for scene in scenes:
         versions = None
@@ -164,7 +164,7 @@ def asked_runs(
             source = {"frozen_with": shipped.frozen_with, "frozen_file": digest(shipped.path)[:12]}
             versions = row_versions(find_method(REFERENCE)) | source
         asked.append(Asked(scene, REFERENCE, versions=versions))
-        asked += [Asked(scene, name, given) for name, given in own[scene.name].items()]
+        asked += [Asked(scene, name, own_settings(scene, name) | of_call[name]) for name in methods[scene.name]]
     return asked
 
 

@@ -221,6 +221,8 @@ def error_panels(record: Record) -> Panels:
     rows = record.arrays[verdict.axis]
     series = [Series(rows, np.abs(_array(record, channel, "_error")), _look(channel)) for channel in channels]
     panels = plots.errors(series, f"error ({channels[0].unit})", verdict.horizon_s)
+    if len(rows) and rows[-1] > rows[0]:  # also where no error is above zero, so that nothing is drawn
+        panels.axes[-1].set_xlim(rows[0], rows[-1])
     if verdict.axis == "speed":
         panels.axes[-1].set_xlabel(canvas.SPEED_AXIS)
     return panels
