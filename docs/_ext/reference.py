@@ -336,7 +336,8 @@ _EXAMPLES = {
         "`sweep` writes one flat table at the root. `run` is a number; each varied parameter is a variable. Compared "
         "with a results file there is no reference and no error relative to one, there are no run times, "
         "`error_growth` and `horizon_s` only with `error_growth = true`, and scene, methods and versions are "
-        "attributes instead of columns. `code` distinguishes rows of other versions.",
+        "attributes instead of columns. `code` distinguishes rows of other versions. `rotor_angle_max` is the largest "
+        "magnitude; in a results file it is the largest value, beside `rotor_angle_min`.",
         "sweep study.toml -o sweep.h5 -j 1",
     ),
     "Modes": (
@@ -423,7 +424,8 @@ def _file_format() -> str:
         "`message`, is an array of single characters (run, characters), UTF-8, padded with zeros; xarray reads it as "
         "text, h5py and MATLAB as [described here](../data.md).",
         "**Versions.** The column `versions` is a JSON text with the versions of this package, Python, the libraries "
-        "and the code that computed the row; a sweep has the column `code` instead, a CRC-32 of that text's content. "
+        "and the code that computed the row. A sweep has the column `code` instead, a CRC-32 of such a text: rows of "
+        "other versions can be told apart, but their versions are not stored. "
         f"The attributes {', '.join(map(code, VERSIONED))} of `/` are of the process that created the file. Rows of "
         "other versions are recomputed by the next `run`, `reproduce`, `bench` or `stability`; a sweep keeps them.",
         "**Layout.** Datasets are contiguous, so that a row lies at a fixed offset and is written there when it is "
@@ -431,8 +433,8 @@ def _file_format() -> str:
         "`attributes of NAME`, because the digest covers their attributes only.",
         "**Checksum.** `crc32` of row r is the CRC-32 of zlib (`zlib.crc32`), with r, counted from 0, as its starting "
         "value, over the bytes of the row in each computed dataset of `/runs` except `crc32`, in the order in which "
-        "the file lists them, then of the method's row in each computed dataset of its scene's group that has the "
-        "dimension `run`. For a reference the computed datasets without the dimension `run` follow as a whole. In "
+        "they were created (h5py lists them so), then of the method's row in each computed dataset of its scene's "
+        "group that has the dimension `run`. For a reference the computed datasets without the dimension `run` follow as a whole. In "
         "`/bench` and `/stability` only the table's own datasets are covered, in a sweep those of `/`, where the "
         "starting value is the number `run`. [Reading results](../data.md) has this as a program.",
         "## Status codes",

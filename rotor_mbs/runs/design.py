@@ -105,7 +105,7 @@ COLUMNS = {
         "order": ("1", "order of convergence of the curve, fitted above its round-off floor"),
         "step_for_target_s": ("s", "largest step of the ladder with an error of at most 1e-6 rad"),
         "code": ("1", "CRC-32 of the versions of package, libraries and code that computed the run", "<u4"),
-        "crc32": ("1", "CRC-32 of the row, over all computed columns", "<u4"),
+        "crc32": ("1", "CRC-32 of the row over all computed columns and arrays", "<u4"),
     }.items()
 }
 COLUMNS["status"] = COLUMNS["status"]._replace(attributes=flags(("missing", *STATUSES), MISSING))

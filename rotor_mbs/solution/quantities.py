@@ -125,7 +125,7 @@ SCALES = {
         Quantity("time", ("time",), "s", "time"),
         Quantity("coordinate", ("coordinate",), "1", "joint coordinate: 0 rotor, i pitch of blade i"),
         Quantity("blade", ("blade",), "1", "blade number, from 1"),
-        Quantity("axis", ("axis",), "1", "axis: 0 x, 1 y, 2 z (base frame: y along the shaft, z up)"),
+        Quantity("axis", ("axis",), "1", "axis: 0 x, 1 y, 2 z of the frame that each variable names"),
         Quantity("refined_time", ("refined_time",), "s", "time of the integrator's own output points"),
     )
 }
@@ -275,7 +275,7 @@ BUILT_IN = (
     *LOADS,
     Quantity(
         "angle_uncertainty", ("time",), "rad",
-        "bound on the error of the angles, before rounding to double precision (half a unit in the last place)",
+        "estimate of the error of the angles, before rounding to double precision (half a unit in the last place)",
         required=False,
     ),
     Quantity(

@@ -79,6 +79,24 @@ def test_a_scene_builds_what_it_needs_and_no_more(scene, tree, chain) -> None:
     assert extra(CHAIN, scene) == chain
 
 
+@pytest.mark.parametrize(
+    ("outputs", "damping", "along_the_path"),
+    [(("angles", "energy"), 1.0, True), (("angles", "energy"), 0.0, False), (("angles",), 1.0, False)],
+)
+def test_work_is_integrated_along_the_path_where_it_is_asked_for_and_not_known(
+    outputs, damping, along_the_path
+) -> None:
+    """The tree keeps rows between samples for it, and the extrapolated chain the work itself."""
+    scene = replace(FIG11, duration=0.2, samples=21, outputs=outputs, shaft_damping=damping)
+    tree, extrapolated = (
+        METHODS[name].build(scene, METHODS[name].settings()) for name in (TREE, "exudyn_chain/extrapolated")
+    )
+    assert tree.integrate().success
+    assert extrapolated.integrate().success
+    assert (len(tree.system.rows("rates")) > scene.samples) is along_the_path
+    assert (extrapolated.kept[-1].work != 0.0) is along_the_path
+
+
 def test_a_pitch_without_inertia_is_left_out() -> None:
     assert listed(TREE, SCENES["fixed pitch"])["node"] == 1
     assert "1 coordinates" in METHODS[TREE].items(SCENES["fixed pitch"])[0].detail

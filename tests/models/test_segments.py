@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from support.scenes import ARM, MASS, OFFSET, paper
 
+from rotor_mbs.methods.catalogue import find_method
 from rotor_mbs.methods.solve import solve
 from rotor_mbs.models.lagrange.closed_form import load_values
 from rotor_mbs.models.lagrange.heyoka_adapter import array_of
@@ -77,6 +78,16 @@ def test_a_solver_at_chosen_times_has_those(engine: str) -> None:
     result = solver.observe()
     assert result.time.tolist() == times.tolist()
     assert result.angles[:, 0] == pytest.approx(scene.initial_angles[0] + 0.5 * times, abs=1e-9)
+
+
+@pytest.mark.parametrize("settings", [{}, {"tolerance": 1e-9}])
+def test_the_order_of_taylors_series_is_that_of_its_tolerance(settings: dict[str, float]) -> None:
+    """⌈1 - ln(tol) / 2⌉: A. Jorba, M. Zou, Exp. Math. 14 (2005). At round-off neither errors nor steps show it."""
+    pytest.importorskip("heyoka")
+    method = find_method("lagrange/taylor")
+    solver: Any = method.build(paper("fig03"), method.settings.of(method.name, settings))
+    tolerance = settings.get("tolerance", np.finfo(float).eps)
+    assert solver.integrator.order == math.ceil(1.0 - 0.5 * math.log(tolerance))
 
 
 def test_a_load_over_time_is_in_quad_precision_in_a_quad_run() -> None:

@@ -52,7 +52,7 @@ EXPLAINED = {
     r"checks\._of_reference .* 0 -> 1": "compared by its length: no shipped reference has a single sample",
     r"checks\._of_run .*(judgement\.status != run\.status\) \+|'; '\.join)": "more faults than none; a text",
     r"checks\._of_samples .* 1 -> 2": "one zero or two: the largest is zero",
-    r"adapter\.linear_solver .*scaled|adapter\._SPARSE_FROM ": "sizes near the bound take as long by either solver",
+    r"adapter\.(linear_solver|_SPARSE_FROM) ": "dense or sparse: the same solution, in another time",
     r"adapter\.linearized .*0 -> 1": "a column of zeros among the joints' directions hinders no motion",
     r"metrics\.energy_scale .*(if run\.|and, or in|0\.0 -> )": "nobody asks for the scale of a run without energies",
     r"checks\._own_extremes .*(and, or in between|:20 2 -> 3$)": (

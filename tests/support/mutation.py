@@ -96,10 +96,7 @@ _SENSORS = (
     f"{_EXACT}[exudyn_tree/rk44-{_CONSTANT}]",
     "models/test_exact_solutions.py::test_a_thousand_radians_a_second_are_counted_turn_by_turn",
 )
-_EXTRAPOLATION = (
-    "models/test_extrapolation.py::test_steps_are_those_of_all_columns",
-    "models/test_extrapolation.py::test_the_work_of_loads_and_dampers_along_the_substeps",
-)
+_EXTRAPOLATION = ("models/test_extrapolation.py",)
 _SIXTEEN_BLADES = (
     "models/test_exudyn_models.py::test_sixteen_blades_take_another_path_through_the_engine_to_the_same_motion"
 )
