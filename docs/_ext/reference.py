@@ -434,9 +434,9 @@ def _file_format() -> str:
         "**Checksum.** `crc32` of row r is the CRC-32 of zlib (`zlib.crc32`), with r, counted from 0, as its starting "
         "value, over the bytes of the row in each computed dataset of `/runs` except `crc32`, in the order in which "
         "they were created (h5py lists them so), then of the method's row in each computed dataset of its scene's "
-        "group that has the dimension `run`. For a reference the computed datasets without the dimension `run` follow as a whole. In "
-        "`/bench` and `/stability` only the table's own datasets are covered, in a sweep those of `/`, where the "
-        "starting value is the number `run`. [Reading results](../data.md) has this as a program.",
+        "group that has the dimension `run`. For a reference the computed datasets without the dimension `run` follow "
+        "as a whole. In `/bench` and `/stability` only the table's own datasets are covered, in a sweep those of `/`, "
+        "where the starting value is the number `run`. [Reading results](../data.md) has this as a program.",
         "## Status codes",
         "The attributes `flag_values` and `flag_meanings` of every dataset `status` list the codes and their names.",
         table(["code", "status", "meaning"], [[-1, "missing", _MEANINGS["missing"]], *_statuses()]),

@@ -95,11 +95,12 @@ def test_loads_at_every_sample_from_the_first_on() -> None:
         assert off.max() < 1e-5
 
 
-def test_the_work_of_loads_and_dampers_along_the_substeps() -> None:
+@pytest.mark.parametrize("method", [METHOD, "exudyn_tree/dopri5", "exudyn_tree/rk67"])
+def test_the_work_of_loads_and_dampers_along_the_substeps(method: str) -> None:
     """Springs that swing by 3.8 rad between samples: the energy keeps to 1e-6 of the largest kinetic one, where a power
     interpolated through the samples loses 2e-3 and more."""
     given = replace(scene("turbine/pitch-step"), duration=1.2, samples=61, outputs=("angles", "energy"))
-    result = solve(METHOD, given, {})
+    result = solve(method, given, {})
     total = result["kinetic_energy"] + result["potential_energy"] - result["work"]
     assert np.abs(total - total[0]).max() < 1e-6 * result["kinetic_energy"].max()
     assert result["work"][0] == 0.0
