@@ -87,6 +87,7 @@ EXPLAINED = {
     r"adapter\._solve .*(rejected|newtonSteps).* scaled": "evaluations of rejected steps are not judged",
     r"adapter\.integrate .*1 -> 2": "a scheme that chooses its own steps makes the first one of the interval anyway",
     r"adapter\.integrate .*(step is None|every_step)": "rows at every step or at every sample carry the work as well",
+    r"ode_solvers\.scipy_integrator .*:36 0 -> 1": "the evaluations of a solver that cannot begin",
     r"(ode_solvers|taylor)\..*deadline\.is_over": "the time limit of a run, which a run within it does not show",
 }
 
