@@ -14,14 +14,14 @@ from support.scenes import general, paper
 from support.stored import Arrays, Made, rotor, store
 
 from rotor_mbs.analysis import checks
-from rotor_mbs.analysis.judgement import defects_of, energy_slack, judge, start_slack
+from rotor_mbs.analysis.judgement import defects_of, energy_slack, judge, quantity_errors, start_slack
 from rotor_mbs.methods.catalogue import REFERENCE
 from rotor_mbs.methods.solve import solve
 from rotor_mbs.runs.read import open_results
 from rotor_mbs.scenario.accuracy_bounds import load_bounds
 from rotor_mbs.scenario.catalogue import reference_folder
 from rotor_mbs.solution.metrics import energy_scale, metrics_of
-from rotor_mbs.solution.trajectory import Solution
+from rotor_mbs.solution.trajectory import Solution, Trajectory
 
 METHOD, PRINTED, BOUNDS = "lagrange/dop853", "printed/ode45", load_bounds()
 LOADED = scene("check/loads")
@@ -74,6 +74,17 @@ def test_a_sample_off_is_seen_in_its_channel(array: str, place: Any, off: float,
     size = size or max(energy_scale(run.scene, run.trajectory), float(run.trajectory.kinetic_energy.max()))
     assert after[channel] == pytest.approx(off / size, rel=1e-6)
     assert before[channel] < 1e-6 * after[channel]
+    if array != "energy_error":
+        assert after["energies", "energy error"] < 1e-12
+
+
+def test_the_start_of_small_angles_is_compared_in_rad_and_a_fixed_pitch_does_not_turn() -> None:
+    fixed = replace(general().blades[1], inertia=(0.0,) * 6, centre_of_mass=(0.0, 0.0, 9.0))
+    blades = (general().blades[0], fixed, general().blades[2])
+    run = run_of(blades=blades, initial_angles=(0.3, 0.2, 0.4, 0.6), initial_rates=(0.1, 0.2, 0.3, 0.4))
+    assert of_samples(run)["start", "angles, rates"] < 1e-15
+    run.trajectory.angles[0, 1] += 1e-3
+    assert of_samples(run)["start", "angles, rates"] == pytest.approx(1e-3, rel=1e-9)
 
 
 @pytest.mark.parametrize("outputs", [("angles", "energy"), ("angles", "rates")])
@@ -112,6 +123,14 @@ def test_extremes_of_the_printed_equations_are_found_between_samples(name: str, 
     exact = metrics_of(run.scene, run.trajectory, None)
     expected = {name: pytest.approx(exact[name], rel=1e-3, abs=1e-3) for name in ANGLES | RATE}
     assert checks._own_extremes(run) == expected
+
+
+def test_extremes_between_samples_are_not_sought_after_a_break_and_under_loads_that_change() -> None:
+    run = solve(PRINTED, paper("fig06", duration=5.0, samples=5), {})
+    broken_off = Trajectory(run.time[:4], run.angles[:4], run.rates[:4])
+    assert checks._own_extremes(replace(run, trajectory=broken_off)) == {}
+    ramp = solve(PRINTED, paper("fig06", duration=5.0, samples=5, rotor_torque=((0.0, 0.0), (5.0, 9.0))), {})
+    assert checks._own_extremes(ramp) == {}
 
 
 def of_stored(run: Solution, metrics: Any, name: str, stored_value: float) -> tuple[str, float]:
@@ -170,23 +189,33 @@ def test_a_reference_is_compared_with_the_shipped_one() -> None:
     assert found["uncertainty", "angle uncertainty"] == pytest.approx(3.0)
     assert np.isnan(of_reference(stored(REFERENCE, angles=two), shipped)["growth", "error growth"])
     assert of_reference(own, None) == {}
+    frozen = stored(REFERENCE, angles=two)  # of a scene without rates
+    frozen.is_frozen = True
+    assert of_reference(frozen, shipped)["frozen", "all"] == 0.0
     assert np.isnan(of_reference(None, shipped)["reference", "all"])
 
 
 def test_the_growth_of_a_reference_is_that_of_its_samples() -> None:
     """To the factor by which it was changed; of no other method."""
-    reference_run = solve(REFERENCE, general(duration=0.2, samples=5), {})
-    reference_run.trajectory.error_growth[1:] *= np.e
-    for method, growth in ((REFERENCE, {("growth", "of the samples"): pytest.approx(1.0, rel=0.05)}), (METHOD, {})):
-        found = values(checks._of_run(stored(method), BOUNDS, reference_run, [], None, False))
-        assert {place: value for place, value in found.items() if place[0] == "growth"} == growth
+    exact = solve(REFERENCE, general(duration=0.2, samples=5), {})
+    growth = exact.trajectory.error_growth.copy()
+    for off, passed in ((0.04, True), (0.06, False), (1.0, False)):
+        exact.trajectory.error_growth[1:] = growth[1:] * np.exp(off)
+        found = {check.name: check for check in checks._of_run(stored(REFERENCE), BOUNDS, exact, [], None, False)}
+        assert found["growth"].value == pytest.approx(off, abs=1e-3)
+        assert found["growth"].passed is passed
+        assert found["status"].value == 0.0  # judged as it was, and no report of success called false
+    assert "growth" not in {check.name for check in checks._of_run(stored(), BOUNDS, exact, [], None, False)}
 
 
 def test_loads_are_checked_under_one_name() -> None:
     run = solve(METHOD, replace(LOADED, duration=0.2, samples=41), {})
     metrics = judge(run.scene, run, run.trajectory).metrics
-    found = values(checks._of_corrected_model(stored(), BOUNDS, run.scene, run.trajectory, metrics))
-    assert {"blade root force", "shaft moment"} < {channel for check, channel in found if check == "loads"}
+    found = [*checks._of_corrected_model(stored(), BOUNDS, run.scene, run.trajectory, metrics)]
+    assert {"blade root force", "shaft moment"} < {check.where.channel for check in found if check.name == "loads"}
+    for quantity, rule, _ in quantity_errors(run.scene, metrics):
+        (check,) = (check for check in found if check.where.channel == rule.channel)
+        assert (check.name, check.hint, check.unit) == (rule.check, rule.look_at, "of the largest"), quantity.name
 
 
 def test_a_turn_of_a_pendulum_is_off_by_what_was_added() -> None:

@@ -59,6 +59,7 @@ def test_steps_are_those_of_all_columns() -> None:
     assert len(solver.columns) == 100  # none was halved
     again = solver.integrate()
     assert again.steps == sum(k * (k + 1) for k in solver.columns)  # 2 + 4 + ... + 2k
+    assert again.rhs_evaluations >= 2 * again.steps  # each at least once in Newton's method, and at its end
     assert not again.out_of_time
     smooth = integrated(beginning("paper/fig03", 101))
     assert set(smooth.columns) == {2}

@@ -125,7 +125,7 @@ def test_a_hopeless_solve_ends_soon_and_says_so_in_one_line(name, capfd) -> None
     assert time.process_time() - start < 5.0
     assert not run.integration.success
     assert not run.integration.out_of_time
-    assert run.integration.message
+    assert run.integration.message not in ("", "the engine gave no reason")
     assert "\n" not in run.integration.message
     assert 0.0 < run.integration.time_reached < 0.1
     assert 1 < len(run.trajectory.time) < 11

@@ -27,11 +27,20 @@ def test_a_run_counts_all_its_segments_and_ends_in_the_one_that_fails(method: st
     one = paper("fig03", duration=1.0, samples=11, rotor_torque=((0.0, 0.0), (1.0, 10.0), (2.0, 0.0)))
     reports = [solve(method, scene, {}).integration for scene in (one, replace(one, duration=1.1, samples=12))]
     assert [report.time_reached for report in reports] == [1.0, 1.1]
-    assert reports[1].steps > reports[0].steps > 0
+    end = solve(method, one, {})
+    rest = replace(
+        one, duration=0.1, samples=2, rotor_torque=((0.0, 10.0), (1.0, 0.0)),
+        initial_angles=tuple(end.angles[-1].tolist()), initial_rates=tuple(end.rates[-1].tolist()),
+    )  # fmt: skip
+    reports.append(solve(method, rest, {}).integration)
+    assert reports[1].steps == reports[0].steps + reports[2].steps
+    if reports[0].rhs_evaluations is not None:
+        assert reports[1].rhs_evaluations == reports[0].rhs_evaluations + reports[2].rhs_evaluations
     failing = replace(one, gravity=0.0, initial_angles=(1.0, 1.2), initial_rates=(0.0, 1.0), duration=3.0, samples=301)
     failed = solve(method, replace(failing, rotor_torque=((0.0, 0.0), (0.05, 10.0), (2.0, 0.0))), {}).integration
     assert not failed.success
     assert failed.message
+    assert not failed.out_of_time
     assert 0.05 < failed.time_reached < 2.0
 
 

@@ -161,8 +161,10 @@ def test_a_run_that_was_changed_together_with_its_checksum_fails(
     assert not any("exudyn_tree" in line for line in lines[:-2])  # and nobody else
 
 
-def test_a_changed_byte_is_of_its_run(copy: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    damage(copy, f"{SCENE}/{METHOD}", "tip")
+@pytest.mark.parametrize(("column", "bit"), [("tip", 0), ("samples", 7)])
+def test_a_changed_byte_is_of_its_run(column: str, bit: int, copy: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Whatever it does to the other checks: a number of samples below zero."""
+    damage(copy, f"{SCENE}/{METHOD}", column, bit=bit)
     named(lines_of(capsys, copy, status=1), f"FAIL integrity: {SCENE} {METHOD} row", "changed after it was written")
 
 
@@ -179,7 +181,10 @@ def test_a_false_success_and_an_edited_status_fail(copy: Path, capsys: pytest.Ca
         row["status"][...] = row["false_success"][...] = 0
 
     change_row(copy, f"{SCENE}/{METHOD}", call_it_ok)
-    named(lines_of(capsys, copy, status=1), f"FAIL status: check/general {METHOD}", "stored ok, its samples give")
+    line = named(
+        lines_of(capsys, copy, status=1), f"FAIL status: check/general {METHOD}", "stored ok, its samples give"
+    )
+    assert "report of success is false" in line
 
 
 def test_a_run_that_gave_up_early_is_not_excused(copy: Path, capsys: pytest.CaptureFixture[str]) -> None:

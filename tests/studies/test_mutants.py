@@ -82,6 +82,7 @@ EXPLAINED = {
     r"adapter\.(linearized|initial_values) .*(1\.0 -> |0\.01 \* 0\.5|3 -> 4)": (
         "the size of a difference quotient's step, and how many are extrapolated: any near it does as well"
     ),
+    r"solvers\.(__init__|integrate) .*0 -> 1": "parts of the first interval; how small the smallest may be",
     r"schemes\.trial_steps .*-> 2": "the least of a range: one trial step ends as soon as two",
     r"schemes\.scheme .*(1e-14|5\.0) -> ": "the smallest step, and how fast steps grow: no motion here comes near",
     r"adapter\._solve .*(rejected|newtonSteps).* scaled": "evaluations of rejected steps are not judged",

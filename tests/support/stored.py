@@ -96,17 +96,17 @@ class Arrays:
         return self.arrays[name]
 
 
-def damage(path: Path, run: str, column: str, at: int = 0) -> None:
-    """Change a byte of a stored row: of the column, `at` bytes from its end."""
-    change_byte(TableFile(path).place(run), column, at)
+def damage(path: Path, run: str, column: str, at: int = 0, bit: int = 0) -> None:
+    """Change a bit of a stored row: of the column, `at` bytes from its end."""
+    change_byte(TableFile(path).place(run), column, at, bit)
 
 
-def change_byte(place: Place, column: str, at: int = 0) -> None:
+def change_byte(place: Place, column: str, at: int = 0, bit: int = 0) -> None:
     with place.path.open("r+b") as file:
         file.seek(place.offsets[column] + place.row_type[column].itemsize - 1 - at)
         byte = file.read(1)[0]
         file.seek(-1, 1)
-        file.write(bytes([byte ^ 1]))
+        file.write(bytes([byte ^ 1 << bit]))
 
 
 def change_row(path: Path, run: str, change: Callable[[Rows], None]) -> None:
