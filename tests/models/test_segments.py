@@ -19,6 +19,7 @@ from rotor_mbs.models.lagrange.heyoka_adapter import array_of
 from rotor_mbs.models.lagrange.ode_solvers import OdeSolver, ode45_integrator, scipy_integrator, work_unit
 from rotor_mbs.models.lagrange.samples import at_constant_rests
 from rotor_mbs.models.lagrange.taylor import Propagation
+from rotor_mbs.scenario.time_table import segments
 
 
 @pytest.mark.parametrize("method", ["lagrange/dop853", "lagrange/taylor"])
@@ -33,8 +34,10 @@ def test_a_run_counts_all_its_segments_and_ends_in_the_one_that_fails(method: st
         initial_angles=tuple(end.angles[-1].tolist()), initial_rates=tuple(end.rates[-1].tolist()),
     )  # fmt: skip
     reports.append(solve(method, rest, {}).integration)
+    assert all(isinstance(report.steps, int) for report in reports)
     assert reports[1].steps == reports[0].steps + reports[2].steps
     if reports[0].rhs_evaluations is not None:
+        assert isinstance(reports[0].rhs_evaluations, int)
         assert reports[1].rhs_evaluations == reports[0].rhs_evaluations + reports[2].rhs_evaluations
     failing = replace(one, gravity=0.0, initial_angles=(1.0, 1.2), initial_rates=(0.0, 1.0), duration=3.0, samples=301)
     failed = solve(method, replace(failing, rotor_torque=((0.0, 0.0), (0.05, 10.0), (2.0, 0.0))), {}).integration
@@ -69,6 +72,15 @@ def test_every_evaluation_is_counted(name: str) -> None:
         tolerances = {"DOP853": (1e-9, 1e-12), "Radau": (1e-6, 1e-9)}[name]
         alone = solve_ivp(decay, (1.0, 3.0), np.ones(1), name, rtol=tolerances[0], atol=tolerances[1])
         assert result.steps == len(alone.t) - 1
+
+
+def test_a_state_that_has_diverged_has_no_derivative() -> None:
+    scene = paper("fig03", duration=1.0, samples=2)
+    solver = OdeSolver(scene, INTEGRATORS["DOP853"], np.array([0.0, 1.0]))
+    (segment,) = segments(scene.load_tables, scene.duration)
+    values = solver._right_hand_side(segment)(0.0, [math.inf, 0.0, 1.0, 0.0])
+    assert len(values) == 4
+    assert np.isnan(values).all()
 
 
 @pytest.mark.parametrize("name", INTEGRATORS)

@@ -45,6 +45,7 @@ EXPLAINED = {
     r"(samples\.loads_at(_start)?|kinematics\.(work_of_constant_loads|exact_rotor_angle)) .*0\.0 -> ": (
         "a constant load is the same at any time"
     ),
+    r"taylor\.items .*turned round": "refuses to list what is installed: heyoka() itself does not refuse it",
     r"taylor\.equation_numbers .*0\.0 -> ": "takes a place that the next line fills",
     r"taylor\.(_UNROLLED_BLADES|compiled|is_compact) |adapter\.(_settings .*|)(constraints|_OLD_JACOBIAN_FROM)": (
         "decides how long a run takes, not what comes out"
