@@ -145,17 +145,6 @@ class _Parser(argparse.ArgumentParser):
         self.add_argument("--timeout", type=SECONDS, default=seconds, metavar="SECONDS", help=text)
 
 
-class _Names(argparse.Action):
-    """Prints the names of columns that `compare` understands, and ends."""
-
-    def __call__(self, parser: argparse.ArgumentParser, *_: Any) -> NoReturn:
-        from rotor_mbs.foreign.channels import KNOWN_NAMES, LOAD_AND_MODE_NAMES
-
-        lines = [f"{channel}: {names}" for channel, names in KNOWN_NAMES + LOAD_AND_MODE_NAMES]
-        print(*lines, "case, spaces and underscores are ignored", sep="\n")
-        parser.exit(0)
-
-
 def parse(argv: Sequence[str]) -> argparse.Namespace:
     """The arguments; `command` is the place of the function to call, "module:function". Ends with status 2 on bad
     usage."""
@@ -243,7 +232,9 @@ def _parser() -> tuple[_Parser, dict[str, _Parser]]:
     text = "text with a header, .json, .npz, .mat, HDF5, netCDF, an Exudyn sensor file, OpenFAST .out or .outb"
     own.add_argument("data", type=Path, metavar="DATA", help=text)
     own.add_argument("--scene", required=True, metavar="SCENE", help="a name (paper/fig05) or a TOML file")
-    text = "mapping file: column, unit, sign and offset of each channel (default: identified by name)"
+    text = (
+        "mapping file: column, unit, sign and offset of each channel (default: identified by name, see docs/compare.md)"
+    )
     own.add_argument("--columns", type=Path, metavar="MAP.toml", help=text)
     text = (
         "bound (rad) on interval defects (the equations of motion integrated from each row to the next, minus the "
@@ -253,7 +244,6 @@ def _parser() -> tuple[_Parser, dict[str, _Parser]]:
     own.add_argument("--tolerance", type=POSITIVE, default=1e-6, metavar="X", help=text)
     text = "time limit for the reference in s (default: %(default)g)"
     own.add_argument("--timeout", type=SECONDS, default=600.0, metavar="SECONDS", help=text)
-    own.add_argument("--names", action=_Names, nargs=0, help="print the accepted column names and exit")
     own.output(folder, "DIR", Path("comparison"), "output folder (default: %(default)s)")
     own.flag("--json", help="print the verdict as JSON")
 

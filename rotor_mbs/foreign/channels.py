@@ -35,8 +35,8 @@ _FEW_DIGITS, _ALL_DIGITS = 9, 17
 _FEW_VALUES = 10
 _EQUAL = 1e-6  # of an interval between rows
 _FEWEST = 3  # rows: fewer have no motion to be compared
-# Names without digits, blanks and marks; a name of a rate is one of an angle with a word of _RATE_WORDS behind it, or
-# d before it.
+# Names without digits, blanks and marks, as listed in docs/compare.md; a name of a rate is one of an angle with a word
+# of _RATE_WORDS behind it, or d before it.
 _TIME_NAMES = ("time", "t", "times", "zeit")
 _ROTOR_NAMES = (
     "rotor", "rotorangle", "rotorposition", "rot", "azimuth", "rotorazimuth", "azim", "psi", "phi", "shaft",
@@ -60,24 +60,6 @@ _FREQUENCIES = {
     "undamped frequency": ("undampedfrequency", "undampedfrequencies", "naturalfrequency", "naturalfrequencies"),
 }
 _LOAD_NAMES = tuple(load.name.replace("_", " ") for load in LOADS)
-# What is understood, in words.
-_RATE_AFFIXES = f"the suffix {', '.join(_RATE_WORDS[:-1])} or {_RATE_WORDS[-1]}, or the prefix d"
-KNOWN_NAMES = (
-    ("time", ", ".join(_TIME_NAMES)),
-    ("rotor", ", ".join(_ROTOR_NAMES)),
-    ("pitch of blade i, followed by the blade's number", ", ".join(_PITCH_NAMES)),
-    ("rotor rate", f"a name of the rotor with {_RATE_AFFIXES}; {', '.join(_ROTOR_RATE_NAMES)}"),
-    ("pitch rate", f"a name of a pitch with {_RATE_AFFIXES}"),
-    ("array of angles, rotor first", ", ".join(_VECTORS["angle"])),
-    ("array of rates, rotor first", ", ".join(_VECTORS["rate"])),
-)
-LOAD_AND_MODE_NAMES = (
-    ("load, followed by the blade's number and x, y or z; or an array", ", ".join(load.name for load in LOADS)),
-    ("root load of OpenFAST", "RootFxb1, RootMyc2, ..."),
-    ("modes: rotor speed, if there is no time", ", ".join(_SPEED_NAMES)),
-    ("modes: damped frequency, followed by its number; or an array", ", ".join(_FREQUENCIES["frequency"])),
-    ("modes: undamped frequency, followed by its number; or an array", ", ".join(_FREQUENCIES["undamped frequency"])),
-)
 _UNIT_ENDING = re.compile(r"_((?:rad|deg|turns|rev)(?:_per_s|/s|_s)?|rpm|hz|s|ms|us|min|(?-i:k?Nm?))$", re.IGNORECASE)
 
 

@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
 import pytest
-from support.commands import refusal, rotor_mbs
+from support.commands import refusal
 from support.data_files import FORMATS
 from support.scenes import paper
 
 import rotor_mbs as rm
 from rotor_mbs.errors import InputError, RotorError
-from rotor_mbs.foreign.channels import KNOWN_NAMES, LOAD_AND_MODE_NAMES, channels, guess, half_last_digits, load_data
+from rotor_mbs.foreign import channels as names
+from rotor_mbs.foreign.channels import channels, guess, half_last_digits, load_data
+from rotor_mbs.solution.quantities import LOADS
 
 SCENE = paper("fig08")
 TIME = np.linspace(0.0, 10.0, 201)
@@ -92,20 +95,31 @@ def test_names_that_are_known(name: str, channel: str | None) -> None:
     assert (found and found.name) == channel
 
 
-def test_the_names_that_are_understood_are_printed_and_documented() -> None:
-    """Each that is listed is understood; the list of the docs is the printed one."""
-    shown = rotor_mbs("compare", "--names").out
-    document = (Path(__file__).parents[2] / "docs" / "compare.md").read_text()
-    for channel, names in KNOWN_NAMES + LOAD_AND_MODE_NAMES:
-        assert f"{channel}: {names}\n" in shown
-        assert f"| {channel} | {names} |\n" in document
-    for channel, names in KNOWN_NAMES:
-        for name in [] if channel.endswith(" rate") else names.split(", "):
-            column = f"{name}[0]" if "array" in channel else f"{name} 2" if "pitch" in channel else name
-            expected = {"time": "time", "pitch": "pitch 2"}.get(channel.split()[0], "rotor")
-            found = guess(column, 4, channels(SCENE))
+def test_the_documented_names_are_understood() -> None:
+    """The table of the docs has the names of the code; each of an angle, a rate or the time is understood."""
+    text = (Path(__file__).parents[2] / "docs" / "compare.md").read_text()
+    documented = dict(re.findall(r"^\| (.+?) \| (.+) \|$", text, re.MULTILINE))
+    affixes = f"the suffix {', '.join(names._RATE_WORDS[:-1])} or {names._RATE_WORDS[-1]}, or the prefix d"
+    assert documented["rotor rate"] == f"a name of the rotor with {affixes}; {', '.join(names._ROTOR_RATE_NAMES)}"
+    assert documented["pitch rate"] == f"a name of a pitch with {affixes}"
+    assert documented["load, followed by the blade's number and x, y or z; or an array"] == ", ".join(
+        load.name for load in LOADS
+    )
+    assert documented["modes: rotor speed, if there is no time"] == ", ".join(names._SPEED_NAMES)
+    for kind, frequencies in zip(("damped", "undamped"), names._FREQUENCIES.values(), strict=True):
+        assert documented[f"modes: {kind} frequency, followed by its number; or an array"] == ", ".join(frequencies)
+    for row, listed, form, channel in (
+        ("time", names._TIME_NAMES, "{}", "time"),
+        ("rotor", names._ROTOR_NAMES, "{}", "rotor"),
+        ("pitch of blade i, followed by the blade's number", names._PITCH_NAMES, "{} 2", "pitch 2"),
+        ("array of angles, rotor first", names._VECTORS["angle"], "{}[0]", "rotor"),
+        ("array of rates, rotor first", names._VECTORS["rate"], "{}[0]", "rotor rate"),
+    ):
+        assert documented[row] == ", ".join(listed)
+        for name in listed:
+            found = guess(form.format(name), 4, channels(SCENE))
             assert found is not None, name
-            assert found.name == expected + " rate" * channel.startswith("array of rates")
+            assert found.name == channel
 
 
 def column_of(text: str) -> np.ndarray:
