@@ -17,7 +17,7 @@ from typing import Any, Literal, NamedTuple
 
 from rotor_mbs.analysis import run_selection
 from rotor_mbs.runs.read import StoredScene
-from rotor_mbs.scenario.catalogue import reference_folder
+from rotor_mbs.scenario.catalogue import REFERENCES
 from rotor_mbs.solution.status import GOOD
 
 
@@ -110,7 +110,7 @@ def errata() -> tuple[Erratum, ...]:
 
 
 def _tables(name: str) -> dict[str, Any]:
-    return tomllib.loads((reference_folder() / f"{name}.toml").read_text(encoding="utf-8"))
+    return tomllib.loads((REFERENCES / f"{name}.toml").read_text(encoding="utf-8"))
 
 
 def checked_entries() -> list[CheckedEntry]:
@@ -118,7 +118,7 @@ def checked_entries() -> list[CheckedEntry]:
 
     Tests compute every entry (`tests/support/printed_entries.py`) and compare the file with it.
     """
-    with (reference_folder() / "errata-check.csv").open(encoding="utf-8", newline="") as file:
+    with (REFERENCES / "errata-check.csv").open(encoding="utf-8", newline="") as file:
         rows: list[dict[str, Any]] = list(csv.DictReader(file))
     for row in rows:
         row["difference"], row["agrees"] = float(row["difference"]), row["agrees"] == "True"
@@ -160,7 +160,7 @@ def claim_study() -> ClaimStudy:
     >>> claim_study().verdicts["fig11-pitches-grow"]["printed/ode45"]
     'holds'
     """
-    stored = json.loads((reference_folder() / "claims.json").read_text(encoding="utf-8"))
+    stored = json.loads((REFERENCES / "claims.json").read_text(encoding="utf-8"))
     return ClaimStudy(**{field.name: stored[field.name] for field in fields(ClaimStudy)})
 
 

@@ -11,7 +11,7 @@ from pathlib import Path
 
 from rotor_mbs.errors import InputError
 from rotor_mbs.scenario import keys
-from rotor_mbs.scenario.catalogue import reference_folder
+from rotor_mbs.scenario.catalogue import REFERENCES
 from rotor_mbs.scenario.keys import file_key
 from rotor_mbs.scenario.toml_file import read_toml
 
@@ -88,7 +88,7 @@ class Bounds:
 @functools.cache
 def shipped_bounds() -> Bounds:
     """The bounds of reference/accuracy.toml, read once. Raises InputError with every error of the file."""
-    return read_bounds(reference_folder() / "accuracy.toml")
+    return read_bounds(REFERENCES / "accuracy.toml")
 
 
 def load_bounds(own: Path | None = None) -> Bounds:

@@ -17,32 +17,18 @@ if TYPE_CHECKING:  # `rotor-mbs list` reads no scene
 RESERVED_GROUPS = ("bench", "claims", "comparison", "errata", "modes", "stability", "summary", "sweep")
 
 _PACKAGE = Path(__file__).resolve().parents[1]
+# A wheel carries the folders inside the package; an editable install has them at the top of the checkout.
+_DATA = _PACKAGE / "_data" if (_PACKAGE / "_data").is_dir() else _PACKAGE.parent
+SCENARIOS = _DATA / "scenarios"  # the shipped scenes
+SWEEPS = SCENARIOS / "sweeps"  # the shipped sweeps: TOML files that vary a scene
+REFERENCES = _DATA / "reference"  # published numbers, errata, bounds, trajectories
+for _folder in (SCENARIOS, REFERENCES):
+    if not _folder.is_dir():
+        raise RotorError(f"{_folder}: the folder is missing; install rotor_mbs again")
+
 _PIECE = r"[A-Za-z0-9_-][A-Za-z0-9._-]*"
 _NAME = re.compile(rf"{_PIECE}(?:/{_PIECE})*")
 _NAME_RULE = "of the characters A-Z a-z 0-9 . _ -, with no dot in front"
-
-
-def scenarios_folder() -> Path:
-    """The shipped scenes. Raises RotorError in an incomplete installation."""
-    return _folder("scenarios")
-
-
-def sweeps_folder() -> Path:
-    """The shipped sweeps: TOML files that vary a scene."""
-    return scenarios_folder() / "sweeps"
-
-
-def reference_folder() -> Path:
-    """The shipped reference data: published numbers, errata, bounds, trajectories. Raises RotorError as above."""
-    return _folder("reference")
-
-
-def _folder(name: str) -> Path:
-    # A wheel carries the folders inside the package; an editable install has them at the top of the checkout.
-    for candidate in (_PACKAGE / "_data" / name, _PACKAGE.parent / name):
-        if candidate.is_dir():
-            return candidate
-    raise RotorError(f"{_PACKAGE}: the folder {name} is missing; install rotor_mbs again")
 
 
 def natural_key(name: str) -> list[tuple[int, int, str]]:
@@ -56,13 +42,13 @@ def natural_order(names: Iterable[str]) -> list[str]:
 
 
 def list_scenes() -> list[tuple[str, str]]:
-    """(name, title) of every shipped scene; the title of a broken file says that it is broken."""
+    """(name, title) of every shipped scene."""
     return [(name, _title(path)) for name, path in _shipped().items()]
 
 
 def list_sweeps() -> list[tuple[str, str]]:
-    paths = sorted(sweeps_folder().glob("*.toml"), key=lambda path: natural_key(path.name))
-    return [(f"{sweeps_folder().name}/{path.stem}", _title(path)) for path in paths]
+    paths = sorted(SWEEPS.glob("*.toml"), key=lambda path: natural_key(path.name))
+    return [(f"sweeps/{path.stem}", _title(path)) for path in paths]
 
 
 def find_scenes(arguments: Sequence[str], check: Check | None = None) -> list[Scene]:
@@ -128,20 +114,15 @@ def scene_of(given: Scene | str) -> Scene:
 
 
 def _shipped() -> dict[str, Path]:
-    folder = scenarios_folder()
-    paths = (path for path in folder.rglob("*.toml") if path.parent != sweeps_folder())
-    names = ((path.relative_to(folder).with_suffix("").as_posix(), path) for path in paths)
+    paths = (path for path in SCENARIOS.rglob("*.toml") if path.parent != SWEEPS)
+    names = ((path.relative_to(SCENARIOS).with_suffix("").as_posix(), path) for path in paths)
     return dict(sorted(names, key=lambda item: natural_key(item[0])))
 
 
 def _title(path: Path) -> str:
     """Of a shipped file: all of its tables come after the title, and reading them would take most of the time."""
-    try:
-        text = path.read_text(encoding="utf-8")
-        title = parse_toml(text.partition("\n[")[0], shown_path(path)).tables.get("title")
-    except (InputError, OSError, UnicodeDecodeError) as error:
-        return f"(broken file: {error})"
-    return title if isinstance(title, str) else "(broken file: no title)"
+    text = path.read_text(encoding="utf-8")
+    return str(parse_toml(text.partition("\n[")[0], str(path)).tables.get("title", ""))
 
 
 def _files(argument: str) -> list[Path]:

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from rotor_mbs.errors import InputError
 from rotor_mbs.scenario import keys
-from rotor_mbs.scenario.catalogue import list_scenes, only_scene, scenarios_folder, sweeps_folder
+from rotor_mbs.scenario.catalogue import SCENARIOS, SWEEPS, list_scenes, only_scene
 from rotor_mbs.scenario.keys import Kind, file_key, list_of, table_of, where, wrong
 from rotor_mbs.scenario.scene import (
     OUTPUT_NAMES,
@@ -356,7 +356,7 @@ class Sweep:
 def load_sweep(path: Path, check: Check = no_check) -> Sweep:
     """The sweep in the TOML file `path`; sweeps/NAME means a shipped one. check: what else is wrong with its values.
     Raises InputError with all errors of the file."""
-    shipped = (sweeps_folder().parent / path).with_suffix(".toml")
+    shipped = (SWEEPS.parent / path).with_suffix(".toml")
     if not path.exists() and path.parts[:1] == ("sweeps",) and shipped.is_file():
         path = shipped
     if not path.exists() and str(path) in dict(list_scenes()):
@@ -386,7 +386,7 @@ def _sweep(path: Path, file: TomlFile, check: Check, base: Scene | None = None) 
     with file.located():
         design = Design(**keys.read_keys(DESIGN_KEYS, file.tables, check))
     if base is None:
-        is_shipped = (scenarios_folder() / f"{design.scene}.toml").is_file()
+        is_shipped = (SCENARIOS / f"{design.scene}.toml").is_file()
         is_beside = design.scene.endswith(".toml") and not is_shipped
         with file.located("scene"):
             base = only_scene(str(path.parent / design.scene) if is_beside else design.scene)

@@ -20,7 +20,7 @@ from rotor_mbs.runs.read import open_results
 from rotor_mbs.runs.runner import OnProgress, Task, compute_tasks, ignore_progress
 from rotor_mbs.runs.table import extend_file, results_tables
 from rotor_mbs.runs.versions import versions
-from rotor_mbs.scenario.catalogue import find_scenes, reference_folder, scenarios_folder
+from rotor_mbs.scenario.catalogue import REFERENCES, SCENARIOS, find_scenes
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.studies.bench import Curve, curve_of, curve_tables, curve_tasks
 from rotor_mbs.studies.run import RunReport, asked_runs, run_tasks
@@ -56,7 +56,7 @@ def made_from(results: Path, timeout_s: float) -> str:
     package = Path(rotor_mbs.__file__).parent
     sources = sorted(path for path in package.rglob("*") if path.is_file() and path.parent.name != "__pycache__")
     digest = hashlib.sha256(f"{versions()} {timeout_s}".encode())
-    for path in (results, *sources, *sorted(scenarios_folder().rglob("*.toml")), *sorted(reference_folder().iterdir())):
+    for path in (results, *sources, *sorted(SCENARIOS.rglob("*.toml")), *sorted(REFERENCES.iterdir())):
         with path.open("rb") as file:
             digest.update(hashlib.file_digest(file, "sha256").digest())
     return digest.hexdigest()

@@ -16,7 +16,7 @@ from rotor_mbs.methods.catalogue import REFERENCE
 from rotor_mbs.runs.design import FROZEN, MISSING, RUNS
 from rotor_mbs.runs.read import open_results
 from rotor_mbs.runs.table import Place, TableFile
-from rotor_mbs.scenario.catalogue import reference_folder
+from rotor_mbs.scenario.catalogue import REFERENCES
 from rotor_mbs.scenario.scene import Scene, scene_hash
 from rotor_mbs.solution.quantities import sample_times
 from rotor_mbs.solution.trajectory import Integration, Solution, Trajectory
@@ -27,7 +27,7 @@ _recent: dict[tuple[object, ...], Trajectory] = {}
 
 
 def shipped_files() -> list[Path]:
-    return sorted(reference_folder().glob("*.h5"))
+    return sorted(REFERENCES.glob("*.h5"))
 
 
 class ShippedReference(NamedTuple):

@@ -19,7 +19,7 @@ from rotor_mbs.methods.catalogue import REFERENCE
 from rotor_mbs.methods.solve import solve
 from rotor_mbs.runs.read import open_results
 from rotor_mbs.scenario.accuracy_bounds import load_bounds
-from rotor_mbs.scenario.catalogue import reference_folder
+from rotor_mbs.scenario.catalogue import REFERENCES
 from rotor_mbs.solution.metrics import energy_scale, metrics_of
 from rotor_mbs.solution.trajectory import Solution, Trajectory
 
@@ -263,7 +263,7 @@ def test_a_file_is_judged_by_the_papers_numbers_too(tmp_path: Path) -> None:
 
 def test_a_scene_that_is_not_shipped_is_not_compared_with_the_shipped_one_of_its_name(tmp_path: Path) -> None:
     made = store(tmp_path / "r.h5", [Made(FIG11, REFERENCE, rotor(np.zeros_like))])
-    with open_results(made) as results, open_results(reference_folder() / "paper.h5") as shipped:
+    with open_results(made) as results, open_results(REFERENCES / "paper.h5") as shipped:
         found = {check.name for check in checks.checks_of(results, [shipped], BOUNDS)}
     assert "complete" in found
     assert not found & {"reference", "uncertainty"}

@@ -10,7 +10,7 @@ from support import make_claims
 from support.make_claims import DURATIONS, FILE, METHODS, STATISTICS, Conditions, numbers_of, trials_under
 
 from rotor_mbs.analysis.published import Published, claim_study, conditions, published
-from rotor_mbs.scenario.catalogue import find_scenes, reference_folder
+from rotor_mbs.scenario.catalogue import REFERENCES, find_scenes
 
 RUNS = json.loads(FILE.read_text(encoding="utf-8"))
 FINDINGS = " ".join((Path(__file__).parents[2] / "docs/findings.md").read_text().split())
@@ -27,7 +27,7 @@ def test_the_files_are_written_as_they_are_shipped() -> None:
     """But for the versions that the runs were made with."""
     made = json.loads(make_claims.runs_as_json(RUNS["shares"], RUNS["trials"], RUNS["runs"], RUNS["seed"]))
     assert made | {"made_with": RUNS["made_with"]} == RUNS
-    assert make_claims.verdicts_as_json(RUNS) == (reference_folder() / "claims.json").read_text(encoding="utf-8")
+    assert make_claims.verdicts_as_json(RUNS) == (REFERENCES / "claims.json").read_text(encoding="utf-8")
 
 
 def test_the_findings_count_the_claims_as_the_shipped_study_does() -> None:

@@ -9,7 +9,7 @@ from support.formulas import value
 from support.printed_entries import NAMES, TOLERANCE, check_errata, printed_entries, random_states, right_entries
 
 from rotor_mbs.analysis.published import checked_entries
-from rotor_mbs.scenario.catalogue import reference_folder
+from rotor_mbs.scenario.catalogue import REFERENCES
 
 STATES = random_states(2020, 5)
 
@@ -21,7 +21,7 @@ def found():
 
 def test_the_file_says_what_the_code_finds(found):
     """No entry is unexplained, and each erratum is in its equations and no others."""
-    written = {one["id"]: one for one in tomllib.loads((reference_folder() / "errata.toml").read_text())["erratum"]}
+    written = {one["id"]: one for one in tomllib.loads((REFERENCES / "errata.toml").read_text())["erratum"]}
     assert tuple(written) == NAMES
     assert all(off <= TOLERANCE or explanation for off, explanation in found.values())
     for name in NAMES:

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from rotor_mbs.errors import InputError
-from rotor_mbs.scenario.catalogue import find_scenes, scenarios_folder
+from rotor_mbs.scenario.catalogue import SCENARIOS, find_scenes
 from rotor_mbs.scenario.scene import (
     DEFAULT_OUTPUTS,
     Scene,
@@ -196,7 +196,7 @@ def test_the_line_scanner_ends_for_any_text(text: str) -> None:
 def test_arguments_keep_their_order_and_name_a_scene_once(tmp_path: Path) -> None:
     own = tmp_path / "own.toml"
     own.write_text(SCENE, encoding="utf-8")
-    fig05 = scenarios_folder() / "paper" / "fig05.toml"
+    fig05 = SCENARIOS / "paper" / "fig05.toml"
     scenes = find_scenes(["paper/fig08", str(fig05), str(own), "paper/fig05", str(tmp_path), "paper"])
     names = [scene.name for scene in scenes]
     assert names[:3] == ["paper/fig08", "paper/fig05", "own"]

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from rotor_mbs.errors import InputError
-from rotor_mbs.scenario.catalogue import find_scenes, list_scenes, sweeps_folder
+from rotor_mbs.scenario.catalogue import SWEEPS, find_scenes, list_scenes
 from rotor_mbs.scenario.sweep import Axis, Design, Range, Sweep, load_sweep, split_rows, sweep_of
 
 _HEAD = 'title = "t"\nscene = "paper/fig11"\n'
@@ -137,7 +137,7 @@ def test_errors_name_file_line_key_and_what_is_allowed(tmp_path: Path, text: str
     assert int(caught.value.problems[0].removeprefix(f"{tmp_path / 's.toml'}:").split(":")[0]) == line
 
 
-@pytest.mark.parametrize("path", sorted(sweeps_folder().glob("*.toml")), ids=lambda path: path.stem)
+@pytest.mark.parametrize("path", sorted(SWEEPS.glob("*.toml")), ids=lambda path: path.stem)
 def test_shipped_sweeps_load_and_are_no_scenes(path: Path) -> None:
     assert load_sweep(Path("sweeps") / path.stem).design.count >= 100
     assert f"sweeps/{path.stem}" not in dict(list_scenes())

@@ -28,9 +28,8 @@ from rotor_mbs.cli import verdicts as formats
 from rotor_mbs.methods.catalogue import REFERENCE, method_names
 from rotor_mbs.methods.solve import solve
 from rotor_mbs.runs.table import Rows, characters, extend_file
-from rotor_mbs.scenario import catalogue
 from rotor_mbs.scenario.accuracy_bounds import Bound, load_bounds
-from rotor_mbs.scenario.catalogue import reference_folder
+from rotor_mbs.scenario.catalogue import REFERENCES
 from rotor_mbs.solution.metrics import horizon_samples, running_growth
 from rotor_mbs.solution.status import code_of
 from rotor_mbs.studies.stored_references import frozen_solution
@@ -215,35 +214,25 @@ def test_a_reference_that_is_altered_or_not_there_fails(copy: Path, capsys: pyte
     named(lines_of(capsys, copy, status=1), f"FAIL reference: {SCENE} reference all", "no reference")
 
 
-@pytest.fixture
-def own_references(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """The shipped references in a folder of their own, to be touched."""
-    folder = tmp_path / "reference"
-    shutil.copytree(reference_folder(), folder)
-    right = catalogue._folder
-    monkeypatch.setattr(catalogue, "_folder", lambda name: folder if name == "reference" else right(name))
-    return folder
-
-
 def test_references_of_a_results_file_are_frozen_bit_for_bit(good: Path, tmp_path: Path) -> None:
     """Those of `good` were read from the shipped file."""
     freeze(good, tmp_path / "again.h5")
     lines = (tmp_path / "again.sha256").read_text().splitlines()
     assert lines
-    assert {*lines} <= {*(reference_folder() / "check.sha256").read_text().splitlines()}
+    assert {*lines} <= {*(REFERENCES / "check.sha256").read_text().splitlines()}
 
 
-def test_the_shipped_references_are_bit_for_bit_those_that_were_frozen(own_references: Path) -> None:
+def test_the_shipped_references_are_bit_for_bit_those_that_were_frozen(tmp_path: Path) -> None:
     """A number touched in its last bit is found, beyond its horizon, too, where no agreement would tell."""
-    for path in own_references.glob("*.h5"):
+    for path in REFERENCES.glob("*.h5"):
         assert digests(path) == path.with_suffix(".sha256").read_text()
 
     def touch(row: Rows) -> None:
         row["angles"][900, 2] = np.nextafter(row["angles"][900, 2], np.inf)
 
-    change_row(own_references / "paper.h5", "paper/fig12/reference", touch)
-    path = own_references / "paper.sha256"
-    now, frozen = digests(own_references / "paper.h5").splitlines(), path.read_text().splitlines()
+    touched = Path(shutil.copy(REFERENCES / "paper.h5", tmp_path))
+    change_row(touched, "paper/fig12/reference", touch)
+    now, frozen = digests(touched).splitlines(), (REFERENCES / "paper.sha256").read_text().splitlines()
     assert [new.split()[1:] for new, old in zip(now, frozen, strict=True) if new != old] == [["paper/fig12", "angles"]]
 
 

@@ -31,7 +31,7 @@ from rotor_mbs.methods.solve import solve
 from rotor_mbs.models.printed import literal
 from rotor_mbs.report.numbers import number, power, with_unit
 from rotor_mbs.runs.versions import versions
-from rotor_mbs.scenario.catalogue import find_scenes, reference_folder
+from rotor_mbs.scenario.catalogue import REFERENCES, find_scenes
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.status import COMPLETE
 from rotor_mbs.solution.trajectory import Array
@@ -405,7 +405,7 @@ def main() -> None:
     trials = number_trials(tuple(GRAVITY_ROWS), TRIED_DURATIONS, TOLERANCES, arguments.jobs)
     text = runs_as_json(shares, trials, arguments.runs, arguments.seed)
     FILE.write_text(text, encoding="utf-8")
-    (reference_folder() / "claims.json").write_text(verdicts_as_json(json.loads(text)), encoding="utf-8")
+    (REFERENCES / "claims.json").write_text(verdicts_as_json(json.loads(text)), encoding="utf-8")
 
 
 if __name__ == "__main__":

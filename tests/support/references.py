@@ -8,7 +8,7 @@ import pytest
 
 from rotor_mbs.methods.solve import solve
 from rotor_mbs.runs.read import open_results
-from rotor_mbs.scenario.catalogue import find_scenes, reference_folder
+from rotor_mbs.scenario.catalogue import REFERENCES, find_scenes
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.trajectory import Array, Solution, Trajectory
 from rotor_mbs.studies.stored_references import rebuilt_reference
@@ -24,7 +24,7 @@ def scene(name: str) -> Scene:
 @functools.cache
 def _arrays(group: str) -> dict[str, dict[str, Array]]:
     """Of every reference in a file: to open and verify it takes a second, to read all of it no more."""
-    with open_results(reference_folder() / f"{group}.h5") as results:
+    with open_results(REFERENCES / f"{group}.h5") as results:
         runs = {name: stored.reference for name, stored in results.scenes.items()}
         return {name: {array: run.array(array) for array in run.names} for name, run in runs.items() if run}
 
