@@ -87,7 +87,7 @@ def checks_of(results: OpenResults, frozen: Sequence[OpenResults], bounds: Bound
     checks: list[Check] = []
     with np.errstate(all="ignore"):  # a hostile file may hold any number; what overflows fails
         for scene in results.scenes.values():
-            own = bounds.for_scene(scene.name if _is_shipped(scene) else "")
+            own = replace(bounds, scene=scene.name if _is_shipped(scene) else "")
             # Whether the reference itself stops early: the motion does not exist beyond.
             motion_ends = scene.reference is not None and scene.reference.status == "singular"
             for run in scene.runs.values():

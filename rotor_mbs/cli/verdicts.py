@@ -16,7 +16,7 @@ from rotor_mbs.cli.terminal import ProgressLine, print_table
 from rotor_mbs.errors import InputError
 from rotor_mbs.runs.output_files import refuse_foreign, replace_file
 from rotor_mbs.runs.read import is_sweep
-from rotor_mbs.scenario.accuracy_bounds import load_bounds
+from rotor_mbs.scenario.accuracy_bounds import read_bounds, shipped_bounds
 from rotor_mbs.studies import check as study
 
 WORST = 10  # annotations: GitHub shows as many of a step and drops the others silently
@@ -30,7 +30,7 @@ JSON = rb'\A\[\]\Z|\A\[\n \{\n  "check": "'
 def check(arguments: argparse.Namespace) -> int:
     """Prints every verdict that fails (with --verbose all), then a count; status 1 where one fails."""
     _refuse_foreign(arguments)
-    bounds = load_bounds(arguments.bounds)
+    bounds = shipped_bounds().with_entries(read_bounds(arguments.bounds) if arguments.bounds else ())
     earlier = None if arguments.against is None else study.check_file(arguments.against, bounds)
     if earlier is not None and arguments.file is not None and is_sweep(arguments.against) != is_sweep(arguments.file):
         raise InputError(f"--against {arguments.against}: a file of another kind than {arguments.file}")

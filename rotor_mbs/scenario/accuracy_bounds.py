@@ -48,9 +48,8 @@ class Bound:
     scenes: str = file_key("scenes", _PATTERN, default="*")
 
 
-@dataclass(frozen=True)
-class _BoundsFile:
-    bound: tuple[Bound, ...] = file_key("bound", keys.list_of(keys.table_of(Bound), "one or more [[bound]] tables"))
+_BOUND_TABLES = keys.list_of(keys.table_of(Bound), "one or more [[bound]] tables")
+_FILE = {"bound": file_key("bound", _BOUND_TABLES).metadata}
 
 
 @dataclass(frozen=True)
@@ -60,10 +59,6 @@ class Bounds:
 
     entries: Sequence[Bound]
     scene: str = ""
-
-    def for_scene(self, scene: str) -> Bounds:
-        """The bounds on runs of a shipped scene, which are near to what is seen there."""
-        return replace(self, scene=scene)
 
     def of(self, check: str, method: str) -> Bound:
         """The first that fits. Raises InputError where none does: a check without a bound would pass anything."""
@@ -88,17 +83,12 @@ class Bounds:
 @functools.cache
 def shipped_bounds() -> Bounds:
     """The bounds of reference/accuracy.toml, read once. Raises InputError with every error of the file."""
-    return read_bounds(REFERENCES / "accuracy.toml")
+    return Bounds(read_bounds(REFERENCES / "accuracy.toml"))
 
 
-def load_bounds(own: Path | None = None) -> Bounds:
-    """The bounds of the file `own`, then the shipped ones. Raises InputError with every error of a file."""
-    return shipped_bounds().with_entries(read_bounds(own).entries if own else [])
-
-
-def read_bounds(path: Path) -> Bounds:
-    """The bounds of one TOML file of [[bound]] tables. Raises InputError with every error of the file."""
+def read_bounds(path: Path) -> tuple[Bound, ...]:
+    """The entries of one TOML file of [[bound]] tables. Raises InputError with every error of the file."""
     file = read_toml(path)
     with file.located():
-        bounds: _BoundsFile = keys.table_of(_BoundsFile).read(file.tables)
-    return Bounds(bounds.bound)
+        entries: tuple[Bound, ...] = keys.read_keys(_FILE, file.tables)["bound"]
+    return entries

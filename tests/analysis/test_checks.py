@@ -18,12 +18,12 @@ from rotor_mbs.analysis.judgement import defects_of, energy_slack, judge, quanti
 from rotor_mbs.methods.catalogue import REFERENCE
 from rotor_mbs.methods.solve import solve
 from rotor_mbs.runs.read import open_results
-from rotor_mbs.scenario.accuracy_bounds import load_bounds
+from rotor_mbs.scenario.accuracy_bounds import shipped_bounds
 from rotor_mbs.scenario.catalogue import REFERENCES
 from rotor_mbs.solution.metrics import energy_scale, metrics_of
 from rotor_mbs.solution.trajectory import Solution, Trajectory
 
-METHOD, PRINTED, BOUNDS = "lagrange/dop853", "printed/ode45", load_bounds()
+METHOD, PRINTED, BOUNDS = "lagrange/dop853", "printed/ode45", shipped_bounds()
 LOADED = scene("check/loads")
 FIG11 = paper("fig11", samples=101)
 ANGLES, RATE = {"rotor_angle_min", "rotor_angle_max"}, {"rotor_rate_max"}

@@ -15,7 +15,7 @@ from rotor_mbs.analysis import judgement as judgement_module
 from rotor_mbs.analysis import kinematics
 from rotor_mbs.analysis.judgement import OK_ERROR, judge, rotor_inertia_shares
 from rotor_mbs.methods.catalogue import is_corrected, method_names
-from rotor_mbs.scenario.accuracy_bounds import Bound, load_bounds
+from rotor_mbs.scenario.accuracy_bounds import Bound, shipped_bounds
 from rotor_mbs.scenario.catalogue import find_scenes
 from rotor_mbs.scenario.scene import Blade, Scene
 from rotor_mbs.solution.metrics import ANGLE_LIMIT, metrics_of, running_growth
@@ -25,7 +25,7 @@ Array = Any
 DONE, FAILED = Integration(True), Integration(False, "gave up")
 OUT_OF_TIME = Integration(False, "ended", 0.5, out_of_time=True)
 METHOD, PRINTED = "lagrange/taylor", "printed/ode45"
-BOUNDS = load_bounds()
+BOUNDS = shipped_bounds()
 LONG = Blade(1000.0, (0.1, 0.0, 10.0), (0.0,) * 6, (0.1, 0.0, 20.0))
 SHORT = Blade(1000.0, (0.1, 0.0, 5.0), (0.0,) * 6, (0.1, 0.0, 20.0))
 SCENE = Scene(

@@ -15,7 +15,7 @@ import yaml
 from support.commands import rotor_mbs
 
 import rotor_mbs as rm
-from rotor_mbs.scenario.accuracy_bounds import load_bounds
+from rotor_mbs.scenario.accuracy_bounds import shipped_bounds
 from rotor_mbs.studies.check import judge_file, regressions
 
 ROOT = Path(__file__).parents[2]
@@ -69,7 +69,7 @@ def test_a_run_that_is_gone_is_found(earlier: Path, folder: Path) -> None:
     ],
 )
 def test_a_margin_may_shrink_tenfold(before: float, now: float, passes: bool, earlier: Path) -> None:
-    verdict = replace(judge_file(earlier, load_bounds())[0], bound=1.0)
+    verdict = replace(judge_file(earlier, shipped_bounds())[0], bound=1.0)
     (compared,) = regressions([replace(verdict, value=now)], [replace(verdict, value=before)])
     assert compared.passed == passes
 

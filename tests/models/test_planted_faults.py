@@ -58,7 +58,7 @@ def near_the_end(scene: Scene) -> tuple[Scene, Trajectory]:
 
 def limits(name: str, method: str) -> tuple[float, float]:
     """rad: the method's bounds on the largest defect and on the median."""
-    bounds = shipped_bounds().for_scene(f"paper/{name}")
+    bounds = replace(shipped_bounds(), scene=f"paper/{name}")
     of_median = bounds.find("defect median", method)
     return bounds.of("defect", method).value, np.inf if of_median is None else of_median.value
 

@@ -28,7 +28,7 @@ from rotor_mbs.cli import verdicts as formats
 from rotor_mbs.methods.catalogue import REFERENCE, method_names
 from rotor_mbs.methods.solve import solve
 from rotor_mbs.runs.table import Rows, characters, extend_file
-from rotor_mbs.scenario.accuracy_bounds import Bound, load_bounds
+from rotor_mbs.scenario.accuracy_bounds import Bound, shipped_bounds
 from rotor_mbs.scenario.catalogue import REFERENCES
 from rotor_mbs.solution.metrics import horizon_samples, running_growth
 from rotor_mbs.solution.status import code_of
@@ -119,7 +119,7 @@ def test_a_reference_computed_now_is_the_frozen_one(scene: str) -> None:
     uncertainty = np.abs(np.log(own.angle_uncertainty[used] / frozen.angle_uncertainty[used]))
     beyond = np.abs(own.angles - frozen.angles).max(axis=1) - own.angle_uncertainty
     for name, differences in {"reference": beyond, "growth": growth, "uncertainty": uncertainty}.items():
-        assert differences.max(initial=0.0) <= load_bounds().of(name, REFERENCE).value
+        assert differences.max(initial=0.0) <= shipped_bounds().of(name, REFERENCE).value
 
 
 # Faults in files
@@ -240,17 +240,17 @@ def test_the_shipped_references_are_bit_for_bit_those_that_were_frozen(tmp_path:
 
 
 def test_every_bound_is_below_what_a_known_fault_gives() -> None:
-    for bound in load_bounds().entries:
+    for bound in shipped_bounds().entries:
         assert bound.value < bound.fault, bound
         assert bound.known_fault
 
 
 def _known_faults() -> Iterator[tuple[Bound, str, str, float]]:
     """Each bound whose known fault is a number of a scene that is off: with the scene, a method, and by how much."""
-    for bound in load_bounds().entries:
+    for bound in shipped_bounds().entries:
         text, _, place = bound.known_fault.rstrip(")").partition(" (")
         scene = place if "/" in place else f"paper/{place}"
-        own = load_bounds().for_scene("" if bound.scenes == "*" else scene)
+        own = replace(shipped_bounds(), scene="" if bound.scenes == "*" else scene)
         methods = [name for name in method_names(is_corrected=True) if own.find(bound.check, name) == bound]
         if methods and (bound.check in WRONG or bound.check == "gap"):
             share = {"no gravity": -1.0, "every second sample omitted": EVERY_SECOND_SAMPLE}.get(text)

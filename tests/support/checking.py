@@ -16,7 +16,7 @@ from rotor_mbs.methods.solve import solve
 from rotor_mbs.models.exudyn import chain
 from rotor_mbs.runs.design import Asked
 from rotor_mbs.runs.table import extend_file, results_tables, row_of_run
-from rotor_mbs.scenario.accuracy_bounds import Bounds, load_bounds
+from rotor_mbs.scenario.accuracy_bounds import Bounds, shipped_bounds
 from rotor_mbs.scenario.catalogue import find_scenes
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.trajectory import Solution
@@ -47,7 +47,7 @@ def add_run(path: Path, scene: Scene, run: Solution) -> None:
 
 
 def judged(path: Path, bounds: Bounds | None = None) -> list[Check]:
-    return check.judge_file(path, bounds or load_bounds())
+    return check.judge_file(path, bounds or shipped_bounds())
 
 
 def failed(checks: Sequence[Check]) -> list[Check]:

@@ -70,7 +70,7 @@ def smallest_faults(scene: str, run: StoredRun, of_fault: dict[str, Array]) -> l
     A wrong number is in every interval: it shows where its largest defect is above the bound on the largest, or their
     median above the bound on the median.
     """
-    own = shipped_bounds().for_scene(scene)
+    own = replace(shipped_bounds(), scene=scene)
     limits = [(own.of("defect", run.method).value + FLOOR_SAFETY * run.attributes["defect_floor"], np.max)]
     if (of_median := own.find("defect median", run.method)) is not None:
         limits.append((of_median.value, np.median))
