@@ -14,7 +14,7 @@ import sys
 import threading
 import warnings
 from collections.abc import Iterator, Sequence
-from contextlib import ExitStack, contextmanager, suppress
+from contextlib import contextmanager, redirect_stderr, redirect_stdout, suppress
 from typing import Any, TextIO
 
 from rotor_mbs.errors import InputError, MethodRefusal, PlausibilityWarning, RotorError, StoreError
@@ -72,19 +72,11 @@ def main(argv: Sequence[str] | None = None) -> int:
             return EXIT_BAD_INPUT if exc.filename else EXIT_FAILED
 
 
-def _print_warning(
-    message: Warning | str,
-    category: type[Warning],
-    filename: str,
-    lineno: int,
-    file: TextIO | None = None,
-    line: str | None = None,
-) -> None:
+def _print_warning(message: Warning | str, category: type[Warning], *where: Any, **_: Any) -> None:
     """Doubts about numbers of a file in a line, other warnings as Python shows them."""
-    text = f"warning: {message}"
-    if not issubclass(category, PlausibilityWarning):
-        text = warnings.formatwarning(message, category, filename, lineno, line)
-    print_line(text.rstrip(), file or sys.stderr)
+    is_doubt = issubclass(category, PlausibilityWarning)
+    text = f"warning: {message}" if is_doubt else warnings.formatwarning(message, category, *where[:2])
+    print_line(text.rstrip(), sys.stderr)
 
 
 def _is_interrupt(error: BaseException) -> bool:
@@ -157,14 +149,10 @@ class PlainStream:
 @contextmanager
 def plain_streams() -> Iterator[None]:
     """In the block, standard output and standard error are plain; in place of a closed one stands the null device."""
-    before = sys.stdout, sys.stderr
-    with ExitStack() as stack:
-        null = stack.enter_context(open(os.devnull, "w"))  # noqa: PTH123  (a device)
-        sys.stdout, sys.stderr = (PlainStream(stream or null) for stream in before)
-        try:
+    with open(os.devnull, "w") as null:  # noqa: PTH123  (a device)
+        output, errors = PlainStream(sys.stdout or null), PlainStream(sys.stderr or null)
+        with redirect_stdout(output), redirect_stderr(errors):
             yield
-        finally:
-            sys.stdout, sys.stderr = before
 
 
 def print_line(text: str, stream: TextIO) -> None:
