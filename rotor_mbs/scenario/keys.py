@@ -19,7 +19,6 @@ from rotor_mbs.scenario.toml_file import KeyProblem, TableError
 
 ALLOWED = "numbers, + - * / ** ( ), pi, sqrt(x), hypot(x, y), deg(x)"
 MAX_LENGTH = 200  # characters
-MAX_DEPTH = 32  # signs, right operands and calls inside one another
 
 # What Python would read but an expression may not hold: other characters, 0x10, 1j, 2pi, a comma that ends a list.
 _FORBIDDEN = re.compile(r"[^0-9A-Za-z.+\-*/(), \t]|(?<=[0-9.])(?![eE][+-]?[0-9])[A-Za-z]|,(?=[ \t]*\))|//")
@@ -47,33 +46,29 @@ def evaluate(text: str) -> float:
     if forbidden:
         raise ValueError(f"{forbidden[0]!a} has no meaning in an expression")
     try:
-        tree = ast.parse(_LEADING_ZEROS.sub("", text.strip(" \t")), mode="eval")
+        return _value(ast.parse(_LEADING_ZEROS.sub("", text.strip(" \t")), mode="eval").body)
     except (SyntaxError, MemoryError, RecursionError) as error:
-        raise ValueError(f"{_shown(text)} is not a complete expression") from error
-    return _value(tree.body, 1)
+        raise ValueError(f"{shown(text)} is not a complete expression") from error
 
 
-def _value(node: ast.expr, depth: int) -> float:
-    if depth > MAX_DEPTH:
-        raise ValueError(f"an expression is nested deeper than {MAX_DEPTH}")
+def _value(node: ast.expr) -> float:
     match node:
         case ast.Constant(value=int() | float() as number) if not isinstance(number, bool):
-            return _applied(_shown(ast.unparse(node)), float, number)
+            return _applied(shown(ast.unparse(node)), float, number)
         case ast.Name(id="pi"):
             return math.pi
         case ast.UnaryOp(op=ast.USub(), operand=operand):
-            return -_value(operand, depth + 1)
+            return -_value(operand)
         case ast.BinOp(op=op) if type(op) in _OPERATIONS:
             sign, function = _OPERATIONS[type(op)]
-            # A sum of many terms is a chain of left operands: no deeper than its first one.
-            x, y = _value(node.left, depth), _value(node.right, depth + 1)
+            x, y = _value(node.left), _value(node.right)
             return _applied(f"{x:g} {sign} {y:g}", function, x, y)
         case ast.Call(func=ast.Name(id=name), args=arguments, keywords=[]) if name in _FUNCTIONS:
             function, count = _FUNCTIONS[name]
             if len(arguments) != count:
                 raise ValueError(f"{name} takes {count} argument{'s' if count > 1 else ''}, not {len(arguments)}")
-            return _applied(name, function, *(_value(argument, depth + 1) for argument in arguments))
-    raise ValueError(f"{_shown(ast.unparse(node))} is not a number or an operation on numbers")
+            return _applied(name, function, *(_value(argument) for argument in arguments))
+    raise ValueError(f"{shown(ast.unparse(node))} is not a number or an operation on numbers")
 
 
 def _applied(called: str, function: Callable[..., float], *arguments: float) -> float:
@@ -84,11 +79,6 @@ def _applied(called: str, function: Callable[..., float], *arguments: float) -> 
     if not math.isfinite(value):
         raise ValueError(f"{called} has no finite value")
     return value
-
-
-def _shown(text: str) -> str:
-    short = text if len(text) <= 40 else f"{text[:37]}..."
-    return f"'{short}'" if short.isprintable() else ascii(short)  # a tab
 
 
 MAX_NUMBER = 1e300
