@@ -23,6 +23,7 @@ from rotor_mbs.methods.catalogue import look_up, methods, problems_of_methods
 from rotor_mbs.runs import cores
 from rotor_mbs.scenario.catalogue import find_scenes, list_scenes, list_sweeps, only_scene
 from rotor_mbs.scenario.keys import counted
+from rotor_mbs.scenario.toml_file import KeyPath, shown_key
 from rotor_mbs.solution.status import GOOD
 
 
@@ -103,9 +104,8 @@ def _show_scene(arguments: argparse.Namespace) -> None:
         return
     print(f"{scene.name}\n")
     for path, value in _keys(tables):
-        name = "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in path)[1:]
         unit = "" if unit_of(path) == "1" else f", {unit_of(path)}"
-        print(f"  {name + unit:28} {value}")
+        print(f"  {shown_key(path) + unit:28} {value}")
     print("\nmethods" + (", and the items that each model builds" if arguments.build else ""))
     for name, model in models.items():
         first, *others = model["methods"]
@@ -119,7 +119,7 @@ def _show_scene(arguments: argparse.Namespace) -> None:
             print(f"    {item['kind']:9} {item['name']:28} {item['detail']}".rstrip())
 
 
-def _keys(value: Any, path: tuple[str | int, ...] = ()) -> Iterator[tuple[tuple[str | int, ...], Any]]:
+def _keys(value: Any, path: KeyPath = ()) -> Iterator[tuple[KeyPath, Any]]:
     """The path and the value of each key of a scene file."""
     if isinstance(value, dict):
         for name, inner in value.items():

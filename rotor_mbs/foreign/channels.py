@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from rotor_mbs.errors import InputError
 from rotor_mbs.foreign.files import ALLOWED_UNITS, BASE_UNITS, UNITS, DataTable, read_table, shown_names, table_of
 from rotor_mbs.scenario import keys
-from rotor_mbs.scenario.keys import Kind, file_key, wrong
+from rotor_mbs.scenario.keys import Kind, file_key
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.scenario.toml_file import TableError, read_toml
 from rotor_mbs.solution.quantities import LOADS
@@ -180,10 +180,7 @@ def split_unit(name: str) -> tuple[str, str]:
     return name[: match.start()], re.sub("_(?:per_)?s$", "/s", match[1].lower())
 
 
-def _read_sign(value: object) -> int:
-    if isinstance(value, bool) or not isinstance(value, int) or abs(value) != 1:
-        raise wrong(f"{keys.shown(value)} is not one of them")
-    return value
+_SIGN = keys.where(keys.whole(-1, 1), bool, "1, -1")
 
 
 @dataclass(frozen=True)
@@ -196,7 +193,7 @@ class Entry:
 
     column: str = file_key("column", Kind(keys.read_text, "the name of a column"))
     unit: str = file_key("unit", Kind(keys.read_text, "a unit such as deg"), default="")
-    sign: int = file_key("sign", Kind(_read_sign, "1, -1"), default=1)
+    sign: int = file_key("sign", _SIGN, default=1)
     offset: float = file_key("offset", keys.NUMBER, note=", in the column's unit", default=0.0)
     wrapped: bool = file_key("wrapped", keys.FLAG, default=False)
     frame: str = file_key("frame", keys.choice(("blade", "rotor", "base")), default="")

@@ -600,15 +600,11 @@ _EXAMPLE: dict[str, Any] = {
 
 def new_scene_text() -> str:
     """A scene file with every key, a value and what is allowed, to start a scene from."""
-    lines: dict[str, list[str]] = {"": _HEADER.splitlines()}
+    lines: dict[str, list[str]] = {"": _HEADER.splitlines(), "blade": []}
     needed = {"blade"}
-    declarations: dict[str, Mapping[str, Any]] = {}  # by path; those of a blade in the place of `blade`
-    for declared in SCENE_KEYS.values():
-        if declared["key"] == "blade":
-            declarations |= {f"blade.{name}": of_blade for name, of_blade in BLADE_KEYS.items()}
-        elif declared["key"] != "settings":
-            declarations[declared["key"]] = declared
-    for path, declared in declarations.items():
+    for path, declared in _BY_PATH.items():
+        if path in ("blade", "settings"):  # tables
+            continue
         table, _, name = path.rpartition(".")
         value = _EXAMPLE.get(path, declared.get("optional"))
         if value == () and declared["unit"] != "1":  # no load
