@@ -303,45 +303,35 @@ def read_keys(
     that could be read."""
     values: dict[str, Any] = {}
     problems: list[KeyProblem] = []
-    names: dict[str, list[str]] = {"": []}  # of the keys by table, "" for the top
-    needed = set()  # tables with a key that must be there
-    for key in keys.values():
-        table, _, name = key["key"].rpartition(".")
-        names.setdefault(table, []).append(name)
-        if "optional" not in key:
-            needed.add(table)
-    inside = {"": tables}
-    for table in list(names)[1:]:
-        names[""].append(table)
-        given = tables.get(table, {})
-        allowed = f"a table with {', '.join(names[table])}"
-        if table not in tables and table in needed:
-            problems.append(KeyProblem((table,), "is missing", allowed))
-        elif isinstance(given, dict):
-            inside[table] = given
-        else:
-            problems.append(KeyProblem((table,), f"{shown(given)} is not a table", allowed))
+    fields: dict[str, dict[str, str]] = {"": {}}  # by table, "" for the top, the field of each key's name
     for field, key in keys.items():
         table, _, name = key["key"].rpartition(".")
-        path = (table, name) if table else (name,)
-        if table not in inside:
+        fields.setdefault(table, {})[name] = field
+    for table, own in fields.items():
+        given = tables.get(table, {}) if table else tables
+        is_needed = any("optional" not in keys[field] for field in own.values())
+        if table and ((table not in tables and is_needed) or not isinstance(given, dict)):
+            what = f"{shown(given)} is not a table" if table in tables else "is missing"
+            problems.append(KeyProblem((table,), what, f"a table with {', '.join(own)}"))
             continue
-        if name in inside[table]:
-            context = [values] if key["kind"].in_context else []
-            try:
-                values[field] = key["kind"].read(inside[table][name], *context)
-            except TableError as error:
-                problems += error.below(*path, allowed=key["allowed"])
-        elif "optional" in key and not (table in tables and len(names[table]) == 1):
-            values[field] = key["optional"]
-        else:
-            problems.append(KeyProblem(path, "is missing", key["allowed"]))
-    for table, entries in inside.items():
-        for name in entries:
-            if name not in names[table]:
-                what = f"unknown key{nearest(name, names[table])}"
-                path = (table, name) if table else (name,)
-                problems.append(KeyProblem(path, what, ", ".join(names[table]), is_of_key=True))
+        path = (table,) if table else ()
+        for name, field in own.items():
+            key = keys[field]
+            if name in given:
+                context = [values] if key["kind"].in_context else []
+                try:
+                    values[field] = key["kind"].read(given[name], *context)
+                except TableError as error:
+                    problems += error.below(*path, name, allowed=key["allowed"])
+            elif "optional" in key and not (table in tables and len(own) == 1):
+                values[field] = key["optional"]
+            else:
+                problems.append(KeyProblem((*path, name), "is missing", key["allowed"]))
+        known = [*own] if table else [*own, *filter(None, fields)]
+        for name in given:
+            if name not in known:
+                what = f"unknown key{nearest(name, known)}"
+                problems.append(KeyProblem((*path, name), what, ", ".join(known), is_of_key=True))
     problems += also(values)
     if problems:
         raise TableError(problems)

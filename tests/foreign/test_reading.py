@@ -243,7 +243,7 @@ def test_wrong_arrays_are_refused(arrays: dict[str, object], message: str) -> No
         ('time = "t"\nrotr = "a"', "map.toml:2: rotr: unknown key, perhaps rotor; allowed: time, rotor, pitch_1"),
         ('rotor = "c"', "no column 'c'; available: t, a, b"),
         ('rotor = { column = "a", unit = "rpm" }', "'rpm'; allowed: rad, deg, turns"),
-        ('rotor = { column = "a", sign = 2 }', "rotor.sign: 2 is not one of them; allowed: 1, -1"),
+        ('rotor = { column = "a", sign = 2 }', "rotor.sign: 2 is out of range; allowed: 1, -1"),
         ("rotor = 3", "rotor: 3 is not a table; allowed: a column's name, or a table with `column`"),
         ('time = "t"', "no channel to compare"),
         ("rotor", "not TOML"),
