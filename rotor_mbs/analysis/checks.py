@@ -17,9 +17,8 @@ from rotor_mbs.analysis import kinematics
 from rotor_mbs.analysis.judgement import energy_slack, judge, quantity_bound, quantity_errors, start_slack
 from rotor_mbs.analysis.kinematics import exact_rotor_angle
 from rotor_mbs.analysis.published import claims
-from rotor_mbs.analysis.run_selection import PRINTED
 from rotor_mbs.errors import InputError, StoreError
-from rotor_mbs.methods.catalogue import REFERENCE, is_corrected, look_up, methods
+from rotor_mbs.methods.catalogue import PRINTED, REFERENCE, is_corrected, look_up, methods
 from rotor_mbs.methods.solve import solve
 from rotor_mbs.runs.read import OpenResults, StoredRun, StoredScene
 from rotor_mbs.runs.table import reading

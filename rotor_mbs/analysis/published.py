@@ -15,7 +15,6 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, fields
 from typing import Any, Literal, NamedTuple
 
-from rotor_mbs.analysis import run_selection
 from rotor_mbs.runs.read import StoredScene
 from rotor_mbs.scenario.catalogue import REFERENCES
 from rotor_mbs.solution.status import GOOD
@@ -196,7 +195,7 @@ def claims(scenes: Mapping[str, StoredScene], items: Iterable[Published] | None 
             continue
         metric, _ = STATISTICS[item.of.quantity, item.of.statistic]
         scene = scenes[item.of.scene]
-        runs = run_selection.printed_run(scene), run_selection.reference_or_corrected_run(scene)
+        runs = scene.printed, scene.corrected
         values = [None if run is None else run.attributes.get(metric) for run in runs]
         if values != [None, None]:
             results.append(Claim(item, *values))
@@ -225,7 +224,7 @@ def finding(scenes: Mapping[str, StoredScene], claims: Iterable[Claim]) -> list[
         study = claim_study()
         printed, corrected = (f"{study.count(name, HOLDS)} of {len(study.verdicts)}" for name in study.methods)
         rows.append(("Published claims that hold", printed, corrected))
-    runs = [run for scene in scenes.values() if (run := run_selection.printed_run(scene)) is not None]
+    runs = [run for scene in scenes.values() if (run := scene.printed) is not None]
     runs = [run for run in runs if "energy_gain_J" in run.attributes]
     rising = [run for run in runs if run.attributes["energy_gain_J"] > ENERGY_RISE * run.attributes["energy_scale_J"]]
     if runs:

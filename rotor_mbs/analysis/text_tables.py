@@ -7,7 +7,6 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from html import escape
 
-from rotor_mbs.analysis.run_selection import in_catalogue_order
 from rotor_mbs.analysis.work_precision import TARGETS_RAD, points, time_to_reach
 from rotor_mbs.methods.catalogue import REFERENCE, is_corrected
 from rotor_mbs.runs.read import Record, StoredRun, StoredScene
@@ -46,8 +45,7 @@ def method_table(runs: Iterable[StoredRun]) -> TextTable:
     for run in runs:
         by_method.setdefault(run.method, []).append(run)
     rows = []
-    for method in in_catalogue_order(by_method):
-        own = by_method[method]
+    for method, own in by_method.items():
         ended_well = [run for run in own if run.status in GOOD]
         count = f"{len(ended_well)} of {len(own)} {'ok' if is_corrected(method) else 'completed'}"
         numbers = []

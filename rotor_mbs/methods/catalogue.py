@@ -23,6 +23,7 @@ if TYPE_CHECKING:  # `rotor-mbs list` reads no scene
     from rotor_mbs.scenario.scene import Scene
 
 REFERENCE = "reference"
+PRINTED = "printed/ode45"  # with all errata
 GROUP = "rotor_mbs.methods"
 
 R = TypeVar("R")

@@ -10,7 +10,6 @@ from pathlib import Path
 import numpy as np
 from PIL import Image
 
-from rotor_mbs.analysis import run_selection
 from rotor_mbs.analysis.kinematics import tip_paths
 from rotor_mbs.errors import InputError
 from rotor_mbs.report import canvas
@@ -65,7 +64,7 @@ def write_animation(results: Path, name: str, output: Path, magnified: float | N
 def frames(stored: StoredScene, magnified: float | None) -> Iterator[Image.Image]:
     """The runs side by side: paths up to the frame, then the blades. Raises InputError where nothing can be drawn."""
     scene = stored.scene
-    runs = {label_of(run.method): run for run in run_selection.sides(stored).values() if "angles" in run}
+    runs = {label_of(run.method): run for run in stored.sides.values() if "angles" in run}
     if not runs:
         raise InputError(f"{stored.name}: nothing to plot: no angles")
     end = max(float(run.array("time")[-1]) for run in runs.values())

@@ -24,7 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor_mbs.errors import StoreError
-from rotor_mbs.methods.catalogue import REFERENCE, look_up
+from rotor_mbs.methods.catalogue import PRINTED, REFERENCE, is_corrected, look_up
 from rotor_mbs.runs.design import FROZEN, MISSING, OF_METHODS, POINT_COLUMNS, REPEATED, RUNS, Column
 from rotor_mbs.runs.table import (
     DIGESTS,
@@ -214,7 +214,8 @@ class StoredRun:
 
 @dataclass(frozen=True)
 class StoredScene:
-    """A scene in an open file: name, attributes (title, figures, blades, scene_toml, scene_hash) and its runs."""
+    """A scene in an open file: name, attributes (title, figures, blades, scene_toml, scene_hash) and its runs, the
+    reference first, then methods in the order of the catalogue."""
 
     name: str
     attributes: dict[str, Any]
@@ -242,6 +243,29 @@ class StoredScene:
     def methods(self) -> dict[str, StoredRun]:
         """The runs but the reference, in the order of the file."""
         return {name: run for name, run in self.runs.items() if name != REFERENCE}
+
+    @property
+    def printed(self) -> StoredRun | None:
+        """The run of the printed equations with all their errata, where it has samples."""
+        run = self.runs.get(PRINTED)
+        return run if run is not None and run.samples else None
+
+    @property
+    def corrected_runs(self) -> dict[str, StoredRun]:
+        """Runs of the corrected models but the reference; those without samples too."""
+        return {name: run for name, run in self.methods.items() if is_corrected(name)}
+
+    @property
+    def corrected(self) -> StoredRun | None:
+        """The reference, else the first run of a corrected model that has samples; None without either."""
+        candidates = [self.reference, *self.corrected_runs.values()]
+        return next((run for run in candidates if run is not None and run.samples), None)
+
+    @property
+    def sides(self) -> dict[str, StoredRun]:
+        """The "printed" run and the one that stands for the "corrected" model, those that there are."""
+        sides = {"printed": self.printed, "corrected": self.corrected}
+        return {side: run for side, run in sides.items() if run is not None}
 
 
 @dataclass(frozen=True)

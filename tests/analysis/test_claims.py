@@ -9,7 +9,6 @@ import pytest
 from support.scenes import paper
 from support.stored import Made, rotor, store
 
-from rotor_mbs.analysis import run_selection
 from rotor_mbs.analysis.published import (
     HOLDS,
     Claim,
@@ -62,11 +61,11 @@ def test_what_the_file_cannot_decide_is_left_out(tmp_path: Path) -> None:
 def test_the_reference_stands_for_right_and_without_it_the_closed_form(tmp_path: Path) -> None:
     right = [Made(FIG11, name, rotor(np.zeros_like)) for name in ("exudyn_tree/rk67", TAYLOR, REFERENCE, PRINTED)]
     with open_results(store(tmp_path / "a.h5", right)) as results:
-        assert run_selection.reference_or_corrected_run(results.scenes["paper/fig11"]).method == REFERENCE
-        assert list(run_selection.in_order(results.scenes["paper/fig11"]))[:2] == [PRINTED, REFERENCE]
+        assert results.scenes["paper/fig11"].corrected.method == REFERENCE
+        assert list(results.scenes["paper/fig11"].runs)[:2] == [REFERENCE, PRINTED]
     with open_results(store(tmp_path / "b.h5", right[:2])) as results:
-        assert run_selection.reference_or_corrected_run(results.scenes["paper/fig11"]).method == TAYLOR
-        assert run_selection.printed_run(results.scenes["paper/fig11"]) is None
+        assert results.scenes["paper/fig11"].corrected.method == TAYLOR
+        assert results.scenes["paper/fig11"].printed is None
 
 
 def test_the_finding_counts_what_was_put_in(tmp_path: Path) -> None:

@@ -13,7 +13,6 @@ from support.commands import refusal, rotor_mbs
 from support.scenes import paper
 from support.stored import Made, rotor, store
 
-from rotor_mbs.analysis.run_selection import sides
 from rotor_mbs.cli import main
 from rotor_mbs.report.animation import wires
 from rotor_mbs.report.elements import TableCell
@@ -57,7 +56,7 @@ def test_models_are_compared_in_numbers(tmp_path: Path) -> None:
     ]
     with open_results(store(tmp_path / "r.h5", runs)) as opened:
         table, _ = scene_table(opened.scenes, dict.fromkeys(opened.scenes, "x.html"))
-        parted, same = (parting(*sides(scene).values()) for scene in opened.scenes.values())
+        parted, same = (parting(*scene.sides.values()) for scene in opened.scenes.values())
     head = [cell if isinstance(cell, str) else cell.note for cell in table.head]
     row, _ = (dict(zip(head, row, strict=True)) for row in table.rows)
     assert parted == (pytest.approx(2.5, abs=0.04), pytest.approx(0.2))

@@ -6,11 +6,11 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from functools import cached_property
 
-from rotor_mbs.analysis import published, run_selection
+from rotor_mbs.analysis import published
 from rotor_mbs.analysis.judgement import OK_ERROR
 from rotor_mbs.analysis.published import Claim, ClaimStudy, Erratum, claims
 from rotor_mbs.analysis.work_precision import by_scene
-from rotor_mbs.methods.catalogue import REFERENCE, errata_methods, is_corrected, look_up
+from rotor_mbs.methods.catalogue import PRINTED, REFERENCE, errata_methods, is_corrected, look_up
 from rotor_mbs.report.elements import PageTable, Row, TableCell
 from rotor_mbs.report.files import page_names
 from rotor_mbs.report.looks import label_of, with_capital
@@ -53,7 +53,7 @@ class Report(OpenResults):
     @cached_property
     def errata(self) -> Sequence[Erratum]:
         """Empty where no run is of equations that have them."""
-        printed = {run_selection.PRINTED, *errata_methods().values()}
+        printed = {PRINTED, *errata_methods().values()}
         return published.errata() if any(printed & {*scene.runs} for scene in self.scenes.values()) else ()
 
     @cached_property
@@ -127,7 +127,7 @@ def compared_time(scenes: Iterable[StoredScene]) -> tuple[float, float]:
     """s: how much of the scenes' time lies before their horizons, and how much they have in all."""
     compared = whole = 0.0
     for scene in scenes:
-        if scene.reference is not None and run_selection.has_samples(scene.reference):
+        if scene.reference is not None and scene.reference.samples:
             end = float(scene.reference.array("time")[-1])
             whole += end
             compared += min(horizon_of(scene) or 0.0, end)
@@ -141,7 +141,7 @@ def metrics_table(scene: StoredScene, suite_runs: Sequence[SuiteRun] = ()) -> Pa
     judged = [name for name in columns if name.endswith("_error_max") and name not in METRICS]
     shown = {name: columns[name] for name in (*METRICS, *judged) if name in columns}
     rows: list[Row] = []
-    for run in run_selection.in_order(scene).values():
+    for run in scene.runs.values():
         row = [run_cell(run), status_cell(run, of_suite.get(run.method))]
         for name in shown:
             value = metric(run, name)

@@ -5,10 +5,9 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 
-from rotor_mbs.analysis import run_selection
 from rotor_mbs.analysis.published import finding
 from rotor_mbs.analysis.text_tables import method_table
-from rotor_mbs.methods.catalogue import REFERENCE
+from rotor_mbs.methods.catalogue import PRINTED, REFERENCE
 from rotor_mbs.report import plots
 from rotor_mbs.report.elements import PageTable, Row, Section, TableCell, picture
 from rotor_mbs.report.looks import label_of
@@ -39,24 +38,24 @@ def index_page(report: Report) -> dict[str, object]:
     scenes, claims, study = report.scenes, report.claims, report.study
     model = "Corrected model" if claims else "Model"  # of a user's own rotor nothing was corrected
     # The scene with a published extreme that is no rounding error; else one with both models; else the first.
-    both = [name for name, scene in scenes.items() if len(run_selection.sides(scene)) > 1]
+    both = [name for name, scene in scenes.items() if len(scene.sides) > 1]
     shown = next(iter([*both, *scenes]))
     for claim in claims:
         item = claim.published
         if item.is_number and not item.rounding and item.of is not None and item.of.scene in scenes:
             shown = item.of.scene
             break
-    sides = list(run_selection.sides(scenes[shown]).values())
+    sides = list(scenes[shown].sides.values())
     own_claims = [claim for claim in claims if shown in claim.published.scenes]
-    printed = run_selection.printed_run(scenes[shown])
+    printed = scenes[shown].printed
     judged = {} if printed is None else {printed.method: printed}
-    judged |= run_selection.corrected_runs(scenes[shown])
+    judged |= scenes[shown].corrected_runs
     still = None
     for run in sides:
         if "tip" in run:
             still = picture(plots.paths(run.array("tip")), "still", f"{shown}: paths of the tips")
     benched = next((scene for scene in report.curves if scene in scenes), "")
-    methods = method_table(run for scene in scenes.values() for run in run_selection.corrected_runs(scene).values())
+    methods = method_table(run for scene in scenes.values() for run in scene.corrected_runs.values())
     method_rows = [(method_cell(name), *cells) for name, *cells in methods.rows]
     compared, whole = compared_time(scenes.values())
     notes = []
@@ -101,7 +100,7 @@ def scene_table(scenes: Scenes, files: Mapping[str, str]) -> tuple[PageTable, di
 
     Returns the table, and what its marks stand for.
     """
-    names = dict.fromkeys(name for scene in scenes.values() for name in run_selection.in_order(scene))
+    names = dict.fromkeys(name for scene in scenes.values() for name in scene.runs)
     methods = [name for name in names if name != REFERENCE]
     marks: dict[str, str] = {}
     rows: list[Row] = []
@@ -126,7 +125,7 @@ def scene_table(scenes: Scenes, files: Mapping[str, str]) -> tuple[PageTable, di
                 marks[mark] = status_text(run)
             title = f"{label_of(method)}: {'error unknown' if error is None else number(error)}, {status_text(run)}"
             row.append(TableCell(f"{number(error)} {mark}".rstrip(), shade=shade, title=title))
-        printed = scene.methods.get(run_selection.PRINTED)
+        printed = scene.methods.get(PRINTED)
         row.append("" if printed is None else prefixed(metric(printed, "energy_gain_J"), "J"))
         rows.append(row)
     head = ("Scene", "Figure", "Compared (s)", *map(method_cell, methods), "As printed: energy gain")

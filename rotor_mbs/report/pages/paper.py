@@ -11,7 +11,6 @@ from typing import Any, NamedTuple
 
 from markupsafe import Markup
 
-from rotor_mbs.analysis import run_selection
 from rotor_mbs.analysis.published import (
     FAILS,
     HOLDS,
@@ -186,10 +185,10 @@ def available(scenes: Mapping[str, StoredScene]) -> tuple[PaperFigure, ...]:
 
 def compared_runs(scene: StoredScene) -> dict[str, StoredRun]:
     """The scene's runs by the keys of HEADINGS, those that have samples of angles and rates."""
-    candidates = run_selection.sides(scene)
-    for name, run in run_selection.corrected_runs(scene).items():
+    candidates = scene.sides
+    for name, run in scene.corrected_runs.items():
         method = look_up(name)
-        if method and "exudyn" in method.distributions and run_selection.has_samples(run):
+        if method and "exudyn" in method.distributions and run.samples:
             if run not in candidates.values():
                 candidates["exudyn"] = run
             break

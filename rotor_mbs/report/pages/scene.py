@@ -7,7 +7,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from rotor_mbs.analysis import run_selection
 from rotor_mbs.analysis.published import Claim
 from rotor_mbs.methods.catalogue import REFERENCE, is_corrected
 from rotor_mbs.models.lagrange.defects import interval_defects
@@ -38,11 +37,11 @@ def scene_page(name: str, report: Report) -> dict[str, object]:
     scene = report.scenes[name]
     horizon = horizon_of(scene)
     # The printed run and the one that stands for the corrected model, then the others of corrected models.
-    sides = run_selection.sides(scene)
+    sides = scene.sides
     runs = list(sides.values())
     drawn = {run.method: run for run in runs}
-    for method, run in run_selection.corrected_runs(scene).items():
-        if run_selection.has_samples(run):
+    for method, run in scene.corrected_runs.items():
+        if run.samples:
             drawn[method] = run
     pages = ["", *report.files.values(), ""]
     place = pages.index(report.files[name])
