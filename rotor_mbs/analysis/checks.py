@@ -101,11 +101,11 @@ def checks_of(results: OpenResults, frozen: Sequence[OpenResults], bounds: Bound
                     checks.append(_of(run, "complete", "all", math.nan, own, "faults", str(exc)))
             checks += _of_reference(scene, shipped.get(scene.name) if own.scene else None, own)
         for claim in claims(results.scenes):  # the paper's numbers, in units of their last printed digit
-            item, value = claim.published, claim.printed
-            if item.of is not None and value is not None:
-                off = abs(round(value, item.decimals) - item.value) * 10**item.decimals
-                hint = f"the paper prints {item.value}, the run gives {value:.6f}: the printed entries, g, ode45"
-                where = Where(item.of.scene, PRINTED, item.id)
+            if claim.printed is not None:
+                off = abs(round(claim.printed, claim.decimals) - claim.value) * 10**claim.decimals
+                gives = f"the paper prints {claim.value}, the run gives {claim.printed:.6f}"
+                hint = f"{gives}: the printed entries, g, ode45"
+                where = Where(claim.scene, PRINTED, claim.id)
                 checks.append(make_check(bounds, "published", where, off, "last digits", hint))
     return checks
 

@@ -12,46 +12,42 @@ import functools
 import json
 import tomllib
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, fields
-from typing import Any, Literal, NamedTuple
+from dataclasses import dataclass, fields, replace
+from typing import Any, NamedTuple
 
 from rotor_mbs.runs.read import StoredScene
 from rotor_mbs.scenario.catalogue import REFERENCES
 from rotor_mbs.solution.status import GOOD
 
 
-class TrajectoryNumber(NamedTuple):
-    """A number read off a trajectory: scene, "angle" or "rate", coordinate (0 rotor, i pitch of blade i), statistic."""
-
-    scene: str
-    quantity: Literal["angle", "rate"]
-    coordinate: int
-    statistic: str
-
-
 @dataclass(frozen=True)
 class Published:
     """A number or claim of the paper, as in reference/published.toml.
 
-    A number has of, value, decimals; a claim has statement, tests. rounding: of a number, whether it is amplified
-    rounding error, which depends on how the equations are written. scenes: whose runs decide it.
+    statement, tests : of a claim.
+    scene, metric, value, decimals : of a number: it is this metric of a run of the scene, rad or rad/s.
+    rounding : of a number, whether it is amplified rounding error, which depends on how the equations are written.
+    scenes : whose runs decide it.
+    printed, corrected : of a number, what a file's runs of the printed and the corrected model give (`claims`).
     """
 
     id: str
     figure: str
-    kind: Literal["number", "claim"]
     quote: str
     statement: str = ""
-    of: TrajectoryNumber | None = None
+    tests: Sequence[Mapping[str, Any]] = ()
+    scene: str = ""
+    metric: str = ""
     value: float = 0.0
     decimals: int = 0
     rounding: bool = False
-    tests: Sequence[Mapping[str, Any]] = ()
     scenes: frozenset[str] = frozenset()
+    printed: float | None = None
+    corrected: float | None = None
 
     @property
     def is_number(self) -> bool:
-        return self.kind == "number"
+        return bool(self.metric)
 
 
 @dataclass(frozen=True)
@@ -91,10 +87,8 @@ def published() -> tuple[Published, ...]:
     items = []
     for table in _tables("published")["published"]:
         sides = [test[side] for test in table.get("tests", ()) for side in ("of", "than") if side in test]
-        if "of" in table:
-            table["of"] = TrajectoryNumber(*table["of"])
-            sides.append(table["of"])
-        items.append(Published(**table, scenes=frozenset(scene for scene, *_ in sides)))
+        scenes = frozenset(scene for scene, *_ in sides) or frozenset({table["scene"]})
+        items.append(Published(**table, scenes=scenes))
     return tuple(items)
 
 
@@ -163,42 +157,24 @@ def claim_study() -> ClaimStudy:
     return ClaimStudy(**{field.name: stored[field.name] for field in fields(ClaimStudy)})
 
 
-# The metric of a run that a published number is, and its words. Of the rotor, over the integrator's own output points.
-STATISTICS = {
-    ("angle", "min"): ("rotor_angle_min", "smallest"),
-    ("angle", "max"): ("rotor_angle_max", "largest"),
-    ("rate", "max_abs"): ("rotor_rate_max", "largest magnitude of"),
-}
-
 # Share of a scene's energy scale. The drift of ode45 itself at the paper's tolerances is below a thousandth of that
 # (3e-7 of the scale at most, on the corrected equations).
 ENERGY_RISE = 1e-3
 
 
-@dataclass(frozen=True)
-class Claim:
-    """A number or claim of the paper; of a number what the printed and the corrected model give, rad or rad/s."""
-
-    published: Published
-    printed: float | None = None
-    corrected: float | None = None
-
-
-def claims(scenes: Mapping[str, StoredScene], items: Iterable[Published] | None = None) -> list[Claim]:
+def claims(scenes: Mapping[str, StoredScene], items: Iterable[Published] | None = None) -> list[Published]:
     """The numbers that runs of `scenes` have, and the claims about scenes that are all there; of `items`, or of all."""
     results = []
     for item in published() if items is None else items:
         if not item.scenes <= scenes.keys():
             continue
-        if item.of is None:
-            results.append(Claim(item))
+        if not item.is_number:
+            results.append(item)
             continue
-        metric, _ = STATISTICS[item.of.quantity, item.of.statistic]
-        scene = scenes[item.of.scene]
-        runs = scene.printed, scene.corrected
-        values = [None if run is None else run.attributes.get(metric) for run in runs]
-        if values != [None, None]:
-            results.append(Claim(item, *values))
+        runs = scenes[item.scene].printed, scenes[item.scene].corrected
+        printed, corrected = (None if run is None else run.attributes.get(item.metric) for run in runs)
+        if printed is not None or corrected is not None:
+            results.append(replace(item, printed=printed, corrected=corrected))
     return results
 
 
@@ -207,17 +183,17 @@ def rounds_to(value: float, item: Published) -> bool:
     return f"{value:.{item.decimals}f}" == f"{item.value:.{item.decimals}f}"
 
 
-def finding(scenes: Mapping[str, StoredScene], claims: Iterable[Claim]) -> list[tuple[str, str, str]]:
+def finding(scenes: Mapping[str, StoredScene], claims: Iterable[Published]) -> list[tuple[str, str, str]]:
     """How much of the paper is reproduced, and the energy that its equations gain; empty for other scenes.
 
     A row has a result, and what the equations as printed and the corrected model give; "" where nothing is known.
     """
     claims = list(claims)
-    numbers = [claim for claim in claims if claim.published.is_number]
+    numbers = [claim for claim in claims if claim.is_number]
     counts = []
     for values in ([claim.printed for claim in numbers], [claim.corrected for claim in numbers]):
         pairs = zip(values, numbers, strict=True)
-        known = [rounds_to(value, claim.published) for value, claim in pairs if value is not None]
+        known = [rounds_to(value, claim) for value, claim in pairs if value is not None]
         counts.append(f"{sum(known)} of {len(known)}" if known else "")
     rows = [("Published numbers reproduced", counts[0], counts[1])]
     if claims:

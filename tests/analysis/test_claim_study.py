@@ -10,6 +10,7 @@ from support import make_claims
 from support.make_claims import DURATIONS, FILE, METHODS, STATISTICS, Conditions, numbers_of, trials_under
 
 from rotor_mbs.analysis.published import Published, claim_study, conditions, published
+from rotor_mbs.runs.design import COLUMNS
 from rotor_mbs.scenario.catalogue import REFERENCES, find_scenes
 
 RUNS = json.loads(FILE.read_text(encoding="utf-8"))
@@ -57,6 +58,10 @@ def test_all_numbers_come_out_under_the_papers_tolerances_and_for_12_s_alone() -
 def test_what_is_measured_exists(item: Published) -> None:
     # A number that is rounding error is said to be so in the conditions, by its figure.
     assert not item.rounding or "most probable form" in conditions()[f"fig{int(item.figure):02d}"]
+    if item.is_number:
+        assert item.metric in COLUMNS
+        assert len(find_scenes([item.scene])) == 1
+        return
     assert item.scenes == {asked.scene for asked in numbers_of(item)}
     for asked in numbers_of(item):
         assert len(find_scenes([asked.scene])) == 1

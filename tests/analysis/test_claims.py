@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -11,9 +12,7 @@ from support.stored import Made, rotor, store
 
 from rotor_mbs.analysis.published import (
     HOLDS,
-    Claim,
     Published,
-    TrajectoryNumber,
     claim_study,
     claims,
     finding,
@@ -27,12 +26,12 @@ PRINTED, REFERENCE, TAYLOR = "printed/ode45", "reference", "lagrange/taylor"
 
 
 def number(value: float, scene: str = "paper/fig11") -> Published:
-    asked = TrajectoryNumber(scene, "angle", 0, "max")
-    return Published("n", "11", "number", "«»", of=asked, value=value, decimals=4, scenes=frozenset({scene}))
+    metric = "rotor_angle_max"
+    return Published("n", "11", "«»", scene=scene, metric=metric, value=value, decimals=4, scenes=frozenset({scene}))
 
 
 def claim(*scenes: str) -> Published:
-    return Published("c", "11", "claim", "«»", statement="A claim.", scenes=frozenset(scenes))
+    return Published("c", "11", "«»", statement="A claim.", scenes=frozenset(scenes))
 
 
 @pytest.mark.parametrize(("value", "reproduced"), [(2.73146, True), (2.73154, True), (2.73144, False), (2.7316, False)])
@@ -95,9 +94,9 @@ def test_the_finding_counts_what_was_put_in(tmp_path: Path) -> None:
 def test_the_finding_counts_numbers_that_are_known_and_the_claims_of_the_study() -> None:
     item = number(1.0)
     evaluated = [
-        Claim(item, 1.0, 2.0),
-        Claim(item, corrected=2.0),
-        Claim(claim("paper/fig11")),
+        replace(item, printed=1.0, corrected=2.0),
+        replace(item, corrected=2.0),
+        claim("paper/fig11"),
     ]
     study = claim_study()
     printed, corrected = (f"{study.count(method, HOLDS)} of {len(study.verdicts)}" for method in study.methods)

@@ -13,7 +13,7 @@ from support.scenes import paper
 from support.stored import Made, rotor, store
 from support.sweeps import made_sweep
 
-from rotor_mbs.analysis.published import CheckedEntry, Claim, claim_study, errata, published
+from rotor_mbs.analysis.published import CheckedEntry, claim_study, errata, published
 from rotor_mbs.errors import StoreError
 from rotor_mbs.methods.catalogue import find_method, look_up
 from rotor_mbs.report import numbers
@@ -220,7 +220,7 @@ def test_claims_have_a_verdict_for_each_model() -> None:
         items[1].id: {PRINTED: "undecided", TAYLOR: "undecided"},
     }
     study = replace(claim_study(), verdicts=verdicts)
-    table = claim_table([Claim(item) for item in items], study)
+    table = claim_table(items, study)
     assert [cells_of(row[2:]) for row in table.rows] == [["holds", "fails"], ["undecided", "undecided"]]
 
 

@@ -25,7 +25,7 @@ from unittest import mock
 import numpy as np
 
 from rotor_mbs.analysis.judgement import judge
-from rotor_mbs.analysis.published import FAILS, HOLDS, UNDECIDED, Published, TrajectoryNumber, published, rounds_to
+from rotor_mbs.analysis.published import FAILS, HOLDS, UNDECIDED, Published, published, rounds_to
 from rotor_mbs.methods.catalogue import find_method
 from rotor_mbs.methods.solve import solve
 from rotor_mbs.models.printed import literal
@@ -33,6 +33,7 @@ from rotor_mbs.report.numbers import number, power, with_unit
 from rotor_mbs.runs.versions import versions
 from rotor_mbs.scenario.catalogue import REFERENCES, find_scenes
 from rotor_mbs.scenario.scene import Scene
+from rotor_mbs.solution.metrics import metrics_of
 from rotor_mbs.solution.status import COMPLETE
 from rotor_mbs.solution.trajectory import Array
 from support.gravity_rows import DEFAULT_ROW, GRAVITY_ROWS, SUMMED, moment
@@ -61,6 +62,15 @@ Row = dict[str, Any]  # of a table of claim_runs.json
 
 
 # Numbers read off runs
+
+
+class TrajectoryNumber(NamedTuple):
+    """A number read off a trajectory: scene, "angle" or "rate", coordinate (0 rotor, i pitch of blade i), statistic."""
+
+    scene: str
+    quantity: str
+    coordinate: int
+    statistic: str
 
 
 def _reversals(x: Array) -> float:
@@ -116,9 +126,9 @@ RELATIONS: Mapping[str, Callable[[float, float], bool]] = {
 
 
 def numbers_of(item: Published) -> list[TrajectoryNumber]:
-    """All that is read off runs for a number or a claim, each once."""
+    """All that is read off runs for a claim, each once."""
     sides = [TrajectoryNumber(*test[side]) for test in item.tests for side in ("of", "than") if side in test]
-    return list(dict.fromkeys([item.of] if item.of is not None else sides))
+    return list(dict.fromkeys(sides))
 
 
 def claim_holds(item: Published, values: NumberValues) -> bool | None:
@@ -249,10 +259,8 @@ def numbers_of_run(task: tuple[Scene, Conditions]) -> dict[str, float | None]:
     tolerances = {name: getattr(conditions, name) for name in ("relative_tolerance", "absolute_tolerance")}
     with written_as(conditions.gravity_row):
         run = solve(PRINTED, replace(scene, duration=conditions.duration), tolerances).trajectory
-    # At ode45's own output points, as off a printed figure.
-    arrays = run.refined_time, run.refined_angles, run.refined_rates
-    items = [item for item in published() if item.of is not None and item.of.scene == scene.name]
-    return {item.id: measure(*arrays, item.of) for item in items if item.of is not None}
+    extremes = metrics_of(scene, run, None, None)  # at ode45's own output points, as off a printed figure
+    return {item.id: extremes[item.metric] for item in published() if item.scene == scene.name}
 
 
 def usual_conditions() -> Conditions:
@@ -270,7 +278,7 @@ def number_trials(
 
     remainder: N m, the row's value at the start of Fig. 5: zero but for rounding.
     """
-    items = [item for item in published() if item.of is not None]
+    items = [item for item in published() if item.is_number]
     scenes = {scene.name: scene for scene in find_scenes(sorted({name for item in items for name in item.scenes}))}
     usual = usual_conditions()
     tried = [usual._replace(gravity_row=row, duration=duration) for row in rows for duration in durations]

@@ -8,7 +8,7 @@ from functools import cached_property
 
 from rotor_mbs.analysis import published
 from rotor_mbs.analysis.judgement import OK_ERROR
-from rotor_mbs.analysis.published import Claim, ClaimStudy, Erratum, claims
+from rotor_mbs.analysis.published import ClaimStudy, Erratum, Published, claims
 from rotor_mbs.analysis.work_precision import by_scene
 from rotor_mbs.methods.catalogue import PRINTED, REFERENCE, errata_methods, is_corrected, look_up
 from rotor_mbs.report.elements import PageTable, Row, TableCell
@@ -36,7 +36,7 @@ class Report(OpenResults):
         return page_names(name for name, scene in self.scenes.items() if scene.methods or not self.is_suite)
 
     @cached_property
-    def claims(self) -> Sequence[Claim]:
+    def claims(self) -> Sequence[Published]:
         """Of the paper, about these scenes."""
         return claims(self.scenes)
 

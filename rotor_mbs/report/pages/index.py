@@ -41,12 +41,11 @@ def index_page(report: Report) -> dict[str, object]:
     both = [name for name, scene in scenes.items() if len(scene.sides) > 1]
     shown = next(iter([*both, *scenes]))
     for claim in claims:
-        item = claim.published
-        if item.is_number and not item.rounding and item.of is not None and item.of.scene in scenes:
-            shown = item.of.scene
+        if claim.is_number and not claim.rounding:
+            shown = claim.scene
             break
     sides = list(scenes[shown].sides.values())
-    own_claims = [claim for claim in claims if shown in claim.published.scenes]
+    own_claims = [claim for claim in claims if shown in claim.scenes]
     printed = scenes[shown].printed
     judged = {} if printed is None else {printed.method: printed}
     judged |= scenes[shown].corrected_runs

@@ -14,10 +14,8 @@ from markupsafe import Markup
 from rotor_mbs.analysis.published import (
     FAILS,
     HOLDS,
-    STATISTICS,
     UNDECIDED,
     CheckedEntry,
-    Claim,
     ClaimStudy,
     Published,
     checked_entries,
@@ -30,51 +28,48 @@ from rotor_mbs.report.elements import PageTable, Row, Section, TableCell, pictur
 from rotor_mbs.report.looks import COLOURS, Look, label_of
 from rotor_mbs.report.numbers import NOTHING, fixed, formula, number
 from rotor_mbs.report.pages import Report
+from rotor_mbs.runs.design import COLUMNS
 from rotor_mbs.runs.output_files import replace_file
 from rotor_mbs.runs.read import StoredRun, StoredScene, open_results
 
 ROUNDING = "amplified rounding error, which depends on how the equations are written"
-_UNITS = {"angle": "rad", "rate": "rad/s"}
 _TONES = {HOLDS: "good", FAILS: "bad", UNDECIDED: ""}
 
 
-def number_table(claims: Iterable[Claim]) -> PageTable:
+def number_table(claims: Iterable[Published]) -> PageTable:
     """The published numbers, a row each."""
     head = ("Figure", "Quantity", "Published", "As printed", "Reproduced?", "Corrected model", "Same number?")
     rows: list[Row] = []
     for claim in claims:
-        item, printed, corrected = claim.published, claim.printed, claim.corrected
-        if item.of is None:
+        if not claim.is_number:
             continue
-        verdict = _verdict(printed, item)
-        if item.rounding and verdict.tone == "good":
+        verdict = _verdict(claim.printed, claim)
+        if claim.rounding and verdict.tone == "good":
             verdict = replace(verdict, note=ROUNDING)
-        body = "rotor" if item.of.coordinate == 0 else f"pitch {item.of.coordinate}"
-        _, words = STATISTICS[item.of.quantity, item.of.statistic]
-        description = f"{words} {body} {item.of.quantity} ({_UNITS[item.of.quantity]})"
+        column = COLUMNS[claim.metric]
+        description = f"{column.long_name.partition(',')[0]} ({column.units})"
         rows.append([
-            item.figure,
-            TableCell(description, note=f"«{item.quote}»", note_language="es"),
-            fixed(item.value, item.decimals),
-            fixed(printed, item.decimals + 2),
+            claim.figure,
+            TableCell(description, note=f"«{claim.quote}»", note_language="es"),
+            fixed(claim.value, claim.decimals),
+            fixed(claim.printed, claim.decimals + 2),
             verdict,
-            fixed(corrected, item.decimals + 2),
-            _verdict(corrected, item),
+            fixed(claim.corrected, claim.decimals + 2),
+            _verdict(claim.corrected, claim),
         ])  # fmt: skip
     return PageTable("Published numbers", head, rows)
 
 
-def claim_table(claims: Iterable[Claim], study: ClaimStudy) -> PageTable:
+def claim_table(claims: Iterable[Published], study: ClaimStudy) -> PageTable:
     """The claims in words, a row each, with their verdicts."""
     rows: list[Row] = []
     for claim in claims:
-        item = claim.published
-        if item.is_number:
+        if claim.is_number:
             continue
-        statement = TableCell(item.statement, note=f"«{item.quote}»", note_language="es")
-        row: list[TableCell | str] = [item.figure, statement]
+        statement = TableCell(claim.statement, note=f"«{claim.quote}»", note_language="es")
+        row: list[TableCell | str] = [claim.figure, statement]
         for method in study.methods:
-            verdict = study.verdicts[item.id][method]
+            verdict = study.verdicts[claim.id][method]
             row.append(TableCell(verdict, tone=_TONES[verdict]))
         rows.append(row)
     return PageTable("Published claims", ("Figure", "Claim", "As printed", "Corrected model"), rows)
@@ -310,6 +305,6 @@ def figures_page(report: Report) -> dict[str, object]:
             "kind": figure.kind,
             "panels": panels,
             "picture": picture(composed(figure, report.scenes, for_print=False), f"f{figure.number}", caption),
-            "numbers": number_table([claim for claim in report.claims if claim.published.figure == figure.number]),
+            "numbers": number_table([claim for claim in report.claims if claim.figure == figure.number]),
         })  # fmt: skip
     return {"figures": figures}

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from rotor_mbs.analysis.published import Claim
+from rotor_mbs.analysis.published import Published
 from rotor_mbs.methods.catalogue import REFERENCE, is_corrected
 from rotor_mbs.models.lagrange.defects import interval_defects
 from rotor_mbs.report import plots
@@ -45,7 +45,7 @@ def scene_page(name: str, report: Report) -> dict[str, object]:
             drawn[method] = run
     pages = ["", *report.files.values(), ""]
     place = pages.index(report.files[name])
-    claims = [claim for claim in report.claims if name in claim.published.scenes]
+    claims = [claim for claim in report.claims if name in claim.scenes]
     study = report.study
     tables = [paper.number_table(claims)]
     if study is not None:
@@ -64,7 +64,7 @@ def scene_page(name: str, report: Report) -> dict[str, object]:
     return {
         "scene": scene,
         "claims": Section(tables=[table for table in tables if table.rows], notes=[condition] if condition else []),
-        "study": study if any(not claim.published.is_number for claim in claims) else None,
+        "study": study if any(not claim.is_number for claim in claims) else None,
         "viewer": viewer(scene, {label_of(run.method): run for run in runs}),
         "key": key_picture(runs, claims, horizon),
         "paths": Section(paths),
@@ -84,7 +84,7 @@ def scene_page(name: str, report: Report) -> dict[str, object]:
 
 
 def key_picture(
-    sides: Sequence[StoredRun], claims: Sequence[Claim], horizon: float | None, name: str = "key"
+    sides: Sequence[StoredRun], claims: Sequence[Published], horizon: float | None, name: str = "key"
 ) -> list[Picture]:
     """The rotor's angle and the pitch that differs most, printed and corrected, with published values.
 
@@ -113,9 +113,8 @@ def key_picture(
             series.append(Series(run.array("time"), run.array("angles")[:, i], look))
         rows.append((f"{runs[0].labels[i]} angle (rad)", series))
         for claim in claims:
-            item, of = claim.published, claim.published.of
-            if item.is_number and of is not None and of.quantity == "angle" and of.coordinate == i:
-                marks.append((place, item.value, f"published {fixed(item.value, item.decimals)} rad"))
+            if i == 0 and claim.metric in ("rotor_angle_min", "rotor_angle_max"):
+                marks.append((place, claim.value, f"published {fixed(claim.value, claim.decimals)} rad"))
     parted, difference = parting(*runs)
     caption = f"Rotor and pitch angles of both models; largest difference {with_unit(difference, 'rad')}"
     if parted is not None:
