@@ -13,6 +13,7 @@ import os
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -54,10 +55,6 @@ _HANGING, _LOADING_S = 3.0, 60.0
 # Errors are compared on at most so many sample intervals: more would make every step shorter than a coarse rung's, and
 # a bench would time the reading of samples.
 _MOST_INTERVALS = 100
-ERRORS = (
-    "angle_error_max", "angle_error_end", "tip_error_max", "energy_drift_max", "defect_max", "defect_median",
-    "zero_pitch_max",
-)  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)
@@ -216,7 +213,7 @@ class PointTimer:
         return {"status": status, "message": message, "run_time_s": self.warm_s, **nothing}
 
     def judge(self) -> dict[str, Any]:
-        """Status, message, errors and steps of the last run, and the time to read out and compute its samples."""
+        """Status, message, metrics and steps of the last run, and the time to read out and compute its samples."""
         start = self._clock()
         trajectory = self._solver.observe()
         output = self._clock() - start
@@ -228,15 +225,14 @@ class PointTimer:
             judgement = judge(scene, run, self._reference)
         del self._solver
         status = judgement.status
-        errors = judgement.metrics if status in COMPLETE else {}  # those of a run that broke off are of its part
         return {
+            **(judgement.metrics if status in COMPLETE else {}),  # those of a run that broke off are of its part
             "status": status,
             "message": judgement.message,
             "false_success": int(judgement.false_success),
             "steps": integration.steps or 0,
             "output_time_s": output,
             "same": np.array_equal(trajectory.angles, self._first_angles),
-            **{name: errors.get(name, np.nan) for name in ERRORS},
         }
 
 
@@ -312,37 +308,22 @@ def allot(seconds: Sequence[float], wanted: Sequence[int], budget_s: float) -> l
     return counts
 
 
-@dataclass(frozen=True)
-class Measurement:
-    """Curves of a scene that are timed together, in one process.
-
-    repeats, budget_s : timed runs of a point at most, and s for all of them.
-    """
-
-    scene: Scene
-    reference: Trajectory | None
-    curves: Sequence[Curve]
-    repeats: int
-    budget_s: float
-
-    def split(self) -> list[Measurement]:
-        """Its curves one by one; [] where it is one."""
-        return [replace(self, curves=[curve]) for curve in self.curves] if len(self.curves) > 1 else []
-
-
-def measure(task: Measurement) -> list[list[dict[str, Any]]]:
+def measure(
+    curves: Sequence[Curve], scene: Scene, reference: Trajectory | None, repeats: int, budget_s: float
+) -> list[list[dict[str, Any]]]:
     """The columns of every point, by curve: timed in rounds over all points, then the last run of each judged.
 
     For a process that does nothing else: engines are loaded beforehand, which is part of no run's time, and the garbage
     collector is off.
+
+    scene, reference : as they are benched (`prepared`).
+    repeats, budget_s : timed runs of a point at most, and s for all of them.
     """
-    for method in dict.fromkeys(curve.method for curve in task.curves):
+    for method in dict.fromkeys(curve.method for curve in curves):
         catalogue.find_method(method).load()
     gc.disable()
-    timers = [
-        [PointTimer(point, task.scene, task.reference, _RUN_LIMIT_S) for point in curve.points] for curve in task.curves
-    ]
-    conduct(timers, task.budget_s, task.repeats, time.perf_counter)
+    timers = [[PointTimer(point, scene, reference, _RUN_LIMIT_S) for point in curve.points] for curve in curves]
+    conduct(timers, budget_s, repeats, time.perf_counter)
     return [[timer.row() for timer in own] for own in timers]
 
 
@@ -408,7 +389,7 @@ class CurveTask(Task):
             if timer.is_repeatable:
                 timer.times.append(timer.warm_s)
             points.append(timer.row())
-            if points[-1]["status"] == "ok" and points[-1]["angle_error_max"] < 0.1 * curve.target:
+            if points[-1]["status"] == "ok" and points[-1].get("angle_error_max", math.inf) < 0.1 * curve.target:
                 reason = "not run: the setting before is accurate"
             elif (timer.is_repeatable or timer.is_stopped) and timer.warm_s > self.longest_s:
                 reason = f"not run: the setting before took {timer.warm_s:.2g} s"
@@ -503,11 +484,15 @@ def _measure_scene(
     """Time, judge and store every point of the curves of one scene."""
     core = last_core()
     facts = facts_of(short, reference) | {"pinned_core": -1 if core is None else core}
-    task = Measurement(short, reference, curves, repeats, budget_s)
+    work = partial(measure, scene=short, reference=reference, repeats=repeats, budget_s=budget_s)
+
+    def split(together: Sequence[Curve]) -> list[list[Curve]]:
+        return [[curve] for curve in together] if len(together) > 1 else []
+
     with WorkerPool(1, core=core) as pool:
         limit_s = _HANGING * budget_s + _LOADING_S
-        for end in run_in(pool, catalogue.with_method_files(measure), [task], limit_s, Measurement.split):
-            for i, curve in enumerate(end.task.curves):
+        for end in run_in(pool, catalogue.with_method_files(work), [curves], limit_s, split):
+            for i, curve in enumerate(end.task):
                 if end.value is None:
                     yield Outcome(curve.label, curve.method, end.failure, end.message, is_stored=False)
                     continue

@@ -24,7 +24,7 @@ from rotor_mbs.scenario.accuracy_bounds import Bound
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.trajectory import Integration, Trajectory
 from rotor_mbs.studies import bench
-from rotor_mbs.studies.bench import Measurement, Point, PointTimer, allot, conduct, measure
+from rotor_mbs.studies.bench import Curve, Point, PointTimer, allot, conduct, measure
 
 SCENE = paper("fig08", duration=1.0, samples=11)
 
@@ -241,11 +241,11 @@ def test_bad_input_is_one_line(words: tuple[str, ...], says: str, tmp_path: Path
 AT_REST = paper("fig05", duration=0.1, samples=3)
 
 
-def measure_dying(task: Measurement) -> Any:
+def measure_dying(curves: list[Curve], **options: Any) -> Any:
     """As the timing worker, which one curve kills."""
-    if any(curve.name.endswith("deadly") for curve in task.curves):
+    if any(curve.name.endswith("deadly") for curve in curves):
         os.kill(os.getpid(), signal.SIGKILL)
-    return measure(task)
+    return measure(curves, **options)
 
 
 @pytest.mark.full
