@@ -20,7 +20,7 @@ KNOWN = {
     "pendulum": ONE,
     "rest": THREE,
     "uniform rotation": replace(THREE, **TURNING),
-    "constant torque": replace(THREE, **TURNING, rotor_torque=((0.0, 1e5),)),
+    "constant torque": replace(THREE, **TURNING, rotor_torque=((0.0, 1e7),)),
 }
 
 

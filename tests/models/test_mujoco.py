@@ -42,6 +42,17 @@ def test_order_of_convergence(method: str, order: int, steps: list[float]) -> No
     assert np.polyfit(np.log(steps), np.log(errors), 1)[0] == pytest.approx(order, abs=0.2)
 
 
+def test_the_work_of_loads_and_dampers_is_of_fourth_order() -> None:
+    """Energy balance at two steps; without the dampers' part of the slopes it is of second order."""
+    scene = replace(references.scene("check/general"), outputs=("angles", "energy"))
+    drifts = []
+    for step in (1e-3, 5e-4):
+        result = run("mujoco/rk4", scene, step=step)
+        total = result.kinetic_energy + result.potential_energy - result.work
+        drifts.append(np.abs(total - total[0]).max() / result.kinetic_energy.max())
+    assert np.log2(drifts[0] / drifts[1]) == pytest.approx(4.0, abs=0.3)
+
+
 def test_point_masses_have_no_inertia_that_the_scene_does_not_give() -> None:
     """The toy of 1 g: MuJoCo's least inertia would be a defect of 8.6e-6 rad at any step; what the step itself leaves
     is divided by 16 where it is halved."""

@@ -20,6 +20,7 @@ from rotor_mbs.models.lagrange.methods import ReferenceSettings
 from rotor_mbs.models.lagrange.reference import ReferenceSolver, build, reference_at, uncertainty
 from rotor_mbs.models.lagrange.samples import sampled_loads
 from rotor_mbs.models.lagrange.taylor import Propagation
+from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.trajectory import Integration
 
 
@@ -99,6 +100,20 @@ def test_a_reference_of_which_one_run_ends_early(
     assert result.angle_uncertainty.tobytes() == whole.angle_uncertainty[:rows].tobytes()
     # Without heyoka quotients of differences of 1e-9.
     np.testing.assert_allclose(result.error_growth, whole.error_growth[:rows], rtol=1e-6)
+
+
+def test_quotients_are_known_as_far_as_both_runs_went(monkeypatch: pytest.MonkeyPatch) -> None:
+    scene, solver_of = paper("fig03", duration=0.1, samples=4), reference_module._in_doubles
+
+    def ends_early(start: Scene, tolerances: tuple[float, float], times: Any) -> Any:
+        run = solver_of(start, tolerances, times)
+        run.integrate()
+        return SimpleNamespace(integrate=lambda: None, states=run.states[: 4 if start == scene else 2])
+
+    monkeypatch.setattr(reference_module, "_in_doubles", ends_early)
+    result = reference_module._matrices_by_quotients(scene, np.linspace(0.0, 0.1, 4))
+    assert np.isfinite(result[:2]).all()
+    assert np.isposinf(result[2:]).all()
 
 
 @pytest.mark.parametrize(("known", "finite"), [(2, [True, True, False]), (3, [True] * 3), (4, [True] * 3)])

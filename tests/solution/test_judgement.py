@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import time
 from dataclasses import replace
 from types import SimpleNamespace
@@ -11,7 +12,7 @@ import pytest
 from support.references import reference, scene
 from support.scenes import paper
 
-from rotor_mbs.analysis.judgement import Judgement, judge
+from rotor_mbs.analysis.judgement import Judgement, _status, judge
 from rotor_mbs.methods.catalogue import find_method, method_names
 from rotor_mbs.methods.solve import solve
 from rotor_mbs.methods.time_limit import OutOfTimeError, is_over, polled, time_limit
@@ -52,6 +53,34 @@ def test_an_engines_claim_of_success_that_is_false(name: str) -> None:
     given, method, settings = CLAIMS[name]
     exact = reference(given.name) if name == "the singular pitch" else None
     caught(given, solve(method, given, settings), exact)
+
+
+@pytest.mark.parametrize(
+    ("numbers", "message"),
+    [
+        (
+            {"defect_max": 1.9, "defect_judged": 1.0, "defect_time": 0.5},
+            "defect 1.9e+00 rad in the interval up to t = 0.5 s",
+        ),
+        (
+            {"defect_max": 2.1, "defect_judged": 1.0, "defect_time": 0.5},
+            "defect 2.1e+00 rad in the interval up to t = 0.5 s, 1.0e+00 rad scaled to 0.01 s and to a fivefold error "
+            "growth",
+        ),
+        ({"angle_error_max": 0.02, "defect_max": 3e-6}, "angle error 2.0e-02 rad up to the horizon"),
+        (
+            {"angle_error_max": 0.02, "defect_max": 1e-6},
+            "angle error 2.0e-02 rad up to the horizon, because the motion amplifies small errors",
+        ),
+        ({"angle_error_predicted": 0.02, "defect_max": 3e-6}, "predicted angle error 2.0e-02 rad up to the horizon"),
+    ],
+)
+def test_an_inaccurate_run_says_by_how_much(numbers: dict[str, float], message: str) -> None:
+    run = solve("lagrange/dop853", paper("fig11", duration=0.2, samples=21), {})
+    metrics = judge(run.scene, run, None).metrics | {"defect_max": 0.0, "defect_judged": 0.0, "defect_median": 0.0}
+    metrics = {name: value for name, value in metrics.items() if not name.startswith("angle_error")}
+    status, said = _status(run.scene, run, None, metrics | numbers)
+    assert (status, re.split("[,;] allowed", said)[0]) == ("inaccurate", message)
 
 
 def test_a_body_that_falls_free_of_its_joints() -> None:

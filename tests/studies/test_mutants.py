@@ -65,6 +65,7 @@ EXPLAINED = {
     ),
     r"time_table\.values_before .*1e-12 scaled": "keeps rounding from passing a jump: any size near it does",
     r"judgement\._status .*right side of OK_ERROR": "of angles within the limit 2e-9 rad, beside 0.01",
+    r"judgement\.smallest_rotor_inertia_share .*65 -> 66": "points of a search along the way to the next sample",
     r"judgement\._status .*_GROWN ": "an order of magnitude, for a message",
     r"checks\._MOST_INTERVALS ": "how many peaks are looked at: their number decides how many a run may have",
     r"schemes\.scheme .*(_NEWTON_SHARE .* scaled|1e-10 -> |40 -> |2\.0 -> )": (

@@ -104,6 +104,7 @@ _MUJOCO = "models/test_mujoco.py::test_"
 _JUDGEMENT = "solution/test_judgement.py::test_"
 _RULES = (
     "analysis/test_status_rules.py",
+    f"{_JUDGEMENT}an_inaccurate_run_says_by_how_much",
     f"{_JUDGEMENT}a_run_that_broke_off_names_time_and_reason",
     f"{_JUDGEMENT}a_wrong_motion_is_unchecked_where_nothing_can_tell",
     f"{_JUDGEMENT}a_start_turns_away_leaves_ten_units_in_its_last_place_open",
@@ -141,12 +142,13 @@ _TARGETS = (
             f"{_MUJOCO}an_inertia_at_the_limit_of_the_triangle_inequality",
             f"{_ALL_LOADS}[mujoco/rk4]"), 0.001),
     Target(f"{_J}.solver", "_advance observe _work _springs", "mujoco",
-           (f"{_MUJOCO}steps_and_evaluations_are_counted", f"{_ALL_LOADS}[mujoco/rk4]"), 0.001),
+           (f"{_MUJOCO}steps_and_evaluations_are_counted", f"{_MUJOCO}the_work_of_loads_and_dampers_is_of_fourth_order",
+            f"{_ALL_LOADS}[mujoco/rk4]"), 0.001),
     Target(f"{_A}.judgement",
            "judge _is_close _status start_slack "
            "energy_slack energy_conditioning smallest_rotor_inertia_share "
            "rotor_inertia_shares _shaft_inertia_forms _SINGULAR_SHARE _ROUND_OFF _RESEMBLES _NO_INERTIA",
-           "tests alone", _RULES, 0.5),
+           "tests alone", (*_RULES, "solution/test_metrics.py::test_a_load_that_is_off_is_inaccurate"), 0.5),
     Target("rotor_mbs.solution.metrics",
            "running_growth horizon_samples angle_error energy_scale _angle_errors HORIZON_GROWTH",
            "tests alone", (*_RULES, "solution/test_metrics.py::test_a_pitch_that_leaves_zero"), 0.5),
