@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from rotor_mbs.scenario.scene import Blade, Scene
-from rotor_mbs.scenario.time_table import value_at
+from rotor_mbs.scenario.time_table import value_at, values_at
 from rotor_mbs.solution.trajectory import Array
 
 
@@ -24,8 +24,7 @@ def kinetic_energy(scene: Scene, angles: Array, rates: Array) -> Array:
         omega = rates[:, 1 + i, None] * frames[:, :, 2]
         omega[:, 1] += rates[:, 0]
         velocity = np.cross(omega, _rotated(frames, blade.centre_of_mass))
-        xx, yy, zz, xy, xz, yz = blade.inertia
-        tensor = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+        tensor = blade.inertia_tensor
         own = np.einsum("nij,ni->nj", frames, omega)  # ω in the blade's frame
         total = total + 0.5 * blade.mass * (velocity**2).sum(axis=1) + 0.5 * np.einsum("ni,ij,nj->n", own, tensor, own)
     return total
@@ -40,7 +39,7 @@ def potential_energy(scene: Scene, time: Array, angles: Array) -> Array:
     for i, blade in enumerate(scene.blades):
         total += blade.mass * scene.gravity * _rotated(_frames(scene, angles, i), blade.centre_of_mass)[:, 2]
         if scene.bearing_stiffness and blade.has_pitch_inertia:
-            rest = np.array([value_at(scene.pitch_load(i)[1], t) for t in time.tolist()])
+            rest = values_at(scene.pitch_load(i)[1], time)
             total += 0.5 * scene.bearing_stiffness[i] * (angles[:, 1 + i] - rest) ** 2
     return total
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -117,11 +117,10 @@ def step_for(target: float, steps: Array, errors: Array) -> float | None:
     return float(steps[last + 1] * (target / errors[last + 1]) ** (1.0 / slope))
 
 
-def best(curves: Sequence[Record], column: str) -> float | None:
-    """The smallest value of a column over the points on these curves; None where there is none."""
+def values_of(curves: Iterable[Record], column: str) -> list[float]:
+    """The finite values of a column over the points on these curves."""
     values = [curve.arrays[column][succeeded(curve)] for curve in curves if column in curve.arrays]
-    known = [value for array in values for value in array.tolist() if math.isfinite(value)]
-    return min(known, default=None)
+    return [value for array in values for value in array.tolist() if math.isfinite(value)]
 
 
 def by_scene(curves: Sequence[Record]) -> Mapping[str, list[Record]]:

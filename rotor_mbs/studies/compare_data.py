@@ -226,24 +226,16 @@ def compare_with_reference(
         known = [channel for channel in channels if channel.defect is not None]
         for channel in sorted(known, key=lambda channel: -(channel.defect or 0.0)):
             if not (channel.defect or 0.0) <= tolerance:
-                yield (
-                    "inaccurate",
-                    (
-                        f"{channel.name}: defect of {channel.defect:.1e} rad beyond rounding, in the interval up to "
-                        f"t = {defect_time:.6g} s, allowed {tolerance:.0e}"
-                    ),
-                )
+                size = f"defect of {channel.defect:.1e} rad beyond rounding"
+                interval = f"in the interval up to t = {defect_time:.6g} s"
+                yield "inaccurate", f"{channel.name}: {size}, {interval}, allowed {tolerance:.0e}"
         if not drift <= tolerance:
             yield "inaccurate", f"{drifting}: defect of {drift:.1e} rad beyond rounding, allowed {tolerance:.0e}"
         worst = int(per_growth.argmax())
         if not per_growth[worst] <= tolerance:
-            yield (
-                "inaccurate",
-                (
-                    f"{channels[worst].name}: error {channels[worst].error_max:.1e} {channels[worst].unit} up to the "
-                    f"horizon, {per_growth[worst]:.1e} per unit of error growth, allowed {tolerance:.0e}"
-                ),
-            )
+            size = f"error {channels[worst].error_max:.1e} {channels[worst].unit} up to the horizon"
+            growing = f"{per_growth[worst]:.1e} per unit of error growth"
+            yield "inaccurate", f"{channels[worst].name}: {size}, {growing}, allowed {tolerance:.0e}"
         angles = [channel for channel in channels if channel.unit == "rad"] or channels
         largest = max(angles, key=lambda channel: channel.error_max)
         # Without defects the errors are all that there is.

@@ -212,8 +212,7 @@ def _pitch_turned(scene: Scene, chosen: Sequence[int], angle: float) -> Scene:
     turn = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
     blades = list(scene.blades)
     for i in chosen:
-        xx, yy, zz, xy, xz, yz = blades[i].inertia
-        inertia = turn @ np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]) @ turn.T
+        inertia = turn @ blades[i].inertia_tensor @ turn.T
         x, y, z = (turn @ blades[i].centre_of_mass).tolist()
         elements = _inertia(inertia[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]].tolist())
         blades[i] = replace(blades[i], centre_of_mass=(x, y, z), inertia=elements)

@@ -187,8 +187,8 @@ def engine_tables(results: OpenResults, scenes: Mapping[str, Sequence[Record]]) 
 
 def _worst_cell(own: Mapping[str, Sequence[Record]], column: str) -> TableCell | str:
     """The smallest value on the scene where that is largest; on how many scenes no setting is useful."""
-    values = {name: work_precision.best(curves, column) for name, curves in own.items()}
-    known = {name: value for name, value in values.items() if value is not None}
+    values = {name: work_precision.values_of(curves, column) for name, curves in own.items()}
+    known = {name: min(of_scene) for name, of_scene in values.items() if of_scene}
     if not known:
         is_cut = any(work_precision.left_out(curve) for curves in own.values() for curve in curves)
         return (TableCell("not measured") if is_cut else TableCell("none", "bad")) if own else NOTHING
@@ -246,11 +246,7 @@ def _drift_cell(run: StoredRun | None) -> TableCell | str:
 
 def _zero_pitch_cell(own: Mapping[str, Sequence[Record]]) -> TableCell | str:
     """Whether pitches that are zero in the reference are zero at every setting."""
-    values = [
-        curve.arrays["zero_pitch_max"][work_precision.succeeded(curve)]
-        for curves in own.values() for curve in curves if "zero_pitch_max" in curve.arrays
-    ]  # fmt: skip
-    known = [value for array in values for value in array.tolist() if math.isfinite(value)]
+    known = work_precision.values_of((curve for curves in own.values() for curve in curves), "zero_pitch_max")
     if not known:
         return NOTHING
     return "kept" if not any(known) else TableCell("lost", "bad", note=f"up to {with_unit(max(known), 'rad')}")

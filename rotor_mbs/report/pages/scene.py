@@ -21,7 +21,7 @@ from rotor_mbs.report.pages.viewer import viewer
 from rotor_mbs.report.plots import LOWEST, Series
 from rotor_mbs.runs.read import StoredRun, StoredScene
 from rotor_mbs.scenario.scene import Scene
-from rotor_mbs.scenario.time_table import Table, value_at
+from rotor_mbs.scenario.time_table import values_at
 from rotor_mbs.solution.quantities import Plot, Quantity, known_quantities, sizes
 from rotor_mbs.solution.status import GOOD
 from rotor_mbs.solution.trajectory import Array
@@ -187,14 +187,10 @@ def _drive_section(scene: Scene, run: StoredRun | None) -> Section:
     if run is None or "rates" not in run or "angles" not in run or not len(run.array("time")):
         return Section()
     time, angles, rates = run.array("time"), run.array("angles"), run.array("rates")
-
-    def over_time(table: Table) -> Array:
-        return np.array([value_at(table, t) for t in time.tolist()])
-
     drawn: dict[str, list[tuple[str, list[Series]]]] = {}  # by caption
     numbers: list[tuple[str, Array, str]] = []
     if scene.has_torque:
-        look, torque = coordinate_look(0, "torque on the rotor"), over_time(scene.rotor_torque)
+        look, torque = coordinate_look(0, "torque on the rotor"), values_at(scene.rotor_torque, time)
         powers = [Series(time, torque * rates[:, 0], look)]
         numbers += [("Torque on the rotor", torque, "N m"), ("Its power", powers[0].values, "W")]
         if scene.shaft_damping:
@@ -206,7 +202,7 @@ def _drive_section(scene: Scene, run: StoredRun | None) -> Section:
     if driven:
         pitches, powers = plots.coordinate_series(time, angles)[1:], []
         for i in driven:
-            torque, rest = map(over_time, scene.pitch_load(i))
+            torque, rest = (values_at(table, time) for table in scene.pitch_load(i))
             stiffness, damping = scene.bearing(i)
             moment = torque + stiffness * (rest - angles[:, 1 + i]) - damping * rates[:, 1 + i]
             powers.append(Series(time, moment * rates[:, 1 + i], coordinate_look(1 + i)))
