@@ -7,7 +7,7 @@ no reference; where one is wrong, the search of `compare` looks for the cause.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -19,15 +19,17 @@ from rotor_mbs.errors import MethodRefusal, RotorError
 from rotor_mbs.foreign.channels import load_data
 from rotor_mbs.methods.base import STEP, Method
 from rotor_mbs.methods.catalogue import find_method, line_of, with_method_files
-from rotor_mbs.methods.time_limit import OutOfTimeError, time_limit
+from rotor_mbs.methods.solve import solve
+from rotor_mbs.methods.time_limit import OutOfTimeError
 from rotor_mbs.runs.pool import TaskLostError, TaskPool, WorkerPool
 from rotor_mbs.scenario.accuracy_bounds import shipped_bounds
 from rotor_mbs.scenario.catalogue import only_scene
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.defects import Defects
 from rotor_mbs.solution.metrics import metrics_of
-from rotor_mbs.solution.trajectory import Array, Integration, Trajectory, sample_times, shape_fault
+from rotor_mbs.solution.trajectory import Solution, Trajectory, sample_times
 from rotor_mbs.studies.compare_data import compare_with_reference
+from rotor_mbs.studies.run import without_samples
 
 # Between them they have every term; those with fewer terms first. With durations in s that show each at work, and how
 # many times its bounds, which are for slow motions, a method may need: stiff bearings take more of a fixed step.
@@ -52,53 +54,23 @@ _LONG = 1000.0  # times the duration, of a run that is to be stopped
 _STOP_S, _LOAD_S = 0.5, 20.0
 _FIRST_S = 300.0  # of a first run, in which an engine may compile its code
 NOT_FOUND = "cause not found"
+REFUSED = "refused"  # in place of a status
 
 
-@dataclass(frozen=True)
-class _Task:
-    method: str
-    scene: Scene
-    settings: Mapping[str, object]
-    time_limit_s: float
-    twice: bool
-
-
-@dataclass
-class _Answer:
-    """failure: "" , "refused", "raised", "timed_out", "lost"."""
-
-    failure: str = ""
-    message: str = ""
-    trajectory: Trajectory = field(default_factory=lambda: Trajectory(*np.empty((3, 0))))
-    integration: Integration = field(default_factory=lambda: Integration(False))
-    is_repeated: bool = True
-
-
-def _run(task: _Task) -> _Answer:
-    """In a worker process."""
+def _run(task: tuple[str, Scene, Mapping[str, object], int, float]) -> Solution:
+    """In a worker process: (method, scene, settings, integrations, time limit in s). Without samples, and why, where
+    the engine raises something."""
+    name, scene, settings, repeats, time_limit_s = task
     try:
-        method = find_method(task.method)
-        solver = method.build(task.scene, method.settings.of(task.method, task.settings))
-        with time_limit(task.time_limit_s), np.errstate(all="ignore"):
-            answer = _Answer(integration=solver.integrate(), trajectory=solver.observe())
-            if task.twice:
-                first = {name: values.copy() for name, values in _arrays(answer.trajectory).items()}
-                solver.integrate()
-                second = _arrays(solver.observe())
-                answer.is_repeated = first.keys() == second.keys() and all(
-                    np.array_equal(values, second[name]) for name, values in first.items()
-                )
+        with np.errstate(all="ignore"):
+            return solve(name, scene, settings, repeats, time_limit_s=time_limit_s)
     except MethodRefusal as exc:
-        return _Answer("refused", str(exc))
+        status, message = REFUSED, str(exc)
     except OutOfTimeError as exc:
-        return _Answer("timed_out", str(exc))
+        status, message = "timed_out", str(exc)
     except Exception as exc:  # whatever an engine raises is what is asked
-        return _Answer("raised", line_of(exc))
-    return answer
-
-
-def _arrays(run: Trajectory) -> dict[str, Array]:
-    return {"time": run.time, "angles": run.angles, "rates": run.rates, **run.quantities}
+        status, message = "solver_failed", str(exc) if isinstance(exc, RotorError) else line_of(exc)
+    return without_samples(scene, name, settings, status, message)
 
 
 def examine(name: str, timeout_s: float = 60.0) -> list[Check]:
@@ -140,31 +112,39 @@ class _Examination:
         return made.passed
 
     def _ask(
-        self, scene: Scene, settings: Mapping[str, object] | None = None, *, twice: bool = False, limit: float = 0.0
-    ) -> _Answer:
-        limit = limit or self._timeout_s
-        task = _Task(self._method.name, scene, settings or {}, limit, twice)
+        self, scene: Scene, settings: Mapping[str, object] | None = None, *, repeats: int = 1, limit: float = 0.0
+    ) -> Solution:
+        """A run, not judged; its status is "" where it came back, else a reason why it has no samples."""
+        name, settings, limit = self._method.name, settings or {}, repeats * (limit or self._timeout_s)
+        task = (name, scene, settings, repeats, limit)
         try:
-            kill_after_s = (1.0 + twice) * limit + _LOAD_S
-            return self._pool.submit(with_method_files(_run), task, kill_after_s).result()
+            return self._pool.submit(with_method_files(_run), task, limit + _LOAD_S).result()
         except TaskLostError as exc:
-            return _Answer("lost", str(exc))
+            status, message = "worker_died", str(exc)
         except Exception as exc:  # what cannot be sent from one process to the other
-            return _Answer("raised", line_of(exc))
+            status, message = "solver_failed", line_of(exc)
+        return without_samples(scene, name, settings, status, message)
 
     def _scene(self, scene: Scene, allowance: float) -> None:
-        answer = self._ask(scene, twice=scene.name == _SMOOTH)
-        if answer.failure == "refused":
+        solution = self._ask(scene)
+        if solution.status == REFUSED:
+            reason = solution.message
             self._refused.add(scene.name)
-            self._add("refusal", scene.name, 0.0 if answer.message else 1.0, 0.0, answer.message or "without a reason")
+            self._add("refusal", scene.name, float(not reason), 0.0, reason or "without a reason")
             return
-        fault = answer.message if answer.failure else protocol_fault(scene, answer.trajectory, answer.integration)
+        fault = protocol_fault(solution)
         if not self._add("samples", scene.name, float(bool(fault)), 0.0, fault):
             return
         if scene.name == _SMOOTH:
+            # Built again, and integrated twice: neither the process nor the solver may keep state.
+            again = self._ask(scene, repeats=2)
+            first, second = (run.quantities | {"time": run.time} for run in (solution, again))
+            is_same = first.keys() == second.keys() and all(
+                np.array_equal(values, second[name]) for name, values in first.items()
+            )
             hint = "a repeated run gives different numbers: state kept between runs, or randomness"
-            self._add("determinism", scene.name, float(not answer.is_repeated), 0.0, hint)
-        run = answer.trajectory
+            self._add("determinism", scene.name, float(not is_same), 0.0, hint)
+        run = solution.trajectory
         defects = defects_of(scene, run)
         with np.errstate(all="ignore"):
             metrics = metrics_of(scene, run, None, defects)
@@ -182,7 +162,7 @@ class _Examination:
         step, order = self._method.defaults.get("step"), self._method.order or 1.0
         if isinstance(step, float) and defects is not None:
             finer = self._ask(scene, {"step": 0.5 * step})
-            if not finer.failure and len(finer.trajectory.time) == len(run.time):
+            if len(finer.time) == len(run.time):
                 half = defects_of(scene, finer.trajectory)
                 left = metrics_of(scene, finer.trajectory, None, half).get("defect_max", np.inf)
                 seen = float(np.log2(size / max(left, np.finfo(float).tiny)))
@@ -199,12 +179,12 @@ class _Examination:
 
     def _exact(self, scene: Scene) -> None:
         known = exact_rotor_angle(scene, sample_times(scene))
-        answer = self._ask(scene)
-        if known is None or answer.failure == "refused":
+        solution = self._ask(scene)
+        if known is None or solution.status == REFUSED:
             return
         name, angle = known
-        fault = answer.message if answer.failure else protocol_fault(scene, answer.trajectory, answer.integration)
-        error = np.inf if fault else np.abs(answer.trajectory.angles[:, 0] - angle).max()
+        fault = protocol_fault(solution)
+        error = np.inf if fault else np.abs(solution.angles[:, 0] - angle).max()
         # The defects of all intervals, added up; the pendulum falls, in a second by less than tenfold.
         bound = 10.0 * scene.samples * self._bound
         self._add("exact", scene.name, error, bound, fault or f"{name}: {self._reason or NOT_FOUND}", "rad")
@@ -223,7 +203,7 @@ class _Examination:
             initial_angles=(rotor - turn, *pitches[-1:], *pitches[:-1]),
             initial_rates=(spin, *rates[-1:], *rates[:-1]),
         )
-        angles, image, others = (self._ask(one).trajectory.angles for one in (scene, mirrored, renumbered))
+        angles, image, others = (self._ask(one).angles for one in (scene, mirrored, renumbered))
         if len(others):
             others = np.hstack([others[:, :1] + turn, others[:, 2:], others[:, 1:2]])
         for check, there in (("mirror image", image * sign if len(image) else image), ("renumbered", others)):
@@ -250,15 +230,16 @@ class _Examination:
     def _stops(self, scene: Scene) -> None:
         """A run that would take long is to end at its time limit, by itself."""
         long = replace(scene, duration=_LONG * scene.duration, samples=int(_LONG) * (scene.samples - 1) + 1)
-        answer = self._ask(long, limit=_STOP_S)
-        hint = f"not stopped after {_STOP_S:g} s: {answer.message}; it had to be killed"
-        self._add("time limit", scene.name, float(answer.failure == "lost"), 0.0, hint)
+        solution = self._ask(long, limit=_STOP_S)
+        hint = f"not stopped after {_STOP_S:g} s: {solution.message}; it had to be killed"
+        self._add("time limit", scene.name, float(solution.status == "worker_died"), 0.0, hint)
 
 
-def protocol_fault(scene: Scene, run: Trajectory, integration: Integration) -> str:
+def protocol_fault(solution: Solution) -> str:
     """What is wrong with the form of a run that claims to be complete; "" where nothing is."""
-    if fault := shape_fault(scene, run):
-        return fault
+    scene, run, integration = solution.scene, solution.trajectory, solution.integration
+    if solution.status:  # without samples
+        return solution.message
     times, n = sample_times(scene), len(run.time)
     rows = np.isfinite(np.hstack([run.time[:, None], run.angles, run.rates])).all(axis=1)
     if not rows.all():
