@@ -131,10 +131,9 @@ def _here(call: Callable[[], Any]) -> Any:
     return call()
 
 
-@pytest.mark.parametrize("called", [_here, pytest.param(_in_thread, marks=pytest.mark.full)])
-@pytest.mark.parametrize(
-    "kind", ["damper", *(pytest.param(kind, marks=pytest.mark.full) for kind in ("fast", "shaft"))]
-)
+@pytest.mark.full
+@pytest.mark.parametrize("called", [_here, _in_thread])
+@pytest.mark.parametrize("kind", ["damper", "fast", "shaft"])
 def test_a_time_limit_bounds_reference_and_judging(kind: str, called: Callable[..., rm.Run]) -> None:
     """Of the limit of 2 s: as long again for the engine's compilation, and a second for observing and for judging.
 

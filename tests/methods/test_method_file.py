@@ -93,6 +93,7 @@ def test_the_documents_example_is_short_complete_and_right() -> None:
         rm.run("check/held", "./mine.py")
 
 
+@pytest.mark.full
 def test_a_run_is_keyed_by_the_code_of_its_file() -> None:
     first = run("-m", "./mine.py", "-m", "lagrange/dop853", "-o", "o.h5")
     assert "mine/lsoda" in first
@@ -151,7 +152,7 @@ def test_whatever_a_method_does_is_one_line_and_loses_nothing(capfd: pytest.Capt
     ("act", "line"),
     [
         ("os._exit(3)", "bad/bad: ended the process that built it for one (exit code 3)"),
-        ("time.sleep(1e3)", "bad/bad: not built for one within 5 s"),
+        pytest.param("time.sleep(1e3)", "bad/bad: not built for one within 5 s", marks=pytest.mark.full),
     ],
 )
 def test_a_build_that_ends_or_hangs_its_process_is_one_line(

@@ -77,7 +77,9 @@ LOADED = replace(
 )
 
 
-@pytest.mark.parametrize("scene", [DAMPED, LOADED], ids=["damped", "pitch torques and rest angles"])
+@pytest.mark.parametrize(
+    "scene", [pytest.param(DAMPED, marks=pytest.mark.full), LOADED], ids=["damped", "pitch torques and rest angles"]
+)
 def test_the_motion_repeats_itself_after_a_turn_also_by_other_equations(scene: Scene) -> None:
     turn = periodic_turn(scene, 1.2)
     end = oracle(scene, turn).y[:, -1]

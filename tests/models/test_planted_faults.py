@@ -71,7 +71,9 @@ def smallest_share(name: str, method: str, fault: str) -> float:
 
 
 @pytest.mark.parametrize("fault", SEEN_IN)
-@pytest.mark.parametrize("method", ENGINES)
+@pytest.mark.parametrize(
+    "method", [pytest.param(name, marks=pytest.mark.full) if "extrapolated" in name else name for name in ENGINES]
+)
 def test_a_fault_near_the_end_is_seen_where_the_motion_exercises_it(method: str, fault: str) -> None:
     if not find_method(method).is_installed:
         pytest.skip(f"{method} is not installed")

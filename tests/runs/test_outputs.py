@@ -181,6 +181,7 @@ def test_what_a_sweep_writes_beside_its_dataset_replaces_no_other_file(tmp_path:
         assert rotor_mbs(*command).status == 0
 
 
+@pytest.mark.full
 def test_pages_figures_and_saved_runs_replace_no_other_file(tmp_path: Path) -> None:
     scene = paper("fig08", samples=11)
     path = store(tmp_path / "r.h5", [Made(scene, "lagrange/dop853", rotor(np.sin))])
@@ -221,7 +222,7 @@ def test_pages_figures_and_saved_runs_replace_no_other_file(tmp_path: Path) -> N
         ("animate .. {results} -o /proc/none/x.webp", ""),
         ("run check/held -m lagrange/ode45 -o /proc/none/x.h5", ""),
         ("new /proc/none/x.toml", ""),
-        ("figures {results} -o /proc/none/x", ""),
+        pytest.param("figures {results} -o /proc/none/x", "", marks=pytest.mark.full),
         ("report {dataset} -o /proc/none/x", ""),
     ],
 )

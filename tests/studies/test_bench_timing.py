@@ -197,6 +197,7 @@ def curves_of(path: Path) -> dict[str, Record]:
     return {curve.name: curve for curve in read_records(path, "bench")}
 
 
+@pytest.mark.full
 def test_the_stored_points_keep_the_contract_and_a_bench_goes_on_where_it_was(tmp_path: Path) -> None:
     path = tmp_path / "b.h5"
     ended = rotor_mbs("bench", *QUICK, "-o", path)
