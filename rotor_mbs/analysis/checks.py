@@ -23,7 +23,7 @@ from rotor_mbs.methods.solve import solve
 from rotor_mbs.runs.read import OpenResults, StoredRun, StoredScene
 from rotor_mbs.runs.table import reading
 from rotor_mbs.scenario.accuracy_bounds import Bounds
-from rotor_mbs.scenario.catalogue import find_scenes
+from rotor_mbs.scenario.catalogue import shipped_scene
 from rotor_mbs.scenario.scene import Scene, scene_hash
 from rotor_mbs.solution.defects import DRIFT_ROWS, FLOOR_SAFETY
 from rotor_mbs.solution.metrics import HORIZON_GROWTH, Metrics, energy_scale, running_growth
@@ -112,10 +112,8 @@ def checks_of(results: OpenResults, frozen: Sequence[OpenResults], bounds: Bound
 
 def _is_shipped(scene: StoredScene) -> bool:
     """Whether it is a scene of this package, number by number: the bounds of its name are for no other."""
-    try:
-        return any(scene_hash(known) == scene.attributes["scene_hash"] for known in find_scenes([scene.name]))
-    except InputError:
-        return False
+    known = shipped_scene(scene.name)
+    return known is not None and scene_hash(known) == scene.attributes["scene_hash"]
 
 
 def _of(run: StoredRun, name: str, channel: str, value: float, bounds: Bounds, unit: str, hint: str) -> Check:

@@ -113,6 +113,14 @@ def scene_of(given: Scene | str) -> Scene:
     return only_scene(given) if isinstance(given, str) else given
 
 
+def shipped_scene(name: str) -> Scene | None:
+    """The scene of this package with that name; no file of a user's is read."""
+    from rotor_mbs.scenario.scene import load_scene, no_check
+
+    path = _shipped().get(name)
+    return None if path is None else load_scene(path, name, no_check)
+
+
 def _shipped() -> dict[str, Path]:
     paths = (path for path in SCENARIOS.rglob("*.toml") if path.parent != SWEEPS)
     names = ((path.relative_to(SCENARIOS).with_suffix("").as_posix(), path) for path in paths)
