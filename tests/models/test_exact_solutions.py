@@ -105,6 +105,14 @@ CASES = {
         lambda t: 0.1 + t + 2.5 * t**2 / 462.0,
         lambda t: 0.7 + 12.0 / K_PITCH + oscillator(-0.5 - 12.0 / K_PITCH, -0.5, t, 0.0),
     ),
+    "a growing torque and a constant angle of rest": (
+        axial(
+            0.2, -0.5, damping=0.0, duration=2.0,
+            pitch_torque=(((0.0, 0.0), (2.0, 24.0)),), bearing_rest=(((0.0, 0.7),),),
+        ),
+        lambda t: 0.1 + t,
+        lambda t: 0.7 + 12.0 * t / K_PITCH + oscillator(-0.5, -0.5 - 12.0 / K_PITCH, t, 0.0),
+    ),
     "a step of the command between samples": (
         axial(0.0, 0.0, duration=2.0, bearing_rest=(((0.43, 0.0), (0.43, 0.3)),)), lambda t: 0.1 + t,
         lambda t: np.where(t < 0.43, 0.0, 0.3 + oscillator(-0.3, 0.0, t - 0.43)),
