@@ -14,7 +14,7 @@ from rotor_mbs.models.lagrange import closed_form
 from rotor_mbs.models.lagrange.ode_solvers import Accelerations
 from rotor_mbs.models.lagrange.reference import LEFT_OUT, at_azimuths
 from rotor_mbs.models.printed.derivation import Errata
-from rotor_mbs.models.printed.methods import PrintedModel
+from rotor_mbs.models.printed.methods import equations, point_mass_rotor
 from rotor_mbs.scenario.catalogue import find_scenes, list_scenes
 from rotor_mbs.scenario.scene import Blade, Scene, scene_fields
 from rotor_mbs.solution.trajectory import Array
@@ -57,14 +57,14 @@ def other_models(scene: Scene) -> Iterator[tuple[str, Model]]:
             yield text, Model(other)
     for text, azimuths in _azimuths(scene):
         yield text, Model(scene, tuple(azimuths))
-    for terms, equations in LEFT_OUT.items():
-        yield f"without the {terms}", Model(scene, equations=equations)
+    for terms, reduced in LEFT_OUT.items():
+        yield f"without the {terms}", Model(scene, equations=reduced)
     yield "small-angle approximation: sin x = x, cos x = 1", Model(scene, equations=_small_angles)
     # E3 is the power of a term that is zero without E2.
     for names in ("E1", "E2", "E1 and E2", "E2 and E3", "E1 and E2 and E3"):
         errata = Errata(*(name in names for name in ("E1", "E2", "E3")))
-        equations = functools.partial(_printed, scene, PrintedModel("printed", errata))
-        yield f"erratum {names} of the paper's equations", Model(scene, equations=equations)
+        printed = functools.partial(_printed, scene, errata)
+        yield f"erratum {names} of the paper's equations", Model(scene, equations=printed)
 
 
 def scenes_with_start(scene: Scene, first: Array) -> Iterator[tuple[str, Model]]:
@@ -79,9 +79,9 @@ def _small_angles(angles: Any, rates: Any, form: Any, loads: Any, *_: Any) -> li
     return closed_form.accelerations(angles, rates, form, loads, lambda x: x, lambda x: 1.0 + 0.0 * x)
 
 
-def _printed(scene: Scene, model: PrintedModel, angles: Any, rates: Any, _form: Any, loads: Any, *_: Any) -> list[Any]:
+def _printed(scene: Scene, errata: Errata, angles: Any, rates: Any, _form: Any, loads: Any, *_: Any) -> list[Any]:
     """Of (n,) arrays. Raises MethodRefusal for a scene that the printed equations have no place for."""
-    accelerations = model.accelerations(scene)
+    accelerations = equations(point_mass_rotor("printed", errata, scene), errata)
     torques = [loads.rotor, *(loads.pitches or (0.0,) * (len(angles) - 1))]
     rows = np.broadcast_arrays(*torques, *angles, *rates)
     count = len(torques)

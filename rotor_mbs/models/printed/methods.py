@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import asdict
+from functools import partial
 from typing import TYPE_CHECKING
 
 from rotor_mbs.errors import MethodRefusal
@@ -25,19 +26,15 @@ Accelerations = Callable[[Sequence[float], Sequence[float]], Sequence[float]]
 
 
 class PrintedSolver:
-    def __init__(
-        self,
-        scene: Scene,
-        rotor: PointMassRotor,
-        accelerations: Accelerations,
-        settings: Ode45Settings,
-        *,
-        keeps_refined: bool,
-    ) -> None:
-        self._scene, self._rotor, self._keeps_refined = scene, rotor, keeps_refined
+    """The equations as printed or, with errata, the paper's derivation, integrated by ode45."""
+
+    def __init__(self, name: str, errata: Errata | None, scene: Scene, settings: Ode45Settings) -> None:
+        """Raises MethodRefusal where the printed equations cannot represent the scene."""
+        self._scene, self._errata = scene, errata
+        self._rotor = rotor = point_mass_rotor(name, errata, scene)
         self._moving = moving = len(scene.initial_angles) if rotor.pitches_move else 1
         self._initial = [*scene.initial_angles[:moving], *scene.initial_rates[:moving]]
-        self._right_hand_side = right_hand_side(scene, accelerations, moving)
+        self._right_hand_side = right_hand_side(scene, equations(rotor, errata), moving)
         self._tolerances = settings.relative_tolerance, settings.absolute_tolerance
         self._result: Ode45Result  # of the last integration
 
@@ -63,7 +60,7 @@ class PrintedSolver:
         states = result.at(time)
         angles, rates = all_coordinates(scene, states[:, : self._moving], states[:, self._moving :])
         trajectory = Trajectory(time, angles, rates)
-        if self._keeps_refined:  # ode45's own output points: the paper's numbers are read off at them
+        if not self._errata:  # ode45's own output points: the paper's numbers are read off at them
             trajectory.refined_time, states = result.refined()
             refined = all_coordinates(scene, states[:, : self._moving], states[:, self._moving :])
             trajectory.refined_angles, trajectory.refined_rates = refined
@@ -86,70 +83,53 @@ class PrintedSolver:
         return trajectory
 
 
-class PrintedModel:
-    """The equations as printed, or the paper's derivation with chosen errata."""
+def point_mass_rotor(name: str, errata: Errata | None, scene: Scene) -> PointMassRotor:
+    """Raises MethodRefusal, in one sentence, where the printed equations have no place for what the scene has."""
+    from rotor_mbs.models.printed.observables import PointMassRotor
 
-    def __init__(self, name: str, errata: Errata | None = None) -> None:
-        self._name = name
-        self._errata = errata
+    blade, count = scene.blades[0], len(scene.blades)
+    x, y, z = blade.centre_of_mass
+    refusals = {
+        f"{name} requires 1 or 3 blades; the scene has {count}": not errata and count not in (1, 3),
+        f"{name} requires equal blades": any(other != blade for other in scene.blades),
+        f"{name} requires point-mass blades, without inertia about the centre of mass": not blade.is_point_mass,
+        f"{name} requires the centre of mass in the blade's x-z plane: y = 0, not {y:g}": y != 0.0,
+        f"{name} does not include hub inertia; it must be 0": scene.hub_inertia != 0.0,
+        f"{name} does not include bearing stiffness or damping; both must be 0": (
+            any(scene.bearing_stiffness) or any(scene.bearing_damping)
+        ),
+        f"{name} does not include shaft damping; it must be 0": scene.shaft_damping != 0.0,
+    }
+    for sentence, refused in refusals.items():
+        if refused:
+            raise MethodRefusal(sentence)
+    tip = (blade.tip[0] - x, blade.tip[1] - y, blade.tip[2] - z)
+    return PointMassRotor(blade.mass, x, z, scene.gravity, scene.phases, tip)
 
-    def items(self, scene: Scene) -> list[BuiltItem]:
-        """Raises MethodRefusal where the printed equations cannot represent the scene."""
-        self._rotor(scene)
-        # Where in the paper the rotor's row and a pitch's stand, in the form that is run.
-        if self._errata:
-            left = " ".join(name.upper() for name, is_left in asdict(self._errata).items() if is_left)
-            return equation_items(scene, (f"(24)-(38) rederived, with {left}",) * 2)
-        if len(scene.blades) == 1:
-            return equation_items(scene, ("(33), rotor row", "(33), pitch row"))
-        rows = "(42)-(45), (52), (56) with its factor expanded", "(46)-(51), (53)-(56)"
-        return equation_items(scene, rows)
 
-    def build(self, scene: Scene, settings: Ode45Settings) -> PrintedSolver:
-        """Raises MethodRefusal where the printed equations cannot represent the scene."""
-        rotor = self._rotor(scene)
-        return PrintedSolver(scene, rotor, self._accelerations(rotor), settings, keeps_refined=not self._errata)
+def equations(rotor: PointMassRotor, errata: Errata | None) -> Accelerations:
+    """As printed or, with errata, derived anew with these."""
+    m, c, d, g = rotor.m, rotor.c, rotor.d, rotor.g
+    if not rotor.pitches_move:
+        return lambda torques, state: [literal.fixed_pitch_acceleration(m, d, g, torques[0], state[0], rotor.phases)]
+    if errata:
+        derived = DerivedRotor(m, c, d, g, rotor.phases, errata)
+        n = 1 + len(rotor.phases)
+        return lambda torques, state: derived.accelerations(torques, state[:n], state[n:])
+    if len(rotor.phases) == 1:
+        return lambda torques, state: literal.one_blade_accelerations(m, c, d, g, torques, state)
+    return lambda torques, state: literal.three_blade_accelerations(m, c, d, g, torques, state)
 
-    def accelerations(self, scene: Scene) -> Accelerations:
-        """From torques (rotor, pitches) and the state (angles, rates) to accelerations. Raises MethodRefusal."""
-        return self._accelerations(self._rotor(scene))
 
-    def _rotor(self, scene: Scene) -> PointMassRotor:
-        """Raises MethodRefusal, in one sentence, where the printed equations have no place for what the scene has."""
-        from rotor_mbs.models.printed.observables import PointMassRotor
-
-        blade, name, count = scene.blades[0], self._name, len(scene.blades)
-        x, y, z = blade.centre_of_mass
-        refusals = {
-            f"{name} requires 1 or 3 blades; the scene has {count}": not self._errata and count not in (1, 3),
-            f"{name} requires equal blades": any(other != blade for other in scene.blades),
-            f"{name} requires point-mass blades, without inertia about the centre of mass": not blade.is_point_mass,
-            f"{name} requires the centre of mass in the blade's x-z plane: y = 0, not {y:g}": y != 0.0,
-            f"{name} does not include hub inertia; it must be 0": scene.hub_inertia != 0.0,
-            f"{name} does not include bearing stiffness or damping; both must be 0": (
-                any(scene.bearing_stiffness) or any(scene.bearing_damping)
-            ),
-            f"{name} does not include shaft damping; it must be 0": scene.shaft_damping != 0.0,
-        }
-        for sentence, refused in refusals.items():
-            if refused:
-                raise MethodRefusal(sentence)
-        tip = (blade.tip[0] - x, blade.tip[1] - y, blade.tip[2] - z)
-        return PointMassRotor(blade.mass, x, z, scene.gravity, scene.phases, tip)
-
-    def _accelerations(self, rotor: PointMassRotor) -> Accelerations:
-        m, c, d, g = rotor.m, rotor.c, rotor.d, rotor.g
-        if not rotor.pitches_move:
-            return lambda torques, state: [
-                literal.fixed_pitch_acceleration(m, d, g, torques[0], state[0], rotor.phases)
-            ]
-        if self._errata:
-            derived = DerivedRotor(m, c, d, g, rotor.phases, self._errata)
-            n = 1 + len(rotor.phases)
-            return lambda torques, state: derived.accelerations(torques, state[:n], state[n:])
-        if len(rotor.phases) == 1:
-            return lambda torques, state: literal.one_blade_accelerations(m, c, d, g, torques, state)
-        return lambda torques, state: literal.three_blade_accelerations(m, c, d, g, torques, state)
+def items(name: str, errata: Errata | None, scene: Scene) -> list[BuiltItem]:
+    """Where in the paper the rotor's row and a pitch's stand, in the form that is run. Raises MethodRefusal."""
+    point_mass_rotor(name, errata, scene)
+    if errata:
+        left = " ".join(erratum.upper() for erratum, is_left in asdict(errata).items() if is_left)
+        return equation_items(scene, (f"(24)-(38) rederived, with {left}",) * 2)
+    if len(scene.blades) == 1:
+        return equation_items(scene, ("(33), rotor row", "(33), pitch row"))
+    return equation_items(scene, ("(42)-(45), (52), (56) with its factor expanded", "(46)-(51), (53)-(56)"))
 
 
 def _torque_tables(scene: Scene, moving: int) -> tuple[Table, ...]:
@@ -176,12 +156,11 @@ def right_hand_side(scene: Scene, accelerations: Accelerations, moving: int) -> 
 
 
 def _method(name: str, label: str, errata: Errata | None = None, erratum: str = "") -> Method:
-    model = PrintedModel(name, errata)
     return Method(
         name=name,
         label=label,
-        build=model.build,
-        items=model.items,
+        build=partial(PrintedSolver, name, errata),
+        items=partial(items, name, errata),
         settings=Ode45Settings,
         is_corrected=False,
         is_default=not erratum,
