@@ -12,7 +12,6 @@ from typing import Any
 
 import matplotlib
 import numpy as np
-from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
@@ -83,12 +82,8 @@ class Panels:
 def panels(heights: tuple[float, ...], x_label: str) -> Panels:
     """Panels one below the other; heights in inches, that of the top one first. x_label: of the last one."""
     figure = Figure(figsize=(WIDTH, sum(heights) + 0.6), facecolor="white")
-    axes: list[Axes] = []
     with style():
-        grid = figure.add_gridspec(len(heights), 1, height_ratios=heights)
-        for row in range(len(heights)):
-            axes.append(figure.add_subplot(grid[row], sharex=axes[0] if axes else None))
-            axes[-1].tick_params(labelbottom=row == len(heights) - 1)
+        axes = figure.subplots(len(heights), squeeze=False, sharex=True, height_ratios=heights)[:, 0].tolist()
         axes[-1].set_xlabel(x_label)
     # Fixed margins: the layout does not depend on the fonts.
     height = float(figure.get_figheight())
