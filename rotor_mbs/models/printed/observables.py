@@ -11,7 +11,7 @@ import numpy as np
 from rotor_mbs.models.ode45 import Ode45Result
 from rotor_mbs.models.printed import derivation
 from rotor_mbs.models.printed.derivation import CORRECTED
-from rotor_mbs.scenario.time_table import Segment, Table, segments
+from rotor_mbs.scenario.time_table import Table, knots, segments, values_at, values_before
 from rotor_mbs.solution.quantities import named_loads
 from rotor_mbs.solution.trajectory import Array
 
@@ -109,18 +109,14 @@ def torque_work(table: Table, run: Ode45Result, column: int, times: Array) -> Ar
     """(n,) J done up to each of `times` (s) by a torque over time (N m) on the coordinate in `column`, from angles
     alone. Where τ is linear, ∫τ q̇ dt = [τ q] - τ' ∫q dt, and the integral is exact for the interpolant, a quartic in
     each step."""
-    parts = segments([table], float(times[-1])) if len(times) > 1 else ()
-    grids = [np.unique([part.start, *_inside(run.time, part), *_inside(times, part), part.end]) for part in parts]
-    done = [np.zeros(1)]
-    for part, grid in zip(parts, grids, strict=True):
-        start, width, torque = grid[:-1], np.diff(grid), part.at(0, grid)
-        points = start[:, None] + width[:, None] * _GAUSS_POINTS
-        mean = run.at(points.ravel())[:, column].reshape(points.shape) @ _GAUSS_WEIGHTS
-        at_ends = run.at(grid)[:, column]
-        done.append(torque[1:] * (at_ends[1:] - mean) + torque[:-1] * (mean - at_ends[:-1]))
-    ends = np.concatenate([times[:1], *(grid[1:] for grid in grids)])
-    return np.asarray(np.cumsum(np.concatenate(done))[np.searchsorted(ends, times)])
-
-
-def _inside(times: Array, part: Segment) -> Array:
-    return times[(times > part.start) & (times < part.end)]
+    if len(times) < 2:
+        return np.zeros(len(times))
+    end = float(times[-1])
+    grid = np.unique([*run.time, *times, *knots([table], end)])
+    grid = grid[grid <= end]
+    before, after = values_before(segments([table], end), grid[1:])[0], values_at(table, grid[:-1])  # at a jump
+    points = grid[:-1, None] + np.diff(grid)[:, None] * _GAUSS_POINTS
+    mean = run.at(points.ravel())[:, column].reshape(points.shape) @ _GAUSS_WEIGHTS
+    angles = run.at(grid)[:, column]
+    done = np.cumsum(before * (angles[1:] - mean) + after * (mean - angles[:-1]))
+    return np.asarray(np.append(0.0, done)[np.searchsorted(grid, times)])
