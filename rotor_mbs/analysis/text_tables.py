@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from html import escape
 
-from rotor_mbs.analysis.work_precision import TARGETS_RAD, points, time_to_reach
+from rotor_mbs.analysis.work_precision import TARGETS_RAD, left_out, points, time_to_reach
 from rotor_mbs.methods.catalogue import REFERENCE, is_corrected
 from rotor_mbs.runs.read import Record, StoredRun, StoredScene
 from rotor_mbs.solution.status import GOOD
@@ -58,14 +58,16 @@ def method_table(runs: Iterable[StoredRun]) -> TextTable:
 
 
 def bench_table(curves: Sequence[Record]) -> TextTable:
-    """A row for each curve: how many settings are ok, the smallest error, and the run time to reach given errors."""
+    """A row for each curve: how many settings are ok, the smallest error, and the run time to reach given errors: empty
+    if it does not, "not measured" if it might with finer settings, which the budget left out."""
     rows = []
     for curve in curves:
         errors, seconds = points(curve)
         times = [time_to_reach(errors, seconds, target) for target in TARGETS_RAD]
         count = f"{curve.statuses.count('ok')} of {len(curve.statuses)}"
         best = _short(float(errors.min())) if len(errors) else ""
-        rows.append((curve.scene, curve.name, count, best, *("" if t is None else f"{t:.2e}" for t in times)))
+        missing = "not measured" if left_out(curve) else ""
+        rows.append((curve.scene, curve.name, count, best, *(missing if t is None else f"{t:.2e}" for t in times)))
     return TextTable(
         ("scene", "method", "ok", "best error (rad)", *(f"s to {target:.0e} rad" for target in TARGETS_RAD)), rows
     )

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from rotor_mbs.analysis.text_tables import bench_table
 from rotor_mbs.analysis.work_precision import (
     failed,
     fastest,
@@ -19,7 +20,7 @@ from rotor_mbs.analysis.work_precision import (
 )  # fmt: skip
 from rotor_mbs.report.build import write_report
 from rotor_mbs.report.looks import look_of
-from rotor_mbs.report.pages.bench import diagram, engine_tables, point_table, reach_table
+from rotor_mbs.report.pages.bench import diagram, engine_tables, point_table
 from rotor_mbs.runs.design import POINT_COLUMNS
 from rotor_mbs.runs.read import Record, open_results, points_table, read_records
 from rotor_mbs.runs.table import TableFile, extend_file
@@ -79,8 +80,8 @@ def test_ratios_are_to_the_fastest() -> None:
     assert slow.seconds == pytest.approx(1e-2 * 10**0.5)
     assert (fast.ratio, slow.ratio) == (1.0, pytest.approx(slow.seconds / fast.seconds))
     assert [one.name for one, _ in fastest([SLOW, FAST], 1e-6)] == ["lagrange/taylor"]
-    ((_, *cells),) = reach_table([SLOW]).rows  # whose ladder the budget cut
-    assert [cell.text for cell in cells][1:] == ["not measured"] * 2
+    (row,) = bench_table([SLOW]).rows  # whose ladder the budget cut
+    assert row[5:] == ("not measured",) * 2
 
 
 def test_a_row_for_each_engine_with_dashes_for_what_the_file_does_not_say(tmp_path: Path) -> None:

@@ -11,6 +11,7 @@ from itertools import cycle
 import numpy as np
 
 from rotor_mbs.analysis import work_precision
+from rotor_mbs.analysis.text_tables import bench_table
 from rotor_mbs.report import canvas
 from rotor_mbs.report.canvas import Panels
 from rotor_mbs.report.elements import PageTable, Picture, Row, Section, TableCell, picture
@@ -23,7 +24,6 @@ from rotor_mbs.scenario.catalogue import natural_order
 from rotor_mbs.solution.status import COMPLETE
 from rotor_mbs.studies.stability import SuiteRun, suite_runs
 
-_TARGETS = [f"{power(round(math.log10(target)))} rad" for target in work_precision.TARGETS_RAD]
 _POINT_COLUMNS = (
     "angle_error_max", "angle_error_end", "tip_error_max", "energy_drift_max", "run_time_s", "run_time_q1_s",
     "run_time_q3_s", "run_time_min_s", "setup_time_s", "setup_again_time_s", "output_time_s", "repeats", "steps",
@@ -50,11 +50,14 @@ def bench_page(results: OpenResults) -> dict[str, object]:
             picture(diagram(curves), f"bench-{i}", "Run time of the integration: lower left is best"),
             picture(diagram(curves, "defect_max"), f"bench-{i}-defect", "Largest interval defect and run time"),
         ]
+        table = bench_table(curves)
+        rows = [[method_cell(method), *(cell or NOTHING for cell in cells)] for _, method, *cells in table.rows]
+        times = PageTable("Run time to reach an angle error", table.head[1:], rows)
         parts.append({
             "id": f"scene-{i}",
             "name": name,
             "facts": curves[0].attributes,
-            "diagram": Section(pictures, [reach_table(curves)]),
+            "diagram": Section(pictures, [times]),
             "points": point_table(curves),
         })  # fmt: skip
     return {"engines": engine_tables(results, scenes), "scenes": parts}
@@ -268,31 +271,6 @@ def _false_success_cell(own: Mapping[str, Sequence[Record]], suite: Sequence[Sui
         return TableCell("all ok" if suite else "none failed", note=note)
     what = "not ok" if suite else "failed"
     return TableCell(f"{claimed} of {count} {what}", "bad" if claimed else "", note=note)
-
-
-def reach_table(curves: Sequence[Record]) -> PageTable:
-    """A row per curve: time and ratio for each target, or whether the method cannot, or was not asked to."""
-    rows: list[Row] = []
-    for curve in curves:
-        errors = curve.arrays["angle_error_max"][work_precision.succeeded(curve)]
-        missing = TableCell(
-            NOTHING, note=f"{with_unit(errors.min(), 'rad')} at best" if len(errors) else "no error below 1 rad"
-        )
-        count = work_precision.left_out(curve)
-        if count:
-            note = f"{count} finer {'setting' if count == 1 else 'settings'} omitted"
-            missing = TableCell("not measured", note=note)
-        row = [method_cell(curve.name)]
-        for target in work_precision.TARGETS_RAD:
-            for other, reach in work_precision.fastest(curves, target):
-                if other is curve:
-                    row.append(TableCell(prefixed(reach.seconds, "s", 3), note=f"× {number(reach.ratio)}"))
-                    break
-            else:
-                row.append(missing)
-        rows.append(row)
-    head = ["method", *_TARGETS]
-    return PageTable("Run time to reach an angle error, and its ratio to that of the fastest method", head, rows)
 
 
 def point_table(curves: Sequence[Record]) -> PageTable:
