@@ -311,7 +311,7 @@ _MEANINGS = {
     "missing": "not computed yet",
     "ok": "defects, energy balance and error up to the horizon within the bounds",
     "inaccurate": "end reached, but one of these bounds is exceeded",
-    "diverged": "values that are not finite, although the engine reports success",
+    "diverged": "values that are not finite, although the engine reports success; `samples` ends before them",
     "singular": "the mass matrix is singular at the start or becomes singular; what follows is not determined",
     "solver_failed": "end not reached: the engine reports a failure",
     "timed_out": "end not reached: time limit",
@@ -372,7 +372,7 @@ _ATTRIBUTES = {
     "NX_class": "for viewers of NeXus files",
     "signal": "for viewers of NeXus files",
     "axes": "for viewers of NeXus files",
-    "columns_of_the_reference": "computed datasets without the dimension run: they belong to the reference",
+    "columns_of_the_reference": "arrays over time that only the reference has, without the dimension run",
     "sweep_toml": "text of the sweep file",
     "base_scene": "name of the scene that is varied",
     "combine": "grid or zip",
@@ -386,7 +386,7 @@ _ATTRIBUTES = {
     "methods": "names of the methods",
     "runs": "number of runs in this file",
     "parameter_keys": "keys of the varied parameters",
-    "record": "1: the group is complete when the file is written, without rows",
+    "record": "1: the group has no rows; it is written as a whole",
     "notes": "results that could not be computed, with the reason",
     "label": "label of the model",
     "symmetric": "1 if the modes are named after multiblade coordinates",
@@ -411,32 +411,42 @@ def _statuses() -> list[list[object]]:
 def _file_format() -> str:
     parts = [
         "All files are HDF5 and readable as netCDF-4, without links or compression. Numbers are little-endian. Every "
-        "dataset has the attributes `units` and `long_name`, and every dimension a dataset of its name (a dimension "
-        "scale); `characters` is a dimension without values. The tables list the content of files that were written "
-        "when these pages were built; signs, frames and units are explained in [Reading results](../data.md).",
+        "dataset has the attributes `units` and `long_name`, and every dimension has a dataset of the same name with "
+        "its values (a dimension scale), except `characters`, whose dataset has the length alone. The tables list the "
+        "content of files that were written when these pages were built; signs, frames and units are explained in "
+        "[Reading results](../data.md).",
         "**Rows.** A row is complete if its `status` is not -1 and its `crc32` is correct; a file is complete if all "
         "rows are. Of a missing row only the columns that are known in advance (`run`, `scene`, `method_name`, "
         "`settings`, `versions`, `scene_hash`, varied parameters, `split`) are valid; its other values are undefined. "
         "In a complete row a value that does not exist or was not computed is NaN, -1 (integers) or an empty text.",
-        "**Arrays over time** have one entry per sample. `samples` (in a sweep `time_reached`) tells where a run "
-        "ended; later entries are NaN, as is the whole array if the method does not compute it.",
+        "**Arrays over time** have one entry per sample. A run that ended early has `samples` of them, and the rest is "
+        "NaN; in a sweep, which has no such column, the entries that are not NaN are those of the run. An array that "
+        "the method does not compute is NaN as a whole.",
         "**Text** that is known when the file is created is a string of variable length, UTF-8. Computed text, such as "
         "`message`, is an array of single characters (run, characters), UTF-8, padded with zeros; xarray reads it as "
         "text, h5py and MATLAB as [described here](../data.md).",
         "**Versions.** The column `versions` is a JSON text with the versions of this package, Python, the libraries "
-        "and the code that computed the row. A sweep has the column `code` instead, a CRC-32 of such a text: rows of "
-        "other versions can be told apart, but their versions are not stored. "
+        "and the code that computed the row. A sweep has the column `code` instead, the CRC-32 of that text: among "
+        "rows of one method those of other versions can be told apart, but the versions themselves are not stored. "
         f"The attributes {', '.join(map(code, VERSIONED))} of `/` are of the process that created the file. Rows of "
         "other versions are recomputed by the next `run`, `reproduce`, `bench` or `stability`; a sweep keeps them.",
         "**Layout.** Datasets are contiguous, so that a row lies at a fixed offset and is written there when it is "
-        "computed. *Computed* datasets are those that are filled in this way; in `digests` their key is "
-        "`attributes of NAME`, because the digest covers their attributes only.",
+        "computed. The datasets that are filled in this way are called *computed* here, the others *known in advance*. "
+        "A dataset is computed if the attribute `digests` of its group has the key `attributes of NAME`; a dataset "
+        "known in advance has the key `NAME`.",
         "**Checksum.** `crc32` of row r is the CRC-32 of zlib (`zlib.crc32`), with r, counted from 0, as its starting "
         "value, over the bytes of the row in each computed dataset of `/runs` except `crc32`, in the order in which "
         "they were created (h5py lists them so), then of the method's row in each computed dataset of its scene's "
         "group that has the dimension `run`. For a reference the computed datasets without the dimension `run` follow "
         "as a whole. In `/bench` and `/stability` only the table's own datasets are covered, in a sweep those of `/`, "
-        "where the starting value is the number `run`. [Reading results](../data.md) has this as a program.",
+        "where the starting value is the number `run`. Datasets known in advance are not covered; they have digests. "
+        "[Reading results](../data.md) has a program for results files.",
+        "**Digests.** `digests` of a group is a JSON object of SHA-256 digests in hexadecimal. `attributes` and "
+        "`attributes of NAME`: over the JSON text, with sorted keys as Python's `json.dumps` writes it, of the "
+        "attributes as numbers, texts and lists, without `digests` and those that HDF5 and netCDF-4 keep for "
+        "themselves. `NAME`: over the values, then the digest of the dataset's attributes as text. Values are, of "
+        "texts, the texts joined by a zero byte; of numbers, the text of type, bytes per number and shape "
+        "(`f8(101,)`), then the numbers. `rotor-mbs check` verifies them.",
         "## Status codes",
         "The attributes `flag_values` and `flag_meanings` of every dataset `status` list the codes and their names.",
         table(["code", "status", "meaning"], [[-1, "missing", _MEANINGS["missing"]], *_statuses()]),

@@ -49,10 +49,10 @@ def flags(names: Sequence[str], first: int = 0) -> dict[str, Any]:
 COLUMNS = {
     name: Column(("run", CHARACTERS) if CHARACTER in kind else ("run",), units, long_name, kind[0] if kind else "<f8")
     for name, (units, long_name, *kind) in {
-        "status": ("1", "outcome of the run, determined from its samples; -1: not computed yet", "i1"),
-        "message": ("1", "reason for a status other than ok", CHARACTER),
+        "status": ("1", "outcome of the run, see the status codes; -1: not computed yet", "i1"),
+        "message": ("1", "reason for a status other than ok and completed", CHARACTER),
         "samples": ("1", "number of samples stored", "<i8"),
-        "time_reached": ("s", "time of the last sample"),
+        "time_reached": ("s", "time of the run's last sample; 0 also without any"),
         "time_limit_s": ("s", "time limit that stopped the run; NaN if it was not stopped"),
         "steps": ("1", "number of integration steps; -1: unknown", "<i8"),
         "rhs_evaluations": ("1", "number of evaluations of the right-hand side; -1: unknown", "<i8"),
@@ -71,30 +71,38 @@ COLUMNS = {
         "energy_scale_J": ("J", "energy scale, to which energy errors are relative"),
         "energy_drift_max": ("1", "largest energy error over the run, relative to the energy scale"),
         "energy_gain_J": ("J", "largest increase of the total energy beyond the work"),
-        "angle_error_max": ("rad", "largest angle error up to the horizon"),
+        "angle_error_max": ("rad", "largest error of an angle up to the horizon"),
         "angle_error_predicted": ("rad", "largest angle error up to the horizon, predicted from the defects"),
-        "defect_max": ("rad", "largest defect of an interval between samples"),
+        "defect_max": (
+            "rad",
+            "largest defect of a coordinate in an interval between samples",
+        ),
         "defect_median": ("rad", "median of the interval defects"),
         "defect_time": ("s", "end of the interval of the largest defect"),
         "defect_judged": (
             "rad",
-            "value compared with the bound: largest defect beyond rounding, scaled in long intervals",
+            "value compared with the bound: largest defect beyond rounding; in intervals longer than 0.01 s divided by "
+            "(length / 0.01 s), where the error growth is above 5 by (growth / 5)",
         ),
         "defect_mean": ("rad", "largest signed mean of the defects of a coordinate"),
-        "defect_drift": ("rad", "largest sum of the defects of 100 intervals, each propagated to their end"),
+        "defect_drift": (
+            "rad",
+            "largest sum of the defects of 100 consecutive intervals, each multiplied by the state transition matrix "
+            "from its interval to the last of the 100",
+        ),
         "defect_floor": ("rad", "largest defect that rounding of the samples can cause"),
         "defects_not_judged": ("1", "number of intervals in which errors may grow by more than 1e5"),
-        "angle_error_whole": ("rad", "largest angle error over the whole run"),
-        "angle_error_end": ("rad", "angle error at the last sample"),
+        "angle_error_whole": ("rad", "largest angle error over the whole run, also after the horizon"),
+        "angle_error_end": ("rad", "angle error at the last sample of the scene"),
         "tip_error_max": ("m", "largest distance of a tip from the reference up to the horizon"),
         "error_growth": ("1", "largest factor by which a small error of the initial state has grown"),
-        "horizon_s": ("s", "time of the last sample before the error growth reaches 1e5"),
+        "horizon_s": ("s", "time of the run's last sample before the error growth reaches 1e5"),
         "uncertainty_rad": ("rad", "uncertainty of the reference up to the horizon"),
         "angular_impulse_error_max": ("1", "largest error of the angular momentum balance, relative to its scale"),
         "linear_impulse_error_max": ("1", "largest error of the linear momentum balance, relative to its scale"),
-        "zero_pitch_max": ("rad", "largest pitch angle among those that are zero in the reference"),
-        "zero_pitch_left_s": ("s", "time at which a pitch angle that is zero in the reference becomes nonzero"),
-        "zero_pitch_growth_per_s": ("1/s", "growth rate of a pitch angle that is zero in the reference"),
+        "zero_pitch_max": ("rad", "largest magnitude of the pitch angles that stay zero in the reference"),
+        "zero_pitch_left_s": ("s", "time at which a pitch angle that stays zero in the reference becomes nonzero"),
+        "zero_pitch_growth_per_s": ("1/s", "growth rate of a pitch angle that stays zero in the reference"),
         "rotor_angle_min": ("rad", "smallest rotor angle, at the integrator's own output points"),
         "rotor_angle_max": ("rad", "largest rotor angle, at the integrator's own output points"),
         "rotor_rate_max": ("rad/s", "largest magnitude of the rotor rate, at the integrator's own output points"),
@@ -104,8 +112,16 @@ COLUMNS = {
         "pinned_core": ("1", "number of the core used for timing; -1: any", "<i8"),
         "order": ("1", "order of convergence of the curve, fitted above its round-off floor"),
         "step_for_target_s": ("s", "largest step of the ladder with an error of at most 1e-6 rad"),
-        "code": ("1", "CRC-32 of the versions of package, libraries and code that computed the run", "<u4"),
-        "crc32": ("1", "CRC-32 of the row over all computed columns and arrays", "<u4"),
+        "code": (
+            "1",
+            "CRC-32 of the versions (package, code, libraries of the method) that computed the run",
+            "<u4",
+        ),
+        "crc32": (
+            "1",
+            "CRC-32 of the row over what is computed; not of what is known before",
+            "<u4",
+        ),
     }.items()
 }
 COLUMNS["status"] = COLUMNS["status"]._replace(attributes=flags(("missing", *STATUSES), MISSING))
