@@ -122,7 +122,7 @@ class Method:
         energy only; or None.
     linearize : (scene, steady angles, rotor speed, rotor torque) -> Linearization, or None; for one method of each
         model. Raises MethodRefusal for a state about which the model cannot be linearized.
-    arrays : (settings) -> names of optional quantities that it stores, such as "constraint_error".
+    arrays : names of optional quantities that it stores, such as "constraint_error".
     sources : source files of a method of another package, or its code.
     load : imports the packages it needs, and ignores code compiled by earlier processes; called before a timing.
     """
@@ -144,7 +144,7 @@ class Method:
     bounds: tuple[Bound, ...] = ()
     solve_many: Callable[[Sequence[Scene], Any], RunBlock] | None = None
     linearize: Callable[[Scene, Any, float, float], Linearization] | None = None
-    arrays: Callable[[Any], tuple[str, ...]] = lambda _: ()
+    arrays: tuple[str, ...] = ()
     sources: tuple[Path | str, ...] = ()
     load: Callable[[], object] = lambda: None
 

@@ -25,8 +25,6 @@ RUNS = "runs"
 # What a frozen reference stores: it cannot be computed again from angles and rates as precisely.
 FROZEN = ("angles", "rates", "work", *(load.name for load in LOADS), "angle_uncertainty", "error_growth")
 _ONCE_A_SCENE = ("angle_uncertainty", "error_growth")  # stored once a scene, over time
-# What a method that is no reference says of itself under such a name: its name in the file.
-OF_METHODS = {"angle_uncertainty": "own_uncertainty"}
 
 
 class Column(NamedTuple):
@@ -224,16 +222,15 @@ def metric_columns(outputs: Iterable[str]) -> dict[str, Column]:
 def arrays_of(run: Asked) -> dict[str, Column]:
     """The arrays over time that a run stores, by their name in the file."""
     method = find_method(run.method)
-    own = method.arrays(method.settings.of(run.method, run.settings))
     # A reference is read back by its angles and rates, whatever the scene asks for.
     outputs = (*run.scene.outputs, "angles", "rates") if run.method == REFERENCE else run.scene.outputs
     columns = {}
     for quantity in quantities(outputs):
-        if not quantity.is_over_time or not (quantity.required or quantity.name in own):
+        if not quantity.is_over_time or not (quantity.required or quantity.name in method.arrays):
             continue
-        if quantity.name in _ONCE_A_SCENE and run.method == REFERENCE:
-            columns[quantity.name] = Column(quantity.dimensions, quantity.units, quantity.long_name)
-        else:
-            name = OF_METHODS.get(quantity.name, quantity.name)
-            columns[name] = Column(("run", *quantity.dimensions), quantity.units, quantity.long_name)
+        is_once = quantity.name in _ONCE_A_SCENE
+        if is_once and run.method != REFERENCE:
+            continue
+        dimensions = quantity.dimensions if is_once else ("run", *quantity.dimensions)
+        columns[quantity.name] = Column(dimensions, quantity.units, quantity.long_name)
     return columns

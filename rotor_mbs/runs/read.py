@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 
 from rotor_mbs.errors import StoreError
 from rotor_mbs.methods.catalogue import PRINTED, REFERENCE, is_corrected, look_up
-from rotor_mbs.runs.design import FROZEN, MISSING, OF_METHODS, POINT_COLUMNS, REPEATED, RUNS, Column
+from rotor_mbs.runs.design import FROZEN, MISSING, POINT_COLUMNS, REPEATED, RUNS, Column
 from rotor_mbs.runs.table import (
     DIGESTS,
     Place,
@@ -57,7 +57,6 @@ from rotor_mbs.solution.status import STATUSES, code_of
 from rotor_mbs.solution.trajectory import Integration, Solution, Trajectory
 
 _TEXTS = ("message", "engine_message")
-_OWN_NAMES = {name: quantity for quantity, name in OF_METHODS.items()}
 _ATTEMPTS = 3  # to open a file that is being replaced
 
 
@@ -91,10 +90,10 @@ class StoredRun:
 
     @functools.cached_property
     def _row(self) -> Rows:
-        """The columns by the names of their quantities. Raises StoreError where they are not what was written."""
+        """Its columns. Raises StoreError where they are not what was written."""
         if self._verify and self.is_damaged:
             raise StoreError(f"{self._name} changed after it was written")
-        return {_OWN_NAMES.get(name, name): values[0] for name, values in self._stored.items()}
+        return {name: values[0] for name, values in self._stored.items()}
 
     @property
     def _name(self) -> str:

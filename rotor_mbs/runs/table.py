@@ -43,7 +43,6 @@ from rotor_mbs.runs.design import (
     COLUMNS,
     KNOWN,
     MISSING,
-    OF_METHODS,
     REPEATED,
     RUNS,
     Asked,
@@ -363,11 +362,8 @@ def text_of(values: NDArray[np.bytes_]) -> str:
 def row_of_run(run: Solution, place: Place, facts: Mapping[str, object]) -> Rows:
     """The row of a run: status, metrics, times, arrays. facts: further columns by name."""
     integration = run.integration
-    arrays = dict(run.quantities)
-    if run.method == REFERENCE:
-        arrays |= {"angles": run.angles, "rates": run.rates}
-    else:
-        arrays = {OF_METHODS.get(name, name): array for name, array in arrays.items()}
+    # A reference is read back by its angles and rates, whatever the scene asks for.
+    own = {"angles": run.angles, "rates": run.rates} if run.method == REFERENCE else {}
     return place.rows_of(
         {
             "status": run.status,
@@ -385,7 +381,8 @@ def row_of_run(run: Solution, place: Place, facts: Mapping[str, object]) -> Rows
             "repeats": len(run.run_times_s),
             **run.metrics,
             **facts,
-            **arrays,
+            **run.quantities,
+            **own,
         }
     )
 
@@ -431,10 +428,8 @@ def _put_table(file: Any, table: Table) -> None:
         put_dimension(group, CHARACTERS, table.characters)
     for name, (column, values) in table.known.items():
         put(group, name, values, column)
-    row = table.row_type
     for name, column in table.computed.items():
-        kind = row[name].base
-        shape = (len(table.runs), *row[name].shape) if "run" in column.dimensions else row[name].shape
+        kind, shape = table.row_type[name].base, table.shape(name)
         put_empty(group, name, shape, kind, column, MISSING if name == "status" else None)
     of_reference = [name for name, column in table.computed.items() if "run" not in column.dimensions]
     if of_reference:
@@ -676,7 +671,7 @@ def _refuse_changes(item: Any, group: str) -> None:
 
 def member(group: Any, name: str) -> Any:
     """A member of a group. Raises KeyError where there is none, StoreError at a link."""
-    if is_link(group, name):
+    if not isinstance(group.get(name, getlink=True), h5py.HardLink):
         raise StoreError(
             f"{group.file.filename}: {group.name}/{name} is a link; allowed: groups and arrays of this file"
         )
@@ -729,22 +724,15 @@ def attribute(target: Any, name: str, default: Any = None) -> Any:
     return plain(target.attrs[name])
 
 
-def dimensions_of(dataset: Any) -> list[str]:
-    """The names of its scales; "" where a dimension has none.
-
-    By the attribute of the scale: the library would look for its path through the whole file, and its own way to the
-    name ends the process where that is damaged.
-    """
-    names = [str(attribute(dimension[0], "NAME")) if len(dimension) else "" for dimension in dataset.dims]
-    return [CHARACTERS if name.startswith(_WITHOUT_VALUES) else name for name in names]
-
-
 def columns_of(group: Any) -> dict[str, Column]:
     """What the datasets of a group are, by name."""
     columns = {}
     for name, dataset in group.items():
         if not is_group(dataset) and not is_dimension_only(dataset):
-            dimensions = tuple(dimension or name for dimension in dimensions_of(dataset))
+            # The names of the scales by their attribute: the library would look for their paths through the whole
+            # file, and its own way to a name ends the process where that is damaged. A scale is its own dimension.
+            scales = [str(attribute(scale[0], "NAME")) if len(scale) else name for scale in dataset.dims]
+            dimensions = tuple(CHARACTERS if scale.startswith(_WITHOUT_VALUES) else scale for scale in scales)
             # Lists of texts as such; numbers as they are, whose type belongs to the attribute.
             attributes = {
                 name: dataset.attrs[name] if isinstance(value, list) and not isinstance(value[0], str) else value
@@ -769,11 +757,6 @@ def groups_in(group: Any, seen: set[Any] | None = None) -> Iterator[Any]:
         item = member(group, name)
         if is_group(item):
             yield from groups_in(item, seen)
-
-
-def is_link(group: Any, name: str) -> bool:
-    """Whether a member of a group stands elsewhere, in this file or another one."""
-    return not isinstance(group.get(name, getlink=True), h5py.HardLink)
 
 
 def is_group(item: Any) -> bool:

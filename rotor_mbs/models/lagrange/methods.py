@@ -133,7 +133,7 @@ METHODS = (
         label="reference, quad precision",
         settings=ReferenceSettings,
         build=late("rotor_mbs.models.lagrange.reference:build"),
-        arrays=lambda _: ("angle_uncertainty", "error_growth"),
+        arrays=("angle_uncertainty", "error_growth"),
         items=equation_items,
     ),
 )  # fmt: skip
