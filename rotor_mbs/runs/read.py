@@ -367,17 +367,12 @@ def points_table(group: str, points: Sequence[Mapping[str, object]]) -> Table:
     return Table(group, runs, known_columns(points), POINT_COLUMNS[group], characters=_MESSAGE_LENGTH)
 
 
-def read_records(path: Path, *kinds: str) -> list[Record]:
-    """The records of these kinds, in the order of the file; no curve of which a point is missing. Raises StoreError."""
+def read_records(path: Path, kind: str) -> list[Record]:
+    """The records of a kind, in the order of the file; no curve of which a point is missing. Raises StoreError."""
+    if kind in POINT_COLUMNS:
+        return [record for table in TableFile(path, [kind]).tables.values() for record in _point_records(table)]
     with open_file(path) as file, reading(path):
-        there = [kind for kind in kinds if kind in file]
-        tables = [kind for kind in there if kind in POINT_COLUMNS]
-        groups = [record for kind in there if kind not in tables for record in _group_records(file, kind)]
-        has_points = {kind for kind in tables if "run" in file[kind]}
-    if not has_points:
-        return groups
-    points = TableFile(path, has_points)
-    return [record for kind in kinds if kind in has_points for record in _point_records(points.tables[kind])] + groups
+        return list(_group_records(file, kind)) if kind in file else []
 
 
 def _point_records(stored: Table) -> Iterator[Record]:

@@ -8,7 +8,7 @@ import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from importlib.metadata import entry_points
-from typing import Protocol
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,18 +16,10 @@ from numpy.typing import NDArray
 from rotor_mbs.errors import InputError
 from rotor_mbs.scenario.scene import ENTRY_POINT_GROUP, Scene
 
+if TYPE_CHECKING:
+    from rotor_mbs.solution.trajectory import Trajectory
+
 Array = NDArray[np.float64]
-
-
-class Samples(Protocol):
-    """What quantities are computed from: the samples of a run, see `trajectory.Trajectory`."""
-
-    time: Array
-    angles: Array
-    rates: Array
-
-    def get(self, name: str) -> Array | None:
-        """An array by its quantity's name; None where the run does not have it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,7 +47,7 @@ class QuantityMetric:
     with_reference: bool = True
     relative_to: Callable[[Scene], float] | None = None
     at_own_state: bool = False
-    scale_of: Callable[[Scene, Samples], float] | None = None
+    scale_of: Callable[[Scene, Trajectory], float] | None = None
     check: str = ""
     bound: float | None = None
     channel: str = ""
@@ -105,7 +97,7 @@ class Quantity:
     units: str
     long_name: str
     output: str = ""
-    producer: Callable[[Scene, Samples], Array | None] | None = None
+    producer: Callable[[Scene, Trajectory], Array | None] | None = None
     required: bool = True
     judgement: QuantityMetric | None = None
     plot: Plot | None = None
@@ -163,7 +155,7 @@ def energy_balance(kinetic: Array, potential: Array, work: Array) -> Array:
     return error
 
 
-def energy_error(samples: Samples) -> Array | None:
+def energy_error(samples: Trajectory) -> Array | None:
     """(n,) J: the energy balance of a run; None where energies were not asked for."""
     kinetic, potential, work = (samples.get(name) for name in ("kinetic_energy", "potential_energy", "work"))
     if kinetic is None or potential is None or work is None:
@@ -176,13 +168,13 @@ def longest_arm(scene: Scene) -> float:
     return max(math.hypot(*blade.centre_of_mass) for blade in scene.blades) or 1.0
 
 
-def _largest_root_force(_scene: Scene, run: Samples) -> float:
+def _largest_root_force(_scene: Scene, run: Trajectory) -> float:
     """N, over the blades and the samples; 1 where there is none."""
     forces = run.get("blade_root_force")
     return 1.0 if forces is None else float(np.linalg.norm(forces, axis=-1).max(initial=0.0)) or 1.0
 
 
-def _largest_root_force_at_arm(scene: Scene, run: Samples) -> float:
+def _largest_root_force_at_arm(scene: Scene, run: Trajectory) -> float:
     """N m, that force at the longest arm: a scale for moments, which may all be next to nothing."""
     return _largest_root_force(scene, run) * longest_arm(scene)
 
@@ -351,7 +343,7 @@ def installed(output: str) -> tuple[Quantity, ...]:
 # ---- Arrays of a run
 
 
-def array_of(quantity: Quantity, scene: Scene, samples: Samples) -> Array | None:
+def array_of(quantity: Quantity, scene: Scene, samples: Trajectory) -> Array | None:
     """The run's array: the model's own, or what the quantity's producer makes of the samples; None where there is none.
     Raises InputError where a producer gives an array of another shape."""
     values = samples.get(quantity.name)
@@ -367,7 +359,7 @@ def array_of(quantity: Quantity, scene: Scene, samples: Samples) -> Array | None
     return values
 
 
-def arrays(scene: Scene, samples: Samples) -> dict[str, Array]:
+def arrays(scene: Scene, samples: Trajectory) -> dict[str, Array]:
     by_name = {quantity.name: array_of(quantity, scene, samples) for quantity in quantities(scene.outputs)}
     return {name: values for name, values in by_name.items() if values is not None}
 
@@ -378,7 +370,7 @@ def sizes(quantity: Quantity, values: Array) -> Array:
     return lengths
 
 
-def deviation(quantity: Quantity, scene: Scene, run: Samples, reference: Samples | None) -> Array | None:
+def deviation(quantity: Quantity, scene: Scene, run: Trajectory, reference: Trajectory | None) -> Array | None:
     """(common samples,) size of a quantity, or of its difference from the reference, largest over the other axes; None
     where it is not judged, or the run or the needed reference does not have it."""
     rule = quantity.judgement
