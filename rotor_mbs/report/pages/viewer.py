@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import base64
 import json
 import math
 from collections.abc import Mapping
@@ -19,7 +18,7 @@ from rotor_mbs.solution.trajectory import Array
 
 MAX_FRAMES = 2401  # of a page of a size that can be mailed; a shorter run has a frame for each sample
 _COARSE = 0.5 * math.pi  # rad from a frame to the next beyond which the page says that it interpolates
-_QUANTUM, _LARGEST = 1e-4, 32767  # rad: a pixel at the tip on any screen; 16 bits with a sign
+_DECIMALS = 4  # of an angle in rad: a pixel at the tip on any screen
 _VISIBLE = 0.1  # of the longest blade
 
 
@@ -41,6 +40,7 @@ def viewer(stored: StoredScene, runs: Mapping[str, StoredRun]) -> dict[str, Any]
     if longest[-1] <= 0.0:
         return None
     step = float(longest[-1]) / (min(len(longest), MAX_FRAMES) - 1)
+    frames = {name: angles_at(*move, step) for name, move in moves.items()}
     data = {
         "step": step,
         "colours": [name_of_colour(coordinate_look(i + 1).colour) for i in range(len(scene.blades))],
@@ -48,11 +48,11 @@ def viewer(stored: StoredScene, runs: Mapping[str, StoredRun]) -> dict[str, Any]
             {"phase": phase, "tip": blade.tip, "mass": blade.centre_of_mass}
             for phase, blade in zip(scene.phases, scene.blades, strict=True)
         ],
-        "models": [{"name": name, **packed(*move, step)} for name, move in moves.items()],
+        "models": [{"name": name, "frames": angles.round(_DECIMALS).tolist()} for name, angles in frames.items()],
     }
     notes = []
-    for name, (time, angles) in moves.items():
-        largest = float(np.abs(np.diff(angles_at(time, angles, step), axis=0)).max(initial=0.0))
+    for name, angles in frames.items():
+        largest = float(np.abs(np.diff(angles, axis=0)).max(initial=0.0))
         if largest > _COARSE:
             turned = f"{with_capital(name)} turns by up to {with_unit(largest, 'rad')} from one frame to the next"
             notes.append(f"{turned}: the animation interpolates linearly in between.")
@@ -73,19 +73,6 @@ def magnification(scene: Scene) -> int | None:
         return None
     length = max(math.hypot(*blade.tip) for blade in scene.blades)
     return max(1, round(_VISIBLE * length / offset))
-
-
-def packed(time: Array, angles: Array, step: float) -> dict[str, object]:
-    """The angles (rad) at 0, step, 2 step ...: those at the start, and the steps from frame to frame in `quantum` rad.
-
-    steps: base64 of (frames, coordinates) signed 16 bit, little end first. Rounding does not add up.
-    """
-    shown = angles_at(time, angles, step)
-    largest = float(np.abs(np.diff(shown, axis=0)).max(initial=0.0))
-    quantum = max(_QUANTUM, largest / (_LARGEST - 1))
-    places = np.round((shown - shown[0]) / quantum)
-    steps = np.diff(places, axis=0, prepend=0.0).astype("<i2")
-    return {"start": shown[0].tolist(), "quantum": quantum, "steps": base64.b64encode(steps.tobytes()).decode("ascii")}
 
 
 def script_json(data: object) -> Markup:

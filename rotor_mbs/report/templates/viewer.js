@@ -6,16 +6,6 @@
   const shades = getComputedStyle(document.documentElement), night = matchMedia("(prefers-color-scheme:dark)");
   const shade = (name) => shades.getPropertyValue(`--${name}`).trim();
 
-  // Differences of 16 bits, in units of `quantum` rad, summed up from the start.
-  const unpack = ({ start, quantum, steps }) => {
-    const bytes = Uint8Array.from(atob(steps), (sign) => sign.charCodeAt(0)), columns = start.length;
-    const values = new DataView(bytes.buffer), frames = [], sums = start.map(() => 0);
-    for (let at = 0; at < bytes.length; at += 2 * columns) {
-      frames.push(start.map((from, i) => from + quantum * (sums[i] += values.getInt16(at + 2 * i, true))));
-    }
-    return frames;
-  };
-
   // Angles are whole, not within one turn: straight from a frame to the next.
   const between = (frames, place) => {
     const last = frames.length - 1, i = Math.min(Math.floor(place), last), j = Math.min(i + 1, last), part = place - i;
@@ -37,8 +27,7 @@
   };
 
   const start = (box) => {
-    const data = JSON.parse(box.querySelector("script").textContent);
-    const models = data.models.map((one) => ({ name: one.name, frames: unpack(one) }));
+    const data = JSON.parse(box.querySelector("script").textContent), models = data.models;
     const canvas = box.querySelector("canvas"), pen = canvas.getContext("2d");
     const part = (name) => box.querySelector(`[data-part=${name}]`);
     const reach = Math.max(...data.blades.map((blade) => Math.hypot(...blade.tip)));
