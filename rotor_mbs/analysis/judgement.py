@@ -15,6 +15,7 @@ from fractions import Fraction
 import numpy as np
 from numpy.typing import NDArray
 
+from rotor_mbs.methods.catalogue import is_corrected, look_up
 from rotor_mbs.models.lagrange.defects import interval_defects
 from rotor_mbs.scenario.accuracy_bounds import Bound, Bounds, shipped_bounds
 from rotor_mbs.scenario.scene import Blade, Scene
@@ -80,7 +81,7 @@ def quantity_bound(rule: QuantityMetric, bounds: Bounds, method: str) -> float |
 @np.errstate(over="ignore", invalid="ignore", divide="ignore")  # of a runaway: what is not finite is judged
 def judge(scene: Scene, run: Solution, reference: Trajectory | None) -> Judgement:
     """The status of a run, the numbers that it follows from, and whether its engine claims a success that it is not."""
-    defects = defects_of(scene, run.trajectory, is_corrected=run.is_corrected)
+    defects = defects_of(scene, run.trajectory, is_corrected=is_corrected(run.method))
     metrics = metrics_of(scene, run.trajectory, reference, defects)
     status, message = _status(scene, run, reference, metrics)
     false_success = run.integration.success and not _is_close(scene, status, metrics)
@@ -156,7 +157,7 @@ def _status(scene: Scene, run: Solution, reference: Trajectory | None, metrics: 
             end = f" after {reached.removeprefix('at ')}" if samples else ""
             return "diverged", f"no finite sample{end}; {reported}"
         return "solver_failed", f"{reported}; {reached}"
-    if not run.is_corrected:
+    if not is_corrected(run.method):
         return "completed", ""
 
     # Complete runs of scenes without a solution: from a singular state, or past the time where the solution ends.
@@ -169,7 +170,8 @@ def _status(scene: Scene, run: Solution, reference: Trajectory | None, metrics: 
     ):
         return "singular", f"the motion ends in a singularity after t = {reference.time[-1]:.6g} s; the run continued"
 
-    bounds = shipped_bounds().with_entries(run.bounds)
+    method = look_up(run.method)
+    bounds = shipped_bounds().with_entries(method.bounds if method else ())
     energy = bounds.of("energy", run.method).value + energy_slack(scene, run.trajectory)
     if "energy_drift_max" in metrics and not metrics["energy_drift_max"] <= energy:
         return "inaccurate", f"energy drift {metrics['energy_drift_max']:.1e} of the energy scale, allowed {energy:.0e}"

@@ -60,15 +60,4 @@ def solve(
     output = time.perf_counter() - start
     if fault := shape_fault(scene, trajectory):
         raise RotorError(f"{method.name}: {fault}")
-    return Solution(
-        scene,
-        method.name,
-        trajectory,
-        integration,
-        chosen.as_dict(),
-        setup,
-        run_times,
-        output,
-        is_corrected=method.is_corrected,
-        bounds=method.bounds,
-    )
+    return Solution(scene, method.name, trajectory, integration, chosen.as_dict(), setup, run_times, output)

@@ -24,7 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor_mbs.errors import StoreError
-from rotor_mbs.methods.catalogue import PRINTED, REFERENCE, is_corrected, look_up
+from rotor_mbs.methods.catalogue import PRINTED, REFERENCE, is_corrected
 from rotor_mbs.runs.design import FROZEN, MISSING, POINT_COLUMNS, REPEATED, RUNS, Column
 from rotor_mbs.runs.table import (
     DIGESTS,
@@ -205,10 +205,7 @@ class StoredRun:
         success = bool(facts.get("engine_success", self.is_frozen))  # a frozen reference has no report of its engine
         out_of_time = self.status == "timed_out" and not success
         engine = Integration(success, str(facts.get("engine_message", "")), out_of_time=out_of_time)
-        solution = Solution(scene, self.method, trajectory, engine, self.settings)
-        if (method := look_up(self.method)) is not None:
-            solution.is_corrected, solution.bounds = method.is_corrected, method.bounds
-        return solution
+        return Solution(scene, self.method, trajectory, engine, self.settings)
 
 
 @dataclass(frozen=True)

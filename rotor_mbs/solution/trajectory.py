@@ -13,7 +13,6 @@ from typing import Any
 import numpy as np
 
 from rotor_mbs.errors import InputError
-from rotor_mbs.scenario.accuracy_bounds import Bound
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.quantities import (
     NAMES,
@@ -204,8 +203,6 @@ class Solution:
         samples.
     status, message : status determined from the samples, and its reason; "" if not assessed.
     metrics : numbers by their names in a results file, such as energy_drift_max.
-    is_corrected : whether the method solves the corrected equations.
-    bounds : accuracy bounds defined by the method, in addition to reference/accuracy.toml.
 
     Quantities are attributes and items: `solution.tip`, `solution["tip"]`; (n, ...) arrays, n samples.
     """
@@ -221,8 +218,6 @@ class Solution:
     status: str = ""
     message: str = ""
     metrics: Mapping[str, float] = field(default_factory=dict)
-    is_corrected: bool = True
-    bounds: tuple[Bound, ...] = ()
 
     @property
     def time(self) -> Array:

@@ -218,9 +218,7 @@ class PointTimer:
         trajectory = self._solver.observe()
         output = self._clock() - start
         point, scene, integration = self._point, self._scene, self._integration
-        method = catalogue.find_method(point.method)
         run = Solution(scene, point.method, trajectory, integration, dict(point.settings))
-        run.is_corrected, run.bounds = method.is_corrected, method.bounds
         with np.errstate(over="ignore", invalid="ignore"):  # a runaway's distances may overflow
             judgement = judge(scene, run, self._reference)
         del self._solver

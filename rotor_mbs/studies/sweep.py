@@ -160,7 +160,6 @@ def _side_by_side(chunk: Chunk, scenes: Sequence[Scene]) -> Rows:
         rows["rhs_evaluations"][i] = -1 if integration.rhs_evaluations is None else integration.rhs_evaluations
     for i in np.flatnonzero(~ok).tolist():
         run = Solution(scenes[i], method.name, block.trajectory(i), block.integrations[i], settings.as_dict())
-        run.is_corrected, run.bounds = method.is_corrected, method.bounds
         try:
             judged = _judged_row(chunk, run, run.integration.time_reached)
         except OutOfTimeError as exc:

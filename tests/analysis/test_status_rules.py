@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -14,7 +15,7 @@ from support.defects import made_defects
 from rotor_mbs.analysis import judgement as judgement_module
 from rotor_mbs.analysis import kinematics
 from rotor_mbs.analysis.judgement import OK_ERROR, judge, rotor_inertia_shares
-from rotor_mbs.methods.catalogue import is_corrected, method_names
+from rotor_mbs.methods.catalogue import find_method, method_names
 from rotor_mbs.scenario.accuracy_bounds import Bound, shipped_bounds
 from rotor_mbs.scenario.catalogue import find_scenes
 from rotor_mbs.scenario.scene import Blade, Scene
@@ -52,7 +53,7 @@ def status(
     run: Trajectory, engine: Integration = DONE, reference: Trajectory | None = None, method: str = METHOD
 ) -> Any:
     """(status, whether the engine's claim of success is false)."""
-    solution = Solution(SCENE, method, run, engine, is_corrected=is_corrected(method))
+    solution = Solution(SCENE, method, run, engine)
     with np.errstate(all="ignore"):
         judgement = judge(SCENE, solution, reference)
     return judgement.status, judgement.false_success
@@ -128,7 +129,8 @@ def test_the_largest_defect_has_a_bound(method: str, monkeypatch: pytest.MonkeyP
 def test_the_median_of_the_defects_has_the_bound_of_a_methods_own(monkeypatch: pytest.MonkeyPatch) -> None:
     """A tenth of that of the largest defect; without defects nothing is asked."""
     own = Bound("defect median", METHOD, 0.1 * BOUNDS.of("defect", METHOD).value, "none")
-    run = Solution(SCENE, METHOD, moving(), DONE, bounds=(own,))
+    monkeypatch.setattr(judgement_module, "look_up", lambda _: replace(find_method(METHOD), bounds=(own,)))
+    run = Solution(SCENE, METHOD, moving(), DONE)
     assert judge(SCENE, run, None).status == "ok"
     for side, expected in SIDES:
         defects = made_defects([side * own.value] * 3, transitions=None)
