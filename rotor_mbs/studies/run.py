@@ -27,10 +27,10 @@ from rotor_mbs.runs.design import Asked
 from rotor_mbs.runs.output_files import locked
 from rotor_mbs.runs.pool import Workers, pool_of
 from rotor_mbs.runs.runner import OnProgress, Outcome, Task, compute_tasks, ignore_progress
-from rotor_mbs.runs.table import Place, Rows, TableFile, extend_file, results_tables, row_of_run, text_of
+from rotor_mbs.runs.table import Place, Rows, extend_file, results_tables, row_of_run, text_of
 from rotor_mbs.runs.versions import row_versions
 from rotor_mbs.scenario.scene import Scene, scene_hash
-from rotor_mbs.solution.status import STATUSES, code_of
+from rotor_mbs.solution.status import STATUSES
 from rotor_mbs.solution.trajectory import Integration, Solution, Trajectory
 from rotor_mbs.studies.stored_references import digest, frozen_solution, read_reference, shipped_reference
 
@@ -91,7 +91,7 @@ class RunReport:
     """What became of a list of runs: of those that this call computed, and of those that were stored already."""
 
     made: list[Outcome]
-    kept: list[Outcome]
+    kept: list[tuple[Asked, str, str]]  # with status and message
 
     @property
     def failures(self) -> list[Outcome]:
@@ -101,8 +101,11 @@ class RunReport:
     @property
     def stored_failures(self) -> list[str]:
         """A line for each run that was stored already, should have succeeded and did not."""
-        failed = [run for run in self.kept if run.status != "ok" and is_corrected(run.method)]
-        return [f"{run.label} {run.status}: {run.message}" for run in failed]
+        return [
+            f"{run.scene.name} {run.method} {status}: {message}"
+            for run, status, message in self.kept
+            if status != "ok" and is_corrected(run.method)
+        ]
 
     @property
     def not_computed(self) -> list[Outcome]:
@@ -139,8 +142,8 @@ def run_scenes(
     asked = asked_runs(scenes, methods, settings or {}, use_frozen=use_frozen)
     with locked(output), pool_of(workers) as pool:
         file = extend_file(output, results_tables(asked))
-        tasks, kept = missing_tasks(file, asked, timeout_s)
-        return RunReport(compute_tasks(tasks, pool, on_progress), kept)
+        missing, kept = file.split_missing(asked, timeout_s)
+        return RunReport(compute_tasks(run_tasks(missing, timeout_s), pool, on_progress), kept)
 
 
 def asked_runs(
@@ -165,23 +168,14 @@ def asked_runs(
     return asked
 
 
-def missing_tasks(file: TableFile, asked: Sequence[Asked], timeout_s: float) -> tuple[list[RunTask], list[Outcome]]:
-    """Of `asked`, of each scene the reference first, the tasks of runs to compute, and the runs that stay as stored.
-
-    To be computed are those that the file lacks, that a shorter time limit ended, or whose reference is one of these;
-    their rows are marked as missing.
-    """
-    tasks: list[RunTask] = []
-    kept: list[Outcome] = []
-    references: dict[str, Place] = {}  # by label
-    new_references = set[str]()
-    for run in asked:
-        place = file.place(run.label)
-        task = RunTask(
+def run_tasks(missing: Sequence[tuple[Asked, Place, Place | None]], timeout_s: float) -> list[RunTask]:
+    """The tasks of runs, each given with its place and that of its reference."""
+    return [
+        RunTask(
             label=f"{run.scene.name} {run.method}",
             method=run.method,
             place=place,
-            reference=references.get(run.reference_label),
+            reference=reference,
             # What ends itself at its time limit needs a while before, to load its engine and compile, and to write
             # after.
             kill_after_s=1.2 * timeout_s + 10.0,
@@ -189,21 +183,8 @@ def missing_tasks(file: TableFile, asked: Sequence[Asked], timeout_s: float) -> 
             asked=run,
             time_limit_s=timeout_s,
         )
-        if run.method == REFERENCE:
-            references[run.label] = place
-        row, is_stored = place.read(), place.is_stored
-        # A shipped reference may end early itself; it has a limit only where reading it was over one.
-        limit = row["time_limit_s"][0]
-        is_short = limit < timeout_s if run.is_shipped else not limit >= timeout_s
-        is_over = is_stored and row["status"][0] == code_of("timed_out") and is_short
-        if not is_stored or is_over or run.reference_label in new_references:
-            if run.method == REFERENCE:
-                new_references.add(run.label)
-            tasks.append(task)
-            place.mark_missing([0])
-        else:
-            kept.append(task.outcome(row))
-    return tasks, kept
+        for run, place, reference in missing
+    ]
 
 
 def solve_judged(
