@@ -28,11 +28,10 @@ from rotor_mbs.runs.output_files import locked
 from rotor_mbs.runs.pool import Workers, pool_of
 from rotor_mbs.runs.runner import OnProgress, Outcome, Task, compute_tasks, ignore_progress
 from rotor_mbs.runs.table import Place, Rows, extend_file, results_tables, row_of_run, text_of
-from rotor_mbs.runs.versions import row_versions
 from rotor_mbs.scenario.scene import Scene, scene_hash
 from rotor_mbs.solution.status import STATUSES
 from rotor_mbs.solution.trajectory import Integration, Solution, Trajectory
-from rotor_mbs.studies.stored_references import digest, frozen_solution, read_reference, shipped_reference
+from rotor_mbs.studies.stored_references import frozen_solution, read_reference, shipped_versions
 
 # Short runs are repeated, so that the stored time is not that of a cold cache; long ones are not.
 _REPEATS = 5
@@ -158,13 +157,8 @@ def asked_runs(
     of_call = settings_for(list(dict.fromkeys(name for scene in scenes for name in methods[scene.name])), settings)
     asked: list[Asked] = []
     for scene in scenes:
-        versions = None
-        shipped = shipped_reference(scene_hash(scene)) if use_frozen else None
-        if shipped is not None:
-            source = {"frozen_with": shipped.frozen_with, "frozen_file": digest(shipped.path)[:12]}
-            versions = row_versions(find_method(REFERENCE)) | source
-        asked.append(Asked(scene, REFERENCE, versions=versions))
-        asked += [Asked(scene, name, own_settings(scene, name) | of_call[name]) for name in methods[scene.name]]
+        runs = [Asked(scene, name, own_settings(scene, name) | of_call[name]) for name in methods[scene.name]]
+        asked += [Asked(scene, REFERENCE, versions=shipped_versions(scene_hash(scene)) if use_frozen else None), *runs]
     return asked
 
 

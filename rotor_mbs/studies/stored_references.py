@@ -12,18 +12,15 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from rotor_mbs.methods.catalogue import REFERENCE
+from rotor_mbs.methods.catalogue import REFERENCE, find_method
 from rotor_mbs.runs.design import FROZEN, MISSING, RUNS
 from rotor_mbs.runs.read import open_results
 from rotor_mbs.runs.table import Place, TableFile
+from rotor_mbs.runs.versions import row_versions
 from rotor_mbs.scenario.catalogue import REFERENCES
 from rotor_mbs.scenario.scene import Scene, scene_hash
 from rotor_mbs.solution.quantities import sample_times
 from rotor_mbs.solution.trajectory import Integration, Solution, Trajectory
-
-# References that stay in memory: of so many samples, at some 30 numbers each, twenty of them take 25 MB at most.
-_SHORT, _MAX_RECENT = 5001, 20
-_recent: dict[tuple[object, ...], Trajectory] = {}
 
 
 def shipped_files() -> list[Path]:
@@ -53,29 +50,29 @@ def _shipped_by_hash(files: tuple[Path, ...]) -> dict[str, ShippedReference]:
     return by_hash
 
 
+def shipped_versions(scene_hash: str) -> dict[str, str] | None:
+    """`versions` of a row with the shipped reference of the scene of that hash; None where there is none."""
+    shipped = shipped_reference(scene_hash)
+    if shipped is None:
+        return None
+    source = {"frozen_with": shipped.frozen_with, "frozen_file": _digest(shipped.path)[:12]}
+    return row_versions(find_method(REFERENCE)) | source
+
+
 @functools.cache
-def digest(path: Path) -> str:
+def _digest(path: Path) -> str:
     """SHA-256 of a file, in hexadecimal."""
     return hashlib.sha256(path.read_bytes()).hexdigest()
 
 
 def read_reference(place: Place, scene: Scene) -> Trajectory | None:
-    """The reference of `scene` at a place of a results file, not to be changed; None where it is missing or empty.
-    Short ones stay in memory: a process judges runs of one scene by many methods."""
+    """The reference of `scene` at a place of a results file; None where it is missing or empty."""
     row = place.read()
     samples = int(row["samples"][0])
     if int(row["status"][0]) == MISSING or samples <= 0:
         return None
-    key = (place.path, place.inode, int(row["crc32"][0]), scene)
-    if key in _recent:
-        return _recent[key]
     arrays = {name: row[name][0][:samples] for name in FROZEN if name in row}
-    reference = rebuilt_reference(scene, {"time": sample_times(scene)[:samples], **arrays})
-    if scene.samples <= _SHORT:
-        if len(_recent) >= _MAX_RECENT:
-            _recent.pop(next(iter(_recent)))
-        _recent[key] = reference
-    return reference
+    return rebuilt_reference(scene, {"time": sample_times(scene)[:samples], **arrays})
 
 
 def rebuilt_reference(scene: Scene, arrays: Mapping[str, NDArray[Any]]) -> Trajectory:
