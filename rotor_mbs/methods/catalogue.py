@@ -12,7 +12,6 @@ from dataclasses import replace
 from functools import partial
 from importlib import import_module, metadata
 from pathlib import Path
-from pkgutil import resolve_name
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from rotor_mbs.errors import InputError, MethodRefusal, nearest
@@ -29,22 +28,18 @@ GROUP = "rotor_mbs.methods"
 
 R = TypeVar("R")
 
-_BUILT_IN = (
-    "rotor_mbs.models.printed.methods:METHODS",
-    "rotor_mbs.models.lagrange.methods:METHODS",
-    "rotor_mbs.models.exudyn.methods:METHODS",
-    "rotor_mbs.models.mujoco.methods:METHODS",
-)
-
-
-@functools.cache
-def _built_in() -> dict[str, Method]:
-    return {method.name: method for place in _BUILT_IN for method in resolve_name(place)}
+# By the object that has them: how the names of its methods begin.
+_BUILT_IN: Mapping[str, tuple[str, ...]] = {
+    "rotor_mbs.models.printed.methods:METHODS": ("printed",),
+    "rotor_mbs.models.lagrange.methods:METHODS": ("lagrange", REFERENCE),
+    "rotor_mbs.models.exudyn.methods:METHODS": ("exudyn",),
+    "rotor_mbs.models.mujoco.methods:METHODS": ("mujoco",),
+}
 
 
 def methods() -> tuple[Method, ...]:
     """Every method, in the order of tables and legends; plug-ins last; the reference is not one of them."""
-    built_in = (method for method in _built_in().values() if method.name != REFERENCE)
+    built_in = (method for place in _BUILT_IN for method in _load(place) if method.name != REFERENCE)
     return (*built_in, *_plug_ins().values(), *_of_files.values())
 
 
@@ -55,7 +50,12 @@ def method_names(*, is_corrected: bool | None = None) -> tuple[str, ...]:
 
 def look_up(name: str) -> Method | None:
     """The method called `name`, "reference" included; None where it is not known here (a file from elsewhere)."""
-    return _built_in().get(name) or _of_files.get(name) or _plug_ins().get(name)
+    for place, beginnings in _BUILT_IN.items():
+        if name.startswith(beginnings):
+            for method in _load(place):
+                if method.name == name:
+                    return method
+    return _of_files.get(name) or _plug_ins().get(name)
 
 
 def find_method(name: str) -> Method:
@@ -221,6 +221,18 @@ def model_label(model: str) -> str:
     return next((method.model_label for method in methods() if method.model == model), model)
 
 
+def _load(place: str) -> tuple[Method, ...]:
+    module, _, name = place.partition(":")
+    return _as_methods(getattr(import_module(module), name))
+
+
+def _as_methods(loaded: object) -> tuple[Method, ...]:
+    several = tuple(loaded) if isinstance(loaded, Iterable) else (loaded,)
+    if not several or not all(isinstance(method, Method) for method in several):
+        raise TypeError(f"{loaded!r:.60} is no Method and no sequence of them")
+    return several
+
+
 def _warn(message: str, *values: object) -> None:
     import logging  # late: 6 ms that `rotor-mbs list` need not wait for
 
@@ -230,19 +242,16 @@ def _warn(message: str, *values: object) -> None:
 @functools.cache
 def _plug_ins() -> dict[str, Method]:
     """Methods of other packages by name. One that cannot be loaded is left out, with a warning."""
-    taken = set(_built_in())
+    taken = {REFERENCE} | {method.name for place in _BUILT_IN for method in _load(place)}
     plug_ins: dict[str, Method] = {}
     for point in metadata.entry_points(group=GROUP):
         try:
-            loaded = point.load()
-            several = tuple(loaded) if isinstance(loaded, Iterable) else (loaded,)
-            if not several or not all(isinstance(method, Method) for method in several):
-                raise TypeError(f"{loaded!r:.60} is no Method and no sequence of them")
+            loaded = _as_methods(point.load())
         except (Exception, SystemExit) as exc:  # whatever another package raises must not stop this one
             _warn("plug-in %s of %s omitted: %s: %s", point.name, point.value, type(exc).__name__, exc)
             continue
         package = (point.dist.name,) if point.dist else ()
-        for method in several:
+        for method in loaded:
             if method.name in taken:
                 _warn("plug-in %s of %s: method %s omitted: name already used", point.name, point.value, method.name)
                 continue
