@@ -6,6 +6,7 @@ Each loads what it needs, and not what the others need: `list` reads no scene, a
 from __future__ import annotations
 
 import argparse
+import errno
 import json
 import sys
 import time
@@ -15,10 +16,10 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from rotor_mbs.cli import print_line
+from rotor_mbs.cli import EXIT_BAD_INPUT, EXIT_FAILED, print_line
 from rotor_mbs.cli.arguments import pages_beside
 from rotor_mbs.cli.terminal import ProgressLine, print_not_computed, print_table
-from rotor_mbs.errors import InputError, MethodRefusal
+from rotor_mbs.errors import InputError, MethodRefusal, StoreError
 from rotor_mbs.methods.catalogue import look_up, methods, problems_of_methods
 from rotor_mbs.runs import cores
 from rotor_mbs.scenario.catalogue import find_scenes, list_scenes, list_sweeps, only_scene
@@ -129,6 +130,9 @@ def _keys(value: Any, path: KeyPath = ()) -> Iterator[tuple[KeyPath, Any]]:
             yield from _keys(inner, (*path, place))
     else:
         yield path, value
+
+
+_DISK_IS_FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 
 
 def bench(arguments: argparse.Namespace) -> int:
@@ -269,7 +273,7 @@ def animate(arguments: argparse.Namespace) -> int:
 
 
 def sweep(arguments: argparse.Namespace) -> int:
-    """A parameter study into one dataset; 1 where a run did not succeed."""
+    """A parameter study into one dataset; 1 where a run did not succeed, or the disk is full."""
     from rotor_mbs.runs.cluster import open_task_pool
 
     with open_task_pool(arguments.engine, arguments.jobs) as pool:  # its workers load their code meanwhile
@@ -294,8 +298,14 @@ def sweep(arguments: argparse.Namespace) -> int:
             failed = [f", {count} {status}" for status, count in sorted(made.items()) if status not in GOOD]
             progress.stage("runs", done, total, "".join(failed))
 
-        with ProgressLine() as progress:
-            result = run_sweep(plan, output, pool, on_progress, fresh=arguments.fresh)
+        try:
+            with ProgressLine() as progress:
+                result = run_sweep(plan, output, pool, on_progress, fresh=arguments.fresh)
+        except StoreError as exc:
+            print_line(str(exc), sys.stderr)
+            is_full = isinstance(exc.__cause__, OSError) and exc.__cause__.errno in _DISK_IS_FULL
+            # What is stored stays, the same command continues; else nothing was begun.
+            return EXIT_FAILED if is_full or made else EXIT_BAD_INPUT
         stream = sys.stderr if arguments.json else sys.stdout  # standard output is the JSON's alone
         if arguments.json:
             facts = {"runs": result.runs, "made": result.made, "statuses": result.statuses, "files": [str(result.path)]}
