@@ -11,6 +11,7 @@ from support.runs import run
 from support.scenes import paper
 
 from rotor_mbs.analysis.kinematics import exact_rotor_angle
+from rotor_mbs.models.exudyn.adapter import linear_solver
 
 SHORT = replace(FIG11, duration=1.0, samples=101)
 
@@ -55,6 +56,17 @@ def test_sixteen_blades_take_another_path_through_the_engine_to_the_same_motion(
     finer = angle_error(run(name, scene, step=2.5e-4), closed_form(scene))
     assert error < 1e-5
     assert np.log2(error / finer) == pytest.approx(2.0, abs=0.2)
+
+
+def test_large_chains_alone_are_solved_by_a_sparse_factorization() -> None:
+    """Where it is faster; the scenes of the paper keep their bits."""
+
+    def sizes(blades: int) -> tuple[int, int]:  # Euler parameters and their norms
+        return 7 * (1 + blades), (1 + blades) + 5 * (1 + blades)
+
+    assert [linear_solver(*sizes(blades)) for blades in (3, 6, 12, 96)] == [*["EigenDense"] * 2, *["EigenSparse"] * 2]
+    assert linear_solver(97, 0) == "EigenDense"
+    assert linear_solver(200, 0) == "EigenDense"
 
 
 @pytest.mark.parametrize(

@@ -45,7 +45,7 @@ EXPLAINED = {
     r"(samples\.loads_at(_start)?|kinematics\.(work_of_constant_loads|exact_rotor_angle)) .*0\.0 -> ": (
         "a constant load is the same at any time"
     ),
-    r"taylor\.items .*turned round": "refuses to list what is installed: heyoka() itself does not refuse it",
+    r"taylor\.items .*turned round": "seen in test_independence.py, whose processes have no mutants",
     r"taylor\.equation_numbers .*0\.0 -> ": "takes a place that the next line fills",
     r"taylor\.(_UNROLLED_BLADES|compiled|is_compact) |adapter\.(_settings .*|)(constraints|_OLD_JACOBIAN_FROM)": (
         "decides how long a run takes, not what comes out"
@@ -53,7 +53,8 @@ EXPLAINED = {
     r"checks\._of_reference .* 0 -> 1": "compared by its length: no shipped reference has a single sample",
     r"checks\._of_run .*(judgement\.status != run\.status\) \+|'; '\.join)": "more faults than none; a text",
     r"checks\._of_samples .* 1 -> 2": "one zero or two: the largest is zero",
-    r"adapter\.(linear_solver|_SPARSE_FROM) ": "dense or sparse: the same solution, in another time",
+    r"adapter\.linear_solver .*scaled|adapter\._SPARSE_FROM ": "sizes near the bound take as long by either solver",
+    r"adapter\._caused_by .*exc\.__cause__": "an exception raised in a handler has both",
     r"adapter\.linearized .*0 -> 1": "a column of zeros among the joints' directions hinders no motion",
     r"metrics\.energy_scale .*(if run\.|and, or in|0\.0 -> )": "nobody asks for the scale of a run without energies",
     r"checks\._own_extremes .*(and, or in between|:20 2 -> 3$)": (

@@ -97,9 +97,6 @@ _SENSORS = (
     "models/test_exact_solutions.py::test_a_thousand_radians_a_second_are_counted_turn_by_turn",
 )
 _EXTRAPOLATION = ("models/test_extrapolation.py",)
-_SIXTEEN_BLADES = (
-    "models/test_exudyn_models.py::test_sixteen_blades_take_another_path_through_the_engine_to_the_same_motion"
-)
 _MUJOCO = "models/test_mujoco.py::test_"
 _JUDGEMENT = "solution/test_judgement.py::test_"
 _RULES = (
@@ -164,7 +161,7 @@ _TARGETS = (
            (*_PARTS, *_EXTRAPOLATION, "models/test_linearization.py",
             "models/test_loads.py::test_at_a_jump_of_the_torque_stands_the_load_before_it[exudyn_tree/rk67]",
             f"{_EXACT}[exudyn_chain/extrapolated-torsion from 9.7 rad]",
-            f"{_SIXTEEN_BLADES}[exudyn_chain/generalized_alpha]"), 0.5),
+            "models/test_exudyn_models.py::test_large_chains_alone_are_solved_by_a_sparse_factorization"), 0.5),
     Target(f"{_L}.ode_solvers", "*", "integration", ("models/test_segments.py",), 0.5),
     Target(f"{_L}.samples", "over_segments loads_at loads_at_start at_constant_rests", "integration", _SAMPLES, 0.5),
     Target(f"{_L}.taylor", "*", "integration",

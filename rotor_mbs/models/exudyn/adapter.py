@@ -315,7 +315,7 @@ def _caused_by(exc: BaseException | None, kind: type[BaseException]) -> bool:
     while exc is not None:
         if isinstance(exc, kind):
             return True
-        exc = exc.__context__
+        exc = exc.__cause__ or exc.__context__
     return False
 
 
