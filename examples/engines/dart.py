@@ -46,7 +46,7 @@ class Solver:
         self.world = dart.simulation.World()
         self.world.setGravity([0.0, 0.0, -scene.gravity])
         self.world.addSkeleton(self.rotor)
-        self.stiffness = np.array([0.0, *(scene.bearing(i)[0] for i in range(len(scene.blades)))])
+        self.stiffness = np.array([0.0, *(stiffness for stiffness, _ in scene.bearings)])
         self.damping = np.array(scene.dampings)
 
     def put(self, t, q, v, part):

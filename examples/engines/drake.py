@@ -62,11 +62,11 @@ class Solver:
             centre, inertia = np.array(blade.centre_of_mass), RotationalInertia(*blade.inertia)
             body = plant.AddRigidBody(str(i), SpatialInertia.MakeFromCentralInertia(blade.mass, centre, inertia))
             root = RigidTransform(RotationMatrix.MakeYRotation(phase))
-            place, (stiffness, damping) = FixedOffsetFrame(f"root {i}", hub.body_frame(), root), scene.bearing(i)
+            place, (stiffness, damping) = FixedOffsetFrame(f"root {i}", hub.body_frame(), root), scene.bearings[i]
             joint = RevoluteJoint(f"pitch {i}", plant.AddFrame(place), body.body_frame(), [0.0, 0.0, 1.0], damping)
             plant.AddForceElement(RevoluteSpring(plant.AddJoint(joint), 0.0, stiffness))
         plant.Finalize()
-        self.loads = builder.AddSystem(Loads(np.array([scene.bearing(i)[0] for i in range(len(scene.blades))])))
+        self.loads = builder.AddSystem(Loads(np.array([stiffness for stiffness, _ in scene.bearings])))
         builder.Connect(self.loads.get_output_port(), plant.get_applied_generalized_force_input_port())
         self.simulator, self.settings, self.scheme = Simulator(builder.Build()), settings, (scheme, interval)
 

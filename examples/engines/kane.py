@@ -56,7 +56,7 @@ class Solver:
             raise MethodRefusal("kane: blades without inertia about the pitch axis are not supported")
         self.scene, self.tolerance, self.of_a_blade = scene, settings.relative_tolerance, of_a_blade()
         self.numbers = [(blade.mass, *blade.centre_of_mass, *blade.inertia) for blade in scene.blades]
-        self.stiffness = np.array([scene.bearing(i)[0] for i in range(len(scene.blades))])
+        self.stiffness = np.array([stiffness for stiffness, _ in scene.bearings])
         self.damping = np.array(scene.dampings)
 
     def derivative(self, t, state, part):

@@ -40,7 +40,7 @@ class Solver:
         builder.add_articulation(joints)
         self.model = builder.finalize(device="cpu")
         self.solver = newton.solvers.SolverFeatherstone(self.model, angular_damping=0.0)
-        self.stiffness = np.array([0.0, *(scene.bearing(i)[0] for i in range(len(scene.blades)))])
+        self.stiffness = np.array([0.0, *(stiffness for stiffness, _ in scene.bearings)])
         self.damping = np.array(scene.dampings)
 
     def integrate(self):

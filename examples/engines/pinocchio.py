@@ -46,7 +46,7 @@ class Solver:
             body = pin.Inertia(blade.mass, np.array(blade.centre_of_mass), blade.inertia_tensor)
             model.appendBodyToJoint(hinge, body, pin.SE3.Identity())
         self.data = model.createData()
-        self.stiffness = np.array([0.0, *(scene.bearing(i)[0] for i in range(len(scene.blades)))])
+        self.stiffness = np.array([0.0, *(stiffness for stiffness, _ in scene.bearings)])
         self.damping = np.array(scene.dampings)
 
     def acceleration(self, t, q, v, part):

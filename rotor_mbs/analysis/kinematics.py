@@ -39,7 +39,7 @@ def potential_energy(scene: Scene, time: Array, angles: Array) -> Array:
     for i, blade in enumerate(scene.blades):
         total += blade.mass * scene.gravity * _rotated(_frames(scene, angles, i), blade.centre_of_mass)[:, 2]
         if scene.bearing_stiffness and blade.has_pitch_inertia:
-            rest = values_at(scene.pitch_load(i)[1], time)
+            rest = values_at(scene.pitch_loads[i][1], time)
             total += 0.5 * scene.bearing_stiffness[i] * (angles[:, 1 + i] - rest) ** 2
     return total
 
@@ -48,7 +48,7 @@ def work_of_constant_loads(scene: Scene, angles: Array) -> Array | None:
     """(n,) J; None where a load changes or there is damping: there the work is no function of the angles."""
     if scene.work_needs_path:
         return None
-    torques = [scene.torque_at(0.0), *(value_at(scene.pitch_load(i)[0], 0.0) for i in range(len(scene.blades)))]
+    torques = [scene.torque_at(0.0), *(value_at(torque, 0.0) for torque, _ in scene.pitch_loads)]
     return np.asarray((angles - np.array(scene.initial_angles)) @ np.array(torques))
 
 
@@ -75,7 +75,7 @@ def exact_rotor_angle(scene: Scene, time: Array) -> tuple[str, Array] | None:
     # Zero pitch is invariant for blades that their own x-z plane mirrors; nothing may damp the rotor.
     mirrored = all(b.centre_of_mass[1] == 0.0 and b.inertia[3] == 0.0 and b.inertia[5] == 0.0 for b in scene.blades)
     at_zero = not any(scene.initial_angles[1:]) and not any(scene.initial_rates[1:])
-    driven = any(table for i in range(len(scene.blades)) for table in scene.pitch_load(i))
+    driven = any(table for tables in scene.pitch_loads for table in tables)
     if not mirrored or not at_zero or driven or scene.shaft_damping:
         return None
     if len(scene.blades) == 1:

@@ -356,15 +356,15 @@ def fastest_rates(scene: Scene) -> tuple[float, float]:
     swing = abs(scene.initial_rates[0])
     driven = max((abs(torque) for _, torque in scene.rotor_torque), default=0.0) / _rotor_inertia(scene)
     decay = scene.shaft_damping / _rotor_inertia(scene) if scene.shaft_damping else 0.0
-    for i, blade in enumerate(scene.blades):
+    each = zip(scene.blades, scene.bearings, scene.pitch_loads, scene.initial_rates[1:], strict=True)
+    for blade, (stiffness, damping), (torques, _), rate in each:
         if not blade.has_pitch_inertia:
             continue
         x, y, z = blade.centre_of_mass
         inertia = blade.pitch_inertia
-        stiffness, damping = scene.bearing(i)
-        torque = max((abs(value) for _, value in scene.pitch_load(i)[0]), default=0.0)
+        torque = max((abs(value) for _, value in torques), default=0.0)
         moment = stiffness + torque + blade.mass * (scene.gravity + driven * abs(z)) * math.hypot(x, y)
-        swing = max(swing, math.sqrt(moment / inertia), abs(scene.initial_rates[1 + i]))
+        swing = max(swing, math.sqrt(moment / inertia), abs(rate))
         decay = max(decay, damping / inertia)
     return swing, decay
 

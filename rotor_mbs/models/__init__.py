@@ -33,7 +33,7 @@ def equation_items(scene: Scene, sources: tuple[str, str] = ("", "")) -> list[Bu
         "rotor torque": scene.has_torque,
         "pitch torque": any(scene.pitch_torque),
         "bearing stiffness": any(scene.bearing_stiffness),
-        "bearing rest angle": any(scene.pitch_load(i - 1)[1] for i in moving[1:]),
+        "bearing rest angle": any(scene.pitch_loads[i - 1][1] for i in moving[1:]),
         "bearing damping": any(scene.bearing_damping),
         "shaft damping": scene.shaft_damping != 0.0,
     }

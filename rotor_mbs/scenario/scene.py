@@ -304,8 +304,7 @@ class Scene:
     @property
     def load_tables(self) -> tuple[Table, ...]:
         """Loads over time: rotor torque, then torque and rest angle of each pitch."""
-        pitches = (self.pitch_load(blade) for blade in range(len(self.blades)))
-        return (self.rotor_torque, *(table for pair in pitches for table in pair))
+        return (self.rotor_torque, *(table for pair in self.pitch_loads for table in pair))
 
     @property
     def has_constant_loads(self) -> bool:
@@ -329,20 +328,23 @@ class Scene:
         """Columns of the coordinates with inertia: 0 (rotor), and 1 + i for each blade i with pitch inertia."""
         return [0, *(1 + i for i, blade in enumerate(self.blades) if blade.has_pitch_inertia)]
 
-    def bearing(self, blade: int) -> tuple[float, float]:
-        """Return stiffness (N m/rad) and damping (N m s/rad) of a pitch bearing; blades are counted from 0."""
-        stiffness = self.bearing_stiffness[blade] if self.bearing_stiffness else 0.0
-        return stiffness, self.bearing_damping[blade] if self.bearing_damping else 0.0
+    @property
+    def bearings(self) -> list[tuple[float, float]]:
+        """Stiffness (N m/rad) and damping (N m s/rad) of each pitch bearing."""
+        none = (0.0,) * len(self.blades)
+        return list(zip(self.bearing_stiffness or none, self.bearing_damping or none, strict=True))
 
     @property
     def dampings(self) -> tuple[float, ...]:
         """Damping of the shaft, then of each pitch bearing: (1 + blades,) N m s/rad."""
-        return self.shaft_damping, *(self.bearing(i)[1] for i in range(len(self.blades)))
+        return self.shaft_damping, *(damping for _, damping in self.bearings)
 
-    def pitch_load(self, blade: int) -> tuple[Table, Table]:
-        """Return torque (N m) and rest angle (rad; none without stiffness) over time of a pitch; counted from 0."""
-        torque = self.pitch_torque[blade] if self.pitch_torque else ()
-        return torque, self.bearing_rest[blade] if self.bearing_rest and self.bearing(blade)[0] else ()
+    @property
+    def pitch_loads(self) -> list[tuple[Table, Table]]:
+        """Torque (N m) and rest angle (rad; none without stiffness) of each pitch over time."""
+        none: tuple[Table, ...] = ((),) * len(self.blades)
+        loads = zip(self.pitch_torque or none, self.bearing_rest or none, self.bearings, strict=True)
+        return [(torque, rest if stiffness else ()) for torque, rest, (stiffness, _) in loads]
 
     @property
     def rotor_key(self) -> tuple[object, ...]:
@@ -646,8 +648,8 @@ def doubts(scene: Scene) -> list[str]:
     for i, angle in enumerate(scene.initial_angles):
         if abs(angle) > TURN or (in_degrees and abs(angle) >= 1.0 and angle == round(angle)):
             lines.append(f"initial.angles[{i}]: {_as_degrees(angle)}")
-    for i in range(len(scene.blades)):
-        rest = max((value for _, value in scene.pitch_load(i)[1]), key=abs, default=0.0)
+    for i, (_, rests) in enumerate(scene.pitch_loads):
+        rest = max((value for _, value in rests), key=abs, default=0.0)
         if abs(rest) > 0.5 * TURN:
             lines.append(f"bearing.rest[{i}]: {_as_degrees(rest)}")
     for i, rate in enumerate(scene.initial_rates):

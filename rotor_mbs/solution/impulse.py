@@ -58,8 +58,11 @@ def linear_balance(scene: Scene, run: Trajectory) -> Balance | None:
     if force is None or len(run.time) < max(_POINTS_WITHOUT_SLOPES) or knots(scene.load_tables, scene.duration):
         return None
     # rad/s: the largest natural frequency of a blade on the spring of its bearing.
-    on_springs = [(scene.bearing(i)[0], blade) for i, blade in enumerate(scene.blades) if blade.has_pitch_inertia]
-    frequencies = [np.sqrt(stiffness / _inertia_about_hub(blade)[2, 2]) for stiffness, blade in on_springs]
+    frequencies = [
+        np.sqrt(stiffness / _inertia_about_hub(blade)[2, 2])
+        for blade, (stiffness, _) in zip(scene.blades, scene.bearings, strict=True)
+        if blade.has_pitch_inertia
+    ]
     if not _is_resolved(scene, run, max(frequencies, default=0.0)):
         return None
     momentum, mass = np.zeros(force.shape), sum(blade.mass for blade in scene.blades)

@@ -53,7 +53,7 @@ def energy_scale(scene: Scene, run: Trajectory) -> float:
     """J: Σ m g |r| + kinetic and spring energy at the start + largest |work|; zero only where nothing moves."""
     weights = sum(blade.mass * scene.gravity * float(np.linalg.norm(blade.centre_of_mass)) for blade in scene.blades)
     springs = sum(
-        0.5 * stiffness * float(np.square(angle - value_at(scene.pitch_load(i)[1], 0.0)))
+        0.5 * stiffness * float(np.square(angle - value_at(scene.pitch_loads[i][1], 0.0)))
         for i, (stiffness, angle) in enumerate(zip(scene.bearing_stiffness, scene.initial_angles[1:], strict=False))
     )
     kinetic = float(run.kinetic_energy[0]) if run.kinetic_energy is not None and len(run.time) else 0.0

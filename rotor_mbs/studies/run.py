@@ -158,7 +158,8 @@ def asked_runs(
     asked: list[Asked] = []
     for scene in scenes:
         runs = [Asked(scene, name, own_settings(scene, name) | of_call[name]) for name in methods[scene.name]]
-        asked += [Asked(scene, REFERENCE, versions=shipped_versions(scene_hash(scene)) if use_frozen else None), *runs]
+        digest = scene_hash(scene)
+        asked += [Asked(scene, REFERENCE, versions=shipped_versions(digest) if use_frozen else None), *runs]
     return asked
 
 

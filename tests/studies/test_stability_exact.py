@@ -67,7 +67,7 @@ def test_rk44_grows_where_theory_says(name: str, limit: float) -> None:
     Of a pitch about zero, the rotor fixed: gravity and rotation are negligible beside such a spring.
     """
     one = scene(name)
-    stiffness, damping = one.bearing(0)
+    stiffness, damping = one.bearings[0]
     fastest = np.abs(np.roots([one.blades[0].pitch_inertia, damping, stiffness])).max()
     for share, grows in ((0.985, False), (1.015, True)):
         step = share * limit / fastest

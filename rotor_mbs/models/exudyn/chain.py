@@ -137,10 +137,10 @@ def _bearing(name: str, first: Part, second: Part) -> list[Part]:
 
 def _pitch_spring(scene: Scene, loads: Loads, blade: int, seat: str, root: str) -> list[Part]:
     """Spring, damper and torque between hub and blade; the engine adds `torque` to what resists."""
-    stiffness, damping = scene.bearing(blade)
+    stiffness, damping = scene.bearings[blade]
     name, moment = f"pitch spring {blade + 1}", moment_on(scene, loads, 1 + blade)
-    constants = {"stiffness": stiffness, "damping": damping, "offset": constant_value(scene.pitch_load(blade)[1])}
-    if all(map(is_constant, scene.pitch_load(blade))):
+    constants = {"stiffness": stiffness, "damping": damping, "offset": constant_value(scene.pitch_loads[blade][1])}
+    if all(map(is_constant, scene.pitch_loads[blade])):
         constants["torque"] = -moment.at(0.0)
     constants = {key: value for key, value in constants.items() if value}
     if not is_driven(scene, blade):

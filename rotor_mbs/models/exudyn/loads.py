@@ -33,11 +33,11 @@ def drives(scene: Scene) -> list[tuple[int, int, float]]:
     moments k r of springs whose rest angle r changes over time; one that is constant is the spring's own."""
     all_drives = [(0, ROTOR, 1.0)] if scene.has_torque else []
     for column in scene.moving_coordinates[1:]:
-        torque, rest = scene.pitch_load(column - 1)
+        torque, rest = scene.pitch_loads[column - 1]
         if torque:
             all_drives.append((column, 2 * column - 1, 1.0))
         if not is_constant(rest):
-            all_drives.append((column, 2 * column, scene.bearing(column - 1)[0]))
+            all_drives.append((column, 2 * column, scene.bearings[column - 1][0]))
     return all_drives
 
 
@@ -78,7 +78,7 @@ def moment_on(scene: Scene, loads: Loads, coordinate: int) -> Moment:
 
 def is_driven(scene: Scene, blade: int) -> bool:
     """Whether a spring, a damper or a torque acts on the pitch of a blade."""
-    return any(scene.bearing(blade)) or any(driven == 1 + blade for driven, _, _ in drives(scene))
+    return any(scene.bearings[blade]) or any(driven == 1 + blade for driven, _, _ in drives(scene))
 
 
 # (name of a sensor) -> (samples, k) values

@@ -157,7 +157,7 @@ def springs(scene: Scene, angles: Array) -> tuple[Array, Array]:
     - r) dr of rest angles r that move, jumps included: the change of ½ k r (r - 2θ); `work` has ∫ k r dθ."""
     energy, of_rests = np.zeros((2, len(angles)))
     for i in pitching(scene):
-        stiffness, table = scene.bearing(i)[0], scene.pitch_load(i)[1]
+        stiffness, table = scene.bearings[i][0], scene.pitch_loads[i][1]
         if stiffness:
             rest = values_at(table, sample_times(scene)[: len(angles)])
             energy += 0.5 * stiffness * (angles[:, 1 + i] - rest) ** 2

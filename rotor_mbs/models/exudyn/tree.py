@@ -80,9 +80,9 @@ def _tree(scene: Scene) -> Part:
     if scene.gravity != 0.0:
         parameters["gravity"] = [0.0, 0.0, -scene.gravity]
         detail += ", gravity"
-    if any(stiffness := [scene.bearing(i)[0] for i in blades]):
+    if any(stiffness := [scene.bearings[i][0] for i in blades]):
         parameters["jointPControlVector"] = [0.0, *stiffness]
-        parameters["jointPositionOffsetVector"] = [0.0, *(constant_value(scene.pitch_load(i)[1]) for i in blades)]
+        parameters["jointPositionOffsetVector"] = [0.0, *(constant_value(scene.pitch_loads[i][1]) for i in blades)]
         detail += ", bearing stiffness"
     damping = [scene.dampings[column] for column in scene.moving_coordinates]
     if any(damping):

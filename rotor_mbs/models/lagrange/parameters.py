@@ -76,7 +76,7 @@ def rotor_form(
     for i, blade in enumerate(scene.blades):
         phase = phases[i] if phases else phase_of(i, count)
         if blade.has_pitch_inertia:
-            bearing = (Fraction(value) for value in scene.bearing(i))
+            bearing = (Fraction(value) for value in scene.bearings[i])
             values = [*phase, *_coefficients(blade, gravity), *bearing, *_rotor_inertia(blade)]
             forms.append(BladeForm(*(convert(value) for value in values)))
         else:
@@ -144,7 +144,7 @@ def _cosine_of_turn(turn: Fraction) -> Fraction:
 
 def load_tables(scene: Scene) -> tuple[Table, ...]:
     """Loads over time: rotor torque, then the torque of each pitch that moves, then the rest angle of each."""
-    pitches = [scene.pitch_load(column - 1) for column in scene.moving_coordinates[1:]]
+    pitches = [scene.pitch_loads[column - 1] for column in scene.moving_coordinates[1:]]
     return (scene.rotor_torque, *(torque for torque, _ in pitches), *(rest for _, rest in pitches))
 
 

@@ -130,8 +130,7 @@ def at_constant_rests(changing: Sequence[int], loads: LoadValues) -> LoadValues:
 def constant_work(scene: Scene, angles: Array) -> Array:
     """(n,) J of constant torques from (n, 1 + blades) rad: τ·(q - q(0)), exact."""
     work: Array = scene.torque_at(0.0) * (angles[:, 0] - scene.initial_angles[0])
-    for i in range(len(scene.pitch_torque)):
-        torque, _ = scene.pitch_load(i)
+    for i, torque in enumerate(scene.pitch_torque):
         work = work + value_at(torque, 0.0) * (angles[:, 1 + i] - scene.initial_angles[1 + i])
     return work
 
@@ -162,7 +161,7 @@ def _loads(
         accelerations[:, column] = values
     actuators = np.zeros_like(angles[:, 1:])
     for i, column in enumerate(moving[1:], start=1):
-        (stiffness, damping), torque, rest = scene.bearing(column - 1), applied[i], applied[len(moving) - 1 + i]
+        (stiffness, damping), torque, rest = scene.bearings[column - 1], applied[i], applied[len(moving) - 1 + i]
         actuators[:, column - 1] = torque - stiffness * (angles[:, column] - rest) - damping * rates[:, column]
     sin_q, cos_q = sin(angles[:, 0]), cos(angles[:, 0])
     roots, in_base = [], []

@@ -48,11 +48,11 @@ def loads_of(scene: Scene) -> list[Load]:
     """Torque on the rotor, torques of the pitches that move, rest angles that change over time, as far as there are."""
     loads = [Load("torque rotor", 0, 1.0, scene.rotor_torque)] if scene.has_torque else []
     for number in scene.moving_coordinates[1:]:
-        torque, rest = scene.pitch_load(number - 1)
+        torque, rest = scene.pitch_loads[number - 1]
         if torque:
             loads.append(Load(f"torque pitch {number}", number, 1.0, torque))
         if not is_constant(rest):
-            loads.append(Load(f"rest pitch {number}", number, scene.bearing(number - 1)[0], rest))
+            loads.append(Load(f"rest pitch {number}", number, scene.bearings[number - 1][0], rest))
     return loads
 
 
@@ -121,8 +121,8 @@ def _blade(hub: ET.Element, scene: Scene, number: int) -> None:
     cp, sp = math.cos(0.5 * pitch), math.sin(0.5 * pitch)
     body = ET.SubElement(hub, "body", name=f"blade {number}", quat=numbers(c * cp, s * sp, s * cp, c * sp))
     if blade.has_pitch_inertia:
-        stiffness, damping = scene.bearing(number - 1)
-        _joint(body, number, "0 0 1", stiffness, damping, constant_value(scene.pitch_load(number - 1)[1]))
+        stiffness, damping = scene.bearings[number - 1]
+        _joint(body, number, "0 0 1", stiffness, damping, constant_value(scene.pitch_loads[number - 1][1]))
     _inertial(body, blade.mass, blade.centre_of_mass, blade.inertia)
     if scene.wants("tip"):
         ET.SubElement(body, "site", name=f"tip {number}", pos=numbers(*blade.tip))

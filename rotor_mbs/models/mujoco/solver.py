@@ -248,7 +248,7 @@ def _springs(scene: Scene, angles: Array) -> tuple[Array, Array]:
     less the ∫ k r dθ that actuators did."""
     energy, work = np.zeros((2, len(angles)))
     for number in scene.moving_coordinates[1:]:
-        stiffness, table = scene.bearing(number - 1)[0], scene.pitch_load(number - 1)[1]
+        stiffness, table = scene.bearings[number - 1][0], scene.pitch_loads[number - 1][1]
         if stiffness:
             rest = values_at(table, sample_times(scene)[: len(angles)])
             energy += 0.5 * (stiffness * (angles[:, number] - rest) ** 2)

@@ -134,7 +134,7 @@ def items(name: str, errata: Errata | None, scene: Scene) -> list[BuiltItem]:
 
 def _torque_tables(scene: Scene, moving: int) -> tuple[Table, ...]:
     """τ2, then τ3 to τ5, over time, of the `moving` coordinates."""
-    return (scene.rotor_torque, *(scene.pitch_load(i)[0] for i in range(moving - 1)))
+    return (scene.rotor_torque, *(torque for torque, _ in scene.pitch_loads[: moving - 1]))
 
 
 def right_hand_side(scene: Scene, accelerations: Accelerations, moving: int) -> RightHandSide:

@@ -198,15 +198,15 @@ def _drive_section(scene: Scene, run: StoredRun | None) -> Section:
             numbers.append(("Dissipated by the shaft damper", powers[1].values, "W"))
         torques = [Series(time, torque, look)]
         drawn["Rotor torque and its power"] = [("torque (N m)", torques), ("power (W)", powers)]
-    driven = [i for i in range(len(scene.blades)) if any(scene.pitch_load(i))]
+    driven = [i for i, tables in enumerate(scene.pitch_loads) if any(tables)]
     if driven:
         pitches, powers = plots.coordinate_series(time, angles)[1:], []
         for i in driven:
-            torque, rest = (values_at(table, time) for table in scene.pitch_load(i))
-            stiffness, damping = scene.bearing(i)
+            torque, rest = (values_at(table, time) for table in scene.pitch_loads[i])
+            stiffness, damping = scene.bearings[i]
             moment = torque + stiffness * (rest - angles[:, 1 + i]) - damping * rates[:, 1 + i]
             powers.append(Series(time, moment * rates[:, 1 + i], coordinate_look(1 + i)))
-            if scene.pitch_load(i)[1]:
+            if scene.pitch_loads[i][1]:
                 pitches.append(Series(time, rest, COMMAND))
             numbers += [
                 (f"Pitch {i + 1}", angles[:, 1 + i], "rad"),
