@@ -17,7 +17,7 @@ from rotor_mbs.scenario.scene import Scene
 
 heyoka = pytest.importorskip("heyoka")
 
-TWO = {"initial_angles": (0.1, 0.3, -0.2), "initial_rates": (0.2, 0.1, 0.4)}
+TWO = {"initial_angles": (0.1, 0.3, -0.2), "initial_rates": (0.2, 0.1, 0.4), "bearing_damping": ()}
 
 
 def machine_derivation(scene: Scene):
