@@ -33,7 +33,6 @@ _LOAD_S = 300.0  # large engines load in seconds, on a busy machine in minutes
 _NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.-]*")
 _TOLERANCES = ("tolerance", "relative_tolerance", "accuracy")  # settings that make a ladder where there is no step
 _SERVING = "from rotor_mbs.methods.method_file import answer_questions; answer_questions()"
-_MOST_PROCESSES = 16  # of files that are loaded apart
 _END_S = 5.0  # until such a process has ended
 
 
@@ -99,7 +98,10 @@ class MethodFile:
     def _items(self, method: Method, scene: Scene) -> list[BuiltItem]:
         """Where the method does not say what it builds, it is built: what it cannot represent it refuses there. In a
         process of its own: somebody's code may end or hang it."""
-        items: list[BuiltItem] = _apart(self).ask(f"{self.model}/{method.name.rpartition('/')[2]}", scene)
+        name = f"{self.model}/{method.name.rpartition('/')[2]}"
+        late = f"{name}: not built for {scene.name} within {_LOAD_S:g} s"
+        ended = f"{name}: ended the process that built it for {scene.name}"
+        items: list[BuiltItem] = _ask(self, (name, scene), late, ended)
         return items
 
     def build_items(self, method: Method, scene: Scene) -> list[BuiltItem]:
@@ -136,103 +138,87 @@ def read_file(path: str) -> MethodFile:
         file = MethodFile(path, Path(path).read_text(encoding="utf-8"))
     except (OSError, ValueError) as exc:
         raise InputError(f"{path}: {getattr(exc, 'strerror', None) or exc}; allowed: a Python file") from exc
-    _apart(file)
+    _ask(file, None, f"{path}: not loaded within {_LOAD_S:g} s", f"{path}: ended the process that loaded it")
     return file
 
 
-class _Process:
-    """A process that has loaded a file, and builds its methods. Raises InputError where the file ends or hangs it."""
+_loading = threading.Lock()  # where files are loaded by several threads, their output is restored in order
+_asking = threading.Lock()
+_process: subprocess.Popen[bytes] | None = None  # that loads files; somebody's code may end or hang it
 
-    def __init__(self, file: MethodFile) -> None:
-        self._path = file.path
-        # Without -P, Python would import from this folder.
-        command = [sys.executable, "-P", "-c", _SERVING]
-        pipe, nothing = subprocess.PIPE, subprocess.DEVNULL
-        self._process = subprocess.Popen(command, stdin=pipe, stdout=pipe, stderr=nothing)
-        late = f"{self._path}: not loaded within {_LOAD_S:g} s"
-        self._ask(file, late, f"{self._path}: ended the process that loaded it")
 
-    def ask(self, name: str, scene: Scene) -> Any:
-        """What the method builds for the scene. Raises MethodRefusal, InputError."""
-        late = f"{name}: not built for {scene.name} within {_LOAD_S:g} s"
-        answer = self._ask((name, scene), late, f"{name}: ended the process that built it for {scene.name}")
-        if isinstance(answer, RotorError):
-            raise answer
-        return answer
+def _ask(file: MethodFile, built: tuple[str, Scene] | None, late: str, ended: str) -> Any:
+    """What the other process builds: a method, by its name, for a scene; None where it only loads the file.
 
-    def _ask(self, question: object, late: str, ended: str) -> Any:
-        timer = threading.Timer(_LOAD_S, self._process.kill)
+    Raises MethodRefusal and InputError as the file's method does, and InputError where it is `late`, or has `ended` the
+    process.
+    """
+    global _process
+    with _asking:
+        if _process is None:
+            # Without -P, Python would import from this folder.
+            command = [sys.executable, "-P", "-c", _SERVING]
+            pipe, nothing = subprocess.PIPE, subprocess.DEVNULL
+            _process = subprocess.Popen(command, stdin=pipe, stdout=pipe, stderr=nothing)
+        assert _process.stdin is not None
+        assert _process.stdout is not None
+        timer = threading.Timer(_LOAD_S, _process.kill)
         timer.start()
         try:
-            assert self._process.stdin is not None
-            assert self._process.stdout is not None
-            pickle.dump(question, self._process.stdin)
-            self._process.stdin.flush()
-            return pickle.load(self._process.stdout)
+            pickle.dump((os.getcwd(), file, built), _process.stdin)  # noqa: PTH109  (a text)
+            _process.stdin.flush()
+            answer = pickle.load(_process.stdout)
         except (OSError, EOFError):
-            is_late = not timer.is_alive()
-            self.close()
-            raise InputError(late if is_late else f"{ended} (exit code {self._process.returncode})") from None
+            is_late, code = not timer.is_alive(), _end_process()
+            raise InputError(late if is_late else f"{ended} (exit code {code})") from None
         finally:
             timer.cancel()
-
-    def close(self) -> None:
-        _processes.pop(self._path, None)
-        with suppress(subprocess.TimeoutExpired):
-            self._process.communicate(timeout=_END_S)  # it ends with its input
-        self._process.kill()
-        self._process.wait()
-
-
-_loading = threading.Lock()  # where files are loaded by several threads, their output is restored in order
-_processes: dict[str, tuple[MethodFile, _Process]] = {}
-
-
-def _apart(file: MethodFile) -> _Process:
-    """The process that has loaded this text of the file."""
-    known = _processes.get(file.path)
-    if known is not None and known[0] == file:
-        return known[1]
-    if known is not None:
-        known[1].close()
-    elif len(_processes) == _MOST_PROCESSES:
-        next(iter(_processes.values()))[1].close()
-    process = _Process(file)
-    _processes[file.path] = file, process
-    return process
+    if isinstance(answer, RotorError):
+        raise answer
+    return answer
 
 
 @atexit.register
-def _close_processes() -> None:
-    for _, process in list(_processes.values()):
-        process.close()
+def _end_process() -> int | None:
+    """Its exit code; None where there is none."""
+    global _process
+    if _process is None:
+        return None
+    process, _process = _process, None
+    with suppress(subprocess.TimeoutExpired):
+        process.communicate(timeout=_END_S)  # it ends with its input
+    process.kill()
+    return process.wait()
 
 
 def answer_questions() -> None:
-    """What a `_Process` does: loads the file, then builds what is asked. What loading raises is raised again where it
-    counts."""
+    """What the other process does: loads files, once each, and builds what is asked. What loading raises is raised
+    again where it counts."""
     answers = os.fdopen(os.dup(1), "wb")
     with open(os.devnull, "wb") as nowhere:  # noqa: PTH123  (a device)
         os.dup2(nowhere.fileno(), 1)
-    questions = sys.stdin.buffer
-    file: MethodFile = pickle.load(questions)
-    methods: dict[str, Method] = {}
-    with suppress(InputError):
-        methods = file.load(())
-    answer: object = None
+    loaded: dict[MethodFile, dict[str, Method]] = {}
     while True:
-        pickle.dump(answer, answers)
-        answers.flush()
         try:
-            name, scene = pickle.load(questions)
+            folder, file, built = pickle.load(sys.stdin.buffer)
         except EOFError:
             return
-        try:
-            items = methods[name].items
-            assert isinstance(items, partial)
-            answer = file.build_items(items.args[0], scene)
-        except RotorError as exc:
-            answer = exc
+        answer: object = None
+        os.chdir(folder)
+        if file not in loaded:
+            loaded[file] = {}
+            with suppress(InputError):
+                loaded[file] = file.load(())
+        if built is not None:
+            name, scene = built
+            try:
+                items = loaded[file][name].items
+                assert isinstance(items, partial)
+                answer = file.build_items(items.args[0], scene)
+            except RotorError as exc:
+                answer = exc
+        pickle.dump(answer, answers)
+        answers.flush()
 
 
 @contextmanager
