@@ -33,14 +33,7 @@ class Ladder:
     fill: Callable[[float], Mapping[str, float]]  # the settings that go with one value
     choices: Mapping[str, object] = field(default_factory=dict)  # settings that stay the same along the ladder
     variant: str = ""  # what follows the method's name in the curve's name; "" where the choices are the default ones
-    label: str = ""  # of the variant; the method's where it is left out
-    method: str = ""  # name and expected order (None: adaptive step) of the method; filled in by the `Method`
-    order: float | None = None
-
-    @property
-    def curve(self) -> str:
-        """Name of the curve: "model/integrator", and the variant."""
-        return self.method + self.variant
+    label: str = ""  # of the variant, which follows the method's
 
     @property
     def short(self) -> Ladder:
@@ -147,16 +140,6 @@ class Method:
     arrays: tuple[str, ...] = ()
     sources: tuple[Path | str, ...] = ()
     load: Callable[[], object] = lambda: None
-
-    def __post_init__(self) -> None:
-        ladders = []
-        for ladder in self.ladders:
-            if not ladder.method:
-                label = f"{self.label}, {ladder.label}" if ladder.label else self.label
-                order = self.order if ladder.kind == STEP else None
-                ladder = replace(ladder, method=self.name, label=label, order=order)
-            ladders.append(ladder)
-        object.__setattr__(self, "ladders", tuple(ladders))
 
     @property
     def model(self) -> str:

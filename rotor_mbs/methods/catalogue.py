@@ -200,20 +200,25 @@ def errata_methods() -> dict[str, str]:
     return {method.erratum: method.name for method in methods() if method.erratum}
 
 
-def ladders(names: Sequence[str] = ()) -> tuple[Ladder, ...]:
-    """Ladders of the methods named, of all where none is named. Raises InputError for a method that has none."""
+def ladders(names: Sequence[str] = ()) -> dict[str, tuple[Method, Ladder]]:
+    """Method and ladder by the name of the curve, "model/integrator" and the variant: of the methods named, of all
+    where none is named. Raises InputError for a method that has none."""
     with_ladder = [method for method in methods() if method.ladders]
     allowed = [method.name for method in with_ladder]
     without = [name for name in names if name not in allowed]
     if without:
         raise InputError([f"no ladder for method {name!r}; allowed: {', '.join(allowed)}" for name in without])
-    return tuple(ladder for method in with_ladder if not names or method.name in names for ladder in method.ladders)
+    chosen = [method for method in with_ladder if not names or method.name in names]
+    return {method.name + ladder.variant: (method, ladder) for method in chosen for ladder in method.ladders}
 
 
 def label_of(curve: str) -> str:
     """How a method, or a variant of one by the name of its curve, is called; its name where it is not known here."""
-    method = look_up(curve) or next((ladder for ladder in ladders() if ladder.curve == curve), None)
-    return method.label if method else curve
+    known = look_up(curve)
+    if known is not None:
+        return known.label
+    variants = ladders()
+    return ", ".join(part.label for part in variants[curve] if part.label) if curve in variants else curve
 
 
 def model_label(model: str) -> str:

@@ -23,7 +23,7 @@ from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 from rotor_mbs.errors import InputError, RotorError, one_line
-from rotor_mbs.methods.base import BuiltItem, Ladder, Method, no_items, step_ladder, tolerance_ladder
+from rotor_mbs.methods.base import BuiltItem, Method, no_items, step_ladder, tolerance_ladder
 
 if TYPE_CHECKING:
     from rotor_mbs.scenario.scene import Scene
@@ -75,23 +75,21 @@ class MethodFile:
 
     def _named(self, method: Method) -> Method:
         name = f"{self.model}/{method.name.rpartition('/')[2]}"
-        ladders = [replace(one, method=name) if one.method == method.name else one for one in method.ladders]
+        ladders = method.ladders
         if not ladders:
             allowed = method.settings.allowed()
             tolerance = next((setting for setting in _TOLERANCES if setting in allowed), "")
             if "step" in allowed:
-                ladders = [step_ladder(6)]
+                ladders = (step_ladder(6),)
             elif tolerance:
                 steps = [10.0**-k for k in range(3, 14) if allowed[tolerance].at_least <= 10.0**-k]
-                ladders = [tolerance_ladder(lambda value: {tolerance: value}, *steps)]
-            order = method.order if "step" in allowed else None
-            ladders = [replace(ladder, method=name, label=method.label, order=order) for ladder in ladders]
+                ladders = (tolerance_ladder(lambda value: {tolerance: value}, *steps),)
         return replace(
             method,
             name=name,
             items=partial(self._items, method),
             bounds=tuple(replace(bound, method=name) for bound in method.bounds),
-            ladders=tuple[Ladder, ...](ladders),
+            ladders=ladders,
             sources=(self.text,),
         )
 

@@ -61,7 +61,7 @@ def _catalogue_looks() -> dict[str, Look]:
     """By the name of each method and of each curve of the bench: within a model lines and markers take turns."""
     models, counts = {"printed": 0}, Counter[str]()
     looks = {REFERENCE: Look(BLUE, "-.", "*")}
-    for curve in dict.fromkeys([*method_names(), *(ladder.curve for ladder in ladders())]):
+    for curve in dict.fromkeys([*method_names(), *ladders()]):
         model = curve.partition("/")[0] if is_corrected(curve) else "printed"
         place, turn = models.setdefault(model, len(models)), counts[model]
         colours = _MODEL_COLOURS[place] if place < len(_MODEL_COLOURS) else (GREY,)

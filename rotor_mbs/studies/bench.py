@@ -24,16 +24,16 @@ from rotor_mbs.analysis.work_precision import fitted_order, step_for, succeeded
 from rotor_mbs.analysis.work_precision import points as points_of
 from rotor_mbs.errors import OF_THE_MACHINE, InputError, RotorError, one_line
 from rotor_mbs.methods import catalogue
-from rotor_mbs.methods.base import STEP, TOLERANCE, Ladder
+from rotor_mbs.methods.base import STEP, TOLERANCE, Ladder, Method
 from rotor_mbs.methods.time_limit import OutOfTimeError, time_limit
 from rotor_mbs.runs import last_core
+from rotor_mbs.runs.design import Asked
 from rotor_mbs.runs.output_files import locked
 from rotor_mbs.runs.pool import WorkerPool, run_in
 from rotor_mbs.runs.read import Record, points_table
 from rotor_mbs.runs.runner import OnProgress, Outcome, Task, ignore_progress
 from rotor_mbs.runs.table import Place, Rows, Table, TableFile, extend_file
-from rotor_mbs.runs.versions import row_versions
-from rotor_mbs.scenario.scene import Scene, scene_hash
+from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.metrics import horizon, horizon_samples
 from rotor_mbs.solution.status import COMPLETE, code_of
 from rotor_mbs.solution.trajectory import Solution, Trajectory
@@ -107,10 +107,10 @@ class Curve:
         return all(place.is_stored for place in self.places(file))
 
 
-def curve_of(scene: Scene, ladder: Ladder, options: Mapping[str, object]) -> Curve:
-    """The curve of a ladder. options: of the study, stored with each point, with facts of the method that a page may
-    want."""
-    method, (short, _) = catalogue.find_method(ladder.method), thinned(scene)
+def curve_of(scene: Scene, method: Method, ladder: Ladder, options: Mapping[str, object]) -> Curve:
+    """The curve of a method's ladder. options: of the study, stored with each point, with facts of the method that a
+    page may want."""
+    name, (short, _) = method.name + ladder.variant, thinned(scene)
     facts = {
         **options,
         "duration_s": scene.duration,
@@ -118,30 +118,18 @@ def curve_of(scene: Scene, ladder: Ladder, options: Mapping[str, object]) -> Cur
         "lines": sum(len(text.splitlines()) for text in method.sources if isinstance(text, str)),
     }
     of_all: dict[str, object] = {
-        **known_of(scene, method.name),
-        "curve": ladder.curve,
+        "curve": name,
         "setting_kind": ladder.kind,
         "options": json.dumps(facts, sort_keys=True),
-        "order_expected": math.nan if ladder.order is None else ladder.order,
+        "order_expected": math.nan if method.order is None or ladder.kind != STEP else method.order,
     }
     points = []
     for setting, chosen in ladder.rungs(short.duration / (short.samples - 1)).items():
-        settings = method.settings.of(method.name, chosen).as_dict()
-        known = of_all | {"settings": json.dumps(settings, sort_keys=True)}
+        known = Asked(scene, method.name, chosen).known | of_all
         known |= {kind: setting if kind == ladder.kind else math.nan for kind in (STEP, TOLERANCE)}
-        known["run"] = f"{scene.name}/{ladder.curve} {ladder.kind}={setting:.6g}"
+        known["run"] = f"{scene.name}/{name} {ladder.kind}={setting:.6g}"
         points.append(Point(method.name, setting, dict(sorted(chosen.items())), known))
-    return Curve(scene, ladder.curve, ladder.kind, points)
-
-
-def known_of(scene: Scene, method: str) -> dict[str, object]:
-    """What is known of every point of a method on a scene."""
-    return {
-        "scene": scene.name,
-        "method_name": method,
-        "versions": json.dumps(row_versions(catalogue.find_method(method)), sort_keys=True),
-        "scene_hash": scene_hash(scene),
-    }
+    return Curve(scene, name, ladder.kind, points)
 
 
 class PointTimer:
@@ -444,7 +432,7 @@ def run_bench(
     StoreError
         Where the file cannot be read or written.
     """
-    chosen = catalogue.ladders(methods)
+    chosen = catalogue.ladders(methods).values()
     with locked(output):
         none: Mapping[str, Sequence[str]] = {scene.name: () for scene in scenes}
         report = run_scenes(scenes, none, output, workers=workers, timeout_s=_REFERENCE_LIMIT_S)
@@ -462,8 +450,8 @@ def run_bench(
         left_out: list[str] = []
         options = {"repeats": repeats, "budget_s": budget_s}
         for scene in scenes:
-            able, refused = catalogue.able_methods(scene, dict.fromkeys(ladder.method for ladder in chosen))
-            curves += [curve_of(scene, ladder, options) for ladder in chosen if ladder.method in able]
+            able, refused = catalogue.able_methods(scene, dict.fromkeys(method.name for method, _ in chosen))
+            curves += [curve_of(scene, method, ladder, options) for method, ladder in chosen if method.name in able]
             left_out += refused
         file = extend_file(output, curve_tables(curves), [curve.key for curve in curves])
         missing = [curve for curve in curves if curve.scene.name in changed or not curve.is_stored(file)]

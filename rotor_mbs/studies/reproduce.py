@@ -73,6 +73,10 @@ def summary_of(path: Path) -> str:
 
 def short_curves(scene: Scene) -> list[Curve]:
     """A short curve of each method on `scene`."""
-    able, _ = able_methods(scene, list(dict.fromkeys(ladder.method for ladder in ladders())))
+    able, _ = able_methods(scene, list(dict.fromkeys(method.name for method, _ in ladders().values())))
     options = {"budget_s": _LONGEST_S, "is_short": True}
-    return [curve_of(scene, ladder.short, options) for ladder in ladders(able) if not ladder.variant]
+    return [
+        curve_of(scene, method, ladder.short, options)
+        for method, ladder in ladders(able).values()
+        if not ladder.variant
+    ]

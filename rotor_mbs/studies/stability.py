@@ -10,13 +10,14 @@ from pathlib import Path
 from rotor_mbs.analysis.text_tables import TextTable
 from rotor_mbs.methods.base import STEP
 from rotor_mbs.methods.catalogue import able_methods, find_method, method_names, settings_for
+from rotor_mbs.runs.design import Asked
 from rotor_mbs.runs.output_files import locked
 from rotor_mbs.runs.pool import Workers, pool_of
 from rotor_mbs.runs.read import open_results, read_records
 from rotor_mbs.runs.runner import OnProgress, Outcome, compute_tasks, ignore_progress
 from rotor_mbs.runs.table import extend_file
 from rotor_mbs.scenario.scene import Scene
-from rotor_mbs.studies.bench import Curve, Point, curve_tables, curve_tasks, known_of
+from rotor_mbs.studies.bench import Curve, Point, curve_tables, curve_tasks
 from rotor_mbs.studies.run import run_scenes
 
 TARGET = 1e-6  # rad: what a method must reach on the stiff and light scenes
@@ -190,9 +191,8 @@ def ladder_curve(scene: Scene, method: str) -> Curve:
     steps = [scene.duration / (scene.samples - 1)]
     while scene.duration <= _MAX_STEPS * steps[-1] / _FACTOR:
         steps.append(steps[-1] / _FACTOR)
-    known = known_of(scene, method)
-    points = [
-        Point(method, step, {STEP: step}, known | {"run": f"{scene.name}/{method} step={step:.6g}", STEP: step})
-        for step in steps
-    ]
+    points = []
+    for step in steps:
+        known = Asked(scene, method, {STEP: step}).known | {"run": f"{scene.name}/{method} step={step:.6g}"}
+        points.append(Point(method, step, {STEP: step}, known | {STEP: step}))
     return Curve(scene, method, STEP, points, STEPS, TARGET)

@@ -48,7 +48,7 @@ def test_facts_of_the_built_in_methods_agree_with_each_other() -> None:
         assert method.is_corrected == bool(method.ladders)
         assert not (method.erratum and (method.is_corrected or method.is_default))
         assert not method.fallback or find_method(method.fallback).is_corrected
-    assert [ladder.curve for ladder in catalogue.ladders(["exudyn_tree/generalized_alpha"])] == [
+    assert [*catalogue.ladders(["exudyn_tree/generalized_alpha"])] == [
         "exudyn_tree/generalized_alpha", "exudyn_tree/generalized_alpha_rho0.7", "exudyn_tree/generalized_alpha_rho1.0",
     ]  # fmt: skip
 

@@ -124,7 +124,7 @@ def test_a_published_value_stands_in_the_plot_at_its_height() -> None:
 
 
 def test_every_method_and_every_curve_of_a_bench_has_a_look_of_its_own() -> None:
-    names = {"reference", *method_names(), *(ladder.curve for ladder in ladders())}
+    names = {"reference", *method_names(), *ladders()}
     looks = {name: look_of(name) for name in names}
     assert len(set(looks.values())) == len(looks)
     for first, second in combinations(method_names(), 2):  # methods differ by more than a colour

@@ -252,9 +252,10 @@ def measure_dying(curves: list[Curve], **options: Any) -> Any:
 @pytest.mark.full
 def test_curves_are_tried_alone_where_their_process_dies(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(bench, "measure", measure_dying)
-    (ladder,) = ladders(["lagrange/ode45"])
+    ((method, ladder),) = ladders(["lagrange/ode45"]).values()
     short = replace(ladder, values=(1e-3,))
-    curves = [bench.curve_of(AT_REST, replace(short, variant=f" {name}"), {}) for name in ("first", "deadly", "last")]
+    variants = [replace(short, variant=f" {name}") for name in ("first", "deadly", "last")]
+    curves = [bench.curve_of(AT_REST, method, ladder, {}) for ladder in variants]
     file = extend_file(tmp_path / "b.h5", [*bench.curve_tables(curves)])
     still = np.zeros((3, 4))
     reference = Trajectory(np.linspace(0.0, 0.1, 3), still, still, error_growth=np.ones(3))
