@@ -4,8 +4,10 @@ state transition matrix over one turn, whose eigenvalues are the Floquet multipl
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
+from typing import Any
 
 import numpy as np
 
@@ -13,7 +15,7 @@ from rotor_mbs.errors import InputError
 from rotor_mbs.models.lagrange import closed_form
 from rotor_mbs.models.lagrange.closed_form import load_values
 from rotor_mbs.models.lagrange.heyoka_adapter import Parameters, array_of, failure, heyoka
-from rotor_mbs.models.lagrange.linearization import Jet, cosine, holding_torque, linearize, sine, steady_rotation
+from rotor_mbs.models.lagrange.linearization import holding_torque, linearize, slopes, steady_rotation
 from rotor_mbs.models.lagrange.parameters import load_tables, rotor_form
 from rotor_mbs.models.lagrange.samples import loads_at_start
 from rotor_mbs.models.lagrange.taylor import compiled, state_symbols
@@ -68,7 +70,11 @@ def periodic_turn(scene: Scene, speed: float, guess: Turn | None = None) -> Turn
         period = 2.0 * math.pi / speed
         shift = np.zeros(2 * n)
         shift[0] = 2.0 * math.pi
-        form = rotor_form(scene)
+        form, constant_loads = rotor_form(scene), loads_at_start(scene)
+
+        def energy(state: Sequence[Any]) -> Any:
+            return sum(closed_form.energies(state[:n], state[n:], form, constant_loads, np.sin, np.cos))
+
         best: Turn | None = None
         for _ in range(_MAX_CORRECTIONS):
             end, derivatives, trace = system.propagate(state, torque, period)
@@ -77,9 +83,7 @@ def periodic_turn(scene: Scene, speed: float, guess: Turn | None = None) -> Turn
             mismatch = float(np.abs(residual).max())
             if best is None or mismatch < best.mismatch:
                 # Gradient of energy less the torques' work, zero where dampers act; and the state's time derivative.
-                variables, loads = Jet.variables(state), loads_at_start(scene, torque)
-                kinetic, potential = closed_form.energies(variables[:n], variables[n:], form, loads, sine, cosine)
-                gradient = (kinetic + potential).slope
+                loads, gradient = loads_at_start(scene, torque), slopes(energy, state)
                 gradient[:n] -= [torque, *loads.pitches]
                 gradient = np.zeros(2 * n) if scene.has_damping else gradient
                 angles, rates = state[:n].tolist(), state[n:].tolist()
