@@ -228,12 +228,11 @@ def _own_extremes(solution: Solution) -> dict[str, float]:
             duration=scene.duration / (scene.samples - 1),
             samples=2,
         )
-        between = solve(PRINTED, part, solution.settings).trajectory
-        if between.refined_angles is not None and between.refined_rates is not None:
-            own, rates = between.refined_angles[:, 0], np.abs(between.refined_rates[:, 0])
-            extremes["rotor_angle_min"] = min(extremes["rotor_angle_min"], own.min())
-            extremes["rotor_angle_max"] = max(extremes["rotor_angle_max"], own.max())
-            extremes["rotor_rate_max"] = max(extremes["rotor_rate_max"], rates.max())
+        own = solve(PRINTED, part, solution.settings).trajectory.refined
+        assert own is not None
+        extremes["rotor_angle_min"] = min(extremes["rotor_angle_min"], own.angles[:, 0].min())
+        extremes["rotor_angle_max"] = max(extremes["rotor_angle_max"], own.angles[:, 0].max())
+        extremes["rotor_rate_max"] = max(extremes["rotor_rate_max"], np.abs(own.rates[:, 0]).max())
     return {name: float(value) for name, value in extremes.items()}
 
 

@@ -226,7 +226,7 @@ def arrays_of(run: Asked) -> dict[str, Column]:
     outputs = (*run.scene.outputs, "angles", "rates") if run.method == REFERENCE else run.scene.outputs
     columns = {}
     for quantity in quantities(outputs):
-        if not quantity.is_over_time or not (quantity.required or quantity.name in method.arrays):
+        if not (quantity.required or quantity.name in method.arrays):
             continue
         is_once = quantity.name in _ONCE_A_SCENE
         if is_once and run.method != REFERENCE:

@@ -193,7 +193,7 @@ class StoredRun:
             return None
         time = self.array("time")
         blank = np.zeros((len(time), 1 + len(scene.blades)))
-        names = {quantity.name for quantity in known_quantities(scene.outputs) if quantity.is_over_time}
+        names = {quantity.name for quantity in known_quantities(scene.outputs)}
         arrays = {name: self.array(name) for name in names if name in self}
         return Trajectory(**{"time": time, "angles": blank, "rates": blank, **arrays})
 

@@ -83,12 +83,10 @@ def metrics_of(scene: Scene, run: Trajectory, reference: Trajectory | None, defe
             if balance is not None:
                 metrics[f"{name}_impulse_error_max"] = balance.largest
     # Of the rotor over the integrator's own output points, where the run has them.
-    refined_angles, refined_rates = run.get("refined_angles"), run.get("refined_rates")
-    angles = run.angles if refined_angles is None else refined_angles
-    rates = run.rates if refined_rates is None else refined_rates
-    metrics["rotor_angle_min"] = float(angles[:, 0].min())
-    metrics["rotor_angle_max"] = float(angles[:, 0].max())
-    metrics["rotor_rate_max"] = float(np.abs(rates[:, 0]).max())
+    own = run.refined or run
+    metrics["rotor_angle_min"] = float(own.angles[:, 0].min())
+    metrics["rotor_angle_max"] = float(own.angles[:, 0].max())
+    metrics["rotor_rate_max"] = float(np.abs(own.rates[:, 0]).max())
     peaks: Metrics = {}  # of a quantity: its largest size, the time of it in s, and the blade, from 1
     for quantity in known_quantities(scene.outputs):
         values = array_of(quantity, scene, run) if quantity.has_peak else None

@@ -88,8 +88,6 @@ class Quantity:
     ...     "hub_angular_momentum", ("time",), "N m s", "angular momentum of the hub about the shaft",
     ...     output="momentum", producer=lambda scene, samples: scene.hub_inertia * samples.rates[:, 0],
     ...     judgement=QuantityMetric("hub_angular_momentum_error_max", bound=1e-3, unit="N m s"))
-    >>> angular_momentum.is_over_time
-    True
     """
 
     name: str
@@ -103,10 +101,6 @@ class Quantity:
     plot: Plot | None = None
     has_peak: bool = False
 
-    @property
-    def is_over_time(self) -> bool:
-        return self.dimensions[:1] == ("time",)
-
 
 # ---- Dimensions
 
@@ -118,7 +112,6 @@ SCALES = {
         Quantity("coordinate", ("coordinate",), "1", "joint coordinate: 0 rotor, i pitch of blade i"),
         Quantity("blade", ("blade",), "1", "blade number, from 1"),
         Quantity("axis", ("axis",), "1", "axis: 0 x, 1 y, 2 z of the frame that each variable names"),
-        Quantity("refined_time", ("refined_time",), "s", "time of the integrator's own output points"),
     )
 }
 
@@ -274,19 +267,10 @@ BUILT_IN = (
         "error_growth", ("time",), "1", "largest factor by which a small error of the initial state has grown",
         required=False,
     ),
-    Quantity(
-        "refined_angles", ("refined_time", "coordinate"), "rad", "angles at the integrator's own output points",
-        "angles", required=False,
-    ),
-    Quantity(
-        "refined_rates", ("refined_time", "coordinate"), "rad/s", "rates at the integrator's own output points",
-        "rates", required=False,
-    ),
 )  # fmt: skip
 
 _OUTPUTS = frozenset(quantity.output for quantity in BUILT_IN)
-# What a trajectory may hold beside time: every built-in quantity, and the scale of an integrator's own output points.
-NAMES = frozenset({*(quantity.name for quantity in BUILT_IN), "refined_time"})
+NAMES = frozenset(quantity.name for quantity in BUILT_IN)
 
 
 # ---- Quantities of a scene: built-in ones, and those of installed packages
@@ -323,14 +307,14 @@ def installed(output: str) -> tuple[Quantity, ...]:
     if not isinstance(brought, Sequence) or not all(isinstance(quantity, Quantity) for quantity in brought):
         raise InputError(f"{where}: is a {type(loaded).__name__}; allowed: a Quantity or a sequence of them")
     problems = []
-    allowed = sorted(set(SCALES) - {"time", "refined_time"})
+    allowed = sorted(set(SCALES) - {"time"})
     for quantity in brought:
         name, dimensions = quantity.name, quantity.dimensions
         faults = []
         if not name.isidentifier() or name in NAMES | set(SCALES):
             faults.append(f"name {name!r}; allowed: an identifier that is not taken")
         is_repeated = len(set(dimensions)) < len(dimensions)
-        if not quantity.is_over_time or is_repeated or not set(dimensions[1:]) <= set(allowed):
+        if dimensions[:1] != ("time",) or is_repeated or not set(dimensions[1:]) <= set(allowed):
             faults.append(f"dimensions {dimensions}; allowed: 'time', then any of {', '.join(allowed)}, once each")
         if quantity.output != output:
             faults.append(f"output {quantity.output!r}; allowed: {output!r}, the entry point's name")

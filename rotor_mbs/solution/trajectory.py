@@ -38,6 +38,7 @@ class Trajectory:
     angles: Array
     rates: Array
     quantities: dict[str, Array]
+    refined: Trajectory | None = None  # angles and rates at the integrator's own output points, where it has such
 
     def __init__(self, time: Array, angles: Array, rates: Array, **quantities: Array | None) -> None:
         self.time, self.angles, self.rates = time, angles, rates
@@ -51,7 +52,7 @@ class Trajectory:
         return self.quantities.get(name)
 
     def replace(self, **changes: Array | None) -> Trajectory:
-        """Return a copy with other arrays; None removes an array. Arrays are not copied."""
+        """Return a copy with other arrays, without `refined`; None removes an array. Arrays are not copied."""
         arrays: dict[str, Any] = {"time": self.time, "angles": self.angles, "rates": self.rates, **self.quantities}
         return Trajectory(**{**arrays, **changes})
 
@@ -63,7 +64,7 @@ class Trajectory:
         raise AttributeError(f"a trajectory has no attribute {name!r}")
 
     def __setattr__(self, name: str, value: Any) -> None:
-        if name in _FIELDS or name == "quantities":
+        if name in (*_FIELDS, "quantities", "refined"):
             object.__setattr__(self, name, value)
         elif name not in NAMES:
             raise AttributeError(f"a trajectory has no attribute {name!r}")
@@ -84,7 +85,7 @@ def shape_fault(scene: Scene, run: Trajectory) -> str:
     for quantity in known_quantities(scene.outputs):
         values = run.get(quantity.name)
         wanted = (*time, *row_shape(quantity, scene))
-        if quantity.is_over_time and values is not None and np.shape(values) != wanted:
+        if values is not None and np.shape(values) != wanted:
             return f"{quantity.name} has the shape {np.shape(values)}; allowed: {wanted}"
     return ""
 
@@ -265,8 +266,6 @@ class Solution:
         xarray = need_xarray()
         labels = {"coordinate": list(self.scene.coordinate_labels), "axis": ["x", "y", "z"]}
         scales: dict[str, Any] = {**scale_values(self.scene), "time": self.time}
-        if (refined := self.trajectory.get("refined_time")) is not None:
-            scales["refined_time"] = refined
         arrays = self.quantities
         variables, used = {}, {"time"}
         for quantity in quantities(self.scene.outputs):

@@ -75,7 +75,7 @@ def reference_csv(scene: Scene) -> str:
     labels = {"coordinate": scene.coordinate_labels, "blade": blades, "axis": "xyz"}
     columns = {"time [s]": trajectory.time}
     for quantity in quantities.quantities(scene.outputs):
-        values = quantities.array_of(quantity, scene, trajectory) if quantity.is_over_time else None
+        values = quantities.array_of(quantity, scene, trajectory)
         if values is None:
             continue
         parts = itertools.product(*(labels[dimension] for dimension in quantity.dimensions[1:]))

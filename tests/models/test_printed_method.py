@@ -35,10 +35,10 @@ def drift(trajectory):
 
 def test_figure_11_crest():
     """The other published digits: analysis/test_claim_study.py."""
-    trajectory = run(FIG11).trajectory
-    angle = trajectory.refined_angles[:, 0]
+    own = run(FIG11).trajectory.refined
+    angle = own.angles[:, 0]
     assert round(angle.max(), 4) == 2.7315
-    assert trajectory.refined_time[angle.argmax()] == pytest.approx(7.26, abs=0.01)
+    assert own.time[angle.argmax()] == pytest.approx(7.26, abs=0.01)
 
 
 # Exact solutions.
@@ -99,7 +99,7 @@ def test_a_singularity_ends_the_run_with_what_was_reached():
     assert "Failure at t=" in result.integration.message
     assert 11.0 < result.integration.time_reached < 14.0
     assert result.trajectory.time[-1] <= result.integration.time_reached
-    assert abs(result.trajectory.refined_angles[-1, 1]) == pytest.approx(PI / 2, abs=1e-3)
+    assert abs(result.trajectory.refined.angles[-1, 1]) == pytest.approx(PI / 2, abs=1e-3)
     for part in (result.trajectory.angles, result.trajectory.rates, result.trajectory.tip):
         assert np.all(np.isfinite(part))
         assert len(part) == len(result.trajectory.time)

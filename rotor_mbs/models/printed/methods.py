@@ -61,9 +61,9 @@ class PrintedSolver:
         angles, rates = all_coordinates(scene, states[:, : self._moving], states[:, self._moving :])
         trajectory = Trajectory(time, angles, rates)
         if not self._errata:  # ode45's own output points: the paper's numbers are read off at them
-            trajectory.refined_time, states = result.refined()
+            own_time, states = result.refined()
             refined = all_coordinates(scene, states[:, : self._moving], states[:, self._moving :])
-            trajectory.refined_angles, trajectory.refined_rates = refined
+            trajectory.refined = Trajectory(own_time, *refined)
         if scene.wants("tip"):
             trajectory.tip = rotor.tip_path(angles)
         if scene.wants("energy"):

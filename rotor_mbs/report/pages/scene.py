@@ -233,7 +233,7 @@ def quantity_sections(scene: StoredScene, runs: Runs, horizon: float | None) -> 
     sections = []
     for quantity in known_quantities(scene.scene.outputs):
         plot, own = quantity.plot, {method: run for method, run in runs.items() if quantity.name in run}
-        if plot is None or not quantity.is_over_time or not own:
+        if plot is None or not own:
             continue
         name = f"quantity-{quantity.name}"
         if plot.logarithmic:
