@@ -12,6 +12,7 @@ from dataclasses import replace
 from functools import partial
 from importlib import import_module, metadata
 from pathlib import Path
+from pkgutil import resolve_name
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from rotor_mbs.errors import InputError, MethodRefusal, nearest
@@ -227,8 +228,8 @@ def model_label(model: str) -> str:
 
 
 def _load(place: str) -> tuple[Method, ...]:
-    module, _, name = place.partition(":")
-    return _as_methods(getattr(import_module(module), name))
+    methods: tuple[Method, ...] = resolve_name(place)
+    return methods
 
 
 def _as_methods(loaded: object) -> tuple[Method, ...]:

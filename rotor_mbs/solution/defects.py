@@ -105,9 +105,8 @@ class Defects:
     @property
     def channel_sizes(self) -> Array:
         """Magnitudes of the defects of the moving coordinates: (n - 1, m) rad, angles, then rates; inf for NaN."""
-        columns = list(self.moving)
-        both = np.abs(np.hstack([self.angles[:, columns], self.rates[:, columns]])) / self._units
-        return np.asarray(np.where(np.isfinite(both), both, np.inf))
+        sizes = np.abs(self._vectors) / self._units
+        return np.asarray(np.where(np.isfinite(sizes), sizes, np.inf))
 
     @functools.cached_property
     def growth(self) -> Array:

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from rotor_mbs.models.lagrange import closed_form
-from rotor_mbs.models.lagrange.ode_solvers import Accelerations
+from rotor_mbs.models.lagrange.closed_form import Accelerations
 from rotor_mbs.models.lagrange.reference import LEFT_OUT, at_azimuths
 from rotor_mbs.models.printed.derivation import Errata
 from rotor_mbs.models.printed.methods import equations, point_mass_rotor

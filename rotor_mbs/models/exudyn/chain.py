@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from rotor_mbs.methods.base import BuiltItem
 from rotor_mbs.models.exudyn import geometry
 from rotor_mbs.models.exudyn.geometry import Part, Ref, sensor
 from rotor_mbs.models.exudyn.loads import Loads, Moment, chain_sensors, is_driven, moment_on
@@ -90,6 +91,10 @@ def parts(scene: Scene, loads: Loads, node: str = "euler_parameters") -> list[Pa
     if scene.wants("loads"):
         built += chain_sensors(scene, hub.body)
     return built
+
+
+def items(scene: Scene) -> list[BuiltItem]:
+    return geometry.items(parts(scene, Loads(scene)))
 
 
 def _body(placed: Placed, node: str) -> list[Part]:

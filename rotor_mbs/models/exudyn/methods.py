@@ -35,7 +35,7 @@ def _method(model: str, integrator: str, label: str, builder: str = "", **facts:
         name=f"{model}/{integrator}",
         label=f"Exudyn {kind}, {label}",
         build=late(f"{_SOLVERS}:build_{builder or kind}"),
-        items=late(f"{_SOLVERS}:{kind}_items"),
+        items=late(f"rotor_mbs.models.exudyn.{kind}:items"),
         arrays=() if in_tree else ("constraint_error",),
         distributions=("exudyn",),
         relative_cost=10.0 if in_tree else 100.0,
@@ -85,7 +85,6 @@ METHODS = (
                 1e-2, 1e-4, 1e-6, 1e-8, 1e-10, 1e-12, 1e-14,
             ),
         ),
-
     ),
     _method(
         "exudyn_tree", "generalized_alpha", "generalized-α",

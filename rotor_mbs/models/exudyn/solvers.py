@@ -9,9 +9,10 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from rotor_mbs.errors import MethodRefusal
-from rotor_mbs.methods.base import BuiltItem, Solver
+from rotor_mbs.methods.base import Solver
 from rotor_mbs.methods.time_limit import MESSAGE, is_over, polled
-from rotor_mbs.models.exudyn import chain, geometry, sensor_samples, tree
+from rotor_mbs.models.exudyn import chain, sensor_samples, tree
+from rotor_mbs.models.exudyn.adapter import System
 from rotor_mbs.models.exudyn.geometry import Part
 from rotor_mbs.models.exudyn.loads import Loads
 from rotor_mbs.models.exudyn.schemes import ExtrapolatedSettings, Scheme, SchemeSettings
@@ -72,8 +73,6 @@ class ExtrapolatedSolver:
     """See `methods.base.Solver`; `tolerance` (rad) is for the estimated error of each part of an interval."""
 
     def __init__(self, scene: Scene, scheme: Scheme, tolerance: float) -> None:
-        from rotor_mbs.models.exudyn.adapter import System  # late: to list what is built needs no engine
-
         self._scene, self._scheme, self._loads = scene, scheme, Loads(scene)
         self._least_error = max(tolerance, _ROUNDING)
         self._newton_tolerance = float(str(scheme.options["newton.relativeTolerance"]))
@@ -224,14 +223,6 @@ Reading = Callable[[Scene, Sequence[Segment], Callable[[str], Array]], Trajector
 _SHORTEST_INTERVAL = 1e-8
 
 
-def tree_items(scene: Scene) -> list[BuiltItem]:
-    return geometry.items(tree.parts(scene, Loads(scene)))
-
-
-def chain_items(scene: Scene) -> list[BuiltItem]:
-    return geometry.items(chain.parts(scene, Loads(scene)))
-
-
 class MultibodySolver:
     """See `methods.base.Solver`; `reading` makes the trajectory from recorded rows, for which it may need
     `rows_between` samples. Raises MethodRefusal, with the engine's reason, where the engine does not take the parts."""
@@ -245,12 +236,9 @@ class MultibodySolver:
         reading: Reading,
         rows_between: bool,
     ) -> None:
-
         self._scene, self._loads, self._scheme, self._reading = scene, loads, scheme, reading
         self._rows_between = rows_between
         self._intervals = intervals(loads.segments, scene.samples, every_sample=scheme.step is None)
-        from rotor_mbs.models.exudyn.adapter import System  # late: to list what is built needs no engine
-
         self.system = System(parts)
 
     def integrate(self) -> Integration:
@@ -263,7 +251,6 @@ class MultibodySolver:
 
 
 def build_tree(scene: Scene, settings: SchemeSettings) -> Solver:
-
     scheme, loads = _scheme(scene, settings), Loads(scene)
     if scene.wants("loads"):
         scheme = scheme.with_accelerations()
@@ -272,7 +259,6 @@ def build_tree(scene: Scene, settings: SchemeSettings) -> Solver:
 
 
 def build_chain(scene: Scene, settings: Any) -> Solver:
-
     scheme = _scheme(scene, settings)
     if scene.wants("loads") and settings.node == "rotation_vector":
         raise MethodRefusal(
@@ -287,7 +273,6 @@ def build_chain(scene: Scene, settings: Any) -> Solver:
 
 
 def build_extrapolated(scene: Scene, settings: ExtrapolatedSettings) -> Solver:
-
     return ExtrapolatedSolver(scene, _scheme(scene, settings), settings.tolerance)
 
 

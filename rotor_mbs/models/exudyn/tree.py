@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from rotor_mbs.methods.base import BuiltItem
+from rotor_mbs.models.exudyn import geometry
 from rotor_mbs.models.exudyn.geometry import Body, Part, Ref, blade_body, hub_body, mounting, on_body, pitching, sensor
 from rotor_mbs.models.exudyn.loads import Loads, moment_on, tree_sensors
 from rotor_mbs.scenario.scene import Scene
@@ -53,6 +55,10 @@ def parts(scene: Scene, loads: Loads) -> list[Part]:
     if scene.wants("loads"):
         built += tree_sensors(scene, _link_sensor)
     return built
+
+
+def items(scene: Scene) -> list[BuiltItem]:
+    return geometry.items(parts(scene, Loads(scene)))
 
 
 def bodies(scene: Scene) -> list[Body]:

@@ -19,6 +19,7 @@ from typing import Any
 from rotor_mbs.models.lagrange.parameters import BladeForm, Number, RotorForm
 
 Function = Callable[[Any], Any]
+Accelerations = Callable[..., list[Number]]  # `accelerations`, or other equations in their place
 
 
 @dataclass(frozen=True, slots=True)

@@ -12,8 +12,9 @@ import numpy as np
 from rotor_mbs.errors import InputError
 from rotor_mbs.methods.time_limit import stop_in_time
 from rotor_mbs.models.lagrange import closed_form
+from rotor_mbs.models.lagrange.closed_form import Accelerations
 from rotor_mbs.models.lagrange.heyoka_adapter import is_available
-from rotor_mbs.models.lagrange.ode_solvers import Accelerations, OdeSolver, scipy_integrator
+from rotor_mbs.models.lagrange.ode_solvers import OdeSolver, scipy_integrator
 from rotor_mbs.models.lagrange.parameters import load_segments, rate_units, resting_pitches, rotor_form
 from rotor_mbs.models.lagrange.samples import loads_at, sampled_loads
 from rotor_mbs.models.lagrange.taylor import Propagation, is_compact

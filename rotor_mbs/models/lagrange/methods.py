@@ -70,7 +70,6 @@ def _linearize(scene: Scene, angles: Any, speed: float, torque: float) -> Linear
 
 
 def _scipy_method(solver: str, settings: type[Settings], ladder: Ladder, relative_cost: float) -> Method:
-
     def build(scene: Scene, chosen: Any) -> Solver:
         from rotor_mbs.models.lagrange.ode_solvers import OdeSolver, scipy_integrator
 
@@ -107,7 +106,6 @@ METHODS = (
                 1e-1, 1e-3, 1e-5, 1e-7, 1e-9, 1e-10, 1e-11, 1e-13, 2.0**-52,
             ),
         ),
-
     ),
     Method(
         name="lagrange/ode45",
@@ -116,7 +114,6 @@ METHODS = (
         build=_build_ode45,
         items=equation_items,
         ladders=(tolerance_ladder(tolerance_pair, 1e-2, 1e-4, 1e-6, 1e-8, 1e-10, 1e-12, 3e-14),),
-
         relative_cost=10.0,
         linearize=_linearize,
     ),

@@ -7,37 +7,27 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from rotor_mbs.methods import time_limit as deadline
+from rotor_mbs.methods import time_limit
 from rotor_mbs.methods.time_limit import OutOfTimeError
 from rotor_mbs.models import ode45 as matlab
 from rotor_mbs.models.lagrange import closed_form, samples
 from rotor_mbs.models.lagrange.closed_form import load_values
-from rotor_mbs.models.lagrange.parameters import Number, changing_loads, load_segments, rotor_form, work_is_integrated
+from rotor_mbs.models.lagrange.parameters import changing_loads, load_segments, rotor_form, work_is_integrated
 from rotor_mbs.models.lagrange.samples import Advance, at_constant_rests, loads_at_start, over_segments
 from rotor_mbs.models.ode45 import RightHandSide
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.scenario.time_table import Segment
 from rotor_mbs.solution.trajectory import Array, Integration, Trajectory, sample_times
 
-# As closed_form.accelerations
-Accelerations = Callable[..., list[Number]]
 # (right-hand side, start, end, state at the start, sample times inside) -> Advance
 Integrator = Callable[[RightHandSide, float, float, Array, Array], Advance]
 
 
 class OdeSolver:
-    """Any integrator over the scene, one call per segment of the loads; `times` as of `taylor.Propagation`,
-    `accelerations` in place of the closed form's."""
+    """Any integrator over the scene, one call per segment of the loads; `times` as of `taylor.Propagation`."""
 
-    def __init__(
-        self,
-        scene: Scene,
-        integrator: Integrator,
-        times: Array | None = None,
-        accelerations: Accelerations | None = None,
-    ) -> None:
-        self._scene, self._accelerations = scene, accelerations
-        self._integrator = integrator
+    def __init__(self, scene: Scene, integrator: Integrator, times: Array | None = None) -> None:
+        self._scene, self._integrator = scene, integrator
         self._form = rotor_form(scene)
         self._segments = load_segments(scene)
         self._work_unit = work_unit(scene) if work_is_integrated(scene) else 0.0
@@ -57,7 +47,6 @@ class OdeSolver:
     def _right_hand_side(self, segment: Segment) -> RightHandSide:
         """d/dt of (angles, rates[, work]) on plain floats: for a handful of blades faster than arrays."""
         form, work_unit = self._form, self._work_unit
-        equations = self._accelerations or closed_form.accelerations
         count = 1 + len(form.blades)
         changing = changing_loads(self._scene)
         constant = None if any(segment.slopes) else load_values(segment.values)
@@ -67,7 +56,7 @@ class OdeSolver:
             angles, rates = values[:count], values[count : 2 * count]
             loads = constant or load_values(segment.loads_at(time))
             try:
-                accelerations = equations(angles, rates, form, loads, math.sin, math.cos)
+                accelerations = closed_form.accelerations(angles, rates, form, loads, math.sin, math.cos)
             except (ZeroDivisionError, ValueError, OverflowError):
                 # A singular mass matrix, or a state that has diverged: not a number, as in array arithmetic.
                 return [math.nan] * len(values)
@@ -105,12 +94,12 @@ def scipy_integrator(name: str, relative_tolerance: float, absolute_tolerance: f
 
     def advance(function: RightHandSide, start: float, end: float, state: Array, times: Array) -> Advance:
         def watched(time: float, values: Sequence[float]) -> list[float]:
-            if deadline.is_over():  # a step may try ever smaller sizes without end
+            if time_limit.is_over():  # a step may try ever smaller sizes without end
                 raise OutOfTimeError
             return function(time, values)
 
         rows, steps, message, solver = [np.empty((0, len(state)))], 0, "", None
-        with np.errstate(all="ignore"), deadline.polled():
+        with np.errstate(all="ignore"), time_limit.polled():
             try:
                 solver = solver_type(watched, start, state, end, rtol=relative_tolerance, atol=absolute_tolerance)
                 done = 0
@@ -125,7 +114,7 @@ def scipy_integrator(name: str, relative_tolerance: float, absolute_tolerance: f
                         rows.append(solver.dense_output()(times[done:reached]).T)
                         done = reached
             except OutOfTimeError:
-                message = deadline.MESSAGE
+                message = time_limit.MESSAGE
             except (ValueError, np.linalg.LinAlgError) as exc:  # of its linear algebra, on what is not finite
                 message = f"SciPy: {exc}"
         last, evaluations = (state, 0) if solver is None else (solver.y, solver.nfev)

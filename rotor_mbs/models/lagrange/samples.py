@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from rotor_mbs.methods import time_limit as deadline
+from rotor_mbs.methods import time_limit
 from rotor_mbs.models.lagrange import closed_form
 from rotor_mbs.models.lagrange.closed_form import Function, LoadValues, load_values
 from rotor_mbs.models.lagrange.heyoka_adapter import quad_arithmetic
@@ -68,7 +68,7 @@ def over_segments(
     states = np.concatenate(rows)
     states = states[: finite_rows(states.astype(float, copy=False))]
     reached = float(times[max(len(states) - 1, 0)])
-    return states, Integration(not message, message, reached, steps, evaluations, message == deadline.MESSAGE)
+    return states, Integration(not message, message, reached, steps, evaluations, message == time_limit.MESSAGE)
 
 
 def trajectory(scene: Scene, times: Array, states: Array) -> Trajectory:

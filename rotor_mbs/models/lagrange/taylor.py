@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from rotor_mbs.methods import time_limit as deadline
+from rotor_mbs.methods import time_limit
 from rotor_mbs.methods.base import BuiltItem
 from rotor_mbs.models import equation_items
 from rotor_mbs.models.lagrange import closed_form, hamilton, samples
@@ -143,9 +143,9 @@ class Propagation:
         self.enter(segment)
         end = [] if len(times) and times[-1] == segment.end else [segment.end]
         grid = np.concatenate([[segment.start], times, end]).astype(kind)
-        with deadline.polled():
-            outcome, _, _, steps, _, states = integrator.propagate_grid(grid, callback=deadline.step_callback())
-        message = deadline.MESSAGE if deadline.is_over() else failure(outcome)
+        with time_limit.polled():
+            outcome, _, _, steps, _, states = integrator.propagate_grid(grid, callback=time_limit.step_callback())
+        message = time_limit.MESSAGE if time_limit.is_over() else failure(outcome)
         return Advance(states[1 : 1 + len(times)], integrator.state, steps, None, message)
 
     def observe(self) -> Trajectory:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
@@ -38,21 +38,18 @@ def _items(scene: Scene) -> list[BuiltItem]:
     return mjcf.items(scene)
 
 
-def _build(integrator: str) -> Callable[[Scene, Any], Solver]:
-    def build(scene: Scene, settings: Rk4Settings | FirstOrderSettings) -> Solver:
-        _items(scene)
-        from rotor_mbs.models.mujoco.solver import MujocoSolver
+def _build(integrator: str, scene: Scene, settings: Rk4Settings | FirstOrderSettings) -> Solver:
+    _items(scene)
+    from rotor_mbs.models.mujoco.solver import MujocoSolver
 
-        return MujocoSolver(scene, integrator, settings.step)
-
-    return build
+    return MujocoSolver(scene, integrator, settings.step)
 
 
 def _method(integrator: str, label: str, **facts: Any) -> Method:
     return Method(
         name=f"mujoco/{integrator}",
         label=f"MuJoCo, {label}",
-        build=_build(integrator),
+        build=partial(_build, integrator),
         items=_items,
         distributions=("mujoco",),
         fixed_step=True,
