@@ -63,7 +63,7 @@ def find_method(name: str) -> Method:
     """The method called `name` ("model/integrator" or "reference"). Raises InputError for an unknown name."""
     method = look_up(name)
     if method is None:
-        raise InputError(_unknown(name))
+        raise InputError(_unknown([name]))
     return method
 
 
@@ -71,16 +71,16 @@ def check_names(names: str | Sequence[str]) -> tuple[str, ...]:
     """The names, or the one name, once each, in order; of a Python file, those of all its methods. Raises InputError
     with a line for every unknown one."""
     names = _with_files([names] if isinstance(names, str) else names)
-    known = method_names() if names else ()
-    unknown = [name for name in names if name not in known]
-    if unknown:
-        raise InputError([_unknown(name) for name in unknown])
+    if unknown := _unknown(names):
+        raise InputError(unknown)
     return tuple(dict.fromkeys(names))
 
 
-def _unknown(name: str) -> str:
-    known = method_names()
-    return f"unknown method {name!r}{nearest(name, known)}; allowed: {', '.join(known)}"
+def _unknown(names: Sequence[str]) -> list[str]:
+    """A line for each of the names that no method has."""
+    known = method_names() if names else ()
+    unknown = [name for name in names if name not in known]
+    return [f"unknown method {name!r}{nearest(name, known)}; allowed: {', '.join(known)}" for name in unknown]
 
 
 # Files that were named, by model, and their methods: state of this process, as a file may be edited between two calls.
@@ -163,9 +163,7 @@ def own_settings(scene: Scene, method: str) -> dict[str, object]:
 
 def problems_of_methods(values: Mapping[str, Any]) -> list[KeyProblem]:
     """What is wrong with the `methods` that a scene file or a sweep file names."""
-    names = values.get("methods", ())
-    known = method_names() if names else ()
-    return [KeyProblem(("methods",), _unknown(name)) for name in names if name not in known]
+    return [KeyProblem(("methods",), line) for line in _unknown(values.get("methods", ()))]
 
 
 def problems_of_scene(values: Mapping[str, Any]) -> list[KeyProblem]:
@@ -297,9 +295,8 @@ def selected_methods(scenes: Sequence[Scene], names: Sequence[str] = ()) -> tupl
     reasons: list[str] = []
     refused: list[str] = []
     for scene in scenes:
-        unknown = [name for name in scene.methods if name not in method_names()]
-        if unknown and not names:
-            raise InputError(f"{scene.name}: methods: {_unknown(name)}" for name in unknown)
+        if not names and (unknown := _unknown(scene.methods)):
+            raise InputError(f"{scene.name}: methods: {line}" for line in unknown)
         named = names or tuple(dict.fromkeys(scene.methods))
         if named:
             methods[scene.name], lines = able_methods(scene, named)

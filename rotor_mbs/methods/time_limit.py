@@ -28,7 +28,6 @@ class _State(threading.local):
     end = math.inf
     polled = False
     is_over = False  # as the signal, or a question to `is_over`, has set it
-    has_signal = False
 
 
 _state = _State()
@@ -48,7 +47,7 @@ def time_limit(seconds: float) -> Iterator[None]:
         yield
         return
     has_signal = hasattr(signal, "SIGALRM") and threading.current_thread() is threading.main_thread()
-    _state.end, _state.is_over, _state.has_signal = time.monotonic() + seconds, False, has_signal
+    _state.end, _state.is_over = time.monotonic() + seconds, False
     if has_signal:
         before = signal.signal(signal.SIGALRM, _interrupt)
         signal.setitimer(signal.ITIMER_REAL, max(seconds, _SHORTEST_S))
@@ -86,11 +85,7 @@ def polled() -> Iterator[None]:
 def step_callback() -> Callable[[object], bool] | None:
     """Called with anything after every step, it returns whether to go on; None where there is no limit; for use inside
     `polled`."""
-    if math.isinf(_state.end):
-        return None
-    if _state.has_signal:
-        return lambda _: not _state.is_over
-    return lambda _: not is_over()
+    return None if math.isinf(_state.end) else lambda _: not is_over()
 
 
 def is_over() -> bool:

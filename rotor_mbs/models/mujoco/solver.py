@@ -58,16 +58,16 @@ class Poses:
 
 
 class Engine:
-    """A compiled model and its state; masses and moments of `least` or less are then set to zero. Raises MethodRefusal,
-    with MuJoCo's reason, where it does not take the model."""
+    """The compiled model of a scene, and its state; masses and moments of `mjcf.LEAST` are set to zero. Arguments as of
+    `mjcf.model`. Raises MethodRefusal, with MuJoCo's reason, where it does not take the model."""
 
-    def __init__(self, mjcf: str, least: float) -> None:
+    def __init__(self, scene: Scene, integrator: str, step: float) -> None:
         try:
-            self._model = _engine.MjModel.from_xml_string(mjcf)
+            self._model = _engine.MjModel.from_xml_string(mjcf.text(mjcf.model(scene, integrator, step)))
         except ValueError as exc:
             raise MethodRefusal(f"MuJoCo rejected this model: {' '.join(str(exc).split())[:300]}") from exc
         for values in (self._model.body_mass, self._model.body_inertia):
-            values[values <= least] = 0.0
+            values[values <= mjcf.LEAST] = 0.0
         self._data = _engine.MjData(self._model)
         self.masses: Array = np.array(self._model.body_mass[1:])
         self.moments: Array = np.array(self._model.body_inertia[1:])
@@ -150,7 +150,7 @@ class MujocoSolver:
         self._intervals = intervals(mjcf.load_segments(scene), scene.samples, every_sample=True)
         self._rows_between = scene.wants("energy") and scene.work_needs_path
         self._rows: list[_Row] = []
-        self.engine = Engine(mjcf.text(mjcf.model(scene, integrator, step)), mjcf.LEAST)
+        self.engine = Engine(scene, integrator, step)
 
     def integrate(self) -> Integration:
         scene, self._rows = self._scene, []
@@ -262,7 +262,7 @@ def linearize(scene: Scene, angles: Sequence[float] | Array, speed: float, torqu
     """About `angles` (1 + blades,) rad, the rotor turning at `speed` rad/s under `torque` N m. Raises MethodRefusal."""
     state = scene_at(scene, angles, speed, torque)
     columns = state.moving_coordinates
-    engine = Engine(mjcf.text(mjcf.model(state, "rk4", 1e-3)), mjcf.LEAST)
+    engine = Engine(state, "rk4", 1e-3)
     here = np.concatenate([np.array(values)[columns] for values in (state.initial_angles, state.initial_rates)])
     n = len(columns)
     loads = np.array(mjcf.load_segments(state)[0].values)
