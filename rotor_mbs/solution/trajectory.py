@@ -34,22 +34,18 @@ class Trajectory:
     Angles and rates have the shape (n, 1 + blades). Other quantities are in `quantities` by name; built-in ones are
     also attributes, None if the scene does not request them or the model does not compute them."""
 
-    time: Array
-    angles: Array
-    rates: Array
-    quantities: dict[str, Array]
-    refined: Trajectory | None = None  # angles and rates at the integrator's own output points, where it has such
+    # An array that is set elsewhere than in `quantities` would not be found.
+    __slots__ = ("angles", "quantities", "rates", "refined", "time")
 
     def __init__(self, time: Array, angles: Array, rates: Array, **quantities: Array | None) -> None:
         self.time, self.angles, self.rates = time, angles, rates
         self.quantities = {name: values for name, values in quantities.items() if values is not None}
+        # Angles and rates at the integrator's own output points, where it has such.
+        self.refined: Trajectory | None = None
 
     def get(self, name: str) -> Array | None:
         """Return a quantity by name, or the time; None if the run does not have it."""
-        if name in _FIELDS:
-            values: Array = self.__dict__[name]
-            return values
-        return self.quantities.get(name)
+        return {"time": self.time, "angles": self.angles, "rates": self.rates}.get(name, self.quantities.get(name))
 
     def replace(self, **changes: Array | None) -> Trajectory:
         """Return a copy with other arrays, without `refined`; None removes an array. Arrays are not copied."""
@@ -62,19 +58,6 @@ class Trajectory:
         if name in NAMES:
             return self.quantities.get(name)
         raise AttributeError(f"a trajectory has no attribute {name!r}")
-
-    def __setattr__(self, name: str, value: Any) -> None:
-        if name in (*_FIELDS, "quantities", "refined"):
-            object.__setattr__(self, name, value)
-        elif name not in NAMES:
-            raise AttributeError(f"a trajectory has no attribute {name!r}")
-        elif value is None:
-            self.quantities.pop(name, None)
-        else:
-            self.quantities[name] = value
-
-
-_FIELDS = ("time", "angles", "rates")
 
 
 def shape_fault(scene: Scene, run: Trajectory) -> str:

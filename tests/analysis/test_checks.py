@@ -65,11 +65,11 @@ def test_a_sample_off_is_seen_in_its_channel(array: str, place: Any, off: float,
         replace(blade, tip=(0.0, 0.0, length)) for blade, length in zip(general().blades, (9.0, 11.5, 3.0), strict=True)
     ]
     run = run_of(initial_angles=(5.0, 0.2, -0.4, 0.6), rotor_torque=((0.0, 30.0),), blades=tuple(tips))
-    run.trajectory.energy_error = checks.energy_error(run.trajectory)
+    run.trajectory.quantities["energy_error"] = checks.energy_error(run.trajectory)
     before = of_samples(run)
     getattr(run.trajectory, array)[place] += off
     if array not in ("energy_error", "tip", "time"):
-        run.trajectory.energy_error = checks.energy_error(run.trajectory)
+        run.trajectory.quantities["energy_error"] = checks.energy_error(run.trajectory)
     after = of_samples(run)
     size = size or max(energy_scale(run.scene, run.trajectory), float(run.trajectory.kinetic_energy.max()))
     assert after[channel] == pytest.approx(off / size, rel=1e-6)

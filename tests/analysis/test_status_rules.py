@@ -71,7 +71,7 @@ def moving(pitch: float = 0.0, growth: float | None = None) -> Trajectory:
     energies = {"kinetic_energy": KINETIC_J + 3.0 * work, "potential_energy": 7.0 - 2.0 * work, "work": work}
     trajectory = Trajectory(time, angles, rates, **energies)
     if growth is not None:
-        trajectory.error_growth = np.where(np.arange(11) < 4, 1.0, growth)
+        trajectory.quantities["error_growth"] = np.where(np.arange(11) < 4, 1.0, growth)
     return trajectory
 
 

@@ -38,7 +38,7 @@ EXPLAINED = {
     r"derivation\.blade_terms .*trace\(by_23, m, by_3\) \+ trace\(by_32, m, by_3\)": "U33,2 and U33 are perpendicular",
     r"derivation\.forces .*left side of terms\.h_2_22": "U32,2 and U32 of a point mass are perpendicular",
     r"observables\.tip_path .*sign of -1 lost": "the last axis of three one-dimensional arrays is their axis 1",
-    r"samples\._put_energies .*2 \* len\(columns\) scaled": "a count beside a count",
+    r"samples\._energies .*2 \* len\(columns\) scaled": "a count beside a count",
     r"tree\._tree .*0\.0 -> ": "the offset of a spring of no stiffness: the rotor's",
     r"ode_solvers\._right_hand_side .*isinstance\(state": "plain floats or the array's own: the same numbers",
     r"ode_solvers\.__init__ .*0\.0 -> ": "the work of constant torques is known from the angles",

@@ -100,8 +100,8 @@ def faulty_run(check_name: str, scene: Scene, method: str, share: float) -> Solu
     run = solve(method, with_wrong_number(scene, WRONG[check_name], share), {})
     if check_name == "energy":
         motion = run.trajectory
-        motion.kinetic_energy = kinematics.kinetic_energy(scene, motion.angles, motion.rates)
-        motion.potential_energy = kinematics.potential_energy(scene, motion.time, motion.angles)
+        motion.quantities["kinetic_energy"] = kinematics.kinetic_energy(scene, motion.angles, motion.rates)
+        motion.quantities["potential_energy"] = kinematics.potential_energy(scene, motion.time, motion.angles)
     return run
 
 

@@ -117,7 +117,7 @@ _TARGETS = (
     Target("rotor_mbs.scenario.time_table", "value_at values_at constant_value values at segments values_before",
            "lagrange", _TIME_TABLE),
     Target("rotor_mbs.scenario.time_table", "intervals steps_and_rows", "tree", _TIME_TABLE),
-    Target(f"{_L}.samples", "trajectory _put_energies constant_work", "lagrange", _SAMPLES),
+    Target(f"{_L}.samples", "trajectory _energies constant_work", "lagrange", _SAMPLES),
     Target(f"{_P}.literal", "*", "printed",
            (*_PRINTED, "models/test_printed_method.py::test_one_blade_is_a_pendulum_that_does_not_pitch")),
     Target(f"{_P}.derivation", "*", "printed", _PRINTED),

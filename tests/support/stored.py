@@ -41,17 +41,16 @@ class Made:
         time = np.linspace(0.0, scene.duration, scene.samples)[: max(int(self.until * scene.samples), 0)]
         angles = np.broadcast_to(self.angles(time), (len(time), 1 + len(scene.blades))).copy()
         rates = np.gradient(angles, time, axis=0) if len(time) > 1 else np.zeros_like(angles)
-        trajectory = Trajectory(time, angles, rates)
+        fields = {}
         if len(time) and scene.wants("tip"):
             turned = angles[:, :1] + np.array(scene.phases)
-            trajectory.tip = 33.0 * np.stack([np.sin(turned), 1e-3 * np.sin(angles[:, 1:]), np.cos(turned)], axis=2)
+            fields["tip"] = 33.0 * np.stack([np.sin(turned), 1e-3 * np.sin(angles[:, 1:]), np.cos(turned)], axis=2)
         if len(time) and scene.wants("energy"):
-            trajectory.kinetic_energy = 1e6 + self.gain * time / scene.duration
-            trajectory.potential_energy = np.zeros(len(time))
-            trajectory.work = np.zeros(len(time))
+            fields["kinetic_energy"] = 1e6 + self.gain * time / scene.duration
+            fields["potential_energy"] = fields["work"] = np.zeros(len(time))
         if self.method == "reference":
-            trajectory.angle_uncertainty = np.full(len(time), 1e-30)
-            trajectory.error_growth = np.ones(len(time))
+            fields |= {"angle_uncertainty": np.full(len(time), 1e-30), "error_growth": np.ones(len(time))}
+        trajectory = Trajectory(time, angles, rates, **fields)
         return Solution(scene, self.method, trajectory, Integration(True), {}, 0.01, [0.002], 0.001)
 
 

@@ -62,13 +62,13 @@ class ReferenceSolver:
         if self._scene.wants("loads") and best.dtype != np.float64:
             result.quantities |= quad_loads(self._scene, result.time, best)
         difference = np.abs((best - check)[:, : len(self._scene.moving_coordinates)]).astype(float).max(axis=1)
-        result.angle_uncertainty = uncertainty(difference, result.angles, self._epsilon)
+        result.quantities["angle_uncertainty"] = uncertainty(difference, result.angles, self._epsilon)
         # Over what was reached: the rest of a run that its time limit ended may take for ever.
         if rows > 1:
             reached = replace(self._scene, duration=float(result.time[-1]), samples=rows)
-            result.error_growth = _largest_growth(reached, _transition_matrices(reached, result.time))
+            result.quantities["error_growth"] = _largest_growth(reached, _transition_matrices(reached, result.time))
         else:
-            result.error_growth = np.ones(rows)
+            result.quantities["error_growth"] = np.ones(rows)
         return result
 
 
@@ -179,7 +179,7 @@ def reference_at(scene: Scene, times: Array) -> TimedReference:
     run = _in_quad(scene, _QUAD_TOLERANCE, times) if is_available() else _in_doubles(scene, _TIGHTEST, times)
     run.integrate()
     trajectory, matrices = run.observe(), _transition_matrices(scene, times)
-    trajectory.error_growth = _largest_growth(scene, matrices)[: len(trajectory.time)]
+    trajectory.quantities["error_growth"] = _largest_growth(scene, matrices)[: len(trajectory.time)]
     rows, moving, count = len(trajectory.time), scene.moving_coordinates, len(scene.initial_angles)
     columns = np.array([*moving, *(count + i for i in moving)])
     free = free_variables(scene)

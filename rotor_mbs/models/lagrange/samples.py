@@ -76,37 +76,37 @@ def trajectory(scene: Scene, times: Array, states: Array) -> Trajectory:
     one more column, or not."""
     count, time = len(scene.moving_coordinates), times[: len(states)]
     angles, rates = all_coordinates(scene, states[:, :count], states[:, count : 2 * count])
-    result = Trajectory(time, angles, rates)
+    fields: dict[str, Array] = {}
     if scene.wants("tip"):
         paths = [
             closed_form.point_path(angles[:, 0] + phase, angles[:, 1 + i], blade.tip, np.sin, np.cos)
             for i, (blade, phase) in enumerate(zip(scene.blades, scene.phases, strict=True))
         ]
-        result.tip = np.ascontiguousarray(np.array([np.broadcast_arrays(*path) for path in paths]).transpose(2, 0, 1))
+        rows = np.array([np.broadcast_arrays(*path) for path in paths])
+        fields["tip"] = np.ascontiguousarray(rows.transpose(2, 0, 1))
     if scene.wants("energy"):
-        _put_energies(scene, result, states)
+        fields |= _energies(scene, time, angles, rates, states)
     if scene.wants("loads"):
-        result.quantities |= sampled_loads(scene, time, angles, rates)
-    return result
+        fields |= sampled_loads(scene, time, angles, rates)
+    return Trajectory(time, angles, rates, **fields)
 
 
-def _put_energies(scene: Scene, result: Trajectory, states: Array) -> None:
+def _energies(scene: Scene, time: Array, all_angles: Array, all_rates: Array, states: Array) -> dict[str, Array]:
     form, columns = rotor_form(scene), scene.moving_coordinates
-    angles, rates = list(result.angles[:, columns].T), list(result.rates[:, columns].T)
-    loads = loads_at(scene, result.time)
+    angles, rates = list(all_angles[:, columns].T), list(all_rates[:, columns].T)
+    loads = loads_at(scene, time)
     with np.errstate(over="ignore", invalid="ignore"):  # of rates like 1e200; the judgement sees what is not finite
-        result.kinetic_energy, result.potential_energy = closed_form.energies(
-            angles, rates, form, loads, np.sin, np.cos
-        )
+        kinetic, potential = closed_form.energies(angles, rates, form, loads, np.sin, np.cos)
         if states.shape[1] <= 2 * len(columns):
-            result.work = constant_work(scene, result.angles)
+            work = constant_work(scene, all_angles)
         else:
-            result.work = states[:, 2 * len(columns)]
+            work = states[:, 2 * len(columns)]
             # What `closed_form.power` leaves out of the work of rest angles that move.
             rests = at_constant_rests(changing_loads(scene), loads).rests
             energy = closed_form.rest_energy(angles, form, rests)
             if isinstance(energy, np.ndarray):
-                result.work = result.work + (energy - energy[0])
+                work = work + (energy - energy[0])
+    return {"kinetic_energy": kinetic, "potential_energy": potential, "work": work}
 
 
 def loads_at(scene: Scene, time: Array) -> LoadValues:

@@ -59,27 +59,28 @@ class PrintedSolver:
         time = time[time <= result.time[-1]]
         states = result.at(time)
         angles, rates = all_coordinates(scene, states[:, : self._moving], states[:, self._moving :])
-        trajectory = Trajectory(time, angles, rates)
-        if not self._errata:  # ode45's own output points: the paper's numbers are read off at them
-            own_time, states = result.refined()
-            refined = all_coordinates(scene, states[:, : self._moving], states[:, self._moving :])
-            trajectory.refined = Trajectory(own_time, *refined)
+        fields = {}
         if scene.wants("tip"):
-            trajectory.tip = rotor.tip_path(angles)
+            fields["tip"] = rotor.tip_path(angles)
         if scene.wants("energy"):
-            trajectory.kinetic_energy = rotor.kinetic_energy(angles, rates)
-            trajectory.potential_energy = rotor.potential_energy(angles)
-            trajectory.work = np.zeros(len(time))
+            fields["kinetic_energy"] = rotor.kinetic_energy(angles, rates)
+            fields["potential_energy"] = rotor.potential_energy(angles)
+            fields["work"] = np.zeros(len(time))
             for i, table in enumerate(_torque_tables(scene, self._moving)):
                 if table:
-                    trajectory.work += torque_work(table, result, i, time)
+                    fields["work"] += torque_work(table, result, i, time)
         if scene.wants("loads"):
             before = np.nextafter(time, 0.0)  # where a torque jumps, the value before it
             torque = np.array([scene.torque_at(t) for t in before.tolist()])
             accelerations = np.zeros((len(time), len(scene.initial_angles)))  # zero of a fixed pitch
-            for k, (t, state) in enumerate(zip(before.tolist(), result.at(time).tolist(), strict=True)):
+            for k, (t, state) in enumerate(zip(before.tolist(), states.tolist(), strict=True)):
                 accelerations[k, : self._moving] = self._right_hand_side(t, state)[self._moving :]
-            trajectory.quantities |= rotor.loads(angles, rates, accelerations, torque)
+            fields |= rotor.loads(angles, rates, accelerations, torque)
+        trajectory = Trajectory(time, angles, rates, **fields)
+        if not self._errata:  # ode45's own output points: the paper's numbers are read off at them
+            own_time, states = result.refined()
+            refined = all_coordinates(scene, states[:, : self._moving], states[:, self._moving :])
+            trajectory.refined = Trajectory(own_time, *refined)
         return trajectory
 
 
