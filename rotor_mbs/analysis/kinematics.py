@@ -46,7 +46,7 @@ def potential_energy(scene: Scene, time: Array, angles: Array) -> Array:
 
 def work_of_constant_loads(scene: Scene, angles: Array) -> Array | None:
     """(n,) J; None where a load changes or there is damping: there the work is no function of the angles."""
-    if scene.work_needs_path:
+    if scene.has_damping or not scene.has_constant_loads:
         return None
     torques = [scene.torque_at(0.0), *(value_at(torque, 0.0) for torque, _ in scene.pitch_loads)]
     return np.asarray((angles - np.array(scene.initial_angles)) @ np.array(torques))

@@ -316,8 +316,8 @@ class Scene:
 
     @property
     def work_needs_path(self) -> bool:
-        """Whether the work must be integrated along the path: False for constant loads without dampers."""
-        return self.has_damping or not self.has_constant_loads
+        """Whether the work is requested and must be integrated along the path: for dampers, and loads over time."""
+        return self.wants("energy") and (self.has_damping or not self.has_constant_loads)
 
     @property
     def coordinate_labels(self) -> tuple[str, ...]:

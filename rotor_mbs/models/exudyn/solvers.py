@@ -78,7 +78,7 @@ class ExtrapolatedSolver:
         self._newton_tolerance = float(str(scheme.options["newton.relativeTolerance"]))
         self._intervals = intervals(self._loads.segments, scene.samples, every_sample=True)
         # Dampers and loads over time want it along the path: it is extrapolated with the state.
-        self._integrates_work = scene.wants("energy") and scene.work_needs_path
+        self._integrates_work = scene.work_needs_path
         parts = chain.parts(scene, self._loads)
         sensors = [part.name for part in parts if part.kind == "sensor"]
         self._of_rates = [name for name in sensors if name.endswith(("rotation", "spin"))]
@@ -254,8 +254,8 @@ def build_tree(scene: Scene, settings: SchemeSettings) -> Solver:
     scheme, loads = _scheme(scene, settings), Loads(scene)
     if scene.wants("loads"):
         scheme = scheme.with_accelerations()
-    between = scene.wants("energy") and scene.work_needs_path
-    return MultibodySolver(scene, tree.parts(scene, loads), loads, scheme, sensor_samples.tree_trajectory, between)
+    parts = tree.parts(scene, loads)
+    return MultibodySolver(scene, parts, loads, scheme, sensor_samples.tree_trajectory, scene.work_needs_path)
 
 
 def build_chain(scene: Scene, settings: Any) -> Solver:

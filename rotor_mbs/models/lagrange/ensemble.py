@@ -13,7 +13,6 @@ import numpy as np
 from rotor_mbs.methods.solve import solve
 from rotor_mbs.models.lagrange import closed_form, hamilton, taylor
 from rotor_mbs.models.lagrange.heyoka_adapter import Parameters, array_of, failure, heyoka
-from rotor_mbs.models.lagrange.parameters import work_is_integrated
 from rotor_mbs.models.lagrange.samples import constant_work
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.trajectory import Array, Integration, RunBlock
@@ -66,7 +65,7 @@ def solve_many(scenes: Sequence[Scene], tolerance: float) -> RunBlock:
             parameters = Parameters()
             taylor.equation_numbers(scene, parameters)
             _tip_numbers(scene, parameters)
-            structure = (*parameters.structure, work_is_integrated(scene), *scene.moving_coordinates)
+            structure = (*parameters.structure, scene.work_needs_path, *scene.moving_coordinates)
             rotors[key] = array_of(parameters.values, quad=False), structure
         groups.setdefault(rotors[key][1], []).append(i)
     for structure, places in groups.items():

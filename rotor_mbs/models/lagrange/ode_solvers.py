@@ -12,7 +12,7 @@ from rotor_mbs.methods.time_limit import OutOfTimeError
 from rotor_mbs.models import ode45 as matlab
 from rotor_mbs.models.lagrange import closed_form, samples
 from rotor_mbs.models.lagrange.closed_form import load_values
-from rotor_mbs.models.lagrange.parameters import changing_loads, load_segments, rotor_form, work_is_integrated
+from rotor_mbs.models.lagrange.parameters import changing_loads, load_segments, rotor_form
 from rotor_mbs.models.lagrange.samples import Advance, at_constant_rests, loads_at_start, over_segments
 from rotor_mbs.models.ode45 import RightHandSide
 from rotor_mbs.scenario.scene import Scene
@@ -30,7 +30,7 @@ class OdeSolver:
         self._scene, self._integrator = scene, integrator
         self._form = rotor_form(scene)
         self._segments = load_segments(scene)
-        self._work_unit = work_unit(scene) if work_is_integrated(scene) else 0.0
+        self._work_unit = work_unit(scene) if scene.work_needs_path else 0.0
         columns = scene.moving_coordinates
         start = [np.array(scene.initial_angles)[columns], np.array(scene.initial_rates)[columns]]
         self._initial = np.concatenate([*start, np.zeros(int(self._work_unit > 0.0))])

@@ -157,11 +157,6 @@ def load_segments(scene: Scene) -> tuple[Segment, ...]:
     return segments(load_tables(scene), scene.duration)
 
 
-def work_is_integrated(scene: Scene) -> bool:
-    """Whether the work is a variable of the equations: of constant loads without dampers it is known exactly."""
-    return scene.wants("energy") and scene.work_needs_path
-
-
 def resting_pitches(scene: Scene) -> tuple[int, ...]:
     """Coordinates of the pitches that the equations leave at zero for ever: started there at rest, without a load, of a
     blade whose mass and inertia are symmetric about its x-z plane."""

@@ -16,13 +16,7 @@ from rotor_mbs.models import equation_items
 from rotor_mbs.models.lagrange import closed_form, hamilton, samples
 from rotor_mbs.models.lagrange.closed_form import LoadValues, load_values
 from rotor_mbs.models.lagrange.heyoka_adapter import Parameters, array_of, failure, heyoka
-from rotor_mbs.models.lagrange.parameters import (
-    RotorForm,
-    changing_loads,
-    load_segments,
-    rotor_form,
-    work_is_integrated,
-)
+from rotor_mbs.models.lagrange.parameters import RotorForm, changing_loads, load_segments, rotor_form
 from rotor_mbs.models.lagrange.samples import Advance, at_constant_rests, over_segments
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.scenario.time_table import Segment
@@ -47,7 +41,7 @@ def build_system(scene: Scene, *, in_momenta: bool = False) -> tuple[list[tuple[
         rates = others
         derivatives = closed_form.accelerations(angles, rates, form, loads, engine.sin, engine.cos)
     equations = [*zip(angles, rates, strict=True), *zip(others, derivatives, strict=True)]
-    if work_is_integrated(scene):
+    if scene.work_needs_path:
         working = at_constant_rests(changing_loads(scene), loads)
         equations.append((engine.make_vars("work"), closed_form.power(rates, form, working)))
     return equations, parameters

@@ -148,7 +148,7 @@ class MujocoSolver:
         self._scene, self._step, self._stages = scene, step, _STAGES[integrator]
         self._moving = scene.moving_coordinates
         self._intervals = intervals(mjcf.load_segments(scene), scene.samples, every_sample=True)
-        self._rows_between = scene.wants("energy") and scene.work_needs_path
+        self._rows_between = scene.work_needs_path
         self._rows: list[_Row] = []
         self.engine = Engine(scene, integrator, step)
 
