@@ -56,12 +56,12 @@ def steady_rotation(scene: Scene, speed: float) -> Array:
     """(1 + blades,) rad: angles at which the rotor turns steadily at `speed` rad/s, no gravity acting: stationary
     points of V - ½ Ω² a - Σ τ θ, downhill from the scene's initial pitches, kept where they are stationary already,
     stable or not. Raises InputError where there is none within 200 steps."""
-    return _stationary(replace(scene, gravity=0.0), speed, fixed_rotor=True)
+    return _stationary(replace(scene, gravity=0.0), speed)
 
 
 def equilibrium(scene: Scene) -> Array:
     """(1 + blades,) rad: angles at which the rotor rests without a torque, found as by `steady_rotation`."""
-    return _stationary(scene, 0.0, fixed_rotor=scene.gravity == 0.0)
+    return _stationary(scene, 0.0)
 
 
 class _Potential(NamedTuple):
@@ -72,11 +72,11 @@ class _Potential(NamedTuple):
     curvature: Array  # (n, n) N m/rad
 
 
-def _stationary(scene: Scene, speed: float, *, fixed_rotor: bool) -> Array:
+def _stationary(scene: Scene, speed: float) -> Array:
     """Newton's method with the absolute eigenvalues of the Hessian, and a step halved until it goes downhill."""
     form, columns, loads = rotor_form(scene), scene.moving_coordinates, loads_at_start(scene)
     angles = np.array(scene.initial_angles, dtype=float)
-    free = slice(1, None) if fixed_rotor else slice(None)
+    free = slice(None) if scene.gravity else slice(1, None)  # without gravity any rotor angle will do
     changed = columns[free]
     for _ in range(_MAX_STEPS):
         potential = _amended_potential(form, angles[columns], speed, loads)
