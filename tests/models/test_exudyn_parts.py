@@ -15,7 +15,6 @@ from support.rotors import FIG08, FIG11, MIXED, PAPER, make_scene
 from rotor_mbs.errors import InputError, MethodRefusal
 from rotor_mbs.methods.solve import solve
 from rotor_mbs.models.exudyn import methods, sensor_samples
-from rotor_mbs.scenario.time_table import segments
 
 POLE = replace(PAPER, centre_of_mass=(0.0, 0.0, 15.42))
 BARE = replace(FIG08, gravity=0.0, outputs=("angles", "rates"))
@@ -196,7 +195,7 @@ def test_work_of_a_torque_that_jumps(rows: int, at_jump: float) -> None:
     time = time[:rows]
     angles, rates = np.zeros((rows, 2)), np.zeros((rows, 2))
     angles[:, 0], rates[:, 0] = time, 1.0
-    work = sensor_samples.work(scene, segments(scene.load_tables, scene.duration), time, angles, rates)
+    work = sensor_samples.work(scene, time, angles, rates)
     exact = np.where(time <= 4.0, 0.5 * time**2, 8.0 + 10.0 * (time - 4.0))
     assert np.abs(work - exact).max() < 1e-12
 

@@ -4,7 +4,7 @@ and Euler's laws on the engine's accelerations."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -28,6 +28,11 @@ from rotor_mbs.solution.trajectory import Array
 ROTOR = 0  # the rotor's torque in `Scene.load_tables`
 
 
+def load_segments(scene: Scene) -> tuple[Segment, ...]:
+    """The whole run; the loads of a segment are those of `Scene.load_tables`."""
+    return segments(scene.load_tables, scene.duration)
+
+
 def drives(scene: Scene) -> list[tuple[int, int, float]]:
     """What drives a coordinate (0: rotor): a factor times the load at a place in `Scene.load_tables`. Torques, and the
     moments k r of springs whose rest angle r changes over time; one that is constant is the spring's own."""
@@ -45,8 +50,7 @@ class Loads:
     """The loads over time; `segment` is the one of the interval being integrated."""
 
     def __init__(self, scene: Scene) -> None:
-        self.segments = segments(scene.load_tables, scene.duration)
-        self.segment = self.segments[0]
+        self.segment = load_segments(scene)[0]
 
     def enter(self, interval: Interval) -> None:
         self.segment = interval.segment
@@ -110,14 +114,14 @@ def _newton_euler(scene: Scene, i: int, sampled: Sampled) -> tuple[Array, Array,
     return force, moment, frames
 
 
-def tree_loads(scene: Scene, segments: Sequence[Segment], time: Array, sampled: Sampled) -> dict[str, Array]:
+def tree_loads(scene: Scene, time: Array, sampled: Sampled) -> dict[str, Array]:
     """Every blade by Newton and Euler, their sum with the hub's share at the shaft; the moment of a pitch actuator is
     what they leave about the pitch axis."""
     blades = [_newton_euler(scene, i, sampled) for i in range(len(scene.blades))]
     shaft_force = sum(_in_base(frames, force) for force, _, frames in blades)
     shaft_moment = sum(_in_base(frames, moment) for _, moment, frames in blades)
     assert isinstance(shaft_moment, np.ndarray)
-    shaft_moment[:, 1] -= values_before(segments, time)[ROTOR]
+    shaft_moment[:, 1] -= values_before(load_segments(scene), time)[ROTOR]
     if scene.hub_inertia:
         shaft_moment[:, 1] += scene.hub_inertia * sampled("hub spin rate")[:, 1]
     actuators = np.zeros((len(time), len(blades)))

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from rotor_mbs.models.exudyn import chain, tree
 from rotor_mbs.models.exudyn.geometry import Body, mounting, pitching
-from rotor_mbs.models.exudyn.loads import ROTOR, chain_loads, drives, matrices, tree_loads
+from rotor_mbs.models.exudyn.loads import ROTOR, chain_loads, drives, load_segments, matrices, tree_loads
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.scenario.time_table import Segment, is_constant, values_at
 from rotor_mbs.solution.trajectory import Array, Trajectory, all_coordinates, finite_rows, finite_samples, sample_times
@@ -46,20 +46,18 @@ class _Reader:
         return self.all(name)[self.samples]
 
 
-def tree_trajectory(scene: Scene, segments: Sequence[Segment], recorded: Callable[[str], Array]) -> Trajectory:
+def tree_trajectory(scene: Scene, recorded: Callable[[str], Array]) -> Trajectory:
     """The kinematic tree's own coordinates; `recorded` gives (n, 1 + k) rows of a sensor, time first."""
     read = _Reader(scene, recorded, ("angles", "rates"))
     angles, rates = all_coordinates(scene, read.all("angles"), read.all("rates"))
     bodies = [(tree.link_name(link), body) for link, body in enumerate(tree.bodies(scene))]
-    fields = _fields(scene, segments, read, angles, rates, bodies)
+    fields = _fields(scene, read, angles, rates, bodies)
     if scene.wants("loads"):
-        fields |= tree_loads(scene, segments, read.time[read.samples], read.sampled)
+        fields |= tree_loads(scene, read.time[read.samples], read.sampled)
     return finite_samples(scene, fields)
 
 
-def chain_trajectory(
-    scene: Scene, segments: Sequence[Segment], recorded: Callable[[str], Array], has_work: bool = False
-) -> Trajectory:
+def chain_trajectory(scene: Scene, recorded: Callable[[str], Array], has_work: bool = False) -> Trajectory:
     """Joint angles from the bodies' rotation matrices, rates from their angular velocities, and the joints' gaps;
     `has_work`: there are rows "work" in J, and `work` need not integrate."""
     placed = chain.placed_bodies(scene)
@@ -67,7 +65,7 @@ def chain_trajectory(
     state = [f"{name} {what}" for name, _ in bodies for what in ("position", "rotation", "spin")]
     read = _Reader(scene, recorded, state)
     angles, rates = _joint_motion(scene, read)
-    fields = _fields(scene, segments, read, angles, rates, bodies, has_work)
+    fields = _fields(scene, read, angles, rates, bodies, has_work)
     # Every body's hub centre, which the joints keep together with the ground's and the hub's.
     hub, *blades = (
         read.sampled(f"{name} position") - matrices(read.sampled(f"{name} rotation")) @ body.com
@@ -108,13 +106,7 @@ def _dot(a: Array, b: Array) -> Array:
 
 
 def _fields(
-    scene: Scene,
-    segments: Sequence[Segment],
-    read: _Reader,
-    angles: Array,
-    rates: Array,
-    bodies: Sequence[tuple[str, Body]],
-    has_work: bool = False,
+    scene: Scene, read: _Reader, angles: Array, rates: Array, bodies: Sequence[tuple[str, Body]], has_work: bool = False
 ) -> dict[str, Array]:
     """What the scene asks for, at the samples. angles and rates are (rows, 1 + blades)."""
     fields = {"angles": angles[read.samples], "rates": rates[read.samples]}
@@ -125,7 +117,7 @@ def _fields(
         if has_work:
             fields["work"] = read.sampled("work")[:, 0]
         else:
-            fields["work"] = work(scene, segments, read.time, angles, rates)[read.samples]
+            fields["work"] = work(scene, read.time, angles, rates)[read.samples]
         fields["potential_energy"], of_rests = springs(scene, fields["angles"])
         if any(scene.bearing_rest):
             fields["work"] += of_rests
@@ -167,11 +159,11 @@ def springs(scene: Scene, angles: Array) -> tuple[Array, Array]:
     return energy, of_rests
 
 
-def work(scene: Scene, segments: Sequence[Segment], time: Array, angles: Array, rates: Array) -> Array:
+def work(scene: Scene, time: Array, angles: Array, rates: Array) -> Array:
     """(n,) J of the torques less what the dampers took, from all rows, samples among them: s, rad, rad/s. A spring
     whose rest angle r changes counts as one that is unloaded at 0 and a torque k r; see `springs`."""
     if not scene.work_needs_path:
-        turned, torques = angles - angles[:1], segments[0].values
+        turned, torques = angles - angles[:1], load_segments(scene)[0].values
         exact: Array = torques[ROTOR] * turned[:, 0]
         for column, load, _ in drives(scene):
             exact = exact + torques[load] * turned[:, column] if column else exact
@@ -179,7 +171,7 @@ def work(scene: Scene, segments: Sequence[Segment], time: Array, angles: Array, 
 
     out, done = np.zeros(len(time)), 0.0
     slack = 1e-9 * scene.duration / (scene.samples - 1)
-    for segment in segments:
+    for segment in load_segments(scene):
         first, last = np.searchsorted(time, [segment.start - slack, segment.end + slack])
         if last - first < 2:
             break

@@ -14,10 +14,10 @@ from rotor_mbs.methods.time_limit import MESSAGE, is_over, polled
 from rotor_mbs.models.exudyn import chain, sensor_samples, tree
 from rotor_mbs.models.exudyn.adapter import System
 from rotor_mbs.models.exudyn.geometry import Part
-from rotor_mbs.models.exudyn.loads import Loads
+from rotor_mbs.models.exudyn.loads import Loads, load_segments
 from rotor_mbs.models.exudyn.schemes import ExtrapolatedSettings, Scheme, SchemeSettings
 from rotor_mbs.scenario.scene import Scene
-from rotor_mbs.scenario.time_table import Interval, Segment, intervals
+from rotor_mbs.scenario.time_table import Interval, intervals
 from rotor_mbs.solution.trajectory import Array, Integration, Trajectory, all_coordinates
 
 # Of 2, 4, ..., 14 substeps. Twelve and fourteen serve tolerances below 1e-9 rad.
@@ -76,7 +76,7 @@ class ExtrapolatedSolver:
         self._scene, self._scheme, self._loads = scene, scheme, Loads(scene)
         self._least_error = max(tolerance, _ROUNDING)
         self._newton_tolerance = float(str(scheme.options["newton.relativeTolerance"]))
-        self._intervals = intervals(self._loads.segments, scene.samples, every_sample=True)
+        self._intervals = intervals(load_segments(scene), scene.samples, every_sample=True)
         # Dampers and loads over time want it along the path: it is extrapolated with the state.
         self._integrates_work = scene.work_needs_path
         parts = chain.parts(scene, self._loads)
@@ -212,12 +212,10 @@ class ExtrapolatedSolver:
         rows["work"] = np.array([[kept.time, kept.work] for kept in self.kept])
         # A diverging state may overflow in its energies; the rows are cut where they stop being finite.
         with np.errstate(over="ignore", invalid="ignore"):
-            return sensor_samples.chain_trajectory(
-                self._scene, self._loads.segments, rows.__getitem__, has_work=self._integrates_work
-            )
+            return sensor_samples.chain_trajectory(self._scene, rows.__getitem__, self._integrates_work)
 
 
-Reading = Callable[[Scene, Sequence[Segment], Callable[[str], Array]], Trajectory]
+Reading = Callable[[Scene, Callable[[str], Array]], Trajectory]
 
 # The engine takes a run as ended within 1e-10 s of its end, whatever the step.
 _SHORTEST_INTERVAL = 1e-8
@@ -228,17 +226,11 @@ class MultibodySolver:
     `rows_between` samples. Raises MethodRefusal, with the engine's reason, where the engine does not take the parts."""
 
     def __init__(
-        self,
-        scene: Scene,
-        parts: Sequence[Part],
-        loads: Loads,
-        scheme: Scheme,
-        reading: Reading,
-        rows_between: bool,
+        self, scene: Scene, parts: Sequence[Part], loads: Loads, scheme: Scheme, reading: Reading, rows_between: bool
     ) -> None:
         self._scene, self._loads, self._scheme, self._reading = scene, loads, scheme, reading
         self._rows_between = rows_between
-        self._intervals = intervals(loads.segments, scene.samples, every_sample=scheme.step is None)
+        self._intervals = intervals(load_segments(scene), scene.samples, every_sample=scheme.step is None)
         self.system = System(parts)
 
     def integrate(self) -> Integration:
@@ -247,7 +239,7 @@ class MultibodySolver:
     def observe(self) -> Trajectory:
         # A diverging state may overflow in its energies; the rows are cut where they stop being finite.
         with np.errstate(over="ignore", invalid="ignore"):
-            return self._reading(self._scene, self._loads.segments, self.system.rows)
+            return self._reading(self._scene, self.system.rows)
 
 
 def build_tree(scene: Scene, settings: SchemeSettings) -> Solver:
