@@ -1,4 +1,4 @@
-"""Every model: exact solutions, symmetries, and one scene with every load beside equations written anew."""
+"""Every model: exact solutions, and one scene with every load beside equations written anew."""
 
 from __future__ import annotations
 
@@ -11,7 +11,6 @@ from support.rotors import (
     AXIAL,
     MIXED,
     PAPER,
-    SLIM,
     STOUT,
     C,
     D,
@@ -22,7 +21,6 @@ from support.rotors import (
     pendulum,
 )
 from support.runs import energy_error, run
-from support.symmetries import relabelled, relabelling_error
 
 from rotor_mbs.analysis import kinematics
 from rotor_mbs.methods.catalogue import REFERENCE, find_method
@@ -159,13 +157,6 @@ def test_a_thousand_radians_a_second_are_counted_turn_by_turn(name) -> None:
     got = run(name, scene, **settings)
     assert np.abs(got.angles[:, 1] - (-50.0 + 1000.0 * got.time)).max() < bound
     assert np.abs(got.rates[:, 1] - 1000.0).max() < bound
-
-
-@pytest.mark.parametrize("name", NAMES[1:])  # Taylor's with other symmetries: studies/test_stability_exact.py
-def test_turning_the_rotor_by_a_third_and_renaming_blades_changes_nothing(name) -> None:
-    scene = make_scene([0.2, 0.3, -0.6, 0.9], [0.5, 0.1, 0.2, -0.3], (STOUT, SLIM, PAPER), duration=0.3, samples=31)
-    error = relabelling_error(run(name, scene).angles, run(name, relabelled(scene)).angles)
-    assert error < (1e-6 if name in CHAIN else 1e-11)  # round-off, for the chain Newton's tolerance
 
 
 @every_method
