@@ -15,10 +15,9 @@ from rotor_mbs.analysis.modes import modes_of
 from rotor_mbs.methods.catalogue import find_method
 from rotor_mbs.models.exudyn import linearization as engine
 from rotor_mbs.models.lagrange import linearization as closed
-from rotor_mbs.scenario.scene import Blade, Scene
+from rotor_mbs.scenario.scene import Scene
 
 DAMPED = general(bearing_damping=(30.0, 20.0, 10.0), shaft_damping=50.0)
-SLAB = Blade(120.0, (0.0, 0.0, 6.0), (900.0, 400.0, 520.0, 0.0, 0.0, 0.0), (0.0, 0.0, 9.0))
 
 
 def without_gravity(scene: Scene, speed: float) -> Scene:
@@ -69,15 +68,6 @@ def test_pendulum():
     assert closed.equilibrium(upright) == pytest.approx([0.0, 0.0], abs=0.0)
     rates = modes_of(linear(upright, 0.0).stiffness, np.zeros((2, 2)), is_cyclic=False).growth_rates
     assert max(rates) == pytest.approx(expected[0], rel=1e-13)
-
-
-@pytest.mark.parametrize("speed", [0.0, 0.5, 2.0])
-def test_the_propeller_moment_is_a_pitch_stiffness(speed):
-    """(Jyy - Jxx) Ω² about the pitch axis, for blades whose principal axes are the blade's: exact at any speed."""
-    scene = make_scene([0.2, 0, 0, 0], [0] * 4, (SLAB,) * 3, gravity=0.0, bearing_stiffness=(5000.0,) * 3)
-    xx, yy, zz, *_ = SLAB.inertia
-    expected = math.sqrt((5000.0 + (yy - xx) * speed**2) / zz)
-    assert frequencies(linear(scene, speed), scene, speed)[1:] == pytest.approx([expected] * 3, rel=1e-13)
 
 
 DRIVEN = replace(

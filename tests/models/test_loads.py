@@ -53,27 +53,6 @@ def off(result, expected) -> float:
     return float(np.abs(result - np.asarray(expected)).max())
 
 
-def test_centrifugal_force_and_gyroscopic_moment_of_a_pitching_blade(method: str) -> None:
-    """Of equal transverse moments, with the polar moment C, that spins about its own axis in a turning rotor.
-
-    Without gravity the root pulls inwards with m l Ω². Of its angular momentum A' Ω e_y + C θ̇ e_z only e_z turns,
-    with Ω e_y × e_z = Ω e_x: the moment is C θ̇ Ω along the azimuth's x axis, and none is left along the shaft.
-    """
-    speed, rate, C = 2.0, 5.0, 150.0
-    blade = replace(BEAM, inertia=(900.0, 900.0, C, 0.0, 0.0, 0.0))
-    scene = replace(beam((0.0, 0.4), (speed, rate), gravity=0.0), blades=(blade,))
-    result = run(method, scene)
-    pitch, azimuth = result.angles[:, 1], result.angles[:, 0]
-    assert off(result.rates, [speed, rate]) < 1e-6
-    in_blade = C * speed * rate * np.stack([np.cos(pitch), -np.sin(pitch), np.zeros_like(pitch)], axis=1)
-    in_base = C * speed * rate * np.stack([np.cos(azimuth), np.zeros_like(pitch), -np.sin(azimuth)], axis=1)
-    inwards = -np.stack([np.sin(azimuth), np.zeros_like(pitch), np.cos(azimuth)], axis=1)
-    assert off(result.blade_root_force, [0.0, 0.0, -MASS * ARM * speed**2]) < METHODS[method]
-    assert off(result.shaft_force, MASS * ARM * speed**2 * inwards) < METHODS[method]
-    assert off(result.blade_root_moment[:, 0], in_blade) < METHODS[method]
-    assert off(result.shaft_moment, in_base) < METHODS[method]
-
-
 # Three unlike blades of full inertia on springs and dampers, torques on rotor and pitches, and pitch commands.
 DRIVEN = general(
     outputs=OUTPUTS,
