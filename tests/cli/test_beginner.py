@@ -38,6 +38,23 @@ MISTAKES: dict[str, tuple[dict[str, str], str, str]] = {
     "a new file over an old one": ({}, "new {file}", "allowed: a file that does not exist yet"),
     "too many processes": ({}, "run {file} -j 1025", "allowed: a whole number from 1 to 1024"),
     "no process": ({}, "run {file} -j 0", "allowed: a whole number from 1 to 1024"),
+    "no motion at all": ({}, "run extreme/singular-start", "singular-start: rejected: all pitches are ±π/2 and"),
+    "a motion that ends at once": ({}, "run extreme/singular-one-blade", "rejected: one point-mass blade on a hub"),
+    "a bench of no motion": (
+        {}, "bench extreme/singular-start -m lagrange/dop853", "the initial mass matrix is singular"
+    ),
+    "a bench without a ladder": ({}, "bench paper/fig09 -m printed/ode45", "no ladder for method 'printed/ode45'"),
+    "a figure that is not there": ({}, "figures {results} --figure 2 -o out", "figure 2: not in the file; allowed: 8"),
+    "a film of no scene": (
+        {}, "animate a/mine.toml {results} -o a.webp", "'mine': no such scene in it; allowed: paper/fig08"
+    ),
+    "a film of another kind": (
+        {}, "animate paper/fig11 {results} -o a.avi", "unknown format .avi; allowed: .webp, .gif"
+    ),
+    "a film of no file": ({}, "animate paper/fig11 none.h5 -o a.webp", "no such file"),
+    "an engine that is none": (
+        {}, "sweep sweeps/fig11-spread --engine slurm -o s.h5", "no such engine; allowed: local, or dask:tcp://host:port"
+    ),
 }  # fmt: skip
 SLIPS: dict[str, tuple[str, str, str]] = {
     "degrees": ('"deg(30)"', "30", '30 rad are 4.8 turns; degrees? write "deg(30)"'),
@@ -58,9 +75,11 @@ def scene_file(folder: Path, edits: dict[str, str]) -> Path:
 
 
 @pytest.mark.parametrize("mistake", MISTAKES)
-def test_a_mistake_is_one_line_that_says_what_to_do_next(mistake: str, folder: Path) -> None:
+def test_a_mistake_is_one_line_that_says_what_to_do_next(mistake: str, folder: Path, results: Path) -> None:
+    """And nothing is written, but for the points that a bench is about to measure."""
     edits, command, says = MISTAKES[mistake]
-    assert says in refusal(*command.format(file=scene_file(folder, edits).name).split())
+    assert says in refusal(*command.format(file=scene_file(folder, edits).name, results=results).split())
+    assert {path.name for path in folder.iterdir()} - {"bench.h5"} == {"mine.toml"}
 
 
 @pytest.mark.parametrize("slip", SLIPS)

@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from pathlib import Path
 
 import pytest
 from support.references import reference, scene
 from support.scenes import PAPER, paper
 
 from rotor_mbs.analysis.judgement import judge
-from rotor_mbs.cli import main
 from rotor_mbs.errors import InputError, MethodRefusal
 from rotor_mbs.methods.catalogue import (
     choose,
@@ -81,16 +79,6 @@ def test_what_the_rule_takes_holds(name: str) -> None:
             result = solve(method, chosen, {}, time_limit_s=120.0)
             verdict = judge(chosen, result, stored)
             assert verdict.status == "ok", f"{method}: {verdict.message}"
-
-
-@pytest.mark.parametrize("name", ["singular-start", "singular-one-blade"])
-def test_what_has_no_motion_is_refused(name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["run", f"extreme/{name}", "-o", str(tmp_path / "r.h5")]) == 2
-    message = capsys.readouterr().err.strip()
-    assert message.startswith(f"extreme/{name}: rejected: ")
-    assert "singular" in message
-    assert "\n" not in message
-    assert not (tmp_path / "r.h5").exists()
 
 
 @pytest.mark.parametrize(

@@ -124,23 +124,6 @@ def test_paths_without_tips_are_no_figure(tmp_path: Path) -> None:
     assert "figure 10: not in the file; allowed: 8" in refusal("figures", path, "--figure", "10", "-o", tmp_path)
 
 
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        (["figures", "FILE", "--figure", "2", "-o", "out"], "figure 2: not in the file; allowed: 8, 9"),
-        (["animate", "a/mine.toml", "FILE", "-o", "a.webp"], "'mine': no such scene in it; allowed: paper/fig08"),
-        (["animate", "paper/fig11", "FILE", "-o", "a.avi"], "unknown format .avi; allowed: .webp, .gif"),
-        (["animate", "paper/fig11", "none.h5", "-o", "a.webp"], "no such file"),
-    ],
-)
-def test_bad_input_is_one_line_and_status_2(
-    drawn: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, arguments: list[str], message: str
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    assert message in refusal(*(drawn if word == "FILE" else word for word in arguments))
-    assert not list(tmp_path.iterdir())
-
-
 # Animations
 
 SHORT = paper("fig11", duration=1.0, samples=101)

@@ -226,19 +226,6 @@ def test_the_stored_points_keep_the_contract_and_a_bench_goes_on_where_it_was(tm
     assert sorted(entry.name for entry in tmp_path.iterdir()) == ["b-report", "b.h5"]
 
 
-@pytest.mark.parametrize(
-    ("words", "says"),
-    [
-        (("paper/fig09", "-m", "printed/ode45"), "no ladder for method 'printed/ode45'"),
-        (("extreme/singular-start", "-m", "lagrange/dop853"), "the initial mass matrix is singular"),
-    ],
-)
-def test_bad_input_is_one_line(words: tuple[str, ...], says: str, tmp_path: Path) -> None:
-    ended = rotor_mbs("bench", *words, "-o", tmp_path / "b.h5")
-    assert ended.status == 2
-    assert says in ended.err.splitlines()[-1]
-
-
 AT_REST = paper("fig05", duration=0.1, samples=3)
 
 

@@ -7,12 +7,12 @@ import subprocess
 import sys
 import time
 from collections.abc import Iterator
-from concurrent.futures import Future
 from contextlib import ExitStack
 from functools import partial
 from pathlib import Path
 
 import pytest
+from support.commands import refusal
 from support.sweeps import stored_runs
 
 from rotor_mbs.cli import main
@@ -110,24 +110,15 @@ def test_a_scheduler_that_dies_ends_in_one_line(
     assert errors.strip().splitlines()[-1].startswith("engine dask: the scheduler was lost; stored runs are kept")
 
 
-class _WithoutWorkers:
-    """A client of a cluster that has just lost its last worker: nothing ever ends there."""
-
-    status = "running"
-
-    def nthreads(self) -> dict[str, int]:
-        return {}
-
-    def get_executor(self, *, pure: bool) -> _WithoutWorkers:
-        assert not pure
-        return self
-
-    def submit(self, *_: object) -> Future[int]:
-        return Future()
-
-
-def test_a_cluster_without_workers_ends_in_one_line() -> None:
-    pool = dask_cluster.Cluster(_WithoutWorkers(), patience_s=0.2)
-    (end,) = run_in(pool, abs, [-3], 60.0)
+def test_a_cluster_that_is_not_there_and_one_without_workers_are_a_line(
+    tmp_path: Path, cluster: tuple[str, list[subprocess.Popen[bytes]]]
+) -> None:
+    told = refusal("sweep", "sweeps/fig11-spread", "-o", tmp_path / "o.h5", "--engine", "dask:tcp://127.0.0.1:9")
+    assert "engine dask:tcp://127.0.0.1:9: no dask scheduler answers there" in told
+    address, (_, *workers) = cluster
+    with Client(address, timeout=30, set_as_default=False) as client:
+        for worker in workers:
+            worker.kill()
+        (end,) = run_in(dask_cluster.Cluster(client, patience_s=0.5), time.sleep, [100.0], 200.0)
     assert isinstance(end.error, StoreError)  # which ends a sweep
-    assert str(end.error) == "engine dask: no workers for 0.2 s; stored runs are kept"
+    assert str(end.error) == "engine dask: no workers for 0.5 s; stored runs are kept"
