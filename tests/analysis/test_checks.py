@@ -230,6 +230,7 @@ def test_a_turn_of_a_pendulum_is_off_by_what_was_added() -> None:
     [
         ("singular", METHOD, "singular", True),
         ("timed_out", METHOD, "singular", False),
+        ("ok", METHOD, "solver_failed", False),  # gave up, and says so
         ("singular", METHOD, "ok", False),  # says that it got to the end
         ("timed_out", PRINTED, "diverged", True),
     ],

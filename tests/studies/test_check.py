@@ -15,11 +15,9 @@ from xml.etree import ElementTree
 
 import numpy as np
 import pytest
-from support import other_code
 from support.checking import EVERY_SECOND_SAMPLE, WRONG, add_run, failed, faulty_run, judged, results_file, shipped
 from support.commands import PROGRAM
 from support.frozen_references import digests, freeze
-from support.other_code import Mistakes
 from support.scenes import paper
 from support.stored import Made, change_row, damage, drop, rotor, store
 
@@ -27,11 +25,10 @@ from rotor_mbs.cli import main
 from rotor_mbs.cli import verdicts as formats
 from rotor_mbs.methods.catalogue import REFERENCE, method_names
 from rotor_mbs.methods.solve import solve
-from rotor_mbs.runs.table import Rows, characters, extend_file
+from rotor_mbs.runs.table import Rows, extend_file
 from rotor_mbs.scenario.accuracy_bounds import Bound, shipped_bounds
 from rotor_mbs.scenario.catalogue import REFERENCES
 from rotor_mbs.solution.metrics import horizon_samples, running_growth
-from rotor_mbs.solution.status import code_of
 from rotor_mbs.studies.stored_references import frozen_solution
 
 ROOT = Path(__file__).parents[2]
@@ -96,17 +93,6 @@ def test_the_default_set_passes(tmp_path: Path, capsys: pytest.CaptureFixture[st
 # Faults in the models
 
 
-@pytest.mark.parametrize("errata", [{"e1": True}, pytest.param({"e2": True}, marks=pytest.mark.full)])
-def test_the_papers_errata_fail(errata: dict[str, bool], tmp_path: Path) -> None:
-    """In another code's run, put in as a right method's."""
-    scene = shipped("check/point-masses")
-    path, run = results_file(tmp_path / "e.h5", [scene.name], []), solve(METHOD, scene, {})
-    motion = run.trajectory
-    motion.angles, motion.rates = other_code.trajectory(scene, motion.time, Mistakes(**errata))
-    add_run(path, scene, run)
-    assert {"defect", "energies"} <= {check.name for check in failed(judged(path))}
-
-
 @pytest.mark.parametrize(
     "scene", ["check/general", *(pytest.param(f"paper/{name}", marks=pytest.mark.full) for name in ("fig08", "fig11"))]
 )
@@ -138,7 +124,7 @@ def _without_last_sample(row: Rows) -> None:
 
 
 TAMPERING: dict[str, tuple[Callable[[Rows], None], tuple[str, ...]]] = {
-    "a sample missing": (_without_last_sample, ("FAIL complete", "time has 150 rows, not 151")),
+    "a sample missing": (_without_last_sample, ("FAIL complete", "time has 150 rows, not 151", "stored as ok")),
     "a channel missing": (_with("tip", ..., math.nan), ("FAIL complete", "tip is missing")),
     "a NaN": (_with("rates", 7, math.nan), ("FAIL complete", "rates is not finite at sample 7")),
     "a touched angle": (_with("angles", 20, 3.0), ("FAIL tip",)),
@@ -184,17 +170,6 @@ def test_a_false_success_and_an_edited_status_fail(copy: Path, capsys: pytest.Ca
         lines_of(capsys, copy, status=1), f"FAIL status: check/general {METHOD}", "stored ok, its samples give"
     )
     assert "report of success is false" in line
-
-
-def test_a_run_that_gave_up_early_is_not_excused(copy: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    def give_up(row: Rows) -> None:
-        _without_last_sample(row)
-        row["status"][...], row["engine_success"][...] = code_of("solver_failed"), 0
-        row["message"][...] = characters("gave up", len(row["message"]))
-
-    change_row(copy, f"{SCENE}/{METHOD}", give_up)
-    line = named(lines_of(capsys, copy, status=1), "FAIL complete: check/general", "not 151")
-    assert "stored as solver_failed gave up" in line
 
 
 def test_a_model_that_is_not_there_is_missed_where_it_is_required(
