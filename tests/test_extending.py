@@ -17,6 +17,7 @@ import numpy as np
 import pytest
 from support.commands import PROGRAM, rotor_mbs
 from support.packages import install
+from support.rotors import energies
 
 import rotor_mbs as rm
 from rotor_mbs.methods.catalogue import find_method
@@ -28,24 +29,12 @@ PACKAGES = {
     "rotor_rk4": ("rotor_mbs.methods", {"rk4": "rotor_rk4:METHOD"}),
     "rotor_momentum": ("rotor_mbs.quantities", {"momentum": "rotor_momentum:QUANTITY"}),
 }
-SCENE = """
-title = "Two pitched blades"
-blades = 2
-gravity = 9.81
-duration = 0.5
-samples = 51
-outputs = ["angles", "rates", "tip", "energy"{more}]
-[blade]
-mass = 800.0
-centre_of_mass = [0.3, 0.1, 5.2]
-inertia = [4000, 4100, 300, 0, -40, 0]
-tip = [0.5, 0, 11]
-[hub]
-inertia = 5000.0
-[initial]
-angles = [0.5, 0.3, -0.2]
-rates = [0.4, 0, 0]
-"""
+# What outside/rk4 can compute, with pitches at rest.
+SCENE = rm.scene("check/general").replace(
+    duration=0.5, samples=51,
+    **{"torque.rotor": 0, "bearing.stiffness": 0, "bearing.damping": 0, "shaft.damping": 0},
+    **{"initial.angles": [0.5, 0.3, -0.2, 0.1], "initial.rates": [0.4, 0, 0, 0]},
+)  # fmt: skip
 
 
 def forget_what_is_installed() -> None:
@@ -62,8 +51,8 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
     folder = tmp_path_factory.mktemp("site")
     for module, (group, entry_points) in PACKAGES.items():
         install(folder, module, (SOURCES / f"{module}.py").read_text(), group, entry_points)
-    (folder / "one.toml").write_text(SCENE.format(more=""))
-    (folder / "two.toml").write_text(SCENE.format(more=', "momentum"'))
+    (folder / "one.toml").write_text(SCENE.text)
+    (folder / "two.toml").write_text(SCENE.text.replace("outputs = [", 'outputs = ["momentum", '))
     with pytest.MonkeyPatch.context() as patch:
         patch.chdir(folder)
         patch.syspath_prepend(folder)
@@ -128,16 +117,13 @@ def test_a_sweep_takes_its_runs_side_by_side_and_judges_them_by_its_own_bounds()
 def test_a_quantity_is_stored_judged_and_drawn_for_every_method() -> None:
     methods = ("outside/rk4", "lagrange/dop853", "exudyn_tree/rk67")
     command("run", "two.toml", *(word for method in methods for word in ("-m", method)), "-o", "two.h5", "-j", "1")
-    # At the start the pitches are at rest: the inertia about the shaft times the rotor's rate.
-    inertia = 5000.0
-    for theta in (0.3, -0.2):
-        s, c, (x, y, z) = np.sin(theta), np.cos(theta), (0.3, 0.1, 5.2)
-        inertia += s * s * 4000.0 + c * c * 4100.0 + 800.0 * (z * z + (c * x - s * y) ** 2)
+    # At the start the pitches are at rest: twice the kinetic energy by the rotor's rate.
+    (kinetic,), _ = energies(SCENE, np.array([[*SCENE.initial_angles, *SCENE.initial_rates]]))
     stored = rm.open("two.h5")
     for method in methods:
         run = stored[f"two/{method}"]
         assert run["shaft_momentum"].shape == (51,)
-        assert run["shaft_momentum"][0] == pytest.approx(0.4 * inertia, rel=1e-12)
+        assert run["shaft_momentum"][0] == pytest.approx(2.0 * kinetic / 0.4, rel=1e-12)
         assert 0.0 <= run.metrics["shaft_momentum_error_max"] < 1.0
     with h5py.File("two.h5") as file:
         column = file["two/shaft_momentum"]

@@ -11,23 +11,11 @@ from pathlib import Path
 import pytest
 from support.commands import Ended, refusal, rotor_mbs
 
+import rotor_mbs as rm
 from rotor_mbs.report.pages import metrics_table
 from rotor_mbs.runs.read import open_results
 
-QUICK = """
-title = "quick"
-blades = 1
-gravity = 9.8
-duration = 0.5
-samples = 11
-[blade]
-mass = 10.0
-centre_of_mass = [0.1, 0.0, 1.0]
-tip = [0.1, 0.0, 2.0]
-[initial]
-angles = [{angle}, 0.1]
-rates = [0, 0]
-"""
+QUICK = rm.scene("paper/fig03").replace(duration=0.5, samples=11).text
 BOTH = ("-m", "lagrange/dop853", "-m", "exudyn_tree/rk67")
 
 
@@ -35,14 +23,14 @@ BOTH = ("-m", "lagrange/dop853", "-m", "exudyn_tree/rk67")
 def first_run(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Ended]:
     """The results file of `quick`, and the command that made it."""
     folder = tmp_path_factory.mktemp("quick")
-    (folder / "quick.toml").write_text(QUICK.format(angle=0.5))
+    (folder / "quick.toml").write_text(QUICK)
     return folder / "r.h5", rotor_mbs("run", folder / "quick.toml", *BOTH, "-o", folder / "r.h5", "-j", "1")
 
 
 @pytest.fixture
 def quick(folder: Path) -> Path:
     path = folder / "quick.toml"
-    path.write_text(QUICK.format(angle=0.5))
+    path.write_text(QUICK)
     return path
 
 

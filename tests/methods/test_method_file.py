@@ -15,17 +15,7 @@ from rotor_mbs.methods import catalogue, method_file
 
 DOCUMENT = (Path(__file__).parents[2] / "docs" / "your-engine.md").read_text()
 (EXAMPLE,) = re.findall(r"```python\n(.*?)```", DOCUMENT, re.DOTALL)
-SCENE = """
-title = "One blade"
-blades = 1
-gravity = 9.81
-duration = 0.1
-samples = 6
-outputs = ["angles", "rates"]
-blade = { mass = 800, centre_of_mass = [0.3, 0.1, 5.2], inertia = [4000, 4100, 300, 0, -40, 0] }
-hub = { inertia = 5000 }
-initial = { angles = [0.5, 0.3], rates = [0.4, 0] }
-"""
+SCENE = rm.scene("check/general").replace(duration=0.1, samples=6, outputs=["angles", "rates"]).text
 # Methods of one file, each of which does something else in `integrate`.
 BAD = """
 import os, time
@@ -49,8 +39,8 @@ class Still:
         return Integration(True, "", self.scene.duration)
     def observe(self):
         time = np.linspace(0.0, self.scene.duration, self.scene.samples)
-        columns = 1 if self.name == "Shape" else 2
-        return Trajectory(time, np.tile(self.scene.initial_angles[:columns], (len(time), 1)), np.zeros((len(time), 2)))
+        columns = 1 if self.name == "Shape" else 4
+        return Trajectory(time, np.tile(self.scene.initial_angles[:columns], (len(time), 1)), np.zeros((len(time), 4)))
 
 METHODS = [Method(name=name, label=name, build=lambda scene, _, name=name: Still(scene, name)) for name in ACTS]
 """
@@ -143,7 +133,7 @@ def test_whatever_a_method_does_is_one_line_and_loses_nothing(capfd: pytest.Capt
         "bad/Raises": "solver_failed", "bad/Hangs": "timed_out", "bad/Prints": "inaccurate", "mine/lsoda": "ok",
         "bad/Shape": "solver_failed",
     }  # fmt: skip
-    assert runs["bad/Shape"].message == "bad/Shape: angles has the shape (6, 1); allowed: (6, 2)"
+    assert runs["bad/Shape"].message == "bad/Shape: angles has the shape (6, 1); allowed: (6, 4)"
     assert runs["bad/Raises"].message == "bad.py:9: ZeroDivisionError: division by zero"
     assert ended.err.count("one bad/Dies: not computed (its process died (exit code 9)") == 1
 

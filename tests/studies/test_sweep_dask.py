@@ -13,7 +13,7 @@ from pathlib import Path
 
 import pytest
 from support.commands import refusal
-from support.sweeps import stored_runs
+from support.sweeps import starts_file, stored_runs
 
 from rotor_mbs.cli import main
 from rotor_mbs.errors import InputError, StoreError
@@ -22,20 +22,6 @@ from rotor_mbs.runs.pool import SerialPool, run_in
 
 Client = pytest.importorskip("distributed").Client
 pytestmark = pytest.mark.full
-
-_SWEEP = """
-title = "starts"
-scene = "paper/fig11"
-methods = ["lagrange/dop853"]
-samples = 21
-outputs = ["angles"]
-change = {{ duration = 3.0 }}
-draws = {draws}
-
-[[axis]]
-key = "initial.angles[1]"
-uniform = [0.5, 1.0]
-"""
 
 
 @pytest.fixture
@@ -64,8 +50,7 @@ def cluster() -> Iterator[tuple[str, list[subprocess.Popen[bytes]]]]:
 
 def swept(folder: Path, address: str, victim: subprocess.Popen[bytes], draws: int) -> tuple[str, str, int]:
     """Output, errors and status of s.toml into dask.h5 on a cluster of which a process is killed after five runs."""
-    path, output = folder / "s.toml", folder / "dask.h5"
-    path.write_text(_SWEEP.format(draws=draws))
+    path, output = starts_file(folder, draws, 21, 3.0), folder / "dask.h5"
     command = [sys.executable, "-m", "rotor_mbs", "sweep", str(path), "-o", str(output), "--engine", f"dask:{address}"]
     with subprocess.Popen(command, stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as sweep:
         while sweep.poll() is None and stored_runs(output) < 5:

@@ -11,6 +11,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from support.sweeps import starts_file
 
 from rotor_mbs.runs.cluster import open_task_pool
 from rotor_mbs.runs.table import Place
@@ -21,24 +22,6 @@ pytestmark = [
     pytest.mark.nightly,
     pytest.mark.skipif(not Path("/proc/self/statm").exists(), reason="memory is read in /proc"),
 ]
-
-_SWEEP = """
-title = "short runs"
-scene = "paper/fig11"
-methods = ["{method}"]
-samples = {samples}
-change = {{ duration = {duration} }}
-draws = {draws}
-[[axis]]
-key = "initial.angles[1]"
-uniform = [0.5, 1.0]
-"""
-
-
-def _file(folder: Path, method: str, draws: int, samples: int, duration: float) -> Path:
-    path = folder / "s.toml"
-    path.write_text(_SWEEP.format(method=method, draws=draws, samples=samples, duration=duration))
-    return path
 
 
 def _resident(_: object) -> float:
@@ -52,7 +35,7 @@ def _resident(_: object) -> float:
 )
 def test_a_worker_does_not_grow(tmp_path: Path, method: str, samples: int, duration: float) -> None:
     """10,000 runs after the first thousand: at most 20 MB."""
-    plan = plan_sweep(load_sweep(_file(tmp_path, method, 11_000, samples, duration)))
+    plan = plan_sweep(load_sweep(starts_file(tmp_path, 11_000, samples, duration, method)))
     nowhere = Place(Path(), 0, 0, {}, plan.table().row_type)
     with open_task_pool("local", 1) as pool:
         before = 0.0
@@ -66,7 +49,7 @@ def test_a_worker_does_not_grow(tmp_path: Path, method: str, samples: int, durat
 
 
 def test_the_parent_of_100_000_runs_is_small(tmp_path: Path) -> None:
-    path = _file(tmp_path, "lagrange/taylor", 100_000, 11, 0.1)
+    path = starts_file(tmp_path, 100_000, 11, 0.1, "lagrange/taylor")
     code = "import resource, sys; from rotor_mbs.cli import main; status = main(sys.argv[1:]); "
     code += "print('KB', resource.getrusage(resource.RUSAGE_SELF).ru_maxrss); sys.exit(status)"
     command = [sys.executable, "-c", code, "sweep", str(path), "-o", str(tmp_path / "o.h5"), "-j", "2"]

@@ -54,10 +54,7 @@ def splits(dataset: Path) -> Iterator[tuple[str, dict[str, np.ndarray]]]:
     with h5py.File(dataset) as whole:
         for code, split in enumerate(("train", "validation", "test")):
             rows = np.flatnonzero(whole["split"][()] == code)
-            yield (
-                split,
-                {name: whole[name][()][rows] for name in ("run", "bearing_stiffness", "status", "angles", "tip")},
-            )
+            yield split, {name: whole[name][()][rows] for name in COLUMNS}
 
 
 def test_croissant_names_every_variable_and_the_content(dataset: Path) -> None:

@@ -12,7 +12,7 @@ import h5py
 import numpy as np
 import pytest
 from support.commands import refusal, rotor_mbs
-from support.sweeps import made_sweep, run_local
+from support.sweeps import made_sweep, run_local, starts_file
 
 from rotor_mbs.methods.catalogue import find_method
 from rotor_mbs.runs.design import MISSING
@@ -26,29 +26,12 @@ from rotor_mbs.solution.metrics import horizon
 from rotor_mbs.studies.stored_references import frozen_solution
 from rotor_mbs.studies.sweep import Chunk, plan_sweep, run_sweep
 
-_SWEEP = """
-title = "starts and springs"
-scene = "paper/fig11"
-methods = ["lagrange/dop853"]
-samples = 21
-outputs = ["angles"]
-change = {{ duration = 0.2 }}
-validation = 0.25
-draws = {draws}
-
-[[axis]]
-key = "initial.angles[1]"
-uniform = [0.5, 1.0]
-
-[[axis]]
-key = "bearing.stiffness"
-values = [0, 10]
-"""
-
 
 def _file(folder: Path, draws: int = 4) -> Path:
-    path = folder / "s.toml"
-    path.write_text(_SWEEP.format(draws=draws))
+    """Starts and springs."""
+    path = starts_file(folder, draws, 21, 0.2)
+    springs = '[[axis]]\nkey = "bearing.stiffness"\nvalues = [0, 10]\n'
+    path.write_text(f"validation = 0.25\n{path.read_text()}{springs}")
     return path
 
 

@@ -8,7 +8,7 @@ from dataclasses import replace
 from typing import Any
 
 from rotor_mbs.scenario.catalogue import find_scenes
-from rotor_mbs.scenario.scene import Blade, Scene
+from rotor_mbs.scenario.scene import Scene
 
 PAPER = tuple(scene.name.removeprefix("paper/") for scene in find_scenes(["paper"]))
 MASS, OFFSET, ARM, GRAVITY = 15000.0, math.hypot(0.08, 0.03), 15.42, 9.8
@@ -26,28 +26,9 @@ def paper(name: str, **changes: Any) -> Scene:
 
 def general(**changes: Any) -> Scene:
     """Three different rigid blades of full inertia on a heavy hub, sprung and moving: nothing is zero or equal."""
-    blades = tuple(
-        Blade(
-            800.0 + 100.0 * i,
-            (0.4 - 0.1 * i, 0.15 * i - 0.2, 5.0 + 0.3 * i),
-            (4000.0 + 50.0 * i, 4100.0, 300.0 + 20.0 * i, 30.0, -40.0 + 5.0 * i, 25.0),
-            (0.5, 0.1, 11.0),
-        )
-        for i in range(3)
-    )
-    scene = Scene(
-        name="general",
-        title="three different blades",
-        figures=(),
-        gravity=9.81,
-        duration=4.0,
-        samples=401,
-        outputs=("angles", "rates", "tip", "energy"),
-        blades=blades,
-        hub_inertia=5000.0,
-        initial_angles=(0.3, 0.2, -0.4, 0.6),
-        initial_rates=(0.5, -0.3, 0.2, 0.4),
-        bearing_stiffness=(2.0e4, 1.5e4, 3.0e4),
-        bearing_damping=(0.0, 0.0, 0.0),
-    )
+    scene = replace(
+        find_scenes(["check/general"])[0], name="general", text="", duration=4.0, samples=401,
+        rotor_torque=(), shaft_damping=0.0, bearing_damping=(0.0,) * 3, bearing_stiffness=(2.0e4, 1.5e4, 3.0e4),
+        initial_angles=(0.3, 0.2, -0.4, 0.6), initial_rates=(0.5, -0.3, 0.2, 0.4),
+    )  # fmt: skip
     return replace(scene, **changes)

@@ -42,6 +42,23 @@ values = [9.7, 9.8, 9.9]
 """
 
 
+def starts_file(folder: Path, draws: int, samples: int, duration: float, method: str = "lagrange/dop853") -> Path:
+    """s.toml: fig. 11 for `duration` (s) from random angles of a pitch."""
+    path = folder / "s.toml"
+    path.write_text(f"""title = "starts"
+scene = "paper/fig11"
+methods = ["{method}"]
+samples = {samples}
+outputs = ["angles"]
+change = {{ duration = {duration} }}
+draws = {draws}
+[[axis]]
+key = "initial.angles[1]"
+uniform = [0.5, 1.0]
+""")
+    return path
+
+
 def run_local(
     sweep: Sweep, output: Path, workers: int, methods: Sequence[str] = (), timeout_s: float = 60.0, **options: Any
 ) -> SweepResult:
