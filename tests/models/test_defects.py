@@ -71,15 +71,6 @@ def test_without_heyoka_the_defects_are_the_same(monkeypatch: pytest.MonkeyPatch
     )
 
 
-@pytest.mark.parametrize(("method", "order"), [("exudyn_tree/rk44", 4), ("exudyn_tree/generalized_alpha", 2)])
-def test_half_the_step_divides_the_defects_by_two_to_the_order(method: str, order: int) -> None:
-    """An interval has as many steps as it has error: the order is the global one. ±0.2, as orders are fitted."""
-    medians = [
-        np.median(defects_of(FIG11, solve(method, FIG11, {"step": step}).trajectory).sizes) for step in (5e-3, 2.5e-3)
-    ]
-    assert np.log2(medians[0] / medians[1]) == pytest.approx(order, abs=0.2)
-
-
 # ---- Wrong numbers of a model are seen in test_planted_faults.py; a wrong load, a wrong row and others in
 # studies/test_planted_mistakes.py.
 

@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import functools
-import runpy
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -25,7 +23,6 @@ from rotor_mbs.studies.compare_data import LoadComparison, compare_loads
 
 Array = Any
 Arrays = dict[str, Array]
-ROOT = Path(__file__).parents[2]
 
 
 @functools.cache
@@ -238,26 +235,3 @@ def test_loads_of_few_digits_are_judged_by_them() -> None:
             "blade_root_force_1_z": six_digits(factor * arrays["blade_root_force"][:, 0, 2]),
         }
         assert rm.compare(table, short("check/general")).status == status
-
-
-@pytest.mark.parametrize("name", ["paper/fig11", "check/pitch-loads"])
-def test_loads_by_pinocchios_newton_euler_algorithm_are_accepted_at_1e_9(name: str) -> None:
-    """Of the model and accelerations of the example engine; the shaft's are in the frame that turns with it."""
-    pin = pytest.importorskip("pinocchio")
-    scene, (arrays, _) = short(name), data_of(name)
-    tables = SimpleNamespace(loads_at=lambda t: [other_code.value_at(table, t) for table in scene.load_tables])
-    engine = runpy.run_path(str(ROOT / "examples" / "engines" / "pinocchio.py"))["Solver"](scene, None)
-    forces = []
-    for t, q, v in zip(arrays["time"], arrays["angles"], arrays["rates"], strict=True):
-        pin.rnea(engine.model, engine.data, q, v, engine.acceleration(t, q, v, tables))
-        forces.append([np.concatenate([force.linear, force.angular]) for force in list(engine.data.f)[1:]])
-    force, moment = np.split(np.array(forces), 2, axis=2)  # (n, 1 + blades, 3) of the shaft and the blades
-    turn = other_code.about("y", arrays["angles"][:, 0])
-    torque = other_code.value_at(scene.rotor_torque, arrays["time"])
-    loads = {
-        "blade_root_force": force[:, 1:], "blade_root_moment": moment[:, 1:],
-        "shaft_force": turn.apply(force[:, 0]),
-        "shaft_moment": turn.apply(moment[:, 0]) - torque[:, None] * [0.0, 1.0, 0.0],
-    }  # fmt: skip
-    found = judged(name, loads, 1e-9)
-    assert (found.message, found.likely) == ("", ())

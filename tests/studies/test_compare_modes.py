@@ -14,7 +14,6 @@ import pytest
 import rotor_mbs as rm
 from rotor_mbs.cli import main
 from rotor_mbs.report.pages.comparison import DataComparison
-from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.studies.modes import compute_modes
 
 Array = Any
@@ -28,20 +27,6 @@ def tables(name: str) -> tuple[Array, Array]:
     scene = rm.scene(name).replace(gravity=0.0)
     modes = compute_modes(scene, SPEEDS, models=("exudyn_tree",)).rotation["exudyn_tree"]
     return modes.damped_frequencies, modes.undamped_frequencies
-
-
-def blade_alone(scene: Scene, *, stiffening: bool) -> Array:
-    """(speeds,) rad/s of a blade that pitches on its spring while the rotor turns steadily, by sums over its masses.
-
-    With the distances u across the shaft and v along it from the pitch axis, at pitch 0: J θ'' + (k + Ω² Σ m (u² - v²))
-    θ = 0; of linear displacements alone, without the share of u², which is of second order.
-    """
-    blade = scene.blades[0]
-    x, y, _ = blade.centre_of_mass
-    xx, yy, zz = blade.inertia[:3]
-    across, along = 0.5 * (yy + zz - xx) + blade.mass * x * x, 0.5 * (xx + zz - yy) + blade.mass * y * y
-    stiffness = scene.bearing_stiffness[0] + SPEEDS**2 * (across * stiffening - along)
-    return np.sqrt(stiffness / (across + along))
 
 
 def compare(name: str, frequencies: Array, speeds: Array = SPEEDS, key: str = "frequencies") -> DataComparison:
@@ -75,10 +60,6 @@ MISTAKES: dict[str, tuple[str, Callable[[Array, Array], tuple[Array, Array]], st
         UNEQUAL, lambda f, _: (SPEEDS, np.abs(f[:, 1:] - SPEEDS[:, None])),
         "frequencies in the fixed frame (whirl), the rotor's speed below or above those in the rotor's frame",
     ),
-    "no stiffening": (
-        SPRUNG, lambda *_: (SPEEDS, np.repeat(blade_alone(rm.scene(SPRUNG), stiffening=False)[:, None], 2, axis=1)),
-        "centrifugal stiffening is missing: f² = f0² - α Ω², α = ",
-    ),
     "unequal blades, softened": (
         UNEQUAL, lambda _, u: (SPEEDS, np.sqrt(u[:1, 1:] ** 2 - 0.4 * SPEEDS[:, None] ** 2)),
         "centrifugal stiffening is missing: f² = f0² - α Ω², α = 0.4",
@@ -94,11 +75,6 @@ def test_a_mistake_is_named(mistake: str) -> None:
     assert found.status == "inaccurate"
     assert found.likely[0].startswith(text), found.likely
     assert len(found.likely) == 1
-
-
-def test_a_blade_with_its_stiffening_is_right() -> None:
-    """The sums over its masses are those of the scene: what is left out above is the stiffening alone."""
-    assert compare(SPRUNG, blade_alone(rm.scene(SPRUNG), stiffening=True)[:, None]).status == "ok"
 
 
 def test_what_nothing_explains_has_no_cause() -> None:

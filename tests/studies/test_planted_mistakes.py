@@ -189,10 +189,6 @@ PLANTS = {
     "truncated": Plant("the data end at t = 1.49 s of 2 s", spoilt=lambda t, q, w: (t[:150], q[:150], w[:150])),
     "late": Plant("begin at t = 0.6 s", spoilt=lambda t, q, w: (t[60:], q[60:], w[60:])),
     "another scene": Plant("the scene paper/fig09", changed=lambda _: short("paper/fig09")),
-    "time in ms, and degrees": Plant(
-        "time in ms taken as s; and rotor, pitch 1, pitch 2, pitch 3: degrees taken as rad",
-        spoilt=lambda t, q, w: (1e3 * t, np.degrees(q), np.degrees(w)),
-    ),
     "from the end, rates turned": Plant(
         "time reversed; and rotor rate, pitch 1 rate, pitch 2 rate, pitch 3 rate: sign reversed",
         spoilt=lambda t, q, w: (t, q[::-1], -w[::-1]),
