@@ -165,19 +165,6 @@ def test_more_rows_keep_those_that_are_stored(tmp_path: Path) -> None:
     assert np.isnan(file.place(first).read()["constraint_error"]).all()  # a column that it does not have
 
 
-def test_other_settings_and_versions_are_missing_and_others_stay(tmp_path: Path) -> None:
-    path = tmp_path / "r.h5"
-    names = ("lagrange/taylor", "exudyn_tree/rk67")
-    file = extend_file(path, results_tables(_asked(*names)))
-    for name in names:
-        _write(file, f"paper/fig08/{name}", 1.0)
-    scene = _asked("exudyn_tree/rk67")[0].scene
-    extend_file(path, results_tables([Asked(scene, "exudyn_tree/rk67", {"step": 1e-3})]))
-    assert _runs(path) == ["paper/fig08/lagrange/taylor"]
-    extend_file(path, results_tables([Asked(scene, "lagrange/taylor", versions={"rotor_mbs": "0"})]))
-    assert _runs(path) == []
-
-
 def test_runs_of_other_numbers_are_not_dropped_without_being_computed_again(tmp_path: Path) -> None:
     path = tmp_path / "r.h5"
     _write(extend_file(path, results_tables(_asked("lagrange/taylor"))), "paper/fig08/lagrange/taylor", 1.0)
