@@ -33,14 +33,6 @@ def drift(trajectory):
     return np.abs(energy - energy[0]).max() / WEIGHT
 
 
-def test_figure_11_crest():
-    """The other published digits: analysis/test_claim_study.py."""
-    own = run(FIG11).trajectory.refined
-    angle = own.angles[:, 0]
-    assert round(angle.max(), 4) == 2.7315
-    assert own.time[angle.argmax()] == pytest.approx(7.26, abs=0.01)
-
-
 # Exact solutions.
 
 

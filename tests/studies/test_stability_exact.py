@@ -57,25 +57,6 @@ def test_an_hour_of_a_regular_motion() -> None:
     assert np.abs(tree.angles[-1] - exact.angles[-1]).max() <= 1e-8
 
 
-@pytest.mark.parametrize(
-    ("name", "limit"), [("stiff/bearing-1e8", 2.0 * np.sqrt(2.0)), ("stiff/bearing-1e8-damping-100", 2.785)]
-)
-def test_rk44_grows_where_theory_says(name: str, limit: float) -> None:
-    """On the imaginary axis and on the negative real one (Hairer & Wanner II, IV.2), in steps of the fastest mode.
-
-    Of a pitch about zero, the rotor fixed: gravity and rotation are negligible beside such a spring.
-    """
-    one = scene(name)
-    stiffness, damping = one.bearings[0]
-    fastest = np.abs(np.roots([one.blades[0].pitch_inertia, damping, stiffness])).max()
-    for share, grows in ((0.985, False), (1.015, True)):
-        step = share * limit / fastest
-        short = replace(one, duration=1800.0 * step, samples=11, outputs=("angles", "rates"))
-        pitches = run(short, "exudyn_tree/rk44", step=step).trajectory.angles[:, 1:]
-        largest = 100.0 * max(map(abs, one.initial_angles[1:]))
-        assert (len(pitches) < short.samples or np.abs(pitches).max() > largest) == grows
-
-
 def test_generalized_alpha_has_no_limit() -> None:
     """ωh = 1000 on a linear swing: what it draws is wrong, but does not grow. (The chain's Newton fails.)"""
     one = replace(scene("stiff/bearing-1e12"), duration=5.0, samples=51, outputs=("angles", "rates"))
