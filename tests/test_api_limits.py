@@ -105,15 +105,15 @@ def test_the_reason_of_lost_workers_is_told(tmp_path: Path) -> None:
     assert 'in a script, the call belongs under `if __name__ == "__main__":`' in told
 
 
+STIFF: dict[str, dict[str, Any]] = {
+    "damper": {"bearing.damping": 1e9},
+    "fast": {"initial.rates": [0.3, 1e4, 1e4, 1e4]},
+    "shaft": {"shaft.damping": 1e12},
+}
+
+
 def _stiff(kind: str = "damper") -> Scene:
-    scene = rm.scene("check/general")
-    blades = len(scene.blades)
-    changes: dict[str, dict[str, Any]] = {
-        "damper": {"bearing.damping": [1e9] * blades},
-        "fast": {"initial.rates": [0.3, *[1e4] * blades]},
-        "shaft": {"shaft.damping": 1e12},
-    }
-    return scene.replace(**changes[kind])
+    return rm.scene("check/general").replace(**STIFF[kind])
 
 
 def _in_thread(call: Callable[[], Any]) -> Any:

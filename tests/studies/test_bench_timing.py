@@ -26,7 +26,7 @@ from rotor_mbs.solution.trajectory import Integration, Trajectory
 from rotor_mbs.studies import bench
 from rotor_mbs.studies.bench import Curve, Point, PointTimer, allot, conduct, measure
 
-SCENE = paper("fig08", duration=1.0, samples=11)
+SCENE = paper("fig05", duration=1.0, samples=11)
 
 
 @dataclass
@@ -226,9 +226,6 @@ def test_the_stored_points_keep_the_contract_and_a_bench_goes_on_where_it_was(tm
     assert sorted(entry.name for entry in tmp_path.iterdir()) == ["b-report", "b.h5"]
 
 
-AT_REST = paper("fig05", duration=0.1, samples=3)
-
-
 def measure_dying(curves: list[Curve], **options: Any) -> Any:
     """As the timing worker, which one curve kills."""
     if any(curve.name.endswith("deadly") for curve in curves):
@@ -242,12 +239,10 @@ def test_curves_are_tried_alone_where_their_process_dies(tmp_path: Path, monkeyp
     ((method, ladder),) = ladders(["lagrange/ode45"]).values()
     short = replace(ladder, values=(1e-3,))
     variants = [replace(short, variant=f" {name}") for name in ("first", "deadly", "last")]
-    curves = [bench.curve_of(AT_REST, method, ladder, {}) for ladder in variants]
+    curves = [bench.curve_of(SCENE, method, ladder, {}) for ladder in variants]
     file = extend_file(tmp_path / "b.h5", [*bench.curve_tables(curves)])
-    still = np.zeros((3, 4))
-    reference = Trajectory(np.linspace(0.0, 0.1, 3), still, still, error_growth=np.ones(3))
     ended = {
-        outcome.label.split()[-2]: outcome for outcome in bench._measure_scene(file, curves, AT_REST, reference, 2, 5.0)
+        outcome.label.split()[-2]: outcome for outcome in bench._measure_scene(file, curves, SCENE, still(), 2, 5.0)
     }
     assert [curve.is_stored(file) for curve in curves] == [True, False, True]
     assert (ended["deadly"].status, ended["deadly"].is_stored) == ("worker_died", False)
