@@ -20,10 +20,10 @@ from support.scenes import paper
 from support.stored import Made, rotor, store
 from support.sweeps import THREE_RUNS
 
-from rotor_mbs.analysis.text_tables import bench_table, table_of_runs
+from rotor_mbs.analysis.text_tables import table_of_runs
 from rotor_mbs.cli.terminal import ProgressLine
 from rotor_mbs.errors import MethodRefusal
-from rotor_mbs.runs.read import Record, open_results
+from rotor_mbs.runs.read import open_results
 from rotor_mbs.runs.runner import Outcome
 from rotor_mbs.runs.sweeps import StoredSweep
 
@@ -155,15 +155,3 @@ def test_a_row_for_each_run_and_of_many_runs_one_for_each_method(tmp_path: Path)
         (GOOD, "14 of 14 ok", "3.0e-12", "1.0e-09", "0.0e+00", "0.002"),
         (BAD, "0 of 14 ok", "", "", "", "0.002"),
     ]
-
-
-def test_a_bench_curve_has_its_smallest_error_and_the_times_to_given_ones() -> None:
-    arrays = {
-        "angle_error_max": np.array([1e-2, 1e-4, np.nan]),
-        "run_time_s": np.array([1.0, 10.0, 20.0]),
-        "status": np.array([0, 0, 2]),
-    }
-    (row,) = bench_table([Record("bench", "paper/fig05", GOOD, arrays=arrays)]).rows
-    assert row[:4] == ("paper/fig05", GOOD, "2 of 3", "1.0e-04")
-    assert float(row[4]) == np.round(10**0.5, 2)  # halfway between the two, in logarithms
-    assert row[5:] == ("", "")

@@ -1,4 +1,4 @@
-"""Both Exudyn models against the closed form, their order, their symmetries, and what they say of themselves."""
+"""Both Exudyn models against the closed form: any number of blades, their order, long runs."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Loads against statics and dynamics done by hand: weights, centrifugal forces, gyroscopic moments, sums."""
+"""Loads against Newton's and Euler's laws written anew, of the chain at the order of its steps, and at jumps."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""printed/ode45 and its single-erratum variants: the published digits, exact solutions, energy, refusals."""
+"""printed/ode45 and its single-erratum variants: exact solutions, energy, refusals."""
 
 from __future__ import annotations
 

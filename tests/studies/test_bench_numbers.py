@@ -80,8 +80,9 @@ def test_ratios_are_to_the_fastest() -> None:
     assert slow.seconds == pytest.approx(1e-2 * 10**0.5)
     assert (fast.ratio, slow.ratio) == (1.0, pytest.approx(slow.seconds / fast.seconds))
     assert [one.name for one, _ in fastest([SLOW, FAST], 1e-6)] == ["lagrange/taylor"]
-    (row,) = bench_table([SLOW]).rows  # whose ladder the budget cut
-    assert row[5:] == ("not measured",) * 2
+    cut, coarse = bench_table([SLOW, curve("mine/euler", [1e-2, 1e-4], [1.0, 10.0])]).rows  # one cut by the budget
+    assert cut[2:] == ("2 of 5", "1.0e-04", "3.16e-02", "not measured", "not measured")
+    assert coarse == ("paper/fig09", "mine/euler", "2 of 2", "1.0e-04", "3.16e+00", "", "")
 
 
 def test_a_row_for_each_engine_with_dashes_for_what_the_file_does_not_say(tmp_path: Path) -> None:

@@ -1,4 +1,4 @@
-"""Stiff and extreme scenes against what is known of them exactly: quadrature, elliptic functions, symmetry, order."""
+"""Stiff and extreme scenes against what is known of them exactly: quadrature, elliptic functions; ladders of steps."""
 
 from __future__ import annotations
 
