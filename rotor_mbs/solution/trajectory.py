@@ -168,8 +168,7 @@ def limit_at_zero(quotients: Sequence[Array], ratio: float) -> Array:
     doubled step enlarges each further term of the error, 2 for one-sided quotients, 4 for central ones."""
     values = list(quotients)
     for power in range(1, len(values)):
-        pairs = itertools.pairwise(values)
-        values = [(ratio**power * fine - coarse) / (ratio**power - 1.0) for fine, coarse in pairs]
+        values = [fine + (fine - coarse) / (ratio**power - 1.0) for fine, coarse in itertools.pairwise(values)]
     return values[0]
 
 

@@ -16,7 +16,7 @@ from rotor_mbs.methods.time_limit import MESSAGE, OutOfTimeError
 from rotor_mbs.models.exudyn.geometry import LISTS, Part, Ref
 from rotor_mbs.models.exudyn.schemes import Scheme
 from rotor_mbs.scenario.time_table import Interval, steps_and_rows
-from rotor_mbs.solution.trajectory import Array, Integration
+from rotor_mbs.solution.trajectory import Array, Integration, limit_at_zero
 
 os.environ.setdefault("EXUDYN_MODULE", "fast")
 with contextlib.redirect_stdout(io.StringIO()):  # it greets on import
@@ -198,18 +198,15 @@ class System:
         integration.generalizedAlpha.computeInitialAccelerations = True
         differences = integration.newton.numericalDifferentiation
         differences.minimumCoordinateSize = 1.0
-        row: list[Array] = []
+        by_step: list[Array] = []
         for k in range(3):
             differences.relativeEpsilon = 0.01 * 0.5**k
             with contextlib.suppress(_engine.ExudynError, RuntimeError):
                 self._solver.InitializeSolver(self._mbs, self._settings)
                 self._solver.FinalizeSolver(self._mbs, self._settings)
-            new = [self.values()]
-            for column, before in enumerate(row):
-                new.append(new[column] + (new[column] - before) / (2.0 ** (column + 1) - 1.0))
-            row = new
+            by_step.append(self.values())
         integration.generalizedAlpha.computeInitialAccelerations = False
-        return row[-1], self.turns()
+        return limit_at_zero(by_step[::-1], 2.0), self.turns()
 
     def advance(self, start: float, end: float, steps: int, total: Integration) -> str:
         """Integrate from the state set last in equal steps, counted in `total`; why it failed, or ""."""
