@@ -111,6 +111,7 @@ def clearly_ok(
     shares = [rotor_inertia_shares(scene, np.array([scene.initial_angles]))[0] for scene in scenes]
     within = [
         run["energy_drift_max"] <= energy
+        and ("defect_max" in run or "defects_not_judged" not in run)
         and run.get("defect_judged", 0.0) <= defect
         and run.get("angle_error_predicted", 0.0) <= OK_ERROR
         for run in metrics
@@ -201,9 +202,11 @@ def _status(scene: Scene, run: Solution, reference: Trajectory | None, metrics: 
     if angle > ANGLE_LIMIT:
         limit = f"above {ANGLE_LIMIT:.0e} rad double precision is not sufficient"
         return "unchecked", f"angles of {angle:.1e} rad; {limit}"
-    if any(name in metrics for name in _CHECKS):
-        return "ok", ""
-    return "unchecked", "cannot be assessed: no energies, and no angles or rates"
+    if not any(name in metrics for name in _CHECKS):
+        return "unchecked", "cannot be assessed: no energies, and no angles or rates"
+    if "defects_not_judged" in metrics and not any(name in metrics for name in ("defect_max", "angle_error_max")):
+        return "unchecked", "only the energy balance could be assessed: the samples are too far apart for the motion"
+    return "ok", ""
 
 
 def start_slack(scene: Scene) -> float:

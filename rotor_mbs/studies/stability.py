@@ -22,10 +22,9 @@ from rotor_mbs.studies.run import run_scenes
 
 TARGET = 1e-6  # rad: what a method must reach on the stiff and light scenes
 
-# What the map shows of a run: its status, or one of two that say more. Symbol, text; colour is the report's.
+# What the map shows of a run: its status, or one that says more. Symbol, text; colour is the report's.
 OUTCOMES = {
     "ok": ("✓", "ok"),
-    "energy_alone": ("E", "ok, without an angle error: no reference, or horizon before the second sample"),
     "smaller_step": ("▾", "ok with a smaller step"),
     "inaccurate": ("≈", "inaccurate: end reached, bound exceeded"),
     "diverged": ("↯", "diverged"),
@@ -67,14 +66,7 @@ def suite_runs(path: Path) -> list[SuiteRun]:
             for name, run in scene.methods.items():
                 facts, ladder = run.attributes, ladders.get((scene.name, name))
                 outcome, message = run.status, str(facts.get("message", ""))
-                if run.status == "ok" and "angle_error_max" not in facts:
-                    reason = "the horizon is before the second sample"
-                    if reference is None:
-                        reason = "there is no reference"
-                    elif len(reference.array("time")) < 2:
-                        reason = f"no reference ({reference.attributes['message']})"
-                    outcome, message = "energy_alone", f"no angle error: {reason}"
-                elif run.status != "ok" and ladder is not None and "ok" in ladder.statuses:
+                if run.status != "ok" and ladder is not None and "ok" in ladder.statuses:
                     outcome = "smaller_step"
                 runs.append(
                     SuiteRun(
@@ -103,7 +95,7 @@ def suite_table(runs: Sequence[SuiteRun]) -> TextTable:
         cells = []
         for folder in folders:
             outcomes = [run.outcome for run in compared if (run.method, run.folder) == (method, folder)]
-            ok, smaller = sum(outcome in ("ok", "energy_alone") for outcome in outcomes), outcomes.count("smaller_step")
+            ok, smaller = outcomes.count("ok"), outcomes.count("smaller_step")
             count = f"{ok}+{smaller}" if smaller else f"{ok}"
             cells.append(f"{count} of {len(outcomes)}" if outcomes else "")
         claimed = sum(run.false_success for run in runs if run.method == method)

@@ -14,12 +14,13 @@ from support.defects import made_defects
 
 from rotor_mbs.analysis import judgement as judgement_module
 from rotor_mbs.analysis import kinematics
-from rotor_mbs.analysis.judgement import OK_ERROR, judge, rotor_inertia_shares
+from rotor_mbs.analysis.judgement import OK_ERROR, clearly_ok, judge, rotor_inertia_shares
 from rotor_mbs.methods.catalogue import find_method, method_names
 from rotor_mbs.scenario.accuracy_bounds import Bound, shipped_bounds
 from rotor_mbs.scenario.catalogue import find_scenes
 from rotor_mbs.scenario.scene import Blade, Scene
-from rotor_mbs.solution.metrics import ANGLE_LIMIT, metrics_of, running_growth
+from rotor_mbs.solution.defects import MAX_INTERVAL_GROWTH
+from rotor_mbs.solution.metrics import ANGLE_LIMIT, defect_metrics, metrics_of, running_growth
 from rotor_mbs.solution.trajectory import Integration, Solution, Trajectory
 
 Array = Any
@@ -136,6 +137,18 @@ def test_the_median_of_the_defects_has_the_bound_of_a_methods_own(monkeypatch: p
         defects = made_defects([side * own.value] * 3, transitions=None)
         monkeypatch.setattr(judgement_module, "defects_of", lambda *_, defects=defects, **__: defects)
         assert judge(SCENE, run, None).status == expected
+
+
+@pytest.mark.parametrize(("side", "expected"), [(1.0 - JUST, "ok"), (1.0 + JUST, "unchecked")])
+def test_an_energy_balance_alone_is_no_verdict(side: float, expected: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Errors may grow by more than 1e5 in every interval, and there is no reference."""
+    rate = math.log(side * MAX_INTERVAL_GROWTH) / 0.01
+    defects = made_defects([0.0] * 10, transitions=None, growth_rate=rate)
+    monkeypatch.setattr(judgement_module, "defects_of", lambda *_, **__: defects)
+    assert status(moving())[0] == expected
+    metrics = {"energy_drift_max": 0.0} | defect_metrics(defects, None)
+    (is_ok,) = clearly_ok([SCENE], METHOD, [DONE], [SCENE.samples], [metrics], np.ones(1))
+    assert is_ok == (expected == "ok")
 
 
 NOTHING = Trajectory(np.empty(0), np.empty((0, 4)), np.empty((0, 4)))

@@ -73,12 +73,13 @@ def test_what_the_rule_takes_holds(name: str) -> None:
     chosen = scene(name)
     if singular_reason(chosen) or name in _NOTHING_HOLDS:
         pytest.skip("refused, or beyond every method")
-    stored = None if name == "extreme/hour-chaos" else reference(name)  # an hour of chaos: by its energy
+    is_chaos = name == "extreme/hour-chaos"  # for an hour, in samples of 10 s: only the energy is known
+    stored = None if is_chaos else reference(name)
     for method in choose(chosen, DEFAULT_METHODS)[0]:
         if is_corrected(method):
             result = solve(method, chosen, {}, time_limit_s=120.0)
             verdict = judge(chosen, result, stored)
-            assert verdict.status == "ok", f"{method}: {verdict.message}"
+            assert verdict.status == ("unchecked" if is_chaos else "ok"), f"{method}: {verdict.message}"
 
 
 @pytest.mark.parametrize(
