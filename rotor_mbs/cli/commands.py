@@ -13,6 +13,7 @@ import time
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import asdict
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -215,13 +216,17 @@ def modes(arguments: argparse.Namespace) -> int:
 def compare(arguments: argparse.Namespace) -> int:
     """Data of another program against a scene's reference: a table, its page, the numbers as a results file."""
     from rotor_mbs.report.pages.comparison import compare as compare_data
+    from rotor_mbs.runs.output_files import refuse_foreign
+    from rotor_mbs.runs.table import is_of_this_program
     from rotor_mbs.studies.compare_data import as_dictionary
 
+    stored = arguments.output / "comparison.h5"
+    refuse_foreign(stored, partial(is_of_this_program, kind="comparison"))  # before anything is computed
     found = compare_data(
         arguments.data, only_scene(arguments.scene), columns=arguments.columns, tolerance=arguments.tolerance,
         timeout=arguments.timeout,
     )  # fmt: skip
-    page, stored = found.to_html(arguments.output), arguments.output / "comparison.h5"
+    page = found.to_html(arguments.output)
     found.save(stored)
     if arguments.json:
         print(json.dumps(as_dictionary(found.verdict), ensure_ascii=False, indent=1))

@@ -405,8 +405,9 @@ def _point_records(stored: Table) -> Iterator[Record]:
 
 
 def write_records(path: Path, records: Sequence[Record]) -> None:
-    """A file with these records alone, atomically. Raises StoreError."""
-    with new_file(path) as file:
+    """A file with these records alone, atomically. Raises StoreError; InputError where `path` is a file without records
+    of the first one's kind, which is not replaced."""
+    with new_file(path, records[0].kind if records else "") as file:
         put_attributes(file, {**versions(), **machine()})
         for record in records:
             group = new_group(file, "/".join((record.kind, record.scene, record.name)))

@@ -983,24 +983,29 @@ def stored_digests(group: Any) -> dict[str, str]:
 
 
 @contextmanager
-def new_file(path: Path) -> Iterator[Any]:
+def new_file(path: Path, kind: str = "") -> Iterator[Any]:
     """A new HDF5 file, put in the place of `path` when all of it is written and on the disk.
 
     It is made in memory: HDF5 does not survive a disk that fills up under it, a plain write does. Raises StoreError
-    where the file cannot be written; what stood at `path` before then still stands.
+    where the file cannot be written, InputError where `path` is not `is_of_this_program`; what stood there before then
+    still stands.
     """
     memory = {"driver": "core", "backing_store": False, "block_size": 1 << 20}
     with begin_file(f"{path.name}.{threading.get_ident()}", **memory) as file:
         yield file
         file.flush()
         image = file.id.get_file_image()
-    replace_file(path, image, is_of_this_program)
+    replace_file(path, image, functools.partial(is_of_this_program, kind=kind))
 
 
-def is_of_this_program(path: Path) -> bool:
+def is_of_this_program(path: Path, kind: str = "") -> bool:
+    """Whether it is a file that this program wrote; with `kind`, one that has records of this kind."""
     try:
         with h5py.File(path, "r") as file:
-            return bool(attribute(file, "format") == FORMAT)
+            is_own = bool(attribute(file, "format") == FORMAT)
+            if is_own and kind:
+                return kind in file and any("record" in group.attrs for group in groups_in(file[kind]))
+            return is_own
     except (OSError, RuntimeError, ValueError):
         return False
 

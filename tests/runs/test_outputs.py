@@ -109,8 +109,9 @@ OUTPUTS = {
     "stability": (["stability", "check/held", "-m", "lagrange/dop853", "-j", "1", "-o"], "results"),
     "reference": (["reference", "check/held", "-j", "1", "-o"], "results"),
     "sweep": (["sweep", "{sweep}", "-j", "1", "-o"], "sweep"),
+    "compare": (["compare", "{results}", "--scene", "check/held", "-o"], ""),
 }
-_QUICK_OUTPUTS = {"export csv", "check json", "run", "sweep"}  # one of each kind of file
+_QUICK_OUTPUTS = {"export csv", "check json", "run", "sweep", "compare"}  # one of each kind of file
 
 
 @pytest.fixture(scope="module")
@@ -145,9 +146,10 @@ def test_an_output_replaces_nothing_but_its_own_earlier_output(
     suffix = ".webp" if output == "animate" else ".file"
     words = [word.format(results=kinds["results"], sweep=dataset.with_name("s.toml")) for word in words]
     for kind, path in kinds.items():
-        there = tmp_path / f"{kind}{suffix}"
+        there = tmp_path / kind / "comparison.h5" if output == "compare" else tmp_path / f"{kind}{suffix}"
+        there.parent.mkdir(exist_ok=True)
         there.write_bytes(path.read_bytes())
-        ended = rotor_mbs(*words, there)
+        ended = rotor_mbs(*words, there.parent if output == "compare" else there)
         if kind == own:
             assert ended.status == 0, ended.err
         else:

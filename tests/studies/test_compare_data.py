@@ -15,7 +15,7 @@ import rotor_mbs as rm
 from rotor_mbs.cli import main
 from rotor_mbs.models.lagrange import reference
 from rotor_mbs.report.pages.comparison import verdict_of
-from rotor_mbs.runs.read import read_records
+from rotor_mbs.runs.read import read_records, write_records
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.studies.compare_data import as_dictionary
 from rotor_mbs.testing import assert_agrees
@@ -138,6 +138,9 @@ def test_the_stored_comparison_has_data_reference_and_errors_in_si(run: rm.Run, 
         xarray.testing.assert_equal(data, found.to_xarray())
     (record,) = read_records(tmp_path / "c.h5", "comparison")
     assert as_dictionary(verdict_of(record)) == as_dictionary(found.verdict)
+    write_records(tmp_path / "other.h5", [replace(record, kind="modes")])
+    with pytest.raises(rm.InputError, match="is not replaced"):
+        found.save(tmp_path / "other.h5")
 
 
 def test_a_test_of_another_project(run: rm.Run) -> None:

@@ -137,7 +137,8 @@ class DataComparison:
         return write_page(folder, "comparison", comparison_page(self.record), versions() | machine())
 
     def save(self, path: str | os.PathLike[str]) -> None:
-        """Save data, reference, errors and verdict as a results file. Raises StoreError if it cannot be written."""
+        """Save data, reference, errors and verdict as a results file. An earlier comparison is replaced; raises
+        InputError for other files, StoreError if it cannot be written."""
         write_records(Path(path), [self.record])
 
     def __repr__(self) -> str:

@@ -94,7 +94,8 @@ class Modes(SceneModes):
         return linear_dataset(self.rest if state == "rest" else self.rotation, need_xarray())
 
     def save(self, path: str | os.PathLike[str]) -> Path:
-        """Save the modes in a file that `rotor-mbs report` reads. An existing file is replaced."""
+        """Save the modes in a file that `rotor-mbs report` reads. A file of modes is replaced; raises InputError for
+        other files."""
         write_records(Path(path), to_records(self))
         return Path(path)
 
