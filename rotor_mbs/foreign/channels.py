@@ -288,10 +288,10 @@ def find_channels(
                 f"{ALLOWED_UNITS[channel.kind]}"
             )
         chosen[channel] = replace(entry, unit=unit or channel.unit)
-        line = f"{channel.name} = {'-' if entry.sign < 0 else ''}{entry.column!r}"
-        if entry.offset:
-            line += f" {entry.offset:+g}"
-        line += f" [{unit or channel.unit}]"
+        term = f"{entry.column!r} {entry.offset:+g}" if entry.offset else repr(entry.column)
+        if entry.sign < 0:
+            term = f"-({term})" if entry.offset else f"-{term}"
+        line = f"{channel.name} = {term} [{unit or channel.unit}]"
         notes = [note for note, holds in (("unit assumed", not unit), ("wrapped", entry.wrapped)) if holds]
         lines.append(f"{line} ({', '.join(notes)})" if notes else line)
     shown = shown_names(list(table.columns))

@@ -162,7 +162,7 @@ def test_a_mapping_says_column_unit_sign_zero_and_subset(tmp_path: Path) -> None
     data = load_data(path, SCENE, mapping)
     assert data.columns == [0, 6]
     np.testing.assert_allclose(data.values, STATES[:, [0, 6]], atol=1e-13)
-    assert data.read[1] == "rotor = -'a' +90 [deg]"
+    assert data.read[1] == "rotor = -('a' +90) [deg]"
 
 
 def test_results_of_this_program_are_data_too(results: Path, tmp_path: Path) -> None:
