@@ -259,7 +259,7 @@ class System:
         try:
             if not solver.SolveSystem(self._mbs, settings):
                 failure = _one_line(solver.GetErrorString()) or _NO_REASON
-        except (_engine.ExudynError, RuntimeError, SystemError) as exc:
+        except (_engine.ExudynError, OutOfTimeError, RuntimeError, SystemError) as exc:
             if _caused_by(exc, KeyboardInterrupt):
                 raise KeyboardInterrupt from exc
             failure = MESSAGE
