@@ -13,6 +13,7 @@ import tempfile
 import weakref
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from html import escape
 from pathlib import Path
@@ -29,7 +30,7 @@ from rotor_mbs.methods.time_limit import checked_seconds
 from rotor_mbs.runs.design import MISSING, RUNS
 from rotor_mbs.runs.output_files import replace_file
 from rotor_mbs.runs.read import StoredRun, StoredScene, is_sweep, open_results
-from rotor_mbs.runs.sweeps import StoredSweep, parameter_name
+from rotor_mbs.runs.sweeps import ERROR_GROWTH, METRICS, StoredSweep, parameter_name
 from rotor_mbs.runs.table import TableFile, is_of_this_program, text_of
 from rotor_mbs.scenario.catalogue import list_scenes, only_scene, scene_of
 from rotor_mbs.scenario.scene import Scene, load_scene, parse_scene
@@ -88,20 +89,20 @@ def load(path: str | os.PathLike[str]) -> Scene:
 
 @overload
 def run(  # type: ignore[overload-overlap]
-    scene: Scene | str, method: str = ..., *, timeout: float = ..., reference: bool = ..., workers: int = ...,
-    **settings: object,
+    scene: Scene | str | os.PathLike[str], method: str = ..., *, timeout: float = ..., reference: bool = ...,
+    workers: int = ..., **settings: object,
 ) -> Run: ...  # fmt: skip
 
 
 @overload
 def run(
-    scene: Scene | str, method: Sequence[str], *, timeout: float = ..., reference: bool = ..., workers: int = ...,
-    **settings: object,
+    scene: Scene | str | os.PathLike[str], method: Sequence[str], *, timeout: float = ..., reference: bool = ...,
+    workers: int = ..., **settings: object,
 ) -> Runs: ...  # fmt: skip
 
 
 def run(
-    scene: Scene | str,
+    scene: Scene | str | os.PathLike[str],
     method: str | Sequence[str] = "lagrange/taylor",
     *,
     timeout: float = float("inf"),
@@ -217,11 +218,14 @@ class Run(Solution):
         return RunPlots(self, self.reference)
 
     def _repr_html_(self) -> str:
-        return super()._repr_html_() + (self.plot()._repr_svg_() if len(self.time) else "")
+        drawn = ""
+        with suppress(InputError):  # without samples, or without angles and rates
+            drawn = self.plot()._repr_svg_()
+        return super()._repr_html_() + drawn
 
 
 def sweep(
-    scene: Scene | str,
+    scene: Scene | str | os.PathLike[str],
     parameters: Mapping[str, object],
     *,
     methods: str | Sequence[str] = ("lagrange/taylor",),
@@ -301,7 +305,7 @@ def listed(name: str, values: object) -> list[str]:
     """Texts of a list, or of anything that can be gone through once. Raises InputError."""
     texts: list[Any] = list(values) if isinstance(values, Iterable) else [values]
     if isinstance(values, str) or not all(isinstance(text, str) for text in texts):
-        raise InputError(f"{name}: {values!r}; allowed: a name, or a list of names")
+        raise InputError(f"{name}: {values!r}; allowed: a name, or a list of names (str)")
     return texts
 
 
@@ -470,29 +474,27 @@ class Runs(Mapping[Any, Any]):
 
     def _run_of_sweep(self, number: int) -> Run:
         sweep = self._sweep
-        facts, row = sweep.attributes, number - int(sweep.column("run")[0])
+        design, row = sweep.attributes, number - int(sweep.column("run")[0])
         values = {key: float(sweep.column(parameter_name(key))[row]) for key in sweep.keys}
-        base = parse_scene(str(facts["scene_toml"]), str(facts["base_scene"]))
+        base = parse_scene(str(design["scene_toml"]), str(design["base_scene"]))
         scene = base.replace(**values, samples=len(sweep.column("time")))
+        facts = {name: sweep.column(name)[row] for name in METRICS | ERROR_GROWTH if name in sweep.columns}
         arrays: dict[str, Any] = {}
         for quantity in known_quantities(scene.outputs):
-            if quantity.name in sweep.columns:
+            if quantity.name in sweep.columns and quantity.name not in facts:
                 arrays[quantity.name] = np.array(sweep.column(quantity.name)[row], float)
         known = [~np.isnan(array.reshape(len(array), -1)).any(axis=1) for array in arrays.values()]
         samples = int(np.all(known, axis=0).sum()) if known else 0
         blank = np.full((samples, 1 + len(scene.blades)), np.nan)
         arrays = {"angles": blank, "rates": blank, **{name: array[:samples] for name, array in arrays.items()}}
-        status = STATUSES[int(sweep.column("status")[row])]
-        message = text_of(sweep.column("message")[row])
-        time = np.array(sweep.column("time")[:samples])
-        metrics = {
-            name: float(sweep.column(name)[row])
-            for name in ("energy_drift_max", "rotor_angle_max", "rotor_rate_max", "pitch_max")
-        }
+        trajectory = Trajectory(np.array(sweep.column("time")[:samples]), **arrays)
+        status, message = STATUSES[int(facts["status"])], text_of(facts["message"])
+        steps, evaluations = (int(facts[name]) if facts[name] >= 0 else None for name in ("steps", "rhs_evaluations"))
+        integration = Integration(status == "ok", message, float(facts["time_reached"]), steps, evaluations)
         method = sweep.methods[int(sweep.column("method_code")[row])]
-        settings = json.loads(str(facts["settings"]))
+        metrics = {name: value.item() for name, value in facts.items() if value.dtype == float and value == value}
         return Run(
-            scene, method, Trajectory(time, **arrays), Integration(status == "ok", message), settings, status=status,
+            scene, method, trajectory, integration, json.loads(str(design["settings"])), run_times_s=[], status=status,
             message=message, metrics=metrics,
         )  # fmt: skip
 
@@ -503,7 +505,9 @@ class Runs(Mapping[Any, Any]):
         return f"{self.scene or self.path}\n{self.table()}"
 
     def _repr_html_(self) -> str:
-        drawn = self.plot.error()._repr_svg_() if self.scene and REFERENCE in self else ""
+        drawn = ""
+        with suppress(InputError):  # of several scenes, without a reference or without angles
+            drawn = self.plot.error()._repr_svg_()
         return f"<p>{escape(self.scene or str(self.path))}</p>{self.table()._repr_html_()}{drawn}"
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from typing import Any
 
 from rotor_mbs.report.pages.comparison import DataComparison, compare
@@ -9,7 +10,7 @@ from rotor_mbs.scenario.scene import Scene
 
 
 def assert_agrees(
-    time: Any, angles: Any, *, scene: Scene | str, rates: Any = None, tolerance: float = 1e-6
+    time: Any, angles: Any, *, scene: Scene | str | os.PathLike[str], rates: Any = None, tolerance: float = 1e-6
 ) -> DataComparison:
     """Raise AssertionError, with the table of the comparison, if a trajectory does not agree with a scene.
 

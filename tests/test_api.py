@@ -10,7 +10,9 @@ import numpy as np
 import pytest
 
 import rotor_mbs as rm
+from rotor_mbs.testing import assert_agrees
 
+METHOD = "lagrange/dop853"
 SHORT = {"duration": 1.0, "samples": 101}
 
 
@@ -31,14 +33,17 @@ def test_importing_the_package_imports_nothing_else() -> None:
     assert loaded == ["rotor_mbs"]
 
 
-def test_every_function_takes_a_scene_by_its_name(tmp_path: Path) -> None:
-    run = rm.run("check/held", "lagrange/dop853")
-    assert run.scene == rm.scene("check/held")
-    assert list(rm.run("check/held", ["lagrange/dop853"])) == ["reference", "lagrange/dop853"]
-    assert rm.compare({"time": run.time, "angles": run.angles}, "check/held").agrees
-    assert rm.modes("check/held").scene == "check/held"
-    assert rm.sweep("check/held", {"gravity": [0.0]}, methods="lagrange/dop853").statuses == {"ok": 1}
-    assert [path.name for path in rm.export("check/held", "csv", tmp_path / "a.csv")] == ["a.csv"]
+def test_every_function_takes_a_scene_by_its_name_or_path(tmp_path: Path) -> None:
+    path = tmp_path / "mine.toml"
+    path.write_text(rm.scene("paper/fig03").text)
+    for scene in ("paper/fig03", path):
+        run = rm.run(scene, "lagrange/dop853")
+        assert run.scene.text == rm.scene("paper/fig03").text
+        assert list(rm.run(scene, ["lagrange/dop853"])) == ["reference", "lagrange/dop853"]
+        assert assert_agrees(run.time, run.angles, scene=scene).agrees
+        assert rm.modes(scene).scene == run.scene.name
+        assert rm.sweep(scene, {"gravity": [0.0]}, methods="lagrange/dop853").statuses == {"ok": 1}
+        assert [path.name for path in rm.export(scene, "csv", tmp_path / "a.csv")] == ["a.csv"]
     with pytest.raises(rm.InputError, match="paper/fig08"):
         rm.run("paper/fig8", "lagrange/dop853")
 
@@ -111,6 +116,14 @@ def test_what_was_not_asked_for_is_refused_by_name(tmp_path: Path) -> None:
         run.plot().save(tmp_path / "motion.bmp")
     run.plot().save(tmp_path / "motion.png")
     assert (tmp_path / "motion.png").read_bytes().startswith(b"\x89PNG")
+    # Read from a file that does not have them: NaN, and no plot of them.
+    scene = scene.replace(outputs=["energy"])
+    stored, of_sweep = rm.run(scene, [METHOD])[METHOD], rm.sweep(scene, {"gravity": [9.8]}, methods=METHOD)[0]
+    assert np.isnan([stored.angles, stored.rates, of_sweep.angles, of_sweep.rates]).all()
+    for draw in (stored.plot, stored.plot.error, stored.plot.defects, of_sweep.plot.rotor):
+        with pytest.raises(rm.InputError, match="angles are not stored; allowed: angles in `outputs`"):
+            draw()
+    assert "<svg" not in stored._repr_html_() + rm.run(scene, [METHOD])._repr_html_()
 
 
 def test_a_sweep_gives_labelled_runs_of_each_parameter_value(tmp_path: Path) -> None:
@@ -128,6 +141,8 @@ def test_a_sweep_gives_labelled_runs_of_each_parameter_value(tmp_path: Path) -> 
     np.testing.assert_array_equal(data.at("angles", 7), data.column("angles")[:, 7])
     assert repr(rm.open(tmp_path / "stiffness.h5")) == f"{tmp_path / 'stiffness.h5'}: 3 runs: 3 ok" == repr(data)
     assert data[1].status == "ok"
+    assert data[1].metrics["defect_max"] == data.column("defect_max")[1]
+    assert "run time" not in repr(data[1])
     np.testing.assert_array_equal(data[1].angles, data.column("angles")[1])
     by_stiffness = data.to_xarray(unstack=True).angles.sel(bearing_stiffness=1e3)
     np.testing.assert_array_equal(by_stiffness, data.column("angles")[1])

@@ -75,7 +75,7 @@ def test_wrong_parameters_are_a_line(parameters: Any) -> None:
 
 @pytest.mark.parametrize("method", [None, 3, [3]])
 def test_wrong_methods_are_a_line(method: Any) -> None:
-    with pytest.raises(InputError, match=r"^method: .*; allowed: a name, or a list of names$"):
+    with pytest.raises(InputError, match=r"^method: .*; allowed: a name, or a list of names \(str\)$"):
         rm.run(_scene(), method)
 
 

@@ -181,7 +181,7 @@ def _changed_metric(run: StoredRun, metrics: Metrics, solution: Solution) -> tup
         "defect_drift": floor * DRIFT_ROWS * growth,
         "angle_error_predicted": floor * HORIZON_GROWTH,
     }
-    # Angles and rates that are not stored are zeros here.
+    # Angles and rates that are not stored are NaN here.
     lacking = set() if solution.scene.wants("rates") else {"rotor_rate_max"}
     if not solution.scene.wants("angles"):
         lacking |= {"rotor_angle_min", "rotor_angle_max"}

@@ -212,9 +212,11 @@ class ComparisonPlots:
         return self.error()
 
     def error(self) -> Panels:
-        """Plot the largest angle error (rad) of each run over time. Raises InputError without a reference."""
+        """Plot the largest angle error (rad) of each run over time. Raises InputError without angles or reference."""
         if self._reference is None:
             raise InputError("no reference to compare with; allowed: run(..., reference=True) computes one")
+        for run in self._runs:
+            _quantity(run, "angles")
         series = self._series([angle_error(run.trajectory, self._reference) for run in self._runs])
         return errors(series, "largest angle error (rad)", horizon(self._reference)).with_legend()
 
@@ -224,13 +226,14 @@ class ComparisonPlots:
         for run in self._runs:
             if len(run.time) < 2:
                 raise InputError("the run has fewer than two samples; no interval to plot")
-            sizes = interval_defects(run.scene, run.time, run.angles, run.rates).sizes
+            angles, rates = _quantity(run, "angles"), _quantity(run, "rates")
+            sizes = interval_defects(run.scene, run.time, angles, rates).sizes
             series.append(Series(run.time[1:], sizes, look_of(run.method)))
         return errors(series, "defect (rad)").with_legend()
 
     def rotor(self) -> Panels:
         """Plot the rotor angle (rad) of each run over time."""
-        series = self._series([run.angles[:, 0] for run in self._runs])
+        series = self._series([_quantity(run, "angles")[:, 0] for run in self._runs])
         return lines([("rotor angle (rad)", series)]).with_legend()
 
     def energy_error(self) -> Panels:
@@ -254,10 +257,11 @@ class RunPlots(ComparisonPlots):
         self._run = run
 
     def __call__(self) -> Panels:
-        """Plot angles (rad) and rates (rad/s) of rotor and pitches over time (s)."""
+        """Plot angles (rad) and rates (rad/s) of rotor and pitches over time (s). Raises InputError without both."""
         run = self._run
         horizon_s = None if self._reference is None else horizon(self._reference)
-        return motion(_some(run.time), run.angles, run.rates, horizon_s)
+        angles, rates = (None if np.isnan(values).all() else values for values in (run.angles, run.rates))
+        return motion(_some(run.time), _quantity(run, "angles") if rates is None else angles, rates, horizon_s)
 
     def energy(self) -> Panels:
         """Plot kinetic and potential energy, and their sum minus the work (J). Raises InputError without energies."""
@@ -295,8 +299,12 @@ def _some(time: Array) -> Array:
 
 
 def _quantity(run: Solution, name: str) -> Array:
+    """Raises InputError where the run does not have it, or its file does not."""
     _some(run.time)
     try:
-        return run[name]
+        values = run[name]
     except KeyError as exc:
         raise InputError(f"{run.scene.name} {run.method} has no {exc.args[0]}") from exc
+    if np.isnan(values).all():
+        raise InputError(f"{run.scene.name} {run.method}: {name} are not stored; allowed: {name} in `outputs`")
+    return values

@@ -187,12 +187,11 @@ class StoredRun:
         return faults
 
     def trajectory(self, scene: Scene) -> Trajectory | None:
-        """Its samples; None where its arrays cannot be used. Angles and rates that were not asked for are zeros, which
-        are not judged."""
+        """Its samples; None where its arrays cannot be used. Angles and rates that are not stored are NaN."""
         if self.faults(scene, complete=False):
             return None
         time = self.array("time")
-        blank = np.zeros((len(time), 1 + len(scene.blades)))
+        blank = np.full((len(time), 1 + len(scene.blades)), np.nan)
         names = {quantity.name for quantity in known_quantities(scene.outputs)}
         arrays = {name: self.array(name) for name in names if name in self}
         return Trajectory(**{"time": time, "angles": blank, "rates": blank, **arrays})

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 from collections.abc import Iterable, Sequence
 from pathlib import Path
@@ -108,9 +109,15 @@ def only_scene(argument: str) -> Scene:
     return scenes[0]
 
 
-def scene_of(given: Scene | str) -> Scene:
-    """The scene itself, or the one that a name or the path of a TOML file means."""
-    return only_scene(given) if isinstance(given, str) else given
+def scene_of(given: Scene | str | os.PathLike[str]) -> Scene:
+    """The scene itself, or the one that a name or the path of a TOML file means. Raises InputError."""
+    from rotor_mbs.scenario.scene import Scene
+
+    if isinstance(given, str | os.PathLike):
+        return only_scene(os.fspath(given))
+    if not isinstance(given, Scene):
+        raise InputError(f"scene: a {type(given).__name__}; allowed: a Scene, a scene's name, a TOML file")
+    return given
 
 
 def shipped_scene(name: str) -> Scene | None:

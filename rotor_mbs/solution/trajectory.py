@@ -31,8 +31,9 @@ from rotor_mbs.solution.quantities import sample_times as sample_times
 class Trajectory:
     """Samples of a run at equally spaced times, up to its end (n rows, all finite). Angles are unwrapped.
 
-    Angles and rates have the shape (n, 1 + blades). Other quantities are in `quantities` by name; built-in ones are
-    also attributes, None if the scene does not request them or the model does not compute them."""
+    Angles and rates have the shape (n, 1 + blades); those of a file that does not have them are NaN. Other quantities
+    are in `quantities` by name; built-in ones are also attributes, None if the scene does not request them or the model
+    does not compute them."""
 
     # An array that is set elsewhere than in `quantities` would not be found.
     __slots__ = ("angles", "quantities", "rates", "refined", "time")
@@ -183,7 +184,7 @@ class Solution:
     integration : report of the engine.
     settings : all settings of the method.
     setup_time_s, run_times_s, output_time_s : times (s) to build the model, for each integration, and to compute the
-        samples.
+        samples; no run times if they are unknown.
     status, message : status determined from the samples, and its reason; "" if not assessed.
     metrics : numbers by their names in a results file, such as energy_drift_max.
 
@@ -209,12 +210,12 @@ class Solution:
 
     @property
     def angles(self) -> Array:
-        """Angles of the rotor, then the pitch of each blade: (n, 1 + blades) rad."""
+        """Angles of the rotor, then the pitch of each blade: (n, 1 + blades) rad; NaN if not stored."""
         return self.trajectory.angles
 
     @property
     def rates(self) -> Array:
-        """Rates of the rotor, then the pitch of each blade: (n, 1 + blades) rad/s."""
+        """Rates of the rotor, then the pitch of each blade: (n, 1 + blades) rad/s; NaN if not stored."""
         return self.trajectory.rates
 
     @property
@@ -263,14 +264,15 @@ class Solution:
         return xarray.Dataset(variables, coordinates, {**facts, **self.metrics})
 
     def _summary(self) -> dict[str, str]:
-        reached = f"{self.time[-1]:g} s of {self.scene.duration:g} s" if len(self.time) else "no sample"
+        last = float(self.time[-1]) if len(self.time) else self.integration.time_reached
+        reached = f"{last:g} s of {self.scene.duration:g} s, {len(self.time)} samples"
         rows = {
             "method": self.method,
             "status": self.status or "not assessed",
             "message": self.message,
-            "reached": f"{reached}, {len(self.time)} samples",
+            "reached": reached,
             "steps": "" if self.integration.steps is None else str(self.integration.steps),
-            "run time": f"{float(np.median(self.run_times_s)):.3g} s",
+            "run time": f"{float(np.median(self.run_times_s)):.3g} s" if self.run_times_s else "",
         }
         return {name: text for name, text in rows.items() if text}
 

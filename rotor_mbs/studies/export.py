@@ -27,7 +27,7 @@ from rotor_mbs.solution import quantities
 from rotor_mbs.studies.stored_references import frozen_solution
 
 
-def export(scene: Scene | str, to: str, output: str | os.PathLike[str]) -> list[Path]:
+def export(scene: Scene | str | os.PathLike[str], to: str, output: str | os.PathLike[str]) -> list[Path]:
     """Write a scene in a format of other programs.
 
     Parameters

@@ -14,6 +14,7 @@ import pytest
 from support.commands import refusal, rotor_mbs
 from support.sweeps import made_sweep, run_local, starts_file
 
+import rotor_mbs as rm
 from rotor_mbs.methods.catalogue import find_method
 from rotor_mbs.runs.design import MISSING
 from rotor_mbs.runs.pool import SerialPool
@@ -176,10 +177,14 @@ def test_the_error_growth_is_that_of_the_frozen_reference(tmp_path: Path) -> Non
     (scene,) = find_scenes(["paper/fig11"])
     assert scene.gravity == 9.8
     frozen = frozen_solution(scene).trajectory
-    with h5py.File(made_sweep(tmp_path, WITH_GROWTH)) as file:
+    path = made_sweep(tmp_path, WITH_GROWTH)
+    with h5py.File(path) as file:
         growth, until = file["error_growth"][()], file["horizon_s"][()]
         assert file["horizon_s"].attrs["units"] == "s"
     assert growth[1] == pytest.approx(np.maximum.accumulate(frozen.error_growth)[-1], rel=1e-3)
     assert until[1] == horizon(frozen)
     assert growth[0] < growth[1]
     assert np.array_equal(growth[:2], growth[2:])  # of the motion, not of the method
+    run = rm.open(path)[1]
+    assert (run.metrics["error_growth"], run.metrics["horizon_s"]) == (growth[1], until[1])
+    assert "reached: 10 s of 10 s, 0 samples" in repr(run)

@@ -41,7 +41,7 @@ from rotor_mbs.studies.compare_data import (
 
 def compare(
     data: str | os.PathLike[str] | Mapping[str, Any],
-    scene: Scene | str,
+    scene: Scene | str | os.PathLike[str],
     *,
     columns: str | os.PathLike[str] | Mapping[str, Any] | None = None,
     tolerance: float = DEFAULT_TOLERANCE,

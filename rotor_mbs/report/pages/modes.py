@@ -40,7 +40,7 @@ from rotor_mbs.studies.modes import compute_modes
 _MARKS = ("o", "s", "^", "D", "v", "P", "x")
 
 
-def modes(scene: Scene | str, speeds: Sequence[float] = ()) -> Modes:
+def modes(scene: Scene | str | os.PathLike[str], speeds: Sequence[float] = ()) -> Modes:
     """Compute natural frequencies, damping ratios and mode shapes of a scene with every model that can be linearized.
 
     Modes at rest under gravity, and over `speeds` in steady rotation without gravity (Campbell diagram); Floquet
