@@ -295,6 +295,12 @@ def sweep(arguments: argparse.Namespace) -> int:
             else:
                 print(f"{plan.runs:,} runs with {', '.join(plan.methods)}: {size / 1e6:,.3f} MB")
             return 0
+        stream = sys.stderr if arguments.json else sys.stdout  # standard output is the JSON's alone
+        if not plan.runs:  # as in a job array with more parts than runs
+            if arguments.json:
+                print(json.dumps({"event": "end", "runs": 0, "made": 0, "statuses": {}, "files": [], "seconds": 0.0}))
+            print("no runs in this part", file=stream)
+            return 0
         output = arguments.output or Path(f"{plan.sweep.name}.h5")
         made: Counter[str] = Counter()
 
@@ -311,7 +317,6 @@ def sweep(arguments: argparse.Namespace) -> int:
             is_full = isinstance(exc.__cause__, OSError) and exc.__cause__.errno in _DISK_IS_FULL
             # What is stored stays, the same command continues; else nothing was begun.
             return EXIT_FAILED if is_full or made else EXIT_BAD_INPUT
-        stream = sys.stderr if arguments.json else sys.stdout  # standard output is the JSON's alone
         if arguments.json:
             facts = {"runs": result.runs, "made": result.made, "statuses": result.statuses, "files": [str(result.path)]}
             print(json.dumps({"event": "end", **facts, "seconds": round(result.seconds, 3)}))

@@ -81,6 +81,9 @@ def test_parts_of_a_job_array_are_the_slices_of_the_whole(tmp_path: Path) -> Non
     for name in ("run", "angles", "initial_angles_1", "status", "split", "crc32"):
         joined = np.concatenate([part.column(name) for part in parts])
         np.testing.assert_array_equal(joined, whole.column(name), err_msg=name)
+    empty = rotor_mbs("sweep", tmp_path / "s.toml", "--part", "1/9", "-o", tmp_path / "empty.h5", "-j", 1)
+    assert (empty.status, empty.out) == (0, "no runs in this part\n")
+    assert not (tmp_path / "empty.h5").exists()
 
 
 # Rows of other versions, and damaged ones

@@ -88,20 +88,28 @@ def _responses(sweep: StoredSweep, ok: NDArray[np.bool_]) -> list[Picture]:
     axes = {key: sweep.column(parameter_name(key)) for key in sweep.keys}
     labels = {key: _axis(field_name(key), sweep.columns[parameter_name(key)].units) for key in sweep.keys}
     shape = json.loads(sweep.attributes.get("shape", "[]"))  # of a grid: values along every axis, slowest first
-    if len(shape) == len(axes) == 2 and min(shape) > 1:
-        rows, columns = shape
-        y, x, grid = (numbers[: rows * columns].reshape(rows, columns) for numbers in (*axes.values(), values))
-        y_label, x_label = labels.values()
-        drawn = panels((3.8,), x_label)
-        (x_edges, x_scale), (y_edges, y_scale) = _edges(x[0]), _edges(y[:, 0])
-        norm = "log" if _is_wide(grid) else "linear"
-        drawn.axes[0].set(xscale=x_scale, yscale=y_scale, ylabel=y_label)
-        drawn.axes[0].grid(visible=False)
-        mesh = drawn.axes[0].pcolormesh(x_edges, y_edges, grid, cmap="cividis", norm=norm, rasterized=True)
-        with style():
-            drawn.figure.colorbar(mesh, ax=drawn.axes[0]).set_label(label)
-        drawn.figure.subplots_adjust(left=0.18)
-        return [picture(drawn, "grid", with_capital(quantity))]
+    if len(shape) == len(axes) == 2:
+        # By one method, as those of the others would look the same; runs that a part of a sweep does not have are NaN.
+        codes = np.asarray(sweep.column("method_code"))
+        shown = codes == codes[np.isfinite(values)][0]
+        (y, rows), (x, columns) = (np.unique(numbers[shown], return_inverse=True) for numbers in axes.values())
+        if min(len(y), len(x)) > 1:
+            grid = np.full((len(y), len(x)), np.nan)
+            grid[rows, columns] = values[shown]
+            y_label, x_label = labels.values()
+            drawn = panels((3.8,), x_label)
+            (x_edges, x_scale), (y_edges, y_scale) = _edges(x), _edges(y)
+            norm = "log" if _is_wide(grid) else "linear"
+            drawn.axes[0].set(xscale=x_scale, yscale=y_scale, ylabel=y_label)
+            drawn.axes[0].grid(visible=False)
+            if x_scale == "linear":
+                drawn.axes[0].locator_params("x", nbins=4)
+            mesh = drawn.axes[0].pcolormesh(x_edges, y_edges, grid, cmap="cividis", norm=norm, rasterized=True)
+            with style():
+                drawn.figure.colorbar(mesh, ax=drawn.axes[0]).set_label(label)
+            drawn.figure.subplots_adjust(left=0.18)
+            method = f", by {sweep.methods[codes[shown][0]]}" if len(sweep.methods) > 1 else ""
+            return [picture(drawn, "grid", with_capital(quantity) + method)]
     pictures = []
     known = np.isfinite(values)
     for key in sweep.keys[:_MAX_RESPONSES]:
@@ -124,7 +132,8 @@ def _is_wide(values: Array) -> bool:
 
 
 def _edges(values: Array) -> tuple[Array, str]:
-    """(n + 1,) Edges of the cells about values, and the scale of their axis: logarithmic where ratios are equal."""
+    """(n + 1,) Edges of the cells about ascending values, and the scale of their axis: logarithmic where ratios are
+    equal."""
     is_geometric = _is_wide(values) and np.ptp(np.diff(np.log(values))) < 0.01 * np.log(values[-1] / values[0])
     places = np.log(values) if is_geometric else values
     middles = 0.5 * (places[1:] + places[:-1])
