@@ -12,6 +12,7 @@ from support.commands import rotor_mbs
 from rotor_mbs.report.build import write_report
 from rotor_mbs.runs.read import read_records
 from rotor_mbs.scenario.catalogue import find_scenes
+from rotor_mbs.solution.status import STATUSES
 from rotor_mbs.studies.run import run_scenes
 from rotor_mbs.studies.stability import (
     OUTCOMES,
@@ -78,10 +79,14 @@ def test_runs_are_counted_by_folder() -> None:
         made_run("a", "diverged", "extreme/feather-1", false_success=True),
         made_run("a", "singular", "extreme/passage-1", has_reference=False),  # no motion exists: not counted
         made_run("b", "ok"),
+        made_run("printed/ode45", "completed"),
+        made_run("printed/ode45", "diverged"),
     ]
     table = suite_table(runs)
     assert table.head == ("method", "stiff", "extreme", "reported as success")
-    assert table.rows == [("a", "1+1 of 2", "0 of 1", "1"), ("b", "1 of 1", "", "0")]
+    printed = ("printed/ode45", "1 of 2 completed", "", "0")
+    assert table.rows == [("a", "1+1 of 2", "0 of 1", "1"), ("b", "1 of 1", "", "0"), printed]
+    assert {*STATUSES} - {"left_out", "worker_died"} <= {*OUTCOMES}  # the map shows whatever a stored run can have
 
 
 def test_an_interrupted_suite_goes_on_where_it_stopped(tmp_path: Path) -> None:
