@@ -64,6 +64,7 @@ CONVENTIONS = "CF-1.11, ACDD-1.3"
 # What every file is about: the attribute `keywords` of the ACDD conventions.
 KEYWORDS = "multibody dynamics, wind turbine rotor, Euler-Lagrange equations, model verification"
 DIGESTS = "digests"  # the attribute with the digests of a group
+SPLIT_OF = "split_of"  # the attribute of a split of a sweep's dataset, which is no table: name of the sweep's file
 _NOT_ATTRIBUTES = (DIGESTS, "CLASS", "NAME", "REFERENCE_LIST", "DIMENSION_LIST", "_Netcdf4Dimid", "_Netcdf4Coordinates")
 # The netCDF-4 library's name for the scale of a dimension without values.
 _WITHOUT_VALUES = "This is a netCDF dimension but not a netCDF variable."
@@ -537,6 +538,10 @@ def open_file(path: Path) -> Iterator[Any]:
                 f"{path}: format_version {version!r}, this program reads {FORMAT_VERSION}; allowed: a file of this "
                 "version, with its runs recomputed"
             )
+        with reading(path):
+            whole = attribute(file, SPLIT_OF)
+        if whole is not None:
+            raise StoreError(f"{path}: a split for Hugging Face datasets; allowed: the sweep's own file, {whole}")
         yield file
 
 

@@ -18,7 +18,7 @@ import numpy as np
 from rotor_mbs.runs.design import MISSING, Column
 from rotor_mbs.runs.output_files import replace_file
 from rotor_mbs.runs.sweeps import StoredSweep
-from rotor_mbs.runs.table import KEYWORDS, new_file
+from rotor_mbs.runs.table import KEYWORDS, SPLIT_OF, new_file
 from rotor_mbs.scenario.sweep import SPLITS
 from rotor_mbs.solution.status import STATUSES
 
@@ -78,6 +78,7 @@ def write_splits(path: Path | str, folder: Path) -> list[Path]:
             continue
         files.append(folder / f"{split}.h5")
         with new_file(files[-1]) as file:
+            file.attrs[SPLIT_OF] = Path(path).name
             for name, column in columns.items():
                 values = stored.column(name)[rows]
                 if values.dtype.kind == "S":  # a text is one value there

@@ -16,7 +16,8 @@ import numpy as np
 import pytest
 
 from rotor_mbs.cli import main
-from rotor_mbs.errors import InputError
+from rotor_mbs.errors import InputError, StoreError
+from rotor_mbs.runs.sweeps import StoredSweep
 from rotor_mbs.studies.sweep_metadata import write_splits
 
 ROOT = Path(__file__).parents[2]
@@ -86,6 +87,8 @@ def test_a_dataset_card_replaces_its_own_kind_only(dataset: Path, tmp_path: Path
     text = card.read_text()
     assert [file.name for file in files] == ["train.h5", "validation.h5", "test.h5"]
     assert all(f"path: {file.name}" in text for file in files)
+    with pytest.raises(StoreError, match=f"a split for .*; allowed: the sweep's own file, {dataset.name}"):
+        StoredSweep(files[0])
     write_splits(dataset, tmp_path)
     card.write_text("of somebody else")
     with pytest.raises(InputError, match="is not an output of this command"):
