@@ -134,7 +134,8 @@ def _of_run(
         faults = []
     hint = "every channel, row and number is present"
     if faults:
-        hint = f"{'; '.join(faults)}; stored as {run.status} {run.attributes.get('message', '')}".rstrip()
+        message = run.attributes.get("message", "")
+        hint = "; ".join([f"stored as {run.status}{': ' if message else ''}{message}", *faults])
     yield _of(run, "complete", "all", float(len(faults)), bounds, "faults", hint)
     if solution is None:
         return

@@ -159,7 +159,7 @@ def parse(argv: Sequence[str]) -> argparse.Namespace:
 
 def load_methods(arguments: argparse.Namespace) -> None:
     """In place of a Python file the names of its methods. Raises InputError for methods that are unknown."""
-    given = [name for name in ("method", "methods", "require") if name in arguments]
+    given = [name for name in ("method", "methods") if name in arguments]
     if given:
         from rotor_mbs.methods.catalogue import check_names  # late: other commands need not wait for it
 

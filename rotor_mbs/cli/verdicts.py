@@ -30,17 +30,21 @@ JSON = rb'\A\[\]\Z|\A\[\n \{\n  "check": "'
 def check(arguments: argparse.Namespace) -> int:
     """Prints every verdict that fails (with --verbose all), then a count; status 1 where one fails."""
     _refuse_foreign(arguments)
+    if arguments.require and arguments.file is None:
+        raise InputError("--require: allowed: with a FILE that is to have the runs")
     bounds = shipped_bounds().with_entries(read_bounds(arguments.bounds) if arguments.bounds else ())
     earlier = None if arguments.against is None else study.check_file(arguments.against, bounds)
     if earlier is not None and arguments.file is not None and is_sweep(arguments.against) != is_sweep(arguments.file):
         raise InputError(f"--against {arguments.against}: a file of another kind than {arguments.file}")
     if arguments.file is not None:
-        verdicts = study.check_file(arguments.file, bounds, arguments.require)
+        verdicts = study.check_file(arguments.file, bounds, arguments.require or ())
     else:
         with ProgressLine() as progress:
             verdicts = study.check_default_set(bounds, arguments.jobs, progress, arguments.method)
     if verdicts and earlier is not None:
         verdicts += study.regressions(verdicts, earlier)
+        if arguments.file is not None and is_sweep(arguments.file):
+            verdicts.append(study.runs_gone(arguments.file, arguments.against))
 
     _write_verdicts(arguments, verdicts)
     stream = sys.stderr if arguments.json == Path("-") else sys.stdout  # standard output is the JSON's alone
@@ -78,7 +82,13 @@ def test_method(arguments: argparse.Namespace) -> int:
 
 
 def _refuse_foreign(arguments: argparse.Namespace) -> None:
-    """Before anything is computed: files of --junit and --json that hold something else."""
+    """Before anything is computed: files of --junit and --json that hold something else, or are the same."""
+    if (
+        arguments.junit is not None
+        and arguments.json is not None
+        and arguments.junit.resolve() == arguments.json.resolve()
+    ):
+        raise InputError(f"--json {arguments.json}: is the file of --junit; allowed: two files")
     if arguments.junit is not None:
         refuse_foreign(arguments.junit, JUNIT)
     if arguments.json is not None and arguments.json != Path("-"):

@@ -165,14 +165,16 @@ class StoredRun:
     def faults(self, scene: Scene, *, complete: bool = True) -> list[str]:
         """A line for every array that is missing or wrong; complete: every sample must be there, else as many as there
         are times. A frozen reference need not have what follows from its angles and rates."""
-        rows = scene.samples if complete or "time" not in self else len(self.array("time"))
+        faults = []
+        rows = len(self.array("time")) if "time" in self else scene.samples
+        if complete and rows != scene.samples:
+            faults.append(f"{rows} of {scene.samples} samples" if rows else "no samples")
         expected: dict[str, tuple[int, ...]] = {"time": (rows,)}
         for quantity in quantities(scene.outputs):
             if self.is_frozen and quantity.name not in (*FROZEN, *self.names):
                 continue
             if quantity.required or (quantity.name == "angle_uncertainty" and self.method == REFERENCE):
                 expected[quantity.name] = (rows, *row_shape(quantity, scene))
-        faults = []
         for name, shape in expected.items():
             if name not in self:
                 faults.append(f"{name} is missing")

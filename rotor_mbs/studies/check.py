@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 import tempfile
 from collections import Counter
@@ -9,14 +10,26 @@ from collections.abc import Iterable, Sequence
 from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
 
 from rotor_mbs.analysis.checks import Check, Where, checks_of, make_check
 from rotor_mbs.errors import InputError, StoreError
-from rotor_mbs.methods.catalogue import REFERENCE, able_methods, default_methods, find_method, method_names
+from rotor_mbs.methods.catalogue import (
+    REFERENCE,
+    able_methods,
+    check_names,
+    default_methods,
+    find_method,
+    method_names,
+)
+from rotor_mbs.methods.method_file import ENDING
 from rotor_mbs.runs.design import MISSING
 from rotor_mbs.runs.read import is_sweep, open_results
 from rotor_mbs.runs.runner import OnProgress, ignore_progress
-from rotor_mbs.runs.sweeps import StoredSweep
+from rotor_mbs.runs.sweeps import StoredSweep, parameter_name
 from rotor_mbs.scenario.accuracy_bounds import Bounds
 from rotor_mbs.scenario.catalogue import find_scenes
 from rotor_mbs.studies.run import run_scenes
@@ -30,17 +43,26 @@ _SHRINK = 10.0  # times by which a margin may be smaller than in an earlier file
 
 
 def check_file(path: Path, bounds: Bounds, required: Sequence[str] = ()) -> list[Check]:
-    """Check what is stored, and whether every scene has a run of each required method.
+    """Check what is stored, and whether every scene, or the sweep, has a run of each required method.
 
     Raises InputError where there is no run of a method, as in a bench file or a file of references; StoreError.
     """
     checks = judge_file(path, bounds)
     if all(check.passed and check.where.method == REFERENCE for check in checks):
         raise InputError(f"{path}: nothing to check: no run of a method")
-    stored = {(check.where.scene, check.where.method) for check in checks}
-    for scene in dict.fromkeys(check.where.scene for check in checks if check.name == _OF_EVERY_RUN):
-        for method in required:
-            checks.append(_required(scene, method, "not in the file", is_missing=(scene, method) not in stored))
+    methods: dict[str, list[str]] = {}  # by scene
+    if is_sweep(path):
+        sweep = StoredSweep(path, allow_damaged_runs=True)
+        codes = np.asarray(sweep.column("method_code"))[np.asarray(sweep.column("status")) != MISSING]
+        methods[checks[0].where.scene] = [sweep.methods[code] for code in np.unique(codes)]
+    else:
+        for check in checks:
+            methods.setdefault(check.where.scene, []).append(check.where.method)
+    named = [check_names(name) if name.endswith(ENDING) else (name,) for name in required]
+    for name in dict.fromkeys(itertools.chain(*named)):
+        for scene, stored in methods.items():
+            hint = f"not in the file, which has {', '.join(dict.fromkeys(stored))}"
+            checks.append(_required(scene, name, hint, is_missing=name not in stored))
     return checks
 
 
@@ -94,6 +116,24 @@ def judge_file(path: Path, bounds: Bounds) -> list[Check]:
             return checks_of(results, shipped, bounds)
     except (RuntimeError, OSError) as exc:  # what HDF5 finds wrong, at whatever place
         raise StoreError(f"{path}: damaged or incomplete ({' '.join(str(exc).split())[:150]})") from exc
+
+
+def runs_gone(path: Path, earlier: Path) -> Check:
+    """Check that the sweep at `path` has every run of an earlier one: its method with the same varied numbers."""
+    new, old = (StoredSweep(place, allow_damaged_runs=True) for place in (path, earlier))
+    methods = [*old.methods, *new.methods]
+
+    def runs(sweep: StoredSweep) -> NDArray[Any]:
+        is_there = np.asarray(sweep.column("status")) != MISSING
+        numbers = np.array([methods.index(name) for name in sweep.methods])[sweep.column("method_code")]
+        columns = [numbers, *(sweep.column(parameter_name(key)) for key in sweep.keys)]
+        return np.rec.fromarrays([column[is_there] for column in columns])
+
+    before = runs(old)
+    gone = np.isin(before, runs(new), invert=True).sum() if new.keys == old.keys else len(before)
+    where = Where(str(old.attributes["base_scene"]), "*", "run: all")
+    hint = f"{gone} of {len(before)} runs of the earlier file are missing in this one"
+    return Check("against", where, float(gone), 0.0, hint, "runs")
 
 
 def judged_runs(checks: Iterable[Check]) -> Counter[str]:

@@ -20,6 +20,7 @@ from support.commands import PROGRAM
 from support.frozen_references import digests, freeze
 from support.scenes import paper
 from support.stored import Made, change_row, damage, drop, rotor, store
+from support.sweeps import THREE_RUNS, made_sweep
 
 from rotor_mbs.cli import main
 from rotor_mbs.cli import verdicts as formats
@@ -124,7 +125,7 @@ def _without_last_sample(row: Rows) -> None:
 
 
 TAMPERING: dict[str, tuple[Callable[[Rows], None], tuple[str, ...]]] = {
-    "a sample missing": (_without_last_sample, ("FAIL complete", "time has 150 rows, not 151", "stored as ok")),
+    "a sample missing": (_without_last_sample, ("FAIL complete", "stored as ok; 150 of 151 samples")),
     "a channel missing": (_with("tip", ..., math.nan), ("FAIL complete", "tip is missing")),
     "a NaN": (_with("rates", 7, math.nan), ("FAIL complete", "rates is not finite at sample 7")),
     "a touched angle": (_with("angles", 20, 3.0), ("FAIL tip",)),
@@ -179,7 +180,21 @@ def test_a_model_that_is_not_there_is_missed_where_it_is_required(
     lines_of(capsys, copy, *required, status=0)
     drop(copy, "check/general", METHOD)
     lines_of(capsys, copy, status=0)
-    named(lines_of(capsys, copy, *required, status=1), "FAIL required: check/general", METHOD, "not in the file")
+    lines = lines_of(capsys, copy, *required, "--require", "mine/lsoda", status=1)
+    for method in (METHOD, "mine/lsoda"):
+        named(lines, "FAIL required: check/general", method, "not in the file, which has reference, exudyn_tree/rk67")
+
+
+def test_a_sweep_is_checked_for_methods_and_for_runs_of_an_earlier_file(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    for name, values in (("old", "9.7, 9.8, 9.9"), ("new", "9.9, 9.7")):
+        (tmp_path / name).mkdir()
+        made_sweep(tmp_path / name, THREE_RUNS.replace("9.7, 9.8, 9.9", values))
+    old, new = tmp_path / "old/s.h5", tmp_path / "new/s.h5"
+    lines_of(capsys, old, "--require", METHOD, "--against", new, status=0)
+    named(lines_of(capsys, old, "--require", "mine/lsoda", status=1), "FAIL required: paper/fig11", f"has {METHOD}")
+    named(lines_of(capsys, new, "--against", old, status=1), "FAIL against", "1 of 3 runs of the earlier file")
 
 
 def test_a_reference_that_is_altered_or_not_there_fails(copy: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -319,6 +334,17 @@ def test_hostile_texts_in_a_file_come_out_as_text(tmp_path: Path, capsys: pytest
     rows = json.loads((tmp_path / "c.json").read_text(), parse_constant=pytest.fail)  # NaN is no JSON
     assert [row["passed"] for row in rows].count(False) == failures
     assert len(rows) == sum(line[:4] in ("pass", "FAIL") for line in lines)
+
+
+def test_a_run_without_samples_says_why_and_one_file_is_not_written_twice(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    failure = {"status": "solver_failed", "message": "no step"}
+    path = store(tmp_path / "r.h5", [Made(paper("fig11"), METHOD, rotor(np.sin), attributes=failure, until=0.0)])
+    line = named(lines_of(capsys, path, status=1), "FAIL complete", METHOD)
+    assert line.endswith("; stored as solver_failed: no step; no samples")
+    assert main(["check", "--junit", str(tmp_path / "a"), "--json", str(tmp_path / "a")]) == 2
+    assert not (tmp_path / "a").exists()
 
 
 def test_json_on_standard_output_is_alone_there(good: Path, capsys: pytest.CaptureFixture[str]) -> None:
