@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import functools
 import json
+import math
 import os
 import shutil
 import tempfile
@@ -29,6 +30,7 @@ from rotor_mbs.methods.method_file import ENDING
 from rotor_mbs.methods.time_limit import checked_seconds
 from rotor_mbs.runs.design import MISSING, RUNS
 from rotor_mbs.runs.output_files import replace_file
+from rotor_mbs.runs.pool import check_workers
 from rotor_mbs.runs.read import StoredRun, StoredScene, is_sweep, open_results
 from rotor_mbs.runs.sweeps import ERROR_GROWTH, METRICS, StoredSweep, parameter_name
 from rotor_mbs.runs.table import TableFile, is_of_this_program, text_of
@@ -162,6 +164,7 @@ def run(
     True
     """
     scene, timeout = scene_of(scene), checked_seconds(timeout)
+    check_workers(workers)
     if isinstance(method, str):
         if method.endswith(ENDING):
             method, *others = check_names(method)
@@ -418,7 +421,10 @@ class Runs(Mapping[Any, Any]):
 
     def at(self, name: str, sample: int) -> Any:
         """Return a trajectory of a sweep, such as "angles", at one sample of all runs. Raises StoreError."""
-        return np.array(self._sweep.column(name)[:, sample])
+        values, count = self._sweep.column(name), len(self._sweep.column("time"))
+        if "time" not in self._sweep.columns[name].dimensions or not -count <= sample < count:
+            raise StoreError(f"{name}, sample {sample}: allowed: a quantity over time, samples 0 to {count - 1}")
+        return np.array(values[:, sample])
 
     def to_xarray(self, *, unstack: bool = False) -> Any:
         """Return the runs as xarray objects with units, long names and labels.
@@ -440,6 +446,8 @@ class Runs(Mapping[Any, Any]):
         ------
         StoreError
             If a run of a sweep is damaged.
+        InputError
+            If a sweep that is no grid is to be unstacked.
         """
         xarray = need_xarray()
         if not self._is_sweep and not self.scene:
@@ -453,6 +461,11 @@ class Runs(Mapping[Any, Any]):
                 keys += ["method_name"] if len(self._sweep.methods) > 1 else []
                 if len(keys) == 1:
                     return data.swap_dims(run=keys[0]).drop_vars("run")
+                values = [data[key].values.tolist() for key in keys]
+                combinations = len(set(zip(*values, strict=True)))
+                if not combinations == len(data.run) == math.prod(len(set(of_key)) for of_key in values):
+                    what = f"the {len(data.run)} runs are not every combination of {', '.join(keys)}, once each"
+                    raise InputError(f"unstack: {what}; allowed: the sweep of a grid")
                 data = data.set_index(run=keys).unstack("run")
             return data
         with xarray.open_dataset(self.path, group=self.scene) as scene:

@@ -95,6 +95,8 @@ def test_runs_are_saved_opened_and_rendered(study: rm.Runs, tmp_path: Path) -> N
             assert (again.status, again.settings, again.metrics) == (run.status, run.settings, run.metrics)
     with pytest.raises(KeyError, match="rk67"):
         file[f"{study.scene}/lagrange/radau"]
+    with pytest.raises(rm.StoreError, match=r"^\.: is a folder; allowed: the name of a file$"):
+        study.save(".")
     with pytest.raises(rm.InputError, match="of the runs of one scene"):
         _ = file.plot
     for shown in (study, study["lagrange/dop853"]):  # in a notebook
@@ -116,6 +118,8 @@ def test_what_was_not_asked_for_is_refused_by_name(tmp_path: Path) -> None:
         run.plot().save(tmp_path / "motion.bmp")
     run.plot().save(tmp_path / "motion.png")
     assert (tmp_path / "motion.png").read_bytes().startswith(b"\x89PNG")
+    alone = rm.run(scene.replace(outputs=["angles"]), METHOD)
+    assert alone.message.endswith("without energies it needs both angles and rates, or angles and a reference")
     # Read from a file that does not have them: NaN, and no plot of them.
     scene = scene.replace(outputs=["energy"])
     stored, of_sweep = rm.run(scene, [METHOD])[METHOD], rm.sweep(scene, {"gravity": [9.8]}, methods=METHOD)[0]
@@ -146,6 +150,14 @@ def test_a_sweep_gives_labelled_runs_of_each_parameter_value(tmp_path: Path) -> 
     np.testing.assert_array_equal(data[1].angles, data.column("angles")[1])
     by_stiffness = data.to_xarray(unstack=True).angles.sel(bearing_stiffness=1e3)
     np.testing.assert_array_equal(by_stiffness, data.column("angles")[1])
+    for name, sample in (("angles", 11), ("status", 0)):
+        with pytest.raises(rm.StoreError, match=rf"^{name}, sample {sample}: allowed: .*, samples 0 to 10$"):
+            data.at(name, sample)
+    for options in ({"gravity": [9.8, 9.8, 9.8]}, {"gravity": [9.0, 9.5, 9.8], "combine": "zip"}):
+        gravity = {"gravity": options.pop("gravity")}
+        other = rm.sweep(scene, {"bearing.stiffness": values, **gravity}, methods=METHOD, samples=3, **options)
+        with pytest.raises(rm.InputError, match=r"not every combination of bearing_stiffness, gravity, once each; al"):
+            other.to_xarray(unstack=True)
     with pytest.raises(rm.InputError, match=r"bearing\.stifness"):
         rm.sweep(scene, {"bearing.stifness": values})
 

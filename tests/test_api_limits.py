@@ -46,9 +46,8 @@ def test_a_wrong_limit_is_a_line(name: str, value: Any, allowed: str) -> None:
         rm.run(_scene(), [METHOD], **{name: value})
     with pytest.raises(InputError, match=line):
         _sweep(**{name: value})
-    if name == "timeout":
-        with pytest.raises(InputError, match=line):
-            rm.run(_scene(), METHOD, timeout=value)
+    with pytest.raises(InputError, match=line):
+        rm.run(_scene(), METHOD, **{name: value})
 
 
 @pytest.mark.parametrize("timeout", [1e308, float("inf")])

@@ -203,7 +203,8 @@ def _status(scene: Scene, run: Solution, reference: Trajectory | None, metrics: 
         limit = f"above {ANGLE_LIMIT:.0e} rad double precision is not sufficient"
         return "unchecked", f"angles of {angle:.1e} rad; {limit}"
     if not any(name in metrics for name in _CHECKS):
-        return "unchecked", "cannot be assessed: no energies, and no angles or rates"
+        needed = "both angles and rates, or angles and a reference"
+        return "unchecked", f"cannot be assessed: without energies it needs {needed}"
     if "defects_not_judged" in metrics and not any(name in metrics for name in ("defect_max", "angle_error_max")):
         return "unchecked", "only the energy balance could be assessed: the samples are too far apart for the motion"
     return "ok", ""

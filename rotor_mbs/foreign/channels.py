@@ -373,9 +373,16 @@ def load_data(
     scene: Scene,
     columns: str | os.PathLike[str] | Mapping[str, Any] | None = None,
 ) -> ForeignData:
-    """Data from a file or from arrays by name, by a mapping or by guesses. Raises InputError, StoreError."""
+    """Data from a file or from arrays by name, by a mapping or by guesses; of xarray with its coordinates, of pandas
+    the columns. Raises InputError, StoreError."""
     entries, group, omitted = read_mapping(columns, scene)
-    table = table_of("data", data) if isinstance(data, Mapping) else read_table(data, group, scene.name)
+    if isinstance(data, str | os.PathLike):
+        table = read_table(data, group, scene.name)
+    elif hasattr(data, "items"):
+        table = table_of("data", {**getattr(data, "coords", {}), **dict(data.items())})
+    else:
+        allowed = 'a file, or arrays by name, such as {"time": run.time, "angles": run.angles}'
+        raise InputError(f"data: {type(data).__name__}; allowed: {allowed}")
     chosen, lines = find_channels(table, scene, entries, omitted)
     lengths = {entry.column: len(table[entry.column].values) for entry in chosen.values()}
     if len(set(lengths.values())) > 1:

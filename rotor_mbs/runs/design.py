@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from types import MappingProxyType
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -35,7 +34,7 @@ class Column(NamedTuple):
     units: str
     long_name: str
     kind: str = "<f8"
-    attributes: Mapping[str, Any] = MappingProxyType({})
+    attributes: Mapping[str, Any] = {}
 
 
 def flags(names: Sequence[str], first: int = 0) -> dict[str, Any]:

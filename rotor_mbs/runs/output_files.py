@@ -139,6 +139,8 @@ def replacing(path: Path) -> Iterator[Path]:
 
     The name cannot be guessed, and a file or link of that name is not opened.
     """
+    if path.is_dir():
+        raise StoreError(f"{path}: is a folder; allowed: the name of a file")
     temporary = path.with_name(f".{path.name}.{secrets.randbits(60)}.tmp")
     with store_errors(path):
         path.parent.mkdir(parents=True, exist_ok=True)

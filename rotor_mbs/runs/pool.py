@@ -172,13 +172,18 @@ class SerialPool(TaskPool):
         return future
 
 
+def check_workers(workers: int) -> None:
+    """Raises InputError for what is no number of worker processes."""
+    if isinstance(workers, bool) or not isinstance(workers, Integral) or not 0 <= workers <= MAX_WORKERS:
+        raise InputError(f"workers: {workers!r}; allowed: a whole number from 0 to {MAX_WORKERS}")
+
+
 def local_pool(workers: int, initializer: Callable[[], object] | None = None) -> TaskPool:
     """So many worker processes of this machine; 0: none, tasks run in this process, without a time limit.
 
     Raises InputError for another number, and where this process may not start processes.
     """
-    if isinstance(workers, bool) or not isinstance(workers, Integral) or not 0 <= workers <= MAX_WORKERS:
-        raise InputError(f"workers: {workers!r}; allowed: a whole number from 0 to {MAX_WORKERS}")
+    check_workers(workers)
     if workers and getattr(multiprocessing.current_process(), "_inheriting", False):
         raise InputError(
             'workers: a worker process runs the script itself; allowed: the call under `if __name__ == "__main__":`, '

@@ -525,10 +525,13 @@ def put_value(tables: dict[str, Any], path: KeyPath, value: object) -> None:
     for depth, part in enumerate(path):
         has_such_entries = isinstance(here, list) if isinstance(part, int) else isinstance(here, dict)
         if not has_such_entries:
-            what = "is a single value"
+            what, allowed = "is a single value", KEY_FORM
             if isinstance(here, dict | list):
                 what = "is a table" if isinstance(here, dict) else "is a list"
-            raise TableError([KeyProblem(path[:depth], what, KEY_FORM, is_of_key=True)])
+            if path[:depth] == ("blade",):
+                first, last = (shown_key(("blade", i, *path[depth:])) for i in (0, len(here) - 1))
+                allowed = f"{first} to {last}"
+            raise TableError([KeyProblem(path[:depth], what, allowed, is_of_key=True)])
         if isinstance(part, int) and part >= len(here):
             name = shown_key(path[:depth])
             allowed = f"{name}[0] to {name}[{len(here) - 1}]"

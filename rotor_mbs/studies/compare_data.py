@@ -9,6 +9,7 @@ import math
 from collections import Counter
 from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass, replace
+from numbers import Real
 from time import monotonic
 from typing import Any
 
@@ -127,6 +128,13 @@ def from_dictionary(stored: Mapping[str, Any]) -> DataVerdict:
     return DataVerdict(**values)
 
 
+def _checked(tolerance: float) -> float:
+    """As a plain number. Raises InputError."""
+    if isinstance(tolerance, bool) or not isinstance(tolerance, Real) or not 0.0 < tolerance < math.inf:
+        raise InputError(f"tolerance: {tolerance!r}; allowed: a number more than 0")
+    return float(tolerance)
+
+
 # A trajectory
 
 _ROUNDING = 1e-9  # of the duration: times that are sums of steps may end so far past it
@@ -150,8 +158,7 @@ def compare_with_reference(
     """
     is_available()  # the engine is loaded before: an interrupt would leave half of it
     ends = monotonic() + time_limit_s
-    if not 0.0 < tolerance < float("inf"):
-        raise InputError(f"tolerance: {tolerance!r}; allowed: a number more than 0, rad")
+    tolerance = _checked(tolerance)
     loads, data = data.only(loads=True), data.only(loads=False)
     cut = data.rows(data.time <= scene.duration * (1.0 + _ROUNDING))
     # At the times of the data and at the scene's samples, which make growth and horizon the same for all data.
@@ -246,7 +253,10 @@ def compare_with_reference(
         # What the rows leave out of the motion.
         time, last = at_rows.time, min(scene.duration, float(run.time[-1]))
         step = float(np.diff(time).max(initial=0.0))
-        if time[-1] < last - 1.5 * step:
+        if rows < _FEWEST and len(data.time) > rows:
+            lie = f"{rows} of {len(data.time)} rows within the {scene.duration:g} s of {scene.name}"
+            yield "inaccurate", f"{lie}; is the time in s? `unit` of the time in a mapping file says otherwise"
+        elif time[-1] < last - 1.5 * step:
             yield "inaccurate", f"the data end at t = {time[-1]:.6g} s of {last:g} s"
         if time[0] > 1.5 * step:
             yield "inaccurate", f"the data begin at t = {time[0]:.6g} s, not at 0"
@@ -569,8 +579,7 @@ def compare_modes(data: ForeignData, scene: Scene, tolerance: float) -> tuple[Da
     without gravity; at rest under gravity where no speed is above 0. Raises InputError for more than 1000 speeds, or
     more columns than modes.
     """
-    if not 0.0 < tolerance < math.inf:
-        raise InputError(f"tolerance: {tolerance!r}; allowed: a number more than 0")
+    tolerance = _checked(tolerance)
     if len(data.time) > _MOST_SPEEDS:
         raise InputError(f"{data.source}: {len(data.time)} speeds; allowed: up to {_MOST_SPEEDS}")
     if len({channel.name.startswith("undamped") for channel in data.channels}) > 1:

@@ -6,7 +6,6 @@ how far from steady it is there.
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
@@ -228,9 +227,10 @@ def _floquet_table(scene: Scene, speeds: Array) -> modal.FloquetTable:
 
 
 def _increasing(speeds: Sequence[float] | Array) -> list[float]:
-    numbers = [float(value) for value in speeds]
-    if any(not 0.0 <= value < float("inf") for value in numbers) or any(
-        later <= earlier for earlier, later in itertools.pairwise(numbers)
-    ):
-        raise InputError("speeds: allowed: increasing numbers of at least 0")
+    try:
+        numbers = [float(value) for value in speeds]
+    except (TypeError, ValueError):
+        numbers = [np.nan]
+    if any(not 0.0 <= value < np.inf for value in numbers) or (np.diff(numbers) <= 0.0).any():
+        raise InputError(f"speeds: {speeds!r}; allowed: a list of increasing numbers of at least 0")
     return numbers

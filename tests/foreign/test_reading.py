@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -230,9 +231,10 @@ def test_wrong_input_is_one_line_and_status_2(tmp_path: Path, case: str) -> None
         ({"time": TIME, "angles": [[1.0, 2.0], [3.0]]}, "rows of different lengths"),
         ({"time": TIME[1:], "rotor": ANGLES[:, 0]}, "columns of different lengths"),
         ({"time": 3.0, "rotor": 2.0}, "no columns of numbers"),
+        (ANGLES, "data: ndarray; allowed: a file, or arrays by name, such as "),
     ],
 )
-def test_wrong_arrays_are_refused(arrays: dict[str, object], message: str) -> None:
+def test_wrong_arrays_are_refused(arrays: Any, message: str) -> None:
     with pytest.raises(InputError, match=message):
         load_data(arrays, SCENE)
 

@@ -107,12 +107,13 @@ def test_the_number_of_blades_can_be_changed_with_what_depends_on_it() -> None:
         ("initial.angles[4]", 1.0, r"initial.angles: has 4 entries; allowed: initial.angles\[0\] to "),
         ("initial.angles", 1.0, "initial.angles: 1.0 is not a list; allowed: 1 \\+ blades numbers"),
         ("gravity", None, "gravity: .* is not a number"),
+        ("blade.mass", 1.0, r"blade: is a list; allowed: blade\[0\].mass to blade\[2\].mass$"),
         ("a b", 1.0, "'a b' is not the path of a key; allowed: the path"),
     ],
 )
 def test_an_impossible_change_is_refused_with_its_key(key: str, value: object, message: str) -> None:
     with pytest.raises(InputError, match=message):
-        find_scenes(["paper/fig11"])[0].replace(**{key: value})
+        find_scenes(["paper/fig11"])[0].replace(**{"blade[1].mass": 1e4}).replace(**{key: value})
 
 
 def test_the_template_is_a_scene_with_every_key(tmp_path: Path) -> None:

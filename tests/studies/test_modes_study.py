@@ -81,9 +81,9 @@ def test_records_keep_every_number(tmp_path):
         read_modes(tmp_path / "none.h5")
 
 
-@pytest.mark.parametrize("speeds", [(1.0, 0.5), (-1.0,), (1.0, 1.0), (float("nan"),)])
+@pytest.mark.parametrize("speeds", [(1.0, 0.5), (-1.0,), (1.0, 1.0), (float("nan"),), 1.0, ("a",)])
 def test_speeds_that_do_not_increase_from_zero_are_refused(speeds):
-    with pytest.raises(InputError, match="speeds: allowed"):
+    with pytest.raises(InputError, match=r"speeds: .*[1na].*; allowed: a list of increasing"):
         study.compute_modes(SOFT, speeds)
 
 

@@ -274,6 +274,8 @@ def test_data_of_another_time_are_refused() -> None:
     late = Plant("", spoilt=lambda t, q, w: (t + 10.0, q, w)).data()
     with pytest.raises(rm.InputError, match="`offset = -10` of the time"):
         rm.compare(late, short("paper/fig11"))
+    found = rm.compare(PLANTS["time in ms"].data(), short("paper/fig11"))
+    assert found.message.startswith(f"1 of {ROWS} rows within the 2 s of paper/fig11; is the time in s? ")
 
 
 @pytest.mark.parametrize("scene", ["paper/fig11", "check/general"])

@@ -56,7 +56,8 @@ def compare(
     ----------
     data : a file, or arrays by name: `time` (n,) s, `angles` and `rates` (n, 1 + blades) rad and rad/s, or single
         columns such as `rotor`, `pitch_1_deg`; angles or rates may be missing. Loads by name (N, N m), see
-        docs/compare.md. For modes: `speed` (m,) rad/s, `frequencies` (m, modes) rad/s.
+        docs/compare.md. For modes: `speed` (m,) rad/s, `frequencies` (m, modes) rad/s. Also an `xarray.Dataset` or a
+        `pandas.DataFrame` with these names.
     scene : a Scene, the name of a shipped scene, or a TOML file.
     columns : a mapping file, or a mapping with the same keys: column, unit, sign, offset of each channel, and whether
         it is wrapped. By default columns are identified by name, see `verdict.read`.
@@ -136,10 +137,11 @@ class DataComparison:
         """Write the page into a folder. Returns its path."""
         return write_page(folder, "comparison", comparison_page(self.record), versions() | machine())
 
-    def save(self, path: str | os.PathLike[str]) -> None:
+    def save(self, path: str | os.PathLike[str]) -> Path:
         """Save data, reference, errors and verdict as a results file. An earlier comparison is replaced; raises
         InputError for other files, StoreError if it cannot be written."""
         write_records(Path(path), [self.record])
+        return Path(path)
 
     def __repr__(self) -> str:
         """Says how columns were read, numbers by channel, and the verdict."""
