@@ -245,6 +245,15 @@ def test_an_early_end_is_excused_where_the_reference_ends_or_nothing_is_claimed(
     assert [check.passed for check in found if check.name == "complete"][1] is complete
 
 
+@pytest.mark.parametrize(("outputs", "passed"), [(("energy",), True), (("angles", "rates", "energy"), False)])
+def test_a_singularity_is_not_judged_without_angles(outputs: tuple[str, ...], passed: bool, tmp_path: Path) -> None:
+    facts = {"status": "singular", "false_success": 1}
+    made = [Made(FIG11.replace(outputs=outputs), METHOD, rotor(np.sin), 0.5, attributes=facts)]
+    with open_results(store(tmp_path / "r.h5", made)) as results:
+        found = checks.checks_of(results, [], BOUNDS)
+    assert [check.passed for check in found if check.name == "status"] == [passed]
+
+
 @pytest.mark.parametrize(
     ("value", "passed", "margin"),
     [(0.5, True, 4.0), (2.0, True, 1.0), (2.1, False, 2.0 / 2.1), (0.0, True, np.inf), (np.nan, False, 0.0)],
