@@ -262,6 +262,8 @@ def compare_with_reference(
             yield "inaccurate", f"the data begin at t = {time[0]:.6g} s, not at 0"
         if until < _FEWEST:
             yield "unchecked", f"{until} rows up to the horizon: too few to be compared"
+        if defects is None and note and until < len(at_rows.time):
+            yield "unchecked", f"after the horizon at {horizon_s:.6g} s nothing is checked; {note}"
         if defects is not None and not defects.is_judged[until - 1 :].all():
             long = until - 1 + int(np.argmin(defects.is_judged[until - 1 :]))
             since = f"the first after t = {defects.time[long]:.6g} s"

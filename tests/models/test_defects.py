@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -117,11 +118,19 @@ def test_the_predicted_error_is_the_true_one_within_a_fifth(name: str, method: s
     assert (off[judged] <= 0.2 * largest[judged]).all()
 
 
-@pytest.mark.parametrize("name", ["fig03", "fig09"])
-def test_the_transition_matrices_are_those_of_the_variational_equations(name: str) -> None:
+@pytest.mark.parametrize(
+    ("name", "changes"),
+    [
+        ("fig03", {}),
+        ("fig09", {}),
+        # Rates that change within an interval.
+        ("fig11", {"samples": 11, "initial_rates": (np.pi / 10.0, 30.0, 0.0, 0.0)}),
+    ],
+)
+def test_the_transition_matrices_are_those_of_the_variational_equations(name: str, changes: dict[str, Any]) -> None:
     """Each carries their product on by one interval, to 1e-4 of its size, angles in rad and rates in their units."""
     pytest.importorskip("heyoka")
-    scene = paper(name, duration=1.0, samples=101, outputs=("angles", "rates"))
+    scene = replace(paper(name, duration=1.0, samples=101, outputs=("angles", "rates")), **changes)
     exact = _variational_matrices(scene)
     transitions = defects_of(scene, solve(DOP853, scene, {}).trajectory).transitions
     assert transitions is not None
@@ -215,10 +224,13 @@ def test_a_run_that_left_the_symmetry_has_one_horizon_with_and_without_a_referen
 # ---- Rates from angles; sums over rows
 
 
-@pytest.mark.parametrize("name", ["fig03", "fig04b", "fig11"])
-def test_rates_are_found_from_the_angles(name: str) -> None:
+@pytest.mark.parametrize(
+    ("name", "duration", "samples"),
+    [("fig03", 1.0, 101), ("fig04b", 1.0, 101), ("fig11", 1.0, 101), ("fig09", 10.0, 51), ("fig14a", 10.0, 101)],
+)
+def test_rates_are_found_from_the_angles(name: str, duration: float, samples: int) -> None:
     """To the rounding of five angles."""
-    scene = paper(name, duration=1.0, samples=101, outputs=("angles", "rates"))
+    scene = paper(name, duration=duration, samples=samples, outputs=("angles", "rates"))
     run = solve(DOP853, scene, {}).trajectory
     np.testing.assert_allclose(fitted_rates(scene, run.time, run.angles), run.rates, rtol=0, atol=1e-10)
 
