@@ -107,7 +107,7 @@ def _show_scene(arguments: argparse.Namespace) -> None:
     print(f"{scene.name}\n")
     for path, value in _keys(tables):
         unit = "" if unit_of(path) == "1" else f", {unit_of(path)}"
-        print(f"  {shown_key(path) + unit:28} {value}")
+        print(f"  {shown_key(path) + unit:28} {_with_constants(value)}")
     print("\nmethods" + (", and the items that each model builds" if arguments.build else ""))
     for name, model in models.items():
         first, *others = model["methods"]
@@ -131,6 +131,16 @@ def _keys(value: Any, path: KeyPath = ()) -> Iterator[tuple[KeyPath, Any]]:
             yield from _keys(inner, (*path, place))
     else:
         yield path, value
+
+
+def _with_constants(value: Any) -> Any:
+    """A load over time whose table has one row is that number."""
+    match value:
+        case [[float(), float() as number]]:
+            return number
+        case list():
+            return [_with_constants(entry) for entry in value]
+    return value
 
 
 _DISK_IS_FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
@@ -200,8 +210,11 @@ def modes(arguments: argparse.Namespace) -> int:
             print(f"{modes.scene}: {modes.title}")
             print_table(mode_table([row for row in rows if row["state"] == "at rest" or row["speed"] in ends]))
             if modes.floquet is not None:
-                unstable = int((modes.floquet.stable == 0).sum())
-                print(f"unstable in rotation under gravity at {unstable} of {len(modes.floquet.speeds)} speeds")
+                unstable, unknown = (int((modes.floquet.stable == code).sum()) for code in (0, -1))
+                text = f"unstable in rotation under gravity at {unstable}"
+                if unknown:
+                    text += f", unknown at {unknown}"
+                print(f"{text} of {len(modes.floquet.speeds)} speeds")
             models = [*dict.fromkeys((*modes.rest, *modes.rotation))]
             if len(models) > 1:
                 verdict = "agree" if modes.agrees else "DISAGREE"

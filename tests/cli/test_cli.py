@@ -73,6 +73,7 @@ def test_show_build_lists_what_a_scene_needs_and_no_more() -> None:
     text = rotor_mbs("show", "paper/fig15-1kNm", "--build").out
     assert "rotor torque" in text
     assert "exudyn_chain" in text
+    assert "torque.rotor, N m            1000.0\n" in text  # constant: as in the file, no table
     assert "rotor torque" not in rotor_mbs("show", "paper/fig05", "--build").out
     assert "(not available: " in rotor_mbs("show", "stiff/nrel-5mw-damped").out
 

@@ -103,6 +103,10 @@ def test_the_command_writes_a_file_that_opens_in_xarray_and_a_page(tmp_path: Pat
     page = (tmp_path / "modes-report" / "index.html").read_text(encoding="utf-8")
     for text in ("Campbell diagram", "collective pitch", "Floquet multipliers", "forward whirl"):
         assert text in page
+    assert main(["modes", "check/held", "--speeds", "0:2:3", "-o", str(tmp_path / "held.h5"), "-j", "1"]) == 0
+    assert "under gravity at 0, unknown at 2 of 2 speeds" in capsys.readouterr().out
+    page = (tmp_path / "held-report" / "index.html").read_text(encoding="utf-8")
+    assert page.count("no periodic motion found: ") == 2
     with xarray.open_datatree(output, engine="netcdf4") as tree:
         data = tree["modes/stiff/nrel-5mw/exudyn_tree/rotation"].load()
         assert data.undamped_frequency.dims == ("speed", "mode")

@@ -223,7 +223,8 @@ def modes_page(modes: Sequence[SceneModes]) -> dict[str, object]:
 def _multipliers(scene: str, table: FloquetTable) -> PageTable:
     rows: list[Row] = []
     for i, (speed, largest) in enumerate(zip(table.speeds.tolist(), table.largest.tolist(), strict=True)):
-        cell = TableCell(_shown(largest, 7), "bad" if table.stable[i] == 0 else "", note=table.messages[i])
+        text = "unknown" if table.stable[i] == -1 else _shown(largest, 7)
+        cell = TableCell(text, "bad" if table.stable[i] == 0 else "", note=table.messages[i])
         numbers = ((table.growth_rates, 4), (table.product_error, 2), (table.torque, 4))
         rows.append([number(speed, 4), cell, *(_shown(float(values[i]), digits) for values, digits in numbers)])
     head = ("Speed (rad/s)", "largest multiplier", "growth rate (1/s)", "product minus trace", "torque (N m)")
