@@ -376,6 +376,6 @@ def _parser() -> tuple[_Parser, dict[str, _Parser]]:
     own.add_argument("scene", metavar="SCENE", help="a name (paper/fig05) or a TOML file")
     text = "mjcf: MuJoCo model; exudyn: stand-alone Exudyn script; csv: reference trajectory"
     own.add_argument("--to", required=True, choices=EXPORT_FORMATS, metavar="FORMAT", help=text)
-    own.output(file, "FILE", help="output file (default: name of the scene with .xml, .py or .csv)")
+    own.output(file, "FILE", help="output file (default: name of the scene with .xml, -exudyn.py or .csv)")
 
     return parser, dict(commands.choices)

@@ -121,7 +121,7 @@ def exudyn_script(scene: Scene) -> str:
         types=", ".join(dict.fromkeys(part.type for part in parts)),
         duration=repr(float(scene.duration)),
         samples=scene.samples,
-        loads=_value([[list(map(float, row)) for row in table] for table in scene.load_tables]),
+        loads=_value([[list(map(float, row)) for row in table] for table in scene.load_tables], indent=0),
         labels=_value(list(scene.coordinate_labels)),
         angles=_value(list(map(float, scene.initial_angles))),
         rates=_value([float(rate) if i in moving else 0.0 for i, rate in enumerate(scene.initial_rates)]),
@@ -145,17 +145,19 @@ def _argument(key: str, value: Any) -> str:
     return f"exu.{LISTS[key]}({_value(value)})" if key in LISTS else _value(value)
 
 
-def _value(value: object) -> str:
-    """Numbers with all their digits; matrices as arrays, a row of a list on its own line where it is nested."""
+def _value(value: object, indent: int = 4) -> str:
+    """Numbers with all their digits; matrices as arrays, a row of a list on its own line where it is nested; indent: of
+    the line that the value is on."""
     if isinstance(value, np.ndarray):
         return f"np.array({value.tolist()!r})"
     if isinstance(value, np.generic):
         return repr(value.item())
     if isinstance(value, str) or not isinstance(value, Sequence):
         return repr(value)
-    items = [_value(item) for item in value]
+    items = [_value(item, indent + 4) for item in value]
     if any(isinstance(item, (Sequence, np.ndarray)) and not isinstance(item, str) for item in value):
-        return "[\n" + "".join(f"        {item},\n" for item in items) + "    ]"
+        margin = " " * indent
+        return "[\n" + "".join(f"{margin}    {item},\n" for item in items) + f"{margin}]"
     return "[" + ", ".join(items) + "]"
 
 

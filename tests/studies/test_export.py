@@ -69,7 +69,9 @@ def test_the_mujoco_file_in_plain_mujoco(name: str, tmp_path: Path) -> None:
 def test_the_exudyn_script_in_plain_python(name: str, tmp_path: Path) -> None:
     scene, exact = references.scene(name), references.reference(name)
     (path,) = export(scene, "exudyn", tmp_path / "scene.py")
-    assert "rotor_mbs" not in path.read_text(encoding="utf-8")
+    text = path.read_text(encoding="utf-8")
+    assert "rotor_mbs" not in text
+    assert text[text.index("\nLOADS = [\n    [") :].partition("],\n]\n")[1]  # each bracket below its line
     done = plain_python(path, tmp_path / "out.csv")
     assert done.returncode == 0, done.stderr
     with (tmp_path / "out.csv").open(encoding="utf-8", newline="") as file:
