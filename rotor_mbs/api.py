@@ -552,6 +552,6 @@ def _loaded(scene: StoredScene, stored: StoredRun) -> Run:
     run = Run(**vars(solution), reference=None if stored.method == REFERENCE else scene.reference_trajectory)
     run.status, run.message = stored.status, str(facts.get("message", ""))
     run.metrics = {name: value for name, value in facts.items() if isinstance(value, float)}
-    setup, seconds, output = (float(facts.get(f"{name}_time_s", 0.0)) for name in ("setup", "run", "output"))
-    run.setup_time_s, run.run_times_s, run.output_time_s = setup, [seconds], output
+    run.run_times_s = [facts["run_time_s"]] if "run_time_s" in facts else []
+    run.setup_time_s, run.output_time_s = (facts.get(name, math.nan) for name in ("setup_time_s", "output_time_s"))
     return run

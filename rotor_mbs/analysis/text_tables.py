@@ -20,7 +20,8 @@ def run_row(run: StoredRun) -> tuple[str, ...]:
     """Cells under RUN_HEAD."""
     facts = run.attributes
     error = "" if run.method == REFERENCE else _short(facts.get("angle_error_max"))  # none against itself
-    time = "read" if run.is_frozen else f"{facts.get('run_time_s', 0.0):.3g}"
+    seconds = facts.get("run_time_s")  # none where the process was ended
+    time = "read" if run.is_frozen else "" if seconds is None else f"{seconds:.3g}"
     return run.method, run.status, _short(facts.get("defect_max")), error, _short(facts.get("energy_drift_max")), time
 
 
@@ -52,8 +53,8 @@ def method_table(runs: Iterable[StoredRun]) -> TextTable:
         for name in ("defect_max", "angle_error_max", "energy_drift_max"):
             known = [float(run.attributes[name]) for run in ended_well if name in run.attributes]
             numbers.append(_short(max(known, default=None)))
-        longest_s = max((run.attributes.get("run_time_s", 0.0) for run in own), default=0.0)
-        rows.append((method, count, *numbers, f"{longest_s:.3g}"))
+        seconds = [run.attributes["run_time_s"] for run in own if "run_time_s" in run.attributes]
+        rows.append((method, count, *numbers, f"{max(seconds):.3g}" if seconds else ""))
     return TextTable(head, rows)
 
 

@@ -362,7 +362,7 @@ def text_of(values: NDArray[np.bytes_]) -> str:
 
 def row_of_run(run: Solution, place: Place, facts: Mapping[str, object]) -> Rows:
     """The row of a run: status, metrics, times, arrays. facts: further columns by name."""
-    integration = run.integration
+    integration, run_times_s = run.integration, run.run_times_s or [math.nan]
     # A reference is read back by its angles and rates, whatever the scene asks for.
     own = {"angles": run.angles, "rates": run.rates} if run.method == REFERENCE else {}
     return place.rows_of(
@@ -371,13 +371,13 @@ def row_of_run(run: Solution, place: Place, facts: Mapping[str, object]) -> Rows
             "message": run.message,
             "engine_message": integration.message,
             "samples": len(run.time),
-            "time_reached": integration.time_reached,
+            "time_reached": float(run.time[-1]) if len(run.time) else 0.0,
             "steps": -1 if integration.steps is None else integration.steps,
             "rhs_evaluations": -1 if integration.rhs_evaluations is None else integration.rhs_evaluations,
             "engine_success": int(integration.success),
             "setup_time_s": run.setup_time_s,
-            "run_time_s": float(np.median(run.run_times_s)),
-            "run_time_min_s": min(run.run_times_s),
+            "run_time_s": float(np.median(run_times_s)),
+            "run_time_min_s": min(run_times_s),
             "output_time_s": run.output_time_s,
             "repeats": len(run.run_times_s),
             **run.metrics,

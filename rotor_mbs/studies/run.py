@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -247,4 +248,6 @@ def without_samples(scene: Scene, method: str, settings: Mapping[str, object], s
     columns = 1 + len(scene.blades)
     trajectory = Trajectory(np.empty(0), np.empty((0, columns)), np.empty((0, columns)))
     chosen = find_method(method).settings.of(method, settings).as_dict()
-    return Solution(scene, method, trajectory, Integration(False, message), chosen, status=status, message=message)
+    engine = Integration(False, message)
+    # Times are not known: its process may have been ended.
+    return Solution(scene, method, trajectory, engine, chosen, math.nan, [], math.nan, status, message)

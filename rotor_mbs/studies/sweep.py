@@ -67,7 +67,7 @@ class Chunk(Task):
             for i, scene in enumerate(scenes):
                 try:
                     run = solve(self.method, scene, self.settings, time_limit_s=self.time_limit_s)
-                    each.append(_judged_row(self, run, float(run.time[-1]) if len(run.time) else 0.0))
+                    each.append(_judged_row(self, run))
                 except OutOfTimeError as exc:
                     each.append(self.part(i, i + 1).failed("timed_out", str(exc)))
             rows = {name: np.concatenate([row[name] for row in each]) for name in each[0]}
@@ -101,13 +101,13 @@ def limit_of(runs: int, time_limit_s: float) -> float:
     return time_limit_s * runs + _GRACE_S
 
 
-def _judged_row(chunk: Chunk, run: Solution, time_reached: float) -> Rows:
+def _judged_row(chunk: Chunk, run: Solution) -> Rows:
     """Raises OutOfTimeError where judging takes longer than the time limit."""
     with time_limit(chunk.time_limit_s):
         judgement = judge(run.scene, run, None)
     judged = replace(run, status=judgement.status, message=judgement.message, metrics=judgement.metrics)
     extremes = {name: values[0] for name, values in _extremes(run.angles[None], run.rates[None]).items()}
-    return row_of_run(judged, chunk.place, {"time_reached": time_reached, **extremes})
+    return row_of_run(judged, chunk.place, extremes)
 
 
 def _extremes(angles: Array, rates: Array) -> dict[str, Array]:
@@ -161,7 +161,7 @@ def _side_by_side(chunk: Chunk, scenes: Sequence[Scene]) -> Rows:
     for i in np.flatnonzero(~ok).tolist():
         run = Solution(scenes[i], method.name, block.trajectory(i), block.integrations[i], settings.as_dict())
         try:
-            judged = _judged_row(chunk, run, run.integration.time_reached)
+            judged = _judged_row(chunk, run)
         except OutOfTimeError as exc:
             judged = chunk.place.rows_of({"status": "timed_out", "message": f"{exc}, while its samples were assessed"})
             judged |= {name: rows[name][i : i + 1] for name in ("energy_drift_max", *_OF_DEFECTS)}

@@ -13,8 +13,9 @@ import numpy as np
 import pytest
 from support.commands import rotor_mbs
 from support.scenes import paper
-from support.stored import damage
+from support.stored import Made, damage, rotor, store
 
+from rotor_mbs.analysis.text_tables import run_row
 from rotor_mbs.errors import StoreError
 from rotor_mbs.methods.catalogue import find_method
 from rotor_mbs.runs.pool import SerialPool
@@ -173,11 +174,21 @@ def test_a_run_that_a_shorter_limit_ended_is_computed_again(tmp_path: Path) -> N
         return task.failed("timed_out", "too slow") if task.asked.method == METHODS[0] else blank(task)
 
     run(tmp_path / "r.h5", perform=slow, timeout_s=5.0)
+    with open_results(tmp_path / "r.h5") as results:
+        assert run_row(results.scenes[SCENE.name].runs[METHODS[0]])[-1] == ""  # nobody knows how long it took
     again = run(tmp_path / "r.h5", perform=slow, timeout_s=5.0)
     assert made(again) == []
     assert again.stored_failures == [f"{SCENE.name} {METHODS[0]} timed_out: too slow"]
     assert made(run(tmp_path / "r.h5", timeout_s=4.0)) == []
     assert made(run(tmp_path / "r.h5", timeout_s=6.0)) == [METHODS[0]]
+
+
+def test_the_time_reached_is_that_of_the_last_sample(tmp_path: Path) -> None:
+    """As the message has it, whatever the engine says: of a reference, the slower of its two runs has the last one."""
+    path = store(tmp_path / "r.h5", [Made(SCENE, "reference", rotor(np.sin), until=0.5)])
+    with open_results(path) as results:
+        run = results.scenes[SCENE.name].runs["reference"]
+        assert run.attributes["time_reached"] == run.array("time")[-1] > 0.0
 
 
 def test_a_shipped_reference_that_was_not_read_in_time_is_read_again(tmp_path: Path) -> None:
