@@ -422,7 +422,7 @@ class Runs(Mapping[Any, Any]):
     def at(self, name: str, sample: int) -> Any:
         """Return a trajectory of a sweep, such as "angles", at one sample of all runs. Raises StoreError."""
         values, count = self._sweep.column(name), len(self._sweep.column("time"))
-        if "time" not in self._sweep.columns[name].dimensions or not -count <= sample < count:
+        if "time" not in self._sweep.columns[name].dimensions or sample not in range(-count, count):
             raise StoreError(f"{name}, sample {sample}: allowed: a quantity over time, samples 0 to {count - 1}")
         return np.array(values[:, sample])
 
