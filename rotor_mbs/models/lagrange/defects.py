@@ -283,7 +283,8 @@ def _transitions(scene: Scene, time: Array, states: Array, ends: Array) -> Array
 
     with np.errstate(all="ignore"):
         transitions, quick = matrices(np.arange(len(ends)), steps)
-        rough = np.flatnonzero(np.isfinite(ends).all(axis=1) & ~(np.abs(quick - ends) / units <= _ROUGH_END).all(axis=1))
+        is_near = (np.abs(quick - ends) / units <= _ROUGH_END).all(axis=1)
+        rough = np.flatnonzero(np.isfinite(ends).all(axis=1) & ~is_near)
         for _ in range(_MAX_HALVINGS):
             if not len(rough):
                 break
@@ -312,7 +313,8 @@ def quick_ends(
     scene: Scene, begins: Array, ends: Array, states: Array, steps: int, equations: Accelerations | None = None
 ) -> Array:
     """The ends of n intervals from (m, ..., n) states, all at once, in steps of order 4; by `equations` in place of the
-    closed form's. Differences of two calls are right to a share of some 1e-5, but where rates change within an interval."""
+    closed form's. Differences of two calls are right to a share of some 1e-5, but where rates change within an
+    interval."""
     form, half = rotor_form(scene), len(states) // 2
     equations = equations or closed_form.accelerations
     h = (ends - begins) / steps
