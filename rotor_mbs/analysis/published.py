@@ -163,10 +163,11 @@ ENERGY_RISE = 1e-3
 
 
 def claims(scenes: Mapping[str, StoredScene], items: Iterable[Published] | None = None) -> list[Published]:
-    """The numbers that runs of `scenes` have, and the claims about scenes that are all there; of `items`, or of all."""
+    """The numbers that runs of the paper's scenes have, and the claims about those that are all there; of `items`, or
+    of all. A scene that was changed under its name is not the paper's."""
     results = []
     for item in published() if items is None else items:
-        if not item.scenes <= scenes.keys():
+        if not all(name in scenes and scenes[name].is_shipped for name in item.scenes):
             continue
         if not item.is_number:
             results.append(item)

@@ -49,14 +49,23 @@ def method_names(*, is_corrected: bool | None = None) -> tuple[str, ...]:
     return tuple(method.name for method in methods() if is_corrected in (None, method.is_corrected))
 
 
-def look_up(name: str) -> Method | None:
-    """The method called `name`, "reference" included; None where it is not known here (a file from elsewhere)."""
+def _built_in(name: str) -> Method | None:
     for place, beginnings in _BUILT_IN.items():
         if name.startswith(beginnings):
             for method in _load(place):
                 if method.name == name:
                     return method
-    return _of_files.get(name) or _plug_ins().get(name)
+    return None
+
+
+def is_built_in(name: str) -> bool:
+    """Whether the method called `name`, "reference" included, is one of this package."""
+    return _built_in(name) is not None
+
+
+def look_up(name: str) -> Method | None:
+    """The method called `name`, "reference" included; None where it is not known here (a file from elsewhere)."""
+    return _built_in(name) or _of_files.get(name) or _plug_ins().get(name)
 
 
 def find_method(name: str) -> Method:

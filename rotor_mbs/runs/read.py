@@ -16,7 +16,7 @@ import json
 import os
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import IO, Any
 
@@ -24,7 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor_mbs.errors import StoreError
-from rotor_mbs.methods.catalogue import PRINTED, REFERENCE, is_corrected
+from rotor_mbs.methods.catalogue import PRINTED, REFERENCE, is_built_in, is_corrected
 from rotor_mbs.runs.design import FROZEN, MISSING, POINT_COLUMNS, REPEATED, RUNS, Column
 from rotor_mbs.runs.table import (
     DIGESTS,
@@ -50,8 +50,8 @@ from rotor_mbs.runs.table import (
     values_of,
 )
 from rotor_mbs.runs.versions import machine, versions
-from rotor_mbs.scenario.catalogue import natural_order
-from rotor_mbs.scenario.scene import Scene, coordinate_labels, parse_scene
+from rotor_mbs.scenario.catalogue import natural_order, shipped_scene
+from rotor_mbs.scenario.scene import Scene, coordinate_labels, parse_scene, scene_hash
 from rotor_mbs.solution.quantities import known_quantities, quantities, row_shape
 from rotor_mbs.solution.status import STATUSES, code_of
 from rotor_mbs.solution.trajectory import Integration, Solution, Trajectory
@@ -164,14 +164,17 @@ class StoredRun:
 
     def faults(self, scene: Scene, *, complete: bool = True) -> list[str]:
         """A line for every array that is missing or wrong; complete: every sample must be there, else as many as there
-        are times. A frozen reference need not have what follows from its angles and rates."""
+        are times. A frozen reference need not have what follows from its angles and rates, a method that is not
+        built in no more than these."""
         faults = []
         rows = len(self.array("time")) if "time" in self else scene.samples
         if complete and rows != scene.samples:
             faults.append(f"{rows} of {scene.samples} samples" if rows else "no samples")
+        always_there = FROZEN if self.is_frozen else ("angles", "rates")
+        may_omit_others = self.is_frozen or not is_built_in(self.method)
         expected: dict[str, tuple[int, ...]] = {"time": (rows,)}
         for quantity in quantities(scene.outputs):
-            if self.is_frozen and quantity.name not in (*FROZEN, *self.names):
+            if may_omit_others and quantity.name not in (*always_there, *self.names):
                 continue
             if quantity.required or (quantity.name == "angle_uncertainty" and self.method == REFERENCE):
                 expected[quantity.name] = (rows, *row_shape(quantity, scene))
@@ -227,6 +230,19 @@ class StoredScene:
     def reference_trajectory(self) -> Trajectory | None:
         """None where there is no reference, or its arrays cannot be used."""
         return None if self.reference is None else self.reference.trajectory(self.scene)
+
+    @functools.cached_property
+    def is_shipped(self) -> bool:
+        """Whether its motion is that of this package's scene of its name; samples and outputs may be others."""
+        known = shipped_scene(self.name)
+        if known is None:
+            return False
+        return scene_hash(replace(self.scene, samples=known.samples, outputs=known.outputs)) == scene_hash(known)
+
+    @property
+    def figures(self) -> str:
+        """The paper's figures that show its motion, as "11, 13a"; "" where none does."""
+        return str(self.attributes.get("figures", "")) if self.is_shipped else ""
 
     @property
     def title(self) -> str:

@@ -77,7 +77,7 @@ class Quantity:
     output : entry of a scene's `outputs` that requests it; "" if it is stored whenever the model computes it.
     producer : (scene, samples) -> array, a formula for all methods; returns None if it lacks input. None if each model
         computes the quantity from its own state.
-    required : whether every run of a scene that requests it must have it.
+    required : whether every run of a built-in method must have it where its scene requests it.
     judgement : how it is checked; None if it is not, or by a rule of its own.
     plot : how it is plotted; None if it has no plot of its own.
     has_peak : whether its largest magnitude and the time of that are metrics of a run.

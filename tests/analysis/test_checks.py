@@ -17,6 +17,7 @@ from rotor_mbs.analysis import checks
 from rotor_mbs.analysis.judgement import defects_of, energy_slack, judge, quantity_errors, start_slack
 from rotor_mbs.methods.catalogue import REFERENCE
 from rotor_mbs.methods.solve import solve
+from rotor_mbs.report.pages.paper import available
 from rotor_mbs.runs.read import open_results
 from rotor_mbs.scenario.accuracy_bounds import shipped_bounds
 from rotor_mbs.scenario.catalogue import REFERENCES
@@ -263,12 +264,19 @@ def test_the_margin_is_bound_over_value(value: float, passed: bool, margin: floa
     assert (one.passed, one.margin) == (passed, pytest.approx(margin))
 
 
-def test_a_file_is_judged_by_the_papers_numbers_too(tmp_path: Path) -> None:
-    curve = rotor(lambda t: 2.7313 * np.sin(np.pi * t / 10.0))
-    made = [Made(FIG11, REFERENCE, rotor(np.zeros_like)), Made(FIG11, "printed/ode45", curve)]
+@pytest.mark.parametrize(
+    ("changes", "off", "figures"), [({"samples": 51}, [2.0], "11, 13a"), ({"gravity": 3.7}, [], "")]
+)
+def test_a_scene_of_the_paper_that_nobody_changed_is_judged_by_its_numbers_too(
+    changes: dict[str, Any], off: list[float], figures: str, tmp_path: Path
+) -> None:
+    scene, curve = FIG11.replace(**changes), rotor(lambda t: 2.7313 * np.sin(np.pi * t / 10.0))
+    made = [Made(scene, REFERENCE, rotor(np.zeros_like)), Made(scene, PRINTED, curve)]
     with open_results(store(tmp_path / "r.h5", made)) as results:
         found = values(checks.checks_of(results, [], BOUNDS))
-    assert [value for (check, _), value in found.items() if check == "published"] == pytest.approx([2.0])
+        assert results.scenes[scene.name].figures == figures
+        assert bool(available(results.scenes)) is bool(figures)
+    assert [value for (check, _), value in found.items() if check == "published"] == pytest.approx(off)
 
 
 def test_a_scene_that_is_not_shipped_is_not_compared_with_the_shipped_one_of_its_name(tmp_path: Path) -> None:

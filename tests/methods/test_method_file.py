@@ -83,6 +83,13 @@ def test_the_documents_example_is_short_complete_and_right() -> None:
         rm.run("check/held", "./mine.py")
 
 
+def test_arrays_that_a_method_omits_are_no_fault() -> None:
+    outputs = ["angles", "rates", "tip", "energy", "loads"]
+    Path("one.toml").write_text(rm.load("one.toml").replace(outputs=outputs).text)
+    run("-m", "mine.py", "-o", "o.h5")
+    assert rotor_mbs("check", "o.h5").out.startswith("runs checked: 1 mine/lsoda\n")
+
+
 @pytest.mark.full
 def test_a_run_is_keyed_by_the_code_of_its_file() -> None:
     first = run("-m", "./mine.py", "-m", "lagrange/dop853", "-o", "o.h5")

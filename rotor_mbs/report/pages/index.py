@@ -107,7 +107,7 @@ def scene_table(scenes: Scenes, files: Mapping[str, str]) -> tuple[PageTable, di
         compared, whole = compared_time([scene])
         row: list[TableCell | str] = [TableCell(name, href=files[name], note=scene.title)]
         row += [
-            str(scene.attributes.get("figures", "")),
+            scene.figures,
             f"{number(compared, 3)} of {number(whole, 3)}" * (whole > 0.0),
         ]
         for method in methods:

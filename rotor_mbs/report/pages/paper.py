@@ -169,10 +169,10 @@ FIGURES = (
 
 
 def available(scenes: Mapping[str, StoredScene]) -> tuple[PaperFigure, ...]:
-    """The figures of which `scenes` has a panel, with the panels that it has."""
+    """The figures of which `scenes` has a panel, with the panels that it has; none of a scene that was changed."""
     figures = []
     for figure in FIGURES:
-        panels = tuple(panel for panel in figure.panels if panel[1] in scenes)
+        panels = tuple(panel for panel in figure.panels if panel[1] in scenes and scenes[panel[1]].is_shipped)
         if panels:
             figures.append(figure._replace(panels=panels))
     return tuple(figures)

@@ -50,7 +50,7 @@ def scene_page(name: str, report: Report) -> dict[str, object]:
     tables = [paper.number_table(claims)]
     if study is not None:
         tables.append(paper.claim_table(claims, study))
-    condition = report.conditions.get(name.rpartition("/")[2])
+    condition = report.conditions.get(name.rpartition("/")[2]) if scene.is_shipped else None
     suite_runs = [run for run in report.suite_runs if run.scene == name]
     has_zero_pitch = any("zero_pitch_max" in run.attributes for run in scene.runs.values())
     motion, paths = [], []
