@@ -154,24 +154,27 @@ def isotropic_modes(stiffness: Array, damping: Array) -> ModeSet:
 
 
 def track(sets: Sequence[ModeSet]) -> list[ModeSet]:
-    """Puts the same modes in the same places at every speed: each set is put in the order of the one before, by shape.
+    """Puts the same modes in the same places at every speed: each set is put in the order of the one before."""
+    out = list(sets[:1])
+    for each in sets[1:]:
+        out.append(in_order_of(out[-1], each))
+    return out
+
+
+def in_order_of(first: ModeSet, other: ModeSet) -> ModeSet:
+    """The modes of `other` in the places of those of `first` that they are most like.
 
     Likeness of two modes: the modal assurance criterion |φ·ψ*|² / (|φ|² |ψ|²), less their relative distance.
     """
     from scipy.optimize import linear_sum_assignment
 
-    out = list(sets[:1])
-    for each in sets[1:]:
-        if each.names and each.names == out[-1].names:
-            out.append(each)
-            continue
-        before = out[-1]
-        size = max(float(np.abs(each.eigenvalues).max()), 1e-300)
-        likeness = _assurance(before.shapes, each.shapes)
-        likeness -= np.abs(before.eigenvalues[:, None, 0] - each.eigenvalues[None, :, 0]) / size
-        order = linear_sum_assignment(-likeness)[1]
-        out.append(ModeSet(each.eigenvalues[order], each.shapes[order]))
-    return out
+    if other.names and other.names == first.names:
+        return other
+    size = max(float(np.abs(other.eigenvalues).max()), 1e-300)
+    likeness = _assurance(first.shapes, other.shapes)
+    likeness -= np.abs(first.eigenvalues[:, None, 0] - other.eigenvalues[None, :, 0]) / size
+    order = linear_sum_assignment(-likeness)[1]
+    return ModeSet(other.eigenvalues[order], other.shapes[order])
 
 
 def whirl_frequencies(frequency: Array, speed: Array, harmonic: Array | int = 1) -> tuple[Array, Array]:
@@ -215,7 +218,7 @@ def _assurance(first: Complex, second: Complex) -> Array:
 REST, ROTATION = "rest", "rotation"
 CLOSED_FORM = "lagrange"  # the source that others are compared with
 FLOQUET = f"{CLOSED_FORM}/floquet"  # name of a record
-# Sources agree where their frequencies differ by no more than this share.
+# Sources agree where their frequencies and decay rates differ by no more than this share.
 AGREEMENT = 1e-8
 # Frequencies below this share of the largest are not compared: they are roots of what is left when stiffnesses cancel,
 # and of a rotor that nothing holds that is rounding.
@@ -300,14 +303,18 @@ class SceneModes:
 
     @property
     def disagreement(self) -> float:
-        """Largest relative difference between the frequencies of two models; 0 for one model."""
+        """Largest difference of a mode's frequency or decay rate between two models, relative to its frequency; 0 for
+        one model."""
         largest = 0.0
         for kind in (self.rest, self.rotation):
-            # Modes in the order of their size.
-            sizes = [np.sort(np.abs(source.eigenvalues).max(axis=2), axis=1) for source in kind.values()]
-            for other in sizes[1:]:
-                fast = sizes[0] > _SLOW * np.nanmax(sizes[0], initial=0.0)
-                share = np.abs(other - sizes[0])[fast] / sizes[0][fast]
+            numbers = [  # (2, speeds, modes)
+                np.stack([np.abs(source.eigenvalues).max(axis=2), source.eigenvalues.real.mean(axis=2)])
+                for source in kind.values()
+            ]
+            for other in numbers[1:]:
+                sizes = numbers[0][0]
+                fast = sizes > _SLOW * np.nanmax(sizes, initial=0.0)
+                share = np.abs(other - numbers[0])[:, fast] / sizes[fast]
                 largest = max(largest, float(np.nanmax(share, initial=0.0)))
         return largest
 
@@ -468,7 +475,8 @@ def linear_dataset(sources: Mapping[str, LinearModes], xarray: Any) -> Any:
         coordinates = {name: value for name, value in variables.items() if value[0] == (name,)}
         data = {name: value for name, value in variables.items() if name not in coordinates}
         sets.append(xarray.Dataset(data, coords=coordinates))
-    return xarray.concat(sets, xarray.Variable("solver", list(sources)), join="override", combine_attrs="override")
+    models = xarray.Variable("solver", list(sources), {"long_name": "model"})
+    return xarray.concat(sets, models, join="override", combine_attrs="override")
 
 
 def read_modes(path: Path) -> dict[str, SceneModes]:

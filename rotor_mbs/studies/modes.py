@@ -161,7 +161,11 @@ def _linear(
             if symmetric
             else partial(modal.modes_of, is_cyclic=kind == modal.ROTATION or scene.gravity == 0.0)
         )
-        sets = modal.track([modes_at(linear.stiffness, linear.damping) for linear in made])
+        sets = [modes_at(linear.stiffness, linear.damping) for linear in made]
+        if not modes_by_model:
+            sets = first_sets = modal.track(sets)
+        else:  # modes of equal frequencies are in the same places for every model
+            sets = [modal.in_order_of(first, own) for first, own in zip(first_sets, sets, strict=True)]
         names = (name if name == "rotor" else f"{name} pitch" for name in sets[0].names)
         modes_by_model[method.model] = modal.LinearModes(
             eigenvalues=over_speed([modes.eigenvalues for modes in sets], complex(np.nan, np.nan)),

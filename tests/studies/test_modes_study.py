@@ -39,19 +39,35 @@ def test_all_models_agree_on_the_nrel_rotor(found):
     assert (np.diff(closed.undamped_frequencies[:, 1]) > 0.0).all()  # centrifugal stiffening
 
 
-def test_a_model_of_another_rotor_is_found_out(monkeypatch):
-    """One blade a millionth stiffer in one model alone."""
+def change_one_model(monkeypatch, part, share):
+    """One blade's stiffness or damping a little larger in one model alone."""
     method = find_method("exudyn_tree/rk67")
     right = method.linearize
 
     def wrong(scene, *state):
-        stiffer = (scene.bearing_stiffness[0] * (1.0 + 1e-6), *scene.bearing_stiffness[1:])
-        return right(replace(scene, bearing_stiffness=stiffer), *state)
+        first, *others = getattr(scene, part)
+        return right(replace(scene, **{part: (first * (1.0 + share), *others)}), *state)
 
     monkeypatch.setitem(method.__dict__, "linearize", wrong)
-    found = study.compute_modes(general(gravity=0.0))
+
+
+@pytest.mark.parametrize(("part", "off"), [("bearing_stiffness", 5e-7), ("bearing_damping", 5e-8)])
+def test_a_model_of_another_rotor_is_found_out(part, off, monkeypatch):
+    """Half a millionth of the frequency, or a millionth of a decay rate that is a twentieth of it."""
+    change_one_model(monkeypatch, part, 1e-6)
+    found = study.compute_modes(general(gravity=0.0, bearing_damping=(300.0, 500.0, 400.0)))
     assert not found.agrees
-    assert found.disagreement == pytest.approx(5e-7, rel=0.2)
+    assert found.disagreement == pytest.approx(off, rel=0.2)
+
+
+@pytest.mark.parametrize("share", [-1e-13, 1e-13])
+def test_modes_of_equal_frequency_are_in_the_same_places_for_every_model(share, monkeypatch):
+    """Of equal blades with unequal dampers the last bits of each model decide which is the slowest."""
+    change_one_model(monkeypatch, "bearing_stiffness", share)
+    found = study.compute_modes(replace(SOFT, gravity=0.0, bearing_damping=(3e3, 4e3, 5e3)), [3.0])
+    ratios = [model.damping_ratios for model in found.rotation.values()]
+    np.testing.assert_allclose(ratios[1:], [ratios[0]] * (len(ratios) - 1), rtol=1e-8)
+    assert found.agrees
 
 
 def test_blades_that_differ_have_numbered_modes_and_unknown_speeds_a_message():
@@ -152,5 +168,6 @@ def test_the_api_has_tables_figures_files(found, tmp_path):
         found.plot.multipliers()
     pytest.importorskip("xarray")
     data = found.to_xarray()
+    assert data.solver.long_name == "model"
     expected = found.rotation["lagrange"].undamped_frequencies[:, 2]
     np.testing.assert_array_equal(data.undamped_frequency.sel(solver="lagrange", mode="cosine pitch"), expected)
