@@ -215,7 +215,9 @@ def ladders(names: Sequence[str] = ()) -> dict[str, tuple[Method, Ladder]]:
     allowed = [method.name for method in with_ladder]
     without = [name for name in names if name not in allowed]
     if without:
-        raise InputError([f"no ladder for method {name!r}; allowed: {', '.join(allowed)}" for name in without])
+        own = " (a Method of a file needs a setting `step` or `tolerance`, or `ladders`: docs/your-engine.md)"
+        faults = [f"no ladder for method {name!r}{own * (name in _of_files)}" for name in without]
+        raise InputError([f"{fault}; allowed: {', '.join(allowed)}" for fault in faults])
     chosen = [method for method in with_ladder if not names or method.name in names]
     return {method.name + ladder.variant: (method, ladder) for method in chosen for ladder in method.ladders}
 

@@ -172,7 +172,10 @@ def test_a_sweep_and_python_take_a_file() -> None:
         rm.run(scene, "bad.py")
 
 
-def test_a_model_without_linearization_has_no_modes() -> None:
+def test_what_modes_and_bench_need_is_named() -> None:
     ended = rotor_mbs("modes", "one.toml", "-m", "mine.py")
     assert ended.status == 2
     assert ended.err == "mine/lsoda: its model has no linearization; allowed: a model with `linearize`\n"
+    ended = rotor_mbs("bench", "one.toml", "-m", "mine.py")
+    assert ended.status == 2
+    assert "no ladder for method 'mine/lsoda' (a Method of a file needs a setting `step` or" in ended.err
