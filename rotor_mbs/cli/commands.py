@@ -218,9 +218,7 @@ def modes(arguments: argparse.Namespace) -> int:
             models = [*dict.fromkeys((*modes.rest, *modes.rotation))]
             if len(models) > 1:
                 verdict = "agree" if modes.agrees else "DISAGREE"
-                print(
-                    f"{', '.join(models)} {verdict}: frequencies differ by at most {modes.disagreement:.1e} (relative)"
-                )
+                print(f"{', '.join(models)} {verdict}: modes differ by at most {modes.disagreement:.1e} (relative)")
             print(*modes.notes, sep="\n", end="\n" if modes.notes else "")
         _write_pages(arguments.output)
     return int(is_lost or not all(modes.agrees for modes in chosen))

@@ -78,7 +78,7 @@ def modes_of_scenes(
                     records += modal.to_records(modes)
                     status, message = "ok", "; ".join(modes.notes)
                     if not modes.agrees:
-                        differ = f"relative difference of frequencies up to {modes.disagreement:.1e}"
+                        differ = f"relative difference of modes up to {modes.disagreement:.1e}"
                         status, message = "inaccurate", differ
                     outcome = Outcome(label, "", status, message, share=share)
                 made.append(outcome)
@@ -137,7 +137,7 @@ def _linear(
         whole[there] = values
         return whole
 
-    modes_by_model = {}
+    modes_by_model: dict[str, modal.LinearModes] = {}
     known = {method.model: method for method in methods() if method.linearize and method.is_installed}
     closed_form = next(iter(known), "")
     for method in known.values():

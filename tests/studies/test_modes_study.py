@@ -111,7 +111,7 @@ def test_the_command_writes_a_file_that_opens_in_xarray_and_a_page(tmp_path: Pat
     assert main(["modes", "stiff/nrel-5mw", "--speeds", "0:3:4", "-o", str(output), "-j", "1"]) == 0
     printed = capsys.readouterr().out
     assert "lagrange, exudyn_tree, exudyn_chain" in printed
-    assert " agree: frequencies differ by at most " in printed
+    assert " agree: modes differ by at most " in printed
     rows = [line.split() for line in printed.splitlines() if "collective pitch" in line]
     assert [row[4] for row in rows] == ["0", "3"]  # the lowest and the highest speed
     for *_, damped, hertz, _, _ in rows:

@@ -77,7 +77,8 @@ class Modes(SceneModes):
     rest, rotation : modes by model, at rest under gravity, and over speed without gravity; the closed form first.
     floquet : Floquet multipliers under gravity; None if not computed.
     notes : results that could not be computed, with the reason.
-    agrees, disagreement : whether the frequencies of the models agree, and their largest relative difference.
+    agrees, disagreement : whether the modes of the models agree, and the largest difference of a frequency or a decay
+        rate, relative to the frequency.
     plot : `modes.plot()` draws the Campbell diagram; `.damping()`, `.multipliers()`.
     """
 
