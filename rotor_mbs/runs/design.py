@@ -93,7 +93,11 @@ COLUMNS = {
         "angle_error_end": ("rad", "angle error at the last sample of the scene"),
         "tip_error_max": ("m", "largest distance of a tip from the reference up to the horizon"),
         "error_growth": ("1", "largest factor by which a small error of the initial state has grown"),
-        "horizon_s": ("s", "time of the run's last sample before the error growth reaches 1e5"),
+        "horizon_s": (
+            "s",
+            "time of the last sample before the error growth reaches 1e5; of a run also before rounding moves a pitch "
+            "that is zero by symmetry by 1e-4 rad",
+        ),
         "uncertainty_rad": ("rad", "uncertainty of the reference up to the horizon"),
         "angular_impulse_error_max": ("1", "largest error of the angular momentum balance, relative to its scale"),
         "linear_impulse_error_max": ("1", "largest error of the linear momentum balance, relative to its scale"),

@@ -72,8 +72,13 @@ def metrics_of(scene: Scene, run: Trajectory, reference: Trajectory | None, defe
         metrics["energy_scale_J"] = scale
         metrics["energy_drift_max"] = float(np.abs(energy).max()) / scale if scale else float(np.abs(energy).max())
         metrics["energy_gain_J"] = float(energy.max())
-    if reference is not None and len(reference.time) and scene.wants("angles"):
-        metrics |= _angle_errors(run, reference, defects)
+    until = len(run.time)  # samples up to the horizon of the run: it has left a symmetry, or the reference's is over
+    if reference is not None:
+        until = min(until, horizon_samples(reference))
+        if defects is not None:
+            until = min(until, defects.samples_at_rest(HORIZON_GROWTH))
+        if len(reference.time) and scene.wants("angles"):
+            metrics |= _angle_errors(run, reference, until)
     if defects is not None:
         metrics |= defect_metrics(defects, metrics.get("horizon_s"))
     if scene.wants("angles") and scene.wants("rates"):
@@ -104,7 +109,6 @@ def metrics_of(scene: Scene, run: Trajectory, reference: Trajectory | None, defe
         if rule is None or errors is None:
             continue
         if rule.with_reference and reference is not None and not rule.at_own_state:
-            until = min(horizon_samples(reference), len(errors))
             errors = errors[: until if until > 1 else 0]  # the first sample is given, and equal in every run
         if len(errors):
             metrics[rule.metric] = float(errors.max()) / (rule.scale_of(scene, run) if rule.scale_of else 1.0)
@@ -136,10 +140,9 @@ def defect_metrics(defects: Defects, horizon_s: float | None) -> Metrics:
     return {name: value for name, value in metrics.items() if not np.isnan(value)}
 
 
-def _angle_errors(run: Trajectory, reference: Trajectory, defects: Defects | None) -> Metrics:
+def _angle_errors(run: Trajectory, reference: Trajectory, until: int) -> Metrics:
     """Errors only where there is a second sample: the first one is given, and equal in every run."""
     error = angle_error(run, reference)
-    until = min(horizon_samples(reference), len(error))
     metrics: Metrics = {}
     # Pitches that are exactly zero in the reference: whether they stayed so, and if not, when and how fast they left.
     zero = [i for i in range(1, reference.angles.shape[1]) if not reference.angles[:, i].any()]
@@ -154,8 +157,6 @@ def _angle_errors(run: Trajectory, reference: Trajectory, defects: Defects | Non
             if linear.sum() >= 10:
                 slope = np.polyfit(run.time[linear], np.log(away[linear]), 1)[0]
                 metrics["zero_pitch_growth_per_s"] = float(slope)
-    if defects is not None:
-        until = min(until, defects.samples_at_rest(HORIZON_GROWTH))
     metrics["horizon_s"] = float(reference.time[max(until - 1, 0)])
     if until > 1:
         metrics["angle_error_max"] = float(error[:until].max())
