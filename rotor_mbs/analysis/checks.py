@@ -318,7 +318,7 @@ def _of_corrected_model(
         if (name := f"{channel}_impulse_error_max") in metrics:
             hint = "momentum minus the impulses of torque, weights and bearing: a force, an inertia, or too long a step"
             yield _of(run, "impulse", channel, metrics[name], bounds, "of scale", hint)
-    for quantity, rule, error in quantity_errors(scene, metrics):
+    for quantity, rule, error in quantity_errors(scene, metrics, trajectory):
         bound = quantity_bound(rule, bounds, run.method)
         if bound is not None:
             where = Where(run.scene, run.method, rule.channel or quantity.name)

@@ -17,11 +17,12 @@ from numpy.typing import NDArray
 
 from rotor_mbs.methods.catalogue import is_corrected, look_up
 from rotor_mbs.models.lagrange.defects import interval_defects
+from rotor_mbs.models.lagrange.samples import load_rounding
 from rotor_mbs.scenario.accuracy_bounds import Bound, Bounds, shipped_bounds
 from rotor_mbs.scenario.scene import Blade, Scene
 from rotor_mbs.solution.defects import Defects
 from rotor_mbs.solution.metrics import ANGLE_LIMIT, Metrics, metrics_of
-from rotor_mbs.solution.quantities import Array, Quantity, QuantityMetric, known_quantities
+from rotor_mbs.solution.quantities import Array, Quantity, QuantityMetric, known_quantities, sizes
 from rotor_mbs.solution.trajectory import Integration, Solution, Trajectory
 
 # rad: the largest error of an angle, up to the horizon, of a run that is called ok.
@@ -134,12 +135,22 @@ def largest_angle_error(metrics: Metrics) -> float:
     return metrics.get("angle_error_max", metrics.get("angle_error_predicted", 0.0))
 
 
-def quantity_errors(scene: Scene, metrics: Metrics) -> Iterator[tuple[Quantity, QuantityMetric, float]]:
-    """Each judged quantity, its rule, and its error relative to what the rule says; only those that the run has."""
+def quantity_errors(
+    scene: Scene, metrics: Metrics, run: Trajectory | None = None
+) -> Iterator[tuple[Quantity, QuantityMetric, float]]:
+    """Each judged quantity, its rule, and its error relative to what the rule says; only those that the run has. Loads
+    of a `run` that is given less what rounding of its state leaves open."""
+    has_loads = run is not None and scene.wants("loads")
+    rounding = load_rounding(scene, run.time, run.angles, run.rates) if run is not None and has_loads else {}
     for quantity in known_quantities(scene.outputs):
         rule = quantity.judgement
-        if rule is not None and rule.metric in metrics:
-            yield quantity, rule, metrics[rule.metric] / (rule.relative_to(scene) if rule.relative_to else 1.0)
+        if rule is None or rule.metric not in metrics:
+            continue
+        error = metrics[rule.metric] / (rule.relative_to(scene) if rule.relative_to else 1.0)
+        if run is not None and quantity.name in rounding and rule.scale_of is not None:
+            unknown = float(sizes(quantity, rounding[quantity.name]).max()) / rule.scale_of(scene, run)
+            error = max(error - unknown, 0.0)
+        yield quantity, rule, error
 
 
 def _status(scene: Scene, run: Solution, reference: Trajectory | None, metrics: Metrics) -> tuple[str, str]:
@@ -176,7 +187,7 @@ def _status(scene: Scene, run: Solution, reference: Trajectory | None, metrics: 
     energy = bounds.of("energy", run.method).value + energy_slack(scene, run.trajectory)
     if "energy_drift_max" in metrics and not metrics["energy_drift_max"] <= energy:
         return "inaccurate", f"energy drift {metrics['energy_drift_max']:.1e} of the energy scale, allowed {energy:.0e}"
-    for _, rule, error in quantity_errors(scene, metrics):
+    for _, rule, error in quantity_errors(scene, metrics, run.trajectory):
         bound = quantity_bound(rule, bounds, run.method)
         if bound is not None and not error <= bound:
             fault = rule.fault or f"{rule.metric} is {{value}} {rule.unit}".rstrip()

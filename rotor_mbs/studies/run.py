@@ -233,9 +233,10 @@ def _judged(run: Solution, reference: Trajectory | None, end: float) -> tuple[So
 
 
 def next_to_try(scene: Scene, method: str, settings: Mapping[str, object], status: str) -> str:
-    """What would make an inaccurate run better: the next rung of the method's ladder, or another method; else ""."""
+    """What would make an inaccurate run better: the next rung of the method's ladder, or another method; else "". Of a
+    reference, which nothing else can stand for, ""."""
     known = look_up(method)
-    if status != "inaccurate" or known is None or not known.is_corrected:
+    if status != "inaccurate" or known is None or not known.is_corrected or method == REFERENCE:
         return ""
     finer = known.finer(settings, scene.duration / (scene.samples - 1))
     if finer:

@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from math import pi
 
 import numpy as np
 import pytest
 from support import references
 
+from rotor_mbs.analysis.judgement import judge
+from rotor_mbs.methods.catalogue import REFERENCE
 from rotor_mbs.methods.solve import solve
 from rotor_mbs.solution.metrics import metrics_of
+from rotor_mbs.studies.run import next_to_try
+from rotor_mbs.studies.stored_references import frozen_solution
 
 RATED = 12.1 * pi / 30.0  # rad/s
 TORQUE = 97.0 * 43093.55  # N m at the slow shaft
@@ -36,6 +41,19 @@ def test_scipys_integrators_are_not_stopped_by_megawatts_that_balance(name: str)
     assert found.integration.success
     assert np.abs(found.trajectory.angles - exact.angles).max() < 1e-11
     assert np.abs(found.trajectory.work - exact.work).max() < 1e-12 * np.abs(exact.kinetic_energy).max()
+
+
+@pytest.mark.parametrize(("factor", "status"), [(1.0, "ok"), (1.0 + 1e-12, "inaccurate")])
+def test_loads_of_a_stiff_bearing_are_known_to_the_rounding_of_its_angle(factor: float, status: str) -> None:
+    """9.7e8 N m/rad: a unit in the last place of a pitch is 4e-14 of the largest load."""
+    scene = references.scene("turbine/feather-stuck")
+    exact = frozen_solution(scene)
+    assert exact is not None
+    angles, forces = exact.trajectory.angles.copy(), factor * exact.trajectory.quantities["shaft_force"]
+    angles[:, 1:] = np.nextafter(angles[:, 1:], 0.0)
+    moved = replace(exact, trajectory=exact.trajectory.replace(angles=angles, shaft_force=forces))
+    assert judge(scene, moved, exact.trajectory).status == status
+    assert next_to_try(scene, REFERENCE, {}, "inaccurate") == ""
 
 
 @pytest.mark.parametrize("method", ["exudyn_tree/rk67", "mujoco/rk4"])

@@ -31,6 +31,8 @@ from rotor_mbs.scenario.time_table import Segment, is_constant, value_at, values
 from rotor_mbs.solution.quantities import named_loads
 from rotor_mbs.solution.trajectory import Array, Integration, Trajectory, all_coordinates, finite_rows
 
+_DIFFERENCE = 1e-6  # rad and rad/s: far above rounding, and yet linear
+
 # (n,) or (n, 3) numbers of one kind: doubles, or quad numbers as objects.
 Numbers = Any
 
@@ -139,6 +141,25 @@ def sampled_loads(scene: Scene, times: Array, angles: Array, rates: Array) -> di
     """The load quantities at (n,) times in s, in double precision; angles and rates (n, 1 + blades) rad, rad/s."""
     with np.errstate(all="ignore"):  # near a singularity; what is not finite cuts the run
         return _loads(scene, times, angles, rates, float, np.sin, np.cos)
+
+
+def load_rounding(scene: Scene, times: Array, angles: Array, rates: Array) -> dict[str, Array]:
+    """How much of the load quantities the last digits of times, angles and rates leave open, in the shape of each.
+
+    A stiff bearing's moment is a small difference of large ones. Of each number two roundings count, half a unit in the
+    last place: its own, and that of what it is compared with, such as the angle of a pitch command.
+    """
+    loads = sampled_loads(scene, times, angles, rates)
+    rounding = {name: np.zeros_like(values) for name, values in loads.items()}
+    numbers, count = np.column_stack([times, angles, rates]), angles.shape[1]
+    for column, values in enumerate(numbers.T):
+        moved = numbers.copy()
+        moved[:, column] -= _DIFFERENCE  # back in time, so that a jump of a load counts from its own sample on
+        last_digits = np.finfo(float).eps * np.abs(values) / _DIFFERENCE
+        others = sampled_loads(scene, moved[:, 0], moved[:, 1 : 1 + count], moved[:, 1 + count :])
+        for name, other in others.items():
+            rounding[name] += (np.abs(other - loads[name]).T * last_digits).T
+    return rounding
 
 
 def quad_loads(scene: Scene, times: Array, states: Any) -> dict[str, Array]:
