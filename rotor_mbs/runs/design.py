@@ -42,6 +42,7 @@ def flags(names: Sequence[str], first: int = 0) -> dict[str, Any]:
     return {"flag_values": np.arange(first, first + len(names), dtype=np.int8), "flag_meanings": " ".join(names)}
 
 
+_OWN_POINTS = "of printed/ode45 over ode45's own output points instead"
 # What a computed column with a value a row is, whichever table has it: units, long name, type where it is no double.
 COLUMNS = {
     name: Column(("run", CHARACTERS) if CHARACTER in kind else ("run",), units, long_name, kind[0] if kind else "<f8")
@@ -104,9 +105,9 @@ COLUMNS = {
         "zero_pitch_max": ("rad", "largest magnitude of the pitch angles that stay zero in the reference"),
         "zero_pitch_left_s": ("s", "time at which a pitch angle that stays zero in the reference becomes nonzero"),
         "zero_pitch_growth_per_s": ("1/s", "growth rate of a pitch angle that stays zero in the reference"),
-        "rotor_angle_min": ("rad", "smallest rotor angle, at the integrator's own output points"),
-        "rotor_angle_max": ("rad", "largest rotor angle, at the integrator's own output points"),
-        "rotor_rate_max": ("rad/s", "largest magnitude of the rotor rate, at the integrator's own output points"),
+        "rotor_angle_min": ("rad", f"smallest rotor angle (signed) over the samples; {_OWN_POINTS}"),
+        "rotor_angle_max": ("rad", f"largest rotor angle (signed) over the samples; {_OWN_POINTS}"),
+        "rotor_rate_max": ("rad/s", f"largest magnitude of the rotor rate over the samples; {_OWN_POINTS}"),
         "pitch_max": ("rad", "largest magnitude of a pitch angle"),
         "left_out": ("1", "1 if the point was omitted because of the time budget", "i1"),
         "load_before": ("1", "load average of the machine before the timing"),

@@ -19,7 +19,7 @@ from rotor_mbs.methods.catalogue import find_method
 from rotor_mbs.runs.design import MISSING
 from rotor_mbs.runs.pool import SerialPool
 from rotor_mbs.runs.sweeps import StoredSweep
-from rotor_mbs.runs.table import Rows, TableFile
+from rotor_mbs.runs.table import Rows, TableFile, text_of
 from rotor_mbs.runs.versions import code_digest
 from rotor_mbs.scenario.catalogue import find_scenes
 from rotor_mbs.scenario.sweep import load_sweep
@@ -161,6 +161,14 @@ def test_a_dry_run_tells_runs_and_size_and_writes_nothing(tmp_path: Path) -> Non
     assert facts["runs"] == 8
     assert facts["bytes"] >= 8 * 21 * 4 * 8
     assert not list(tmp_path.glob("o.h5*"))
+
+
+def test_the_longest_message_is_stored_whole(tmp_path: Path) -> None:
+    varied = '[[axis]]\nkey = "shaft.damping"\nvalues = [0]\n'
+    scene = 'title = "one"\nscene = "extreme/singular-one-blade"\nmethods = ["lagrange/ode45"]\n'
+    message = text_of(StoredSweep(made_sweep(tmp_path, scene + varied)).column("message")[0])
+    assert message.startswith("with all pitches at ±π/2")
+    assert message.endswith(" at time t.")
 
 
 WITH_GROWTH = """
