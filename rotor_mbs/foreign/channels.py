@@ -9,6 +9,7 @@ the time (or speed) alone is guessed then. All are guessed where it names a grou
 from __future__ import annotations
 
 import itertools
+import math
 import os
 import re
 from collections import Counter
@@ -32,7 +33,10 @@ Array = NDArray[np.float64]
 
 TIME, SPEED = "time", "speed"
 _FEW_DIGITS, _ALL_DIGITS = 9, 17
-_FEW_VALUES = 10
+_EXCEPTIONS = 0.05  # of the numbers
+_FULL_DIGITS = 8  # as many as single precision has
+_FEW_VALUES = 10  # distinct ones: fewer may have been chosen, and say nothing of digits
+_SAMPLE = 200  # numbers of a column, at least, where not all are needed
 _EQUAL = 1e-6  # of an interval between rows
 _FEWEST = 3  # rows: fewer have no motion to be compared
 # Names without digits, blanks and marks, as listed in docs/compare.md; a name of a rate is one of an angle with a word
@@ -323,7 +327,7 @@ class ForeignData:
     read, unused : a line for each channel: column, unit, and what was assumed; names of the other columns.
     rounding, time_rounding : (n, channels), (n,) half a unit in the last digit of each number, as it was written.
     wrapped : for each channel, whether whole turns are missing from it.
-    digits : how many significant digits the numbers have, at most; 17 where they have all.
+    precision : "4 decimals: rounding error 5e-05", or the like of digits; "" of numbers with hardly any rounding.
     omitted : names of channels that are not to be missed.
     is_modes : whether it is a table of modes.
     """
@@ -337,7 +341,7 @@ class ForeignData:
     read: tuple[str, ...] = ()
     unused: tuple[str, ...] = ()
     wrapped: tuple[bool, ...] = ()
-    digits: int = _ALL_DIGITS
+    precision: str = ""
     omitted: tuple[str, ...] = ()
     is_modes: bool = False
 
@@ -389,7 +393,6 @@ def load_data(
         shown = ", ".join(f"{name} has {length} rows" for name, length in lengths.items())
         raise InputError(f"{table.source}: columns of different lengths: {shown}; allowed: a row for every time")
     arrays: list[Array] = []
-    last_digits: list[Array] = []
     for channel, entry in chosen.items():
         values = table[entry.column].values
         bad = np.flatnonzero(~np.isfinite(values))
@@ -398,10 +401,18 @@ def load_data(
                 f"{table.source}: column {entry.column!r} is {values[bad[0]]} in row {bad[0] + 1} of "
                 f"{len(values)}; allowed: finite numbers"
             )
-        factor = UNITS[channel.kind][entry.unit.lower()]
-        last_digits.append(half_last_digits(values) * abs(factor))
-        si_values: Array = entry.sign * (values + entry.offset) * factor
+        si_values: Array = entry.sign * (values + entry.offset) * UNITS[channel.kind][entry.unit.lower()]
         arrays.append(np.unwrap(si_values) if entry.wrapped else si_values)
+    time, *numbers = (table[entry.column].values for entry in chosen.values())
+    kinds = [(channel.kind, entry.unit) for channel, entry in chosen.items()][1:]
+    last_digits = [half_last_digits(time)]
+    for own, values in zip(kinds, numbers, strict=True):
+        alike = [other for kind, other in zip(kinds, numbers, strict=True) if kind == own]
+        few = 1 if own[0] == "frequency" else _FEW_VALUES  # frequencies are computed, not chosen
+        last_digits.append(half_last_digits(values, [alike, numbers], few))
+    precision = _precision(numbers, last_digits[1:])
+    for j, (channel, entry) in enumerate(chosen.items()):
+        last_digits[j] = last_digits[j] * abs(UNITS[channel.kind][entry.unit.lower()])
     is_modes = next(iter(chosen)).name == SPEED
     if is_modes:
         order = np.argsort(arrays[0], kind="stable")
@@ -424,51 +435,71 @@ def load_data(
         lines,
         tuple(name for name in table.columns if name not in lengths),
         tuple(entry.wrapped for entry in chosen.values())[1:],
-        max(_digits(table[entry.column].values) for channel, entry in list(chosen.items())[1:]),
+        precision,
         omitted,
         is_modes,
     )
 
 
-def half_last_digits(values: Array) -> Array:
+def half_last_digits(values: Array, others: Sequence[Sequence[Array]] = (), few: int = _FEW_VALUES) -> Array:
     """(n,) half a unit in the last place of numbers as they were written: decimals, digits, single or double precision.
 
-    Of the ways that all of them fit, the coarsest.
+    Of the ways that all of them fit, the coarsest. others: groups of columns; a column of few distinct values is judged
+    together with the first group that has enough. few: if these have fewer than that, they are exact.
     """
-    sizes = np.abs(values)
-    largest = float(sizes.max(initial=0.0))
-    if len(np.unique(values)) < _FEW_VALUES:  # which say nothing of digits
+    sizes, judged = np.abs(values), values
+    for group in others:
+        if len(np.unique(judged)) < _FEW_VALUES:
+            judged = np.concatenate([values, *(other[:: 1 + len(other) // _SAMPLE] for other in group)])
+    largest = float(np.abs(judged).max(initial=0.0))
+    if len(np.unique(judged)) < few:
         return np.asarray(sizes * 2.0**-53)
     # Numbers of so many decimals may seem to have so many digits, and the other way round: of both the coarser.
     last = np.zeros(len(values))
     for decimals in range(_FEW_DIGITS + 1):
         unit = 10.0**-decimals
         noise = 4.0 * 2.0**-52 * largest  # of the arithmetic; with less than a hundredth of a unit any number fits
-        if 100.0 * noise < unit < largest and np.abs(values - np.round(values / unit) * unit).max() <= noise:
+        if 100.0 * noise < unit < largest and np.abs(judged - np.round(judged / unit) * unit).max() <= noise:
             last[:] = 0.5 * unit
             break
-    digits = _digits(values)
+    digits = _digits(judged)
     if digits <= _FEW_DIGITS:
         exponents = np.floor(np.log10(np.where(sizes > 0.0, sizes, 1.0)))
         last = np.maximum(last, np.where(sizes > 0.0, 0.5 * 10.0 ** (exponents + 1 - digits), 0.0))
     if last.any():
         return last
     with np.errstate(over="ignore"):  # of what is larger than single precision can be
-        single = np.asarray(values, np.float32).astype(float)
-    return np.asarray(sizes * (2.0**-24 if np.array_equal(single, values) else 2.0**-53))
+        single = np.asarray(judged, np.float32).astype(float)
+    return np.asarray(sizes * (2.0**-24 if np.array_equal(single, judged) else 2.0**-53))
+
+
+def _precision(columns: Sequence[Array], last_digits: Sequence[Array]) -> str:
+    """See `ForeignData`. last_digits: `half_last_digits` of each column."""
+    pairs = list(zip(map(np.abs, columns), last_digits, strict=True))
+    rounded = [(sizes, last) for sizes, last in pairs if (last > 10.0**-_FEW_DIGITS * sizes).any()]
+    digits = max(map(_digits, columns))
+    if digits >= _FULL_DIGITS or not rounded:
+        return ""
+    # Of numbers that are all of one size digits are decimals, too; and 0.100000 might have one digit.
+    is_fixed = any(sizes.min() < 0.1 * sizes.max() for sizes, _ in rounded)
+    if is_fixed and all((last > 2.0 * last.min()).mean() < _EXCEPTIONS for _, last in rounded):
+        decimals = sorted({round(-math.log10(2.0 * last.min())) for _, last in rounded})
+        return f"{' or '.join(map(str, decimals))} decimals: rounding error {0.5 * 10.0 ** -decimals[0]:.0e}"
+    return f"{digits} digits: relative rounding error {0.5 * 10.0 ** (1 - digits):.0e}"
 
 
 def _digits(values: Array) -> int:
     """With how many significant digits the numbers may have been written."""
-    some = values[values != 0.0][:200]
-    sizes = 10.0 ** np.floor(np.log10(np.abs(some)))
-    for digits in range(1, _FEW_DIGITS + 1):
-        unit = sizes * 10.0 ** (1 - digits)
+    some = values[values != 0.0]
+
+    def fit(some: Array, digits: int) -> bool:
+        unit = 10.0 ** (np.floor(np.log10(np.abs(some))) + 1 - digits)
         with np.errstate(all="ignore"):  # of a number near the smallest there is the unit may be 0: no digits fit
             rounded = np.round(some / unit) * unit
-        if np.allclose(some, rounded, rtol=1e-12, atol=0.0):
-            return digits
-    return _ALL_DIGITS
+        return np.allclose(some, rounded, rtol=1e-12, atol=0.0)
+
+    fitting = (digits for digits in range(1, _FEW_DIGITS + 1) if fit(some[:_SAMPLE], digits) and fit(some, digits))
+    return next(fitting, _ALL_DIGITS)
 
 
 def _refuse_wrong_times(source: str, time: Array) -> None:

@@ -140,7 +140,6 @@ def _checked(tolerance: float) -> float:
 _ROUNDING = 1e-9  # of the duration: times that are sums of steps may end so far past it
 _FEWEST = 3
 _START = 1e-3  # rad, rad/s: starts that differ by more are another start
-_FULL_DIGITS = 8  # as many as single precision has
 _STRETCHES = (10, 100)  # rows over which defects are added up, too
 _MOST_NAMES = 100  # of columns that were not used
 
@@ -276,9 +275,8 @@ def compare_with_reference(
     notes = [note] if note else []
     if len(data.time) > len(cut.time):
         notes.append(f"{len(data.time) - len(cut.time)} rows after the scene's {scene.duration:g} s are not compared")
-    if data.digits < _FULL_DIGITS:
-        rounding = 0.5 * 10.0 ** (1 - data.digits)
-        notes.append(f"numbers of {data.digits} digits: relative rounding error {rounding:.0e}")
+    if data.precision:
+        notes.append(f"numbers of {data.precision}")
     if missing:
         notes.append(f"missing angles: {', '.join(missing)}")
     likely: list[str] = []
@@ -612,7 +610,8 @@ def compare_modes(data: ForeignData, scene: Scene, tolerance: float) -> tuple[Da
     likely = _mode_causes(scene, data, tolerance, error) if messages else []
     verdict = DataVerdict(
         scene.name, data.source, status, message, tolerance, tuple(channels), len(data.time), float(data.time[-1]),
-        read=data.read, unused=data.unused, likely=tuple(likely), axis="speed",
+        read=data.read, unused=data.unused, notes=(f"numbers of {data.precision}",) if data.precision else (),
+        likely=tuple(likely), axis="speed",
     )  # fmt: skip
     return verdict, comparison_record(verdict, scene, data, expected, None)
 

@@ -146,6 +146,9 @@ def test_the_last_digit_of_single_and_double_precision_and_of_few_values() -> No
     # A pitch that stays at 0.1 rad says nothing of digits.
     np.testing.assert_array_equal(half_last_digits(np.full(50, 0.1)), np.full(50, 0.1 * 2.0**-53))
     assert not half_last_digits(np.zeros(50)).any()
+    # But other columns may.
+    np.testing.assert_array_equal(half_last_digits(np.full(50, 0.1), [[column_of("%.4f")]]), np.full(50, 0.5e-4))
+    np.testing.assert_array_equal(half_last_digits(np.full(50, 0.1), [[double]]), np.full(50, 0.1 * 2.0**-53))
     # Nor does a number next to the smallest there is, as a flipped bit may make: no unit of it can be written.
     assert half_last_digits(np.array([1.0 / 3.0, 2.0 / 3.0, 5e-324])).max() < 1e-15
 

@@ -91,13 +91,15 @@ def test_the_command_reads_a_table_in_rpm_and_hz_and_few_digits(
     rows = np.column_stack([SPEEDS * 30.0 / math.pi, damped[:, 1:] / (2.0 * math.pi)])[::-1]
     page, data = tmp_path / "page" / "index.html", tmp_path / "modes.csv"
     call = ["compare", str(data), "--scene", UNEQUAL, "-o", str(page.parent)]
-    for digits, factor, status in (("%.5e", 1.0, 0), ("%.17g", 1.001, 1)):
+    decimals = ["%.17g", "%.4f", "%.4f", "%.4f"]
+    for digits, factor, status in ((decimals, 1.0, 0), ("%.17g", 1.001, 1)):
         head = "speed [rpm],f1 [Hz],f2 [Hz],freq_3_Hz"
         np.savetxt(data, rows * [1.0, factor, 1.0, 1.0], digits, ",", header=head, comments="")
         assert main(call) == status
         shown = capsys.readouterr().out
         assert "frequency 3 = 'freq_3_Hz' [hz]" in shown
         assert "horizon" not in shown
+        assert ("rounding error" in shown) == (digits == decimals)
         assert ("inaccurate" in page.read_text()) == (status == 1)
     (tmp_path / "map.toml").write_text('omit = ["frequency_1"]\n')
     assert main([*call, "--columns", str(tmp_path / "map.toml"), "--json"]) == 0
