@@ -97,6 +97,9 @@ class DefectCauses:
         self._weights = 1.0 / np.maximum(self._floors[chosen], 1e-4 * largest)
         self._steps = explicit_steps(scene, self._ends - self._begins, defects.states[chosen]) if len(chosen) else None
         self._own_ends: dict[int, Array] = {}  # by the scene, by the factor of the steps
+        # (m,) for how many of these rows a coordinate has one number, and with it one rounding error, on average.
+        repeats = len(chosen) / (1.0 + np.count_nonzero(np.diff(self._states), axis=1))
+        self._repeats = np.tile(repeats.reshape(2, -1).max(axis=0), 2)
 
     @property
     def is_rounding(self) -> bool:
@@ -202,7 +205,8 @@ class DefectCauses:
             return None
         spread = float(np.sqrt((weighted**2).mean()))
         if self.is_rounding:
-            spread = max(spread, 0.3)
+            sizes = (slopes**2).reshape(self._tried.shape).sum(axis=0)  # of a single parameter
+            spread = max(spread, 0.3) * math.sqrt(float(sizes @ self._repeats / sizes.sum()))
         deviation = spread * np.sqrt(np.diag(np.linalg.pinv(slopes.T @ slopes)))
         deviation = np.maximum(deviation, _QUICK * np.abs(change))
         if (np.abs(change) < _SIGNIFICANT * deviation).any():
