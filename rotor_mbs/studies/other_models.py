@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import itertools
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, fields, replace
@@ -110,6 +111,15 @@ def _scenes(scene: Scene) -> Iterator[tuple[str, Scene]]:
         },
     }.items():
         yield text, replace(scene, blades=tuple(others))
+    for chosen, k in itertools.product([range(len(blades)), *((i,) for i in few if len(blades) > 1)], (0, 1)):
+        number = f"[{chosen[0]}]" if len(chosen) < len(blades) else ""
+        opposite = _scaled_at(scene, [("blades", b, "centre_of_mass", k) for b in chosen], -2.0)
+        yield f"blade{number}.centre_of_mass[{k}] with opposite sign", opposite
+    for name, key in _OF_BEARINGS.items():
+        values = getattr(scene, name)
+        for i, j in itertools.combinations(few if len(values) == len(blades) else (), 2):
+            exchanged: dict[str, Any] = {name: tuple(values[{i: j, j: i}.get(k, k)] for k in range(len(values)))}
+            yield f"{key} of blades {i + 1} and {j + 1} exchanged", replace(scene, **exchanged)
     for name, text in (
         ("rotor_torque", "the torque of the rotor"), ("bearing_stiffness", "the springs"),
         ("bearing_damping", "the dampers of the bearings"), ("shaft_damping", "the damper of the shaft"),

@@ -88,6 +88,12 @@ def pitched(angle: float) -> Callable[[Scene], Scene]:
     return changed
 
 
+def reversed_c(scene: Scene) -> Scene:
+    first, second, *others = scene.blades
+    x, y, z = second.centre_of_mass
+    return replace(scene, blades=(first, replace(second, centre_of_mass=(-x, y, z)), *others))
+
+
 def with_gravity(value: float) -> Callable[[Scene], Scene]:
     return lambda scene: replace(scene, gravity=value)
 
@@ -237,6 +243,11 @@ PLANTS = {
         "bearing.damping[0] off by +10 % (uncertainty ", "sprung",
         changed=lambda scene: replace(scene, bearing_damping=(330.0, 500.0, 400.0)),
     ),
+    "bearings exchanged": Plant(
+        "bearing.damping of blades 1 and 2 exchanged", "sprung",
+        changed=lambda scene: replace(scene, bearing_damping=(500.0, 300.0, 400.0)),
+    ),
+    "c of a blade reversed": Plant("blade[1].centre_of_mass[0] with opposite sign", changed=reversed_c),
     "rest angle": Plant(
         "bearing.rest off by -0.1 rad (uncertainty ", "sprung",
         changed=lambda scene: replace(scene, bearing_rest=(((0.0, -0.1),),) * 3),
