@@ -41,6 +41,9 @@ _MAX_RUNGE_KUTTA_STEPS = 32
 FIT_ROWS = 5
 _FIT_ROUNDS = 12
 _STANDS_STILL = 1e-9  # rad in an interval: the error that is left is the square of it
+# rad in an interval, median of the rows: from differences that are this near, right data of the paper's motions always
+# came to stand still; from 0.8 on some did not.
+_NEAR = 0.5
 _SIDE = 1e-9  # of a step
 _DIFFERENCE = 1e-7  # rad and rate units: rounding and curvature are a share of 1e-8 or so of a matrix's entries
 
@@ -117,7 +120,8 @@ def fitted_rates(scene: Scene, time: Array, angles: Array) -> Array:
     ------
     InputError
         Where there are fewer rows than a window has, the motion is too stiff to carry a state from row to row, or the
-        rates do not come to stand still: differences are too far from them, or no motion passes through the rows.
+        rows are too far apart: from differences the rates do not come to stand still. Where they do not although the
+        rows are near, no motion passes through some rows; the rates of the others are found.
     """
     count = len(time)
     if count < FIT_ROWS:
@@ -135,7 +139,7 @@ def fitted_rates(scene: Scene, time: Array, angles: Array) -> Array:
     places = np.arange(count) - windows
     step = float(np.median(np.diff(time)))
     scale = np.concatenate([np.ones(half), np.full(half, 1.0 / step)])
-    before = np.inf
+    before, is_near = np.inf, False
     for _ in range(_FIT_ROUNDS):
         states = np.hstack([angles[:, moving], rates[:, moving]])
         ends = interval_ends(scene, time[:-1], time[1:], states[:-1])
@@ -160,16 +164,17 @@ def fitted_rates(scene: Scene, time: Array, angles: Array) -> Array:
         )
         correction = all_rows[places, windows, half:]
         rates[:, moving] += correction
-        change = step * float(np.abs(correction).max())
+        changes = step * np.abs(correction).max(axis=1)
+        change, usual = float(changes.max()), float(np.median(changes))
+        is_near |= before == np.inf and usual <= _NEAR
         if change <= _STANDS_STILL:
             return rates
-        if not change < before:
+        if not change < before and (usual <= _STANDS_STILL or not is_near):
             break
         before = change
-    raise InputError(
-        "the rates cannot be computed from the angles: the rows are too far apart for this motion, or no motion passes "
-        "through them"
-    )
+    if is_near:
+        return rates
+    raise InputError("the rates cannot be computed from the angles: the rows are too far apart for this motion")
 
 
 def interval_ends(scene: Scene, begins: Array, ends: Array, states: Array) -> Array:
