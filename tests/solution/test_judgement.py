@@ -190,7 +190,7 @@ def test_a_wrong_motion_is_unchecked_where_nothing_can_tell(outputs: tuple[str, 
     run = Solution(scene, METHOD, Trajectory(time, angles + 2e-3, np.zeros((11, 4))), Integration(True))
     verdict = judge(scene, run, None)
     assert verdict.status == status
-    assert ("angles or rates" in verdict.message) == (status == "unchecked")
+    assert ("without energies" in verdict.message) == (status == "unchecked")
     if "angles" in outputs:
         exact = Trajectory(time, angles + 0.1, np.zeros((11, 4)), error_growth=np.ones(11))
         assert judge(scene, run, exact).status == "inaccurate"
