@@ -7,18 +7,20 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from support.checking import with_wrong_number
-from support.defect_tables import signatures
 from support.references import reference
 
 from rotor_mbs.methods.catalogue import find_method
 from rotor_mbs.methods.solve import solve
+from rotor_mbs.models.lagrange import closed_form
 from rotor_mbs.models.lagrange.defects import interval_defects
+from rotor_mbs.models.lagrange.parameters import rate_units, rotor_form
+from rotor_mbs.models.lagrange.samples import loads_at
 from rotor_mbs.scenario.accuracy_bounds import shipped_bounds
 from rotor_mbs.scenario.catalogue import find_scenes
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.defects import FLOOR_SAFETY
 from rotor_mbs.solution.metrics import horizon
-from rotor_mbs.solution.trajectory import Trajectory
+from rotor_mbs.solution.trajectory import Array, Trajectory
 
 SCENES = {scene.name.removeprefix("paper/"): scene for scene in find_scenes(["paper"])}
 ENGINES = ("exudyn_tree/rk67", "mujoco/rk4", "exudyn_chain/extrapolated")
@@ -26,6 +28,7 @@ ROWS = 40  # of a stretch near the end, which is run with the fault
 # A fault is planted four times as large as its signature, which no engine has computed, says that the bounds see it;
 # up to 100 % of a number, and 400 % of a torque.
 MARGIN = 4.0
+SMALL = 1e-7  # relative: far above rounding, and the defects are linear in it
 LARGEST_SHARE = {"c": 1.0, "gravity": 1.0, "torque": 4.0}
 
 # In so many of the scenes at least a fault can be seen by the method's bounds. In figs. 5 and 6 the rotor stands or
@@ -61,6 +64,25 @@ def limits(name: str, method: str) -> tuple[float, float]:
     bounds = replace(shipped_bounds(), scene=f"paper/{name}")
     of_median = bounds.find("defect median", method)
     return bounds.of("defect", method).value, np.inf if of_median is None else of_median.value
+
+
+def signatures(scene: Scene, motion: Trajectory) -> dict[str, Array]:
+    """(n,) rad for each fault: size of each interval's defect for a relative fault of 1.
+
+    To first order in the interval h: a wrong acceleration Δa is a defect of h Δa in the rates.
+    """
+    moving = scene.moving_coordinates
+    angles, rates = motion.angles[:, moving].T, motion.rates[:, moving].T
+    interval = scene.duration / (scene.samples - 1)
+    units = np.maximum(rate_units(scene), 1.0 / interval)[:, None]
+
+    def accelerations(scene: Scene) -> Array:
+        form, loads = rotor_form(scene), loads_at(scene, motion.time)
+        rows = closed_form.accelerations(list(angles), list(rates), form, loads, np.sin, np.cos)
+        return np.array([np.broadcast_to(row, angles[0].shape) for row in rows])
+
+    differences = {name: accelerations(wrong(scene, SMALL)) - accelerations(scene) for name, wrong in WRONG.items()}
+    return {name: np.abs(each * interval / units).max(axis=0) / SMALL for name, each in differences.items()}
 
 
 def smallest_share(name: str, method: str, fault: str) -> float:
