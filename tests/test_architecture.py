@@ -70,18 +70,3 @@ def test_every_model_is_in_the_catalogue_and_in_the_contract_of_independence() -
     (independent,) = (contract["modules"] for contract in CONTRACTS if contract["type"] == "independence")
     assert {name.rpartition(".")[2] for name in independent} == models
     assert set(re.findall(r"'rotor_mbs\.models\.(\w+)", CODE["methods/catalogue.py"])) == models
-
-
-def test_a_page_is_a_module_with_a_template_that_the_report_builds() -> None:
-    templates = {path.name.removesuffix(".html.j2") for path in PACKAGE.glob("report/templates/*.html.j2")}
-    pages = [file for file in CODE if file.startswith("report/pages/") and Path(file).stem in templates]
-    assert len(pages) > 4
-    built = "".join(code for file, code in CODE.items() if file.startswith("report/"))
-    assert [page for page in pages if page.removesuffix(".py").replace("/", ".") not in built] == []
-
-
-def test_a_command_is_a_function_in_the_command_line() -> None:
-    commands = re.findall(r"command\('([\w-]+)', .*?'(\w+):(\w+)'", CODE["cli/arguments.py"])
-    assert len(commands) > 10
-    for name, module, function in commands:
-        assert f"def {function}(" in CODE[f"cli/{module}.py"], name

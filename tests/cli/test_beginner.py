@@ -15,21 +15,13 @@ from rotor_mbs.scenario.scene import doubts, new_scene_text
 # Mistake: (edits of the template, the command with {file} for the scene file, what the one line must say).
 MISTAKES: dict[str, tuple[dict[str, str], str, str]] = {
     "a scene without its folder": ({}, "run fig05", "perhaps paper/fig05"),
-    "a method by its integrator": ({}, "run {file} -m rk67", "perhaps exudyn_tree/rk67"),
     "a misspelt command": ({}, "rnu {file}", "perhaps run"),
     "a misspelt setting": ({}, "run {file} -m lagrange/taylor --set tolerence=1e-9", "perhaps tolerance"),
     "a step too short": ({}, "run {file} -m exudyn_tree/rk67 --set step=1e-300", "allowed: a step of at least 1e-08 s"),
-    "a setting out of range": (
-        {}, "run {file} -m exudyn_tree/rk67 --set step=-1", "step (a number above 0, in s; default"
-    ),
-    "a misspelt key": ({"[shaft]": "[shaf]"}, "run {file}", "shaf: unknown key, perhaps shaft"),
     "no tip": ({"tip = [0.08, 0.0, 33.4]": ""}, "run {file}", 'needed for the output "tip"'),
     "a sweep that is run": ({}, "run sweeps/fig11-spread", "rotor-mbs sweep sweeps/fig11-spread"),
     "a scene that is swept": ({}, "sweep paper/fig11", "rotor-mbs run paper/fig11"),
     "a report of a scene file": ({}, "report {file}", "allowed: a file that rotor-mbs wrote"),
-    "a method of the file": (
-        {"methods = []": 'methods = ["rk67"]'}, "run {file}", "methods: unknown method"
-    ),
     "a new file that would not run": ({}, "new mine.txt", "allowed: a name that ends in .toml"),
     "a time limit that is none": ({}, "run {file} --timeout nan", "allowed: seconds, more than 0"),
     "a bench of nothing": ({}, "bench", "required: SCENE"),

@@ -15,7 +15,6 @@ from rotor_mbs.models.printed import literal
 from rotor_mbs.models.printed.derivation import AS_PRINTED, CORRECTED, DerivedRotor, Errata
 from rotor_mbs.scenario.scene import Blade, Scene
 
-THIRDS = tuple(2.0 * math.pi * i / 3.0 for i in range(3))
 M, C, D, G = 15000.0, math.hypot(0.08, 0.03), 15.42, 9.8  # Table 1
 
 

@@ -206,16 +206,6 @@ def test_a_shipped_reference_that_was_not_read_in_time_is_read_again(tmp_path: P
     assert made(run(tmp_path / "r.h5", METHODS[:1], timeout_s=7.0)) == []
 
 
-def test_an_error_of_a_method_is_a_run_that_failed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    def build(*_: object) -> object:
-        raise ZeroDivisionError("by nothing")
-
-    monkeypatch.setitem(find_method(METHODS[0]).__dict__, "build", build)
-    (failure,) = run(tmp_path / "r.h5", METHODS[:1], perform=RunTask.perform).failures
-    assert (failure.status, failure.message) == ("solver_failed", "ZeroDivisionError: by nothing")
-    assert stored(tmp_path / "r.h5") == [REFERENCE, FIRST]
-
-
 # Versions
 
 

@@ -95,15 +95,6 @@ def test_xarray_opens_it_at_every_moment(path: Path, engine: str) -> None:
         assert "method" not in {*data.dims, *data.variables}
 
 
-def test_rows_without_their_status_are_missing(path: Path) -> None:
-    """As after a kill between the numbers and the status."""
-    _fill(path, range(0, 8, 4))
-    _stored(path).place().mark_missing([5])
-    assert _missing(path) == [5, *range(8, ROWS)]
-    _fill(path, range(4, ROWS, 4))
-    assert _missing(path) == []
-
-
 def test_rows_of_another_number_do_not_count(path: Path) -> None:
     """Bytes that are copied to another row have the wrong checksum."""
     place = _stored(path).place()
