@@ -44,8 +44,6 @@ def test_every_function_takes_a_scene_by_its_name_or_path(tmp_path: Path) -> Non
         assert rm.modes(scene).scene == run.scene.name
         assert rm.sweep(scene, {"gravity": [0.0]}, methods="lagrange/dop853").statuses == {"ok": 1}
         assert [path.name for path in rm.export(scene, "csv", tmp_path / "a.csv")] == ["a.csv"]
-    with pytest.raises(rm.InputError, match="paper/fig08"):
-        rm.run("paper/fig8", "lagrange/dop853")
 
 
 def test_a_scene_of_ones_own_gets_a_computed_reference(tmp_path: Path) -> None:
@@ -84,6 +82,26 @@ def test_two_models_differ_by_what_the_plot_and_the_table_show(study: rm.Runs) -
         assert np.nanmax(line.get_ydata()) == run.metrics["angle_error_whole"]
     assert all(f"{run.metrics['angle_error_max']:.1e}" in str(study.table()) for run in runs)
     assert study.statuses == {"ok": 4}
+
+
+def test_a_solution_has_its_quantities_status_and_metrics() -> None:
+    run = rm.run(rm.scene("paper/fig08").replace(**SHORT), METHOD)
+    assert (run.status, run.message) == ("ok", "")
+    assert run.metrics["energy_drift_max"] < 1e-9
+    np.testing.assert_array_equal(run.energy_error, run["energy_error"])
+    np.testing.assert_array_equal(run["time"], run.time)
+    with pytest.raises(KeyError, match="this solution has: time, angles"):
+        run["constraint_error"]
+    with pytest.raises(AttributeError, match="nothing"):
+        assert run.nothing is None
+    pytest.importorskip("xarray")
+    np.testing.assert_array_equal(run.to_xarray().angles.sel(coordinate="pitch 2"), run.angles[:, 2])
+
+
+def test_without_xarray_the_extra_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "xarray", None)
+    with pytest.raises(rm.InputError, match=r'pip install "rotor_mbs\[xarray\]"'):
+        rm.run(rm.scene("paper/fig03").replace(**SHORT), METHOD).to_xarray()
 
 
 def test_runs_are_saved_opened_and_rendered(study: rm.Runs, tmp_path: Path) -> None:

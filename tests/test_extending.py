@@ -6,8 +6,8 @@ Each is one module, found by its entry point; no file of rotor_mbs knows them.
 from __future__ import annotations
 
 import json
+import math
 import os
-import subprocess
 import sys
 from collections.abc import Iterator
 from pathlib import Path
@@ -15,19 +15,27 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
-from support.commands import PROGRAM, rotor_mbs
+from support.commands import rotor_mbs
 from support.packages import install
 from support.rotors import energies
 
 import rotor_mbs as rm
+from rotor_mbs.analysis.judgement import judge
 from rotor_mbs.methods.catalogue import find_method
 from rotor_mbs.report.build import write_report
 from rotor_mbs.runs.read import read_records
+from rotor_mbs.scenario.scene import Scene
+from rotor_mbs.solution import quantities
+from rotor_mbs.solution.quantities import Quantity
+from rotor_mbs.solution.trajectory import Integration, Solution, Trajectory
 
 SOURCES = Path(__file__).parent / "extension"
 PACKAGES = {
     "rotor_rk4": ("rotor_mbs.methods", {"rk4": "rotor_rk4:METHOD"}),
-    "rotor_momentum": ("rotor_mbs.quantities", {"momentum": "rotor_momentum:QUANTITY"}),
+    "rotor_momentum": (
+        "rotor_mbs.quantities",
+        {"momentum": "rotor_momentum:QUANTITY", "broken": "rotor_momentum:NOTHING", "number": "math:pi"},
+    ),
 }
 # What outside/rk4 can compute, with pitches at rest.
 SCENE = rm.scene("check/general").replace(
@@ -68,13 +76,8 @@ def command(*words: str, status: int = 0) -> str:
     return ended.out + ended.err
 
 
-def test_a_new_process_finds_the_method() -> None:
-    done = subprocess.run([*PROGRAM, "list"], capture_output=True, text=True, check=True)
-    assert "  outside/rk4  " in done.stdout
-    assert done.stderr == ""
-
-
-def test_show_and_a_wrong_name_know_the_method() -> None:
+def test_list_show_and_a_wrong_name_know_the_method() -> None:
+    assert "  outside/rk4  " in command("list")
     assert json.loads(command("show", "one.toml", "--json"))["models"]["outside"]["methods"] == ["outside/rk4"]
     assert "step" in command("show", "outside/rk4")
     assert "outside/rk4" in command("run", "one.toml", "-m", "outside/rk5", status=2)
@@ -132,6 +135,36 @@ def test_a_quantity_is_stored_judged_and_drawn_for_every_method() -> None:
     page = (write_report(Path("two.h5"), Path("pages")).parent / "two.html").read_text()
     assert "from outside, RK4" in page
     assert "Angular momentum about the shaft" in page
+
+
+def moved(scene: Scene, pitch: float) -> Trajectory:
+    time = np.linspace(0.0, scene.duration, scene.samples)
+    return Trajectory(time, np.full((scene.samples, 4), pitch), np.zeros((scene.samples, 4)))
+
+
+@pytest.mark.parametrize(("error", "status"), [(0.9, "ok"), (1.1, "inaccurate"), (math.nan, "inaccurate")])
+def test_it_is_judged_against_the_same_producer_applied_to_the_reference(error: float, status: str) -> None:
+    """At rest there is no momentum, in N m s."""
+    asked = rm.scene("paper/fig08").replace(duration=0.5, samples=11, outputs=["angles", "momentum"])
+    exact, run = moved(asked, 1.0), moved(asked, 1.0)
+    run.quantities["shaft_momentum"] = np.full(asked.samples, error)
+    result = judge(asked, Solution(asked, "lagrange/taylor", run, Integration(True)), exact)
+    assert result.status == status
+    assert result.metrics["shaft_momentum_error_max"] == pytest.approx(error, nan_ok=True)
+
+
+@pytest.mark.parametrize("output", ["broken", "number", "absent"])
+def test_an_output_that_cannot_be_had_is_refused_in_one_line(output: str) -> None:
+    with pytest.raises(rm.InputError) as caught:
+        quantities.quantities(["angles", output])
+    assert output in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_a_producer_of_another_shape_is_refused() -> None:
+    wrong = Quantity("wrong", ("time", "blade"), "1", "", producer=lambda _, samples: samples.time)
+    with pytest.raises(rm.InputError, match=r"gives shape \(51,\); allowed: \(51, 3\)"):
+        quantities.array_of(wrong, SCENE, moved(SCENE, 0.0))
 
 
 @pytest.mark.parametrize("method", ["lagrange/taylor", "lagrange/dop853"])

@@ -5,7 +5,7 @@ from __future__ import annotations
 import tomllib
 
 import pytest
-from support.formulas import value
+from support.gravity_rows import value
 from support.printed_entries import NAMES, TOLERANCE, check_errata, printed_entries, random_states, right_entries
 
 from rotor_mbs.analysis.published import checked_entries

@@ -1,7 +1,8 @@
-"""Pages of synthetic files: what they show, what is left out, what is escaped, where they are written."""
+"""Pages of synthetic files: what they show, what is left out, what is escaped, where they are written; the viewer."""
 
 from __future__ import annotations
 
+import json
 import re
 from dataclasses import replace
 from pathlib import Path
@@ -18,16 +19,23 @@ from rotor_mbs.errors import StoreError
 from rotor_mbs.methods.catalogue import find_method, look_up
 from rotor_mbs.report import numbers
 from rotor_mbs.report.build import write_report
+from rotor_mbs.report.canvas import Panels
 from rotor_mbs.report.elements import Row, Section
 from rotor_mbs.report.files import page_names, render, write_pages
 from rotor_mbs.report.looks import COLOURS, COORDINATES
-from rotor_mbs.report.pages import METRICS, compared_time
+from rotor_mbs.report.pages import METRICS, compared_time, sweep
 from rotor_mbs.report.pages.paper import claim_table, matrices
 from rotor_mbs.report.pages.scene import quantity_sections, range_table
+from rotor_mbs.report.pages.sweep import _edges, response, sweep_page
+from rotor_mbs.report.pages.viewer import MAX_FRAMES, script_json, viewer
 from rotor_mbs.runs import design
 from rotor_mbs.runs.design import metric_columns
+from rotor_mbs.runs.pool import SerialPool
 from rotor_mbs.runs.read import open_results
+from rotor_mbs.runs.sweeps import StoredSweep
 from rotor_mbs.scenario.scene import known_outputs
+from rotor_mbs.scenario.sweep import load_sweep
+from rotor_mbs.studies.sweep import plan_sweep, run_sweep
 
 FIG11 = paper("fig11", samples=101)
 PLAIN = replace(FIG11, outputs=("angles",))
@@ -206,6 +214,65 @@ def test_a_sweep_has_a_page_from_its_dataset_alone(tmp_path: Path) -> None:
     assert len(text.encode()) < 250_000
 
 
+def test_a_sweep_shows_the_pitch_over_what_was_varied(tmp_path: Path) -> None:
+    output = made_sweep(
+        tmp_path,
+        'title = "t"\nscene = "paper/fig08"\nsamples = 11\noutputs = []\nmethods = ["lagrange/dop853"]\n'
+        'change = { "initial.angles[1]" = 0.2 }\n[[axis]]\nkey = "bearing.stiffness"\nvalues = [1e2, 1e4, 1e6]\n',
+    )
+    dataset = StoredSweep(output)
+    page = sweep_page(dataset)
+    section = page["plots"]
+    assert isinstance(section, Section)
+    (shown,) = section.pictures
+    assert "bearing stiffness" in shown.caption
+    stiffness, pitch = dataset.column("bearing_stiffness"), dataset.column("pitch_max")
+    (axes,) = response(stiffness, pitch, "k (N m/rad)", "largest pitch (rad)").axes
+    (points,) = axes.get_lines()
+    np.testing.assert_array_equal(points.get_xydata(), np.column_stack([stiffness, pitch]))
+    assert (axes.get_xscale(), axes.get_ylabel()) == ("log", "largest pitch (rad)")
+    results = page["results"]
+    assert isinstance(results, Section)
+    (row,) = (row for row in results.tables[0].rows if row[1] == "pitch_max")
+    assert [float(str(cell)) for cell in row[2:]] == pytest.approx(
+        np.quantile(pitch, (0, 0.05, 0.5, 0.95, 1)), rel=1e-5
+    )
+    for values, edges in (
+        ([0.0, 10.0, 20.0], [-5, 5, 15, 25]),
+        ([1.0, 10.0, 100.0], [0.1**0.5, 10**0.5, 1e3**0.5, 1e5**0.5]),
+    ):
+        np.testing.assert_allclose(_edges(np.array(values))[0], edges)  # no cell is cut off
+
+
+@pytest.mark.parametrize(("part", "rows"), [((1, 1), 3), ((1, 4), 2), ((2, 3), 1)])
+def test_the_map_of_a_grid_has_each_run_at_its_own_values(
+    part: tuple[int, int], rows: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Whatever the order of the values, by the first method, also of a part that ends within a row."""
+    (tmp_path / "s.toml").write_text(
+        'title = "t"\nscene = "paper/fig08"\nsamples = 3\noutputs = []\nchange = { duration = 0.5 }\n'
+        'methods = ["lagrange/dop853", "lagrange/ode45"]\n[[axis]]\nkey = "bearing.stiffness"\n'
+        'values = [1e4, 0, 2e3]\n[[axis]]\nkey = "initial.angles[1]"\nvalues = [0.3, 0.1, 0.2]\n'
+    )
+    run_sweep(plan_sweep(load_sweep(tmp_path / "s.toml"), part=part), tmp_path / "s.h5", SerialPool())
+    shown: list[tuple[Panels, str]] = []
+    monkeypatch.setattr(sweep, "picture", lambda panel, _, caption: shown.append((panel, caption)))
+    stored = StoredSweep(tmp_path / "s.h5")
+    sweep_page(stored)
+    if rows == 1:  # of each method: no map
+        assert all(" over the " in caption for _, caption in shown)
+        return
+    ((panel, caption),) = shown
+    assert caption.endswith(", by lagrange/dop853")
+    (mesh,) = panel.axes[0].collections
+    corners, cells = mesh.get_coordinates(), np.ma.filled(mesh.get_array(), np.nan)
+    columns = [stored.column(name)[:9] for name in ("initial_angles_1", "bearing_stiffness", "pitch_max")]
+    for x, y, value in zip(*columns, strict=True):
+        inside = (corners[:-1, :-1] < (x, y)).all(axis=2) & (corners[1:, 1:] > (x, y)).all(axis=2)
+        assert cells[inside].tolist() == [value]
+    assert np.isfinite(cells).sum() == len(columns[0])
+
+
 # The paper's claims and errata
 
 
@@ -278,6 +345,70 @@ def test_the_page_of_a_driven_scene_shows_power_pitch_and_command_and_no_other_d
     power = rows_of(section)["Its power"]
     assert power[0].startswith("5.3")
     assert power[2] == "31.8 MJ"  # 5.297 MW over 6 s
+
+
+# The viewer's data
+
+FRAMES11 = paper("fig11", samples=301)
+TURNING = rotor(lambda t: 40.0 * t, lambda t: -7.0 * t + 1.0, np.cos, np.sin)
+
+
+def viewer_of(folder: Path, run: Made) -> dict:  # type: ignore[type-arg]
+    """What the viewer of a file with this run has."""
+    with open_results(store(folder / "r.h5", [run])) as opened:
+        scene = opened.scenes[run.scene.name]
+        made = viewer(scene, dict(scene.runs))
+    assert made is not None
+    return made
+
+
+def test_angles_are_those_of_the_run_to_a_ten_thousandth_of_a_radian_over_any_number_of_turns(tmp_path: Path) -> None:
+    data = json.loads(str(viewer_of(tmp_path, Made(FRAMES11, "reference", TURNING))["data"]))
+    np.testing.assert_allclose(data["models"][0]["frames"], TURNING(np.linspace(0.0, 10.0, 301)), atol=0.5001e-4)
+
+
+@pytest.mark.parametrize(("samples", "frames"), [(301, 301), (5001, MAX_FRAMES)])
+def test_a_frame_for_each_sample_but_no_more_than_fit_a_page(tmp_path: Path, samples: int, frames: int) -> None:
+    made = viewer_of(tmp_path, Made(paper("fig11", samples=samples), "reference", TURNING))
+    assert len(json.loads(str(made["data"]))["models"][0]["frames"]) == frames
+
+
+@pytest.mark.parametrize(("rate", "noted"), [(4.0, ""), (400.0, "turns by up to 13 rad from one frame to the next")])
+def test_a_motion_too_fast_for_the_frames_is_stated(tmp_path: Path, rate: float, noted: str) -> None:
+    notes = viewer_of(tmp_path, Made(FRAMES11, "reference", rotor(lambda t: rate * t)))["notes"]
+    assert bool(notes) == bool(noted)
+    assert noted in "".join(notes).replace("\N{NO-BREAK SPACE}", " ")
+
+
+def test_a_page_holds_both_models_thinned_and_small(tmp_path: Path) -> None:
+    runs = [Made(FRAMES11, "reference", TURNING), Made(FRAMES11, "printed/ode45", TURNING, until=0.5)]
+    folder = write_report(store(tmp_path / "r.h5", runs), tmp_path / "out").parent
+    text = (folder / "paper-fig11.html").read_text(encoding="utf-8")
+    (shown,) = re.findall(r'<script type="application/json">(.*?)</script>', text, re.S)
+    data = json.loads(shown)
+    assert [model["name"] for model in data["models"]] == ["as printed, ode45", "reference, quad precision"]
+    counts = [len(model["frames"]) for model in data["models"]]
+    assert counts[1] == 301  # every sample
+    # The printed run stops at 149/300 of 10 s: its frames do, too.
+    assert (counts[0] - 1) * data["step"] == pytest.approx(10.0 * 149 / 300, abs=data["step"])
+    assert data["blades"][1]["tip"] == list(FRAMES11.blades[1].tip)
+    assert len(shown) < 15_000
+    (script,) = (script for script in re.findall(r"<script>(.*?)</script>", text, re.S) if "viewer" in script)
+    assert len(script.encode()) < 40_000
+
+
+def test_a_run_is_drawn_up_to_its_first_sample_that_is_not_finite(tmp_path: Path) -> None:
+    broken = rotor(lambda t: np.where(t > 4.0, np.nan, t))
+    made = viewer_of(tmp_path, Made(replace(FRAMES11, outputs=("angles",)), "lagrange/taylor", broken))
+    data = json.loads(str(made["data"]))
+    assert (len(data["models"][0]["frames"]) - 1) * data["step"] == pytest.approx(4.0, abs=0.05)
+
+
+def test_data_cannot_end_the_script_element() -> None:
+    evil = "</script><script>alert(1)</script><!-- &amp;"
+    text = str(script_json({"name": evil}))
+    assert not set("<>&") & set(text)
+    assert json.loads(text) == {"name": evil}
 
 
 # Safety

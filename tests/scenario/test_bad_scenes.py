@@ -1,4 +1,4 @@
-"""Wrong scene files: one readable line per error, with file, line, key and what is allowed, and never a traceback."""
+"""Wrong scene and bounds files: a readable line per error, with file, line, key and what is allowed; no traceback."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from rotor_mbs.errors import InputError
+from rotor_mbs.scenario.accuracy_bounds import Bound, read_bounds, shipped_bounds
 from rotor_mbs.scenario.catalogue import find_scenes
 from rotor_mbs.scenario.scene import load_scene
 from rotor_mbs.scenario.toml_file import MAX_BYTES
@@ -212,3 +213,43 @@ def test_no_damage_to_a_file_gives_a_traceback(tmp_path: Path, damages: list[tup
         problems = error.problems
     assert all(problem.isprintable() for problem in problems)
     assert all(re.match(rf"{re.escape(str(path))}(:\d+)?: ", problem) for problem in problems)
+
+
+# Bounds files: what is accepted, and which entry counts
+
+WRONG_BOUNDS = {
+    'value = 1\nreason = "x"\nunit = "m"': (6, "unit: unknown key"),
+    'value = -1e-9\nreason = "x"': (4, "value: -1e-09 is out of range"),
+    'reason = "x"': (1, "value: is missing; allowed: a number from 0"),
+    'value = 1\nreason = " "': (5, "reason: is empty; allowed: a sentence"),
+}
+
+
+@pytest.mark.parametrize("text", WRONG_BOUNDS)
+def test_an_error_of_bounds_is_one_line(tmp_path: Path, text: str) -> None:
+    own, (line, message) = tmp_path / "own.toml", WRONG_BOUNDS[text]
+    own.write_text(f'[[bound]]\ncheck = "tip"\nmethod = "*"\n{text}\n')
+    with pytest.raises(InputError, match=rf"bound\[0\]\.{message}") as caught:
+        read_bounds(own)
+    (problem,) = caught.value.problems
+    assert problem.startswith(f"{own}:{line}: bound[0].")
+
+
+@pytest.mark.parametrize("text", ["bound = 3", "[[bounds]]\n", ""])
+def test_a_file_of_another_kind_is_refused(tmp_path: Path, text: str) -> None:
+    own = tmp_path / "own.toml"
+    own.write_text(text)
+    with pytest.raises(InputError) as caught:
+        read_bounds(own)
+    assert all(problem.startswith(str(own)) for problem in caught.value.problems)
+
+
+def test_entries_in_front_count_first_and_the_shipped_ones_stay(tmp_path: Path) -> None:
+    own = tmp_path / "own.toml"
+    own.write_text('[[bound]]\ncheck = "energy"\nmethod = "mine/*"\nvalue = 1e-3\nreason = "explicit method"\n')
+    bounds = shipped_bounds().with_entries(read_bounds(own))
+    assert bounds.of("energy", "mine/euler") == Bound("energy", "mine/*", 1e-3, "explicit method")
+    brought = Bound("energy", "mine/euler", 1e-4, "of the method")
+    bounds = shipped_bounds().with_entries([brought])
+    assert bounds.of("energy", "mine/euler") == brought
+    assert bounds.of("energy", "lagrange/taylor") == shipped_bounds().of("energy", "lagrange/taylor")

@@ -15,9 +15,10 @@ from xml.etree import ElementTree
 
 import numpy as np
 import pytest
-from support.checking import EVERY_SECOND_SAMPLE, WRONG, add_run, failed, faulty_run, judged, results_file, shipped
+from support.checking import EVERY_SECOND_SAMPLE, WRONG, add_run, failed, faulty_run, judged, results_file
 from support.commands import PROGRAM
 from support.frozen_references import digests, freeze
+from support.references import scene as shipped
 from support.scenes import paper
 from support.stored import Made, change_row, damage, drop, rotor, store
 from support.sweeps import THREE_RUNS, made_sweep

@@ -15,7 +15,8 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from support.checking import add_run, failed, judged, results_file, shipped
+from support.checking import add_run, failed, judged, results_file
+from support.references import scene as shipped
 
 from rotor_mbs.errors import InputError
 from rotor_mbs.methods.solve import solve

@@ -25,10 +25,6 @@ from rotor_mbs.studies.run import run_scenes
 from rotor_mbs.studies.stored_references import read_reference
 
 
-def shipped(name: str) -> Scene:
-    return find_scenes([name])[0]
-
-
 def results_file(path: Path, scenes: Sequence[str], methods: Sequence[str], timeout_s: float = 60.0) -> Path:
     """A batch as `run` makes it."""
     chosen = find_scenes(scenes)

@@ -7,10 +7,13 @@ halves and its root multiplied in or left outside; the last is the sum over the 
 
 from __future__ import annotations
 
+import functools
 import math
+import re
+from collections.abc import Mapping
+from types import CodeType
 
 from rotor_mbs.models.printed.literal import ROOT3
-from support.formulas import value
 
 _PHASES = (0.0, 2.0 * math.pi / 3.0, 4.0 * math.pi / 3.0)  # (34)-(36), rad
 
@@ -45,3 +48,24 @@ def moment(row: str, m: float, c: float, d: float, g: float, q2: float, c3: floa
         for turn, cosine in zip(turns, (c3, c4, c5), strict=True)
     ]
     return -(moments[0] + moments[1] + moments[2])
+
+
+_FUNCTIONS = {"sin": math.sin, "cos": math.cos, "pi": math.pi}
+
+
+def value(text: str, names: Mapping[str, float]) -> float:
+    """The formula, in the paper's notation, at the values of its symbols, in the order in which it is written.
+
+    >>> names = {"c": 2.0, "s3": 0.5, "√3": 3.0**0.5}
+    >>> value("-c s3 + 2 c² - (c + √3/2)", names) == -2.0 * 0.5 + 2.0 * 2.0**2 - (2.0 + 3.0**0.5 / 2.0)
+    True
+    """
+    plain = {name.replace("√", "root"): number for name, number in names.items()}
+    return float(eval(_code(text), _FUNCTIONS | plain))
+
+
+@functools.cache
+def _code(text: str) -> CodeType:
+    python = text.replace("²", "**2").replace("√", "root").replace("π", "*pi")
+    python = re.sub(r"(?<=[\w)]) (?=[\w(])", " * ", python)  # a blank between two factors
+    return compile(python, text, "eval")

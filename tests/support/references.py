@@ -8,7 +8,7 @@ import pytest
 
 from rotor_mbs.methods.solve import solve
 from rotor_mbs.runs.read import open_results
-from rotor_mbs.scenario.catalogue import REFERENCES, find_scenes
+from rotor_mbs.scenario.catalogue import REFERENCES, only_scene
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.trajectory import Array, Solution, Trajectory
 from rotor_mbs.studies.stored_references import rebuilt_reference
@@ -16,9 +16,7 @@ from rotor_mbs.studies.stored_references import rebuilt_reference
 TAYLOR = "lagrange/taylor"
 
 
-@functools.cache
-def scene(name: str) -> Scene:
-    return find_scenes([name])[0]
+scene = functools.cache(only_scene)
 
 
 @functools.cache
