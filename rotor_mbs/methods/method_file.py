@@ -169,6 +169,10 @@ def _ask(file: MethodFile, built: tuple[str, Scene] | None, late: str, ended: st
         except (OSError, EOFError):
             is_late, code = not timer.is_alive(), _end_process()
             raise InputError(late if is_late else f"{ended} (exit code {code})") from None
+        except BaseException:  # an interrupt: the answer that is still to come would be taken for the next one
+            _process.kill()
+            _end_process()
+            raise
         finally:
             timer.cancel()
     if isinstance(answer, RotorError):

@@ -162,6 +162,18 @@ def test_a_build_that_ends_or_hangs_its_process_is_one_line(
     assert (ended.status, ended.out, ended.err) == (2, "", f"{line}\n")
 
 
+def test_the_answer_to_an_interrupted_question_is_not_the_next_ones(monkeypatch: pytest.MonkeyPatch) -> None:
+    def interrupted(_: object) -> None:
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as patched:
+        patched.setattr(method_file.pickle, "load", interrupted)
+        with pytest.raises(KeyboardInterrupt):
+            method_file.read_file("mine.py")
+    catalogue.check_names(["mine.py"])
+    assert catalogue.find_method("mine/lsoda").items(rm.load("one.toml")) == []
+
+
 def test_a_sweep_and_python_take_a_file() -> None:
     scene = rm.load("one.toml").replace(outputs=["angles", "rates", "energy"])
     runs = rm.sweep(scene, {"gravity": [10.0]}, methods="mine.py", outputs=["angles", "rates"], workers=1)
