@@ -140,8 +140,9 @@ def quantity_errors(
 ) -> Iterator[tuple[Quantity, QuantityMetric, float]]:
     """Each judged quantity, its rule, and its error relative to what the rule says; only those that the run has. Loads
     of a `run` that is given less what rounding of its state leaves open."""
-    has_loads = run is not None and scene.wants("loads")
-    rounding = load_rounding(scene, run.time, run.angles, run.rates) if run is not None and has_loads else {}
+    rounding: dict[str, Array] = {}
+    if run is not None and scene.wants("loads"):
+        rounding = load_rounding(scene, run.time, run.angles, run.rates)
     for quantity in known_quantities(scene.outputs):
         rule = quantity.judgement
         if rule is None or rule.metric not in metrics:

@@ -253,8 +253,8 @@ def compare_with_reference(
         time, last = at_rows.time, min(scene.duration, float(run.time[-1]))
         step = float(np.diff(time).max(initial=0.0))
         if rows < _FEWEST and len(data.time) > rows:
-            lie = f"{rows} of {len(data.time)} rows within the {scene.duration:g} s of {scene.name}"
-            yield "inaccurate", f"{lie}; is the time in s? `unit` of the time in a mapping file says otherwise"
+            inside = f"{rows} of {len(data.time)} rows within the {scene.duration:g} s of {scene.name}"
+            yield "inaccurate", f"{inside}; is the time in s? `unit` of the time in a mapping file says otherwise"
         elif time[-1] < last - 1.5 * step:
             yield "inaccurate", f"the data end at t = {time[-1]:.6g} s of {last:g} s"
         if time[0] > 1.5 * step:

@@ -166,7 +166,8 @@ def fitted_rates(scene: Scene, time: Array, angles: Array) -> Array:
         rates[:, moving] += correction
         changes = step * np.abs(correction).max(axis=1)
         change, usual = float(changes.max()), float(np.median(changes))
-        is_near |= before == np.inf and usual <= _NEAR
+        if before == np.inf:  # the first round
+            is_near = usual <= _NEAR
         if change <= _STANDS_STILL:
             return rates
         if not change < before and (usual <= _STANDS_STILL or not is_near):
