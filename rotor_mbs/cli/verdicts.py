@@ -19,7 +19,8 @@ from rotor_mbs.runs.read import is_sweep
 from rotor_mbs.scenario.accuracy_bounds import read_bounds, shipped_bounds
 from rotor_mbs.studies import check as study
 
-WORST = 10  # annotations: GitHub shows as many of a step and drops the others silently
+# Annotations: GitHub shows as many of a step and drops the others silently. Also lines about shrunken margins.
+WORST = 10
 
 
 # What is found in every output of a kind.
@@ -49,15 +50,45 @@ def check(arguments: argparse.Namespace) -> int:
     _write_verdicts(arguments, verdicts)
     stream = sys.stderr if arguments.json == Path("-") else sys.stdout  # standard output is the JSON's alone
     failures = [verdict for verdict in verdicts if not verdict.passed]
-    for verdict in verdicts if arguments.verbose else failures:
-        print(line(verdict), file=stream)
-    if arguments.github:
-        for verdict in sorted(failures, key=lambda verdict: verdict.margin)[:WORST]:  # NaN before all others
-            print(github(verdict), file=stream)
+    annotated = worst_first(failures)[:WORST] if arguments.github else []
+    for text in report_lines(verdicts, annotated, verbose=arguments.verbose):
+        print(text, file=stream)
     runs = ", ".join(f"{count} {method}" for method, count in study.judged_runs(verdicts).items())
     print(f"runs checked: {runs or 'none'}", file=stream)
     print(f"{len(verdicts) - len(failures)} passed, {len(failures)} failed", file=stream)
     return 1 if failures else 0
+
+
+def report_lines(verdicts: Sequence[Check], annotated: Sequence[Check] = (), *, verbose: bool = False) -> list[str]:
+    """Return the lines that report checks, each failure once.
+
+    Parameters
+    ----------
+    verdicts : checks, in the order in which they are reported.
+    annotated : failures that GitHub shows as annotations; in its log these lines stand for them.
+    verbose : whether passed checks have lines, too.
+
+    Returns
+    -------
+    list of str
+        A line per failure, or per check; of failures `against` an earlier file only the ten worst,
+        as one changed default setting shrinks hundreds of margins; then the annotations.
+    """
+    shrunk = worst_first([verdict for verdict in verdicts if verdict.name == study.AGAINST and not verdict.passed])
+    left_out = [] if verbose else shrunk[WORST:]
+    lines = []
+    for verdict in verdicts:
+        is_wanted = verbose or not verdict.passed
+        if is_wanted and verdict not in annotated and verdict not in left_out:
+            lines.append(line(verdict))
+    if left_out:
+        lines.append(f"... {len(left_out)} more against the earlier file (all with --verbose)")
+    return [*lines, *map(github, annotated)]
+
+
+def worst_first(failures: Sequence[Check]) -> list[Check]:
+    """Sort failed checks by their margin, those without a number first."""
+    return sorted(failures, key=lambda check: (not math.isnan(check.margin), check.margin))
 
 
 def test_method(arguments: argparse.Namespace) -> int:

@@ -36,6 +36,7 @@ from rotor_mbs.studies.run import run_scenes
 from rotor_mbs.studies.stored_references import shipped_reference
 
 _TIMEOUT_S = 60.0
+AGAINST = "against"  # the name of the checks that compare with an earlier file
 _OF_EVERY_RUN = "status"  # the name of a check that each run has one of
 # A value below a few units in the last place of a double is rounding: its change says nothing.
 _ROUNDING = 2.0**-50
@@ -133,7 +134,7 @@ def runs_gone(path: Path, earlier: Path) -> Check:
     gone = np.isin(before, runs(new), invert=True).sum() if new.keys == old.keys else len(before)
     where = Where(str(old.attributes["base_scene"]), "*", "run: all")
     hint = f"{gone} of {len(before)} runs of the earlier file are missing in this one"
-    return Check("against", where, float(gone), 0.0, hint, "runs")
+    return Check(AGAINST, where, float(gone), 0.0, hint, "runs")
 
 
 def judged_runs(checks: Iterable[Check]) -> Counter[str]:
@@ -172,5 +173,5 @@ def regressions(new: Sequence[Check], old: Sequence[Check]) -> list[Check]:
                 f"bound {now.bound:.2e} {now.unit}; {now.hint}"
             )
         where = check.where._replace(channel=f"{check.name}: {check.where.channel}")
-        changes.append(Check("against", where, value, _SHRINK, hint, "fold"))
+        changes.append(Check(AGAINST, where, value, _SHRINK, hint, "fold"))
     return changes

@@ -87,7 +87,7 @@ def _bash(script: str, folder: Path, **variables: str) -> subprocess.CompletedPr
     command.write_text(f'#!/bin/sh\nexec "{sys.executable}" -m rotor_mbs "$@"\n')
     command.chmod(0o755)
     path = f"{command.parent}:{os.environ['PATH']}"
-    environment = {**os.environ, "PYTHONPATH": str(ROOT), **variables, "PATH": path}
+    environment = {**os.environ, "PYTHONPATH": f"{folder}:{ROOT}", **variables, "PATH": path}
     return subprocess.run(
         ["bash", "-eo", "pipefail", "-c", script], cwd=folder, env=environment, capture_output=True, text=True
     )
@@ -103,7 +103,8 @@ def _run_action(folder: Path, **given: str) -> list[subprocess.CompletedProcess[
         names = {key: re.fullmatch(r"\$\{\{ inputs\.(\w+) \}\}", text) for key, text in step["env"].items()}
         values = {key: str(inputs[match[1]]) for key, match in names.items() if match}
         assert len(values) == len(step["env"])
-        done.append(_bash(step["run"], folder, GITHUB_ACTION_PATH=str(folder), **values))
+        values |= {"GITHUB_ACTION_PATH": str(folder), "GITHUB_STEP_SUMMARY": str(folder / "summary.md")}
+        done.append(_bash(step["run"], folder, **values))
         if done[-1].returncode:
             break
     return done
@@ -114,7 +115,7 @@ def test_the_action_fails_on_a_loosened_run_and_leaves_its_files(earlier: Path, 
     assert [step.returncode for step in done] == [0, 1], done[-1]
     assert "::error title=rotor-mbs against" in done[-1].stdout
     output = folder / "rotor-mbs-check"
-    assert {path.name for path in output.iterdir()} == {"verdicts.json", "junit.xml"}
+    assert {path.name for path in output.iterdir()} == {"verdicts.json", "junit.xml", "check.txt"}
     for case in ElementTree.parse(output / "junit.xml").iter("testcase"):
         properties = {item.attrib["name"]: item.attrib["value"] for item in case.iter("property")}
         assert set(properties) == {"value", "bound", "margin", "unit"}
@@ -135,11 +136,25 @@ def test_the_action_installs_the_checkout_it_is_from(folder: Path) -> None:
     assert (place / "pyproject.toml").samefile(ROOT / "pyproject.toml")
 
 
-# The whole workflows of docs/check.md: the first time there is no earlier file, the second time there is
+# The whole workflows of docs/check.md: without an earlier file, with one, and with one and a fault in a model since.
 
-GITHUB, GITLAB = map(yaml.safe_load, re.findall(r"```yaml\n(.*?)```", (ROOT / "docs/check.md").read_text(), re.DOTALL))
+DOCUMENT = (ROOT / "docs/check.md").read_text()
+GITHUB, GITLAB = map(yaml.safe_load, re.findall(r"```yaml\n(.*?)```", DOCUMENT, re.DOTALL))
+(SCRIPT,) = re.findall(r"```bash\n(.*?)```", DOCUMENT, re.DOTALL)
 PIP = "python -m pip install"
 EARLIER = "main/results.h5"
+
+# Python runs this module at the start of every process, worker processes included.
+FAULT = """
+from rotor_mbs.models.exudyn import tree
+
+right = tree.parts
+
+def heavier(scene, *arguments):
+    return right(scene.replace(gravity=1.01 * scene.gravity), *arguments)
+
+tree.parts = heavier
+"""
 
 
 @pytest.fixture
@@ -150,20 +165,42 @@ def project(folder: Path) -> Path:
     return folder
 
 
+def plant_fault(project: Path) -> None:
+    (project / "sitecustomize.py").write_text(FAULT)
+    (project / "results.h5").unlink()  # a runner has an empty folder
+
+
+def reported(junit: Path) -> list[str]:
+    """The failures in a JUnit file."""
+    return [failure.attrib["message"] for failure in ElementTree.parse(junit).iter("failure")]
+
+
 @pytest.mark.full
 def test_the_workflow_for_github_compares_with_the_file_of_the_main_branch(project: Path) -> None:
     steps = GITHUB["jobs"]["accuracy"]["steps"]
     caches = [step for step in steps if "actions/cache" in step.get("uses", "")]
     assert [step["with"]["path"] for step in caches] == [EARLIER, EARLIER]  # restored first, saved at last
-    for against in ("", EARLIER):
+    output, summary = project / "rotor-mbs-check", project / "summary.md"
+    for against, has_fault in (("", False), (EARLIER, False), (EARLIER, True)):
+        if has_fault:
+            plant_fault(project)
         for step in steps:
-            if "run" in step:
+            if "run" in step and "if" not in step:
                 done = _bash(step["run"].replace(PIP, "echo"), project)
                 assert done.returncode == 0, done
-            elif step["uses"] == "./rotor_mbs/.github/actions/check":
+            elif "run" in step and not has_fault:  # a failed step skips those that store the file
+                assert _bash(step["run"], project).returncode == 0
+            elif step.get("uses") == "./rotor_mbs/.github/actions/check":
                 done = _run_action(project, **{**step["with"], "against": against})
-                assert [end.returncode for end in done] == [0, 0], done[-1]
-        assert ("against" in (project / "rotor-mbs-check" / "verdicts.json").read_text()) == bool(against)
+                assert [end.returncode for end in done] == [0, int(has_fault)], done[-1]
+        assert ("against" in (output / "verdicts.json").read_text()) == bool(against)
+        assert ("0 failed" in summary.read_text().splitlines()[-2]) != has_fault
+    failures = reported(output / "junit.xml")
+    assert any(f"{METHOD} error" in failure for failure in failures)
+    annotations = [text for text in done[-1].stdout.splitlines() if text.startswith("::error")]
+    assert 0 < len(annotations) <= 10
+    told = [text for text in done[-1].stdout.splitlines() if "FAIL " in text]
+    assert len(told) == len(set(told)) <= len(failures)  # each failure once
 
 
 @pytest.mark.full
@@ -171,11 +208,32 @@ def test_the_pipeline_for_gitlab_compares_with_the_file_of_the_main_branch(proje
     assert GITLAB["accuracy"]["extends"] == ".rotor-mbs-check"
     job = {**JOB, **GITLAB["accuracy"], "variables": {**JOB["variables"], **GITLAB["accuracy"]["variables"]}}
     assert GITLAB["keep"]["cache"][0]["paths"] == job["cache"][0]["paths"] == [job["variables"]["AGAINST"]]
+    assert job["artifacts"]["when"] == "always"
     script = "\n".join([*job["before_script"], *job["script"]]).replace(PIP, "echo")
-    for is_first in (True, False):
+    for is_first, has_fault in ((True, False), (False, False), (False, True)):
+        if has_fault:
+            plant_fault(project)
         done = _bash(script, project, **job["variables"])
-        assert done.returncode == 0, done
+        assert done.returncode == int(has_fault), done
         assert ("no earlier file" in done.stdout) == is_first
         for name in [job["artifacts"]["reports"]["junit"], *job["artifacts"]["paths"]]:
             assert (project / name.replace("$FILE", job["variables"]["FILE"])).stat().st_size
-        assert _bash("\n".join(GITLAB["keep"]["script"]), project).returncode == 0
+        failures = reported(project / job["artifacts"]["reports"]["junit"])
+        assert any(f"{METHOD} error" in failure for failure in failures) == has_fault
+        if not has_fault:
+            assert _bash("\n".join(GITLAB["keep"]["script"]), project).returncode == 0
+
+
+@pytest.mark.full
+def test_the_script_for_other_systems_compares_with_an_earlier_file(project: Path) -> None:
+    for has_fault in (False, True):
+        if has_fault:
+            (project / "main").mkdir()
+            (project / "results.h5").rename(project / EARLIER)
+            (project / "results.h5").touch()
+            plant_fault(project)
+        done = _bash(SCRIPT, project)
+        assert done.returncode == int(has_fault), done
+        assert bool(reported(project / "check.xml")) == has_fault
+    shrunk = [text for text in done.stdout.splitlines() if text.startswith("FAIL against")]
+    assert 0 < len(shrunk) <= 10
