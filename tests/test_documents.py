@@ -26,7 +26,7 @@ TEXTS = {path.name: path.read_text() for path in DOCUMENTS}
 def commands(text: str) -> list[list[str]]:
     """Every call of rotor-mbs in an indented line, without what the shell does around it."""
     lines = [line.split("#")[0] for line in text.splitlines() if line.startswith("    ")]
-    parts = [part.strip() for line in lines for part in line.replace("exec ", "").split("&&")]
+    parts = [part.strip() for line in lines for part in re.split(r"&&|\|\|", line.replace("exec ", ""))]
     calls = [part for part in parts if re.match(r"(\.venv/bin/|- run: )?rotor-mbs ", part)]
     return [shlex.split(re.sub(r"\$\(.*?\)", "0001", call.partition("rotor-mbs ")[2])) for call in calls]
 
