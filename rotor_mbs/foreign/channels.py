@@ -22,7 +22,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor_mbs.errors import InputError
-from rotor_mbs.foreign.files import ALLOWED_UNITS, BASE_UNITS, UNITS, DataTable, read_table, shown_names, table_of
+from rotor_mbs.foreign.columns import ALLOWED_UNITS, BASE_UNITS, UNITS, DataTable, shown_names, table_of
+from rotor_mbs.foreign.files import read_table
 from rotor_mbs.scenario import keys
 from rotor_mbs.scenario.keys import Kind, file_key
 from rotor_mbs.scenario.scene import Scene
@@ -138,7 +139,7 @@ def guess(name: str, vector: int, known: Sequence[Channel]) -> Channel | None:
     letters, digits = re.sub(r"[^a-z]", "", plain), re.findall(r"\d+", plain)
     by_name, is_one_blade = {channel.name: channel for channel in known}, all(c.name != "pitch 2" for c in known)
     if known[0].name == SPEED:
-        number = int(digits[-1]) + (entry is not None) if digits else 1
+        number = _number(digits[-1]) + (entry is not None) if digits else 1
         # A column "mode" alone numbers them.
         kinds = [f"{kind} {number}" for kind, names in _FREQUENCIES.items() if letters in names and plain != "mode"]
         return by_name.get(SPEED if letters in _SPEED_NAMES else kinds[0] if kinds else "")
@@ -147,11 +148,11 @@ def guess(name: str, vector: int, known: Sequence[Channel]) -> Channel | None:
         load = by_name.get(f"blade root {'force' if openfast[1] == 'f' else 'moment'} {openfast[4]} {axis}")
         return load and replace(load.in_frame("rotor" if openfast[3] == "c" else "blade"), sign=sign)
     if entry is not None:
-        place = [int(number) for number in entry[2].split(",")]
+        place = [_number(number) for number in entry[2].split(",")]
         fitting = [channel for channel in known if array in _VECTORS.get(channel.kind, ())]
         fitting = fitting or [channel for channel in known if array and channel.key.startswith(f"{array}_")]
         offset = 3 * place[0] + place[1] if len(place) == 2 else place[0]
-        return fitting[offset] if len(fitting) == vector else None
+        return fitting[offset] if len(fitting) == vector and offset < vector else None
     words = re.findall(r"[a-z]+|\d+", plain)
     frame = words[-2] if words[-2:] in (["blade", "frame"], ["rotor", "frame"], ["base", "frame"]) else ""
     named = " ".join(words[:-2] if frame else words)
@@ -174,6 +175,11 @@ def guess(name: str, vector: int, known: Sequence[Channel]) -> Channel | None:
     else:
         return None
     return by_name.get(wanted)
+
+
+def _number(digits: str) -> int:
+    """Return digits as a number; one that no index reaches where there are none, or too many."""
+    return int(digits) if 0 < len(digits) < 10 else 10**10
 
 
 def split_unit(name: str) -> tuple[str, str]:
@@ -377,16 +383,46 @@ def load_data(
     scene: Scene,
     columns: str | os.PathLike[str] | Mapping[str, Any] | None = None,
 ) -> ForeignData:
-    """Data from a file or from arrays by name, by a mapping or by guesses; of xarray with its coordinates, of pandas
-    the columns. Raises InputError, StoreError."""
-    entries, group, omitted = read_mapping(columns, scene)
+    """Load data of a scene from a file, or from arrays by name.
+
+    Parameters
+    ----------
+    data : a file; or arrays by name, an xarray.Dataset, whose coordinates are arrays too, or a pandas.DataFrame.
+    scene : the scene of which they are data.
+    columns : a mapping file, or a mapping of its keys; by default channels are known by the names of columns.
+
+    Raises
+    ------
+    InputError, StoreError
+        For data that cannot be read, or are not of this scene.
+    """
+    mapping = read_mapping(columns, scene)
     if isinstance(data, str | os.PathLike):
-        table = read_table(data, group, scene.name)
+        table = read_table(data, mapping[1], scene.name)
     elif hasattr(data, "items"):
         table = table_of("data", {**getattr(data, "coords", {}), **dict(data.items())})
     else:
         allowed = 'a file, or arrays by name, such as {"time": run.time, "angles": run.angles}'
         raise InputError(f"data: {type(data).__name__}; allowed: {allowed}")
+    return data_of_table(table, scene, *mapping)
+
+
+@np.errstate(all="ignore")  # data may be of any size
+def data_of_table(
+    table: DataTable,
+    scene: Scene,
+    entries: Mapping[str, Entry] | None = None,
+    _group: str = "",
+    omitted: tuple[str, ...] = (),
+) -> ForeignData:
+    """Take the channels of a scene from named columns, in SI units; entries, omitted: see `read_mapping`.
+
+    Raises
+    ------
+    InputError
+        For columns that cannot be channels: not finite, of different lengths, times that do not increase.
+    """
+    entries = entries or {}
     chosen, lines = find_channels(table, scene, entries, omitted)
     lengths = {entry.column: len(table[entry.column].values) for entry in chosen.values()}
     if len(set(lengths.values())) > 1:
@@ -395,13 +431,13 @@ def load_data(
     arrays: list[Array] = []
     for channel, entry in chosen.items():
         values = table[entry.column].values
-        bad = np.flatnonzero(~np.isfinite(values))
+        si_values: Array = entry.sign * (values + entry.offset) * UNITS[channel.kind][entry.unit.lower()]
+        bad = np.flatnonzero(~np.isfinite(si_values))
         if len(bad):
             raise InputError(
                 f"{table.source}: column {entry.column!r} is {values[bad[0]]} in row {bad[0] + 1} of "
                 f"{len(values)}; allowed: finite numbers"
             )
-        si_values: Array = entry.sign * (values + entry.offset) * UNITS[channel.kind][entry.unit.lower()]
         arrays.append(np.unwrap(si_values) if entry.wrapped else si_values)
     time, *numbers = (table[entry.column].values for entry in chosen.values())
     kinds = [(channel.kind, entry.unit) for channel, entry in chosen.items()][1:]

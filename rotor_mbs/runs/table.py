@@ -1015,22 +1015,48 @@ def is_of_this_program(path: Path, kind: str = "") -> bool:
         return False
 
 
-def read_arrays(path: Path, group: str = "", scene: str = "") -> tuple[dict[str, NDArray[Any]], dict[str, str]]:
-    """Arrays of numbers of up to three dimensions and their units by name, of any HDF5 file: those of one group.
+def read_arrays(
+    path: Path, group: str = "", scene: str = "", max_bytes: float = math.inf
+) -> tuple[dict[str, NDArray[Any]], dict[str, str]]:
+    """Read arrays of numbers of up to three dimensions and their units, by name, from one group of any HDF5 file.
 
-    group: its path, or the end of it; may be left out where one group alone has arrays, or one alone but the reference
-    below `scene`. Raises StoreError with the groups that there are.
+    Parameters
+    ----------
+    path : the file; of another program, or of this one.
+    group : path of the group, or the end of it; may be left out where one group alone has arrays, or one alone but the
+        reference below `scene`.
+    scene : name of a scene, whose groups are preferred.
+    max_bytes : of all arrays as float64, by what the file claims of them, before any is read.
+
+    Raises
+    ------
+    StoreError
+        If the file cannot be read or claims more, or with the groups that there are.
     """
     try:
         with h5py.File(path, "r") as file:
             places = _array_places(file)
-            name = chosen_group(path, list(places), group.strip("/"), scene)
-            chosen = file[name or "/"]
-            arrays = {name: chosen[name][()] for name in places[name]}
-            units = {name: str(attribute(chosen[name], "units", "")) for name in arrays}
+            place = chosen_group(path, list(places), group.strip("/"), scene)
+            datasets = {name: file[place or "/"][name] for name in places[place]}
+            size = sum(8.0 * dataset.size for dataset in datasets.values())
+            if size > max_bytes:
+                allowed = f"up to {max_bytes / 2**30:g} GB: export fewer rows or arrays"
+                raise StoreError(f"{path}: its arrays claim {size / 2**30:.1f} GB; allowed: {allowed}")
+            for dataset in datasets.values():
+                if dataset.is_virtual or dataset.external:
+                    raise StoreError(f"{path}: {dataset.name} is stored in another file; allowed: arrays of this one")
+            arrays = {name: dataset[()] for name, dataset in datasets.items()}
+            units = {name: _unit_of(dataset) for name, dataset in datasets.items()}
     except (OSError, RuntimeError, KeyError, ValueError, TypeError) as exc:
         raise StoreError(f"{path}: not a readable HDF5 file ({_reason(exc)})") from exc
     return arrays, {name: unit for name, unit in units.items() if unit}
+
+
+def _unit_of(dataset: Any) -> str:
+    """Return the attribute `units`, "" where there is none; many texts, which may take long to read, are no unit."""
+    if "units" not in dataset.attrs or dataset.attrs.get_id("units").get_space().get_simple_extent_npoints() != 1:
+        return ""
+    return str(attribute(dataset, "units", ""))
 
 
 def chosen_group(path: Path, places: Sequence[str], group: str, scene: str) -> str:

@@ -141,7 +141,8 @@ _ROUNDING = 1e-9  # of the duration: times that are sums of steps may end so far
 _FEWEST = 3
 _START = 1e-3  # rad, rad/s: starts that differ by more are another start
 _STRETCHES = (10, 100)  # rows over which defects are added up, too
-_MOST_NAMES = 100  # of columns that were not used
+_MOST_NAMES = 100  # of columns that were not used,
+_MOST_BYTES = 30_000  # and as long: an attribute has 64 kB
 
 
 @np.errstate(all="ignore")  # data may be of any size
@@ -349,7 +350,10 @@ def comparison_record(
         for ending, (unit, long_name, array) in kinds.items():
             arrays[channel.key + ending] = array
             columns[channel.key + ending] = Column((axis,), unit, channel.name + long_name)
-    shown = replace(verdict, unused=verdict.unused[:_MOST_NAMES])  # an attribute has 64 kB
+    unused = verdict.unused[:_MOST_NAMES]
+    while len(json.dumps(unused)) > _MOST_BYTES:
+        unused = unused[: len(unused) // 2]
+    shown = replace(verdict, unused=unused)
     facts = {
         "title": scene.title,
         "scene_hash": scene_hash(scene),

@@ -3,7 +3,9 @@ value. The long form (1,000 files, 10,000 scenes): `pytest -m nightly tests/fuzz
 
 from __future__ import annotations
 
+import csv
 import random
+import re
 import warnings
 from functools import partial
 from pathlib import Path
@@ -15,6 +17,9 @@ from support.scenes import paper
 from support.sweeps import run_local
 
 import rotor_mbs as rm
+from rotor_mbs.errors import RotorError
+from rotor_mbs.foreign.channels import data_of_table, load_data
+from rotor_mbs.foreign.formats import read_columns
 from rotor_mbs.runs.pool import WorkerPool
 from rotor_mbs.scenario.scene import parse_scene, scene_toml
 from rotor_mbs.scenario.sweep import load_sweep
@@ -23,7 +28,14 @@ from rotor_mbs.studies.run import run_scenes
 METHOD = "lagrange/dop853"
 SWEEP = f'title = "s"\nscene = "a.toml"\nmethods = ["{METHOD}"]\n[[axis]]\nkey = "gravity"\nvalues = [9.7, 9.8]\n'
 OWN = ("results.h5", "sweep.h5")
-FOREIGN = ("data.mat", "data73.mat", "data.nc", "data3.nc", "data.npz", "data.outb")
+FOREIGN = tuple(FORMATS)
+# What a word of a text file may be replaced by: not numbers, numbers that are hard to hold, names with odd indices.
+ODD_WORDS = (
+    "nan", "-inf", "1e999", "1e308", "5e-324", "-1e308", "", "x", "1" * 5000, "0x10", "1_000", "12:00", "****",
+    "0.12-101",
+    '"', "'", "[", "{", "[1, 2]", "null", "true", ",", ";", "\t", "\n", "\x00", "\u2028", "é", "time", "t / s", "speed",
+    "f1", "f" + "9" * 5000, "q[0]", "q[,]", "q[9]", "q[0,1]", "rotor [deg]", "rotor [", "RootMxb1",
+)  # fmt: skip
 _EDGE = 8192  # bytes at both ends: most of a large file is arrays, descriptions are at its beginning and its end
 _LIMIT_S = 120.0  # for one file
 
@@ -46,6 +58,18 @@ def damaged(content: bytes, seed: int) -> bytes:
     for at in (place, *others):
         changed[at] ^= 1 << chance.randrange(8)
     return bytes(changed)
+
+
+def edited(text: str, seed: int) -> str:
+    """With some words replaced by odd ones; of some files also the first line gone, twice, or joined with the next."""
+    chance = random.Random(seed)
+    words = re.split(r"([ ,\t\n:\[\]{}]+)", text)
+    near_head = min(40, len(words))
+    for _ in range(chance.choice([1, 1, 3])):
+        words[chance.randrange(chance.choice([near_head, len(words)]))] = chance.choice(ODD_WORDS)
+    changed = "".join(words)
+    first, _, rest = changed.partition("\n")
+    return chance.choice([changed] * 7 + [rest, f"{first}\n{changed}", first + rest])
 
 
 def resume(folder: Path, path: Path) -> None:
@@ -113,6 +137,37 @@ def test_a_damaged_file_of_another_program(name: str, count: int, folder: Path) 
         return [outcome("compare", broken, "--scene", folder / "a.toml", "-o", folder / "pages")]
 
     try_all(range(count), compare)
+
+
+@pytest.mark.parametrize("count", [1, pytest.param(100, marks=pytest.mark.nightly)])
+@pytest.mark.parametrize("name", FOREIGN)
+def test_a_damaged_file_of_another_program_is_data_or_one_line(name: str, count: int, folder: Path) -> None:
+    """As far as its channels: without the comparison."""
+    scene, broken = paper("fig11"), folder / f"broken-{name}"
+
+    def load(seed: int) -> list[str]:
+        broken.write_bytes(damaged((folder / name).read_bytes(), seed))
+        return [outcome_of_call(lambda: str(load_data(broken, scene).is_modes))]
+
+    try_all(range(count), load)
+
+
+@pytest.mark.parametrize("count", [150, pytest.param(10_000, marks=pytest.mark.nightly)])
+@pytest.mark.parametrize("name", ["data.csv", "data.txt", "sensor.txt", "data.out", "data.json"])
+def test_edited_text_of_another_program_is_data_or_refused(name: str, count: int, folder: Path) -> None:
+    """Read in this process: what is raised there is one line of the reading process (tests/foreign)."""
+    scene, broken = paper("fig11"), folder / f"edited-{name}"
+    text = (folder / name).read_text()
+
+    def load(seed: int) -> list[str]:
+        broken.write_text(edited(text, seed), encoding="utf-8")
+        try:
+            table = read_columns(broken, "", "")
+        except (RotorError, ValueError, TypeError, AttributeError, csv.Error, RecursionError) as refusal:
+            return [f"refused: {type(refusal).__name__}"]
+        return [outcome_of_call(lambda: str(data_of_table(table, scene).is_modes))]
+
+    try_all(range(count), load)
 
 
 # Random scenes
