@@ -32,7 +32,8 @@ CODE = {file: code_of(text) for file, text in SOURCES.items()}
 
 def test_the_layers_are_those_of_the_import_contract() -> None:
     (layers,) = (contract["layers"] for contract in CONTRACTS if contract["type"] == "layers")
-    assert re.findall(r"^\| `(\w+)` \|", TEXT.partition("## Data flow")[0], re.M) == layers
+    names = [name.strip() for layer in layers for name in layer.split(":")]  # those of one layer stand together
+    assert re.findall(r"^\| `(\w+)` \|", TEXT.partition("## Data flow")[0], re.M) == names
 
 
 def test_every_place_that_is_named_exists() -> None:
@@ -40,7 +41,7 @@ def test_every_place_that_is_named_exists() -> None:
     assert len(places) > 10
     for place in places:
         assert any((base / place).exists() for base in (ROOT, PACKAGE)), place
-    layers = "scenario|studies|methods|solution|runs|analysis|report"
+    layers = "scenario|studies|comparison|methods|solution|runs|analysis|report"
     for dotted in re.findall(rf"(?<![.\w])((?:{layers})\.(?!py\b)[a-z_]+)\b", TEXT):
         path = PACKAGE / dotted.replace(".", "/")
         assert path.with_suffix(".py").exists() or path.is_dir(), dotted

@@ -226,10 +226,10 @@ def modes(arguments: argparse.Namespace) -> int:
 
 def compare(arguments: argparse.Namespace) -> int:
     """Data of another program against a scene's reference: a table, its page, the numbers as a results file."""
+    from rotor_mbs.comparison.trajectory import as_dictionary
     from rotor_mbs.report.pages.comparison import compare as compare_data
     from rotor_mbs.runs.output_files import refuse_foreign
     from rotor_mbs.runs.table import is_of_this_program
-    from rotor_mbs.studies.compare_data import as_dictionary
 
     stored = arguments.output / "comparison.h5"
     refuse_foreign(stored, partial(is_of_this_program, kind="comparison"))  # before anything is computed

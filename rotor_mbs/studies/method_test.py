@@ -15,8 +15,9 @@ from rotor_mbs.analysis.checks import Check, Where
 from rotor_mbs.analysis.judgement import defects_of, energy_slack
 from rotor_mbs.analysis.kinematics import exact_rotor_angle
 from rotor_mbs.analysis.work_precision import fitted_order
+from rotor_mbs.comparison.channels import load_data
+from rotor_mbs.comparison.trajectory import compare_with_reference
 from rotor_mbs.errors import MethodRefusal, RotorError
-from rotor_mbs.foreign.channels import load_data
 from rotor_mbs.methods.base import STEP, Method
 from rotor_mbs.methods.catalogue import find_method, line_of, with_method_files
 from rotor_mbs.methods.solve import solve
@@ -28,7 +29,6 @@ from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.defects import Defects
 from rotor_mbs.solution.metrics import metrics_of
 from rotor_mbs.solution.trajectory import Solution, Trajectory, sample_times
-from rotor_mbs.studies.compare_data import compare_with_reference
 from rotor_mbs.studies.run import without_samples
 
 # Between them they have every term; those with fewer terms first. With durations in s that show each at work, and how

@@ -17,9 +17,9 @@ from support.scenes import paper
 from support.sweeps import run_local
 
 import rotor_mbs as rm
+from rotor_mbs.comparison.channels import data_of_table, load_data
+from rotor_mbs.comparison.formats import read_columns
 from rotor_mbs.errors import RotorError
-from rotor_mbs.foreign.channels import data_of_table, load_data
-from rotor_mbs.foreign.formats import read_columns
 from rotor_mbs.runs.pool import WorkerPool
 from rotor_mbs.scenario.scene import parse_scene, scene_toml
 from rotor_mbs.scenario.sweep import load_sweep
@@ -155,7 +155,7 @@ def test_a_damaged_file_of_another_program_is_data_or_one_line(name: str, count:
 @pytest.mark.parametrize("count", [150, pytest.param(10_000, marks=pytest.mark.nightly)])
 @pytest.mark.parametrize("name", ["data.csv", "data.txt", "sensor.txt", "data.out", "data.json"])
 def test_edited_text_of_another_program_is_data_or_refused(name: str, count: int, folder: Path) -> None:
-    """Read in this process: what is raised there is one line of the reading process (tests/foreign)."""
+    """Read in this process: what is raised there is one line of the reading process (tests/comparison)."""
     scene, broken = paper("fig11"), folder / f"edited-{name}"
     text = (folder / name).read_text()
 

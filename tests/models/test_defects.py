@@ -73,7 +73,7 @@ def test_without_heyoka_the_defects_are_the_same(monkeypatch: pytest.MonkeyPatch
 
 
 # ---- Wrong numbers of a model are seen in test_planted_faults.py; a wrong load, a wrong row and others in
-# studies/test_planted_mistakes.py.
+# comparison/test_planted_mistakes.py.
 
 
 def test_a_wrong_start_has_no_defect_but_is_in_the_predicted_error() -> None:

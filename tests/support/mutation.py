@@ -172,8 +172,9 @@ _TARGETS = (
            "_variational_matrices _matrices_by_quotients _largest_growth free_variables _in_units reference_at",
            "tests alone",
            ("models/test_reference.py", f"{_CHECK}a_reference_computed_now_is_the_frozen_one[check/general]",
-            "studies/test_compare_data.py::test_growth_of_each_channel_is_at_most_that_of_all",
-            "studies/test_compare_data.py::test_the_reference_at_the_times_of_the_data_is_the_frozen_one"), 0.5),
+            "comparison/test_compare_trajectory.py::test_growth_of_each_channel_is_at_most_that_of_all",
+            "comparison/test_compare_trajectory.py"
+            "::test_the_reference_at_the_times_of_the_data_is_the_frozen_one"), 0.5),
     Target(f"{_A}.kinematics", "*", "tests alone",
            ("analysis/test_exact.py", "analysis/test_claims.py", "analysis/test_checks.py",
             f"{_CHECK}what_is_shipped_passes_in_short")),

@@ -13,8 +13,17 @@ from typing import Any
 import numpy as np
 
 from rotor_mbs.analysis.text_tables import TextTable
+from rotor_mbs.comparison.channels import load_data
+from rotor_mbs.comparison.trajectory import (
+    DEFAULT_TOLERANCE,
+    LEVELS,
+    ChannelErrors,
+    DataVerdict,
+    compare_modes,
+    compare_with_reference,
+    from_dictionary,
+)
 from rotor_mbs.errors import InputError
-from rotor_mbs.foreign.channels import load_data
 from rotor_mbs.methods.time_limit import checked_seconds
 from rotor_mbs.report import canvas, plots
 from rotor_mbs.report.canvas import Panels
@@ -28,15 +37,6 @@ from rotor_mbs.runs.versions import machine, versions
 from rotor_mbs.scenario.catalogue import scene_of
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.trajectory import need_xarray
-from rotor_mbs.studies.compare_data import (
-    DEFAULT_TOLERANCE,
-    LEVELS,
-    ChannelErrors,
-    DataVerdict,
-    compare_modes,
-    compare_with_reference,
-    from_dictionary,
-)
 
 
 def compare(
@@ -98,7 +98,7 @@ class DataComparison:
 
     Attributes
     ----------
-    verdict : errors and verdict, see `rotor_mbs.studies.compare_data.DataVerdict`.
+    verdict : errors and verdict, see `rotor_mbs.comparison.trajectory.DataVerdict`.
     record : data, reference, errors and defects, as `save` stores them.
     status, message, agrees : status, the reason if it is not "ok", and whether it is "ok".
     likely : probable causes of a difference.

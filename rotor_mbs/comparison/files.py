@@ -15,13 +15,13 @@ from pathlib import Path
 
 import numpy as np
 
+from rotor_mbs.comparison.columns import DataColumn, DataTable
+from rotor_mbs.comparison.formats import FORMATS, MAX_BYTES
 from rotor_mbs.errors import InputError, ResourceError
-from rotor_mbs.foreign.columns import DataColumn, DataTable
-from rotor_mbs.foreign.formats import FORMATS, MAX_BYTES
 
 TIME_LIMIT_S = 120.0  # for reading a file; text of MAX_BYTES takes about half of it
 MEMORY_LIMIT = 1 << 32  # bytes of address space: a file of MAX_BYTES, its text, and its arrays twice
-_CALL = "from rotor_mbs.foreign.formats import write_columns; write_columns()"
+_CALL = "from rotor_mbs.comparison.formats import write_columns; write_columns()"
 # Threads of linear algebra, of which there is none here, reserve address space for each processor.
 _ONE_THREAD = {"OPENBLAS_NUM_THREADS": "1", "MKL_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
 

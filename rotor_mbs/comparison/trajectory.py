@@ -19,8 +19,10 @@ from scipy.optimize import linear_sum_assignment
 
 from rotor_mbs.analysis.judgement import OK_ERROR
 from rotor_mbs.analysis.modes import CLOSED_FORM, LinearModes
+from rotor_mbs.comparison.channels import Channel, ForeignData, channels
+from rotor_mbs.comparison.data_mistakes import CauseSearch, carried_errors, defects_of_data, likely_causes, states_of
+from rotor_mbs.comparison.hypotheses import DefectCauses
 from rotor_mbs.errors import InputError
-from rotor_mbs.foreign.channels import Channel, ForeignData, channels
 from rotor_mbs.methods.time_limit import OutOfTimeError, stop_in_time, time_limit
 from rotor_mbs.models.lagrange.heyoka_adapter import is_available
 from rotor_mbs.models.lagrange.parameters import load_segments, load_tables
@@ -35,8 +37,6 @@ from rotor_mbs.solution.defects import FLOOR_SAFETY, Defects
 from rotor_mbs.solution.metrics import horizon, horizon_samples
 from rotor_mbs.solution.quantities import LOADS, longest_arm
 from rotor_mbs.solution.trajectory import Array, Trajectory, all_coordinates
-from rotor_mbs.studies.data_causes import CauseSearch, carried_errors, defects_of_data, likely_causes, states_of
-from rotor_mbs.studies.defect_causes import DefectCauses
 from rotor_mbs.studies.modes import compute_modes
 
 LEVELS = (1e-3, 1e-6, 1e-9)  # rad, rad/s, or of the largest: until when data agree to each

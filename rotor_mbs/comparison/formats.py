@@ -1,4 +1,4 @@
-"""Which library reads which format: files of other programs to columns, in the process that `foreign.files` starts.
+"""Which library reads which format: files of other programs to columns, in the process that `comparison.files` starts.
 
 A file may be damaged, or made to harm: what it claims to hold is bounded before it is read, and the process has limits
 of memory and processor time for what no check foresees. No regular expression here takes longer than a constant times
@@ -21,8 +21,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rotor_mbs.errors import InputError, RotorError
-from rotor_mbs.foreign.columns import (
+from rotor_mbs.comparison.columns import (
     MAX_COLUMNS,
     MAX_NAME,
     UNITS,
@@ -31,6 +30,7 @@ from rotor_mbs.foreign.columns import (
     split_bracketed_unit,
     table_of,
 )
+from rotor_mbs.errors import InputError, RotorError
 
 MAX_BYTES = 1 << 29  # of a file, and of its arrays unpacked; a million rows of ten columns are 80 MB
 _MAX_PROBLEM = 2000  # characters of a message, which may name groups of the file

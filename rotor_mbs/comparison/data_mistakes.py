@@ -14,15 +14,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 
+from rotor_mbs.comparison.channels import ForeignData, channels
+from rotor_mbs.comparison.hypotheses import DefectCauses
 from rotor_mbs.errors import InputError
-from rotor_mbs.foreign.channels import ForeignData, channels
 from rotor_mbs.models.lagrange.defects import FIT_ROWS, fitted_rates, interval_defects, interval_ends
 from rotor_mbs.models.lagrange.reference import TimedReference
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.defects import Defects
 from rotor_mbs.solution.metrics import horizon
 from rotor_mbs.solution.trajectory import Array, Trajectory
-from rotor_mbs.studies.defect_causes import DefectCauses
 
 # A mistake fits where what is left is within the tolerance, or a thousandth of what there was and at most this.
 _LEFT = 1e-3

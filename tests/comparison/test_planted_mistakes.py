@@ -281,7 +281,7 @@ def test_what_is_within_the_tolerance_but_not_random_is_named() -> None:
 
 
 def test_data_of_another_time_are_refused() -> None:
-    """What no file can have, a NaN, a time twice, is in tests/foreign."""
+    """What no file can have, a NaN, a time twice, is in tests/comparison."""
     late = Plant("", spoilt=lambda t, q, w: (t + 10.0, q, w)).data()
     with pytest.raises(rm.InputError, match="`offset = -10` of the time"):
         rm.compare(late, short("paper/fig11"))

@@ -21,9 +21,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from rotor_mbs.comparison.columns import ALLOWED_UNITS, BASE_UNITS, UNITS, DataTable, shown_names, table_of
+from rotor_mbs.comparison.files import read_table
 from rotor_mbs.errors import InputError
-from rotor_mbs.foreign.columns import ALLOWED_UNITS, BASE_UNITS, UNITS, DataTable, shown_names, table_of
-from rotor_mbs.foreign.files import read_table
 from rotor_mbs.scenario import keys
 from rotor_mbs.scenario.keys import Kind, file_key
 from rotor_mbs.scenario.scene import Scene

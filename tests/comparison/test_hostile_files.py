@@ -22,10 +22,10 @@ from support.data_files import FORMATS
 from support.scenes import paper
 
 import rotor_mbs as rm
+from rotor_mbs.comparison import files
+from rotor_mbs.comparison.channels import channels, guess, load_data, mode_channels
+from rotor_mbs.comparison.columns import MAX_NAME, split_bracketed_unit, table_of
 from rotor_mbs.errors import InputError
-from rotor_mbs.foreign import files
-from rotor_mbs.foreign.channels import channels, guess, load_data, mode_channels
-from rotor_mbs.foreign.columns import MAX_NAME, split_bracketed_unit, table_of
 
 SCENE = paper("fig08")
 TIME = np.linspace(0.0, 10.0, 201)

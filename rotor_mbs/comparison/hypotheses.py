@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from rotor_mbs.comparison.other_rotors import Model, Parameter, other_models, parameters, scenes_with_start
 from rotor_mbs.errors import RotorError
 from rotor_mbs.models.lagrange import closed_form
 from rotor_mbs.models.lagrange.defects import explicit_steps, quick_ends
@@ -23,7 +24,6 @@ from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.scenario.time_table import knots
 from rotor_mbs.solution.defects import Defects
 from rotor_mbs.solution.trajectory import Array
-from rotor_mbs.studies.other_models import Model, Parameter, other_models, parameters, scenes_with_start
 
 _AT_FLOOR = 3.0  # times the rounding
 _LEFT = 1e-3  # of the largest defect: the rest is the other program's own error, or that of the quick steps

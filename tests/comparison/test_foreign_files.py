@@ -14,9 +14,9 @@ from support.data_files import FORMATS
 from support.scenes import paper
 
 import rotor_mbs as rm
+from rotor_mbs.comparison import channels as names
+from rotor_mbs.comparison.channels import channels, guess, half_last_digits, load_data
 from rotor_mbs.errors import InputError, RotorError
-from rotor_mbs.foreign import channels as names
-from rotor_mbs.foreign.channels import channels, guess, half_last_digits, load_data
 from rotor_mbs.solution.quantities import LOADS
 
 SCENE = paper("fig08")

@@ -1,0 +1,1 @@
+"""Other people's data against a scene: files to named columns, columns to channels, and the verdict on them."""
