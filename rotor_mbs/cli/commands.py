@@ -226,7 +226,7 @@ def modes(arguments: argparse.Namespace) -> int:
 
 def compare(arguments: argparse.Namespace) -> int:
     """Data of another program against a scene's reference: a table, its page, the numbers as a results file."""
-    from rotor_mbs.comparison.trajectory import as_dictionary
+    from rotor_mbs.comparison.verdict import as_dictionary
     from rotor_mbs.report.pages.comparison import compare as compare_data
     from rotor_mbs.runs.output_files import refuse_foreign
     from rotor_mbs.runs.table import is_of_this_program

@@ -15,9 +15,14 @@ import numpy as np
 from scipy.optimize import linear_sum_assignment
 
 from rotor_mbs.comparison.channels import ForeignData, channels
-from rotor_mbs.comparison.hypotheses import DefectCauses
+from rotor_mbs.comparison.defect_causes import DefectCauses
 from rotor_mbs.errors import InputError
-from rotor_mbs.models.lagrange.defects import FIT_ROWS, fitted_rates, interval_defects, interval_ends
+from rotor_mbs.models.lagrange.defects import (
+    FIT_ROWS,
+    fitted_rates,
+    interval_defects,
+    interval_ends,
+)
 from rotor_mbs.models.lagrange.reference import TimedReference
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.defects import Defects
@@ -35,9 +40,17 @@ _FACTORS = {
         (1.0 / _DEGREE, "rad taken as degrees"),
         (_TURN, "turns taken as rad"),
     ),
-    "rate": ((_DEGREE, "deg/s taken as rad/s"), (_TURN / 60.0, "rpm taken as rad/s"), (_TURN, "Hz taken as rad/s")),
+    "rate": (
+        (_DEGREE, "deg/s taken as rad/s"),
+        (_TURN / 60.0, "rpm taken as rad/s"),
+        (_TURN, "Hz taken as rad/s"),
+    ),
 }
-_TIMES = ((1e-3, "time in ms taken as s"), (1e-6, "time in us taken as s"), (60.0, "time in minutes taken as s"))
+_TIMES = (
+    (1e-3, "time in ms taken as s"),
+    (1e-6, "time in us taken as s"),
+    (60.0, "time in minutes taken as s"),
+)
 _LEAST_LAG = 1e-4  # of an interval between rows: less is rounding
 _LAG_ROW = 50  # by which a lag is found
 _LAG_ROUNDS = 8
@@ -48,7 +61,9 @@ def carried_errors(reference: Trajectory, growth: Array, units: Array) -> Array:
     """(n, 2 (1 + blades)) What a relative error of 1 at the start may be in each angle, then rate, at most; growth,
     units: of `TimedReference`."""
     largest = np.maximum.accumulate(np.maximum(np.abs(reference.angles).max(axis=1), 1.0))
-    return np.asarray(np.maximum(np.maximum.accumulate(growth, axis=0), 1.0) * largest[:, None] * units)
+    return np.asarray(
+        np.maximum(np.maximum.accumulate(growth, axis=0), 1.0) * largest[:, None] * units
+    )
 
 
 def states_of(run: Trajectory) -> Array:
@@ -56,7 +71,9 @@ def states_of(run: Trajectory) -> Array:
     return np.hstack([run.angles, run.rates])
 
 
-def defects_of_data(scene: Scene, data: ForeignData, reference: Trajectory, until: int) -> tuple[Defects | None, str]:
+def defects_of_data(
+    scene: Scene, data: ForeignData, reference: Trajectory, until: int
+) -> tuple[Defects | None, str]:
     """The defects of the data, and what a reader must know of them. Angles that the data lack are the reference's, and
     then only as far as the horizon; rates that they lack are found from the angles."""
     count = len(scene.initial_angles)
@@ -129,11 +146,16 @@ class CauseSearch:
         if len(data.time) < 2 or not len(inside.time):
             return True
         count = len(self.scene.initial_angles)
-        states = np.tile([*self.scene.initial_angles, *self.scene.initial_rates], (len(data.time), 1))
+        states = np.tile(
+            [*self.scene.initial_angles, *self.scene.initial_rates], (len(data.time), 1)
+        )
         states[: len(inside.time)] = self.states_at(inside.time)
         reference = Trajectory(data.time, states[:, :count], states[:, count:])
         defects, _ = defects_of_data(self.scene, data, reference, len(inside.time))
-        return defects is None or DefectCauses(self.scene, defects, self.tolerance).largest <= self.fitting
+        return (
+            defects is None
+            or DefectCauses(self.scene, defects, self.tolerance).largest <= self.fitting
+        )
 
 
 def likely_causes(search: CauseSearch, defects: DefectCauses | None) -> list[str]:
@@ -145,7 +167,11 @@ def likely_causes(search: CauseSearch, defects: DefectCauses | None) -> list[str
         start = search.states_at(first.time[:1])[0, first.columns]
         is_elsewhere = not np.abs(first.values[0] - start).max() <= _SAME_START
     is_different = defects is not None and not defects.is_rounding
-    if search.worst <= search.tolerance and not is_different and search.data.time[-1] <= 2.0 * search.scene.duration:
+    if (
+        search.worst <= search.tolerance
+        and not is_different
+        and search.data.time[-1] <= 2.0 * search.scene.duration
+    ):
         return []
     for text, data in itertools.chain([("", search.data)], _times(search)):
         if texts := _column_mistakes(search, text, data):
@@ -155,13 +181,19 @@ def likely_causes(search: CauseSearch, defects: DefectCauses | None) -> list[str
         found = defects.scenes()
     elif defects is not None and is_different:
         found = defects.explanations() or defects.faults()
-    found = found or _scatter(search, first) or _column_mistakes(search, "", search.data, with_factor=True)
+    found = (
+        found
+        or _scatter(search, first)
+        or _column_mistakes(search, "", search.data, with_factor=True)
+    )
     if not found and is_different and defects is not None and is_elsewhere:
         found = defects.explanations() or defects.faults()
     return found
 
 
-def _column_mistakes(search: CauseSearch, text: str, data: ForeignData, *, with_factor: bool = False) -> list[str]:
+def _column_mistakes(
+    search: CauseSearch, text: str, data: ForeignData, *, with_factor: bool = False
+) -> list[str]:
     """What is wrong with the columns of data whose times are corrected, which `text` says, beside it; [] where no
     mistakes explain the data."""
     inside = search.up_to_horizon(data)
@@ -181,12 +213,17 @@ def _times(search: CauseSearch) -> Iterator[tuple[str, ForeignData]]:
     if np.array_equal(np.diff(data.time), np.ones(len(data.time) - 1)):
         factors.append((search.scene.duration / (len(data.time) - 1), "row numbers taken as s"))
     for factor, text in factors:
-        yield text, replace(data, time=data.time * factor, time_rounding=data.time_rounding * factor)
+        yield (
+            text,
+            replace(data, time=data.time * factor, time_rounding=data.time_rounding * factor),
+        )
     step = float(np.median(np.diff(data.time)))
     lag = _lag(search)
     if abs(lag) > _LEAST_LAG * step:
         rows = lag / step
-        whole = f", {abs(round(rows))} rows" if abs(rows - round(rows)) < 1e-3 and round(rows) else ""
+        whole = (
+            f", {abs(round(rows))} rows" if abs(rows - round(rows)) < 1e-3 and round(rows) else ""
+        )
         text = f"a constant lag of {lag:.6g} s{whole} ({'late' if lag > 0.0 else 'early'})"
         yield f"{text}: `offset = {-lag:.6g}` of the time", replace(data, time=data.time - lag)
     turned = (data.time[0] + data.time[-1] - data.time)[::-1]
@@ -229,12 +266,19 @@ def _corrected(
         expected, scale = states[:, channel.column], carried[:, channel.column]
         whole = list(_corrections(channel.kind, data.values[:, j], begin, float(expected[0])))
         if with_factor and (factor := float(values[:, j] @ expected / (expected @ expected))):
-            whole.append((f"too large by a factor of {factor:.6g}", 1.0 / factor, data.values[:, j] / factor))
-        left = [float(np.abs((v[begin : begin + len(values)] - expected) / scale).max()) for _, _, v in whole]
+            whole.append(
+                (f"too large by a factor of {factor:.6g}", 1.0 / factor, data.values[:, j] / factor)
+            )
+        left = [
+            float(np.abs((v[begin : begin + len(values)] - expected) / scale).max())
+            for _, _, v in whole
+        ]
         least = max(min(left), 1e-3 * search.tolerance)
         if not least <= search.fitting:
             break
-        text, factor, corrected = next(item for item, size in zip(whole, left, strict=True) if size <= 10.0 * least)
+        text, factor, corrected = next(
+            item for item, size in zip(whole, left, strict=True) if size <= 10.0 * least
+        )
         names.setdefault(text, []).append(channel.name)
         parts.append((corrected, data.rounding[:, j] * abs(factor)))
     else:
@@ -251,7 +295,9 @@ def _corrected(
         yield [text], exchanged
 
 
-def _corrections(kind: str, values: Array, begin: int, start: float) -> Iterator[tuple[str, float, Array]]:
+def _corrections(
+    kind: str, values: Array, begin: int, start: float
+) -> Iterator[tuple[str, float, Array]]:
     """What is wrong, factor, values so corrected, the simplest first; begin: the first row that is compared; start: the
     right value there."""
     factors = [(1.0, ""), *_FACTORS[kind]]
@@ -259,7 +305,11 @@ def _corrections(kind: str, values: Array, begin: int, start: float) -> Iterator
     for shifted in (False, True):
         for factor, text in signed:
             zero = factor * float(values[begin]) - start if shifted else 0.0
-            parts = [text, "sign reversed" if factor < 0.0 else "", f"zero off by {zero:.6g}" if shifted else ""]
+            parts = [
+                text,
+                "sign reversed" if factor < 0.0 else "",
+                f"zero off by {zero:.6g}" if shifted else "",
+            ]
             parts = [part for part in parts if part]
             corrected = factor * values - zero
             yield ", ".join(parts), factor, corrected
@@ -273,7 +323,11 @@ def _exchanged(scene: Scene, data: ForeignData, chosen: Sequence[int]) -> tuple[
     """In words, and the data with their columns taken as those of other channels."""
     known = channels(scene)[1:]
     others = tuple(known[c] for c in chosen)
-    moved = [f"{own.name} is {other.name}" for own, other in zip(data.channels, others, strict=True) if own != other]
+    moved = [
+        f"{own.name} is {other.name}"
+        for own, other in zip(data.channels, others, strict=True)
+        if own != other
+    ]
     return f"columns exchanged: {', '.join(moved)}", replace(data, channels=others)
 
 
@@ -282,15 +336,25 @@ def _scatter(search: CauseSearch, data: ForeignData) -> list[str]:
     if len(data.time) < 4 * _FEWEST:
         return []
     errors = data.values - search.states_at(data.time)[:, data.columns]
-    wrong = np.abs(errors / search.carried(data.time)[:, data.columns]).max(axis=0) > search.tolerance
+    wrong = (
+        np.abs(errors / search.carried(data.time)[:, data.columns]).max(axis=0) > search.tolerance
+    )
     centred = errors[:, wrong] - errors[:, wrong].mean(axis=0)
     sizes = (centred**2).mean(axis=0)
     if not wrong.any() or not ((sizes > 0.0) & (sizes < math.inf)).all():
         return []
     # Of every second row alone neighbours have nothing in common either.
-    common = np.max([np.abs((centred[n:] * centred[:-n]).mean(axis=0)) for n in (1, 2)], axis=0) / sizes
+    common = (
+        np.max([np.abs((centred[n:] * centred[:-n]).mean(axis=0)) for n in (1, 2)], axis=0) / sizes
+    )
     half = len(data.time) // 2
-    early, late = ((centred[part] ** 2).mean(axis=0) for part in (slice(None, half), slice(half, None)))
-    if (common > 3.0 / math.sqrt(len(errors))).any() or (late > 2.0 * early).any() or (early > 2.0 * late).any():
+    early, late = (
+        (centred[part] ** 2).mean(axis=0) for part in (slice(None, half), slice(half, None))
+    )
+    if (
+        (common > 3.0 / math.sqrt(len(errors))).any()
+        or (late > 2.0 * early).any()
+        or (early > 2.0 * late).any()
+    ):
         return []
     return [f"scatter from row to row, standard deviation {math.sqrt(float(sizes.max())):.1e}"]

@@ -14,7 +14,7 @@ from support.data_files import FORMATS
 
 import rotor_mbs as rm
 from rotor_mbs.cli import main
-from rotor_mbs.comparison.trajectory import as_dictionary
+from rotor_mbs.comparison.verdict import as_dictionary
 from rotor_mbs.models.lagrange import reference
 from rotor_mbs.report.pages.comparison import verdict_of
 from rotor_mbs.runs.read import read_records, write_records

@@ -14,15 +14,9 @@ import numpy as np
 
 from rotor_mbs.analysis.text_tables import TextTable
 from rotor_mbs.comparison.channels import load_data
-from rotor_mbs.comparison.trajectory import (
-    DEFAULT_TOLERANCE,
-    LEVELS,
-    ChannelErrors,
-    DataVerdict,
-    compare_modes,
-    compare_with_reference,
-    from_dictionary,
-)
+from rotor_mbs.comparison.modes import compare_modes
+from rotor_mbs.comparison.trajectory import compare_with_reference
+from rotor_mbs.comparison.verdict import DEFAULT_TOLERANCE, LEVELS, ChannelErrors, DataVerdict, from_dictionary
 from rotor_mbs.errors import InputError
 from rotor_mbs.methods.time_limit import checked_seconds
 from rotor_mbs.report import canvas, plots
@@ -98,7 +92,7 @@ class DataComparison:
 
     Attributes
     ----------
-    verdict : errors and verdict, see `rotor_mbs.comparison.trajectory.DataVerdict`.
+    verdict : errors and verdict, see `rotor_mbs.comparison.verdict.DataVerdict`.
     record : data, reference, errors and defects, as `save` stores them.
     status, message, agrees : status, the reason if it is not "ok", and whether it is "ok".
     likely : probable causes of a difference.

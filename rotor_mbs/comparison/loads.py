@@ -1,0 +1,444 @@
+"""Loads of another program against the closed form's at the data's own states; what is wrong."""
+
+from __future__ import annotations
+
+import functools
+import itertools
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotor_mbs.comparison.channels import Channel, ForeignData, channels
+from rotor_mbs.comparison.hypotheses import Explanation, Hypothesis, cheapest, explanations
+from rotor_mbs.comparison.verdict import ChannelErrors, agrees_until
+from rotor_mbs.models.lagrange.parameters import load_segments, load_tables
+from rotor_mbs.models.lagrange.samples import sampled_loads
+from rotor_mbs.scenario.scene import Scene
+from rotor_mbs.scenario.time_table import ALIGNMENT, values_before
+from rotor_mbs.solution.defects import FLOOR_SAFETY, Defects
+from rotor_mbs.solution.quantities import LOADS, longest_arm
+from rotor_mbs.solution.trajectory import Array, all_coordinates
+
+# Of the largest force at a root: components that stay below are judged by this, not by their own
+# largest.
+_SMALL = 1e-3
+_LOAD_ROUNDING = 16.0 * 2.0**-53  # of that force: of the sums that a load is
+_STATE_STEP = 1e-7  # of a state, for the derivative of the loads
+MIN_EXPLAINED = 5  # rows: with fewer, something always fits
+MAX_LEFT = 1e-4  # of the largest load, or of a frequency, by a mistake that is named,
+LEFT_SHARE = 1e-2  # and of the difference: another program's own error is no mistake
+_UNITS = {1.0: "", 1e-3: "kN taken as N", 1e3: "N taken as kN"}
+_FACTORS = [sign * factor for sign in (1.0, -1.0) for factor in _UNITS]
+# "" is the one that the scene's loads have: of a root the blade's, of the shaft the base.
+_FRAMES = ("", "rotor", "base")
+
+
+@dataclass(frozen=True)
+class LoadComparison:
+    """Result of a comparison of loads.
+
+    Attributes
+    ----------
+    expected : (n, channels) N or N m, loads of the closed form.
+    errors : by channel.
+    message : why the loads are not right, "" where they are.
+    likely : causes.
+    """
+
+    expected: Array
+    errors: tuple[ChannelErrors, ...]
+    message: str
+    likely: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Component:
+    """What a column of loads may be: a factor times (n,) values; shown: of which component."""
+
+    factor: float
+    values: Array
+    shown: str = ""
+
+
+@dataclass(frozen=True)
+class JudgedLoads:
+    """Loads in the rows that are judged, and all that they may be mistaken for.
+
+    Attributes
+    ----------
+    scene, channels : the scene, and the channels of the data.
+    known : all components of loads of the scene, as the columns of `by_frame`.
+    by_frame : by frame the (n, components) loads of the closed form.
+    time : (n,) s.
+    values, rounding, expected : (n, channels) N or N m.
+    smallest_scale : (channels,) by which an error is judged at least.
+    tolerance : of a component's largest.
+    """
+
+    scene: Scene
+    channels: tuple[Channel, ...]
+    known: Sequence[Channel]
+    by_frame: Mapping[str, Array]
+    time: Array
+    values: Array
+    rounding: Array
+    expected: Array
+    smallest_scale: Array
+    tolerance: float
+
+    def scale(self, j: int, component: Array) -> float:
+        """Return the size by which errors of channel j are judged, if it is this component."""
+        largest = float(np.abs(component).max(initial=0.0))
+        return max(largest, float(self.smallest_scale[j])) or 1.0
+
+    def left(self, j: int, component: Component, *, may_vanish: bool = False) -> float:
+        """Return by how much more than allowed is left if channel j is a component.
+
+        Infinite for a component that is next to nothing, which anything small fits, unless it may
+        vanish.
+        """
+        factor, values = component.factor, component.values
+        rounding = FLOOR_SAFETY * self.rounding[:, j] / min(abs(factor), 1)
+        left = float((np.abs(self.values[:, j] / factor - values) - rounding).max())
+        before = np.abs(self.values[:, j] - self.expected[:, j]).max(initial=0.0)
+        share = min(self.tolerance, MAX_LEFT)
+        allowed = min(share * self.scale(j, values), LEFT_SHARE * before)
+        if not may_vanish and not float(np.abs(values).max()) > 100.0 * allowed:
+            return np.inf
+        return float(left - allowed)
+
+
+def loads_by_frame(scene: Scene, time: Array, angles: Array, rates: Array) -> dict[str, Array]:
+    """Return the loads of the closed form at given states, in every frame.
+
+    Parameters
+    ----------
+    scene : the scene.
+    time : (n,) s.
+    angles, rates : (n, 1 + blades) rad and rad/s.
+
+    Returns
+    -------
+    dict of ndarray
+        By frame, (n, components) N or N m in the order of `channels`. What has no components in a
+        frame is as it is in its own.
+    """
+    loads = sampled_loads(scene, time, angles, rates)
+    in_rotor, in_base = dict[str, Array](), dict[str, Array]()
+    azimuths = angles[:, :1] + np.array(scene.phases)
+    for name, values in loads.items():
+        in_rotor[name] = in_base[name] = values
+        if name.startswith("shaft"):
+            in_rotor[name] = _turned(values, -angles[:, 0], axis=1)
+        elif name.startswith("blade"):
+            in_rotor[name] = _turned(values, angles[:, 1:], axis=2)
+            in_base[name] = _turned(in_rotor[name], azimuths, axis=1)
+    matrices = {}
+    for frame, arrays in zip(_FRAMES, (loads, in_rotor, in_base), strict=True):
+        columns = [arrays[load.name].reshape(len(time), -1) for load in LOADS]
+        matrices[frame] = np.hstack(columns)
+    return matrices
+
+
+def _turned(vectors: Array, angle: Array, axis: int) -> Array:
+    """Turn (..., 3) vectors about y (axis 1) or z (axis 2) by (...) rad."""
+    first, second = (axis + 1) % 3, (axis + 2) % 3
+    turned = vectors.copy()
+    turned[..., first] = np.cos(angle) * vectors[..., first] - np.sin(angle) * vectors[..., second]
+    turned[..., second] = np.sin(angle) * vectors[..., first] + np.cos(angle) * vectors[..., second]
+    return turned
+
+
+def compare_loads(
+    scene: Scene, loads: ForeignData, defects: Defects, tolerance: float
+) -> LoadComparison:
+    """Compare each component with the closed form's at the data's own states.
+
+    Errors are relative to the component's largest, beyond what the rounding of states and loads
+    explains. Rows at a jump of a torque are left out: a load has its value before the jump, or
+    after it.
+
+    Parameters
+    ----------
+    scene : the scene.
+    loads : loads alone, from the first row of the defects on.
+    defects : interval defects of the motion beside them, which has its states and their rounding.
+    tolerance : of a component's largest.
+    """
+    expected, loads_in_rows = _loads_in_rows(scene, loads, defects, tolerance)
+    errors, wrong, message = _load_errors(loads_in_rows)
+    likely: tuple[str, ...] = ()
+    if len(loads_in_rows.time) >= MIN_EXPLAINED:
+        likely = _explained(loads_in_rows, wrong)
+    return LoadComparison(expected, errors, message, likely)
+
+
+def _loads_in_rows(
+    scene: Scene, loads: ForeignData, defects: Defects, tolerance: float
+) -> tuple[Array, JudgedLoads]:
+    """Compute the loads at the states of the data, (rows, channels), and choose the judged rows."""
+    states, time, half = defects.states, defects.time, len(defects.moving)
+    known = [channel for channel in channels(scene) if channel.is_load]
+    places = [channel.column - known[0].column for channel in loads.channels]
+
+    def loads_at(states: Array) -> dict[str, Array]:
+        angles, rates = all_coordinates(scene, states[:, :half], states[:, half:])
+        return loads_by_frame(scene, time, angles, rates)
+
+    def columns_of(by_frame: Mapping[str, Array]) -> Array:
+        columns = []
+        for channel, place in zip(loads.channels, places, strict=True):
+            columns.append(by_frame[channel.frame][:, place])
+        return np.stack(columns, axis=1)
+
+    by_frame = loads_at(states)
+    expected = columns_of(by_frame)
+    forces = by_frame[""][:, : 3 * len(scene.blades)].reshape(len(time), -1, 3)
+    largest_force = np.linalg.norm(forces, axis=2).max(axis=1)
+    arms = np.ones(len(loads.channels))
+    for j, channel in enumerate(loads.channels):
+        if channel.kind == "moment":
+            arms[j] = longest_arm(scene)
+    rounding = loads.rounding[: len(time)] + _LOAD_ROUNDING * largest_force[:, None] * arms
+    # The loads are those at states that are rounded, too: by their derivative, state by state.
+    for i in range(2 * half):
+        step = _STATE_STEP * np.maximum(np.abs(states[:, i]), 1.0)
+        moved = states.copy()
+        moved[:, i] += step
+        change = np.abs(columns_of(loads_at(moved)) - expected)
+        rounding += change * (defects.rounding[:, i] / step)[:, None]
+
+    judged = np.isfinite(expected).all(axis=1) & ~_is_at_jump(scene, time)
+    judged_loads = JudgedLoads(
+        scene=scene,
+        channels=loads.channels,
+        known=known,
+        by_frame={frame: matrix[judged] for frame, matrix in by_frame.items()},
+        time=time[judged],
+        values=loads.values[: len(time)][judged],
+        rounding=rounding[judged],
+        expected=expected[judged],
+        smallest_scale=_SMALL * arms * float(largest_force.max(initial=0.0)),
+        tolerance=tolerance,
+    )
+    return expected, judged_loads
+
+
+def _is_at_jump(scene: Scene, time: Array) -> NDArray[np.bool_]:
+    """Whether each of (n,) times is one at which a prescribed load jumps."""
+    at_jump = np.zeros(len(time), bool)
+    for table in load_tables(scene):
+        for (before, _), (after, _) in itertools.pairwise(table):
+            if before == after:
+                step = float(np.median(np.diff(time)))
+                at_jump |= np.abs(time - before) <= ALIGNMENT * step
+    return at_jump
+
+
+def _load_errors(loads: JudgedLoads) -> tuple[tuple[ChannelErrors, ...], list[int], str]:
+    """Judge each component.
+
+    Returns
+    -------
+    tuple of ChannelErrors, list of int, str
+        By channel; the channels that are wrong; why the worst of them is, "" where none is.
+    """
+    errors, wrong = [], []
+    message, largest = "", 0.0
+    if not len(loads.time):
+        message = "no row in which the loads are known"
+    for j, channel in enumerate(loads.channels):
+        size = loads.scale(j, loads.expected[:, j])
+        error = np.abs(loads.values[:, j] - loads.expected[:, j])
+        rounding = loads.rounding[:, j]
+        excess = np.maximum(error - FLOOR_SAFETY * rounding, 0.0) / size
+        worst, error_max = float(excess.max(initial=0.0)), float(error.max(initial=0.0))
+        errors.append(
+            ChannelErrors(
+                name=channel.name,
+                unit=channel.unit,
+                error_max=error_max,
+                error_whole=error_max,
+                defect=worst,
+                floor=float((rounding / size).max(initial=0.0)),
+                agrees_until=agrees_until(loads.time, error / size),
+                defect_unit="of the largest",
+            )
+        )
+        if not worst <= loads.tolerance:
+            wrong.append(j)
+        if not worst <= max(loads.tolerance, largest):
+            largest = worst
+            at = f"at t = {loads.time[int(excess.argmax())]:.6g} s"
+            beyond = f"difference of {worst:.1e} of its largest magnitude beyond rounding"
+            message = f"{channel.name}: {beyond}, {at}, allowed {loads.tolerance:.0e}"
+    return tuple(errors), wrong, message
+
+
+# What is wrong with loads
+
+
+def _explained(loads: JudgedLoads, wrong: Sequence[int]) -> tuple[str, ...]:
+    """Search for what is wrong with components, in words with the names of all that are alike.
+
+    Parameters
+    ----------
+    loads : the loads.
+    wrong : numbers of the channels that are wrong.
+    """
+    by_channel: dict[int, list[Explanation[Component]]] = {}
+    unexplained: dict[tuple[str, str], list[int]] = {}  # moments by load and frame
+    for j in wrong:
+        candidates = _component_hypotheses(loads, j)
+        found = cheapest(explanations(candidates, functools.partial(loads.left, j), allowed=0.0))
+        by_channel[j] = found
+        channel = loads.channels[j]
+        if not found and channel.kind == "moment" and "actuator" not in channel.name:
+            unexplained.setdefault((_load(channel), channel.frame), []).append(j)
+
+    named = _shared_texts(loads, by_channel)
+    # What is left may be moments about another point, all of one load about the same.
+    for (load, frame), group in unexplained.items():
+        text = _other_point(loads, load, frame, group)
+        if text:
+            named.setdefault(text, []).extend(loads.channels[j].name for j in group)
+    exchanged = named.pop("", [])  # of another component, with nothing else wrong
+    likely = [f"{', '.join(names)}: {text}" for text, names in named.items()]
+    if exchanged:
+        likely.append(f"columns exchanged: {', '.join(exchanged)}")
+    return tuple(likely)
+
+
+def _component_hypotheses(loads: JudgedLoads, j: int) -> Iterator[Hypothesis[Component]]:
+    """Yield what channel j may be.
+
+    In another unit, sign, axis or frame, another load, or with the torque on the rotor in it.
+    """
+    channel = loads.channels[j]
+    name = channel.name.partition(",")[0]
+    torque = values_before(load_segments(loads.scene), loads.time)[0]
+    for frame, matrix in loads.by_frame.items():
+        for i, other in enumerate(loads.known):
+            if other.kind != channel.kind:
+                continue
+            shown = f" is {other.name}" if other.name != name else ""
+            exchanges = int(_load(other) != _load(channel)) + int(other.name != name)
+            for factor in _FACTORS:
+                mistakes = _mistakes(factor)
+                if frame != channel.frame:
+                    mistakes.insert(0, f"in the {_frame_name(other, frame)} frame")
+                price = exchanges + len(mistakes)
+                component = Component(factor, matrix[:, i], shown)
+                yield Hypothesis(", ".join(mistakes), component, price)
+                if other.name == "shaft moment y":
+                    text = ", ".join(["with the torque on the rotor in it", *mistakes])
+                    component = Component(factor, matrix[:, i] + torque, shown)
+                    yield Hypothesis(text, component, price + 1)
+
+
+def _shared_texts(
+    loads: JudgedLoads, by_channel: Mapping[int, Sequence[Explanation[Component]]]
+) -> dict[str, list[str]]:
+    """Choose one explanation for each channel: of several the one that most channels have.
+
+    Returns
+    -------
+    dict
+        By text the channels' names, with the component that each is.
+    """
+    shown_by_text: dict[int, dict[str, str]] = {}
+    for j, found in by_channel.items():
+        # Of one text for several components, the first is shown.
+        shown_by_text[j] = {e.text: e.hypothesis.change.shown for e in reversed(found)}
+    count = Counter(text for texts in shown_by_text.values() for text in texts)
+    named: dict[str, list[str]] = {}
+    for j, texts in shown_by_text.items():
+        if texts:
+            text = max(reversed(texts), key=lambda text: count[text])
+            named.setdefault(text, []).append(f"{loads.channels[j].name}{texts[text]}")
+    return named
+
+
+def _other_point(loads: JudgedLoads, load: str, frame: str, group: Sequence[int]) -> str:
+    """Search for the point about which moments of one load are: M - p × F = M + F × p.
+
+    Parameters
+    ----------
+    loads : the loads.
+    load : name of the moment, such as "blade root moment 1".
+    frame : of its components.
+    group : its channels.
+
+    Returns
+    -------
+    str
+        The point, in words; "" where none explains all of the channels.
+    """
+    force = _columns(loads, frame, load.replace("moment", "force"))
+    axes = ["xyz".index(loads.channels[j].name.partition(",")[0][-1]) for j in group]
+    moment = _columns(loads, frame, load)[:, axes]
+    # (n, axes, 3): F × p is this matrix times p.
+    matrix = np.cross(force[:, None, :], np.eye(3)[None]).transpose(0, 2, 1)[:, axes]
+
+    points: list[Hypothesis[tuple[float, Array]]] = []
+    is_root = load.startswith("blade root")
+    origin = "the root" if is_root else "the hub centre"
+
+    def add(name: str, point: Array, factor: float) -> None:
+        text = ", ".join([f"about {name} in place of {origin}", *_mistakes(factor)])
+        points.append(Hypothesis(text, (factor, point)))
+
+    if is_root and not frame:
+        blade = loads.scene.blades[int(load.split()[-1]) - 1]
+        for name, place in (("the centre of mass", blade.centre_of_mass), ("the tip", blade.tip)):
+            for factor in _FACTORS:
+                add(name, np.array(place), factor)
+    # Any point: by least squares over the wrong components.
+    frame_name = _frame_name(loads.channels[group[0]], frame)
+    for factor in _FACTORS:
+        difference = (loads.values[:, group] / factor - moment).ravel()
+        solution = np.linalg.lstsq(matrix.reshape(-1, 3), difference, rcond=1e-9)[0]
+        point = np.asarray(solution, float)
+        point[np.abs(point) < 1e-9 * np.abs(point).max()] = 0.0
+        shown = ", ".join(f"{x:.6g}" for x in point)
+        add(f"the point ({shown}) m of the {frame_name} frame", point, factor)
+
+    def left(change: tuple[float, Array]) -> float:
+        factor, point = change
+        moved = moment + matrix @ point
+        by_channel = []
+        for k, j in enumerate(group):
+            component = Component(factor, moved[:, k])
+            by_channel.append(loads.left(j, component, may_vanish=True))
+        return float(np.max(by_channel))
+
+    first = next(explanations(points, left, 0.0), None)
+    return first.text if first else ""
+
+
+def _columns(loads: JudgedLoads, frame: str, name: str) -> Array:
+    """Return the three components of a load, (n, 3), in a frame."""
+    places = [i for i, channel in enumerate(loads.known) if _load(channel) == name]
+    return loads.by_frame[frame][:, places]
+
+
+def _load(channel: Channel) -> str:
+    """Return a channel's name without its axis and frame: "blade root moment 1"."""
+    return channel.name.partition(",")[0].rstrip("xyz ")
+
+
+def _mistakes(factor: float) -> list[str]:
+    """Return what is wrong with a column that is this factor times the right one, in words."""
+    mistakes = ["sign reversed (action in place of reaction)"] if factor < 0.0 else []
+    unit = _UNITS[abs(factor)]
+    return [*mistakes, unit] if unit else mistakes
+
+
+def _frame_name(channel: Channel, frame: str) -> str:
+    """Return a frame in words; "" is the channel's own."""
+    if frame:
+        return frame
+    return "blade's own" if channel.name.startswith("blade root") else "base"

@@ -1,0 +1,222 @@
+"""The verdict on other people's data, by channel, and as a record of a results file."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, replace
+from numbers import Real
+from typing import Any
+
+import numpy as np
+
+from rotor_mbs.comparison.channels import Channel, ForeignData
+from rotor_mbs.errors import InputError
+from rotor_mbs.runs.design import Column
+from rotor_mbs.runs.read import Record
+from rotor_mbs.runs.versions import versions
+from rotor_mbs.scenario.scene import Scene, scene_hash
+from rotor_mbs.solution.defects import Defects
+from rotor_mbs.solution.trajectory import Array
+
+LEVELS = (1e-3, 1e-6, 1e-9)  # rad, rad/s, or of the largest: until when data agree to each
+DEFAULT_TOLERANCE = 1e-6  # rad, of an interval's defect; of a load's largest; of a frequency
+# Names of columns without use that a file keeps: so many, and so long as JSON; an attribute has
+# 64 kB.
+_MAX_NAMES, _MAX_NAME_BYTES = 100, 30_000
+
+
+@dataclass(frozen=True)
+class ChannelErrors:
+    """Errors of a channel of data, such as "pitch 1" in "rad".
+
+    Angles and rates are compared with the reference, loads with those at the states of the data.
+
+    Attributes
+    ----------
+    error_max, error_whole : the largest error up to the horizon, and at all.
+    defect : what is judged, less what the rounding of the data explains; None where it cannot be
+        known. Of an angle or a rate (times the interval) the largest over all intervals, rad; of a
+        load the largest error, of the load's largest size; of a frequency the largest error, of its
+        size.
+    floor : the largest that rounding explains, likewise.
+    agrees_until : see the function of this name.
+    """
+
+    name: str
+    unit: str
+    error_max: float
+    error_whole: float
+    defect: float | None
+    floor: float | None
+    agrees_until: Mapping[str, float | None]
+    defect_unit: str = "rad"
+
+
+@dataclass(frozen=True)
+class DataVerdict:
+    """Result of a comparison.
+
+    Attributes
+    ----------
+    source : name of the file.
+    status, message : as of a run: "ok", or another one and why in a line.
+    tolerance : rad, of an interval's defect.
+    rows, compared_until, horizon_s : rows compared, time of the last one (s), horizon of the scene
+        (s); None of modes.
+    defect_time, predicted : s, end of the interval of the largest defect; rad, the error up to the
+        horizon that the defects add up to; None where they are not known.
+    read, unused, notes : how columns were read; columns that were not; what else there is to know.
+    likely : what the difference looks like, of what was tried; empty where nothing fits, or nothing
+        was tried.
+    axis : "time", or "speed" of a table of modes, whose `compared_until` is in rad/s.
+    """
+
+    scene: str
+    source: str
+    status: str
+    message: str
+    tolerance: float
+    channels: tuple[ChannelErrors, ...]
+    rows: int
+    compared_until: float
+    horizon_s: float | None = None
+    defect_time: float | None = None
+    predicted: float | None = None
+    read: tuple[str, ...] = ()
+    unused: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
+    likely: tuple[str, ...] = ()
+    axis: str = "time"
+
+    @property
+    def agrees(self) -> bool:
+        return self.status == "ok"
+
+
+def agrees_until(rows: Array, error: Array) -> dict[str, float | None]:
+    """Find until when data agree to each of `LEVELS`.
+
+    Parameters
+    ----------
+    rows : (n,) times, s, or speeds, rad/s.
+    error : (n,) absolute errors, in the unit of the levels.
+
+    Returns
+    -------
+    dict
+        By level, as text, the last row before the error is larger; None where the first is.
+    """
+    until: dict[str, float | None] = {}
+    for level in LEVELS:
+        is_beyond = ~(error <= level)
+        end = int(np.argmax(is_beyond)) if is_beyond.any() else len(rows)
+        until[str(level)] = float(rows[end - 1]) if end else None
+    return until
+
+
+def as_dictionary(verdict: DataVerdict) -> dict[str, Any]:
+    """Return a verdict as JSON can hold it."""
+    return asdict(verdict) | {"agrees": verdict.agrees}
+
+
+def from_dictionary(stored: Mapping[str, Any]) -> DataVerdict:
+    """Return the verdict of which `as_dictionary` made this, also where it has been JSON since."""
+    values: dict[str, Any] = {}
+    for name, value in stored.items():
+        values[name] = tuple(value) if isinstance(value, list) else value
+    values["channels"] = tuple(ChannelErrors(**channel) for channel in values["channels"])
+    del values["agrees"]
+    return DataVerdict(**values)
+
+
+def valid_tolerance(tolerance: float) -> float:
+    """Return a tolerance as a plain number. Raises InputError unless it is finite and positive."""
+    is_number = isinstance(tolerance, Real) and not isinstance(tolerance, bool)
+    if not is_number or not 0.0 < tolerance < math.inf:
+        raise InputError(f"tolerance: {tolerance!r}; allowed: a number more than 0")
+    return float(tolerance)
+
+
+def defects_of_channel(
+    scene: Scene, defects: Defects | None, channel: Channel
+) -> tuple[Array, Array] | None:
+    """Return a channel's interval defects, and what rounding may make of them.
+
+    Returns
+    -------
+    tuple of ndarray, or None
+        Both (n - 1,) rad; None where the channel's coordinate has no defects.
+    """
+    count = len(scene.initial_angles)
+    coordinate, is_rate = channel.column % count, channel.column >= count
+    if defects is None or coordinate not in defects.moving:
+        return None
+    place = defects.moving.index(coordinate)
+    if is_rate:
+        place += len(defects.moving)
+    return defects.channel_sizes[:, place], defects.floors[:, place]
+
+
+def comparison_record(
+    verdict: DataVerdict,
+    scene: Scene,
+    data: ForeignData,
+    expected: Array,
+    defects: Defects | None,
+) -> Record:
+    """Return a comparison as a record of a results file.
+
+    Parameters
+    ----------
+    verdict : the verdict, stored as JSON in an attribute.
+    scene : the scene, stored as text.
+    data : the rows that were compared.
+    expected : (n, channels) what they should be.
+    defects : interval defects of the data, None where unknown.
+
+    Returns
+    -------
+    Record
+        Of each channel data, `_reference`, `_error`, and `_defect` of an angle or a rate.
+    """
+    axis, content = verdict.axis, "modes" if data.is_modes else "trajectory"
+    if data.is_modes:
+        scale = Column((axis,), "rad/s", "rotor speed")
+    else:
+        scale = Column((axis,), "s", "time")
+    columns, arrays = {axis: scale}, {axis: data.time}
+    for j, channel in enumerate(data.channels):
+        values, right = data.values[:, j], expected[:, j]
+        by_ending = {
+            "": (channel.unit, "", values),
+            "_reference": (channel.unit, ", reference", right),
+            "_error": (channel.unit, ", data minus reference", values - right),
+        }
+        if not channel.is_load and not data.is_modes:
+            # Of the interval that ends at a row; NaN where there is none.
+            defect = np.full(len(values), np.nan)
+            known = defects_of_channel(scene, defects, channel)
+            if known is not None:
+                defect[1 : 1 + len(known[0])] = known[0]
+            by_ending["_defect"] = ("rad", ", defect of the interval before the row", defect)
+        for ending, (unit, long_name, array) in by_ending.items():
+            arrays[channel.key + ending] = array
+            columns[channel.key + ending] = Column((axis,), unit, channel.name + long_name)
+    unused = verdict.unused[:_MAX_NAMES]
+    while len(json.dumps(unused)) > _MAX_NAME_BYTES:
+        unused = unused[: len(unused) // 2]
+    attributes = {
+        "title": scene.title,
+        "scene_hash": scene_hash(scene),
+        "scene_toml": scene.text,
+        "source": verdict.source,
+        "status": verdict.status,
+        "message": verdict.message,
+        "tolerance": verdict.tolerance,
+        "horizon_s": np.nan if verdict.horizon_s is None else verdict.horizon_s,
+        "verdict": json.dumps(as_dictionary(replace(verdict, unused=unused))),
+        **versions(),
+    }
+    return Record("comparison", scene.name, f"data/{content}", attributes, arrays, columns)
