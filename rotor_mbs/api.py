@@ -29,11 +29,10 @@ from rotor_mbs.methods.catalogue import REFERENCE, check_names, problems_of_scen
 from rotor_mbs.methods.method_file import ENDING
 from rotor_mbs.methods.time_limit import checked_seconds
 from rotor_mbs.runs.design import MISSING, RUNS
-from rotor_mbs.runs.output_files import replace_file
 from rotor_mbs.runs.pool import check_workers
 from rotor_mbs.runs.read import StoredRun, StoredScene, is_sweep, open_results
 from rotor_mbs.runs.sweeps import ERROR_GROWTH, METRICS, StoredSweep, parameter_name
-from rotor_mbs.runs.table import TableFile, is_of_this_program, text_of
+from rotor_mbs.runs.table import TableFile, copy_file, text_of
 from rotor_mbs.scenario.catalogue import list_scenes, only_scene, scene_of
 from rotor_mbs.scenario.scene import Scene, load_scene, parse_scene
 from rotor_mbs.solution.defects import Defects
@@ -473,10 +472,13 @@ class Runs(Mapping[Any, Any]):
         return data.assign(status=("run", [run.status for run in self._runs()]))
 
     def save(self, path: str | os.PathLike[str]) -> Path:
-        """Save a copy of the file, which `rotor-mbs report` and `rotor_mbs.open` read. A file of this program is
-        replaced; raises InputError for other files."""
+        """Save a copy of the file, which `rotor-mbs report` and `rotor_mbs.open` read.
+
+        An earlier copy is replaced if no run in it is lost. Raises InputError for files with other runs or of another
+        kind, StoreError for files that are damaged or not of this program.
+        """
         target = Path(path)
-        replace_file(target, self.path.read_bytes(), is_of_this_program)
+        copy_file(self.path, target)
         return target
 
     def to_html(self, folder: str | os.PathLike[str]) -> Path:

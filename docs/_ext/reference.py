@@ -363,7 +363,7 @@ _ATTRIBUTES = {
     "cpu": "processor, number of cores",
     "created": "time of creation (UTC); not in sweeps, which are reproduced byte by byte",
     "date_created": "the same, as ACDD names it",
-    "digests": "JSON: SHA-256 of the attributes and of every dataset that is not computed",
+    "integrity": "how changes are found",
     "figures": "figures of the paper",
     "blades": "number of blades",
     "gravity": "m/s^2",
@@ -372,7 +372,6 @@ _ATTRIBUTES = {
     "NX_class": "for viewers of NeXus files",
     "signal": "for viewers of NeXus files",
     "axes": "for viewers of NeXus files",
-    "columns_of_the_reference": "arrays over time that only the reference has, without the dimension run",
     "sweep_toml": "text of the sweep file",
     "base_scene": "name of the scene that is varied",
     "combine": "grid or zip",
@@ -386,7 +385,6 @@ _ATTRIBUTES = {
     "methods": "names of the methods",
     "runs": "number of runs in this file",
     "parameter_keys": "keys of the varied parameters",
-    "record": "1: the group has no rows; it is written as a whole",
     "notes": "results that could not be computed, with the reason",
     "label": "label of the model",
     "symmetric": "1 if the modes are named after multiblade coordinates",
@@ -432,21 +430,19 @@ def _file_format() -> str:
         "other versions are recomputed by the next `run`, `reproduce`, `bench` or `stability`; a sweep keeps them.",
         "**Layout.** Datasets are contiguous, so that a row lies at a fixed offset and is written there when it is "
         "computed. The datasets that are filled in this way are called *computed* here, the others *known in advance*. "
-        "A dataset is computed if the attribute `digests` of its group has the key `attributes of NAME`; a dataset "
-        "known in advance has the key `NAME`.",
+        "The trailer of the file lists them.",
         "**Checksum.** `crc32` of row r is the CRC-32 of zlib (`zlib.crc32`), with r, counted from 0, as its starting "
         "value, over the bytes of the row in each computed dataset of `/runs` except `crc32`, in the order in which "
         "they were created (h5py lists them so), then of the method's row in each computed dataset of its scene's "
         "group that has the dimension `run`. For a reference the computed datasets without the dimension `run` follow "
         "as a whole. In `/bench` and `/stability` only the table's own datasets are covered, in a sweep those of `/`, "
-        "where the starting value is the number `run`. Datasets known in advance are not covered; they have digests. "
+        "where the starting value is the number `run`. Datasets known in advance are not covered, but by the digest. "
         "[Reading results](../data.md) has a program for results files.",
-        "**Digests.** `digests` of a group is a JSON object of SHA-256 digests in hexadecimal. `attributes` and "
-        "`attributes of NAME`: over the JSON text, with sorted keys as Python's `json.dumps` writes it, of the "
-        "attributes as numbers, texts and lists, without `digests` and those that HDF5 and netCDF-4 keep for "
-        "themselves. `NAME`: over the values, then the digest of the dataset's attributes as text. Values are, of "
-        "texts, the texts joined by a zero byte; of numbers, the text of type, bytes per number and shape "
-        "(`f8(101,)`), then the numbers. `rotor-mbs check` verifies them.",
+        "**Trailer.** Behind the end of HDF5, which does not see it: a JSON text, its length (8 bytes, little-endian), "
+        "a SHA-256 (32 bytes) and the text `rmbs-end`. The JSON object has `format_version`, `kind` (`results`, "
+        "`sweep`, `modes`, `comparison` or `split of FILE`) and `groups`: by group, by name of each computed dataset "
+        "in the order of the checksum, offset and length of its values in bytes. The SHA-256 covers every byte before "
+        "it except these values. `rotor-mbs` verifies it before it opens a file.",
         "## Status codes",
         "The attributes `flag_values` and `flag_meanings` of every dataset `status` list the codes and their names.",
         table(["code", "status", "meaning"], [[-1, "missing", _MEANINGS["missing"]], *_statuses()]),

@@ -13,7 +13,6 @@ import time
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import asdict
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -200,7 +199,7 @@ def modes(arguments: argparse.Namespace) -> int:
     is_lost = print_not_computed(made)
     lost = {outcome.label.partition(" ")[0] for outcome in made if not outcome.is_stored}
     found = read_modes(arguments.output) if len(lost) < len(scenes) else {}
-    chosen = [found[scene.name] for scene in scenes if scene.name in found]
+    chosen = [found[scene.name] for scene in scenes if scene.name in found and scene.name not in lost]
     if arguments.json:
         print(json.dumps({modes.scene: mode_rows(modes) for modes in chosen}, ensure_ascii=False, indent=1))
     else:
@@ -228,11 +227,10 @@ def compare(arguments: argparse.Namespace) -> int:
     """Data of another program against a scene's reference: a table, its page, the numbers as a results file."""
     from rotor_mbs.comparison.verdict import as_dictionary
     from rotor_mbs.report.pages.comparison import compare as compare_data
-    from rotor_mbs.runs.output_files import refuse_foreign
-    from rotor_mbs.runs.table import is_of_this_program
+    from rotor_mbs.runs.trailer import COMPARISON, may_extend
 
     stored = arguments.output / "comparison.h5"
-    refuse_foreign(stored, partial(is_of_this_program, kind="comparison"))  # before anything is computed
+    may_extend(stored, COMPARISON)  # before anything is computed
     found = compare_data(
         arguments.data, only_scene(arguments.scene), columns=arguments.columns, tolerance=arguments.tolerance,
         timeout=arguments.timeout,

@@ -23,7 +23,7 @@ CHARACTER = "S1"  # kind of a column of texts that are computed: (run, character
 RUNS = "runs"
 # What a frozen reference stores: it cannot be computed again from angles and rates as precisely.
 FROZEN = ("angles", "rates", "work", *(load.name for load in LOADS), "angle_uncertainty", "error_growth")
-_ONCE_A_SCENE = ("angle_uncertainty", "error_growth")  # stored once a scene, over time
+ONCE_A_SCENE = ("angle_uncertainty", "error_growth")  # stored once a scene, over time
 
 
 class Column(NamedTuple):
@@ -141,6 +141,7 @@ KNOWN = {
     "tolerance": ("1", "tolerance of the method"),
     "order_expected": ("1", "order of the method"),
 }
+NUMBERS = ("step", "tolerance", "order_expected")  # those of them that are no texts
 
 _RUN_COLUMNS = (
     "status", "message", "samples", "time_reached", "time_limit_s", "steps", "rhs_evaluations", "setup_time_s",
@@ -232,7 +233,7 @@ def arrays_of(run: Asked) -> dict[str, Column]:
     for quantity in quantities(outputs):
         if not (quantity.required or quantity.name in method.arrays):
             continue
-        is_once = quantity.name in _ONCE_A_SCENE
+        is_once = quantity.name in ONCE_A_SCENE
         if is_once and run.method != REFERENCE:
             continue
         dimensions = quantity.dimensions if is_once else ("run", *quantity.dimensions)

@@ -7,17 +7,16 @@ import os
 import re
 import secrets
 import socket
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import TYPE_CHECKING, TypeAlias
+from typing import TYPE_CHECKING
 
 from rotor_mbs.errors import InputError, StoreError
 
 if TYPE_CHECKING:
     from _typeshed import ReadableBuffer as Buffer
 
-Mark: TypeAlias = bytes | Callable[[Path], bool]  # see `refuse_foreign`
 _LARGEST_REPLACED = 1 << 28  # bytes, of an output that is not HDF5
 # What a lock file holds, unless its process was killed before it wrote.
 _OWNER = rb"(process [0-9]+ on [!-~]*)?\Z"
@@ -94,13 +93,19 @@ def store_errors(path: object) -> Iterator[None]:
         raise StoreError(f"{path}: cannot be written: {exc.strerror or exc}; nothing stored before is lost") from exc
 
 
-def replace_file(path: Path, content: Buffer, mark: Mark) -> None:
+def replace_file(path: Path, content: Buffer, mark: bytes) -> None:
+    """As `write_file`, in the place of an earlier output of the same kind alone: see `refuse_foreign`. Raises
+    InputError, StoreError."""
+    refuse_foreign(path, mark)
+    write_file(path, content)
+
+
+def write_file(path: Path, content: Buffer) -> None:
     """`content` under a temporary name beside `path`, forced to the disk, then renamed.
 
-    Of a symbolic link the file that it points to is replaced; a device or a pipe is written to. mark: see
-    `refuse_foreign`. Raises InputError where `path` is a file of another kind, StoreError where it cannot be written.
+    Of a symbolic link the file that it points to is replaced; a device or a pipe is written to. Raises StoreError where
+    it cannot be written.
     """
-    refuse_foreign(path, mark)
     if path.exists() and not path.is_file() and not path.is_dir():
         with store_errors(path):
             path.write_bytes(content)
@@ -111,22 +116,17 @@ def replace_file(path: Path, content: Buffer, mark: Mark) -> None:
         os.fsync(file.fileno())
 
 
-def refuse_foreign(path: Path, mark: Mark) -> None:
-    """Raises InputError where `path` is a file that this program did not write as an output of the same kind.
+def refuse_foreign(path: Path, mark: bytes) -> None:
+    """Raises InputError where `path` is a file that this program did not write as an output of the same kind, which is
+    no HDF5 file.
 
-    mark: a regular expression that is found in every output of the kind, or a function that tells them. An empty file
-    may be replaced.
+    mark: a regular expression that is found in every output of the kind. An empty file may be replaced.
     """
     if not path.is_file():
         return
     with store_errors(path):
         size = path.stat().st_size
-        if size == 0:
-            return
-        if isinstance(mark, bytes):
-            is_own = size <= _LARGEST_REPLACED and re.search(mark, path.read_bytes()) is not None
-        else:
-            is_own = mark(path)
+        is_own = size <= _LARGEST_REPLACED and (size == 0 or re.search(mark, path.read_bytes()) is not None)
     if not is_own:
         raise InputError(
             f"{path}: is not an output of this command and is not replaced; allowed: another name, or remove that file"

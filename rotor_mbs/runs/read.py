@@ -25,9 +25,9 @@ from numpy.typing import NDArray
 
 from rotor_mbs.errors import StoreError
 from rotor_mbs.methods.catalogue import PRINTED, REFERENCE, is_built_in, is_corrected
-from rotor_mbs.runs.design import FROZEN, MISSING, POINT_COLUMNS, REPEATED, RUNS, Column
+from rotor_mbs.runs.design import FROZEN, MISSING, NUMBERS, POINT_COLUMNS, REPEATED, RUNS, Column
+from rotor_mbs.runs.output_files import locked
 from rotor_mbs.runs.table import (
-    DIGESTS,
     Place,
     Rows,
     Table,
@@ -36,8 +36,7 @@ from rotor_mbs.runs.table import (
     checksums,
     chosen_group,
     columns_of,
-    damages_of,
-    groups_in,
+    group_at,
     known_columns,
     new_file,
     new_group,
@@ -45,10 +44,10 @@ from rotor_mbs.runs.table import (
     put,
     put_attributes,
     reading,
-    seal_all,
     text_of,
     values_of,
 )
+from rotor_mbs.runs.trailer import MODES, SWEEP, may_extend, read_trailer
 from rotor_mbs.runs.versions import machine, versions
 from rotor_mbs.scenario.catalogue import natural_order, shipped_scene
 from rotor_mbs.scenario.scene import Scene, coordinate_labels, parse_scene, scene_hash
@@ -316,8 +315,7 @@ def run_arrays(path: Path, group: str = "", scene: str = "") -> dict[str, NDArra
 
 def is_sweep(path: Path) -> bool:
     """Whether a file of this program is the dataset of a sweep. Raises StoreError where it cannot be read."""
-    with open_file(path) as file, reading(path):
-        return "run" in file
+    return read_trailer(path).kind == SWEEP
 
 
 def _scenes(stored: TableFile, file: IO[bytes], verify: bool, only: Collection[str] | None) -> Iterator[StoredScene]:
@@ -339,7 +337,6 @@ def _scenes(stored: TableFile, file: IO[bytes], verify: bool, only: Collection[s
 
 
 _MESSAGE_LENGTH = 300
-_NUMBERS = ("step", "tolerance", "order_expected")  # that the design says of a point
 
 
 @dataclass(frozen=True)
@@ -385,15 +382,15 @@ def read_records(path: Path, kind: str) -> list[Record]:
     """The records of a kind, in the order of the file; no curve of which a point is missing. Raises StoreError."""
     if kind in POINT_COLUMNS:
         return [record for table in TableFile(path, [kind]).tables.values() for record in _point_records(table)]
-    with open_file(path) as file, reading(path):
-        return list(_group_records(file, kind)) if kind in file else []
+    with open_file(path) as (file, trailer), reading(path):
+        return [_record(file, group) for group in trailer.groups] if trailer.kind == kind else []
 
 
 def _point_records(stored: Table) -> Iterator[Record]:
     """The rows of a table that belong to one curve or one ladder."""
     kind, statuses, rows = stored.group, stored.statuses(), list(stored.known_rows().values())
     columns = stored.place().read(len(stored.runs)) | {
-        name: stored.column(name) for name in _NUMBERS if name in stored.known
+        name: stored.column(name) for name in NUMBERS if name in stored.known
     }
     owners = [(row["scene"], row.get("curve", row["method_name"])) for row in rows]
     for scene, name in dict.fromkeys(owners):
@@ -422,31 +419,36 @@ def _point_records(stored: Table) -> Iterator[Record]:
 
 
 def write_records(path: Path, records: Sequence[Record]) -> None:
-    """A file with these records alone, atomically. Raises StoreError; InputError where `path` is a file without records
-    of the first one's kind, which is not replaced."""
-    with new_file(path, records[0].kind if records else "") as file:
-        put_attributes(file, {**versions(), **machine()})
-        for record in records:
-            group = new_group(file, "/".join((record.kind, record.scene, record.name)))
-            put_attributes(group, {"record": 1, **record.attributes})
-            for name, column in record.columns.items():
-                dataset = put(group, name, np.asarray(record.arrays[name]), column)
-                if f"{name}_labels" in record.attributes:
-                    put_attributes(dataset, {"labels": record.attributes[f"{name}_labels"]})
-        seal_all(file)
+    """Write records, all of one kind, into a file that has those of other scenes still.
+
+    The modes of a scene replace all earlier ones of it, a comparison those of the same name. Raises InputError where
+    `path` is a file of another kind, StoreError where it cannot be read or written.
+    """
+    kind = records[0].kind
+    scenes = {record.scene for record in records}
+    names = {(record.scene, record.name) for record in records}
+    with locked(path):
+        earlier = read_records(path, kind) if may_extend(path, kind) else []
+        for record in earlier:
+            is_replaced = record.scene in scenes if kind == MODES else (record.scene, record.name) in names
+            if not is_replaced:
+                records = [*records, record]
+        with new_file(path, kind) as file:
+            put_attributes(file, {**versions(), **machine()})
+            for record in records:
+                group = new_group(file, "/".join((kind, record.scene, record.name)))
+                put_attributes(group, record.attributes)
+                for name, column in record.columns.items():
+                    dataset = put(group, name, np.asarray(record.arrays[name]), column)
+                    if f"{name}_labels" in record.attributes:
+                        put_attributes(dataset, {"labels": record.attributes[f"{name}_labels"]})
 
 
-def _group_records(file: Any, kind: str) -> Iterator[Record]:
-    for group in groups_in(file[kind]):
-        if "record" not in group.attrs:
-            continue
-        damages = [part for part in damages_of(group) if part != DIGESTS]
-        path = str(group.name).strip("/")
-        if damages:
-            raise StoreError(f"{file.filename}: {path}: {', '.join(damages)} changed after they were written")
-        parts = path.removeprefix(f"{kind}/").split("/")
-        columns = columns_of(group)
-        arrays = {name: values_of(group[name]) for name in columns}
-        scales_first = dict(sorted(columns.items(), key=lambda column: column[1].dimensions != (column[0],)))
-        scene, name = "/".join(parts[:-2]), "/".join(parts[-2:])
-        yield Record(kind, scene, name, attributes_of(group), arrays, scales_first)
+def _record(file: Any, path: str) -> Record:
+    """The group of arrays at `path` in an open file."""
+    group = group_at(file, path)
+    kind, *scene, owner, name = path.split("/")
+    columns = columns_of(group)
+    arrays = {name: values_of(group[name]) for name in columns}
+    scales_first = dict(sorted(columns.items(), key=lambda column: column[1].dimensions != (column[0],)))
+    return Record(kind, "/".join(scene), f"{owner}/{name}", attributes_of(group), arrays, scales_first)

@@ -24,14 +24,14 @@ from rotor_mbs.errors import InputError, StoreError
 from rotor_mbs.methods.catalogue import find_method
 from rotor_mbs.runs.design import COLUMNS, MISSING, Column, flags
 from rotor_mbs.runs.output_files import locked
-from rotor_mbs.runs.table import Table, TableFile, laid_out, reading, scene_scales
+from rotor_mbs.runs.table import IDENTITY, Table, TableFile, laid_out, reading, scene_scales
+from rotor_mbs.runs.trailer import SWEEP, may_extend
 from rotor_mbs.runs.versions import row_versions
 from rotor_mbs.scenario.sweep import SPLITS, Sweep, split_rows
 from rotor_mbs.solution import quantities
 from rotor_mbs.solution.status import code_of
 
 MESSAGE_LENGTH = 256  # bytes; the longest message seen has 242, of a singularity that ode45 does not pass
-IDENTITY = "sweep_identity"  # the attribute with a hash of all that the design says
 
 METRICS = {
     name: COLUMNS[name]
@@ -101,7 +101,7 @@ def open_sweep(
     """
     with locked(output):
         path = output.resolve() if output.is_symlink() else output  # a link stays one
-        is_new = not path.exists()
+        is_new = not may_extend(path, SWEEP)
         if is_new:
             with laid_out(path, [table], attributes):
                 pass

@@ -8,7 +8,7 @@
 All space is taken when a file is laid out. From then on no HDF5 metadata changes, so that the file is valid and can be
 read at every moment. The bytes of a row are written to their offsets, its status after a sync: a row is stored where
 its status is not -1 and its checksum is right. What the design says of a row (its scene, method, settings, versions) is
-written with the layout and covered by the digests of its group.
+written with the layout and covered by the digest in the file's trailer (`runs.trailer`).
 
 An HDF5 handle that is open while rows are written reads old values, and one that writes would destroy them: nothing is
 written by the HDF5 library after the layout.
@@ -18,14 +18,13 @@ from __future__ import annotations
 
 import errno
 import functools
-import hashlib
-import json
+import io
 import math
 import os
 import threading
 import zlib
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager, nullcontext, suppress
+from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime
 from pathlib import Path
@@ -43,6 +42,9 @@ from rotor_mbs.runs.design import (
     COLUMNS,
     KNOWN,
     MISSING,
+    NUMBERS,
+    ONCE_A_SCENE,
+    POINT_COLUMNS,
     REPEATED,
     RUNS,
     Asked,
@@ -50,7 +52,19 @@ from rotor_mbs.runs.design import (
     arrays_of,
     metric_columns,
 )
-from rotor_mbs.runs.output_files import replace_file, replacing, store_errors
+from rotor_mbs.runs.output_files import locked, replacing, store_errors, write_file
+from rotor_mbs.runs.trailer import (
+    FORMAT_VERSION,
+    INTEGRITY,
+    MAGIC,
+    RESULTS,
+    SPLIT_OF,
+    SWEEP,
+    Trailer,
+    may_extend,
+    read_trailer,
+    trailer_of,
+)
 from rotor_mbs.runs.versions import machine, versions
 from rotor_mbs.scenario.catalogue import natural_key
 from rotor_mbs.scenario.scene import Scene, scene_hash
@@ -59,13 +73,11 @@ from rotor_mbs.solution.status import STATUSES, code_of
 from rotor_mbs.solution.trajectory import Solution
 
 FORMAT = "rotor_mbs"
-FORMAT_VERSION = 2
 CONVENTIONS = "CF-1.11, ACDD-1.3"
 # What every file is about: the attribute `keywords` of the ACDD conventions.
 KEYWORDS = "multibody dynamics, wind turbine rotor, Euler-Lagrange equations, model verification"
-DIGESTS = "digests"  # the attribute with the digests of a group
-SPLIT_OF = "split_of"  # the attribute of a split of a sweep's dataset, which is no table: name of the sweep's file
-_NOT_ATTRIBUTES = (DIGESTS, "CLASS", "NAME", "REFERENCE_LIST", "DIMENSION_LIST", "_Netcdf4Dimid", "_Netcdf4Coordinates")
+IDENTITY = "sweep_identity"  # the attribute of a sweep's file with a hash of all that the design says
+_NOT_ATTRIBUTES = ("CLASS", "NAME", "REFERENCE_LIST", "DIMENSION_LIST", "_Netcdf4Dimid", "_Netcdf4Coordinates")
 # The netCDF-4 library's name for the scale of a dimension without values.
 _WITHOUT_VALUES = "This is a netCDF dimension but not a netCDF variable."
 
@@ -78,8 +90,8 @@ _DAMAGE = (
 # An array may be larger than its bytes in the file, where it is compressed: up to a factor, and a size in any case.
 _UNPACKED, _UNPACKED_BYTES = 100, 1 << 26
 _HEAD_BYTES = 1 << 17  # of a file beside its rows, at most: descriptions and texts
-_OF_REFERENCE = "columns_of_the_reference"  # the attribute with the names of those that have no value a run
 _READ_BYTES = 1 << 25  # read at once when checksums are verified
+_ATTEMPTS = 3  # to open a file that is being replaced
 _TEXT_LENGTH = 600  # characters of a message
 
 # (rows, ...) arrays by the name of their dataset.
@@ -401,9 +413,12 @@ def laid_out(path: Path, tables: Sequence[Table], attributes: Mapping[str, objec
         _reserve(temporary, _HEAD_BYTES + rows)
         with begin_file(temporary) as file:
             put_attributes(file, attributes)
-            for table in tables:
-                _put_table(file, table)
-            seal_all(file)
+            rows_of = {table.group: _put_table(file, table) for table in tables}
+        kind = SWEEP if "" in rows_of else RESULTS
+        with temporary.open("r+b") as laid:
+            trailer = trailer_of(laid, kind, rows_of)
+            laid.seek(0, os.SEEK_END)
+            laid.write(trailer)
         _reserve(temporary, temporary.stat().st_size)
         yield temporary
 
@@ -421,7 +436,8 @@ def _reserve(path: Path, size: int) -> None:
         os.fsync(file.fileno())
 
 
-def _put_table(file: Any, table: Table) -> None:
+def _put_table(file: Any, table: Table) -> dict[str, tuple[int, int]]:
+    """Offset and length in bytes of its computed columns."""
     group = new_group(file, table.group) if table.group else file
     put_attributes(group, table.attributes)
     put(group, "run", table.runs, Column(("run",), "1", "name or number of the run"))
@@ -429,13 +445,17 @@ def _put_table(file: Any, table: Table) -> None:
         put_dimension(group, CHARACTERS, table.characters)
     for name, (column, values) in table.known.items():
         put(group, name, values, column)
+    rows = {}
     for name, column in table.computed.items():
         kind, shape = table.row_type[name].base, table.shape(name)
-        put_empty(group, name, shape, kind, column, MISSING if name == "status" else None)
-    of_reference = [name for name, column in table.computed.items() if "run" not in column.dimensions]
-    if of_reference:
-        put_attributes(group, {_OF_REFERENCE: of_reference})
-    seal(group, later=table.computed.keys())
+        dataset = put_empty(group, name, shape, kind, column, MISSING if name == "status" else None)
+        rows[name] = _place_of(dataset)
+    return rows
+
+
+def _place_of(dataset: Any) -> tuple[int, int]:
+    """Offset and length in bytes of the values of a contiguous dataset."""
+    return dataset.id.get_offset() or 0, dataset.nbytes
 
 
 def begin_file(place: Path | str, **driver: object) -> Any:
@@ -444,6 +464,7 @@ def begin_file(place: Path | str, **driver: object) -> Any:
     file.attrs["Conventions"] = CONVENTIONS
     file.attrs["format"] = FORMAT
     file.attrs["format_version"] = FORMAT_VERSION
+    file.attrs["integrity"] = INTEGRITY
     return file
 
 
@@ -513,36 +534,26 @@ def put_attributes(target: Any, values: Mapping[str, object]) -> None:
 
 
 @contextmanager
-def open_file(path: Path) -> Iterator[Any]:
-    """An existing results file, read only. Raises StoreError where it is missing, damaged or another program's."""
-    if not path.is_file():
-        found = "is a folder" if path.is_dir() else "no such file"
-        raise StoreError(f"{path}: {found}; allowed: a results file, as rotor-mbs run or reproduce writes it")
-    try:
-        path.open("rb").close()
-    except OSError as exc:
-        raise StoreError(f"{path}: cannot be read: {exc.strerror}") from exc
-    try:
-        file = h5py.File(path, "r")
-    except OSError as exc:
-        raise StoreError(
-            f"{path}: not a readable HDF5 file ({_reason(exc)}); allowed: a file that rotor-mbs wrote"
-        ) from exc
-    with file:
-        with reading(path):
-            written_by, version = (attribute(file, name) for name in ("format", "format_version"))
-        if written_by != FORMAT:
-            raise StoreError(f"{path}: its attribute format is {written_by!r}; allowed: a file that rotor-mbs wrote")
-        if version != FORMAT_VERSION:
+def open_file(path: Path) -> Iterator[tuple[Any, Trailer]]:
+    """An existing file of this program, read only, and its trailer, which is checked before HDF5 sees the file. Raises
+    StoreError where it is missing, damaged or another program's."""
+    for _ in range(_ATTEMPTS):
+        trailer = read_trailer(path)
+        try:
+            file = h5py.File(path, "r")
+        except OSError as exc:
             raise StoreError(
-                f"{path}: format_version {version!r}, this program reads {FORMAT_VERSION}; allowed: a file of this "
-                "version, with its runs recomputed"
-            )
-        with reading(path):
-            whole = attribute(file, SPLIT_OF)
-        if whole is not None:
-            raise StoreError(f"{path}: a split for Hugging Face datasets; allowed: the sweep's own file, {whole}")
-        yield file
+                f"{path}: not a readable HDF5 file ({_reason(exc)}); allowed: a file that rotor-mbs wrote"
+            ) from exc
+        with file:
+            if path.stat().st_ino != trailer.inode:  # replaced since it was checked
+                continue
+            if trailer.kind.startswith(SPLIT_OF):
+                whole = trailer.kind.removeprefix(SPLIT_OF)
+                raise StoreError(f"{path}: a split for Hugging Face datasets; allowed: the sweep's own file, {whole}")
+            yield file, trailer
+            return
+    raise StoreError(f"{path}: is being replaced by another process")
 
 
 @contextmanager
@@ -567,12 +578,22 @@ class TableFile:
 
     def __init__(self, path: Path, only: Collection[str] | None = None) -> None:
         self.path = path
-        with open_file(path) as file, reading(path):
+        with open_file(path) as (file, trailer), reading(path):
             self.attributes = attributes_of(file)
-            if "run" not in file:
-                _refuse_changes(file, "")
-            self.groups = [str(group.name).strip("/") for group in groups_in(file) if "run" in group]
-            self.tables = {group: _read_table(file, group) for group in self.groups if only is None or group in only}
+            self.groups = list(trailer.groups) if trailer.kind in (RESULTS, SWEEP) else []
+            self.tables = {
+                group: _read_table(file, group, trailer) for group in self.groups if only is None or group in only
+            }
+            self._check_runs()
+
+    def _check_runs(self) -> None:
+        """Raises StoreError where a run has no arrays."""
+        rows = self.tables[RUNS].known_rows() if RUNS in self.tables else {}
+        for run, row in rows.items():
+            scene, method = row["scene"], row["method_name"]
+            is_there = scene in self.groups and (scene not in self.tables or method in self.tables[scene].runs)
+            if run != f"{scene}/{method}" or not is_there:
+                raise StoreError(f"{self.path}: {run} has no arrays; damaged")
 
     def place(self, run: str, group: str = RUNS) -> Place:
         """Where a row is; of a run, together with its arrays."""
@@ -628,50 +649,76 @@ class TableFile:
         return missing, kept
 
 
-def _read_table(file: Any, group: str) -> Table:
+def _read_table(file: Any, group: str, trailer: Trailer) -> Table:
     """A table in an open file. Raises StoreError where it is not what was laid out, or is no table."""
-    path, item = Path(file.filename), file[group] if group else file
-    _refuse_changes(item, group)
-    attributes = attributes_of(item)
-    of_reference = attributes.pop(_OF_REFERENCE, [])
-    digests = stored_digests(item)
-    known: dict[str, tuple[Column, Any]] = {}
-    computed: dict[str, Column] = {}
-    offsets: dict[str, int] = {}
-    for name, column in columns_of(item).items():
-        dataset = item[name]
-        if f"{_COMPUTED}{name}" in digests:
-            offset = dataset.id.get_offset()
-            if offset is None and dataset.size:
-                raise StoreError(f"{path}: {dataset.name} is not contiguous; allowed: a file as it was laid out")
-            computed[name], offsets[name] = column, offset or 0
-        else:
-            known[name] = column, values_of(dataset)
+    path, item, rows = Path(file.filename), group_at(file, group), trailer.groups[group]
+    columns = columns_of(item)
+    known = {name: (column, values_of(item[name])) for name, column in columns.items() if name not in rows}
+    computed = {name: columns[name] for name in rows}
+    offsets = {name: offset for name, (offset, _) in rows.items()}
     _, runs = known.pop("run")
     characters = len(item[CHARACTERS]) if CHARACTERS in item else 0
-    table = Table(group, runs, known, computed, attributes, characters, path, path.stat().st_ino, offsets)
-    # What the digests do not cover: shapes and types, and where the values are.
-    size = path.stat().st_size
+    table = Table(group, runs, known, computed, attributes_of(item), characters, path, trailer.inode, offsets)
     for name, column in computed.items():
         kind, shape, dataset = np.dtype(column.kind), table.shape(name), item[name]
-        is_wrong = dataset.shape != shape or kind.kind not in "fiuS"
-        is_wrong = is_wrong or ("run" in column.dimensions) == (name in of_reference)
-        if name in COLUMNS and "run" in column.dimensions:
+        is_wrong = dataset.shape != shape or kind.kind not in "fiuS" or _place_of(dataset) != tuple(rows[name])
+        if name in COLUMNS and name not in ONCE_A_SCENE:
             usual = COLUMNS[name]
             is_wrong = is_wrong or kind != np.dtype(usual.kind) or column.dimensions != usual.dimensions
-        if is_wrong or offsets[name] + math.prod(shape) * kind.itemsize > size:
+        if is_wrong:
             raise StoreError(f"{path}: {dataset.name} has shape {dataset.shape} of {kind}; damaged")
-    for name, (_, values) in known.items():
-        if values.ndim == 0:
-            raise StoreError(f"{path}: {group or 'file'}/{name} is a single value; damaged")
+    _check(table)
     return table
 
 
-def _refuse_changes(item: Any, group: str) -> None:
-    changed = damages_of(item)
-    if changed:
-        place = f"{item.file.filename}: {group or 'file'}"
-        raise StoreError(f"{place}: {', '.join(changed)} changed after the file was laid out")
+# What every table of a kind has: computed columns; columns that the design says; attributes.
+_ALWAYS: Mapping[str, tuple[Collection[str], Collection[str], Collection[str]]] = {
+    "": (("status", "crc32"), (), ()),
+    RUNS: (
+        ("status", "message", "engine_message", "samples", "time_limit_s", "crc32"),
+        ("scene", "method_name", "settings", "versions", "scene_hash"),
+        (),
+    ),
+    **{group: (columns, ("scene", "method_name"), ()) for group, columns in POINT_COLUMNS.items()},
+}
+_OF_A_SCENE = (REPEATED, ("time",), ("title", "scene_toml", "scene_hash"))
+
+
+def _check(table: Table) -> None:
+    """Raises StoreError where a table lacks what every table of its kind has, or a column has another length.
+
+    A digest can be right although another program wrote the file.
+    """
+    place = f"{table.path}: {table.group or 'file'}"
+    computed, known, attributes = _ALWAYS.get(table.group, _OF_A_SCENE)
+    for name in computed:
+        if name not in table.computed:
+            raise StoreError(f"{place}: has no {name}; damaged")
+    columns = {"run": (Column(("run",), "", ""), np.asarray(table.runs)), **table.known}
+    lengths = {name: len(values) for name, (_, values) in columns.items() if values.ndim}
+    for name in known:
+        if name not in columns:
+            raise StoreError(f"{place}: has no {name}; damaged")
+    for name, (column, values) in columns.items():
+        if values.shape != tuple(lengths[dimension] for dimension in column.dimensions):
+            raise StoreError(f"{place}/{name} has shape {values.shape}; damaged")
+        is_text = name in KNOWN and name not in NUMBERS
+        if is_text != (values.dtype.kind == "O") and name != "run":
+            raise StoreError(f"{place}/{name} has values of another type; damaged")
+        if name == "time" and not (np.isfinite(values).all() and (np.diff(values) > 0.0).all()):
+            raise StoreError(f"{place}/time does not increase; damaged")
+    if len(set(table.runs)) != len(table.runs):
+        raise StoreError(f"{place}/run names a run twice; damaged")
+    for name in attributes:
+        if not isinstance(table.attributes.get(name), str):
+            raise StoreError(f"{place}: its attribute {name} is no text; damaged")
+
+
+def group_at(file: Any, path: str) -> Any:
+    """A group by its path. Raises KeyError where there is none, StoreError at a link."""
+    for name in path.split("/") if path else ():
+        file = member(file, name)
+    return file
 
 
 def member(group: Any, name: str) -> Any:
@@ -713,7 +760,7 @@ def plain(value: Any) -> Any:
 
 
 def attributes_of(target: Any) -> dict[str, Any]:
-    """As plain Python values, without those that the library writes and changes by itself, and the digests."""
+    """As plain Python values, without those that the library writes by itself."""
     return {name: attribute(target, name) for name in target.attrs if name not in _NOT_ATTRIBUTES}
 
 
@@ -732,7 +779,8 @@ def attribute(target: Any, name: str, default: Any = None) -> Any:
 def columns_of(group: Any) -> dict[str, Column]:
     """What the datasets of a group are, by name."""
     columns = {}
-    for name, dataset in group.items():
+    for name in group:
+        dataset = member(group, name)
         if not is_group(dataset) and not is_dimension_only(dataset):
             # The names of the scales by their attribute: the library would look for their paths through the whole
             # file, and its own way to a name ends the process where that is damaged. A scale is its own dimension.
@@ -747,21 +795,6 @@ def columns_of(group: Any) -> dict[str, Column]:
             units, long_name = (str(attributes.pop(name)) for name in ("units", "long_name"))
             columns[name] = Column(dimensions, units, long_name, dataset.dtype.str, attributes)
     return columns
-
-
-def groups_in(group: Any, seen: set[Any] | None = None) -> Iterator[Any]:
-    """A group and every one below it, but for those below a table. Raises StoreError at a link or a second name."""
-    seen = set() if seen is None else seen
-    if group in seen:
-        raise StoreError(
-            f"{group.file.filename}: {group.name} is a second name of a group; allowed: one name for each group"
-        )
-    seen.add(group)
-    yield group
-    for name in () if "run" in group else group:
-        item = member(group, name)
-        if is_group(item):
-            yield from groups_in(item, seen)
 
 
 def is_group(item: Any) -> bool:
@@ -785,17 +818,15 @@ def extend_file(path: Path, wanted: Sequence[Table], replaced: Collection[tuple[
     Where the file has all rows as they are asked for, nothing is written. Else a file is laid out beside it, the rows
     that stay are copied, and it takes the place of the old one. A row of which anything in the design differs
     (settings, versions, the scene's numbers) is missing afterwards. Raises InputError where runs of a scene that has
-    other numbers by now would be dropped and not computed again, StoreError where the file cannot be read or written,
-    or is a sweep's.
+    other numbers by now would be dropped and not computed again, or the file holds something else, StoreError where it
+    cannot be read or written.
     """
     if path.is_symlink():  # a link stays one
         path = path.resolve()
-    if not path.exists():
+    if not may_extend(path, RESULTS):
         _write_tables(path, wanted, [])
         return TableFile(path)
     old, new = TableFile(path), {made.group: made for made in wanted}
-    if "" in old.groups:
-        raise StoreError(f"{path}: holds the dataset of a sweep; allowed: another output file")
     stored = old.tables
     wanted_runs = _known_rows(new.get(RUNS))
     hashes = {row["scene"]: row["scene_hash"] for row in wanted_runs.values()}
@@ -845,6 +876,27 @@ def extend_file(path: Path, wanted: Sequence[Table], replaced: Collection[tuple[
     rows_kept = [(group, run, place.read()) for group, run, place in places if place.is_stored]
     _write_tables(path, list(merged.values()), rows_kept)
     return TableFile(path)
+
+
+def copy_file(source: Path, target: Path) -> None:
+    """Copy a file with tables; one at `target` is replaced where the copy has all its rows, and is of the same sweep.
+
+    Raises InputError where rows would be lost, or `target` holds something else, StoreError where it is damaged, not
+    this program's, or cannot be written.
+    """
+    with locked(target):
+        if may_extend(target, read_trailer(source).kind):
+            old, new = TableFile(target), TableFile(source)
+            is_same = old.attributes.get(IDENTITY) == new.attributes.get(IDENTITY)
+            for group, table in old.tables.items():
+                copied = {str(run) for run in new.tables[group].runs} if is_same and group in new.tables else set()
+                for run, status in zip(map(str, table.runs), table.column("status"), strict=True):
+                    if status != MISSING and run not in copied:
+                        raise InputError(
+                            f"{target}: has {f'{group}: ' if group else 'run '}{run}, which would be lost; allowed: "
+                            "another name, or remove that file"
+                        )
+        write_file(target, source.read_bytes())
 
 
 def _known_rows(table: Table | None) -> dict[str, dict[str, Any]]:
@@ -901,118 +953,42 @@ def _write_tables(path: Path, tables: Sequence[Table], rows: Sequence[tuple[str,
                     place.write({name: values.get(name, blank[name]) for name in place.row_type.names or ()})
 
 
-# Digests: the attribute `digests` of a group is a JSON object, SHA-256 by the name of each dataset, over values and
-# attributes, and by "attributes" over the group's own. Of columns that are filled later it covers the attributes alone.
-
-ATTRIBUTES = "attributes"
-_COMPUTED = "attributes of "
-
-
-def array_digest(values: NDArray[Any], attributes: str = "") -> str:
-    """Over shape and values as little-endian numbers: the same on every machine and for every HDF5 layout; attributes:
-    their digest, where it is over these, too."""
-    if values.dtype.kind == "O":  # texts
-        digest = hashlib.sha256("\0".join(map(str, values.tolist())).encode())
-    else:
-        values = np.ascontiguousarray(values)
-        digest = hashlib.sha256(f"{values.dtype.kind}{values.dtype.itemsize}{values.shape}".encode())
-        digest.update(values.astype(values.dtype.newbyteorder("<"), copy=False).tobytes())
-    digest.update(attributes.encode())
-    return digest.hexdigest()
-
-
-def attributes_digest(target: Any) -> str:
-    """Over names and values, in any order."""
-    return hashlib.sha256(json.dumps(attributes_of(target), sort_keys=True).encode()).hexdigest()
-
-
-def seal(group: Any, later: Collection[str] = ()) -> None:
-    """Store the digests of a group; of the datasets `later`, which are computed later, those of their attributes."""
-    sums = {ATTRIBUTES: attributes_digest(group)}
-    for name, item in group.items():
-        if name in later:
-            sums[f"{_COMPUTED}{name}"] = attributes_digest(item)
-        elif not is_group(item) and not is_dimension_only(item):
-            sums[name] = _digest_of(item)
-    group.attrs[DIGESTS] = json.dumps(sums)
-
-
-def _digest_of(dataset: Any) -> str:
-    """Over values, units, long name and further attributes."""
-    return array_digest(values_of(dataset), attributes_digest(dataset))
-
-
-def seal_all(group: Any) -> None:
-    """Store the digests of every group that has none yet."""
-    if DIGESTS not in group.attrs:
-        seal(group)
-    for name in group:
-        if is_group(group.get(name)):
-            seal_all(group[name])
-
-
-def damages_of(group: Any) -> list[str]:
-    """The parts of a group, "attributes" or names of datasets, that are not what was written, are new or are gone.
-
-    "digests" where it has none. Links, and arrays that cannot be read, count too.
-    """
-    try:
-        known = stored_digests(group)
-    except ValueError:
-        known = {}
-    if not known:
-        return [DIGESTS]
-    sums = {ATTRIBUTES: attributes_digest(group)}
-    for name in group:
-        is_computed = f"{_COMPUTED}{name}" in known
-        label = f"{_COMPUTED}{name}" if is_computed else name
-        sums[label] = ""
-        with suppress(StoreError), reading(""):
-            item = member(group, name)
-            if is_group(item) or is_dimension_only(item):
-                del sums[label]
-            else:
-                sums[label] = attributes_digest(item) if is_computed else _digest_of(item)
-    return [name for name in {**known, **sums} if known.get(name) != sums.get(name)]
-
-
-def stored_digests(group: Any) -> dict[str, str]:
-    """By name; {} where there are none. Raises ValueError where they cannot be read."""
-    found = json.loads(str(attribute(group, DIGESTS, "{}")))
-    if not isinstance(found, dict):
-        raise ValueError("no object of digests")
-    return found
-
-
 # Other HDF5 files
 
 
 @contextmanager
-def new_file(path: Path, kind: str = "") -> Iterator[Any]:
-    """A new HDF5 file, put in the place of `path` when all of it is written and on the disk.
+def new_file(path: Path, kind: str) -> Iterator[Any]:
+    """A new HDF5 file of a kind, put in the place of `path` when all of it is written and on the disk.
 
     It is made in memory: HDF5 does not survive a disk that fills up under it, a plain write does. Raises StoreError
-    where the file cannot be written, InputError where `path` is not `is_of_this_program`; what stood there before then
-    still stands.
+    where the file cannot be written; what stood there before then still stands. Whether it may be replaced is decided
+    before, by `may_extend`.
     """
     memory = {"driver": "core", "backing_store": False, "block_size": 1 << 20}
+    groups: dict[str, Mapping[str, tuple[int, int]]] = {}
+
+    def note(name: str, item: Any) -> None:
+        if isinstance(item, h5py.Dataset):
+            groups[name.rpartition("/")[0]] = {}
+
     with begin_file(f"{path.name}.{threading.get_ident()}", **memory) as file:
         yield file
+        file.visititems(note)
         file.flush()
-        image = file.id.get_file_image()
-    replace_file(path, image, functools.partial(is_of_this_program, kind=kind))
+        image = io.BytesIO(file.id.get_file_image())
+    trailer = trailer_of(image, kind, groups)
+    image.seek(0, io.SEEK_END)
+    image.write(trailer)
+    write_file(path, image.getbuffer())
 
 
-def is_of_this_program(path: Path, kind: str = "") -> bool:
-    """Whether it is a file that this program wrote; with `kind`, one that has records of this kind."""
-    try:
-        with h5py.File(path, "r") as file:
-            is_own = bool(attribute(file, "format") == FORMAT)
-            if is_own and kind:
-                return kind in file and any("record" in group.attrs for group in groups_in(file[kind]))
-            return is_own
-    except (OSError, RuntimeError, ValueError):
+def is_of_this_program(path: Path) -> bool:
+    """Whether a file ends as those that this program writes; it may be damaged all the same."""
+    if not path.is_file():
         return False
+    with path.open("rb") as file:
+        file.seek(max(file.seek(0, os.SEEK_END) - len(MAGIC), 0))
+        return file.read() == MAGIC
 
 
 def read_arrays(

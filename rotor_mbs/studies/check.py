@@ -26,10 +26,12 @@ from rotor_mbs.methods.catalogue import (
     method_names,
 )
 from rotor_mbs.methods.method_file import ENDING
-from rotor_mbs.runs.design import MISSING
+from rotor_mbs.runs.design import MISSING, RUNS
+from rotor_mbs.runs.output_files import is_being_written
 from rotor_mbs.runs.read import is_sweep, open_results
 from rotor_mbs.runs.runner import OnProgress, ignore_progress
 from rotor_mbs.runs.sweeps import StoredSweep, parameter_name
+from rotor_mbs.runs.table import TableFile
 from rotor_mbs.scenario.accuracy_bounds import Bounds
 from rotor_mbs.scenario.catalogue import find_scenes
 from rotor_mbs.studies.run import run_scenes
@@ -96,11 +98,12 @@ def _required(scene: str, method: str, hint: str, *, is_missing: bool = True) ->
 
 def judge_file(path: Path, bounds: Bounds) -> list[Check]:
     """Check what is there, runs or a sweep; [] where nothing can be judged. Raises StoreError, InputError."""
+    writer = "; another process is writing it, or was killed while it did" if is_being_written(path) else ""
     if is_sweep(path):  # all runs are there, and as written; their energies were judged when they were computed
         sweep = StoredSweep(path, allow_damaged_runs=True)
         where = Where(str(sweep.attributes.get("base_scene", "sweep")), "*", "runs")
         missing, damaged = int((sweep.column("status") == MISSING).sum()), len(sweep.damaged_runs)
-        absent = f"{missing} runs missing; the sweep's own command computes them"
+        absent = f"{missing} runs missing; the sweep's own command computes them{writer}"
         changed = f"{damaged} runs changed after they were written" if damaged else "every run as written"
         return [
             make_check(bounds, "complete", where, missing, "runs", absent),
@@ -114,9 +117,15 @@ def judge_file(path: Path, bounds: Bounds) -> list[Check]:
                 stack.enter_context(open_results(file, only=[known.scene for known in frozen if known is not None]))
                 for file in {known.path for known in frozen if known is not None}
             ]
-            return checks_of(results, shipped, bounds)
+            checks = checks_of(results, shipped, bounds)
     except (RuntimeError, OSError) as exc:  # what HDF5 finds wrong, at whatever place
         raise StoreError(f"{path}: damaged or incomplete ({' '.join(str(exc).split())[:150]})") from exc
+    runs = TableFile(path, [RUNS]).tables.get(RUNS)
+    missing = 0 if runs is None else int((runs.column("status") == MISSING).sum())
+    if missing:
+        absent = f"{missing} runs missing; the command that wrote the file computes them{writer}"
+        checks.append(make_check(bounds, "complete", Where("*", "*", "runs"), missing, "runs", absent))
+    return checks
 
 
 def runs_gone(path: Path, earlier: Path) -> Check:

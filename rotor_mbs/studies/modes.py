@@ -20,8 +20,9 @@ from rotor_mbs.errors import InputError, MethodRefusal, RotorError
 from rotor_mbs.methods.catalogue import find_method, methods, with_method_files
 from rotor_mbs.runs.output_files import locked
 from rotor_mbs.runs.pool import local_pool, run_in
-from rotor_mbs.runs.read import Record, read_records, write_records
+from rotor_mbs.runs.read import Record, write_records
 from rotor_mbs.runs.runner import OnProgress, Outcome, ignore_progress
+from rotor_mbs.runs.trailer import MODES, may_extend
 from rotor_mbs.scenario.scene import Scene, scene_hash
 from rotor_mbs.scenario.time_table import value_at
 from rotor_mbs.solution.trajectory import Array
@@ -58,13 +59,8 @@ def modes_of_scenes(
     speeds = _increasing(speeds)
     made: list[Outcome] = []
     with locked(output):
+        may_extend(output, MODES)  # before anything is computed
         records: list[Record] = []
-        if output.exists():
-            records = read_records(output, "modes")
-            if not records:
-                raise InputError(f"{output}: is no file of modes; allowed: another output file")
-            asked = {scene.name for scene in scenes}
-            records = [record for record in records if record.scene not in asked]
         work = with_method_files(partial(compute_modes, speeds=speeds, models=models))
         with local_pool(workers) as pool:
             for done, end in enumerate(run_in(pool, work, scenes, timeout_s), 1):
@@ -83,7 +79,7 @@ def modes_of_scenes(
                     outcome = Outcome(label, "", status, message, share=share)
                 made.append(outcome)
                 on_progress(done, len(scenes), outcome)
-        if any(outcome.is_stored for outcome in made):
+        if records:
             write_records(output, records)
     return made
 

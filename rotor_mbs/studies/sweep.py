@@ -22,8 +22,8 @@ from rotor_mbs.models.lagrange.reference import error_growth
 from rotor_mbs.runs.design import MISSING
 from rotor_mbs.runs.pool import TaskPool
 from rotor_mbs.runs.runner import Task, compute
-from rotor_mbs.runs.sweeps import ERROR_GROWTH, IDENTITY, METRICS, code_of_method, open_sweep, sweep_table
-from rotor_mbs.runs.table import KEYWORDS, Place, Rows, Table, blank_rows, row_of_run
+from rotor_mbs.runs.sweeps import ERROR_GROWTH, METRICS, code_of_method, open_sweep, sweep_table
+from rotor_mbs.runs.table import IDENTITY, KEYWORDS, Place, Rows, Table, blank_rows, row_of_run
 from rotor_mbs.runs.versions import machine, versions
 from rotor_mbs.scenario.scene import Scene, scene_hash
 from rotor_mbs.scenario.sweep import Sweep, Variants

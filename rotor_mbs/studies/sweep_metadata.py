@@ -18,7 +18,8 @@ import numpy as np
 from rotor_mbs.runs.design import MISSING, Column
 from rotor_mbs.runs.output_files import replace_file
 from rotor_mbs.runs.sweeps import StoredSweep
-from rotor_mbs.runs.table import KEYWORDS, SPLIT_OF, new_file
+from rotor_mbs.runs.table import KEYWORDS, new_file
+from rotor_mbs.runs.trailer import SPLIT_OF, may_extend
 from rotor_mbs.scenario.sweep import SPLITS
 from rotor_mbs.solution.status import STATUSES
 
@@ -71,14 +72,14 @@ def write_splits(path: Path | str, folder: Path) -> list[Path]:
     columns = _of_runs(stored)
     is_there = np.asarray(stored.column("status")) != MISSING
     marks = stored.column("split") if "split" in columns else np.zeros(len(is_there), np.int8)
-    files = []
+    files, kind = [], f"{SPLIT_OF}{Path(path).name}"
     for code, split in enumerate(SPLITS):
         rows = np.flatnonzero(is_there & (marks == code))
         if not len(rows):
             continue
         files.append(folder / f"{split}.h5")
-        with new_file(files[-1]) as file:
-            file.attrs[SPLIT_OF] = Path(path).name
+        may_extend(files[-1], kind)
+        with new_file(files[-1], kind) as file:
             for name, column in columns.items():
                 values = stored.column(name)[rows]
                 if values.dtype.kind == "S":  # a text is one value there

@@ -141,7 +141,7 @@ def test_the_stored_comparison_has_data_reference_and_errors_in_si(run: rm.Run, 
     (record,) = read_records(tmp_path / "c.h5", "comparison")
     assert as_dictionary(verdict_of(record)) == as_dictionary(found.verdict)
     write_records(tmp_path / "other.h5", [replace(record, kind="modes")])
-    with pytest.raises(rm.InputError, match="is not replaced"):
+    with pytest.raises(rm.InputError, match="holds modes, and this command writes comparisons"):
         found.save(tmp_path / "other.h5")
 
 

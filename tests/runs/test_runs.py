@@ -68,7 +68,7 @@ def test_only_what_was_asked_for_is_stored(tmp_path: Path) -> None:
 def test_names_and_units_keep_the_contract(results: Path) -> None:
     with h5py.File(results) as file:
         assert file.attrs["format"] == "rotor_mbs"
-        assert file.attrs["format_version"] == 2
+        assert file.attrs["format_version"] == 3
         assert file.attrs["Conventions"].startswith("CF-")
         scene, runs = file["paper/fig11"], file["runs"]
         units = {"angles": "rad", "rates": "rad/s", "tip": "m", "kinetic_energy": "J", "work": "J", "time": "s"}

@@ -92,7 +92,7 @@ def test_records_keep_every_number(tmp_path):
     for name in ("speeds", "multipliers", "largest", "stable", "torque", "mismatch"):
         np.testing.assert_array_equal(getattr(read.floquet, name), getattr(found.floquet, name))
     assert np.nanmax(np.abs(found.floquet.product_error)) < 1e-9
-    write_records(tmp_path / "none.h5", [])
+    write_records(tmp_path / "none.h5", [replace(to_records(found)[0], kind="comparison")])
     with pytest.raises(StoreError, match="no modes"):
         read_modes(tmp_path / "none.h5")
 

@@ -5,14 +5,19 @@ python tests/support/frozen_references.py references.h5 reference/paper.h5
 
 from __future__ import annotations
 
+import hashlib
 import sys
 from datetime import UTC, datetime
 from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
 
 from rotor_mbs.methods.catalogue import REFERENCE
 from rotor_mbs.runs.design import FROZEN, Asked
 from rotor_mbs.runs.read import open_results
-from rotor_mbs.runs.table import array_digest, extend_file, runs_table, scene_table
+from rotor_mbs.runs.table import extend_file, runs_table, scene_table
 
 _FACTS = ("steps", "time_reached", "setup_time_s", "run_time_s", "output_time_s")
 
@@ -44,6 +49,14 @@ def digests(path: Path) -> str:
         references = [scene.reference for scene in results.scenes.values()]
         lines = [f"{array_digest(run.array(name))}  {run.scene} {name}\n" for run in references for name in run.names]
     return "".join(lines)
+
+
+def array_digest(values: NDArray[Any]) -> str:
+    """SHA-256 over shape and values as little-endian numbers."""
+    values = np.ascontiguousarray(values)
+    digest = hashlib.sha256(f"{values.dtype.kind}{values.dtype.itemsize}{values.shape}".encode())
+    digest.update(values.astype(values.dtype.newbyteorder("<"), copy=False).tobytes())
+    return digest.hexdigest()
 
 
 if __name__ == "__main__":

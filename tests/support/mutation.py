@@ -184,7 +184,7 @@ _TARGETS = (
             f"{_CHECK}a_changed_byte_is_of_its_run", f"{_CHECK}a_false_success_and_an_edited_status_fail",
             f"{_CHECK}a_number_of_the_reference_that_is_edited_is_seen",
             f"{_CHECK}a_reference_that_is_altered_or_not_there_fails",
-            "runs/test_digests.py::test_an_edit_behind_a_right_checksum_is_found"), 0.5),
+            "runs/test_integrity.py::test_an_edit_behind_a_right_checksum_is_found"), 0.5),
     Target(f"{_A}.published", "ENERGY_RISE claims rounds_to finding", "tests alone",
            ("analysis/test_claims.py",), 0.5),
 )  # fmt: skip

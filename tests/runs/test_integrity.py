@@ -7,6 +7,7 @@ import re
 import shutil
 import zlib
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 from itertools import islice
 from pathlib import Path
@@ -16,15 +17,18 @@ import numpy as np
 import pytest
 from support.checking import failed, judged, results_file
 from support.commands import refusal, rotor_mbs
+from support.forging import append_trailer, forged
 from support.stored import change_byte, change_row, damage
 from support.sweeps import THREE_RUNS, made_sweep
 
 import rotor_mbs as rm
 from rotor_mbs.errors import StoreError
-from rotor_mbs.runs import table
+from rotor_mbs.runs import table, trailer
+from rotor_mbs.runs.output_files import locked
 from rotor_mbs.runs.read import open_results
 from rotor_mbs.runs.sweeps import StoredSweep
 from rotor_mbs.runs.table import Rows, TableFile
+from rotor_mbs.runs.trailer import read_trailer
 
 METHOD = "lagrange/dop853"
 SCENE = "check/held"
@@ -46,33 +50,27 @@ def swept(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return made_sweep(tmp_path_factory.mktemp("sweep"), THREE_RUNS)
 
 
-def reseal(group: h5py.Group) -> None:
-    """Gives a group the digests of what it holds now, as someone who changes a file on purpose could."""
-    known = table.stored_digests(group)
-    later = [name for name in group if f"attributes of {name}" in known]
-    del group.attrs[table.DIGESTS]
-    table.seal(group, later=later)
-
-
 def describe_as(column: h5py.Dataset, attributes: dict[str, object]) -> None:
     for name in ("units", "long_name"):
         column.attrs[name] = attributes[name]
 
 
-def reshape(group: h5py.Group, name: str, shape: tuple[int, ...]) -> None:
-    """Puts zeros of another shape in the place of a column; digests do not cover the shape of computed columns."""
-    attributes, kind = dict(group[name].attrs), group[name].dtype
-    del group[name]
-    describe_as(group.create_dataset(name, data=np.zeros(shape, kind)), attributes)
-    reseal(group)
+def reshape(path: Path, group: str, name: str, shape: tuple[int, ...]) -> None:
+    """Put zeros of another shape in the place of a column."""
+    with forged(path) as file:
+        attributes, kind = dict(file[group][name].attrs), file[group][name].dtype
+        del file[group][name]
+        describe_as(file[group].create_dataset(name, data=np.zeros(shape, kind)), attributes)
 
 
 def test_checksums_are_as_the_documentation_says(written: Path, swept: Path) -> None:
     """Computed with h5py and zlib alone, as the page of the file format describes it."""
 
     def computed(group: h5py.Group) -> list[h5py.Dataset]:
-        digests = json.loads(group.attrs["digests"])
-        return [group[name] for name in group if name != "crc32" and f"attributes of {name}" in digests]
+        content = Path(group.file.filename).read_bytes()
+        length = int.from_bytes(content[-48:-40], "little")
+        groups = json.loads(content[-48 - length : -48])["groups"]
+        return [group[name] for name in groups[group.name.strip("/")] if name != "crc32"]
 
     def is_of_runs(column: h5py.Dataset) -> bool:
         return column.dims[0][0].name.endswith("/run")
@@ -124,20 +122,73 @@ LAID_OUT: dict[str, Callable[[h5py.File], object]] = {
     "a unit": lambda file: file[SCENE]["angles"].attrs.modify("units", "deg"),
     "a title": lambda file: file[SCENE].attrs.modify("title", "another"),
     "the version of a library": lambda file: file.attrs.modify("numpy", "0.0"),
-    "no digests": lambda file: file[SCENE].attrs.__delitem__("digests"),
     "an array more": lambda file: file[SCENE].create_dataset("more", data=np.zeros(3)),
     "an array less": lambda file: file[SCENE].__delitem__("energy_error"),
+    "a status": lambda file: file["runs/status"].__setitem__(1, 3),
+    "nothing": lambda _: None,
 }
 
 
 @pytest.mark.parametrize("change", LAID_OUT)
-def test_a_change_of_what_was_laid_out_is_refused_in_one_line(change: str, copy: Path) -> None:
+def test_a_change_by_another_program_is_refused_in_one_line(change: str, copy: Path) -> None:
     with h5py.File(copy, "r+") as file:
         LAID_OUT[change](file)
     before = copy.read_bytes()
     for words in (["check", copy], ["run", SCENE, "-m", METHOD, "-o", copy, "-j", "1"]):
-        assert "changed after the file was laid out" in refusal(*words)
+        assert "another program has written to it" in refusal(*words)
         assert copy.read_bytes() == before
+
+
+def test_what_became_of_a_file_is_told_apart(copy: Path, tmp_path: Path) -> None:
+    whole = copy.read_bytes()
+    with h5py.File(tmp_path / "foreign.h5", "w") as file:
+        file["time"] = [0.0, 1.0]
+    with h5py.File(tmp_path / "earlier.h5", "w") as file:
+        file.attrs["format"], file.attrs["format_version"] = "rotor_mbs", 2
+    told: dict[str, bytes] = {
+        "its digest does not match": whole[:3000] + bytes([whole[3000] ^ 1]) + whole[3001:],
+        "cut off: ": whole[: len(whole) // 2],
+        "cut off, or another program has written to it": whole[:-1],
+        "not an HDF5 file": b"time [s],rotor [rad]\n" * 10,
+        "not a file of this program": (tmp_path / "foreign.h5").read_bytes(),
+        "of an earlier format": (tmp_path / "earlier.h5").read_bytes(),
+    }
+    for words, content in told.items():
+        copy.write_bytes(content)
+        assert words in refusal("check", copy), words
+    layout = tmp_path / ".results.h5.12345.tmp"
+    layout.write_bytes(whole[: len(whole) // 2])
+    assert "a layout that was interrupted" in refusal("check", layout)
+
+
+def test_a_file_that_is_being_filled_is_told_from_a_damaged_one(copy: Path) -> None:
+    TableFile(copy).place(RUN).mark_missing([0])
+    ended = rotor_mbs("check", copy)
+    assert ended.status == 1
+    assert "1 runs missing; the command that wrote the file computes them\n" in ended.out
+    with ThreadPoolExecutor(1) as other, locked(copy):
+        assert "another process is writing it" in other.submit(rotor_mbs, "check", copy).result().out
+
+
+@pytest.mark.parametrize("offset", [0, 8, 40, 100, -1, -9, -41, -60])
+def test_a_flipped_bit_outside_the_rows_is_refused_before_hdf5_sees_it(
+    offset: int, copy: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    content = bytearray(copy.read_bytes())
+    content[offset] ^= 4
+    copy.write_bytes(content)
+    monkeypatch.setattr(table.h5py, "File", None)
+    assert str(copy) in refusal("check", copy)
+
+
+def test_a_newer_format_is_named(copy: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    known = read_trailer(copy)
+    with h5py.File(copy, "r+"):  # cuts the trailer off
+        pass
+    with monkeypatch.context() as newer:
+        newer.setattr(trailer, "FORMAT_VERSION", 99)
+        append_trailer(copy, known.kind, known.groups)
+    assert "format_version 99, this program reads 3" in refusal("check", copy)
 
 
 # By the check that finds it: a run, and a change in it that has the right checksum. With a growth of 1e6 at the second
@@ -157,9 +208,8 @@ def test_an_edit_behind_a_right_checksum_is_found(check: str, copy: Path) -> Non
 
 
 def test_settings_that_are_not_the_methods_are_found(copy: Path) -> None:
-    with h5py.File(copy, "r+") as file:
+    with forged(copy) as file:
         file["runs/settings"][1] = '{"step": 0.001}'
-        reseal(file["runs"])
     assert "settings" in {check.name for check in failed(judged(copy))}
 
 
@@ -178,16 +228,14 @@ FOREIGN: dict[str, Callable[[h5py.Group, Path], object]] = {
 
 @pytest.mark.parametrize("kind", FOREIGN)
 def test_what_is_not_an_array_of_the_file_is_refused(kind: str, copy: Path, tmp_path: Path) -> None:
-    """With right digests, but where a link leads out of the file or there is no array to describe."""
     (tmp_path / "outside.bin").write_bytes(bytes(range(256)) * 64)
-    with h5py.File(copy, "r+") as file:
+    with forged(copy) as file:
         scene = file[SCENE]
         attributes = dict(scene["angles"].attrs)
         del scene["angles"]
         FOREIGN[kind](scene, tmp_path / "outside.bin")
         if kind not in ("an external link", "a group"):
             describe_as(scene["angles"], attributes)
-            reseal(scene)
     assert str(copy) in refusal("report", copy, "-o", tmp_path / "report")
     assert rotor_mbs("check", copy).status in (1, 2)
 
@@ -203,8 +251,7 @@ def test_a_column_of_another_shape_is_a_line(
     group: str, name: str, shape: tuple[int, ...], copy: Path, swept: Path, tmp_path: Path
 ) -> None:
     path = Path(shutil.copy(swept, tmp_path / "s.h5")) if group == "/" else copy
-    with h5py.File(path, "r+") as file:
-        reshape(file[group], name, shape)
+    reshape(path, group, name, shape)
     before = path.read_bytes()
     for command in (["check", path], ["report", path, "-o", tmp_path / "pages"]):
         assert rotor_mbs(*command).status in (1, 2)
@@ -213,11 +260,11 @@ def test_a_column_of_another_shape_is_a_line(
     assert path.read_bytes() == before
 
 
-def test_a_group_that_holds_itself_ends(copy: Path) -> None:
-    with h5py.File(copy, "r+") as file:
+def test_a_group_of_two_names_is_read_once(copy: Path) -> None:
+    with forged(copy) as file:
         file["check/again"] = file["check"]
         file["check/once_more"] = file["/"]
-    assert str(copy) in refusal("check", copy)
+    assert rotor_mbs("check", copy).status == 0
 
 
 def test_files_that_are_not_ours_are_refused_with_one_line(
@@ -227,9 +274,7 @@ def test_files_that_are_not_ours_are_refused_with_one_line(
     (tmp_path / "text.h5").write_text("no HDF5")
     with h5py.File(tmp_path / "other.h5", "w") as file:
         file["x"] = 1
-    with h5py.File(tmp_path / "newer.h5", "w") as file:
-        file.attrs["format"], file.attrs["format_version"] = "rotor_mbs", 99
-    for name in ("cut.h5", "text.h5", "other.h5", "newer.h5", "missing.h5", "."):
+    for name in ("cut.h5", "text.h5", "other.h5", "missing.h5", "."):
         with pytest.raises(StoreError) as caught, open_results(tmp_path / name):
             pass
         assert "\n" not in str(caught.value)
@@ -244,10 +289,14 @@ def test_files_that_are_not_ours_are_refused_with_one_line(
 
 
 def test_an_attribute_that_became_a_list_is_not_read(copy: Path) -> None:
-    """One bit makes a list of a text, at which the HDF5 library ends the process that reads it."""
-    content, refused = copy.read_bytes(), 0
+    """One bit makes a list of a text, at which the HDF5 library ends the process that reads it: of forged files."""
+    known, refused = read_trailer(copy), 0
+    with h5py.File(copy, "r+"):  # cuts the trailer off
+        pass
+    content = copy.read_bytes()
     for found in islice(re.finditer(rb"\x19\x01", content), 0, None, 5):
         copy.write_bytes(content[: found.start()] + b"\x19\x00" + content[found.end() :])
+        append_trailer(copy, known.kind, known.groups)
         try:
             with open_results(copy) as results:
                 _ = [run.attributes for scene in results.scenes.values() for run in scene.runs.values()]
@@ -262,12 +311,13 @@ def test_an_attribute_that_became_a_list_is_not_read(copy: Path) -> None:
 @pytest.mark.parametrize("column", ["angles", "energy_drift_max", "status", "gravity", "time", "crc32"])
 def test_a_changed_number_of_a_finished_sweep_is_found(column: str, swept: Path, tmp_path: Path) -> None:
     copy = Path(shutil.copy(swept, tmp_path / "s.h5"))
-    with h5py.File(copy, "r+") as file:
-        values = file[column][()]
-        values.view(np.uint8).reshape(-1)[0] ^= 1
-        file[column][...] = values
+    with h5py.File(copy) as file:
+        place = file[column].id.get_offset()
+    content = bytearray(copy.read_bytes())
+    content[place] ^= 1
+    copy.write_bytes(content)
     if column in ("gravity", "time"):
-        assert f"{column} changed after the file was laid out" in refusal("check", copy)
+        assert "its digest does not match" in refusal("check", copy)
         return
     ended = rotor_mbs("check", copy)
     assert ended.status == 1

@@ -1,0 +1,173 @@
+"""The trailer of a file of this program: behind HDF5's end, where the rows lie and a digest of every other byte.
+
+    HDF5 | JSON | its length, 8 bytes | SHA-256, 32 bytes | MAGIC
+
+The JSON has `format_version`, `kind`, and `groups`: by group, by name of each computed column, offset and length in
+bytes of its rows, in the order in which the checksum of a row covers them. The digest covers all that stands before
+it, but for these rows, which have checksums of their own: it is right from the layout on, whichever rows are filled.
+
+A flipped bit can hang the HDF5 library, or end the process: whoever opens a file reads the trailer first. It is read
+anew each time, since it is cheap: rows, nearly all of a large file, are not hashed.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import re
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import IO, NamedTuple
+
+from rotor_mbs.errors import InputError, StoreError
+
+FORMAT_VERSION = 3
+MAGIC = b"rmbs-end"
+# The attribute `integrity` of every file: how it is checked. By it a file is known whose trailer is gone.
+INTEGRITY = "CRC-32 of each row; SHA-256 of the rest, behind the end of HDF5"
+RESULTS, SWEEP, MODES, COMPARISON = "results", "sweep", "modes", "comparison"
+SPLIT_OF = "split of "  # and the name of the sweep's file: a split of its dataset
+_KINDS = {
+    RESULTS: "runs, bench or stability",
+    SWEEP: "a sweep",
+    MODES: "modes",
+    COMPARISON: "comparisons",
+}
+_LENGTH, _DIGEST = 8, hashlib.sha256().digest_size
+_TAIL = _LENGTH + _DIGEST + len(MAGIC)
+_LONGEST_JSON = 1 << 24  # bytes; a table of 60 columns has 2,000
+_BLOCK = 1 << 20  # bytes that are read at once
+_HEAD = 1 << 24  # bytes at the beginning in which the attributes of a file are looked for
+_HDF5 = b"\x89HDF\r\n\x1a\n"
+_END_OF_HDF5 = slice(40, 48)  # of its first bytes, in the superblock that h5py writes by default
+_OF_A_LAYOUT = re.compile(r"\..*\.[0-9]+\.tmp")  # the name of a file that `replacing` has begun
+
+# By group, by name of a computed column: offset and length of its rows in bytes.
+Regions = Mapping[str, Mapping[str, tuple[int, int]]]
+
+
+class Trailer(NamedTuple):
+    """What a trailer says, see above; inode: of the file that was checked."""
+
+    kind: str
+    groups: Regions
+    inode: int
+
+
+def trailer_of(file: IO[bytes], kind: str, groups: Regions) -> bytes:
+    """The bytes to be appended to an HDF5 file that is laid out."""
+    text = json.dumps({"format_version": FORMAT_VERSION, "kind": kind, "groups": groups}, separators=(",", ":"))
+    head = text.encode() + len(text.encode()).to_bytes(_LENGTH, "little")
+    digest = hashlib.sha256()
+    for block in _blocks(file, file.seek(0, 2), groups):
+        digest.update(block)
+    digest.update(head)
+    return head + digest.digest() + MAGIC
+
+
+def read_trailer(path: Path) -> Trailer:
+    """What the trailer of a file says, which is as it was written but for its rows.
+
+    Raises StoreError where the file cannot be read, is not one of this program and format, or has changed.
+    """
+    if not path.is_file():
+        found = "is a folder" if path.is_dir() else "no such file"
+        raise StoreError(f"{path}: {found}; allowed: a results file, as rotor-mbs run or reproduce writes it")
+    try:
+        with path.open("rb") as file:
+            return _checked(path, file)
+    except OSError as exc:
+        raise StoreError(f"{path}: cannot be read: {exc.strerror}") from exc
+
+
+def _checked(path: Path, file: IO[bytes]) -> Trailer:
+    size = file.seek(0, 2)
+    file.seek(max(size - _TAIL, 0))
+    tail = file.read(_TAIL)
+    if len(tail) < _TAIL or not tail.endswith(MAGIC):
+        raise StoreError(f"{path}: {_why_without(path, file, size)}")
+    damaged = StoreError(f"{path}: damaged: what was laid out is not as it was written (its digest does not match)")
+    length = int.from_bytes(tail[:_LENGTH], "little")
+    end = size - _TAIL - length
+    if end < 0 or length > _LONGEST_JSON:
+        raise damaged
+    file.seek(end)
+    text = file.read(length)
+    try:
+        known = json.loads(text)
+        version, kind, groups = known["format_version"], known["kind"], known["groups"]
+        digest = hashlib.sha256()
+        for block in _blocks(file, end, groups):
+            digest.update(block)
+    except (ValueError, TypeError, KeyError, AttributeError, RecursionError):
+        raise damaged from None
+    digest.update(text + tail[:_LENGTH])
+    if digest.digest() != tail[_LENGTH : _LENGTH + _DIGEST]:
+        raise damaged
+    if version != FORMAT_VERSION:
+        raise StoreError(
+            f"{path}: format_version {version!r}, this program reads {FORMAT_VERSION}; allowed: a file of this "
+            "version, with its runs recomputed"
+        )
+    if not isinstance(kind, str) or not _words(kind):
+        raise StoreError(f"{path}: damaged: kind {kind!r}; allowed: {', '.join(_KINDS)}, {SPLIT_OF}FILE")
+    return Trailer(kind, groups, os.fstat(file.fileno()).st_ino)
+
+
+def may_extend(path: Path, kind: str) -> bool:
+    """Decide what a command may write to: whether there is a file of the kind that it extends, and not nothing yet.
+
+    An empty file is nothing. Raises InputError where the file holds something else, StoreError where it is damaged, or
+    not this program's.
+    """
+    if not path.exists() or (path.is_file() and path.stat().st_size == 0):
+        return False
+    found = read_trailer(path).kind
+    if found != kind:
+        raise InputError(
+            f"{path}: holds {_words(found)}, and this command writes {_words(kind)}; allowed: another output file"
+        )
+    return True
+
+
+def _words(kind: str) -> str:
+    return kind if kind.startswith(SPLIT_OF) else _KINDS.get(kind, "")
+
+
+def _blocks(file: IO[bytes], end: int, groups: Regions) -> Iterator[bytes]:
+    """The bytes before `end` outside the rows. Raises ValueError, TypeError, AttributeError where `groups` are no
+    regions one behind the other."""
+    every = [tuple(region) for columns in groups.values() for region in columns.values()]
+    position = 0
+    for start, length in [*sorted(region for region in every if region[1]), (end, 0)]:
+        if not position <= start <= start + length <= end:
+            raise ValueError(f"{length} bytes at {start}")
+        file.seek(position)
+        while position < start:
+            block = file.read(min(start - position, _BLOCK))
+            if not block:
+                raise ValueError("the file became shorter")
+            yield block
+            position += len(block)
+        position = start + length
+
+
+def _why_without(path: Path, file: IO[bytes], size: int) -> str:
+    """What a file is that does not end with a trailer."""
+    file.seek(0)
+    head = file.read(_HEAD)
+    if _OF_A_LAYOUT.fullmatch(path.name):
+        return "a layout that was interrupted; allowed: to remove it"
+    if not head.startswith(_HDF5):
+        return "not an HDF5 file; allowed: a file that rotor-mbs wrote"
+    end = int.from_bytes(head[_END_OF_HDF5], "little")
+    if INTEGRITY.encode() in head:
+        if size < end:
+            return f"cut off: {size} bytes of more than {end}"
+        if size == end:
+            return "changed: another program has written to it since (its trailer is gone)"
+        return "cut off, or another program has written to it (its trailer is not at its end)"
+    if b"rotor_mbs" in head and b"format_version" in head:
+        return f"of an earlier format, this program reads format_version {FORMAT_VERSION}; allowed: to compute it again"
+    return "not a file of this program, or damaged; allowed: a file that rotor-mbs wrote"
