@@ -173,9 +173,11 @@ def run(
                 )
         solution, exact = solve_judged(scene, method, settings, compute_reference=reference, time_limit_s=timeout)
         return Run(**vars(solution), reference=exact)
-    chosen, reasons = selected_methods([scene], check_names(listed("method", method)))
+    chosen, _, refused = selected_methods([scene], check_names(listed("method", method)), settings)
     if not chosen[scene.name]:
-        raise MethodRefusal("; ".join(reasons))
+        raise MethodRefusal("\n".join(map(str, refused)))
+    if asked := [str(refusal) for refusal in refused if refusal.is_asked]:
+        raise InputError(asked)
     folder = _TemporaryFolder()
     path = folder.path / "runs.h5"
     report = run_scenes([scene], chosen, path, workers=workers, timeout_s=min(timeout, _NO_LIMIT_S), settings=settings)
@@ -255,6 +257,8 @@ def sweep(
     ------
     InputError
         For an invalid key, value or option, or if `output` is not the file of this sweep.
+    MethodRefusal
+        If a method cannot represent the scene, or some of its variants; the other runs are stored in `output`.
     ResourceError
         If worker processes died or could not be started; the other runs are stored in `output`.
 
@@ -280,8 +284,12 @@ def sweep(
     folder = _TemporaryFolder() if output is None else None
     path = folder.path / "sweep.h5" if folder is not None else Path(str(output))
     plan = plan_sweep(study, time_limit_s=timeout)
+    if plan.refused:
+        raise MethodRefusal("\n".join(map(str, plan.refused)))
     with open_task_pool("local", workers) as pool:
         result = run_sweep(plan, path, pool, fresh=fresh)
+    if result.refused:
+        raise MethodRefusal("\n".join(result.refused))
     refuse_losses(result.lost)
     return Runs(path, _folder=folder)
 

@@ -16,12 +16,13 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from rotor_mbs.cli import EXIT_BAD_INPUT, EXIT_FAILED, print_line
+from rotor_mbs.cli import EXIT_BAD_INPUT, EXIT_FAILED, EXIT_OK, print_line
 from rotor_mbs.cli.arguments import pages_beside
 from rotor_mbs.cli.terminal import ProgressLine, print_not_computed, print_table
 from rotor_mbs.errors import InputError, MethodRefusal, StoreError
 from rotor_mbs.methods.catalogue import look_up, methods, problems_of_methods
 from rotor_mbs.runs import cores
+from rotor_mbs.runs.runner import REFUSED
 from rotor_mbs.scenario.catalogue import find_scenes, list_scenes, list_sweeps, only_scene
 from rotor_mbs.scenario.keys import counted
 from rotor_mbs.scenario.toml_file import KeyPath, shown_key
@@ -153,18 +154,21 @@ def bench(arguments: argparse.Namespace) -> int:
 
     scenes, output = find_scenes(arguments.scenes), arguments.output
     with ProgressLine() as progress:
-        made, left_out = run_bench(
+        made, refused = run_bench(
             scenes, arguments.method, output, repeats=arguments.repeats, budget_s=arguments.budget, workers=cores(),
             on_progress=progress,
         )  # fmt: skip
     measured = len({outcome.label.partition(" ")[0] for outcome in made})
-    for line in left_out:
-        print(line, file=sys.stderr)
-    names = {scene.name for scene in scenes}
+    is_incomplete = print_not_computed(made, refused)
+    not_run = {refusal.scene for refusal in refused if not refusal.method}
+    names = {scene.name for scene in scenes} - not_run
     print_table(bench_table([curve for curve in read_records(output, "bench") if curve.scene in names]))
-    print(f"{output}: {counted(measured, 'scene')} measured, {len(scenes) - measured} already stored")
+    text = f"{counted(measured, 'scene')} measured, {len(names) - measured} already stored"
+    if refused:
+        text += f", {counted(len(refused), 'curve')} not run"
+    print(f"{output}: {text}")
     _write_pages(output)
-    return int(print_not_computed(made))
+    return int(is_incomplete)
 
 
 def stability(arguments: argparse.Namespace) -> int:
@@ -173,16 +177,19 @@ def stability(arguments: argparse.Namespace) -> int:
 
     start, scenes = time.monotonic(), find_scenes(arguments.scenes or SUITE)
     with ProgressLine() as progress:
-        made = run_suite(
+        made, refused = run_suite(
             scenes, arguments.output, workers=arguments.jobs, timeout_s=arguments.timeout,
             methods=arguments.method, settings=dict(arguments.set or ()), on_progress=progress,
         )  # fmt: skip
+    is_incomplete = print_not_computed(made, refused)
     runs = suite_runs(arguments.output)
     print_table(suite_table(runs))
-    seconds = time.monotonic() - start
-    print(f"{arguments.output}: {counted(len(scenes), 'scene')}, {counted(len(runs), 'run')}, {seconds:.0f} s")
+    text = f"{counted(len(scenes), 'scene')}, {counted(len(runs), 'run')}"
+    if refused:
+        text += f", {len(refused)} not run"
+    print(f"{arguments.output}: {text}, {time.monotonic() - start:.0f} s")
     _write_pages(arguments.output)
-    return int(print_not_computed(made))
+    return int(is_incomplete)
 
 
 def modes(arguments: argparse.Namespace) -> int:
@@ -196,7 +203,9 @@ def modes(arguments: argparse.Namespace) -> int:
             scenes, arguments.output, speeds=arguments.speeds, names=arguments.method, workers=arguments.jobs,
             timeout_s=arguments.timeout, on_progress=progress,
         )  # fmt: skip
-    is_lost = print_not_computed(made)
+    is_incomplete = print_not_computed(made)
+    if all(outcome.status == REFUSED for outcome in made):
+        return EXIT_BAD_INPUT
     lost = {outcome.label.partition(" ")[0] for outcome in made if not outcome.is_stored}
     found = read_modes(arguments.output) if len(lost) < len(scenes) else {}
     chosen = [found[scene.name] for scene in scenes if scene.name in found and scene.name not in lost]
@@ -220,7 +229,7 @@ def modes(arguments: argparse.Namespace) -> int:
                 print(f"{', '.join(models)} {verdict}: modes differ by at most {modes.disagreement:.1e} (relative)")
             print(*modes.notes, sep="\n", end="\n" if modes.notes else "")
         _write_pages(arguments.output)
-    return int(is_lost or not all(modes.agrees for modes in chosen))
+    return int(is_incomplete or not all(modes.agrees for modes in chosen))
 
 
 def compare(arguments: argparse.Namespace) -> int:
@@ -297,6 +306,8 @@ def sweep(arguments: argparse.Namespace) -> int:
         study = load_sweep(arguments.file, problems_of_methods)
         plan = plan_sweep(study, arguments.method, arguments.part, arguments.timeout)
         if arguments.dry_run:
+            for refusal in plan.refused:
+                print_line(str(refusal), sys.stderr)
             size = plan.runs * plan.table().row_type.itemsize
             if arguments.json:
                 facts = {"runs": plan.runs, "methods": list(plan.methods), "bytes": size}
@@ -331,6 +342,7 @@ def sweep(arguments: argparse.Namespace) -> int:
             print(json.dumps({"event": "end", **facts, "seconds": round(result.seconds, 3)}))
         else:
             by_status = ", ".join(f"{count} {status}" for status, count in Counter(result.statuses).most_common())
+            by_status = by_status or "none stored"
             rate = f", {result.made / result.seconds:.4g} per s" if result.made else ""
             computed = f"{result.made} computed in {result.seconds:.1f} s{rate}"
             print(f"{result.path}: {counted(result.runs, 'run')}: {by_status}; {computed}")
@@ -338,6 +350,8 @@ def sweep(arguments: argparse.Namespace) -> int:
             print_line(f"{result.older} stored runs are from other versions; --fresh recomputes them", sys.stderr)
         for line in result.lost:
             print_line(f"{line}; not computed; repeat the command to try again", sys.stderr)
+        for line in result.refused:
+            print_line(line, sys.stderr)
         if arguments.metadata:
             from rotor_mbs.studies.sweep_metadata import describe
 
@@ -347,7 +361,9 @@ def sweep(arguments: argparse.Namespace) -> int:
 
             names = ", ".join(place.name for place in write_splits(result.path, arguments.datasets))
             print(f"{arguments.datasets}: {names}", file=stream)
-        return 0 if result.is_ok else 1
+        if result.refused and not result.statuses:
+            return EXIT_BAD_INPUT
+        return EXIT_OK if result.is_ok else EXIT_FAILED
 
 
 def _write_pages(results: Path) -> None:

@@ -10,9 +10,9 @@ from importlib import import_module
 from pathlib import Path
 
 from rotor_mbs.analysis.text_tables import table_of_runs
-from rotor_mbs.cli import EXIT_BAD_INPUT
 from rotor_mbs.cli.terminal import ProgressLine, print_summary, print_table
-from rotor_mbs.methods.catalogue import problems_of_scene, selected_methods
+from rotor_mbs.errors import InputError
+from rotor_mbs.methods.catalogue import problems_of_scene, selected_methods, settings_of_any
 from rotor_mbs.runs.output_files import is_being_written, replace_file
 from rotor_mbs.runs.pool import local_pool
 from rotor_mbs.runs.read import open_results
@@ -23,23 +23,25 @@ from rotor_mbs.studies.run import run_scenes
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Methods named with -m, or by a scene's file, must represent it; without, a rule selects them."""
-    scenes = find_scenes(arguments.scenes, problems_of_scene)
-    methods, reasons = selected_methods(scenes, arguments.method)
+    """Run scenes with the methods named with -m, or by a scene's file; without, a rule selects them."""
+    scenes, settings = find_scenes(arguments.scenes, problems_of_scene), dict(arguments.set or ())
+    methods, reasons, refused = selected_methods(scenes, arguments.method, settings)
     for reason in reasons:
         print(reason, file=sys.stderr)
     scenes = [scene for scene in scenes if methods[scene.name]]
     if not scenes:
-        return EXIT_BAD_INPUT
+        raise InputError(map(str, refused))
+    # A setting that refused methods alone have is none of the others'.
+    settings = settings_of_any([name for able in methods.values() for name in able], settings)
     with ProgressLine() as progress:
         report = run_scenes(
             scenes, methods, arguments.output, workers=arguments.jobs, timeout_s=arguments.timeout,
-            settings=dict(arguments.set or ()), on_progress=progress,
+            settings=settings, on_progress=progress,
         )  # fmt: skip
     with open_results(arguments.output) as results:
         table = table_of_runs(results.scenes, methods)
     print_table(table)
-    return print_summary(report, arguments.output)
+    return print_summary(report, arguments.output, refused)
 
 
 def reproduce(arguments: argparse.Namespace) -> int:
@@ -67,11 +69,11 @@ def _reproduce(arguments: argparse.Namespace, results: Path, pages: Path) -> tup
     """The exit status and the summary; one pool of processes does all."""
     load_runs = partial(import_module, "rotor_mbs.studies.reproduce")
     with local_pool(arguments.jobs, load_runs) as pool, ProgressLine() as progress:
-        report = reproduce_paper(results, workers=pool, timeout_s=arguments.timeout, on_progress=progress)
+        report, refused = reproduce_paper(results, workers=pool, timeout_s=arguments.timeout, on_progress=progress)
         from rotor_mbs.report.build import write_report  # late: matplotlib
 
         write_report(results, pages, pool, partial(progress.stage, "pages and figures"))
-    return print_summary(report, results), summary_of(results)
+    return print_summary(report, results, refused), summary_of(results)
 
 
 def reference(arguments: argparse.Namespace) -> int:

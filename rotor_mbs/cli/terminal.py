@@ -13,7 +13,9 @@ from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Self, TextIO
 
-from rotor_mbs.cli import printable
+from rotor_mbs.cli import EXIT_BAD_INPUT, EXIT_FAILED, EXIT_OK, printable
+from rotor_mbs.methods.catalogue import REFERENCE, Refusal
+from rotor_mbs.runs.runner import REFUSED
 from rotor_mbs.scenario.keys import counted
 from rotor_mbs.solution.status import GOOD, STATUSES
 
@@ -122,21 +124,60 @@ def span(seconds: float) -> str:
     return f"{seconds:.0f} s" if seconds >= 10.0 else f"{seconds:.1f} s"
 
 
-def print_summary(report: RunReport, output: Path) -> int:
-    """The runs in a few lines; the exit status: 1 where a run that should succeed did not, or was not computed."""
-    is_lost = print_not_computed(report.made)
-    counts = Counter(run.status if run.is_stored else "not computed" for run in report.made)
+def print_summary(report: RunReport, output: Path, refused: Sequence[Refusal] = ()) -> int:
+    """Print the runs of a call in a few lines.
+
+    Parameters
+    ----------
+    report : what the call computed, and what was stored already.
+    output : the results file.
+    refused : runs that were left out before.
+
+    Returns
+    -------
+    int
+        The exit status: 1 if a run that should succeed did not, or was not computed; 2 if the methods refused all runs.
+    """
+    is_incomplete = print_not_computed(report.made, refused)
+    made = [run for run in report.made if run.status != REFUSED]
+    counts = Counter(run.status if run.is_stored else "not computed" for run in made)
     parts = [f"{count} {status}" for status, count in counts.most_common()]
-    made = f"{counted(len(report.made), 'run')} computed ({', '.join(parts)})" if report.made else "nothing to do"
-    print(f"{output}: {made}, {len(report.kept)} already stored")
+    text = f"{counted(len(made), 'run')} computed ({', '.join(parts)})" if made else "nothing to do"
+    text += f", {len(report.kept)} already stored"
+    not_run = len(refused) + len(report.made) - len(made)
+    if not_run:
+        text += f", {not_run} not run"
+    print(f"{output}: {text}")
     for line in report.stored_failures:
         print(f"stored: {line}", file=sys.stderr)
-    return 1 if report.failures or is_lost or report.stored_failures else 0
+    methods = [run.method for run in made] + [run.method for run, _, _ in report.kept]
+    if not_run and all(method == REFERENCE for method in methods):
+        return EXIT_BAD_INPUT
+    return EXIT_FAILED if report.failures or is_incomplete or report.stored_failures else EXIT_OK
 
 
-def print_not_computed(made: Sequence[Outcome]) -> bool:
-    """A line for each run whose process died or could not start; whether there are any."""
-    lost = [outcome for outcome in made if not outcome.is_stored]
+def print_not_computed(made: Sequence[Outcome], refused: Sequence[Refusal] = ()) -> bool:
+    """Print a line for each run that was not computed.
+
+    Parameters
+    ----------
+    made : what a call computed or tried to. Not computed are runs that their method refused when it was built, and
+        runs whose process died or could not start.
+    refused : runs that were left out before.
+
+    Returns
+    -------
+    bool
+        Whether one of the runs was asked for by name, or should be tried again: the exit status is not 0.
+    """
+    not_stored = [outcome for outcome in made if not outcome.is_stored]
+    lost = [outcome for outcome in not_stored if outcome.status != REFUSED]
+    refusals = list(refused)
+    for outcome in not_stored:
+        if outcome.status == REFUSED:
+            refusals.append(Refusal(outcome.label.partition(" ")[0], outcome.method, outcome.message))
+    for refusal in refusals:
+        print(refusal, file=sys.stderr)
     for outcome in lost:
         print(f"{outcome.label}: not computed ({outcome.message}); repeat the command to try again", file=sys.stderr)
-    return bool(lost)
+    return bool(lost) or any(refusal.is_asked for refusal in refusals)

@@ -8,7 +8,7 @@ import functools
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import nullcontext
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
 from importlib import import_module, metadata
 from pathlib import Path
@@ -160,6 +160,12 @@ def settings_for(names: Sequence[str], given: Mapping[str, object]) -> dict[str,
     return settings
 
 
+def settings_of_any(names: Iterable[str], given: Mapping[str, object]) -> dict[str, object]:
+    """Return those of the `given` settings that at least one of some methods has."""
+    known = {setting for name in names for setting in find_method(name).settings.allowed()}
+    return {setting: value for setting, value in given.items() if setting in known}
+
+
 def own_settings(scene: Scene, method: str) -> dict[str, object]:
     """Those of the scene's settings that the method has. Raises InputError for one that no method at all has."""
     if not scene.settings:
@@ -285,46 +291,127 @@ def _sources(module: str) -> tuple[Path, ...]:
     return (Path(top.__file__),) if top.__file__ else ()
 
 
-def able_methods(scene: Scene, names: Iterable[str]) -> tuple[list[str], list[str]]:
-    """Those of `names` that can represent the scene, and a line for each that cannot."""
-    able, refused = [], []
+@dataclass(frozen=True)
+class Refusal:
+    """A run that is left out: its method cannot represent the scene, or its settings do not fit it.
+
+    Attributes
+    ----------
+    scene, method : their names; "" for `method` if no method was selected for the scene.
+    reason : in one sentence.
+    is_asked : whether the method or its settings were named, by the call or by the scene, not selected by a rule.
+    """
+
+    scene: str
+    method: str
+    reason: str
+    is_asked: bool = True
+
+    def __str__(self) -> str:
+        run = f"{self.method} on {self.scene}" if self.method else self.scene
+        return f"not run: {run}: {self.reason}"
+
+
+def able_methods(
+    scene: Scene,
+    names: Iterable[str],
+    settings: Mapping[str, Mapping[str, object]] | None = None,
+    *,
+    are_named: bool = True,
+) -> tuple[list[str], list[Refusal]]:
+    """Return those of some methods that can run a scene, and a Refusal for each of the others.
+
+    This is where every command decides what it leaves out.
+
+    Parameters
+    ----------
+    scene : the scene.
+    names : known methods.
+    settings : by method, settings in place of the scene's own and the defaults; already valid by their
+        declared ranges. None if the caller chooses settings that fit.
+    are_named : whether the user named the methods.
+
+    Raises
+    ------
+    InputError
+        If the scene has a setting that no method has.
+    """
+    able: list[str] = []
+    refused: list[Refusal] = []
     for name in names:
+        method = find_method(name)
+        # What a file's method raises while it is built is an InputError.
         try:
-            find_method(name).items(scene)
-            able.append(name)
-        except MethodRefusal as exc:
-            reason = str(exc) if str(exc).startswith(name) else f"{name}: {exc}"
-            refused.append(f"{scene.name}: {reason}")
+            method.items(scene)
+        except (MethodRefusal, InputError) as exc:
+            refused.append(Refusal(scene.name, name, _reason(exc, name), are_named))
+            continue
+        if settings is not None:
+            own = own_settings(scene, name) | dict(settings.get(name, {}))
+            # Declared ranges are checked before any scene: what is left is that they do not fit this one.
+            try:
+                method.chosen(scene, own)
+            except InputError as exc:
+                refused.append(Refusal(scene.name, name, _reason(exc, name), are_named or bool(own)))
+                continue
+        able.append(name)
     return able, refused
 
 
-def selected_methods(scenes: Sequence[Scene], names: Sequence[str] = ()) -> tuple[dict[str, list[str]], list[str]]:
-    """The methods of each scene: `names`, else those that it names itself, else those that the rule selects, none where
-    it refuses; and the reasons. names: checked ones. Raises InputError for a method of a scene that is unknown, and for
-    a named one that cannot represent its scene."""
-    methods: dict[str, list[str]] = {}
-    reasons: list[str] = []
-    refused: list[str] = []
+def _reason(error: Exception, method: str) -> str:
+    """Return the text of an error without the method's name in front."""
+    return str(error).removeprefix(f"{method}: ")
+
+
+def selected_methods(
+    scenes: Sequence[Scene],
+    names: Sequence[str] = (),
+    settings: Mapping[str, object] | None = None,
+) -> tuple[dict[str, list[str]], list[str], list[Refusal]]:
+    """Select the methods of each scene: those named, else those that it names itself, else those of the rule.
+
+    Parameters
+    ----------
+    scenes : the scenes.
+    names : known methods; () for none.
+    settings : of the call, for the methods that have them.
+
+    Returns
+    -------
+    methods : by scene name; an empty list where none can run.
+    reasons : a line for each scene for which the rule selected methods.
+    refused : the methods that were left out, and the scenes for which the rule selects none.
+
+    Raises
+    ------
+    InputError
+        For an unknown method of a scene, and for a setting that none of the methods has or whose value is invalid.
+    """
+    wanted: dict[str, list[str]] = {}
+    rules: dict[str, str] = {}
+    refused: list[Refusal] = []
     for scene in scenes:
         if not names and (unknown := _unknown(scene.methods)):
             raise InputError(f"{scene.name}: methods: {line}" for line in unknown)
-        named = names or tuple(dict.fromkeys(scene.methods))
-        if named:
-            methods[scene.name], lines = able_methods(scene, named)
-            refused += lines
-            continue
-        try:
-            chosen, reason = choose(scene, default_methods())
-        except MethodRefusal as exc:
-            methods[scene.name] = []
-            reasons.append(str(exc))
-            continue
-        methods[scene.name], left_out = able_methods(scene, chosen)
-        reasons.append(f"{scene.name}: {reason}: {', '.join(methods[scene.name])}")
-        reasons += [f"{line}; skipped" for line in left_out]
-    if refused:
-        raise InputError(refused)
-    return methods, reasons
+        wanted[scene.name] = list(names or dict.fromkeys(scene.methods))
+        if not wanted[scene.name]:
+            try:
+                chosen, reason = choose(scene, default_methods())
+            except MethodRefusal as exc:
+                refused.append(Refusal(scene.name, "", str(exc).removeprefix(f"{scene.name}: ")))
+            else:
+                wanted[scene.name] = list(chosen)
+                rules[scene.name] = reason
+    all_names = list(dict.fromkeys(name for chosen in wanted.values() for name in chosen))
+    valid_settings = settings_for(all_names, settings or {})
+    methods: dict[str, list[str]] = {}
+    for scene in scenes:
+        are_named = bool(names or scene.methods)
+        able, others = able_methods(scene, wanted[scene.name], valid_settings, are_named=are_named)
+        methods[scene.name] = able
+        refused += others
+    reasons = [f"{name}: {reason}: {', '.join(methods[name])}" for name, reason in rules.items()]
+    return methods, reasons, refused
 
 
 # Explicit fixed steps at their default (1e-3 s and below) follow a swing up to this rate, rad/s, within their bounds.

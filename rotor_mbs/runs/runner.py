@@ -21,15 +21,16 @@ from rotor_mbs.runs.table import Place, Rows
 
 # Columns that a worker returns of rows that it has written.
 _REPORTED = ("status", "message", "run_time_s")
+REFUSED = "refused"  # how a task ends whose method cannot represent its scene; nothing is stored
 
 
 @dataclass(frozen=True)
 class Outcome:
     """A run, or other rows of a study, that this call computed or tried to.
 
-    status: of a run; "measured" for other rows. seconds: run time; NaN where nothing was timed. is_stored: whether
-    there is a row; else the same call tries again. is_shipped: read from a shipped file and not computed. share: of the
-    work of the call that was done when it ended.
+    status: of a run; "measured" for other rows; REFUSED where the method refused the scene. seconds: run time; NaN
+    where nothing was timed. is_stored: whether there is a row; else the same call tries again. is_shipped: read from a
+    shipped file and not computed. share: of the work of the call that was done when it ended.
     """
 
     label: str
@@ -94,14 +95,17 @@ def compute(pool: TaskPool, tasks: Iterable[T]) -> Iterator[Finished[T, Rows]]:
 
     However the loop ends, the rows of what has ended are in the file. The `value` of a finished task has at least the
     status and message of its stored rows, also where they are those of a failure, and the run time where there is one;
-    None where nothing is stored, and its failure and message say why. Raises what a task raised of InputError,
-    MethodRefusal and StoreError.
+    None where nothing is stored, and its failure and message say why: REFUSED where the method refused the scene.
+    Raises what a task raised of InputError and StoreError.
     """
     work = with_method_files(partial(perform, stores=pool.shares_disk))
     for end in run_in(pool, work, tasks, lambda task: task.kill_after_s, lambda task: task.split()):
         task = end.task
-        if isinstance(end.error, InputError | MethodRefusal | StoreError):
+        if isinstance(end.error, InputError | StoreError):
             raise end.error
+        if isinstance(end.error, MethodRefusal):
+            yield Finished(task, None, REFUSED, str(end.error).removeprefix(f"{task.method}: "))
+            continue
         if end.value is not None:
             if not pool.shares_disk:
                 task.place.write(end.value)

@@ -22,7 +22,7 @@ import numpy as np
 from rotor_mbs.analysis.judgement import judge
 from rotor_mbs.analysis.work_precision import fitted_order, step_for, succeeded
 from rotor_mbs.analysis.work_precision import points as points_of
-from rotor_mbs.errors import OF_THE_MACHINE, InputError, RotorError, one_line
+from rotor_mbs.errors import OF_THE_MACHINE, InputError, MethodRefusal, RotorError, one_line
 from rotor_mbs.methods import catalogue
 from rotor_mbs.methods.base import STEP, TOLERANCE, Ladder, Method
 from rotor_mbs.methods.time_limit import OutOfTimeError, time_limit
@@ -125,7 +125,10 @@ def curve_of(scene: Scene, method: Method, ladder: Ladder, options: Mapping[str,
     }
     points = []
     for setting, chosen in ladder.rungs(short.duration / (short.samples - 1)).items():
-        known = Asked(scene, method.name, chosen).known | of_all
+        try:
+            known = Asked(scene, method.name, chosen).known | of_all
+        except InputError:  # a step that is too small for the scene's duration; all finer ones are
+            break
         known |= {kind: setting if kind == ladder.kind else math.nan for kind in (STEP, TOLERANCE)}
         known["run"] = f"{scene.name}/{name} {ladder.kind}={setting:.6g}"
         points.append(Point(method.name, setting, dict(sorted(chosen.items())), known))
@@ -181,6 +184,8 @@ class PointTimer:
             raise
         except OutOfTimeError as exc:
             self._failure, self.is_stopped = ("timed_out", str(exc)), True
+        except MethodRefusal as exc:
+            self.left_out = f"not run: {exc}"
         except Exception as exc:
             self._failure = "solver_failed", str(exc) if isinstance(exc, RotorError) else one_line(exc)
         if not self.is_repeatable:
@@ -411,7 +416,7 @@ def run_bench(
     budget_s: float,
     workers: int,
     on_progress: OnProgress = ignore_progress,
-) -> tuple[list[Outcome], list[str]]:
+) -> tuple[list[Outcome], list[catalogue.Refusal]]:
     """The curves of every scene into the results file `output`; what it has already is kept.
 
     Parameters
@@ -423,12 +428,15 @@ def run_bench(
 
     Returns
     -------
-    The curves measured by this call, and a line for each method that is left out on a scene.
+    list of Outcome
+        The curves measured by this call.
+    list of Refusal
+        What was left out: methods that cannot represent a scene, and scenes without a usable reference.
 
     Raises
     ------
     InputError
-        For a method without a ladder and for a scene without a usable reference.
+        For a method without a ladder, and if no curve is left.
     StoreError
         Where the file cannot be read or written.
     """
@@ -436,23 +444,31 @@ def run_bench(
     with locked(output):
         none: Mapping[str, Sequence[str]] = {scene.name: () for scene in scenes}
         report = run_scenes(scenes, none, output, workers=workers, timeout_s=_REFERENCE_LIMIT_S)
-        failed = [*report.failures, *report.not_computed]
-        if failed:
-            raise InputError(
-                f"{run.label.partition(' ')[0]}: no usable reference ({run.status}: {run.message}); a bench needs one"
-                for run in failed
-            )
+        failed = {run.label.partition(" ")[0]: run for run in (*report.failures, *report.not_computed)}
         changed = {run.label.partition(" ")[0] for run in report.made}  # whose reference is another one now
-        # Refused before the first is measured.
-        places = {scene.name: TableFile(output).place(f"{scene.name}/{catalogue.REFERENCE}") for scene in scenes}
-        ready = {scene.name: prepared(scene, places[scene.name]) for scene in scenes}
+        ready: dict[str, tuple[Scene, Trajectory]] = {}
         curves: list[Curve] = []
-        left_out: list[str] = []
+        refused: list[catalogue.Refusal] = []
         options = {"repeats": repeats, "budget_s": budget_s}
+        names = dict.fromkeys(method.name for method, _ in chosen)
         for scene in scenes:
-            able, refused = catalogue.able_methods(scene, dict.fromkeys(method.name for method, _ in chosen))
+            if scene.name in failed:
+                run = failed[scene.name]
+                reason = f"no usable reference ({run.status}: {run.message}); a bench needs one"
+                refused.append(catalogue.Refusal(scene.name, "", reason))
+                continue
+            place = TableFile(output).place(f"{scene.name}/{catalogue.REFERENCE}")
+            try:
+                ready[scene.name] = prepared(scene, place)
+            except InputError as exc:
+                reason = str(exc).removeprefix(f"{scene.name}: ")
+                refused.append(catalogue.Refusal(scene.name, "", reason))
+                continue
+            able, others = catalogue.able_methods(scene, names, are_named=bool(methods))
             curves += [curve_of(scene, method, ladder, options) for method, ladder in chosen if method.name in able]
-            left_out += refused
+            refused += others
+        if not curves:
+            raise InputError(map(str, refused))
         file = extend_file(output, curve_tables(curves), [curve.key for curve in curves])
         missing = [curve for curve in curves if curve.scene.name in changed or not curve.is_stored(file)]
         made: list[Outcome] = []
@@ -461,7 +477,7 @@ def run_bench(
             for outcome in _measure_scene(file, own, *ready[scene.name], repeats, budget_s) if own else ():
                 made.append(replace(outcome, share=(len(made) + 1) / len(missing)))
                 on_progress(len(made), len(missing), made[-1])
-        return made, left_out
+        return made, refused
 
 
 def _measure_scene(

@@ -82,7 +82,7 @@ def check_default_set(
     asked: dict[str, Sequence[str]] = {}
     for scene in (*paper, *own):
         if methods:
-            asked[scene.name] = able_methods(scene, methods)[0]
+            asked[scene.name] = able_methods(scene, methods, {})[0]
         else:
             asked[scene.name] = corrected if scene in own else default_methods()
     with tempfile.TemporaryDirectory() as folder:
@@ -103,7 +103,7 @@ def judge_file(path: Path, bounds: Bounds) -> list[Check]:
         sweep = StoredSweep(path, allow_damaged_runs=True)
         where = Where(str(sweep.attributes.get("base_scene", "sweep")), "*", "runs")
         missing, damaged = int((sweep.column("status") == MISSING).sum()), len(sweep.damaged_runs)
-        absent = f"{missing} runs missing; the sweep's own command computes them{writer}"
+        absent = f"{missing} runs missing; the sweep's own command computes them, or says why not{writer}"
         changed = f"{damaged} runs changed after they were written" if damaged else "every run as written"
         return [
             make_check(bounds, "complete", where, missing, "runs", absent),

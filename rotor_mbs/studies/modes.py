@@ -21,7 +21,7 @@ from rotor_mbs.methods.catalogue import find_method, methods, with_method_files
 from rotor_mbs.runs.output_files import locked
 from rotor_mbs.runs.pool import local_pool, run_in
 from rotor_mbs.runs.read import Record, write_records
-from rotor_mbs.runs.runner import OnProgress, Outcome, ignore_progress
+from rotor_mbs.runs.runner import REFUSED, OnProgress, Outcome, ignore_progress
 from rotor_mbs.runs.trailer import MODES, may_extend
 from rotor_mbs.scenario.scene import Scene, scene_hash
 from rotor_mbs.scenario.time_table import value_at
@@ -49,8 +49,8 @@ def modes_of_scenes(
     """The modes of every scene into the file `output`; those of other scenes that it has are kept.
 
     speeds: rad/s, of the Campbell diagram and the Floquet multipliers. names: of methods whose models stand beside the
-    closed form; by default all. Raises InputError for a negative or repeated speed, and for a method that is not
-    linearized; StoreError.
+    closed form; by default all. A scene that cannot be linearized is an outcome with the reason. Raises InputError for
+    a negative or repeated speed, and for a method that is not linearized; StoreError.
     """
     models = tuple(find_method(name).model for name in names)
     for name, model in zip(names, models, strict=True):
@@ -64,10 +64,11 @@ def modes_of_scenes(
         work = with_method_files(partial(compute_modes, speeds=speeds, models=models))
         with local_pool(workers) as pool:
             for done, end in enumerate(run_in(pool, work, scenes, timeout_s), 1):
-                if isinstance(end.error, RotorError):
-                    raise end.error
                 label, share = f"{end.task.name} modes", done / len(scenes)
-                if end.value is None:
+                if isinstance(end.error, RotorError):
+                    reason = str(end.error).removeprefix(f"{end.task.name}: ")
+                    outcome = Outcome(label, "", REFUSED, reason, is_stored=False, share=share)
+                elif end.value is None:
                     outcome = Outcome(label, "", end.failure, end.message, is_stored=False, share=share)
                 else:
                     modes = end.value

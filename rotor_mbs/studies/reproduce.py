@@ -13,7 +13,7 @@ from pathlib import Path
 import rotor_mbs
 from rotor_mbs.analysis.published import claims, finding
 from rotor_mbs.analysis.text_tables import TextTable, method_table
-from rotor_mbs.methods.catalogue import REFERENCE, able_methods, default_methods, errata_methods, ladders
+from rotor_mbs.methods.catalogue import REFERENCE, Refusal, able_methods, default_methods, errata_methods, ladders
 from rotor_mbs.runs.output_files import locked
 from rotor_mbs.runs.pool import Workers, pool_of
 from rotor_mbs.runs.read import open_results
@@ -32,11 +32,34 @@ _LONGEST_S = 0.25  # a run longer than this is the last of its curve: the next o
 
 def reproduce(
     output: Path, *, workers: Workers, timeout_s: float, on_progress: OnProgress = ignore_progress
-) -> RunReport:
-    """Into the results file `output`; what it has already is kept. Raises InputError, StoreError."""
+) -> tuple[RunReport, list[Refusal]]:
+    """Compute the default set of runs and the curves into a results file; what it has already is kept.
+
+    Parameters
+    ----------
+    output : the results file.
+    workers : parallel processes, or a pool that is open.
+    timeout_s : time limit of a run in s.
+    on_progress : called after each run.
+
+    Returns
+    -------
+    RunReport
+        The runs of this call, and those that were stored.
+    list of Refusal
+        Runs that were left out.
+
+    Raises
+    ------
+    InputError, StoreError
+    """
     scenes, benched = find_scenes(["paper"]), find_scenes([BENCHED])[0]
     names = (*default_methods(), *errata_methods().values())
-    methods = {scene.name: able_methods(scene, names)[0] for scene in scenes}
+    methods: dict[str, list[str]] = {}
+    refused: list[Refusal] = []
+    for scene in scenes:
+        methods[scene.name], others = able_methods(scene, names, {}, are_named=False)
+        refused += others
     curves = short_curves(benched)
     asked = asked_runs(scenes, methods, {})
     with locked(output), pool_of(workers) as pool:
@@ -48,7 +71,7 @@ def reproduce(
         of_curves = curve_tasks(file, unmeasured, 1.2 * timeout_s + 10.0, _LONGEST_S)
         made = compute_tasks([*runs, *of_curves], pool, on_progress)
         labels = {task.label for task in runs}
-        return RunReport([outcome for outcome in made if outcome.label in labels], kept)
+        return RunReport([outcome for outcome in made if outcome.label in labels], kept), refused
 
 
 def made_from(results: Path, timeout_s: float) -> str:

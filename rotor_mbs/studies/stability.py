@@ -8,8 +8,17 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from rotor_mbs.analysis.text_tables import TextTable
+from rotor_mbs.errors import InputError
 from rotor_mbs.methods.base import STEP
-from rotor_mbs.methods.catalogue import able_methods, find_method, is_corrected, method_names, settings_for
+from rotor_mbs.methods.catalogue import (
+    Refusal,
+    able_methods,
+    find_method,
+    is_corrected,
+    method_names,
+    settings_for,
+    settings_of_any,
+)
 from rotor_mbs.runs.design import Asked
 from rotor_mbs.runs.output_files import locked
 from rotor_mbs.runs.pool import Workers, pool_of
@@ -133,26 +142,54 @@ def run_suite(
     methods: Sequence[str] = (),
     settings: Mapping[str, object] | None = None,
     on_progress: OnProgress = ignore_progress,
-) -> list[Outcome]:
-    """The suite on some scenes into the results file `output`; what this call computed, or tried to.
+) -> tuple[list[Outcome], list[Refusal]]:
+    """Compute the suite on some scenes into a results file.
 
-    methods: all corrected ones where none is named; settings: of the methods that have them, for the runs of the map
-    (the step ladders vary the step by themselves).
-    What the file has already is kept; records of these scenes that are no longer wanted are dropped. Raises InputError,
-    StoreError.
+    What the file has already is kept; records of these scenes that are no longer wanted are dropped.
+
+    Parameters
+    ----------
+    scenes : the scenes.
+    output : the results file.
+    workers : parallel processes.
+    timeout_s : time limit of a run in s.
+    methods : names; all corrected methods if there are none.
+    settings : of the methods that have them, for the runs of the map. Ladders vary the step by themselves.
+    on_progress : called after each run.
+
+    Returns
+    -------
+    list of Outcome
+        What this call computed, or tried to.
+    list of Refusal
+        Runs that were left out.
+
+    Raises
+    ------
+    InputError, StoreError
+        InputError also if no run is left.
     """
-    asked = {scene.name: able_methods(scene, methods or method_names(is_corrected=True))[0] for scene in scenes}
+    names = methods or method_names(is_corrected=True)
+    chosen_settings = settings_for(list(names), settings or {})
+    asked: dict[str, list[str]] = {}
+    refused: list[Refusal] = []
+    for scene in scenes:
+        able, others = able_methods(scene, names, chosen_settings, are_named=bool(methods))
+        asked[scene.name] = able
+        refused += others
+    if not any(asked.values()):
+        raise InputError(map(str, refused))
+    scenes = [scene for scene in scenes if asked[scene.name]]
     patient = {name: [method for method in able if method == _PATIENT_METHOD] for name, able in asked.items()}
-    chosen_settings = settings_for(list(dict.fromkeys(m for able in asked.values() for m in able)), settings or {})
     made: list[Outcome] = []
     with pool_of(workers) as pool:
         for chosen, limit_s in ((patient, max(timeout_s, _PATIENT_S)), (asked, timeout_s)):
-            own = {k: v for able in chosen.values() for method in able for k, v in chosen_settings[method].items()}
+            own = settings_of_any([name for able in chosen.values() for name in able], settings or {})
             report = run_scenes(
                 scenes, chosen, output, workers=pool, timeout_s=limit_s, settings=own, on_progress=on_progress
             )
             made += report.made
-        return made + complete_ladders(scenes, asked, output, pool, on_progress)
+        return made + complete_ladders(scenes, asked, output, pool, on_progress), refused
 
 
 def complete_ladders(

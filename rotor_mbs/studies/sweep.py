@@ -14,14 +14,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor_mbs.analysis.judgement import clearly_ok, defects_of, judge
-from rotor_mbs.errors import InputError
-from rotor_mbs.methods.catalogue import check_names, find_method, is_corrected, settings_for
+from rotor_mbs.errors import InputError, MethodRefusal
+from rotor_mbs.methods.catalogue import (
+    Refusal,
+    able_methods,
+    check_names,
+    find_method,
+    is_corrected,
+    settings_for,
+)
 from rotor_mbs.methods.solve import solve
 from rotor_mbs.methods.time_limit import OutOfTimeError, time_limit
 from rotor_mbs.models.lagrange.reference import error_growth
 from rotor_mbs.runs.design import MISSING
 from rotor_mbs.runs.pool import TaskPool
-from rotor_mbs.runs.runner import Task, compute
+from rotor_mbs.runs.runner import REFUSED, Task, compute
 from rotor_mbs.runs.sweeps import ERROR_GROWTH, METRICS, code_of_method, open_sweep, sweep_table
 from rotor_mbs.runs.table import IDENTITY, KEYWORDS, Place, Rows, Table, blank_rows, row_of_run
 from rotor_mbs.runs.versions import machine, versions
@@ -51,7 +58,15 @@ class Chunk(Task):
     with_defects: bool = False
 
     def perform(self) -> Rows:
-        """(runs, ...) columns of all its runs, failures of runs included. Raises InputError, MethodRefusal."""
+        """Return (runs, ...) columns of all its runs, failures of runs included.
+
+        Raises
+        ------
+        InputError
+            If the varied values make no scene.
+        MethodRefusal
+            If the method cannot represent a scene.
+        """
         try:
             scenes = [self.variants.scene(values) for values in self.values.tolist()]
         except TableError as error:
@@ -184,7 +199,7 @@ OnProgress = Callable[[int, int, Counter[str]], None]
 @dataclass(frozen=True)
 class SweepPlan:
     """The runs first <= r < last of a sweep, by its methods; run r is row r mod rows of the design, by method r div
-    rows. settings: by method, those of the sweep that it has."""
+    rows. settings: by method, those of the sweep that it has. refused: the methods that were left out."""
 
     sweep: Sweep
     methods: tuple[str, ...]
@@ -192,6 +207,7 @@ class SweepPlan:
     first: int
     last: int
     time_limit_s: float
+    refused: tuple[Refusal, ...] = ()
 
     @property
     def runs(self) -> int:
@@ -272,15 +288,33 @@ class SweepPlan:
 def plan_sweep(
     sweep: Sweep, methods: Sequence[str] = (), part: tuple[int, int] = (1, 1), time_limit_s: float = 60.0
 ) -> SweepPlan:
-    """The runs of part k of n by `methods`, else by those of the file. Raises InputError, MethodRefusal."""
-    chosen = check_names(methods or sweep.design.methods)
+    """Return the runs of a part of a sweep, by the methods that can represent its base scene.
+
+    Parameters
+    ----------
+    sweep : the sweep.
+    methods : names; those of the sweep's file if there are none.
+    part : (k, n) for part k of n.
+    time_limit_s : time limit of a run in s.
+
+    Raises
+    ------
+    InputError
+        For unknown methods and settings.
+    MethodRefusal
+        If all methods refuse the base scene.
+    """
+    named = check_names(methods or sweep.design.methods)
     with sweep.file.located("settings"):
-        settings = settings_for(chosen, sweep.design.settings)
-    for method in chosen:
-        find_method(method).items(sweep.base)
+        settings = settings_for(named, sweep.design.settings)
+    able, refused = able_methods(sweep.base, named, settings)
+    if not able:
+        raise MethodRefusal("\n".join(map(str, refused)))
+    chosen = tuple(able)
     total = sweep.design.count * len(chosen)
     number, parts = part
-    return SweepPlan(sweep, chosen, settings, (number - 1) * total // parts, number * total // parts, time_limit_s)
+    first, last = (number - 1) * total // parts, number * total // parts
+    return SweepPlan(sweep, chosen, settings, first, last, time_limit_s, tuple(refused))
 
 
 @dataclass(frozen=True)
@@ -288,8 +322,9 @@ class SweepResult:
     """A sweep that is complete, but for runs that were lost.
 
     runs, made: in the dataset, and by this call. is_ok: whether every run is ok whose method claims the correct
-    equations. older: how many stored runs other versions computed. lost: a line for each run whose process died or
-    could not start, also when it was tried alone: not stored.
+    equations, and none is refused. older: how many stored runs other versions computed. lost: a line for each run whose
+    process died or could not start, also when it was tried alone: not stored. refused: a line for each method and
+    reason, of runs that are not stored because the method cannot represent them.
     """
 
     path: Path
@@ -300,6 +335,7 @@ class SweepResult:
     is_ok: bool
     lost: tuple[str, ...] = ()
     older: int = 0
+    refused: tuple[str, ...] = ()
 
 
 def run_sweep(
@@ -321,6 +357,7 @@ def run_sweep(
     with opened as (stored, statuses):
         place = stored.place()
         missing, lost = int((statuses == MISSING).sum()), list[str]()
+        refused: dict[tuple[str, str], list[int]] = {}  # runs by method and reason
         done = plan.runs - missing
         now = np.array([code_of_method(name) for name in plan.methods], np.uint32)
         is_older = stored.column("code") != now[np.arange(plan.first, plan.last) // plan.rows]
@@ -333,7 +370,11 @@ def run_sweep(
             chunk = end.task
             assert isinstance(chunk, Chunk)
             if end.value is None:  # nothing is known of these runs: they stay missing
-                lost += [f"run {run}: {end.message}" for run in range(chunk.first, chunk.first + len(chunk.values))]
+                runs = range(chunk.first, chunk.first + len(chunk.values))
+                if end.failure == REFUSED:
+                    refused.setdefault((chunk.method, end.message), []).extend(runs)
+                else:
+                    lost += [f"run {run}: {end.message}" for run in runs]
                 on_progress(done, plan.runs, Counter({end.failure: len(chunk.values)}))
                 continue
             made = end.value["status"]
@@ -341,10 +382,17 @@ def run_sweep(
             done += len(made)
             on_progress(done, plan.runs, _counted(made))
         seconds = time.monotonic() - start
+        computed = missing - len(lost) - sum(map(len, refused.values()))
+        lines = [str(refusal) for refusal in plan.refused]
+        for (method, reason), numbers in refused.items():
+            which = f"run {numbers[0]}"
+            if len(numbers) > 1:
+                which = f"{len(numbers)} runs ({min(numbers)} to {max(numbers)})"
+            lines.append(str(Refusal(which, method, reason)))
         failed = np.unique((np.flatnonzero(statuses != code_of("ok")) + plan.first) // plan.rows)
-        is_ok = not any(is_corrected(plan.methods[number]) for number in failed)
+        is_ok = not lines and not any(is_corrected(plan.methods[number]) for number in failed)
         counts = _counted(statuses)
-        return SweepResult(place.path, plan.runs, missing - len(lost), counts, seconds, is_ok, tuple(lost), older)
+        return SweepResult(place.path, plan.runs, computed, counts, seconds, is_ok, tuple(lost), older, tuple(lines))
 
 
 def _counted(statuses: NDArray[np.int8]) -> Counter[str]:
