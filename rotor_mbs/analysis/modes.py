@@ -97,18 +97,25 @@ def multiblade_shapes(shapes: Complex) -> Complex:
     return np.concatenate([shapes[..., :1], pitches], axis=-1)
 
 
-def modes_of(stiffness: Array, damping: Array, *, is_cyclic: bool) -> ModeSet:
-    """All modes of δq̈ + damping δq̇ + stiffness δq = 0, rotor first among the (n,) coordinates, by undamped frequency.
+def modes_of(stiffness: Array, damping: Array, *, is_cyclic: bool, rounding: float = 0.0) -> ModeSet:
+    """Return all modes of δq̈ + damping δq̇ + stiffness δq = 0 by undamped frequency.
 
-    is_cyclic   nothing depends on the rotor's angle (no gravity): it is left out, its mode has an eigenvalue of exact 0
+    Parameters
+    ----------
+    stiffness, damping : ndarray
+        (n, n), 1/s² and 1/s, rotor first among the coordinates.
+    is_cyclic : bool
+        Whether nothing depends on the rotor's angle (no gravity): it is left out, and its mode has an eigenvalue of
+        exactly 0.
+    rounding : float
+        1/s², a stiffness that is rounding of larger numbers: an eigenvalue that follows from it is 0.
     """
     n = len(stiffness)
     matrix = np.block([[np.zeros((n, n)), np.eye(n)], [-stiffness, -damping]])
     first = 1 if is_cyclic else 0
     values, vectors = np.linalg.eig(matrix[first:, first:])
-    values = np.where(np.abs(values) ** 2 <= 4e-16 * n * np.abs(stiffness).max(initial=0.0), 0.0, values).astype(
-        complex
-    )
+    rounding = max(rounding, 4e-16 * n * np.abs(stiffness).max(initial=0.0))
+    values = np.where(np.abs(values) ** 2 <= rounding, 0.0, values).astype(complex)
     values.real[np.abs(values.real) < 1e-14 * np.abs(values).max(initial=0.0)] = 0.0  # rounding of undamped modes
     shapes = []
     for vector in vectors.T:
@@ -125,7 +132,9 @@ def modes_of(stiffness: Array, damping: Array, *, is_cyclic: bool) -> ModeSet:
         last = single.pop()
         partner = max(single, key=lambda k: float(_assurance(shapes[last][None], shapes[k][None])[0, 0]))
         single.remove(partner)
-        pairs.append(((values[last], values[partner]), shapes[partner]))
+        # The growing one first, in every model: modes are recognized by their first eigenvalue, too.
+        growing, decaying = sorted((values[last], values[partner]), key=lambda value: -value.real)
+        pairs.append(((growing, decaying), shapes[partner]))
     modes = ModeSet(np.array([pair for pair, _ in pairs], dtype=complex), np.array([shape for _, shape in pairs]))
     order = np.argsort(np.nan_to_num(modes.undamped_frequencies), kind="stable")
     return ModeSet(modes.eigenvalues[order], modes.shapes[order])

@@ -18,7 +18,7 @@ from rotor_mbs.runs import MAX_WORKERS, cores
 REPRODUCED = Path("rotor-mbs-out")  # where `reproduce` writes
 EXPORT_FORMATS = ("mjcf", "exudyn", "csv")
 
-_MAX_SPEED = 1e25  # rad/s, as of numbers in a scene
+_MIN_SPEED, _MAX_SPEED = 1e-25, 1e25  # rad/s, as of numbers in a scene
 _MAX_SPAN = 10_000  # numbers of FROM:TO:COUNT
 _MAX_NUMBER = 1e9  # of a count; of seconds: thirty years
 
@@ -57,11 +57,15 @@ def span(text: str) -> tuple[float, ...]:
         start, end, number = text.split(":")
         first, last, count = float(start), float(end), int(number)
         if 0.0 <= first < last <= _MAX_SPEED and 2 <= count <= _MAX_SPAN:
-            return tuple(first + (last - first) * i / (count - 1) for i in range(count))
+            numbers = tuple(first + (last - first) * i / (count - 1) for i in range(count))
+            # A difference of a few units of rounding has fewer numbers than COUNT; 1e-320 has an infinite inverse.
+            if len(set(numbers)) == count and all(number >= _MIN_SPEED for number in numbers if number):
+                return numbers
     except ValueError:
         pass
     raise argparse.ArgumentTypeError(
-        f"{text!r} given, allowed: FROM:TO:COUNT with 0 <= FROM < TO <= {_MAX_SPEED:g} and COUNT from 2 to {_MAX_SPAN}"
+        f"{text!r} given, allowed: FROM:TO:COUNT with 0 <= FROM < TO <= {_MAX_SPEED:g}, COUNT from 2 to {_MAX_SPAN}, "
+        f"and COUNT different speeds, each 0 or at least {_MIN_SPEED:g}"
     )
 
 

@@ -208,8 +208,11 @@ def modes(arguments: argparse.Namespace) -> int:
         return EXIT_BAD_INPUT
     lost = {outcome.label.partition(" ")[0] for outcome in made if not outcome.is_stored}
     found = read_modes(arguments.output) if len(lost) < len(scenes) else {}
+    # The file may have modes of an earlier call for a scene of which none were computed now.
     chosen = [found[scene.name] for scene in scenes if scene.name in found and scene.name not in lost]
     if arguments.json:
+        for modes in chosen:
+            print(*modes.notes, sep="\n", end="\n" if modes.notes else "", file=sys.stderr)
         print(json.dumps({modes.scene: mode_rows(modes) for modes in chosen}, ensure_ascii=False, indent=1))
     else:
         for modes in chosen:

@@ -6,9 +6,11 @@ how far from steady it is there.
 
 from __future__ import annotations
 
+import reprlib
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
+from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias
 
@@ -20,9 +22,10 @@ from rotor_mbs.errors import InputError, MethodRefusal, RotorError
 from rotor_mbs.methods.catalogue import find_method, methods, with_method_files
 from rotor_mbs.runs.output_files import locked
 from rotor_mbs.runs.pool import local_pool, run_in
-from rotor_mbs.runs.read import Record, write_records
+from rotor_mbs.runs.read import write_records
 from rotor_mbs.runs.runner import REFUSED, OnProgress, Outcome, ignore_progress
 from rotor_mbs.runs.trailer import MODES, may_extend
+from rotor_mbs.scenario.keys import LARGEST, SMALLEST
 from rotor_mbs.scenario.scene import Scene, scene_hash
 from rotor_mbs.scenario.time_table import value_at
 from rotor_mbs.solution.trajectory import Array
@@ -32,6 +35,9 @@ if TYPE_CHECKING:
 
 # A source whose accelerations at the steady state are above this share of its largest stiffness is not steady there.
 _STEADY = 1e-7
+# Share of what the weights would do if they did not balance, which is rounding in every model (finite differences).
+_STIFFNESS_ROUNDING = 1e-9
+_BALANCED = "balanced rotor: no preferred angle; modes taken at the initial angle"
 
 _Point: TypeAlias = "tuple[Scene, Array, float, float]"
 
@@ -46,11 +52,33 @@ def modes_of_scenes(
     timeout_s: float,
     on_progress: OnProgress = ignore_progress,
 ) -> list[Outcome]:
-    """The modes of every scene into the file `output`; those of other scenes that it has are kept.
+    """Compute the modes of every scene into the file `output`; those that it has of other scenes are kept.
 
-    speeds: rad/s, of the Campbell diagram and the Floquet multipliers. names: of methods whose models stand beside the
-    closed form; by default all. A scene that cannot be linearized is an outcome with the reason. Raises InputError for
-    a negative or repeated speed, and for a method that is not linearized; StoreError.
+    Parameters
+    ----------
+    scenes : sequence of Scene
+        A scene without any modes is an outcome with the reason; the others are computed.
+    output : Path
+        It is not written where no scene has modes.
+    speeds : sequence of float
+        rad/s, of the Campbell diagram and the Floquet multipliers.
+    names : sequence of str
+        Methods whose models stand beside the closed form; by default all.
+    workers : int
+    timeout_s : float
+        Time limit of each scene.
+    on_progress : callable
+
+    Returns
+    -------
+    list of Outcome
+        One per scene, in the order in which they ended.
+
+    Raises
+    ------
+    InputError
+        For a negative or repeated speed, and for a method that is not linearized.
+    StoreError
     """
     models = tuple(find_method(name).model for name in names)
     for name, model in zip(names, models, strict=True):
@@ -58,9 +86,9 @@ def modes_of_scenes(
             raise InputError(f"{name}: its model has no linearization; allowed: a model with `linearize`")
     speeds = _increasing(speeds)
     made: list[Outcome] = []
+    computed: list[modal.SceneModes] = []
     with locked(output):
         may_extend(output, MODES)  # before anything is computed
-        records: list[Record] = []
         work = with_method_files(partial(compute_modes, speeds=speeds, models=models))
         with local_pool(workers) as pool:
             for done, end in enumerate(run_in(pool, work, scenes, timeout_s), 1):
@@ -71,25 +99,41 @@ def modes_of_scenes(
                 elif end.value is None:
                     outcome = Outcome(label, "", end.failure, end.message, is_stored=False, share=share)
                 else:
-                    modes = end.value
-                    records += modal.to_records(modes)
-                    status, message = "ok", "; ".join(modes.notes)
-                    if not modes.agrees:
-                        differ = f"relative difference of modes up to {modes.disagreement:.1e}"
+                    computed.append(end.value)
+                    status, message = "ok", ""
+                    if not end.value.agrees:
+                        differ = f"relative difference of modes up to {end.value.disagreement:.1e}"
                         status, message = "inaccurate", differ
                     outcome = Outcome(label, "", status, message, share=share)
                 made.append(outcome)
                 on_progress(done, len(scenes), outcome)
-        if records:
+        if computed:
+            records = []
+            for modes in computed:
+                records += modal.to_records(modes)
             write_records(output, records)
     return made
 
 
 def compute_modes(scene: Scene, speeds: Sequence[float] | Array = (), models: Sequence[str] = ()) -> modal.SceneModes:
-    """All modes of `scene`: at rest under gravity; in steady rotation without gravity at `speeds` (rad/s); multipliers
-    of a turn under gravity at those above 0.
+    """Compute all modes of a scene.
 
-    The torque on the rotor is left out: the drive holds its speed. Pitch torques and rest angles are those at t = 0.
+    At rest under gravity; in steady rotation without gravity at `speeds`; Floquet multipliers of a turn under gravity
+    at those above 0. The torque on the rotor is left out: the drive holds its speed. Pitch torques and rest angles are
+    those at t = 0.
+
+    Parameters
+    ----------
+    scene : Scene
+    speeds : sequence of float
+        rad/s, increasing, at least 0.
+    models : sequence of str
+        The models beside the closed form; by default all.
+
+    Raises
+    ------
+    InputError
+        For speeds that do not increase, and where there are no modes at all; the message says why.
     """
     notes: list[str] = []
     torques, rests = (
@@ -108,7 +152,10 @@ def compute_modes(scene: Scene, speeds: Sequence[float] | Array = (), models: Se
             table = _floquet_table(scene, turning)
         except MethodRefusal as exc:
             notes.append(f"no Floquet multipliers: {exc}")
-    return modal.SceneModes(*facts, rest, rotation, table, tuple(notes))
+    reasons = tuple(dict.fromkeys(notes))  # rest and rotation may have the same
+    if not (rest or rotation or (table is not None and (table.stable >= 0).any())):
+        raise InputError("; ".join(reasons))
+    return modal.SceneModes(*facts, rest, rotation, table, reasons)
 
 
 def _linear(
@@ -116,6 +163,8 @@ def _linear(
 ) -> dict[str, modal.LinearModes]:
     """By model, the closed form first, then `models`, or all; one that cannot do any of the speeds is left out, with a
     note."""
+    from rotor_mbs.models.lagrange.linearization import is_balanced, weight_stiffness
+
     points = _steady_states(scene, kind, speeds)
     there = [not isinstance(point, str) for point in points]
     steady = [point for point in points if not isinstance(point, str)]
@@ -127,6 +176,11 @@ def _linear(
     same = all(len(set(values)) <= 1 for values in (scene.blades, *bearings)) and scene.blades[0].has_pitch_inertia
     symmetric = same and all(at.gravity == 0.0 and np.ptp(angles[1:]) < 1e-9 for at, angles, _, _ in steady)
     columns = scene.moving_coordinates
+    # Of a balanced rotor all stiffness about the shaft may be rounding of the weights.
+    weight_stiffnesses = [weight_stiffness(at, angles) for at, angles, _, _ in steady]
+    is_balanced_rotor = kind == modal.REST and scene.gravity != 0.0 and is_balanced(scene, steady[0][1])
+    if is_balanced_rotor:
+        notes.append(_BALANCED)
 
     def over_speed(values: Sequence[NDArray[Any]], nothing: complex = np.nan) -> NDArray[Any]:
         """By speed; NaN where there is no steady state."""
@@ -142,11 +196,11 @@ def _linear(
             continue
         try:
             made = []
-            for point in steady:
+            for point, weight in zip(steady, weight_stiffnesses, strict=True):
                 assert method.linearize is not None
                 made.append(method.linearize(*point))
                 left = np.abs(made[-1].residual).max(initial=0.0)
-                if left > _STEADY * max(np.abs(made[-1].stiffness).max(), 1e-12):
+                if left > _STEADY * max(np.abs(made[-1].stiffness).max(), weight, 1e-12):
                     moves = f"accelerates by {left:.1e} rad/s^2 where the closed form is steady"
                     raise MethodRefusal(f"{method.model}: {moves}")
         except MethodRefusal as exc:
@@ -156,7 +210,11 @@ def _linear(
         modes_at = (
             modal.isotropic_modes
             if symmetric
-            else partial(modal.modes_of, is_cyclic=kind == modal.ROTATION or scene.gravity == 0.0)
+            else partial(
+                modal.modes_of,
+                is_cyclic=kind == modal.ROTATION or scene.gravity == 0.0,
+                rounding=_STIFFNESS_ROUNDING * weight_stiffnesses[0] if is_balanced_rotor else 0.0,
+            )
         )
         sets = [modes_at(linear.stiffness, linear.damping) for linear in made]
         if not modes_by_model:
@@ -228,10 +286,15 @@ def _floquet_table(scene: Scene, speeds: Array) -> modal.FloquetTable:
 
 
 def _increasing(speeds: Sequence[float] | Array) -> list[float]:
+    """Return rotor speeds as floats. Raises InputError where they are not allowed, TypeError for what is no number."""
     try:
-        numbers = [float(value) for value in speeds]
-    except (TypeError, ValueError):
+        numbers = [float(speed) for speed in speeds]
+    except (ValueError, OverflowError):  # a text, a whole number above 1e308
         numbers = [np.nan]
-    if any(not 0.0 <= value < np.inf for value in numbers) or (np.diff(numbers) <= 0.0).any():
-        raise InputError(f"speeds: {speeds!r}; allowed: a list of increasing numbers of at least 0")
+    are_allowed = all(number == 0.0 or SMALLEST <= number <= LARGEST for number in numbers)
+    if not are_allowed or any(after <= before for before, after in pairwise(numbers)):
+        shown = reprlib.repr(speeds)
+        raise InputError(
+            f"speeds: {shown}; allowed: increasing numbers, each 0 or from {SMALLEST:g} to {LARGEST:g} (rad/s)"
+        )
     return numbers

@@ -28,6 +28,16 @@ def test_a_mode_that_grows_without_oscillating_has_no_undamped_frequency():
     assert found.growth_rates == pytest.approx([3.0], rel=1e-14)
 
 
+def test_the_growing_eigenvalue_is_the_first_of_its_mode():
+    """The eigenvalue routine gives them in either order; modes of several models are recognized by the first one."""
+    random = np.random.default_rng(1)
+    for _ in range(20):
+        basis = np.linalg.qr(random.normal(size=(3, 3)))[0]
+        found = modes.modes_of(basis @ np.diag([-9.0, -16.0, 25.0]) @ basis.T, np.zeros((3, 3)), is_cyclic=False)
+        assert (found.eigenvalues[:, 0].real >= found.eigenvalues[:, 1].real).all()
+        assert sorted(found.growth_rates) == pytest.approx([0.0, 3.0, 4.0], abs=1e-12)
+
+
 def test_a_rotor_nothing_holds_has_an_eigenvalue_of_exact_zero():
     stiffness, damping = np.array([[0.0, 3.0], [0.0, 50.0]]), np.diag([0.2, 0.0])
     found = modes.modes_of(stiffness, damping, is_cyclic=True)

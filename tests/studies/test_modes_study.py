@@ -17,6 +17,7 @@ from rotor_mbs.errors import InputError, StoreError
 from rotor_mbs.methods.catalogue import find_method
 from rotor_mbs.runs.read import write_records
 from rotor_mbs.scenario.catalogue import find_scenes
+from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.studies import modes as study
 
 NREL = find_scenes(["stiff/nrel-5mw"])[0]
@@ -97,10 +98,100 @@ def test_records_keep_every_number(tmp_path):
         read_modes(tmp_path / "none.h5")
 
 
-@pytest.mark.parametrize("speeds", [(1.0, 0.5), (-1.0,), (1.0, 1.0), (float("nan"),), 1.0, ("a",)])
+@pytest.mark.parametrize("speeds", [(1.0, 0.5), (-1.0,), (1.0, 1.0), (float("nan"),), ("a",), (1e-320,), (10**400,)])
 def test_speeds_that_do_not_increase_from_zero_are_refused(speeds):
-    with pytest.raises(InputError, match=r"speeds: .*[1na].*; allowed: a list of increasing"):
+    with pytest.raises(InputError, match=r"speeds: .*[1na].*; allowed: increasing numbers, each 0 or from"):
         study.compute_modes(SOFT, speeds)
+
+
+RIGID = {"blade.centre_of_mass": [0.0, 0.0, 20.0], "blade.inertia": [0.0] * 6, "bearing.stiffness": 0.0}
+AXIAL = {**RIGID, "blade.inertia": [4e6, 4e6, 2e4, 0.0, 0.0, 0.0]}
+BALANCED = "balanced rotor: no preferred angle; modes taken at the initial angle"
+
+
+def at_rest(changes: dict[str, object], *pitches: float) -> Scene:
+    """The turbine's rotor at 0.5 rad and at rest."""
+    start = {"initial.angles": [0.5, *pitches], "initial.rates": [0.0] * (1 + len(pitches))}
+    return rm.scene("stiff/nrel-5mw").replace(**start, **changes)
+
+
+@pytest.mark.parametrize(
+    ("changes", "pitches"),
+    [
+        (RIGID, (0.1, 0.1, 0.1)),
+        (AXIAL, (0.1, 0.2, 0.3)),
+        ({"blades": 5, **AXIAL}, (0.1,) * 5),
+        ({}, (0.1, 0.1, 0.1)),
+        ({"bearing.stiffness": 1e10, "bearing.rest": 0.5}, (0.1, 0.1, 0.1)),
+        ({"bearing.stiffness": 0.0}, (0.0, 0.0, 0.0)),
+        ({"blades": 4, "bearing.stiffness": 0.0}, (0.0,) * 4),
+    ],
+)
+def test_a_balanced_rotor_has_its_modes_at_the_initial_angle(changes, pitches):
+    """Weights that balance leave rounding of 1e-16 of them, which is no stiffness, and no torque."""
+    found = study.compute_modes(at_rest(changes, *pitches))
+    assert found.notes == (BALANCED,)
+    assert found.agrees
+    assert list(found.rest)[:3] == ["lagrange", "exudyn_tree", "exudyn_chain"]
+    for modes in found.rest.values():
+        assert modes.angles[0, 0] == 0.5
+    closed = found.rest["lagrange"]
+    assert 0.0 in closed.undamped_frequencies
+    assert closed.damped_frequencies.shape == (1, len(closed.coordinates))
+
+
+def test_weights_that_soft_bearings_do_not_balance_turn_the_rotor():
+    """On springs of 1e5 N m/rad the pitches move by 0.1 rad a turn: the energy has minima at every sixth of one."""
+    found = study.compute_modes(at_rest({"bearing.stiffness": 1e5, "bearing.rest": 0.5}, 0.5, 0.5, 0.5))
+    assert found.notes == ()
+    assert found.rest["lagrange"].angles[0, 0] == pytest.approx(np.pi / 6.0, abs=1e-9)
+
+
+FREE_TORQUE = {"torque.pitch": 500.0, "bearing.stiffness": 0.0, "gravity": 0.0}
+
+
+def test_no_steady_state_is_one_line_and_no_file(tmp_path, capsys):
+    scene = replace(at_rest(FREE_TORQUE, 0.1, 0.1, 0.1), name="free")
+    (tmp_path / "free.toml").write_text(scene.text, encoding="utf-8")
+    output = tmp_path / "modes.h5"
+    command = ["modes", "-o", str(output), "-j", "1", str(tmp_path / "free.toml")]
+    reason = "free: no steady state at 0 rad/s: a torque of 500 N m acts on pitch 1, which has no spring, and nothing"
+    assert main([*command, "--speeds=0:0.001:2"]) == 2
+    shown = capsys.readouterr()
+    assert shown.out == ""
+    assert shown.err == f"{reason} balances it\n"
+    assert not output.exists()
+    with pytest.raises(InputError, match=reason):
+        rm.modes(scene)
+
+
+def test_a_scene_without_modes_ends_no_batch_and_takes_nothing_away(tmp_path):
+    scene, output = replace(at_rest(FREE_TORQUE, 0.1, 0.1, 0.1), name="free"), tmp_path / "modes.h5"
+    options = {"names": ["exudyn_tree/rk67"], "workers": 0, "timeout_s": 60.0}
+    other = general(gravity=0.0)
+    made = study.modes_of_scenes([scene, other], output, **options)
+    assert [(outcome.status, outcome.is_stored) for outcome in made] == [("solver_failed", False), ("ok", True)]
+    assert "no steady state" in made[0].message
+    assert list(read_modes(output)) == [other.name]
+    before = output.read_bytes()
+    with pytest.raises(InputError, match="no steady state"):
+        study.modes_of_scenes([scene, replace(scene, name=other.name)], output, **options)
+    assert output.read_bytes() == before
+
+
+def test_a_torque_that_the_weight_balances_is_a_steady_state():
+    """At a torque of up to m g x a pitch can rest where its weight, off the axis, holds it."""
+    hanging = at_rest({"torque.pitch": 500.0, "bearing.stiffness": 0.0}, 0.1, 0.1, 0.1)
+    weight = 17740.0 * 9.80665 * 0.1
+    assert study.compute_modes(hanging).rest
+    with pytest.raises(InputError, match=f"gravity and rotation balance at most {weight:g} N m"):
+        study.compute_modes(hanging.replace(**{"torque.pitch": 1.001 * weight}))
+
+
+def test_a_turn_that_takes_years_has_no_multipliers_but_a_reason():
+    pytest.importorskip("heyoka")
+    found = study.compute_modes(SOFT, [1e-25])
+    assert found.floquet.messages[0].endswith("takes more than 1000000000 steps")
 
 
 @pytest.mark.full
@@ -149,7 +240,22 @@ def test_other_speeds_take_the_place_of_all_that_was_stored_for_the_scene(tmp_pa
     np.testing.assert_array_equal(general_now.eigenvalues, general_before.eigenvalues)
 
 
-@pytest.mark.parametrize("span", ["3", "0:3", "3:0:4", "0:3:1", "-1:3:4", "0:nan:4", "0:3:x", "0:1e300:3", "0:inf:3"])
+@pytest.mark.parametrize(
+    "span",
+    [
+        "3",
+        "0:3",
+        "3:0:4",
+        "0:3:1",
+        "-1:3:4",
+        "0:nan:4",
+        "0:3:x",
+        "0:1e300:3",
+        "0:inf:3",
+        "0:1e-320:3",
+        "1:1.0000000000000002:5",
+    ],
+)
 def test_a_span_that_means_nothing_is_bad_usage(span, capsys):
     with pytest.raises(SystemExit) as ended:
         main(["modes", "stiff/nrel-5mw", f"--speeds={span}"])

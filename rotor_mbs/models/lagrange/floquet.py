@@ -31,6 +31,7 @@ _MAX_CORRECTIONS = 12
 # Of the integrator: a turn of a stiff bearing takes about two steps for each of its oscillations; a rotor that has
 # left for good takes more and more.
 _STEPS, _STEPS_PER_OSCILLATION = 500, 10
+_MOST_STEPS = 10**9  # days of computing: a turn that may take more is not begun
 # rad: a motion that ends a turn this far from its start is not on its way to a periodic one.
 _LOST = 20.0
 
@@ -141,7 +142,10 @@ class _Variational:
         integrator.pars[:] = [*self._values[:-1], torque][: len(integrator.pars)]
         integrator.time = 0.0
         integrator.state[:] = np.concatenate([state, np.eye(count, count + 1).ravel(), [0.0]])
-        max_steps = int(_STEPS + _STEPS_PER_OSCILLATION * self._frequency * period / (2.0 * math.pi))
+        expected_steps = _STEPS + _STEPS_PER_OSCILLATION * self._frequency * period / (2.0 * math.pi)
+        if not expected_steps <= _MOST_STEPS:
+            raise InputError(f"no periodic motion found: a turn of {period:.3g} s takes more than {_MOST_STEPS} steps")
+        max_steps = int(expected_steps)
         message = failure(integrator.propagate_until(period, max_steps=max_steps)[0])
         if "step_limit" in message:
             message = f"no periodic motion found: a turn takes more than {max_steps} steps"

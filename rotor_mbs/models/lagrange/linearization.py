@@ -20,6 +20,10 @@ from rotor_mbs.solution.trajectory import Array, Linearization
 # rad: a step of Newton's method below this is followed by three more, and the state is found.
 _SMALL_STEP = 1e-6
 _MAX_STEPS = 200
+# Share of the weights' moments, and of a torque, that is taken for their rounding.
+_ROUNDING = 1e-12
+# Of the coordinates that move: all, or all but the rotor.
+_ALL, _PITCHES = slice(None), slice(1, None)
 
 
 def slopes(function: Function, values: Sequence[float] | Array) -> Array:
@@ -53,15 +57,89 @@ def holding_torque(scene: Scene, speed: float) -> float:
 
 
 def steady_rotation(scene: Scene, speed: float) -> Array:
-    """(1 + blades,) rad: angles at which the rotor turns steadily at `speed` rad/s, no gravity acting: stationary
-    points of V - ½ Ω² a - Σ τ θ, downhill from the scene's initial pitches, kept where they are stationary already,
-    stable or not. Raises InputError where there is none within 200 steps."""
-    return _stationary(replace(scene, gravity=0.0), speed)
+    """Return the angles at which the rotor turns steadily at `speed` rad/s without gravity.
+
+    Stationary points of V - ½ Ω² a - Σ τ θ, downhill from the scene's initial pitches, kept where they are stationary
+    already, stable or not. The rotor keeps its initial angle.
+
+    Returns
+    -------
+    ndarray, (1 + blades,) rad
+
+    Raises
+    ------
+    InputError
+        If a pitch torque is larger than all that can balance it, or no such state is found within 200 steps.
+    """
+    still = replace(scene, gravity=0.0)
+    return _checked(still, speed, _stationary(still, speed, _PITCHES))
 
 
 def equilibrium(scene: Scene) -> Array:
-    """(1 + blades,) rad: angles at which the rotor rests without a torque, found as by `steady_rotation`."""
-    return _stationary(scene, 0.0)
+    """Return the angles at which the rotor rests without a torque, found as by `steady_rotation`.
+
+    A balanced rotor (`is_balanced`) keeps its initial angle. Any other rotor turns downhill as well, from the initial
+    angles.
+
+    Returns
+    -------
+    ndarray, (1 + blades,) rad
+
+    Raises
+    ------
+    InputError
+        As `steady_rotation`.
+    """
+    if not scene.gravity:
+        return steady_rotation(scene, 0.0)
+    try:
+        angles = _stationary(scene, 0.0, _PITCHES)
+    except _NotFoundError:  # at another rotor angle there may be one
+        angles = None
+    if angles is None or not is_balanced(scene, angles):
+        angles = _stationary(scene, 0.0, _ALL)
+    return _checked(scene, 0.0, angles)
+
+
+def is_balanced(scene: Scene, angles: Sequence[float] | Array) -> bool:
+    """Return whether gravity gives a rotor at rest no preferred angle.
+
+    The rotor's torque is zero at `angles`, and remains zero to first order where the rotor is turned and the pitches
+    follow: both up to the rounding of the weights that balance. Bearing springs move the pitches of equal blades once a
+    turn, so that their weights balance to third order of the deflection only: on stiff bearings that is rounding, on
+    soft ones the rotor has a preferred angle.
+
+    Parameters
+    ----------
+    scene : Scene
+        With gravity.
+    angles : sequence of float
+        (1 + blades,) rad, at which the pitches are in equilibrium.
+    """
+    form = rotor_form(scene)
+    angles = np.asarray(angles, dtype=float)[scene.moving_coordinates]
+    potential = _amended_potential(form, angles, 0.0, loads_at_start(scene))
+    curvature = potential.curvature
+    following = np.linalg.lstsq(curvature[1:, 1:], -curvature[1:, 0], rcond=1e-12)[0]
+    change_of_torques = curvature @ np.concatenate([[1.0], following])
+    allowed = _ROUNDING * _weights(form)
+    return bool(abs(potential.slope[0]) <= allowed and np.abs(change_of_torques).max() <= allowed)
+
+
+def weight_stiffness(scene: Scene, angles: Sequence[float] | Array) -> float:
+    """Return the moments of all weights about the shaft, divided by the rotor's inertia at `angles`, in 1/s².
+
+    The size of the stiffness of a rotor whose weights do not balance: the unit of rounding where they do.
+    """
+    form, loads = rotor_form(scene), loads_at_start(scene)
+    moving = [float(angles[column]) for column in scene.moving_coordinates]
+    half_inertia, _ = closed_form.energies(moving, [1.0] + [0.0] * len(form.blades), form, loads, math.sin, math.cos)
+    weights = _weights(form)
+    return weights / (2.0 * half_inertia) if weights else 0.0
+
+
+class _NotFoundError(InputError):
+    """No steady state was found."""
 
 
 class _Potential(NamedTuple):
@@ -72,11 +150,14 @@ class _Potential(NamedTuple):
     curvature: Array  # (n, n) N m/rad
 
 
-def _stationary(scene: Scene, speed: float) -> Array:
-    """Newton's method with the absolute eigenvalues of the Hessian, and a step halved until it goes downhill."""
+def _stationary(scene: Scene, speed: float, free: slice) -> Array:
+    """Return (1 + blades,) rad, where the forces on the `free` ones of the coordinates that move are zero.
+
+    Newton's method with the absolute eigenvalues of the Hessian, and a step halved until it goes downhill.
+    """
     form, columns, loads = rotor_form(scene), scene.moving_coordinates, loads_at_start(scene)
+    _refuse_large_torques(scene, form, speed, loads)
     angles = np.array(scene.initial_angles, dtype=float)
-    free = slice(None) if scene.gravity else slice(1, None)  # without gravity any rotor angle will do
     changed = columns[free]
     for _ in range(_MAX_STEPS):
         potential = _amended_potential(form, angles[columns], speed, loads)
@@ -85,12 +166,6 @@ def _stationary(scene: Scene, speed: float) -> Array:
             for _ in range(3):
                 potential = _amended_potential(form, angles[columns], speed, loads)
                 angles[changed] += _newton_step(form, potential, free, downhill=False)
-            # The accelerations must say so, too: they keep differences that the energies' rounding hides.
-            linear = linearize(scene, angles, [speed, *(0.0 for _ in scene.blades)], holding_torque(scene, speed))
-            if np.abs(linear.residual).max() > 1e-9 * np.abs(linear.stiffness).max():
-                raise InputError(
-                    f"{scene.name}: the steady state at {speed:g} rad/s is not resolved: rounding of the energies"
-                )
             return angles
         trial = angles.copy()
         for halving in range(30):
@@ -98,7 +173,32 @@ def _stationary(scene: Scene, speed: float) -> Array:
             if _is_lower(_amended_potential(form, trial[columns], speed, loads), potential, step, free):
                 break
         angles = trial
-    raise InputError(f"{scene.name}: no steady state at {speed:g} rad/s found in {_MAX_STEPS} steps from its start")
+    message = f"no steady state at {speed:g} rad/s found in {_MAX_STEPS} steps from its start"
+    raise _NotFoundError(f"{scene.name}: {message}")
+
+
+def _refuse_large_torques(scene: Scene, form: RotorForm, speed: float, loads: LoadValues) -> None:
+    """Raise InputError where a pitch has no spring, and a torque above all that gravity and rotation can balance."""
+    for column, blade, torque in zip(scene.moving_coordinates[1:], form.blades, loads.pitches, strict=True):
+        # The largest values over the pitch of x s + y c and of ½ ∂a/∂θ = ½ half_slope_sc sin 2θ + half_slope_cs cos 2θ
+        largest = math.hypot(blade.weight_x, blade.weight_y)
+        largest += speed * speed * math.hypot(0.5 * blade.half_slope_sc, blade.half_slope_cs)
+        if not blade.stiffness and abs(torque) > (1.0 + _ROUNDING) * largest:
+            balance = f"gravity and rotation balance at most {largest:g} N m" if largest else "nothing balances it"
+            raise InputError(
+                f"{scene.name}: no steady state at {speed:g} rad/s: a torque of {torque:g} N m acts on pitch {column}, "
+                f"which has no spring, and {balance}"
+            )
+
+
+def _checked(scene: Scene, speed: float, angles: Array) -> Array:
+    """Return the angles of a steady state. Raises InputError where the accelerations say that it is none: they keep
+    differences that the energies' rounding hides."""
+    linear = linearize(scene, angles, [speed, *(0.0 for _ in scene.blades)], holding_torque(scene, speed))
+    scale = max(np.abs(linear.stiffness).max(), weight_stiffness(scene, angles))
+    if np.abs(linear.residual).max() > 1e-9 * scale:
+        raise InputError(f"{scene.name}: the steady state at {speed:g} rad/s is not resolved: rounding of the energies")
+    return angles
 
 
 def _is_lower(trial: _Potential, start: _Potential, step: Array, free: slice) -> bool:
@@ -125,11 +225,7 @@ def _amended_potential(form: RotorForm, angles: Array, speed: float, loads: Load
 def _newton_step(form: RotorForm, potential: _Potential, free: slice, *, downhill: bool) -> Array:
     """(free,) rad: -H⁻¹ g, with |H| where `downhill`; at most 0.5 rad, none where nothing holds the rotor."""
     gradient, hessian = potential.slope[free], potential.curvature[free, free]
-    weights = []
-    for blade in form.blades:
-        weights += [abs(blade.weight_x), abs(blade.weight_y), abs(blade.weight_z)]
-    weights += [abs(float(weight)) for weight, _, _ in form.fixed]
-    least = max(1e-9 * sum(weights), 1e-300)
+    least = max(1e-9 * _weights(form), 1e-300)
     scale = 1.0 / np.sqrt(np.maximum(np.abs(np.diag(hessian)), least))
     values, vectors = np.linalg.eigh(hessian * scale * scale[:, None])
     stiff = np.abs(values) > 1e-4  # else it is the rounding of weights that balance
@@ -138,3 +234,11 @@ def _newton_step(form: RotorForm, potential: _Potential, free: slice, *, downhil
     step = -scale * (vectors @ components)
     longest = np.abs(step).max(initial=0.0)
     return np.asarray(step if longest < 0.5 else step * (0.5 / longest))
+
+
+def _weights(form: RotorForm) -> float:
+    """Return the sum of the moments of all weights, N m, as if each acted alone."""
+    moments = [abs(float(weight)) for weight, _, _ in form.fixed]
+    for blade in form.blades:
+        moments += [abs(blade.weight_x), abs(blade.weight_y), abs(blade.weight_z)]
+    return float(sum(moments))
