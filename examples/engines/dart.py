@@ -14,7 +14,7 @@ from rotor_mbs.errors import MethodRefusal
 from rotor_mbs.methods.base import Method, Settings
 from rotor_mbs.methods.settings import number, step
 from rotor_mbs.scenario.accuracy_bounds import Bound
-from rotor_mbs.scenario.time_table import intervals, segments
+from rotor_mbs.scenario.time_table import intervals
 from rotor_mbs.solution.trajectory import Integration, Trajectory, sample_times
 
 
@@ -69,7 +69,7 @@ class Solver:
     def integrate(self):
         y, scene = np.array(self.scene.initial_angles + self.scene.initial_rates), self.scene
         self.states = [y]
-        for stop in intervals(segments(scene.load_tables, scene.duration), scene.samples, every_sample=True):
+        for stop in intervals(scene.load_segments, scene.samples, every_sample=True):
             y = self.advance(y, stop)
             if stop.ends_at_sample:
                 self.states.append(y)

@@ -20,7 +20,7 @@ from rotor_mbs.errors import MethodRefusal
 from rotor_mbs.methods.base import Method, Settings
 from rotor_mbs.methods.settings import number, step
 from rotor_mbs.scenario.accuracy_bounds import Bound
-from rotor_mbs.scenario.time_table import intervals, segments
+from rotor_mbs.scenario.time_table import intervals
 from rotor_mbs.solution.trajectory import Integration, Trajectory, sample_times
 
 
@@ -78,7 +78,7 @@ class Solver:
         inside = self.plant.GetMyMutableContextFromRoot(context)
         self.plant.SetPositionsAndVelocities(inside, np.array(scene.initial_angles + scene.initial_rates))
         self.states = [self.plant.GetPositionsAndVelocities(inside)]
-        for stop in intervals(segments(scene.load_tables, scene.duration), scene.samples, every_sample=True):
+        for stop in intervals(scene.load_segments, scene.samples, every_sample=True):
             if self.loads.part is not stop.segment:
                 self.loads.part = stop.segment
                 self.simulator.Initialize()

@@ -18,7 +18,7 @@ from rotor_mbs.errors import MethodRefusal
 from rotor_mbs.methods.base import Method, Settings
 from rotor_mbs.methods.settings import number
 from rotor_mbs.scenario.accuracy_bounds import Bound
-from rotor_mbs.scenario.time_table import intervals, segments
+from rotor_mbs.scenario.time_table import intervals
 from rotor_mbs.solution.trajectory import Integration, Trajectory, sample_times
 
 
@@ -76,7 +76,7 @@ class Solver:
     def integrate(self):
         y, scene = np.array(self.scene.initial_angles + self.scene.initial_rates), self.scene
         self.states, tolerances = [y], {"rtol": self.tolerance, "atol": 0.01 * self.tolerance}
-        for stop in intervals(segments(scene.load_tables, scene.duration), scene.samples, every_sample=False):
+        for stop in intervals(scene.load_segments, scene.samples, every_sample=False):
             inside = np.linspace(stop.start, stop.end, stop.sample_intervals + 1)[1:]
             span = stop.start, stop.end
             run = solve_ivp(self.derivative, span, y, "LSODA", inside, args=(stop.segment,), **tolerances)

@@ -14,7 +14,7 @@ from rotor_mbs.errors import MethodRefusal
 from rotor_mbs.methods.base import Method, Settings
 from rotor_mbs.methods.settings import step
 from rotor_mbs.scenario.accuracy_bounds import Bound
-from rotor_mbs.scenario.time_table import intervals, segments
+from rotor_mbs.scenario.time_table import intervals
 from rotor_mbs.solution.trajectory import Integration, Trajectory, sample_times
 
 
@@ -51,7 +51,7 @@ class Solver:
         states[0].joint_qd.assign(v.astype(np.float32))
         newton.eval_fk(self.model, states[0].joint_q, states[0].joint_qd, states[0])
         self.states = [np.append(q, v)]
-        for stop in intervals(segments(scene.load_tables, scene.duration), scene.samples, every_sample=True):
+        for stop in intervals(scene.load_segments, scene.samples, every_sample=True):
             count = int(np.ceil((stop.end - stop.start) / self.step * (1.0 - 1e-9)))
             h = (stop.end - stop.start) / count
             for i in range(count):

@@ -16,7 +16,7 @@ from rotor_mbs.errors import MethodRefusal
 from rotor_mbs.methods.base import Method, Settings
 from rotor_mbs.methods.settings import number, step
 from rotor_mbs.scenario.accuracy_bounds import Bound
-from rotor_mbs.scenario.time_table import intervals, segments
+from rotor_mbs.scenario.time_table import intervals
 from rotor_mbs.solution.trajectory import Integration, Trajectory, sample_times
 
 
@@ -69,7 +69,7 @@ class Solver:
         scene = self.scene
         q, v = np.array(scene.initial_angles), np.array(scene.initial_rates)
         self.states = [(q, v)]
-        for stop in intervals(segments(scene.load_tables, scene.duration), scene.samples, every_sample=True):
+        for stop in intervals(scene.load_segments, scene.samples, every_sample=True):
             q, v, message = self.advance(q, v, stop)
             if message or not (np.isfinite(q).all() and np.isfinite(v).all()):
                 return Integration(False, message or "not finite", stop.start)

@@ -25,9 +25,9 @@ from rotor_mbs.comparison.other_rotors import (
 from rotor_mbs.errors import RotorError
 from rotor_mbs.models.lagrange import closed_form
 from rotor_mbs.models.lagrange.defects import explicit_steps, quick_ends
-from rotor_mbs.models.lagrange.parameters import load_tables, rotor_form
+from rotor_mbs.models.lagrange.parameters import rotor_form
 from rotor_mbs.scenario.scene import Scene
-from rotor_mbs.scenario.time_table import knots
+from rotor_mbs.scenario.time_table import torque_place
 from rotor_mbs.solution.defects import Defects
 from rotor_mbs.solution.trajectory import Array
 
@@ -93,7 +93,7 @@ class DefectCauses:
         self._allowed = max(_LEFT * largest, min(tolerance, _LEFT_OF_SMALL * largest))
         # Some all over the run, and the largest; none with a kink of a load inside, where quick steps are wrong.
         tried = judged.copy()
-        for kink in knots(load_tables(scene), scene.duration):
+        for kink in scene.kink_times:
             inside = (defects.time[:-1] < kink * (1.0 - 1e-9)) & (
                 kink * (1.0 + 1e-9) < defects.time[1:]
             )
@@ -407,8 +407,8 @@ class DefectCauses:
 
     def _edge(self, place: int, start: float, end: float, more: Array) -> str:
         """Of intervals beside a jump of a coordinate's load, "" elsewhere; more: N m that the data have more."""
-        tables = load_tables(self._scene)[: len(self._defects.moving)]
-        for (t0, value0), (t1, value1) in itertools.pairwise(tables[place]):
+        table = self._scene.load_tables[torque_place(self._defects.moving[place])]
+        for (t0, value0), (t1, value1) in itertools.pairwise(table):
             jump = value1 - value0
             if t0 != t1 or not jump or not start * (1.0 - 1e-9) <= t0 <= end * (1.0 + 1e-9):
                 continue

@@ -14,10 +14,9 @@ from numpy.typing import NDArray
 from rotor_mbs.comparison.channels import Channel, ForeignData, channels
 from rotor_mbs.comparison.hypotheses import Explanation, Hypothesis, cheapest, explanations
 from rotor_mbs.comparison.verdict import ChannelErrors, agrees_until
-from rotor_mbs.models.lagrange.parameters import load_segments, load_tables
 from rotor_mbs.models.lagrange.samples import sampled_loads
 from rotor_mbs.scenario.scene import Scene
-from rotor_mbs.scenario.time_table import ALIGNMENT, values_before
+from rotor_mbs.scenario.time_table import ALIGNMENT, ROTOR_TORQUE, values_before
 from rotor_mbs.solution.defects import FLOOR_SAFETY, Defects
 from rotor_mbs.solution.quantities import LOADS, longest_arm
 from rotor_mbs.solution.trajectory import Array, all_coordinates
@@ -230,7 +229,7 @@ def _loads_in_rows(
 def _is_at_jump(scene: Scene, time: Array) -> NDArray[np.bool_]:
     """Whether each of (n,) times is one at which a prescribed load jumps."""
     at_jump = np.zeros(len(time), bool)
-    for table in load_tables(scene):
+    for table in scene.load_tables:
         for (before, _), (after, _) in itertools.pairwise(table):
             if before == after:
                 step = float(np.median(np.diff(time)))
@@ -319,7 +318,7 @@ def _component_hypotheses(loads: JudgedLoads, j: int) -> Iterator[Hypothesis[Com
     """
     channel = loads.channels[j]
     name = channel.name.partition(",")[0]
-    torque = values_before(load_segments(loads.scene), loads.time)[0]
+    torque = values_before(loads.scene.load_segments, loads.time)[ROTOR_TORQUE]
     for frame, matrix in loads.by_frame.items():
         for i, other in enumerate(loads.known):
             if other.kind != channel.kind:

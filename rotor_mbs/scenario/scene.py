@@ -21,7 +21,7 @@ from typing import TYPE_CHECKING, Any, Literal
 from rotor_mbs.errors import InputError, PlausibilityWarning
 from rotor_mbs.scenario import keys
 from rotor_mbs.scenario.keys import Kind, counted, file_key, list_of, read_each, shown, where, wrong
-from rotor_mbs.scenario.time_table import Table, is_constant, is_one_table, value_at
+from rotor_mbs.scenario.time_table import LoadTable, Segment, is_constant, is_one_table, kink_times, segments, value_at
 from rotor_mbs.scenario.toml_file import (
     KEY_FORM,
     KeyPath,
@@ -99,12 +99,12 @@ def is_rigid_body_inertia(inertia: Sequence[float]) -> bool:
     return bool(np.linalg.eigvalsh(0.5 * trace * np.eye(3) - J)[0] >= -INERTIA_TOLERANCE * trace)
 
 
-def _read_load(value: object) -> Table:
+def _read_load(value: object) -> LoadTable:
     """A table over time, from its rows or a constant; () where it is zero at all times."""
     if not isinstance(value, list):
         constant = keys.SIZE.read(value)
         return ((0.0, constant),) if constant else ()
-    rows: Table = list_of(list_of(keys.SIZE, "", 2, 2), "", 1).read(value)
+    rows: LoadTable = list_of(list_of(keys.SIZE, "", 2, 2), "", 1).read(value)
     times = [time for time, _ in rows]
     if times[0] < 0.0:
         raise wrong("the first time is below 0")
@@ -280,8 +280,8 @@ class Scene:
     )
     bearing_damping: tuple[float, ...] = _key("bearing.damping", _per_blade(keys.NOT_NEGATIVE), "N m s/rad", default=())
     shaft_damping: float = _key("shaft.damping", keys.NOT_NEGATIVE, "N m s/rad", default=0.0)
-    pitch_torque: tuple[Table, ...] = _key("torque.pitch", _per_blade(_LOAD), "N m", default=(), added=True)
-    bearing_rest: tuple[Table, ...] = _key(
+    pitch_torque: tuple[LoadTable, ...] = _key("torque.pitch", _per_blade(_LOAD), "N m", default=(), added=True)
+    bearing_rest: tuple[LoadTable, ...] = _key(
         "bearing.rest", _per_blade(_LOAD), "rad", ": pitch at which the spring is unloaded", default=(), added=True
     )
     methods: tuple[str, ...] = _key("methods", _METHODS, part="label", default=())
@@ -302,9 +302,22 @@ class Scene:
         return is_constant(self.rotor_torque)
 
     @property
-    def load_tables(self) -> tuple[Table, ...]:
-        """Loads over time: rotor torque, then torque and rest angle of each pitch."""
+    def load_tables(self) -> tuple[LoadTable, ...]:
+        """Loads over time: rotor torque, then torque and rest angle of each pitch, fixed ones too.
+
+        This is the one order of the loads of a scene; `time_table.torque_place` and `rest_place` have their places.
+        """
         return (self.rotor_torque, *(table for pair in self.pitch_loads for table in pair))
+
+    @property
+    def load_segments(self) -> tuple[Segment, ...]:
+        """The run cut into segments on which all loads are linear, in the order of `load_tables`."""
+        return segments(self.load_tables, self.duration)
+
+    @property
+    def kink_times(self) -> list[float]:
+        """Times (s) within the run at which a load has a kink or a jump, increasing."""
+        return kink_times(self.load_tables, self.duration)
 
     @property
     def has_constant_loads(self) -> bool:
@@ -340,9 +353,9 @@ class Scene:
         return self.shaft_damping, *(damping for _, damping in self.bearings)
 
     @property
-    def pitch_loads(self) -> list[tuple[Table, Table]]:
+    def pitch_loads(self) -> list[tuple[LoadTable, LoadTable]]:
         """Torque (N m) and rest angle (rad; none without stiffness) of each pitch over time."""
-        none: tuple[Table, ...] = ((),) * len(self.blades)
+        none: tuple[LoadTable, ...] = ((),) * len(self.blades)
         loads = zip(self.pitch_torque or none, self.bearing_rest or none, self.bearings, strict=True)
         return [(torque, rest if stiffness else ()) for torque, rest, (stiffness, _) in loads]
 

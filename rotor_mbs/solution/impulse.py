@@ -10,7 +10,6 @@ from typing import NamedTuple
 import numpy as np
 
 from rotor_mbs.scenario.scene import Blade, Scene
-from rotor_mbs.scenario.time_table import knots
 from rotor_mbs.solution.trajectory import Array, Trajectory
 
 # Samples that one polynomial goes through; a narrower one shows how much is left open between samples.
@@ -55,7 +54,7 @@ def linear_balance(scene: Scene, run: Trajectory) -> Balance | None:
     of the bearing, where a load has a kink (the force jumps there), or as for `angular_balance`, oscillations of a
     stiff bearing among the motion."""
     force = run.get("shaft_force")
-    if force is None or len(run.time) < max(_POINTS_WITHOUT_SLOPES) or knots(scene.load_tables, scene.duration):
+    if force is None or len(run.time) < max(_POINTS_WITHOUT_SLOPES) or scene.kink_times:
         return None
     # rad/s: the largest natural frequency of a blade on the spring of its bearing.
     frequencies = [

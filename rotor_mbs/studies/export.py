@@ -17,7 +17,7 @@ from rotor_mbs.errors import InputError, StoreError
 from rotor_mbs.methods.catalogue import REFERENCE
 from rotor_mbs.methods.solve import solve
 from rotor_mbs.models.exudyn import tree
-from rotor_mbs.models.exudyn.geometry import LISTS, Ref, pitching
+from rotor_mbs.models.exudyn.geometry import LISTS, Ref, movable_blades
 from rotor_mbs.models.exudyn.loads import Loads, Moment
 from rotor_mbs.models.mujoco.mjcf import mjcf_file
 from rotor_mbs.runs.output_files import refuse_foreign, replace_file
@@ -108,7 +108,7 @@ _COMMENTS = {  # by kind; parts of another kind are left out
 def exudyn_script(scene: Scene) -> str:
     """The kinematic tree with the same step as a Python script for Exudyn alone; its text is a template."""
     parts = [part for part in tree.parts(scene, Loads(scene)) if part.kind in _COMMENTS]
-    moving = [0, *(1 + i for i in pitching(scene))]
+    moving = [0, *(1 + i for i in movable_blades(scene))]
     calls = []
     for part in parts:
         arguments = "".join(f"    {key}={_argument(key, value)},\n" for key, value in part.parameters.items())

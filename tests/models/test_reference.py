@@ -18,7 +18,7 @@ from rotor_mbs.methods.solve import solve
 from rotor_mbs.models.lagrange import reference as reference_module
 from rotor_mbs.models.lagrange.heyoka_adapter import heyoka
 from rotor_mbs.models.lagrange.methods import ReferenceSettings
-from rotor_mbs.models.lagrange.parameters import changing_loads, load_segments
+from rotor_mbs.models.lagrange.parameters import changing_loads
 from rotor_mbs.models.lagrange.reference import ReferenceSolver, build, reference_at, uncertainty
 from rotor_mbs.models.lagrange.samples import sampled_loads
 from rotor_mbs.models.lagrange.taylor import Propagation, build_system, set_parameters
@@ -49,8 +49,8 @@ def moving_angles(scene: Scene) -> Any:
     integrator = heyoka().taylor_adaptive(equations, state=start, compact_mode=True, **kind)
     set_parameters(integrator, _numbers(parameters.values))
     times, rows = np.linspace(0.0, scene.duration, scene.samples), [start[None, :]]
-    for segment in load_segments(scene):
-        if numbers := [number for i in changing_loads(scene) for number in segment.lines[i]]:
+    for segment in scene.load_segments:
+        if numbers := [number for i in changing_loads(scene) for number in segment.linear_loads[i]]:
             integrator.pars[-len(numbers) :] = _numbers(numbers)
         inside = times[(times > segment.start) & (times <= segment.end)]
         end = [] if len(inside) and inside[-1] == segment.end else [segment.end]

@@ -19,7 +19,6 @@ from rotor_mbs.models.lagrange.heyoka_adapter import array_of
 from rotor_mbs.models.lagrange.ode_solvers import OdeSolver, ode45_integrator, scipy_integrator, work_unit
 from rotor_mbs.models.lagrange.samples import at_constant_rests
 from rotor_mbs.models.lagrange.taylor import Propagation
-from rotor_mbs.scenario.time_table import segments
 
 
 @pytest.mark.parametrize("method", ["lagrange/dop853", "lagrange/taylor"])
@@ -77,7 +76,7 @@ def test_every_evaluation_is_counted(name: str) -> None:
 def test_a_state_that_has_diverged_has_no_derivative() -> None:
     scene = paper("fig03", duration=1.0, samples=2)
     solver = OdeSolver(scene, INTEGRATORS["DOP853"], np.array([0.0, 1.0]))
-    (segment,) = segments(scene.load_tables, scene.duration)
+    (segment,) = scene.load_segments
     values = solver._right_hand_side(segment)(0.0, [math.inf, 0.0, 1.0, 0.0])
     assert len(values) == 4
     assert np.isnan(values).all()
@@ -130,9 +129,10 @@ def test_a_load_over_time_is_in_quad_precision_in_a_quad_run() -> None:
 
 
 def test_constant_rest_angles_do_no_work() -> None:
-    """Of three pitches, loads 1 to 3 are their torques, 4 to 6 their rest angles."""
-    loads = load_values([0.0, 1.0, 2.0, 3.0, 0.1, 0.2, 0.3])
-    assert at_constant_rests((0, 1, 5), loads).rests == [0.0, 0.2, 0.0]
+    """After the rotor's torque a torque and a rest angle for each of four pitches, of which the third is fixed."""
+    loads = load_values([0.0, 1.0, 0.1, 2.0, 0.2, 3.0, 0.3, 4.0, 0.4], (1, 2, 4))
+    assert (loads.pitches, loads.rests) == ([1.0, 2.0, 4.0], [0.1, 0.2, 0.4])
+    assert at_constant_rests((False, True, False), loads).rests == [0.0, 0.2, 0.0]
 
 
 @pytest.mark.parametrize(

@@ -8,21 +8,26 @@ import random
 import numpy as np
 import pytest
 
+from rotor_mbs.scenario.catalogue import find_scenes
+from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.scenario.time_table import (
-    Table,
+    ROTOR_TORQUE,
+    LoadTable,
     intervals,
+    rest_place,
     segments,
     steps_and_rows,
+    torque_place,
     value_at,
     values_at,
     values_before,
 )
 
-CONSTANT: Table = ((0.0, 7.0),)
-RAMP: Table = ((0.3, 0.0), (0.47, 2.0), (0.47, 5.0), (0.8, 1.0))
+CONSTANT: LoadTable = ((0.0, 7.0),)
+RAMP: LoadTable = ((0.3, 0.0), (0.47, 2.0), (0.47, 5.0), (0.8, 1.0))
 
 
-def drawn_table(chance: random.Random) -> Table:
+def drawn_table(chance: random.Random) -> LoadTable:
     """Rows at tenths of a second, so that some of them are jumps."""
     times = sorted(chance.choices([k / 10.0 for k in range(12)], k=chance.randint(1, 6)))
     times = [t for i, t in enumerate(times) if i < 2 or times[i - 2] < t]
@@ -43,6 +48,28 @@ def test_segments_have_the_values_of_their_tables() -> None:
                 assert part.loads_at(time) == pytest.approx(exact, rel=4e-15, abs=4e-12)
             before = [value_at(table, math.nextafter(part.end, 0.0)) for table in tables]
             assert part.loads_at(part.end) == pytest.approx(before, rel=4e-15, abs=1e-11)
+
+
+@pytest.mark.parametrize(
+    "scene", find_scenes(["check/loads", "check/pitch-loads", "check/general"]), ids=lambda s: s.name
+)
+def test_each_load_of_a_scene_is_at_its_place(scene: Scene) -> None:
+    """Against the keys of the scene file, not the tables that the segments are cut from; bounds as above."""
+    pitches = range(1, 1 + len(scene.blades))
+    torques = {pitch: scene.pitch_torque[pitch - 1] if scene.pitch_torque else () for pitch in pitches}
+    rests = {pitch: scene.bearing_rest[pitch - 1] if scene.bearing_rest else () for pitch in pitches}
+    rows = [*scene.rotor_torque, *(row for table in (*torques.values(), *rests.values()) for row in table)]
+    inside = {time for time, _ in rows if 0.0 < time < scene.duration}
+    assert set(scene.kink_times) <= inside
+    assert scene.kink_times == [segment.start for segment in scene.load_segments[1:]]
+    assert torque_place(0) == ROTOR_TORQUE
+    for segment in scene.load_segments:
+        time = segment.start + 0.37 * (segment.end - segment.start)
+        loads = segment.loads_at(time)
+        assert loads[ROTOR_TORQUE] == pytest.approx(value_at(scene.rotor_torque, time), rel=4e-15, abs=4e-12)
+        for pitch in pitches:
+            assert loads[torque_place(pitch)] == pytest.approx(value_at(torques[pitch], time), rel=4e-15, abs=4e-12)
+            assert loads[rest_place(pitch)] == pytest.approx(value_at(rests[pitch], time), rel=4e-15, abs=4e-12)
 
 
 def test_a_sample_on_a_jump_has_the_value_before_it() -> None:

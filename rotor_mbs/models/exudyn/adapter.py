@@ -15,7 +15,7 @@ from rotor_mbs.errors import MethodRefusal
 from rotor_mbs.methods.time_limit import MESSAGE, OutOfTimeError
 from rotor_mbs.models.exudyn.geometry import LISTS, Part, Ref
 from rotor_mbs.models.exudyn.schemes import Scheme
-from rotor_mbs.scenario.time_table import Interval, steps_and_rows
+from rotor_mbs.scenario.time_table import Interval, Segment, steps_and_rows
 from rotor_mbs.solution.trajectory import Array, Integration, limit_at_zero
 
 os.environ.setdefault("EXUDYN_MODULE", "fast")
@@ -113,10 +113,22 @@ class System:
         scheme: Scheme,
         intervals: Sequence[Interval],
         rows_between: bool,
-        before_interval: Callable[[Interval], None],
+        set_segment: Callable[[Segment], None],
     ) -> Integration:
-        """From the initial state through the intervals of linear loads, or to the first failure, which is in the
-        result; `rows_between` keeps rows between samples, too; `before_interval` is called with each interval first."""
+        """Integrate from the initial state through all intervals, or to the first failure.
+
+        Parameters
+        ----------
+        scheme : solver and options.
+        intervals : from one stop to the next; on each of them all loads are linear.
+        rows_between : whether the sensors keep rows between samples, too.
+        set_segment : called with the loads of each interval before it is integrated.
+
+        Returns
+        -------
+        Integration
+            With the reason, where the end was not reached.
+        """
         data = self._mbs.systemData
         data.SetSystemState(self._initial_state, _engine.ConfigurationType.Initial)
         settings = _settings(scheme, data.ODE2Size(), data.AEsize())
@@ -133,7 +145,7 @@ class System:
             self._mbs.SetPreStepUserFunction(before_trial)
         total = Integration(True)
         for interval in intervals:
-            before_interval(interval)
+            set_segment(interval.segment)
             if interval is intervals[0] and scheme.lacks_initial_accelerations:
                 # What sensors of accelerations read at the initial state: only an implicit solver computes it. From a
                 # singular start the run itself will fail.

@@ -39,7 +39,7 @@ def placed_bodies(scene: Scene) -> list[Placed]:
     shaft = np.array([0.0, 1.0, 0.0])
     spin = rate * shaft
     bodies = [Placed("hub", geometry.hub_body(scene), rotor, 0.0, shaft, spin)]
-    for i in geometry.pitching(scene):
+    for i in geometry.movable_blades(scene):
         pitch, pitch_rate = scene.initial_angles[1 + i], scene.initial_rates[1 + i]
         about_shaft = rotor + scene.phases[i]
         axis = np.array([np.sin(about_shaft), 0.0, np.cos(about_shaft)])
@@ -60,7 +60,7 @@ def parts(scene: Scene, loads: Loads, node: str = "euler_parameters") -> list[Pa
             built += [mass, Part("load", f"gravity on {placed.name}", "LoadMassProportional", weight)]
     ground = _marker("ground", "at shaft", geometry.ALONG_SHAFT, np.zeros(3))
     built += _bearing("shaft bearing", ground, _on_body(hub, "at shaft", geometry.ALONG_SHAFT))
-    for i, blade in zip(geometry.pitching(scene), blades, strict=True):
+    for i, blade in zip(geometry.movable_blades(scene), blades, strict=True):
         seat = _on_body(hub, f"at bearing {i + 1}", geometry.mounting(i, len(scene.blades)))
         built += _bearing(f"pitch bearing {i + 1}", seat, _on_body(blade, "at bearing", np.eye(3)))
         built += _pitch_spring(scene, loads, i, seat.name, f"{blade.name} at bearing")
@@ -85,7 +85,7 @@ def parts(scene: Scene, loads: Loads, node: str = "euler_parameters") -> list[Pa
             built.append(sensor(f"{name} velocity", "SensorNode", "Velocity", nodeNumber=of_node))
     if scene.wants("tip"):
         for i, tip in enumerate(blade.tip for blade in scene.blades):
-            number, point = geometry.on_body(scene, i, tip)
+            number, point = geometry.body_of_point(scene, i, tip)
             body, position = Ref("object", bodies[number].name), list(point - bodies[number].body.com)
             built.append(sensor(f"tip {i + 1}", "SensorBody", "Position", bodyNumber=body, localPosition=position))
     if scene.wants("loads"):

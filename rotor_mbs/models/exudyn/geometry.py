@@ -73,7 +73,7 @@ def rotation_vector(p: Array) -> Array:
     return 2.0 * p[1:] if length == 0.0 else p[1:] * (2.0 * math.atan2(length, p[0]) / length)
 
 
-def pitching(scene: Scene) -> tuple[int, ...]:
+def movable_blades(scene: Scene) -> tuple[int, ...]:
     """Indices (from 0) of the blades that resist pitching; the others are rigidly part of the hub."""
     return tuple(i for i, blade in enumerate(scene.blades) if blade.has_pitch_inertia)
 
@@ -83,9 +83,9 @@ def fixed_blade_rotation(scene: Scene, index: int) -> Array:
     return mounting(index, len(scene.blades)) @ rotation_z(scene.initial_angles[1 + index])
 
 
-def on_body(scene: Scene, index: int, point: Sequence[float]) -> tuple[int, Array]:
+def body_of_point(scene: Scene, index: int, point: Sequence[float]) -> tuple[int, Array]:
     """Which body a point (3,) m of a blade is on, 0 for the hub, k for the k-th blade that pitches; (3,) m there."""
-    blades = pitching(scene)
+    blades = movable_blades(scene)
     if index in blades:
         return 1 + blades.index(index), np.array(point)
     return 0, fixed_blade_rotation(scene, index) @ np.array(point)

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -14,46 +15,60 @@ from rotor_mbs.models.exudyn.geometry import (
     Body,
     Part,
     Ref,
+    body_of_point,
     fixed_blade_rotation,
     mounting,
-    on_body,
-    pitching,
+    movable_blades,
     sensor,
 )
 from rotor_mbs.scenario.scene import Scene
-from rotor_mbs.scenario.time_table import Interval, Segment, is_constant, segments, values_before
+from rotor_mbs.scenario.time_table import ROTOR_TORQUE, Segment, is_constant, rest_place, torque_place, values_before
 from rotor_mbs.solution.quantities import named_loads
 from rotor_mbs.solution.trajectory import Array
 
-ROTOR = 0  # the rotor's torque in `Scene.load_tables`
+
+class PrescribedMoment(NamedTuple):
+    """A moment on a coordinate that is a factor times a load over time.
+
+    Attributes
+    ----------
+    coordinate : 0 for the rotor, then the pitches.
+    load : place of the load in `Scene.load_tables`.
+    factor : 1 for a torque, the spring's stiffness (N m/rad) for a rest angle (rad).
+    """
+
+    coordinate: int
+    load: int
+    factor: float
 
 
-def load_segments(scene: Scene) -> tuple[Segment, ...]:
-    """The whole run; the loads of a segment are those of `Scene.load_tables`."""
-    return segments(scene.load_tables, scene.duration)
+def prescribed_moments(scene: Scene) -> list[PrescribedMoment]:
+    """Return the moments that loads exert: torques, and k r of springs whose rest angle r changes over time.
 
-
-def drives(scene: Scene) -> list[tuple[int, int, float]]:
-    """What drives a coordinate (0: rotor): a factor times the load at a place in `Scene.load_tables`. Torques, and the
-    moments k r of springs whose rest angle r changes over time; one that is constant is the spring's own."""
-    all_drives = [(0, ROTOR, 1.0)] if scene.has_torque else []
-    for column in scene.moving_coordinates[1:]:
-        torque, rest = scene.pitch_loads[column - 1]
+    A rest angle that is constant is a parameter of the spring itself.
+    """
+    moments = []
+    if scene.has_torque:
+        moments.append(PrescribedMoment(0, ROTOR_TORQUE, 1.0))
+    for coordinate in scene.moving_coordinates[1:]:
+        torque, rest = scene.pitch_loads[coordinate - 1]
         if torque:
-            all_drives.append((column, 2 * column - 1, 1.0))
+            moments.append(PrescribedMoment(coordinate, torque_place(coordinate), 1.0))
         if not is_constant(rest):
-            all_drives.append((column, 2 * column, scene.bearings[column - 1][0]))
-    return all_drives
+            stiffness, _ = scene.bearings[coordinate - 1]
+            moments.append(PrescribedMoment(coordinate, rest_place(coordinate), stiffness))
+    return moments
 
 
 class Loads:
-    """The loads over time; `segment` is the one of the interval being integrated."""
+    """The loads of the interval that is being integrated, which the engine asks for by load functions."""
 
     def __init__(self, scene: Scene) -> None:
-        self.segment = load_segments(scene)[0]
+        self.segment = scene.load_segments[0]
 
-    def enter(self, interval: Interval) -> None:
-        self.segment = interval.segment
+    def set_segment(self, segment: Segment) -> None:
+        """Set the loads to those of a segment."""
+        self.segment = segment
 
 
 @dataclass(frozen=True)
@@ -77,12 +92,16 @@ class Moment:
 
 
 def moment_on(scene: Scene, loads: Loads, coordinate: int) -> Moment:
-    return Moment(loads, tuple((load, factor) for driven, load, factor in drives(scene) if driven == coordinate))
+    """Return the sum of the moments that loads exert on a coordinate (0: rotor)."""
+    moments = [moment for moment in prescribed_moments(scene) if moment.coordinate == coordinate]
+    return Moment(loads, tuple((moment.load, moment.factor) for moment in moments))
 
 
 def is_driven(scene: Scene, blade: int) -> bool:
-    """Whether a spring, a damper or a torque acts on the pitch of a blade."""
-    return any(scene.bearings[blade]) or any(driven == 1 + blade for driven, _, _ in drives(scene))
+    """Return whether a spring, a damper or a torque acts on the pitch of a blade (counted from 0)."""
+    if any(scene.bearings[blade]):
+        return True
+    return any(moment.coordinate == 1 + blade for moment in prescribed_moments(scene))
 
 
 # (name of a sensor) -> (samples, k) values
@@ -102,7 +121,7 @@ def _newton_euler(scene: Scene, i: int, sampled: Sampled) -> tuple[Array, Array,
     e_z), M = I α + ω × I ω + r × F, r the centre of mass, I the inertia about it."""
     blade, name = scene.blades[i], f"blade {i + 1} root"
     # From the blade's frame to the engine's body that it is, or, where it cannot pitch, is part of.
-    turned = np.eye(3) if i in pitching(scene) else fixed_blade_rotation(scene, i)
+    turned = np.eye(3) if i in movable_blades(scene) else fixed_blade_rotation(scene, i)
     frames = matrices(sampled(f"{name} rotation")) @ turned
     lifted = sampled(f"{name} acceleration") + np.array([0.0, 0.0, scene.gravity])
     force = blade.mass * _in_frames(frames, lifted)
@@ -121,11 +140,11 @@ def tree_loads(scene: Scene, time: Array, sampled: Sampled) -> dict[str, Array]:
     shaft_force = sum(_in_base(frames, force) for force, _, frames in blades)
     shaft_moment = sum(_in_base(frames, moment) for _, moment, frames in blades)
     assert isinstance(shaft_moment, np.ndarray)
-    shaft_moment[:, 1] -= values_before(load_segments(scene), time)[ROTOR]
+    shaft_moment[:, 1] -= values_before(scene.load_segments, time)[ROTOR_TORQUE]
     if scene.hub_inertia:
         shaft_moment[:, 1] += scene.hub_inertia * sampled("hub spin rate")[:, 1]
     actuators = np.zeros((len(time), len(blades)))
-    for i in pitching(scene):
+    for i in movable_blades(scene):
         actuators[:, i] = blades[i][1][:, 2]
     roots = ((force, moment) for force, moment, _ in blades)
     return named_loads(roots, np.asarray(shaft_force), shaft_moment, actuators)
@@ -134,7 +153,7 @@ def tree_loads(scene: Scene, time: Array, sampled: Sampled) -> dict[str, Array]:
 def tree_sensors(scene: Scene, on_link: Callable[[str, str, int, Array], Part]) -> list[Part]:
     sensors = []
     for i, blade in enumerate(scene.blades):
-        place = on_body(scene, i, blade.centre_of_mass)
+        place = body_of_point(scene, i, blade.centre_of_mass)
         sensors += [on_link(name, output, *place) for name, output in _motion_outputs(scene, i).items()]
     if scene.hub_inertia:
         sensors.append(on_link("hub spin rate", "AngularAccelerationLocal", 0, np.zeros(3)))
@@ -145,10 +164,10 @@ def chain_sensors(scene: Scene, hub: Body) -> list[Part]:
     """What `chain_loads` reads beside the rotations: joints, connectors, and blades that are part of the hub."""
     sensors = _joint_sensors("shaft bearing", "shaft damper" if scene.shaft_damping else "")
     for i in range(len(scene.blades)):
-        if i in pitching(scene):
+        if i in movable_blades(scene):
             sensors += _joint_sensors(f"pitch bearing {i + 1}", f"pitch spring {i + 1}" if is_driven(scene, i) else "")
             continue
-        point = list(on_body(scene, i, scene.blades[i].centre_of_mass)[1] - hub.com)
+        point = list(body_of_point(scene, i, scene.blades[i].centre_of_mass)[1] - hub.com)
         for name, output in _motion_outputs(scene, i).items():
             sensors.append(sensor(name, "SensorBody", output, bodyNumber=Ref("object", "hub"), localPosition=point))
     return sensors
@@ -168,7 +187,7 @@ def chain_loads(scene: Scene, sampled: Sampled) -> dict[str, Array]:
     hub = matrices(sampled("hub rotation"))
     roots, actuators = [], np.zeros((len(hub), len(scene.blades)))
     for i in range(len(scene.blades)):
-        if i not in pitching(scene):
+        if i not in movable_blades(scene):
             roots.append(_newton_euler(scene, i, sampled)[:2])
             continue
         frames = matrices(sampled(f"blade {i + 1} rotation"))

@@ -8,10 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor_mbs.models.exudyn import chain, tree
-from rotor_mbs.models.exudyn.geometry import Body, mounting, pitching
-from rotor_mbs.models.exudyn.loads import ROTOR, chain_loads, drives, load_segments, matrices, tree_loads
+from rotor_mbs.models.exudyn.geometry import Body, mounting, movable_blades
+from rotor_mbs.models.exudyn.loads import chain_loads, matrices, prescribed_moments, tree_loads
 from rotor_mbs.scenario.scene import Scene
-from rotor_mbs.scenario.time_table import Segment, is_constant, values_at
+from rotor_mbs.scenario.time_table import ROTOR_TORQUE, Segment, is_constant, values_at
 from rotor_mbs.solution.trajectory import Array, Trajectory, all_coordinates, finite_rows, finite_samples, sample_times
 
 # Points of the local polynomial that stands in for the power between rows.
@@ -82,7 +82,7 @@ def _joint_motion(scene: Scene, read: _Reader) -> tuple[Array, Array]:
     hub, rates = matrices(read.all("hub rotation")), joint_rates(scene, read.all)
     wrapped = np.arctan2(hub[:, 0, 2] - hub[:, 2, 0], hub[:, 0, 0] + hub[:, 2, 2])
     angles = [unwrap(read.time, wrapped, rates[:, 0], scene.initial_angles[0])]
-    for column, i in enumerate(pitching(scene), start=1):
+    for column, i in enumerate(movable_blades(scene), start=1):
         x, y, _ = np.moveaxis(matrices(read.all(f"blade {i + 1} rotation")), 2, 0)
         seat_x, seat_y = hub @ mounting(i, len(scene.blades))[:, 0], hub[:, :, 1]
         wrapped = np.arctan2(_dot(seat_y, x) - _dot(seat_x, y), _dot(seat_x, x) + _dot(seat_y, y))
@@ -95,7 +95,7 @@ def joint_rates(scene: Scene, values: Callable[[str], Array]) -> Array:
     hub, hub_spin = matrices(values("hub rotation")), values("hub spin")
     hub_omega = (hub @ hub_spin[:, :, None])[:, :, 0]
     rates = [hub_spin[:, 1]]
-    for i in pitching(scene):
+    for i in movable_blades(scene):
         z = matrices(values(f"blade {i + 1} rotation"))[:, :, 2]
         rates.append(values(f"blade {i + 1} spin")[:, 2] - _dot(hub_omega, z))
     return np.stack(rates, axis=1)
@@ -148,7 +148,7 @@ def springs(scene: Scene, angles: Array) -> tuple[Array, Array]:
     """(n,) J at the first n samples: energy ½ k (θ - r)² of the springs, and what `work` leaves out of the work -∫ k (θ
     - r) dr of rest angles r that move, jumps included: the change of ½ k r (r - 2θ); `work` has ∫ k r dθ."""
     energy, of_rests = np.zeros((2, len(angles)))
-    for i in pitching(scene):
+    for i in movable_blades(scene):
         stiffness, table = scene.bearings[i][0], scene.pitch_loads[i][1]
         if stiffness:
             rest = values_at(table, sample_times(scene)[: len(angles)])
@@ -163,15 +163,17 @@ def work(scene: Scene, time: Array, angles: Array, rates: Array) -> Array:
     """(n,) J of the torques less what the dampers took, from all rows, samples among them: s, rad, rad/s. A spring
     whose rest angle r changes counts as one that is unloaded at 0 and a torque k r; see `springs`."""
     if not scene.work_needs_path:
-        turned, torques = angles - angles[:1], load_segments(scene)[0].values
-        exact: Array = torques[ROTOR] * turned[:, 0]
-        for column, load, _ in drives(scene):
-            exact = exact + torques[load] * turned[:, column] if column else exact
+        # All loads are constant and nothing is damped: torque times angle, exact.
+        turned, torques = angles - angles[:1], scene.load_segments[0].values
+        exact: Array = torques[ROTOR_TORQUE] * turned[:, 0]
+        for moment in prescribed_moments(scene):
+            if moment.coordinate:
+                exact = exact + torques[moment.load] * turned[:, moment.coordinate]
         return exact
 
     out, done = np.zeros(len(time)), 0.0
     slack = 1e-9 * scene.duration / (scene.samples - 1)
-    for segment in load_segments(scene):
+    for segment in scene.load_segments:
         first, last = np.searchsorted(time, [segment.start - slack, segment.end + slack])
         if last - first < 2:
             break
@@ -185,8 +187,8 @@ def work(scene: Scene, time: Array, angles: Array, rates: Array) -> Array:
 def power(scene: Scene, segment: Segment, time: Array, rates: Array) -> Array:
     """(n,) W of what `work` is the integral of; rates: (n, 1 + blades) rad/s."""
     drawn: Array = -(rates**2) @ np.array(scene.dampings)
-    for column, load, factor in drives(scene):
-        drawn = drawn + factor * segment.at(load, time) * rates[:, column]
+    for coordinate, load, factor in prescribed_moments(scene):
+        drawn = drawn + factor * segment.at(load, time) * rates[:, coordinate]
     return drawn
 
 

@@ -14,7 +14,7 @@ from rotor_mbs.methods.time_limit import MESSAGE, is_over, polled
 from rotor_mbs.models.exudyn import chain, sensor_samples, tree
 from rotor_mbs.models.exudyn.adapter import System
 from rotor_mbs.models.exudyn.geometry import Part
-from rotor_mbs.models.exudyn.loads import Loads, load_segments
+from rotor_mbs.models.exudyn.loads import Loads
 from rotor_mbs.models.exudyn.schemes import ExtrapolatedSettings, Scheme, SchemeSettings
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.scenario.time_table import Interval, intervals
@@ -76,7 +76,7 @@ class ExtrapolatedSolver:
         self._scene, self._scheme, self._loads = scene, scheme, Loads(scene)
         self._least_error = max(tolerance, _ROUNDING)
         self._newton_tolerance = float(str(scheme.options["newton.relativeTolerance"]))
-        self._intervals = intervals(load_segments(scene), scene.samples, every_sample=True)
+        self._intervals = intervals(scene.load_segments, scene.samples, every_sample=True)
         # Dampers and loads over time want it along the path: it is extrapolated with the state.
         self._integrates_work = scene.work_needs_path
         parts = chain.parts(scene, self._loads)
@@ -103,14 +103,14 @@ class ExtrapolatedSolver:
         self._total = Integration(True)
         self._halvings, self.columns, self.kept = 0, [], []
         first = self._intervals[0]
-        self._loads.enter(first)
+        self._loads.set_segment(first.segment)
         self.system.begin(self._scheme, with_rows=self._integrates_work)
         self._keep(first.start, first, *self.system.initial_values(first.start), 0.0)
         failure = ""
         with polled():
             for interval in self._intervals:
                 if interval.segment is not self._loads.segment:
-                    self._loads.enter(interval)
+                    self._loads.set_segment(interval.segment)
                     self.system.start_from(*self.system.initial_values(interval.start))
                 failure = self._cross(interval, interval.start, interval.end, 0)
                 if failure:
@@ -205,7 +205,7 @@ class ExtrapolatedSolver:
         """What the sensors read of each state, under the load before a jump."""
         tables: dict[str, list[Array]] = {name: [] for name in self.system.sensors}
         for kept in self.kept:
-            self._loads.enter(kept.interval)
+            self._loads.set_segment(kept.interval.segment)
             for name, read in self.system.read(kept.time, kept.values, kept.turns).items():
                 tables[name].append(np.concatenate([[kept.time], read]))
         rows = {name: np.array(table) for name, table in tables.items()}
@@ -230,11 +230,11 @@ class MultibodySolver:
     ) -> None:
         self._scene, self._loads, self._scheme, self._reading = scene, loads, scheme, reading
         self._rows_between = rows_between
-        self._intervals = intervals(load_segments(scene), scene.samples, every_sample=scheme.step is None)
+        self._intervals = intervals(scene.load_segments, scene.samples, every_sample=scheme.step is None)
         self.system = System(parts)
 
     def integrate(self) -> Integration:
-        return self.system.integrate(self._scheme, self._intervals, self._rows_between, self._loads.enter)
+        return self.system.integrate(self._scheme, self._intervals, self._rows_between, self._loads.set_segment)
 
     def observe(self) -> Trajectory:
         # A diverging state may overflow in its energies; the rows are cut where they stop being finite.

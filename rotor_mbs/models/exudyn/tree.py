@@ -6,7 +6,17 @@ import numpy as np
 
 from rotor_mbs.methods.base import BuiltItem
 from rotor_mbs.models.exudyn import geometry
-from rotor_mbs.models.exudyn.geometry import Body, Part, Ref, blade_body, hub_body, mounting, on_body, pitching, sensor
+from rotor_mbs.models.exudyn.geometry import (
+    Body,
+    Part,
+    Ref,
+    blade_body,
+    body_of_point,
+    hub_body,
+    mounting,
+    movable_blades,
+    sensor,
+)
 from rotor_mbs.models.exudyn.loads import Loads, moment_on, tree_sensors
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.scenario.time_table import constant_value, is_constant
@@ -43,7 +53,7 @@ def parts(scene: Scene, loads: Loads) -> list[Part]:
     ]
     if scene.wants("tip"):
         for i, blade in enumerate(scene.blades):
-            built.append(_link_sensor(f"tip {i + 1}", "Position", *on_body(scene, i, blade.tip)))
+            built.append(_link_sensor(f"tip {i + 1}", "Position", *body_of_point(scene, i, blade.tip)))
     if scene.wants("energy"):
         for link, body in enumerate(bodies(scene)):
             name = link_name(link)
@@ -63,7 +73,7 @@ def items(scene: Scene) -> list[BuiltItem]:
 
 def bodies(scene: Scene) -> list[Body]:
     """The links in order: hub, then the blades that pitch."""
-    return [hub_body(scene), *(blade_body(scene.blades[i]) for i in pitching(scene))]
+    return [hub_body(scene), *(blade_body(scene.blades[i]) for i in movable_blades(scene))]
 
 
 def link_name(link: int) -> str:
@@ -71,7 +81,7 @@ def link_name(link: int) -> str:
 
 
 def _tree(scene: Scene) -> Part:
-    blades, links = pitching(scene), bodies(scene)
+    blades, links = movable_blades(scene), bodies(scene)
     parameters: dict[str, object] = {
         "nodeNumber": _NODE,
         "jointTypes": ["RevoluteY", *("RevoluteZ" for _ in blades)],

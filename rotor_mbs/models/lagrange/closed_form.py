@@ -17,6 +17,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from rotor_mbs.models.lagrange.parameters import BladeForm, Number, RotorForm
+from rotor_mbs.scenario.time_table import ROTOR_TORQUE, rest_place, torque_place
 
 Function = Callable[[Any], Any]
 Accelerations = Callable[..., list[Number]]  # `accelerations`, or other equations in their place
@@ -31,10 +32,19 @@ class LoadValues:
     rests: Sequence[Number] = ()  # (form.blades,) rad, at which the bearings' springs are unloaded; () for 0
 
 
-def load_values(values: Sequence[Any]) -> LoadValues:
-    """From one number for each of `parameters.load_tables`."""
-    blades = len(values) // 2
-    return LoadValues(values[0], values[1 : 1 + blades], values[1 + blades :])
+def load_values(values: Sequence[Any], pitches: Sequence[int]) -> LoadValues:
+    """Return the loads of the coordinates that move.
+
+    Parameters
+    ----------
+    values : one number, or array over time, for each of `Scene.load_tables`: N m and rad.
+    pitches : the coordinates of the pitches that move, `Scene.moving_coordinates[1:]`.
+    """
+    return LoadValues(
+        values[ROTOR_TORQUE],
+        [values[torque_place(pitch)] for pitch in pitches],
+        [values[rest_place(pitch)] for pitch in pitches],
+    )
 
 
 def accelerations(

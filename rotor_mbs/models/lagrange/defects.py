@@ -16,7 +16,7 @@ from rotor_mbs.models.lagrange import closed_form
 from rotor_mbs.models.lagrange.closed_form import Accelerations
 from rotor_mbs.models.lagrange.heyoka_adapter import is_available
 from rotor_mbs.models.lagrange.ode_solvers import OdeSolver, scipy_integrator
-from rotor_mbs.models.lagrange.parameters import load_segments, rate_units, resting_pitches, rotor_form
+from rotor_mbs.models.lagrange.parameters import rate_units, resting_pitches, rotor_form
 from rotor_mbs.models.lagrange.samples import loads_at, sampled_loads
 from rotor_mbs.models.lagrange.taylor import Propagation, is_compact
 from rotor_mbs.scenario.scene import Scene
@@ -191,7 +191,7 @@ def interval_ends(scene: Scene, begins: Array, ends: Array, states: Array) -> Ar
     (n, m)
         NaN where it does not get there.
     """
-    segments = load_segments(scene)
+    segments = scene.load_segments
     advance = (_advance_by_taylor if is_available() else _advance_by_dop853)(scene, states.shape[1])
     reached_states = states.astype(float)
     place = 0
@@ -223,7 +223,7 @@ def _advance_by_taylor(scene: Scene, count: int) -> _Advance:
     def advance(segment: Segment, start: float, end: float, values: Array) -> Array:
         if not entered or entered[-1] is not segment:
             entered[:] = [segment]
-            propagation.enter(segment)
+            propagation.set_segment(segment)
         integrator.time = start
         state[:count] = values
         state[count:] = 0.0  # the work, where it is a variable
@@ -240,7 +240,7 @@ def _advance_by_dop853(scene: Scene, _: int) -> _Advance:
     solver = OdeSolver(replace(scene, outputs=("angles", "rates")), integrator)
 
     def advance(segment: Segment, start: float, end: float, values: Array) -> Array:
-        part = solver.advance(Segment(start, end, segment.lines), values, np.empty(0))
+        part = solver.advance(Segment(start, end, segment.linear_loads), values, np.empty(0))
         return np.full(len(values), np.nan) if part.message else part.end
 
     return advance

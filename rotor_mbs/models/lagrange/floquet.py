@@ -16,7 +16,7 @@ from rotor_mbs.models.lagrange import closed_form
 from rotor_mbs.models.lagrange.closed_form import load_values
 from rotor_mbs.models.lagrange.heyoka_adapter import Parameters, array_of, failure, heyoka
 from rotor_mbs.models.lagrange.linearization import holding_torque, linearize, slopes, steady_rotation
-from rotor_mbs.models.lagrange.parameters import load_tables, rotor_form
+from rotor_mbs.models.lagrange.parameters import rotor_form
 from rotor_mbs.models.lagrange.samples import loads_at_start
 from rotor_mbs.models.lagrange.taylor import compiled, state_symbols
 from rotor_mbs.scenario.scene import Scene
@@ -115,10 +115,10 @@ class _Variational:
         parameters = Parameters()
         form = rotor_form(scene, parameters)
         self.coordinates = 1 + len(form.blades)
-        pitch_loads = [parameters(Fraction(value_at(table, 0.0))) for table in load_tables(scene)[1:]]
+        pitch_loads = [parameters(Fraction(value_at(table, 0.0))) for table in scene.load_tables[1:]]
         torque = parameters.own(Fraction(0))
         angles, rates = state_symbols(form)
-        loads = load_values([torque, *pitch_loads])
+        loads = load_values([torque, *pitch_loads], scene.moving_coordinates[1:])
         accelerations = closed_form.accelerations(angles, rates, form, loads, engine.sin, engine.cos)
         symbols = [*angles, *rates]
         equations = [*zip(symbols, [*rates, *accelerations], strict=True)]

@@ -12,7 +12,7 @@ from rotor_mbs.methods.time_limit import OutOfTimeError
 from rotor_mbs.models import ode45 as matlab
 from rotor_mbs.models.lagrange import closed_form, samples
 from rotor_mbs.models.lagrange.closed_form import load_values
-from rotor_mbs.models.lagrange.parameters import changing_loads, load_segments, rotor_form
+from rotor_mbs.models.lagrange.parameters import changing_rests, rotor_form
 from rotor_mbs.models.lagrange.samples import Advance, at_constant_rests, loads_at_start, over_segments
 from rotor_mbs.models.ode45 import RightHandSide
 from rotor_mbs.scenario.scene import Scene
@@ -29,7 +29,7 @@ class OdeSolver:
     def __init__(self, scene: Scene, integrator: Integrator, times: Array | None = None) -> None:
         self._scene, self._integrator = scene, integrator
         self._form = rotor_form(scene)
-        self._segments = load_segments(scene)
+        self._segments = scene.load_segments
         self._work_unit = work_unit(scene) if scene.work_needs_path else 0.0
         columns = scene.moving_coordinates
         start = [np.array(scene.initial_angles)[columns], np.array(scene.initial_rates)[columns]]
@@ -48,13 +48,13 @@ class OdeSolver:
         """d/dt of (angles, rates[, work]) on plain floats: for a handful of blades faster than arrays."""
         form, work_unit = self._form, self._work_unit
         count = 1 + len(form.blades)
-        changing = changing_loads(self._scene)
-        constant = None if any(segment.slopes) else load_values(segment.values)
+        changing, pitches = changing_rests(self._scene), self._scene.moving_coordinates[1:]
+        constant = None if any(segment.slopes) else load_values(segment.values, pitches)
 
         def derivative(time: float, state: Sequence[float]) -> list[float]:
             values = state.tolist() if isinstance(state, np.ndarray) else state
             angles, rates = values[:count], values[count : 2 * count]
-            loads = constant or load_values(segment.loads_at(time))
+            loads = constant or load_values(segment.loads_at(time), pitches)
             try:
                 accelerations = closed_form.accelerations(angles, rates, form, loads, math.sin, math.cos)
             except (ZeroDivisionError, ValueError, OverflowError):

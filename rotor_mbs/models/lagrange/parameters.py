@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from rotor_mbs.scenario.scene import Blade, Scene
-from rotor_mbs.scenario.time_table import Segment, Table, is_constant, segments
+from rotor_mbs.scenario.time_table import is_constant
 from rotor_mbs.solution.trajectory import Array
 
 # A number of whatever kind the equations are to be evaluated in: float, quad precision, symbolic parameter.
@@ -142,28 +142,24 @@ def _cosine_of_turn(turn: Fraction) -> Fraction:
     return Fraction(total, _FIXED_POINT).limit_denominator(10**50)
 
 
-def load_tables(scene: Scene) -> tuple[Table, ...]:
-    """Loads over time: rotor torque, then the torque of each pitch that moves, then the rest angle of each."""
-    pitches = [scene.pitch_loads[column - 1] for column in scene.moving_coordinates[1:]]
-    return (scene.rotor_torque, *(torque for torque, _ in pitches), *(rest for _, rest in pitches))
-
-
 def changing_loads(scene: Scene) -> tuple[int, ...]:
-    return tuple(i for i, table in enumerate(load_tables(scene)) if not is_constant(table))
+    """Return the places in `Scene.load_tables` of the loads that change over time."""
+    return tuple(i for i, table in enumerate(scene.load_tables) if not is_constant(table))
 
 
-def load_segments(scene: Scene) -> tuple[Segment, ...]:
-    """The whole run; the loads of a segment are those of `load_tables`."""
-    return segments(load_tables(scene), scene.duration)
+def changing_rests(scene: Scene) -> tuple[bool, ...]:
+    """Return for each pitch that moves whether the rest angle of its spring changes over time."""
+    rests = [scene.pitch_loads[coordinate - 1][1] for coordinate in scene.moving_coordinates[1:]]
+    return tuple(not is_constant(rest) for rest in rests)
 
 
 def resting_pitches(scene: Scene) -> tuple[int, ...]:
     """Coordinates of the pitches that the equations leave at zero for ever: started there at rest, without a load, of a
     blade whose mass and inertia are symmetric about its x-z plane."""
-    form, tables = rotor_form(scene, Fraction), load_tables(scene)
+    form = rotor_form(scene, Fraction)
     resting = []
-    for i, (column, blade) in enumerate(zip(scene.moving_coordinates[1:], form.blades, strict=True)):
-        torque, rest = tables[1 + i], tables[1 + len(form.blades) + i]
+    for column, blade in zip(scene.moving_coordinates[1:], form.blades, strict=True):
+        torque, rest = scene.pitch_loads[column - 1]
         loads = [value for _, value in torque] + [value for _, value in rest if blade.stiffness]
         asymmetry = blade.weight_y, blade.half_slope_cs, blade.coupling_c
         if not any([scene.initial_angles[column], scene.initial_rates[column], *loads, *asymmetry]):

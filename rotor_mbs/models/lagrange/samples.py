@@ -20,14 +20,21 @@ from rotor_mbs.models.lagrange.closed_form import Function, LoadValues, load_val
 from rotor_mbs.models.lagrange.heyoka_adapter import quad_arithmetic
 from rotor_mbs.models.lagrange.parameters import (
     Convert,
-    changing_loads,
-    load_segments,
-    load_tables,
+    changing_rests,
     phase_of,
     rotor_form,
 )
 from rotor_mbs.scenario.scene import Blade, Scene
-from rotor_mbs.scenario.time_table import Segment, is_constant, value_at, values_at, values_before
+from rotor_mbs.scenario.time_table import (
+    ROTOR_TORQUE,
+    Segment,
+    is_constant,
+    rest_place,
+    torque_place,
+    value_at,
+    values_at,
+    values_before,
+)
 from rotor_mbs.solution.quantities import named_loads
 from rotor_mbs.solution.trajectory import Array, Integration, Trajectory, all_coordinates, finite_rows
 
@@ -104,7 +111,7 @@ def _energies(scene: Scene, time: Array, all_angles: Array, all_rates: Array, st
         else:
             work = states[:, 2 * len(columns)]
             # What `closed_form.power` leaves out of the work of rest angles that move.
-            rests = at_constant_rests(changing_loads(scene), loads).rests
+            rests = at_constant_rests(changing_rests(scene), loads).rests
             energy = closed_form.rest_energy(angles, form, rests)
             if isinstance(energy, np.ndarray):
                 work = work + (energy - energy[0])
@@ -113,19 +120,22 @@ def _energies(scene: Scene, time: Array, all_angles: Array, all_rates: Array, st
 
 def loads_at(scene: Scene, time: Array) -> LoadValues:
     """Loads at (n,) s: numbers where they are constant, else (n,) arrays; at a jump, the values after it."""
-    tables = load_tables(scene)
-    return load_values([value_at(table, 0.0) if is_constant(table) else values_at(table, time) for table in tables])
+    values: list[Any] = []
+    for table in scene.load_tables:
+        values.append(value_at(table, 0.0) if is_constant(table) else values_at(table, time))
+    return load_values(values, scene.moving_coordinates[1:])
 
 
 def loads_at_start(scene: Scene, torque: float = 0.0) -> LoadValues:
     """Numbers: loads of the pitches at t = 0, with `torque` (N m) on the rotor in place of the scene's."""
-    return load_values([torque, *(value_at(table, 0.0) for table in load_tables(scene)[1:])])
+    values = [value_at(table, 0.0) for table in scene.load_tables]
+    values[ROTOR_TORQUE] = torque
+    return load_values(values, scene.moving_coordinates[1:])
 
 
-def at_constant_rests(changing: Sequence[int], loads: LoadValues) -> LoadValues:
-    """`loads` without the rest angles that are constant, which do no work; changing: as of `changing_loads`."""
-    first = 1 + len(loads.pitches)
-    rests = [rest if first + i in changing else 0.0 for i, rest in enumerate(loads.rests)]
+def at_constant_rests(changing: Sequence[bool], loads: LoadValues) -> LoadValues:
+    """`loads` without the rest angles that are constant, which do no work; changing: as of `changing_rests`."""
+    rests = [rest if changes else 0.0 for rest, changes in zip(loads.rests, changing, strict=True)]
     return LoadValues(loads.rotor, loads.pitches, rests)
 
 
@@ -173,16 +183,16 @@ def quad_loads(scene: Scene, times: Array, states: Any) -> dict[str, Array]:
 def _loads(
     scene: Scene, times: Array, angles: Numbers, rates: Numbers, convert: Convert, sin: Function, cos: Function
 ) -> dict[str, Array]:
-    moving, applied = scene.moving_coordinates, values_before(load_segments(scene), times)
+    moving, applied = scene.moving_coordinates, values_before(scene.load_segments, times)
     accelerations = np.zeros_like(angles)
-    of_moving = closed_form.accelerations(
-        angles[:, moving].T, rates[:, moving].T, rotor_form(scene, convert), load_values(list(applied)), sin, cos
-    )
+    form, loads = rotor_form(scene, convert), load_values(list(applied), moving[1:])
+    of_moving = closed_form.accelerations(angles[:, moving].T, rates[:, moving].T, form, loads, sin, cos)
     for column, values in zip(moving, of_moving, strict=True):
         accelerations[:, column] = values
     actuators = np.zeros_like(angles[:, 1:])
-    for i, column in enumerate(moving[1:], start=1):
-        (stiffness, damping), torque, rest = scene.bearings[column - 1], applied[i], applied[len(moving) - 1 + i]
+    for column in moving[1:]:
+        stiffness, damping = scene.bearings[column - 1]
+        torque, rest = applied[torque_place(column)], applied[rest_place(column)]
         actuators[:, column - 1] = torque - stiffness * (angles[:, column] - rest) - damping * rates[:, column]
     sin_q, cos_q = sin(angles[:, 0]), cos(angles[:, 0])
     roots, in_base = [], []
@@ -194,7 +204,7 @@ def _loads(
         roots.append(root_load(blade, azimuth, pitch, turning, scene.gravity))
         in_base.append([_in_base_frame(vectors, azimuth, pitch) for vectors in roots[-1]])
     shaft_force, shaft_moment = (sum(vectors) for vectors in zip(*in_base, strict=True))
-    shaft_moment[:, 1] += scene.hub_inertia * accelerations[:, 0] - applied[0]
+    shaft_moment[:, 1] += scene.hub_inertia * accelerations[:, 0] - applied[ROTOR_TORQUE]
     return named_loads(roots, shaft_force, shaft_moment, actuators)
 
 

@@ -16,7 +16,7 @@ from rotor_mbs.models import equation_items
 from rotor_mbs.models.lagrange import closed_form, hamilton, samples
 from rotor_mbs.models.lagrange.closed_form import LoadValues, load_values
 from rotor_mbs.models.lagrange.heyoka_adapter import Parameters, array_of, failure, heyoka
-from rotor_mbs.models.lagrange.parameters import RotorForm, changing_loads, load_segments, rotor_form
+from rotor_mbs.models.lagrange.parameters import RotorForm, changing_loads, changing_rests, rotor_form
 from rotor_mbs.models.lagrange.samples import Advance, at_constant_rests, over_segments
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.scenario.time_table import Segment
@@ -42,7 +42,7 @@ def build_system(scene: Scene, *, in_momenta: bool = False) -> tuple[list[tuple[
         derivatives = closed_form.accelerations(angles, rates, form, loads, engine.sin, engine.cos)
     equations = [*zip(angles, rates, strict=True), *zip(others, derivatives, strict=True)]
     if scene.work_needs_path:
-        working = at_constant_rests(changing_loads(scene), loads)
+        working = at_constant_rests(changing_rests(scene), loads)
         equations.append((engine.make_vars("work"), closed_form.power(rates, form, working)))
     return equations, parameters
 
@@ -57,12 +57,12 @@ def state_symbols(form: RotorForm) -> tuple[list[Any], list[Any]]:
 def equation_numbers(scene: Scene, parameters: Parameters) -> tuple[RotorForm, LoadValues]:
     """Form and loads; takes the scene's numbers into `parameters`, in the order that integrators have them."""
     form = rotor_form(scene, parameters)
-    lines, changing = load_segments(scene)[0].lines, changing_loads(scene)
-    values = [0.0 if i in changing else parameters(offset) for i, (offset, _) in enumerate(lines)]
+    linear_loads, changing = scene.load_segments[0].linear_loads, changing_loads(scene)
+    values = [0.0 if i in changing else parameters(offset) for i, (offset, _) in enumerate(linear_loads)]
     for i in changing:
-        offset, slope = lines[i]
+        offset, slope = linear_loads[i]
         values[i] = parameters.own(offset) + parameters.own(slope) * heyoka().time
-    return form, load_values(values)
+    return form, load_values(values, scene.moving_coordinates[1:])
 
 
 _compiled: dict[tuple[object, ...], Any] = {}
@@ -115,7 +115,7 @@ class Propagation:
         self.integrator = compiled(key, lambda: engine.taylor_adaptive(equations, state=start, **options))
         set_parameters(self.integrator, array_of(parameters.values, quad=quad))
         self._initial = np.concatenate([start, np.eye(count).ravel()]) if variational else start
-        self._segments = load_segments(scene)
+        self._segments = scene.load_segments
         self.times = sample_times(scene) if times is None else times
         self.states = self._initial[None, :]
 
@@ -125,16 +125,16 @@ class Propagation:
         self.states, integration = over_segments(self.times, self._segments, self._initial, self._advance)
         return integration
 
-    def enter(self, segment: Segment) -> None:
-        """The loads from now on are those of the segment."""
+    def set_segment(self, segment: Segment) -> None:
+        """Set the loads to those of a segment."""
         if self._changing:
-            numbers = [number for i in self._changing for number in segment.lines[i]]
+            numbers = [number for i in self._changing for number in segment.linear_loads[i]]
             self.integrator.pars[-len(numbers) :] = array_of(numbers, quad=self._initial.dtype != np.float64)
 
     def _advance(self, segment: Segment, _state: Array, times: Array) -> Advance:
         """From where the integrator is, the end of the segment before."""
         integrator, kind = self.integrator, self._initial.dtype
-        self.enter(segment)
+        self.set_segment(segment)
         end = [] if len(times) and times[-1] == segment.end else [segment.end]
         grid = np.concatenate([[segment.start], times, end]).astype(kind)
         with time_limit.polled():

@@ -26,7 +26,15 @@ import numpy as np
 
 from rotor_mbs.methods.base import BuiltItem
 from rotor_mbs.scenario.scene import Scene
-from rotor_mbs.scenario.time_table import Segment, Table, constant_value, is_constant, segments, steps_and_rows
+from rotor_mbs.scenario.time_table import (
+    ROTOR_TORQUE,
+    Segment,
+    constant_value,
+    is_constant,
+    rest_place,
+    steps_and_rows,
+    torque_place,
+)
 
 LEAST = 2e-15  # kg, kg m²
 
@@ -36,29 +44,47 @@ _FILE_STEP = 2.5e-4  # s, the largest time step of a file: the default of mujoco
 
 @dataclass(frozen=True)
 class Load:
-    """A moment `gain` times a table over time, on a coordinate (0 = rotor)."""
+    """An actuator: a moment on a coordinate that is a gain times a load over time.
+
+    Attributes
+    ----------
+    name : of the actuator.
+    coordinate : 0 for the rotor, then the pitches.
+    gain : 1, or the stiffness (N m/rad) of a spring whose rest angle (rad) changes over time.
+    place : of the load in `Scene.load_tables`.
+    """
 
     name: str
     coordinate: int
-    gain: float  # 1, or the stiffness (N m/rad) of a spring whose rest angle (rad) changes over time
-    table: Table
+    gain: float
+    place: int
+
+    def activation(self, segment: Segment, time: float) -> float:
+        """Return the load (N m or rad) at a time (s) of a segment."""
+        return segment.at(self.place, time)
+
+    def control(self, segment: Segment) -> float:
+        """Return the slope of the load (per s) on a segment."""
+        return segment.slopes[self.place]
 
 
 def loads_of(scene: Scene) -> list[Load]:
-    """Torque on the rotor, torques of the pitches that move, rest angles that change over time, as far as there are."""
-    loads = [Load("torque rotor", 0, 1.0, scene.rotor_torque)] if scene.has_torque else []
+    """Return the actuators of a scene: as many as it has loads of these kinds.
+
+    First the torque on the rotor, then for each pitch that moves its torque, and the rest angle of
+    its spring where that changes over time.
+    """
+    loads = []
+    if scene.has_torque:
+        loads.append(Load("torque rotor", 0, 1.0, ROTOR_TORQUE))
     for number in scene.moving_coordinates[1:]:
         torque, rest = scene.pitch_loads[number - 1]
         if torque:
-            loads.append(Load(f"torque pitch {number}", number, 1.0, torque))
+            loads.append(Load(f"torque pitch {number}", number, 1.0, torque_place(number)))
         if not is_constant(rest):
-            loads.append(Load(f"rest pitch {number}", number, scene.bearings[number - 1][0], rest))
+            stiffness, _ = scene.bearings[number - 1]
+            loads.append(Load(f"rest pitch {number}", number, stiffness, rest_place(number)))
     return loads
-
-
-def load_segments(scene: Scene) -> tuple[Segment, ...]:
-    """The whole run; the loads of a segment are those of `loads_of`: activations, and their slopes."""
-    return segments([load.table for load in loads_of(scene)], scene.duration)
 
 
 def joint_name(coordinate: int) -> str:
@@ -167,8 +193,8 @@ def mjcf_file(scene: Scene) -> str:
     capsules to look at."""
     spacing = scene.duration / (scene.samples - 1)
     steps, _ = steps_and_rows(spacing, _FILE_STEP, rows_between=False)
-    root, has_loads = model(scene, "rk4", spacing / steps), bool(loads_of(scene))
-    root.insert(0, ET.Comment(_header(scene, steps, has_loads)))
+    root, loads = model(scene, "rk4", spacing / steps), loads_of(scene)
+    root.insert(0, ET.Comment(_header(scene, steps, bool(loads))))
     # A capsule from the hub to each tip, without mass or contact.
     reach = max(math.hypot(*blade.tip) for blade in scene.blades)
     bodies = {body.get("name"): body for body in root.iter("body")}
@@ -178,18 +204,21 @@ def mjcf_file(scene: Scene) -> str:
                 bodies[f"blade {number}"], "geom", type="capsule", fromto=numbers(0.0, 0.0, 0.0, *blade.tip),
                 size=numbers(0.01 * reach), mass="0", contype="0", conaffinity="0",
             )  # fmt: skip
-    pieces, moving = load_segments(scene), scene.moving_coordinates
-    if has_loads:
-        custom = ET.SubElement(root, "custom")
-        for number, piece in enumerate(pieces, start=1):
-            data = numbers(piece.start, *piece.values, *piece.slopes)
-            ET.SubElement(custom, "numeric", name=f"segment {number}", data=data)
-    key = ET.SubElement(ET.SubElement(root, "keyframe"), "key", name="start")
+    moving = scene.moving_coordinates
+    key = ET.Element("key", name="start")
     key.set("qpos", numbers(*(scene.initial_angles[i] for i in moving)))
     key.set("qvel", numbers(*(scene.initial_rates[i] for i in moving)))
-    if has_loads:
-        key.set("act", numbers(*pieces[0].values))
-        key.set("ctrl", numbers(*pieces[0].slopes))
+    if loads:
+        custom = ET.SubElement(root, "custom")
+        for number, segment in enumerate(scene.load_segments, start=1):
+            activations = [load.activation(segment, segment.start) for load in loads]
+            controls = [load.control(segment) for load in loads]
+            data = numbers(segment.start, *activations, *controls)
+            ET.SubElement(custom, "numeric", name=f"segment {number}", data=data)
+            if number == 1:
+                key.set("act", numbers(*activations))
+                key.set("ctrl", numbers(*controls))
+    ET.SubElement(root, "keyframe").append(key)
     return text(root)
 
 

@@ -147,7 +147,8 @@ class MujocoSolver:
     def __init__(self, scene: Scene, integrator: str, step: float) -> None:
         self._scene, self._step, self._stages = scene, step, _STAGES[integrator]
         self._moving = scene.moving_coordinates
-        self._intervals = intervals(mjcf.load_segments(scene), scene.samples, every_sample=True)
+        self._loads = mjcf.loads_of(scene)
+        self._intervals = intervals(scene.load_segments, scene.samples, every_sample=True)
         self._rows_between = scene.work_needs_path
         self._rows: list[_Row] = []
         self.engine = Engine(scene, integrator, step)
@@ -174,16 +175,21 @@ class MujocoSolver:
         """Over one interval: steps taken, and why it ended early."""
         span, segment = interval.end - interval.start, interval.segment
         steps, count = steps_and_rows(span, self._step, self._rows_between)
+        slopes = [load.control(segment) for load in self._loads]
         total = 0
         for row in range(1, count + 1):
-            loads = segment.loads_at(interval.start + span * (row - 1) / count)
-            taken, message = self.engine.advance(span / steps, steps // count, loads, segment.slopes)
+            loads = self._activations(segment, interval.start + span * (row - 1) / count)
+            taken, message = self.engine.advance(span / steps, steps // count, loads, slopes)
             total += taken
             if message:
                 return total, message
             time = interval.end if row == count else interval.start + span * row / count
             self._keep(time, segment, interval.ends_at_sample and row == count)
         return total, ""
+
+    def _activations(self, segment: Segment, time: float) -> list[float]:
+        """Return the activations of all actuators (N m or rad) at a time (s) of a segment."""
+        return [load.activation(segment, time) for load in self._loads]
 
     def _keep(self, time: float, segment: Segment, is_sample: bool) -> None:
         angles, rates = self.engine.state
@@ -196,7 +202,7 @@ class MujocoSolver:
         fields = dict(zip(("angles", "rates"), all_coordinates(scene, angles[at], rates[at]), strict=True))
         with np.errstate(over="ignore", invalid="ignore"):
             if {"tip", "energy", "loads"} & set(scene.outputs):
-                values = np.array([row.segment.loads_at(row.time) for row in rows])
+                values = np.array([self._activations(row.segment, row.time) for row in rows])
                 poses = self.engine.poses(angles, rates, values)
             if scene.wants("tip"):
                 fields["tip"] = poses.site[at]
@@ -209,10 +215,10 @@ class MujocoSolver:
                 fields["potential_energy"] = weights[at] + springs
                 fields["work"] = self._work(angles, rates, poses.acceleration, values)[at] + of_rests
             if scene.wants("loads"):
-                fields |= {name: table[at] for name, table in self._loads(poses, values).items()}
+                fields |= {name: table[at] for name, table in self._root_loads(poses, values).items()}
         return finite_samples(scene, fields)
 
-    def _loads(self, poses: Poses, values: Array) -> dict[str, Array]:
+    def _root_loads(self, poses: Poses, values: Array) -> dict[str, Array]:
         """What each body's parent does to it; the moment of an actuator is the part about the pitch axis."""
         moment, force = poses.wrench[:, :, :3], poses.wrench[:, :, 3:]
         roots = [np.einsum("nbij,nbi->bnj", poses.frame, vectors)[1:] for vectors in (force, moment)]
@@ -226,15 +232,15 @@ class MujocoSolver:
     def _work(self, angles: Array, rates: Array, accelerations: Array, values: Array) -> Array:
         """(n,) J of the actuators, less what the dampers took. Constant loads: torque times angle. Else from row to row
         ∫ P dt ≈ h (P₀ + P₁)/2 + h² (P₀' - P₁')/12, of order 4 like the best integrator here."""
-        loads = mjcf.loads_of(self._scene)
-        columns = [self._moving.index(load.coordinate) for load in loads]
-        gains = np.array([load.gain for load in loads])
+        columns = [self._moving.index(load.coordinate) for load in self._loads]
+        gains = np.array([load.gain for load in self._loads])
         torques = gains * values
         if not self._scene.work_needs_path:
             turned = angles[:, columns] - angles[:1, columns]
             return np.asarray((torques * turned).sum(axis=1))
         dampings = np.array(self._scene.dampings)[self._moving]
-        slopes = gains * np.array([row.segment.slopes for row in self._rows]).reshape(values.shape)
+        controls = [[load.control(row.segment) for load in self._loads] for row in self._rows]
+        slopes = gains * np.array(controls).reshape(values.shape)
         power = (torques * rates[:, columns]).sum(axis=1) - (dampings * rates**2).sum(axis=1)
         change = (slopes * rates[:, columns] + torques * accelerations[:, columns]).sum(axis=1)
         change -= 2.0 * (dampings * rates * accelerations).sum(axis=1)
@@ -265,7 +271,8 @@ def linearize(scene: Scene, angles: Sequence[float] | Array, speed: float, torqu
     engine = Engine(state, "rk4", 1e-3)
     here = np.concatenate([np.array(values)[columns] for values in (state.initial_angles, state.initial_rates)])
     n = len(columns)
-    loads = np.array(mjcf.load_segments(state)[0].values)
+    first = state.load_segments[0]
+    loads = np.array([load.activation(first, first.start) for load in mjcf.loads_of(state)])
 
     def accelerations(states: Array) -> Array:
         return engine.poses(states[:, :n], states[:, n:], np.tile(loads, (len(states), 1))).acceleration

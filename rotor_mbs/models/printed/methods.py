@@ -13,12 +13,13 @@ from rotor_mbs.methods.base import BuiltItem, Method
 from rotor_mbs.models import Ode45Settings, equation_items
 from rotor_mbs.models.printed import literal
 from rotor_mbs.models.printed.derivation import DerivedRotor, Errata
+from rotor_mbs.scenario.time_table import is_constant, torque_place, value_at
 
 if TYPE_CHECKING:  # the list of methods needs none of them
     from rotor_mbs.models.ode45 import Ode45Result, RightHandSide
     from rotor_mbs.models.printed.observables import PointMassRotor
     from rotor_mbs.scenario.scene import Scene
-    from rotor_mbs.scenario.time_table import Table
+    from rotor_mbs.scenario.time_table import LoadTable
     from rotor_mbs.solution.trajectory import Integration, Trajectory
 
 # (torques in N m, angles and rates) -> accelerations; all of the coordinates that move.
@@ -66,9 +67,9 @@ class PrintedSolver:
             fields["kinetic_energy"] = rotor.kinetic_energy(angles, rates)
             fields["potential_energy"] = rotor.potential_energy(angles)
             fields["work"] = np.zeros(len(time))
-            for i, table in enumerate(_torque_tables(scene, self._moving)):
+            for coordinate, table in enumerate(_torque_tables(scene, self._moving)):
                 if table:
-                    fields["work"] += torque_work(table, result, i, time)
+                    fields["work"] += torque_work(scene, result, coordinate, time)
         if scene.wants("loads"):
             before = np.nextafter(time, 0.0)  # where a torque jumps, the value before it
             torque = np.array([scene.torque_at(t) for t in before.tolist()])
@@ -133,15 +134,13 @@ def items(name: str, errata: Errata | None, scene: Scene) -> list[BuiltItem]:
     return equation_items(scene, ("(42)-(45), (52), (56) with its factor expanded", "(46)-(51), (53)-(56)"))
 
 
-def _torque_tables(scene: Scene, moving: int) -> tuple[Table, ...]:
-    """τ2, then τ3 to τ5, over time, of the `moving` coordinates."""
-    return (scene.rotor_torque, *(torque for torque, _ in scene.pitch_loads[: moving - 1]))
+def _torque_tables(scene: Scene, moving: int) -> tuple[LoadTable, ...]:
+    """Return τ2, then τ3 to τ5, over time, of the `moving` coordinates."""
+    return tuple(scene.load_tables[torque_place(coordinate)] for coordinate in range(moving))
 
 
 def right_hand_side(scene: Scene, accelerations: Accelerations, moving: int) -> RightHandSide:
     """y' = f(t, y) of y = (angles, rates) of the `moving` coordinates; NaN where the equations are singular."""
-    from rotor_mbs.scenario.time_table import is_constant, value_at
-
     undefined = [math.nan] * (2 * moving)
     tables = _torque_tables(scene, moving)
     constant = [value_at(table, 0.0) for table in tables] if all(map(is_constant, tables)) else None

@@ -11,7 +11,8 @@ import numpy as np
 from rotor_mbs.models.ode45 import Ode45Result
 from rotor_mbs.models.printed import derivation
 from rotor_mbs.models.printed.derivation import CORRECTED
-from rotor_mbs.scenario.time_table import Table, knots, segments, values_at, values_before
+from rotor_mbs.scenario.scene import Scene
+from rotor_mbs.scenario.time_table import torque_place, values_at, values_before
 from rotor_mbs.solution.quantities import named_loads
 from rotor_mbs.solution.trajectory import Array
 
@@ -105,18 +106,34 @@ class PointMassRotor:
         return [(np.sin(q2), np.cos(q2), np.sin(q3), np.cos(q3)) for q2, q3 in turns]
 
 
-def torque_work(table: Table, run: Ode45Result, column: int, times: Array) -> Array:
-    """(n,) J done up to each of `times` (s) by a torque over time (N m) on the coordinate in `column`, from angles
-    alone. Where τ is linear, ∫τ q̇ dt = [τ q] - τ' ∫q dt, and the integral is exact for the interpolant, a quartic in
-    each step."""
+def torque_work(scene: Scene, run: Ode45Result, coordinate: int, times: Array) -> Array:
+    """Compute the work of the torque on a coordinate from angles alone.
+
+    Where the torque τ is linear, ∫τ q̇ dt = [τ q] - τ' ∫q dt, and the integral is exact for the interpolant, a quartic
+    in each step.
+
+    Parameters
+    ----------
+    scene : whose torque it is.
+    run : every step of the integration.
+    coordinate : 0 for the rotor, then the pitches.
+    times : (n,) s, increasing, that the run reached.
+
+    Returns
+    -------
+    ndarray, shape (n,)
+        J done up to each of the times.
+    """
     if len(times) < 2:
         return np.zeros(len(times))
-    end = float(times[-1])
-    grid = np.unique([*run.time, *times, *knots([table], end)])
+    place, end = torque_place(coordinate), float(times[-1])
+    grid = np.unique([*run.time, *times, *scene.kink_times])
     grid = grid[grid <= end]
-    before, after = values_before(segments([table], end), grid[1:])[0], values_at(table, grid[:-1])  # at a jump
+    # At a jump the value before it ends one part of the grid, and the one after it begins the next.
+    before = values_before(scene.load_segments, grid[1:])[place]
+    after = values_at(scene.load_tables[place], grid[:-1])
     points = grid[:-1, None] + np.diff(grid)[:, None] * _GAUSS_POINTS
-    mean = run.at(points.ravel())[:, column].reshape(points.shape) @ _GAUSS_WEIGHTS
-    angles = run.at(grid)[:, column]
+    mean = run.at(points.ravel())[:, coordinate].reshape(points.shape) @ _GAUSS_WEIGHTS
+    angles = run.at(grid)[:, coordinate]
     done = np.cumsum(before * (angles[1:] - mean) + after * (mean - angles[:-1]))
     return np.asarray(np.append(0.0, done)[np.searchsorted(grid, times)])
