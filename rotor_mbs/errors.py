@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import difflib
-from collections.abc import Iterable
+import traceback
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 
 
 class RotorError(Exception):
@@ -29,8 +31,8 @@ class ResourceError(RotorError):
     """Raised if the system lacks memory, processes or open files, independently of the run."""
 
 
-# What the machine lacks: an error of these is no result of a run.
-OF_THE_MACHINE = (MemoryError, OSError, ImportError, ResourceError)
+# What the system lacks: an error of these is no result of a run.
+SYSTEM_ERRORS = (MemoryError, OSError, ImportError, ResourceError)
 
 
 class StoreError(RotorError):
@@ -39,6 +41,46 @@ class StoreError(RotorError):
 
 class PlausibilityWarning(UserWarning):
     """Issued for a number that is valid but implausible, such as degrees, millimetres or tonnes."""
+
+
+@contextmanager
+def system_errors_apart(*others: type[Exception]) -> Iterator[None]:
+    """Raise one of SYSTEM_ERRORS in the block for every error that the system causes, whatever its type.
+
+    A library that cannot be loaded may raise any error (NumPy a ValueError for an invalid SOURCE_DATE_EPOCH), and an
+    engine may replace an error of the system by one of its own. Neither says anything of the run.
+
+    Parameters
+    ----------
+    *others : types of errors that may be raised at any point, also during an import, and pass as they are.
+
+    Raises
+    ------
+    ImportError
+        If an error is raised while a module is being imported.
+    ResourceError
+        If an error has one of SYSTEM_ERRORS as its cause.
+    """
+    passing: tuple[type[Exception], ...] = (RotorError, *SYSTEM_ERRORS, *others)
+    try:
+        yield
+    except passing:
+        raise
+    except Exception as exc:
+        if _was_importing(exc):
+            raise ImportError(one_line(exc)) from exc
+        if isinstance(exc.__cause__, SYSTEM_ERRORS):
+            raise ResourceError(f"{one_line(exc)} ({one_line(exc.__cause__)})") from exc
+        raise
+
+
+def _was_importing(error: BaseException) -> bool:
+    """Return whether an error passed through the code of a module that was being imported."""
+    for frame, _ in traceback.walk_tb(error.__traceback__):
+        # Code that `exec` runs has this name, too, but not the module's file.
+        if frame.f_code.co_name == "<module>" and frame.f_code.co_filename == frame.f_globals.get("__file__"):
+            return True
+    return False
 
 
 def one_line(error: BaseException) -> str:

@@ -7,6 +7,7 @@ a closed standard error must not end a batch.
 from __future__ import annotations
 
 import _thread
+import atexit
 import importlib
 import os
 import signal
@@ -15,9 +16,16 @@ import threading
 import warnings
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, redirect_stderr, redirect_stdout, suppress
-from typing import Any, TextIO
+from typing import Any, NoReturn, TextIO
 
-from rotor_mbs.errors import InputError, MethodRefusal, PlausibilityWarning, RotorError, StoreError
+from rotor_mbs.errors import (
+    InputError,
+    MethodRefusal,
+    PlausibilityWarning,
+    RotorError,
+    StoreError,
+    system_errors_apart,
+)
 
 EXIT_OK, EXIT_FAILED, EXIT_BAD_INPUT, EXIT_INTERRUPTED = 0, 1, 2, 130
 # Commands that only print: a reader who has seen enough (`rotor-mbs list | head`) has missed nothing.
@@ -35,10 +43,35 @@ def main(argv: Sequence[str] | None = None) -> int:
 
     Returns 0 done and all well; 1 done, but a check failed or a run did not succeed; 2 bad input; 130 interrupted.
     """
-    words = sys.argv[1:] if argv is None else list(argv)
-    with plain_streams():
+    if argv is not None:
+        return _run(list(argv))
+    # Python would show a traceback of the exit and ask for input, also in worker processes.
+    is_inspected = bool(os.environ.pop("PYTHONINSPECT", ""))
+    try:
+        status = _run(sys.argv[1:])
+    except SystemExit as exc:  # of the argument parser
+        if not is_inspected:
+            raise
+        status = exc.code if isinstance(exc.code, int) else EXIT_OK
+    if is_inspected:
+        _end_process(status)
+    return status
+
+
+def _end_process(status: int) -> NoReturn:
+    """End this process without a SystemExit, after what has to be done at its exit."""
+    atexit._run_exitfuncs()
+    for stream in (sys.stdout, sys.stderr):
+        with suppress(AttributeError, OSError, ValueError):
+            stream.flush()
+    os._exit(status)
+
+
+def _run(words: list[str]) -> int:
+    """Run a command and return the exit status."""
+    with plain_streams(), _without_invalid_date():
         try:
-            with _signals_as_interrupts(), warnings.catch_warnings():
+            with _signals_as_interrupts(), warnings.catch_warnings(), system_errors_apart():
                 warnings.simplefilter("always", PlausibilityWarning)
                 warnings.showwarning = _print_warning
                 from rotor_mbs.cli.arguments import load_methods, parse
@@ -70,6 +103,20 @@ def main(argv: Sequence[str] | None = None) -> int:
             discard_output()
             print_line(f"{exc.filename or 'standard output'}: {exc.strerror or exc}", sys.stderr)
             return EXIT_BAD_INPUT if exc.filename else EXIT_FAILED
+
+
+@contextmanager
+def _without_invalid_date() -> Iterator[None]:
+    """Ignore a SOURCE_DATE_EPOCH that is no number in the block: a part of NumPy would not load, and SciPy with it."""
+    date = os.environ.get("SOURCE_DATE_EPOCH")
+    if date is None or date.isdecimal():
+        yield
+        return
+    del os.environ["SOURCE_DATE_EPOCH"]
+    try:
+        yield
+    finally:
+        os.environ["SOURCE_DATE_EPOCH"] = date
 
 
 def _print_warning(message: Warning | str, category: type[Warning], *where: Any, **_: Any) -> None:

@@ -8,10 +8,10 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from rotor_mbs.errors import RotorError
+from rotor_mbs.errors import RotorError, system_errors_apart
 from rotor_mbs.methods.base import Method
 from rotor_mbs.methods.catalogue import find_method
-from rotor_mbs.methods.time_limit import time_limit
+from rotor_mbs.methods.time_limit import OutOfTimeError, time_limit
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.trajectory import Solution, shape_fault
 
@@ -29,35 +29,37 @@ def solve(
     """Build once, integrate up to `repeats` times within `budget_s`, the garbage collector off, and observe once;
     `settings` that differ from the defaults; `time_limit_s` is for the integrations together. The Solution is not yet
     judged, and holds a failure of the engine. Raises InputError for an unknown method or setting, MethodRefusal,
-    OutOfTimeError where a method cannot keep the samples it reached, RotorError where an array has a wrong shape."""
+    OutOfTimeError where a method cannot keep the samples it reached, RotorError where an array has a wrong shape, one
+    of SYSTEM_ERRORS where the system lacks something or a library cannot be loaded, and what the method raises."""
     method = find_method(method) if isinstance(method, str) else method
     chosen = method.chosen(scene, settings)
-    start = time.perf_counter()
-    solver = method.build(scene, chosen)
-    setup = time.perf_counter() - start
-    run_times: list[float] = []
-    gc_was_on = gc.isenabled()
-    gc.disable()
-    try:
-        begun = time.monotonic()
-        with time_limit(time_limit_s):
-            while not run_times or (len(run_times) < repeats and sum(run_times) + run_times[-1] < budget_s):
-                start = time.perf_counter()
-                integration = solver.integrate()
-                run_times.append(time.perf_counter() - start)
-                if integration.out_of_time:  # another would not be stopped
-                    break
-    finally:
-        if gc_was_on:
-            gc.enable()
-    start = time.perf_counter()
-    left = max(begun + time_limit_s - time.monotonic(), _OBSERVING_S)
-    with (
-        time_limit(left),
-        np.errstate(over="ignore", invalid="ignore"),
-    ):  # of a runaway: the judgement sees what is not finite
-        trajectory = solver.observe()
-    output = time.perf_counter() - start
+    with system_errors_apart(OutOfTimeError):
+        start = time.perf_counter()
+        solver = method.build(scene, chosen)
+        setup = time.perf_counter() - start
+        run_times: list[float] = []
+        gc_was_on = gc.isenabled()
+        gc.disable()
+        try:
+            begun = time.monotonic()
+            with time_limit(time_limit_s):
+                while not run_times or (len(run_times) < repeats and sum(run_times) + run_times[-1] < budget_s):
+                    start = time.perf_counter()
+                    integration = solver.integrate()
+                    run_times.append(time.perf_counter() - start)
+                    if integration.out_of_time:  # another would not be stopped
+                        break
+        finally:
+            if gc_was_on:
+                gc.enable()
+        start = time.perf_counter()
+        left = max(begun + time_limit_s - time.monotonic(), _OBSERVING_S)
+        with (
+            time_limit(left),
+            np.errstate(over="ignore", invalid="ignore"),
+        ):  # of a runaway: the judgement sees what is not finite
+            trajectory = solver.observe()
+        output = time.perf_counter() - start
     if fault := shape_fault(scene, trajectory):
         raise RotorError(f"{method.name}: {fault}")
     return Solution(scene, method.name, trajectory, integration, chosen.as_dict(), setup, run_times, output)

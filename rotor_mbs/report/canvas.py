@@ -3,27 +3,56 @@
 from __future__ import annotations
 
 import io
+import logging
 import math
-from collections.abc import Mapping
-from contextlib import AbstractContextManager
+import os
+import sys
+from collections.abc import Iterator, Mapping
+from contextlib import AbstractContextManager, contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import matplotlib
 import numpy as np
-from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.colors import to_hex
-from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
-from matplotlib.markers import MarkerStyle
-from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
 from numpy.typing import NDArray
 
 from rotor_mbs.errors import InputError
 from rotor_mbs.report.looks import PAPER, Look
 from rotor_mbs.report.numbers import power
 from rotor_mbs.runs.output_files import replace_file
+
+
+@contextmanager
+def _unaffected_by_environment() -> Iterator[None]:
+    """Import matplotlib in the block whatever the environment says of backends and folders.
+
+    No backend is needed here, and an unknown one in MPLBACKEND would be an error. A home that cannot be written is told
+    once in every process, though a temporary folder serves as well.
+    """
+    backend = os.environ.pop("MPLBACKEND", None)
+    logger = logging.getLogger("matplotlib")
+    level = logger.level
+    logger.setLevel(logging.ERROR)
+    try:
+        yield
+    finally:
+        logger.setLevel(level)
+        if backend is not None:
+            os.environ["MPLBACKEND"] = backend
+
+
+_is_imported_here = "matplotlib" not in sys.modules
+with _unaffected_by_environment():
+    import matplotlib
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.colors import to_hex
+    from matplotlib.figure import Figure
+    from matplotlib.lines import Line2D
+    from matplotlib.markers import MarkerStyle
+    from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
+if _is_imported_here and os.environ.get("MPLBACKEND"):  # for what else is drawn in this process
+    with suppress(ValueError):
+        matplotlib.rcParams["backend"] = os.environ["MPLBACKEND"]
 
 WIDTH = 5.2  # in; on a telephone's 360 px a text of 9.5 points is then 9 px high
 TIME_AXIS, SPEED_AXIS = "time (s)", "rotor speed (rad/s)"

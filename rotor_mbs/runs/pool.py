@@ -23,7 +23,7 @@ from numbers import Integral
 from queue import LifoQueue
 from typing import TYPE_CHECKING, Any, Generic, Self, TypeAlias, TypeVar
 
-from rotor_mbs.errors import OF_THE_MACHINE, InputError, ResourceError, RotorError, one_line
+from rotor_mbs.errors import SYSTEM_ERRORS, InputError, ResourceError, RotorError, one_line, system_errors_apart
 from rotor_mbs.runs import MAX_WORKERS, cores
 
 if TYPE_CHECKING:  # loaded with the first process
@@ -166,7 +166,8 @@ class SerialPool(TaskPool):
     def submit(self, work: Callable[[T], R], task: T, timeout_s: float) -> Future[R]:  # noqa: ARG002
         future: Future[R] = Future()
         try:
-            future.set_result(work(task))
+            with system_errors_apart():
+                future.set_result(work(task))
         except (Exception, SystemExit) as exc:  # also of another package's method
             future.set_exception(RuntimeError(one_line(exc)) if isinstance(exc, SystemExit) else exc)
         return future
@@ -234,9 +235,11 @@ def run_in(
             task, error = waiting.pop(future), CancelledError() if future.cancelled() else future.exception()
             if error is None:
                 end = Finished(task, future.result())
-            elif isinstance(error, OF_THE_MACHINE):
-                lack = "code" if isinstance(error, ImportError) else "memory, files or processes"
-                end = Finished(task, None, "worker_died", f"not enough {lack}: {one_line(error)}", error)
+            elif isinstance(error, SYSTEM_ERRORS):
+                what = "not enough memory, files or processes"
+                if isinstance(error, ImportError):
+                    what = "code cannot be loaded"
+                end = Finished(task, None, "worker_died", f"{what}: {one_line(error)}", error)
             elif (failure := pool.failure(error)) == "error":
                 end = Finished(task, None, failure, one_line(error), error)
             else:
@@ -430,8 +433,10 @@ def _answer(request: bytes) -> bytes:
     try:
         if _initial_error is not None:
             raise _initial_error
-        work, task = pickle.loads(request)
-        return pickle.dumps((work(task), None))
+        with system_errors_apart():
+            work, task = pickle.loads(request)
+            result = work(task)
+        return pickle.dumps((result, None))
     except Exception as exc:
         try:
             answer = pickle.dumps((None, exc))

@@ -22,7 +22,7 @@ import numpy as np
 from rotor_mbs.analysis.judgement import judge
 from rotor_mbs.analysis.work_precision import fitted_order, step_for, succeeded
 from rotor_mbs.analysis.work_precision import points as points_of
-from rotor_mbs.errors import OF_THE_MACHINE, InputError, MethodRefusal, RotorError, one_line
+from rotor_mbs.errors import SYSTEM_ERRORS, InputError, MethodRefusal, RotorError, one_line, system_errors_apart
 from rotor_mbs.methods import catalogue
 from rotor_mbs.methods.base import STEP, TOLERANCE, Ladder, Method
 from rotor_mbs.methods.time_limit import OutOfTimeError, time_limit
@@ -167,20 +167,21 @@ class PointTimer:
         try:
             method = catalogue.find_method(self._point.method)
             settings = method.settings.of(self._point.method, self._point.settings)
-            for name in ("setup_time_s", "setup_again_time_s"):
-                begun = self._clock()
-                self._solver = method.build(self._scene, settings)
-                self._setup[name] = self._clock() - begun
-            if not gc.isenabled():
-                gc.collect()
-            # A limit makes engines ask after every step, which takes time: only the warm-up run of a bench has one.
-            with time_limit(self._warm_up_limit_s):
-                self.warm_s = self.run()
-            if self._integration.out_of_time:
-                raise OutOfTimeError(self._integration.message)
-            self._first_angles = self._solver.observe().angles
+            with system_errors_apart(OutOfTimeError):
+                for name in ("setup_time_s", "setup_again_time_s"):
+                    begun = self._clock()
+                    self._solver = method.build(self._scene, settings)
+                    self._setup[name] = self._clock() - begun
+                if not gc.isenabled():
+                    gc.collect()
+                # A limit makes engines ask after every step, which takes time: only the warm-up run of a bench has one.
+                with time_limit(self._warm_up_limit_s):
+                    self.warm_s = self.run()
+                if self._integration.out_of_time:
+                    raise OutOfTimeError(self._integration.message)
+                self._first_angles = self._solver.observe().angles
             self.is_repeatable = True
-        except OF_THE_MACHINE:
+        except SYSTEM_ERRORS:
             raise
         except OutOfTimeError as exc:
             self._failure, self.is_stopped = ("timed_out", str(exc)), True

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from rotor_mbs.analysis.judgement import judge
-from rotor_mbs.errors import OF_THE_MACHINE, MethodRefusal, RotorError
+from rotor_mbs.errors import SYSTEM_ERRORS, MethodRefusal, RotorError
 from rotor_mbs.methods.catalogue import (
     REFERENCE,
     default_methods,
@@ -62,7 +62,7 @@ class RunTask(Task):
             run = shipped or solve(
                 asked.method, asked.scene, asked.settings, _REPEATS, _REPEAT_BUDGET_S, self.time_limit_s
             )
-        except (*OF_THE_MACHINE, MethodRefusal):
+        except (*SYSTEM_ERRORS, MethodRefusal):
             raise
         except OutOfTimeError as exc:  # from a method that cannot be stopped with its samples
             return self.failed("timed_out", str(exc))

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import functools
+import os
 from collections.abc import Callable, Sequence
 from fractions import Fraction
+from pathlib import Path
 from types import ModuleType
 from typing import Any
 
@@ -26,7 +28,21 @@ def heyoka() -> ModuleType:
         if not isinstance(exc, ModuleNotFoundError):  # it is there, and the system could not load it
             raise ResourceError(f"heyoka cannot be loaded: {exc}") from exc
         raise MethodRefusal(f"heyoka is not installed: {_HINT}; lagrange/dop853 needs SciPy only") from exc
+    if not _is_writable(engine.llvm_state.get_diskcache_path()):
+        # The engine would warn twice of every system that it compiles.
+        engine.llvm_state.set_diskcache_enabled(False)
     return engine  # type: ignore[no-any-return]
+
+
+def _is_writable(cache: Path) -> bool:
+    """Return whether the engine can keep compiled code in a folder, which is made; there is none without a home."""
+    if cache == Path():
+        return False
+    try:
+        cache.mkdir(parents=True, exist_ok=True)
+    except OSError:
+        return False
+    return all(os.access(path, os.W_OK) for path in (cache, *cache.glob("*.db")))
 
 
 def is_available() -> bool:
