@@ -11,6 +11,7 @@ import multiprocessing
 import os
 import pickle
 import signal
+import sys
 import threading
 import time
 from abc import ABC, abstractmethod
@@ -18,8 +19,10 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, CancelledError, Future, ThreadPoolExecutor, wait
 from contextlib import AbstractContextManager, contextmanager, nullcontext, suppress
 from dataclasses import dataclass, replace
+from multiprocessing import process as process_module
 from multiprocessing import resource_tracker
 from numbers import Integral
+from pathlib import Path
 from queue import LifoQueue
 from typing import TYPE_CHECKING, Any, Generic, Self, TypeAlias, TypeVar
 
@@ -313,10 +316,7 @@ class _Process:
         except Exception as exc:  # none is the task's own: those come back as answers
             self.close()
             code = getattr(exc, "exitcode", None)
-            text = " ".join(str(exc).split())[:200] or "ended by this process"
-            if isinstance(exc, RuntimeError) and code is None:
-                text += '; in a script, the call belongs under `if __name__ == "__main__":`'
-            reason = f"exit code {code}" if code is not None else text
+            reason = _reason_of_death(exc, code)
             at_start = code is None and not isinstance(exc, CancelledError)
             raise TaskLostError(f"its process died ({reason})", "worker_died", at_start=at_start) from None
 
@@ -355,15 +355,56 @@ class _Process:
         return self._pool
 
 
-def _ended_at(timeout_s: float) -> TaskLostError:
-    """Under a limit of its memory a library may wait for memory without end: that says nothing of the task."""
+def _reason_of_death(error: Exception, exit_code: int | None) -> str:
+    """Return why a worker process died, in one line.
+
+    Parameters
+    ----------
+    error : what its pool raised.
+    exit_code : of the process; None if it died before its task began, or was ended by this process.
+    """
+    if exit_code is not None:
+        return f"exit code {exit_code}"
+    text = " ".join(str(error).split())[:200] or "ended by this process"
+    if not isinstance(error, RuntimeError):
+        return text
+    # A process goes to the folder in which this one began, and runs its script before it takes a task.
+    try:
+        folder = Path(getattr(process_module, "ORIGINAL_DIR", None) or Path.cwd())
+    except OSError:
+        return "the working folder is gone"
+    if not folder.is_dir():
+        return f"the folder in which the program was started is gone: {folder}"
+    main = sys.modules["__main__"]
+    script = getattr(main, "__file__", None)
+    if getattr(main, "__spec__", None) is None and script is not None:
+        try:
+            source = (folder / script).read_text(encoding="utf-8", errors="replace")
+        except OSError:
+            return f"{text}; the script {script} is no file that it can read; allowed: a script in a file, or workers=0"
+        if "__main__" not in source:
+            return f'{text}; in a script, the call belongs under `if __name__ == "__main__":`'
+    if limit := _memory_limit():
+        return f"{text}; {limit}"
+    return text
+
+
+def _memory_limit() -> str:
+    """Return the limit of this process's memory in words, "" if there is none."""
     with suppress(ImportError):  # Windows
         import resource
 
         limit, _ = resource.getrlimit(resource.RLIMIT_AS)
         if limit != resource.RLIM_INFINITY:
-            text = f"ended after {timeout_s:g} s under a memory limit (ulimit -v) of {limit >> 20} MiB"
-            return TaskLostError(text, "worker_died")
+            return f"under a memory limit (ulimit -v) of {limit >> 20} MiB"
+    return ""
+
+
+def _ended_at(timeout_s: float) -> TaskLostError:
+    """Under a limit of its memory a library may wait for memory without end: that says nothing of the task."""
+    limit = _memory_limit()
+    if limit:
+        return TaskLostError(f"ended after {timeout_s:g} s {limit}", "worker_died")
     return TaskLostError(f"ended after {timeout_s:g} s", "timed_out")
 
 

@@ -18,10 +18,10 @@ from rotor_mbs.errors import InputError, MethodRefusal, StoreError
 from rotor_mbs.methods.catalogue import with_method_files
 from rotor_mbs.runs.pool import Finished, TaskPool, run_in
 from rotor_mbs.runs.table import Place, Rows
+from rotor_mbs.solution.status import REFUSED
 
 # Columns that a worker returns of rows that it has written.
 _REPORTED = ("status", "message", "run_time_s")
-REFUSED = "refused"  # how a task ends whose method cannot represent its scene; nothing is stored
 
 
 @dataclass(frozen=True)

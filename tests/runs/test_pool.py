@@ -19,6 +19,7 @@ from typing import Any
 import pytest
 
 from rotor_mbs.errors import ResourceError
+from rotor_mbs.runs import pool as pool_module
 from rotor_mbs.runs.pool import Finished, SerialPool, TaskLostError, TaskPool, WorkerPool, run_in
 
 # Beyond any start of a process on a busy machine.
@@ -263,3 +264,56 @@ def test_a_task_that_exits_ends_no_process() -> None:
     (end,) = _ends(_raise, [SystemExit(3)], SerialPool())
     assert end.failure == "error"
     assert "SystemExit: 3" in end.message
+
+
+_SCRIPT = """
+from rotor_mbs.errors import RotorError
+from rotor_mbs.runs.pool import local_pool
+
+def main():
+    with local_pool(1) as pool:
+        try:
+            pool.submit(abs, -3, 60.0).result()
+        except RotorError as exc:
+            print(exc)
+"""
+_GUARDED = _SCRIPT + 'if __name__ == "__main__":\n    main()\n'
+
+
+def _answer_of(command: list[str], script: str = "", cwd: Path | None = None) -> str:
+    ended = subprocess.run([sys.executable, *command], input=script, capture_output=True, text=True, cwd=cwd)
+    return ended.stdout.strip()
+
+
+def test_a_script_from_standard_input_is_named_where_a_worker_cannot_run_it() -> None:
+    answer = _answer_of(["-"], _GUARDED)
+    assert "the script <stdin> is no file that it can read; allowed: a script in a file, or workers=0" in answer
+    assert "if __name__" not in answer
+
+
+def test_a_script_without_a_guard_is_asked_for_one(tmp_path: Path) -> None:
+    (tmp_path / "script.py").write_text(_SCRIPT + "main()\n")
+    assert 'in a script, the call belongs under `if __name__ == "__main__":`' in _answer_of(["script.py"], cwd=tmp_path)
+    (tmp_path / "script.py").write_text(_GUARDED)
+    assert _answer_of(["script.py"], cwd=tmp_path) == ""
+
+
+def test_a_working_folder_that_is_gone_is_named(tmp_path: Path) -> None:
+    (tmp_path / "script.py").write_text(_GUARDED)
+    (tmp_path / "gone").mkdir()
+    command = 'rmdir ../gone; exec "$@"'  # in the folder that goes
+    ended = subprocess.run(
+        ["sh", "-c", command, "sh", sys.executable, str(tmp_path / "script.py")],
+        cwd=tmp_path / "gone",
+        capture_output=True,
+        text=True,
+    )
+    assert "its process died (the working folder is gone)" in ended.stdout
+    assert "if __name__" not in ended.stdout
+
+
+def test_a_memory_limit_is_named_where_a_worker_dies_at_its_start(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sys.modules["__main__"], "__file__", None, raising=False)
+    with _limited(resource.RLIMIT_AS, 1 << 46):
+        reason = pool_module._reason_of_death(RuntimeError("All workers expired"), None)
+    assert reason == "All workers expired; under a memory limit (ulimit -v) of 67108864 MiB"
