@@ -9,13 +9,14 @@ from __future__ import annotations
 import _thread
 import atexit
 import importlib
+import io
 import os
 import signal
 import sys
 import threading
 import warnings
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager, redirect_stderr, redirect_stdout, suppress
+from contextlib import ExitStack, contextmanager, redirect_stderr, redirect_stdout, suppress
 from typing import Any, NoReturn, TextIO
 
 from rotor_mbs.errors import (
@@ -82,6 +83,8 @@ def _run(words: list[str]) -> int:
                 command = getattr(importlib.import_module(f"rotor_mbs.cli.{module}"), function)
                 status = int(command(arguments))
             sys.stdout.flush()
+            if isinstance(sys.stdout, PlainStream) and sys.stdout.failure is not None:
+                raise sys.stdout.failure
             return status
         except (KeyboardInterrupt, RotorError, SystemError, ImportError) as exc:
             if _is_interrupt(exc):
@@ -97,10 +100,8 @@ def _run(words: list[str]) -> int:
             print_line(f"not enough memory: {exc}" if str(exc) else "not enough memory", sys.stderr)
             return EXIT_FAILED
         except BrokenPipeError:
-            discard_output()
             return EXIT_OK if words[:1] and words[0] in _ONLY_PRINT else EXIT_FAILED
         except OSError as exc:
-            discard_output()
             print_line(f"{exc.filename or 'standard output'}: {exc.strerror or exc}", sys.stderr)
             return EXIT_BAD_INPUT if exc.filename else EXIT_FAILED
 
@@ -180,14 +181,38 @@ def printable(text: str) -> str:
 
 
 class PlainStream:
-    """A text stream that writes control characters as their escapes; `unfiltered` is the stream itself."""
+    """A text stream that writes control characters as their escapes, and goes on where nobody reads it any more.
+
+    Attributes
+    ----------
+    unfiltered : the stream itself.
+    failure : the first error in writing, such as BrokenPipeError; what follows is dropped, so that a command does all
+        its work, and ends with this error.
+    """
 
     def __init__(self, stream: TextIO) -> None:
         self.unfiltered = stream
+        self.failure: OSError | None = None
 
     def write(self, text: str) -> int:
-        self.unfiltered.write(printable(text))
+        self.write_unfiltered(printable(text))
         return len(text)
+
+    def write_unfiltered(self, text: str) -> None:
+        with self._kept_failure():
+            self.unfiltered.write(text)
+
+    def flush(self) -> None:
+        with self._kept_failure():
+            self.unfiltered.flush()
+
+    @contextmanager
+    def _kept_failure(self) -> Iterator[None]:
+        try:
+            yield
+        except OSError as exc:
+            self.failure = self.failure or exc
+            discard_output(self.unfiltered)
 
     def __getattr__(self, name: str) -> Any:
         return getattr(self.unfiltered, name)
@@ -195,11 +220,17 @@ class PlainStream:
 
 @contextmanager
 def plain_streams() -> Iterator[None]:
-    """In the block, standard output and standard error are plain; in place of a closed one stands the null device."""
-    with open(os.devnull, "w") as null:  # noqa: PTH123  (a device)
-        output, errors = PlainStream(sys.stdout or null), PlainStream(sys.stderr or null)
-        with redirect_stdout(output), redirect_stderr(errors):
-            yield
+    """Make standard output and standard error plain in the block; in place of a closed one stands the null device.
+
+    What their encoding cannot express, such as ° in ASCII, is written as its escape.
+    """
+    with open(os.devnull, "w") as null, ExitStack() as stack:  # noqa: PTH123  (a device)
+        for redirect, stream in ((redirect_stdout, sys.stdout), (redirect_stderr, sys.stderr)):
+            if isinstance(stream, io.TextIOWrapper):
+                stack.callback(stream.reconfigure, errors=stream.errors)
+                stream.reconfigure(errors="backslashreplace")
+            stack.enter_context(redirect(PlainStream(stream or null)))
+        yield
 
 
 def print_line(text: str, stream: TextIO) -> None:
@@ -208,7 +239,7 @@ def print_line(text: str, stream: TextIO) -> None:
         print(text, file=stream, flush=True)
 
 
-def discard_output() -> None:
-    """After a failed write: what is still in the buffer must not fail again when the interpreter ends."""
+def discard_output(stream: TextIO) -> None:
+    """Drop what is in a stream's buffer after a failed write: it must not fail again when the interpreter ends."""
     with suppress(OSError, ValueError):
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.__stdout__.fileno())  # type: ignore[union-attr]
+        os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())

@@ -18,15 +18,14 @@ from typing import Any
 
 from rotor_mbs.cli import EXIT_BAD_INPUT, EXIT_FAILED, EXIT_OK, print_line
 from rotor_mbs.cli.arguments import pages_beside
-from rotor_mbs.cli.terminal import ProgressLine, print_not_computed, print_table
+from rotor_mbs.cli.terminal import ProgressLine, print_json, print_not_computed, print_table
 from rotor_mbs.errors import InputError, MethodRefusal, StoreError
 from rotor_mbs.methods.catalogue import look_up, methods, problems_of_methods
 from rotor_mbs.runs import cores
-from rotor_mbs.runs.runner import REFUSED
 from rotor_mbs.scenario.catalogue import find_scenes, list_scenes, list_sweeps, only_scene
 from rotor_mbs.scenario.keys import counted
 from rotor_mbs.scenario.toml_file import KeyPath, shown_key
-from rotor_mbs.solution.status import GOOD
+from rotor_mbs.solution.status import GOOD, REFUSED
 
 
 def list_all(arguments: argparse.Namespace) -> int:
@@ -36,7 +35,7 @@ def list_all(arguments: argparse.Namespace) -> int:
     if arguments.json:
         kinds = {"scene": scenes, "sweep": sweeps, "method": labels}
         rows = [{"name": name, "title": title, "kind": kind} for kind in kinds for name, title in kinds[kind]]
-        print(json.dumps(rows, ensure_ascii=False))
+        print_json(rows)
         return 0
     headings: dict[str, list[tuple[str, str]]] = {}
     for name, title in scenes:
@@ -76,7 +75,7 @@ def show(arguments: argparse.Namespace) -> int:
     if arguments.json:
         rules = {name: {"allowed": str(rule), "doc": rule.doc} for name, rule in allowed.items()}
         facts = {"name": method.name, "label": method.label, "settings": defaults, "allowed": rules}
-        print(json.dumps(facts, ensure_ascii=False, indent=1))
+        print_json(facts, indent=1)
         return 0
     print(f"{method.name}: {method.label}\n")
     for name, rule in allowed.items():
@@ -102,7 +101,7 @@ def _show_scene(arguments: argparse.Namespace) -> None:
                 model["refused"] = str(exc)
     tables = scene_tables(scene)
     if arguments.json:
-        print(json.dumps({"name": scene.name, "scene": tables, "models": models}, ensure_ascii=False, indent=1))
+        print_json({"name": scene.name, "scene": tables, "models": models}, indent=1)
         return
     print(f"{scene.name}\n")
     for path, value in _keys(tables):
@@ -213,7 +212,7 @@ def modes(arguments: argparse.Namespace) -> int:
     if arguments.json:
         for modes in chosen:
             print(*modes.notes, sep="\n", end="\n" if modes.notes else "", file=sys.stderr)
-        print(json.dumps({modes.scene: mode_rows(modes) for modes in chosen}, ensure_ascii=False, indent=1))
+        print_json({modes.scene: mode_rows(modes) for modes in chosen}, indent=1)
     else:
         for modes in chosen:
             rows = mode_rows(modes)
@@ -250,7 +249,7 @@ def compare(arguments: argparse.Namespace) -> int:
     page = found.to_html(arguments.output)
     found.save(stored)
     if arguments.json:
-        print(json.dumps(as_dictionary(found.verdict), ensure_ascii=False, indent=1))
+        print_json(as_dictionary(found.verdict), indent=1)
     else:
         print(found, f"page: {page}, numbers: {stored}", sep="\n")
     return 0 if found.agrees else 1

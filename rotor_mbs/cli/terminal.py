@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import re
 import shutil
@@ -15,9 +16,8 @@ from typing import TYPE_CHECKING, Self, TextIO
 
 from rotor_mbs.cli import EXIT_BAD_INPUT, EXIT_FAILED, EXIT_OK, printable
 from rotor_mbs.methods.catalogue import REFERENCE, Refusal
-from rotor_mbs.runs.runner import REFUSED
 from rotor_mbs.scenario.keys import counted
-from rotor_mbs.solution.status import GOOD, STATUSES
+from rotor_mbs.solution.status import GOOD, REFUSED, STATUSES
 
 if TYPE_CHECKING:  # a sweep's workers load their code meanwhile
     from rotor_mbs.analysis.text_tables import TextTable
@@ -42,8 +42,16 @@ def coloured(text: str, stream: TextIO) -> str:
 def print_table(table: TextTable | str) -> None:
     """On standard output, after an empty line, with its statuses coloured on a terminal; nothing without rows."""
     if isinstance(table, str) or table.rows:
-        text, stream = printable(str(table)), getattr(sys.stdout, "unfiltered", sys.stdout)
-        print("", coloured(text, stream), sep="\n", file=stream)
+        # Colours are control characters, which the stream would escape.
+        write = getattr(sys.stdout, "write_unfiltered", sys.stdout.write)
+        write(f"\n{coloured(printable(str(table)), sys.stdout)}\n")
+
+
+def print_json(data: object, *, indent: int | None = None) -> None:
+    """Print data as JSON on standard output, in ASCII where the stream's encoding may lack a character."""
+    encoding = sys.stdout.encoding or "utf-8"
+    is_unicode = encoding.lower().startswith("utf")
+    print(json.dumps(data, ensure_ascii=not is_unicode, indent=indent))
 
 
 class ProgressLine:

@@ -13,6 +13,9 @@ STATUSES = (
 # Those of runs that reached the end.
 COMPLETE = ("ok", "inaccurate", "unchecked", "completed")
 
+# In place of a status: the run was not made, as its method cannot represent the scene. Nothing is stored.
+REFUSED = "refused"
+
 # Those that nobody has to look at: "ok" may be acted on, and of a "completed" run no more is asked.
 GOOD = ("ok", "completed")
 

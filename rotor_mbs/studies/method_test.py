@@ -28,6 +28,7 @@ from rotor_mbs.scenario.catalogue import only_scene
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.defects import Defects
 from rotor_mbs.solution.metrics import metrics_of
+from rotor_mbs.solution.status import REFUSED
 from rotor_mbs.solution.trajectory import Solution, Trajectory, sample_times
 from rotor_mbs.studies.run import without_samples
 
@@ -54,7 +55,6 @@ _LONG = 1000.0  # times the duration, of a run that is to be stopped
 _STOP_S, _LOAD_S = 0.5, 20.0
 _FIRST_S = 300.0  # of a first run, in which an engine may compile its code
 NOT_FOUND = "cause not found"
-REFUSED = "refused"  # in place of a status
 
 
 def _run(task: tuple[str, Scene, Mapping[str, object], int, float]) -> Solution:

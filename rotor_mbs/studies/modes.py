@@ -23,11 +23,12 @@ from rotor_mbs.methods.catalogue import find_method, methods, with_method_files
 from rotor_mbs.runs.output_files import locked
 from rotor_mbs.runs.pool import local_pool, run_in
 from rotor_mbs.runs.read import write_records
-from rotor_mbs.runs.runner import REFUSED, OnProgress, Outcome, ignore_progress
+from rotor_mbs.runs.runner import OnProgress, Outcome, ignore_progress
 from rotor_mbs.runs.trailer import MODES, may_extend
 from rotor_mbs.scenario.keys import LARGEST, SMALLEST
 from rotor_mbs.scenario.scene import Scene, scene_hash
 from rotor_mbs.scenario.time_table import value_at
+from rotor_mbs.solution.status import REFUSED
 from rotor_mbs.solution.trajectory import Array
 
 if TYPE_CHECKING:

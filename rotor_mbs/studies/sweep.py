@@ -28,7 +28,7 @@ from rotor_mbs.methods.time_limit import OutOfTimeError, time_limit
 from rotor_mbs.models.lagrange.reference import error_growth
 from rotor_mbs.runs.design import MISSING
 from rotor_mbs.runs.pool import TaskPool
-from rotor_mbs.runs.runner import REFUSED, Task, compute
+from rotor_mbs.runs.runner import Task, compute
 from rotor_mbs.runs.sweeps import ERROR_GROWTH, METRICS, code_of_method, open_sweep, sweep_table
 from rotor_mbs.runs.table import IDENTITY, KEYWORDS, Place, Rows, Table, blank_rows, row_of_run
 from rotor_mbs.runs.versions import machine, versions
@@ -37,7 +37,7 @@ from rotor_mbs.scenario.sweep import Sweep, Variants
 from rotor_mbs.scenario.toml_file import TableError
 from rotor_mbs.solution.metrics import Metrics, defect_metrics, energy_drifts, horizon, largest, running_growth
 from rotor_mbs.solution.quantities import energy_balance, quantities
-from rotor_mbs.solution.status import STATUSES, code_of
+from rotor_mbs.solution.status import REFUSED, STATUSES, code_of
 from rotor_mbs.solution.trajectory import Array, Solution, Trajectory
 
 _SIDE_BY_SIDE = ("", "angles", "rates", "tip", "energy")  # outputs that every `Method.solve_many` computes
