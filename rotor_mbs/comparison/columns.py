@@ -1,4 +1,4 @@
-"""Named columns of numbers with their units: what becomes of every file, and of arrays in memory."""
+"""Named columns of numbers with units: what becomes of every file, and of arrays in memory."""
 
 from __future__ import annotations
 
@@ -25,10 +25,12 @@ _TIMES = {
     "µs": 1e-6,
     "min": 60.0,
 }
-_RATES = {f"{unit}{per}": factor for unit, factor in _ANGLES.items() for per in ("/s", "/sec", " s-1")}
+_PER_SECOND = ("/s", "/sec", " s-1")
+_RATES = {f"{unit}{per}": factor for unit, factor in _ANGLES.items() for per in _PER_SECOND}
 _RATES |= dict.fromkeys(("rpm", "rev/min", "r/min"), math.pi / 30.0) | {"hz": 2.0 * math.pi}
 _FORCES = {"n": 1.0, "kn": 1e3}
-_MOMENTS = {f"{unit}{mark}m": factor for unit, factor in _FORCES.items() for mark in (" ", "", "-", "*", "·", ".")}
+_TIMES_METRE = (" m", "m", "-m", "*m", "·m", ".m")
+_MOMENTS = {f"{unit}{metre}": factor for unit, factor in _FORCES.items() for metre in _TIMES_METRE}
 UNITS = {
     "time": _TIMES,
     "angle": _ANGLES,
@@ -75,19 +77,22 @@ class DataTable:
     columns: Mapping[str, DataColumn]
 
     def __getitem__(self, name: str) -> DataColumn:
-        """Raises InputError, with the columns that there are."""
+        """Return a column. Raises InputError, with the columns that there are."""
         if name not in self.columns:
             available = shown_names(list(self.columns))
             raise InputError(f"{self.source}: no column {name!r}; available: {available}")
         return self.columns[name]
 
 
-def table_of(source: str, arrays: Mapping[str, Any], units: Mapping[str, str] | None = None) -> DataTable:
+def table_of(
+    source: str, arrays: Mapping[str, Any], units: Mapping[str, str] | None = None
+) -> DataTable:
     """Return arrays by name as columns.
 
-    An array of two dimensions (n, k) becomes the columns `name[0]` ... `name[k-1]`, one of three (n, j, k) the columns
-    `name[0,0]` ... `name[j-1,k-1]`. An array (k, n) beside others of length n is transposed, as MATLAB's arrays are
-    where HDF5 stores them. What is no numbers, is a single number, or has more dimensions is left out.
+    An array of two dimensions (n, k) becomes the columns `name[0]` ... `name[k-1]`, one of three
+    (n, j, k) the columns `name[0,0]` ... `name[j-1,k-1]`. An array (k, n) beside others of length n
+    is transposed, as MATLAB's arrays are where HDF5 stores them. What is no numbers, is a single
+    number, or has more dimensions is left out.
 
     Parameters
     ----------
@@ -103,8 +108,10 @@ def table_of(source: str, arrays: Mapping[str, Any], units: Mapping[str, str] | 
     try:
         plain_arrays = {name: _unmasked(values) for name, values in arrays.items()}
     except ValueError as exc:
-        raise InputError(f"{source}: rows of different lengths; allowed: arrays (n,) and (n, columns)") from exc
-    # A single row, of one speed, is a column of length 1; otherwise dimensions of length 1 are MATLAB's.
+        allowed = "arrays (n,) and (n, columns)"
+        raise InputError(f"{source}: rows of different lengths; allowed: {allowed}") from exc
+    # A single row, of one speed, is a column of length 1; otherwise dimensions of length 1 are
+    # MATLAB's.
     is_single_row = any(values.shape == (1,) for values in plain_arrays.values())
     numeric: dict[str, NDArray[Any]] = {}
     for name, values in plain_arrays.items():
@@ -123,14 +130,14 @@ def table_of(source: str, arrays: Mapping[str, Any], units: Mapping[str, str] | 
         oriented = values.T if is_transposed else values
         count = math.prod(oriented.shape[1:])
         if len(columns) + count > MAX_COLUMNS:
-            raise InputError(
-                f"{source}: array {name[:_MAX_SHOWN_NAME]!r} has {count} columns; allowed: up to {MAX_COLUMNS} in all"
-            )
+            problem = f"array {name[:_MAX_SHOWN_NAME]!r} has {count} columns"
+            raise InputError(f"{source}: {problem}; allowed: up to {MAX_COLUMNS} in all")
         for place in np.ndindex(oriented.shape[1:]):
             label = f"{plain_name}[{','.join(map(str, place))}]"
             columns[label] = DataColumn(oriented[:, *place].astype(float), unit)
     if not columns:
-        raise InputError(f"{source}: no columns of numbers in it; allowed: a time and angles, as columns or arrays")
+        allowed = "a time and angles, as columns or arrays"
+        raise InputError(f"{source}: no columns of numbers in it; allowed: {allowed}")
     return DataTable(source, columns)
 
 
@@ -142,18 +149,21 @@ def _unmasked(values: Any) -> NDArray[Any]:
 
 
 def split_bracketed_unit(name: str) -> tuple[str, str]:
-    """Return name and unit of "rotor [deg]", "rotor (deg)" or "rotor / deg"; "" where there is no unit.
+    """Return name and unit of "rotor [deg]", "rotor (deg)" or "rotor / deg"; "" for no unit.
 
-    A number in brackets is an index: "q[0]" has no unit. Linear in the length of the name, which may be any.
+    A number in brackets is an index: "q[0]" has no unit. Linear in the length of the name, which
+    may be any.
 
-    >>> split_bracketed_unit("rotor [deg]"), split_bracketed_unit("t / s"), split_bracketed_unit("q[0]")
-    (('rotor', 'deg'), ('t', 's'), ('q[0]', ''))
+    >>> split_bracketed_unit("rotor [deg]"), split_bracketed_unit("t / s")
+    (('rotor', 'deg'), ('t', 's'))
+    >>> split_bracketed_unit("q[0]")
+    ('q[0]', '')
     """
     text = name.strip()
-    found = [place for place in (_bracketed(text), _behind_stroke(text)) if place is not None]
-    if not found:
+    units = [place for place in (_bracketed(text), _behind_stroke(text)) if place is not None]
+    if not units:
         return text, ""
-    end, unit = min(found)
+    end, unit = min(units)
     stem = text[:end].strip()
     if not stem or unit.isdigit():
         return text, ""
@@ -173,7 +183,7 @@ def _bracketed(text: str) -> tuple[int, str] | None:
 
 
 def _behind_stroke(text: str) -> tuple[int, str] | None:
-    """Return where "/ unit" begins at the end of a name, with blanks before the stroke, and the unit."""
+    """Return where "/ unit" begins at the end of a name, blanks before the stroke, and the unit."""
     words = text.rsplit(maxsplit=2)
     if len(words) == 3 and words[1] == "/":
         return len(words[0]), words[2]

@@ -1,12 +1,11 @@
-"""What data that do not agree look like: mistakes in their columns and times, then another model, parameters, faults.
+"""Mistakes in the columns and times of a trajectory: units, signs, zeros, turns, lags, exchanges.
 
-A mistake in the columns or times is looked for by the reference, at most carried on from one of its rows, and named
-where the data so corrected have no defects.
+A mistake is looked for by the reference, at most carried on from one of its rows. It explains the
+data where the data so corrected have no defects.
 """
 
 from __future__ import annotations
 
-import itertools
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -14,25 +13,25 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 
-from rotor_mbs.comparison.channels import ForeignData, channels
-from rotor_mbs.comparison.defect_causes import DefectCauses
-from rotor_mbs.errors import InputError
-from rotor_mbs.models.lagrange.defects import (
-    FIT_ROWS,
-    fitted_rates,
-    interval_defects,
-    interval_ends,
+from rotor_mbs.comparison.channels import channels
+from rotor_mbs.comparison.data import ForeignData
+from rotor_mbs.comparison.data_defects import (
+    carried_errors,
+    defects_of_data,
+    judged_defects,
+    states_of,
 )
+from rotor_mbs.comparison.hypotheses import Hypothesis, explanations
+from rotor_mbs.models.lagrange.defects import interval_ends
 from rotor_mbs.models.lagrange.reference import TimedReference
 from rotor_mbs.scenario.scene import Scene
-from rotor_mbs.solution.defects import Defects
 from rotor_mbs.solution.metrics import horizon
 from rotor_mbs.solution.trajectory import Array, Trajectory
 
-# A mistake fits where what is left is within the tolerance, or a thousandth of what there was and at most this.
-_LEFT = 1e-3
-_MOST_LEFT = 1e-4
-_FEWEST = 5  # rows: with fewer, something always fits
+# A mistake fits where what is left is within the tolerance, or a thousandth of what there was and
+# at most this.
+_LEFT, _MAX_LEFT = 1e-3, 1e-4
+MIN_ROWS = 5  # with fewer, something always fits
 _DEGREE, _TURN = math.pi / 180.0, 2.0 * math.pi
 _FACTORS = {
     "angle": (
@@ -46,67 +45,26 @@ _FACTORS = {
         (_TURN, "Hz taken as rad/s"),
     ),
 }
-_TIMES = (
+_TIME_FACTORS = (
     (1e-3, "time in ms taken as s"),
     (1e-6, "time in us taken as s"),
     (60.0, "time in minutes taken as s"),
 )
-_LEAST_LAG = 1e-4  # of an interval between rows: less is rounding
-_LAG_ROW = 50  # by which a lag is found
+_MIN_LAG = 1e-4  # of an interval between rows: less is rounding
+_WHOLE_ROWS = 1e-3  # of a row: a lag so near a number of rows is that number
+_LAG_ROW = 50  # by which a lag is explanation
 _LAG_ROUNDS = 8
-_SAME_START = 1e-3  # rad, rad/s: data that start farther off are no run of the scene as they are
-
-
-def carried_errors(reference: Trajectory, growth: Array, units: Array) -> Array:
-    """(n, 2 (1 + blades)) What a relative error of 1 at the start may be in each angle, then rate, at most; growth,
-    units: of `TimedReference`."""
-    largest = np.maximum.accumulate(np.maximum(np.abs(reference.angles).max(axis=1), 1.0))
-    return np.asarray(
-        np.maximum(np.maximum.accumulate(growth, axis=0), 1.0) * largest[:, None] * units
-    )
-
-
-def states_of(run: Trajectory) -> Array:
-    """(n, 2 (1 + blades)) Angles, then rates."""
-    return np.hstack([run.angles, run.rates])
-
-
-def defects_of_data(
-    scene: Scene, data: ForeignData, reference: Trajectory, until: int
-) -> tuple[Defects | None, str]:
-    """The defects of the data, and what a reader must know of them. Angles that the data lack are the reference's, and
-    then only as far as the horizon; rates that they lack are found from the angles."""
-    count = len(scene.initial_angles)
-    states, rounding = states_of(reference).copy(), np.zeros((len(data.time), 2 * count))
-    states[:, data.columns], rounding[:, data.columns] = data.values, data.rounding
-    lacking = [i for i in scene.moving_coordinates if i not in data.columns]
-    without_rates = [i for i in scene.moving_coordinates if count + i not in data.columns]
-    rows, note = until if lacking else len(data.time), ""
-    if rows < 2:
-        return None, ""
-    time, states, rounding = data.time[:rows], states[:rows], rounding[:rows]
-    if without_rates and not lacking:
-        try:
-            rates = fitted_rates(scene, time, states[:, :count])
-        except InputError as exc:
-            return None, f"no defects: {exc}"
-        columns = [count + i for i in without_rates]
-        states[:, columns] = rates[:, without_rates]
-        # Of a slope through five rows.
-        rounding[:, columns] = rounding[:, without_rates] / float(np.median(np.diff(time)))
-        names = ", ".join(f"{scene.coordinate_labels[i]} rate" for i in without_rates)
-        note = f"computed from the angles, by fitting the equations of motion to {FIT_ROWS} rows: {names}"
-    if not np.isfinite(states).all():
-        return None, ""
-    return interval_defects(
-        scene, time, states[:, :count], states[:, count:], rounding, data.time_rounding[:rows]
-    ), note
+_TIME_ROUNDING = 1e-9  # of the duration
 
 
 @dataclass(frozen=True)
-class CauseSearch:
-    """Data, all rows, against a scene's reference at the times of the data and at the scene's samples.
+class TrajectorySearch:
+    """Data, all rows, and a scene's reference at their times and at the scene's samples.
 
+    Attributes
+    ----------
+    scene, data, exact : the scene, the data, the reference.
+    tolerance : rad, of an interval's defect.
     worst : the largest error per unit of error growth.
     """
 
@@ -117,128 +75,166 @@ class CauseSearch:
     worst: float
 
     def states_at(self, time: Array) -> Array:
-        """(n, 2 (1 + blades)) The motion at any increasing times up to the horizon, from the reference's row before."""
+        """Compute the motion at other times, from the reference's row before each.
+
+        Parameters
+        ----------
+        time : (n,) s, increasing, up to the horizon.
+
+        Returns
+        -------
+        ndarray
+            (n, 2 (1 + blades)) angles, then rates.
+        """
         run, moving = self.exact.trajectory, self.scene.moving_coordinates
         before = np.searchsorted(run.time, time, side="right") - 1
         states = states_of(run)[before]
-        columns = [*moving, *(len(self.scene.initial_angles) + i for i in moving)]
-        states[:, columns] = interval_ends(self.scene, run.time[before], time, states[:, columns])
+        count = len(self.scene.initial_angles)
+        columns = [*moving, *(count + i for i in moving)]
+        moved = interval_ends(self.scene, run.time[before], time, states[:, columns])
+        states[:, columns] = moved
         return states
 
     def up_to_horizon(self, data: ForeignData) -> ForeignData:
-        return data.rows((data.time >= 0.0) & (data.time <= horizon(self.exact.trajectory)))
+        """Return the rows of data from the start to the horizon of the scene."""
+        end = horizon(self.exact.trajectory)
+        return data.rows((data.time >= 0.0) & (data.time <= end))
 
     def carried(self, time: Array) -> Array:
-        """(n, 2 (1 + blades)) as `carried_errors`, at any times up to the horizon."""
+        """Return `carried_errors` at (n,) times up to the horizon, (n, 2 (1 + blades))."""
         run = self.exact.trajectory
         carried = carried_errors(run, self.exact.growth, self.exact.units)
-        return np.stack([np.interp(time, run.time, column) for column in carried.T], axis=1)
+        columns = [np.interp(time, run.time, column) for column in carried.T]
+        return np.stack(columns, axis=1)
 
     @property
-    def fitting(self) -> float:
-        """The largest error per unit of growth that a mistake may leave."""
-        return max(self.tolerance, min(_LEFT * self.worst, _MOST_LEFT))
+    def allowed(self) -> float:
+        """The largest error per unit of growth, and defect, that a mistake may leave."""
+        return max(self.tolerance, min(_LEFT * self.worst, _MAX_LEFT))
 
-    def is_right(self, data: ForeignData) -> bool:
-        """Whether corrected data have no defects, as far as any are known."""
-        data = data.rows((data.time >= 0.0) & (data.time <= self.scene.duration * (1.0 + 1e-9)))
+    def defect_left(self, correction: Correction) -> float:
+        """Return the largest defect of corrected data beyond rounding; 0 where none is known.
+
+        Parameters
+        ----------
+        correction : the data, whose times may begin before 0 and end after the scene.
+        """
+        data = correction.data
+        end = self.scene.duration * (1.0 + _TIME_ROUNDING)
+        data = data.rows((data.time >= 0.0) & (data.time <= end))
         inside = self.up_to_horizon(data)
         if len(data.time) < 2 or not len(inside.time):
-            return True
+            return 0.0
         count = len(self.scene.initial_angles)
-        states = np.tile(
-            [*self.scene.initial_angles, *self.scene.initial_rates], (len(data.time), 1)
-        )
+        start = [*self.scene.initial_angles, *self.scene.initial_rates]
+        states = np.tile(start, (len(data.time), 1))
         states[: len(inside.time)] = self.states_at(inside.time)
         reference = Trajectory(data.time, states[:, :count], states[:, count:])
         defects, _ = defects_of_data(self.scene, data, reference, len(inside.time))
-        return (
-            defects is None
-            or DefectCauses(self.scene, defects, self.tolerance).largest <= self.fitting
-        )
+        if defects is None:
+            return 0.0
+        return judged_defects(self.scene, defects, self.tolerance).largest
 
 
-def likely_causes(search: CauseSearch, defects: DefectCauses | None) -> list[str]:
-    """What fits, in words: mistakes in columns and times; else another model, parameters, or faults at a time; else
-    scatter, or a factor of a channel."""
-    first = search.up_to_horizon(search.data)
-    is_elsewhere = True
-    if len(first.time):
-        start = search.states_at(first.time[:1])[0, first.columns]
-        is_elsewhere = not np.abs(first.values[0] - start).max() <= _SAME_START
-    is_different = defects is not None and not defects.is_rounding
-    if (
-        search.worst <= search.tolerance
-        and not is_different
-        and search.data.time[-1] <= 2.0 * search.scene.duration
-    ):
-        return []
-    for text, data in itertools.chain([("", search.data)], _times(search)):
-        if texts := _column_mistakes(search, text, data):
+@dataclass(frozen=True)
+class Correction:
+    """Corrected data, and the mistakes that their columns had, in words."""
+
+    data: ForeignData
+    mistakes: tuple[str, ...] = ()
+
+
+def data_mistakes(search: TrajectorySearch) -> list[str]:
+    """Search for mistakes in the columns, and for those in the times with any in the columns."""
+    texts = column_mistakes(search)
+    if texts:
+        return texts
+    for hypothesis in _time_hypotheses(search):
+        texts = column_mistakes(search, hypothesis)
+        if texts:
             return texts
-    found: list[str] = []
-    if defects is not None and is_elsewhere:
-        found = defects.scenes()
-    elif defects is not None and is_different:
-        found = defects.explanations() or defects.faults()
-    found = (
-        found
-        or _scatter(search, first)
-        or _column_mistakes(search, "", search.data, with_factor=True)
-    )
-    if not found and is_different and defects is not None and is_elsewhere:
-        found = defects.explanations() or defects.faults()
-    return found
-
-
-def _column_mistakes(
-    search: CauseSearch, text: str, data: ForeignData, *, with_factor: bool = False
-) -> list[str]:
-    """What is wrong with the columns of data whose times are corrected, which `text` says, beside it; [] where no
-    mistakes explain the data."""
-    inside = search.up_to_horizon(data)
-    if len(inside.time) < _FEWEST:
-        return []
-    for mistakes, corrected in _corrected(search, data, inside, with_factor):
-        texts = [text, *mistakes] if text else mistakes
-        if texts and search.is_right(corrected):
-            return ["; and ".join([text, "; and ".join(mistakes)])] if text and mistakes else texts
     return []
 
 
-def _times(search: CauseSearch) -> Iterator[tuple[str, ForeignData]]:
-    """Times in another unit, or numbers of rows; a constant lag; rows from the end to the start."""
+def column_mistakes(
+    search: TrajectorySearch,
+    times: Hypothesis[ForeignData] | None = None,
+    *,
+    with_factor: bool = False,
+) -> list[str]:
+    """Search for what is wrong with the columns of data.
+
+    Parameters
+    ----------
+    search : the data.
+    times : a mistake in their times, and the data without it.
+    with_factor : whether any factor of a channel may be wrong.
+
+    Returns
+    -------
+    list of str
+        The mistakes, one text with the one in the times; none where they do not explain the data.
+    """
+    data = times.change if times is not None else search.data
+    inside = search.up_to_horizon(data)
+    if len(inside.time) < MIN_ROWS:
+        return []
+    hypotheses = _column_hypotheses(search, data, inside, with_factor=with_factor)
+    # Without a mistake in the times there is one in the columns, or none at all.
+    mistaken = (each for each in hypotheses if each.text or times is not None)
+    explanation = next(explanations(mistaken, search.defect_left, search.allowed), None)
+    if explanation is None:
+        return []
+    mistakes = explanation.hypothesis.change.mistakes
+    return list(mistakes) if times is None else ["; and ".join([times.text, *mistakes])]
+
+
+# Times
+
+
+def _time_hypotheses(search: TrajectorySearch) -> Iterator[Hypothesis[ForeignData]]:
+    """Yield times in another unit, numbers of rows, a constant lag, and time reversed."""
     data = search.data
-    factors = list(_TIMES)
+    factors = list(_TIME_FACTORS)
     if np.array_equal(np.diff(data.time), np.ones(len(data.time) - 1)):
-        factors.append((search.scene.duration / (len(data.time) - 1), "row numbers taken as s"))
+        step = search.scene.duration / (len(data.time) - 1)
+        factors.append((step, "row numbers taken as s"))
     for factor, text in factors:
-        yield (
-            text,
-            replace(data, time=data.time * factor, time_rounding=data.time_rounding * factor),
-        )
+        time, rounding = data.time * factor, data.time_rounding * factor
+        yield Hypothesis(text, replace(data, time=time, time_rounding=rounding))
     step = float(np.median(np.diff(data.time)))
     lag = _lag(search)
-    if abs(lag) > _LEAST_LAG * step:
+    if abs(lag) > _MIN_LAG * step:
         rows = lag / step
-        whole = (
-            f", {abs(round(rows))} rows" if abs(rows - round(rows)) < 1e-3 and round(rows) else ""
-        )
-        text = f"a constant lag of {lag:.6g} s{whole} ({'late' if lag > 0.0 else 'early'})"
-        yield f"{text}: `offset = {-lag:.6g}` of the time", replace(data, time=data.time - lag)
-    turned = (data.time[0] + data.time[-1] - data.time)[::-1]
-    backward = replace(data, time=turned, values=data.values[::-1], rounding=data.rounding[::-1])
-    yield "rows from the end to the start, time reversed", backward
+        in_rows = ""
+        if round(rows) and abs(rows - round(rows)) < _WHOLE_ROWS:
+            in_rows = f", {abs(round(rows))} rows"
+        side = "late" if lag > 0.0 else "early"
+        text = f"a constant lag of {lag:.6g} s{in_rows} ({side}): `offset = {-lag:.6g}` of the time"
+        yield Hypothesis(text, replace(data, time=data.time - lag))
+    reversed_time = (data.time[0] + data.time[-1] - data.time)[::-1]
+    backward = replace(
+        data, time=reversed_time, values=data.values[::-1], rounding=data.rounding[::-1]
+    )
+    yield Hypothesis("rows from the end to the start, time reversed", backward)
 
 
-def _lag(search: CauseSearch) -> float:
-    """s, by when the reference is nearest to a row of the data; 0 where it never is near."""
+def _lag(search: TrajectorySearch) -> float:
+    """Find by how much a row of the data is later than the reference is nearest to it, s.
+
+    From the nearest row of the reference on by Gauss and Newton's iteration over the time.
+
+    Parameters
+    ----------
+    search : the data and the reference, which is carried on from its rows.
+    """
     data, run = search.data, search.exact.trajectory
     row = min(_LAG_ROW, len(data.time) // 4)
     columns, end = data.columns, horizon(run)
-    distances = np.abs(states_of(run)[run.time <= end][:, columns] - data.values[row]).max(axis=1)
+    states = states_of(run)[run.time <= end][:, columns]
+    distances = np.abs(states - data.values[row]).max(axis=1)
     time = float(run.time[int(distances.argmin())])
-    step = 1e-6 * max(end, 1e-9)
+    step = 1e-6 * max(end, 1e-9)  # for the derivative
     for _ in range(_LAG_ROUNDS):
         here, ahead = search.states_at(np.array([time, time + step]))[:, columns]
         slope = (ahead - here) / step
@@ -248,113 +244,138 @@ def _lag(search: CauseSearch) -> float:
     return float(data.time[row]) - time
 
 
-def _corrected(
-    search: CauseSearch, data: ForeignData, inside: ForeignData, with_factor: bool
-) -> Iterator[tuple[list[str], ForeignData]]:
-    """What may be wrong with the columns of data whose times are right, and the data so corrected; inside: the rows up
-    to the horizon. with_factor: whether any factor of a channel may be wrong."""
+# Columns
+
+
+def _column_hypotheses(
+    search: TrajectorySearch, data: ForeignData, inside: ForeignData, *, with_factor: bool
+) -> Iterator[Hypothesis[Correction]]:
+    """Yield what may be wrong with the columns of data whose times are right.
+
+    Parameters
+    ----------
+    search : what the data should be.
+    data, inside : all rows, and those up to the horizon.
+    with_factor : whether any factor of a channel may be wrong.
+    """
     states, carried = search.states_at(inside.time), search.carried(inside.time)
-    columns, values = data.columns, inside.values
-    if float(np.abs((values - states[:, columns]) / carried[:, columns]).max()) <= search.fitting:
-        yield [], data
+    columns = data.columns
+    error = np.abs((inside.values - states[:, columns]) / carried[:, columns])
+    if float(error.max()) <= search.allowed:
+        yield Hypothesis("", Correction(data), price=0)
         return
-    # Each channel by itself: unit, sign, zero, turns; the simplest of those that leave least.
+    corrected = _corrected_channels(search, data, states, carried, with_factor=with_factor)
+    if corrected is not None:
+        yield corrected
+    # Columns that are those of other channels, rates taken as angles among them: each column is
+    # assigned another channel, so that the sum of the errors' digits is least.
+    differences = np.abs(inside.values[:, :, None] - states[:, None, :])
+    errors = (differences / carried[:, None, :]).max(axis=0)
+    preference = np.zeros_like(errors)
+    places = range(len(columns))
+    preference[places, columns] = -1e-3  # of equal ones, its own
+    _, chosen = linear_sum_assignment(np.log10(np.clip(errors, 1e-16, 1e16)) + preference)
+    if errors[places, chosen].max() <= search.allowed and list(chosen) != columns:
+        yield _exchange(search.scene, data, list(chosen))
+
+
+def _corrected_channels(
+    search: TrajectorySearch,
+    data: ForeignData,
+    states: Array,
+    carried: Array,
+    *,
+    with_factor: bool,
+) -> Hypothesis[Correction] | None:
+    """Correct each channel by itself: unit, sign, zero, turns.
+
+    Parameters
+    ----------
+    search, data : what the data should be, and all rows.
+    states, carried : (n, 2 (1 + blades)) in the rows from t = 0 to the horizon, see
+        `TrajectorySearch`.
+    with_factor : whether any factor of a channel may be wrong.
+
+    Returns
+    -------
+    Hypothesis or None
+        None where a channel fits by no correction.
+    """
     begin = int(np.searchsorted(data.time, 0.0))
+    rows = slice(begin, begin + len(states))
     names: dict[str, list[str]] = {}
-    parts: list[tuple[Array, Array]] = []
+    values, roundings = [], []
     for j, channel in enumerate(data.channels):
         expected, scale = states[:, channel.column], carried[:, channel.column]
-        whole = list(_corrections(channel.kind, data.values[:, j], begin, float(expected[0])))
-        if with_factor and (factor := float(values[:, j] @ expected / (expected @ expected))):
-            whole.append(
-                (f"too large by a factor of {factor:.6g}", 1.0 / factor, data.values[:, j] / factor)
-            )
-        left = [
-            float(np.abs((v[begin : begin + len(values)] - expected) / scale).max())
-            for _, _, v in whole
-        ]
+        candidates = list(_corrections(channel.kind, data.values[:, j], begin, float(expected[0])))
+        if with_factor:
+            # By least squares.
+            factor = float(data.values[rows, j] @ expected / (expected @ expected))
+            if factor:
+                text = f"too large by a factor of {factor:.6g}"
+                candidates.append((text, 1.0 / factor, data.values[:, j] / factor))
+        left = []
+        for _, _, corrected in candidates:
+            left.append(float(np.abs((corrected[rows] - expected) / scale).max()))
         least = max(min(left), 1e-3 * search.tolerance)
-        if not least <= search.fitting:
-            break
-        text, factor, corrected = next(
-            item for item, size in zip(whole, left, strict=True) if size <= 10.0 * least
-        )
-        names.setdefault(text, []).append(channel.name)
-        parts.append((corrected, data.rounding[:, j] * abs(factor)))
-    else:
-        texts = [f"{', '.join(which)}: {text}" for text, which in names.items() if text]
-        both = [np.stack(arrays, axis=1) for arrays in zip(*parts, strict=True)]
-        yield texts, replace(data, values=both[0], rounding=both[1])
-    # Columns that are those of other channels, rates taken as angles among them.
-    errors = (np.abs(values[:, :, None] - states[:, None, :]) / carried[:, None, :]).max(axis=0)
-    own = np.zeros_like(errors)
-    own[range(len(columns)), columns] = -1e-3  # of equal ones, its own
-    _, chosen = linear_sum_assignment(np.log10(np.clip(errors, 1e-16, 1e16)) + own)
-    if errors[range(len(columns)), chosen].max() <= search.fitting and list(chosen) != columns:
-        text, exchanged = _exchanged(search.scene, data, list(chosen))
-        yield [text], exchanged
+        if not least <= search.allowed:
+            return None
+        # The simplest of those that leave about as little as the best.
+        for (text, factor, corrected), size in zip(candidates, left, strict=True):
+            if size <= 10.0 * least:
+                names.setdefault(text, []).append(channel.name)
+                values.append(corrected)
+                roundings.append(data.rounding[:, j] * abs(factor))
+                break
+    mistakes = [f"{', '.join(which)}: {text}" for text, which in names.items() if text]
+    corrected_data = replace(
+        data, values=np.stack(values, axis=1), rounding=np.stack(roundings, axis=1)
+    )
+    correction = Correction(corrected_data, tuple(mistakes))
+    return Hypothesis("; and ".join(mistakes), correction, len(mistakes))
 
 
 def _corrections(
     kind: str, values: Array, begin: int, start: float
 ) -> Iterator[tuple[str, float, Array]]:
-    """What is wrong, factor, values so corrected, the simplest first; begin: the first row that is compared; start: the
-    right value there."""
+    """Yield what may be wrong with a channel, the factor, and its values so corrected.
+
+    The simplest first: another unit, the other sign, another zero, turns that are missing.
+
+    Parameters
+    ----------
+    kind : "angle" or "rate".
+    values : (rows,) of the channel.
+    begin : the first row that is compared.
+    start : the right value there.
+    """
     factors = [(1.0, ""), *_FACTORS[kind]]
     signed = [(sign * factor, text) for sign in (1.0, -1.0) for factor, text in factors]
-    for shifted in (False, True):
+    for has_other_zero in (False, True):
         for factor, text in signed:
-            zero = factor * float(values[begin]) - start if shifted else 0.0
-            parts = [
-                text,
-                "sign reversed" if factor < 0.0 else "",
-                f"zero off by {zero:.6g}" if shifted else "",
-            ]
-            parts = [part for part in parts if part]
+            mistakes = [text] if text else []
+            if factor < 0.0:
+                mistakes.append("sign reversed")
+            zero = 0.0
+            if has_other_zero:
+                zero = factor * float(values[begin]) - start
+                mistakes.append(f"zero off by {zero:.6g}")
             corrected = factor * values - zero
-            yield ", ".join(parts), factor, corrected
+            yield ", ".join(mistakes), factor, corrected
             if kind == "angle" and np.abs(np.diff(corrected)).max() > 0.5 * _TURN:
                 unwrapped = np.unwrap(corrected)
                 unwrapped += _TURN * np.round((start - unwrapped[begin]) / _TURN)
-                yield ", ".join([*parts, "wrapped, taken as unwrapped"]), factor, unwrapped
+                text_of_turns = ", ".join([*mistakes, "wrapped, taken as unwrapped"])
+                yield text_of_turns, factor, unwrapped
 
 
-def _exchanged(scene: Scene, data: ForeignData, chosen: Sequence[int]) -> tuple[str, ForeignData]:
-    """In words, and the data with their columns taken as those of other channels."""
+def _exchange(scene: Scene, data: ForeignData, chosen: Sequence[int]) -> Hypothesis[Correction]:
+    """Take the columns of data as those of other channels, by their numbers."""
     known = channels(scene)[1:]
-    others = tuple(known[c] for c in chosen)
-    moved = [
-        f"{own.name} is {other.name}"
-        for own, other in zip(data.channels, others, strict=True)
-        if own != other
-    ]
-    return f"columns exchanged: {', '.join(moved)}", replace(data, channels=others)
-
-
-def _scatter(search: CauseSearch, data: ForeignData) -> list[str]:
-    """Errors that have nothing in common from row to row, whatever the growth; data: up to the horizon."""
-    if len(data.time) < 4 * _FEWEST:
-        return []
-    errors = data.values - search.states_at(data.time)[:, data.columns]
-    wrong = (
-        np.abs(errors / search.carried(data.time)[:, data.columns]).max(axis=0) > search.tolerance
-    )
-    centred = errors[:, wrong] - errors[:, wrong].mean(axis=0)
-    sizes = (centred**2).mean(axis=0)
-    if not wrong.any() or not ((sizes > 0.0) & (sizes < math.inf)).all():
-        return []
-    # Of every second row alone neighbours have nothing in common either.
-    common = (
-        np.max([np.abs((centred[n:] * centred[:-n]).mean(axis=0)) for n in (1, 2)], axis=0) / sizes
-    )
-    half = len(data.time) // 2
-    early, late = (
-        (centred[part] ** 2).mean(axis=0) for part in (slice(None, half), slice(half, None))
-    )
-    if (
-        (common > 3.0 / math.sqrt(len(errors))).any()
-        or (late > 2.0 * early).any()
-        or (early > 2.0 * late).any()
-    ):
-        return []
-    return [f"scatter from row to row, standard deviation {math.sqrt(float(sizes.max())):.1e}"]
+    others = tuple(known[column] for column in chosen)
+    moved = []
+    for own, other in zip(data.channels, others, strict=True):
+        if own != other:
+            moved.append(f"{own.name} is {other.name}")
+    text = f"columns exchanged: {', '.join(moved)}"
+    return Hypothesis(text, Correction(replace(data, channels=others), (text,)))

@@ -1,8 +1,8 @@
-"""Which library reads which format: files of other programs to columns, in the process that `comparison.files` starts.
+"""Which library reads which format: the work of the process that `comparison.files` starts.
 
-A file may be damaged, or made to harm: what it claims to hold is bounded before it is read, and the process has limits
-of memory and processor time for what no check foresees. No regular expression here takes longer than a constant times
-the length of its text.
+A file may be damaged, or made to harm: what it claims to hold is bounded before it is read, and the
+process has limits of memory and processor time for what no check foresees. No regular expression
+here takes longer than a constant times the length of its text.
 """
 
 from __future__ import annotations
@@ -32,12 +32,15 @@ from rotor_mbs.comparison.columns import (
 )
 from rotor_mbs.errors import InputError, RotorError
 
-MAX_BYTES = 1 << 29  # of a file, and of its arrays unpacked; a million rows of ten columns are 80 MB
+# Of a file, and of its arrays unpacked; a million rows of ten columns are 80 MB.
+MAX_BYTES = 1 << 29
 _MAX_PROBLEM = 2000  # characters of a message, which may name groups of the file
 FORMATS = "text with a header, .json, .npz, .mat, HDF5, netCDF, OpenFAST .out and .outb"
-_HDF5, _NETCDF3, _ZIP, _MATLAB_5 = b"\x89HDF\r\n\x1a\n", b"CDF", b"PK\x03\x04", b"MATLAB 5.0 MAT-file"
+_HDF5, _NETCDF3 = b"\x89HDF\r\n\x1a\n", b"CDF"
+_ZIP, _MATLAB_5 = b"PK\x03\x04", b"MATLAB 5.0 MAT-file"
 _MATLAB_NUMBERS = {
-    "double", "single", "logical", "int8", "int16", "int32", "int64", "uint8", "uint16", "uint32", "uint64",
+    "double", "single", "logical", "int8", "int16", "int32", "int64", "uint8", "uint16", "uint32",
+    "uint64",
 }  # fmt: skip
 _UTF_16 = (b"\xff\xfe", b"\xfe\xff")  # spreadsheets' "Unicode text"
 
@@ -56,9 +59,10 @@ Lines = Sequence[tuple[int, str]]  # number of the line in the file, its text
 def write_columns() -> None:
     """Read a file and write its columns: the whole of the reading process.
 
-    The arguments of the process are the file, the result's place without suffix, `group`, `scene`, and its limits of
-    memory (bytes) and of processor time (s). The result is a .json file, with names, units and lengths of the columns
-    or the problems with the file; and a .f8 file with the numbers, one column after the other.
+    The arguments of the process are the file, the result's place without suffix, `group`, `scene`,
+    and its limits of memory (bytes) and of processor time (s). The result is a .json file, with
+    names, units and lengths of the columns or the problems with the file; and a .f8 file with the
+    numbers, one column after the other.
     """
     path, output, group, scene, memory, seconds = sys.argv[1:]
     _limit_resources(int(memory), math.ceil(float(seconds)))
@@ -115,7 +119,12 @@ def _short_names(columns: Mapping[str, DataColumn]) -> dict[str, DataColumn]:
 
 
 def read_columns(path: Path, group: str, scene: str) -> DataTable:
-    """Read the columns of a file of any format; `group`, `scene`: see `runs.table.read_arrays`.
+    """Read the columns of a file of any format.
+
+    Parameters
+    ----------
+    path : the file; what it is is decided by its first bytes.
+    group, scene : of an HDF5 file, see `runs.table.read_arrays`.
 
     Raises
     ------
@@ -133,7 +142,8 @@ def read_columns(path: Path, group: str, scene: str) -> DataTable:
         return table_of(source, *_netcdf_3(path))
     if path.suffix.lower() == ".outb":
         return table_of(source, *_openfast(path))
-    if head.startswith(_HDF5) or head[512:].startswith(_HDF5):  # MATLAB's v7.3 has 512 bytes of its own before
+    # MATLAB's v7.3 has 512 bytes of its own before.
+    if head.startswith(_HDF5) or head[512:].startswith(_HDF5):
         return table_of(source, *_hdf5(path, group, scene))
     if b"\x00" in head and not head.startswith(_UTF_16):
         raise InputError(f"{path}: not a format that can be read; allowed: {FORMATS}")
@@ -152,11 +162,12 @@ def read_columns(path: Path, group: str, scene: str) -> DataTable:
 def _refuse_large(path: Path, size: float) -> None:
     """Raise InputError if arrays of this size, in bytes, are more than is read."""
     if size > MAX_BYTES:
-        shown = f"{size / 2**30:.1f} GB; allowed: up to {MAX_BYTES / 2**30:g} GB: export fewer rows or arrays"
-        raise InputError(f"{path}: its arrays claim {shown}")
+        allowed = f"up to {MAX_BYTES / 2**30:g} GB: export fewer rows or arrays"
+        raise InputError(f"{path}: its arrays claim {size / 2**30:.1f} GB; allowed: {allowed}")
 
 
 def _numpy_archive(path: Path) -> Arrays:
+    """Read the arrays of an .npz file."""
     # An entry is read to the size that the archive declares for it, and no further.
     with zipfile.ZipFile(path) as entries:
         _refuse_large(path, sum(entry.file_size for entry in entries.infolist()))
@@ -165,6 +176,7 @@ def _numpy_archive(path: Path) -> Arrays:
 
 
 def _matlab_5(path: Path) -> Arrays:
+    """Read the arrays of numbers of a MAT file of version 5 to 7."""
     from scipy.io import loadmat, whosmat  # late: 0.1 s
 
     # The heads of the arrays alone are unpacked for this; structures and cells are not read at all.
@@ -175,13 +187,16 @@ def _matlab_5(path: Path) -> Arrays:
 
 
 def _netcdf_3(path: Path) -> tuple[Arrays, Units]:
+    """Read the variables of a netCDF-3 file and their units; path: the file."""
     from scipy.io import netcdf_file
 
     arrays: dict[str, Any] = {}
     units: dict[str, str] = {}
-    # Variables are views of the file, until they are copied: several may be views of the same bytes.
+    # Variables are views of the file, until they are copied: several may be views of the same
+    # bytes.
     with netcdf_file(path, "r", mmap=True) as file:
-        _refuse_large(path, sum(8.0 * math.prod(variable.shape) for variable in file.variables.values()))
+        sizes = [8.0 * math.prod(variable.shape) for variable in file.variables.values()]
+        _refuse_large(path, sum(sizes))
         for name in file.variables:
             arrays[name] = np.array(file.variables[name][:])
             if hasattr(file.variables[name], "units"):
@@ -190,6 +205,7 @@ def _netcdf_3(path: Path) -> tuple[Arrays, Units]:
 
 
 def _hdf5(path: Path, group: str, scene: str) -> tuple[Arrays, Units]:
+    """Read the arrays of a group of an HDF5 file, of this program's own or of any other."""
     from rotor_mbs.runs import table  # late: 0.2 s
     from rotor_mbs.runs.design import RUNS
     from rotor_mbs.runs.read import run_arrays
@@ -200,7 +216,7 @@ def _hdf5(path: Path, group: str, scene: str) -> tuple[Arrays, Units]:
 
 
 def _openfast(path: Path) -> tuple[Arrays, Units]:
-    """Read OpenFAST's binary output by its own project's reader."""
+    """Read OpenFAST's binary output by its own project's reader; path: the file."""
     try:
         from openfast_io.FAST_output_reader import load_binary_output
     except ImportError as exc:
@@ -212,32 +228,47 @@ def _openfast(path: Path) -> tuple[Arrays, Units]:
     counts = struct.unpack_from("<ii", head, 4 if head[:2] == b"\x04\x00" else 2)  # channels, rows
     number_bytes = 8 if head[:2] == b"\x03\x00" else 2
     if min(counts) < 0 or math.prod(counts) * number_bytes > path.stat().st_size:
-        raise InputError(f"{path}: cannot be read: it has fewer numbers than it claims; allowed: {FORMATS}")
+        problem = "cannot be read: it has fewer numbers than it claims"
+        raise InputError(f"{path}: {problem}; allowed: {FORMATS}")
     values, facts, _ = load_binary_output(str(path))
     names, units = facts["attribute_names"], facts["attribute_units"]
-    return {name: values[:, i] for i, name in enumerate(names)}, dict(zip(names, units, strict=True))
+    arrays = {name: values[:, i] for i, name in enumerate(names)}
+    return arrays, dict(zip(names, units, strict=True))
 
 
 def _read_text(source: str, text: str) -> DataTable:
-    """Read the columns of a text file. Raises InputError with the line where something else than a number stands."""
+    """Read the columns of a text file.
+
+    Parameters
+    ----------
+    source : what messages call the file.
+    text : comma-separated values, columns divided by blanks, Exudyn's sensor files, OpenFAST's
+        `.out`.
+
+    Raises
+    ------
+    InputError
+        With the line where something else than a number stands.
+    """
     lines = []
     for number, line in enumerate(text.splitlines(), start=1):
-        if line.strip(" \t,;"):  # lines of nothing but dividers are what spreadsheets write for empty rows
+        # Lines of nothing but dividers are what spreadsheets write for empty rows.
+        if line.strip(" \t,;"):
             lines.append((number, line.strip(" ")))
     first, divider = _first_row(source, lines)
     head = [line for _, line in lines[:first]]
     rows = [(i, _FORTRAN.sub("E", row)) for i, row in lines[first:] if not row.startswith(_COMMENT)]
     del lines
-    if divider != "," and not any("." in row for _, row in rows):  # else a comma may stand between thousands
+    # Beside a point a comma may stand between thousands; without one it is decimal.
+    if divider != "," and not any("." in row for _, row in rows):
         rows = [(i, row.replace(",", ".")) for i, row in rows]
     values = _numbers(source, rows, divider)
     comments = [line.lstrip("#%/! ") for line in head if line.startswith(_COMMENT)]
     variable = _EXUDYN.search("\n".join(comments))
     if variable is not None and "sensor output file" in comments[0]:
         return table_of(source, {"time": values[:, 0], variable[1]: values[:, 1:]})
-    names = _names(
-        source, [line for line in head if not line.startswith(_COMMENT)] or comments, values.shape[1], divider
-    )
+    plain = [line for line in head if not line.startswith(_COMMENT)]
+    names = _names(source, plain or comments, values.shape[1], divider)
     columns: dict[str, DataColumn] = {}
     repeats: dict[str, int] = {}
     for (name, unit), column in zip(names, values.T, strict=True):
@@ -255,22 +286,43 @@ def _read_text(source: str, text: str) -> DataTable:
 
 
 def _first_row(source: str, lines: Lines) -> tuple[int, str | None]:
-    """Find the first row of numbers. Returns its place in `lines` and what divides its fields."""
+    """Find the first row of numbers.
+
+    Parameters
+    ----------
+    source : what messages call the file.
+    lines : of the file, with their numbers.
+
+    Returns
+    -------
+    int, str or None
+        Its place in `lines`; what divides its fields, None for blanks.
+
+    Raises
+    ------
+    InputError
+        Where there is none, with the row that comes nearest.
+    """
     most_numbers, nearest = 0, ""  # of the row that comes nearest, and what in it is no number
     for place, (number, line) in enumerate(lines):
         if line.startswith(_COMMENT):
             continue
         for divider in _DIVIDERS:
             fields = _fields(_FORTRAN.sub("E", line), divider)
-            others = [field for field in fields if field and not _is_number(field, decimal_comma=divider != ",")]
+            others = []
+            for field in fields:
+                if field and not _is_number(field, decimal_comma=divider != ","):
+                    others.append(field)
             if len(fields) > 1 and any(fields) and not others:
                 return place, divider
             if others and len(fields) - len(others) > most_numbers:
                 most_numbers = len(fields) - len(others)
                 nearest = f"; line {number} has {others[0][:40]!a}"
     if any(_is_number(line, decimal_comma=True) for _, line in lines):
-        raise InputError(f"{source}: one column of numbers; allowed: a column of times, and others beside it")
-    raise InputError(f"{source}: no row of numbers in it{nearest}; allowed: columns of numbers below a header line")
+        allowed = "a column of times, and others beside it"
+        raise InputError(f"{source}: one column of numbers; allowed: {allowed}")
+    allowed = "columns of numbers below a header line"
+    raise InputError(f"{source}: no row of numbers in it{nearest}; allowed: {allowed}")
 
 
 def _fields(line: str, divider: str | None) -> list[str]:
@@ -290,7 +342,24 @@ def _is_number(field: str, *, decimal_comma: bool) -> bool:
 
 
 def _numbers(source: str, rows: Lines, divider: str | None) -> NDArray[np.float64]:
-    """Return the numbers of all rows, (n, columns), NaN where a field is empty. Raises InputError."""
+    """Read the numbers of all rows.
+
+    Parameters
+    ----------
+    source : what messages call the file.
+    rows : the lines of numbers.
+    divider : what divides them.
+
+    Returns
+    -------
+    ndarray
+        (n, columns), NaN where a field is empty.
+
+    Raises
+    ------
+    InputError
+        With the line that has another number of fields, or something else than a number.
+    """
     width = len(_fields(rows[0][1], divider))
     if width > MAX_COLUMNS:
         raise InputError(f"{source}: {width} columns; allowed: up to {MAX_COLUMNS}")
@@ -298,7 +367,8 @@ def _numbers(source: str, rows: Lines, divider: str | None) -> NDArray[np.float6
     for i, (number, line) in enumerate(rows):
         fields = _fields(line, divider)
         if len(fields) != width:
-            raise InputError(f"{source}:{number}: {len(fields)} fields, where the rows above have {width}")
+            problem = f"{len(fields)} fields, where the rows above have {width}"
+            raise InputError(f"{source}:{number}: {problem}")
         try:
             values[i] = [float(field or "nan") for field in fields]
         except ValueError:
@@ -310,7 +380,9 @@ def _numbers(source: str, rows: Lines, divider: str | None) -> NDArray[np.float6
     return values
 
 
-def _names(source: str, head: Sequence[str], width: int, divider: str | None) -> list[tuple[str, str]]:
+def _names(
+    source: str, head: Sequence[str], width: int, divider: str | None
+) -> list[tuple[str, str]]:
     """Return name and unit of each column, from the last line of the head, or from the last two.
 
     Parameters
@@ -321,7 +393,8 @@ def _names(source: str, head: Sequence[str], width: int, divider: str | None) ->
     divider : what divides the numbers; the names may be divided otherwise.
     """
     if not head:
-        raise InputError(f"{source}: no header line above the numbers; allowed: a line such as: time [s],rotor [rad]")
+        allowed = "a line such as: time [s],rotor [rad]"
+        raise InputError(f"{source}: no header line above the numbers; allowed: {allowed}")
     last = _words(head[-1], divider, width)
     above = _words(head[-2], divider, width) if len(head) > 1 else []
     units = [word.strip("[]() ") for word in last]
@@ -333,23 +406,25 @@ def _names(source: str, head: Sequence[str], width: int, divider: str | None) ->
     if len(names) == width - 1 and divider is not None:
         names.append(("", ""))
     if len(names) != width:
-        raise InputError(f"{source}: {len(names)} names in the header, {width} columns of numbers; allowed: as many")
+        problem = f"{len(names)} names in the header, {width} columns of numbers"
+        raise InputError(f"{source}: {problem}; allowed: as many")
     return names
 
 
 def _words(line: str, divider: str | None, width: int) -> list[str]:
-    """Return the names in a line of the head, which may be divided otherwise than the numbers are."""
+    """Return the names in a line of the head; they may be divided otherwise than numbers are."""
     words = _fields(line, divider)
     if len(words) in (width, width - 1) and divider is not None:
         return words
-    for others in (re.split(r"\s{2,}|\t", line), _names_with_units(line), line.split(), _fields(line, ",")):
+    by_wide_blanks = re.split(r"\s{2,}|\t", line)
+    for others in (by_wide_blanks, _names_with_units(line), line.split(), _fields(line, ",")):
         if len(others) == width:
             return others
     return words
 
 
 def _names_with_units(line: str) -> list[str]:
-    """Return the names of a line such as "time [s] pitch 1 rate [rad/s]", each with its unit in brackets."""
+    """Return the names of a line such as "time [s] pitch 1 rate [rad/s]", with their units."""
     names = []
     for part in line.replace(")", "]").split("]")[:-1]:
         name, _, unit = part.replace("(", "[").partition("[")

@@ -1,14 +1,15 @@
 """What could explain a difference: hypotheses, and the one search that tries them.
 
-Every search for a cause has the same form, whatever the data are: columns of a trajectory, defects of intervals, loads,
-frequencies. There are candidates, each with a text, with what it makes of the data or of the model, and with a price in
-freedom: the number of mistakes or parameters that it takes. There is a measure of what a candidate leaves of the
-difference. Those that leave no more than is allowed explain it; of these the cheapest, or those that leave least, are
-named.
+Every search for a cause has the same form, whatever the data are: columns of a trajectory, defects
+of intervals, loads, frequencies. There are candidates, each with a text, with what it changes in
+the data or the model, and with a price in freedom: the number of mistakes or parameters that it
+takes. There is a measure of what a change leaves of the difference. What leaves no more than is
+allowed explains it; of these the cheapest, or those that leave least, are named.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from typing import Generic, TypeVar
@@ -23,7 +24,7 @@ class Hypothesis(Generic[Change]):
     Attributes
     ----------
     text : the cause, in words; "" where nothing is wrong.
-    change : what it changes: a model in place of the scene's, corrected data, a component of loads.
+    change : what it changes: another model, corrected data, another component of loads.
     price : number of mistakes or parameters that it takes.
     """
 
@@ -34,7 +35,7 @@ class Hypothesis(Generic[Change]):
 
 @dataclass(frozen=True)
 class Explanation(Generic[Change]):
-    """A hypothesis that explains a difference, and what it leaves of it, by the measure of the search."""
+    """A hypothesis that explains a difference, and what it leaves, by the measure of the search."""
 
     hypothesis: Hypothesis[Change]
     left: float
@@ -47,14 +48,14 @@ class Explanation(Generic[Change]):
 def explanations(
     hypotheses: Iterable[Hypothesis[Change]],
     left: Callable[[Change], float],
-    allowed: float,
+    allowed: float = math.inf,
 ) -> Iterator[Explanation[Change]]:
     """Search for the hypotheses that explain a difference.
 
     Parameters
     ----------
     hypotheses : what is tried, in this order.
-    left : what a change leaves of the difference; infinite where it cannot be tried, NaN where nothing is known of it.
+    left : what a change leaves of the difference; NaN or infinite where it explains nothing.
     allowed : what may be left.
 
     Yields
@@ -64,30 +65,28 @@ def explanations(
     """
     for hypothesis in hypotheses:
         size = left(hypothesis.change)
-        if size <= allowed:
+        if size <= allowed and size < math.inf:
             yield Explanation(hypothesis, size)
 
 
-def cheapest(found: Iterable[Explanation[Change]]) -> list[Explanation[Change]]:
-    """Return the explanations of the lowest price: what takes more mistakes explains no more."""
-    found = list(found)
-    lowest = min((explanation.hypothesis.price for explanation in found), default=0)
-    return [explanation for explanation in found if explanation.hypothesis.price == lowest]
+def cheapest(explained: Iterable[Explanation[Change]]) -> list[Explanation[Change]]:
+    """Return the explanations of the lowest price: more mistakes than it takes explain no more."""
+    explained = list(explained)
+    lowest = min((explanation.hypothesis.price for explanation in explained), default=0)
+    return [explanation for explanation in explained if explanation.hypothesis.price == lowest]
 
 
 def closest(
-    found: Iterable[Explanation[Change]], factor: float, least: float = 0.0
+    explained: Iterable[Explanation[Change]], factor: float, least: float
 ) -> list[Explanation[Change]]:
-    """Return the explanations that leave least, best first: those within a factor of the best cannot be told from it.
+    """Return the explanations that cannot be told from the best one, the best first.
 
     Parameters
     ----------
-    found : explanations.
+    explained : explanations.
     factor : by which what they leave may differ.
-    least : below this, what is left says nothing of an explanation.
+    least : a size that says nothing of an explanation: what a right one may leave.
     """
-    ordered = sorted(found, key=lambda explanation: explanation.left)
-    if not ordered:
-        return []
-    bound = factor * max(ordered[0].left, least)
-    return [explanation for explanation in ordered if explanation.left <= bound]
+    ordered = sorted(explained, key=lambda explanation: explanation.left)
+    best = ordered[0].left if ordered else 0.0
+    return [each for each in ordered if each.left <= factor * max(best, least)]

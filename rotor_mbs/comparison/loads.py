@@ -11,7 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from rotor_mbs.comparison.channels import Channel, ForeignData, channels
+from rotor_mbs.comparison.channels import Channel, channels
+from rotor_mbs.comparison.data import ForeignData
 from rotor_mbs.comparison.hypotheses import Explanation, Hypothesis, cheapest, explanations
 from rotor_mbs.comparison.verdict import ChannelErrors, agrees_until
 from rotor_mbs.models.lagrange.samples import sampled_loads
@@ -94,10 +95,15 @@ class JudgedLoads:
         return max(largest, float(self.smallest_scale[j])) or 1.0
 
     def left(self, j: int, component: Component, *, may_vanish: bool = False) -> float:
-        """Return by how much more than allowed is left if channel j is a component.
+        """Return by how much more than allowed is left if a channel is a component.
 
-        Infinite for a component that is next to nothing, which anything small fits, unless it may
-        vanish.
+        Infinite for a component that is next to nothing, which anything small fits.
+
+        Parameters
+        ----------
+        j : the channel's number.
+        component : what it may be.
+        may_vanish : whether it may be next to nothing all the same.
         """
         factor, values = component.factor, component.values
         rounding = FLOOR_SAFETY * self.rounding[:, j] / min(abs(factor), 1)
@@ -178,7 +184,17 @@ def compare_loads(
 def _loads_in_rows(
     scene: Scene, loads: ForeignData, defects: Defects, tolerance: float
 ) -> tuple[Array, JudgedLoads]:
-    """Compute the loads at the states of the data, (rows, channels), and choose the judged rows."""
+    """Compute the loads at the states of the data, and choose the judged rows.
+
+    Parameters
+    ----------
+    scene, loads, defects, tolerance : see `compare_loads`.
+
+    Returns
+    -------
+    ndarray, JudgedLoads
+        (rows, channels) N or N m; the rows that are judged.
+    """
     states, time, half = defects.states, defects.time, len(defects.moving)
     known = [channel for channel in channels(scene) if channel.is_load]
     places = [channel.column - known[0].column for channel in loads.channels]
@@ -238,7 +254,7 @@ def _is_at_jump(scene: Scene, time: Array) -> NDArray[np.bool_]:
 
 
 def _load_errors(loads: JudgedLoads) -> tuple[tuple[ChannelErrors, ...], list[int], str]:
-    """Judge each component.
+    """Judge each component of `loads`.
 
     Returns
     -------
@@ -292,10 +308,12 @@ def _explained(loads: JudgedLoads, wrong: Sequence[int]) -> tuple[str, ...]:
     unexplained: dict[tuple[str, str], list[int]] = {}  # moments by load and frame
     for j in wrong:
         candidates = _component_hypotheses(loads, j)
-        found = cheapest(explanations(candidates, functools.partial(loads.left, j), allowed=0.0))
-        by_channel[j] = found
+        explained = cheapest(
+            explanations(candidates, functools.partial(loads.left, j), allowed=0.0)
+        )
+        by_channel[j] = explained
         channel = loads.channels[j]
-        if not found and channel.kind == "moment" and "actuator" not in channel.name:
+        if not explained and channel.kind == "moment" and "actuator" not in channel.name:
             unexplained.setdefault((_load(channel), channel.frame), []).append(j)
 
     named = _shared_texts(loads, by_channel)
@@ -312,9 +330,14 @@ def _explained(loads: JudgedLoads, wrong: Sequence[int]) -> tuple[str, ...]:
 
 
 def _component_hypotheses(loads: JudgedLoads, j: int) -> Iterator[Hypothesis[Component]]:
-    """Yield what channel j may be.
+    """Yield what a channel may be.
 
     In another unit, sign, axis or frame, another load, or with the torque on the rotor in it.
+
+    Parameters
+    ----------
+    loads : the loads.
+    j : the channel's number.
     """
     channel = loads.channels[j]
     name = channel.name.partition(",")[0]
@@ -343,15 +366,20 @@ def _shared_texts(
 ) -> dict[str, list[str]]:
     """Choose one explanation for each channel: of several the one that most channels have.
 
+    Parameters
+    ----------
+    loads : the loads.
+    by_channel : explanations by the channel's number.
+
     Returns
     -------
     dict
         By text the channels' names, with the component that each is.
     """
     shown_by_text: dict[int, dict[str, str]] = {}
-    for j, found in by_channel.items():
+    for j, explained in by_channel.items():
         # Of one text for several components, the first is shown.
-        shown_by_text[j] = {e.text: e.hypothesis.change.shown for e in reversed(found)}
+        shown_by_text[j] = {e.text: e.hypothesis.change.shown for e in reversed(explained)}
     count = Counter(text for texts in shown_by_text.values() for text in texts)
     named: dict[str, list[str]] = {}
     for j, texts in shown_by_text.items():
@@ -405,7 +433,7 @@ def _other_point(loads: JudgedLoads, load: str, frame: str, group: Sequence[int]
         shown = ", ".join(f"{x:.6g}" for x in point)
         add(f"the point ({shown}) m of the {frame_name} frame", point, factor)
 
-    def left(change: tuple[float, Array]) -> float:
+    def left_about(change: tuple[float, Array]) -> float:
         factor, point = change
         moved = moment + matrix @ point
         by_channel = []
@@ -414,7 +442,7 @@ def _other_point(loads: JudgedLoads, load: str, frame: str, group: Sequence[int]
             by_channel.append(loads.left(j, component, may_vanish=True))
         return float(np.max(by_channel))
 
-    first = next(explanations(points, left, 0.0), None)
+    first = next(explanations(points, left_about, allowed=0.0), None)
     return first.text if first else ""
 
 

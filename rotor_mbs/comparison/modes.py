@@ -10,7 +10,7 @@ import numpy as np
 from scipy.optimize import linear_sum_assignment
 
 from rotor_mbs.analysis.modes import CLOSED_FORM, LinearModes
-from rotor_mbs.comparison.channels import ForeignData
+from rotor_mbs.comparison.data import ForeignData
 from rotor_mbs.comparison.hypotheses import Hypothesis, cheapest, explanations
 from rotor_mbs.comparison.loads import LEFT_SHARE, MAX_LEFT
 from rotor_mbs.comparison.verdict import (
@@ -165,9 +165,17 @@ def _closed_form_modes(scene: Scene, speeds: Array) -> LinearModes | str:
 
 
 def _families(modes: LinearModes, data: ForeignData) -> dict[str, Array]:
-    """Return what a program may call its frequencies, by words; those that are right have "".
+    """Return what a program may call its frequencies.
 
-    Each is (speeds, columns or modes) rad/s.
+    Parameters
+    ----------
+    modes : of the scene.
+    data : the table, whose columns may be undamped frequencies.
+
+    Returns
+    -------
+    dict of ndarray
+        By words, "" for those that are right, (speeds, columns or modes) rad/s.
     """
     damped, undamped = modes.damped_frequencies, modes.undamped_frequencies
     speed = modes.speeds[:, None]
@@ -247,14 +255,19 @@ def _likely_causes(scene: Scene, data: ForeignData, tolerance: float, error: Arr
     """
     largest = float(np.nanmax(error, initial=0.0))
     allowed = min(tolerance, MAX_LEFT, LEFT_SHARE * largest)
-    found = explanations(_hypotheses(scene, data, tolerance), _left, allowed)
-    return [explanation.text for explanation in cheapest(found)]
+    explained = explanations(_hypotheses(scene, data, tolerance), _left, allowed)
+    return [explanation.text for explanation in cheapest(explained)]
 
 
 def _hypotheses(
     scene: Scene, data: ForeignData, tolerance: float
 ) -> Iterator[Hypothesis[FrequencyTable]]:
-    """Yield wrong units of frequencies or speeds, another kind of frequency, missing stiffening."""
+    """Yield wrong units of frequencies or speeds, other frequencies, missing stiffening.
+
+    Parameters
+    ----------
+    scene, data, tolerance : see `compare_modes`.
+    """
     # The stiffening is seen from rest on: the squares of undamped frequencies, there and at the
     # speeds of the data.
     from_rest: LinearModes | str = ""

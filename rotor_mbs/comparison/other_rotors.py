@@ -1,16 +1,17 @@
-"""What people mistake a scene or its equations for, and what changes when one of its numbers is off."""
+"""What people mistake a scene or its equations for, and what changes when one number is off."""
 
 from __future__ import annotations
 
 import functools
 import itertools
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from typing import Any
 
 import numpy as np
 
+from rotor_mbs.comparison.hypotheses import Hypothesis
 from rotor_mbs.models.lagrange import closed_form
 from rotor_mbs.models.lagrange.closed_form import Accelerations
 from rotor_mbs.models.lagrange.reference import LEFT_OUT, at_azimuths
@@ -21,16 +22,32 @@ from rotor_mbs.scenario.scene import Blade, Scene, scene_fields
 from rotor_mbs.solution.trajectory import Array
 
 _GRAVITIES = (9.8, 9.80665, 9.81, 9.82, 10.0, 0.0)
-_QUARTERS = {90: math.pi / 2.0, 180: math.pi, 270: -math.pi / 2.0}  # zeros that people choose, by degrees
+# Zeros that people choose, by degrees.
+_QUARTERS = {90: math.pi / 2.0, 180: math.pi, 270: -math.pi / 2.0}
 _SAME_START = 1e-3  # rad, rad/s: a scene that starts farther off cannot be the one
-_MOST_BLADES = 6  # that are tried one by one
-_OF_BEARINGS = {  # fields of a scene with an entry per blade, and their keys
-    "bearing_stiffness": "bearing.stiffness", "bearing_damping": "bearing.damping", "pitch_torque": "torque.pitch",
-}  # fmt: skip
+_MAX_BLADES = 6  # that are tried one by one
+# Fields of a scene with an entry per blade, and their keys.
+_BEARING_FIELDS = {
+    "bearing_stiffness": "bearing.stiffness",
+    "bearing_damping": "bearing.damping",
+    "pitch_torque": "torque.pitch",
+}
+# Fields of a scene that may be forgotten.
+_FORGOTTEN = {
+    "rotor_torque": "the torque of the rotor",
+    "bearing_stiffness": "the springs",
+    "bearing_damping": "the dampers of the bearings",
+    "shaft_damping": "the damper of the shaft",
+    "hub_inertia": "the hub's inertia",
+}
+# E3 is the power of a term that is zero without E2.
+_ERRATA = ("E1", "E2", "E1 and E2", "E2 and E3", "E1 and E2 and E3")
+
+Path = Sequence[str | int]  # names of fields and numbers of entries, from a scene to a number
 
 
 @dataclass(frozen=True)
-class Model:
+class RotorModel:
     """A scene, with its blades at other azimuths (rad), or with other equations."""
 
     scene: Scene
@@ -38,104 +55,188 @@ class Model:
     equations: Accelerations | None = None
 
     def accelerations(self) -> Accelerations | None:
-        """In place of the closed form's. Raises RotorError where the equations have no place for the scene."""
+        """Return the equations, None for the closed form's own.
+
+        Raises
+        ------
+        RotorError
+            Where the equations have no place for the scene.
+        """
         return at_azimuths(self.scene, self.azimuths) if self.azimuths else self.equations
 
 
 @dataclass(frozen=True)
 class Parameter:
-    """A number of the scene; unit: "" where its change is a share of it; change: (model, change) -> model."""
+    """A number of the scene that may be off.
+
+    Attributes
+    ----------
+    key : of the scene file, or what it is.
+    unit : "" where its change is a share of it.
+    apply : (model, change) -> model.
+    """
 
     key: str
     unit: str
-    change: Callable[[Model, float], Model]
+    apply: Callable[[RotorModel, float], RotorModel]
 
 
-def other_models(scene: Scene) -> Iterator[tuple[str, Model]]:
-    """In words, and the model."""
-    for text, other in _scenes(scene):
+def rotor_hypotheses(scene: Scene) -> Iterator[Hypothesis[RotorModel]]:
+    """Yield other scenes and equations that people mistake a scene's for."""
+    for text, other in _other_scenes(scene):
         if other != scene:
-            yield text, Model(other)
-    for text, azimuths in _azimuths(scene):
-        yield text, Model(scene, tuple(azimuths))
+            yield Hypothesis(text, RotorModel(other))
+    for text, azimuths in _other_azimuths(scene):
+        yield Hypothesis(text, RotorModel(scene, azimuths))
     for terms, reduced in LEFT_OUT.items():
-        yield f"without the {terms}", Model(scene, equations=reduced)
-    yield "small-angle approximation: sin x = x, cos x = 1", Model(scene, equations=_small_angles)
-    # E3 is the power of a term that is zero without E2.
-    for names in ("E1", "E2", "E1 and E2", "E2 and E3", "E1 and E2 and E3"):
+        yield Hypothesis(f"without the {terms}", RotorModel(scene, equations=reduced))
+    text = "small-angle approximation: sin x = x, cos x = 1"
+    yield Hypothesis(text, RotorModel(scene, equations=_small_angles))
+    for names in _ERRATA:
         errata = Errata(*(name in names for name in ("E1", "E2", "E3")))
         printed = functools.partial(_printed, scene, errata)
-        yield f"erratum {names} of the paper's equations", Model(scene, equations=printed)
+        text = f"erratum {names} of the paper's equations"
+        yield Hypothesis(text, RotorModel(scene, equations=printed))
 
 
-def scenes_with_start(scene: Scene, first: Array) -> Iterator[tuple[str, Model]]:
-    """Other scenes of the catalogue that start with a row, (2 (1 + blades),)."""
+def scenes_with_start(scene: Scene, first: Array) -> Iterator[Hypothesis[RotorModel]]:
+    """Yield other scenes of the catalogue that start with a row, (2 (1 + blades),)."""
     for other in _catalogue():
         start = np.array([*other.initial_angles, *other.initial_rates])
-        if other.name != scene.name and len(start) == len(first) and np.abs(start - first).max() < _SAME_START:
-            yield f"the scene {other.name}", Model(other)
+        if other.name == scene.name or len(start) != len(first):
+            continue
+        if np.abs(start - first).max() < _SAME_START:
+            yield Hypothesis(f"the scene {other.name}", RotorModel(other))
+
+
+@functools.cache
+def _catalogue() -> tuple[Scene, ...]:
+    """Return all shipped scenes."""
+    folders = {name.partition("/")[0] for name, _ in list_scenes()}
+    return tuple(find_scenes(sorted(folders)))
+
+
+# Other equations
 
 
 def _small_angles(angles: Any, rates: Any, form: Any, loads: Any, *_: Any) -> list[Any]:
-    return closed_form.accelerations(angles, rates, form, loads, lambda x: x, lambda x: 1.0 + 0.0 * x)
+    """Return the closed form's accelerations with the sine and cosine of small angles."""
+    return closed_form.accelerations(
+        angles, rates, form, loads, lambda x: x, lambda x: 1.0 + 0.0 * x
+    )
 
 
-def _printed(scene: Scene, errata: Errata, angles: Any, rates: Any, _form: Any, loads: Any, *_: Any) -> list[Any]:
-    """Of (n,) arrays. Raises MethodRefusal for a scene that the printed equations have no place for."""
+def _printed(
+    scene: Scene, errata: Errata, angles: Any, rates: Any, _form: Any, loads: Any, *_: Any
+) -> list[Any]:
+    """Return the accelerations of the printed equations, for (n,) arrays.
+
+    Parameters
+    ----------
+    scene : the rotor.
+    errata : which errors are left in.
+    angles, rates, _form, loads : as of the closed form's `accelerations`.
+
+    Raises
+    ------
+    MethodRefusal
+        For a scene that the printed equations have no place for.
+    """
     accelerations = equations(point_mass_rotor("printed", errata, scene), errata)
     torques = [loads.rotor, *(loads.pitches or (0.0,) * (len(angles) - 1))]
     rows = np.broadcast_arrays(*torques, *angles, *rates)
     count = len(torques)
-    columns = np.stack(rows).reshape(len(rows), -1).T.tolist()
-    return list(np.array([accelerations(row[:count], row[count:]) for row in columns]).T)
+    by_instant = np.stack(rows).reshape(len(rows), -1).T.tolist()
+    values = [accelerations(row[:count], row[count:]) for row in by_instant]
+    return list(np.array(values).T)
 
 
-def _scenes(scene: Scene) -> Iterator[tuple[str, Scene]]:
-    """Some may be the scene itself."""
+# Other scenes
+
+
+def _other_scenes(scene: Scene) -> Iterator[tuple[str, Scene]]:
+    """Yield scenes in words, some of which may be the scene itself."""
     for gravity in (*_GRAVITIES, -scene.gravity):
         yield f"gravity of {gravity:g} m/s^2", replace(scene, gravity=gravity)
-    blades = scene.blades
-    few = range(len(blades) if len(blades) <= _MOST_BLADES else 0)
-    for text, others in {
-        "blade mass on the pitch axis": [replace(b, centre_of_mass=(0.0, 0.0, b.centre_of_mass[2])) for b in blades],
-        "blades without inertia, as point masses": [replace(b, inertia=_inertia([0.0] * 6)) for b in blades],
-        "products of inertia with opposite sign": [
-            replace(b, inertia=_inertia([*b.inertia[:3], *(-x for x in b.inertia[3:])])) for b in blades
-        ],
-        "tip used as centre of mass": [replace(b, centre_of_mass=b.tip) for b in blades],
-        "inertia about the root used as inertia about the centre of mass": [_with_steiner(b) for b in blades],
-        **{
-            f"numbers of blades {i + 1} and {j + 1} exchanged": [blades[{i: j, j: i}.get(k, k)] for k in few]
-            for i in few
-            for j in range(i)
-        },
-    }.items():
-        yield text, replace(scene, blades=tuple(others))
-    for chosen, k in itertools.product([range(len(blades)), *((i,) for i in few if len(blades) > 1)], (0, 1)):
-        number = f"[{chosen[0]}]" if len(chosen) < len(blades) else ""
-        opposite = _scaled_at(scene, [("blades", b, "centre_of_mass", k) for b in chosen], -2.0)
-        yield f"blade{number}.centre_of_mass[{k}] with opposite sign", opposite
-    for name, key in _OF_BEARINGS.items():
-        values = getattr(scene, name)
-        for i, j in itertools.combinations(few if len(values) == len(blades) else (), 2):
-            exchanged: dict[str, Any] = {name: tuple(values[{i: j, j: i}.get(k, k)] for k in range(len(values)))}
-            yield f"{key} of blades {i + 1} and {j + 1} exchanged", replace(scene, **exchanged)
-    for name, text in (
-        ("rotor_torque", "the torque of the rotor"), ("bearing_stiffness", "the springs"),
-        ("bearing_damping", "the dampers of the bearings"), ("shaft_damping", "the damper of the shaft"),
-        ("hub_inertia", "the hub's inertia"),
-    ):  # fmt: skip
-        yield f"without {text}", _scaled_at(scene, [(name,)], -1.0)
+    yield from _other_blades(scene)
+    yield from _exchanged_bearings(scene)
+    for field, text in _FORGOTTEN.items():
+        yield f"without {text}", _scaled_at(scene, [(field,)], -1.0)
     for degrees, angle in _QUARTERS.items():
-        turned = _pitch_turned(scene, range(len(blades)), angle)
+        turned = _pitch_turned(scene, range(len(scene.blades)), angle)
         yield f"pitch angles from another zero: {degrees} degrees where they are 0", turned
 
 
+def _single_blades(scene: Scene) -> range:
+    """Return the blades that are tried one by one: none where there are many."""
+    return range(len(scene.blades) if len(scene.blades) <= _MAX_BLADES else 0)
+
+
+def _other_blades(scene: Scene) -> Iterator[tuple[str, Scene]]:
+    """Yield variants of a scene with other masses, centres of mass or inertias, in words."""
+    changes: Mapping[str, Callable[[Blade], Blade]] = {
+        "blade mass on the pitch axis": _with_mass_on_axis,
+        "blades without inertia, as point masses": _without_inertia,
+        "products of inertia with opposite sign": _with_opposite_products,
+        "tip used as centre of mass": lambda blade: replace(blade, centre_of_mass=blade.tip),
+        "inertia about the root used as inertia about the centre of mass": _with_steiner,
+    }
+    blades = scene.blades
+    for text, change in changes.items():
+        yield text, replace(scene, blades=tuple(change(blade) for blade in blades))
+    for i in _single_blades(scene):
+        for j in range(i):
+            text = f"numbers of blades {i + 1} and {j + 1} exchanged"
+            yield text, replace(scene, blades=_exchanged(blades, i, j))
+    groups = [list(range(len(blades)))]
+    if len(blades) > 1:
+        groups += [[i] for i in _single_blades(scene)]
+    for group, axis in itertools.product(groups, (0, 1)):
+        number = f"[{group[0]}]" if len(group) < len(blades) else ""
+        paths = [("blades", blade, "centre_of_mass", axis) for blade in group]
+        text = f"blade{number}.centre_of_mass[{axis}] with opposite sign"
+        yield text, _scaled_at(scene, paths, -2.0)
+
+
+def _exchanged(values: tuple[Any, ...], i: int, j: int) -> tuple[Any, ...]:
+    """Return values with entries i and j exchanged."""
+    exchanged = list(values)
+    exchanged[i], exchanged[j] = values[j], values[i]
+    return tuple(exchanged)
+
+
+def _exchanged_bearings(scene: Scene) -> Iterator[tuple[str, Scene]]:
+    """Yield scenes in which two blades have each other's springs, dampers or torques."""
+    for field, key in _BEARING_FIELDS.items():
+        values = getattr(scene, field)
+        if len(values) != len(scene.blades):
+            continue
+        for i, j in itertools.combinations(_single_blades(scene), 2):
+            change: dict[str, Any] = {field: _exchanged(values, i, j)}
+            yield f"{key} of blades {i + 1} and {j + 1} exchanged", replace(scene, **change)
+
+
+def _with_mass_on_axis(blade: Blade) -> Blade:
+    """Return a blade whose centre of mass is on its pitch axis."""
+    return replace(blade, centre_of_mass=(0.0, 0.0, blade.centre_of_mass[2]))
+
+
+def _without_inertia(blade: Blade) -> Blade:
+    return replace(blade, inertia=_inertia([0.0] * 6))
+
+
+def _with_opposite_products(blade: Blade) -> Blade:
+    products = [-product for product in blade.inertia[3:]]
+    return replace(blade, inertia=_inertia([*blade.inertia[:3], *products]))
+
+
 def _with_steiner(blade: Blade) -> Blade:
-    """As if its inertia, which is about the root, were about the centre of mass: Steiner's share twice."""
+    """Return a blade as if its inertia were about the centre of mass: Steiner's share twice."""
     m, (x, y, z) = blade.mass, blade.centre_of_mass
-    share = (m * (y * y + z * z), m * (x * x + z * z), m * (x * x + y * y), -m * x * y, -m * x * z, -m * y * z)
-    return replace(blade, inertia=_inertia([a + b for a, b in zip(blade.inertia, share, strict=True)]))
+    moments = (m * (y * y + z * z), m * (x * x + z * z), m * (x * x + y * y))
+    share = (*moments, -m * x * y, -m * x * z, -m * y * z)
+    total = [own + steiner for own, steiner in zip(blade.inertia, share, strict=True)]
+    return replace(blade, inertia=_inertia(total))
 
 
 def _inertia(values: Sequence[float]) -> tuple[float, float, float, float, float, float]:
@@ -143,81 +244,118 @@ def _inertia(values: Sequence[float]) -> tuple[float, float, float, float, float
     return xx, yy, zz, xy, xz, yz
 
 
-@functools.cache
-def _catalogue() -> tuple[Scene, ...]:
-    return tuple(find_scenes(sorted({name.partition("/")[0] for name, _ in list_scenes()})))
-
-
-def _azimuths(scene: Scene) -> Iterator[tuple[str, Sequence[float]]]:
-    """Blades at other angles about the shaft than they should be."""
-    right, n = scene.phases, len(scene.blades)
-    if n > 1:
-        yield "all blades at the azimuth of blade 1", (0.0,) * n
-        yield "azimuths of the blades in degrees taken as rad", [math.degrees(phase) for phase in right]
-    if n > 2:
+def _other_azimuths(scene: Scene) -> Iterator[tuple[str, tuple[float, ...]]]:
+    """Yield azimuths, rad, at which the blades of a scene should not be, in words."""
+    right, count = tuple(scene.phases), len(scene.blades)
+    if count > 1:
+        yield "all blades at the azimuth of blade 1", (0.0,) * count
+        in_degrees = tuple(math.degrees(phase) for phase in right)
+        yield "azimuths of the blades in degrees taken as rad", in_degrees
+    if count > 2:
         yield "blades numbered in the opposite sense", (right[0], *right[:0:-1])
-    for i in range(n if 2 < n <= _MOST_BLADES else 0):
-        for other in ((i + 1) % n, (i - 1) % n):
-            text = f"blade {i + 1} at an azimuth of {360 * other / n:g} degrees in place of {360 * i / n:g}"
-            yield text, (*right[:i], right[other], *right[i + 1 :])
-    others = {360.0 * i / n: phase for i, phase in enumerate(right) if i}
-    for degrees, angle in (others | _QUARTERS).items():
-        text = f"rotor angle from another zero: blade 1 at an azimuth of {degrees:g} degrees where it is 0"
-        yield text, [phase + angle for phase in right]
+    for i in range(count if 2 < count <= _MAX_BLADES else 0):
+        for other in ((i + 1) % count, (i - 1) % count):
+            place = f"{360 * other / count:g} degrees in place of {360 * i / count:g}"
+            azimuths = (*right[:i], right[other], *right[i + 1 :])
+            yield f"blade {i + 1} at an azimuth of {place}", azimuths
+    zeros = {360.0 * i / count: phase for i, phase in enumerate(right) if i}
+    for degrees, angle in (zeros | _QUARTERS).items():
+        place = f"blade 1 at an azimuth of {degrees:g} degrees where it is 0"
+        turned = tuple(phase + angle for phase in right)
+        yield f"rotor angle from another zero: {place}", turned
+
+
+# Numbers that are off
 
 
 def parameters(scene: Scene) -> Iterator[Parameter]:
-    """Every number, or list of numbers, that is not zero, and the zeros of the angles; of all blades, and of each where
-    there are a few."""
+    """Yield every number, or list of numbers, that is not zero, and the zeros of the angles.
+
+    Those of the blades for all blades at once, and for each where there are a few.
+    """
     for item in scene_fields("rotor"):
-        key, value = item.metadata["key"], getattr(scene, item.name)
+        value = getattr(scene, item.name)
         if item.name != "blades" and _scaled(value, 1.0) != value:
-            yield Parameter(key, "", _share_of([(item.name,)]))
-    blades = range(len(scene.blades))
-    alone = [[i] for i in blades] if 1 < len(blades) <= _MOST_BLADES else []
-    for chosen in [list(blades), *alone]:
-        number = f"{chosen}" if chosen in alone else ""
-        for field in fields(Blade):
-            value = getattr(scene.blades[chosen[0]], field.name)
-            entries = [(i,) for i, x in enumerate(value) if x] if isinstance(value, tuple) else [()] * bool(value)
-            for entry in entries if field.name != "tip" else []:
-                paths = [("blades", b, field.name, *entry) for b in chosen]
-                place = f"[{entry[0]}]" if entry else ""
-                yield Parameter(f"blade{number}.{field.name}{place}", "", _share_of(paths))
-        for name, key in _OF_BEARINGS.items() if number else ():
+            yield Parameter(item.metadata["key"], "", _share_of([(item.name,)]))
+    blades = list(range(len(scene.blades)))
+    yield from _blade_parameters(scene, blades, "")
+    if 1 < len(blades) <= _MAX_BLADES:
+        for blade in blades:
+            yield from _blade_parameters(scene, [blade], f"[{blade}]")
+
+
+def _blade_parameters(scene: Scene, chosen: list[int], number: str) -> Iterator[Parameter]:
+    """Yield the numbers of some blades, which are changed together.
+
+    Parameters
+    ----------
+    scene : the scene.
+    chosen : the blades.
+    number : of a single blade among several, as in its key; else "".
+    """
+    for field in fields(Blade):
+        if field.name == "tip":
+            continue
+        value = getattr(scene.blades[chosen[0]], field.name)
+        if isinstance(value, tuple):
+            entries: list[tuple[int, ...]] = [(i,) for i, entry in enumerate(value) if entry]
+        else:
+            entries = [()] if value else []
+        for entry in entries:
+            paths: list[Path] = [("blades", blade, field.name, *entry) for blade in chosen]
+            place = f"[{entry[0]}]" if entry else ""
+            yield Parameter(f"blade{number}.{field.name}{place}", "", _share_of(paths))
+    if number:
+        for name, key in _BEARING_FIELDS.items():
             values = getattr(scene, name)
-            if len(values) == len(blades) and _scaled(values[chosen[0]], 1.0) != values[chosen[0]]:
+            if len(values) != len(scene.blades):
+                continue
+            value = values[chosen[0]]
+            if _scaled(value, 1.0) != value:
                 yield Parameter(f"{key}{number}", "", _share_of([(name, chosen[0])]))
-        if any(scene.bearing_stiffness):
-            yield Parameter(f"bearing.rest{number}", "rad", functools.partial(_rest_moved, chosen))
-        which = f"blade {chosen[0] + 1}" if len(chosen) == 1 else "all blades"
-        yield Parameter(f"azimuth of {which}", "rad", functools.partial(_azimuth_moved, chosen))
-        yield Parameter(f"zero of the pitch of {which}", "rad", functools.partial(_zero_moved, chosen))
+    if any(scene.bearing_stiffness):
+        rest = functools.partial(_rest_moved, chosen)
+        yield Parameter(f"bearing.rest{number}", "rad", rest)
+    which = f"blade {chosen[0] + 1}" if len(chosen) == 1 else "all blades"
+    azimuth = functools.partial(_azimuth_moved, chosen)
+    yield Parameter(f"azimuth of {which}", "rad", azimuth)
+    zero = functools.partial(_zero_moved, chosen)
+    yield Parameter(f"zero of the pitch of {which}", "rad", zero)
 
 
-def _share_of(paths: Sequence[Sequence[str | int]]) -> Callable[[Model, float], Model]:
-    return lambda model, change: replace(model, scene=_scaled_at(model.scene, paths, change))
+def _share_of(paths: Sequence[Path]) -> Callable[[RotorModel, float], RotorModel]:
+    """Return what makes the numbers at some paths larger by a share."""
+
+    def apply(model: RotorModel, change: float) -> RotorModel:
+        return replace(model, scene=_scaled_at(model.scene, paths, change))
+
+    return apply
 
 
-def _azimuth_moved(chosen: Sequence[int], model: Model, change: float) -> Model:
-    azimuths = model.azimuths or model.scene.phases
-    return replace(model, azimuths=tuple(angle + change * (i in chosen) for i, angle in enumerate(azimuths)))
+def _azimuth_moved(chosen: Sequence[int], model: RotorModel, change: float) -> RotorModel:
+    """Turn some blades about the shaft, by a change in rad."""
+    azimuths = list(model.azimuths or model.scene.phases)
+    for blade in chosen:
+        azimuths[blade] += change
+    return replace(model, azimuths=tuple(azimuths))
 
 
-def _rest_moved(chosen: Sequence[int], model: Model, change: float) -> Model:
-    rests = model.scene.bearing_rest or (((0.0, 0.0),),) * len(model.scene.blades)
-    moved = tuple(
-        tuple((t, angle + change) for t, angle in rest) if i in chosen else rest for i, rest in enumerate(rests)
-    )
-    return replace(model, scene=replace(model.scene, bearing_rest=moved))
+def _rest_moved(chosen: Sequence[int], model: RotorModel, change: float) -> RotorModel:
+    """Move the rest angles of some blades' springs at all times, by a change in rad."""
+    scene = model.scene
+    rests = list(scene.bearing_rest or (((0.0, 0.0),),) * len(scene.blades))
+    for blade in chosen:
+        rests[blade] = tuple((time, angle + change) for time, angle in rests[blade])
+    return replace(model, scene=replace(scene, bearing_rest=tuple(rests)))
 
 
-def _zero_moved(chosen: Sequence[int], model: Model, change: float) -> Model:
+def _zero_moved(chosen: Sequence[int], model: RotorModel, change: float) -> RotorModel:
+    """Move the pitch angle at which some blades are as the scene has them, by a change in rad."""
     return replace(model, scene=_pitch_turned(model.scene, chosen, change))
 
 
 def _pitch_turned(scene: Scene, chosen: Sequence[int], angle: float) -> Scene:
-    """Chosen blades that are turned about the pitch axis where their pitch is 0."""
+    """Turn some blades about the pitch axis, rad, where their pitch is 0."""
     s, c = math.sin(angle), math.cos(angle)
     turn = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
     blades = list(scene.blades)
@@ -229,10 +367,10 @@ def _pitch_turned(scene: Scene, chosen: Sequence[int], angle: float) -> Scene:
     return replace(scene, blades=tuple(blades))
 
 
-def _scaled_at(scene: Scene, paths: Sequence[Sequence[str | int]], share: float) -> Scene:
-    """The scene with the values at some paths, of names of fields and numbers of entries, larger by a share."""
+def _scaled_at(scene: Scene, paths: Sequence[Path], share: float) -> Scene:
+    """Make the values at some paths of a scene larger by a share."""
 
-    def with_value(whole: Any, path: Sequence[str | int]) -> Any:
+    def with_value(whole: Any, path: Path) -> Any:
         if not path:
             return _scaled(whole, share)
         place, rest = path[0], path[1:]
@@ -246,9 +384,15 @@ def _scaled_at(scene: Scene, paths: Sequence[Sequence[str | int]], share: float)
 
 
 def _scaled(value: Any, share: float) -> Any:
-    """Numbers larger by a share; of a table over time, not the times."""
+    """Make numbers larger by a share; of a table over time, not the times."""
     if not isinstance(value, tuple):
         return value * (1.0 + share) if isinstance(value, float) else value
-    if value and all(isinstance(row, tuple) and len(row) == 2 and not isinstance(row[0], tuple) for row in value):
-        return tuple((row[0], row[1] * (1.0 + share)) for row in value)
+    if value and all(_is_row(row) for row in value):
+        return tuple((time, number * (1.0 + share)) for time, number in value)
     return tuple(_scaled(entry, share) for entry in value)
+
+
+def _is_row(value: Any) -> bool:
+    """Whether a value is a row of a table over time."""
+    is_pair = isinstance(value, tuple) and len(value) == 2
+    return is_pair and not isinstance(value[0], tuple)

@@ -10,15 +10,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor_mbs.analysis.judgement import OK_ERROR
-from rotor_mbs.comparison.channels import ForeignData
-from rotor_mbs.comparison.data_mistakes import (
-    CauseSearch,
+from rotor_mbs.comparison.causes import likely_causes
+from rotor_mbs.comparison.data import ForeignData
+from rotor_mbs.comparison.data_defects import (
     carried_errors,
     defects_of_data,
-    likely_causes,
+    judged_defects,
     states_of,
 )
-from rotor_mbs.comparison.defect_causes import DefectCauses
+from rotor_mbs.comparison.data_mistakes import TrajectorySearch
+from rotor_mbs.comparison.defect_search import DefectSearch
 from rotor_mbs.comparison.loads import compare_loads
 from rotor_mbs.comparison.verdict import (
     DEFAULT_TOLERANCE,
@@ -199,7 +200,18 @@ def compare_with_reference(
 
 
 def _rows_with_reference(data: ForeignData, scene: Scene) -> ReferencedRows:
-    """Compute the reference at the times of data, and their defects. Raises InputError."""
+    """Compute the reference at the times of data, and their defects.
+
+    Parameters
+    ----------
+    data : angles and rates.
+    scene : the scene.
+
+    Raises
+    ------
+    InputError
+        For data without rows in the scene's duration.
+    """
     inside = data.rows(data.time <= scene.duration * (1.0 + _TIME_ROUNDING))
     end = max(scene.duration, float(inside.time[-1])) if len(inside.time) else scene.duration
     # At the times of the data, and at the scene's samples, which make growth and horizon the same
@@ -243,7 +255,14 @@ def _rows_with_reference(data: ForeignData, scene: Scene) -> ReferencedRows:
 
 
 def _errors_of(data: ForeignData, scene: Scene, rows: ReferencedRows) -> TrajectoryErrors:
-    """Measure the errors and defects of data against their reference."""
+    """Measure the errors and defects of data against their reference.
+
+    Parameters
+    ----------
+    data : angles and rates.
+    scene : the scene.
+    rows : the data with their reference.
+    """
     error = np.abs(rows.compared.values - rows.expected)
     predicted = defect_time = None
     if rows.defects is not None:
@@ -272,7 +291,14 @@ def _errors_of(data: ForeignData, scene: Scene, rows: ReferencedRows) -> Traject
 
 
 def _channel_errors(scene: Scene, rows: ReferencedRows, error: Array) -> tuple[ChannelErrors, ...]:
-    """Return the errors of each channel; error: (rows, channels)."""
+    """Return the errors of each channel.
+
+    Parameters
+    ----------
+    scene : the scene.
+    rows : the data with their reference.
+    error : (rows, channels) absolute errors.
+    """
     channels = []
     for j, channel in enumerate(rows.compared.channels):
         defect = floor = None
@@ -307,6 +333,11 @@ def _largest_drift(scene: Scene, defects: Defects | None) -> tuple[float, str]:
 
     A drift may be hidden by the rounding of every single interval.
 
+    Parameters
+    ----------
+    scene : names the coordinates.
+    defects : of the data, None where they are not known.
+
     Returns
     -------
     float, str
@@ -332,7 +363,13 @@ def _findings(
     rows: ReferencedRows,
     errors: TrajectoryErrors,
 ) -> Iterator[tuple[str, str]]:
-    """Yield status and message of all that is wrong, the gravest first."""
+    """Yield status and message of all that is wrong, the gravest first.
+
+    Parameters
+    ----------
+    data, scene, tolerance : see `compare_with_reference`.
+    rows, errors : the data with their reference, and their errors.
+    """
     yield from _wrong_first_row(tolerance, rows, errors)
     yield from _wrong_defects(tolerance, errors)
     yield from _wrong_errors(tolerance, rows, errors)
@@ -343,6 +380,7 @@ def _findings(
 def _wrong_first_row(
     tolerance: float, rows: ReferencedRows, errors: TrajectoryErrors
 ) -> Iterator[tuple[str, str]]:
+    """Yield a first row that is not the scene's initial state."""
     compared = rows.compared
     off = errors.error[0] - tolerance - FLOOR_SAFETY * compared.rounding[0]
     worst = int(off.argmax())
@@ -354,6 +392,7 @@ def _wrong_first_row(
 
 
 def _wrong_defects(tolerance: float, errors: TrajectoryErrors) -> Iterator[tuple[str, str]]:
+    """Yield channels whose defects are above the tolerance, and a drift."""
     # Comparisons are negated, so that NaN is wrong.
     known = [channel for channel in errors.channels if channel.defect is not None]
     for channel in sorted(known, key=lambda channel: -(channel.defect or 0.0)):
@@ -369,6 +408,13 @@ def _wrong_defects(tolerance: float, errors: TrajectoryErrors) -> Iterator[tuple
 def _wrong_errors(
     tolerance: float, rows: ReferencedRows, errors: TrajectoryErrors
 ) -> Iterator[tuple[str, str]]:
+    """Yield errors up to the horizon that are too large.
+
+    Parameters
+    ----------
+    tolerance : rad per unit of error growth.
+    rows, errors : the data with their reference, and their errors.
+    """
     worst = int(errors.excess_per_growth.argmax())
     growing = errors.excess_per_growth[worst]
     if not growing <= tolerance:
@@ -390,6 +436,7 @@ def _wrong_errors(
 def _missing_rows(
     data: ForeignData, scene: Scene, rows: ReferencedRows
 ) -> Iterator[tuple[str, str]]:
+    """Yield what the rows of `data` leave out of the motion of `scene`; rows: its reference."""
     time, count = rows.reference.time, len(rows.places)
     last = min(scene.duration, float(rows.exact.trajectory.time[-1]))
     step = float(np.diff(time).max(initial=0.0))
@@ -406,6 +453,7 @@ def _missing_rows(
 def _unchecked_parts(
     data: ForeignData, rows: ReferencedRows, errors: TrajectoryErrors
 ) -> Iterator[tuple[str, str]]:
+    """Yield what cannot be checked of `data`; rows, errors: their reference and errors."""
     defects, until = rows.defects, rows.until
     if until < _MIN_ROWS:
         yield "unchecked", f"{until} rows up to the horizon: too few to be compared"
@@ -464,15 +512,22 @@ def _likely_causes(
 ) -> list[str]:
     """Search for what the differences look like, in words.
 
-    Data that agree may have defects that are correlated, by which another model is known; mistakes
-    in columns and times are looked for in data that do not agree.
+    Data that agree may have defects that are correlated, by which another model is known;
+    mistakes in columns and times are looked for in data that do not agree.
+
+    Parameters
+    ----------
+    data, scene, tolerance : see `compare_with_reference`.
+    rows, errors : the data with their reference, and their errors.
+    is_ok : whether the data agree.
     """
-    causes = None
+    judged = None
     if rows.defects is not None and not errors.missing:
-        causes = DefectCauses(scene, rows.defects, tolerance)
+        judged = judged_defects(scene, rows.defects, tolerance)
     if is_ok:
-        return causes.explanations() if causes is not None else []
+        return DefectSearch(judged).explanations() if judged is not None else []
     turned = rows.data.values[0] - data.values[0]  # the turns that wrapped channels have got
     whole = replace(data, values=data.values + turned)
     worst = float(errors.per_growth[: rows.until].max())
-    return likely_causes(CauseSearch(scene, whole, rows.exact, tolerance, worst), causes)
+    search = TrajectorySearch(scene, whole, rows.exact, tolerance, worst)
+    return likely_causes(search, judged)

@@ -11,7 +11,8 @@ from typing import Any
 
 import numpy as np
 
-from rotor_mbs.comparison.channels import Channel, ForeignData
+from rotor_mbs.comparison.channels import Channel
+from rotor_mbs.comparison.data import ForeignData
 from rotor_mbs.errors import InputError
 from rotor_mbs.runs.design import Column
 from rotor_mbs.runs.read import Record
@@ -143,6 +144,12 @@ def defects_of_channel(
     scene: Scene, defects: Defects | None, channel: Channel
 ) -> tuple[Array, Array] | None:
     """Return a channel's interval defects, and what rounding may make of them.
+
+    Parameters
+    ----------
+    scene : the scene.
+    defects : of the data, None where they are not known.
+    channel : an angle or a rate.
 
     Returns
     -------

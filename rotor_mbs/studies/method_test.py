@@ -15,7 +15,7 @@ from rotor_mbs.analysis.checks import Check, Where
 from rotor_mbs.analysis.judgement import defects_of, energy_slack
 from rotor_mbs.analysis.kinematics import exact_rotor_angle
 from rotor_mbs.analysis.work_precision import fitted_order
-from rotor_mbs.comparison.channels import load_data
+from rotor_mbs.comparison.data import load_data
 from rotor_mbs.comparison.trajectory import compare_with_reference
 from rotor_mbs.errors import MethodRefusal, RotorError
 from rotor_mbs.methods.base import STEP, Method

@@ -14,7 +14,7 @@ from support import other_code
 
 import rotor_mbs as rm
 from rotor_mbs.cli import main
-from rotor_mbs.comparison.channels import load_data
+from rotor_mbs.comparison.data import load_data
 from rotor_mbs.comparison.loads import LoadComparison, compare_loads
 from rotor_mbs.errors import InputError
 from rotor_mbs.models.lagrange.defects import interval_defects

@@ -15,7 +15,8 @@ from support.scenes import paper
 
 import rotor_mbs as rm
 from rotor_mbs.comparison import channels as names
-from rotor_mbs.comparison.channels import channels, guess, half_last_digits, load_data
+from rotor_mbs.comparison.channels import channel_from_name, channels
+from rotor_mbs.comparison.data import load_data, rounding_of_printed
 from rotor_mbs.errors import InputError, RotorError
 from rotor_mbs.solution.quantities import LOADS
 
@@ -92,7 +93,7 @@ def test_text_as_other_programs_write_it(tmp_path: Path, name: str) -> None:
     ],
 )  # fmt: skip
 def test_names_that_are_known(name: str, channel: str | None) -> None:
-    found = guess(name, 0, channels(SCENE))
+    found = channel_from_name(name, 0, channels(SCENE))
     assert (found and found.name) == channel
 
 
@@ -100,25 +101,25 @@ def test_the_documented_names_are_understood() -> None:
     """The table of the docs has the names of the code; each of an angle, a rate or the time is understood."""
     text = (Path(__file__).parents[2] / "docs" / "compare.md").read_text()
     documented = dict(re.findall(r"^\| (.+?) \| (.+) \|$", text, re.MULTILINE))
-    affixes = f"the suffix {', '.join(names._RATE_WORDS[:-1])} or {names._RATE_WORDS[-1]}, or the prefix d"
-    assert documented["rotor rate"] == f"a name of the rotor with {affixes}; {', '.join(names._ROTOR_RATE_NAMES)}"
+    affixes = f"the suffix {', '.join(names.RATE_WORDS[:-1])} or {names.RATE_WORDS[-1]}, or the prefix d"
+    assert documented["rotor rate"] == f"a name of the rotor with {affixes}; {', '.join(names.ROTOR_RATE_NAMES)}"
     assert documented["pitch rate"] == f"a name of a pitch with {affixes}"
     assert documented["load, followed by the blade's number and x, y or z; or an array"] == ", ".join(
         load.name for load in LOADS
     )
-    assert documented["modes: rotor speed, if there is no time"] == ", ".join(names._SPEED_NAMES)
-    for kind, frequencies in zip(("damped", "undamped"), names._FREQUENCIES.values(), strict=True):
+    assert documented["modes: rotor speed, if there is no time"] == ", ".join(names.SPEED_NAMES)
+    for kind, frequencies in zip(("damped", "undamped"), names.FREQUENCY_NAMES.values(), strict=True):
         assert documented[f"modes: {kind} frequency, followed by its number; or an array"] == ", ".join(frequencies)
     for row, listed, form, channel in (
-        ("time", names._TIME_NAMES, "{}", "time"),
-        ("rotor", names._ROTOR_NAMES, "{}", "rotor"),
-        ("pitch of blade i, followed by the blade's number", names._PITCH_NAMES, "{} 2", "pitch 2"),
-        ("array of angles, rotor first", names._VECTORS["angle"], "{}[0]", "rotor"),
-        ("array of rates, rotor first", names._VECTORS["rate"], "{}[0]", "rotor rate"),
+        ("time", names.TIME_NAMES, "{}", "time"),
+        ("rotor", names.ROTOR_NAMES, "{}", "rotor"),
+        ("pitch of blade i, followed by the blade's number", names.PITCH_NAMES, "{} 2", "pitch 2"),
+        ("array of angles, rotor first", names.VECTOR_NAMES["angle"], "{}[0]", "rotor"),
+        ("array of rates, rotor first", names.VECTOR_NAMES["rate"], "{}[0]", "rotor rate"),
     ):
         assert documented[row] == ", ".join(listed)
         for name in listed:
-            found = guess(form.format(name), 4, channels(SCENE))
+            found = channel_from_name(form.format(name), 4, channels(SCENE))
             assert found is not None, name
             assert found.name == channel
 
@@ -134,23 +135,23 @@ def test_the_last_digit_is_found(digits: int) -> None:
     """Of significant digits half a unit of the last one of each number, of decimals the same of all."""
     written = column_of(f"%.{digits - 1}e")
     exponents = np.floor(np.log10(np.abs(written)))
-    np.testing.assert_allclose(half_last_digits(written), 0.5 * 10.0 ** (exponents + 1 - digits), rtol=1e-12)
-    np.testing.assert_allclose(half_last_digits(column_of(f"%.{digits}f")), 0.5 * 10.0**-digits, rtol=1e-12)
+    np.testing.assert_allclose(rounding_of_printed(written), 0.5 * 10.0 ** (exponents + 1 - digits), rtol=1e-12)
+    np.testing.assert_allclose(rounding_of_printed(column_of(f"%.{digits}f")), 0.5 * 10.0**-digits, rtol=1e-12)
 
 
 def test_the_last_digit_of_single_and_double_precision_and_of_few_values() -> None:
     double = column_of("%.17g")
-    np.testing.assert_array_equal(half_last_digits(double), np.abs(double) * 2.0**-53)
+    np.testing.assert_array_equal(rounding_of_printed(double), np.abs(double) * 2.0**-53)
     single = double.astype(np.float32).astype(float)
-    np.testing.assert_array_equal(half_last_digits(single), np.abs(single) * 2.0**-24)
+    np.testing.assert_array_equal(rounding_of_printed(single), np.abs(single) * 2.0**-24)
     # A pitch that stays at 0.1 rad says nothing of digits.
-    np.testing.assert_array_equal(half_last_digits(np.full(50, 0.1)), np.full(50, 0.1 * 2.0**-53))
-    assert not half_last_digits(np.zeros(50)).any()
+    np.testing.assert_array_equal(rounding_of_printed(np.full(50, 0.1)), np.full(50, 0.1 * 2.0**-53))
+    assert not rounding_of_printed(np.zeros(50)).any()
     # But other columns may.
-    np.testing.assert_array_equal(half_last_digits(np.full(50, 0.1), [[column_of("%.4f")]]), np.full(50, 0.5e-4))
-    np.testing.assert_array_equal(half_last_digits(np.full(50, 0.1), [[double]]), np.full(50, 0.1 * 2.0**-53))
+    np.testing.assert_array_equal(rounding_of_printed(np.full(50, 0.1), [[column_of("%.4f")]]), np.full(50, 0.5e-4))
+    np.testing.assert_array_equal(rounding_of_printed(np.full(50, 0.1), [[double]]), np.full(50, 0.1 * 2.0**-53))
     # Nor does a number next to the smallest there is, as a flipped bit may make: no unit of it can be written.
-    assert half_last_digits(np.array([1.0 / 3.0, 2.0 / 3.0, 5e-324])).max() < 1e-15
+    assert rounding_of_printed(np.array([1.0 / 3.0, 2.0 / 3.0, 5e-324])).max() < 1e-15
 
 
 def test_a_mapping_says_column_unit_sign_zero_and_subset(tmp_path: Path) -> None:

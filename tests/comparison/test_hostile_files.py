@@ -23,8 +23,9 @@ from support.scenes import paper
 
 import rotor_mbs as rm
 from rotor_mbs.comparison import files
-from rotor_mbs.comparison.channels import channels, guess, load_data, mode_channels
+from rotor_mbs.comparison.channels import channel_from_name, channels, mode_channels
 from rotor_mbs.comparison.columns import MAX_NAME, split_bracketed_unit, table_of
+from rotor_mbs.comparison.data import load_data
 from rotor_mbs.errors import InputError
 
 SCENE = paper("fig08")
@@ -226,8 +227,8 @@ def test_reading_has_a_limit_of_time(name: str, tmp_path: Path, monkeypatch: pyt
 @pytest.mark.parametrize("name", ["q[,]", "q[]", "q[9]", "q[1,99999999999]", "q[" + "1" * 5000 + "]", "f" + "1" * 5000])
 def test_names_with_odd_numbers_are_no_channels(name: str) -> None:
     """Python refuses to read numbers of more than 4,300 digits."""
-    assert guess(name, 4, channels(SCENE)) is None
-    assert guess(name, 4, mode_channels(SCENE)) is None
+    assert channel_from_name(name, 4, channels(SCENE)) is None
+    assert channel_from_name(name, 4, mode_channels(SCENE)) is None
 
 
 @pytest.mark.parametrize(

@@ -17,7 +17,7 @@ from support.scenes import paper
 from support.sweeps import run_local
 
 import rotor_mbs as rm
-from rotor_mbs.comparison.channels import data_of_table, load_data
+from rotor_mbs.comparison.data import data_of_table, load_data
 from rotor_mbs.comparison.formats import read_columns
 from rotor_mbs.errors import RotorError
 from rotor_mbs.runs.pool import WorkerPool

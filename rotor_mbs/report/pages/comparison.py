@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from rotor_mbs.analysis.text_tables import TextTable
-from rotor_mbs.comparison.channels import load_data
+from rotor_mbs.comparison.data import load_data
 from rotor_mbs.comparison.modes import compare_modes
 from rotor_mbs.comparison.trajectory import compare_with_reference
 from rotor_mbs.comparison.verdict import DEFAULT_TOLERANCE, LEVELS, ChannelErrors, DataVerdict, from_dictionary

@@ -1,0 +1,98 @@
+"""What data that do not agree look like: which searches are made, in which order."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from rotor_mbs.comparison.data import ForeignData
+from rotor_mbs.comparison.data_defects import JudgedDefects
+from rotor_mbs.comparison.data_mistakes import (
+    MIN_ROWS,
+    TrajectorySearch,
+    column_mistakes,
+    data_mistakes,
+)
+from rotor_mbs.comparison.defect_search import DefectSearch
+from rotor_mbs.comparison.faults import faults_in_time
+
+_SAME_START = 1e-3  # rad, rad/s: data that start farther off are no run of the scene as they are
+_LONG = 2.0  # times the scene's duration: data that are longer are looked at in any case
+_NOT_COMMON = 3.0  # standard deviations of a correlation of numbers that have nothing in common
+
+
+def likely_causes(search: TrajectorySearch, judged: JudgedDefects | None) -> list[str]:
+    """Search for what explains data that do not agree.
+
+    Mistakes in columns and times come first; then another model, parameters, or faults at a time;
+    then scatter, or a factor of a channel. Data that start elsewhere are held to other models last:
+    they may be right but for a column.
+
+    Parameters
+    ----------
+    search : the data and the reference.
+    judged : defects of the data, None where they are not known of all coordinates.
+
+    Returns
+    -------
+    list of str
+        Causes in words; none where nothing fits, or the data are the reference's within rounding.
+    """
+    first = search.up_to_horizon(search.data)
+    is_elsewhere = True
+    if len(first.time):
+        start = search.states_at(first.time[:1])[0, first.columns]
+        is_elsewhere = not np.abs(first.values[0] - start).max() <= _SAME_START
+    has_defects = judged is not None and not judged.is_rounding
+    is_long = not search.data.time[-1] <= _LONG * search.scene.duration
+    if search.worst <= search.tolerance and not has_defects and not is_long:
+        return []
+    texts = data_mistakes(search)
+    if texts:
+        return texts
+    if judged is not None and is_elsewhere:
+        texts = DefectSearch(judged).scenes()
+    elif judged is not None and has_defects:
+        texts = _other_models_or_faults(judged)
+    texts = texts or _scatter(search, first) or column_mistakes(search, with_factor=True)
+    if not texts and judged is not None and has_defects and is_elsewhere:
+        texts = _other_models_or_faults(judged)
+    return texts
+
+
+def _other_models_or_faults(judged: JudgedDefects) -> list[str]:
+    """Search for another model or parameters, else for faults at a time."""
+    return DefectSearch(judged).explanations() or faults_in_time(judged)
+
+
+def _scatter(search: TrajectorySearch, data: ForeignData) -> list[str]:
+    """Find errors that have nothing in common from row to row, whatever the growth.
+
+    Parameters
+    ----------
+    search : the reference.
+    data : rows up to the horizon.
+    """
+    if len(data.time) < 4 * MIN_ROWS:
+        return []
+    errors = data.values - search.states_at(data.time)[:, data.columns]
+    carried = search.carried(data.time)[:, data.columns]
+    is_wrong = np.abs(errors / carried).max(axis=0) > search.tolerance
+    centred = errors[:, is_wrong] - errors[:, is_wrong].mean(axis=0)
+    sizes = (centred**2).mean(axis=0)
+    if not is_wrong.any() or not ((sizes > 0.0) & (sizes < math.inf)).all():
+        return []
+    # Of every second row alone neighbours have nothing in common either.
+    correlations = []
+    for lag in (1, 2):
+        correlations.append(np.abs((centred[lag:] * centred[:-lag]).mean(axis=0)))
+    common = np.max(correlations, axis=0) / sizes
+    half = len(data.time) // 2
+    early = (centred[:half] ** 2).mean(axis=0)
+    late = (centred[half:] ** 2).mean(axis=0)
+    is_common = (common > _NOT_COMMON / math.sqrt(len(errors))).any()
+    if is_common or (late > 2.0 * early).any() or (early > 2.0 * late).any():
+        return []
+    deviation = math.sqrt(float(sizes.max()))
+    return [f"scatter from row to row, standard deviation {deviation:.1e}"]

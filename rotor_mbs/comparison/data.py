@@ -1,0 +1,362 @@
+"""Data of a scene in SI units, from files or arrays, with the rounding of each number.
+
+Data that cannot be compared are refused here: not finite, of different lengths, times that do not
+increase.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotor_mbs.comparison.channels import SPEED, Channel
+from rotor_mbs.comparison.columns import UNITS, DataTable, table_of
+from rotor_mbs.comparison.files import read_table
+from rotor_mbs.comparison.mapping import ColumnMapping, DataMapping, find_channels, read_mapping
+from rotor_mbs.errors import InputError
+from rotor_mbs.scenario.scene import Scene
+
+Array = NDArray[np.float64]
+
+_FEW_DIGITS, _ALL_DIGITS = 9, 17
+_SINGLE_DIGITS = 8  # as many as single precision has
+_MAX_EXCEPTIONS = 0.05  # of the numbers
+_MIN_DISTINCT = 10  # values: fewer may have been chosen, and say nothing of digits
+_SAMPLE = 200  # numbers of a column, at least, where not all are needed
+_EQUAL = 1e-6  # of an interval between rows
+_MIN_ROWS = 3  # fewer have no motion to be compared
+
+
+@dataclass(frozen=True)
+class ForeignData:
+    """Samples of another program, or its modes over speed.
+
+    Attributes
+    ----------
+    source : what messages call the data.
+    time, values : (n,) s, increasing from 0 or later; (n, channels) in SI units, what `channels`
+        says. Of a table of modes the speeds, rad/s, in place of the times.
+    channels : what the columns of `values` are.
+    rounding, time_rounding : (n, channels), (n,) half a unit in the last digit of each number, as
+        it was written.
+    read, unused : a line for each channel: column, unit, and what was assumed; names of the other
+        columns.
+    wrapped : for each channel, whether whole turns are missing from it.
+    precision : "4 decimals: rounding error 5e-05", or the like of digits; "" of numbers with hardly
+        any rounding.
+    omitted : names of channels that are not to be missed.
+    is_modes : whether it is a table of modes.
+    """
+
+    source: str
+    time: Array
+    values: Array
+    channels: tuple[Channel, ...]
+    rounding: Array
+    time_rounding: Array
+    read: tuple[str, ...] = ()
+    unused: tuple[str, ...] = ()
+    wrapped: tuple[bool, ...] = ()
+    precision: str = ""
+    omitted: tuple[str, ...] = ()
+    is_modes: bool = False
+
+    def rows(self, chosen: NDArray[np.bool_] | slice) -> ForeignData:
+        """Return some rows."""
+        return replace(
+            self,
+            time=self.time[chosen],
+            values=self.values[chosen],
+            rounding=self.rounding[chosen],
+            time_rounding=self.time_rounding[chosen],
+        )
+
+    def only(self, *, loads: bool) -> ForeignData:
+        """Return the channels of loads alone, or all others."""
+        chosen = [j for j, channel in enumerate(self.channels) if channel.is_load == loads]
+        return replace(
+            self,
+            channels=tuple(self.channels[j] for j in chosen),
+            values=self.values[:, chosen],
+            rounding=self.rounding[:, chosen],
+            wrapped=tuple(self.wrapped[j] for j in chosen if self.wrapped),
+        )
+
+    def beside(self, other: ForeignData) -> ForeignData:
+        """Return the data with the channels of `other`, which has the same rows, behind them."""
+        return replace(
+            self,
+            channels=self.channels + other.channels,
+            values=np.hstack([self.values, other.values]),
+            rounding=np.hstack([self.rounding, other.rounding]),
+            wrapped=self.wrapped + other.wrapped,
+        )
+
+    @property
+    def columns(self) -> list[int]:
+        """Places of the channels in a matrix of all angles, then all rates, then all loads."""
+        return [channel.column for channel in self.channels]
+
+
+def load_data(
+    data: str | os.PathLike[str] | Mapping[str, Any],
+    scene: Scene,
+    columns: str | os.PathLike[str] | Mapping[str, Any] | None = None,
+) -> ForeignData:
+    """Load data of a scene from a file, or from arrays by name.
+
+    Parameters
+    ----------
+    data : a file; or arrays by name, an xarray.Dataset, whose coordinates are arrays too, or a
+        pandas.DataFrame.
+    scene : the scene of which they are data.
+    columns : a mapping file, or a mapping of its keys; by default channels are known by the names
+        of columns.
+
+    Raises
+    ------
+    InputError
+        For data that cannot be read, or are not of this scene.
+    """
+    mapping = read_mapping(columns, scene)
+    if isinstance(data, str | os.PathLike):
+        table = read_table(data, mapping.group, scene.name)
+    elif hasattr(data, "items"):
+        table = table_of("data", {**getattr(data, "coords", {}), **dict(data.items())})
+    else:
+        allowed = 'a file, or arrays by name, such as {"time": run.time, "angles": run.angles}'
+        raise InputError(f"data: {type(data).__name__}; allowed: {allowed}")
+    return data_of_table(table, scene, mapping)
+
+
+@np.errstate(all="ignore")  # data may be of any size
+def data_of_table(
+    table: DataTable, scene: Scene, mapping: DataMapping | None = None
+) -> ForeignData:
+    """Take the channels of a scene from named columns, in SI units.
+
+    Parameters
+    ----------
+    table : the columns.
+    scene : whose channels they may be.
+    mapping : which column is which; by default they are known by their names.
+
+    Raises
+    ------
+    InputError
+        For columns that cannot be channels of one trajectory, or one table of modes.
+    """
+    mapping = mapping or DataMapping()
+    sources, lines = find_channels(table, scene, mapping)
+    _refuse_different_lengths(table, sources)
+    columns = [table[source.column].values for source in sources.values()]
+    arrays = [_si_values(table, channel, source) for channel, source in sources.items()]
+    rounding, precision = _rounding_of_columns(sources, columns)
+    is_modes = next(iter(sources)).name == SPEED
+    if is_modes:
+        order = np.argsort(arrays[0], kind="stable")
+        arrays = [array[order] for array in arrays]
+        rounding = [array[order] for array in rounding]
+        if arrays[0][0] < 0.0 or (np.diff(arrays[0]) == 0.0).any():
+            problem = "a speed below 0, or one that repeats"
+            raise InputError(f"{table.source}: {problem}; allowed: a row for each speed")
+    else:
+        _refuse_wrong_times(table.source, arrays[0])
+        intervals = np.diff(arrays[0])
+        # Equal intervals are meant as they are written, though the times have few digits.
+        if np.ptp(intervals) <= _EQUAL * float(intervals.mean()):
+            rounding[0] = np.abs(arrays[0]) * 2.0**-53
+    used = {source.column for source in sources.values()}
+    return ForeignData(
+        source=table.source,
+        time=arrays[0],
+        values=np.stack(arrays[1:], axis=1),
+        channels=tuple(sources)[1:],
+        rounding=np.stack(rounding[1:], axis=1),
+        time_rounding=rounding[0],
+        read=lines,
+        unused=tuple(name for name in table.columns if name not in used),
+        wrapped=tuple(source.wrapped for source in sources.values())[1:],
+        precision=precision,
+        omitted=mapping.omitted,
+        is_modes=is_modes,
+    )
+
+
+def _refuse_different_lengths(table: DataTable, sources: Mapping[Channel, ColumnMapping]) -> None:
+    """Raise InputError unless all channels have a row for every time."""
+    lengths = {}
+    for source in sources.values():
+        lengths[source.column] = len(table[source.column].values)
+    if len(set(lengths.values())) > 1:
+        shown = ", ".join(f"{name} has {length} rows" for name, length in lengths.items())
+        problem = f"columns of different lengths: {shown}"
+        raise InputError(f"{table.source}: {problem}; allowed: a row for every time")
+
+
+def _si_values(table: DataTable, channel: Channel, source: ColumnMapping) -> Array:
+    """Return a channel in SI units, (n,). Raises InputError where it is not finite."""
+    values = table[source.column].values
+    factor = UNITS[channel.kind][source.unit.lower()]
+    si_values: Array = source.sign * (values + source.offset) * factor
+    bad = np.flatnonzero(~np.isfinite(si_values))
+    if len(bad):
+        place = f"in row {bad[0] + 1} of {len(values)}"
+        problem = f"column {source.column!r} is {values[bad[0]]} {place}"
+        raise InputError(f"{table.source}: {problem}; allowed: finite numbers")
+    return np.unwrap(si_values) if source.wrapped else si_values
+
+
+def _refuse_wrong_times(source: str, time: Array) -> None:
+    """Raise InputError unless times, (n,) s, increase from 0 or later."""
+    if len(time) < _MIN_ROWS:
+        raise InputError(f"{source}: {len(time)} rows; allowed: {_MIN_ROWS} or more")
+    if time[0] < 0.0:
+        allowed = "times from 0, the scene's start (`offset` of the time)"
+        raise InputError(f"{source}: begins at t = {time[0]:g} s; allowed: {allowed}")
+    wrong = np.flatnonzero(np.diff(time) <= 0.0)
+    if len(wrong):
+        row = int(wrong[0])
+        problem = "repeats" if time[row + 1] == time[row] else "comes before"
+        raise InputError(
+            f"{source}: the time of row {row + 2}, {time[row + 1]:.9g} s, {problem} that of the "
+            f"row above, {time[row]:.9g} s; allowed: times that increase"
+        )
+
+
+# Rounding: data are judged by the digits with which they were written
+
+
+def _rounding_of_columns(
+    sources: Mapping[Channel, ColumnMapping], columns: Sequence[Array]
+) -> tuple[list[Array], str]:
+    """Find the rounding of all columns, the time or speed first.
+
+    Parameters
+    ----------
+    sources : by channel, with its unit.
+    columns : (n,) numbers of each, as they were written.
+
+    Returns
+    -------
+    list of ndarray, str
+        Half a unit in the last digit of each number, in SI units; `ForeignData.precision`.
+    """
+    time, *numbers = columns
+    factors = [UNITS[channel.kind][source.unit.lower()] for channel, source in sources.items()]
+    kinds = [(channel.kind, source.unit) for channel, source in sources.items()][1:]
+    rounding = [rounding_of_printed(time)]
+    for kind, values in zip(kinds, numbers, strict=True):
+        alike = []
+        for other_kind, other in zip(kinds, numbers, strict=True):
+            if other_kind == kind:
+                alike.append(other)
+        # Frequencies are computed, not chosen: few of them say something of digits, too.
+        min_distinct = 1 if kind[0] == "frequency" else _MIN_DISTINCT
+        rounding.append(rounding_of_printed(values, [alike, numbers], min_distinct))
+    precision = _precision(numbers, rounding[1:])
+    in_si_units = [each * abs(factor) for each, factor in zip(rounding, factors, strict=True)]
+    return in_si_units, precision
+
+
+def rounding_of_printed(
+    values: Array, others: Sequence[Sequence[Array]] = (), min_distinct: int = _MIN_DISTINCT
+) -> Array:
+    """Find half a unit in the last place of numbers as they were written.
+
+    They may have some decimals, some digits, single or double precision: of the ways that all of
+    them fit, the coarsest is taken.
+
+    Parameters
+    ----------
+    values : (n,) numbers of a column.
+    others : groups of columns; a column of few distinct values is judged together with the first
+        group that has enough.
+    min_distinct : if these have fewer distinct values than that, they are exact.
+
+    Returns
+    -------
+    ndarray
+        (n,) in the unit of the numbers.
+    """
+    sizes, judged = np.abs(values), values
+    for group in others:
+        if len(np.unique(judged)) < _MIN_DISTINCT:
+            samples = [other[:: 1 + len(other) // _SAMPLE] for other in group]
+            judged = np.concatenate([values, *samples])
+    largest = float(np.abs(judged).max(initial=0.0))
+    if len(np.unique(judged)) < min_distinct:
+        return np.asarray(sizes * 2.0**-53)
+    # Numbers of so many decimals may seem to have so many digits, and the other way round: of both
+    # the coarser.
+    last = np.zeros(len(values))
+    noise = 4.0 * 2.0**-52 * largest  # of the arithmetic
+    for decimals in range(_FEW_DIGITS + 1):
+        unit = 10.0**-decimals
+        # With less than a hundredth of a unit any number fits.
+        is_tried = 100.0 * noise < unit < largest
+        if is_tried and np.abs(judged - np.round(judged / unit) * unit).max() <= noise:
+            last[:] = 0.5 * unit
+            break
+    digits = _significant_digits(judged)
+    if digits <= _FEW_DIGITS:
+        exponents = np.floor(np.log10(np.where(sizes > 0.0, sizes, 1.0)))
+        units = 0.5 * 10.0 ** (exponents + 1 - digits)
+        last = np.maximum(last, np.where(sizes > 0.0, units, 0.0))
+    if last.any():
+        return last
+    with np.errstate(over="ignore"):  # of what is larger than single precision can be
+        single = np.asarray(judged, np.float32).astype(float)
+    precision = 2.0**-24 if np.array_equal(single, judged) else 2.0**-53
+    return np.asarray(sizes * precision)
+
+
+def _precision(columns: Sequence[Array], rounding: Sequence[Array]) -> str:
+    """Return `ForeignData.precision`.
+
+    Parameters
+    ----------
+    columns : (n,) numbers of each column, as they were written.
+    rounding : `rounding_of_printed` of each.
+    """
+    rounded = []
+    for values, last in zip(columns, rounding, strict=True):
+        sizes = np.abs(values)
+        if (last > 10.0**-_FEW_DIGITS * sizes).any():
+            rounded.append((sizes, last))
+    digits = max(map(_significant_digits, columns))
+    if digits >= _SINGLE_DIGITS or not rounded:
+        return ""
+    # Of numbers that are all of one size digits are decimals, too; and 0.100000 might have one
+    # digit.
+    is_fixed = any(sizes.min() < 0.1 * sizes.max() for sizes, _ in rounded)
+    exceptions = [(last > 2.0 * last.min()).mean() for _, last in rounded]
+    if is_fixed and max(exceptions) < _MAX_EXCEPTIONS:
+        decimals = sorted({round(-math.log10(2.0 * last.min())) for _, last in rounded})
+        shown = " or ".join(map(str, decimals))
+        return f"{shown} decimals: rounding error {0.5 * 10.0 ** -decimals[0]:.0e}"
+    return f"{digits} digits: relative rounding error {0.5 * 10.0 ** (1 - digits):.0e}"
+
+
+def _significant_digits(values: Array) -> int:
+    """Find with how many significant digits the numbers may have been written."""
+    nonzero = values[values != 0.0]
+    for digits in range(1, _FEW_DIGITS + 1):
+        # Most numbers of digits are refuted by a few values.
+        if _have_digits(nonzero[:_SAMPLE], digits) and _have_digits(nonzero, digits):
+            return digits
+    return _ALL_DIGITS
+
+
+def _have_digits(values: Array, digits: int) -> bool:
+    """Whether all numbers, none of them 0, may have so many significant digits."""
+    with np.errstate(all="ignore"):  # the unit of a number near the smallest may be 0: none fit
+        unit = 10.0 ** (np.floor(np.log10(np.abs(values))) + 1 - digits)
+        rounded = np.round(values / unit) * unit
+    return np.allclose(values, rounded, rtol=1e-12, atol=0.0)

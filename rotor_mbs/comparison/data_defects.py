@@ -1,0 +1,140 @@
+"""Interval defects of data, which may lack angles or rates, and what of them is beyond rounding."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotor_mbs.comparison.data import ForeignData
+from rotor_mbs.errors import InputError
+from rotor_mbs.models.lagrange.defects import FIT_ROWS, fitted_rates, interval_defects
+from rotor_mbs.scenario.scene import Scene
+from rotor_mbs.solution.defects import Defects
+from rotor_mbs.solution.trajectory import Array, Trajectory
+
+AT_FLOOR = 3.0  # times the rounding, as it is estimated
+
+
+def carried_errors(reference: Trajectory, growth: Array, units: Array) -> Array:
+    """Return what a relative error of 1 at the start may become at most.
+
+    Parameters
+    ----------
+    reference : n rows.
+    growth, units : see `TimedReference`.
+
+    Returns
+    -------
+    ndarray
+        (n, 2 (1 + blades)) of each angle, rad, then rate, rad/s.
+    """
+    sizes = np.maximum(np.abs(reference.angles).max(axis=1), 1.0)
+    largest = np.maximum.accumulate(sizes)
+    largest_growth = np.maximum(np.maximum.accumulate(growth, axis=0), 1.0)
+    return np.asarray(largest_growth * largest[:, None] * units)
+
+
+def states_of(run: Trajectory) -> Array:
+    """Return angles, then rates, (n, 2 (1 + blades))."""
+    return np.hstack([run.angles, run.rates])
+
+
+def defects_of_data(
+    scene: Scene, data: ForeignData, reference: Trajectory, until: int
+) -> tuple[Defects | None, str]:
+    """Compute the defects of data.
+
+    Angles that the data lack are the reference's, and then only as far as the horizon; rates that
+    they lack are found from the angles.
+
+    Parameters
+    ----------
+    scene : the scene.
+    data, reference : the same rows.
+    until : rows up to the horizon.
+
+    Returns
+    -------
+    Defects or None, str
+        The defects, None where they cannot be known; what a reader must know of them.
+    """
+    count = len(scene.initial_angles)
+    states = states_of(reference).copy()
+    rounding = np.zeros((len(data.time), 2 * count))
+    states[:, data.columns] = data.values
+    rounding[:, data.columns] = data.rounding
+    without_angles = [i for i in scene.moving_coordinates if i not in data.columns]
+    without_rates = [i for i in scene.moving_coordinates if count + i not in data.columns]
+    rows = until if without_angles else len(data.time)
+    if rows < 2:
+        return None, ""
+    time, states, rounding = data.time[:rows], states[:rows], rounding[:rows]
+    note = ""
+    if without_rates and not without_angles:
+        try:
+            rates = fitted_rates(scene, time, states[:, :count])
+        except InputError as exc:
+            return None, f"no defects: {exc}"
+        columns = [count + i for i in without_rates]
+        states[:, columns] = rates[:, without_rates]
+        # Of a slope through five rows.
+        step = float(np.median(np.diff(time)))
+        rounding[:, columns] = rounding[:, without_rates] / step
+        names = ", ".join(f"{scene.coordinate_labels[i]} rate" for i in without_rates)
+        fitting = f"by fitting the equations of motion to {FIT_ROWS} rows"
+        note = f"computed from the angles, {fitting}: {names}"
+    if not np.isfinite(states).all():
+        return None, ""
+    angles, rates = states[:, :count], states[:, count:]
+    time_rounding = data.time_rounding[:rows]
+    return interval_defects(scene, time, angles, rates, rounding, time_rounding), note
+
+
+@dataclass(frozen=True)
+class JudgedDefects:
+    """Defects of data in rad, and what of them is beyond rounding.
+
+    Attributes
+    ----------
+    scene, defects, tolerance : the scene, the defects of the data, rad.
+    units : (m,) rad, or rad/s of a rate: what counts as a rad.
+    values, floors : (n - 1, m) rad, signed defects of the moving coordinates, angles, then rates,
+        and what rounding makes of them.
+    is_judged : (n - 1,) intervals that count.
+    excess : (n - 1,) rad, the largest of an interval beyond rounding.
+    """
+
+    scene: Scene
+    defects: Defects
+    tolerance: float
+    units: Array
+    values: Array
+    floors: Array
+    is_judged: NDArray[np.bool_]
+    excess: Array
+
+    @property
+    def largest(self) -> float:
+        """Largest defect beyond rounding, rad."""
+        return float(self.excess.max(initial=0.0))
+
+    @property
+    def is_rounding(self) -> bool:
+        """Whether no defect is larger than what rounding explains."""
+        return not self.largest
+
+
+def judged_defects(scene: Scene, defects: Defects, tolerance: float) -> JudgedDefects:
+    """Find what of the defects of data is beyond rounding; tolerance: rad."""
+    moving = list(defects.moving)
+    vectors = np.hstack([defects.angles[:, moving], defects.rates[:, moving]])
+    units = np.concatenate([np.ones(len(moving)), defects.rate_units[moving]])
+    values = vectors / units
+    # Where a number is next to nothing its rounding is no measure.
+    floors = np.maximum(defects.floors, 0.3 * np.median(defects.floors, axis=0) + 1e-18)
+    is_judged = defects.is_judged & np.isfinite(vectors).all(axis=1)
+    sizes = np.abs(np.where(is_judged[:, None], values, 0.0))
+    excess = np.maximum(sizes - AT_FLOOR * floors, 0.0).max(axis=1, initial=0.0)
+    return JudgedDefects(scene, defects, tolerance, units, values, floors, is_judged, excess)

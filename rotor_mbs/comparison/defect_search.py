@@ -1,0 +1,364 @@
+"""Other scenes, equations and parameters that explain the defects of data.
+
+Nothing is run from the start: each hypothesis is held to the data's own states, interval by
+interval. It explains the defects where what it leaves of them would agree.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotor_mbs.comparison.data_defects import AT_FLOOR, JudgedDefects
+from rotor_mbs.comparison.hypotheses import Explanation, Hypothesis, closest, explanations
+from rotor_mbs.comparison.other_rotors import (
+    Parameter,
+    RotorModel,
+    parameters,
+    rotor_hypotheses,
+    scenes_with_start,
+)
+from rotor_mbs.errors import RotorError
+from rotor_mbs.models.lagrange.defects import explicit_steps, quick_ends
+from rotor_mbs.scenario.scene import Scene
+from rotor_mbs.solution.trajectory import Array
+
+# Of the largest defect may be left: the rest is the other program's own error, or that of the quick
+# steps; more where that is within the tolerance.
+_LEFT, _LEFT_OF_SMALL = 1e-3, 0.02
+_ALIKE = 3.0  # times what the best explanation leaves
+_ALIKE_IN_ROUNDING = 1.05
+_QUICK = 3e-5  # share to which a change of the model is known
+_FINE = 8  # times the steps, with which that holds also where the mass matrix is nearly singular
+_PERHAPS = 0.2  # of the defects left by steps that are not so fine
+_LEFT_OF_SETS = 0.1  # by the projections on several parameters, before they are iterated
+_FAR_BETTER = 0.1  # times what a cheaper explanation leaves
+_SIGNIFICANT = 8.0  # standard deviations of an estimate
+_MAX_CHANGE = 0.6  # a share, or rad: what is further off is another scene
+_MAX_FITTED = 8  # sets of parameters, those whose projections leave least
+_MAX_PARAMETERS = 3  # at once
+_MAX_INTERVALS = 120  # that a hypothesis is tried on
+_DIFFERENCE = 1e-4  # share or rad, for the derivative by a parameter
+_ROUNDS = 8
+_INDEPENDENT = 1e-6  # determinant of the cosines between the signatures of a set
+MAX_NAMED = 6  # explanations, or faults
+
+
+class DefectSearch:
+    """Search for other models that explain the defects of data.
+
+    Parameters
+    ----------
+    judged : the defects.
+
+    Attributes
+    ----------
+    rows : (k,) intervals that hypotheses are tried on.
+    """
+
+    def __init__(self, judged: JudgedDefects) -> None:
+        defects, scene = judged.defects, judged.scene
+        self._judged, self._scene = judged, scene
+        self._moving = list(defects.moving)
+        self._allowed = max(
+            _LEFT * judged.largest, min(judged.tolerance, _LEFT_OF_SMALL * judged.largest)
+        )
+        rows = self.rows = _tried_intervals(judged)
+        self._begins, self._ends = defects.time[rows], defects.time[rows + 1]
+        self._states = defects.states[rows].T
+        self._values, self._floors = judged.values[rows], judged.floors[rows]
+        self._weights = 1.0 / np.maximum(self._floors, 1e-4 * judged.largest)
+        self._steps = None
+        if len(rows):
+            self._steps = explicit_steps(scene, self._ends - self._begins, defects.states[rows])
+        self._ends_of_scene: dict[int, Array] = {}  # by the factor of the steps
+        # (m,) for how many of these rows a coordinate has one number, and with it one rounding
+        # error, on average.
+        changes = np.count_nonzero(np.diff(self._states), axis=1)
+        repeats = len(rows) / (1.0 + changes)
+        self._repeats = np.tile(repeats.reshape(2, -1).max(axis=0), 2)
+
+    def explanations(self) -> list[str]:
+        """Search for other scenes and equations, else for parameters that are off.
+
+        Returns
+        -------
+        list of str
+            The best and all that are alike. None where the defects follow nothing that was tried,
+            or the motion is too stiff for explicit steps between the rows.
+        """
+        if self._steps is None:
+            return []
+        is_rounding = self._judged.is_rounding
+        explained: list[Explanation[RotorModel]] = []
+        if not is_rounding:
+            explained = list(explanations(self._plausible_models(), self._left_by))
+        # What has a name of its own is named, unless numbers of the scene explain far more.
+        least = _least(explained)
+        if least > 10.0 * _QUICK:
+            by_parameters = self._parameter_sets()
+            if _least(by_parameters) < _FAR_BETTER * least:
+                explained = by_parameters
+        # What rounding leaves is of one size whatever the cause: there the least is nearly that of
+        # the right one.
+        factor = _ALIKE_IN_ROUNDING if is_rounding else _ALIKE
+        alike = closest(explained, factor, _QUICK)
+        return [explanation.text for explanation in alike[:MAX_NAMED]]
+
+    def scenes(self) -> list[str]:
+        """Search for scenes of the catalogue that start as the data do and explain the defects."""
+        if self._steps is None:
+            return []
+
+        def left(model: RotorModel) -> float:
+            return self._largest_left(self._residual(model, _FINE))
+
+        allowed = max(self._judged.tolerance, self._allowed)
+        hypotheses = scenes_with_start(self._scene, self._first_row())
+        return [explanation.text for explanation in explanations(hypotheses, left, allowed)]
+
+    def _plausible_models(self) -> Iterator[Hypothesis[RotorModel]]:
+        """Yield the models that leave little by coarse steps."""
+        first_row = self._first_row()
+        every = itertools.chain(
+            rotor_hypotheses(self._scene), scenes_with_start(self._scene, first_row)
+        )
+        for hypothesis in every:
+            if not self._share(self._residual(hypothesis.change)) > _PERHAPS:
+                yield hypothesis
+
+    def _first_row(self) -> Array:
+        """Return the first row of the data, (2 (1 + blades),); of fixed coordinates the scene's."""
+        scene = self._scene
+        first = np.array([*scene.initial_angles, *scene.initial_rates])
+        count = len(scene.initial_angles)
+        columns = [*self._moving, *(count + i for i in self._moving)]
+        first[columns] = self._judged.defects.states[0]
+        return first
+
+    # Residuals
+
+    def _residual(self, model: RotorModel, steps: int = 1) -> Array:
+        """Return the defects by another model.
+
+        Parameters
+        ----------
+        model : in place of the scene.
+        steps : how many times as many steps as for transition matrices.
+
+        Returns
+        -------
+        ndarray
+            (k, m) rad; infinite where the model has other coordinates or no place for the scene.
+        """
+        if model.scene.moving_coordinates != self._moving:
+            return np.full_like(self._values, np.inf)
+        assert self._steps is not None
+        intervals = self._begins, self._ends, self._states, steps * self._steps
+        try:
+            ends = quick_ends(model.scene, *intervals, model.accelerations())
+        except RotorError:
+            return np.full_like(self._values, np.inf)
+        # The difference of two models by the same steps, in which the errors of the steps cancel.
+        if steps not in self._ends_of_scene:
+            self._ends_of_scene[steps] = quick_ends(self._scene, *intervals)
+        change = (ends - self._ends_of_scene[steps]).T / self._judged.units
+        return np.asarray(self._values + change)
+
+    def _largest_left(self, residual: Array) -> float:
+        """Return the largest of (k, m) defects beyond rounding, rad."""
+        return float((np.abs(residual) - AT_FLOOR * self._floors).max())
+
+    def _share(self, residual: Array) -> float:
+        """Return the share of the defects' weighted root mean square that is left."""
+        before = float(np.linalg.norm(self._values * self._weights))
+        return float(np.linalg.norm(residual * self._weights)) / (before or 1.0)
+
+    def _left_by(self, model: RotorModel) -> float:
+        """Return the share of the defects that a model leaves; infinite where it is too much.
+
+        In defects that are rounding no single one is too large.
+        """
+        residual = self._residual(model, _FINE)
+        if not self._judged.is_rounding and not self._largest_left(residual) <= self._allowed:
+            return math.inf
+        return self._share(residual)
+
+    # Parameters
+
+    def _parameter_sets(self) -> list[Explanation[RotorModel]]:
+        """Search for the smallest sets of parameters that explain the defects.
+
+        A parameter's signature is the derivative of the defects by it. Least squares over the
+        signatures of a set say how much it may explain; the best sets are fitted.
+        """
+        candidates, signatures = self._signatures()
+        if not candidates:
+            return []
+        cosines = signatures @ signatures.T
+        before = (self._values * self._weights).ravel()
+        projections, total = signatures @ before, float(before @ before)
+        best: list[Explanation[RotorModel]] = []
+        max_count = 1 if self._judged.is_rounding else _MAX_PARAMETERS
+        for count in range(1, max_count + 1):
+            sets = np.array(list(itertools.combinations(range(len(candidates)), count)))
+            if not len(sets):
+                break
+            matrices = cosines[sets[:, :, None], sets[:, None, :]]
+            # Parameters with one signature, such as a mass and gravity, cannot be told apart.
+            is_independent = np.linalg.det(matrices) > _INDEPENDENT
+            sets, matrices = sets[is_independent], matrices[is_independent]
+            sides = projections[sets]
+            amounts = np.linalg.solve(matrices, sides[..., None])[..., 0]
+            squares = (sides * amounts).sum(axis=1)  # of the defects, that the set explains
+            # Of a single one that is far off the signature may be another; several are not.
+            if count > 1:
+                is_enough = squares > (1.0 - _LEFT_OF_SETS**2) * total
+                sets, squares = sets[is_enough], squares[is_enough]
+            fitted = []
+            for places in sets[np.argsort(-squares)[:_MAX_FITTED]]:
+                hypothesis = self._fit([candidates[i] for i in places])
+                if hypothesis is not None:
+                    fitted.append(hypothesis)
+            explained = list(explanations(fitted, self._left_by))
+            # One more is named only where that explains far more.
+            if best and _least(explained) > _FAR_BETTER * _least(best):
+                break
+            if explained:
+                best = explained
+            if _least(best) <= 10.0 * _QUICK:
+                break
+        return best
+
+    def _signatures(self) -> tuple[list[Parameter], Array]:
+        """Return the parameters that have an effect, and their signatures as unit vectors."""
+        candidates, signatures = [], []
+        for parameter in parameters(self._scene):
+            slope = self._slope([parameter], [0.0], 0).ravel()
+            size = float(np.linalg.norm(slope))
+            if 0.0 < size < np.inf:
+                candidates.append(parameter)
+                signatures.append(slope / size)
+        return candidates, np.array(signatures)
+
+    def _fit(self, chosen: Sequence[Parameter]) -> Hypothesis[RotorModel] | None:
+        """Fit some parameters at once to the defects, by Gauss and Newton's iteration.
+
+        Parameters
+        ----------
+        chosen : the parameters.
+
+        Returns
+        -------
+        Hypothesis or None
+            None where the fit does not converge, leads to another scene, or a change is not
+            significant.
+        """
+        change = np.zeros(len(chosen))
+        for _ in range(1 if self._judged.is_rounding else _ROUNDS):
+            residual = self._residual(_changed(self._scene, chosen, change), _FINE)
+            weighted = (residual * self._weights).ravel()
+            columns = [self._slope(chosen, change, i).ravel() for i in range(len(chosen))]
+            slopes = np.stack(columns, axis=1)
+            if not (np.isfinite(weighted).all() and np.isfinite(slopes).all()):
+                return None
+            correction = -np.linalg.lstsq(slopes, weighted, rcond=None)[0]
+            change = change + correction
+            if np.abs(change).max() > _MAX_CHANGE:
+                return None
+            if (np.abs(correction) <= 1e-9 + 1e-6 * np.abs(change)).all():
+                break
+        model = _changed(self._scene, chosen, change)
+        weighted = self._residual(model, _FINE) * self._weights
+        if not np.isfinite(weighted).all():
+            return None
+        deviation = self._deviations(weighted, slopes)
+        # What the quick steps do not know is no change either.
+        deviation = np.maximum(deviation, _QUICK * np.abs(change))
+        if (np.abs(change) < _SIGNIFICANT * deviation).any():
+            return None
+        texts = []
+        amounts = zip(chosen, change.tolist(), deviation.tolist(), strict=True)
+        for parameter, amount, uncertainty in amounts:
+            factor, unit = (1.0, parameter.unit) if parameter.unit else (100.0, "%")
+            size = f"{factor * amount:+.4g} {unit} (uncertainty {factor * uncertainty:.1g})"
+            texts.append(f"{parameter.key} off by {size}")
+        return Hypothesis(" and ".join(texts), model, len(chosen))
+
+    def _deviations(self, weighted: Array, slopes: Array) -> Array:
+        """Return standard deviations of fitted changes.
+
+        Parameters
+        ----------
+        weighted : (k, m) residuals of the fit.
+        slopes : (k m, parameters) their derivatives.
+        """
+        spread = float(np.sqrt((weighted**2).mean()))
+        if self._judged.is_rounding:
+            # Of a single parameter: one rounding error over many rows counts once.
+            sizes = (slopes**2).reshape(self._values.shape).sum(axis=0)
+            spread = max(spread, 0.3) * math.sqrt(float(sizes @ self._repeats / sizes.sum()))
+        return np.asarray(spread * np.sqrt(np.diag(np.linalg.pinv(slopes.T @ slopes))))
+
+    def _slope(self, chosen: Sequence[Parameter], at: Sequence[float] | Array, which: int) -> Array:
+        """Return the weighted derivative of the defects by a parameter, per share or rad.
+
+        Parameters
+        ----------
+        chosen : parameters that are changed.
+        at : their changes.
+        which : the one by which is derived.
+        """
+        residuals = []
+        for step in (_DIFFERENCE, -_DIFFERENCE):
+            change = np.array(at, float)
+            change[which] += step
+            residuals.append(self._residual(_changed(self._scene, chosen, change)))
+        with np.errstate(invalid="ignore"):
+            difference = (residuals[0] - residuals[1]) * self._weights
+            return np.asarray(difference / (2.0 * _DIFFERENCE))
+
+
+def _tried_intervals(judged: JudgedDefects) -> NDArray[np.int64]:
+    """Choose intervals: some all over the run, and those of the largest defects.
+
+    None with a kink of a load inside, where the quick steps are wrong.
+
+    Parameters
+    ----------
+    judged : the defects.
+
+    Returns
+    -------
+    ndarray
+        (k,) numbers of intervals, increasing.
+    """
+    time = judged.defects.time
+    is_tried = judged.is_judged.copy()
+    for kink in judged.scene.kink_times:
+        is_inside = (time[:-1] < kink * (1.0 - 1e-9)) & (kink * (1.0 + 1e-9) < time[1:])
+        is_tried &= ~is_inside
+    rows = np.flatnonzero(is_tried)
+    if not len(rows):
+        return rows
+    half = _MAX_INTERVALS // 2
+    places = np.linspace(0, len(rows) - 1, min(half, len(rows))).astype(int)
+    largest = rows[np.argsort(-judged.excess[rows])[:half]]
+    return np.union1d(rows[places], largest)
+
+
+def _changed(scene: Scene, chosen: Sequence[Parameter], change: Array) -> RotorModel:
+    """Return a scene whose parameters are changed by some amounts."""
+    model = RotorModel(scene)
+    for parameter, amount in zip(chosen, change.tolist(), strict=True):
+        model = parameter.apply(model, amount)
+    return model
+
+
+def _least(explained: Sequence[Explanation[RotorModel]]) -> float:
+    """Return what the best explanation leaves, infinity where there is none."""
+    return min((explanation.left for explanation in explained), default=math.inf)

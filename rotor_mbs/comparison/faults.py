@@ -1,0 +1,294 @@
+"""Faults at a time: what the defects of single intervals, or of a few beside each other, look like.
+
+A row that is stuck, repeated or wrong, a load that jumps a row late, another state from some row
+on: each leaves defects of its own pattern in one to three intervals, and none in the others.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotor_mbs.comparison.data_defects import AT_FLOOR, JudgedDefects
+from rotor_mbs.models.lagrange import closed_form
+from rotor_mbs.models.lagrange.defects import explicit_steps, quick_ends
+from rotor_mbs.models.lagrange.parameters import rotor_form
+from rotor_mbs.scenario.time_table import torque_place
+from rotor_mbs.solution.trajectory import Array
+
+_MAX_NAMED = 6
+_STANDS_OUT = 30.0  # times the median of the defects
+_FAINT = 0.02  # of the largest defect: fainter ones are not told beside it
+_EVERYWHERE = 0.6  # of the intervals
+_EDGE = 0.1  # of the faulty intervals' median: what is beside them is not faulty
+_GAP = 6  # intervals: faults that are nearer are one
+_AT_END = 3  # intervals
+_OF_ENDS = 1e-3  # of the largest: usual defects above this are of the cause of those at the ends
+_PARALLEL = 0.995  # cosine
+_NEARLY = 0.05
+_LEFT_OF_LOADS = 0.15  # of the defects: a load changes within an interval, and the rotor turns on
+_OF_COORDINATE = 0.1  # of a coordinate's defects are a load's on it, the rest of those on others
+_OF_USUAL = 10.0  # times a coordinate's own median: less says nothing of it
+_MAX_DIRECTIONS = 20  # intervals of a fault at which loads are looked for
+_SMALL_TURN = 1e-6  # rad, by the load whose effect is computed: far above round-off, and yet linear
+
+
+def faults_in_time(judged: JudgedDefects) -> list[str]:
+    """Find what stands out of the other intervals, by its pattern in time.
+
+    Parameters
+    ----------
+    judged : the defects.
+
+    Returns
+    -------
+    list of str
+        The first faults, in words; none where most intervals are wrong, or no defect is more
+        than the tolerance.
+    """
+    excess = judged.excess
+    if judged.largest <= judged.tolerance:
+        return []
+    usual = float(np.median(excess[judged.is_judged])) if judged.is_judged.any() else 0.0
+    wrong = np.flatnonzero(excess > max(_STANDS_OUT * usual, _FAINT * judged.largest))
+    # What is wrong everywhere is no fault at a time, though it shows in some places more than in
+    # others.
+    if not len(wrong) or len(wrong) > _EVERYWHERE * len(excess):
+        return []
+    # Nor is one whose size comes down gradually beside what stands out: a fault at a time has
+    # edges.
+    edges = np.concatenate([wrong - 1, wrong + 1])
+    edges = edges[~np.isin(edges, wrong) & (edges >= 0) & (edges < len(excess))]
+    if len(edges):
+        beside = float(np.median(excess[edges]))
+        if beside > _EDGE * float(np.median(excess[wrong])):
+            return []
+    groups = np.split(wrong, np.flatnonzero(np.diff(wrong) > _GAP) + 1)
+    # A filter, or differences in place of rates, are wrong in all rows, and most at the ends.
+    if usual > _OF_ENDS * judged.largest:
+        last = len(excess) - _AT_END
+        groups = [group for group in groups if group[-1] >= _AT_END and group[0] < last]
+    texts = [_fault(judged, group) for group in groups[:_MAX_NAMED]]
+    if len(groups) > _MAX_NAMED:
+        end = float(judged.defects.time[groups[-1][-1] + 1])
+        texts.append(f"and {len(groups) - _MAX_NAMED} more faults until t = {end:.6g} s")
+    return texts
+
+
+def _fault(judged: JudgedDefects, group: NDArray[np.int64]) -> str:
+    """Describe the fault of a group of intervals.
+
+    Parameters
+    ----------
+    judged : the defects.
+    group : (k,) intervals that stand out and are near each other.
+    """
+    time = judged.defects.time
+    start, end = float(time[group[0]]), float(time[group[-1] + 1])
+    text = _wrong_row(judged, group)
+    if text:
+        return text
+    # The coordinates on which loads make such defects.
+    chosen = group[:: max(1, len(group) // _MAX_DIRECTIONS)]
+    loads, acting = _explaining_loads(judged, chosen)
+    if len(acting) == 1:
+        place = acting[0]
+        jump = _load_jump_fault(judged, place, start, end, loads[:, place])
+        if jump:
+            return f"the load on the {_label(judged, place)} {jump}"
+    if len(group) == 1:
+        return _change_of_state(judged, int(group[0]))
+    if acting:
+        amounts = []
+        for place in acting:
+            amounts.append(f"{loads[:, place].mean():+.3g} N m on the {_label(judged, place)}")
+        period = f"from t = {start:.6g} to {end:.6g} s"
+        return f"a load that is wrong or missing {period}: on average {' and '.join(amounts)}"
+    half = len(judged.defects.moving)
+    largest = int(np.abs(judged.values[group]).max(axis=0).argmax()) % half
+    label = _label(judged, largest)
+    return f"a fault from t = {start:.6g} to {end:.6g} s, largest in the {label}"
+
+
+def _label(judged: JudgedDefects, place: int) -> str:
+    """Return the name of a moving coordinate."""
+    return judged.scene.coordinate_labels[judged.defects.moving[place]]
+
+
+def _wrong_row(judged: JudgedDefects, group: NDArray[np.int64]) -> str:
+    """Describe a row that is repeated, stuck, wrong or at a wrong time; "" where it is none.
+
+    The defect is the closed form less the data: along the motion where the data are behind it.
+
+    Parameters
+    ----------
+    judged : the defects.
+    group : (k,) intervals that stand out.
+    """
+    defects, units = judged.defects, judged.units
+    first, last = int(group[0]), int(group[-1])
+    values = judged.values[group]
+    # Of a repeated row the defect is the motion over the interval; of a part of it, that at its
+    # end.
+    motion = values[0] + (defects.states[first + 1] - defects.states[first]) / units
+    cosines = [_cosine(values[0], _state_rate(judged, first)), _cosine(values[0], motion)]
+    along = max(cosines, key=abs)
+    if len(group) == 1 and abs(along) >= _PARALLEL:
+        clock = "late" if along > 0.0 else "early"
+        row = "repeated" if along > 0.0 else "omitted and the others renumbered"
+        at = f"at t = {defects.time[last + 1]:.6g} s"
+        return f"a row {row}, or times {clock} by less than an interval, {at}"
+    if len(group) == 2 and last == first + 1 and defects.transitions is not None:
+        # The second interval starts at the wrong row, and takes its error back.
+        carried = defects.transitions[first + 1] @ (values[0] * units) / units
+        if _cosine(values[1], -carried) >= _PARALLEL:
+            row = f"row {first + 2}, t = {defects.time[first + 1]:.6g} s"
+            if abs(along) >= _PARALLEL:
+                return f"a stuck row, or one at a wrong time: {row}"
+            return f"a single wrong row: {row}"
+    return ""
+
+
+def _change_of_state(judged: JudgedDefects, row: int) -> str:
+    """Describe a single wrong interval that no load explains."""
+    half = len(judged.defects.moving)
+    start, end = (float(time) for time in judged.defects.time[row : row + 2])
+    # Of a change of rates in the interval the angles have got a share.
+    angles = judged.values[row, :half]
+    rates = judged.values[row, half:] * judged.units[half:] * (end - start)
+    share = float(angles @ rates) / (float(rates @ rates) or 1.0)
+    rest = float(np.linalg.norm(angles - share * rates))
+    is_share = -_NEARLY <= share <= 1.0 + _NEARLY
+    if is_share and rest <= _NEARLY * float(np.linalg.norm(rates)):
+        return f"a jump of rates, or a load of one interval, before t = {end:.6g} s"
+    return f"the motion continues from another state after t = {end:.6g} s"
+
+
+def _state_rate(judged: JudgedDefects, row: int) -> Array:
+    """Return how the state goes on at a row, (m,) in rad per s, rates in the units of defects."""
+    states, time = judged.defects.states, judged.defects.time
+    half = states.shape[1] // 2
+    ahead = min(row + 2, len(states) - 1)
+    change = (states[ahead, half:] - states[row, half:]) / (time[ahead] - time[row])
+    return np.asarray(np.concatenate([states[row + 1, half:], change]) / judged.units)
+
+
+def _explaining_loads(judged: JudgedDefects, rows: NDArray[np.int64]) -> tuple[Array, list[int]]:
+    """Find the loads on the coordinates that explain the defects of some intervals best.
+
+    Parameters
+    ----------
+    judged : the defects.
+    rows : (k,) intervals.
+
+    Returns
+    -------
+    loads, acting : ndarray, list of int
+        (k, coordinates) N m that the data have more; the coordinates on which they act, none where
+        loads leave too much.
+    """
+    values, effects = judged.values[rows], _effect_of_unit_load(judged, rows)
+    usual = np.median(np.abs(judged.values[judged.is_judged]), axis=0)
+    usual = usual + AT_FLOOR * judged.floors[rows].max(axis=0)
+    # Each channel counts alike: a pitch moves by millions of what the rotor does.
+    units = np.linalg.norm(values, axis=0) + _OF_USUAL * math.sqrt(len(rows)) * usual
+    sizes = np.linalg.norm(effects / units, axis=2)
+    if not (np.isfinite(sizes).all() and sizes.all()):
+        return np.zeros(sizes.T.shape), []
+    # Least squares in each interval, over effects of unit size.
+    matrices = (effects / units / sizes[:, :, None]).transpose(1, 2, 0)
+    solutions = (np.linalg.pinv(matrices) @ (values / units)[:, :, None])[:, :, 0]
+    loads = -solutions / sizes.T
+    parts = loads.T[:, :, None] * effects
+    left = np.linalg.norm((values + parts.sum(axis=0)) / units)
+    if left > _LEFT_OF_LOADS * np.linalg.norm(values / units):
+        return loads, []
+    acting = []
+    for place, part in enumerate(parts):
+        channels = [place, len(parts) + place]  # its angle and rate
+        if np.linalg.norm(part[:, channels] / units[channels]) > _OF_COORDINATE:
+            acting.append(place)
+    return loads, acting
+
+
+def _load_jump_fault(
+    judged: JudgedDefects, place: int, start: float, end: float, more: Array
+) -> str:
+    """Describe a wrong load beside a jump of a coordinate's prescribed load; "" elsewhere.
+
+    Parameters
+    ----------
+    judged : the defects.
+    place : of the coordinate among those that move.
+    start, end : s, of the intervals.
+    more : (k,) N m that the data have more in these intervals.
+    """
+    table = judged.scene.load_tables[torque_place(judged.defects.moving[place])]
+    for (t0, value0), (t1, value1) in itertools.pairwise(table):
+        jump = value1 - value0
+        is_inside = start * (1.0 - 1e-9) <= t0 <= end * (1.0 + 1e-9)
+        if t0 != t1 or not jump or not is_inside:
+            continue
+        if len(more) == 1 and abs(abs(more[0] / jump) - 1.0) <= _NEARLY:
+            side = "late" if more[0] / jump < 0.0 else "early"
+            return f"jumps a row {side} at t = {t0:.6g} s, or has a wrong value in this row"
+        # One interval has too much, the next too little.
+        is_balanced = abs(more.sum()) <= _NEARLY * np.abs(more).max()
+        if len(more) == 2 and is_balanced and more[0] / jump > 0.0:
+            return f"is smoothed over its jump at t = {t0:.6g} s"
+    return ""
+
+
+def _effect_of_unit_load(judged: JudgedDefects, rows: NDArray[np.int64]) -> Array:
+    """Compute what 1 N m on each moving coordinate makes of an interval's end.
+
+    Parameters
+    ----------
+    judged : the defects.
+    rows : (k,) intervals.
+
+    Returns
+    -------
+    ndarray
+        (coordinates, k, m) rad.
+    """
+    scene, defects, form = judged.scene, judged.defects, rotor_form(judged.scene)
+    begins, ends = defects.time[rows], defects.time[rows + 1]
+    states = defects.states[rows].T
+    steps = explicit_steps(scene, ends - begins, defects.states[rows]) or 1
+    free = quick_ends(scene, begins, ends, states, steps)
+    rotor_inertia = form.inertia + sum(blade.schur_ss + blade.schur_cc for blade in form.blades)
+    inertias = [rotor_inertia, *(blade.pitch_inertia for blade in form.blades)]
+    longest = float((ends - begins).max())
+    effects = []
+    for place, inertia in enumerate(inertias):
+        torque = _SMALL_TURN * float(inertia) / longest**2
+        pushed = quick_ends(scene, begins, ends, states, steps, _with_torque(place, torque))
+        effects.append((pushed - free).T / judged.units / torque)
+    return np.asarray(effects)
+
+
+def _with_torque(place: int, torque: float) -> closed_form.Accelerations:
+    """Return the closed form's equations with a torque more, N m, on the rotor (0) or a pitch."""
+
+    def equations(angles: Any, rates: Any, form: Any, loads: Any, *functions: Any) -> Any:
+        pitches = list(loads.pitches or [0.0] * len(form.blades))
+        if place == 0:
+            pushed = replace(loads, rotor=loads.rotor + torque, pitches=pitches)
+        else:
+            pitches[place - 1] = pitches[place - 1] + torque
+            pushed = replace(loads, pitches=pitches)
+        return closed_form.accelerations(angles, rates, form, pushed, *functions)
+
+    return equations
+
+
+def _cosine(first: Array, second: Array) -> float:
+    """Return the cosine between two vectors, 0 where one is zero."""
+    size = float(np.linalg.norm(first) * np.linalg.norm(second))
+    return float(first @ second) / size if size else 0.0
