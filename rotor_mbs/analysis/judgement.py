@@ -279,11 +279,7 @@ def rotor_inertia_shares(scene: Scene, angles: Array) -> Array:
 def _shaft_inertia_forms(blade: Blade) -> tuple[Sequence[float], Sequence[float]]:
     """Coefficients of s², c², s c (of the pitch) in S and in the inertia about the shaft, kg m²; in exact arithmetic
     until the end: for a point mass the first vanishes, whose rounding is not inertia."""
-    m = Fraction(blade.mass)
-    x, y, z = map(Fraction, blade.centre_of_mass)
-    xx, yy, zz, xy, xz, yz = map(Fraction, blade.inertia)
-    xx, yy, zz = xx + m * (y * y + z * z), yy + m * (x * x + z * z), zz + m * (x * x + y * y)
-    xy, xz, yz = xy - m * x * y, xz - m * x * z, yz - m * y * z
+    xx, yy, zz, xy, xz, yz = blade.inertia_about_apex(Fraction)
     fixed = [xx, yy, 2 * xy]
     taken = [xz * xz, yz * yz, 2 * xz * yz] if blade.has_pitch_inertia else [Fraction(0)] * 3
     free = [a - b / zz if b else a for a, b in zip(fixed, taken, strict=True)]

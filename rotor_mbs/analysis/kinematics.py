@@ -82,16 +82,16 @@ def exact_rotor_angle(scene: Scene, time: Array) -> tuple[str, Array] | None:
         return _pendulum(scene, time)
     if any(blade != scene.blades[0] for blade in scene.blades) or not scene.has_constant_torque:
         return None
-    inertia = scene.hub_inertia + sum(_about_shaft(blade) for blade in scene.blades)
+    inertia = scene.hub_inertia + sum(_inertia_at_zero_pitch(blade) for blade in scene.blades)
     torque = scene.torque_at(0.0)
     angle = scene.initial_angles[0] + scene.initial_rates[0] * time + torque * time**2 / (2.0 * inertia)
     return ("constant torque" if torque else "uniform rotation" if scene.initial_rates[0] else "rest"), angle
 
 
-def _about_shaft(blade: Blade) -> float:
-    """kg m²: about the y axis through the hub centre, at zero pitch."""
-    x, _, z = blade.centre_of_mass
-    return blade.inertia[1] + blade.mass * (x * x + z * z)
+def _inertia_at_zero_pitch(blade: Blade) -> float:
+    """Return a blade's inertia about the shaft, which is then its own y axis, kg m²."""
+    yy: float = blade.inertia_about_apex()[1]
+    return yy
 
 
 def _pendulum(scene: Scene, time: Array) -> tuple[str, Array] | None:
@@ -102,7 +102,7 @@ def _pendulum(scene: Scene, time: Array) -> tuple[str, Array] | None:
     arm, lead = math.hypot(x, z), math.atan2(x, z)
     if scene.has_torque or scene.initial_rates[0] or not scene.gravity or not arm:
         return None
-    frequency = math.sqrt(blade.mass * scene.gravity * arm / (scene.hub_inertia + _about_shaft(blade)))
+    frequency = math.sqrt(blade.mass * scene.gravity * arm / (scene.hub_inertia + _inertia_at_zero_pitch(blade)))
     amplitude = math.pi - (scene.initial_angles[0] + lead)  # from straight down
     if not -math.pi < amplitude < math.pi:
         return None

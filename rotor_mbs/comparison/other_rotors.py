@@ -232,11 +232,7 @@ def _with_opposite_products(blade: Blade) -> Blade:
 
 def _with_steiner(blade: Blade) -> Blade:
     """Return a blade as if its inertia were about the centre of mass: Steiner's share twice."""
-    m, (x, y, z) = blade.mass, blade.centre_of_mass
-    moments = (m * (y * y + z * z), m * (x * x + z * z), m * (x * x + y * y))
-    share = (*moments, -m * x * y, -m * x * z, -m * y * z)
-    total = [own + steiner for own, steiner in zip(blade.inertia, share, strict=True)]
-    return replace(blade, inertia=_inertia(total))
+    return replace(blade, inertia=_inertia(blade.inertia_about_apex()))
 
 
 def _inertia(values: Sequence[float]) -> tuple[float, float, float, float, float, float]:

@@ -471,9 +471,14 @@ def fastest_rates(scene: Scene) -> tuple[float, float]:
 
 
 def _rotor_inertia(scene: Scene) -> float:
-    """kg m², about the shaft: of blades that lie as far from it as they can."""
-    arms = (blade.mass * sum(r * r for r in blade.centre_of_mass) + max(blade.inertia[:3]) for blade in scene.blades)
-    return scene.hub_inertia + sum(arms)
+    """Return the largest inertia about the shaft (kg m²) that the rotor can have, whatever the pitches.
+
+    No axis through the apex has more than half the trace of a tensor, and a point mass far from the axis has as much.
+    """
+    total = scene.hub_inertia
+    for blade in scene.blades:
+        total += 0.5 * sum(blade.inertia_about_apex()[:3])
+    return total
 
 
 def singular_reason(scene: Scene) -> str:

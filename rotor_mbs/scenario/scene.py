@@ -225,11 +225,36 @@ class Blade:
         xx, yy, zz, xy, xz, yz = self.inertia
         return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
 
+    def inertia_about_apex(self, number: Callable[[float], Any] = float) -> tuple[Any, ...]:
+        """Return the inertia about the origin of the blade frame, where the pitch axis meets the shaft.
+
+        Parameters
+        ----------
+        number : kind of number to compute with: float, or Fraction for exact elements.
+
+        Returns
+        -------
+        tuple
+            xx yy zz xy xz yz of the tensor J_com + m (r·r I - r rᵀ), kg m², in the blade frame. About the shaft the
+            blade has xx sin²θ + yy cos²θ + 2 xy sin θ cos θ at a pitch of θ, and zz about the pitch axis.
+        """
+        m = number(self.mass)
+        x, y, z = map(number, self.centre_of_mass)
+        xx, yy, zz, xy, xz, yz = map(number, self.inertia)
+        return (
+            xx + m * (y * y + z * z),
+            yy + m * (x * x + z * z),
+            zz + m * (x * x + y * y),
+            xy - m * x * y,
+            xz - m * x * z,
+            yz - m * y * z,
+        )
+
     @property
     def pitch_inertia(self) -> float:
         """Moment of inertia about the pitch axis (kg m²)."""
-        x, y, _ = self.centre_of_mass
-        return self.inertia[2] + self.mass * (x * x + y * y)
+        zz: float = self.inertia_about_apex()[2]
+        return zz
 
     @property
     def has_pitch_inertia(self) -> bool:

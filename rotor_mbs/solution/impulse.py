@@ -58,7 +58,7 @@ def linear_balance(scene: Scene, run: Trajectory) -> Balance | None:
         return None
     # rad/s: the largest natural frequency of a blade on the spring of its bearing.
     frequencies = [
-        np.sqrt(stiffness / _inertia_about_hub(blade)[2, 2])
+        np.sqrt(stiffness / blade.pitch_inertia)
         for blade, (stiffness, _) in zip(scene.blades, scene.bearings, strict=True)
         if blade.has_pitch_inertia
     ]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import tomllib
+from fractions import Fraction
 from math import hypot, pi
 from pathlib import Path
 from typing import Any
@@ -17,6 +18,7 @@ from rotor_mbs.errors import InputError
 from rotor_mbs.scenario.catalogue import SCENARIOS, find_scenes
 from rotor_mbs.scenario.scene import (
     DEFAULT_OUTPUTS,
+    Blade,
     Scene,
     is_rigid_body_inertia,
     load_scene,
@@ -211,3 +213,23 @@ def test_two_files_with_one_name_are_refused(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="its scene would be named same, as that of") as caught:
         find_scenes([str(path) for path in paths])
     assert len(caught.value.problems) == 1
+
+
+def test_the_inertia_about_the_apex_is_that_of_the_blades_particles() -> None:
+    """Six particles summed about the apex, and about their centre of mass; 1e-13 is some hundred roundings."""
+    chance = np.random.default_rng(3)
+    masses, places = chance.uniform(1.0, 9.0, 6), chance.normal([0.3, -0.2, 9.0], [0.2, 0.1, 5.0], (6, 3))
+
+    def tensor(points: np.ndarray[Any, np.dtype[np.float64]]) -> list[float]:
+        squares = (points**2).sum(axis=1)[:, None, None] * np.eye(3)
+        J = (masses[:, None, None] * (squares - points[:, :, None] * points[:, None, :])).sum(axis=0)
+        return [J[0, 0], J[1, 1], J[2, 2], J[0, 1], J[0, 2], J[1, 2]]
+
+    centre = masses @ places / masses.sum()
+    xx, yy, zz, xy, xz, yz = tensor(places - centre)
+    blade = Blade(masses.sum(), tuple(centre.tolist()), (xx, yy, zz, xy, xz, yz), (0.0, 0.0, 9.0))
+    about_apex = tensor(places)
+    assert blade.inertia_about_apex() == pytest.approx(about_apex, rel=1e-13, abs=1e-13 * max(about_apex))
+    exact = [float(element) for element in blade.inertia_about_apex(Fraction)]
+    assert exact == pytest.approx(about_apex, rel=1e-13, abs=1e-13 * max(about_apex))
+    assert blade.pitch_inertia == blade.inertia_about_apex()[2]
