@@ -1,6 +1,7 @@
 """The Python API: what `import rotor_mbs as rm` offers, on the studies that the command line runs, too.
 
-Prints nothing. Bad input raises `rotor_mbs.errors.InputError`, an unreadable or foreign file `StoreError`.
+Prints nothing. A wrong value raises `rotor_mbs.errors.InputError`, an unreadable or foreign file `StoreError`, an
+argument of a wrong type `TypeError`.
 """
 
 from __future__ import annotations
@@ -8,6 +9,7 @@ from __future__ import annotations
 import functools
 import json
 import math
+import operator
 import os
 import shutil
 import tempfile
@@ -17,6 +19,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from html import escape
+from itertools import islice
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, overload
 
@@ -24,7 +27,7 @@ import numpy as np
 
 from rotor_mbs.analysis.judgement import defects_of
 from rotor_mbs.analysis.text_tables import RUN_HEAD, TextTable, run_row
-from rotor_mbs.errors import InputError, MethodRefusal, ResourceError, StoreError
+from rotor_mbs.errors import InputError, MethodRefusal, ResourceError, StoreError, shown_value
 from rotor_mbs.methods.catalogue import REFERENCE, check_names, problems_of_scene, selected_methods
 from rotor_mbs.methods.method_file import ENDING
 from rotor_mbs.methods.time_limit import checked_seconds
@@ -35,6 +38,7 @@ from rotor_mbs.runs.sweeps import ERROR_GROWTH, METRICS, StoredSweep, parameter_
 from rotor_mbs.runs.table import TableFile, copy_file, text_of
 from rotor_mbs.scenario.catalogue import list_scenes, only_scene, scene_of
 from rotor_mbs.scenario.scene import Scene, load_scene, parse_scene
+from rotor_mbs.scenario.toml_file import file_path, plain_value
 from rotor_mbs.solution.defects import Defects
 from rotor_mbs.solution.quantities import known_quantities
 from rotor_mbs.solution.status import STATUSES
@@ -49,7 +53,7 @@ _SHOWN = 5  # lines of lost runs
 
 
 def scenes(folder: str = "") -> list[str]:
-    """List the names of the shipped scenes, or of those in one folder.
+    """List the names of the shipped scenes, or of those in one folder. Raises InputError if there is no such folder.
 
     Examples
     --------
@@ -57,15 +61,18 @@ def scenes(folder: str = "") -> list[str]:
     >>> rm.scenes("paper")[:3]
     ['paper/fig03', 'paper/fig04b', 'paper/fig05']
     """
-    names = [name for name, _ in list_scenes() if not folder or name.startswith(f"{folder.rstrip('/')}/")]
+    beginning = os.fsdecode(folder).rstrip("/")
+    names = [name for name, _ in list_scenes() if not folder or name.startswith(f"{beginning}/")]
     if not names:
         folders = sorted({name.partition("/")[0] for name, _ in list_scenes()})
-        raise InputError(f"no shipped scenes in {folder!r}; allowed: {', '.join(folders)}")
+        raise InputError(f"no shipped scenes in {shown_value(folder)}; allowed: {', '.join(folders)}")
     return names
 
 
 def scene(name: str) -> Scene:
-    """Return a shipped scene. Raises InputError, with the most similar name, if there is none of that name.
+    """Return a shipped scene, or that of a TOML file.
+
+    Raises InputError, with the most similar name, if there is none of that name, and TypeError if it is no text.
 
     Examples
     --------
@@ -76,16 +83,16 @@ def scene(name: str) -> Scene:
     >>> scene.replace(gravity=9.81, **{"initial.angles[1]": 0.3}).initial_angles[1]
     0.3
     """
-    return only_scene(name)
+    return only_scene(os.fsdecode(name))
 
 
 def load(path: str | os.PathLike[str]) -> Scene:
     """Read a scene from a TOML file. Its name is that of the file.
 
     Implausible numbers, such as 30 rad, cause a PlausibilityWarning. Raises InputError with one line per error in
-    the file.
+    the file, TypeError if `path` is neither text nor a path.
     """
-    return load_scene(Path(path), check=problems_of_scene, stacklevel=3)
+    return load_scene(file_path(path), check=problems_of_scene, stacklevel=3)
 
 
 @overload
@@ -140,7 +147,10 @@ def run(
     Raises
     ------
     InputError
-        For an unknown method, an unknown or invalid setting, or if one of several methods cannot represent the scene.
+        For an unknown method, an unknown setting, or one that is not allowed, a limit or a number of workers out of
+        range, or if one of several methods cannot represent the scene.
+    TypeError
+        For any other argument of a wrong type, such as a text in place of a number.
     MethodRefusal
         If the method cannot represent the scene or is not installed.
     ResourceError
@@ -173,7 +183,7 @@ def run(
                 )
         solution, exact = solve_judged(scene, method, settings, compute_reference=reference, time_limit_s=timeout)
         return Run(**vars(solution), reference=exact)
-    chosen, _, refused = selected_methods([scene], check_names(listed("method", method)), settings)
+    chosen, _, refused = selected_methods([scene], check_names(texts(method)), settings)
     if not chosen[scene.name]:
         raise MethodRefusal("\n".join(map(str, refused)))
     if asked := [str(refusal) for refusal in refused if refusal.is_asked]:
@@ -259,6 +269,8 @@ def sweep(
         For an invalid key, value or option, or if `output` is not the file of this sweep.
     MethodRefusal
         If a method cannot represent the scene, or some of its variants; the other runs are stored in `output`.
+    TypeError
+        For an argument of a wrong type, and a value or option that no sweep file can have, such as None.
     ResourceError
         If worker processes died or could not be started; the other runs are stored in `output`.
 
@@ -278,11 +290,15 @@ def sweep(
     from rotor_mbs.scenario.sweep import sweep_of
     from rotor_mbs.studies.sweep import plan_sweep, run_sweep
 
-    timeout = min(checked_seconds(timeout), _NO_LIMIT_S)
-    names = list(check_names(methods if isinstance(methods, str) else listed("methods", methods)))
-    study = sweep_of(scene_of(scene), parameters, methods=names, **options)
-    folder = _TemporaryFolder() if output is None else None
-    path = folder.path / "sweep.h5" if folder is not None else Path(str(output))
+    scene, timeout = scene_of(scene), min(checked_seconds(timeout), _NO_LIMIT_S)
+    check_workers(workers)
+    names = list(check_names(methods if isinstance(methods, str) else texts(methods)))
+    study = sweep_of(scene, plain_value({**parameters}), methods=names, **plain_value(options))
+    if output is None:
+        folder = _TemporaryFolder()
+        path = folder.path / "sweep.h5"
+    else:
+        folder, path = None, file_path(output)
     plan = plan_sweep(study, time_limit_s=timeout)
     if plan.refused:
         raise MethodRefusal("\n".join(map(str, plan.refused)))
@@ -295,7 +311,9 @@ def sweep(
 
 
 def open(path: str | os.PathLike[str]) -> Runs:
-    """Open the runs in a results file or the file of a sweep. Raises StoreError for other files.
+    """Open the runs in a results file or the file of a sweep.
+
+    Raises StoreError for other files, TypeError if `path` is neither text nor a path.
 
     Examples
     --------
@@ -305,18 +323,17 @@ def open(path: str | os.PathLike[str]) -> Runs:
     >>> runs["paper/fig11/lagrange/taylor"].angles.shape      # doctest: +SKIP
     (1001, 4)
     """
-    file = Path(path)
+    file = file_path(path)
     if not is_sweep(file) and RUNS not in TableFile(file, ()).groups:
         raise StoreError(f"{file}: has no runs; allowed: a file that `rotor-mbs run`, `reproduce` or `sweep` wrote")
     return Runs(file)
 
 
-def listed(name: str, values: object) -> list[str]:
-    """Texts of a list, or of anything that can be gone through once. Raises InputError."""
-    texts: list[Any] = list(values) if isinstance(values, Iterable) else [values]
-    if isinstance(values, str) or not all(isinstance(text, str) for text in texts):
-        raise InputError(f"{name}: {values!r}; allowed: a name, or a list of names (str)")
-    return texts
+def texts(values: Iterable[str]) -> list[str]:
+    """Return the texts of a list, or of anything that can be gone through once. Raises TypeError for anything else."""
+    listed = list(values)
+    "".join(listed)  # refuses an entry that is no text
+    return listed
 
 
 def refuse_losses(lost: Sequence[str]) -> None:
@@ -353,15 +370,18 @@ class Runs(Mapping[Any, Any]):
     statuses : number of stored runs with each status.
     """
 
-    def __init__(self, path: Path, scene: str = "", *, _folder: _TemporaryFolder | None = None) -> None:
-        self.path, self.scene, self._folder = path, scene, _folder
-        self._is_sweep = is_sweep(path)
-        self._labels: list[Any]
+    def __init__(
+        self, path: str | os.PathLike[str], scene: str = "", *, _folder: _TemporaryFolder | None = None
+    ) -> None:
+        self.path, self.scene, self._folder = file_path(path), os.fsdecode(scene), _folder
+        self._is_sweep = is_sweep(self.path)
+        labels: list[Any]
         if self._is_sweep:
             stored = self._sweep.column("status") != MISSING
-            self._labels = self._sweep.column("run")[stored].tolist()
+            labels = self._sweep.column("run")[stored].tolist()
         else:
-            self._labels = [run.method if scene else f"{run.scene}/{run.method}" for run in self._runs()]
+            labels = [run.method if self.scene else f"{run.scene}/{run.method}" for run in self._runs()]
+        self._labels = dict.fromkeys(labels)  # in this order
 
     def __reduce__(self) -> tuple[Any, ...]:
         """A copy, or what another process unpickles, has a file of its own in place of a temporary one."""
@@ -369,12 +389,12 @@ class Runs(Mapping[Any, Any]):
 
     def __getitem__(self, label: Any) -> Any:
         """Raises KeyError for what the file does not have, StoreError for samples that cannot be read."""
-        if not self._is_sweep and not self.scene and any(str(known).startswith(f"{label}/") for known in self._labels):
-            with open_results(self.path) as results:
-                if label in results.scenes:
-                    return Runs(self.path, label, _folder=self._folder)
         if label not in self._labels:
-            raise KeyError(f"{label}; available: {', '.join(map(str, self._labels[:20]))}")
+            if not self._is_sweep and not self.scene:
+                with open_results(self.path) as results:
+                    if label in results.scenes:
+                        return Runs(self.path, label, _folder=self._folder)
+            raise KeyError(f"{shown_value(label)}; available: {', '.join(map(str, islice(self._labels, 20)))}")
         if self._is_sweep:
             return self._run_of_sweep(int(label))
         with open_results(self.path) as results:
@@ -402,6 +422,9 @@ class Runs(Mapping[Any, Any]):
 
     def _runs(self) -> Iterator[StoredRun]:
         with open_results(self.path) as results:
+            if self.scene and self.scene not in results.scenes:
+                known = ", ".join(results.scenes)
+                raise StoreError(f"{self.path}: has no scene {shown_value(self.scene)}; allowed: {known}")
             for scene in [results.scenes[self.scene]] if self.scene else results.scenes.values():
                 yield from scene.runs.values()
 
@@ -427,10 +450,15 @@ class Runs(Mapping[Any, Any]):
         return np.array(self._sweep.column(name))
 
     def at(self, name: str, sample: int) -> Any:
-        """Return a trajectory of a sweep, such as "angles", at one sample of all runs. Raises StoreError."""
+        """Return a trajectory of a sweep, such as "angles", at one sample of all runs.
+
+        Raises StoreError for another quantity or sample, TypeError if `sample` is no whole number.
+        """
+        sample = operator.index(sample)
         values, count = self._sweep.column(name), len(self._sweep.column("time"))
         if "time" not in self._sweep.columns[name].dimensions or sample not in range(-count, count):
-            raise StoreError(f"{name}, sample {sample}: allowed: a quantity over time, samples 0 to {count - 1}")
+            allowed = f"a quantity over time, samples 0 to {count - 1}"
+            raise StoreError(f"{name}, sample {shown_value(sample)}: allowed: {allowed}")
         return np.array(values[:, sample])
 
     def to_xarray(self, *, unstack: bool = False) -> Any:
@@ -483,9 +511,10 @@ class Runs(Mapping[Any, Any]):
         """Save a copy of the file, which `rotor-mbs report` and `rotor_mbs.open` read.
 
         An earlier copy is replaced if no run in it is lost. Raises InputError for files with other runs or of another
-        kind, StoreError for files that are damaged or not of this program.
+        kind, StoreError for files that are damaged or not of this program, TypeError if `path` is neither text nor a
+        path.
         """
-        target = Path(path)
+        target = file_path(path)
         copy_file(self.path, target)
         return target
 
@@ -493,7 +522,7 @@ class Runs(Mapping[Any, Any]):
         """Write the report pages into a folder. Returns the path of the index."""
         from rotor_mbs.report.build import write_report  # late: templates
 
-        return write_report(self.path, Path(folder))
+        return write_report(self.path, file_path(folder))
 
     def _run_of_sweep(self, number: int) -> Run:
         sweep = self._sweep

@@ -83,6 +83,15 @@ def _was_importing(error: BaseException) -> bool:
     return False
 
 
+def shown_value(value: object) -> str:
+    """Return a value for a message: its representation in ASCII, of at most 60 characters."""
+    try:
+        text = ascii(value)
+    except ValueError:  # Python does not convert whole numbers of more than 4300 digits
+        text = "a number of too many digits"
+    return text if len(text) <= 60 else f"{text[:57]}..."
+
+
 def one_line(error: BaseException) -> str:
     """The type of an exception and the first line of its text."""
     text = str(error).strip().splitlines()

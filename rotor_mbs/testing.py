@@ -6,6 +6,8 @@ import os
 from typing import Any
 
 from rotor_mbs.report.pages.comparison import DataComparison, compare
+from rotor_mbs.scenario.catalogue import scene_of
+from rotor_mbs.scenario.keys import as_float
 from rotor_mbs.scenario.scene import Scene
 
 
@@ -30,6 +32,8 @@ def assert_agrees(
     ------
     InputError
         For arrays that cannot be compared: other shapes, times that do not increase, numbers that are not finite.
+    TypeError
+        If `scene` is neither a scene nor text nor a path, or the tolerance no number.
 
     Examples
     --------
@@ -40,7 +44,7 @@ def assert_agrees(
     'ok'
     """
     arrays = {"time": time, "angles": angles} | ({} if rates is None else {"rates": rates})
-    found = compare(arrays, scene, tolerance=tolerance)
+    found = compare(arrays, scene_of(scene), tolerance=as_float(tolerance))
     if not found.agrees:
         raise AssertionError(str(found))
     return found

@@ -34,8 +34,8 @@ def _sweep(**options: Any) -> rm.Runs:
 
 SECONDS, COUNT = "allowed: seconds, more than 0$", "allowed: a whole number from 0 to 1024$"
 WRONG = [
-    *(("timeout", value, SECONDS) for value in (-1, 0, float("-inf"), float("nan"), "3", None, True)),
-    *(("workers", value, COUNT) for value in (-1, 1.5, "2", None, 10**9)),
+    *(("timeout", value, SECONDS) for value in (-1, 0, float("-inf"), float("nan"), -(10**400))),
+    *(("workers", value, COUNT) for value in (-1, 10**9)),
 ]
 
 
@@ -66,16 +66,10 @@ def test_values_of_a_sweep_may_be_anything_that_is_gone_through_once(values: Any
     assert runs.statuses == {"ok": 3}
 
 
-@pytest.mark.parametrize("parameters", [["gravity"], {"gravity": object()}, {"gravity": 1.0}, {"gravity": "12"}])
+@pytest.mark.parametrize("parameters", [{}, {"gravity": 1.0}, {"gravity": "12"}, {"gravity": []}, {3: [1.0]}])
 def test_wrong_parameters_are_a_line(parameters: Any) -> None:
     with pytest.raises(InputError, match="allowed: "):
         _sweep(parameters=parameters)
-
-
-@pytest.mark.parametrize("method", [None, 3, [3]])
-def test_wrong_methods_are_a_line(method: Any) -> None:
-    with pytest.raises(InputError, match=r"^method: .*; allowed: a name, or a list of names \(str\)$"):
-        rm.run(_scene(), method)
 
 
 def test_a_daemonic_process_stores_no_runs_that_never_ran(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

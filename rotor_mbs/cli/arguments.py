@@ -12,8 +12,9 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 import rotor_mbs
-from rotor_mbs.errors import nearest
+from rotor_mbs.errors import InputError, nearest, shown_value
 from rotor_mbs.runs import MAX_WORKERS, cores
+from rotor_mbs.scenario.toml_file import file_path
 
 REPRODUCED = Path("rotor-mbs-out")  # where `reproduce` writes
 EXPORT_FORMATS = ("mjcf", "exudyn", "csv")
@@ -34,20 +35,28 @@ def pages_beside(results: Path) -> Path:
     return results.parent / ("report" if results.name == "results.h5" else f"{results.stem}-report")
 
 
+def path(text: str) -> Path:
+    """The path of a file or folder, there or not."""
+    try:
+        return file_path(text)
+    except InputError as error:
+        raise argparse.ArgumentTypeError(str(error)) from error
+
+
 def file(text: str) -> Path:
     """An output file: neither an empty name nor an existing folder."""
-    output = Path(text)
+    output = path(text)
     if not output.name or output.name == ".." or output.is_dir():
-        raise argparse.ArgumentTypeError(f"{text!r} given, allowed: a file's name, not a folder")
+        raise argparse.ArgumentTypeError(f"{shown_value(text)} given, allowed: a file's name, not a folder")
     return output
 
 
 def folder(text: str) -> Path:
     """An output folder: one that exists, or that can be made."""
-    output = Path(text)
+    output = path(text)
     existing = next((place for place in (output, *output.parents) if place.exists()), output)
     if not (existing.is_dir() and os.access(existing, os.W_OK)):
-        raise argparse.ArgumentTypeError(f"{text!r} given, allowed: a folder that can be written")
+        raise argparse.ArgumentTypeError(f"{shown_value(text)} given, allowed: a folder that can be written")
     return output
 
 
@@ -63,25 +72,29 @@ def span(text: str) -> tuple[float, ...]:
                 return numbers
     except ValueError:
         pass
-    raise argparse.ArgumentTypeError(
-        f"{text!r} given, allowed: FROM:TO:COUNT with 0 <= FROM < TO <= {_MAX_SPEED:g}, COUNT from 2 to {_MAX_SPAN}, "
-        f"and COUNT different speeds, each 0 or at least {_MIN_SPEED:g}"
-    )
+    allowed = f"FROM:TO:COUNT with 0 <= FROM < TO <= {_MAX_SPEED:g} and COUNT from 2 to {_MAX_SPAN}"
+    allowed += f"; speeds that differ, each 0 or at least {_MIN_SPEED:g}"
+    raise argparse.ArgumentTypeError(f"{shown_value(text)} given, allowed: {allowed}")
 
 
 def part(text: str) -> tuple[int, int]:
     """(K, N) of "K/N"."""
     number, _, parts = text.partition("/")
-    if not (number.isdecimal() and parts.isdecimal() and 1 <= int(number) <= int(parts)):
-        raise argparse.ArgumentTypeError(f"{text!r} given, allowed: K/N with K from 1 to N")
-    return int(number), int(parts)
+    try:
+        if number.isdecimal() and parts.isdecimal() and 1 <= int(number) <= int(parts) <= _MAX_NUMBER:
+            return int(number), int(parts)
+    except ValueError:  # more than 4300 digits
+        pass
+    raise argparse.ArgumentTypeError(
+        f"{shown_value(text)} given, allowed: K/N with K from 1 to N, N at most {_MAX_NUMBER:g}"
+    )
 
 
 def setting(text: str) -> tuple[str, object]:
     """(name, value) of "name=value": a number where it is one."""
     name, equals, value = (piece.strip() for piece in text.partition("="))
     if not (name and equals and value):
-        raise argparse.ArgumentTypeError(f"{text!r} given, allowed: NAME=VALUE")
+        raise argparse.ArgumentTypeError(f"{shown_value(text)} given, allowed: NAME=VALUE")
     for kind in (int, float):
         try:
             return name, kind(value)
@@ -94,10 +107,10 @@ def _positive(kind: type[int] | type[float], allowed: str, largest: float = _MAX
     def read(text: str) -> float:
         try:
             value = kind(text)
-        except ValueError:
+        except ValueError:  # also a whole number of more than 4300 digits
             value = kind(0)
         if not 0 < value <= largest:
-            raise argparse.ArgumentTypeError(f"{text!r} given, allowed: {allowed}")
+            raise argparse.ArgumentTypeError(f"{shown_value(text)} given, allowed: {allowed}")
         return value
 
     return read
@@ -137,7 +150,7 @@ class _Parser(argparse.ArgumentParser):
 
     def results(self) -> None:
         text = "file written by rotor-mbs (default: results.h5 if it exists, else rotor-mbs-out/results.h5)"
-        self.add_argument("file", nargs="?", type=Path, default=default_results(), metavar="FILE", help=text)
+        self.add_argument("file", nargs="?", type=path, default=default_results(), metavar="FILE", help=text)
 
     def jobs(self) -> None:
         text = "parallel processes (default: number of cores, here %(default)s)"
@@ -154,7 +167,8 @@ def parse(argv: Sequence[str]) -> argparse.Namespace:
     usage."""
     parser, commands = _parser()
     if argv and not argv[0].startswith("-") and argv[0] not in commands:
-        parser.error(f"unknown command {argv[0]!r}{nearest(argv[0], commands)}; allowed: {', '.join(commands)}")
+        hint = nearest(argv[0], commands)
+        parser.error(f"unknown command {shown_value(argv[0])}{hint}; allowed: {', '.join(commands)}")
     arguments, unknown = parser.parse_known_args(argv or ["--help"])
     if unknown:
         commands.get(argv[0], parser).error(f"unrecognized arguments: {' '.join(unknown)}")
@@ -234,12 +248,12 @@ def _parser() -> tuple[_Parser, dict[str, _Parser]]:
         "commands:compare", "mine.csv --scene paper/fig11", "OpenFAST.out --scene my.toml --columns map.toml",
     )  # fmt: skip
     text = "text with a header, .json, .npz, .mat, HDF5, netCDF, an Exudyn sensor file, OpenFAST .out or .outb"
-    own.add_argument("data", type=Path, metavar="DATA", help=text)
+    own.add_argument("data", type=path, metavar="DATA", help=text)
     own.add_argument("--scene", required=True, metavar="SCENE", help="a name (paper/fig05) or a TOML file")
     text = (
         "mapping file: column, unit, sign and offset of each channel (default: identified by name, see docs/compare.md)"
     )
-    own.add_argument("--columns", type=Path, metavar="MAP.toml", help=text)
+    own.add_argument("--columns", type=path, metavar="MAP.toml", help=text)
     text = (
         "bound (rad) on interval defects (the equations of motion integrated from each row to the next, minus the "
         "next row) and on errors divided by the error growth; for loads and frequencies a relative bound "
@@ -275,16 +289,16 @@ def _parser() -> tuple[_Parser, dict[str, _Parser]]:
         "", "rotor-mbs-out/results.h5 --junit check.xml",
     )  # fmt: skip
     own.add_argument(
-        "file", nargs="?", type=Path, metavar="FILE", help="file to check (default: compute a set of runs)"
+        "file", nargs="?", type=path, metavar="FILE", help="file to check (default: compute a set of runs)"
     )
     own.method("method to compute if no FILE is given, or a Python file that defines methods")
     own.add_argument(
-        "--bounds", type=Path, metavar="TOML", help="bounds that take precedence over reference/accuracy.toml"
+        "--bounds", type=path, metavar="TOML", help="bounds that take precedence over reference/accuracy.toml"
     )
     text = "fail if a scene of FILE has no run with this method; may be repeated"
     own.add_argument("--require", action="append", metavar="METHOD", help=text)
     text = "also fail if, compared with this earlier file, a margin has shrunk more than tenfold or a run is missing"
-    own.add_argument("--against", type=Path, metavar="OLD", help=text)
+    own.add_argument("--against", type=path, metavar="OLD", help=text)
     own.add_argument("--junit", type=file, metavar="XML", help="write the verdicts as JUnit XML")
     own.add_argument("--json", type=file, metavar="FILE", help="write the verdicts as JSON; - for standard output")
     own.flag("--github", help="print the ten worst failures as annotations")
@@ -304,12 +318,12 @@ def _parser() -> tuple[_Parser, dict[str, _Parser]]:
         "sweep", "run a parameter study and store it in one dataset", "commands:sweep",
         "sweeps/fig11-spread -o spread.h5", "my-sweep.toml --dry-run",
     )  # fmt: skip
-    own.add_argument("file", type=Path, metavar="SWEEP.toml", help="a file, or a shipped sweep (sweeps/fig11-spread)")
+    own.add_argument("file", type=path, metavar="SWEEP.toml", help="a file, or a shipped sweep (sweeps/fig11-spread)")
     own.method("method to use instead of those in the file")
     own.output(file, "FILE", help="output file (default: name of the sweep with .h5)")
     own.flag("--metadata", help="also write Croissant metadata beside FILE, as JSON")
     text = "also write a folder for Hugging Face datasets: a file per split and a dataset card"
-    own.add_argument("--datasets", type=Path, metavar="DIR", help=text)
+    own.add_argument("--datasets", type=path, metavar="DIR", help=text)
     own.add_argument("--engine", default="local", metavar="ENGINE", help="local (default), or dask:tcp://HOST:PORT")
     own.add_argument("--part", type=part, default=(1, 1), metavar="K/N", help="compute part K of N, for a job array")
     own.flag("--fresh", help="recompute all stored runs")

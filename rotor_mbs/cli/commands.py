@@ -24,7 +24,7 @@ from rotor_mbs.methods.catalogue import look_up, methods, problems_of_methods
 from rotor_mbs.runs import cores
 from rotor_mbs.scenario.catalogue import find_scenes, list_scenes, list_sweeps, only_scene
 from rotor_mbs.scenario.keys import counted
-from rotor_mbs.scenario.toml_file import KeyPath, shown_key
+from rotor_mbs.scenario.toml_file import KeyPath, file_path, shown_key
 from rotor_mbs.solution.status import GOOD, REFUSED
 
 
@@ -292,7 +292,7 @@ def animate(arguments: argparse.Namespace) -> int:
     """`arguments.scene` of `arguments.file`, moving, into `arguments.output`."""
     from rotor_mbs.report.animation import write_animation
 
-    output = arguments.output or Path(arguments.scene.rpartition("/")[2] + ".webp")
+    output = arguments.output or file_path(arguments.scene.rpartition("/")[2] + ".webp")
     print(write_animation(arguments.file, arguments.scene, output, arguments.offset))
     return 0
 

@@ -18,7 +18,6 @@ from rotor_mbs.comparison.verdict import (
     DataVerdict,
     agrees_until,
     comparison_record,
-    valid_tolerance,
 )
 from rotor_mbs.errors import InputError
 from rotor_mbs.runs.read import Record
@@ -63,7 +62,6 @@ def compare_modes(data: ForeignData, scene: Scene, tolerance: float) -> tuple[Da
     InputError
         For more than 1000 speeds, or more columns than modes.
     """
-    tolerance = valid_tolerance(tolerance)
     if len(data.time) > _MAX_SPEEDS:
         problem = f"{len(data.time)} speeds; allowed: up to {_MAX_SPEEDS}"
         raise InputError(f"{data.source}: {problem}")

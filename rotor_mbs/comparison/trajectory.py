@@ -28,7 +28,6 @@ from rotor_mbs.comparison.verdict import (
     agrees_until,
     comparison_record,
     defects_of_channel,
-    valid_tolerance,
 )
 from rotor_mbs.errors import InputError
 from rotor_mbs.methods.time_limit import OutOfTimeError, stop_in_time, time_limit
@@ -135,7 +134,6 @@ def compare_with_reference(
     """
     is_available()  # the engine is loaded before: an interrupt would leave half of it
     ends = monotonic() + time_limit_s
-    tolerance = valid_tolerance(tolerance)
     loads, data = data.only(loads=True), data.only(loads=False)
     try:
         with time_limit(time_limit_s):

@@ -6,7 +6,6 @@ import json
 import math
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
-from numbers import Real
 from typing import Any
 
 import numpy as np
@@ -130,14 +129,6 @@ def from_dictionary(stored: Mapping[str, Any]) -> DataVerdict:
     values["channels"] = tuple(ChannelErrors(**channel) for channel in values["channels"])
     del values["agrees"]
     return DataVerdict(**values)
-
-
-def valid_tolerance(tolerance: float) -> float:
-    """Return a tolerance as a plain number. Raises InputError unless it is finite and positive."""
-    is_number = isinstance(tolerance, Real) and not isinstance(tolerance, bool)
-    if not is_number or not 0.0 < tolerance < math.inf:
-        raise InputError(f"tolerance: {tolerance!r}; allowed: a number more than 0")
-    return float(tolerance)
 
 
 def defects_of_channel(

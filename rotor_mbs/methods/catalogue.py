@@ -15,10 +15,10 @@ from pathlib import Path
 from pkgutil import resolve_name
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from rotor_mbs.errors import InputError, MethodRefusal, nearest
+from rotor_mbs.errors import InputError, MethodRefusal, nearest, shown_value
 from rotor_mbs.methods.base import Ladder, Method
 from rotor_mbs.methods.method_file import ENDING, MethodFile, located, quiet, read_file
-from rotor_mbs.scenario.toml_file import KeyProblem
+from rotor_mbs.scenario.toml_file import KeyProblem, file_path
 
 if TYPE_CHECKING:  # `rotor-mbs list` reads no scene
     from rotor_mbs.scenario.scene import Scene
@@ -89,7 +89,9 @@ def _unknown(names: Sequence[str]) -> list[str]:
     """A line for each of the names that no method has."""
     known = method_names() if names else ()
     unknown = [name for name in names if name not in known]
-    return [f"unknown method {name!r}{nearest(name, known)}; allowed: {', '.join(known)}" for name in unknown]
+    return [
+        f"unknown method {shown_value(name)}{nearest(name, known)}; allowed: {', '.join(known)}" for name in unknown
+    ]
 
 
 # Files that were named, by model, and their methods: state of this process, as a file may be edited between two calls.
@@ -105,8 +107,9 @@ def _with_files(names: Sequence[str]) -> list[str]:
         if not name.endswith(ENDING):
             expanded.append(name)
             continue
-        model = Path(name).stem
-        if Path(seen.setdefault(model, name)).resolve() != Path(name).resolve():
+        path = file_path(name)
+        model = path.stem
+        if Path(seen.setdefault(model, name)).resolve() != path.resolve():
             raise InputError(f"{name}: methods {model}/... are those of {seen[model]}; allowed: another file name")
         expanded += _add(read_file(name))
     return expanded

@@ -8,7 +8,7 @@ from dataclasses import asdict, dataclass, field, fields
 from numbers import Real
 from typing import Any, Self
 
-from rotor_mbs.errors import InputError, nearest
+from rotor_mbs.errors import InputError, nearest, shown_value
 
 
 @dataclass(frozen=True)
@@ -40,7 +40,10 @@ class Allowed:
             return value
         if isinstance(value, bool) or not isinstance(value, Real):
             raise ValueError
-        number = float(value)
+        try:
+            number = float(value)
+        except OverflowError as error:  # a whole number above 1e308
+            raise ValueError from error
         if not (math.isfinite(number) and number > self.above and self.at_least <= number <= self.at_most):
             raise ValueError
         if self.whole and number != int(number):
@@ -96,8 +99,10 @@ class Settings:
 
     @classmethod
     def of(cls, method: str, given: Mapping[str, object]) -> Self:
-        """Return the settings of `method`: the `given` values, defaults for others. Raises InputError, one line with
-        all settings, for an unknown name or an invalid value."""
+        """Return the settings of `method`: the `given` values, defaults for others.
+
+        Raises InputError, one line with all settings, for an unknown name or a value that is not allowed, of any type.
+        """
         known, values, problems = cls.allowed(), {}, []
         for name, value in given.items():
             if name not in known:
@@ -106,8 +111,7 @@ class Settings:
             try:
                 values[name] = known[name].convert(value)
             except ValueError:
-                text = ascii(value)
-                problems.append(f"{name} = {text if len(text) <= 60 else f'{text[:57]}...'} is not allowed")
+                problems.append(f"{name} = {shown_value(value)} is not allowed")
         if problems:
             raise InputError(f"{method}: {'; '.join(problems)}; allowed: {cls.describe()}")
         return cls(**values)

@@ -9,9 +9,8 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from numbers import Real
 
-from rotor_mbs.errors import InputError
+from rotor_mbs.errors import InputError, shown_value
 
 MESSAGE = "stopped at the time limit"  # of a run that was
 _MAX_LIMIT_S = 1e9  # the system's timers take no more than the seconds of its clock
@@ -34,10 +33,14 @@ _state = _State()
 
 
 def checked_seconds(timeout: float) -> float:
-    """A time limit in s. Raises InputError for what is none."""
-    if isinstance(timeout, bool) or not isinstance(timeout, Real) or not timeout > 0.0:
-        raise InputError(f"timeout: {timeout!r}; allowed: seconds, more than 0")
-    return float(timeout)
+    """Return a time limit in s; inf: none. Raises InputError unless it is above 0, TypeError for no number."""
+    try:
+        seconds = math.fsum([timeout])  # as float(timeout), but not of text
+    except OverflowError:  # a whole number above 1e308
+        seconds = math.nan
+    if not seconds > 0.0:
+        raise InputError(f"timeout: {shown_value(timeout)}; allowed: seconds, more than 0")
+    return seconds
 
 
 @contextmanager

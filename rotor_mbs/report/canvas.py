@@ -10,6 +10,7 @@ import sys
 from collections.abc import Iterator, Mapping
 from contextlib import AbstractContextManager, contextmanager, suppress
 from dataclasses import dataclass
+from os import PathLike
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +21,7 @@ from rotor_mbs.errors import InputError
 from rotor_mbs.report.looks import PAPER, Look
 from rotor_mbs.report.numbers import power
 from rotor_mbs.runs.output_files import replace_file
+from rotor_mbs.scenario.toml_file import file_path
 
 
 @contextmanager
@@ -100,12 +102,16 @@ class Panels:
         self.figure.subplots_adjust(top=0.95 - 0.07 * math.ceil(len(artists) / 2))
         return self
 
-    def save(self, path: str | Path) -> None:
-        """As PDF, SVG or PNG, by the ending of `path`. Raises InputError for another one, StoreError."""
-        kind = Path(path).suffix.removeprefix(".")
+    def save(self, path: str | PathLike[str]) -> None:
+        """Save as PDF, SVG or PNG, by the ending of `path`.
+
+        Raises InputError for another one, StoreError, and TypeError if `path` is neither text nor a path.
+        """
+        target = file_path(path)
+        kind = target.suffix.removeprefix(".")
         if kind not in KINDS:
-            raise InputError(f"{path}: unknown format; allowed: a name that ends in .{', .'.join(KINDS)}")
-        replace_file(Path(path), encoded(self.figure, kind), MARK)
+            raise InputError(f"{target}: unknown format; allowed: a name that ends in .{', .'.join(KINDS)}")
+        replace_file(target, encoded(self.figure, kind), MARK)
 
 
 def panels(heights: tuple[float, ...], x_label: str) -> Panels:

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from rotor_mbs.errors import InputError
+from rotor_mbs.errors import InputError, shown_value
 from rotor_mbs.models.lagrange.defects import interval_defects
 from rotor_mbs.report import canvas
 from rotor_mbs.report.canvas import TIME_AXIS, Panels
@@ -281,10 +281,11 @@ class RunPlots(ComparisonPlots):
 
         Raises InputError if the run does not have it.
         """
-        values, load = _quantity(self._run, name), next((load for load in LOADS if load.name == name), None)
+        plotted = {load.name: load for load in LOADS if load.plot is not None}
+        load = plotted.get(name)
         if load is None or load.plot is None:
-            raise InputError(f"no load {name!r}; allowed: {', '.join(load.name for load in LOADS)}")
-        return component_panels(load, load.plot, self._run.time, values).with_legend()
+            raise InputError(f"no load {shown_value(name)}; allowed: {', '.join(plotted)}")
+        return component_panels(load, load.plot, self._run.time, _quantity(self._run, name)).with_legend()
 
     def tips(self) -> Panels:
         """Plot the paths of the blade tips (m). Raises InputError if the run does not have them."""

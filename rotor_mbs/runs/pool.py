@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import gc
 import multiprocessing
+import operator
 import os
 import pickle
 import signal
@@ -21,12 +22,19 @@ from contextlib import AbstractContextManager, contextmanager, nullcontext, supp
 from dataclasses import dataclass, replace
 from multiprocessing import process as process_module
 from multiprocessing import resource_tracker
-from numbers import Integral
 from pathlib import Path
 from queue import LifoQueue
 from typing import TYPE_CHECKING, Any, Generic, Self, TypeAlias, TypeVar
 
-from rotor_mbs.errors import SYSTEM_ERRORS, InputError, ResourceError, RotorError, one_line, system_errors_apart
+from rotor_mbs.errors import (
+    SYSTEM_ERRORS,
+    InputError,
+    ResourceError,
+    RotorError,
+    one_line,
+    shown_value,
+    system_errors_apart,
+)
 from rotor_mbs.runs import MAX_WORKERS, cores
 
 if TYPE_CHECKING:  # loaded with the first process
@@ -177,9 +185,9 @@ class SerialPool(TaskPool):
 
 
 def check_workers(workers: int) -> None:
-    """Raises InputError for what is no number of worker processes."""
-    if isinstance(workers, bool) or not isinstance(workers, Integral) or not 0 <= workers <= MAX_WORKERS:
-        raise InputError(f"workers: {workers!r}; allowed: a whole number from 0 to {MAX_WORKERS}")
+    """Raise InputError for a wrong number of worker processes, TypeError for what is no whole number."""
+    if not 0 <= operator.index(workers) <= MAX_WORKERS:
+        raise InputError(f"workers: {shown_value(workers)}; allowed: a whole number from 0 to {MAX_WORKERS}")
 
 
 def local_pool(workers: int, initializer: Callable[[], object] | None = None) -> TaskPool:

@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rotor_mbs.errors import InputError, StoreError
+from rotor_mbs.errors import InputError, StoreError, shown_value
 from rotor_mbs.methods.catalogue import find_method
 from rotor_mbs.runs.design import COLUMNS, MISSING, Column, flags
 from rotor_mbs.runs.output_files import locked
@@ -157,4 +157,6 @@ class StoredSweep:
 
     def column(self, name: str) -> NDArray[Any]:
         """A dataset; computed ones as they lie in the file, read where they are indexed. Raises StoreError."""
+        if name not in self.columns:
+            raise StoreError(f"{self._path}: has no {shown_value(name)}; allowed: a sweep whose outputs have it")
         return self._table.column(name)

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rotor_mbs.errors import InputError, RotorError, nearest
-from rotor_mbs.scenario.toml_file import parse_toml, shown_path
+from rotor_mbs.scenario.toml_file import file_path, parse_toml, shown_path
 
 if TYPE_CHECKING:  # `rotor-mbs list` reads no scene
     from rotor_mbs.scenario.scene import Check, Scene
@@ -110,14 +110,13 @@ def only_scene(argument: str) -> Scene:
 
 
 def scene_of(given: Scene | str | os.PathLike[str]) -> Scene:
-    """The scene itself, or the one that a name or the path of a TOML file means. Raises InputError."""
+    """Return the scene itself, or the one that a name or the path of a TOML file means.
+
+    Raises InputError where there is none, TypeError for what is neither a scene nor text nor a path.
+    """
     from rotor_mbs.scenario.scene import Scene
 
-    if isinstance(given, str | os.PathLike):
-        return only_scene(os.fspath(given))
-    if not isinstance(given, Scene):
-        raise InputError(f"scene: a {type(given).__name__}; allowed: a Scene, a scene's name, a TOML file")
-    return given
+    return given if isinstance(given, Scene) else only_scene(os.fsdecode(given))
 
 
 def shipped_scene(name: str) -> Scene | None:
@@ -158,7 +157,7 @@ def _files(argument: str) -> list[Path]:
             raise InputError(f"{shown_path(path)}: no TOML file in this folder; allowed: a folder of scene files")
         return paths
     if path.suffix == ".toml":
-        return [path]
+        return [file_path(path)]
     if is_there:
         wrong = "is not a TOML file; allowed: a scene's name, a folder, a path that ends in .toml"
     elif not _NAME.fullmatch(argument):

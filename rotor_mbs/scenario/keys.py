@@ -14,7 +14,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import MISSING, dataclass
 from typing import Any
 
-from rotor_mbs.errors import nearest
+from rotor_mbs.errors import InputError, nearest
 from rotor_mbs.scenario.toml_file import KeyProblem, TableError
 
 ALLOWED = "numbers, + - * / ** ( ), pi, sqrt(x), hypot(x, y), deg(x)"
@@ -149,6 +149,21 @@ def read_number(value: object) -> float:
     if not abs(result) <= MAX_NUMBER:  # so written that NaN fails, too
         raise wrong(f"{shown(value)} is out of range", f"finite numbers, |x| <= {MAX_NUMBER:g}")
     return float(result)
+
+
+def as_float(value: float) -> float:
+    """Return an argument of Python as a float, inf for a whole number above 1e308; raises TypeError for no number."""
+    try:
+        return math.fsum([value])  # unlike float(value) it takes no text
+    except OverflowError:
+        return math.inf if value > 0 else -math.inf
+
+
+def positive(name: str, number: float) -> float:
+    """Return the argument called `name`. Raises InputError where it is not above 0, or not finite."""
+    if not 0.0 < number < math.inf:
+        raise InputError(f"{name}: {number!r}; allowed: a number more than 0")
+    return number
 
 
 def read_text(value: object) -> str:

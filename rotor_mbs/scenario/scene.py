@@ -396,7 +396,8 @@ class Scene:
         `initial.angles[1]` is the pitch of blade 1. A value is a number, an expression in quotes, or a list (tuple,
         array), as in a scene file. `text` is rewritten from the numbers.
 
-        Raises InputError with a line for each error: the key, what is wrong, what is allowed, the most similar key.
+        Raises InputError with a line for each error: the key, what is wrong, what is allowed, the most similar key;
+        TypeError for a value that no file can have, such as None.
 
         >>> import rotor_mbs.scenario.catalogue
         >>> scene = rotor_mbs.scenario.catalogue.find_scenes(["paper/fig11"])[0]
@@ -417,7 +418,7 @@ class Scene:
 
     def torque_at(self, time: float) -> float:
         """Return the rotor torque (N m) at `time` (s); at a jump, the value after it."""
-        return value_at(self.rotor_torque, time)
+        return value_at(self.rotor_torque, keys.as_float(time))
 
 
 def coordinate_labels(blades: int) -> tuple[str, ...]:

@@ -35,9 +35,9 @@ from rotor_mbs.scenario.toml_file import (
     KeyProblem,
     TableError,
     TomlFile,
+    file_path,
     parse_key,
     parse_toml,
-    plain_value,
     read_toml,
     toml_lines,
 )
@@ -356,9 +356,11 @@ class Sweep:
 def load_sweep(path: Path, check: Check = no_check) -> Sweep:
     """The sweep in the TOML file `path`; sweeps/NAME means a shipped one. check: what else is wrong with its values.
     Raises InputError with all errors of the file."""
-    shipped = (SWEEPS.parent / path).with_suffix(".toml")
-    if not path.exists() and path.parts[:1] == ("sweeps",) and shipped.is_file():
-        path = shipped
+    path = file_path(path)
+    if not path.exists() and path.parts[:1] == ("sweeps",):
+        shipped = (SWEEPS.parent / path).with_suffix(".toml")
+        if shipped.is_file():
+            path = shipped
     if not path.exists() and str(path) in dict(list_scenes()):
         raise InputError(f"{path}: is a scene; allowed: a sweep of scenes (rotor-mbs list), or: rotor-mbs run {path}")
     file = read_toml(path)
@@ -368,16 +370,25 @@ def load_sweep(path: Path, check: Check = no_check) -> Sweep:
 
 
 def sweep_of(scene: Scene, axes: Mapping[str, object], **options: object) -> Sweep:
-    """A sweep made without a file. By key of a number of the scene, `axes` have a list of values or a table as an
-    [[axis]] has it; `options` are the other keys of a sweep file. Raises InputError; line numbers are those of the
-    sweep's text."""
-    if not isinstance(axes, Mapping):
-        raise InputError(f"parameters: {axes!r}; allowed: a dictionary from keys to lists of values")
-    given = {key: plain_value(value) for key, value in options.items()}
-    text = toml_lines({"title": scene.title, "scene": scene.name, **given})
+    """Return a sweep made without a file.
+
+    Parameters
+    ----------
+    scene : Scene
+    axes : mapping
+        By key of a number of the scene a list of values, or a table as an [[axis]] of a file has it: plain values.
+    **options
+        The other keys of a sweep file, plain values.
+
+    Raises
+    ------
+    InputError
+        Line numbers are those of the sweep's text.
+    """
+    text = toml_lines({"title": scene.title, "scene": scene.name, **options})
     for key, values in axes.items():
-        plain = plain_value(values)
-        text += "\n[[axis]]\n" + toml_lines({"key": key, **(plain if isinstance(plain, dict) else {"values": plain})})
+        table = values if isinstance(values, Mapping) else {"values": values}
+        text += "\n[[axis]]\n" + toml_lines({"key": key, **table})
     return _sweep(Path("sweep"), parse_toml(text, "sweep"), no_check, scene)
 
 

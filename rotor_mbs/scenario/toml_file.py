@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
+import errno
 import json
+import os
 import re
 import tomllib
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+from datetime import date, time
 from operator import itemgetter
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from rotor_mbs.errors import InputError
+from rotor_mbs.errors import InputError, shown_value
 
 KeyPath = tuple[str | int, ...]
 
@@ -83,6 +86,28 @@ class TomlFile:
             if len(messages) > MAX_PROBLEMS:
                 shown.append(f"{self.source}: {len(messages) - MAX_PROBLEMS} more errors")
             raise InputError(shown) from error
+
+
+def file_path(path: str | os.PathLike[str]) -> Path:
+    """Return a path that a file may have, whether there is one or not.
+
+    Raises
+    ------
+    TypeError
+        If it is neither text nor a path.
+    InputError
+        If no file can have it: a NUL, half a surrogate pair, a name longer than the system takes.
+    """
+    path = Path(path)
+    try:
+        os.lstat(path)
+    except ValueError as error:
+        raise InputError(f"{shown_value(str(path))}: not a path of a file; allowed: text without NUL") from error
+    except OSError as error:
+        if error.errno == errno.ENAMETOOLONG:
+            shown = shown_value(str(path))
+            raise InputError(f"{shown}: {len(str(path))} characters; allowed: a shorter path") from error
+    return path
 
 
 def shown_path(path: Path) -> str:
@@ -158,14 +183,22 @@ def parse_toml(text: str, source: str) -> TomlFile:
 
 
 def plain_value(value: Any) -> Any:
-    """As a TOML file has it: arrays, tuples, ranges, generators as lists. What no file can have stays as it is."""
+    """Return a value of Python as a TOML file has it: arrays, tuples, ranges, generators as lists.
+
+    Raises TypeError for what no file can have, such as None or bytes.
+    """
     if hasattr(value, "tolist"):  # of NumPy
         value = value.tolist()
+    if isinstance(value, str | bool | int | float | date | time):
+        return value
     if isinstance(value, Mapping):
-        return {str(key): plain_value(entry) for key, entry in value.items()}
-    if isinstance(value, Iterable) and not isinstance(value, str):
+        plain = {}
+        for key, entry in value.items():
+            plain[str(key) if isinstance(key, str) else shown_value(key)] = plain_value(entry)
+        return plain
+    if isinstance(value, Iterable) and not isinstance(value, bytes | bytearray):
         return [plain_value(entry) for entry in value]
-    return value
+    raise TypeError(f"{shown_value(value)}: a file has no {type(value).__name__}")
 
 
 def toml_value(value: object) -> str:
@@ -174,9 +207,14 @@ def toml_value(value: object) -> str:
         return f"{{{', '.join(f'{json.dumps(key)} = {toml_value(entry)}' for key, entry in value.items())}}}"
     if isinstance(value, list | tuple):
         return f"[{', '.join(toml_value(entry) for entry in value)}]"
-    if not isinstance(value, str | bool | int | float):
-        raise InputError(f"{value!r}: not a value of a file; allowed: numbers, texts, and lists of them")
-    return repr(float(value)) if isinstance(value, float) else json.dumps(value, ensure_ascii=False)
+    if isinstance(value, float):
+        return repr(float(value))
+    if isinstance(value, date | time):
+        return value.isoformat()
+    try:
+        return json.dumps(value, ensure_ascii=False)
+    except ValueError as error:  # a whole number of more digits than Python converts
+        raise InputError(f"{shown_value(value)}; allowed: |x| <= 1e300") from error
 
 
 def toml_lines(table: Mapping[str, object]) -> str:

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from rotor_mbs.errors import InputError
+from rotor_mbs.errors import InputError, shown_value
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.quantities import (
     NAMES,
@@ -229,7 +229,7 @@ class Solution:
             return values
         known = self.quantities
         if name not in known:
-            raise KeyError(f"{name!r}; this solution has: time, {', '.join(known)}")
+            raise KeyError(f"{shown_value(name)}; this solution has: time, {', '.join(known)}")
         return known[name]
 
     def __getattr__(self, name: str) -> Array:

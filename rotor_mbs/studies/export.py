@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from rotor_mbs.errors import InputError, StoreError
+from rotor_mbs.errors import InputError, StoreError, shown_value
 from rotor_mbs.methods.catalogue import REFERENCE
 from rotor_mbs.methods.solve import solve
 from rotor_mbs.models.exudyn import tree
@@ -23,6 +23,7 @@ from rotor_mbs.models.mujoco.mjcf import mjcf_file
 from rotor_mbs.runs.output_files import refuse_foreign, replace_file
 from rotor_mbs.scenario.catalogue import scene_of
 from rotor_mbs.scenario.scene import Scene
+from rotor_mbs.scenario.toml_file import file_path
 from rotor_mbs.solution import quantities
 from rotor_mbs.studies.stored_references import frozen_solution
 
@@ -46,6 +47,8 @@ def export(scene: Scene | str | os.PathLike[str], to: str, output: str | os.Path
         For an unknown format, or if `output` exists and is not an earlier file of this format.
     StoreError
         If a file cannot be written, or the reference of the scene cannot be computed.
+    TypeError
+        If `scene` or `output` is neither text nor a path.
 
     Examples
     --------
@@ -56,9 +59,9 @@ def export(scene: Scene | str | os.PathLike[str], to: str, output: str | os.Path
     ...     print(path.read_text().partition(",rotor rate")[0])
     time [s],rotor [rad],pitch 1 [rad],pitch 2 [rad],pitch 3 [rad]
     """
-    scene, output = scene_of(scene), Path(output)
+    scene, output = scene_of(scene), file_path(output)
     if to not in FORMATS:
-        raise InputError(f"no format {to!r}; allowed: {', '.join(FORMATS)}")
+        raise InputError(f"no format {shown_value(to)}; allowed: {', '.join(FORMATS)}")
     _, text_of, mark = FORMATS[to]
     refuse_foreign(output, mark)  # before a reference is computed
     replace_file(output, text_of(scene).encode(), mark)

@@ -6,7 +6,6 @@ how far from steady it is there.
 
 from __future__ import annotations
 
-import reprlib
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
@@ -18,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor_mbs.analysis import modes as modal
-from rotor_mbs.errors import InputError, MethodRefusal, RotorError
+from rotor_mbs.errors import InputError, MethodRefusal, RotorError, shown_value
 from rotor_mbs.methods.catalogue import find_method, methods, with_method_files
 from rotor_mbs.runs.output_files import locked
 from rotor_mbs.runs.pool import local_pool, run_in
@@ -85,7 +84,7 @@ def modes_of_scenes(
     for name, model in zip(names, models, strict=True):
         if not any(method.linearize for method in methods() if method.model == model):
             raise InputError(f"{name}: its model has no linearization; allowed: a model with `linearize`")
-    speeds = _increasing(speeds)
+    speeds = increasing_speeds(speeds)
     made: list[Outcome] = []
     computed: list[modal.SceneModes] = []
     with locked(output):
@@ -143,7 +142,7 @@ def compute_modes(scene: Scene, speeds: Sequence[float] | Array = (), models: Se
     )
     facts = scene.name, scene_hash(scene), scene.title, len(scene.blades), scene.gravity
     scene = replace(scene, pitch_torque=torques, bearing_rest=rests)
-    speeds = np.array(_increasing(speeds))
+    speeds = np.array(increasing_speeds(speeds))
     rest = _linear(scene, modal.REST, np.zeros(1), models, notes)
     rotation = _linear(scene, modal.ROTATION, speeds, models, notes) if len(speeds) else {}
     turning = speeds[speeds > 0.0]
@@ -286,7 +285,7 @@ def _floquet_table(scene: Scene, speeds: Array) -> modal.FloquetTable:
     return modal.FloquetTable(speeds, multipliers, largest, stable, errors, torques, mismatches, messages)
 
 
-def _increasing(speeds: Sequence[float] | Array) -> list[float]:
+def increasing_speeds(speeds: Sequence[float] | Array) -> list[float]:
     """Return rotor speeds as floats. Raises InputError where they are not allowed, TypeError for what is no number."""
     try:
         numbers = [float(speed) for speed in speeds]
@@ -294,8 +293,6 @@ def _increasing(speeds: Sequence[float] | Array) -> list[float]:
         numbers = [np.nan]
     are_allowed = all(number == 0.0 or SMALLEST <= number <= LARGEST for number in numbers)
     if not are_allowed or any(after <= before for before, after in pairwise(numbers)):
-        shown = reprlib.repr(speeds)
-        raise InputError(
-            f"speeds: {shown}; allowed: increasing numbers, each 0 or from {SMALLEST:g} to {LARGEST:g} (rad/s)"
-        )
+        allowed = f"increasing numbers, each 0 or from {SMALLEST:g} to {LARGEST:g} (rad/s)"
+        raise InputError(f"speeds: {shown_value(speeds)}; allowed: {allowed}")
     return numbers

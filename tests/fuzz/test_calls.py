@@ -40,7 +40,7 @@ def compared(number: int) -> dict[str, rm.Run]:
     return {METHOD: run}
 
 
-WRONG_LIMITS, WRONG_WORKERS = (-1.0, 0.0, float("nan"), float("-inf")), (-1, 10**9, 0.5)
+WRONG_LIMITS, WRONG_WORKERS = (-1.0, 0.0, float("nan"), float("-inf")), (-1, 10**9, 1025)
 CALLS: dict[str, Callable[[int], Mapping[str, rm.Run]]] = {
     "one": lambda n: {METHOD: rm.run(scene(n), METHOD, timeout=100.0)},
     "several": lambda n: rm.run(scene(n), (name for name in (METHOD, OTHER))),

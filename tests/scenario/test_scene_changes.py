@@ -106,7 +106,7 @@ def test_the_number_of_blades_can_be_changed_with_what_depends_on_it() -> None:
         ("gravty", 9.81, "paper/fig11: gravty: unknown key, perhaps gravity; allowed: title, "),
         ("initial.angles[4]", 1.0, r"initial.angles: has 4 entries; allowed: initial.angles\[0\] to "),
         ("initial.angles", 1.0, "initial.angles: 1.0 is not a list; allowed: 1 \\+ blades numbers"),
-        ("gravity", None, "gravity: .* is not a number"),
+        ("gravity", [], "gravity: .* is not a number"),
         ("blade.mass", 1.0, r"blade: is a list; allowed: blade\[0\].mass to blade\[2\].mass$"),
         ("a b", 1.0, "'a b' is not the path of a key; allowed: the path"),
     ],

@@ -72,7 +72,7 @@ def test_the_shares_for_validation_and_test_are_exact_and_drawn() -> None:
 
 def test_a_sweep_without_a_file_is_that_of_its_text(tmp_path: Path) -> None:
     scene = find_scenes(["paper/fig11"])[0]
-    axes = {"gravity": np.array([9.0, 10.0]), "initial.angles[1]": {"linear": {"start": 0, "end": 1, "count": 3}}}
+    axes = {"gravity": [9.0, 10.0], "initial.angles[1]": {"linear": {"start": 0, "end": 1, "count": 3}}}
     made = sweep_of(scene, axes, samples=21, outputs=["angles"], validation=0.5)
     (tmp_path / "s.toml").write_text(made.file.text)
     read = load_sweep(tmp_path / "s.toml")

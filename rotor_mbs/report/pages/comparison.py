@@ -17,7 +17,6 @@ from rotor_mbs.comparison.data import load_data
 from rotor_mbs.comparison.modes import compare_modes
 from rotor_mbs.comparison.trajectory import compare_with_reference
 from rotor_mbs.comparison.verdict import DEFAULT_TOLERANCE, LEVELS, ChannelErrors, DataVerdict, from_dictionary
-from rotor_mbs.errors import InputError
 from rotor_mbs.methods.time_limit import checked_seconds
 from rotor_mbs.report import canvas, plots
 from rotor_mbs.report.canvas import Panels
@@ -29,7 +28,9 @@ from rotor_mbs.report.plots import Series
 from rotor_mbs.runs.read import Record, write_records
 from rotor_mbs.runs.versions import machine, versions
 from rotor_mbs.scenario.catalogue import scene_of
+from rotor_mbs.scenario.keys import as_float, positive
 from rotor_mbs.scenario.scene import Scene
+from rotor_mbs.scenario.toml_file import file_path
 from rotor_mbs.solution.trajectory import need_xarray
 
 
@@ -63,6 +64,9 @@ def compare(
     InputError
         For data that cannot be read or compared, in one line with file, column or row, and what is allowed; or if the
         reference takes longer than the time limit.
+    TypeError
+        If `data` or `columns` is neither a mapping nor text nor a path, `scene` neither a scene nor text nor a path, or
+        a limit or a tolerance no number.
 
     Examples
     --------
@@ -77,9 +81,12 @@ def compare(
     >>> rm.compare({"t": run.time, "rotor": np.degrees(run.angles[:, 0])}, scene).likely
     ('rotor: degrees taken as rad',)
     """
-    if isinstance(scene, list | tuple):
-        raise InputError("compare: data and a scene; allowed: rotor_mbs.run(scene, methods) for methods of one scene")
     scene, timeout = scene_of(scene), checked_seconds(timeout)
+    tolerance = positive("tolerance", as_float(tolerance))
+    if not hasattr(data, "items"):
+        data = file_path(data)
+    if columns is not None and not hasattr(columns, "items"):
+        columns = file_path(columns)
     foreign = load_data(data, scene, columns)
     if foreign.is_modes:
         return DataComparison(*compare_modes(foreign, scene, tolerance))
@@ -129,13 +136,17 @@ class DataComparison:
 
     def to_html(self, folder: str | os.PathLike[str]) -> Path:
         """Write the page into a folder. Returns its path."""
-        return write_page(folder, "comparison", comparison_page(self.record), versions() | machine())
+        return write_page(file_path(folder), "comparison", comparison_page(self.record), versions() | machine())
 
     def save(self, path: str | os.PathLike[str]) -> Path:
-        """Save data, reference, errors and verdict as a results file. An earlier comparison is replaced; raises
-        InputError for other files, StoreError if it cannot be written."""
-        write_records(Path(path), [self.record])
-        return Path(path)
+        """Save data, reference, errors and verdict as a results file.
+
+        An earlier comparison is replaced. Raises InputError for other files, StoreError if it cannot be written,
+        TypeError if `path` is neither text nor a path.
+        """
+        target = file_path(path)
+        write_records(target, [self.record])
+        return target
 
     def __repr__(self) -> str:
         """Says how columns were read, numbers by channel, and the verdict."""

@@ -24,7 +24,7 @@ from rotor_mbs.analysis.modes import (
     to_records,
 )
 from rotor_mbs.analysis.text_tables import TextTable
-from rotor_mbs.errors import InputError
+from rotor_mbs.errors import InputError, shown_value
 from rotor_mbs.report.canvas import SPEED_AXIS, Panels, curve, log_axis, panels
 from rotor_mbs.report.elements import PageTable, Picture, Row, Section, TableCell, picture
 from rotor_mbs.report.files import write_page
@@ -34,8 +34,9 @@ from rotor_mbs.runs.read import write_records
 from rotor_mbs.runs.versions import machine, versions
 from rotor_mbs.scenario.catalogue import scene_of
 from rotor_mbs.scenario.scene import Scene
+from rotor_mbs.scenario.toml_file import file_path
 from rotor_mbs.solution.trajectory import need_xarray
-from rotor_mbs.studies.modes import compute_modes
+from rotor_mbs.studies.modes import compute_modes, increasing_speeds
 
 _MARKS = ("o", "s", "^", "D", "v", "P", "x")
 
@@ -54,7 +55,9 @@ def modes(scene: Scene | str | os.PathLike[str], speeds: Sequence[float] = ()) -
     Raises
     ------
     InputError
-        For speeds that do not increase, or are negative.
+        For speeds that do not increase, or are negative, and for a scene without a steady state.
+    TypeError
+        If `scene` is neither a scene nor text nor a path, or a speed is no number.
 
     Examples
     --------
@@ -65,7 +68,7 @@ def modes(scene: Scene | str | os.PathLike[str], speeds: Sequence[float] = ()) -
     >>> study.rotation["lagrange"].names
     ('rotor', 'collective pitch', 'cosine pitch', 'sine pitch')
     """
-    return Modes(**vars(compute_modes(scene_of(scene), speeds)))
+    return Modes(**vars(compute_modes(scene_of(scene), increasing_speeds(speeds))))
 
 
 @dataclass(frozen=True)
@@ -91,18 +94,27 @@ class Modes(SceneModes):
         return mode_table(mode_rows(self))
 
     def to_xarray(self, state: str = "rotation") -> Any:
-        """Return the modes of one state, "rotation" or "rest", as an xarray.Dataset; dimension `solver`: the models."""
-        return linear_dataset(self.rest if state == "rest" else self.rotation, need_xarray())
+        """Return the modes of one state, "rotation" or "rest", as an xarray.Dataset; dimension `solver`: the models.
+
+        Raises InputError for another state, and one that was not computed.
+        """
+        states = {"rotation": self.rotation, "rest": self.rest}
+        if state not in states:
+            raise InputError(f"no state {shown_value(state)}; allowed: {', '.join(states)}")
+        return linear_dataset(states[state], need_xarray())
 
     def save(self, path: str | os.PathLike[str]) -> Path:
-        """Save the modes in a file that `rotor-mbs report` reads. A file of modes is replaced; raises InputError for
-        other files."""
-        write_records(Path(path), to_records(self))
-        return Path(path)
+        """Save the modes in a file that `rotor-mbs report` reads.
+
+        A file of modes is replaced. Raises InputError for other files, TypeError if `path` is neither text nor a path.
+        """
+        target = file_path(path)
+        write_records(target, to_records(self))
+        return target
 
     def to_html(self, folder: str | os.PathLike[str]) -> Path:
         """Write the page into a folder. Returns its path."""
-        return write_page(folder, "modes", modes_page([self]), versions() | machine())
+        return write_page(file_path(folder), "modes", modes_page([self]), versions() | machine())
 
     def _repr_html_(self) -> str:
         drawn = self.plot()._repr_svg_() if self.rotation else ""
