@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import math
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
 from typing import Any
@@ -12,7 +11,6 @@ import numpy as np
 
 from rotor_mbs.comparison.channels import Channel
 from rotor_mbs.comparison.data import ForeignData
-from rotor_mbs.errors import InputError
 from rotor_mbs.runs.design import Column
 from rotor_mbs.runs.read import Record
 from rotor_mbs.runs.versions import versions
