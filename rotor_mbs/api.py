@@ -64,8 +64,8 @@ def scenes(folder: str = "") -> list[str]:
     beginning = os.fsdecode(folder).rstrip("/")
     names = [name for name, _ in list_scenes() if not folder or name.startswith(f"{beginning}/")]
     if not names:
-        folders = sorted({name.partition("/")[0] for name, _ in list_scenes()})
-        raise InputError(f"no shipped scenes in {shown_value(folder)}; allowed: {', '.join(folders)}")
+        allowed = ", ".join(sorted({name.partition("/")[0] for name, _ in list_scenes()}))
+        raise InputError(f"no shipped scenes in {shown_value(folder)}; allowed: {allowed}")
     return names
 
 
@@ -394,7 +394,8 @@ class Runs(Mapping[Any, Any]):
                 with open_results(self.path) as results:
                     if label in results.scenes:
                         return Runs(self.path, label, _folder=self._folder)
-            raise KeyError(f"{shown_value(label)}; available: {', '.join(map(str, islice(self._labels, 20)))}")
+            available = ", ".join(map(str, islice(self._labels, 20)))
+            raise KeyError(f"{shown_value(label)}; available: {available}")
         if self._is_sweep:
             return self._run_of_sweep(int(label))
         with open_results(self.path) as results:
@@ -423,8 +424,8 @@ class Runs(Mapping[Any, Any]):
     def _runs(self) -> Iterator[StoredRun]:
         with open_results(self.path) as results:
             if self.scene and self.scene not in results.scenes:
-                known = ", ".join(results.scenes)
-                raise StoreError(f"{self.path}: has no scene {shown_value(self.scene)}; allowed: {known}")
+                what = f"has no scene {shown_value(self.scene)}"
+                raise StoreError(f"{self.path}: {what}; allowed: {', '.join(results.scenes)}")
             for scene in [results.scenes[self.scene]] if self.scene else results.scenes.values():
                 yield from scene.runs.values()
 

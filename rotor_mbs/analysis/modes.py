@@ -97,7 +97,13 @@ def multiblade_shapes(shapes: Complex) -> Complex:
     return np.concatenate([shapes[..., :1], pitches], axis=-1)
 
 
-def modes_of(stiffness: Array, damping: Array, *, is_cyclic: bool, rounding: float = 0.0) -> ModeSet:
+def modes_of(
+    stiffness: Array,
+    damping: Array,
+    *,
+    is_cyclic: bool,
+    rounding: float = 0.0,
+) -> ModeSet:
     """Return all modes of δq̈ + damping δq̇ + stiffness δq = 0 by undamped frequency.
 
     Parameters

@@ -35,6 +35,10 @@ def pages_beside(results: Path) -> Path:
     return results.parent / ("report" if results.name == "results.h5" else f"{results.stem}-report")
 
 
+def _not_allowed(text: str, allowed: str) -> argparse.ArgumentTypeError:
+    return argparse.ArgumentTypeError(f"{shown_value(text)} given, allowed: {allowed}")
+
+
 def path(text: str) -> Path:
     """The path of a file or folder, there or not."""
     try:
@@ -47,7 +51,7 @@ def file(text: str) -> Path:
     """An output file: neither an empty name nor an existing folder."""
     output = path(text)
     if not output.name or output.name == ".." or output.is_dir():
-        raise argparse.ArgumentTypeError(f"{shown_value(text)} given, allowed: a file's name, not a folder")
+        raise _not_allowed(text, "a file's name, not a folder")
     return output
 
 
@@ -56,7 +60,7 @@ def folder(text: str) -> Path:
     output = path(text)
     existing = next((place for place in (output, *output.parents) if place.exists()), output)
     if not (existing.is_dir() and os.access(existing, os.W_OK)):
-        raise argparse.ArgumentTypeError(f"{shown_value(text)} given, allowed: a folder that can be written")
+        raise _not_allowed(text, "a folder that can be written")
     return output
 
 
@@ -68,33 +72,33 @@ def span(text: str) -> tuple[float, ...]:
         if 0.0 <= first < last <= _MAX_SPEED and 2 <= count <= _MAX_SPAN:
             numbers = tuple(first + (last - first) * i / (count - 1) for i in range(count))
             # A difference of a few units of rounding has fewer numbers than COUNT; 1e-320 has an infinite inverse.
-            if len(set(numbers)) == count and all(number >= _MIN_SPEED for number in numbers if number):
+            slowest = min(number for number in numbers if number)
+            if len(set(numbers)) == count and slowest >= _MIN_SPEED:
                 return numbers
     except ValueError:
         pass
     allowed = f"FROM:TO:COUNT with 0 <= FROM < TO <= {_MAX_SPEED:g} and COUNT from 2 to {_MAX_SPAN}"
     allowed += f"; speeds that differ, each 0 or at least {_MIN_SPEED:g}"
-    raise argparse.ArgumentTypeError(f"{shown_value(text)} given, allowed: {allowed}")
+    raise _not_allowed(text, allowed)
 
 
 def part(text: str) -> tuple[int, int]:
     """(K, N) of "K/N"."""
     number, _, parts = text.partition("/")
     try:
-        if number.isdecimal() and parts.isdecimal() and 1 <= int(number) <= int(parts) <= _MAX_NUMBER:
+        are_whole = number.isdecimal() and parts.isdecimal()
+        if are_whole and 1 <= int(number) <= int(parts) <= _MAX_NUMBER:
             return int(number), int(parts)
     except ValueError:  # more than 4300 digits
         pass
-    raise argparse.ArgumentTypeError(
-        f"{shown_value(text)} given, allowed: K/N with K from 1 to N, N at most {_MAX_NUMBER:g}"
-    )
+    raise _not_allowed(text, f"K/N with K from 1 to N, N at most {_MAX_NUMBER:g}")
 
 
 def setting(text: str) -> tuple[str, object]:
     """(name, value) of "name=value": a number where it is one."""
     name, equals, value = (piece.strip() for piece in text.partition("="))
     if not (name and equals and value):
-        raise argparse.ArgumentTypeError(f"{shown_value(text)} given, allowed: NAME=VALUE")
+        raise _not_allowed(text, "NAME=VALUE")
     for kind in (int, float):
         try:
             return name, kind(value)
@@ -110,7 +114,7 @@ def _positive(kind: type[int] | type[float], allowed: str, largest: float = _MAX
         except ValueError:  # also a whole number of more than 4300 digits
             value = kind(0)
         if not 0 < value <= largest:
-            raise argparse.ArgumentTypeError(f"{shown_value(text)} given, allowed: {allowed}")
+            raise _not_allowed(text, allowed)
         return value
 
     return read

@@ -110,7 +110,8 @@ class Panels:
         target = file_path(path)
         kind = target.suffix.removeprefix(".")
         if kind not in KINDS:
-            raise InputError(f"{target}: unknown format; allowed: a name that ends in .{', .'.join(KINDS)}")
+            allowed = f"a name that ends in .{', .'.join(KINDS)}"
+            raise InputError(f"{target}: unknown format; allowed: {allowed}")
         replace_file(target, encoded(self.figure, kind), MARK)
 
 

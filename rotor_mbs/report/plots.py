@@ -285,7 +285,8 @@ class RunPlots(ComparisonPlots):
         load = plotted.get(name)
         if load is None or load.plot is None:
             raise InputError(f"no load {shown_value(name)}; allowed: {', '.join(plotted)}")
-        return component_panels(load, load.plot, self._run.time, _quantity(self._run, name)).with_legend()
+        values = _quantity(self._run, name)
+        return component_panels(load, load.plot, self._run.time, values).with_legend()
 
     def tips(self) -> Panels:
         """Plot the paths of the blade tips (m). Raises InputError if the run does not have them."""

@@ -187,7 +187,8 @@ class SerialPool(TaskPool):
 def check_workers(workers: int) -> None:
     """Raise InputError for a wrong number of worker processes, TypeError for what is no whole number."""
     if not 0 <= operator.index(workers) <= MAX_WORKERS:
-        raise InputError(f"workers: {shown_value(workers)}; allowed: a whole number from 0 to {MAX_WORKERS}")
+        allowed = f"a whole number from 0 to {MAX_WORKERS}"
+        raise InputError(f"workers: {shown_value(workers)}; allowed: {allowed}")
 
 
 def local_pool(workers: int, initializer: Callable[[], object] | None = None) -> TaskPool:

@@ -158,5 +158,6 @@ class StoredSweep:
     def column(self, name: str) -> NDArray[Any]:
         """A dataset; computed ones as they lie in the file, read where they are indexed. Raises StoreError."""
         if name not in self.columns:
-            raise StoreError(f"{self._path}: has no {shown_value(name)}; allowed: a sweep whose outputs have it")
+            what = f"has no {shown_value(name)}"
+            raise StoreError(f"{self._path}: {what}; allowed: a sweep whose outputs have it")
         return self._table.column(name)

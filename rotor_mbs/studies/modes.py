@@ -178,7 +178,9 @@ def _linear(
     columns = scene.moving_coordinates
     # Of a balanced rotor all stiffness about the shaft may be rounding of the weights.
     weight_stiffnesses = [weight_stiffness(at, angles) for at, angles, _, _ in steady]
-    is_balanced_rotor = kind == modal.REST and scene.gravity != 0.0 and is_balanced(scene, steady[0][1])
+    is_balanced_rotor = False
+    if kind == modal.REST and scene.gravity:
+        is_balanced_rotor = is_balanced(scene, steady[0][1])
     if is_balanced_rotor:
         notes.append(_BALANCED)
 

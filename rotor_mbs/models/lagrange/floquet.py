@@ -142,9 +142,11 @@ class _Variational:
         integrator.pars[:] = [*self._values[:-1], torque][: len(integrator.pars)]
         integrator.time = 0.0
         integrator.state[:] = np.concatenate([state, np.eye(count, count + 1).ravel(), [0.0]])
-        expected_steps = _STEPS + _STEPS_PER_OSCILLATION * self._frequency * period / (2.0 * math.pi)
+        oscillations = self._frequency * period / (2.0 * math.pi)
+        expected_steps = _STEPS + _STEPS_PER_OSCILLATION * oscillations
         if not expected_steps <= _MOST_STEPS:
-            raise InputError(f"no periodic motion found: a turn of {period:.3g} s takes more than {_MOST_STEPS} steps")
+            what = f"a turn of {period:.3g} s takes more than {_MOST_STEPS} steps"
+            raise InputError(f"no periodic motion found: {what}")
         max_steps = int(expected_steps)
         message = failure(integrator.propagate_until(period, max_steps=max_steps)[0])
         if "step_limit" in message:

@@ -133,7 +133,8 @@ def weight_stiffness(scene: Scene, angles: Sequence[float] | Array) -> float:
     """
     form, loads = rotor_form(scene), loads_at_start(scene)
     moving = [float(angles[column]) for column in scene.moving_coordinates]
-    half_inertia, _ = closed_form.energies(moving, [1.0] + [0.0] * len(form.blades), form, loads, math.sin, math.cos)
+    turning = [1.0] + [0.0] * len(form.blades)  # at 1 rad/s the kinetic energy is half the inertia
+    half_inertia, _ = closed_form.energies(moving, turning, form, loads, math.sin, math.cos)
     weights = _weights(form)
     return weights / (2.0 * half_inertia) if weights else 0.0
 
@@ -179,12 +180,15 @@ def _stationary(scene: Scene, speed: float, free: slice) -> Array:
 
 def _refuse_large_torques(scene: Scene, form: RotorForm, speed: float, loads: LoadValues) -> None:
     """Raise InputError where a pitch has no spring, and a torque above all that gravity and rotation can balance."""
-    for column, blade, torque in zip(scene.moving_coordinates[1:], form.blades, loads.pitches, strict=True):
+    columns = scene.moving_coordinates[1:]
+    for column, blade, torque in zip(columns, form.blades, loads.pitches, strict=True):
         # The largest values over the pitch of x s + y c and of ½ ∂a/∂θ = ½ half_slope_sc sin 2θ + half_slope_cs cos 2θ
         largest = math.hypot(blade.weight_x, blade.weight_y)
         largest += speed * speed * math.hypot(0.5 * blade.half_slope_sc, blade.half_slope_cs)
         if not blade.stiffness and abs(torque) > (1.0 + _ROUNDING) * largest:
-            balance = f"gravity and rotation balance at most {largest:g} N m" if largest else "nothing balances it"
+            balance = "nothing balances it"
+            if largest:
+                balance = f"gravity and rotation balance at most {largest:g} N m"
             raise InputError(
                 f"{scene.name}: no steady state at {speed:g} rad/s: a torque of {torque:g} N m acts on pitch {column}, "
                 f"which has no spring, and {balance}"
@@ -194,10 +198,12 @@ def _refuse_large_torques(scene: Scene, form: RotorForm, speed: float, loads: Lo
 def _checked(scene: Scene, speed: float, angles: Array) -> Array:
     """Return the angles of a steady state. Raises InputError where the accelerations say that it is none: they keep
     differences that the energies' rounding hides."""
-    linear = linearize(scene, angles, [speed, *(0.0 for _ in scene.blades)], holding_torque(scene, speed))
+    rates = [speed] + [0.0] * len(scene.blades)
+    linear = linearize(scene, angles, rates, holding_torque(scene, speed))
     scale = max(np.abs(linear.stiffness).max(), weight_stiffness(scene, angles))
     if np.abs(linear.residual).max() > 1e-9 * scale:
-        raise InputError(f"{scene.name}: the steady state at {speed:g} rad/s is not resolved: rounding of the energies")
+        what = f"the steady state at {speed:g} rad/s is not resolved"
+        raise InputError(f"{scene.name}: {what}: rounding of the energies")
     return angles
 
 

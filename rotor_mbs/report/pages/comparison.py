@@ -136,7 +136,8 @@ class DataComparison:
 
     def to_html(self, folder: str | os.PathLike[str]) -> Path:
         """Write the page into a folder. Returns its path."""
-        return write_page(file_path(folder), "comparison", comparison_page(self.record), versions() | machine())
+        page = comparison_page(self.record)
+        return write_page(file_path(folder), "comparison", page, versions() | machine())
 
     def save(self, path: str | os.PathLike[str]) -> Path:
         """Save data, reference, errors and verdict as a results file.
