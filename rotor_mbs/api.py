@@ -30,7 +30,7 @@ from rotor_mbs.analysis.text_tables import RUN_HEAD, TextTable, run_row
 from rotor_mbs.errors import InputError, MethodRefusal, ResourceError, StoreError, shown_value
 from rotor_mbs.methods.catalogue import REFERENCE, check_names, problems_of_scene, selected_methods
 from rotor_mbs.methods.method_file import ENDING
-from rotor_mbs.methods.time_limit import checked_seconds
+from rotor_mbs.methods.time_limit import valid_seconds
 from rotor_mbs.runs.design import MISSING, RUNS
 from rotor_mbs.runs.pool import check_workers
 from rotor_mbs.runs.read import StoredRun, StoredScene, is_sweep, open_results
@@ -172,7 +172,7 @@ def run(
     >>> float(abs(data.angles - data.angles.sel(run="reference")).max()) < 1e-9   # rad
     True
     """
-    scene, timeout = scene_of(scene), checked_seconds(timeout)
+    scene, timeout = scene_of(scene), valid_seconds(timeout)
     check_workers(workers)
     if isinstance(method, str):
         if method.endswith(ENDING):
@@ -290,7 +290,7 @@ def sweep(
     from rotor_mbs.scenario.sweep import sweep_of
     from rotor_mbs.studies.sweep import plan_sweep, run_sweep
 
-    scene, timeout = scene_of(scene), min(checked_seconds(timeout), _NO_LIMIT_S)
+    scene, timeout = scene_of(scene), min(valid_seconds(timeout), _NO_LIMIT_S)
     check_workers(workers)
     names = list(check_names(methods if isinstance(methods, str) else texts(methods)))
     study = sweep_of(scene, plain_value({**parameters}), methods=names, **plain_value(options))

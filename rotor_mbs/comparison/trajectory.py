@@ -30,7 +30,12 @@ from rotor_mbs.comparison.verdict import (
     defects_of_channel,
 )
 from rotor_mbs.errors import InputError
-from rotor_mbs.methods.time_limit import OutOfTimeError, stop_in_time, time_limit
+from rotor_mbs.methods.time_limit import (
+    OutOfTimeError,
+    caller_signals,
+    raise_if_over,
+    time_limit,
+)
 from rotor_mbs.models.lagrange.heyoka_adapter import is_available
 from rotor_mbs.models.lagrange.reference import TimedReference, reference_at
 from rotor_mbs.runs.read import Record
@@ -101,6 +106,7 @@ class TrajectoryErrors:
     missing: tuple[str, ...]
 
 
+@caller_signals()
 @np.errstate(all="ignore")  # data may be of any size
 def compare_with_reference(
     data: ForeignData,
@@ -135,12 +141,15 @@ def compare_with_reference(
     is_available()  # the engine is loaded before: an interrupt would leave half of it
     ends = monotonic() + time_limit_s
     loads, data = data.only(loads=True), data.only(loads=False)
+    missing_part = "no reference"  # within the time limit
     try:
         with time_limit(time_limit_s):
-            rows = _rows_with_reference(data, scene)
-            stop_in_time()
+            inside, exact = _reference_for(data, scene)
+            missing_part = "the rows are not assessed"
+            rows = _rows_with_reference(data, scene, inside, exact)
+            raise_if_over()
     except OutOfTimeError:
-        problem = f"no reference after {time_limit_s:g} s; allowed: a longer time limit"
+        problem = f"{missing_part} after {time_limit_s:g} s; allowed: a longer time limit"
         raise InputError(f"timeout: {problem}") from None
 
     errors = _errors_of(data, scene, rows)
@@ -197,18 +206,18 @@ def compare_with_reference(
     return verdict, comparison_record(verdict, scene, compared, expected, rows.defects)
 
 
-def _rows_with_reference(data: ForeignData, scene: Scene) -> ReferencedRows:
-    """Compute the reference at the times of data, and their defects.
+def _reference_for(data: ForeignData, scene: Scene) -> tuple[ForeignData, TimedReference]:
+    """Compute the reference of a scene at the times of data and at the scene's samples.
 
     Parameters
     ----------
     data : angles and rates.
     scene : the scene.
 
-    Raises
-    ------
-    InputError
-        For data without rows in the scene's duration.
+    Returns
+    -------
+    ForeignData, TimedReference
+        The rows up to the scene's end, and the reference.
     """
     inside = data.rows(data.time <= scene.duration * (1.0 + _TIME_ROUNDING))
     end = max(scene.duration, float(inside.time[-1])) if len(inside.time) else scene.duration
@@ -217,9 +226,27 @@ def _rows_with_reference(data: ForeignData, scene: Scene) -> ReferencedRows:
     samples = np.linspace(0.0, scene.duration, scene.samples)
     times = np.union1d(np.append(inside.time, end), samples)
     sampled_scene = replace(scene, duration=end, samples=len(times), outputs=("angles", "rates"))
-    exact = reference_at(sampled_scene, times)
-    run = exact.trajectory
+    return inside, reference_at(sampled_scene, times)
 
+
+def _rows_with_reference(
+    data: ForeignData, scene: Scene, inside: ForeignData, exact: TimedReference
+) -> ReferencedRows:
+    """Compute the defects of data, and find the reference at their times.
+
+    Parameters
+    ----------
+    data : angles and rates, all rows.
+    scene : the scene.
+    inside : the rows up to the scene's end.
+    exact : the reference at their times and at the scene's samples.
+
+    Raises
+    ------
+    InputError
+        For data without rows in the scene's duration.
+    """
+    run = exact.trajectory
     places: NDArray[np.int64] = np.searchsorted(run.time, inside.time)
     places = places[places < len(run.time)]
     if not len(places):

@@ -11,13 +11,14 @@ import numpy as np
 from rotor_mbs.errors import RotorError, system_errors_apart
 from rotor_mbs.methods.base import Method
 from rotor_mbs.methods.catalogue import find_method
-from rotor_mbs.methods.time_limit import OutOfTimeError, time_limit
+from rotor_mbs.methods.time_limit import OutOfTimeError, caller_signals, time_limit
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.trajectory import Solution, shape_fault
 
 _OBSERVING_S = 1.0  # in any case, of what was reached by the time limit
 
 
+@caller_signals()
 def solve(
     method: Method | str,
     scene: Scene,
@@ -39,9 +40,9 @@ def solve(
         setup = time.perf_counter() - start
         run_times: list[float] = []
         gc_was_on = gc.isenabled()
-        gc.disable()
+        begun = time.monotonic()
         try:
-            begun = time.monotonic()
+            gc.disable()
             with time_limit(time_limit_s):
                 while not run_times or (len(run_times) < repeats and sum(run_times) + run_times[-1] < budget_s):
                     start = time.perf_counter()

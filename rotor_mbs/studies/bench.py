@@ -25,7 +25,7 @@ from rotor_mbs.analysis.work_precision import points as points_of
 from rotor_mbs.errors import SYSTEM_ERRORS, InputError, MethodRefusal, RotorError, one_line, system_errors_apart
 from rotor_mbs.methods import catalogue
 from rotor_mbs.methods.base import STEP, TOLERANCE, Ladder, Method
-from rotor_mbs.methods.time_limit import OutOfTimeError, time_limit
+from rotor_mbs.methods.time_limit import OutOfTimeError, caller_signals, time_limit
 from rotor_mbs.runs import last_core
 from rotor_mbs.runs.design import Asked
 from rotor_mbs.runs.output_files import locked
@@ -408,6 +408,7 @@ def curve_tasks(
     ]
 
 
+@caller_signals()
 def run_bench(
     scenes: Sequence[Scene],
     methods: Sequence[str],

@@ -21,7 +21,7 @@ from rotor_mbs.errors import MethodRefusal, RotorError
 from rotor_mbs.methods.base import STEP, Method
 from rotor_mbs.methods.catalogue import find_method, line_of, with_method_files
 from rotor_mbs.methods.solve import solve
-from rotor_mbs.methods.time_limit import OutOfTimeError
+from rotor_mbs.methods.time_limit import OutOfTimeError, caller_signals
 from rotor_mbs.runs.pool import TaskLostError, TaskPool, WorkerPool
 from rotor_mbs.scenario.accuracy_bounds import shipped_bounds
 from rotor_mbs.scenario.catalogue import only_scene
@@ -73,6 +73,7 @@ def _run(task: tuple[str, Scene, Mapping[str, object], int, float]) -> Solution:
     return without_samples(scene, name, settings, status, message)
 
 
+@caller_signals()
 def examine(name: str, timeout_s: float = 60.0) -> list[Check]:
     """The checks of a method, each with the most likely reason where it fails. Raises InputError for an unknown one."""
     with WorkerPool(1) as pool:

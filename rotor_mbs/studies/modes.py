@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from rotor_mbs.analysis import modes as modal
 from rotor_mbs.errors import InputError, MethodRefusal, RotorError, shown_value
 from rotor_mbs.methods.catalogue import find_method, methods, with_method_files
+from rotor_mbs.methods.time_limit import caller_signals
 from rotor_mbs.runs.output_files import locked
 from rotor_mbs.runs.pool import local_pool, run_in
 from rotor_mbs.runs.read import write_records
@@ -42,6 +43,7 @@ _BALANCED = "balanced rotor: no preferred angle; modes taken at the initial angl
 _Point: TypeAlias = "tuple[Scene, Array, float, float]"
 
 
+@caller_signals()
 def modes_of_scenes(
     scenes: Sequence[Scene],
     output: Path,
@@ -115,6 +117,7 @@ def modes_of_scenes(
     return made
 
 
+@caller_signals()
 def compute_modes(scene: Scene, speeds: Sequence[float] | Array = (), models: Sequence[str] = ()) -> modal.SceneModes:
     """Compute all modes of a scene.
 

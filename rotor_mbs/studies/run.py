@@ -23,7 +23,7 @@ from rotor_mbs.methods.catalogue import (
     settings_for,
 )
 from rotor_mbs.methods.solve import solve
-from rotor_mbs.methods.time_limit import OutOfTimeError, time_limit
+from rotor_mbs.methods.time_limit import OutOfTimeError, caller_signals, time_limit
 from rotor_mbs.runs.design import Asked
 from rotor_mbs.runs.output_files import locked
 from rotor_mbs.runs.pool import Workers, pool_of
@@ -113,6 +113,7 @@ class RunReport:
         return [run for run in self.made if not run.is_stored]
 
 
+@caller_signals()
 def run_scenes(
     scenes: Sequence[Scene],
     methods: Mapping[str, Sequence[str]],
@@ -183,6 +184,7 @@ def run_tasks(missing: Sequence[tuple[Asked, Place, Place | None]], timeout_s: f
     ]
 
 
+@caller_signals()
 def solve_judged(
     scene: Scene,
     method: str,

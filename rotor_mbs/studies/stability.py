@@ -19,6 +19,7 @@ from rotor_mbs.methods.catalogue import (
     settings_for,
     settings_of_any,
 )
+from rotor_mbs.methods.time_limit import caller_signals
 from rotor_mbs.runs.design import Asked
 from rotor_mbs.runs.output_files import locked
 from rotor_mbs.runs.pool import Workers, pool_of
@@ -133,6 +134,7 @@ _STIFF_OR_LIGHT = ("stiff/", "extreme/light", "extreme/feather")
 _MAX_STEPS = 1e7
 
 
+@caller_signals()
 def run_suite(
     scenes: Sequence[Scene],
     output: Path,

@@ -24,7 +24,7 @@ from rotor_mbs.methods.catalogue import (
     settings_for,
 )
 from rotor_mbs.methods.solve import solve
-from rotor_mbs.methods.time_limit import OutOfTimeError, time_limit
+from rotor_mbs.methods.time_limit import OutOfTimeError, caller_signals, time_limit
 from rotor_mbs.models.lagrange.reference import error_growth
 from rotor_mbs.runs.design import MISSING
 from rotor_mbs.runs.pool import TaskPool
@@ -338,6 +338,7 @@ class SweepResult:
     refused: tuple[str, ...] = ()
 
 
+@caller_signals()
 def run_sweep(
     plan: SweepPlan,
     output: Path,

@@ -16,7 +16,7 @@ from rotor_mbs.analysis import judgement as judgement_module
 from rotor_mbs.analysis.judgement import Judgement, _status, judge
 from rotor_mbs.methods.catalogue import find_method, method_names
 from rotor_mbs.methods.solve import solve
-from rotor_mbs.methods.time_limit import OutOfTimeError, is_over, polled, time_limit
+from rotor_mbs.methods.time_limit import OutOfTimeError, is_over, samples_kept_at_limit, time_limit
 from rotor_mbs.models.exudyn import chain, sensor_samples
 from rotor_mbs.models.exudyn.loads import Loads
 from rotor_mbs.models.exudyn.schemes import Scheme
@@ -164,10 +164,10 @@ def test_a_run_that_was_ended_is_not_repeated() -> None:
 def test_who_knows_that_time_is_up_is_not_interrupted_and_the_next_run_starts_afresh() -> None:
     """The signal may come a moment after the clock was read: samples on their way out must not be lost to it."""
     with time_limit(0.05):
-        with polled():
+        with samples_kept_at_limit():
             while not is_over():
                 pass
-        time.sleep(0.1)  # here the signal arrives, outside `polled`
+        time.sleep(0.1)  # here the signal arrives, outside `samples_kept_at_limit`
     assert not is_over()
 
 

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from rotor_mbs.errors import MethodRefusal
-from rotor_mbs.methods.time_limit import MESSAGE, OutOfTimeError
+from rotor_mbs.methods.time_limit import MESSAGE, OutOfTimeError, caller_signals, must_ask, raise_if_over
 from rotor_mbs.models.exudyn.geometry import LISTS, Part, Ref
 from rotor_mbs.models.exudyn.schemes import Scheme
 from rotor_mbs.scenario.time_table import Interval, Segment, steps_and_rows
@@ -134,10 +134,12 @@ class System:
         settings = _settings(scheme, data.ODE2Size(), data.AEsize())
         integration = settings.timeIntegration
         trials: list[float] = []
-        if scheme.trial_steps:
+        if scheme.trial_steps or must_ask():
 
             def before_trial(_system: object, time: float) -> bool:
-                trials.append(time)
+                raise_if_over()
+                if scheme.trial_steps:
+                    trials.append(time)
                 if len(trials) > scheme.trial_steps:
                     raise RuntimeError(f"no progress in {scheme.trial_steps} trial steps near t = {time:.6g} s")
                 return True
@@ -157,6 +159,7 @@ class System:
                         values = self._mbs.GetSensorValues(self._numbers[Ref("sensor", name)])
                         self._initial_values[name] = np.array(values, dtype=float)
                     implicit.FinalizeSolver(self._mbs, plain)
+                raise_if_over()  # as the engine may have been told in vain
             trials.clear()
             settings.solution.sensors.append = interval is not intervals[0]
             span = (interval.end - interval.start) / interval.sample_intervals
@@ -268,15 +271,14 @@ class System:
         """Run the solver from start to end time, its work counted in `total`; why it failed, or "". stages: evaluations
         in an explicit step, 0 of an implicit solver."""
         failure = ""
-        try:
-            if not solver.SolveSystem(self._mbs, settings):
-                failure = _one_line(solver.GetErrorString()) or _NO_REASON
-        except (_engine.ExudynError, OutOfTimeError, RuntimeError, SystemError) as exc:
-            if _caused_by(exc, KeyboardInterrupt):
-                raise KeyboardInterrupt from exc
-            failure = MESSAGE
-            if not _caused_by(exc, OutOfTimeError):
-                failure = _one_line(str(exc)) or _one_line(solver.GetErrorString()) or _NO_REASON
+        with caller_signals():  # whose exceptions, as Ctrl-C, the engine makes its own
+            try:
+                if not solver.SolveSystem(self._mbs, settings):
+                    failure = _one_line(solver.GetErrorString()) or _NO_REASON
+            except (_engine.ExudynError, OutOfTimeError, RuntimeError, SystemError) as exc:
+                failure = MESSAGE
+                if not _is_caused_by_limit(exc):
+                    failure = _one_line(str(exc)) or _one_line(solver.GetErrorString()) or _NO_REASON
         # The engine's index is one ahead of the steps it took, and two where the last one failed; an implicit step
         # evaluates its residual once more than it iterates.
         it = solver.it
@@ -320,11 +322,12 @@ def _settings(scheme: Scheme, coordinates: int, constraints: int) -> Any:
     return settings
 
 
-def _caused_by(exc: BaseException | None, kind: type[BaseException]) -> bool:
-    while exc is not None:
-        if isinstance(exc, kind):
+def _is_caused_by_limit(error: BaseException | None) -> bool:
+    """Return whether the engine made an error of its own of an OutOfTimeError."""
+    while error is not None:
+        if isinstance(error, OutOfTimeError):
             return True
-        exc = exc.__cause__ or exc.__context__
+        error = error.__cause__ or error.__context__
     return False
 
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from rotor_mbs.errors import MethodRefusal
 from rotor_mbs.methods.base import Solver
-from rotor_mbs.methods.time_limit import MESSAGE, is_over, polled
+from rotor_mbs.methods.time_limit import MESSAGE, is_over, samples_kept_at_limit
 from rotor_mbs.models.exudyn import chain, sensor_samples, tree
 from rotor_mbs.models.exudyn.adapter import System
 from rotor_mbs.models.exudyn.geometry import Part
@@ -107,7 +107,7 @@ class ExtrapolatedSolver:
         self.system.begin(self._scheme, with_rows=self._integrates_work)
         self._keep(first.start, first, *self.system.initial_values(first.start), 0.0)
         failure = ""
-        with polled():
+        with samples_kept_at_limit():
             for interval in self._intervals:
                 if interval.segment is not self._loads.segment:
                     self._loads.set_segment(interval.segment)

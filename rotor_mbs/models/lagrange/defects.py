@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor_mbs.errors import InputError
-from rotor_mbs.methods.time_limit import stop_in_time
+from rotor_mbs.methods.time_limit import raise_if_over
 from rotor_mbs.models.lagrange import closed_form
 from rotor_mbs.models.lagrange.closed_form import Accelerations
 from rotor_mbs.models.lagrange.heyoka_adapter import is_available
@@ -196,7 +196,7 @@ def interval_ends(scene: Scene, begins: Array, ends: Array, states: Array) -> Ar
     reached_states = states.astype(float)
     place = 0
     for k, (state, begin, end) in enumerate(zip(states, begins.tolist(), ends.tolist(), strict=True)):
-        stop_in_time()
+        raise_if_over()
         reached = begin
         while place + 1 < len(segments) and segments[place].end <= reached:
             place += 1

@@ -99,7 +99,7 @@ def scipy_integrator(name: str, relative_tolerance: float, absolute_tolerance: f
             return function(time, values)
 
         rows, steps, message, solver = [np.empty((0, len(state)))], 0, "", None
-        with np.errstate(all="ignore"), time_limit.polled():
+        with np.errstate(all="ignore"), time_limit.samples_kept_at_limit():
             try:
                 solver = solver_type(watched, start, state, end, rtol=relative_tolerance, atol=absolute_tolerance)
                 done = 0

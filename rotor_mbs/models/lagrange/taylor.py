@@ -137,7 +137,7 @@ class Propagation:
         self.set_segment(segment)
         end = [] if len(times) and times[-1] == segment.end else [segment.end]
         grid = np.concatenate([[segment.start], times, end]).astype(kind)
-        with time_limit.polled():
+        with time_limit.samples_kept_at_limit():
             outcome, _, _, steps, _, states = integrator.propagate_grid(grid, callback=time_limit.step_callback())
         message = time_limit.MESSAGE if time_limit.is_over() else failure(outcome)
         return Advance(states[1 : 1 + len(times)], integrator.state, steps, None, message)

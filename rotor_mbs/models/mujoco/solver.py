@@ -160,7 +160,7 @@ class MujocoSolver:
         )
         self._keep(0.0, self._intervals[0].segment, is_sample=True)
         steps, message = 0, ""
-        with time_limit.polled():
+        with time_limit.samples_kept_at_limit():
             for interval in self._intervals:
                 if interval.segment is not self._rows[-1].segment:
                     self._keep(interval.start, interval.segment, is_sample=False)

@@ -17,7 +17,7 @@ from rotor_mbs.comparison.data import load_data
 from rotor_mbs.comparison.modes import compare_modes
 from rotor_mbs.comparison.trajectory import compare_with_reference
 from rotor_mbs.comparison.verdict import DEFAULT_TOLERANCE, LEVELS, ChannelErrors, DataVerdict, from_dictionary
-from rotor_mbs.methods.time_limit import checked_seconds
+from rotor_mbs.methods.time_limit import valid_seconds
 from rotor_mbs.report import canvas, plots
 from rotor_mbs.report.canvas import Panels
 from rotor_mbs.report.elements import PageTable, Picture, Row, Section, TableCell, picture
@@ -81,7 +81,7 @@ def compare(
     >>> rm.compare({"t": run.time, "rotor": np.degrees(run.angles[:, 0])}, scene).likely
     ('rotor: degrees taken as rad',)
     """
-    scene, timeout = scene_of(scene), checked_seconds(timeout)
+    scene, timeout = scene_of(scene), valid_seconds(timeout)
     tolerance = positive("tolerance", as_float(tolerance))
     if not hasattr(data, "items"):
         data = file_path(data)
