@@ -14,7 +14,9 @@ from support.references import scene as shipped
 from support.scenes import PAPER, paper
 
 from rotor_mbs.analysis.judgement import judge
+from rotor_mbs.methods.catalogue import find_method
 from rotor_mbs.methods.solve import solve
+from rotor_mbs.models.lagrange import closed_form
 from rotor_mbs.models.lagrange import defects as defects_module
 from rotor_mbs.models.lagrange.defects import fitted_rates, interval_defects
 from rotor_mbs.models.lagrange.parameters import rate_units, resting_pitches
@@ -22,7 +24,7 @@ from rotor_mbs.models.lagrange.reference import _variational_matrices
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.defects import FLOOR_SAFETY, MAX_INTERVAL_GROWTH, Defects
 from rotor_mbs.solution.metrics import defect_metrics, horizon_samples, running_growth
-from rotor_mbs.solution.trajectory import Trajectory
+from rotor_mbs.solution.trajectory import Solution, Trajectory
 
 TAYLOR, DOP853 = "lagrange/taylor", "lagrange/dop853"
 ULP = float(np.finfo(float).eps)
@@ -186,17 +188,69 @@ def test_an_interval_of_huge_growth_is_counted_and_not_judged(growth: float, lef
     assert defect_metrics(endless, None)["defect_max"] == np.inf
 
 
+def wild(rate: float, rows: slice) -> Solution:
+    """A run with rates that no motion of the scene has."""
+    solution = solve(DOP853, FIG11, {})
+    rates = solution.trajectory.rates.copy()
+    rates[rows, 2] = rate
+    return replace(solution, trajectory=solution.trajectory.replace(rates=rates))
+
+
 @pytest.mark.parametrize("rate", [1e200, 1e4])
 def test_a_row_that_is_no_motion_is_inaccurate(rate: float) -> None:
     """Where the closed form has no end, and where it has one somewhere else."""
-    solution = solve(DOP853, FIG11, {})
-    rates = solution.trajectory.rates.copy()
-    rates[40, 2] = rate
-    wrong = replace(solution, trajectory=solution.trajectory.replace(rates=rates))
     with np.errstate(all="ignore"):
-        judgement = judge(FIG11, wrong, None)
+        judgement = judge(FIG11, wild(rate, slice(40, 41)), None)
     assert judgement.status == "inaccurate"
     assert not judgement.metrics["defect_max"] < 1.0
+
+
+@pytest.fixture
+def evaluations(monkeypatch: pytest.MonkeyPatch) -> list[int]:
+    """Without heyoka: one number, how often the closed form has been evaluated."""
+    monkeypatch.setattr(defects_module, "is_available", lambda: False)
+    count, accelerations = [0], closed_form.accelerations
+
+    def counted(*arguments: Any) -> Any:
+        count[0] += 1
+        assert count[0] < 10_000_000, "no end"
+        return accelerations(*arguments)
+
+    monkeypatch.setattr(closed_form, "accelerations", counted)
+    return count
+
+
+RATES = [1e6, 1e12, 1e100, 1e150, 1e153, 1e160, 1e200, 1.7e308]
+
+
+@pytest.mark.parametrize("rows", [slice(40, 41), pytest.param(slice(None), marks=pytest.mark.full)], ids=["one", "all"])
+@pytest.mark.parametrize("rate", RATES)
+def test_samples_that_are_no_motion_are_assessed_in_bounded_work(
+    rate: float, rows: slice, evaluations: list[int]
+) -> None:
+    """One interval's steps, those of the next ones, which are halved, and the fewest of each; of twelve evaluations.
+
+    Three times that, since a step may be tried again and is looked at after some have been made.
+    """
+    solution = wild(rate, rows)
+    evaluations[0] = 0
+    with np.errstate(all="ignore"):
+        judgement = judge(FIG11, solution, None)
+    assert judgement.status != "ok"
+    if rows != slice(None):
+        assert judgement.status == "inaccurate"
+    steps = 2 * defects_module._MAX_STEPS_DOP853 + len(solution.time) * defects_module._FEWEST_STEPS
+    assert evaluations[0] <= 3 * 12 * steps
+
+
+@pytest.mark.parametrize("method", [DOP853, "lagrange/radau"])
+@pytest.mark.parametrize("rate", [rate for rate in RATES if 1e6 < rate < 1e300])
+def test_a_start_far_from_any_motion_ends_by_itself(method: str, rate: float) -> None:
+    """Without a time limit: a million turns a second are many steps, which is seen from the first ones."""
+    with np.errstate(all="ignore"):
+        run = solve(method, FIG11.replace(**{"initial.rates[2]": rate}), {})
+    assert not run.integration.success
+    assert run.integration.message.startswith("SciPy: ")
 
 
 @pytest.mark.parametrize(
@@ -205,12 +259,15 @@ def test_a_row_that_is_no_motion_is_inaccurate(rate: float) -> None:
 @pytest.mark.parametrize("samples", [101, 11])
 def test_how_far_apart_samples_are_decides_no_status(method: str, samples: int) -> None:
     """Over a second errors grow up to 200 times, and a method's own ones add up: the run is the same."""
+    if not find_method(method).is_installed:
+        pytest.skip(f"{method} is not installed")
     scene = replace(paper("fig11"), samples=samples, outputs=("angles", "rates"))
     judgement = judge(scene, solve(method, scene, {}), None)
     assert (judgement.status, judgement.message) == ("ok", "")
 
 
 def test_a_run_that_left_the_symmetry_has_one_horizon_with_and_without_a_reference() -> None:
+    pytest.importorskip("heyoka")
     pytest.importorskip("mujoco")
     scene = replace(paper("fig08"), samples=101, outputs=("angles", "rates", "tip"))
     run = solve("mujoco/rk4", scene, {})

@@ -77,7 +77,7 @@ def test_a_state_that_has_diverged_has_no_derivative() -> None:
     scene = paper("fig03", duration=1.0, samples=2)
     solver = OdeSolver(scene, INTEGRATORS["DOP853"], np.array([0.0, 1.0]))
     (segment,) = scene.load_segments
-    values = solver._right_hand_side(segment)(0.0, [math.inf, 0.0, 1.0, 0.0])
+    values = solver.right_hand_side(segment)(0.0, [math.inf, 0.0, 1.0, 0.0])
     assert len(values) == 4
     assert np.isnan(values).all()
 

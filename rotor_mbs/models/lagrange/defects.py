@@ -25,8 +25,15 @@ from rotor_mbs.solution.defects import Defects
 from rotor_mbs.solution.metrics import ANGLE_LIMIT
 from rotor_mbs.solution.trajectory import Array, Trajectory
 
-# Of one interval: a stiff bearing of 1e12 N m/rad takes some 600; a run far from any motion would take for ever.
-_MAX_STEPS = 5_000
+# Of one interval, by heyoka and by DOP853. A stiff bearing of 1e12 N m/rad takes some 600 and 900, a minute of chaos
+# 2,900 and 8,400; samples far from any motion would take for ever. An interval that needs more is none of this rotor.
+_MAX_STEPS_TAYLOR = 5_000
+_MAX_STEPS_DOP853 = 10_000
+# Such intervals decide the status, which more of them do not change: each halves what the next may take, down to this,
+# so that samples that are all far from a motion take little more than one interval's steps.
+_FEWEST_STEPS = 50
+_DOP853 = (2.3e-14, 1e-16)  # tolerances, the tightest that SciPy takes
+_EVALUATIONS_PER_STEP = 12  # by it, whether a step is kept or tried again
 # Runge-Kutta steps of order 4 over a quarter of a radian leave a share of about 1e-5 of the transition matrices.
 _RADIANS_PER_STEP = 0.25
 # Where rates change within an interval, they leave more. It shows in the state at the end, which is known better: over
@@ -189,10 +196,13 @@ def interval_ends(scene: Scene, begins: Array, ends: Array, states: Array) -> Ar
     Returns
     -------
     (n, m)
-        NaN where it does not get there.
+        NaN where it does not get there, or would take more steps than any motion of the rotor.
     """
     segments = scene.load_segments
-    advance = (_advance_by_taylor if is_available() else _advance_by_dop853)(scene, states.shape[1])
+    if is_available():
+        advance, max_steps = _advance_by_taylor(scene, states.shape[1]), _MAX_STEPS_TAYLOR
+    else:
+        advance, max_steps = _advance_by_dop853(scene), _MAX_STEPS_DOP853
     reached_states = states.astype(float)
     place = 0
     for k, (state, begin, end) in enumerate(zip(states, begins.tolist(), ends.tolist(), strict=True)):
@@ -200,48 +210,55 @@ def interval_ends(scene: Scene, begins: Array, ends: Array, states: Array) -> Ar
         reached = begin
         while place + 1 < len(segments) and segments[place].end <= reached:
             place += 1
-        part = place
-        # Data may go on after the scene's end, with the last loads.
-        while part + 1 < len(segments) and segments[part].end < end:
-            state = advance(segments[part], reached, segments[part].end, state)
-            reached, part = segments[part].end, part + 1
-        if reached < end:
-            reached_states[k] = advance(segments[part], reached, end, state)
+        part, steps = place, 0
+        while reached < end and np.isfinite(state).all():
+            # Data may go on after the scene's end, with the last loads.
+            until = min(segments[part].end, end) if part + 1 < len(segments) else end
+            state, taken = advance(segments[part], reached, until, state, max_steps)
+            reached, part, steps = until, part + 1, steps + taken
+        is_there = bool(np.isfinite(state).all())
+        reached_states[k] = state if is_there else np.nan
+        if steps >= _FEWEST_STEPS and not is_there:
+            max_steps = max(max_steps // 2, _FEWEST_STEPS)
     return reached_states
 
 
-_Advance = Callable[[Segment, float, float, Array], Array]
+# (segment, start, end, state at the start, most steps) -> state at the end, NaN where it is not reached; steps taken
+_Advance = Callable[[Segment, float, float, Array, int], tuple[Array, int]]
 
 
 def _advance_by_taylor(scene: Scene, count: int) -> _Advance:
-    """By the code that is compiled for lagrange/taylor."""
+    """Return the integration of (count,) variables by the code that is compiled for lagrange/taylor."""
     propagation = Propagation(scene, tol=2.0**-52, compact_mode=is_compact(scene), high_accuracy=True)
     integrator = propagation.integrator
     state = integrator.state
     entered: list[Segment] = []
 
-    def advance(segment: Segment, start: float, end: float, values: Array) -> Array:
+    def advance(segment: Segment, start: float, end: float, values: Array, max_steps: int) -> tuple[Array, int]:
         if not entered or entered[-1] is not segment:
             entered[:] = [segment]
             propagation.set_segment(segment)
         integrator.time = start
         state[:count] = values
         state[count:] = 0.0  # the work, where it is a variable
-        integrator.propagate_until(end, max_steps=_MAX_STEPS)
+        _, _, _, steps, *_ = integrator.propagate_until(end, max_steps=max_steps)
         if integrator.time != end:  # too many steps, or not finite: what comes after it is neither
             state[:count] = np.nan
-        return np.asarray(state[:count])
+        return np.array(state[:count]), steps
 
     return advance
 
 
-def _advance_by_dop853(scene: Scene, _: int) -> _Advance:
-    integrator = scipy_integrator("DOP853", 2.3e-14, 1e-16)
-    solver = OdeSolver(replace(scene, outputs=("angles", "rates")), integrator)
+def _advance_by_dop853(scene: Scene) -> _Advance:
+    solver = OdeSolver(replace(scene, outputs=("angles", "rates")), scipy_integrator("DOP853", *_DOP853))
 
-    def advance(segment: Segment, start: float, end: float, values: Array) -> Array:
-        part = solver.advance(Segment(start, end, segment.linear_loads), values, np.empty(0))
-        return np.full(len(values), np.nan) if part.message else part.end
+    def advance(segment: Segment, start: float, end: float, values: Array, max_steps: int) -> tuple[Array, int]:
+        integrator = scipy_integrator("DOP853", *_DOP853, max_steps)
+        function = solver.right_hand_side(Segment(start, end, segment.linear_loads))
+        part = integrator(function, start, end, values, np.empty(0))
+        raise_if_over()  # else its end would be taken for that of no motion
+        end_state = np.full(len(values), np.nan) if part.message else part.end
+        return end_state, (part.evaluations or 0) // _EVALUATIONS_PER_STEP
 
     return advance
 

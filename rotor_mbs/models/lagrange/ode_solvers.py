@@ -8,7 +8,8 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from rotor_mbs.methods import time_limit
-from rotor_mbs.methods.time_limit import OutOfTimeError
+from rotor_mbs.methods.base import MAX_STEPS
+from rotor_mbs.methods.time_limit import OutOfTimeError, raise_if_over
 from rotor_mbs.models import ode45 as matlab
 from rotor_mbs.models.lagrange import closed_form, samples
 from rotor_mbs.models.lagrange.closed_form import load_values
@@ -42,10 +43,10 @@ class OdeSolver:
         return integration
 
     def advance(self, segment: Segment, state: Array, times: Array) -> Advance:
-        return self._integrator(self._right_hand_side(segment), segment.start, segment.end, state, times)
+        return self._integrator(self.right_hand_side(segment), segment.start, segment.end, state, times)
 
-    def _right_hand_side(self, segment: Segment) -> RightHandSide:
-        """d/dt of (angles, rates[, work]) on plain floats: for a handful of blades faster than arrays."""
+    def right_hand_side(self, segment: Segment) -> RightHandSide:
+        """Return d/dt of (angles, rates[, work]) on plain floats: for a handful of blades faster than arrays."""
         form, work_unit = self._form, self._work_unit
         count = 1 + len(form.blades)
         changing, pitches = changing_rests(self._scene), self._scene.moving_coordinates[1:]
@@ -86,24 +87,45 @@ def work_unit(scene: Scene) -> float:
     return 2.0 ** max(math.floor(math.log2(size)), 0) if 0.0 < size < math.inf else 1.0
 
 
-def scipy_integrator(name: str, relative_tolerance: float, absolute_tolerance: float) -> Integrator:
-    """SciPy's solver `name`, step by step, samples by its own interpolant; it ends at the time limit."""
+# Evaluations within one step, however often it is tried. SciPy shortens a step up to 460 times, where it begins at 0,
+# with 12 evaluations each. More are an endless loop: where the slope overflows, its first step is no number.
+_MAX_STEP_EVALUATIONS = 100_000
+# Steps after which it is seen how many the whole interval will take, and the share by which they may be too many.
+_OUTLOOK_STEPS = 2_000
+_OUTLOOK_SHARE = 10.0
+
+
+def scipy_integrator(
+    name: str, relative_tolerance: float, absolute_tolerance: float, max_steps: float = MAX_STEPS
+) -> Integrator:
+    """Return SciPy's solver `name`, step by step, samples by its own interpolant; it ends at the time limit.
+
+    It fails after `max_steps`, or as soon as it is seen that it would take many more.
+    """
     import scipy.integrate
 
     solver_type = getattr(scipy.integrate, name)
 
     def advance(function: RightHandSide, start: float, end: float, state: Array, times: Array) -> Advance:
+        in_step = 0  # evaluations
+
         def watched(time: float, values: Sequence[float]) -> list[float]:
-            if time_limit.is_over():  # a step may try ever smaller sizes without end
-                raise OutOfTimeError
+            nonlocal in_step
+            raise_if_over()  # a step may try ever smaller sizes
+            in_step += 1
+            if in_step > _MAX_STEP_EVALUATIONS:
+                raise ValueError("no step is small enough")
             return function(time, values)
 
         rows, steps, message, solver = [np.empty((0, len(state)))], 0, "", None
         with np.errstate(all="ignore"), time_limit.samples_kept_at_limit():
             try:
+                if not np.isfinite(function(start, state.tolist())).all():
+                    raise ValueError("the derivative of the state is not finite")
                 solver = solver_type(watched, start, state, end, rtol=relative_tolerance, atol=absolute_tolerance)
                 done = 0
                 while solver.status == "running":
+                    in_step = 0
                     reason = solver.step()
                     if solver.status == "failed":
                         message = f"SciPy: {reason}"
@@ -113,9 +135,13 @@ def scipy_integrator(name: str, relative_tolerance: float, absolute_tolerance: f
                     if reached > done:
                         rows.append(solver.dense_output()(times[done:reached]).T)
                         done = reached
+                    if solver.status == "running" and _is_too_long(
+                        steps, max_steps, (solver.t - start) / (end - start)
+                    ):
+                        raise ValueError(f"more than {max_steps:g} steps")
             except OutOfTimeError:
                 message = time_limit.MESSAGE
-            except (ValueError, np.linalg.LinAlgError) as exc:  # of its linear algebra, on what is not finite
+            except (ValueError, np.linalg.LinAlgError) as exc:  # also of its linear algebra, on what is not finite
                 message = f"SciPy: {exc}"
         last, evaluations = (state, 0) if solver is None else (solver.y, solver.nfev)
         return Advance(np.concatenate(rows), last, steps, evaluations, message)
@@ -123,13 +149,21 @@ def scipy_integrator(name: str, relative_tolerance: float, absolute_tolerance: f
     return advance
 
 
+def _is_too_long(steps: int, max_steps: float, share: float) -> bool:
+    """Return whether an interval, of which the steps so far have crossed a share, takes too many."""
+    is_seen = steps % _OUTLOOK_STEPS == 0 and steps > _OUTLOOK_SHARE * max_steps * share
+    return steps >= max_steps or is_seen
+
+
 def ode45_integrator(relative_tolerance: float, absolute_tolerance: float) -> Integrator:
-    """MATLAB's ode45; its clock starts at zero on every segment."""
+    """Return MATLAB's ode45; its clock starts at zero on every segment. Samples are lost at the time limit."""
 
     def advance(function: RightHandSide, start: float, end: float, state: Array, times: Array) -> Advance:
-        result = matlab.ode45(
-            lambda t, y: function(start + t, y), end - start, state.tolist(), relative_tolerance, absolute_tolerance
-        )
+        def watched(time: float, values: Sequence[float]) -> list[float]:
+            raise_if_over()  # of threads, which no signal ends
+            return function(start + time, values)
+
+        result = matlab.ode45(watched, end - start, state.tolist(), relative_tolerance, absolute_tolerance)
         reached = result.time[-1]
         inside = np.minimum(times - start, end - start)
         last = result.at(result.time[-1:])[0]
