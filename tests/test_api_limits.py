@@ -19,6 +19,7 @@ import pytest
 
 import rotor_mbs as rm
 from rotor_mbs.errors import InputError
+from rotor_mbs.models.lagrange import defects, reference
 from rotor_mbs.scenario.scene import Scene
 
 METHOD = "lagrange/dop853"
@@ -140,6 +141,51 @@ def test_a_time_limit_bounds_the_reference_of_a_comparison(called: Callable[...,
         called(lambda: rm.compare(data, _stiff(), timeout=1.0))
     with pytest.raises(InputError, match=SECONDS):
         rm.compare(data, _stiff(), timeout=float("nan"))
+
+
+WILD = """import numpy as np
+from rotor_mbs.methods.base import Method
+from rotor_mbs.solution.trajectory import Integration, Trajectory, sample_times
+
+class Wild:
+    def __init__(self, scene, settings):
+        self.scene = scene
+    def integrate(self):
+        return Integration(success=True)
+    def observe(self):
+        time = sample_times(self.scene)
+        angles, rates = (np.tile(start, (len(time), 1)) for start in (self.scene.initial_angles, [0.0] * 4))
+        rates[3] = 1e200
+        return Trajectory(time, angles, rates)
+
+METHOD = Method(name="wild", label="Wild", build=Wild)
+"""
+
+
+def test_finite_samples_that_are_no_motion_are_inaccurate_without_heyoka(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """And not over a time limit: nothing is integrated without end."""
+    for module in (defects, reference):
+        monkeypatch.setattr(module, "is_available", lambda: False)
+    path = tmp_path / "wild.py"
+    path.write_text(WILD)
+    for limits in ({}, {"timeout": 20.0}):
+        assert rm.run(_scene(), str(path), **limits).status == "inaccurate"
+        run = rm.run(_scene(), METHOD)
+        rates = run.rates.copy()
+        rates[3] = 1e200
+        data = {"time": run.time, "angles": run.angles, "rates": rates}
+        assert rm.compare(data, _scene(), **limits).status == "inaccurate"
+
+
+def test_a_misspelt_setting_is_told_before_a_scene_is_refused() -> None:
+    """Whether the method cannot represent it or is not installed."""
+    scene = _scene().replace(hub={"inertia": 3.0})
+    with pytest.raises(InputError, match=r"no setting 'relative_tolerence', perhaps relative_tolerance"):
+        rm.run(scene, ["printed/ode45"], relative_tolerence=1e-9)
+    with pytest.raises(InputError, match="hub"):
+        rm.run(scene, ["printed/ode45"], relative_tolerance=1e-9)
 
 
 def test_limits_of_threads_do_not_end_each_other() -> None:

@@ -41,7 +41,7 @@ EXPLAINED = {
     r"observables\.tip_path .*sign of -1 lost": "the last axis of three one-dimensional arrays is their axis 1",
     r"samples\._energies .*2 \* len\(columns\) scaled": "a count beside a count",
     r"tree\._tree .*0\.0 -> ": "the offset of a spring of no stiffness: the rotor's",
-    r"ode_solvers\._right_hand_side .*isinstance\(state": "plain floats or the array's own: the same numbers",
+    r"ode_solvers\.right_hand_side .*isinstance\(state": "plain floats or the array's own: the same numbers",
     r"ode_solvers\.__init__ .*0\.0 -> ": "the work of constant torques is known from the angles",
     r"(samples\.loads_at(_start)?|kinematics\.(work_of_constant_loads|exact_rotor_angle)) .*0\.0 -> ": (
         "a constant load is the same at any time"
