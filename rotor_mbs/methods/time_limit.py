@@ -202,14 +202,18 @@ class _Signals:
         self._is_giving_back = False
         self._due, self._interval = math.inf, 0.0  # of the caller's timer, on the monotonic clock; s, where it repeats
         self._is_missed = False  # whether an alarm of the caller came where it had to wait
+        self._is_lost = False  # whether Python ignored what was raised, so that it is raised once more
+        self._hook: Callable[[sys.UnraisableHookArgs], object] = sys.__unraisablehook__  # the caller's
 
     def enter(self) -> None:
         """Begin a block; in the outermost one ours take the place of the caller's handlers."""
         if self._handlers:  # ours are in place
             self._depth += 1
             return
-        self._raised, self._is_missed = None, False
+        self._raised, self._is_missed, self._is_lost = None, False, False
         try:
+            if sys.unraisablehook is not _on_unraisable:
+                self._hook, sys.unraisablehook = sys.unraisablehook, _on_unraisable
             for number in signal.valid_signals():
                 handler = signal.getsignal(number)
                 if number == _ALARM and handler is not None:  # one that is not Python's could not be set again
@@ -243,6 +247,9 @@ class _Signals:
 
     def _restore_handlers(self) -> None:
         try:
+            self.give_timer_back()
+            if sys.unraisablehook is _on_unraisable:
+                sys.unraisablehook = self._hook
             for number, handler in list(self._handlers.items()):
                 signal.signal(number, handler)
                 del self._handlers[number]
@@ -275,8 +282,11 @@ class _Signals:
         """Set the timer to what is due next: the caller's alarm or a limit."""
         if not self._shares_timer:
             return
-        ends = [limit.end for limit in _limits.stack if not limit.has_fired]
-        seconds = min([self._due, *ends]) - time.monotonic()
+        now = time.monotonic()
+        times = [self._due, *(limit.end for limit in _limits.stack if not limit.has_fired)]
+        if self._is_lost:
+            times.append(now + _SOON_S)
+        seconds = min(times) - now
         signal.setitimer(signal.ITIMER_REAL, 0.0 if math.isinf(seconds) else max(seconds, _SHORTEST_S))
 
     def give_timer_back(self, handler: Any = None) -> None:
@@ -315,6 +325,10 @@ class _Signals:
             periods = math.ceil((now - self._due) / self._interval) if self._interval else math.inf
             self._due += max(periods, 1) * self._interval if self._interval else math.inf
             self._call_alarm_handler(frame)
+        if self._is_lost and self._raised is not None:
+            self._is_lost = False
+            self.arm()
+            raise _passing(self._raised)
         stack = _limits.stack
         for place, limit in enumerate(stack):
             if limit.end > now or limit.has_fired:
@@ -361,6 +375,21 @@ class _Signals:
                 return  # it is raised at the end of the block
             raise _passing(error) from None
 
+    def on_unraisable(self, unraisable: sys.UnraisableHookArgs) -> None:
+        """Raise an exception of ours again that came where Python ignores it, as in a weak reference's callback."""
+        error = unraisable.exc_value
+        if isinstance(error, _HandlerError):
+            error = error.error
+        is_callers = error is not None and error is self._raised
+        if not (_handles_signals() and (is_callers or isinstance(error, OutOfTimeError))):
+            self._hook(unraisable)
+            return
+        self._is_lost = self._is_lost or is_callers
+        if not is_callers:
+            for limit in _limits.stack:
+                limit.has_fired = limit.is_known
+        self.share_timer()
+
 
 def _passing(error: BaseException) -> BaseException:
     """Return the exception itself, or what carries it where `except Exception` or our own code would catch it."""
@@ -379,6 +408,10 @@ def _on_signal(number: int, frame: FrameType | None) -> None:
     _signals.call_handler(number, frame)
 
 
+def _on_unraisable(unraisable: sys.UnraisableHookArgs) -> None:
+    _signals.on_unraisable(unraisable)
+
+
 _OURS = {
     function.__code__
     for function in (
@@ -388,6 +421,7 @@ _OURS = {
         caller_signals.__exit__,
         _on_alarm,
         _on_signal,
+        _on_unraisable,
     )
 }
 

@@ -9,6 +9,7 @@ import signal
 import sys
 import threading
 import time
+import weakref
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
@@ -41,7 +42,8 @@ def state() -> tuple[object, ...]:
     """What a call must leave as it was."""
     return (
         [signal.getsignal(number) for number in sorted(signal.valid_signals())], signal.getitimer(signal.ITIMER_REAL),
-        gc.isenabled(), np.geterr(), is_over(), module._limits.stack.copy(), module._signals._handlers.copy(),
+        gc.isenabled(), np.geterr(), sys.unraisablehook, is_over(), module._limits.stack.copy(),
+        module._signals._handlers.copy(),
     )  # fmt: skip
 
 
@@ -282,6 +284,26 @@ def test_what_a_handler_raises_is_raised_again_where_it_was_caught(error: type[B
         assert not went_on
     finally:
         signal.signal(signal.SIGUSR1, before)
+
+
+class Slowly:
+    """Goes slowly where Python ignores exceptions."""
+
+    def __init__(self) -> None:
+        weakref.finalize(self, wait, 0.05)
+
+
+def test_what_python_ignores_is_raised_once_more() -> None:
+    """An alarm, of the limit or the caller, that comes in the callback of a weak reference."""
+    with pytest.raises(OutOfTimeError), time_limit(0.02):
+        Slowly()
+        wait(10.0)
+
+    def ends() -> None:
+        Slowly()
+        wait(10.0)
+
+    alarmed(caller_signals()(ends), 0.02)
 
 
 # ---- Around calls
