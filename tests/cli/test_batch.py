@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -133,7 +134,7 @@ def test_a_scene_without_modes_is_a_line(folder: Path, monkeypatch: pytest.Monke
 
     monkeypatch.setattr(modes_study, "compute_modes", refuse_one)
     scene = rm.scene("check/general")
-    scenes = [scene.replace(name="first"), scene.replace(name="second")]
+    scenes = [replace(scene, name="first"), replace(scene, name="second")]
     made = modes_study.modes_of_scenes(scenes, folder / "m.h5", workers=0, timeout_s=60.0)
     assert (made[0].status, made[0].message) == ("refused", "no model takes it")
     assert list(read_modes(folder / "m.h5")) == ["second"]
