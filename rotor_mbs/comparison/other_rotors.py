@@ -14,7 +14,7 @@ import numpy as np
 from rotor_mbs.comparison.hypotheses import Hypothesis
 from rotor_mbs.models.lagrange import closed_form
 from rotor_mbs.models.lagrange.closed_form import Accelerations
-from rotor_mbs.models.lagrange.reference import LEFT_OUT, at_azimuths
+from rotor_mbs.models.lagrange.reference import REDUCED_EQUATIONS, with_azimuths
 from rotor_mbs.models.printed.derivation import Errata
 from rotor_mbs.models.printed.methods import equations, point_mass_rotor
 from rotor_mbs.scenario.catalogue import find_scenes, list_scenes
@@ -62,7 +62,7 @@ class RotorModel:
         RotorError
             Where the equations have no place for the scene.
         """
-        return at_azimuths(self.scene, self.azimuths) if self.azimuths else self.equations
+        return with_azimuths(self.scene, self.azimuths) if self.azimuths else self.equations
 
 
 @dataclass(frozen=True)
@@ -88,7 +88,7 @@ def rotor_hypotheses(scene: Scene) -> Iterator[Hypothesis[RotorModel]]:
             yield Hypothesis(text, RotorModel(other))
     for text, azimuths in _other_azimuths(scene):
         yield Hypothesis(text, RotorModel(scene, azimuths))
-    for terms, reduced in LEFT_OUT.items():
+    for terms, reduced in REDUCED_EQUATIONS.items():
         yield Hypothesis(f"without the {terms}", RotorModel(scene, equations=reduced))
     text = "small-angle approximation: sin x = x, cos x = 1"
     yield Hypothesis(text, RotorModel(scene, equations=_small_angles))

@@ -166,17 +166,27 @@ class Method:
         return chosen
 
     def finer(self, settings: Mapping[str, object], interval: float) -> dict[str, object]:
-        """Return the next finer settings of its ladder, {} at its end; interval: time between samples (s)."""
+        """Return the next finer settings of its ladder, {} at its end.
+
+        Parameters
+        ----------
+        settings : all settings of a run of the method.
+        interval : s, between samples.
+        """
         for ladder in self.ladders:
             if ladder.variant:
                 continue
             for rung in ladder.rungs(interval):
                 finer = ladder.fill(rung)
-                # By more than the rounding of a rung that was given with three digits.
-                lower = {name: value for name, value in finer.items() if value < 0.99 * float(str(settings[name]))}
+                lower: dict[str, object] = {}
+                for name, value in finer.items():
+                    current = settings[name]
+                    # By more than the rounding of a rung that was given with three digits.
+                    if isinstance(current, int | float) and value < 0.99 * current:
+                        lower[name] = value
                 first_setting = next(iter(finer))
                 if first_setting in lower:
-                    return dict(lower)
+                    return lower
         return {}
 
     @property

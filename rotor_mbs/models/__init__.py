@@ -14,19 +14,23 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Ode45Settings(Settings):
+    """MATLAB's ode45."""
+
     relative_tolerance: float = number(1e-6, above=0.0, doc="relative tolerance of the local error")
     absolute_tolerance: float = number(1e-9, above=0.0, doc="absolute tolerance of the local error, rad and rad/s")
 
 
 def equation_items(scene: Scene, sources: tuple[str, str] = ("", "")) -> list[BuiltItem]:
-    """The equations and terms of the scene; sources: where the rotor's and a pitch's come from."""
+    """Return the equations and terms of a scene; sources: where the rotor's and a pitch's come from."""
     moving = scene.moving_coordinates
-    built = [BuiltItem("equation", scene.coordinate_labels[i], sources[i > 0]) for i in moving]
-    built += [
-        BuiltItem("term", f"blade {i} fixed", "its pitch has no inertia")
-        for i in range(1, 1 + len(scene.blades))
-        if i not in moving
-    ]
+    of_rotor, of_pitch = sources
+    built = []
+    for coordinate in moving:
+        source = of_pitch if coordinate else of_rotor
+        built.append(BuiltItem("equation", scene.coordinate_labels[coordinate], source))
+    for coordinate in range(1, 1 + len(scene.blades)):
+        if coordinate not in moving:
+            built.append(BuiltItem("term", f"blade {coordinate} fixed", "its pitch has no inertia"))
     optional = {
         "hub inertia": scene.hub_inertia != 0.0,
         "gravity": scene.gravity != 0.0,

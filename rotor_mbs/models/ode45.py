@@ -61,21 +61,33 @@ _INTERPOLANT: Array = np.array([[float(weight) for weight in row] for row in INT
 
 @dataclass(frozen=True, slots=True)
 class Ode45Result:
-    """Every accepted step with its stages, so that the solution can be read off at any time it reached."""
+    """Every accepted step with its stages, so that the solution can be read off at any time it reached.
 
-    time: Array  # (k + 1,), (k + 1, n)
+    Attributes
+    ----------
+    time : (k + 1,), of the start and of every step's end.
+    state : (k + 1, n).
+    stages : (k, 7, n), derivatives of every step.
+    success, message : whether the end was reached, and why not.
+    evaluations : of the right-hand side.
+    """
+
+    time: Array
     state: Array
-    stages: Array  # (k, 7, n) derivatives
-    success: bool  # whether the end was reached, and why not
+    stages: Array
+    success: bool
     message: str
-    evaluations: int  # of the right-hand side
+    evaluations: int
 
     @property
     def steps(self) -> int:
         return len(self.time) - 1
 
     def at(self, times: Array) -> Array:
-        """(len(times), n): the pair's quartic interpolant; raises ValueError for a time beyond what was reached."""
+        """Return the pair's quartic interpolant at some times, (len(times), n).
+
+        Raises ValueError for a time beyond what was reached.
+        """
         if np.any(times < self.time[0]) or np.any(times > self.time[-1]):
             raise ValueError(f"the solution covers [{self.time[0]:g}, {self.time[-1]:g}] only")
         if self.steps == 0:
@@ -90,7 +102,7 @@ class Ode45Result:
         return value
 
     def refined(self) -> tuple[Array, Array]:
-        """(time, state) as ode45 returns them by default: four per step, of which the last is the step's end."""
+        """Return (time, state) as ode45 does by default: four per step, of which the last is the step's end."""
         fractions = np.arange(4) / 4
         inner = self.time[:-1, None] + np.diff(self.time)[:, None] * fractions
         time = np.append(inner.ravel(), self.time[-1])
@@ -102,8 +114,22 @@ class Ode45Result:
 def ode45(
     f: RightHandSide, t_end: float, initial_state: Sequence[float], rel_tol: float = 1e-3, abs_tol: float = 1e-6
 ) -> Ode45Result:
-    """Solve y' = f(t, y) over [0, t_end], t_end > 0, in plain floats; f returns NaN where it is not defined. Where a
-    step would have to be shorter than 16 units in the last place of t: success False, and what was reached."""
+    """Solve y' = f(t, y) in plain floats.
+
+    Parameters
+    ----------
+    f : returns NaN where it is not defined.
+    t_end : above 0; the start is at 0.
+    initial_state : (n,).
+    rel_tol, abs_tol : of the local error; the error of a component is relative to the larger of its magnitude and
+        abs_tol / rel_tol.
+
+    Returns
+    -------
+    Ode45Result
+        With success False, and what was reached, where a step would have to be shorter than 16 units in the last place
+        of t.
+    """
     threshold = abs_tol / rel_tol
     t, y = 0.0, [float(value) for value in initial_state]
     k1 = f(t, y)
@@ -144,32 +170,52 @@ def ode45(
 
 
 def smallest_step(t: float) -> float:
-    """hmin of ode45 at time t: 16 units in the last place."""
+    """Return hmin of ode45 at time t: 16 units in the last place."""
     return 16.0 * math.ulp(t)
 
 
 def first_step(y: Sequence[float], k1: Sequence[float], h_max: float, rel_tol: float, threshold: float) -> float:
-    """The first step ode45 tries: h_max, or less where the slope at the start is steep."""
+    """Return the first step that ode45 tries: h_max, or less where the slope at the start is steep."""
     slope = max(abs(rate) / max(abs(value), threshold) for value, rate in zip(y, k1, strict=True))
     rate_of_change = 1.25 * slope / rel_tol**_POWER
     return 1.0 / rate_of_change if h_max * rate_of_change > 1.0 else h_max
 
 
 def _after_success(h: float, error: float, rel_tol: float) -> float:
+    """Return the step after one of h with an error that is small enough: by the error, at most five times as long."""
     shrink = 1.25 * (error / rel_tol) ** _POWER
     return h / shrink if shrink > 0.2 else 5.0 * h
 
 
 def after_failure(h: float, error: float, rel_tol: float, failed_before: bool) -> float:
-    """The step tried after one of h whose error was too large, at the same time: the first time by the error."""
+    """Return the step tried after one of h with too large an error, at the same time: the first time by the error."""
     return 0.5 * h if failed_before else h * max(0.1, 0.8 * (rel_tol / error) ** _POWER)
 
 
 def _attempt(
     f: RightHandSide, t: float, y: list[float], k1: list[float], h: float, threshold: float
 ) -> tuple[list[float], tuple[list[float], ...], float]:
-    """One step: new state, the seven stages, error relative to the state (inf where it is not a number). Lists of
-    floats: for the few equations of a rotor twice as fast as NumPy arrays."""
+    """Take one step of the pair.
+
+    On lists of floats: for the few equations of a rotor twice as fast as on NumPy arrays.
+
+    Parameters
+    ----------
+    f : the right-hand side.
+    t, y : time and state at the start.
+    k1 : the derivative there.
+    h : the step.
+    threshold : below which a component's error is not relative to it.
+
+    Returns
+    -------
+    y_new : list of float
+        The state at the end.
+    stages : tuple of list of float
+        Seven derivatives.
+    error : float
+        Relative to the state; inf where it is not a number.
+    """
     k2 = f(t + _C2 * h, [a + h * (_A21 * p) for a, p in zip(y, k1, strict=True)])
     k3 = f(t + _C3 * h, [a + h * (_A31 * p + _A32 * q) for a, p, q in zip(y, k1, k2, strict=True)])
     k4 = f(t + _C4 * h, [a + h * (_A41 * p + _A42 * q + _A43 * r) for a, p, q, r in zip(y, k1, k2, k3, strict=True)])

@@ -41,10 +41,16 @@ class Linearized(NamedTuple):
 
 
 class System:
-    """An assembled system of the engine, which each `integrate` starts anew. Raises MethodRefusal, with the engine's
-    reason, where it does not take the parts."""
+    """An assembled system of the engine, which each `integrate` starts anew."""
 
     def __init__(self, parts: Sequence[Part]) -> None:
+        """Add all parts to a system, in their order.
+
+        Raises
+        ------
+        MethodRefusal
+            With the engine's reason, where it does not take the parts.
+        """
         self._container = _engine.SystemContainer()
         self._mbs = self._container.AddSystem()
         self._numbers: dict[Ref, object] = {}
@@ -66,6 +72,7 @@ class System:
         self._initial_state = self._mbs.systemData.GetSystemState(_engine.ConfigurationType.Initial)
 
     def _argument(self, key: str, value: Any) -> object:
+        """Return an argument as the engine takes it: numbers of parts, and its own types."""
         if isinstance(value, Ref):
             return self._numbers[value]
         if isinstance(value, tuple) and value and isinstance(value[0], Ref):
@@ -73,15 +80,14 @@ class System:
         return _TRANSLATIONS[key](value) if key in _TRANSLATIONS else value
 
     def rows(self, sensor: str) -> Array:
-        """(n, 1 + k) rows that a sensor kept in the last integration: time in s, then its k values."""
+        """Return the rows that a sensor kept in the last integration, (n, 1 + k): time in s, then its k values."""
         stored = np.array(self._mbs.GetSensorStoredData(self._numbers[Ref("sensor", sensor)]), dtype=float, ndmin=2)
         if sensor in self._initial_values:
             stored[0, 1:] = self._initial_values[sensor]
         return stored
 
     def linearized(self, step: float) -> Linearized:
-        """The engine's own linearization at the initial state, by one-sided difference quotients with `step` (rad,
-        m)."""
+        """Return the engine's linearization at the initial state, by one-sided differences of `step` (rad, m)."""
         settings = _engine.SimulationSettings()
         settings.solution.file.write = False
         differences = settings.staticSolver.newton.numericalDifferentiation
@@ -91,7 +97,7 @@ class System:
         return Linearized(np.array(M), np.array(K), np.array(D), np.array(C))
 
     def forces(self) -> Array:
-        """(n,) applied and gyroscopic forces on the coordinates at the initial state, without those of the joints."""
+        """Return applied and gyroscopic forces on the coordinates at the initial state, (n,), without the joints'."""
         solver, settings = _engine.MainSolverStatic(), _engine.SimulationSettings()
         settings.solution.file.write = False
         solver.InitializeSolver(self._mbs, settings)
@@ -205,9 +211,17 @@ class System:
         self._solver = _engine.MainSolverImplicitSecondOrder()
 
     def initial_values(self, time: float) -> tuple[Array, Array]:
-        """Coordinates, rates, accelerations and multipliers at the state that an integration starts from, and its data
-        coordinates. The engine differentiates the constraints' velocities by one-sided differences of polynomials of
-        third degree in the coordinates, so that three steps, extrapolated to zero, leave rounding errors."""
+        """Compute the state that an integration from a time (s) starts from, accelerations and multipliers included.
+
+        Returns
+        -------
+        values : ndarray
+            As of `values`.
+        turns : ndarray
+            As of `turns`.
+        """
+        # The engine differentiates the constraints' velocities by one-sided differences. They are polynomials of third
+        # degree in the coordinates, so that three steps, extrapolated to zero, leave rounding errors.
         integration = self._settings.timeIntegration
         integration.startTime, integration.endTime, integration.numberOfSteps = time, time + 1.0, 1
         integration.generalizedAlpha.computeInitialAccelerations = True
@@ -224,13 +238,25 @@ class System:
         return limit_at_zero(by_step[::-1], 2.0), self.turns()
 
     def advance(self, start: float, end: float, steps: int, total: Integration) -> str:
-        """Integrate from the state set last in equal steps, counted in `total`; why it failed, or ""."""
+        """Integrate from the state set last in equal steps.
+
+        Parameters
+        ----------
+        start, end : s.
+        steps : number of steps.
+        total : in which steps and evaluations are counted.
+
+        Returns
+        -------
+        str
+            Why it failed; "" where it did not.
+        """
         integration = self._settings.timeIntegration
         integration.startTime, integration.endTime, integration.numberOfSteps = start, end, steps
         return self._solve(self._solver, self._settings, 0, total)
 
     def values(self) -> Array:
-        """Coordinates, rates, accelerations, multipliers where the last integration ended."""
+        """Return coordinates, rates, accelerations and multipliers where the last integration ended."""
         data, current = self._mbs.systemData, _engine.ConfigurationType.Current
         return np.concatenate(
             [
@@ -242,9 +268,11 @@ class System:
         )
 
     def turns(self) -> Array:
+        """Return the data coordinates where the last integration ended: angles of springs over many turns."""
         return np.array(self._mbs.systemData.GetDataCoordinates(_engine.ConfigurationType.Current))
 
     def start_from(self, values: Array, turns: Array) -> None:
+        """Set the state from which the next integration starts, as of `values` and `turns`."""
         self._set(values, turns, _engine.ConfigurationType.Initial)
 
     def _set(self, values: Array, turns: Array, where: Any) -> None:
@@ -257,7 +285,13 @@ class System:
             data.SetDataCoordinates(turns, where)
 
     def read(self, time: float, values: Array, turns: Array) -> dict[str, Array]:
-        """By sensor, what it reads of a state."""
+        """Return the readings of all sensors at a state, by the sensors' names.
+
+        Parameters
+        ----------
+        time : s.
+        values, turns : the state, as of the methods of these names.
+        """
         data, current = self._mbs.systemData, _engine.ConfigurationType.Current
         data.SetTime(time, current)
         self._set(values, turns, current)
@@ -301,11 +335,13 @@ _OLD_JACOBIAN_FROM = 13
 
 
 def linear_solver(coordinates: int, constraints: int) -> str:
-    """The engine's name of the solver for a system of that size. A tree, without constraints, is one dense block."""
+    """Return the engine's name of the linear solver for a system of that size."""
+    # A tree, without constraints, is one dense block.
     return "EigenSparse" if constraints and coordinates + constraints >= _SPARSE_FROM else "EigenDense"
 
 
 def _settings(scheme: Scheme, coordinates: int, constraints: int) -> Any:
+    """Return the engine's settings for a scheme and a system of so many coordinates and constraints."""
     settings = _engine.SimulationSettings()
     settings.solution.file.write = False
     integration = settings.timeIntegration
@@ -332,6 +368,7 @@ def _is_caused_by_limit(error: BaseException | None) -> bool:
 
 
 def _one_line(text: str) -> str:
+    """Return a text of the engine in one line of at most 300 characters."""
     lines = [line.strip(" =*+\t") for line in text.splitlines()]
     return "; ".join(line for line in lines if line)[:300]
 

@@ -34,7 +34,10 @@ class Placed:
 
 
 def placed_bodies(scene: Scene) -> list[Placed]:
-    """Hub and pitching blades as forward kinematics puts them at the start: positions and velocities fit the joints."""
+    """Return hub and blades that pitch as forward kinematics places them at the start.
+
+    Positions and velocities fit the joints.
+    """
     rotor, rate = scene.initial_angles[0], scene.initial_rates[0]
     shaft = np.array([0.0, 1.0, 0.0])
     spin = rate * shaft
@@ -49,7 +52,14 @@ def placed_bodies(scene: Scene) -> list[Placed]:
 
 
 def parts(scene: Scene, loads: Loads, node: str = "euler_parameters") -> list[Part]:
-    """Everything the engine has of this scene, in the order it is built; `node` as in the settings."""
+    """Return everything the engine has of a scene, in the order it is built.
+
+    Parameters
+    ----------
+    scene : the rotor, its start, and the outputs that are read by sensors.
+    loads : the loads that the load functions read while the engine integrates.
+    node : coordinates of a body's rotation, as in the settings.
+    """
     hub, *blades = placed_bodies(scene)
     built = [Part("object", "ground", "ObjectGround")]
     for placed in (hub, *blades):
@@ -94,10 +104,12 @@ def parts(scene: Scene, loads: Loads, node: str = "euler_parameters") -> list[Pa
 
 
 def items(scene: Scene) -> list[BuiltItem]:
+    """Return the parts of a scene as `show --build` lists them."""
     return geometry.items(parts(scene, Loads(scene)))
 
 
 def _body(placed: Placed, node: str) -> list[Part]:
+    """Return the node and the object of a body; `placed`: where it is at the start; node: as in the settings."""
     body, name = placed.body, placed.name
     position = placed.rotation @ body.com
     with np.errstate(over="ignore", invalid="ignore"):  # of a rate that has no bound: the run says so
@@ -105,8 +117,10 @@ def _body(placed: Placed, node: str) -> list[Part]:
     p = geometry.quaternion(placed.about_shaft, placed.pitch)
     if node == "euler_parameters":
         type_, pose, motion = "NodeRigidBodyEP", p, geometry.quaternion_rate(p, placed.omega)
-    else:  # its velocity coordinates are the angular velocity in the body's frame
-        type_, pose, motion = "NodeRigidBodyRotVecLG", geometry.rotation_vector(p), placed.rotation.T @ placed.omega
+    else:
+        # Velocity coordinates of this node are the angular velocity in the body's frame.
+        type_, pose = "NodeRigidBodyRotVecLG", geometry.rotation_vector(p)
+        motion = placed.rotation.T @ placed.omega
     parameters = {
         "referenceCoordinates": [*position, *pose],
         "initialCoordinates": [0.0] * (3 + len(pose)),
@@ -126,30 +140,41 @@ def _body(placed: Placed, node: str) -> list[Part]:
 
 
 def _on_body(placed: Placed, where: str, rotation: Array) -> Part:
+    """Return a marker at the hub centre, with a (3, 3) rotation, that is fixed on a body."""
     return _marker(placed.name, where, rotation, -placed.body.com)
 
 
 def _marker(body: str, where: str, rotation: Array, position: Array) -> Part:
-    """A marker fixed on a body: (3, 3) rotation and (3,) position in m, both in the body's frame."""
+    """Return a marker fixed on a body: (3, 3) rotation and (3,) position in m, both in the body's frame."""
     parameters = {"bodyNumber": Ref("object", body), "localHT": (rotation, position)}
     return Part("marker", f"{body} {where}", "MarkerBodyRigid", parameters)
 
 
 def _bearing(name: str, first: Part, second: Part) -> list[Part]:
+    """Return two markers and the revolute joint about the z axes of both."""
     markers = (Ref("marker", first.name), Ref("marker", second.name))
     return [first, second, Part("object", name, "ObjectJointRevoluteZ", {"markerNumbers": markers})]
 
 
 def _pitch_spring(scene: Scene, loads: Loads, blade: int, seat: str, root: str) -> list[Part]:
-    """Spring, damper and torque between hub and blade; the engine adds `torque` to what resists."""
-    stiffness, damping = scene.bearings[blade]
-    name, moment = f"pitch spring {blade + 1}", moment_on(scene, loads, 1 + blade)
-    constants = {"stiffness": stiffness, "damping": damping, "offset": constant_value(scene.pitch_loads[blade][1])}
-    if all(map(is_constant, scene.pitch_loads[blade])):
-        constants["torque"] = -moment.at(0.0)
-    constants = {key: value for key, value in constants.items() if value}
+    """Return spring, damper and torque between hub and blade; [] where none of them acts.
+
+    Parameters
+    ----------
+    scene : the rotor.
+    loads : the loads that a torque over time reads while the engine integrates.
+    blade : counted from 0.
+    seat, root : names of the markers on the hub and on the blade.
+    """
     if not is_driven(scene, blade):
         return []
+    stiffness, damping = scene.bearings[blade]
+    _, rest = scene.pitch_loads[blade]
+    name, moment = f"pitch spring {blade + 1}", moment_on(scene, loads, 1 + blade)
+    constants = {"stiffness": stiffness, "damping": damping, "offset": constant_value(rest)}
+    if all(map(is_constant, scene.pitch_loads[blade])):
+        constants["torque"] = -moment.at(0.0)  # the engine adds its torque to what resists
+    constants = {key: value for key, value in constants.items() if value}
     built, counter = [], ""
     if stiffness:
         counter = f"turns of {name}"
@@ -164,7 +189,7 @@ def _pitch_spring(scene: Scene, loads: Loads, blade: int, seat: str, root: str) 
 
 
 def _spring_torque(moment: Moment) -> Callable[..., float]:
-    """The spring's law as the engine asks for it: N m that resist a rotation (rad) and its rate (rad/s)."""
+    """Return the spring's law as the engine asks for it: N m that resist a rotation (rad) and its rate (rad/s)."""
 
     def torque(
         _system: object, time: float, _item: int, rotation: float, rate: float,
@@ -176,6 +201,7 @@ def _spring_torque(moment: Moment) -> Callable[..., float]:
 
 
 def _spring(name: str, first: str, second: str, counter: str = "", **constants: float) -> Part:
+    """Return a torsional spring and damper between two markers; counter: the node that counts its turns."""
     parameters: dict[str, object] = {"markerNumbers": (Ref("marker", first), Ref("marker", second)), **constants}
     if counter:
         parameters["nodeNumber"] = Ref("node", counter)

@@ -27,22 +27,29 @@ class Body:
 
 
 def rotation_y(cosine: float, sine: float) -> Array:
-    """(3, 3) turn about the shaft; its y row and column are exact, which keeps exact zeros out of plane."""
+    """Return the turn about the shaft, (3, 3), by the cosine and the sine of its angle.
+
+    Its y row and column are exact, which keeps exact zeros out of plane.
+    """
     return np.array([[cosine, 0.0, sine], [0.0, 1.0, 0.0], [-sine, 0.0, cosine]])
 
 
 def rotation_z(angle: float) -> Array:
+    """Return the turn about z by an angle in rad, (3, 3)."""
     c, s = math.cos(angle), math.sin(angle)
     return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
 
 
 def mounting(index: int, count: int) -> Array:
-    """(3, 3) rotation from hub frame to the zero-pitch frame of blade `index` (from 0) of `count`."""
+    """Return the rotation from the hub frame to the zero-pitch frame of blade `index` (from 0) of `count`, (3, 3)."""
     return rotation_y(*_turn(index, count))
 
 
 def _turn(part: int, whole: int) -> tuple[float, float]:
-    """Cosine and sine of 2π part/whole, folded into the first half quadrant: blades that balance do so exactly."""
+    """Return cosine and sine of 2π part/whole, folded into the first half quadrant.
+
+    So blades that balance do so exactly.
+    """
     quarter, rest = divmod(4 * part, whole)
     quarters = min(rest, whole - rest) / whole
     angle = 0.5 * math.pi * quarters
@@ -54,37 +61,56 @@ def _turn(part: int, whole: int) -> tuple[float, float]:
 
 
 def quaternion(about_shaft: float, pitch: float) -> Array:
-    """(4,) Euler parameters of Ry(about_shaft) Rz(pitch), scalar first."""
+    """Return the Euler parameters of Ry(about_shaft) Rz(pitch), (4,), scalar first."""
     c, s = math.cos(0.5 * about_shaft), math.sin(0.5 * about_shaft)
     cp, sp = math.cos(0.5 * pitch), math.sin(0.5 * pitch)
     return np.array([c * cp, s * sp, s * cp, c * sp])
 
 
 def quaternion_rate(p: Array, omega: Array) -> Array:
-    """(4,) time derivative of Euler parameters `p` at angular velocity `omega` (3,) rad/s in the base frame."""
+    """Return the time derivative of Euler parameters, (4,) per s.
+
+    Parameters
+    ----------
+    p : (4,), scalar first.
+    omega : (3,) rad/s, angular velocity in the base frame.
+    """
     e0, e = p[0], p[1:]
     return 0.5 * np.concatenate([[-(e @ omega)], e0 * omega + np.cross(omega, e)])
 
 
 def rotation_vector(p: Array) -> Array:
-    """(3,) rad: axis times angle, at most π long, of the rotation with Euler parameters `p`."""
-    p = p if p[0] >= 0.0 else -p
+    """Return axis times angle, (3,) rad and at most π long, of the rotation with Euler parameters `p`."""
+    p = p if p[0] >= 0.0 else -p  # both are the same rotation
     length = float(np.linalg.norm(p[1:]))
     return 2.0 * p[1:] if length == 0.0 else p[1:] * (2.0 * math.atan2(length, p[0]) / length)
 
 
 def movable_blades(scene: Scene) -> tuple[int, ...]:
-    """Indices (from 0) of the blades that resist pitching; the others are rigidly part of the hub."""
+    """Return the indices (from 0) of the blades whose pitch has inertia; the others are rigidly part of the hub."""
     return tuple(i for i, blade in enumerate(scene.blades) if blade.has_pitch_inertia)
 
 
 def fixed_blade_rotation(scene: Scene, index: int) -> Array:
-    """(3, 3) rotation from hub frame to the frame of a blade fixed at its initial pitch."""
+    """Return the rotation from the hub frame to the frame of a blade fixed at its initial pitch, (3, 3)."""
     return mounting(index, len(scene.blades)) @ rotation_z(scene.initial_angles[1 + index])
 
 
 def body_of_point(scene: Scene, index: int, point: Sequence[float]) -> tuple[int, Array]:
-    """Which body a point (3,) m of a blade is on, 0 for the hub, k for the k-th blade that pitches; (3,) m there."""
+    """Return the body that a point of a blade is on, and the place of the point in that body's frame.
+
+    Parameters
+    ----------
+    index : of the blade, from 0.
+    point : (3,) m in the blade's frame.
+
+    Returns
+    -------
+    body : int
+        0 for the hub, k for the k-th blade that pitches.
+    place : ndarray, shape (3,)
+        m.
+    """
     blades = movable_blades(scene)
     if index in blades:
         return 1 + blades.index(index), np.array(point)
@@ -92,12 +118,15 @@ def body_of_point(scene: Scene, index: int, point: Sequence[float]) -> tuple[int
 
 
 def blade_body(blade: Blade) -> Body:
+    """Return a blade as a rigid body in its own frame."""
     return Body(blade.mass, np.array(blade.centre_of_mass), blade.inertia_tensor)
 
 
 def hub_body(scene: Scene) -> Body:
-    """The hub as a thin disc about the shaft, with every blade that cannot pitch made part of it. The disc's other two
-    moments, half of the axial one, are never felt: they make it a body that can exist."""
+    """Return the hub as a thin disc about the shaft, with every blade that cannot pitch made part of it.
+
+    The disc's other two moments, half of the axial one, are never felt: they make it a body that can exist.
+    """
     half = 0.5 * scene.hub_inertia
     parts = [Body(0.0, np.zeros(3), np.diag([half, scene.hub_inertia, half]))]
     for index, blade in enumerate(scene.blades):
@@ -108,6 +137,7 @@ def hub_body(scene: Scene) -> Body:
 
 
 def _joined(parts: list[Body]) -> Body:
+    """Return several bodies, given in one frame, as a single one."""
     mass = sum(part.mass for part in parts)
     com = sum((part.mass * part.com for part in parts), np.zeros(3)) / mass if mass else np.zeros(3)
     inertia = np.zeros((3, 3))
@@ -146,12 +176,24 @@ class Part:
 
 
 def sensor(name: str, type_: str, quantity: str, detail: str = "", **where: object) -> Part:
-    """A sensor that keeps `quantity` (the engine's name of an output) in memory."""
+    """Return a sensor that keeps its readings in memory.
+
+    Parameters
+    ----------
+    name : of the sensor.
+    type_ : the engine's name of its type.
+    quantity : the engine's name of what it reads.
+    detail : text for `show --build`; the quantity where left out.
+    where : arguments that say what is measured.
+    """
     stored = {"outputVariableType": quantity, "storeInternal": True, "writeToFile": False, **where}
     return Part("sensor", name, type_, stored, detail or quantity)
 
 
 def items(parts: Sequence[Part]) -> list[BuiltItem]:
-    return [
-        BuiltItem(part.kind, part.name, f"{part.type}: {part.detail}" if part.detail else part.type) for part in parts
-    ]
+    """Return the parts as `show --build` lists them."""
+    built = []
+    for part in parts:
+        detail = f"{part.type}: {part.detail}" if part.detail else part.type
+        built.append(BuiltItem(part.kind, part.name, detail))
+    return built

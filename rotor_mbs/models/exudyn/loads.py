@@ -1,6 +1,8 @@
-"""Loads that drive the rotor, as load functions of the engine; and the loads in N and N m on blade roots and hub that
-follow. The chain: multipliers of joints, moments of connectors. The tree, and a blade that is part of the hub: Newton's
-and Euler's laws on the engine's accelerations."""
+"""Loads that drive the rotor, as load functions of the engine; and the loads in N and N m on blade roots and hub.
+
+Of the chain these follow from multipliers of joints and moments of connectors; of the tree, and of a blade that is
+part of the hub, from Newton's and Euler's laws on the engine's accelerations.
+"""
 
 from __future__ import annotations
 
@@ -73,21 +75,27 @@ class Loads:
 
 @dataclass(frozen=True)
 class Moment:
-    """A moment as a load function of the engine: the sum of factors times loads."""
+    """A moment as a load function of the engine: the sum of factors times loads.
 
-    loads: Loads  # over time
-    # (place in `Scene.load_tables`, factor); the factor of a rest angle is the spring's stiffness, N m/rad
+    Attributes
+    ----------
+    loads : the loads over time.
+    terms : (load, factor) as of `PrescribedMoment`.
+    """
+
+    loads: Loads
     terms: tuple[tuple[int, float], ...]
 
     def at(self, time: float) -> float:
-        """N m at `time` s."""
+        """Return the moment (N m) at a time (s)."""
         return sum(factor * self.loads.segment.at(load, time) for load, factor in self.terms)
 
     def scalar(self, _system: object, time: float, _load: float) -> float:
+        """Return the moment; the engine's load function of a load on a coordinate."""
         return self.at(time)
 
     def about_y(self, _system: object, time: float, _load: object) -> list[float]:
-        """Load function of a torque vector along the shaft."""
+        """Return the moment as a vector; the engine's load function of a torque along the shaft."""
         return [0.0, self.at(time), 0.0]
 
 
@@ -109,16 +117,32 @@ Sampled = Callable[[str], Array]
 
 
 def _motion_outputs(scene: Scene, i: int) -> dict[str, str]:
-    """What Newton's and Euler's laws need of blade i: the engine's names of outputs by those of sensors."""
+    """Return what Newton's and Euler's laws need of blade i: names of the engine's outputs by name of sensor."""
     outputs = {"root acceleration": "Acceleration", "root rotation": "RotationMatrix"}
     if not scene.blades[i].is_point_mass:
-        outputs |= {"root spin": "AngularVelocityLocal", "root spin rate": "AngularAccelerationLocal"}
+        outputs["root spin"] = "AngularVelocityLocal"
+        outputs["root spin rate"] = "AngularAccelerationLocal"
     return {f"blade {i + 1} {what}": output for what, output in outputs.items()}
 
 
 def _newton_euler(scene: Scene, i: int, sampled: Sampled) -> tuple[Array, Array, Array]:
-    """(n, 3) force, moment about the root in the frame of blade i; (n, 3, 3) that frame to the base frame. F = m (a + g
-    e_z), M = I α + ω × I ω + r × F, r the centre of mass, I the inertia about it."""
+    """Compute the load on a blade's root by Newton's and Euler's laws.
+
+    F = m (a + g e_z), M = I α + ω × I ω + r × F, with r the centre of mass and I the inertia about it.
+
+    Parameters
+    ----------
+    scene : the rotor.
+    i : the blade, from 0.
+    sampled : the values of a sensor by its name.
+
+    Returns
+    -------
+    force, moment : ndarray, shape (n, 3)
+        N and N m, about the root, in the frame of the blade.
+    frames : ndarray, shape (n, 3, 3)
+        From that frame to the base frame.
+    """
     blade, name = scene.blades[i], f"blade {i + 1} root"
     # From the blade's frame to the engine's body that it is, or, where it cannot pitch, is part of.
     turned = np.eye(3) if i in movable_blades(scene) else fixed_blade_rotation(scene, i)
@@ -134,8 +158,22 @@ def _newton_euler(scene: Scene, i: int, sampled: Sampled) -> tuple[Array, Array,
 
 
 def tree_loads(scene: Scene, time: Array, sampled: Sampled) -> dict[str, Array]:
-    """Every blade by Newton and Euler, their sum with the hub's share at the shaft; the moment of a pitch actuator is
-    what they leave about the pitch axis."""
+    """Compute the loads of the tree from the engine's accelerations.
+
+    Every blade by Newton's and Euler's laws; their sum, with the hub's share, is the load at the shaft, and the moment
+    of a pitch actuator is what they leave about the pitch axis.
+
+    Parameters
+    ----------
+    scene : the rotor.
+    time : (n,) s, of the samples.
+    sampled : the values of a sensor by its name.
+
+    Returns
+    -------
+    dict of ndarray
+        By quantity, (n, ...).
+    """
     blades = [_newton_euler(scene, i, sampled) for i in range(len(scene.blades))]
     shaft_force = sum(_in_base(frames, force) for force, _, frames in blades)
     shaft_moment = sum(_in_base(frames, moment) for _, moment, frames in blades)
@@ -151,6 +189,7 @@ def tree_loads(scene: Scene, time: Array, sampled: Sampled) -> dict[str, Array]:
 
 
 def tree_sensors(scene: Scene, on_link: Callable[[str, str, int, Array], Part]) -> list[Part]:
+    """Return the sensors that `tree_loads` reads; on_link: (name, quantity, link, point) -> sensor."""
     sensors = []
     for i, blade in enumerate(scene.blades):
         place = body_of_point(scene, i, blade.centre_of_mass)
@@ -161,7 +200,7 @@ def tree_sensors(scene: Scene, on_link: Callable[[str, str, int, Array], Part]) 
 
 
 def chain_sensors(scene: Scene, hub: Body) -> list[Part]:
-    """What `chain_loads` reads beside the rotations: joints, connectors, and blades that are part of the hub."""
+    """Return what `chain_loads` reads beside rotations: joints, connectors, and blades that are part of the hub."""
     sensors = _joint_sensors("shaft bearing", "shaft damper" if scene.shaft_damping else "")
     for i in range(len(scene.blades)):
         if i in movable_blades(scene):
@@ -174,16 +213,29 @@ def chain_sensors(scene: Scene, hub: Body) -> list[Part]:
 
 
 def _joint_sensors(joint: str, connector: str) -> list[Part]:
+    """Return the sensors of a joint and, where it has one, of its spring or damper."""
     outputs = {f"{joint} force": ("ForceLocal", joint), f"{joint} torque": ("TorqueLocal", joint)}
     if connector:
         outputs[f"{connector} torque"] = ("TorqueLocal", connector)
-    return [
-        sensor(name, "SensorObject", output, objectNumber=Ref("object", item))
-        for name, (output, item) in outputs.items()
-    ]
+    sensors = []
+    for name, (output, item) in outputs.items():
+        sensors.append(sensor(name, "SensorObject", output, objectNumber=Ref("object", item)))
+    return sensors
 
 
 def chain_loads(scene: Scene, sampled: Sampled) -> dict[str, Array]:
+    """Compute the loads of the chain from multipliers of joints and moments of connectors.
+
+    Parameters
+    ----------
+    scene : the rotor.
+    sampled : the values of a sensor by its name.
+
+    Returns
+    -------
+    dict of ndarray
+        By quantity, (n, ...).
+    """
     hub = matrices(sampled("hub rotation"))
     roots, actuators = [], np.zeros((len(hub), len(scene.blades)))
     for i in range(len(scene.blades)):
@@ -191,9 +243,11 @@ def chain_loads(scene: Scene, sampled: Sampled) -> dict[str, Array]:
             roots.append(_newton_euler(scene, i, sampled)[:2])
             continue
         frames = matrices(sampled(f"blade {i + 1} rotation"))
-        force, moment = _joint_reaction(f"pitch bearing {i + 1}", hub @ mounting(i, len(scene.blades)), frames, sampled)
+        seat = hub @ mounting(i, len(scene.blades))
+        force, moment = _joint_reaction(f"pitch bearing {i + 1}", seat, frames, sampled)
         if is_driven(scene, i):
             actuators[:, i] = -sampled(f"pitch spring {i + 1} torque")[:, 0]
+        # A joint has no moment about its own axis: there the connector acts.
         along = actuators[:, i, None] * [0.0, 0.0, 1.0]
         roots.append((_in_frames(frames, force), _in_frames(frames, moment) + along))
     ground = np.broadcast_to(ALONG_SHAFT, hub.shape)
@@ -204,8 +258,17 @@ def chain_loads(scene: Scene, sampled: Sampled) -> dict[str, Array]:
 
 
 def _joint_reaction(joint: str, seat: Array, root: Array, sampled: Sampled) -> tuple[Array, Array]:
-    """(n, 3) force and moment of a joint on its second body, base frame, from its (n, 3, 3) frames on both. The engine
-    gives the force on the first body, and multipliers λ of x₁·z₀ = 0, y₁·z₀ = 0: a moment λ₀ z₀ × x₁ + λ₁ z₀ × y₁."""
+    """Compute the force and the moment of a joint on its second body, (n, 3) each in the base frame.
+
+    The engine gives the force on the first body, and multipliers λ of the constraints x₁·z₀ = 0 and y₁·z₀ = 0, which
+    are the moment λ₀ z₀ × x₁ + λ₁ z₀ × y₁.
+
+    Parameters
+    ----------
+    joint : its name.
+    seat, root : (n, 3, 3) its frames on the first and on the second body.
+    sampled : the values of a sensor by its name.
+    """
     force = -_in_base(seat, sampled(f"{joint} force"))
     multipliers = sampled(f"{joint} torque")
     x, y, z = root[:, :, 0], root[:, :, 1], seat[:, :, 2]
@@ -213,12 +276,15 @@ def _joint_reaction(joint: str, seat: Array, root: Array, sampled: Sampled) -> t
 
 
 def matrices(rows: Array) -> Array:
+    """Return (n, 3, 3) matrices from the engine's rows of nine elements."""
     return rows.reshape(-1, 3, 3)
 
 
 def _in_base(frames: Array, vectors: Array) -> Array:
+    """Return (n, 3) vectors of a body's frames, (n, 3, 3), in the base frame."""
     return np.asarray((frames @ vectors[:, :, None])[:, :, 0])
 
 
 def _in_frames(frames: Array, vectors: Array) -> Array:
+    """Return (n, 3) vectors of the base frame in a body's frames, (n, 3, 3)."""
     return np.asarray((vectors[:, None, :] @ frames)[:, 0, :])

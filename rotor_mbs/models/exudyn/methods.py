@@ -1,34 +1,27 @@
-"""The six methods of Exudyn: two models, each with its integrators. The engine is loaded when a system is built."""
+"""The seven methods of Exudyn: two models, each with its integrators. The engine is loaded when a system is built."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from importlib import import_module
-from itertools import product
 from typing import Any
 
-from rotor_mbs.methods.base import Method, late, step_ladder, tolerance_ladder
-from rotor_mbs.methods.settings import choice, step
+from rotor_mbs.methods.base import Ladder, Method, late, step_ladder, tolerance_ladder
 from rotor_mbs.models.exudyn import schemes
 
 _LINEARIZATION = "rotor_mbs.models.exudyn.linearization"
 _SOLVERS = "rotor_mbs.models.exudyn.solvers"
 
-_NODE = choice("euler_parameters", ("euler_parameters", "rotation_vector"), doc="coordinates of a body's rotation")
-
-
-@dataclass(frozen=True)
-class ChainAlphaSettings(schemes.AlphaSettings):
-    step: float = step(5e-4)
-    node: str = _NODE
-
-
-@dataclass(frozen=True)
-class ChainNewmarkSettings(schemes.NewtonSettings):
-    node: str = _NODE
-
 
 def _method(model: str, integrator: str, label: str, builder: str = "", **facts: Any) -> Method:
+    """Return a method of Exudyn.
+
+    Parameters
+    ----------
+    model, integrator : the two parts of its name.
+    label : of the integrator.
+    builder : the function build_... in `solvers`; that of the model where left out.
+    facts : other fields of the `Method`.
+    """
     in_tree = model == "exudyn_tree"
     kind = "tree" if in_tree else "chain"
     return Method(
@@ -44,7 +37,7 @@ def _method(model: str, integrator: str, label: str, builder: str = "", **facts:
     )
 
 
-# What the names and the labels of curves have for a spectral radius, and for a kind of node; the first is the default.
+# By setting: what the names and the labels of curves have for it. The first is the default.
 _RADII = {0.9: ("", ""), 0.7: ("_rho0.7", "ρ∞ 0.7"), 1.0: ("_rho1.0", "ρ∞ 1")}
 _NODES = {"euler_parameters": ("", ""), "rotation_vector": ("_rotation_vector", "rotation vector")}
 
@@ -52,18 +45,22 @@ _TREE_ALPHA_LADDERS = tuple(
     step_ladder(8, choices={"spectral_radius": radius}, variant=variant, label=label)
     for radius, (variant, label) in _RADII.items()
 )
-_CHAIN_ALPHA_LADDERS = tuple(
-    step_ladder(
-        7,
-        choices={"spectral_radius": radius, "node": node},
-        variant=of_radius[0] + of_node[0],
-        label=", ".join(filter(None, (of_radius[1], of_node[1]))),
-    )
-    for (node, of_node), (radius, of_radius) in product(_NODES.items(), _RADII.items())
-)
 _NEWMARK_LADDERS = tuple(
     step_ladder(7, choices={"node": node}, variant=variant, label=label) for node, (variant, label) in _NODES.items()
 )
+
+
+def _chain_alpha_ladders() -> tuple[Ladder, ...]:
+    """Return a ladder for each kind of node with each spectral radius."""
+    ladders = []
+    for node, (node_variant, node_label) in _NODES.items():
+        for radius, (radius_variant, radius_label) in _RADII.items():
+            labels = [label for label in (radius_label, node_label) if label]
+            choices = {"spectral_radius": radius, "node": node}
+            variant = radius_variant + node_variant
+            ladders.append(step_ladder(7, choices=choices, variant=variant, label=", ".join(labels)))
+    return tuple(ladders)
+
 
 METHODS = (
     _method(
@@ -99,12 +96,12 @@ METHODS = (
     ),
     _method(
         "exudyn_chain", "generalized_alpha", "generalized-α",
-        settings=ChainAlphaSettings, order=2, fixed_step=True,
-        ladders=_CHAIN_ALPHA_LADDERS,
+        settings=schemes.ChainAlphaSettings, order=2, fixed_step=True,
+        ladders=_chain_alpha_ladders(),
     ),
     _method(
         "exudyn_chain", "newmark_index2", "Newmark index 2",
-        settings=ChainNewmarkSettings, order=2, fixed_step=True,
+        settings=schemes.ChainNewmarkSettings, order=2, fixed_step=True,
         ladders=_NEWMARK_LADDERS,
     ),
 )  # fmt: skip

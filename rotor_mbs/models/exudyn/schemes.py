@@ -1,28 +1,37 @@
-"""The engine's time integrations as data: which solver, which options, and the settings a user may choose."""
+"""The engine's time integrations as data: which solver, which options, and the settings that a user may choose."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
-from rotor_mbs.methods.settings import Settings, number, step
+from rotor_mbs.methods.settings import Settings, choice, number, step
 
 _END_ACCELERATIONS = "explicit.computeEndOfStepAccelerations"
 
 
 @dataclass(frozen=True)
 class Scheme:
-    solver: str  # the engine's name of it
-    stages: int  # evaluations in a step; 0 for an implicit one
-    # by dotted path below the engine's settings of a time integration
+    """A time integration of the engine.
+
+    Attributes
+    ----------
+    solver : the engine's name of it.
+    stages : evaluations in a step; 0 for an implicit one.
+    options : values by dotted path below the engine's settings of a time integration.
+    step : s, the largest; None where the scheme chooses its own.
+    trial_steps : of a scheme that chooses its step: trials within one integration interval after which the run is given
+        up (the engine itself repeats a rejected smallest step for ever).
+    """
+
+    solver: str
+    stages: int
     options: Mapping[str, object] = field(default_factory=dict)
-    step: float | None = None  # s, the largest; None where the scheme chooses its own
-    # of a scheme that chooses its step: trials within one integration interval after which the run is given up (the
-    # engine itself repeats a rejected smallest step for ever)
+    step: float | None = None
     trial_steps: int = 0
 
     def with_accelerations(self) -> Scheme:
-        """This scheme with accelerations at the end of every step; an implicit one has them anyway."""
+        """Return this scheme with accelerations at the end of every step; an implicit one has them anyway."""
         return replace(self, options={**self.options, _END_ACCELERATIONS: True}) if self.stages else self
 
     @property
@@ -88,7 +97,8 @@ class NewtonSettings(Settings):
         return self._implicit({"generalizedAlpha.useNewmark": True, "generalizedAlpha.useIndex2Constraints": True})
 
     def _implicit(self, options: Mapping[str, object]) -> Scheme:
-        """One Jacobian in each step costs less than the iterations that an old one takes."""
+        """Return the implicit scheme with options of its own."""
+        # One Jacobian in each step costs less than the iterations that an old one takes.
         newton = {
             "newton.relativeTolerance": self.newton_relative_tolerance,
             "newton.absoluteTolerance": self.newton_absolute_tolerance,
@@ -107,6 +117,24 @@ class AlphaSettings(NewtonSettings):
         return self._implicit({"generalizedAlpha.spectralRadius": self.spectral_radius})
 
 
+_NODE = choice("euler_parameters", ("euler_parameters", "rotation_vector"), doc="coordinates of a body's rotation")
+
+
+@dataclass(frozen=True)
+class ChainAlphaSettings(AlphaSettings):
+    """Generalized-alpha for the chain."""
+
+    step: float = step(5e-4)
+    node: str = _NODE
+
+
+@dataclass(frozen=True)
+class ChainNewmarkSettings(NewtonSettings):
+    """The trapezoidal rule for the chain."""
+
+    node: str = _NODE
+
+
 # Newton's method stops at this share of the tolerance; below the least, rounding stops it.
 _NEWTON_SHARE, _LEAST_NEWTON_TOLERANCE = 0.1, 1e-12
 
@@ -119,13 +147,19 @@ class ExtrapolatedSettings(Settings):
         3e-8, above=0.0, at_most=1e-2, unit="rad", doc="tolerance for the estimated error of each interval"
     )
 
+    @property
+    def newton_relative_tolerance(self) -> float:
+        """Relative tolerance of Newton's residual."""
+        return max(_NEWTON_SHARE * self.tolerance, _LEAST_NEWTON_TOLERANCE)
+
     def scheme(self) -> Scheme:
-        """The engine's Jacobian leaves out how the constraints' directions turn, so that Newton's method converges
-        linearly with a new Jacobian as with an old one: one for each step, and no other while the residual falls."""
+        """Return the trapezoidal rule that is extrapolated."""
+        # The engine's Jacobian leaves out how the constraints' directions turn, so that Newton's method converges
+        # linearly with a new Jacobian as with an old one: one for each step, and no other while the residual falls.
         options = {
             "generalizedAlpha.useNewmark": True,
             "generalizedAlpha.useIndex2Constraints": True,
-            "newton.relativeTolerance": max(_NEWTON_SHARE * self.tolerance, _LEAST_NEWTON_TOLERANCE),
+            "newton.relativeTolerance": self.newton_relative_tolerance,
             "newton.absoluteTolerance": 1e-10,
             "newton.modifiedNewtonJacUpdatePerStep": True,
             "newton.maxModifiedNewtonIterations": 40,
@@ -136,3 +170,4 @@ class ExtrapolatedSettings(Settings):
 
 
 SchemeSettings = Rk44Settings | Rk67Settings | Dopri5Settings | NewtonSettings
+ChainSettings = ChainAlphaSettings | ChainNewmarkSettings

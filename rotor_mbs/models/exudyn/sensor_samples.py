@@ -19,9 +19,23 @@ _POINTS = 8
 
 
 class _Reader:
-    """The rows of all sensors: once for each time, up to the last at which the state is finite."""
+    """The rows of all sensors: once for each time, up to the last at which the state is finite.
+
+    Attributes
+    ----------
+    time : (rows,) s.
+    samples : the row of each sample that was reached.
+    """
 
     def __init__(self, scene: Scene, recorded: Callable[[str], Array], state: Iterable[str]) -> None:
+        """Find the rows, from the tables of the sensors named in `state`.
+
+        Parameters
+        ----------
+        scene : the run.
+        recorded : the (n, 1 + k) rows of a sensor by its name, time first.
+        state : names of the sensors that must be finite.
+        """
         tables = {name: recorded(name) for name in state}
         time = next(iter(tables.values()))[:, 0]
         # Two intervals share the row they meet at.
@@ -38,16 +52,18 @@ class _Reader:
         self.samples: NDArray[np.intp] = rows if met.all() else rows[: int(np.argmin(met))]
 
     def all(self, name: str) -> Array:
+        """Return the values of a sensor in all rows, (rows, k)."""
         if name not in self._tables:
             self._tables[name] = self._recorded(name)
         return self._tables[name][self._rows, 1:]
 
     def sampled(self, name: str) -> Array:
+        """Return the values of a sensor at the samples, (samples, k)."""
         return self.all(name)[self.samples]
 
 
 def tree_trajectory(scene: Scene, recorded: Callable[[str], Array]) -> Trajectory:
-    """The kinematic tree's own coordinates; `recorded` gives (n, 1 + k) rows of a sensor, time first."""
+    """Return the samples of the tree, whose coordinates are the angles; recorded: as of `_Reader`."""
     read = _Reader(scene, recorded, ("angles", "rates"))
     angles, rates = all_coordinates(scene, read.all("angles"), read.all("rates"))
     bodies = [(tree.link_name(link), body) for link, body in enumerate(tree.bodies(scene))]
@@ -58,19 +74,28 @@ def tree_trajectory(scene: Scene, recorded: Callable[[str], Array]) -> Trajector
 
 
 def chain_trajectory(scene: Scene, recorded: Callable[[str], Array], has_work: bool = False) -> Trajectory:
-    """Joint angles from the bodies' rotation matrices, rates from their angular velocities, and the joints' gaps;
-    `has_work`: there are rows "work" in J, and `work` need not integrate."""
+    """Return the samples of the chain.
+
+    Joint angles are those of the bodies' rotation matrices, rates those of their angular velocities.
+
+    Parameters
+    ----------
+    scene : the run.
+    recorded : as of `_Reader`.
+    has_work : whether there are rows "work" in J, so that `work` need not integrate.
+    """
     placed = chain.placed_bodies(scene)
     bodies = [(part.name, part.body) for part in placed]
     state = [f"{name} {what}" for name, _ in bodies for what in ("position", "rotation", "spin")]
     read = _Reader(scene, recorded, state)
     angles, rates = _joint_motion(scene, read)
     fields = _fields(scene, read, angles, rates, bodies, has_work)
-    # Every body's hub centre, which the joints keep together with the ground's and the hub's.
-    hub, *blades = (
-        read.sampled(f"{name} position") - matrices(read.sampled(f"{name} rotation")) @ body.com
-        for name, body in bodies
-    )
+    # Every body's own hub centre, which the joints keep together with the ground's and the hub's.
+    centres = []
+    for name, body in bodies:
+        rotations = matrices(read.sampled(f"{name} rotation"))
+        centres.append(read.sampled(f"{name} position") - rotations @ body.com)
+    hub, *blades = centres
     gaps = [hub, *(blade - hub for blade in blades)]
     fields["constraint_error"] = np.asarray(np.max([np.linalg.norm(gap, axis=1) for gap in gaps], axis=0))
     if scene.wants("loads"):
@@ -79,6 +104,7 @@ def chain_trajectory(scene: Scene, recorded: Callable[[str], Array], has_work: b
 
 
 def _joint_motion(scene: Scene, read: _Reader) -> tuple[Array, Array]:
+    """Return the chain's angles and rates in all rows, (rows, 1 + blades) rad and rad/s."""
     hub, rates = matrices(read.all("hub rotation")), joint_rates(scene, read.all)
     wrapped = np.arctan2(hub[:, 0, 2] - hub[:, 2, 0], hub[:, 0, 0] + hub[:, 2, 2])
     angles = [unwrap(read.time, wrapped, rates[:, 0], scene.initial_angles[0])]
@@ -91,7 +117,13 @@ def _joint_motion(scene: Scene, read: _Reader) -> tuple[Array, Array]:
 
 
 def joint_rates(scene: Scene, values: Callable[[str], Array]) -> Array:
-    """(n, coordinates that move) rad/s of the chain, from (n, k) values of its sensors."""
+    """Return the rates of the chain's joints, (n, coordinates that move) rad/s.
+
+    Parameters
+    ----------
+    scene : the rotor.
+    values : the (n, k) values of a sensor by its name.
+    """
     hub, hub_spin = matrices(values("hub rotation")), values("hub spin")
     hub_omega = (hub @ hub_spin[:, :, None])[:, :, 0]
     rates = [hub_spin[:, 1]]
@@ -102,13 +134,23 @@ def joint_rates(scene: Scene, values: Callable[[str], Array]) -> Array:
 
 
 def _dot(a: Array, b: Array) -> Array:
+    """Return the scalar products of (n, 3) vectors, (n,)."""
     return a[:, 0] * b[:, 0] + a[:, 1] * b[:, 1] + a[:, 2] * b[:, 2]
 
 
 def _fields(
     scene: Scene, read: _Reader, angles: Array, rates: Array, bodies: Sequence[tuple[str, Body]], has_work: bool = False
 ) -> dict[str, Array]:
-    """What the scene asks for, at the samples. angles and rates are (rows, 1 + blades)."""
+    """Return the quantities that the scene requests, at the samples, loads not among them.
+
+    Parameters
+    ----------
+    scene : the run.
+    read : the rows of the sensors.
+    angles, rates : (rows, 1 + blades) rad and rad/s.
+    bodies : name and body of everything that has energy.
+    has_work : as of `chain_trajectory`.
+    """
     fields = {"angles": angles[read.samples], "rates": rates[read.samples]}
     if scene.wants("tip"):
         tips = [read.sampled(f"tip {i + 1}") for i in range(len(scene.blades))]
@@ -125,7 +167,8 @@ def _fields(
         # ½ m v² and m g z of each centre of mass, ½ ω·J ω in the body's own frame.
         for name, body in bodies:
             if body.mass:
-                velocity, position = read.sampled(f"{name} velocity"), read.sampled(f"{name} position")
+                velocity = read.sampled(f"{name} velocity")
+                position = read.sampled(f"{name} position")
                 fields["kinetic_energy"] += 0.5 * body.mass * np.sum(velocity * velocity, axis=1)
                 fields["potential_energy"] += body.mass * scene.gravity * position[:, 2]
             if np.any(body.inertia):
@@ -135,8 +178,17 @@ def _fields(
 
 
 def unwrap(time: Array, wrapped: Array, rates: Array, start: float) -> Array:
-    """(n,) rad: angles known but for whole turns, made continuous: the turn nearest to what the mean of the measured
-    rates (rad/s) predicts from row to row; the first row gets the turns of `start`."""
+    """Return continuous angles, (n,) rad, from angles that are known but for whole turns.
+
+    From row to row the turn is the one nearest to what the mean of the measured rates predicts.
+
+    Parameters
+    ----------
+    time : (n,) s.
+    wrapped : (n,) rad, but for whole turns.
+    rates : (n,) rad/s.
+    start : rad, whose turns the first row gets.
+    """
     turn = 2.0 * np.pi
     predicted = 0.5 * np.diff(time) * (rates[1:] + rates[:-1])
     gained = np.round((predicted - np.diff(wrapped)) / turn)
@@ -145,8 +197,21 @@ def unwrap(time: Array, wrapped: Array, rates: Array, start: float) -> Array:
 
 
 def springs(scene: Scene, angles: Array) -> tuple[Array, Array]:
-    """(n,) J at the first n samples: energy ½ k (θ - r)² of the springs, and what `work` leaves out of the work -∫ k (θ
-    - r) dr of rest angles r that move, jumps included: the change of ½ k r (r - 2θ); `work` has ∫ k r dθ."""
+    """Compute the energy of the springs, and the work of moving rest angles that `work` leaves out.
+
+    The energy is ½ k (θ - r)². Of the work -∫ k (θ - r) dr of a rest angle r, jumps included, `work` has ∫ k r dθ; the
+    rest of it is the change of ½ k r (r - 2θ).
+
+    Parameters
+    ----------
+    scene : the rotor.
+    angles : (n, 1 + blades) rad, at the first n samples.
+
+    Returns
+    -------
+    energy, of_rests : ndarray, shape (n,)
+        J.
+    """
     energy, of_rests = np.zeros((2, len(angles)))
     for i in movable_blades(scene):
         stiffness, table = scene.bearings[i][0], scene.pitch_loads[i][1]
@@ -160,8 +225,16 @@ def springs(scene: Scene, angles: Array) -> tuple[Array, Array]:
 
 
 def work(scene: Scene, time: Array, angles: Array, rates: Array) -> Array:
-    """(n,) J of the torques less what the dampers took, from all rows, samples among them: s, rad, rad/s. A spring
-    whose rest angle r changes counts as one that is unloaded at 0 and a torque k r; see `springs`."""
+    """Compute the work of the torques less what the dampers took, (n,) J.
+
+    A spring whose rest angle r changes counts as one that is unloaded at 0 and a torque k r; see `springs`.
+
+    Parameters
+    ----------
+    scene : the run.
+    time : (n,) s of all rows, samples among them.
+    angles, rates : (n, 1 + blades) rad and rad/s.
+    """
     if not scene.work_needs_path:
         # All loads are constant and nothing is damped: torque times angle, exact.
         turned, torques = angles - angles[:1], scene.load_segments[0].values
@@ -171,6 +244,7 @@ def work(scene: Scene, time: Array, angles: Array, rates: Array) -> Array:
                 exact = exact + torques[moment.load] * turned[:, moment.coordinate]
         return exact
 
+    # The power jumps with a load, so that no polynomial may go through both sides of a jump.
     out, done = np.zeros(len(time)), 0.0
     slack = 1e-9 * scene.duration / (scene.samples - 1)
     for segment in scene.load_segments:
@@ -185,7 +259,15 @@ def work(scene: Scene, time: Array, angles: Array, rates: Array) -> Array:
 
 
 def power(scene: Scene, segment: Segment, time: Array, rates: Array) -> Array:
-    """(n,) W of what `work` is the integral of; rates: (n, 1 + blades) rad/s."""
+    """Return the power that `work` is the integral of, (n,) W.
+
+    Parameters
+    ----------
+    scene : the rotor.
+    segment : the loads.
+    time : (n,) s within the segment.
+    rates : (n, 1 + blades) rad/s.
+    """
     drawn: Array = -(rates**2) @ np.array(scene.dampings)
     for coordinate, load, factor in prescribed_moments(scene):
         drawn = drawn + factor * segment.at(load, time) * rates[:, coordinate]
@@ -193,8 +275,16 @@ def power(scene: Scene, segment: Segment, time: Array, rates: Array) -> Array:
 
 
 def cumulative_integral(time: Array, values: Array) -> Array:
-    """(n,) integral from the first row to each row, by a local polynomial through the eight nearest rows, which need
-    not be equally spaced; exact by Gauss-Legendre points."""
+    """Integrate from the first row to each row, (n,).
+
+    Each interval by the polynomial through the eight nearest rows, which need not be equally spaced, and this exactly,
+    by Gauss and Legendre's points.
+
+    Parameters
+    ----------
+    time : (n,) s, increasing.
+    values : (n,) integrand.
+    """
     points = min(_POINTS, len(time))
     first = np.clip(np.arange(len(time) - 1) - (points // 2 - 1), 0, len(time) - points)
     window = first[:, None] + np.arange(points)

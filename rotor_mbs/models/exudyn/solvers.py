@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -15,7 +15,7 @@ from rotor_mbs.models.exudyn import chain, sensor_samples, tree
 from rotor_mbs.models.exudyn.adapter import System
 from rotor_mbs.models.exudyn.geometry import Part
 from rotor_mbs.models.exudyn.loads import Loads
-from rotor_mbs.models.exudyn.schemes import ExtrapolatedSettings, Scheme, SchemeSettings
+from rotor_mbs.models.exudyn.schemes import ChainSettings, ExtrapolatedSettings, Scheme, SchemeSettings
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.scenario.time_table import Interval, intervals
 from rotor_mbs.solution.trajectory import Array, Integration, Trajectory, all_coordinates
@@ -35,13 +35,23 @@ _INSIGNIFICANT = 0.5 * float(np.finfo(float).eps)
 
 
 def substeps(column: int) -> int:
-    """How many equal steps column 0, 1, ... takes."""
+    """Return the number of equal steps of column 0, 1, ... of the extrapolation table."""
     return 2 * (column + 1)
 
 
 def neville(previous: Sequence[Array], values: Array) -> list[Array]:
-    """The next row of the table, from the one before ([] for the first): `values` of its own column, then those without
-    the error's terms of second, fourth, ... power of the substep."""
+    """Return the next row of the extrapolation table.
+
+    Parameters
+    ----------
+    previous : the row before; [] for the first.
+    values : what the new number of substeps gives.
+
+    Returns
+    -------
+    list of ndarray
+        The values, then those without the error's terms of second, fourth, ... power of the substep.
+    """
     column = len(previous)
     row = [values]
     for k, before in enumerate(previous):
@@ -70,20 +80,29 @@ class _Kept(NamedTuple):
 
 
 class ExtrapolatedSolver:
-    """See `methods.base.Solver`; `tolerance` (rad) is for the estimated error of each part of an interval."""
+    """The chain, extrapolated within each interval between samples; see `methods.base.Solver`.
 
-    def __init__(self, scene: Scene, scheme: Scheme, tolerance: float) -> None:
-        self._scene, self._scheme, self._loads = scene, scheme, Loads(scene)
-        self._least_error = max(tolerance, _ROUNDING)
-        self._newton_tolerance = float(str(scheme.options["newton.relativeTolerance"]))
+    Attributes
+    ----------
+    system : the assembled engine.
+    columns : of the extrapolation table, for each part of the last integration.
+    kept : the states at the ends of these parts.
+    """
+
+    def __init__(self, scene: Scene, settings: ExtrapolatedSettings) -> None:
+        """Build the chain of a scene; the settings' tolerance is for each part of an interval."""
+        self._scene, self._scheme, self._loads = scene, _scheme(scene, settings), Loads(scene)
+        self._least_error = max(settings.tolerance, _ROUNDING)
+        self._newton_tolerance = settings.newton_relative_tolerance
         self._intervals = intervals(scene.load_segments, scene.samples, every_sample=True)
         # Dampers and loads over time want it along the path: it is extrapolated with the state.
         self._integrates_work = scene.work_needs_path
         parts = chain.parts(scene, self._loads)
         sensors = [part.name for part in parts if part.kind == "sensor"]
         self._of_rates = [name for name in sensors if name.endswith(("rotation", "spin"))]
+        # What a sensor stores, the engine evaluates after every step: only what the work needs.
         for number, part in enumerate(parts):
-            if part.kind == "sensor":  # what is stored, the engine evaluates after every step
+            if part.kind == "sensor":
                 stored = part.name in self._of_rates
                 parts[number] = replace(part, parameters={**part.parameters, "storeInternal": stored})
         self.system = System(parts)
@@ -99,7 +118,10 @@ class ExtrapolatedSolver:
         self.kept: list[_Kept] = []
 
     def integrate(self) -> Integration:
-        """From sample to sample. Where a load has a kink, accelerations and multipliers are calculated anew."""
+        """Integrate from sample to sample, and from kink to kink of the loads.
+
+        Where a load has a kink, accelerations and multipliers are calculated anew.
+        """
         self._total = Integration(True)
         self._halvings, self.columns, self.kept = 0, [], []
         first = self._intervals[0]
@@ -121,8 +143,21 @@ class ExtrapolatedSolver:
         return self._total
 
     def _cross(self, interval: Interval, start: float, end: float, halvings: int) -> str:
-        """Integrate from `start` to `end` (s) in one part or in halves; why not, or "". Parts are as small as the last
-        ones had to be, and twice as large again where two columns less would do."""
+        """Integrate over a part of an interval, in one go or in halves.
+
+        Parts are as small as the last ones had to be, and twice as large again where two columns less would do.
+
+        Parameters
+        ----------
+        interval : whose loads act.
+        start, end : s, of the part.
+        halvings : how many times the interval was halved to get it.
+
+        Returns
+        -------
+        str
+            Why the end was not reached; "" where it was.
+        """
         if halvings >= self._halvings:
             failure = self._part(interval, start, end)
             if not failure:
@@ -136,7 +171,10 @@ class ExtrapolatedSolver:
         return self._cross(interval, start, middle, halvings + 1) or self._cross(interval, middle, end, halvings + 1)
 
     def _part(self, interval: Interval, start: float, end: float) -> str:
-        """Columns are added until the estimated error is met; why it was not, or ""."""
+        """Extrapolate over a part of an interval, adding columns until the estimated error is small enough.
+
+        Parameters and the returned text are those of `_cross`: interval, start, end.
+        """
         row: list[Array] = []
         for column in range(MOST_COLUMNS):
             failure = self.system.advance(start, end, substeps(column), self._total)
@@ -159,8 +197,10 @@ class ExtrapolatedSolver:
         return f"near t = {start:.6g} s the error of an interval of {end - start:.3g} s remains above the tolerance"
 
     def _work(self, interval: Interval) -> float:
-        """J, of loads and dampers over the substeps of one column: by the trapezoidal rule, whose error is a power
-        series of the substep's square, as the state's is."""
+        """Return the work of loads and dampers over the substeps of one column, J.
+
+        By the trapezoidal rule, whose error is a power series of the substep's square, as the state's is.
+        """
         tables = {name: self.system.rows(name) for name in self._of_rates}
         time = tables["hub spin"][:, 0]
         moving = sensor_samples.joint_rates(self._scene, lambda name: tables[name][:, 1:])
@@ -169,8 +209,16 @@ class ExtrapolatedSolver:
         return float(np.trapezoid(power, time))
 
     def _is_met(self, difference: Array, values: Array, span: float) -> bool:
-        """Whether a difference of Euler parameters, or of their rates over `span` s, is below half the tolerance (they
-        are half of an angle), or as small as Newton's method, which stops at a share of the forces, leaves it."""
+        """Return whether an estimated error is within the tolerance.
+
+        Euler parameters are half of an angle, and so their error may be half of the tolerance. Newton's method stops at
+        a share of the forces: an error as small as it leaves cannot be made smaller by another column.
+
+        Parameters
+        ----------
+        difference, values : as of `System.values`, the estimate and the state.
+        span : s, of the part.
+        """
         rotations, rates, _ = np.abs(difference[self._rotations]).max(axis=1)
         error = 2.0 * max(rotations, span * rates)
         if error <= self._least_error:
@@ -179,12 +227,13 @@ class ExtrapolatedSolver:
         return bool(error <= self._newton_tolerance * span**2 * accelerations)
 
     def _consistent(self, values: Array) -> Array:
-        """The extrapolated state with Euler parameters of length one and rates that keep it. The engine takes both for
-        granted: else what errors of the length do to the motion is ten times as much as all other errors. Rounding
-        errors are set to zero."""
-        kinds = values[: 3 * self._coordinates].reshape(
-            3, -1, 7
-        )  # derivatives, bodies, displacement and Euler parameters
+        """Return an extrapolated state whose Euler parameters have length one, and rates that keep it.
+
+        The engine takes both for granted: else what errors of the length do to the motion is ten times as much as all
+        other errors. Rounding errors are set to zero. `values`: as of `System.values`; changed in place.
+        """
+        # Three derivatives, bodies, displacement (3) and Euler parameters (4).
+        kinds = values[: 3 * self._coordinates].reshape(3, -1, 7)
         parameters = kinds[0, :, 3:] + self._reference[:, 3:]
         parameters /= np.sqrt((parameters * parameters).sum(axis=1))[:, None]
         kinds[0, :, 3:] = parameters - self._reference[:, 3:]
@@ -198,11 +247,12 @@ class ExtrapolatedSolver:
         return values
 
     def _keep(self, time: float, interval: Interval, values: Array, turns: Array, work: float) -> None:
+        """Keep a state, from which the next part starts."""
         self.system.start_from(values, turns)
         self.kept.append(_Kept(time, interval, values, turns, work))
 
     def observe(self) -> Trajectory:
-        """What the sensors read of each state, under the load before a jump."""
+        """Return the samples, from what the sensors read of each state under the load before a jump."""
         tables: dict[str, list[Array]] = {name: [] for name in self.system.sensors}
         for kept in self.kept:
             self._loads.set_segment(kept.interval.segment)
@@ -222,27 +272,45 @@ _SHORTEST_INTERVAL = 1e-8
 
 
 class MultibodySolver:
-    """See `methods.base.Solver`; `reading` makes the trajectory from recorded rows, for which it may need
-    `rows_between` samples. Raises MethodRefusal, with the engine's reason, where the engine does not take the parts."""
+    """A system under one of the engine's own time integrations; see `methods.base.Solver`."""
 
     def __init__(
         self, scene: Scene, parts: Sequence[Part], loads: Loads, scheme: Scheme, reading: Reading, rows_between: bool
     ) -> None:
+        """Build the system.
+
+        Parameters
+        ----------
+        scene : the run.
+        parts : of the system.
+        loads : the loads that the parts' load functions read.
+        scheme : the time integration.
+        reading : makes the trajectory from recorded rows.
+        rows_between : whether it needs rows between samples.
+
+        Raises
+        ------
+        MethodRefusal
+            With the engine's reason, where the engine does not take the parts.
+        """
         self._scene, self._loads, self._scheme, self._reading = scene, loads, scheme, reading
         self._rows_between = rows_between
         self._intervals = intervals(scene.load_segments, scene.samples, every_sample=scheme.step is None)
         self.system = System(parts)
 
     def integrate(self) -> Integration:
+        """Integrate from the initial state to the end, or to the first failure."""
         return self.system.integrate(self._scheme, self._intervals, self._rows_between, self._loads.set_segment)
 
     def observe(self) -> Trajectory:
+        """Return the samples of the last integration."""
         # A diverging state may overflow in its energies; the rows are cut where they stop being finite.
         with np.errstate(over="ignore", invalid="ignore"):
             return self._reading(self._scene, self.system.rows)
 
 
 def build_tree(scene: Scene, settings: SchemeSettings) -> Solver:
+    """Build the kinematic tree of a scene."""
     scheme, loads = _scheme(scene, settings), Loads(scene)
     if scene.wants("loads"):
         scheme = scheme.with_accelerations()
@@ -250,14 +318,14 @@ def build_tree(scene: Scene, settings: SchemeSettings) -> Solver:
     return MultibodySolver(scene, parts, loads, scheme, sensor_samples.tree_trajectory, scene.work_needs_path)
 
 
-def build_chain(scene: Scene, settings: Any) -> Solver:
+def build_chain(scene: Scene, settings: ChainSettings) -> Solver:
+    """Build the chain of a scene. Raises MethodRefusal for loads with the node whose multipliers are wrong."""
     scheme = _scheme(scene, settings)
     if scene.wants("loads") and settings.node == "rotation_vector":
         raise MethodRefusal(
             "exudyn_chain: loads need the setting node = euler_parameters: with rotation_vector the engine's "
             "first multipliers are wrong, and those of newmark_index2 remain wrong"
         )
-
     loads = Loads(scene)
     parts = chain.parts(scene, loads, settings.node)
     # Its angles are unwrapped from row to row, so rows are kept between samples.
@@ -265,10 +333,12 @@ def build_chain(scene: Scene, settings: Any) -> Solver:
 
 
 def build_extrapolated(scene: Scene, settings: ExtrapolatedSettings) -> Solver:
-    return ExtrapolatedSolver(scene, _scheme(scene, settings), settings.tolerance)
+    """Build the chain of a scene, to be extrapolated."""
+    return ExtrapolatedSolver(scene, settings)
 
 
 def _scheme(scene: Scene, settings: SchemeSettings | ExtrapolatedSettings) -> Scheme:
+    """Return the time integration of the settings. Raises MethodRefusal for samples that are too close."""
     if scene.duration / (scene.samples - 1) < _SHORTEST_INTERVAL:
         raise MethodRefusal(f"Exudyn cannot resolve samples less than {_SHORTEST_INTERVAL:g} s apart")
     return settings.scheme()

@@ -27,6 +27,13 @@ _NODE = Ref("node", "joint angles")
 
 
 def parts(scene: Scene, loads: Loads) -> list[Part]:
+    """Return everything the engine has of a scene, in the order it is built.
+
+    Parameters
+    ----------
+    scene : the rotor, its start, and the outputs that are read by sensors.
+    loads : the loads that the load functions read while the engine integrates.
+    """
     moving = scene.moving_coordinates
     node = {
         "referenceCoordinates": [0.0] * len(moving),
@@ -37,16 +44,20 @@ def parts(scene: Scene, loads: Loads) -> list[Part]:
     built = [Part("node", _NODE.name, "NodeGenericODE2", node, f"{len(moving)} coordinates"), _tree(scene)]
     for number, column in enumerate(moving):
         moment = moment_on(scene, loads, column)
-        if moment.terms:
-            what, which = ("pitch", f" {column}") if column else ("rotor", "")
-            is_fixed = all(is_constant(scene.load_tables[load]) for load, _ in moment.terms)
-            marker = {"nodeNumber": _NODE, "coordinate": number}
-            load: dict[str, object] = {"markerNumber": Ref("marker", f"{what} angle{which}"), "load": moment.at(0.0)}
-            if not is_fixed:
-                load["loadUserFunction"] = moment.scalar
-            detail = "constant" if is_fixed else "over time"
-            built.append(Part("marker", f"{what} angle{which}", "MarkerNodeCoordinate", marker))
-            built.append(Part("load", f"{what} torque{which}", "LoadCoordinate", load, detail))
+        if not moment.terms:
+            continue
+        angle_name, torque_name = "rotor angle", "rotor torque"
+        if column:
+            angle_name, torque_name = f"pitch angle {column}", f"pitch torque {column}"
+        marker = {"nodeNumber": _NODE, "coordinate": number}
+        built.append(Part("marker", angle_name, "MarkerNodeCoordinate", marker))
+        load: dict[str, object] = {"markerNumber": Ref("marker", angle_name), "load": moment.at(0.0)}
+        # The engine asks for a load by a function, which costs time, only where it changes.
+        detail = "constant"
+        if not all(is_constant(scene.load_tables[place]) for place, _ in moment.terms):
+            load["loadUserFunction"] = moment.scalar
+            detail = "over time"
+        built.append(Part("load", torque_name, "LoadCoordinate", load, detail))
     built += [
         sensor("angles", "SensorNode", "Coordinates", "joint angles", nodeNumber=_NODE),
         sensor("rates", "SensorNode", "Coordinates_t", "joint rates", nodeNumber=_NODE),
@@ -68,19 +79,22 @@ def parts(scene: Scene, loads: Loads) -> list[Part]:
 
 
 def items(scene: Scene) -> list[BuiltItem]:
+    """Return the parts of a scene as `show --build` lists them."""
     return geometry.items(parts(scene, Loads(scene)))
 
 
 def bodies(scene: Scene) -> list[Body]:
-    """The links in order: hub, then the blades that pitch."""
+    """Return the links in order: hub, then the blades that pitch."""
     return [hub_body(scene), *(blade_body(scene.blades[i]) for i in movable_blades(scene))]
 
 
 def link_name(link: int) -> str:
+    """Return the name of a link in the names of its sensors."""
     return f"link {link}" if link else "hub"
 
 
 def _tree(scene: Scene) -> Part:
+    """Return the tree of a scene, with gravity, springs and dampers, which are parameters of it."""
     blades, links = movable_blades(scene), bodies(scene)
     parameters: dict[str, object] = {
         "nodeNumber": _NODE,
@@ -109,4 +123,5 @@ def _tree(scene: Scene) -> Part:
 
 
 def _link_sensor(name: str, quantity: str, link: int, point: Array) -> Part:
+    """Return a sensor at a point, (3,) m in the frame of a link."""
     return sensor(name, "SensorKinematicTree", quantity, objectNumber=_TREE, linkNumber=link, localPosition=list(point))

@@ -50,8 +50,22 @@ def load_values(values: Sequence[Any], pitches: Sequence[int]) -> LoadValues:
 def accelerations(
     angles: Sequence[Number], rates: Sequence[Number], form: RotorForm, loads: LoadValues, sin: Function, cos: Function
 ) -> list[Number]:
-    """Rotor, then pitch accelerations in rad/s², by Lagrange's equations of T - V above, from 1 + len(form.blades)
-    angles and rates. Singular where S = 0: point-mass blades all at ±π/2 on a massless hub."""
+    """Compute the accelerations by Lagrange's equations of T - V above.
+
+    Singular where S = 0: point-mass blades all at ±π/2 on a massless hub.
+
+    Parameters
+    ----------
+    angles, rates : of the rotor, then of the pitches that move: 1 + len(form.blades) in rad and rad/s.
+    form : the coefficients.
+    loads : the loads of the coordinates that move.
+    sin, cos : for the kind of number.
+
+    Returns
+    -------
+    list
+        rad/s², rotor, then pitches.
+    """
     sin_q, cos_q = sin(angles[0]), cos(angles[0])
     spin = rates[0]
     schur = form.inertia
@@ -91,14 +105,17 @@ def accelerations(
 def pitches(
     form: RotorForm, angles: Sequence[Number], rates: Sequence[Number], loads: LoadValues
 ) -> Iterator[tuple[BladeForm, Number, Number, Number, Number]]:
-    """For each pitch that moves: blade, angle, rate, torque, rest angle."""
+    """Yield blade, angle, rate, torque and rest angle of each pitch that moves."""
     nothing = (0.0,) * len(form.blades)
     return zip(form.blades, angles[1:], rates[1:], loads.pitches or nothing, loads.rests or nothing, strict=True)
 
 
 def power(rates: Sequence[Number], form: RotorForm, loads: LoadValues) -> Number:
-    """W: of the torques and of the moments k r of springs at rest at r, less what the dampers take. The work of a
-    spring whose rest angle moves, -∫ k (θ - r) dr, is that of k r on the pitch and the change of `rest_energy`."""
+    """Return the power (W) of the torques and of the moments k r of springs at rest at r, less what the dampers take.
+
+    The work of a spring whose rest angle moves, -∫ k (θ - r) dr, is that of k r on the pitch and the change of
+    `rest_energy`.
+    """
     spin = rates[0]
     total = loads.rotor * spin - form.shaft_damping * (spin * spin)
     for blade, rate, _, torque, rest in pitches(form, rates, rates, loads):
@@ -107,7 +124,7 @@ def power(rates: Sequence[Number], form: RotorForm, loads: LoadValues) -> Number
 
 
 def rest_energy(angles: Sequence[Number], form: RotorForm, rests: Sequence[Number]) -> Number:
-    """J: what springs with these rest angles hold more than springs that are unloaded at 0, ½ k r (r - 2θ)."""
+    """Return the energy (J) that springs with these rest angles have beyond those unloaded at 0, ½ k r (r - 2θ)."""
     return sum(
         0.5 * blade.stiffness * (rest * (rest - 2.0 * theta))
         for blade, theta, rest in zip(form.blades, angles[1:], rests, strict=True)
@@ -117,7 +134,10 @@ def rest_energy(angles: Sequence[Number], form: RotorForm, rests: Sequence[Numbe
 def energies(
     angles: Sequence[Number], rates: Sequence[Number], form: RotorForm, loads: LoadValues, sin: Function, cos: Function
 ) -> tuple[Number, Number]:
-    """Kinetic and potential energy in J (gravity about the shaft's height, and bearing springs)."""
+    """Return kinetic and potential energy (J), gravity's about the shaft's height, and that of bearing springs.
+
+    Parameters are those of `accelerations`: angles, rates, form, loads, sin, cos.
+    """
     sin_q, cos_q = sin(angles[0]), cos(angles[0])
     spin = rates[0]
     kinetic = 0.5 * form.inertia * (spin * spin)
@@ -140,7 +160,7 @@ def energies(
 def point_path(
     azimuth: Number, pitch: Number, point: Sequence[float], sin: Function, cos: Function
 ) -> tuple[Number, Number, Number]:
-    """(x, y, z) in m of a point of a blade in the base frame: Ry(φ)·Rz(θ)·point."""
+    """Return a point of a blade in the base frame, (x, y, z) in m: Ry(azimuth)·Rz(pitch)·point."""
     x, y, z = point
     s, c = sin(pitch), cos(pitch)
     across, along = x * c - y * s, x * s + y * c

@@ -1,6 +1,8 @@
-"""Many runs of lagrange/taylor at once: heyoka's batch integrator, one run per SIMD lane, one compile per structure, in
-Hamilton's variables. A run's numbers do not depend on its neighbours in the other lanes, so that any partition of a
-sweep gives the same bits. One thread: processes are the parallelism."""
+"""Many runs of lagrange/taylor at once, by heyoka's batch integrator in Hamilton's variables.
+
+One run per SIMD lane, one compile per structure. A run's numbers do not depend on its neighbours in the other lanes, so
+that any partition of a sweep gives the same bits. One thread: processes are the parallelism.
+"""
 
 from __future__ import annotations
 
@@ -29,13 +31,29 @@ _OBSERVED_PER_CALL = 1024
 
 
 def lanes() -> int:
-    """Runs side by side: one vector register's. Two are a fifth slower, and take three times as long to compile."""
+    """Return the number of runs side by side: as many as one vector register holds."""
+    # Two registers are a fifth slower, and take three times as long to compile.
     return int(heyoka().recommended_simd_size())
 
 
 def solve_many(scenes: Sequence[Scene], tolerance: float) -> RunBlock:
-    """Run all scenes, with the same number of blades and samples and the same outputs, loads not among them; a run that
-    breaks off is in the result, cut and with its reason. Raises MethodRefusal where heyoka is not installed."""
+    """Run several scenes.
+
+    Parameters
+    ----------
+    scenes : with the same number of blades and samples and the same outputs, loads not among them.
+    tolerance : of the local error.
+
+    Returns
+    -------
+    RunBlock
+        A run that breaks off is in it, cut and with its reason.
+
+    Raises
+    ------
+    MethodRefusal
+        Where heyoka is not installed.
+    """
     first, runs = scenes[0], len(scenes)
     time = np.linspace(0.0, np.array([scene.duration for scene in scenes]), first.samples, axis=1)
     blades = len(first.blades)
@@ -76,14 +94,14 @@ def solve_many(scenes: Sequence[Scene], tolerance: float) -> RunBlock:
 
 
 def _tip_numbers(scene: Scene, parameters: Parameters) -> list[list[Any]]:
-    """(blades, 3) its tips in m, numbers that come after those of the equations; [] where none are asked for."""
+    """Return the tips, (blades, 3) m, as numbers that come after those of the equations; [] without such an output."""
     if not scene.wants("tip"):
         return []
     return [[parameters(Fraction(x)) for x in blade.tip] for blade in scene.blades]
 
 
 def _momenta(example: Scene) -> Any:
-    """The momenta as compiled code from angles and rates."""
+    """Compile the momenta as a function of angles and rates."""
     form, _ = taylor.equation_numbers(example, Parameters())
     angles, rates = taylor.state_symbols(form)
     rows = hamilton.momenta(angles, rates, form, heyoka().sin, heyoka().cos)
@@ -91,8 +109,10 @@ def _momenta(example: Scene) -> Any:
 
 
 def _observables(example: Scene) -> Any:
-    """Rates, then the tips and energies that are asked for, as compiled code from angles and momenta: a tenth of
-    NumPy's time for the same formulas."""
+    """Compile rates, then tips and energies that the scene requests, as a function of angles and momenta.
+
+    It takes a tenth of NumPy's time for the same formulas. `example`: a scene of the structure.
+    """
     engine, parameters = heyoka(), Parameters()
     form, loads = taylor.equation_numbers(example, parameters)
     points = _tip_numbers(example, parameters)
@@ -110,14 +130,27 @@ def _observables(example: Scene) -> Any:
 
 
 def _compiled_rows(example: Scene, rows: Sequence[Any], variables: Sequence[Any]) -> Any:
+    """Compile expressions as a function of variables."""
     # Where all terms of a row vanish, the closed form gives the number zero: the engine asks for an expression.
     expressions = [heyoka().expression(0.0) + row for row in rows]
     return heyoka().cfunc(expressions, variables, compact_mode=taylor.is_compact(example))
 
 
 def _observed(function: Any, states: Array, numbers: Array) -> Array:
-    """(rows, runs, samples) of compiled code at (variables, runs, samples) states of what moves; `numbers` (parameters,
-    runs) as of `_Group`. The runs must fill the lanes: what is left over is rounded by other instructions."""
+    """Evaluate compiled code at the states of several runs.
+
+    The runs must fill the lanes: what is left over is rounded by other instructions.
+
+    Parameters
+    ----------
+    function : of `_compiled_rows`.
+    states : (variables, runs, samples), of what moves.
+    numbers : (parameters, runs) as of `_Group`.
+
+    Returns
+    -------
+    ndarray, shape (rows, runs, samples)
+    """
     _, runs, samples = states.shape
     parts = []
     for i in range(0, samples, _OBSERVED_PER_CALL):
@@ -130,12 +163,21 @@ def _observed(function: Any, states: Array, numbers: Array) -> Array:
 
 
 class _Group:
-    """Runs of one structure, and the compiled code for them; places: of each run in the block; numbers: (parameters,
-    runs) of their rotors."""
+    """Runs of one structure, and the compiled code for them."""
 
     def __init__(
         self, places: list[int], scenes: list[Scene], structure: tuple[int, ...], numbers: Array, tolerance: float
     ) -> None:
+        """Compile the code, or take what is compiled for another group of the structure.
+
+        Parameters
+        ----------
+        places : of each run in the block.
+        scenes : the runs.
+        structure : of their equations.
+        numbers : (parameters, runs) of their rotors.
+        tolerance : of the local error.
+        """
         example = scenes[0]
         self.places, self.scenes = places, scenes
 
@@ -158,7 +200,7 @@ class _Group:
         self.numbers = np.concatenate([numbers, angles[fixed]])  # of the rotor, then the pitches that are fixed
 
     def run(self, block: RunBlock) -> None:
-        """All runs into the block, as many at once as stay near the processor."""
+        """Run all, and write them to the block; as many at once as stay near the processor."""
         width = self.integrator.state.shape[1]
         runs = len(self.scenes)
         chunk = max(_SAMPLES_PER_CHUNK // len(self.times) // width, 1) * width
@@ -181,8 +223,21 @@ class _Group:
                 self.put(block, alone, states, observed, integrations[:1])
 
     def solve(self, columns: Sequence[int]) -> tuple[Array, Array, list[Integration]]:
-        """(variables, columns, samples) states in rates, (rows, columns, samples) tips and energies, and the engine's
-        status of each column; they fill the lanes in turn."""
+        """Integrate some of the runs.
+
+        Parameters
+        ----------
+        columns : of the runs in this group; they fill the lanes in turn.
+
+        Returns
+        -------
+        states : ndarray, shape (variables, columns, samples)
+            In rates.
+        observed : ndarray, shape (rows, columns, samples)
+            Tips and energies.
+        integrations : list of Integration
+            The engine's status of each column.
+        """
         width = self.integrator.state.shape[1]
         initial, times, numbers = self.initial[:, columns], self.times[:, columns], self.numbers[:, columns]
         states = np.empty((len(initial), len(columns), len(times)))
@@ -212,7 +267,7 @@ class _Group:
         observed: Array,
         integrations: Sequence[Integration],
     ) -> None:
-        """The runs of the first len(integrations) columns into the block; states, observed: as of `solve`."""
+        """Write the runs of the first len(integrations) columns to the block; states, observed: as of `solve`."""
         runs, count = len(integrations), len(self.moving)
         states, observed = states[:, :runs], observed[:, :runs]
         places, scenes = [self.places[i] for i in columns[:runs]], [self.scenes[i] for i in columns[:runs]]

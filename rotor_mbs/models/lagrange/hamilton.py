@@ -17,7 +17,7 @@ Numbers = Sequence[Any]
 
 
 def momenta(angles: Numbers, rates: Numbers, form: RotorForm, sin: Function, cos: Function) -> list[Any]:
-    """(1 + blades) kg m²/s."""
+    """Return the momenta, (1 + blades) kg m²/s; angles and rates as of `closed_form.accelerations`."""
     spin, total, of_pitches = rates[0], form.inertia * rates[0], []
     for blade, theta, rate in zip(form.blades, angles[1:], rates[1:], strict=True):
         s, c = sin(theta), cos(theta)
@@ -29,7 +29,10 @@ def momenta(angles: Numbers, rates: Numbers, form: RotorForm, sin: Function, cos
 
 
 def rates(angles: Numbers, momenta: Numbers, form: RotorForm, sin: Function, cos: Function) -> list[Any]:
-    """(1 + blades) rad/s: the inverse of `momenta`, by the Schur complement. Singular where that is 0."""
+    """Return the rates, (1 + blades) rad/s: the inverse of `momenta`.
+
+    By the Schur complement; singular where that is 0.
+    """
     schur, rest = form.inertia, momenta[0]
     ratios = []
     for blade, theta, p in zip(form.blades, angles[1:], momenta[1:], strict=True):
@@ -45,7 +48,10 @@ def rates(angles: Numbers, momenta: Numbers, form: RotorForm, sin: Function, cos
 def forces(
     angles: Numbers, rates: Numbers, form: RotorForm, loads: LoadValues, sin: Function, cos: Function
 ) -> list[Any]:
-    """(1 + blades) N m: time derivatives of the momenta."""
+    """Return the time derivatives of the momenta, (1 + blades) N m.
+
+    Parameters are those of `closed_form.accelerations`: angles, rates, form, loads, sin, cos.
+    """
     sine, cosine = sin(angles[0]), cos(angles[0])
     spin, of_pitches = rates[0], []
     moment = loads.rotor - form.shaft_damping * spin

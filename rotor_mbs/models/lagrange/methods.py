@@ -21,32 +21,41 @@ _SOLVE_MANY = "rotor_mbs.models.lagrange.ensemble:solve_many"
 
 @dataclass(frozen=True)
 class TaylorSettings(Settings):
+    """heyoka's adaptive Taylor method, double precision."""
+
     tolerance: float = number(_EPS, above=0.0, doc="tolerance of the local error, absolute and relative")
 
 
 @dataclass(frozen=True)
 class ReferenceSettings(Settings):
+    """Two runs in quad precision."""
+
     tolerance: float = number(1e-33, above=0.0, doc="tolerance of the stored run")
     check_tolerance: float = number(1e-30, above=0.0, doc="tolerance of the run for comparison")
 
 
 def _relative(default: float) -> Any:
-    # SciPy raises a smaller one to this value.
+    """Declare a relative tolerance of SciPy, which raises a smaller one to this least value."""
     return number(default, at_least=100.0 * _EPS, doc="relative tolerance of the local error")
 
 
 def _absolute(default: float) -> Any:
+    """Declare an absolute tolerance of SciPy."""
     return number(default, above=0.0, doc="absolute tolerance of the local error, rad and rad/s")
 
 
 @dataclass(frozen=True)
 class Dop853Settings(Settings):
+    """SciPy's DOP853, order 8."""
+
     relative_tolerance: float = _relative(3e-14)
     absolute_tolerance: float = _absolute(1e-16)
 
 
 @dataclass(frozen=True)
 class RadauSettings(Settings):
+    """SciPy's Radau, implicit, order 5."""
+
     relative_tolerance: float = _relative(1e-8)
     absolute_tolerance: float = _absolute(1e-11)
 
@@ -70,6 +79,8 @@ def _linearize(scene: Scene, angles: Any, speed: float, torque: float) -> Linear
 
 
 def _scipy_method(solver: str, settings: type[Settings], ladder: Ladder, relative_cost: float) -> Method:
+    """Return the method of one of SciPy's solvers; settings, ladder and relative_cost as of `Method`."""
+
     def build(scene: Scene, chosen: Any) -> Solver:
         from rotor_mbs.models.lagrange.ode_solvers import OdeSolver, scipy_integrator
 

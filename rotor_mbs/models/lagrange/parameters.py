@@ -1,5 +1,8 @@
-"""A scene's numbers as the closed form needs them. Coefficients are in exact rational arithmetic until the last step:
-of a point mass some vanish identically, and near a pitch of ±π/2 a rounding remainder would be the inertia."""
+"""A scene's numbers as the closed form needs them.
+
+Coefficients are in exact rational arithmetic until the last step: of a point mass some vanish identically, and near a
+pitch of ±π/2 a rounding remainder would be the inertia.
+"""
 
 from __future__ import annotations
 
@@ -66,8 +69,14 @@ class RotorForm:
 def rotor_form(
     scene: Scene, convert: Convert = float, phases: Sequence[tuple[Fraction, Fraction]] | None = None
 ) -> RotorForm:
-    """The coefficients of `scene`, whose doubles are taken as exact; `convert` rounds each once. `phases`: (blades,)
-    cosines and sines of the mounting angles, where they are not those of `Scene.phases`."""
+    """Return the coefficients of a scene, whose doubles are taken as exact.
+
+    Parameters
+    ----------
+    scene : the rotor.
+    convert : rounds each coefficient once, to the kind of number to compute with.
+    phases : (blades,) cosines and sines of the mounting angles; those of `Scene.phases` where left out.
+    """
     gravity = Fraction(scene.gravity)
     count = len(scene.blades)
     forms: list[BladeForm] = []
@@ -87,12 +96,12 @@ def rotor_form(
 
 
 def phase_of(blade: int, count: int) -> tuple[Fraction, Fraction]:
-    """Cosine and sine of the mounting angle of a blade, counted from 0, of `count`."""
+    """Return cosine and sine of the mounting angle of a blade, counted from 0, of `count`."""
     return _cosine_of_turn(Fraction(blade, count)), _cosine_of_turn(Fraction(blade, count) - Fraction(1, 4))
 
 
 def _inertia_about_hub(blade: Blade) -> tuple[Fraction, Fraction, Fraction, Fraction, Fraction, Fraction]:
-    """xx yy zz xy xz yz about the hub centre: J = J_com + m (r·r I - r rᵀ)."""
+    """Return the inertia J = J_com + m (r·r I - r rᵀ) about the hub centre: xx yy zz xy xz yz."""
     m = Fraction(blade.mass)
     x, y, z = (Fraction(value) for value in blade.centre_of_mass)
     xx, yy, zz, xy, xz, yz = (Fraction(value) for value in blade.inertia)
@@ -108,14 +117,14 @@ def _inertia_about_hub(blade: Blade) -> tuple[Fraction, Fraction, Fraction, Frac
 
 @functools.lru_cache(maxsize=256)
 def _rotor_inertia(blade: Blade) -> tuple[Fraction, Fraction, Fraction]:
-    """ss, cc, sc of a(θ) = Jxx s² + Jyy c² + 2 Jxy s c: the blade's inertia about the shaft."""
+    """Return ss, cc, sc of the blade's inertia about the shaft, a(θ) = Jxx s² + Jyy c² + 2 Jxy s c."""
     xx, yy, _, xy, _, _ = _inertia_about_hub(blade)
     return xx, yy, 2 * xy
 
 
 @functools.lru_cache(maxsize=256)  # the blades of a rotor are mostly equal, and so are the rotors of a sweep
 def _coefficients(blade: Blade, gravity: Fraction) -> list[Fraction]:
-    """schur_ss ... lever_sc of BladeForm, in its order."""
+    """Return schur_ss ... lever_sc of BladeForm, in its order."""
     xx, yy, zz, xy, xz, yz = _inertia_about_hub(blade)
     x, y, z = (Fraction(value) for value in blade.centre_of_mass)
     weight = Fraction(blade.mass) * gravity
@@ -130,7 +139,7 @@ _FIXED_POINT = 10**60  # whole numbers stand for this many times a fraction
 
 @functools.lru_cache(maxsize=4096)
 def _cosine_of_turn(turn: Fraction) -> Fraction:
-    """cos(2π·turn) to 50 digits: so that a third of a turn is -1/2 in double and in quad precision."""
+    """Return cos(2π·turn) to 50 digits: so that a third of a turn is -1/2 in double and in quad precision."""
     angle = 2 * PI * ((turn + Fraction(1, 2)) % 1 - Fraction(1, 2))
     square = int(angle * angle * _FIXED_POINT)
     term = total = _FIXED_POINT
@@ -154,15 +163,20 @@ def changing_rests(scene: Scene) -> tuple[bool, ...]:
 
 
 def resting_pitches(scene: Scene) -> tuple[int, ...]:
-    """Coordinates of the pitches that the equations leave at zero for ever: started there at rest, without a load, of a
-    blade whose mass and inertia are symmetric about its x-z plane."""
+    """Return the coordinates of the pitches that the equations leave at zero for ever.
+
+    They start there at rest, without a load, and mass and inertia of the blade are symmetric about its x-z plane.
+    """
     form = rotor_form(scene, Fraction)
     resting = []
     for column, blade in zip(scene.moving_coordinates[1:], form.blades, strict=True):
         torque, rest = scene.pitch_loads[column - 1]
-        loads = [value for _, value in torque] + [value for _, value in rest if blade.stiffness]
+        loads = [value for _, value in torque]
+        if blade.stiffness:
+            loads += [value for _, value in rest]
+        start = scene.initial_angles[column], scene.initial_rates[column]
         asymmetry = blade.weight_y, blade.half_slope_cs, blade.coupling_c
-        if not any([scene.initial_angles[column], scene.initial_rates[column], *loads, *asymmetry]):
+        if not any([*start, *loads, *asymmetry]):
             resting.append(column)
     return tuple(resting)
 
@@ -172,9 +186,11 @@ _UNIT_FREQUENCY = 100.0
 
 
 def rate_units(scene: Scene) -> Array:
-    """(1 + moving blades,) rad/s: 1, or a coordinate's own frequency at the start (spring, gravity, turning) above 100
-    rad/s. Else the quarter period that turns an angle into a rate would count as growth of an error: 1e5-fold on a
-    bearing of 1e12 N m/rad."""
+    """Return what counts as 1 in a rate, (1 + moving blades,) rad/s, where a radian counts as 1 in an angle.
+
+    It is 1, or a coordinate's own frequency at the start (spring, gravity, turning) above 100 rad/s. Else the quarter
+    period that turns an angle into a rate would count as growth of an error: 1e5-fold on a bearing of 1e12 N m/rad.
+    """
     form = rotor_form(scene)
     spin = abs(scene.initial_rates[0])
     frequencies = [0.0]

@@ -1,5 +1,7 @@
-"""The closed form in quad precision, a bound on its error from two tolerances, and the growth of errors; in doubles at
-chosen times; the closed form with terms left out, or with blades elsewhere."""
+"""The reference: the closed form in quad precision, a bound on its error from two tolerances, and the growth of errors.
+
+Also at chosen times, and the closed form with terms left out or with blades at other azimuths.
+"""
 
 from __future__ import annotations
 
@@ -42,26 +44,31 @@ _PERTURBATION = 1e-9
 
 
 class ReferenceSolver:
-    """Two runs over the scene's sample times, and how errors grow along them. The tolerance of the run that is kept,
-    the first, is a thousandth of the other's (without heyoka a hundredth): their distance is the truncation error of
-    the other."""
+    """Two runs over the scene's sample times, and how errors grow along them.
+
+    The tolerance of the run that is kept, the first, is a thousandth of the other's (without heyoka a hundredth): their
+    distance is the truncation error of the other.
+    """
 
     def __init__(self, scene: Scene, runs: Sequence[Propagation | OdeSolver], epsilon: float) -> None:
         self._scene, self._runs, self._epsilon = scene, runs, epsilon
 
     def integrate(self) -> Integration:
+        """Integrate both runs; the report is the first's, with the failure of either."""
         best, check = (run.integrate() for run in self._runs)
         failed = best if not best.success else check
         return replace(best, success=failed.success, message=failed.message, out_of_time=failed.out_of_time)
 
     def observe(self) -> Trajectory:
+        """Return the samples of the first run, with its uncertainty and the growth of errors."""
         rows = min(len(run.states) for run in self._runs)
         best, check = (run.states[:rows] for run in self._runs)
         self._runs[0].states = best
         result = self._runs[0].observe()
         if self._scene.wants("loads") and best.dtype != np.float64:
             result.quantities |= quad_loads(self._scene, result.time, best)
-        difference = np.abs((best - check)[:, : len(self._scene.moving_coordinates)]).astype(float).max(axis=1)
+        angles = slice(len(self._scene.moving_coordinates))
+        difference = np.abs((best - check)[:, angles]).astype(float).max(axis=1)
         result.quantities["angle_uncertainty"] = uncertainty(difference, result.angles, self._epsilon)
         # Over what was reached: the rest of a run that its time limit ended may take for ever.
         if rows > 1:
@@ -73,21 +80,31 @@ class ReferenceSolver:
 
 
 def uncertainty(difference: Array, angles: Array, epsilon: float) -> Array:
-    """(n,) rad: a bound on the error of (n, 1 + blades) angles, but for their rounding to doubles: `SAFETY` times the
-    sum of the difference of two runs, (n,) rad, and of the rounding of the largest angle, because two runs may round
-    alike; of it the largest so far, because they may meet by chance. `epsilon` is that of their arithmetic."""
+    """Return a bound on the error of angles, but for their rounding to doubles, (n,) rad.
+
+    It is `SAFETY` times the sum of the difference of two runs and of the rounding of the largest angle, because two
+    runs may round alike; of it the largest so far, because they may meet by chance.
+
+    Parameters
+    ----------
+    difference : (n,) rad, of the two runs.
+    angles : (n, 1 + blades) rad.
+    epsilon : of their arithmetic.
+    """
     largest = np.maximum(np.abs(angles).max(axis=1), 1.0)
     return np.asarray(SAFETY * np.maximum.accumulate(difference + epsilon * largest))
 
 
 def build(scene: Scene, settings: Any) -> ReferenceSolver:
-    """In quad precision with heyoka; without it by DOP853, with an uncertainty that is larger by many orders."""
+    """Build the two runs: in quad precision with heyoka, by DOP853 without it.
+
+    By DOP853 the uncertainty is larger by many orders.
+    """
     if not is_available():
         runs = _in_doubles(scene, _TIGHTEST), _in_doubles(scene, _LOOSER)
         return ReferenceSolver(scene, runs, _DOUBLE_EPSILON)
-    return ReferenceSolver(
-        scene, [_in_quad(scene, settings.tolerance), _in_quad(scene, settings.check_tolerance)], _QUAD_EPSILON
-    )
+    best, check = _in_quad(scene, settings.tolerance), _in_quad(scene, settings.check_tolerance)
+    return ReferenceSolver(scene, [best, check], _QUAD_EPSILON)
 
 
 def _in_quad(scene: Scene, tolerance: float, times: Array | None = None) -> Propagation:
@@ -99,18 +116,21 @@ def _in_doubles(scene: Scene, tolerances: tuple[float, float], times: Array | No
 
 
 def error_growth(scene: Scene) -> Array:
-    """(samples,) How many times a small error of the initial state may have grown, at most: the largest singular value
-    of the state transition matrix (rad, `rate_units`) in the coordinates that the motion can have, which pitches at
-    rest by symmetry are not; infinite once past what double precision can hold."""
+    """Return how many times a small error of the initial state may have grown, at most, (samples,).
+
+    It is the largest singular value of the state transition matrix (rad, `rate_units`) in the coordinates that the
+    motion can have, which pitches at rest by symmetry are not; infinite once past what double precision can hold.
+    """
     return _largest_growth(scene, _variational_matrices(scene))
 
 
 def _transition_matrices(scene: Scene, times: Array) -> Array:
-    """(n, 2k, 2k) for k coordinates that move, as far as the motion goes."""
+    """Return the state transition matrices, (n, 2k, 2k) for k coordinates that move, as far as the motion goes."""
     return _variational_matrices(scene, times) if is_available() else _matrices_by_quotients(scene, times)
 
 
 def _variational_matrices(scene: Scene, times: Array | None = None) -> Array:
+    """Return the state transition matrices by heyoka's variational equations."""
     count = 2 * len(scene.moving_coordinates)
     propagation = Propagation(scene, variational=True, compact_mode=True, times=times)
     propagation.integrate()
@@ -118,6 +138,10 @@ def _variational_matrices(scene: Scene, times: Array | None = None) -> Array:
 
 
 def _matrices_by_quotients(scene: Scene, times: Array) -> Array:
+    """Return the state transition matrices by difference quotients of runs from neighbouring starts.
+
+    scene : the run; times : (n,) s. Infinite where the neighbouring run did not get.
+    """
     moving = scene.moving_coordinates
 
     def states(start: Scene) -> Array:
@@ -129,16 +153,20 @@ def _matrices_by_quotients(scene: Scene, times: Array) -> Array:
     for name, i in itertools.product(("initial_angles", "initial_rates"), moving):
         start = list(getattr(scene, name))
         start[i] += _PERTURBATION
-        beside: dict[str, Any] = {name: tuple(start)}
-        near = states(replace(scene, **beside))
+        changed: dict[str, Any] = {name: tuple(start)}
+        near = states(replace(scene, **changed))
         rows = min(len(near), len(here))
-        columns.append(np.full_like(here, np.inf))
-        columns[-1][:rows] = (near[:rows] - here[:rows]) / _PERTURBATION
+        column = np.full_like(here, np.inf)
+        column[:rows] = (near[:rows] - here[:rows]) / _PERTURBATION
+        columns.append(column)
     return np.stack(columns, axis=-1)
 
 
 def _largest_growth(scene: Scene, matrices: Array) -> Array:
-    """(samples,) from the state transition matrices of the first samples, as far as they are finite."""
+    """Return the growth of errors, (samples,), from the state transition matrices of the first samples.
+
+    It is infinite where these are not finite.
+    """
     growth = np.full(max(scene.samples, len(matrices)), np.inf)
     finite = np.flatnonzero(np.isfinite(matrices).all(axis=(1, 2)))
     free = free_variables(scene)
@@ -148,13 +176,14 @@ def _largest_growth(scene: Scene, matrices: Array) -> Array:
 
 
 def free_variables(scene: Scene) -> NDArray[np.int64]:
-    """Places, among angles and then rates of the coordinates that move, of those that are not at rest by symmetry."""
+    """Return the places of variables that are not at rest by symmetry, among angles, then rates, of what moves."""
     moving, resting = scene.moving_coordinates, resting_pitches(scene)
     free = np.array([i for i, coordinate in enumerate(moving) if coordinate not in resting])
     return np.concatenate([free, len(moving) + free])
 
 
 def _in_units(scene: Scene, matrices: Array) -> Array:
+    """Return transition matrices in the units of `rate_units`."""
     units = np.concatenate([np.ones(matrices.shape[1] // 2), rate_units(scene)])
     return np.asarray(matrices * units / units[:, None])
 
@@ -164,27 +193,45 @@ _QUAD_TOLERANCE = 1e-30  # its error, grown 1e10-fold, is still below what a dou
 
 @dataclass(frozen=True)
 class TimedReference:
-    """The reference of a scene at chosen times."""
+    """The reference of a scene at chosen times.
 
-    trajectory: Trajectory  # as far as it got: time, angles, rates, error_growth
-    # (n, 2 (1 + blades)) of angles, then rates, how many times larger than an error of the initial state theirs may
-    # be, at most: 2-norms of the rows of the state transition matrix; 1 for a pitch fixed or at rest by symmetry
+    Attributes
+    ----------
+    trajectory : as far as it got: time, angles, rates, error_growth.
+    growth : (n, 2 (1 + blades)), for angles, then rates: how many times larger than an error of the initial state
+        theirs may be, at most. 2-norms of the rows of the state transition matrix; 1 for a pitch that is fixed or at
+        rest by symmetry.
+    units : (2 (1 + blades),) rad or rad/s, what counts as 1 in these norms.
+    """
+
+    trajectory: Trajectory
     growth: Array
-    units: Array  # (2 (1 + blades),) rad or rad/s: what counts as 1 in these norms
+    units: Array
 
 
 def reference_at(scene: Scene, times: Array) -> TimedReference:
-    """The reference at `times`, (n,) s, increasing from 0 to the duration, nothing interpolated: in quad precision with
-    heyoka, else by DOP853 at its tightest."""
-    run = _in_quad(scene, _QUAD_TOLERANCE, times) if is_available() else _in_doubles(scene, _TIGHTEST, times)
+    """Compute the reference at chosen times, nothing interpolated.
+
+    In quad precision with heyoka, else by DOP853 at its tightest.
+
+    Parameters
+    ----------
+    scene : the run.
+    times : (n,) s, increasing from 0 to the duration.
+    """
+    if is_available():
+        run: Propagation | OdeSolver = _in_quad(scene, _QUAD_TOLERANCE, times)
+    else:
+        run = _in_doubles(scene, _TIGHTEST, times)
     run.integrate()
     trajectory, matrices = run.observe(), _transition_matrices(scene, times)
-    trajectory.quantities["error_growth"] = _largest_growth(scene, matrices)[: len(trajectory.time)]
     rows, moving, count = len(trajectory.time), scene.moving_coordinates, len(scene.initial_angles)
+    trajectory.quantities["error_growth"] = _largest_growth(scene, matrices)[:rows]
     columns = np.array([*moving, *(count + i for i in moving)])
     free = free_variables(scene)
     units, growth = np.ones(2 * count), np.ones((rows, 2 * count))
     units[[count + i for i in moving]] = rate_units(scene)
+    # Infinite where the matrices end before the motion does, or overflow.
     growth[:, columns[free]] = np.inf
     known = min(rows, len(matrices))
     with np.errstate(all="ignore"):
@@ -193,20 +240,23 @@ def reference_at(scene: Scene, times: Array) -> TimedReference:
     return TimedReference(trajectory, growth, units)
 
 
-def at_azimuths(scene: Scene, azimuths: Sequence[float]) -> Accelerations:
-    """The closed form with each blade at another angle about the shaft than `Scene.phases`: (blades,) rad."""
+def with_azimuths(scene: Scene, azimuths: Sequence[float]) -> Accelerations:
+    """Return the closed form with the blades at other angles about the shaft than `Scene.phases`, (blades,) rad."""
     form = rotor_form(scene, phases=[(Fraction(math.cos(angle)), Fraction(math.sin(angle))) for angle in azimuths])
     return lambda angles, rates, _form, *rest: closed_form.accelerations(angles, rates, form, *rest)
 
 
-def _sum(*parts: tuple[float, float, float]) -> Accelerations:
-    """The sum of (weight, factor of the rotor's rate, factor of the pitches' rates)."""
+def combined_equations(*parts: tuple[float, float, float]) -> Accelerations:
+    """Return a sum of the closed form's accelerations at different rates.
+
+    Each part is (weight, factor of the rotor's rate, factor of the pitches' rates).
+    """
 
     def equations(angles: Sequence[Number], rates: Sequence[Number], *rest: Any) -> list[Number]:
         total: Any = 0.0
         for weight, spin, pitch in parts:
-            parted = [spin * rates[0], *(pitch * rate for rate in rates[1:])]
-            total = total + weight * np.array(closed_form.accelerations(angles, parted, *rest))
+            scaled = [spin * rates[0], *(pitch * rate for rate in rates[1:])]
+            total = total + weight * np.array(closed_form.accelerations(angles, scaled, *rest))
         return list(total)
 
     return equations
@@ -214,8 +264,12 @@ def _sum(*parts: tuple[float, float, float]) -> Accelerations:
 
 # The accelerations are linear in the dampers' moments and quadratic in the rates otherwise; with one kind of rate at a
 # time, and with rates reversed, each kind of product is taken out without another text of the equations.
-LEFT_OUT: Mapping[str, Accelerations] = {
-    "Coriolis terms (products of rotor rate and pitch rate)": _sum((1.0, 1, 0), (1.0, 0, 1), (-1.0, 0, 0)),
-    "centrifugal terms (square of the rotor rate)": _sum((1.0, 1, 1), (-0.5, 1, 0), (-0.5, -1, 0), (1.0, 0, 0)),
-    "terms with products of rates": _sum((0.5, 1, 1), (-0.5, -1, -1), (1.0, 0, 0)),
+REDUCED_EQUATIONS: Mapping[str, Accelerations] = {
+    "Coriolis terms (products of rotor rate and pitch rate)": combined_equations(
+        (1.0, 1, 0), (1.0, 0, 1), (-1.0, 0, 0)
+    ),
+    "centrifugal terms (square of the rotor rate)": combined_equations(
+        (1.0, 1, 1), (-0.5, 1, 0), (-0.5, -1, 0), (1.0, 0, 0)
+    ),
+    "terms with products of rates": combined_equations((0.5, 1, 1), (-0.5, -1, -1), (1.0, 0, 0)),
 }

@@ -1,6 +1,6 @@
-"""The run of any integrator from segment to segment of the loads, and what its states are as a trajectory.
+"""The run of any integrator from segment to segment of the loads, and the trajectory of its states.
 
-Loads of the closed form by Newton's and Euler's laws, from its own accelerations: roots, shaft bearing, actuators.
+Loads on roots, shaft bearing and actuators follow by Newton's and Euler's laws from the closed form's accelerations.
 
 Symbols, in the frame of a blade with azimuth φ and pitch θ: s = sin θ, c = cos θ; angular velocity
 ω = (Ω s, Ω c, θ̇) and acceleration α = dω/dt; centre of mass r, inertia I about it; up = the base frame's z.
@@ -45,13 +45,22 @@ Numbers = Any
 
 
 class Advance(NamedTuple):
-    """What an integrator made of one segment."""
+    """The integration of one segment.
 
-    states: Any  # (samples reached, variables)
-    end: Any  # (variables,) state at the end of the segment
+    Attributes
+    ----------
+    states : (samples reached, variables).
+    end : (variables,) the state at the end of the segment.
+    steps : number of steps.
+    evaluations : of the right-hand side; None where they are not counted.
+    message : why the end was not reached; "" where it was.
+    """
+
+    states: Any
+    end: Any
     steps: int
-    evaluations: int | None  # of the right-hand side; None where they are not counted
-    message: str  # why the end was not reached; "" where it was
+    evaluations: int | None
+    message: str
 
 
 def over_segments(
@@ -60,9 +69,22 @@ def over_segments(
     initial: Any,
     advance: Callable[[Segment, Any, Array], Advance],
 ) -> tuple[Any, Integration]:
-    """(n, variables) states at the samples, cut before the first row that is not finite, and the engine's report;
-    `times` (samples,) s, the first that of the `initial` state; advance: (segment, state at its start, sample times
-    inside)."""
+    """Integrate from segment to segment of the loads.
+
+    Parameters
+    ----------
+    times : (samples,) s, the first that of the initial state.
+    segments : of the loads.
+    initial : (variables,) state.
+    advance : (segment, state at its start, sample times inside) -> the integration of the segment.
+
+    Returns
+    -------
+    states : ndarray, shape (n, variables)
+        At the samples, cut before the first row that is not finite.
+    integration : Integration
+        The engine's report.
+    """
     state, rows = initial, [initial[None, :]]
     steps, evaluations, message = 0, None, ""
     for segment in segments:
@@ -81,8 +103,14 @@ def over_segments(
 
 
 def trajectory(scene: Scene, times: Array, states: Array) -> Trajectory:
-    """What the scene asks for, from (n, 2k) angles, then rates, of the k coordinates that move; with the work in J as
-    one more column, or not."""
+    """Return the quantities that the scene requests.
+
+    Parameters
+    ----------
+    scene : the run.
+    times : (samples,) s.
+    states : (n, 2k) angles, then rates, of the k coordinates that move; with the work (J) as one more column, or not.
+    """
     count, time = len(scene.moving_coordinates), times[: len(states)]
     angles, rates = all_coordinates(scene, states[:, :count], states[:, count : 2 * count])
     fields: dict[str, Array] = {}
@@ -101,6 +129,15 @@ def trajectory(scene: Scene, times: Array, states: Array) -> Trajectory:
 
 
 def _energies(scene: Scene, time: Array, all_angles: Array, all_rates: Array, states: Array) -> dict[str, Array]:
+    """Return energies and work, (n,) J.
+
+    Parameters
+    ----------
+    scene : the run.
+    time : (n,) s.
+    all_angles, all_rates : (n, 1 + blades) rad and rad/s.
+    states : as of `trajectory`, which may have the work.
+    """
     form, columns = rotor_form(scene), scene.moving_coordinates
     angles, rates = list(all_angles[:, columns].T), list(all_rates[:, columns].T)
     loads = loads_at(scene, time)
@@ -119,7 +156,7 @@ def _energies(scene: Scene, time: Array, all_angles: Array, all_rates: Array, st
 
 
 def loads_at(scene: Scene, time: Array) -> LoadValues:
-    """Loads at (n,) s: numbers where they are constant, else (n,) arrays; at a jump, the values after it."""
+    """Return the loads at (n,) s: numbers where they are constant, else (n,) arrays; at a jump, the values after it."""
     values: list[Any] = []
     for table in scene.load_tables:
         values.append(value_at(table, 0.0) if is_constant(table) else values_at(table, time))
@@ -127,20 +164,20 @@ def loads_at(scene: Scene, time: Array) -> LoadValues:
 
 
 def loads_at_start(scene: Scene, torque: float = 0.0) -> LoadValues:
-    """Numbers: loads of the pitches at t = 0, with `torque` (N m) on the rotor in place of the scene's."""
+    """Return the loads of the pitches at t = 0, with `torque` (N m) on the rotor in place of the scene's."""
     values = [value_at(table, 0.0) for table in scene.load_tables]
     values[ROTOR_TORQUE] = torque
     return load_values(values, scene.moving_coordinates[1:])
 
 
 def at_constant_rests(changing: Sequence[bool], loads: LoadValues) -> LoadValues:
-    """`loads` without the rest angles that are constant, which do no work; changing: as of `changing_rests`."""
+    """Return loads without the rest angles that are constant, which do no work; changing: as of `changing_rests`."""
     rests = [rest if changes else 0.0 for rest, changes in zip(loads.rests, changing, strict=True)]
     return LoadValues(loads.rotor, loads.pitches, rests)
 
 
 def constant_work(scene: Scene, angles: Array) -> Array:
-    """(n,) J of constant torques from (n, 1 + blades) rad: τ·(q - q(0)), exact."""
+    """Return the work of constant torques τ·(q - q(0)), (n,) J, from (n, 1 + blades) rad; exact."""
     work: Array = scene.torque_at(0.0) * (angles[:, 0] - scene.initial_angles[0])
     for i, torque in enumerate(scene.pitch_torque):
         work = work + value_at(torque, 0.0) * (angles[:, 1 + i] - scene.initial_angles[1 + i])
@@ -148,16 +185,22 @@ def constant_work(scene: Scene, angles: Array) -> Array:
 
 
 def sampled_loads(scene: Scene, times: Array, angles: Array, rates: Array) -> dict[str, Array]:
-    """The load quantities at (n,) times in s, in double precision; angles and rates (n, 1 + blades) rad, rad/s."""
+    """Return the load quantities at (n,) times in s; angles, rates: (n, 1 + blades) rad and rad/s."""
     with np.errstate(all="ignore"):  # near a singularity; what is not finite cuts the run
         return _loads(scene, times, angles, rates, float, np.sin, np.cos)
 
 
 def load_rounding(scene: Scene, times: Array, angles: Array, rates: Array) -> dict[str, Array]:
-    """How much of the load quantities the last digits of times, angles and rates leave open, in the shape of each.
+    """Return how much of the load quantities the last digits of a state leave open, in the shape of each.
 
     A stiff bearing's moment is a small difference of large ones. Of each number two roundings count, half a unit in the
     last place: its own, and that of what it is compared with, such as the angle of a pitch command.
+
+    Parameters
+    ----------
+    scene : the run.
+    times : (n,) s.
+    angles, rates : (n, 1 + blades) rad and rad/s.
     """
     loads = sampled_loads(scene, times, angles, rates)
     rounding = {name: np.zeros_like(values) for name, values in loads.items()}
@@ -173,7 +216,7 @@ def load_rounding(scene: Scene, times: Array, angles: Array, rates: Array) -> di
 
 
 def quad_loads(scene: Scene, times: Array, states: Any) -> dict[str, Array]:
-    """The loads in quad precision, rounded at the end; states (n, 2 × moving coordinates): angles, then rates."""
+    """Return the loads in quad precision, rounded at the end; states: (n, 2 × moving coordinates) angles, rates."""
     count = len(scene.moving_coordinates)
     states = states.astype(object)
     angles, rates = all_coordinates(scene, states[:, :count], states[:, count : 2 * count])
@@ -183,6 +226,15 @@ def quad_loads(scene: Scene, times: Array, states: Any) -> dict[str, Array]:
 def _loads(
     scene: Scene, times: Array, angles: Numbers, rates: Numbers, convert: Convert, sin: Function, cos: Function
 ) -> dict[str, Array]:
+    """Compute the load quantities, (n, ...), at a jump of a load before it.
+
+    Parameters
+    ----------
+    scene : the run.
+    times : (n,) s.
+    angles, rates : (n, 1 + blades) rad and rad/s.
+    convert, sin, cos : for the kind of number.
+    """
     moving, applied = scene.moving_coordinates, values_before(scene.load_segments, times)
     accelerations = np.zeros_like(angles)
     form, loads = rotor_form(scene, convert), load_values(list(applied), moving[1:])
@@ -215,8 +267,15 @@ def root_load(
     turning: tuple[Numbers, Numbers, Numbers, Numbers],
     gravity: float,
 ) -> tuple[Numbers, Numbers]:
-    """(n, 3) force and moment in the blade's frame, from (n,) sine and cosine of azimuth and pitch; turning: Ω, θ̇,
-    dΩ/dt, dθ̇/dt."""
+    """Compute the load on a blade's root, (n, 3) force and moment in the blade's frame.
+
+    Parameters
+    ----------
+    blade : its mass and inertia.
+    azimuth, pitch : sine and cosine, (n,) each.
+    turning : Ω, θ̇, dΩ/dt and dθ̇/dt, (n,) each.
+    gravity : m/s².
+    """
     (sin_phi, cos_phi), (s, c) = azimuth, pitch
     spin, rate, spin_rate, rate_rate = turning
     omega = np.stack([spin * s, spin * c, rate], axis=1)
@@ -228,7 +287,7 @@ def root_load(
 
 
 def _in_base_frame(vectors: Numbers, azimuth: tuple[Numbers, Numbers], pitch: tuple[Numbers, Numbers]) -> Numbers:
-    """(n, 3): Ry(φ)·Rz(θ)·vector."""
+    """Return (n, 3) vectors of a blade's frame in the base frame: Ry(φ)·Rz(θ)·vector."""
     (sin_phi, cos_phi), (s, c), (x, y, z) = azimuth, pitch, vectors.T
     across = x * c - y * s
     return np.stack([cos_phi * across + sin_phi * z, x * s + y * c, cos_phi * z - sin_phi * across], axis=1)

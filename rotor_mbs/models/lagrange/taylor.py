@@ -48,7 +48,7 @@ def build_system(scene: Scene, *, in_momenta: bool = False) -> tuple[list[tuple[
 
 
 def state_symbols(form: RotorForm) -> tuple[list[Any], list[Any]]:
-    """Angles, and rates or momenta: rotor, then the pitches that move."""
+    """Return symbols of angles, and of rates or momenta: rotor, then the pitches that move."""
     count = 1 + len(form.blades)
     symbols = heyoka().make_vars(*[f"q{i}" for i in range(count)], *[f"w{i}" for i in range(count)])
     return symbols[:count], symbols[count:]
@@ -69,26 +69,32 @@ _compiled: dict[tuple[object, ...], Any] = {}
 
 
 def compiled(key: tuple[object, ...], make: Callable[[], Any]) -> Any:
-    """Compiled code of its own for the caller, since it holds a state; made once per process and structure."""
+    """Return compiled code of its own for the caller, since it holds a state; made once per process and structure."""
     if key not in _compiled:
         _compiled[key] = make()
     return copy.deepcopy(_compiled[key])
 
 
 def set_parameters(integrator: Any, values: Any) -> None:
-    """Those that the equations of motion use; the ones after them belong to energies alone."""
+    """Set the parameters that the equations of motion use; the ones after them belong to energies alone."""
     integrator.pars[:] = values[: len(integrator.pars)]
 
 
 def is_compact(scene: Scene) -> bool:
+    """Return whether code for a scene is compiled in heyoka's compact mode."""
     return len(scene.blades) > _UNROLLED_BLADES
 
 
 class Propagation:
-    """The equations of a scene under heyoka's Taylor method, in quad precision or doubles, with the state transition
-    matrix row by row where `variational`; times: (n,) s of the samples where not the scene's; options: of the engine.
-    `states` has the rows of the last run before the first that is not finite. Raises MethodRefusal where heyoka is not
-    installed."""
+    """The equations of a scene under heyoka's Taylor method.
+
+    Attributes
+    ----------
+    integrator : heyoka's.
+    times : (n,) s of the samples.
+    states : (rows, variables) of the last run, before the first row that is not finite; where variational, followed by
+        the state transition matrix row by row.
+    """
 
     def __init__(
         self,
@@ -99,6 +105,21 @@ class Propagation:
         times: Array | None = None,
         **options: Any,
     ) -> None:
+        """Compile the equations, or take what is compiled for another scene of the same structure.
+
+        Parameters
+        ----------
+        scene : the run.
+        quad : whether in quad precision; else in doubles.
+        variational : whether to integrate the state transition matrix, too.
+        times : (n,) s of the samples; the scene's where left out.
+        options : of the engine.
+
+        Raises
+        ------
+        MethodRefusal
+            Where heyoka is not installed.
+        """
         engine, self._scene = heyoka(), scene
         columns, count = scene.moving_coordinates, 2 * len(scene.moving_coordinates)
         equations, parameters = build_system(scene)
@@ -120,6 +141,7 @@ class Propagation:
         self.states = self._initial[None, :]
 
     def integrate(self) -> Integration:
+        """Integrate from the initial state to the end, or to the first failure."""
         self.integrator.time = self._initial.dtype.type(0)
         self.integrator.state[:] = self._initial
         self.states, integration = over_segments(self.times, self._segments, self._initial, self._advance)
@@ -132,7 +154,7 @@ class Propagation:
             self.integrator.pars[-len(numbers) :] = array_of(numbers, quad=self._initial.dtype != np.float64)
 
     def _advance(self, segment: Segment, _state: Array, times: Array) -> Advance:
-        """From where the integrator is, the end of the segment before."""
+        """Integrate over a segment from where the integrator is, the end of the segment before."""
         integrator, kind = self.integrator, self._initial.dtype
         self.set_segment(segment)
         end = [] if len(times) and times[-1] == segment.end else [segment.end]
@@ -147,7 +169,10 @@ class Propagation:
 
 
 def items(scene: Scene) -> list[BuiltItem]:
-    """Raises MethodRefusal where heyoka is not installed, before anything is built; does not load it."""
+    """Return the equations and terms of a scene, without loading heyoka.
+
+    Raises MethodRefusal where it is not installed.
+    """
     if find_spec("heyoka") is None:
         heyoka()  # refuses
     return equation_items(scene)

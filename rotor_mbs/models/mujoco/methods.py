@@ -19,6 +19,8 @@ _HINT = "pip install 'rotor_mbs[mujoco]'"
 
 @dataclass(frozen=True)
 class Rk4Settings(Settings):
+    """Classical Runge-Kutta, order 4."""
+
     step: float = step(2.5e-4)
 
 
@@ -30,7 +32,7 @@ class FirstOrderSettings(Settings):
 
 
 def _items(scene: Scene) -> list[BuiltItem]:
-    """Raises MethodRefusal, with the way to get it, where MuJoCo is not installed."""
+    """Return the items of a scene. Raises MethodRefusal, with the way to get it, where MuJoCo is not installed."""
     if not METHODS[0].is_installed:
         raise MethodRefusal(f"MuJoCo is not installed: {_HINT}")
     from rotor_mbs.models.mujoco import mjcf
@@ -39,6 +41,7 @@ def _items(scene: Scene) -> list[BuiltItem]:
 
 
 def _build(integrator: str, scene: Scene, settings: Rk4Settings | FirstOrderSettings) -> Solver:
+    """Build the model of a scene. Raises MethodRefusal as `_items`, and where MuJoCo does not take the model."""
     _items(scene)
     from rotor_mbs.models.mujoco.solver import MujocoSolver
 
@@ -46,6 +49,7 @@ def _build(integrator: str, scene: Scene, settings: Rk4Settings | FirstOrderSett
 
 
 def _method(integrator: str, label: str, **facts: Any) -> Method:
+    """Return a method of MuJoCo; label: of the integrator; facts: other fields of the `Method`."""
     return Method(
         name=f"mujoco/{integrator}",
         label=f"MuJoCo, {label}",

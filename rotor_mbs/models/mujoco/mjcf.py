@@ -88,11 +88,12 @@ def loads_of(scene: Scene) -> list[Load]:
 
 
 def joint_name(coordinate: int) -> str:
+    """Return the name of the hinge of a coordinate (0: rotor)."""
     return f"pitch {coordinate}" if coordinate else "rotor"
 
 
 def model(scene: Scene, integrator: str, step: float) -> ET.Element:
-    """The MJCF element tree. integrator: a key of `INTEGRATORS`; step: time step in s."""
+    """Return the MJCF element tree of a scene; integrator: a key of `INTEGRATORS`; step: time step in s."""
     root = ET.Element("mujoco", model=scene.name or "rotor")
     ET.SubElement(root, "compiler", angle="radian")
     option = ET.SubElement(
@@ -122,24 +123,31 @@ def model(scene: Scene, integrator: str, step: float) -> ET.Element:
 
 
 def text(root: ET.Element) -> str:
+    """Return an element tree as indented text; `root` is changed in place."""
     ET.indent(root)
     return ET.tostring(root, encoding="unicode") + "\n"
 
 
 def items(scene: Scene) -> list[BuiltItem]:
+    """Return the elements of a scene's model as `show --build` lists them."""
     kinds = {"body": "object", "joint": "node", "site": "marker", "general": "load"}
     built = []
     for element in model(scene, "rk4", 1.0).iter():
-        if element.tag in kinds:
-            detail = element.tag
-            if len(element.attrib) > 1:
-                facts = [f"{key} {value}" for key, value in element.attrib.items() if key not in ("name", "type")]
-                detail = f"{element.get('type', element.tag)}: {', '.join(facts)}"
-            built.append(BuiltItem(kinds[element.tag], element.get("name", element.tag), detail))
+        if element.tag not in kinds:
+            continue
+        detail = element.tag
+        if len(element.attrib) > 1:
+            facts = []
+            for key, value in element.attrib.items():
+                if key not in ("name", "type"):
+                    facts.append(f"{key} {value}")
+            detail = f"{element.get('type', element.tag)}: {', '.join(facts)}"
+        built.append(BuiltItem(kinds[element.tag], element.get("name", element.tag), detail))
     return built
 
 
 def _blade(hub: ET.Element, scene: Scene, number: int) -> None:
+    """Add a blade (1, 2, ...) to the hub: body, hinge, inertia and tip."""
     blade, phase = scene.blades[number - 1], scene.phases[number - 1]
     pitch = 0.0 if blade.has_pitch_inertia else scene.initial_angles[number]
     # The quaternion of Ry(phase) Rz(pitch), scalar part first.
@@ -155,6 +163,7 @@ def _blade(hub: ET.Element, scene: Scene, number: int) -> None:
 
 
 def _joint(body: ET.Element, coordinate: int, axis: str, stiffness: float, damping: float, rest: float = 0.0) -> None:
+    """Add a hinge about an axis to a body: N m/rad, N m s/rad, and the rest angle in rad."""
     joint = ET.SubElement(body, "joint", name=joint_name(coordinate), type="hinge", axis=axis)
     if stiffness:
         joint.set("stiffness", numbers(stiffness))
@@ -165,7 +174,15 @@ def _joint(body: ET.Element, coordinate: int, axis: str, stiffness: float, dampi
 
 
 def _inertial(body: ET.Element, mass: float, centre: Iterable[float], inertia: Sequence[float]) -> None:
-    """Mass and principal moments; inertia: xx yy zz xy xz yz about the centre of mass, kg m²."""
+    """Add mass (kg) and principal moments to a body.
+
+    Parameters
+    ----------
+    body : the element.
+    mass : kg.
+    centre : (3,) m, centre of mass.
+    inertia : xx yy zz xy xz yz about it, kg m².
+    """
     element = ET.SubElement(body, "inertial", pos=numbers(*centre), mass=numbers(max(mass, LEAST)))
     xx, yy, zz, xy, xz, yz = inertia
     if not (xy or xz or yz):
@@ -177,20 +194,23 @@ def _inertial(body: ET.Element, mass: float, centre: Iterable[float], inertia: S
 
 
 def _possible(moments: list[float]) -> list[float]:
-    """Principal moments that MuJoCo takes: none below `LEAST`, none above the sum of the others by rounding."""
+    """Return principal moments that MuJoCo takes: none below `LEAST`, none above the sum of the others by rounding."""
     least = [max(moment, LEAST) for moment in moments]
     total = sum(least)
     return [min(moment, total - moment) for moment in least]
 
 
 def numbers(*values: float) -> str:
+    """Return numbers with all their digits, as an attribute has them."""
     return " ".join(repr(float(value)) for value in values)
 
 
 def mjcf_file(scene: Scene) -> str:
-    """The MJCF text of a scene for plain MuJoCo, with a step that is a whole part of the sample interval, initial state
-    and loads at t = 0 in the keyframe "start", a numeric "segment i" (time, torques or rest angles, slopes), and
-    capsules to look at."""
+    """Return the MJCF text of a scene for plain MuJoCo.
+
+    Its step is a whole part of the sample interval. The keyframe "start" has the initial state and the loads at t = 0;
+    a numeric "segment i" has the time, torques or rest angles, and slopes of each segment; capsules are to look at.
+    """
     spacing = scene.duration / (scene.samples - 1)
     steps, _ = steps_and_rows(spacing, _FILE_STEP, rows_between=False)
     root, loads = model(scene, "rk4", spacing / steps), loads_of(scene)
@@ -223,6 +243,7 @@ def mjcf_file(scene: Scene) -> str:
 
 
 def _header(scene: Scene, steps: int, has_loads: bool) -> str:
+    """Return the comment at the head of a file: how to run it, with so many steps from sample to sample."""
     lines = [
         scene.title or scene.name,
         f"SI units, rad. {scene.samples} samples over {scene.duration!r} s, {steps} steps from one to the next.",

@@ -1,5 +1,7 @@
-"""The rotor in the engine: runs it from sample to sample, then reads energies and tips off the engine's bodies; and the
-model linearized, by quotients of the engine's accelerations. The one place that imports MuJoCo."""
+"""The rotor in MuJoCo: runs from sample to sample, energies and tips of its bodies, and the model linearized.
+
+The only module that imports MuJoCo.
+"""
 
 from __future__ import annotations
 
@@ -45,23 +47,38 @@ _PORTION = 10_000
 
 @dataclass
 class Poses:
-    """Every body and site at n states, world frame; world body left out."""
+    """Every body and site at n states in the world frame, the world body left out.
 
-    centre: Array  # (n, bodies, 3) m, centres of mass
-    velocity: Array  # (n, bodies, 3) m/s, of the centres of mass
-    spin: Array  # (n, bodies, 3) rad/s, along the principal axes
-    site: Array  # (n, sites, 3) m
-    acceleration: Array  # (n, coordinates) rad/s²
-    frame: Array  # (n, bodies, 3, 3) body's frame to world frame
-    # (n, bodies, 6) N m and N, world frame: moment about its origin and force of a body's parent on the body
+    Attributes
+    ----------
+    centre, velocity : (n, bodies, 3) m and m/s, of the centres of mass.
+    spin : (n, bodies, 3) rad/s, along the principal axes.
+    site : (n, sites, 3) m.
+    acceleration : (n, coordinates) rad/s².
+    frame : (n, bodies, 3, 3) from a body's frame to the world frame.
+    wrench : (n, bodies, 6) N m about the world's origin and N, of a body's parent on the body.
+    """
+
+    centre: Array
+    velocity: Array
+    spin: Array
+    site: Array
+    acceleration: Array
+    frame: Array
     wrench: Array
 
 
 class Engine:
-    """The compiled model of a scene, and its state; masses and moments of `mjcf.LEAST` are set to zero. Arguments as of
-    `mjcf.model`. Raises MethodRefusal, with MuJoCo's reason, where it does not take the model."""
+    """The compiled model of a scene, and its state; masses and moments of `mjcf.LEAST` are set to zero."""
 
     def __init__(self, scene: Scene, integrator: str, step: float) -> None:
+        """Compile the model; arguments as of `mjcf.model`.
+
+        Raises
+        ------
+        MethodRefusal
+            With MuJoCo's reason, where it does not take the model.
+        """
         try:
             self._model = _engine.MjModel.from_xml_string(mjcf.text(mjcf.model(scene, integrator, step)))
         except ValueError as exc:
@@ -73,13 +90,26 @@ class Engine:
         self.moments: Array = np.array(self._model.body_inertia[1:])
 
     def start(self, angles: Sequence[float], rates: Sequence[float]) -> None:
-        """To the initial state, (coordinates,) rad and rad/s; nothing of an earlier run is left."""
+        """Set the initial state, (coordinates,) rad and rad/s; nothing of an earlier run is left."""
         _engine.mj_resetData(self._model, self._data)
         self._data.qpos[:], self._data.qvel[:] = angles, rates
 
     def advance(self, step: float, steps: int, loads: Sequence[float], slopes: Sequence[float]) -> tuple[int, str]:
-        """Takes equal steps of `step` s, each actuator's activation (N m or rad) at the start and its slope per s
-        given; the steps taken, and why it ended before all were: time limit, a state that is not finite, ""."""
+        """Take equal steps.
+
+        Parameters
+        ----------
+        step : s.
+        steps : number of steps.
+        loads, slopes : (actuators,) activation at the start, N m or rad, and its slope per s.
+
+        Returns
+        -------
+        taken : int
+            Steps.
+        message : str
+            Why it ended before all were taken: time limit, or a state that is not finite; else "".
+        """
         model, data = self._model, self._data
         model.opt.timestep = step
         if loads:
@@ -100,14 +130,16 @@ class Engine:
 
     @property
     def state(self) -> tuple[Array, Array]:
+        """Angles and rates, (coordinates,) rad and rad/s: the engine's own arrays."""
         return self._data.qpos, self._data.qvel
 
     def poses(self, angles: Array, rates: Array, loads: Array) -> Poses:
-        """At given states, (n, coordinates) rad and rad/s, (n, actuators) N m or rad."""
+        """Return bodies and sites at given states, (n, coordinates) rad and rad/s, (n, actuators) N m or rad."""
         rows = [self._pose(*state) for state in zip(angles, rates, loads, strict=True)]
         return Poses(*map(np.array, zip(*rows, strict=True)))
 
     def _pose(self, angles: Array, rates: Array, loads: Array) -> tuple[Array, ...]:
+        """Return the fields of `Poses` at one state."""
         model, data = self._model, self._data
         data.qpos[:], data.qvel[:], data.act[:] = angles, rates, loads
         _engine.mj_forward(model, data)
@@ -131,7 +163,15 @@ _STAGES = {"rk4": 4, "implicitfast": 1, "implicit": 1}
 
 
 class _Row(NamedTuple):
-    """A state, (coordinates,) rad and rad/s. Where a load jumps there are two, with the segment before and after."""
+    """A state that is kept. Where a load jumps there are two, with the segment before and after.
+
+    Attributes
+    ----------
+    time : s.
+    angles, rates : (coordinates,) rad and rad/s.
+    segment : the loads.
+    is_sample : whether a sample is there.
+    """
 
     time: float
     angles: Array
@@ -141,10 +181,10 @@ class _Row(NamedTuple):
 
 
 class MujocoSolver:
-    """See `methods.base.Solver`; integrator: a key of `mjcf.INTEGRATORS`, step: s, the largest. Raises MethodRefusal,
-    with the engine's reason, where the engine does not take the model."""
+    """The model of a scene under one of MuJoCo's integrators; see `methods.base.Solver`."""
 
     def __init__(self, scene: Scene, integrator: str, step: float) -> None:
+        """Build the model; integrator: a key of `mjcf.INTEGRATORS`; step: s, the largest. Raises as `Engine`."""
         self._scene, self._step, self._stages = scene, step, _STAGES[integrator]
         self._moving = scene.moving_coordinates
         self._loads = mjcf.loads_of(scene)
@@ -154,10 +194,10 @@ class MujocoSolver:
         self.engine = Engine(scene, integrator, step)
 
     def integrate(self) -> Integration:
-        scene, self._rows = self._scene, []
-        self.engine.start(
-            *([values[i] for i in self._moving] for values in (scene.initial_angles, scene.initial_rates))
-        )
+        """Integrate from the initial state to the end, or to the first failure."""
+        self._rows = []
+        initial_angles, initial_rates = self._scene.initial_angles, self._scene.initial_rates
+        self.engine.start([initial_angles[i] for i in self._moving], [initial_rates[i] for i in self._moving])
         self._keep(0.0, self._intervals[0].segment, is_sample=True)
         steps, message = 0, ""
         with time_limit.samples_kept_at_limit():
@@ -172,7 +212,7 @@ class MujocoSolver:
         return Integration(not message, message, self._rows[-1].time, steps, steps * self._stages, out_of_time)
 
     def _advance(self, interval: Interval) -> tuple[int, str]:
-        """Over one interval: steps taken, and why it ended early."""
+        """Integrate over one interval; return the steps taken, and why it ended early or ""."""
         span, segment = interval.end - interval.start, interval.segment
         steps, count = steps_and_rows(span, self._step, self._rows_between)
         slopes = [load.control(segment) for load in self._loads]
@@ -192,14 +232,18 @@ class MujocoSolver:
         return [load.activation(segment, time) for load in self._loads]
 
     def _keep(self, time: float, segment: Segment, is_sample: bool) -> None:
+        """Keep the engine's state."""
         angles, rates = self.engine.state
         self._rows.append(_Row(time, angles.copy(), rates.copy(), segment, is_sample))
 
     def observe(self) -> Trajectory:
+        """Return the samples of the last integration."""
         scene, rows = self._scene, self._rows
-        angles, rates = (np.array([getattr(row, name) for row in rows]) for name in ("angles", "rates"))
+        angles, rates = np.array([row.angles for row in rows]), np.array([row.rates for row in rows])
         at = [i for i, row in enumerate(rows) if row.is_sample]
-        fields = dict(zip(("angles", "rates"), all_coordinates(scene, angles[at], rates[at]), strict=True))
+        fields: dict[str, Array] = {}
+        fields["angles"], fields["rates"] = all_coordinates(scene, angles[at], rates[at])
+        # A diverging state may overflow; the samples are cut where they stop being finite.
         with np.errstate(over="ignore", invalid="ignore"):
             if {"tip", "energy", "loads"} & set(scene.outputs):
                 values = np.array([self._activations(row.segment, row.time) for row in rows])
@@ -219,19 +263,32 @@ class MujocoSolver:
         return finite_samples(scene, fields)
 
     def _root_loads(self, poses: Poses, values: Array) -> dict[str, Array]:
-        """What each body's parent does to it; the moment of an actuator is the part about the pitch axis."""
+        """Return the loads at roots and shaft by quantity: what each body's parent does to it.
+
+        The moment of an actuator is the part about the pitch axis. `values`: (rows, actuators) activations.
+        """
         moment, force = poses.wrench[:, :, :3], poses.wrench[:, :, 3:]
-        roots = [np.einsum("nbij,nbi->bnj", poses.frame, vectors)[1:] for vectors in (force, moment)]
+        # In the frame of each body; the first is the hub.
+        root_forces = np.einsum("nbij,nbi->bnj", poses.frame, force)[1:]
+        root_moments = np.einsum("nbij,nbi->bnj", poses.frame, moment)[1:]
         shaft_moment = moment[:, 0].copy()
         if self._scene.has_torque:
             shaft_moment[:, 1] -= values[:, 0]  # the first of `mjcf.loads_of`
-        pitching = np.isin(np.arange(1, 1 + len(self._scene.blades)), self._moving)
-        actuators = np.where(pitching, roots[1][:, :, 2].T, 0.0)
-        return named_loads(zip(*roots, strict=True), force[:, 0], shaft_moment, actuators)
+        has_hinge = np.isin(np.arange(1, 1 + len(self._scene.blades)), self._moving)
+        actuators = np.where(has_hinge, root_moments[:, :, 2].T, 0.0)
+        return named_loads(zip(root_forces, root_moments, strict=True), force[:, 0], shaft_moment, actuators)
 
     def _work(self, angles: Array, rates: Array, accelerations: Array, values: Array) -> Array:
-        """(n,) J of the actuators, less what the dampers took. Constant loads: torque times angle. Else from row to row
-        ∫ P dt ≈ h (P₀ + P₁)/2 + h² (P₀' - P₁')/12, of order 4 like the best integrator here."""
+        """Compute the work of the actuators less what the dampers took, (rows,) J.
+
+        Of constant loads without dampers it is torque times angle. Else the power P is integrated from row to row by
+        ∫ P dt ≈ h (P₀ + P₁)/2 + h² (P₀' - P₁')/12, of order 4 like the best integrator here.
+
+        Parameters
+        ----------
+        angles, rates, accelerations : (rows, coordinates) rad, rad/s and rad/s².
+        values : (rows, actuators) activations.
+        """
         columns = [self._moving.index(load.coordinate) for load in self._loads]
         gains = np.array([load.gain for load in self._loads])
         torques = gains * values
@@ -250,11 +307,24 @@ class MujocoSolver:
 
 
 def _springs(scene: Scene, angles: Array) -> tuple[Array, Array]:
-    """(n,) J at the first n samples: energy of the springs, and the work -∫ k (θ - r) dr of rest angles that change,
-    less the ∫ k r dθ that actuators did."""
+    """Compute the energy of the springs, and the work of rest angles that actuators did not do.
+
+    The work of a rest angle r that changes is -∫ k (θ - r) dr; its actuator did ∫ k r dθ.
+
+    Parameters
+    ----------
+    scene : the rotor.
+    angles : (n, 1 + blades) rad, at the first n samples.
+
+    Returns
+    -------
+    energy, work : ndarray, shape (n,)
+        J.
+    """
     energy, work = np.zeros((2, len(angles)))
     for number in scene.moving_coordinates[1:]:
-        stiffness, table = scene.bearings[number - 1][0], scene.pitch_loads[number - 1][1]
+        stiffness, _ = scene.bearings[number - 1]
+        _, table = scene.pitch_loads[number - 1]
         if stiffness:
             rest = values_at(table, sample_times(scene)[: len(angles)])
             energy += 0.5 * (stiffness * (angles[:, number] - rest) ** 2)
@@ -265,11 +335,25 @@ def _springs(scene: Scene, angles: Array) -> tuple[Array, Array]:
 
 
 def linearize(scene: Scene, angles: Sequence[float] | Array, speed: float, torque: float) -> Linearization:
-    """About `angles` (1 + blades,) rad, the rotor turning at `speed` rad/s under `torque` N m. Raises MethodRefusal."""
+    """Linearize the model by difference quotients of the engine's accelerations.
+
+    Parameters
+    ----------
+    scene : the rotor.
+    angles : (1 + blades,) rad.
+    speed : rad/s, of the rotor.
+    torque : N m, on the rotor.
+
+    Raises
+    ------
+    MethodRefusal
+        Where the engine does not take the model.
+    """
     state = scene_at(scene, angles, speed, torque)
     columns = state.moving_coordinates
     engine = Engine(state, "rk4", 1e-3)
-    here = np.concatenate([np.array(values)[columns] for values in (state.initial_angles, state.initial_rates)])
+    initial_angles, initial_rates = np.array(state.initial_angles), np.array(state.initial_rates)
+    here = np.concatenate([initial_angles[columns], initial_rates[columns]])
     n = len(columns)
     first = state.load_segments[0]
     loads = np.array([load.activation(first, first.start) for load in mjcf.loads_of(state)])

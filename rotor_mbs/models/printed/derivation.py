@@ -32,7 +32,7 @@ CORRECTED = Errata(e1=False, e2=False, e3=False)
 
 
 def a3(s2: Any, c2: Any, s3: Any, c3: Any, c: Any, d: Any) -> Matrix:
-    """(3), base from frame 3, whose origin is the blade's mass point: Ry(q2) Rz(q3), the origin at (c, 0, d)."""
+    """Return (3), base from frame 3, whose origin is the blade's mass point: Ry(q2) Rz(q3), the origin at (c, 0, d)."""
     return (
         (c2 * c3, -c2 * s3, s2, c * c2 * c3 + d * s2),
         (s3, c3, 0, c * s3),
@@ -42,7 +42,7 @@ def a3(s2: Any, c2: Any, s3: Any, c3: Any, c: Any, d: Any) -> Matrix:
 
 
 def u32(s2: Any, c2: Any, s3: Any, c3: Any, c: Any, d: Any, errata: Errata = AS_PRINTED) -> Matrix:
-    """(8), derivative of (3) by q2."""
+    """Return (8), derivative of (3) by q2."""
     return (
         (-s2 * c3, s2 * s3, c2, -c * s2 * c3 + d * c2),
         (0, 0, 0, c * c3 if errata.e1 else 0),
@@ -52,7 +52,7 @@ def u32(s2: Any, c2: Any, s3: Any, c3: Any, c: Any, d: Any, errata: Errata = AS_
 
 
 def u33(s2: Any, c2: Any, s3: Any, c3: Any, c: Any) -> Matrix:
-    """(9), derivative of (3) by q3."""
+    """Return (9), derivative of (3) by q3."""
     return (
         (-c2 * s3, -c2 * c3, 0, -c * c2 * s3),
         (c3, -s3, 0, c * c3),
@@ -62,7 +62,7 @@ def u33(s2: Any, c2: Any, s3: Any, c3: Any, c: Any) -> Matrix:
 
 
 def u32_2(s2: Any, c2: Any, s3: Any, c3: Any, c: Any, d: Any) -> Matrix:
-    """(16), derivative of (8) by q2."""
+    """Return (16), derivative of (8) by q2."""
     return (
         (-c2 * c3, c2 * s3, -s2, -c * c2 * c3 - d * s2),
         (0, 0, 0, 0),
@@ -72,7 +72,7 @@ def u32_2(s2: Any, c2: Any, s3: Any, c3: Any, c: Any, d: Any) -> Matrix:
 
 
 def u32_3(s2: Any, c2: Any, s3: Any, c3: Any, c: Any, errata: Errata = AS_PRINTED) -> Matrix:
-    """(17), derivative of (8) by q3."""
+    """Return (17), derivative of (8) by q3."""
     return (
         (s2 * s3, s2 * c3, 0, c * s2 * s3),
         (0, 0, 0, -c * s3 if errata.e1 else 0),
@@ -82,7 +82,7 @@ def u32_3(s2: Any, c2: Any, s3: Any, c3: Any, c: Any, errata: Errata = AS_PRINTE
 
 
 def u33_2(s2: Any, c2: Any, s3: Any, c3: Any, c: Any) -> Matrix:
-    """(18), derivative of (9) by q2."""
+    """Return (18), derivative of (9) by q2."""
     return (
         (s2 * s3, s2 * c3, 0, c * s2 * s3),
         (0, 0, 0, 0),
@@ -92,7 +92,7 @@ def u33_2(s2: Any, c2: Any, s3: Any, c3: Any, c: Any) -> Matrix:
 
 
 def u33_3(s2: Any, c2: Any, s3: Any, c3: Any, c: Any, errata: Errata = AS_PRINTED) -> Matrix:
-    """(19), derivative of (9) by q3."""
+    """Return (19), derivative of (9) by q3."""
     return (
         (-c2 * c3, c2 * s3, 0, -c * s2 * c3 if errata.e2 else -c * c2 * c3),
         (-s3, -c3, 0, -c * s3),
@@ -118,7 +118,7 @@ class BladeTerms(NamedTuple):
 
 
 def trace(u: Matrix, m: float, v: Matrix) -> float:
-    """Trace of U J3 Vᵀ, as in (24) and (26); J3 of (20) is that of a point mass m (kg) in the origin of frame 3."""
+    """Return the trace of U J3 Vᵀ in (24) and (26); J3 of (20) is that of a point mass m (kg) in frame 3's origin."""
     u0, u1, u2, _ = u  # the last row of a derivative is zero
     v0, v1, v2, _ = v
     total: float = m * (u0[3] * v0[3] + u1[3] * v1[3] + u2[3] * v2[3])
@@ -128,7 +128,16 @@ def trace(u: Matrix, m: float, v: Matrix) -> float:
 def blade_terms(
     q2: float, q3: float, m: float, c: float, d: float, g: float, errata: Errata = AS_PRINTED
 ) -> BladeTerms:
-    """(24), (26), (27), (31) for one blade whose own rotor angle is q2."""
+    """Return (24), (26), (27), (31) for one blade.
+
+    Parameters
+    ----------
+    q2 : rad, the rotor angle at which this blade stands.
+    q3 : rad, its pitch.
+    m, c, d : mass (kg) and place (m) of the point mass.
+    g : m/s².
+    errata : the faults that are left in.
+    """
     s2, c2, s3, c3 = math.sin(q2), math.cos(q2), math.sin(q3), math.cos(q3)
     by_2 = u32(s2, c2, s3, c3, c, d, errata)
     by_3 = u33(s2, c2, s3, c3, c)
@@ -162,14 +171,14 @@ class DerivedRotor:
         self._first_power = errata.e3 and len(self._phases) > 1
 
     def blades(self, angles: Sequence[float]) -> list[BladeTerms]:
-        """Terms of every blade by (34)-(36); angles (1 + blades,) rad."""
+        """Return the terms of every blade by (34)-(36); angles (1 + blades,) rad."""
         return [
             blade_terms(angles[0] + phase, pitch, *self._constants)
             for phase, pitch in zip(self._phases, angles[1:], strict=True)
         ]
 
     def forces(self, blades: Sequence[BladeTerms], rates: Sequence[float]) -> tuple[float, list[float]]:
-        """H + C of the rotor's row and of every pitch row; rates (1 + blades,) rad/s; N m."""
+        """Return H + C of the rotor's row and of every pitch row, N m; rates (1 + blades,) rad/s."""
         v2 = rates[0]
         rotor = 0.0
         pitches = []
@@ -180,7 +189,13 @@ class DerivedRotor:
         return rotor, pitches
 
     def accelerations(self, torques: Sequence[float], angles: Sequence[float], rates: Sequence[float]) -> list[float]:
-        """τ = D q̈ + H + C solved for q̈ (rad/s²), the pitches eliminated one by one; torques (1 + blades,) N m."""
+        """Solve τ = D q̈ + H + C for q̈ (rad/s²), the pitches eliminated one by one.
+
+        Parameters
+        ----------
+        torques : (1 + blades,) N m.
+        angles, rates : (1 + blades,) rad and rad/s.
+        """
         blades = self.blades(angles)
         rotor, forces = self.forces(blades, rates)
         pitches = [force - torque for force, torque in zip(forces, torques[1:], strict=True)]

@@ -25,7 +25,7 @@ Row = tuple[Any, ...]
 
 
 def mass_one(m: Any, c: Any, d: Any, s3: Any, c3: Any) -> tuple[Row, Row]:
-    """(25), rows and columns of q2, q3; kg m²."""
+    """Return (25), rows and columns of q2, q3; kg m²."""
     return (
         (2 * c**2 * m * c3**2 + d**2 * m, -c * d * m * s3 + c**2 * m * c3**2),
         (c**2 * m * c3**2 - c * d * m * s3, c**2 * m),
@@ -33,7 +33,7 @@ def mass_one(m: Any, c: Any, d: Any, s3: Any, c3: Any) -> tuple[Row, Row]:
 
 
 def h2(m: Any, c: Any, d: Any, s2: Any, c2: Any, s3: Any, c3: Any, w23: Any, w33: Any) -> Any:
-    """(29), N m."""
+    """Return (29), N m."""
     return (
         -3 * c**2 * m * s3 * c3 * w23
         + c**2 * m * c3 * (s2**2 * c3 - s3 - s2 * c3 * c2) * w33
@@ -42,19 +42,25 @@ def h2(m: Any, c: Any, d: Any, s2: Any, c2: Any, s3: Any, c3: Any, w23: Any, w33
 
 
 def h3(m: Any, c: Any, s2: Any, c2: Any, s3: Any, c3: Any, w22: Any, w23: Any, w33: Any) -> Any:
-    """(30), N m: with the square of q̇3, unlike (53)."""
+    """Return (30), N m: with the square of q̇3, unlike (53)."""
     return c**2 * m * c3 * s3 * w22 - c**2 * m * c3 * s3 * w23 + c**2 * m * c3 * s3 * (s2 * c2 - c2**2) * w33
 
 
 def gravity_one(m: Any, c: Any, d: Any, g: Any, s2: Any, c2: Any, s3: Any, c3: Any) -> Row:
-    """(32), rows of q2, q3; N m."""
+    """Return (32), rows of q2, q3; N m."""
     return -c * m * g * c2 * c3 - d * m * g * s2, c * m * g * s2 * s3
 
 
 def mass_three(
     m: Any, c: Any, d: Any, s3: Any, c3: Any, s4: Any, c4: Any, s5: Any, c5: Any
 ) -> tuple[Row, Row, Row, Row]:
-    """(39)-(51), rows and columns of q2, q3, q4, q5; kg m²."""
+    """Return (39)-(51), rows and columns of q2, q3, q4, q5; kg m².
+
+    Parameters
+    ----------
+    m, c, d : mass (kg) and place (m) of the point mass.
+    s3, c3, s4, c4, s5, c5 : sines and cosines of the pitches.
+    """
     return (
         (
             2 * c**2 * m * (c3**2 + c4**2 + c5**2) + 3 * d**2 * m,  # (42)
@@ -72,7 +78,15 @@ def h_1(
     m: Any, c: Any, d: Any, s2: Any, c2: Any, s3: Any, c3: Any, s4: Any, c4: Any, s5: Any, c5: Any,
     w23: Any, w24: Any, w25: Any, w33: Any, w44: Any, w55: Any, root3: Any = ROOT3,
 ) -> Any:  # fmt: skip
-    """(52), N m."""
+    """Return (52), N m.
+
+    Parameters
+    ----------
+    m, c, d : mass (kg) and place (m) of the point mass.
+    s2, c2, s3, c3, s4, c4, s5, c5 : sines and cosines of the angles.
+    w23, w24, w25, w33, w44, w55 : products of rates, rad²/s².
+    root3 : the square root of 3.
+    """
     return (
         -3 * c**2 * m * (s3 * c3 * w23 + s4 * c4 * w24 + s5 * c5 * w25)
         + c * m * c3 * (c * c3 * (s2**2 - s2 * c2) - d * (s2**2 + s2 * c2) - c * s3) * w33
@@ -90,18 +104,18 @@ def h_1(
 
 
 def h_2(m: Any, c: Any, s2: Any, c2: Any, s3: Any, c3: Any, w22: Any, w23: Any, w3: Any) -> Any:
-    """(53), N m; q̇3 to the first power in the last term (E3)."""
+    """Return (53), N m; q̇3 to the first power in the last term (E3)."""
     return c**2 * m * s3 * c3 * (w22 - w23 + (s2 * c2 - c2**2) * w3)
 
 
 def h_3(m: Any, c: Any, s2: Any, c2: Any, s4: Any, c4: Any, w22: Any, w24: Any, w4: Any, root3: Any = ROOT3) -> Any:
-    """(54), N m; q̇4 to the first power in the last term (E3)."""
+    """Return (54), N m; q̇4 to the first power in the last term (E3)."""
     last = (-3 + root3) / 4 * s2**2 - (2 + 2 * root3) / 4 * s2 * c2 - (1 + root3) / 4 * c2**2
     return c**2 * m * s4 * c4 * (w22 - w24 + last * w4)
 
 
 def h_4(m: Any, c: Any, s2: Any, c2: Any, s5: Any, c5: Any, w22: Any, w25: Any, w5: Any, root3: Any = ROOT3) -> Any:
-    """(55), N m; q̇5 to the first power in the last term (E3)."""
+    """Return (55), N m; q̇5 to the first power in the last term (E3)."""
     last = (-3 - root3) / 4 * s2**2 - (2 - 2 * root3) / 4 * s2 * c2 - (1 - root3) / 4 * c2**2
     return c**2 * m * s5 * c5 * (w22 - w25 + last * w5)
 
@@ -110,7 +124,7 @@ def gravity_three(
     m: Any, c: Any, g: Any, s2: Any, c2: Any, s3: Any, c3: Any, s4: Any, c4: Any, s5: Any, c5: Any,
     root3: Any = ROOT3,
 ) -> Row:  # fmt: skip
-    """(56), rows of q2, q3, q4, q5; N m. The distance d has cancelled out of the first row."""
+    """Return (56), rows of q2, q3, q4, q5; N m. The distance d has cancelled out of the first row."""
     return (
         c * m * g * (-c2 * c3 + (c2 / 2 + root3 / 2 * s2) * c4 + (c2 / 2 - root3 / 2 * s2) * c5),
         c * m * g * s2 * s3,
@@ -120,16 +134,21 @@ def gravity_three(
 
 
 def rotor_gravity(m: Any, c: Any, g: Any, s2: Any, c2: Any, c3: Any, c4: Any, c5: Any, root3: Any = ROOT3) -> Any:
-    """First row of (56) as it is run, N m: its factor c m g multiplied into the three terms. Rounding decides Fig. 5,
-    which starts at rest in an unstable equilibrium: the printed bracket is exactly zero there, and nothing moves; the
-    three terms leave -4.2e-13 N m, with which the published numbers come out for T = 12 s. Other ways:
-    reference/claims.json."""
+    """Return the first row of (56) as it is run, N m: its factor c m g multiplied into the three terms.
+
+    Rounding decides Fig. 5, which starts at rest in an unstable equilibrium: the printed bracket is exactly zero there,
+    and nothing moves; the three terms leave -4.2e-13 N m, with which the published numbers come out for T = 12 s. Other
+    ways: reference/claims.json.
+    """
     second, third = c2 / 2 + root3 / 2 * s2, c2 / 2 - root3 / 2 * s2
     return -c * m * g * c2 * c3 + c * m * g * second * c4 + c * m * g * third * c5
 
 
 def fixed_pitch_acceleration(m: float, d: float, g: float, torque: float, q2: float, phases: Sequence[float]) -> float:
-    """q̈2 in rad/s² where c = 0: (47) is zero, and the first row of (33) is a pendulum's, summed over the blades."""
+    """Return q̈2 (rad/s²) where c = 0.
+
+    There (47) is zero, and the first row of (33) is a pendulum's, summed over the blades.
+    """
     inertia = moment = 0.0
     for phase in phases:
         s2, c2 = math.sin(q2 + phase), math.cos(q2 + phase)
@@ -142,7 +161,15 @@ def fixed_pitch_acceleration(m: float, d: float, g: float, torque: float, q2: fl
 def one_blade_accelerations(
     m: float, c: float, d: float, g: float, torques: Sequence[float], state: Sequence[float]
 ) -> tuple[float, float]:
-    """(33) solved for q̈2, q̈3 in rad/s²; torques (2,): τ2, τ3 in N m; state (4,): q2, q3, q̇2, q̇3."""
+    """Solve (33) for q̈2, q̈3 in rad/s².
+
+    Parameters
+    ----------
+    m, c, d : mass (kg) and place (m) of the point mass.
+    g : m/s².
+    torques : (2,) τ2, τ3 in N m.
+    state : (4,) q2, q3 in rad, q̇2, q̇3 in rad/s.
+    """
     q2, q3, v2, v3 = state
     s2, c2, s3, c3 = math.sin(q2), math.cos(q2), math.sin(q3), math.cos(q3)
     (d11, d12), (d21, d22) = mass_one(m, c, d, s3, c3)
@@ -158,8 +185,17 @@ def one_blade_accelerations(
 def three_blade_accelerations(
     m: float, c: float, d: float, g: float, torques: Sequence[float], state: Sequence[float]
 ) -> tuple[float, float, float, float]:
-    """(39)-(56) solved for q̈2..q̈5 in rad/s²; torques (4,): τ2..τ5 in N m; state (8,): q2..q5, q̇2..q̇5. By (39)-(41)
-    each pitch row holds q̈2 and its own pitch only, so the pitches are eliminated one by one."""
+    """Solve (39)-(56) for q̈2..q̈5 in rad/s².
+
+    By (39)-(41) each pitch row holds q̈2 and its own pitch only, so the pitches are eliminated one by one.
+
+    Parameters
+    ----------
+    m, c, d : mass (kg) and place (m) of the point masses.
+    g : m/s².
+    torques : (4,) τ2..τ5 in N m.
+    state : (8,) q2..q5 in rad, q̇2..q̇5 in rad/s.
+    """
     q2, q3, q4, q5, v2, v3, v4, v5 = state
     s2, c2, s3, c3 = math.sin(q2), math.cos(q2), math.sin(q3), math.cos(q3)
     s4, c4, s5, c5 = math.sin(q4), math.cos(q4), math.sin(q5), math.cos(q5)

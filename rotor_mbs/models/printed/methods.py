@@ -30,7 +30,7 @@ class PrintedSolver:
     """The equations as printed or, with errata, the paper's derivation, integrated by ode45."""
 
     def __init__(self, name: str, errata: Errata | None, scene: Scene, settings: Ode45Settings) -> None:
-        """Raises MethodRefusal where the printed equations cannot represent the scene."""
+        """Build the equations. Raises MethodRefusal where they cannot represent the scene."""
         self._scene, self._errata = scene, errata
         self._rotor = rotor = point_mass_rotor(name, errata, scene)
         self._moving = moving = len(scene.initial_angles) if rotor.pitches_move else 1
@@ -40,6 +40,7 @@ class PrintedSolver:
         self._result: Ode45Result  # of the last integration
 
     def integrate(self) -> Integration:
+        """Integrate from the initial state to the end, or to the first failure."""
         from rotor_mbs.models.ode45 import ode45
         from rotor_mbs.solution.trajectory import Integration
 
@@ -50,6 +51,7 @@ class PrintedSolver:
         )
 
     def observe(self) -> Trajectory:
+        """Return the samples of the last integration, with ode45's own output points where nothing is corrected."""
         import numpy as np
 
         from rotor_mbs.models.printed.observables import torque_work
@@ -86,7 +88,19 @@ class PrintedSolver:
 
 
 def point_mass_rotor(name: str, errata: Errata | None, scene: Scene) -> PointMassRotor:
-    """Raises MethodRefusal, in one sentence, where the printed equations have no place for what the scene has."""
+    """Return the printed symbols of a scene.
+
+    Parameters
+    ----------
+    name : of the method.
+    errata : the errata that are left in, where the equations are derived anew; None as printed.
+    scene : the rotor.
+
+    Raises
+    ------
+    MethodRefusal
+        In one sentence, where the printed equations have no place for what the scene has.
+    """
     from rotor_mbs.models.printed.observables import PointMassRotor
 
     blade, count = scene.blades[0], len(scene.blades)
@@ -110,7 +124,7 @@ def point_mass_rotor(name: str, errata: Errata | None, scene: Scene) -> PointMas
 
 
 def equations(rotor: PointMassRotor, errata: Errata | None) -> Accelerations:
-    """As printed or, with errata, derived anew with these."""
+    """Return the equations of motion: as printed or, with errata, derived anew with these."""
     m, c, d, g = rotor.m, rotor.c, rotor.d, rotor.g
     if not rotor.pitches_move:
         return lambda torques, state: [literal.fixed_pitch_acceleration(m, d, g, torques[0], state[0], rotor.phases)]
@@ -124,7 +138,10 @@ def equations(rotor: PointMassRotor, errata: Errata | None) -> Accelerations:
 
 
 def items(name: str, errata: Errata | None, scene: Scene) -> list[BuiltItem]:
-    """Where in the paper the rotor's row and a pitch's stand, in the form that is run. Raises MethodRefusal."""
+    """Return the terms of a scene, and where in the paper the rows of rotor and pitches stand, in the form that is run.
+
+    Raises MethodRefusal as `point_mass_rotor`.
+    """
     point_mass_rotor(name, errata, scene)
     if errata:
         left = " ".join(erratum.upper() for erratum, is_left in asdict(errata).items() if is_left)
@@ -140,7 +157,7 @@ def _torque_tables(scene: Scene, moving: int) -> tuple[LoadTable, ...]:
 
 
 def right_hand_side(scene: Scene, accelerations: Accelerations, moving: int) -> RightHandSide:
-    """y' = f(t, y) of y = (angles, rates) of the `moving` coordinates; NaN where the equations are singular."""
+    """Return y' = f(t, y) of y = (angles, rates) of the `moving` coordinates; NaN where the equations are singular."""
     undefined = [math.nan] * (2 * moving)
     tables = _torque_tables(scene, moving)
     constant = [value_at(table, 0.0) for table in tables] if all(map(is_constant, tables)) else None
@@ -156,6 +173,7 @@ def right_hand_side(scene: Scene, accelerations: Accelerations, moving: int) -> 
 
 
 def _method(name: str, label: str, errata: Errata | None = None, erratum: str = "") -> Method:
+    """Return a method; errata: what is left in where the equations are derived anew; erratum: the one it is of."""
     return Method(
         name=name,
         label=label,

@@ -1,6 +1,8 @@
-"""Tip path, energies, work and loads of the printed model's motion, from the paper's matrix (3). Energies and loads are
-the physical ones, whatever equations made the motion: they tell how much energy those equations make, and how large
-their fictitious moments are."""
+"""Tip path, energies, work and loads of the printed model's motion, from the paper's matrix (3).
+
+Energies and loads are the physical ones, whatever equations made the motion: they tell how much energy those equations
+make, and how large their fictitious moments are.
+"""
 
 from __future__ import annotations
 
@@ -23,14 +25,19 @@ _GAUSS_WEIGHTS = np.array([5.0, 8.0, 5.0]) / 18.0
 
 @dataclass(frozen=True, slots=True)
 class PointMassRotor:
-    """The printed symbols of a scene: blades alike, each a mass m (kg) at (c, 0, d) (m); gravity g (m/s²)."""
+    """The printed symbols of a scene: blades alike, each a mass m (kg) at (c, 0, d) (m); gravity g (m/s²).
+
+    Attributes
+    ----------
+    phases : (blades,) rad.
+    tip : (3,) m, the point whose path is drawn, seen from the mass in the directions of the blade frame.
+    """
 
     m: float
     c: float
     d: float
     g: float
-    phases: tuple[float, ...]  # (blades,) rad
-    # (3,) m, the point whose path is drawn, seen from the mass in the directions of the blade frame
+    phases: tuple[float, ...]
     tip: tuple[float, float, float]
 
     @property
@@ -39,7 +46,10 @@ class PointMassRotor:
         return self.c != 0.0
 
     def tip_path(self, angles: Array) -> Array:
-        """(n, blades, 3) m, base frame, of angles (n, 1 + blades) rad: (3) applied to the tip as frame 3 sees it."""
+        """Return the tips' paths, (n, blades, 3) m in the base frame: (3) applied to the tip as frame 3 sees it.
+
+        angles : (n, 1 + blades) rad.
+        """
         x, y, z = self.tip
         paths = []
         for sines in self._sines(angles):
@@ -48,7 +58,7 @@ class PointMassRotor:
         return np.stack(paths, axis=1)
 
     def kinetic_energy(self, angles: Array, rates: Array) -> Array:
-        """(n,) J: ½ m v² with v from the last columns of (8), E1 corrected, and (9)."""
+        """Return ½ m v², (n,) J, with v from the last columns of (8), E1 corrected, and (9)."""
         total = np.zeros(len(angles))
         for pitch, sines in enumerate(self._sines(angles), start=1):
             u32 = derivation.u32(*sines, self.c, self.d, CORRECTED)
@@ -58,26 +68,32 @@ class PointMassRotor:
         return total
 
     def potential_energy(self, angles: Array) -> Array:
-        """(n,) J, zero at the height of the shaft."""
+        """Return the energy of the weights, (n,) J, zero at the height of the shaft."""
         total = np.zeros(len(angles))
         for sines in self._sines(angles):
             total += self.m * self.g * derivation.a3(*sines, self.c, self.d)[2][3]
         return total
 
     def loads(self, angles: Array, rates: Array, accelerations: Array, torque: Array) -> dict[str, Array]:
-        """What the motion needs at roots and shaft, by quantity; from rad, rad/s, rad/s² and (n,) N m on the rotor."""
+        """Compute the loads at roots and shaft that the motion needs, by quantity.
+
+        Parameters
+        ----------
+        angles, rates, accelerations : (n, 1 + blades) rad, rad/s and rad/s².
+        torque : (n,) N m, on the rotor.
+        """
         forces, moments = [], []
         shaft_force, shaft_moment = np.zeros((2, len(angles), 3))
         for pitch, sines in enumerate(self._sines(angles), start=1):
-            place = np.stack(
-                np.broadcast_arrays(*(row[3] for row in derivation.a3(*sines, self.c, self.d)[:3])), axis=1
-            )
+            # (n, 3) m: the last column of (3).
+            columns = [row[3] for row in derivation.a3(*sines, self.c, self.d)[:3]]
+            place = np.stack(np.broadcast_arrays(*columns), axis=1)
             force = self._acceleration(sines, rates[:, [0, pitch]], accelerations[:, [0, pitch]])
             force[:, 2] += self.g
             force *= self.m
-            axes = np.array(
-                [np.broadcast_arrays(*row[:3], angles[:, 0])[:3] for row in derivation.a3(*sines, 0.0, 0.0)[:3]]
-            )
+            # (3, 3, n): the blade's axes in the base frame, some elements of which are plain zeros.
+            rotation = derivation.a3(*sines, 0.0, 0.0)[:3]
+            axes = np.array([np.broadcast_arrays(*row[:3], angles[:, 0])[:3] for row in rotation])
             forces.append(np.einsum("ijn,ni->nj", axes, force))
             moments.append(np.cross([self.c, 0.0, self.d], forces[-1]))
             shaft_force += force
@@ -87,7 +103,10 @@ class PointMassRotor:
         return named_loads(zip(forces, moments, strict=True), shaft_force, shaft_moment, actuators)
 
     def _acceleration(self, sines: tuple[Array, Array, Array, Array], rates: Array, accelerations: Array) -> Array:
-        """(n, 3) m/s² of the mass: the last columns of (8), (9), (16)-(19), E1 and E2 corrected."""
+        """Return the acceleration of the mass, (n, 3) m/s²: last columns of (8), (9), (16)-(19), E1 and E2 corrected.
+
+        sines : as of `_sines`; rates, accelerations : (n, 2) of q2 and q3, rad/s and rad/s².
+        """
         c, d = self.c, self.d
         w2, w3 = rates.T
         terms = (
@@ -101,7 +120,7 @@ class PointMassRotor:
         return np.stack([sum((u[row][3] * rate for u, rate in terms), np.zeros(len(w2))) for row in range(3)], axis=1)
 
     def _sines(self, angles: Array) -> list[tuple[Array, Array, Array, Array]]:
-        """s2, c2, s3, c3 of every blade, each (n,)."""
+        """Return s2, c2, s3, c3 of every blade, each (n,)."""
         turns = [(angles[:, 0] + phase, angles[:, 1 + i]) for i, phase in enumerate(self.phases)]
         return [(np.sin(q2), np.cos(q2), np.sin(q3), np.cos(q3)) for q2, q3 in turns]
 
