@@ -118,7 +118,10 @@ def table_of(
         squeezed = values if is_single_row and values.shape[:1] == (1,) else np.squeeze(values)
         if squeezed.dtype.kind in "fiu" and 0 < squeezed.ndim < 4:
             numeric[name] = squeezed
-    rows = max((values.size for values in numeric.values() if values.ndim == 1), default=0)
+    rows = 0  # of the columns, as the arrays of one dimension have them
+    for values in numeric.values():
+        if values.ndim == 1:
+            rows = max(rows, values.size)
     columns: dict[str, DataColumn] = {}
     for name, values in numeric.items():
         plain_name, stated = split_bracketed_unit(name)
@@ -176,7 +179,8 @@ def _bracketed(text: str) -> tuple[int, str] | None:
         return None
     inner = text[:-1]
     begin = max(inner.rfind("]"), inner.rfind(")")) + 1
-    opened = [place for place in (inner.find("[", begin), inner.find("(", begin)) if place >= 0]
+    places = [inner.find(mark, begin) for mark in "[("]
+    opened = [place for place in places if place >= 0]
     if not opened:
         return None
     return min(opened), inner[min(opened) + 1 :].strip()

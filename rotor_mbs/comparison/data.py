@@ -128,7 +128,9 @@ def load_data(
     if isinstance(data, str | os.PathLike):
         table = read_table(data, mapping.group, scene.name)
     elif hasattr(data, "items"):
-        table = table_of("data", {**getattr(data, "coords", {}), **dict(data.items())})
+        # The time of an xarray.Dataset is a coordinate, which `items` leaves out.
+        coordinates = getattr(data, "coords", {})
+        table = table_of("data", {**coordinates, **dict(data.items())})
     else:
         allowed = 'a file, or arrays by name, such as {"time": run.time, "angles": run.angles}'
         raise InputError(f"data: {type(data).__name__}; allowed: {allowed}")
@@ -249,9 +251,14 @@ def _rounding_of_columns(
         Half a unit in the last digit of each number, in SI units; `ForeignData.precision`.
     """
     time, *numbers = columns
-    factors = [UNITS[channel.kind][source.unit.lower()] for channel, source in sources.items()]
-    kinds = [(channel.kind, source.unit) for channel, source in sources.items()][1:]
+    factors = []
+    kinds = []
+    for channel, source in sources.items():
+        factors.append(UNITS[channel.kind][source.unit.lower()])
+        kinds.append((channel.kind, source.unit))
+    del kinds[0]  # of the time
     rounding = [rounding_of_printed(time)]
+    # Columns of one kind and unit are written alike: one that hardly changes has their digits.
     for kind, values in zip(kinds, numbers, strict=True):
         alike = []
         for other_kind, other in zip(kinds, numbers, strict=True):
@@ -300,8 +307,10 @@ def rounding_of_printed(
     for decimals in range(_FEW_DIGITS + 1):
         unit = 10.0**-decimals
         # With less than a hundredth of a unit any number fits.
-        is_tried = 100.0 * noise < unit < largest
-        if is_tried and np.abs(judged - np.round(judged / unit) * unit).max() <= noise:
+        if not 100.0 * noise < unit < largest:
+            continue
+        rounded = np.round(judged / unit) * unit
+        if np.abs(judged - rounded).max() <= noise:
             last[:] = 0.5 * unit
             break
     digits = _significant_digits(judged)

@@ -229,6 +229,7 @@ def _lag(search: TrajectorySearch) -> float:
     search : the data and the reference, which is carried on from its rows.
     """
     data, run = search.data, search.exact.trajectory
+    # Not the first row: at the start the motion may be slow, and the lag hardly seen.
     row = min(_LAG_ROW, len(data.time) // 4)
     columns, end = data.columns, horizon(run)
     states = states_of(run)[run.time <= end][:, columns]
@@ -270,7 +271,7 @@ def _column_hypotheses(
     # Columns that are those of other channels, rates taken as angles among them: each column is
     # assigned another channel, so that the sum of the errors' digits is least.
     differences = np.abs(inside.values[:, :, None] - states[:, None, :])
-    errors = (differences / carried[:, None, :]).max(axis=0)
+    errors = (differences / carried[:, None, :]).max(axis=0)  # (columns, channels)
     preference = np.zeros_like(errors)
     places = range(len(columns))
     preference[places, columns] = -1e-3  # of equal ones, its own
@@ -301,7 +302,7 @@ def _corrected_channels(
     Hypothesis or None
         None where a channel fits by no correction.
     """
-    begin = int(np.searchsorted(data.time, 0.0))
+    begin = int(np.searchsorted(data.time, 0.0))  # rows before it have no reference
     rows = slice(begin, begin + len(states))
     names: dict[str, list[str]] = {}
     values, roundings = [], []

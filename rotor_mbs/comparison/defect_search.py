@@ -45,7 +45,7 @@ _MAX_INTERVALS = 120  # that a hypothesis is tried on
 _DIFFERENCE = 1e-4  # share or rad, for the derivative by a parameter
 _ROUNDS = 8
 _INDEPENDENT = 1e-6  # determinant of the cosines between the signatures of a set
-MAX_NAMED = 6  # explanations, or faults
+_MAX_NAMED = 6  # explanations, or faults
 
 
 class DefectSearch:
@@ -71,6 +71,7 @@ class DefectSearch:
         self._begins, self._ends = defects.time[rows], defects.time[rows + 1]
         self._states = defects.states[rows].T
         self._values, self._floors = judged.values[rows], judged.floors[rows]
+        # By the rounding of each number, but none so small that its channel alone counts.
         self._weights = 1.0 / np.maximum(self._floors, 1e-4 * judged.largest)
         self._steps = None
         if len(rows):
@@ -107,7 +108,7 @@ class DefectSearch:
         # the right one.
         factor = _ALIKE_IN_ROUNDING if is_rounding else _ALIKE
         alike = closest(explained, factor, _QUICK)
-        return [explanation.text for explanation in alike[:MAX_NAMED]]
+        return [explanation.text for explanation in alike[:_MAX_NAMED]]
 
     def scenes(self) -> list[str]:
         """Search for scenes of the catalogue that start as the data do and explain the defects."""
@@ -236,6 +237,7 @@ class DefectSearch:
 
     def _signatures(self) -> tuple[list[Parameter], Array]:
         """Return the parameters that have an effect, and their signatures as unit vectors."""
+        # Unit vectors, so that products of two of them are the cosines between them.
         candidates, signatures = [], []
         for parameter in parameters(self._scene):
             slope = self._slope([parameter], [0.0], 0).ravel()
@@ -302,7 +304,8 @@ class DefectSearch:
             # Of a single parameter: one rounding error over many rows counts once.
             sizes = (slopes**2).reshape(self._values.shape).sum(axis=0)
             spread = max(spread, 0.3) * math.sqrt(float(sizes @ self._repeats / sizes.sum()))
-        return np.asarray(spread * np.sqrt(np.diag(np.linalg.pinv(slopes.T @ slopes))))
+        covariance = np.linalg.pinv(slopes.T @ slopes)
+        return np.asarray(spread * np.sqrt(np.diag(covariance)))
 
     def _slope(self, chosen: Sequence[Parameter], at: Sequence[float] | Array, which: int) -> Array:
         """Return the weighted derivative of the defects by a parameter, per share or rad.
@@ -314,6 +317,7 @@ class DefectSearch:
         which : the one by which is derived.
         """
         residuals = []
+        # Central differences: their error is of second order in the step.
         for step in (_DIFFERENCE, -_DIFFERENCE):
             change = np.array(at, float)
             change[which] += step
@@ -340,8 +344,10 @@ def _tried_intervals(judged: JudgedDefects) -> NDArray[np.int64]:
     time = judged.defects.time
     is_tried = judged.is_judged.copy()
     for kink in judged.scene.kink_times:
-        is_inside = (time[:-1] < kink * (1.0 - 1e-9)) & (kink * (1.0 + 1e-9) < time[1:])
-        is_tried &= ~is_inside
+        # Not at its ends, where each interval has its own side of the kink.
+        is_after_begin = time[:-1] < kink * (1.0 - 1e-9)
+        is_before_end = kink * (1.0 + 1e-9) < time[1:]
+        is_tried &= ~(is_after_begin & is_before_end)
     rows = np.flatnonzero(is_tried)
     if not len(rows):
         return rows

@@ -54,6 +54,7 @@ def faults_in_time(judged: JudgedDefects) -> list[str]:
     excess = judged.excess
     if judged.largest <= judged.tolerance:
         return []
+    # The median is that of right intervals, as long as most of them are right.
     usual = float(np.median(excess[judged.is_judged])) if judged.is_judged.any() else 0.0
     wrong = np.flatnonzero(excess > max(_STANDS_OUT * usual, _FAINT * judged.largest))
     # What is wrong everywhere is no fault at a time, though it shows in some places more than in
@@ -63,7 +64,8 @@ def faults_in_time(judged: JudgedDefects) -> list[str]:
     # Nor is one whose size comes down gradually beside what stands out: a fault at a time has
     # edges.
     edges = np.concatenate([wrong - 1, wrong + 1])
-    edges = edges[~np.isin(edges, wrong) & (edges >= 0) & (edges < len(excess))]
+    is_interval = (edges >= 0) & (edges < len(excess))
+    edges = edges[is_interval & ~np.isin(edges, wrong)]
     if len(edges):
         beside = float(np.median(excess[edges]))
         if beside > _EDGE * float(np.median(excess[wrong])):
@@ -135,9 +137,10 @@ def _wrong_row(judged: JudgedDefects, group: NDArray[np.int64]) -> str:
     values = judged.values[group]
     # Of a repeated row the defect is the motion over the interval; of a part of it, that at its
     # end.
-    motion = values[0] + (defects.states[first + 1] - defects.states[first]) / units
-    cosines = [_cosine(values[0], _state_rate(judged, first)), _cosine(values[0], motion)]
-    along = max(cosines, key=abs)
+    step_of_data = (defects.states[first + 1] - defects.states[first]) / units
+    motion = values[0] + step_of_data
+    rate = _state_rate(judged, first)
+    along = max(_cosine(values[0], rate), _cosine(values[0], motion), key=abs)
     if len(group) == 1 and abs(along) >= _PARALLEL:
         clock = "late" if along > 0.0 else "early"
         row = "repeated" if along > 0.0 else "omitted and the others renumbered"
@@ -174,8 +177,10 @@ def _state_rate(judged: JudgedDefects, row: int) -> Array:
     states, time = judged.defects.states, judged.defects.time
     half = states.shape[1] // 2
     ahead = min(row + 2, len(states) - 1)
-    change = (states[ahead, half:] - states[row, half:]) / (time[ahead] - time[row])
-    return np.asarray(np.concatenate([states[row + 1, half:], change]) / judged.units)
+    # Over the row that may be wrong, by the two beside it.
+    acceleration = (states[ahead, half:] - states[row, half:]) / (time[ahead] - time[row])
+    rates = states[row + 1, half:]
+    return np.asarray(np.concatenate([rates, acceleration]) / judged.units)
 
 
 def _explaining_loads(judged: JudgedDefects, rows: NDArray[np.int64]) -> tuple[Array, list[int]]:
@@ -202,7 +207,8 @@ def _explaining_loads(judged: JudgedDefects, rows: NDArray[np.int64]) -> tuple[A
         return np.zeros(sizes.T.shape), []
     # Least squares in each interval, over effects of unit size.
     matrices = (effects / units / sizes[:, :, None]).transpose(1, 2, 0)
-    solutions = (np.linalg.pinv(matrices) @ (values / units)[:, :, None])[:, :, 0]
+    sides = (values / units)[:, :, None]
+    solutions = (np.linalg.pinv(matrices) @ sides)[:, :, 0]
     loads = -solutions / sizes.T
     parts = loads.T[:, :, None] * effects
     left = np.linalg.norm((values + parts.sum(axis=0)) / units)
@@ -267,6 +273,7 @@ def _effect_of_unit_load(judged: JudgedDefects, rows: NDArray[np.int64]) -> Arra
     longest = float((ends - begins).max())
     effects = []
     for place, inertia in enumerate(inertias):
+        # That moves the coordinate by a small angle, whatever its inertia.
         torque = _SMALL_TURN * float(inertia) / longest**2
         pushed = quick_ends(scene, begins, ends, states, steps, _with_torque(place, torque))
         effects.append((pushed - free).T / judged.units / torque)

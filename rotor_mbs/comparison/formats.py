@@ -256,8 +256,11 @@ def _read_text(source: str, text: str) -> DataTable:
         if line.strip(" \t,;"):
             lines.append((number, line.strip(" ")))
     first, divider = _first_row(source, lines)
-    head = [line for _, line in lines[:first]]
-    rows = [(i, _FORTRAN.sub("E", row)) for i, row in lines[first:] if not row.startswith(_COMMENT)]
+    head = [line for _, line in lines[:first]]  # comments among it
+    rows = []
+    for number, line in lines[first:]:
+        if not line.startswith(_COMMENT):
+            rows.append((number, _FORTRAN.sub("E", line)))
     del lines
     # Beside a point a comma may stand between thousands; without one it is decimal.
     if divider != "," and not any("." in row for _, row in rows):

@@ -107,7 +107,8 @@ class JudgedLoads:
         """
         factor, values = component.factor, component.values
         rounding = FLOOR_SAFETY * self.rounding[:, j] / min(abs(factor), 1)
-        left = float((np.abs(self.values[:, j] / factor - values) - rounding).max())
+        error = np.abs(self.values[:, j] / factor - values)
+        left = float((error - rounding).max())
         before = np.abs(self.values[:, j] - self.expected[:, j]).max(initial=0.0)
         share = min(self.tolerance, MAX_LEFT)
         allowed = min(share * self.scale(j, values), LEFT_SHARE * before)
@@ -211,6 +212,7 @@ def _loads_in_rows(
 
     by_frame = loads_at(states)
     expected = columns_of(by_frame)
+    # The first components are those of the forces at the roots.
     forces = by_frame[""][:, : 3 * len(scene.blades)].reshape(len(time), -1, 3)
     largest_force = np.linalg.norm(forces, axis=2).max(axis=1)
     arms = np.ones(len(loads.channels))
@@ -317,7 +319,8 @@ def _explained(loads: JudgedLoads, wrong: Sequence[int]) -> tuple[str, ...]:
             unexplained.setdefault((_load(channel), channel.frame), []).append(j)
 
     named = _shared_texts(loads, by_channel)
-    # What is left may be moments about another point, all of one load about the same.
+    # What no component explains may be moments about another point, all of one load about the
+    # same.
     for (load, frame), group in unexplained.items():
         text = _other_point(loads, load, frame, group)
         if text:
@@ -405,10 +408,14 @@ def _other_point(loads: JudgedLoads, load: str, frame: str, group: Sequence[int]
         The point, in words; "" where none explains all of the channels.
     """
     force = _columns(loads, frame, load.replace("moment", "force"))
-    axes = ["xyz".index(loads.channels[j].name.partition(",")[0][-1]) for j in group]
+    axes = []
+    for j in group:
+        component = loads.channels[j].name.partition(",")[0]
+        axes.append("xyz".index(component[-1]))
     moment = _columns(loads, frame, load)[:, axes]
-    # (n, axes, 3): F × p is this matrix times p.
-    matrix = np.cross(force[:, None, :], np.eye(3)[None]).transpose(0, 2, 1)[:, axes]
+    # (n, axes, 3): F × p is this matrix times p, its columns the products with the unit vectors.
+    products = np.cross(force[:, None, :], np.eye(3)[None])
+    matrix = products.transpose(0, 2, 1)[:, axes]
 
     points: list[Hypothesis[tuple[float, Array]]] = []
     is_root = load.startswith("blade root")
@@ -429,6 +436,7 @@ def _other_point(loads: JudgedLoads, load: str, frame: str, group: Sequence[int]
         difference = (loads.values[:, group] / factor - moment).ravel()
         solution = np.linalg.lstsq(matrix.reshape(-1, 3), difference, rcond=1e-9)[0]
         point = np.asarray(solution, float)
+        # A coordinate that is rounding is 0 in the text.
         point[np.abs(point) < 1e-9 * np.abs(point).max()] = 0.0
         shown = ", ".join(f"{x:.6g}" for x in point)
         add(f"the point ({shown}) m of the {frame_name} frame", point, factor)

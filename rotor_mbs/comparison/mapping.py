@@ -196,7 +196,9 @@ def _known_channels(
 
 def _suggested(table: DataTable, known: Sequence[Channel]) -> list[tuple[Channel, str]]:
     """Return the channels that names suggest, and the names."""
-    widths = Counter(name.rpartition("[")[0] for name in table.columns if name.endswith("]"))
+    # How many columns an array has says what it may be: angles are one per coordinate.
+    entries = [name for name in table.columns if name.endswith("]")]
+    widths = Counter(name.rpartition("[")[0] for name in entries)
     suggested = []
     for name in table.columns:
         channel = channel_from_name(name, widths[name.rpartition("[")[0]], known)

@@ -127,6 +127,7 @@ def _channel_errors(
     for j, channel in enumerate(data.channels):
         size = error[is_known, j]
         difference = np.abs(data.values[:, j] - expected[:, j])[is_known]
+        floor = (data.rounding[:, j] / scale[:, j])[is_known]
         worst, largest = float(size.max(initial=0.0)), float(difference.max(initial=0.0))
         channels.append(
             ChannelErrors(
@@ -135,7 +136,7 @@ def _channel_errors(
                 error_max=largest,
                 error_whole=largest,
                 defect=worst,
-                floor=float((data.rounding[:, j] / scale[:, j])[is_known].max(initial=0.0)),
+                floor=float(floor.max(initial=0.0)),
                 agrees_until=agrees_until(speeds, size),
                 defect_unit="of its size",
             )
@@ -271,7 +272,8 @@ def _hypotheses(
     from_rest: LinearModes | str = ""
     if np.count_nonzero(data.time) >= _MIN_TURNING:
         from_rest = _closed_form_modes(scene, np.union1d(0.0, data.time))
-    for speed_factor, of_speeds in _UNITS.items() if data.time.any() else [(1.0, "")]:
+    units_of_speed = _UNITS if data.time.any() else {1.0: ""}  # 0 is 0 in any unit
+    for speed_factor, of_speeds in units_of_speed.items():
         modes = _closed_form_modes(scene, speed_factor * data.time)
         if isinstance(modes, str):
             continue

@@ -271,6 +271,7 @@ def parameters(scene: Scene) -> Iterator[Parameter]:
     """
     for item in scene_fields("rotor"):
         value = getattr(scene, item.name)
+        # A zero, or no number, is not changed by a share.
         if item.name != "blades" and _scaled(value, 1.0) != value:
             yield Parameter(item.metadata["key"], "", _share_of([(item.name,)]))
     blades = list(range(len(scene.blades)))
@@ -291,7 +292,7 @@ def _blade_parameters(scene: Scene, chosen: list[int], number: str) -> Iterator[
     """
     for field in fields(Blade):
         if field.name == "tip":
-            continue
+            continue  # which is in no equation
         value = getattr(scene.blades[chosen[0]], field.name)
         if isinstance(value, tuple):
             entries: list[tuple[int, ...]] = [(i,) for i, entry in enumerate(value) if entry]
@@ -358,7 +359,8 @@ def _pitch_turned(scene: Scene, chosen: Sequence[int], angle: float) -> Scene:
     for i in chosen:
         inertia = turn @ blades[i].inertia_tensor @ turn.T
         x, y, z = (turn @ blades[i].centre_of_mass).tolist()
-        elements = _inertia(inertia[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]].tolist())
+        places = [0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]  # xx yy zz xy xz yz
+        elements = _inertia(inertia[places].tolist())
         blades[i] = replace(blades[i], centre_of_mass=(x, y, z), inertia=elements)
     return replace(scene, blades=tuple(blades))
 
@@ -384,6 +386,7 @@ def _scaled(value: Any, share: float) -> Any:
     if not isinstance(value, tuple):
         return value * (1.0 + share) if isinstance(value, float) else value
     if value and all(_is_row(row) for row in value):
+        # Of a table over time the torques or angles, not the times.
         return tuple((time, number * (1.0 + share)) for time, number in value)
     return tuple(_scaled(entry, share) for entry in value)
 

@@ -220,7 +220,7 @@ def _reference_for(data: ForeignData, scene: Scene) -> tuple[ForeignData, TimedR
         The rows up to the scene's end, and the reference.
     """
     inside = data.rows(data.time <= scene.duration * (1.0 + _TIME_ROUNDING))
-    end = max(scene.duration, float(inside.time[-1])) if len(inside.time) else scene.duration
+    end = float(np.max(inside.time, initial=scene.duration))
     # At the times of the data, and at the scene's samples, which make growth and horizon the same
     # for all data.
     samples = np.linspace(0.0, scene.duration, scene.samples)
@@ -261,8 +261,10 @@ def _rows_with_reference(
         until = max(int(np.searchsorted(reference.time, horizon_s, side="right")), 1)
     expected = states_of(reference)[:, inside.columns]
     # Wrapped channels get as many turns as the reference has in the first row.
-    turns = 2.0 * np.pi * np.round((expected[0] - inside.values[0]) / (2.0 * np.pi))
-    inside = replace(inside, values=np.where(inside.wrapped, inside.values + turns, inside.values))
+    turn = 2.0 * np.pi
+    missing = turn * np.round((expected[0] - inside.values[0]) / turn)
+    values = np.where(inside.wrapped, inside.values + missing, inside.values)
+    inside = replace(inside, values=values)
     compared = inside.rows(slice(len(places)))
     defects, note = defects_of_data(scene, compared, reference, until)
     return ReferencedRows(
@@ -447,6 +449,7 @@ def _wrong_errors(
         size = f"error {channel.error_max:.1e} {channel.unit} up to the horizon"
         allowed = f"{growing:.1e} per unit of error growth, allowed {tolerance:.0e}"
         yield "inaccurate", f"{channel.name}: {size}, {allowed}"
+    # The bound is one of angles; it is held to rates where the data have no angles.
     angles = [channel for channel in errors.channels if channel.unit == "rad"]
     largest = max(angles or errors.channels, key=lambda channel: channel.error_max)
     # Without defects the errors are all that there is.
@@ -551,6 +554,7 @@ def _likely_causes(
         judged = judged_defects(scene, rows.defects, tolerance)
     if is_ok:
         return DefectSearch(judged).explanations() if judged is not None else []
+    # The search has all rows, also those after the scene's duration.
     turned = rows.data.values[0] - data.values[0]  # the turns that wrapped channels have got
     whole = replace(data, values=data.values + turned)
     worst = float(errors.per_growth[: rows.until].max())
