@@ -299,11 +299,15 @@ def test_what_python_ignores_is_raised_once_more() -> None:
         Slowly()
         wait(10.0)
 
+    went_on = []
+
     def ends() -> None:
         Slowly()
-        wait(10.0)
+        wait(1.0)
+        went_on.append(True)
 
     alarmed(caller_signals()(ends), 0.02)
+    assert not went_on
 
 
 # ---- Around calls

@@ -115,13 +115,14 @@ def scipy_integrator(
             in_step += 1
             if in_step > _MAX_STEP_EVALUATIONS:
                 raise ValueError("no step is small enough")
-            return function(time, values)
+            slope = function(time, values)
+            if solver is None and in_step == 1 and not all(map(math.isfinite, slope)):  # at the start
+                raise ValueError("the derivative of the state is not finite")
+            return slope
 
         rows, steps, message, solver = [np.empty((0, len(state)))], 0, "", None
         with np.errstate(all="ignore"), time_limit.samples_kept_at_limit():
             try:
-                if not np.isfinite(function(start, state.tolist())).all():
-                    raise ValueError("the derivative of the state is not finite")
                 solver = solver_type(watched, start, state, end, rtol=relative_tolerance, atol=absolute_tolerance)
                 done = 0
                 while solver.status == "running":
