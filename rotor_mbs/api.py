@@ -7,7 +7,6 @@ argument of a wrong type `TypeError`.
 from __future__ import annotations
 
 import functools
-import json
 import math
 import operator
 import os
@@ -35,7 +34,7 @@ from rotor_mbs.runs.design import MISSING, RUNS
 from rotor_mbs.runs.pool import check_workers
 from rotor_mbs.runs.read import StoredRun, StoredScene, is_sweep, open_results
 from rotor_mbs.runs.sweeps import ERROR_GROWTH, METRICS, StoredSweep, parameter_name
-from rotor_mbs.runs.table import TableFile, copy_file, text_of
+from rotor_mbs.runs.table import TableFile, copy_file, reading, text_of
 from rotor_mbs.scenario.catalogue import list_scenes, only_scene, scene_of
 from rotor_mbs.scenario.scene import Scene, load_scene, parse_scene
 from rotor_mbs.scenario.toml_file import file_path, plain_value
@@ -397,9 +396,12 @@ class Runs(Mapping[Any, Any]):
             available = ", ".join(map(str, islice(self._labels, 20)))
             raise KeyError(f"{shown_value(label)}; available: {available}")
         if self._is_sweep:
-            return self._run_of_sweep(int(label))
+            with reading(self.path):
+                return self._run_of_sweep(int(label))
         with open_results(self.path) as results:
-            name = self.scene or next(name for name in results.scenes if label.startswith(f"{name}/"))
+            name = self.scene or next((name for name in results.scenes if label.startswith(f"{name}/")), "")
+            if name not in results.scenes or label.removeprefix(f"{name}/") not in results.scenes[name].runs:
+                raise StoreError(f"{self.path}: has no {label} any more: another file has taken its place")
             scene = results.scenes[name]
             return _loaded(scene, scene.runs[label.removeprefix(f"{name}/")])
 
@@ -547,7 +549,7 @@ class Runs(Mapping[Any, Any]):
         method = sweep.methods[int(sweep.column("method_code")[row])]
         metrics = {name: value.item() for name, value in facts.items() if value.dtype == float and value == value}
         return Run(
-            scene, method, trajectory, integration, json.loads(str(design["settings"])), run_times_s=[], status=status,
+            scene, method, trajectory, integration, sweep.settings, run_times_s=[], status=status,
             message=message, metrics=metrics,
         )  # fmt: skip
 

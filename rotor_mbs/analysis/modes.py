@@ -25,6 +25,7 @@ from rotor_mbs.analysis.text_tables import TextTable
 from rotor_mbs.errors import InputError, StoreError
 from rotor_mbs.runs.design import Column
 from rotor_mbs.runs.read import Record, read_records
+from rotor_mbs.runs.table import reading
 from rotor_mbs.solution.trajectory import Array
 
 Complex = NDArray[np.complex128]
@@ -496,11 +497,17 @@ def linear_dataset(sources: Mapping[str, LinearModes], xarray: Any) -> Any:
 
 def read_modes(path: Path) -> dict[str, SceneModes]:
     """By scene, all modes in a file. Raises StoreError where the file cannot be read or has none."""
-    by_scene: dict[str, dict[str, Record]] = {}
-    for record in read_records(path, "modes"):
-        by_scene.setdefault(record.scene, {})[record.name] = record
-    if not by_scene:
+    records = read_records(path, "modes")
+    if not records:
         raise StoreError(f"{path}: no modes in it; allowed: a file that rotor-mbs modes has written")
+    with reading(path):
+        return _modes_of(records)
+
+
+def _modes_of(of_all: Sequence[Record]) -> dict[str, SceneModes]:
+    by_scene: dict[str, dict[str, Record]] = {}
+    for record in of_all:
+        by_scene.setdefault(record.scene, {})[record.name] = record
     modes_by_scene = {}
     for scene, records in by_scene.items():
         states: dict[str, dict[str, LinearModes]] = {REST: {}, ROTATION: {}}

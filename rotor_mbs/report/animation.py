@@ -53,10 +53,11 @@ def write_animation(results: Path, name: str, output: Path, magnified: float | N
         if name not in opened.scenes:
             raise InputError(f"{results}: {name!r}: no such scene in it; allowed: {', '.join(opened.scenes) or 'none'}")
         pictures = frames(opened.scenes[name], magnified)
-    options = {"quality": 50, "method": 0, "xmp": _MARK} if kind == ".webp" else {"optimize": False, "comment": _MARK}
-    stream = io.BytesIO()
-    first, name_of_kind = next(pictures), kind.removeprefix(".")
-    first.save(stream, name_of_kind, save_all=True, append_images=pictures, duration=1000 // RATE, loop=0, **options)
+        webp, other = {"quality": 50, "method": 0, "xmp": _MARK}, {"optimize": False, "comment": _MARK}
+        options = webp if kind == ".webp" else other
+        stream = io.BytesIO()
+        first, suffix = next(pictures), kind.removeprefix(".")
+        first.save(stream, suffix, save_all=True, append_images=pictures, duration=1000 // RATE, loop=0, **options)
     replace_file(output, stream.getvalue(), _MARK)
     return output
 
@@ -67,7 +68,7 @@ def frames(stored: StoredScene, magnified: float | None) -> Iterator[Image.Image
     runs = {label_of(run.method): run for run in stored.sides.values() if "angles" in run}
     if not runs:
         raise InputError(f"{stored.name}: nothing to plot: no angles")
-    end = max(float(run.array("time")[-1]) for run in runs.values())
+    end = min(max(float(run.array("time")[-1]) for run in runs.values()), scene.duration)
     count = max(2, min(round(end * RATE) + 1, _MAX_FRAMES))
     at = np.linspace(0.0, end, (count - 1) * _PATH_POINTS + 1)
     needed = magnification(scene)

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+import warnings
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
 from typing import NamedTuple
+
+import numpy as np
 
 from rotor_mbs.errors import StoreError
 from rotor_mbs.report import files
@@ -18,6 +22,7 @@ from rotor_mbs.report.pages.stability import stability_page
 from rotor_mbs.runs.pool import Workers, pool_of, run_in
 from rotor_mbs.runs.read import is_sweep, open_results, read_records
 from rotor_mbs.runs.sweeps import StoredSweep
+from rotor_mbs.runs.table import reading
 
 _GROUPS = 2  # of pages per worker: each opens the file anew, and none waits long for the last one
 _TIMEOUT_S = 600.0
@@ -52,7 +57,9 @@ def write_report(results: Path, output: Path, jobs: Workers = 1, on_page: OnPage
         from rotor_mbs.report.pages.sweep import sweep_page  # late: workers load what most files need
 
         sweep = StoredSweep(results)
-        return files.write_page(output, "sweep", sweep_page(sweep), sweep.attributes)
+        with reading(results), _without_warnings():
+            page = sweep_page(sweep)
+        return files.write_page(output, "sweep", page, sweep.attributes)
     with open_results(results) as opened:
         count = len(pages_of(Report(**vars(opened))))
     made: dict[str, str] = {}
@@ -71,7 +78,7 @@ def write_report(results: Path, output: Path, jobs: Workers = 1, on_page: OnPage
 
 def make_pages(results: Path, numbers: Sequence[int]) -> dict[str, str]:
     """The work of a process: the pages of these numbers, by file name. Raises StoreError."""
-    with open_results(results) as opened:
+    with open_results(results) as opened, _without_warnings():
         pages = pages_of(Report(**vars(opened)))
         made_with = files.made_with(opened.attributes)
         links = [(page.file, page.label) for page in pages if page.label]
@@ -79,6 +86,14 @@ def make_pages(results: Path, numbers: Sequence[int]) -> dict[str, str]:
             page.file: files.render(page.template, page.content(), made_with, links, page.file)
             for page in (pages[number] for number in numbers)
         }
+
+
+@contextmanager
+def _without_warnings() -> Iterator[None]:
+    """A file may hold any number: what overflows in a plot is not told with a line of this program's source."""
+    with warnings.catch_warnings(), np.errstate(all="ignore"):
+        warnings.simplefilter("ignore")
+        yield
 
 
 def pages_of(report: Report) -> list[Page]:

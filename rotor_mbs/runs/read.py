@@ -12,7 +12,6 @@ What studies store beside runs are records: tables of points, and groups of arra
 from __future__ import annotations
 
 import functools
-import json
 import os
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -41,6 +40,7 @@ from rotor_mbs.runs.table import (
     new_file,
     new_group,
     open_file,
+    parsed,
     put,
     put_attributes,
     reading,
@@ -114,7 +114,7 @@ class StoredRun:
     @property
     def is_frozen(self) -> bool:
         """Whether it is a reference that was read from a shipped file."""
-        return "frozen_with" in json.loads(self.known["versions"])
+        return "frozen_with" in parsed(self.known["versions"], dict, self._name)
 
     @property
     def status(self) -> str:
@@ -123,7 +123,7 @@ class StoredRun:
 
     @property
     def settings(self) -> dict[str, Any]:
-        return dict(json.loads(self.known["settings"]))
+        return parsed(self.known["settings"], dict, self._name)
 
     @property
     def labels(self) -> list[str]:
@@ -292,15 +292,16 @@ class OpenResults:
 @contextmanager
 def open_results(path: Path, *, verify: bool = True, only: Collection[str] | None = None) -> Iterator[OpenResults]:
     """An open results file; of a file that replaces it meanwhile nothing is seen. A run is compared with its checksum
-    when it is read, but for verify=False; only: names of scenes, by default all. Raises StoreError."""
+    when it is read, but for verify=False; only: names of scenes, by default all. Raises StoreError, also for whatever
+    goes wrong in the block with what the file holds."""
     for _ in range(_ATTEMPTS):
         stored = TableFile(path, None if only is None else {RUNS, *only})
         with path.open("rb") as file:
             if any(table.inode != os.fstat(file.fileno()).st_ino for table in stored.tables.values()):
                 continue
-            with reading(path):
+            with reading(path):  # what is made of it, too: rows are read when they are asked for
                 scenes = {scene.name: scene for scene in _scenes(stored, file, verify, only)}
-            yield OpenResults(path, stored.attributes, {name: scenes[name] for name in natural_order(scenes)})
+                yield OpenResults(path, stored.attributes, {name: scenes[name] for name in natural_order(scenes)})
             return
     raise StoreError(f"{path}: is being replaced by another process")
 
@@ -381,7 +382,9 @@ def points_table(group: str, points: Sequence[Mapping[str, object]]) -> Table:
 def read_records(path: Path, kind: str) -> list[Record]:
     """The records of a kind, in the order of the file; no curve of which a point is missing. Raises StoreError."""
     if kind in POINT_COLUMNS:
-        return [record for table in TableFile(path, [kind]).tables.values() for record in _point_records(table)]
+        tables = TableFile(path, [kind]).tables.values()
+        with reading(path):
+            return [record for table in tables for record in _point_records(table)]
     with open_file(path) as (file, trailer), reading(path):
         return [_record(file, group) for group in trailer.groups] if trailer.kind == kind else []
 
@@ -412,7 +415,7 @@ def _point_records(stored: Table) -> Iterator[Record]:
             arrays = {column: array[used] for column, array in arrays.items()}
         facts |= {"messages": messages, "method": known["method_name"], "setting_kind": setting_kind}
         facts |= {column: known[column] for column in ("scene_hash", "versions") if column in known}
-        yield Record(kind, scene, name, facts | json.loads(known.get("options", "{}")), arrays)
+        yield Record(kind, scene, name, facts | parsed(known.get("options", "{}"), dict, stored.path), arrays)
 
 
 # Groups of arrays

@@ -24,7 +24,16 @@ from rotor_mbs.errors import InputError, StoreError, shown_value
 from rotor_mbs.methods.catalogue import find_method
 from rotor_mbs.runs.design import COLUMNS, MISSING, Column, flags
 from rotor_mbs.runs.output_files import locked
-from rotor_mbs.runs.table import IDENTITY, Table, TableFile, laid_out, reading, scene_scales
+from rotor_mbs.runs.table import (
+    IDENTITY,
+    Table,
+    TableFile,
+    laid_out,
+    parsed,
+    reading,
+    require_texts,
+    scene_scales,
+)
 from rotor_mbs.runs.trailer import SWEEP, may_extend
 from rotor_mbs.runs.versions import row_versions
 from rotor_mbs.scenario.sweep import SPLITS, Sweep, split_rows
@@ -134,9 +143,10 @@ class StoredSweep:
         self._path = path
         file = TableFile(path, [""])
         self.attributes = file.attributes
-        if IDENTITY not in self.attributes:
+        if IDENTITY not in self.attributes or "" not in file.tables:
             raise StoreError(f"{path}: no sweep's dataset; allowed: a file that `rotor-mbs sweep` wrote")
         self._table = table = file.tables[""]
+        self._check()
         known = {name: column for name, (column, _) in table.known.items()}
         self.columns = {"run": Column(("run",), "1", "run number, from 0"), **known, **table.computed}
         self.keys: list[str] = self.attributes["parameter_keys"]
@@ -149,6 +159,28 @@ class StoredSweep:
                 f"{path}: runs {which} changed after they were written; allowed: the sweep's own command, which "
                 "computes them again"
             )
+
+    def _check(self) -> None:
+        """Raises StoreError where something is missing, or does not fit, that every sweep has."""
+        table, place = self._table, str(self._path)
+        texts = ("title", "summary", "sweep_toml", "base_scene", "scene_toml", "scene_hash")
+        require_texts(self.attributes, texts, place)
+        for name in ("methods", "parameter_keys"):
+            names = self.attributes.get(name)
+            if not isinstance(names, list) or not names or not all(isinstance(one, str) for one in names):
+                raise StoreError(f"{place}: its attribute {name} is no list of texts; damaged")
+        self.shape = parsed(self.attributes.get("shape"), list, place)  # of a grid, slowest first
+        self.settings = parsed(self.attributes.get("settings"), dict, place)
+        missing = {*METRICS} - {*table.computed} | {*map(parameter_name, self.attributes["parameter_keys"])} - {
+            *table.known
+        }
+        if missing or "time" not in table.known or "method_code" not in table.known:
+            raise StoreError(f"{place}: has no {', '.join(sorted(missing)) or 'time or method_code'}; damaged")
+        runs, codes = table.column("run"), table.column("method_code")
+        if runs.dtype.kind != "i" or (runs != np.arange(len(runs)) + runs[:1].sum()).any() or (runs < 0).any():
+            raise StoreError(f"{place}: run is no count; damaged")
+        if ((codes < 0) | (codes >= len(self.methods))).any():
+            raise StoreError(f"{place}: method_code names no method; damaged")
 
     @property
     def methods(self) -> list[str]:

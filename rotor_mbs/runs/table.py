@@ -19,6 +19,7 @@ from __future__ import annotations
 import errno
 import functools
 import io
+import json
 import math
 import os
 import threading
@@ -28,13 +29,13 @@ from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import IO, Any
+from typing import IO, Any, TypeVar
 
 import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-from rotor_mbs.errors import InputError, StoreError
+from rotor_mbs.errors import InputError, RotorError, StoreError, one_line
 from rotor_mbs.methods.catalogue import REFERENCE, method_names
 from rotor_mbs.runs.design import (
     CHARACTER,
@@ -81,19 +82,15 @@ _NOT_ATTRIBUTES = ("CLASS", "NAME", "REFERENCE_LIST", "DIMENSION_LIST", "_Netcdf
 # The netCDF-4 library's name for the scale of a dimension without values.
 _WITHOUT_VALUES = "This is a netCDF dimension but not a netCDF variable."
 
-# What h5py and HDF5 raise on damaged files, and what plain code does with what they return.
-_DAMAGE = (
-    KeyError, OSError, RuntimeError, ValueError, TypeError, AttributeError, IndexError, OverflowError, MemoryError,
-    NotImplementedError,
-)  # fmt: skip
-
-# An array may be larger than its bytes in the file, where it is compressed: up to a factor, and a size in any case.
-_UNPACKED, _UNPACKED_BYTES = 100, 1 << 26
+# A text of variable length as it lies in a dataset.
+_REFERENCE = np.dtype([("length", "<u4"), ("heap", "<u8"), ("index", "<u4")])
 _HEAD_BYTES = 1 << 17  # of a file beside its rows, at most: descriptions and texts
 _READ_BYTES = 1 << 25  # read at once when checksums are verified
+_LONGEST_LABEL = 1000  # characters; names of files are shorter
 _ATTEMPTS = 3  # to open a file that is being replaced
 _TEXT_LENGTH = 600  # characters of a message
 
+T = TypeVar("T")
 # (rows, ...) arrays by the name of their dataset.
 Rows = dict[str, NDArray[Any]]
 
@@ -156,8 +153,10 @@ class Table:
         kind, shape = self.row_type[name].base, self.shape(name)
         if not all(shape):
             return np.empty(shape, kind)
-        with reading(self.path, name):
-            values: NDArray[Any] = np.memmap(self.path, kind, "r", self.offsets[name], shape)
+        with reading(self.path, name), self.path.open("rb") as file:
+            if os.fstat(file.fileno()).st_ino != self.inode:
+                raise StoreError(f"{self.path}: has been replaced by another file")
+            values: NDArray[Any] = np.memmap(file, kind, "r", self.offsets[name], shape)
         return values
 
     def statuses(self) -> NDArray[np.int8]:
@@ -171,7 +170,8 @@ class Table:
                 continue
             rows = part.read(len(status))
             is_right = checksums(part.first, rows, part.row_type) == rows["crc32"]
-            statuses[start : start + step] = np.where(is_right & (status < len(STATUSES)), status, MISSING)
+            is_known = (status >= 0) & (status < len(STATUSES))
+            statuses[start : start + step] = np.where(is_right & is_known, status, MISSING)
         return statuses
 
     def place(self, row: int = 0) -> Place:
@@ -321,7 +321,8 @@ class Place:
     def is_stored(self) -> bool:
         """Whether the first row is there as it was written."""
         row = self.read()
-        return bool(row["status"][0] != MISSING and checksums(self.first, row, self.row_type)[0] == row["crc32"][0])
+        is_known = 0 <= row["status"][0] < len(STATUSES)
+        return bool(is_known and checksums(self.first, row, self.row_type)[0] == row["crc32"][0])
 
     def clear(self) -> None:
         """Write a blank row, which a reader of an unfinished file sees; its status stays as it is."""
@@ -558,15 +559,26 @@ def open_file(path: Path) -> Iterator[tuple[Any, Trailer]]:
 
 @contextmanager
 def reading(path: Path | str, what: str = "") -> Iterator[None]:
-    """Whatever goes wrong in reading a file that may be damaged is a StoreError that names the place."""
+    """Whatever goes wrong with what a file holds is a StoreError that names the place: HDF5 raises errors of many kinds
+    on damaged files, and so does code with what a forged one says, although its digest is right."""
     try:
         yield
-    except StoreError:
+    except (RotorError, ImportError, BrokenPipeError):
         raise
-    except _DAMAGE as exc:
+    except Exception as exc:
         place = f"{path}: {what}" if what else f"{path}"
-        reason = str(exc).splitlines()[0][:150] if str(exc) else type(exc).__name__
-        raise StoreError(f"{place}: damaged or incomplete ({reason})") from exc
+        raise StoreError(f"{place}: damaged or incomplete ({one_line(exc)[:150]})") from exc
+
+
+def parsed(text: object, kind: type[T], place: object) -> T:
+    """The value of a JSON text, of this type. Raises StoreError: a file may hold anything."""
+    try:
+        value = json.loads(str(text))
+    except (ValueError, RecursionError):
+        value = None
+    if not isinstance(value, kind):
+        raise StoreError(f"{place}: {str(text)[:50]!r} is no JSON text of a {kind.__name__}; damaged")
+    return value
 
 
 class TableFile:
@@ -592,8 +604,8 @@ class TableFile:
         for run, row in rows.items():
             scene, method = row["scene"], row["method_name"]
             is_there = scene in self.groups and (scene not in self.tables or method in self.tables[scene].runs)
-            if run != f"{scene}/{method}" or not is_there:
-                raise StoreError(f"{self.path}: {run} has no arrays; damaged")
+            if run != f"{scene}/{method}" or not is_there or len(run) > _LONGEST_LABEL:
+                raise StoreError(f"{self.path}: {run[:_LONGEST_LABEL]} has no arrays; damaged")
 
     def place(self, run: str, group: str = RUNS) -> Place:
         """Where a row is; of a run, together with its arrays."""
@@ -709,24 +721,29 @@ def _check(table: Table) -> None:
             raise StoreError(f"{place}/time does not increase; damaged")
     if len(set(table.runs)) != len(table.runs):
         raise StoreError(f"{place}/run names a run twice; damaged")
-    for name in attributes:
-        if not isinstance(table.attributes.get(name), str):
+    require_texts(table.attributes, attributes, place)
+
+
+def require_texts(attributes: Mapping[str, object], names: Iterable[str], place: object) -> None:
+    """Raises StoreError where one of these attributes is no text."""
+    for name in names:
+        if not isinstance(attributes.get(name), str):
             raise StoreError(f"{place}: its attribute {name} is no text; damaged")
 
 
 def group_at(file: Any, path: str) -> Any:
-    """A group by its path. Raises KeyError where there is none, StoreError at a link."""
+    """A group by its path. Raises StoreError where there is none, or a link."""
     for name in path.split("/") if path else ():
         file = member(file, name)
     return file
 
 
 def member(group: Any, name: str) -> Any:
-    """A member of a group. Raises KeyError where there is none, StoreError at a link."""
-    if not isinstance(group.get(name, getlink=True), h5py.HardLink):
-        raise StoreError(
-            f"{group.file.filename}: {group.name}/{name} is a link; allowed: groups and arrays of this file"
-        )
+    """A member of a group. Raises StoreError where there is none, or a link."""
+    link = group.get(name, getlink=True)
+    if not isinstance(link, h5py.HardLink):
+        found = "is missing" if link is None else "is a link"
+        raise StoreError(f"{group.file.filename}: {group.name}/{name} {found}; allowed: groups and arrays of this file")
     return group[name]
 
 
@@ -737,17 +754,22 @@ def values_of(dataset: Any) -> NDArray[Any]:
     if not isinstance(dataset, h5py.Dataset) or dataset.shape is None:
         raise StoreError(f"{place} is no array")
     layout = dataset.id.get_create_plist()
-    if layout.get_external_count() or layout.get_layout() == h5py.h5d.VIRTUAL:
-        raise StoreError(f"{place} is stored in another file; allowed: arrays of this file")
-    if dataset.dtype.kind == "O":
-        if h5py.check_string_dtype(dataset.dtype) is None:
-            raise StoreError(f"{place} is no array")
-        return np.array([plain(text) for text in dataset[()]], dtype=object)
-    kept = dataset.id.get_storage_size()
-    if kept > dataset.file.id.get_filesize() or dataset.nbytes > max(_UNPACKED_BYTES, _UNPACKED * kept):
+    if layout.get_external_count() or layout.get_layout() != h5py.h5d.CONTIGUOUS:
+        raise StoreError(f"{place} is not contiguous in this file; allowed: an array as rotor-mbs writes it")
+    kept, size = dataset.id.get_storage_size(), dataset.file.id.get_filesize()
+    if kept > size or kept < dataset.nbytes:
         raise StoreError(f"{place} claims {dataset.nbytes:.2g} bytes and has {kept:.2g}")
-    values: NDArray[Any] = dataset[()]
-    return values
+    if dataset.dtype.kind != "O":
+        values: NDArray[Any] = dataset[()]
+        return values
+    if h5py.check_string_dtype(dataset.dtype) is None:
+        raise StoreError(f"{place} is no array")
+    # Each text is a reference that begins with its length, and all may refer to one text: bounded before it is read.
+    if dataset.size:
+        texts = np.memmap(dataset.file.filename, _REFERENCE, "r", dataset.id.get_offset(), dataset.shape)
+        if int(texts["length"].sum(dtype=np.uint64)) > size:
+            raise StoreError(f"{place} claims more text than the file has")
+    return np.array([plain(text) for text in dataset[()]], dtype=object)
 
 
 def plain(value: Any) -> Any:

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor_mbs.analysis.checks import Check, Where, checks_of, make_check
-from rotor_mbs.errors import InputError, StoreError
+from rotor_mbs.errors import InputError
 from rotor_mbs.methods.catalogue import (
     REFERENCE,
     able_methods,
@@ -31,7 +31,7 @@ from rotor_mbs.runs.output_files import is_being_written
 from rotor_mbs.runs.read import is_sweep, open_results
 from rotor_mbs.runs.runner import OnProgress, ignore_progress
 from rotor_mbs.runs.sweeps import StoredSweep, parameter_name
-from rotor_mbs.runs.table import TableFile
+from rotor_mbs.runs.table import TableFile, reading
 from rotor_mbs.scenario.accuracy_bounds import Bounds
 from rotor_mbs.scenario.catalogue import find_scenes
 from rotor_mbs.studies.run import run_scenes
@@ -109,17 +109,15 @@ def judge_file(path: Path, bounds: Bounds) -> list[Check]:
             make_check(bounds, "complete", where, missing, "runs", absent),
             make_check(bounds, "integrity", where, damaged, "runs", changed),
         ]
-    try:
-        with ExitStack() as stack:
-            results = stack.enter_context(open_results(path, verify=False))
-            frozen = [shipped_reference(str(scene.attributes["scene_hash"])) for scene in results.scenes.values()]
-            shipped = [
-                stack.enter_context(open_results(file, only=[known.scene for known in frozen if known is not None]))
-                for file in {known.path for known in frozen if known is not None}
-            ]
+    with ExitStack() as stack:
+        results = stack.enter_context(open_results(path, verify=False))
+        frozen = [shipped_reference(str(scene.attributes["scene_hash"])) for scene in results.scenes.values()]
+        shipped = [
+            stack.enter_context(open_results(file, only=[known.scene for known in frozen if known is not None]))
+            for file in {known.path for known in frozen if known is not None}
+        ]
+        with reading(path):  # within the shipped ones, which are not what is wrong
             checks = checks_of(results, shipped, bounds)
-    except (RuntimeError, OSError) as exc:  # what HDF5 finds wrong, at whatever place
-        raise StoreError(f"{path}: damaged or incomplete ({' '.join(str(exc).split())[:150]})") from exc
     runs = TableFile(path, [RUNS]).tables.get(RUNS)
     missing = 0 if runs is None else int((runs.column("status") == MISSING).sum())
     if missing:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import re
 
 import numpy as np
@@ -87,8 +86,7 @@ def _responses(sweep: StoredSweep, ok: NDArray[np.bool_]) -> list[Picture]:
     label = _axis(quantity, sweep.columns[name].units)
     axes = {key: sweep.column(parameter_name(key)) for key in sweep.keys}
     labels = {key: _axis(field_name(key), sweep.columns[parameter_name(key)].units) for key in sweep.keys}
-    shape = json.loads(sweep.attributes.get("shape", "[]"))  # of a grid: values along every axis, slowest first
-    if len(shape) == len(axes) == 2:
+    if len(sweep.shape) == len(axes) == 2:
         # By one method, as those of the others would look the same; runs that a part of a sweep does not have are NaN.
         codes = np.asarray(sweep.column("method_code"))
         shown = codes == codes[np.isfinite(values)][0]
