@@ -183,10 +183,10 @@ def run(
         solution, exact = solve_judged(scene, method, settings, compute_reference=reference, time_limit_s=timeout)
         return Run(**vars(solution), reference=exact)
     chosen, _, refused = selected_methods([scene], check_names(texts(method)), settings)
-    if not chosen[scene.name]:
-        raise MethodRefusal("\n".join(map(str, refused)))
     if asked := [str(refusal) for refusal in refused if refusal.is_asked]:
         raise InputError(asked)
+    if not chosen[scene.name]:
+        raise MethodRefusal("\n".join(map(str, refused)))
     folder = _TemporaryFolder()
     path = folder.path / "runs.h5"
     report = run_scenes([scene], chosen, path, workers=workers, timeout_s=min(timeout, _NO_LIMIT_S), settings=settings)

@@ -145,6 +145,7 @@ def compare_with_reference(
     try:
         with time_limit(time_limit_s):
             inside, exact = _reference_for(data, scene)
+            raise_if_over()  # a reference that ends early is none
             missing_part = "the rows are not assessed"
             rows = _rows_with_reference(data, scene, inside, exact)
             raise_if_over()

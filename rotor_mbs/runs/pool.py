@@ -243,7 +243,8 @@ def run_in(
 
     def ended(waiting: dict[Future[R], T]) -> Iterator[Finished[T, R]]:
         nonlocal lacks
-        for future in wait(waiting, return_when=FIRST_COMPLETED).done:
+        done = wait(waiting, return_when=FIRST_COMPLETED).done
+        for future in [future for future in waiting if future in done]:  # of several in the order of their tasks
             task, error = waiting.pop(future), CancelledError() if future.cancelled() else future.exception()
             if error is None:
                 end = Finished(task, future.result())

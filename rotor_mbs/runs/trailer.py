@@ -121,6 +121,8 @@ def may_extend(path: Path, kind: str) -> bool:
     An empty file is nothing. Raises InputError where the file holds something else, StoreError where it is damaged, or
     not this program's.
     """
+    if path.is_dir():
+        raise StoreError(f"{path}: is a folder; allowed: the name of a file")
     if not path.exists() or (path.is_file() and path.stat().st_size == 0):
         return False
     found = read_trailer(path).kind

@@ -124,7 +124,7 @@ def test_a_file_that_cannot_be_used_is_one_line(
     Path(name).write_text(text)
     named = ["-m", "mine.py"] * (name != "mine.py")
     ended = rotor_mbs("run", "one.toml", *named, "-m", name, "-o", "o.h5")
-    assert (ended.status, ended.out, ended.err) == (2, "", f"not run: bad/bad on one: {line}\n")
+    assert (ended.status, ended.out, ended.err) == (2, "", f"{line}\n")
     assert not Path("o.h5").exists()
 
 

@@ -157,7 +157,7 @@ NO_NAMES = ("", "../paper/fig05", "/paper/fig05", "paper/fig05\n", "paper/\0")
         *((argument, "is neither a scene's name nor a TOML file") for argument in NO_NAMES),
         ("paper/fig5", "no such scene, perhaps paper/fig05"),
         ("missing.toml", "missing.toml: cannot be read: No such file"),
-        ("\0.toml", "cannot be resolved to a file"),
+        ("\0.toml", "not a path of a file; allowed: text without NUL"),
         ("empty", "no TOML file in this folder"),
         ("text.txt", "is not a TOML file"),
         ("odd name.toml", "cannot name a scene"),

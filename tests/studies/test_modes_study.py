@@ -18,6 +18,7 @@ from rotor_mbs.methods.catalogue import find_method
 from rotor_mbs.runs.read import write_records
 from rotor_mbs.scenario.catalogue import find_scenes
 from rotor_mbs.scenario.scene import Scene
+from rotor_mbs.solution.status import REFUSED
 from rotor_mbs.studies import modes as study
 
 NREL = find_scenes(["stiff/nrel-5mw"])[0]
@@ -155,11 +156,12 @@ def test_no_steady_state_is_one_line_and_no_file(tmp_path, capsys):
     (tmp_path / "free.toml").write_text(scene.text, encoding="utf-8")
     output = tmp_path / "modes.h5"
     command = ["modes", "-o", str(output), "-j", "1", str(tmp_path / "free.toml")]
-    reason = "free: no steady state at 0 rad/s: a torque of 500 N m acts on pitch 1, which has no spring, and nothing"
+    reason = "no steady state at 0 rad/s: a torque of 500 N m acts on pitch 1, which has no spring, and nothing"
     assert main([*command, "--speeds=0:0.001:2"]) == 2
     shown = capsys.readouterr()
     assert shown.out == ""
-    assert shown.err == f"{reason} balances it\n"
+    assert shown.err.splitlines()[-1] == f"not run: free: {reason} balances it"
+    assert shown.err.count(reason) <= 2  # as progress in a log, and at the end
     assert not output.exists()
     with pytest.raises(InputError, match=reason):
         rm.modes(scene)
@@ -170,12 +172,15 @@ def test_a_scene_without_modes_ends_no_batch_and_takes_nothing_away(tmp_path):
     options = {"names": ["exudyn_tree/rk67"], "workers": 0, "timeout_s": 60.0}
     other = general(gravity=0.0)
     made = study.modes_of_scenes([scene, other], output, **options)
-    assert [(outcome.status, outcome.is_stored) for outcome in made] == [("solver_failed", False), ("ok", True)]
-    assert "no steady state" in made[0].message
+    by_label = {outcome.label: outcome for outcome in made}
+    refused, computed = by_label["free modes"], by_label[f"{other.name} modes"]
+    assert (refused.status, refused.is_stored) == (REFUSED, False)
+    assert (computed.status, computed.is_stored) == ("ok", True)
+    assert "no steady state" in refused.message
     assert list(read_modes(output)) == [other.name]
     before = output.read_bytes()
-    with pytest.raises(InputError, match="no steady state"):
-        study.modes_of_scenes([scene, replace(scene, name=other.name)], output, **options)
+    without_any = study.modes_of_scenes([scene, replace(scene, name=other.name)], output, **options)
+    assert [outcome.status for outcome in without_any] == [REFUSED, REFUSED]
     assert output.read_bytes() == before
 
 
