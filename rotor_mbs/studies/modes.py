@@ -70,6 +70,7 @@ def modes_of_scenes(
     timeout_s : float
         Time limit of each scene.
     on_progress : callable
+        Not called for a scene without modes.
 
     Returns
     -------
@@ -97,8 +98,9 @@ def modes_of_scenes(
                 label, share = f"{end.task.name} modes", done / len(scenes)
                 if isinstance(end.error, RotorError):
                     reason = str(end.error).removeprefix(f"{end.task.name}: ")
-                    outcome = Outcome(label, "", REFUSED, reason, is_stored=False, share=share)
-                elif end.value is None:
+                    made.append(Outcome(label, "", REFUSED, reason, is_stored=False, share=share))
+                    continue  # the reason is told once, at the end
+                if end.value is None:
                     outcome = Outcome(label, "", end.failure, end.message, is_stored=False, share=share)
                 else:
                     computed.append(end.value)
