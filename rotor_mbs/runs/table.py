@@ -987,21 +987,24 @@ def new_file(path: Path, kind: str) -> Iterator[Any]:
     before, by `may_extend`.
     """
     memory = {"driver": "core", "backing_store": False, "block_size": 1 << 20}
-    groups: dict[str, Mapping[str, tuple[int, int]]] = {}
-
-    def note(name: str, item: Any) -> None:
-        if isinstance(item, h5py.Dataset):
-            groups[name.rpartition("/")[0]] = {}
-
     with begin_file(f"{path.name}.{threading.get_ident()}", **memory) as file:
         yield file
-        file.visititems(note)
+        groups: dict[str, Mapping[str, tuple[int, int]]] = {place: {} for place in _groups_with_arrays(file)}
         file.flush()
         image = io.BytesIO(file.id.get_file_image())
     trailer = trailer_of(image, kind, groups)
     image.seek(0, io.SEEK_END)
     image.write(trailer)
     write_file(path, image.getbuffer())
+
+
+def _groups_with_arrays(group: Any, place: str = "") -> Iterator[str]:
+    """Yield the path of the group of each array below a group, in the order in which they were written."""
+    for name, item in group.items():
+        if is_group(item):
+            yield from _groups_with_arrays(item, f"{place}/{name}" if place else name)
+        else:
+            yield place
 
 
 def is_of_this_program(path: Path) -> bool:

@@ -27,7 +27,7 @@ RK4 = (
 import dataclasses
 from rotor_mbs.methods.base import Settings
 from rotor_mbs.methods.settings import step
-from rotor_mbs.scenario.time_table import intervals, value_at
+from rotor_mbs.scenario.time_table import intervals, segments, value_at
 
 @dataclasses.dataclass(frozen=True)
 class Steps(Settings):
@@ -49,7 +49,7 @@ class Rk4(Solver):
         return y + h / 6 * (k1 + 2 * k2 + 2 * k3 + k4)
 
     def stops(self):
-        return intervals(segments(self.scene.load_tables, self.scene.duration), self.scene.samples, every_sample=True)
+        return intervals(self.scene.load_segments, self.scene.samples, every_sample=True)
 
     def start(self):
         return np.array(self.scene.initial_angles + self.scene.initial_rates)
@@ -83,7 +83,7 @@ BROKEN = {
         "row [0-9]+ is not finite",
     ),
     "no jump handling": (
-        "return intervals(segments(self.scene.load_tables,", "return intervals(segments([()] * 9,", "load|jump"
+        "intervals(self.scene.load_segments,", "intervals(segments([()] * 9, self.scene.duration),", "load|jump"
     ),
     "first order": ("return y + h / 6 * (k1 + 2 * k2 + 2 * k3 + k4)", "return y + h * k1", "order (1.0|1.1|0.9)"),
     "state kept": (
