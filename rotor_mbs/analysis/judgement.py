@@ -1,41 +1,40 @@
-"""The one judgement of a run, from its samples, by the bounds that `check` reads, too.
+"""The one judgement of a run, from its samples, by the checks and bounds that `check` reads, too.
 
-ok: every interval's defect within the method's bound, the energy balance kept, and the error of the angles up to the
-horizon at most 0.01 rad (from the reference, or predicted from the defects). An engine's report can only lower a
-status. The printed equations are "completed" where they reach the end: nothing is claimed of them.
+ok: what a run has is right over the whole of what was asked. Times and start are the scene's, tips and energies those
+of its angles and rates, loads those of the closed form at its state; every interval's defect is within the method's
+bound, the balances of energy and momentum are kept, and the error of the angles up to the horizon is at most 0.01 rad
+(from the reference, or predicted from the defects). An engine's report can only lower a status. The printed equations
+are "completed" where they reach the end: nothing is claimed of them.
 """
 
 from __future__ import annotations
 
-import functools
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
-from fractions import Fraction
+from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from rotor_mbs.analysis.run_checks import (
+    NO_INERTIA,
+    SINGULAR_SHARE,
+    RunSamples,
+    defect_allowed,
+    defect_bound,
+    quantity_errors,
+    run_checks,
+    symmetry_loss,
+)
 from rotor_mbs.methods.catalogue import is_corrected, look_up
 from rotor_mbs.models.lagrange.defects import interval_defects
-from rotor_mbs.models.lagrange.samples import load_rounding
+from rotor_mbs.models.lagrange.singularity import rotor_inertia_shares
 from rotor_mbs.scenario.accuracy_bounds import Bound, Bounds, shipped_bounds
-from rotor_mbs.scenario.scene import Blade, Scene
+from rotor_mbs.scenario.scene import Scene
+from rotor_mbs.solution.defects import OK_ERROR as OK_ERROR
 from rotor_mbs.solution.defects import Defects
 from rotor_mbs.solution.metrics import ANGLE_LIMIT, Metrics, metrics_of
-from rotor_mbs.solution.quantities import Array, Quantity, QuantityMetric, known_quantities, sizes
+from rotor_mbs.solution.quantities import Array
 from rotor_mbs.solution.trajectory import Integration, Solution, Trajectory
-
-# rad: the largest error of an angle, up to the horizon, of a run that is called ok.
-OK_ERROR = 0.01
-
-# Share of the rotor's inertia that is left once every pitch is free: below this a run that broke off broke off there.
-_SINGULAR_SHARE = 1e-3
-
-# Round-off of a run's state, what it becomes over some hundred steps; magnified it may add to the energy error.
-_ROUND_OFF = 1e-14
-
-# Ten units in the last place of an angle that starts turns away from zero are no error of the method.
-_START_ROUND_OFF = 10.0 * float(np.finfo(float).eps)
 
 # A run is checked where one of these could be found.
 _CHECKS = ("energy_drift_max", "defect_max", "angle_error_max")
@@ -45,48 +44,55 @@ _CHECKS = ("energy_drift_max", "defect_max", "angle_error_max")
 _RESEMBLES = 1e-2
 _RESEMBLING_ANGLE = 1.0
 
-# Below this share the last bit of a pitch decides the rotor's inertia: (π/2 known to 1e-16)², a hundredfold. What comes
-# after such a sample follows from round-off alone, whatever an engine reports.
-_NO_INERTIA = 1e-30
-
-# Steps of a run: an error that is this many times the largest defect has not only been added up, but has grown.
-_GROWN = 1e4
-
 # Of the rotor's inertia at the start: above it, no start is singular.
 _CLEAR_SHARE = 1e-6
 
 
 @dataclass(frozen=True, slots=True)
 class Judgement:
-    status: str  # one of `status.STATUSES`
-    message: str  # one line; "" for ok
-    false_success: bool  # the engine reported success of a run that is wrong
-    metrics: Metrics  # see `metrics.metrics_of`
-    defects: Defects | None  # see `defects_of`
+    """The outcome of a run.
+
+    Attributes
+    ----------
+    status, message : one of `status.STATUSES`, and the reason in a line; "" for ok.
+    advice : what to do about it, where that is known; else "".
+    false_success : whether the engine reported success of a run that is wrong.
+    metrics, defects : see `metrics_of` and `defects_of`.
+    """
+
+    status: str
+    message: str
+    advice: str
+    false_success: bool
+    metrics: Metrics
+    defects: Defects | None
 
 
-def defects_of(scene: Scene, run: Trajectory, *, is_corrected: bool = True) -> Defects | None:
-    """The defects of a run's intervals; None where angles or rates are not asked for, or there is one sample. Of other
-    equations without transition matrices: their defects add up to no error that could be predicted."""
+def defects_of(scene: Scene, run: Trajectory) -> Defects | None:
+    """Return the defects of a run's intervals; None without angles and rates, or with fewer than two samples."""
     if len(run.time) < 2 or not (scene.wants("angles") and scene.wants("rates")):
         return None
-    defects = interval_defects(scene, run.time, run.angles, run.rates)
-    return defects if is_corrected else replace(defects, find_transitions=lambda: None)
+    return interval_defects(scene, run.time, run.angles, run.rates)
 
 
-def quantity_bound(rule: QuantityMetric, bounds: Bounds, method: str) -> float | None:
-    entry = bounds.find(rule.check, method) if rule.check else None
-    return entry.value if entry else rule.bound
+def bounds_of(method: str) -> Bounds:
+    """Return the bounds of any scene that a status is judged by, a method's own first."""
+    known = look_up(method)
+    return shipped_bounds().with_entries(known.bounds if known else ())
 
 
 @np.errstate(over="ignore", invalid="ignore", divide="ignore")  # of a runaway: what is not finite is judged
 def judge(scene: Scene, run: Solution, reference: Trajectory | None) -> Judgement:
-    """The status of a run, the numbers that it follows from, and whether its engine claims a success that it is not."""
-    defects = defects_of(scene, run.trajectory, is_corrected=is_corrected(run.method))
-    metrics = metrics_of(scene, run.trajectory, reference, defects)
-    status, message = _status(scene, run, reference, metrics)
+    """Return the status of a run, its numbers, and whether its engine claims a success that it is not."""
+    bounds = bounds_of(run.method)
+    defects = defects_of(scene, run.trajectory)
+    metrics = metrics_of(scene, run.trajectory, reference, defects, is_corrected=is_corrected(run.method))
+    if "defect_judged" in metrics and is_corrected(run.method):
+        metrics["defect_allowed"] = defect_allowed(metrics, defect_bound(bounds, run.method))
+    samples = RunSamples(scene, run.method, run.trajectory, metrics, defects)
+    status, message, advice = _status(samples, run.integration, reference, bounds)
     false_success = run.integration.success and not _is_close(scene, status, metrics)
-    return Judgement(status, message, false_success, metrics, defects)
+    return Judgement(status, message, advice, false_success, metrics, defects)
 
 
 def clearly_ok(
@@ -106,13 +112,13 @@ def clearly_ok(
     angles : (k,) rad, the largest of each run.
     """
     bounds = shipped_bounds().with_entries(own)
-    energy, defect = (bounds.of(check, method).value for check in ("energy", "defect"))
+    energy, defect = bounds.of("energy", method).value, defect_bound(bounds, method)
     complete = np.array([run.success and n == scenes[0].samples for run, n in zip(integrations, samples, strict=True)])
     complete &= angles <= ANGLE_LIMIT
     shares = [rotor_inertia_shares(scene, np.array([scene.initial_angles]))[0] for scene in scenes]
     within = [
         run["energy_drift_max"] <= energy
-        and ("defect_max" in run or "defects_not_judged" not in run)
+        and not run.get("defects_not_judged", 0.0)
         and run.get("defect_judged", 0.0) <= defect
         and run.get("angle_error_predicted", 0.0) <= OK_ERROR
         for run in metrics
@@ -131,125 +137,70 @@ def _is_close(scene: Scene, status: str, metrics: Metrics) -> bool:
 
 
 def largest_angle_error(metrics: Metrics) -> float:
-    """rad: up to the horizon, from the reference, or predicted from the defects; 0 where neither is known."""
+    """Return the angle error (rad) up to the horizon, from the reference or predicted; 0 where neither is known."""
     return metrics.get("angle_error_max", metrics.get("angle_error_predicted", 0.0))
 
 
-def quantity_errors(
-    scene: Scene, metrics: Metrics, run: Trajectory | None = None
-) -> Iterator[tuple[Quantity, QuantityMetric, float]]:
-    """Each judged quantity, its rule, and its error relative to what the rule says; only those that the run has. Loads
-    of a `run` that is given less what rounding of its state leaves open."""
-    rounding: dict[str, Array] = {}
-    if run is not None and scene.wants("loads"):
-        rounding = load_rounding(scene, run.time, run.angles, run.rates)
-    for quantity in known_quantities(scene.outputs):
-        rule = quantity.judgement
-        if rule is None or rule.metric not in metrics:
-            continue
-        error = metrics[rule.metric] / (rule.relative_to(scene) if rule.relative_to else 1.0)
-        if run is not None and quantity.name in rounding and rule.scale_of is not None:
-            unknown = float(sizes(quantity, rounding[quantity.name]).max()) / rule.scale_of(scene, run)
-            error = max(error - unknown, 0.0)
-        yield quantity, rule, error
-
-
-def _status(scene: Scene, run: Solution, reference: Trajectory | None, metrics: Metrics) -> tuple[str, str]:
-    """Finite? End reached? Through a singularity? Energy, quantities, defects, error? The first no names the status,
-    with a message."""
+def _status(
+    run: RunSamples, integration: Integration, reference: Trajectory | None, bounds: Bounds
+) -> tuple[str, str, str]:
+    """Return status, message and advice: of whether the end was reached, of a singularity, then of the first check
+    that fails."""
+    scene, trajectory, metrics = run.scene, run.trajectory, run.metrics
     # Runs that did not reach the end, or that their engine calls failed.
-    integration, samples = run.integration, len(run.trajectory.time)
+    samples = len(trajectory.time)
     if samples != scene.samples or not integration.success:
-        reached = f"at t = {run.trajectory.time[-1]:.6g} s of {scene.duration:g} s" if samples else "at the start"
+        reached = f"at t = {trajectory.time[-1]:.6g} s of {scene.duration:g} s" if samples else "at the start"
         if integration.out_of_time:
-            return "timed_out", f"{integration.message}, {reached}"
+            return "timed_out", f"{integration.message}, {reached}", ""
         reported = integration.message or ("the engine reported success" if integration.success else "no reason given")
-        if smallest_rotor_inertia_share(scene, run.trajectory) < _SINGULAR_SHARE:
-            return "singular", f"with all pitches at ±π/2 the mass matrix is nearly singular, {reached}; {reported}"
+        if smallest_rotor_inertia_share(scene, trajectory) < SINGULAR_SHARE:
+            return "singular", f"with all pitches at ±π/2 the mass matrix is nearly singular, {reached}; {reported}", ""
         if integration.success:
             end = f" after {reached.removeprefix('at ')}" if samples else ""
-            return "diverged", f"no finite sample{end}; {reported}"
-        return "solver_failed", f"{reported}; {reached}"
+            return "diverged", f"no finite sample{end}; {reported}", ""
+        return "solver_failed", f"{reported}; {reached}", ""
     if not is_corrected(run.method):
-        return "completed", ""
+        return "completed", "", ""
 
     # Complete runs of scenes without a solution: from a singular state, or past the time where the solution ends.
-    if rotor_inertia_shares(scene, run.trajectory.angles[:1])[0] < _NO_INERTIA:
-        return "singular", "with all pitches at ±π/2 the initial mass matrix is singular"
+    if rotor_inertia_shares(scene, trajectory.angles[:1])[0] < NO_INERTIA:
+        return "singular", "with all pitches at ±π/2 the initial mass matrix is singular", ""
     if (
         reference is not None
         and 0 < len(reference.time) < scene.samples
-        and smallest_rotor_inertia_share(scene, reference) < _SINGULAR_SHARE
+        and smallest_rotor_inertia_share(scene, reference) < SINGULAR_SHARE
     ):
-        return "singular", f"the motion ends in a singularity after t = {reference.time[-1]:.6g} s; the run continued"
+        end = reference.time[-1]
+        return "singular", f"the motion ends in a singularity after t = {end:.6g} s; the run continued", ""
 
-    method = look_up(run.method)
-    bounds = shipped_bounds().with_entries(method.bounds if method else ())
-    energy = bounds.of("energy", run.method).value + energy_slack(scene, run.trajectory)
-    if "energy_drift_max" in metrics and not metrics["energy_drift_max"] <= energy:
-        return "inaccurate", f"energy drift {metrics['energy_drift_max']:.1e} of the energy scale, allowed {energy:.0e}"
-    for _, rule, error in quantity_errors(scene, metrics, run.trajectory):
-        bound = quantity_bound(rule, bounds, run.method)
-        if bound is not None and not error <= bound:
-            fault = rule.fault or f"{rule.metric} is {{value}} {rule.unit}".rstrip()
-            return "inaccurate", f"{fault.format(value=f'{error:.1e}')}, allowed {bound:.0e}"
-    defect = bounds.of("defect", run.method).value
-    median = bounds.find("defect median", run.method)
-    if "defect_max" in metrics and median is not None and not metrics["defect_median"] <= median.value:
-        return "inaccurate", f"median of the defects {metrics['defect_median']:.1e} rad, allowed {median.value:.0e}"
-    if "defect_max" in metrics and not metrics["defect_judged"] <= defect:
-        largest = f"defect {metrics['defect_max']:.1e} rad in the interval up to t = {metrics['defect_time']:.6g} s"
-        if metrics["defect_judged"] < 0.5 * metrics["defect_max"]:
-            largest += f", {metrics['defect_judged']:.1e} rad scaled to 0.01 s and to a fivefold error growth"
-        return "inaccurate", f"{largest}, allowed {defect:.0e}"
-    error = largest_angle_error(metrics)
-    if not error <= OK_ERROR + start_slack(scene):
-        how = "angle error" if "angle_error_max" in metrics else "predicted angle error"
-        has_grown = error > _GROWN * metrics.get("defect_max", error)
-        growth = ", because the motion amplifies small errors" if has_grown else ""
-        return "inaccurate", f"{how} {error:.1e} rad up to the horizon{growth}; allowed {OK_ERROR:g} rad"
+    # The table that `check` reads; of several that fail the first names the reason.
+    for check in run_checks(run, bounds):
+        if not check.passed:
+            lost = check.name == "error" and symmetry_loss(run) is not None
+            advice = "; next to try: a method that keeps zeros, lagrange/* or exudyn_tree/*" if lost else ""
+            return "inaccurate", check.message, advice
 
-    # Complete runs with nothing to judge them by.
-    angle = float(np.abs(run.trajectory.angles).max())
+    # Complete runs of which not everything could be judged.
+    angle = float(np.abs(trajectory.angles).max())
     if angle > ANGLE_LIMIT:
         limit = f"above {ANGLE_LIMIT:.0e} rad double precision is not sufficient"
-        return "unchecked", f"angles of {angle:.1e} rad; {limit}"
+        return "unchecked", f"angles of {angle:.1e} rad; {limit}", ""
     if not any(name in metrics for name in _CHECKS):
         needed = "both angles and rates, or angles and a reference"
-        return "unchecked", f"cannot be assessed: without energies it needs {needed}"
-    if "defects_not_judged" in metrics and not any(name in metrics for name in ("defect_max", "angle_error_max")):
-        return "unchecked", "only the energy balance could be assessed: the samples are too far apart for the motion"
-    return "ok", ""
+        return "unchecked", f"cannot be assessed: without energies it needs {needed}", ""
+    if run.defects is not None and metrics.get("defects_not_judged"):
+        return "unchecked", _too_far_apart(run.defects, int(metrics["defects_not_judged"])), ""
+    return "ok", "", ""
 
 
-def start_slack(scene: Scene) -> float:
-    """rad: what the digits of an angle that starts turns away from zero leave open; 0 for a start within a turn."""
-    return _START_ROUND_OFF * max(0.0, *(abs(angle) - 2.0 * np.pi for angle in scene.initial_angles))
-
-
-def energy_slack(scene: Scene, run: Trajectory) -> float:
-    """Share of the energy scale that magnified round-off may add to a method's own energy error."""
-    return _ROUND_OFF * (energy_conditioning(scene, run) - 1.0) + start_slack(scene)
-
-
-def energy_conditioning(scene: Scene, run: Trajectory) -> float:
-    """By how much the energy magnifies round-off of the state, at least 1: near a pitch of π/2 its terms are 1/√share
-    larger than it. A pitch that moves less than a right angle between samples is examined between them, too."""
-    angles = run.angles
-    shares = [rotor_inertia_shares(scene, angles)]
-    if np.abs(np.diff(angles[:, 1:], axis=0)).max(initial=0.0) < 0.5 * np.pi:
-        for column in range(1, angles.shape[1]):
-            # Where the pitch passes ±π/2 between two samples, on the straight way.
-            quarter = np.floor(angles[:, column] / np.pi - 0.5)
-            rows = np.flatnonzero(np.diff(quarter))
-            before, after = angles[rows], angles[rows + 1]
-            target = np.pi * (np.maximum(quarter[rows], quarter[rows + 1]) + 0.5)
-            part = (target - before[:, column]) / (after[:, column] - before[:, column])
-            there = before + part[:, None] * (after - before)
-            there[:, column] = target
-            shares.append(rotor_inertia_shares(scene, there))
-    smallest = max(float(np.concatenate(shares).min()), _NO_INERTIA)
-    return max(1.0, float(np.sqrt(_SINGULAR_SHARE / smallest)))
+def _too_far_apart(defects: Defects, count: int) -> str:
+    """Return why a defect of more than 0.01 rad would not be seen in some intervals."""
+    unseen = np.where(~defects.is_judged | ~(defects.excess <= OK_ERROR), defects.growth, 0.0)
+    worst = int(unseen.argmax())
+    length = float(defects.time[worst + 1] - defects.time[worst])
+    apart = f"rows {length:.3g} s apart, between which errors grow {defects.growth[worst]:.1e}-fold"
+    return f"{apart}: in {count} intervals a defect of {OK_ERROR:g} rad would not be seen; more samples"
 
 
 def smallest_rotor_inertia_share(scene: Scene, run: Trajectory) -> float:
@@ -261,26 +212,3 @@ def smallest_rotor_inertia_share(scene: Scene, run: Trajectory) -> float:
         step = scene.duration / (scene.samples - 1)
         angles = run.angles[-1] + np.linspace(0.0, step, 65)[:, None] * run.rates[-1]
     return float(rotor_inertia_shares(scene, angles).min())
-
-
-def rotor_inertia_shares(scene: Scene, angles: Array) -> Array:
-    """(n,) S / (rotor inertia) for (n, 1 + blades) rad."""
-    remaining = np.full(len(angles), scene.hub_inertia)
-    whole = np.full(len(angles), scene.hub_inertia)
-    for i, blade in enumerate(scene.blades):
-        s, c = np.sin(angles[:, 1 + i]), np.cos(angles[:, 1 + i])
-        free, fixed = _shaft_inertia_forms(blade)
-        remaining += free[0] * s * s + free[1] * c * c + free[2] * s * c
-        whole += fixed[0] * s * s + fixed[1] * c * c + fixed[2] * s * c
-    return np.asarray(remaining / whole)
-
-
-@functools.lru_cache(maxsize=512)
-def _shaft_inertia_forms(blade: Blade) -> tuple[Sequence[float], Sequence[float]]:
-    """Coefficients of s², c², s c (of the pitch) in S and in the inertia about the shaft, kg m²; in exact arithmetic
-    until the end: for a point mass the first vanishes, whose rounding is not inertia."""
-    xx, yy, zz, xy, xz, yz = blade.inertia_about_apex(Fraction)
-    fixed = [xx, yy, 2 * xy]
-    taken = [xz * xz, yz * yz, 2 * xz * yz] if blade.has_pitch_inertia else [Fraction(0)] * 3
-    free = [a - b / zz if b else a for a, b in zip(fixed, taken, strict=True)]
-    return [float(value) for value in free], [float(value) for value in fixed]

@@ -42,6 +42,7 @@ _MAX_CHANGE = 0.6  # a share, or rad: what is further off is another scene
 _MAX_FITTED = 8  # sets of parameters, those whose projections leave least
 _MAX_PARAMETERS = 3  # at once
 _MAX_INTERVALS = 120  # that a hypothesis is tried on
+_MAX_STEPS = 512  # of Runge and Kutta in each of them
 _DIFFERENCE = 1e-4  # share or rad, for the derivative by a parameter
 _ROUNDS = 8
 _INDEPENDENT = 1e-6  # determinant of the cosines between the signatures of a set
@@ -75,7 +76,8 @@ class DefectSearch:
         self._weights = 1.0 / np.maximum(self._floors, 1e-4 * judged.largest)
         self._steps = None
         if len(rows):
-            self._steps = explicit_steps(scene, self._ends - self._begins, defects.states[rows])
+            lengths = self._ends - self._begins
+            self._steps = explicit_steps(scene, lengths, defects.states[rows], _MAX_STEPS)
         self._ends_of_scene: dict[int, Array] = {}  # by the factor of the steps
         # (m,) for how many of these rows a coordinate has one number, and with it one rounding
         # error, on average.

@@ -22,6 +22,7 @@ from rotor_mbs.scenario.time_table import torque_place
 from rotor_mbs.solution.trajectory import Array
 
 _MAX_NAMED = 6
+_MAX_STEPS = 512  # of Runge and Kutta in an interval
 _STANDS_OUT = 30.0  # times the median of the defects
 _FAINT = 0.02  # of the largest defect: fainter ones are not told beside it
 _EVERYWHERE = 0.6  # of the intervals
@@ -146,7 +147,7 @@ def _wrong_row(judged: JudgedDefects, group: NDArray[np.int64]) -> str:
         row = "repeated" if along > 0.0 else "omitted and the others renumbered"
         at = f"at t = {defects.time[last + 1]:.6g} s"
         return f"a row {row}, or times {clock} by less than an interval, {at}"
-    if len(group) == 2 and last == first + 1 and defects.transitions is not None:
+    if len(group) == 2 and last == first + 1:
         # The second interval starts at the wrong row, and takes its error back.
         carried = defects.transitions[first + 1] @ (values[0] * units) / units
         if _cosine(values[1], -carried) >= _PARALLEL:
@@ -266,7 +267,7 @@ def _effect_of_unit_load(judged: JudgedDefects, rows: NDArray[np.int64]) -> Arra
     scene, defects, form = judged.scene, judged.defects, rotor_form(judged.scene)
     begins, ends = defects.time[rows], defects.time[rows + 1]
     states = defects.states[rows].T
-    steps = explicit_steps(scene, ends - begins, defects.states[rows]) or 1
+    steps = explicit_steps(scene, ends - begins, defects.states[rows], _MAX_STEPS) or 1
     free = quick_ends(scene, begins, ends, states, steps)
     rotor_inertia = form.inertia + sum(blade.schur_ss + blade.schur_cc for blade in form.blades)
     inertias = [rotor_inertia, *(blade.pitch_inertia for blade in form.blades)]

@@ -295,8 +295,7 @@ def _errors_of(data: ForeignData, scene: Scene, rows: ReferencedRows) -> Traject
     predicted = defect_time = None
     if rows.defects is not None:
         defect_time = float(rows.defects.time[1 + _largest_interval(rows.defects)])
-        if rows.defects.predicted is not None:
-            predicted = float(np.abs(rows.defects.predicted[: rows.until]).max())
+        predicted = float(np.abs(rows.defects.predicted[: rows.until]).max())
     drift, drifting = _largest_drift(scene, rows.defects)
     # Per unit of error growth: in a motion whose errors do not grow, faults below any interval's
     # tolerance add up.

@@ -76,12 +76,14 @@ COLUMNS = {
             "largest defect of a coordinate in an interval",
         ),
         "defect_median": ("rad", "median of the interval defects"),
-        "defect_time": ("s", "end of the interval of the largest defect"),
+        "defect_time": ("s", "end of the interval that is furthest beyond its bound, or of the largest defect"),
         "defect_judged": (
             "rad",
-            "value compared with the bound: largest defect beyond rounding; in intervals longer than 0.01 s divided by "
-            "(length / 0.01 s), where the error growth is above 5 by (growth / 5)",
+            "value compared with the bound: defect beyond rounding divided by (interval / 0.01 s), if above 1, and by "
+            "the error growth over the interval, if above 1; largest over the run",
         ),
+        "defect_excess": ("rad", "defect beyond rounding in that interval"),
+        "defect_allowed": ("rad", "largest defect beyond rounding that is allowed in that interval"),
         "defect_mean": ("rad", "largest signed mean of the defects of a coordinate"),
         "defect_drift": (
             "rad",
@@ -89,15 +91,17 @@ COLUMNS = {
             "from its interval to the last of the 100",
         ),
         "defect_floor": ("rad", "largest defect that rounding of the samples can cause"),
-        "defects_not_judged": ("1", "number of intervals in which errors may grow by more than 1e5"),
+        "defects_not_judged": (
+            "1",
+            "number of intervals with a defect of more than 0.01 rad, beyond rounding or because of it",
+        ),
         "angle_error_whole": ("rad", "largest angle error over the whole run"),
         "angle_error_end": ("rad", "angle error at the last sample of the scene"),
         "tip_error_max": ("m", "largest distance of a tip from the reference up to the horizon"),
         "error_growth": ("1", "largest factor by which a small error of the initial state has grown"),
         "horizon_s": (
             "s",
-            "time of the last sample before the error growth reaches 1e5; of a run also before rounding moves a pitch "
-            "that is zero by symmetry by 1e-4 rad",
+            "time of the last sample before the error growth reaches 1e5",
         ),
         "uncertainty_rad": ("rad", "uncertainty of the reference up to the horizon"),
         "angular_impulse_error_max": ("1", "largest error of the angular momentum balance, relative to its scale"),
@@ -148,7 +152,8 @@ _RUN_COLUMNS = (
     "run_time_s", "run_time_min_s", "output_time_s", "repeats", "engine_success", "engine_message", "false_success",
     "energy_scale_J", "energy_drift_max", "energy_gain_J", "angle_error_max", "angle_error_predicted",
     "angle_error_whole", "angle_error_end", "horizon_s", "defect_max", "defect_median", "defect_time",
-    "defect_judged", "defect_mean", "defect_drift", "defect_floor", "defects_not_judged",
+    "defect_judged", "defect_excess", "defect_allowed", "defect_mean", "defect_drift", "defect_floor",
+    "defects_not_judged",
     "angular_impulse_error_max", "linear_impulse_error_max",
     "zero_pitch_max", "zero_pitch_left_s", "zero_pitch_growth_per_s", "rotor_angle_min", "rotor_angle_max",
     "rotor_rate_max",

@@ -3,13 +3,20 @@
 Within one interval between samples no chaos can grow, so that defects need no horizon: every second of every run is
 judged, and a fault is located in time. Their signed sum, carried to the end by the transition matrices of the
 intervals, predicts the error of the whole run without a reference. `models.lagrange.defects` computes them.
+
+The rule by which they are judged, with b the bound of a method for 0.01 s, h the length of an interval and G the growth
+of an error over it:
+
+    allowed = min(b, 0.01 rad) max(1, h / 0.01 s) max(1, G),    excess = size - 3 floor
+
+An excess above what is allowed is a fault. An interval in which an excess of more than 0.01 rad is allowed, or in which
+rounding alone may be as large, is not judged.
 """
 
 from __future__ import annotations
 
 import functools
-import itertools
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,19 +24,22 @@ from numpy.typing import NDArray
 
 from rotor_mbs.solution.trajectory import Array, Trajectory
 
-# An interval over which an error may grow this many times says little of the numbers at its start: it is not judged.
-MAX_INTERVAL_GROWTH = 1e5
+# rad: the largest error of an angle, up to the horizon, and the largest defect beyond rounding, of a run that is ok.
+OK_ERROR = 0.01
 # What the rounding of a run's own numbers makes of a defect, as it is estimated, may be this many times larger.
 FLOOR_SAFETY = 3.0
-# Bounds on defects are for intervals as the paper's scenes have: 0.01 s, in which an error grows fivefold at most.
-_BOUND_INTERVAL, _BOUND_GROWTH = 0.01, 5.0
+# s, the interval for which bounds are given: in n of them the errors of a method add up, each grown by at most G.
+_BOUND_INTERVAL = 0.01
+_UNIT_ROUNDOFF = 2.0**-53
+# rad, below any number that a defect can be told from.
+_SMALLEST_FLOOR = 1e-18
 # rad: a pitch that should stay zero has left it when it is past this: ten million times above round-off of a radian,
 # far below what a plot shows.
 LEFT_ZERO = 1e-9
-# Of a pitch that has left zero: a larger defect in an interval is not of a step or of rounding.
-_MOVED_SHARE = 1e-4
 # Rows over which defects are added up, to show a drift that every one of them hides.
 DRIFT_ROWS = 100
+# Intervals whose matrices are worked on at once: of a run of a million samples all of them would take gigabytes.
+BLOCK_ROWS = 40 * DRIFT_ROWS
 
 
 @dataclass(frozen=True)
@@ -45,10 +55,11 @@ class Defects:
     moving : coordinates with inertia.
     resting : pitches that stay at zero by symmetry, where the error is the state itself.
     own_loads : loads of the closed form at the states of the run; without arrays if not requested.
-    growth_rate : 1/s, estimated largest growth rate of an error (gravity and centrifugal forces).
     growth_units : (m,) scales of the error growth of the scene: angles, then rates.
     states : (n, m) angles, then rates, of the moving coordinates of the run.
-    rounding, time_rounding : (n, m), (n,) half a unit in the last place of each of these numbers, and of the times.
+    rounding : (n, m) half a unit in the last place of each of these numbers, and what half a unit in the last place of
+        the row's time makes of them.
+    conditioning : (n - 1,) factor by which the nearly singular mass matrix magnifies rounding inside an interval.
     start : (m,) initial state of the scene in these coordinates.
     """
 
@@ -56,20 +67,20 @@ class Defects:
     angles: Array
     rates: Array
     rate_units: Array
-    find_transitions: Callable[[], Array | None]
+    find_transitions: Callable[[], Array]
     moving: tuple[int, ...]
     resting: tuple[int, ...]
     states: Array
     rounding: Array
-    time_rounding: Array
+    conditioning: Array
     start: Array
-    growth_rate: float
     growth_units: Array
     own_loads: Trajectory
 
     @functools.cached_property
-    def transitions(self) -> Array | None:
-        """State transition matrices of the moving coordinates, (n - 1, m, m): angles, then rates; None if unknown."""
+    def transitions(self) -> Array:
+        """State transition matrices of the moving coordinates, (n - 1, m, m): angles, then rates; infinite where the
+        closed form has no end."""
         return self.find_transitions()
 
     @functools.cached_property
@@ -79,190 +90,224 @@ class Defects:
         return np.asarray(np.where(np.isfinite(both), both, np.inf).max(axis=1))
 
     @property
+    def channel_sizes(self) -> Array:
+        """Magnitudes of the defects of the moving coordinates: (n - 1, m) rad, angles, then rates; inf for NaN."""
+        sizes = np.abs(self._vectors) / self._units
+        return np.asarray(np.where(np.isfinite(sizes), sizes, np.inf))
+
+    @property
     def floor(self) -> Array:
         """Largest of `floors` over the coordinates: (n - 1,) rad."""
         return np.asarray(self.floors.max(axis=1))
 
     @functools.cached_property
     def floors(self) -> Array:
-        """Largest defects that rounding of the samples can cause, per coordinate: (n - 1, m) rad."""
-        units = self._units
-        half = self.states.shape[1] // 2
-        # The sample times are rounded, too: by as much the state goes on.
-        late = (self.time_rounding[1:] + self.time_rounding[:-1])[:, None]
-        slip = late * np.abs(self.states[1:, half:])
-        carried = self.rounding[:-1]
-        if self.transitions is not None:
-            known = np.where(np.isfinite(self.transitions), np.abs(self.transitions), 0.0)
-            carried = np.einsum("kij,kj->ki", known, self.rounding[:-1])
-        total = carried + self.rounding[1:]
-        total[:, :half] += slip
-        # and the rates by their change
-        change = np.abs(np.diff(self.states[:, half:], axis=0)) / np.diff(self.time)[:, None]
-        total[:, half:] += late * change
-        return np.asarray(total / units)
+        """Largest defects that rounding can cause, per coordinate: (n - 1, m) rad.
 
-    @property
-    def channel_sizes(self) -> Array:
-        """Magnitudes of the defects of the moving coordinates: (n - 1, m) rad, angles, then rates; inf for NaN."""
-        sizes = np.abs(self._vectors) / self._units
-        return np.asarray(np.where(np.isfinite(sizes), sizes, np.inf))
+        That of the row at the start, carried to the end; that of the row at the end; and that of the arithmetic in
+        between, of the size of the largest number.
+        """
+        with np.errstate(all="ignore"):
+            carried = np.empty((len(self.angles), len(self.start)))
+            for rows in _blocks(len(carried)):
+                np.einsum("kij,kj->ki", np.abs(self.transitions[rows]), self.rounding[rows], out=carried[rows])
+            floors = (carried + self.rounding[1:]) / self._units
+            floors += _UNIT_ROUNDOFF * 2.0 * (self._largest * self.conditioning)[:, None]
+            return _with_small_numbers(floors)
 
     @functools.cached_property
     def growth(self) -> Array:
-        """Error growth over each interval, (n - 1,); estimated from `growth_rate` if the transition matrices are
-        unknown."""
-        if self.transitions is None:
-            with np.errstate(over="ignore"):
-                return np.asarray(np.exp(self.growth_rate * np.diff(self.time)))
-        units = self._units
-        scaled = self.transitions * units / units[:, None]
-        # Between the largest entry and m times it: what is asked is whether it is huge.
-        return np.asarray(np.abs(scaled).max(axis=(1, 2)))
+        """Error growth over each interval: (n - 1,)."""
+        growth: Array = np.empty(len(self.angles))
+        with np.errstate(all="ignore"):
+            for rows in _blocks(len(growth)):
+                growth[rows] = _largest_entry(self.transitions[rows], self._units)
+        return growth
+
+    @functools.cached_property
+    def channel_excess(self) -> Array:
+        """Defects beyond rounding of the moving coordinates: (n - 1, m) rad; inf where a defect is not finite."""
+        sizes = self.channel_sizes
+        with np.errstate(invalid="ignore"):
+            excess = np.maximum(sizes - FLOOR_SAFETY * self.floors, 0.0)
+        return np.asarray(np.where(np.isfinite(sizes), excess, np.inf))
+
+    @functools.cached_property
+    def excess(self) -> Array:
+        """Largest defect beyond rounding over all coordinates: (n - 1,) rad."""
+        fixed = [i for i in range(self.angles.shape[1]) if i not in self.moving]
+        sizes = np.hstack([np.abs(self.angles[:, fixed]), np.abs(self.rates[:, fixed]) / self.rate_units[fixed]])
+        with np.errstate(invalid="ignore"):
+            of_fixed = np.where(np.isfinite(sizes), sizes - FLOOR_SAFETY * self.floor[:, None], np.inf)
+        return np.asarray(np.hstack([self.channel_excess, of_fixed]).max(axis=1, initial=0.0))
+
+    @functools.cached_property
+    def bound_factors(self) -> Array:
+        """Number by which a bound for 0.01 s is multiplied in each interval: (n - 1,)."""
+        length = np.maximum(np.diff(self.time) / _BOUND_INTERVAL, 1.0)
+        return np.asarray(length * np.maximum(self.growth, 1.0))
+
+    def in_bound_units(self, excess: Array) -> Array:
+        """Return (n - 1,) or (n - 1, m) defects beyond rounding, each divided by its interval's `bound_factors`."""
+        factors = self.bound_factors.reshape(-1, *[1] * (excess.ndim - 1))
+        with np.errstate(invalid="ignore"):
+            return np.asarray(np.where(np.isfinite(excess), excess / factors, np.inf))
+
+    @property
+    def judged_sizes(self) -> Array:
+        """Values that are compared with a method's bound: (n - 1,) rad, `excess` divided by `bound_factors`."""
+        return self.in_bound_units(self.excess)
 
     @property
     def is_judged(self) -> NDArray[np.bool_]:
-        """Whether each interval is assessed, (n - 1,): its error growth is at most `MAX_INTERVAL_GROWTH`, or its defect
-        is not finite although its transition matrix is known."""
-        judged = ~(self.growth > MAX_INTERVAL_GROWTH)
-        if self.transitions is not None:
-            judged |= ~np.isfinite(self.sizes)
-        return np.asarray(judged)
+        """Whether each interval is judged, (n - 1,): rounding explains less than 0.01 rad, or the defect has no end."""
+        return np.asarray((FLOOR_SAFETY * self.floor <= OK_ERROR) | ~np.isfinite(self.sizes))
 
-    @functools.cached_property
-    def judged_size(self) -> float:
-        """Value that is compared with a method's bound (rad): the largest defect beyond rounding. For intervals over
-        0.01 s it is scaled to 0.01 s and to a fivefold error growth. 0 if no interval is assessed."""
-        longer = np.maximum(np.diff(self.time) / _BOUND_INTERVAL, 1.0) * np.fmax(self.growth / _BOUND_GROWTH, 1.0)
-        judged = self.is_judged
-        sizes = self.sizes[judged]
-        with np.errstate(invalid="ignore"):
-            beyond = np.maximum(sizes - FLOOR_SAFETY * self.floor[judged].max(initial=0.0), 0.0) / longer[judged]
-        # Of a runaway whose floor overflows, too, nothing is within a bound.
-        return float(np.where(np.isfinite(sizes) & ~np.isnan(beyond), beyond, np.inf).max(initial=0.0))
-
-    @functools.cached_property
-    def predicted(self) -> Array | None:
-        """Error of the angles predicted from the initial state and the defects, (n, 1 + blades) rad; None if the
-        transition matrices are unknown. Valid for errors that are small compared with 1 rad."""
-        if self._errors_over_rows is None:
-            return None
-        products, sums = self._errors_over_rows
-        rows = [self.states[0] - self.start]
-        with np.errstate(all="ignore"):
-            for product, own in zip(products, sums, strict=True):
-                rows.extend(product[1:] @ rows[-1] + own[1:])
-        errors = np.array(rows[: len(self.time)])
+    @property
+    def predicted(self) -> Array:
+        """Error of the angles predicted from the initial state and the defects, (n, 1 + blades) rad. Valid for errors
+        that are small compared with 1 rad."""
         half = len(self.moving)
         angles = np.zeros((len(self.time), self.angles.shape[1]))
-        angles[:, list(self.moving)] = errors[:, :half]
+        angles[:, list(self.moving)] = self._errors_and_drift[0][:, :half]
         return angles
 
+    @property
+    def drift(self) -> float:
+        """Largest sum of defects over `DRIFT_ROWS` rows, each propagated to their end (rad)."""
+        return self._errors_and_drift[1]
+
     @functools.cached_property
-    def error_growth(self) -> Array | None:
+    def error_growth(self) -> Array:
         """Error growth along the run, (n,): 2-norm of the state transition matrix from the start in the moving
         coordinates."""
-        if self.transitions is None:
-            return None
         half = len(self.moving)
         free = [i for i, coordinate in enumerate(self.moving) if coordinate not in self.resting]
         rows = np.array([*free, *(half + i for i in free)])
         units = self.growth_units[rows]
-        scaled = self.transitions[:, rows[:, None], rows] * units / units[:, None]
-        with np.errstate(all="ignore"):
-            products, _ = _carried(scaled, np.zeros((len(scaled), len(rows))), DRIFT_ROWS)
-            for before, block in itertools.pairwise(products):
-                block[:] = block @ before[-1]
-        stack = np.concatenate([products[:1, 0], products[:, 1:].reshape(-1, len(rows), len(rows))])[: len(self.time)]
-        growth = np.full(len(stack), np.inf)
-        finite = np.isfinite(stack).all(axis=(1, 2))
-        growth[finite] = np.linalg.norm(stack[finite], ord=2, axis=(1, 2))
+        growth = np.full(len(self.time), np.inf)
+        whole = np.eye(len(rows))  # product of the matrices since the start
+        growth[0] = 1.0
+        for block in _blocks(len(self.angles)):
+            scaled = self.transitions[block, rows[:, None], rows] * units / units[:, None]
+            with np.errstate(all="ignore"):
+                products, _ = _carried(scaled, np.zeros((len(scaled), len(rows))), DRIFT_ROWS)
+                for stretch in products:
+                    stretch[:] = stretch @ whole
+                    whole = stretch[-1]
+            stack = products[:, 1:].reshape(-1, len(rows), len(rows))[: len(scaled)]
+            finite = np.isfinite(stack).all(axis=(1, 2))
+            of_block = np.full(len(stack), np.inf)
+            of_block[finite] = np.linalg.norm(stack[finite], ord=2, axis=(1, 2))
+            growth[1 + block.start : 1 + block.stop] = of_block
         return growth
 
     @property
     def mean(self) -> float:
-        """Largest signed mean of the defects over the assessed intervals (rad)."""
-        judged = self.is_judged & np.isfinite(self.sizes)
-        if not judged.any():
+        """Largest signed mean of the defects over the intervals that have an end (rad); NaN if there are none."""
+        finite = np.isfinite(self.sizes)
+        if not finite.any():
             return float("nan")
-        both = np.hstack([self.angles, self.rates / self.rate_units])[judged]
+        both = np.hstack([self.angles, self.rates / self.rate_units])[finite]
         return float(np.abs(both.mean(axis=0)).max())
 
-    @property
-    def drift(self) -> float:
-        """Largest sum of defects over `DRIFT_ROWS` rows, each propagated to their end (rad); NaN if unknown."""
-        if self._errors_over_rows is None:
-            return float("nan")
-        return float((np.abs(self._errors_over_rows[1]) / self._units).max(initial=0.0))
+    def over_rows(self, rows: int) -> tuple[Array, Array]:
+        """Return sums of the defects over a number of rows, and the largest sums that rounding can cause.
+
+        They reveal a drift that is smaller than single defects. Roundings of the rows in between, and of their times,
+        cancel: one row ends an interval and begins the next.
+
+        Returns
+        -------
+        sums, floors : (k, m) rad, of k stretches of `rows` intervals.
+        """
+        count = len(self.angles) // rows * rows
+        sums, floors = np.empty((2, count // rows, len(self.start)))
+        units, stretches_at_once = self._units, max(BLOCK_ROWS // rows, 1)
+        with np.errstate(all="ignore"):
+            for first in range(0, len(sums), stretches_at_once):
+                stretches = slice(first, min(first + stretches_at_once, len(sums)))
+                inside = slice(first * rows, stretches.stop * rows)
+                ends = slice(inside.start + rows, inside.stop + 1, rows)
+                products, errors = _carried(self.transitions[inside], -self._vectors[inside], rows)
+                sums[stretches] = np.abs(errors[:, -1]) / units
+                carried = np.einsum("kij,kj->ki", np.abs(products[:, -1]), self.rounding[inside][::rows])
+                floors[stretches] = (carried + self.rounding[ends]) / units
+                # The errors of the arithmetic are independent of each other, and grow as much as any other.
+                growth = np.maximum(_largest_entry(products[:, -1], units), 1.0)
+                size = (self._largest * self.conditioning)[inside].reshape(-1, rows).max(axis=1)
+                floors[stretches] += (2.0 * _UNIT_ROUNDOFF * np.sqrt(rows) * size * growth)[:, None]
+            return sums, _with_small_numbers(floors)
+
+    def horizon_samples(self, limit: float) -> int:
+        """Return the number of samples before the error growth along the run reaches `limit`."""
+        beyond = np.flatnonzero(~(self.error_growth < limit))
+        return int(beyond[0]) if len(beyond) else len(self.time)
 
     @property
     def _units(self) -> Array:
         columns = list(self.moving)
         return np.concatenate([np.ones(len(columns)), self.rate_units[columns]])
 
-    def over_rows(self, rows: int) -> tuple[Array, Array]:
-        """Return sums of the defects over a number of rows, and the largest sums that rounding can cause: (k, m) rad.
-
-        They reveal a drift that is smaller than single defects. Sums over rows in which errors may grow by more than
-        `MAX_INTERVAL_GROWTH` are omitted; without transition matrices there are none.
-        """
-        empty = np.empty((0, len(self.start)))
-        if self.transitions is None or len(self.time) <= rows:
-            return empty, empty
-        count = len(self.transitions) // rows * rows
-        units = self._units
-        with np.errstate(all="ignore"):
-            products, errors = _carried(self.transitions[:count], -self._vectors[:count], rows)
-            product, error = np.abs(products[:, -1]), np.abs(errors[:, -1])
-            kept = (product * units / units[:, None]).max(axis=(1, 2)) <= MAX_INTERVAL_GROWTH
-            floors = (
-                np.einsum("kij,kj->ki", product, self.rounding[:count:rows]) + self.rounding[rows : count + 1 : rows]
-            )
-        return error[kept] / units, floors[kept] / units
-
-    def horizon_samples(self, limit: float) -> int:
-        """Return the number of samples before the error growth along the run reaches `limit`."""
-        growth = self.error_growth
-        if growth is None:
-            return len(self.time)
-        beyond = np.flatnonzero(~(growth < limit))
-        return int(beyond[0]) if len(beyond) else len(growth)
-
-    def samples_at_rest(self, limit: float) -> int:
-        """Return the number of samples before pitches that are zero by symmetry exceed `limit` times the threshold at
-        which they count as nonzero; all samples if they stay zero, or if wrong equations move them.
-
-        The error growth is that of motions that preserve the symmetry; a deviation from it by rounding grows faster.
-        Wrong equations are distinguished by defects proportional to the pitch.
-        """
-        places = [i for i, coordinate in enumerate(self.moving) if coordinate in self.resting]
-        away = np.abs(self.states[:, places]).max(axis=1, initial=0.0)
-        beyond = np.flatnonzero(away > LEFT_ZERO * limit)
-        if not len(beyond):
-            return len(self.time)
-        first, resting = int(beyond[0]), list(self.resting)
-        moved = np.abs(self.rates[:first, resting] / self.rate_units[resting]).max(axis=1, initial=0.0)
-        by_rounding = (moved <= LEFT_ZERO + _MOVED_SHARE * away[1 : first + 1]).all()
-        return first if by_rounding else len(self.time)
-
-    @property
+    @functools.cached_property
     def _vectors(self) -> Array:
         """(n - 1, m) defects of the angles, then rates, of the coordinates that move."""
         columns = list(self.moving)
         return np.hstack([self.angles[:, columns], self.rates[:, columns]])
 
     @functools.cached_property
-    def _errors_over_rows(self) -> tuple[Array, Array] | None:
-        """`_carried` over `DRIFT_ROWS` rows; None where the transition matrices are not known."""
-        if self.transitions is None:
-            return None
-        matrices, offsets = self.transitions.copy(), -self._vectors
+    def _largest(self) -> Array:
+        """(n - 1,) rad, the largest number of the two rows of each interval."""
+        sizes = (np.abs(self.states) / self._units).max(axis=1)
+        return np.asarray(np.maximum(sizes[:-1], sizes[1:]))
+
+    @functools.cached_property
+    def _errors_and_drift(self) -> tuple[Array, float]:
+        """Errors of the states that the defects add up to, (n, m), and the largest sum over `DRIFT_ROWS` rows."""
         half = len(self.moving)
         resting = [i for i, coordinate in enumerate(self.moving) if coordinate in self.resting]
-        for place in (*resting, *(half + i for i in resting)):
-            matrices[:, place], offsets[:, place] = 0.0, self.states[1:, place]
-        with np.errstate(all="ignore"):
-            return _carried(matrices, offsets, DRIFT_ROWS)
+        at_zero = [*resting, *(half + i for i in resting)]
+        errors, drift = np.empty(self.states.shape), 0.0
+        errors[0] = self.states[0] - self.start
+        for block in _blocks(len(self.angles)):
+            matrices, offsets = self.transitions[block].copy(), -self._vectors[block]
+            # Of a pitch that should be zero the error is known: it is the state.
+            matrices[:, at_zero] = 0.0
+            offsets[:, at_zero] = self.states[1:][block][:, at_zero]
+            row = block.start
+            with np.errstate(all="ignore"):
+                products, sums = _carried(matrices, offsets, DRIFT_ROWS)
+                drift = max(drift, float((np.abs(sums) / self._units).max(initial=0.0)))
+                for product, own in zip(products, sums, strict=True):
+                    last = min(row + DRIFT_ROWS, block.stop)
+                    ends = product[1:] @ errors[row] + own[1:]
+                    errors[row + 1 : last + 1] = ends[: last - row]
+                    row = last
+        return errors, drift
+
+
+def _blocks(count: int) -> Iterator[slice]:
+    """Yield slices of at most `BLOCK_ROWS` of `count` rows, a multiple of `DRIFT_ROWS` but for the last."""
+    for start in range(0, count, BLOCK_ROWS):
+        yield slice(start, min(start + BLOCK_ROWS, count))
+
+
+def _largest_entry(matrices: Array, units: Array) -> Array:
+    """Return the largest entry of each of (k, m, m) matrices in these units: (k,), infinite for NaN.
+
+    It is between the growth of an error and a share 1 / m of it.
+    """
+    entries = np.abs(matrices * units / units[:, None]).max(axis=(1, 2))
+    return np.asarray(np.where(np.isnan(entries), np.inf, entries))
+
+
+def _with_small_numbers(floors: Array) -> Array:
+    """Return (k, m) floors with what roundings of other coordinates add by terms of second order, and at least 1e-18.
+
+    A coordinate that is next to zero has nearly no rounding of its own. NaN becomes infinite.
+    """
+    floors = floors + np.square(floors.max(axis=1, keepdims=True, initial=0.0)) + _SMALLEST_FLOOR
+    return np.asarray(np.where(np.isnan(floors), np.inf, floors))
 
 
 def _carried(matrices: Array, offsets: Array, rows: int) -> tuple[Array, Array]:

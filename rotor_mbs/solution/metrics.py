@@ -8,7 +8,7 @@ import numpy as np
 
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.scenario.time_table import value_at
-from rotor_mbs.solution.defects import LEFT_ZERO, Defects
+from rotor_mbs.solution.defects import LEFT_ZERO, OK_ERROR, Defects
 from rotor_mbs.solution.impulse import angular_balance, linear_balance
 from rotor_mbs.solution.quantities import Array, array_of, deviation, energy_error, known_quantities, sizes
 from rotor_mbs.solution.trajectory import Trajectory
@@ -61,8 +61,18 @@ def energy_scale(scene: Scene, run: Trajectory) -> float:
     return weights + springs + kinetic + work
 
 
-def metrics_of(scene: Scene, run: Trajectory, reference: Trajectory | None, defects: Defects | None = None) -> Metrics:
-    """The metrics stored with a run, by the names of the file format; those that do not exist are left out."""
+def metrics_of(
+    scene: Scene,
+    run: Trajectory,
+    reference: Trajectory | None,
+    defects: Defects | None = None,
+    *,
+    is_corrected: bool = True,
+) -> Metrics:
+    """Return the metrics stored with a run, by the names of the file format; those that do not exist are left out.
+
+    is_corrected : whether the run claims the equations of the defects, so that their sum predicts its error.
+    """
     metrics: Metrics = {}
     if not len(run.time):
         return metrics
@@ -72,15 +82,13 @@ def metrics_of(scene: Scene, run: Trajectory, reference: Trajectory | None, defe
         metrics["energy_scale_J"] = scale
         metrics["energy_drift_max"] = float(np.abs(energy).max()) / scale if scale else float(np.abs(energy).max())
         metrics["energy_gain_J"] = float(energy.max())
-    until = len(run.time)  # samples up to the horizon of the run: it has left a symmetry, or the reference's is over
+    until = len(run.time)  # samples up to the horizon
     if reference is not None:
         until = min(until, horizon_samples(reference))
-        if defects is not None:
-            until = min(until, defects.samples_at_rest(HORIZON_GROWTH))
         if len(reference.time) and scene.wants("angles"):
             metrics |= _angle_errors(run, reference, until)
     if defects is not None:
-        metrics |= defect_metrics(defects, metrics.get("horizon_s"))
+        metrics |= defect_metrics(defects, metrics.get("horizon_s"), is_corrected=is_corrected)
     if scene.wants("angles") and scene.wants("rates"):
         with np.errstate(over="ignore", invalid="ignore"):
             balances = {"angular": angular_balance(scene, run), "linear": linear_balance(scene, run)}
@@ -115,28 +123,38 @@ def metrics_of(scene: Scene, run: Trajectory, reference: Trajectory | None, defe
     return metrics | peaks
 
 
-def defect_metrics(defects: Defects, horizon_s: float | None) -> Metrics:
-    """Numbers of a run's interval defects; horizon_s: that of the reference, None where there is none."""
-    judged = defects.is_judged
-    metrics = {"defects_not_judged": float((~judged).sum())}
-    if judged.any():
-        sizes = np.where(judged, defects.sizes, 0.0)
-        largest = int(sizes.argmax())
-        metrics |= {
-            "defect_max": float(sizes[largest]),
-            "defect_median": float(np.median(defects.sizes[judged])),
-            "defect_time": float(defects.time[1 + largest]),
-            "defect_mean": defects.mean,
-            "defect_judged": defects.judged_size,
-            "defect_floor": float(defects.floor[judged].max()),
-        }
-    predicted = defects.predicted
-    if predicted is not None:
-        metrics["defect_drift"] = defects.drift
+def defect_metrics(defects: Defects, horizon_s: float | None, *, is_corrected: bool = True) -> Metrics:
+    """Return the numbers of a run's interval defects.
+
+    Parameters
+    ----------
+    horizon_s : of the reference; None without a reference: that of the run itself.
+    is_corrected : see `metrics_of`.
+    """
+    largest = int(defects.sizes.argmax())
+    metrics = {
+        "defect_max": float(defects.sizes[largest]),
+        "defect_median": float(np.median(defects.sizes)),
+        "defect_time": float(defects.time[1 + largest]),
+        "defect_mean": defects.mean,
+    }
+    if is_corrected:
+        excess, judged, floor = defects.excess, defects.judged_sizes, defects.floor
+        if judged.any():  # the interval that is told is then the one that is furthest beyond what is allowed
+            largest = int(judged.argmax())
         if horizon_s is None:
-            until = min(defects.horizon_samples(HORIZON_GROWTH), defects.samples_at_rest(HORIZON_GROWTH))
-            metrics["horizon_s"] = horizon_s = float(defects.time[max(until - 1, 0)])
-        metrics["angle_error_predicted"] = float(np.abs(predicted[defects.time <= horizon_s]).max())
+            until = defects.horizon_samples(HORIZON_GROWTH)
+            horizon_s = float(defects.time[max(until - 1, 0)])
+        metrics |= {
+            "defect_time": float(defects.time[1 + largest]),
+            "defect_excess": float(excess[largest]),
+            "defect_judged": float(judged[largest]),
+            "defect_floor": float(floor[np.isfinite(floor)].max(initial=0.0)),
+            "defects_not_judged": float((~defects.is_judged | ~(excess <= OK_ERROR)).sum()),
+            "defect_drift": defects.drift,
+            "horizon_s": horizon_s,
+            "angle_error_predicted": float(np.abs(defects.predicted[defects.time <= horizon_s]).max()),
+        }
     return {name: value for name, value in metrics.items() if not np.isnan(value)}
 
 

@@ -12,8 +12,9 @@ from dataclasses import replace
 import numpy as np
 
 from rotor_mbs.analysis.checks import Check, Where
-from rotor_mbs.analysis.judgement import defects_of, energy_slack
+from rotor_mbs.analysis.judgement import defects_of
 from rotor_mbs.analysis.kinematics import exact_rotor_angle
+from rotor_mbs.analysis.run_checks import defect_bound, energy_slack
 from rotor_mbs.analysis.work_precision import fitted_order
 from rotor_mbs.comparison.data import load_data
 from rotor_mbs.comparison.trajectory import compare_with_reference
@@ -44,8 +45,6 @@ SCENES = {
 }
 EXACT = ("paper/fig05", "paper/fig06", "paper/fig15-10kNm", "paper/fig03")
 _SMOOTH = "paper/fig11"  # order, symmetry, determinism
-# rad: what a defect of a method without a bound of its own may be.
-OWN_BOUND = 1e-6
 _ORDER_BAND = 0.3
 _COARSEST = 0.02  # s, of the steps whose order is looked for
 _FOLLOWS_STEP = 0.6  # order with which a defect must fall with the step to be an error of the step
@@ -84,8 +83,7 @@ class _Examination:
     def __init__(self, method: Method, pool: TaskPool, timeout_s: float) -> None:
         self._method, self._pool, self._timeout_s = method, pool, timeout_s
         bounds = shipped_bounds().with_entries(method.bounds)
-        own = bounds.of("defect", method.name)
-        self._bound = own.value if own.method != "*" else OWN_BOUND
+        self._bound = defect_bound(bounds, method.name)
         self._energy = bounds.of("energy", method.name).value
         self._made: list[Check] = []
         self._reason = ""  # of the first wrong motion, which is the one that is searched

@@ -229,7 +229,8 @@ def _judged(run: Solution, reference: Trajectory | None, end: float) -> tuple[So
             judgement = judge(run.scene, run, reference)
     except OutOfTimeError as exc:
         return replace(run, status="timed_out", message=f"{exc}, while its samples were assessed"), False
-    message = judgement.message + next_to_try(run.scene, run.method, run.settings, judgement.status)
+    advice = judgement.advice or next_to_try(run.scene, run.method, run.settings, judgement.status)
+    message = judgement.message + advice
     judged = replace(run, status=judgement.status, message=message, metrics=judgement.metrics)
     return judged, judgement.false_success
 

@@ -13,13 +13,14 @@ import pytest
 from support.defects import made_defects
 
 from rotor_mbs.analysis import judgement as judgement_module
-from rotor_mbs.analysis import kinematics
-from rotor_mbs.analysis.judgement import OK_ERROR, clearly_ok, judge, rotor_inertia_shares
+from rotor_mbs.analysis import kinematics, run_checks
+from rotor_mbs.analysis.judgement import OK_ERROR, clearly_ok, judge
 from rotor_mbs.methods.catalogue import find_method, method_names
+from rotor_mbs.models.lagrange.singularity import rotor_inertia_shares
 from rotor_mbs.scenario.accuracy_bounds import Bound, shipped_bounds
 from rotor_mbs.scenario.catalogue import find_scenes
 from rotor_mbs.scenario.scene import Blade, Scene
-from rotor_mbs.solution.defects import MAX_INTERVAL_GROWTH
+from rotor_mbs.solution import metrics as metrics_module
 from rotor_mbs.solution.metrics import ANGLE_LIMIT, defect_metrics, metrics_of, running_growth
 from rotor_mbs.solution.trajectory import Integration, Solution, Trajectory
 
@@ -48,6 +49,11 @@ QUARTER = 0.5 * math.pi
 def _without_defects(monkeypatch: pytest.MonkeyPatch) -> None:
     """The motions made here are none that the scene could have: what is tested are the other rules."""
     monkeypatch.setattr(judgement_module, "defects_of", lambda *_, **__: None)
+    for name in ("_checks_of_rows", "_checks_of_outputs"):
+        monkeypatch.setattr(run_checks, name, lambda *_: iter(()))
+    monkeypatch.setattr(kinematics, "exact_rotor_angle", lambda *_: None)
+    for name in ("angular_balance", "linear_balance"):
+        monkeypatch.setattr(metrics_module, name, lambda *_: None)
 
 
 def status(
@@ -119,10 +125,10 @@ def test_energy_angles_and_gap_have_a_bound_each(method: str) -> None:
 
 @pytest.mark.parametrize("method", method_names(is_corrected=True))
 def test_the_largest_defect_has_a_bound(method: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    bound = BOUNDS.of("defect", method).value
+    bound = min(BOUNDS.of("defect", method).value, OK_ERROR)
     for side, expected in (*SIDES, (math.nan, "inaccurate")):
         # The second undoes the first: they add up to no more than one.
-        defects = made_defects((side * bound, -side * bound), transitions=None)
+        defects = made_defects((side * bound, -side * bound))
         monkeypatch.setattr(judgement_module, "defects_of", lambda *_, defects=defects, **__: defects)
         assert status(moving(), method=method)[0] == expected
 
@@ -134,21 +140,51 @@ def test_the_median_of_the_defects_has_the_bound_of_a_methods_own(monkeypatch: p
     run = Solution(SCENE, METHOD, moving(), DONE)
     assert judge(SCENE, run, None).status == "ok"
     for side, expected in SIDES:
-        defects = made_defects([side * own.value] * 3, transitions=None)
+        defects = made_defects([side * own.value] * 3)
         monkeypatch.setattr(judgement_module, "defects_of", lambda *_, defects=defects, **__: defects)
         assert judge(SCENE, run, None).status == expected
 
 
 @pytest.mark.parametrize(("side", "expected"), [(1.0 - JUST, "ok"), (1.0 + JUST, "unchecked")])
-def test_an_energy_balance_alone_is_no_verdict(side: float, expected: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Errors may grow by more than 1e5 in every interval, and there is no reference."""
-    rate = math.log(side * MAX_INTERVAL_GROWTH) / 0.01
-    defects = made_defects([0.0] * 10, transitions=None, growth_rate=rate)
+@pytest.mark.parametrize("cause", ["rounding", "a defect that is allowed"])
+def test_a_defect_of_a_hundredth_of_a_radian_is_never_within_an_ok(
+    cause: str, side: float, expected: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Rounding alone may be as large, or rows are so far apart, or errors grow so much, that a bound allows as much."""
+    size = side * OK_ERROR
+    if cause == "rounding":
+        rounding = np.zeros((3, 2))
+        rounding[0, 0] = size / 3.0
+        defects = made_defects((0.0, 0.0), rounding=rounding)
+    else:  # the second interval undoes the first
+        defects = made_defects((size, -size), time=1e12 * np.arange(3.0))
     monkeypatch.setattr(judgement_module, "defects_of", lambda *_, **__: defects)
-    assert status(moving())[0] == expected
-    metrics = {"energy_drift_max": 0.0} | defect_metrics(defects, None)
+    judgement = judge(SCENE, Solution(SCENE, METHOD, moving(), DONE), None)
+    if cause == "rounding" or side < 1.0:
+        assert judgement.status == expected
+    else:  # the energy decides nothing of a sum that is predicted
+        assert judgement.status == "inaccurate"
+        assert "predicted" in judgement.message
+        metrics = dict(judgement.metrics) | {"angle_error_predicted": 0.0}
+        monkeypatch.setattr(judgement_module, "metrics_of", lambda *_, **__: metrics)
+        judgement = judge(SCENE, Solution(SCENE, METHOD, moving(), DONE), None)
+        assert judgement.status == expected
+    if expected == "unchecked":
+        assert "would not be seen; more samples" in judgement.message
+    metrics = {"energy_drift_max": 0.0} | defect_metrics(defects, None) | {"angle_error_predicted": 0.0}
     (is_ok,) = clearly_ok([SCENE], METHOD, [DONE], [SCENE.samples], [metrics], np.ones(1))
     assert is_ok == (expected == "ok")
+
+
+def test_a_bound_of_more_than_a_hundredth_of_a_radian_counts_as_that(monkeypatch: pytest.MonkeyPatch) -> None:
+    own = Bound("defect", METHOD, 1.0, "none")
+    monkeypatch.setattr(judgement_module, "look_up", lambda _: replace(find_method(METHOD), bounds=(own,)))
+    for side, expected in SIDES:
+        defects = made_defects((side * OK_ERROR, -side * OK_ERROR))
+        monkeypatch.setattr(judgement_module, "defects_of", lambda *_, defects=defects, **__: defects)
+        judgement = judge(SCENE, Solution(SCENE, METHOD, moving(), DONE), None)
+        assert judgement.status == expected
+        assert judgement.metrics["defect_allowed"] == pytest.approx(OK_ERROR)
 
 
 NOTHING = Trajectory(np.empty(0), np.empty((0, 4)), np.empty((0, 4)))

@@ -23,9 +23,8 @@ def made_defects(sizes: Sequence[float], **changes: Any) -> Defects:
         "resting": (),
         "states": np.zeros((count + 1, 2)),
         "rounding": np.zeros((count + 1, 2)),
-        "time_rounding": np.zeros(count + 1),
+        "conditioning": np.ones(count),
         "start": np.zeros(2),
-        "growth_rate": 0.0,
         "growth_units": np.ones(2),
         "own_loads": Trajectory(nothing[0], nothing, nothing),
     }

@@ -13,15 +13,16 @@ from numpy.typing import NDArray
 from rotor_mbs.errors import InputError
 from rotor_mbs.methods.time_limit import raise_if_over
 from rotor_mbs.models.lagrange import closed_form
-from rotor_mbs.models.lagrange.closed_form import Accelerations
+from rotor_mbs.models.lagrange.closed_form import Accelerations, load_values
 from rotor_mbs.models.lagrange.heyoka_adapter import is_available
 from rotor_mbs.models.lagrange.ode_solvers import OdeSolver, scipy_integrator
 from rotor_mbs.models.lagrange.parameters import rate_units, resting_pitches, rotor_form
 from rotor_mbs.models.lagrange.samples import loads_at, sampled_loads
+from rotor_mbs.models.lagrange.singularity import least_inertia_shares
 from rotor_mbs.models.lagrange.taylor import Propagation, is_compact
 from rotor_mbs.scenario.scene import Scene
-from rotor_mbs.scenario.time_table import Segment
-from rotor_mbs.solution.defects import Defects
+from rotor_mbs.scenario.time_table import Segment, values_before
+from rotor_mbs.solution.defects import BLOCK_ROWS, Defects
 from rotor_mbs.solution.metrics import ANGLE_LIMIT
 from rotor_mbs.solution.trajectory import Array, Trajectory
 
@@ -39,10 +40,7 @@ _RADIANS_PER_STEP = 0.25
 # Where rates change within an interval, they leave more. It shows in the state at the end, which is known better: over
 # the paper's motions, up to this distance (rad and rate units) the matrices are right to a share of 4e-4.
 _ROUGH_END = 3e-5
-# Beyond it steps are halved until the matrix changes by a share of this: the finer one is right to a share of 1e-4.
-_MAX_CHANGE = 1e-3
-_MAX_HALVINGS = 6
-# Of an interval; where there are less than a thousand intervals, up to 16 times as many.
+# Of an interval. Beyond some 75 steps the integration of every interval by itself is faster, and always more accurate.
 _MAX_RUNGE_KUTTA_STEPS = 32
 # Rows of a window in which rates are found from angles: two leave no residual, and noise as it is.
 FIT_ROWS = 5
@@ -52,6 +50,9 @@ _STANDS_STILL = 1e-9  # rad in an interval: the error that is left is the square
 # came to stand still; from 0.8 on some did not.
 _NEAR = 0.5
 _SIDE = 1e-9  # of a step
+_UNIT_ROUNDOFF = 2.0**-53
+# Below this share of its inertia a rotor is singular, and nothing is known of the interval.
+_SMALLEST_SHARE = 1e-30
 _DIFFERENCE = 1e-7  # rad and rate units: rounding and curvature are a share of 1e-8 or so of a matrix's entries
 
 
@@ -90,10 +91,15 @@ def interval_defects(
     if len(time) > 1:
         units = np.maximum(units, 1.0 / float(np.median(np.diff(time))))
     loads = sampled_loads(scene, time, angles, rates) if scene.wants("loads") else {}
-    last_digits = 0.5 * float(np.finfo(float).eps) * np.abs(states)
+    last_digits = _UNIT_ROUNDOFF * np.abs(states)
     if rounding is not None:
         count = angles.shape[1]
         last_digits = np.maximum(last_digits, rounding[..., [*moving, *(count + i for i in moving)]])
+    if time_rounding is None:
+        time_rounding = _UNIT_ROUNDOFF * np.abs(time)
+    # A row is at its time to half a digit of that: by as much the state goes on.
+    last_digits = last_digits + time_rounding[:, None] * _rates_of_change(scene, time, states)
+    shares = least_inertia_shares(scene, angles)
     start = np.concatenate([np.array(scene.initial_angles)[moving], np.array(scene.initial_rates)[moving]])
     return Defects(
         time=time,
@@ -105,12 +111,28 @@ def interval_defects(
         resting=resting_pitches(scene),
         states=states,
         rounding=last_digits,
-        time_rounding=0.5 * float(np.finfo(float).eps) * np.abs(time) if time_rounding is None else time_rounding,
+        conditioning=1.0 / np.sqrt(np.maximum(np.minimum(shares[:-1], shares[1:]), _SMALLEST_SHARE)),
         start=start,
-        growth_rate=_growth_rate(scene, states),
         growth_units=np.concatenate([np.ones(half), rate_units(scene)]),
         own_loads=Trajectory(time, angles, rates, **loads),
     )
+
+
+def _rates_of_change(scene: Scene, time: Array, states: Array) -> Array:
+    """Return the largest |dy/dt| at (n, m) states, (n, m) 1/s; at a jump of a load that of either side."""
+    half = states.shape[1] // 2
+    angles, rates = list(states[:, :half].T), states[:, half:].T
+    form, changes = rotor_form(scene), np.zeros(states.shape)
+    changes[:, :half] = np.abs(states[:, half:])
+    sides = [loads_at(scene, time)]
+    if not scene.has_constant_loads:
+        sides.append(load_values(list(values_before(load_segments(scene), time))))
+    with np.errstate(all="ignore"):
+        for loads in sides:
+            accelerations = closed_form.accelerations(angles, list(rates), form, loads, np.sin, np.cos)
+            for i, values in enumerate(accelerations):
+                changes[:, half + i] = np.maximum(changes[:, half + i], np.abs(values))
+    return changes
 
 
 def fitted_rates(scene: Scene, time: Array, angles: Array) -> Array:
@@ -151,8 +173,6 @@ def fitted_rates(scene: Scene, time: Array, angles: Array) -> Array:
         states = np.hstack([angles[:, moving], rates[:, moving]])
         ends = interval_ends(scene, time[:-1], time[1:], states[:-1])
         transitions = _transitions(scene, time, states, ends)
-        if transitions is None:
-            raise InputError("the rates cannot be computed from the angles: the rows are too far apart for this motion")
         jumps = ends - states[1:]
         # Away from the data's own states: row by row matrix @ (at the first row) + offset.
         matrices = [np.broadcast_to(np.eye(2 * half), (len(firsts), 2 * half, 2 * half))]
@@ -263,17 +283,8 @@ def _advance_by_dop853(scene: Scene) -> _Advance:
     return advance
 
 
-def _growth_rate(scene: Scene, states: Array) -> float:
-    """1/s: of a blade that is an inverted pendulum, or the rates of the motion; springs and dampers make none grow."""
-    blades = rotor_form(scene).blades
-    falling = [math.sqrt(math.hypot(blade.weight_x, blade.weight_y) / blade.pitch_inertia) for blade in blades]
-    finite = states[np.isfinite(states).all(axis=1), states.shape[1] // 2 :]
-    turning = float(np.median(np.abs(finite), axis=0).max()) if len(finite) else 0.0
-    return max([*falling, turning])
-
-
-def _transitions(scene: Scene, time: Array, states: Array, ends: Array) -> Array | None:
-    """State transition matrices of the intervals, all at once.
+def _transitions(scene: Scene, time: Array, states: Array, ends: Array) -> Array:
+    """Return the state transition matrices of the intervals.
 
     Parameters
     ----------
@@ -281,54 +292,61 @@ def _transitions(scene: Scene, time: Array, states: Array, ends: Array) -> Array
 
     Returns
     -------
-    (n - 1, m, m), or None
-        Right to a share of 5e-4, mostly of 1e-5; infinite where steps that are short enough would be too many. None
-        where the motion is too stiff for explicit steps.
+    (n - 1, m, m)
+        Right to a share of 5e-4, mostly of 1e-5; infinite where an end is not finite.
     """
-    half = states.shape[1] // 2
-    count = 2 * half
-    if len(time) < 2:
-        return np.empty((0, count, count))
-    steps = explicit_steps(scene, np.diff(time), states)
-    if steps is None:
-        return None
-    units = np.concatenate([np.ones(half), rate_units(scene)])
+    count = states.shape[1]
+    units = np.concatenate([np.ones(count // 2), rate_units(scene)])
+    transitions = np.full((len(ends), count, count), np.inf)
+    is_finite = np.asarray(np.isfinite(ends).all(axis=1))
+    is_rough = is_finite.copy()
+    for start in range(0, len(ends), BLOCK_ROWS):
+        rows = start + np.flatnonzero(is_finite[start : start + BLOCK_ROWS])
+        lengths = time[rows + 1] - time[rows]
+        steps = explicit_steps(scene, lengths, states[rows], _MAX_RUNGE_KUTTA_STEPS) if len(rows) else None
+        if steps is not None:
+            matrices, quick = _quick_transitions(scene, time, states, rows, units, steps)
+            is_near = (np.abs(quick - ends[rows]) / units <= _ROUGH_END).all(axis=1)
+            is_near &= np.isfinite(matrices).all(axis=(1, 2))
+            transitions[rows[is_near]] = matrices[is_near]
+            is_rough[rows[is_near]] = False
+    # Explicit steps are too long there: differences of the ends that the integrator of the defects itself finds.
+    rows = np.flatnonzero(is_rough)
+    if len(rows):
+        with np.errstate(all="ignore"):
+            for i in range(count):
+                moved = states[rows]
+                moved[:, i] += _DIFFERENCE * units[i]
+                change = moved[:, i] - states[rows, i]  # as it is rounded
+                moved_ends = interval_ends(scene, time[rows], time[rows + 1], moved)
+                transitions[rows, :, i] = (moved_ends - ends[rows]) / change[:, None]
+    transitions[~np.isfinite(transitions).all(axis=(1, 2))] = np.inf
+    return transitions
 
-    def matrices(rows: NDArray[np.int64], steps: int) -> tuple[Array, Array]:
-        """(rows, m, m), scaled by the units; and (rows, m), the ends."""
-        # (m, 1 + directions, rows): the state of every interval, as it is and moved by a difference in every direction.
-        moved = np.repeat(states[rows].T[:, None, :], 1 + count, axis=1)
-        for i in range(count):
-            moved[i, 1 + i] += _DIFFERENCE * units[i]
-        moved = quick_ends(scene, time[rows], time[rows + 1], moved, steps)
-        columns = (moved[:, 1:] - moved[:, :1]) / (_DIFFERENCE * units[:, None, None])
-        return columns.transpose(2, 0, 1), moved[:, 0].T
 
+def _quick_transitions(
+    scene: Scene, time: Array, states: Array, rows: NDArray[np.int64], units: Array, steps: int
+) -> tuple[Array, Array]:
+    """Return matrices of the intervals after `rows`, (k, m, m), and their ends, (k, m), by Runge-Kutta steps."""
+    count = states.shape[1]
+    # (m, 1 + directions, k): the state of every interval, as it is and moved by a difference in every direction.
+    moved = np.repeat(states[rows].T[:, None, :], 1 + count, axis=1)
+    for i in range(count):
+        moved[i, 1 + i] += _DIFFERENCE * units[i]
     with np.errstate(all="ignore"):
-        transitions, quick = matrices(np.arange(len(ends)), steps)
-        is_near = (np.abs(quick - ends) / units <= _ROUGH_END).all(axis=1)
-        rough = np.flatnonzero(np.isfinite(ends).all(axis=1) & ~is_near)
-        for _ in range(_MAX_HALVINGS):
-            if not len(rough):
-                break
-            steps *= 2
-            finer, _ = matrices(rough, steps)
-            change = np.abs(finer - transitions[rough]).max(axis=(1, 2)) / np.abs(finer).max(axis=(1, 2))
-            transitions[rough] = finer
-            rough = rough[~(change <= _MAX_CHANGE)]
-        transitions[rough] = np.inf
-    return np.ascontiguousarray(transitions * units[:, None] / units)
+        moved = quick_ends(scene, time[rows], time[rows + 1], moved, steps)
+        columns = (moved[:, 1:] - moved[:, :1]) / (_DIFFERENCE * units[:, None])
+    return columns.transpose(2, 0, 1), moved[:, 0].T
 
 
-def explicit_steps(scene: Scene, intervals: Array, states: Array) -> int | None:
-    """How many steps of Runge and Kutta each of (n,) intervals (s) takes; None where they are too many."""
+def explicit_steps(scene: Scene, intervals: Array, states: Array, most: int) -> int | None:
+    """Return how many Runge-Kutta steps each of (n,) intervals (s) takes; None where they are more than `most`."""
     half = states.shape[1] // 2
     fastest = float(np.max(np.where(np.isfinite(states[:, half:]), np.abs(states[:, half:]), 0.0)))
     for blade in rotor_form(scene).blades:
         moment = blade.stiffness + math.hypot(blade.weight_x, blade.weight_y)
         fastest = max(fastest, math.sqrt(moment / blade.pitch_inertia), blade.damping / blade.pitch_inertia)
     steps = fastest * float(intervals.max()) / _RADIANS_PER_STEP
-    most = _MAX_RUNGE_KUTTA_STEPS * max(1.0, min(1000.0 / len(intervals), 16.0))
     return max(math.ceil(steps), 1) if steps <= most else None
 
 

@@ -215,6 +215,72 @@ def load_rounding(scene: Scene, times: Array, angles: Array, rates: Array) -> di
     return rounding
 
 
+def load_conditioning(scene: Scene, times: Array, angles: Array, rates: Array) -> dict[str, Array]:
+    """Return how much of the load quantities the arithmetic of any engine may lose, in the shape of each.
+
+    An engine forms the moments of inertia forces and weights from terms about some point, each rounded once. What is
+    lost of them turns into accelerations by the inverse of the mass matrix, and these into loads. Of a blade whose
+    inertia about its pitch axis is small beside m |r|^2 that is far more than the last digits of its state.
+
+    Parameters
+    ----------
+    times, angles, rates : (n,) s, and (n, 1 + blades) rad and rad/s.
+    """
+    form, moving = rotor_form(scene), scene.moving_coordinates
+    applied = load_values(list(values_before(scene.load_segments, times)))
+    with np.errstate(all="ignore"):
+        accelerations = closed_form.accelerations(
+            list(angles[:, moving].T), list(rates[:, moving].T), form, applied, np.sin, np.cos
+        )
+        sizes = np.abs(np.stack([np.broadcast_to(row, times.shape) for row in accelerations], axis=1))
+
+        # Moments, (n, moving), of which an engine may lose a rounding: on the rotor those of all blades.
+        moments = np.zeros(sizes.shape)
+        moments[:, 0] = scene.hub_inertia * sizes[:, 0]
+        for i, blade in enumerate(scene.blades):
+            arm = float(np.linalg.norm(blade.centre_of_mass))
+            inertia = blade.mass * arm**2 + float(np.linalg.norm(blade.inertia_tensor))
+            column = 1 + i
+            turning = sizes[:, 0] + (np.abs(rates[:, 0]) + np.abs(rates[:, column])) ** 2
+            if column in moving:
+                turning = turning + sizes[:, moving.index(column)]
+            moment = inertia * turning + blade.mass * scene.gravity * arm
+            moments[:, 0] += moment
+            if column in moving:
+                moments[:, moving.index(column)] = moment
+        inverse = _inverse_mass_matrices(scene, angles)
+        lost = 2.0**-53 * np.einsum("nij,nj->ni", np.abs(inverse), moments)  # of each acceleration
+
+        # The loads of unit accelerations at rest, without gravity: loads are linear in accelerations.
+        still, conditioning = np.zeros_like(rates), dict[str, Array]()
+        for place, coordinate in enumerate(moving):
+            unit = np.zeros_like(rates)
+            unit[:, coordinate] = 1.0
+            roots, shaft_force, shaft_moment = _reactions(scene, angles, still, unit, 0.0, float, np.sin, np.cos)
+            shaft_moment[:, 1] += scene.hub_inertia * unit[:, 0]
+            loads = named_loads(roots, shaft_force, shaft_moment, np.zeros_like(angles[:, 1:]))
+            for name, values in loads.items():
+                part = (np.abs(values).T * lost[:, place]).T
+                conditioning[name] = conditioning[name] + part if name in conditioning else part
+    return conditioning
+
+
+def _inverse_mass_matrices(scene: Scene, angles: Array) -> Array:
+    """Return the inverse of the mass matrix at (n, 1 + blades) rad: (n, moving, moving), by the Schur complement."""
+    form, moving = rotor_form(scene), scene.moving_coordinates
+    schur = np.full(len(angles), form.inertia)
+    levers = [np.full(len(angles), -1.0)]  # of each coordinate on the rotor: -1, then b / Jzz
+    for blade, column in zip(form.blades, moving[1:], strict=True):
+        s, c = np.sin(angles[:, column]), np.cos(angles[:, column])
+        schur += blade.schur_ss * (s * s) + blade.schur_cc * (c * c) + blade.schur_sc * (s * c)
+        levers.append(blade.ratio_s * s + blade.ratio_c * c)
+    lever = np.stack(levers, axis=1)
+    inverse = lever[:, :, None] * lever[:, None, :] / schur[:, None, None]
+    for i, blade in enumerate(form.blades, start=1):
+        inverse[:, i, i] += 1.0 / blade.pitch_inertia
+    return np.asarray(inverse)
+
+
 def quad_loads(scene: Scene, times: Array, states: Any) -> dict[str, Array]:
     """Return the loads in quad precision, rounded at the end; states: (n, 2 × moving coordinates) angles, rates."""
     count = len(scene.moving_coordinates)
@@ -246,6 +312,22 @@ def _loads(
         stiffness, damping = scene.bearings[column - 1]
         torque, rest = applied[torque_place(column)], applied[rest_place(column)]
         actuators[:, column - 1] = torque - stiffness * (angles[:, column] - rest) - damping * rates[:, column]
+    roots, shaft_force, shaft_moment = _reactions(scene, angles, rates, accelerations, scene.gravity, convert, sin, cos)
+    shaft_moment[:, 1] += scene.hub_inertia * accelerations[:, 0] - applied[ROTOR_TORQUE]
+    return named_loads(roots, shaft_force, shaft_moment, actuators)
+
+
+def _reactions(
+    scene: Scene,
+    angles: Numbers,
+    rates: Numbers,
+    accelerations: Numbers,
+    gravity: float,
+    convert: Convert,
+    sin: Function,
+    cos: Function,
+) -> tuple[list[tuple[Numbers, Numbers]], Numbers, Numbers]:
+    """Return force and moment at each root, and the sums of both about the hub centre in the base frame."""
     sin_q, cos_q = sin(angles[:, 0]), cos(angles[:, 0])
     roots, in_base = [], []
     for i, blade in enumerate(scene.blades):
@@ -253,11 +335,10 @@ def _loads(
         azimuth = sin_q * cos_phase + cos_q * sin_phase, cos_q * cos_phase - sin_q * sin_phase
         pitch = sin(angles[:, 1 + i]), cos(angles[:, 1 + i])
         turning = rates[:, 0], rates[:, 1 + i], accelerations[:, 0], accelerations[:, 1 + i]
-        roots.append(root_load(blade, azimuth, pitch, turning, scene.gravity))
+        roots.append(root_load(blade, azimuth, pitch, turning, gravity))
         in_base.append([_in_base_frame(vectors, azimuth, pitch) for vectors in roots[-1]])
     shaft_force, shaft_moment = (sum(vectors) for vectors in zip(*in_base, strict=True))
-    shaft_moment[:, 1] += scene.hub_inertia * accelerations[:, 0] - applied[ROTOR_TORQUE]
-    return named_loads(roots, shaft_force, shaft_moment, actuators)
+    return roots, shaft_force, shaft_moment
 
 
 def root_load(

@@ -1,0 +1,48 @@
+"""How near a rotor is to pitches at which its mass matrix is singular.
+
+S = J_hub + Σ (a - b²/Jzz) is the rotor's inertia with every pitch free to give way, the Schur complement of
+`closed_form`: m (c² + d²) cos²θ for point masses, which vanishes where all pitches are ±π/2.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from rotor_mbs.models.lagrange.parameters import rotor_form
+from rotor_mbs.scenario.scene import Scene
+from rotor_mbs.solution.trajectory import Array
+
+
+def rotor_inertia_shares(scene: Scene, angles: Array) -> Array:
+    """Return S as a share of the inertia that the rotor has with fixed pitches: (n,) for (n, 1 + blades) rad.
+
+    In exact arithmetic until the last step: of a point mass the first coefficient vanishes, whose rounding is no
+    inertia.
+    """
+    form = rotor_form(scene)
+    remaining = np.full(len(angles), form.inertia)
+    whole = remaining.copy()
+    for blade, column in zip(form.blades, scene.moving_coordinates[1:], strict=True):
+        s, c = np.sin(angles[:, column]), np.cos(angles[:, column])
+        remaining += blade.schur_ss * s * s + blade.schur_cc * c * c + blade.schur_sc * s * c
+        whole += blade.inertia_ss * s * s + blade.inertia_cc * c * c + blade.inertia_sc * s * c
+    return np.asarray(remaining / whole)
+
+
+def least_inertia_shares(scene: Scene, angles: Array) -> Array:
+    """Return the smallest share at each row and on the straight way to the next: (n,) for (n, 1 + blades) rad.
+
+    On the way it is sought where a pitch passes ±π/2, unless a pitch moves by a right angle or more.
+    """
+    shares = rotor_inertia_shares(scene, angles)
+    near = np.abs(np.diff(angles[:, 1:], axis=0)).max(axis=1, initial=0.0) < 0.5 * np.pi
+    for column in range(1, angles.shape[1]):
+        quarter = np.floor(angles[:, column] / np.pi - 0.5)
+        rows = np.flatnonzero((np.diff(quarter) != 0.0) & near)
+        before, after = angles[rows], angles[rows + 1]
+        target = np.pi * (np.maximum(quarter[rows], quarter[rows + 1]) + 0.5)
+        part = (target - before[:, column]) / (after[:, column] - before[:, column])
+        passed = before + part[:, None] * (after - before)
+        passed[:, column] = target
+        shares[rows] = np.minimum(shares[rows], rotor_inertia_shares(scene, passed))
+    return shares
