@@ -331,9 +331,13 @@ def _channel_errors(scene: Scene, rows: ReferencedRows, error: Array) -> tuple[C
         defect = floor = None
         known = defects_of_channel(scene, rows.defects, channel)
         if known is not None and rows.defects is not None and rows.defects.is_judged.any():
-            sizes, floors = (values[rows.defects.is_judged] for values in known)
-            defect = float(np.maximum(sizes - FLOOR_SAFETY * floors, 0.0).max())
-            floor = float(floors.max())
+            sizes, floors = known
+            # As of a run: what is allowed grows with the length of an interval and the error
+            # growth over it.
+            beyond_rounding = np.maximum(sizes - FLOOR_SAFETY * floors, 0.0)
+            excess = rows.defects.in_bound_units(beyond_rounding)
+            defect = float(excess[rows.defects.is_judged].max())
+            floor = float(floors[rows.defects.is_judged].max())
         channels.append(
             ChannelErrors(
                 name=channel.name,
@@ -349,10 +353,9 @@ def _channel_errors(scene: Scene, rows: ReferencedRows, error: Array) -> tuple[C
 
 
 def _largest_interval(defects: Defects) -> int:
-    """Return the number of the interval whose defect exceeds its rounding most."""
-    excess = defects.channel_sizes - FLOOR_SAFETY * defects.floors
-    judged = np.where(defects.is_judged[:, None], excess, 0.0)
-    return int(judged.max(axis=1).argmax())
+    """Return the number of the interval whose defect exceeds what is allowed most."""
+    excess = defects.in_bound_units(defects.channel_excess).max(axis=1)
+    return int(np.where(defects.is_judged, excess, 0.0).argmax())
 
 
 def _largest_drift(scene: Scene, defects: Defects | None) -> tuple[float, str]:
@@ -491,7 +494,8 @@ def _unchecked_parts(
     if defects is not None and not defects.is_judged[until - 1 :].all():
         first = until - 1 + int(np.argmin(defects.is_judged[until - 1 :]))
         since = f"the first after t = {defects.time[first]:.6g} s"
-        yield "unchecked", f"after the horizon the rows are too far apart to be checked, {since}"
+        reason = "the rows are too far apart, or have too few digits, to be checked"
+        yield "unchecked", f"after the horizon {reason}, {since}"
     missed = [name for name in errors.missing if name not in data.omitted]
     if missed:
         listed = ", ".join(f'"{name.replace(" ", "_")}"' for name in missed)

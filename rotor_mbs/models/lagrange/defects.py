@@ -126,7 +126,7 @@ def _rates_of_change(scene: Scene, time: Array, states: Array) -> Array:
     changes[:, :half] = np.abs(states[:, half:])
     sides = [loads_at(scene, time)]
     if not scene.has_constant_loads:
-        sides.append(load_values(list(values_before(load_segments(scene), time))))
+        sides.append(load_values(list(values_before(scene.load_segments, time)), scene.moving_coordinates[1:]))
     with np.errstate(all="ignore"):
         for loads in sides:
             accelerations = closed_form.accelerations(angles, list(rates), form, loads, np.sin, np.cos)

@@ -15,6 +15,7 @@ import numpy as np
 from rotor_mbs.methods.solve import solve
 from rotor_mbs.models.lagrange import closed_form, hamilton, taylor
 from rotor_mbs.models.lagrange.heyoka_adapter import Parameters, array_of, failure, heyoka
+from rotor_mbs.models.lagrange.ode_solvers import work_unit
 from rotor_mbs.models.lagrange.samples import constant_work
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.trajectory import Array, Integration, RunBlock
@@ -69,6 +70,7 @@ def solve_many(scenes: Sequence[Scene], tolerance: float) -> RunBlock:
     # agree that share compiled code.
     rotors: dict[tuple[object, ...], tuple[Array, tuple[int, ...]]] = {}
     groups: dict[tuple[int, ...], list[int]] = {}
+    keys: dict[int, tuple[object, ...]] = {}  # of each run: its rotor, and its unit of work
     for i, scene in enumerate(scenes):
         if not scene.has_constant_loads:
             # It is integrated from one kink of its loads to the next, which are at other times in each run.
@@ -78,17 +80,19 @@ def solve_many(scenes: Sequence[Scene], tolerance: float) -> RunBlock:
                 values[i, :n] = getattr(run.trajectory, name)
             block.end(i, run.integration, n)
             continue
-        key = scene.rotor_key
+        unit = work_unit(scene) if scene.work_needs_path else 0.0
+        key = (scene.rotor_key, unit)
         if key not in rotors:
             parameters = Parameters()
             taylor.equation_numbers(scene, parameters)
             _tip_numbers(scene, parameters)
             structure = (*parameters.structure, scene.work_needs_path, *scene.moving_coordinates)
             rotors[key] = array_of(parameters.values, quad=False), structure
+        keys[i] = key
         groups.setdefault(rotors[key][1], []).append(i)
     for structure, places in groups.items():
         of_group = [scenes[i] for i in places]
-        numbers = np.stack([rotors[scene.rotor_key][0] for scene in of_group], axis=1)
+        numbers = np.stack([rotors[keys[i]][0] for i in places], axis=1)
         _Group(places, of_group, structure, numbers, tolerance).run(block)
     return block
 
@@ -102,7 +106,7 @@ def _tip_numbers(scene: Scene, parameters: Parameters) -> list[list[Any]]:
 
 def _momenta(example: Scene) -> Any:
     """Compile the momenta as a function of angles and rates."""
-    form, _ = taylor.equation_numbers(example, Parameters())
+    form, _, _ = taylor.equation_numbers(example, Parameters())
     angles, rates = taylor.state_symbols(form)
     rows = hamilton.momenta(angles, rates, form, heyoka().sin, heyoka().cos)
     return _compiled_rows(example, rows, [*angles, *rates])
@@ -114,7 +118,7 @@ def _observables(example: Scene) -> Any:
     It takes a tenth of NumPy's time for the same formulas. `example`: a scene of the structure.
     """
     engine, parameters = heyoka(), Parameters()
-    form, loads = taylor.equation_numbers(example, parameters)
+    form, loads, _ = taylor.equation_numbers(example, parameters)
     points = _tip_numbers(example, parameters)
     angles, momenta = taylor.state_symbols(form)
     rates = hamilton.rates(angles, momenta, form, engine.sin, engine.cos)
@@ -286,7 +290,10 @@ class _Group:
             kinetic[places], potential[places] = observed[rows], observed[rows + 1]
             has_work = len(states) > 2 * count
             for i, place in enumerate(places):
-                work[place] = states[2 * count, i] if has_work else constant_work(scenes[i], angles[place])
+                if has_work:
+                    work[place] = states[2 * count, i] * work_unit(scenes[i])
+                else:
+                    work[place] = constant_work(scenes[i], angles[place])
         samples = states.shape[2] - np.isnan(states[0]).sum(axis=1)
         for i, integration, n in zip(places, integrations, samples.tolist(), strict=True):
             block.end(i, integration, n)

@@ -227,7 +227,7 @@ def load_conditioning(scene: Scene, times: Array, angles: Array, rates: Array) -
     times, angles, rates : (n,) s, and (n, 1 + blades) rad and rad/s.
     """
     form, moving = rotor_form(scene), scene.moving_coordinates
-    applied = load_values(list(values_before(scene.load_segments, times)))
+    applied = load_values(list(values_before(scene.load_segments, times)), scene.moving_coordinates[1:])
     with np.errstate(all="ignore"):
         accelerations = closed_form.accelerations(
             list(angles[:, moving].T), list(rates[:, moving].T), form, applied, np.sin, np.cos

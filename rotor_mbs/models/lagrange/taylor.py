@@ -16,6 +16,7 @@ from rotor_mbs.models import equation_items
 from rotor_mbs.models.lagrange import closed_form, hamilton, samples
 from rotor_mbs.models.lagrange.closed_form import LoadValues, load_values
 from rotor_mbs.models.lagrange.heyoka_adapter import Parameters, array_of, failure, heyoka
+from rotor_mbs.models.lagrange.ode_solvers import work_unit
 from rotor_mbs.models.lagrange.parameters import RotorForm, changing_loads, changing_rests, rotor_form
 from rotor_mbs.models.lagrange.samples import Advance, at_constant_rests, over_segments
 from rotor_mbs.scenario.scene import Scene
@@ -28,11 +29,11 @@ _UNROLLED_BLADES = 4
 
 def build_system(scene: Scene, *, in_momenta: bool = False) -> tuple[list[tuple[Any, Any]], Parameters]:
     """First-order equations [(symbol, right-hand side)] in heyoka's symbols, of angles, rates (or momenta), and the
-    work where it is integrated; and their parameters, the last of which are offset and slope of each of
-    `changing_loads`. Raises MethodRefusal where heyoka is not installed."""
+    work (in `work_unit`) where it is integrated; and their parameters, the last of which are offset and slope of each
+    of `changing_loads`. Raises MethodRefusal where heyoka is not installed."""
     engine = heyoka()
     parameters = Parameters()
-    form, loads = equation_numbers(scene, parameters)
+    form, loads, work_per_joule = equation_numbers(scene, parameters)
     angles, others = state_symbols(form)
     if in_momenta:
         rates = hamilton.rates(angles, others, form, engine.sin, engine.cos)
@@ -43,7 +44,8 @@ def build_system(scene: Scene, *, in_momenta: bool = False) -> tuple[list[tuple[
     equations = [*zip(angles, rates, strict=True), *zip(others, derivatives, strict=True)]
     if scene.work_needs_path:
         working = at_constant_rests(changing_rests(scene), loads)
-        equations.append((engine.make_vars("work"), closed_form.power(rates, form, working)))
+        power = closed_form.power(rates, form, working)
+        equations.append((engine.make_vars("work"), work_per_joule * power))
     return equations, parameters
 
 
@@ -54,15 +56,21 @@ def state_symbols(form: RotorForm) -> tuple[list[Any], list[Any]]:
     return symbols[:count], symbols[count:]
 
 
-def equation_numbers(scene: Scene, parameters: Parameters) -> tuple[RotorForm, LoadValues]:
-    """Form and loads; takes the scene's numbers into `parameters`, in the order that integrators have them."""
+def equation_numbers(scene: Scene, parameters: Parameters) -> tuple[RotorForm, LoadValues, Any]:
+    """Return form, loads, and 1 / `work_unit` (0 where the work is no variable).
+
+    Takes the scene's numbers into `parameters`, in the order that integrators have them.
+    """
     form = rotor_form(scene, parameters)
+    # The engine's step control is relative to the largest variable. In J the work would be that by far, and set the
+    # accuracy of all others.
+    work_per_joule = parameters.own(1 / Fraction(work_unit(scene))) if scene.work_needs_path else 0.0
     linear_loads, changing = scene.load_segments[0].linear_loads, changing_loads(scene)
     values = [0.0 if i in changing else parameters(offset) for i, (offset, _) in enumerate(linear_loads)]
     for i in changing:
         offset, slope = linear_loads[i]
         values[i] = parameters.own(offset) + parameters.own(slope) * heyoka().time
-    return form, load_values(values, scene.moving_coordinates[1:])
+    return form, load_values(values, scene.moving_coordinates[1:]), work_per_joule
 
 
 _compiled: dict[tuple[object, ...], Any] = {}
@@ -165,7 +173,10 @@ class Propagation:
         return Advance(states[1 : 1 + len(times)], integrator.state, steps, None, message)
 
     def observe(self) -> Trajectory:
-        return samples.trajectory(self._scene, self.times, self.states.astype(float, copy=False))
+        states = self.states.astype(float)
+        if self._scene.work_needs_path and states.shape[1] > 2 * len(self._scene.moving_coordinates):
+            states[:, -1] *= work_unit(self._scene)
+        return samples.trajectory(self._scene, self.times, states)
 
 
 def items(scene: Scene) -> list[BuiltItem]:
