@@ -238,7 +238,7 @@ def _checks_of_defects(run: RunSamples, bounds: Bounds) -> Iterator[Check]:
     allowed = defect_allowed(metrics, bound)
     fault = f"defect {metrics['defect_excess']:.1e} rad in the interval up to t = {metrics['defect_time']:.6g} s"
     fault += f", allowed {allowed:.1e}"
-    if metrics["defect_judged"] < metrics["defect_excess"]:
+    if allowed > 1.05 * bound:
         fault += f" ({bound:.0e} rad per 0.01 s, times length and error growth)"
     error = max(metrics.get("angle_error_max", 0.0), metrics.get("angle_error_predicted", 0.0))
     if error > OK_ERROR:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from html import escape
@@ -10,19 +9,23 @@ from html import escape
 from rotor_mbs.analysis.work_precision import TARGETS_RAD, left_out, points, time_to_reach
 from rotor_mbs.methods.catalogue import REFERENCE, is_corrected
 from rotor_mbs.runs.read import Record, StoredRun, StoredScene
-from rotor_mbs.solution.status import GOOD
+from rotor_mbs.solution.status import GOOD, comparison, short_number
 
-RUN_HEAD = ("method", "status", "largest defect (rad)", "error (rad), limit 0.01", "energy drift", "time (s)")
+RUN_HEAD = (
+    "method", "status", "defect (rad)", "allowed", "error (rad), limit 0.01", "compared", "energy drift", "time (s)",
+)  # fmt: skip
 _MOST_ROWS = 40  # of a table with a row for each run
 
 
 def run_row(run: StoredRun) -> tuple[str, ...]:
     """Cells under RUN_HEAD."""
     facts = run.attributes
-    error = "" if run.method == REFERENCE else _short(facts.get("angle_error_max"))  # none against itself
+    shown = comparison(facts, float(run.scales["time"][-1]))
+    if run.method == REFERENCE:  # not compared with itself
+        shown = shown._replace(error="", compared="")
     seconds = facts.get("run_time_s")  # none where the process was ended
     time = "read" if run.is_frozen else "" if seconds is None else f"{seconds:.3g}"
-    return run.method, run.status, _short(facts.get("defect_max")), error, _short(facts.get("energy_drift_max")), time
+    return run.method, run.status, *shown, short_number(facts.get("energy_drift_max")), time
 
 
 def table_of_runs(scenes: Mapping[str, StoredScene], wanted: Mapping[str, Iterable[str]]) -> TextTable:
@@ -52,7 +55,7 @@ def method_table(runs: Iterable[StoredRun]) -> TextTable:
         numbers = []
         for name in ("defect_max", "angle_error_max", "energy_drift_max"):
             known = [float(run.attributes[name]) for run in ended_well if name in run.attributes]
-            numbers.append(_short(max(known, default=None)))
+            numbers.append(short_number(max(known, default=None)))
         seconds = [run.attributes["run_time_s"] for run in own if "run_time_s" in run.attributes]
         rows.append((method, count, *numbers, f"{max(seconds):.3g}" if seconds else ""))
     return TextTable(head, rows)
@@ -66,16 +69,12 @@ def bench_table(curves: Sequence[Record]) -> TextTable:
         errors, seconds = points(curve)
         times = [time_to_reach(errors, seconds, target) for target in TARGETS_RAD]
         count = f"{curve.statuses.count('ok')} of {len(curve.statuses)}"
-        best = _short(float(errors.min())) if len(errors) else ""
+        best = short_number(float(errors.min())) if len(errors) else ""
         missing = "not measured" if left_out(curve) else ""
         rows.append((curve.scene, curve.name, count, best, *(missing if t is None else f"{t:.2e}" for t in times)))
     return TextTable(
         ("scene", "method", "ok", "best error (rad)", *(f"s to {target:.0e} rad" for target in TARGETS_RAD)), rows
     )
-
-
-def _short(value: object) -> str:
-    return f"{value:.1e}" if isinstance(value, float) and math.isfinite(value) else ""
 
 
 @dataclass(frozen=True)

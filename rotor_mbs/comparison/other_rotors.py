@@ -19,6 +19,7 @@ from rotor_mbs.models.printed.derivation import Errata
 from rotor_mbs.models.printed.methods import equations, point_mass_rotor
 from rotor_mbs.scenario.catalogue import find_scenes, list_scenes
 from rotor_mbs.scenario.scene import Blade, Scene, scene_fields
+from rotor_mbs.scenario.time_table import LoadTable
 from rotor_mbs.solution.trajectory import Array
 
 _GRAVITIES = (9.8, 9.80665, 9.81, 9.82, 10.0, 0.0)
@@ -40,6 +41,8 @@ _FORGOTTEN = {
     "shaft_damping": "the damper of the shaft",
     "hub_inertia": "the hub's inertia",
 }
+# Factors of terms in the equations of motion that are easily wrong.
+_FACTORS = {"without": 0.0, "half of": 0.5, "twice": 2.0, "opposite sign of": -1.0}
 # E3 is the power of a term that is zero without E2.
 _ERRATA = ("E1", "E2", "E1 and E2", "E2 and E3", "E1 and E2 and E3")
 
@@ -89,7 +92,9 @@ def rotor_hypotheses(scene: Scene) -> Iterator[Hypothesis[RotorModel]]:
     for text, azimuths in _other_azimuths(scene):
         yield Hypothesis(text, RotorModel(scene, azimuths))
     for terms, reduced in REDUCED_EQUATIONS.items():
-        yield Hypothesis(f"without the {terms}", RotorModel(scene, equations=reduced))
+        for text, factor in _FACTORS.items():
+            scaled = _with_factor(factor, reduced) if factor else reduced
+            yield Hypothesis(f"{text} the {terms}", RotorModel(scene, equations=scaled))
     text = "small-angle approximation: sin x = x, cos x = 1"
     yield Hypothesis(text, RotorModel(scene, equations=_small_angles))
     for names in _ERRATA:
@@ -124,6 +129,17 @@ def _small_angles(angles: Any, rates: Any, form: Any, loads: Any, *_: Any) -> li
     return closed_form.accelerations(
         angles, rates, form, loads, lambda x: x, lambda x: 1.0 + 0.0 * x
     )
+
+
+def _with_factor(factor: float, reduced: Accelerations) -> Accelerations:
+    """Return the closed form's equations with the terms that reduced ones lack times a factor."""
+
+    def equations(*arguments: Any) -> list[Any]:
+        whole, without = closed_form.accelerations(*arguments), reduced(*arguments)
+        # Linear in these terms, as in the reduced equations themselves.
+        return [factor * a + (1.0 - factor) * b for a, b in zip(whole, without, strict=True)]
+
+    return equations
 
 
 def _printed(
@@ -162,9 +178,36 @@ def _other_scenes(scene: Scene) -> Iterator[tuple[str, Scene]]:
     yield from _exchanged_bearings(scene)
     for field, text in _FORGOTTEN.items():
         yield f"without {text}", _scaled_at(scene, [(field,)], -1.0)
+    if any(scene.bearing_stiffness):
+        unloaded = replace(scene, bearing_rest=())
+        yield "rest angles of the springs ignored: taken as 0", unloaded
+    count = len(scene.blades)
+    if count > 1:
+        hubs = replace(scene, hub_inertia=count * scene.hub_inertia)
+        yield "the hub's inertia once for each blade", hubs
+    yield "ramps of loads held at their value at the start", _with_held_ramps(scene)
     for degrees, angle in _QUARTERS.items():
         turned = _pitch_turned(scene, range(len(scene.blades)), angle)
         yield f"pitch angles from another zero: {degrees} degrees where they are 0", turned
+
+
+def _with_held_ramps(scene: Scene) -> Scene:
+    """Return a scene whose loads keep, between two rows of a table, the value of the first."""
+    return replace(
+        scene,
+        rotor_torque=_held(scene.rotor_torque),
+        pitch_torque=tuple(_held(table) for table in scene.pitch_torque),
+        bearing_rest=tuple(_held(table) for table in scene.bearing_rest),
+    )
+
+
+def _held(table: LoadTable) -> LoadTable:
+    """Return a load that keeps, between two rows of its table, the value of the first."""
+    held: list[tuple[float, float]] = []
+    for (start, value), (end, _) in itertools.pairwise(table):
+        if start < end:
+            held += [(start, value), (end, value)]
+    return (*held, *table[-1:])
 
 
 def _single_blades(scene: Scene) -> range:
@@ -178,8 +221,11 @@ def _other_blades(scene: Scene) -> Iterator[tuple[str, Scene]]:
         "blade mass on the pitch axis": _with_mass_on_axis,
         "blades without inertia, as point masses": _without_inertia,
         "products of inertia with opposite sign": _with_opposite_products,
+        "products of inertia about the root with opposite sign": _with_opposite_root_products,
         "tip used as centre of mass": lambda blade: replace(blade, centre_of_mass=blade.tip),
         "inertia about the root used as inertia about the centre of mass": _with_steiner,
+        "inertia about the centre of mass used as inertia about the root: "
+        "without Steiner's share": _without_steiner,
     }
     blades = scene.blades
     for text, change in changes.items():
@@ -230,9 +276,26 @@ def _with_opposite_products(blade: Blade) -> Blade:
     return replace(blade, inertia=_inertia([*blade.inertia[:3], *products]))
 
 
+def _with_opposite_root_products(blade: Blade) -> Blade:
+    """Return a blade whose products of inertia about its root have the other sign."""
+    # Those of its mass among them, which come back when the tensor is moved to the root.
+    inertia = [*blade.inertia[:3]]
+    for own, about_root in zip(blade.inertia[3:], blade.inertia_about_apex()[3:], strict=True):
+        inertia.append(own - 2.0 * about_root)
+    return replace(blade, inertia=_inertia(inertia))
+
+
 def _with_steiner(blade: Blade) -> Blade:
     """Return a blade as if its inertia were about the centre of mass: Steiner's share twice."""
     return replace(blade, inertia=_inertia(blade.inertia_about_apex()))
+
+
+def _without_steiner(blade: Blade) -> Blade:
+    """Return a blade whose inertia about the root is what it has about the centre of mass."""
+    inertia = []
+    for own, about_root in zip(blade.inertia, blade.inertia_about_apex(), strict=True):
+        inertia.append(2.0 * own - about_root)
+    return replace(blade, inertia=_inertia(inertia))
 
 
 def _inertia(values: Sequence[float]) -> tuple[float, float, float, float, float, float]:
@@ -247,6 +310,9 @@ def _other_azimuths(scene: Scene) -> Iterator[tuple[str, tuple[float, ...]]]:
         yield "all blades at the azimuth of blade 1", (0.0,) * count
         in_degrees = tuple(math.degrees(phase) for phase in right)
         yield "azimuths of the blades in degrees taken as rad", in_degrees
+        if count != 3:
+            of_three = tuple(math.radians(120.0 * i) for i in range(count))
+            yield "blades at multiples of 120 degrees", of_three
     if count > 2:
         yield "blades numbered in the opposite sense", (right[0], *right[:0:-1])
     for i in range(count if 2 < count <= _MAX_BLADES else 0):
@@ -313,6 +379,9 @@ def _blade_parameters(scene: Scene, chosen: list[int], number: str) -> Iterator[
     if any(scene.bearing_stiffness):
         rest = functools.partial(_rest_moved, chosen)
         yield Parameter(f"bearing.rest{number}", "rad", rest)
+    if any(scene.bearing_damping) and not number:
+        text = "share of the rotor's rate that the bearings' dampers see"
+        yield Parameter(text, "of it", _damped_by_rotor)
     which = f"blade {chosen[0] + 1}" if len(chosen) == 1 else "all blades"
     azimuth = functools.partial(_azimuth_moved, chosen)
     yield Parameter(f"azimuth of {which}", "rad", azimuth)
@@ -335,6 +404,19 @@ def _azimuth_moved(chosen: Sequence[int], model: RotorModel, change: float) -> R
     for blade in chosen:
         azimuths[blade] += change
     return replace(model, azimuths=tuple(azimuths))
+
+
+def _damped_by_rotor(model: RotorModel, change: float) -> RotorModel:
+    """Let the bearings' dampers see a share of the rotor's rate beside that of the pitch."""
+
+    def equations(angles: Any, rates: Any, form: Any, loads: Any, *functions: Any) -> list[Any]:
+        pitches = list(loads.pitches or [0.0] * len(form.blades))
+        for i, blade in enumerate(form.blades):
+            pitches[i] = pitches[i] - change * blade.damping * rates[0]
+        damped = replace(loads, pitches=pitches)
+        return closed_form.accelerations(angles, rates, form, damped, *functions)
+
+    return replace(model, equations=equations)
 
 
 def _rest_moved(chosen: Sequence[int], model: RotorModel, change: float) -> RotorModel:

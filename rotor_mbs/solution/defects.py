@@ -22,10 +22,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from rotor_mbs.solution.status import OK_ERROR as OK_ERROR
 from rotor_mbs.solution.trajectory import Array, Trajectory
 
-# rad: the largest error of an angle, up to the horizon, and the largest defect beyond rounding, of a run that is ok.
-OK_ERROR = 0.01
 # What the rounding of a run's own numbers makes of a defect, as it is estimated, may be this many times larger.
 FLOOR_SAFETY = 3.0
 # s, the interval for which bounds are given: in n of them the errors of a method add up, each grown by at most G.

@@ -3,6 +3,10 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Mapping
+from typing import Any, NamedTuple
+
 # Those that a run's state can have ("unchecked": complete, with nothing to judge it by; "completed": the printed
 # equations at their end, of which nothing is claimed), a point of which no run was made, and a run whose process died.
 # Codes are places in this list: new ones go to its end.
@@ -20,5 +24,45 @@ REFUSED = "refused"
 GOOD = ("ok", "completed")
 
 
+# rad: the largest error of an angle, up to the horizon, and the largest defect beyond rounding, of a run that is ok.
+OK_ERROR = 0.01
+
+
 def code_of(status: str) -> int:
     return STATUSES.index(status)
+
+
+class Comparison(NamedTuple):
+    """What a status follows from, as texts for a table; "" for what a run does not have.
+
+    defect, allowed : rad, the defect furthest beyond rounding and what is allowed in its interval, or "rounding".
+    error : rad, the largest angle error up to the horizon; predicted from the defects without a reference.
+    compared : until when, of which duration.
+    """
+
+    defect: str
+    allowed: str
+    error: str
+    compared: str
+
+
+def comparison(metrics: Mapping[str, Any], duration: float) -> Comparison:
+    """Return what a status follows from, from the metrics of a run of `duration` seconds."""
+    excess, allowed = metrics.get("defect_excess"), metrics.get("defect_allowed")
+    defect = excess or metrics.get("defect_max")
+    of_bound = "" if allowed is None else "rounding" if excess == 0.0 else short_number(allowed)
+    error = short_number(metrics.get("angle_error_max"))
+    if not error and (predicted := short_number(metrics.get("angle_error_predicted"))):
+        error = f"{predicted} predicted"
+    horizon = metrics.get("horizon_s")
+    compared = "" if horizon is None or not error else f"{_seconds(horizon)} of {_seconds(duration)} s"
+    return Comparison(short_number(defect), of_bound, error, compared)
+
+
+def _seconds(time: float) -> str:
+    return f"{time:.3g}" if time < 1000.0 else f"{time:.0f}"
+
+
+def short_number(value: object) -> str:
+    """Return a number with two digits; "" for None and what is not finite."""
+    return f"{value:.1e}" if isinstance(value, float) and math.isfinite(value) else ""

@@ -26,6 +26,7 @@ from rotor_mbs.solution.quantities import (
 from rotor_mbs.solution.quantities import Array as Array  # with the samples, for the models
 from rotor_mbs.solution.quantities import arrays as all_arrays
 from rotor_mbs.solution.quantities import sample_times as sample_times
+from rotor_mbs.solution.status import OK_ERROR, comparison
 
 
 class Trajectory:
@@ -266,10 +267,14 @@ class Solution:
     def _summary(self) -> dict[str, str]:
         last = float(self.time[-1]) if len(self.time) else self.integration.time_reached
         reached = f"{last:g} s of {self.scene.duration:g} s, {len(self.time)} samples"
+        shown = comparison(self.metrics, self.scene.duration)
+        error = f"{shown.error}, limit {OK_ERROR:g}, compared to {shown.compared}" if shown.error else ""
         rows = {
             "method": self.method,
             "status": self.status or "not assessed",
             "message": self.message,
+            "defect (rad)": f"{shown.defect}, allowed {shown.allowed}" if shown.allowed else "",
+            "angle error (rad)": error,
             "reached": reached,
             "steps": "" if self.integration.steps is None else str(self.integration.steps),
             "run time": f"{float(np.median(self.run_times_s)):.3g} s" if self.run_times_s else "",

@@ -160,7 +160,8 @@ def test_the_command_prints_a_table_and_writes_what_a_script_reads() -> None:
     assert "lagrange/taylor  determinism   paper/fig11" in ended.out
     checks = json.loads(Path("t.json").read_text())
     assert {check["check"] for check in checks} == {
-        "samples", "defect", "energy", "determinism", "builds", "exact", "mirror image", "renumbered", "time limit"
+        "samples", "times", "start", "defect", "energy", "impulse", "tip", "energies", "loads", "determinism",
+        "builds", "exact", "mirror image", "renumbered", "time limit",
     }  # fmt: skip
     assert b'<testsuites name="rotor-mbs check" tests=' in Path("t.xml").read_bytes()
     assert rotor_mbs("test-method", "./none.py").status == 2
