@@ -113,17 +113,17 @@ class DefectSearch:
         alike = closest(explained, factor, _QUICK)
         return [explanation.text for explanation in alike[:_MAX_NAMED]]
 
-    def textbook_cause(self) -> str:
-        """Find the mistake in equations, else in numbers, that explains the defects.
+    def textbook_causes(self) -> list[str]:
+        """Find the mistakes in equations, else in numbers, that explain the defects.
 
         Returns
         -------
-        str
-            The mistake, which leaves at most a thousandth of them in the mean, while all others
-            leave more than ten times as much; "" where there is none, or several are alike.
+        list of str
+            The best, which leaves at most a thousandth of them in the mean, and all that leave at
+            most ten times as much: of one that is alone it is certain that it is the cause.
         """
         if self._steps is None or self._judged.is_rounding:
-            return ""
+            return []
 
         def left(model: RotorModel) -> float:
             return self._share(self._residual(model, _FINE))
@@ -134,10 +134,10 @@ class DefectSearch:
         if not _least(explained) <= _LEFT:
             explained = self._parameter_sets()
         if not _least(explained) <= _LEFT:
-            return ""
+            return []
         # What the quick steps leave of the right one is not told from nothing.
         alike = closest(explained, _CERTAIN, 0.1 * _QUICK)
-        return alike[0].text if len(alike) == 1 else ""
+        return [explanation.text for explanation in alike]
 
     def scenes(self) -> list[str]:
         """Search for scenes of the catalogue that start as the data do and explain the defects."""

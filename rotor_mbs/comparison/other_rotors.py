@@ -19,7 +19,7 @@ from rotor_mbs.models.printed.derivation import Errata
 from rotor_mbs.models.printed.methods import equations, point_mass_rotor
 from rotor_mbs.scenario.catalogue import find_scenes, list_scenes
 from rotor_mbs.scenario.scene import Blade, Scene, scene_fields
-from rotor_mbs.scenario.time_table import LoadTable
+from rotor_mbs.scenario.time_table import LoadTable, value_at
 from rotor_mbs.solution.trajectory import Array
 
 _GRAVITIES = (9.8, 9.80665, 9.81, 9.82, 10.0, 0.0)
@@ -185,29 +185,32 @@ def _other_scenes(scene: Scene) -> Iterator[tuple[str, Scene]]:
     if count > 1:
         hubs = replace(scene, hub_inertia=count * scene.hub_inertia)
         yield "the hub's inertia once for each blade", hubs
-    yield "ramps of loads held at their value at the start", _with_held_ramps(scene)
+    if not scene.has_constant_loads:
+        yield "ramps of loads held at their value at the start", _with_held_ramps(scene)
     for degrees, angle in _QUARTERS.items():
         turned = _pitch_turned(scene, range(len(scene.blades)), angle)
         yield f"pitch angles from another zero: {degrees} degrees where they are 0", turned
 
 
 def _with_held_ramps(scene: Scene) -> Scene:
-    """Return a scene whose loads keep, between two rows of a table, the value of the first."""
+    """Return a scene whose loads keep, from each kink of any of them to the next, one value."""
+    # An engine that asks for the loads once for each segment gets those of all at the kinks of any.
+    times = [0.0, *scene.kink_times, scene.duration]
     return replace(
         scene,
-        rotor_torque=_held(scene.rotor_torque),
-        pitch_torque=tuple(_held(table) for table in scene.pitch_torque),
-        bearing_rest=tuple(_held(table) for table in scene.bearing_rest),
+        rotor_torque=_held(scene.rotor_torque, times),
+        pitch_torque=tuple(_held(table, times) for table in scene.pitch_torque),
+        bearing_rest=tuple(_held(table, times) for table in scene.bearing_rest),
     )
 
 
-def _held(table: LoadTable) -> LoadTable:
-    """Return a load that keeps, between two rows of its table, the value of the first."""
+def _held(table: LoadTable, times: Sequence[float]) -> LoadTable:
+    """Return a load that keeps, from each of some times (s) to the next, its value at the first."""
     held: list[tuple[float, float]] = []
-    for (start, value), (end, _) in itertools.pairwise(table):
-        if start < end:
-            held += [(start, value), (end, value)]
-    return (*held, *table[-1:])
+    for start, end in itertools.pairwise(times):
+        value = value_at(table, start)
+        held += [(start, value), (end, value)]
+    return tuple(held) if table else ()
 
 
 def _single_blades(scene: Scene) -> range:

@@ -224,7 +224,10 @@ class _Examination:
             return lag
         try:
             judged = judged_defects(scene, defects, self._bound)
-            return DefectSearch(judged).textbook_cause() or " and ".join(faults_in_time(judged)) or NOT_FOUND
+            alike = DefectSearch(judged).textbook_causes()
+            if len(alike) > 1:  # this motion does not tell which
+                return f"{NOT_FOUND}: explained alike by: {'; '.join(alike)}"
+            return (alike or [" and ".join(faults_in_time(judged))])[0] or NOT_FOUND
         except RotorError:
             return NOT_FOUND
 
