@@ -216,7 +216,7 @@ class _Examination:
             finer = self._ask(scene, {"step": 0.5 * step})
             half = defects_of(scene, finer.trajectory) if len(finer.time) == len(run.time) else None
             if half is not None:
-                order = float(np.log2(_rms(defects) / _rms(half)))
+                order = float(np.log2(root_mean_square(defects) / root_mean_square(half)))
                 if order >= (self._method.order or 1.0) - _ORDER_BAND:
                     left = float(half.sizes.max())
                     return f"step of {step:g} s too large: half the step gives {left:.1e} rad, order {order:.1f}"
@@ -276,7 +276,7 @@ class _Examination:
             run = self._ask(scene, settings).trajectory
             if len(run.time) == scene.samples and (defects := defects_of(scene, run)) is not None:
                 steps.append(step)
-                sizes.append(_rms(defects))
+                sizes.append(root_mean_square(defects))
         order = fitted_order(np.array(steps), np.array(sizes)) if steps else None
         if order is not None:
             claimed = self._method.order
@@ -291,7 +291,7 @@ class _Examination:
         self._add("time limit", scene.name, float(solution.status == "worker_died"), 0.0, hint)
 
 
-def _rms(defects: Defects) -> float:
+def root_mean_square(defects: Defects) -> float:
     """Return the root mean square of the defects over the intervals, rad, above zero."""
     return max(float(np.sqrt(np.mean(np.square(defects.sizes)))), float(np.finfo(float).tiny))
 
@@ -302,7 +302,7 @@ def _lag_of_rates(scene: Scene, run: Trajectory, defects: Defects) -> str:
     for text, (of_angles, of_rates) in rows.items():
         moved = Trajectory(run.time[of_angles], run.angles[of_angles], run.rates[of_rates])
         shifted = defects_of(scene, moved)
-        if shifted is not None and _rms(shifted) <= _LEFT * _rms(defects):
+        if shifted is not None and root_mean_square(shifted) <= _LEFT * root_mean_square(defects):
             return f"rates are a row {text}"
     return ""
 
