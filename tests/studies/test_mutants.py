@@ -68,7 +68,7 @@ EXPLAINED = {
     r"judgement\.smallest_rotor_inertia_share .*65 -> 66": "points of a search along the way to the next sample",
     r"judgement\._status .*_GROWN ": "an order of magnitude, for a message",
     r"checks\._MOST_INTERVALS ": "how many peaks are looked at: their number decides how many a run may have",
-    r"schemes\.scheme .*(_NEWTON_SHARE .* scaled|1e-10 -> |40 -> |2\.0 -> )": (
+    r"schemes\.(scheme|newton_relative_tolerance) .*(_NEWTON_SHARE .* scaled|1e-10 -> |40 -> |2\.0 -> )": (
         "where Newton's method stops, below what is kept, and when it begins anew"
     ),
     r"schemes\.scheme .* 0 -> 1$": "extrapolation takes the implicit solver whatever the scheme's stages are",

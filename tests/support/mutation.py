@@ -117,6 +117,7 @@ _TARGETS = (
     Target("rotor_mbs.scenario.time_table",
            "value_at values_at constant_value kink_times torque_place rest_place values at segments values_before",
            "lagrange", _TIME_TABLE),
+    Target("rotor_mbs.scenario.scene", "inertia_about_apex", "tests alone", ("scenario/test_scene_files.py",)),
     Target("rotor_mbs.scenario.time_table", "intervals steps_and_rows", "tree", _TIME_TABLE),
     Target(f"{_L}.samples", "trajectory _energies constant_work", "lagrange", _SAMPLES),
     Target(f"{_P}.literal", "*", "printed",

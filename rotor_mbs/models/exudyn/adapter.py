@@ -81,7 +81,8 @@ class System:
 
     def rows(self, sensor: str) -> Array:
         """Return the rows that a sensor kept in the last integration, (n, 1 + k): time in s, then its k values."""
-        stored = np.array(self._mbs.GetSensorStoredData(self._numbers[Ref("sensor", sensor)]), dtype=float, ndmin=2)
+        number = self._numbers[Ref("sensor", sensor)]
+        stored = np.array(self._mbs.GetSensorStoredData(number), dtype=float, ndmin=2)
         if sensor in self._initial_values:
             stored[0, 1:] = self._initial_values[sensor]
         return stored
@@ -184,6 +185,7 @@ class System:
             total.time_reached = max(interval.start, it.currentTime - it.currentStepSize) if failure else interval.end
             if failure:
                 break
+            # The next interval starts where this one ended.
             data.SetSystemState(data.GetSystemState(), _engine.ConfigurationType.Initial)
             # The engine would cut a longer step itself, with another rounding.
             integration.initialStepSize = min(it.currentStepSize, interval.end - interval.start)
@@ -276,6 +278,7 @@ class System:
         self._set(values, turns, _engine.ConfigurationType.Initial)
 
     def _set(self, values: Array, turns: Array, where: Any) -> None:
+        """Set a state as one of the engine's configurations."""
         data = self._mbs.systemData
         n = data.ODE2Size()
         data.SetODE2Coordinates(values[:n], where)
@@ -296,10 +299,11 @@ class System:
         data.SetTime(time, current)
         self._set(values, turns, current)
         data.SetAECoordinates(values[3 * data.ODE2Size() :], current)
-        return {
-            name: np.array(self._mbs.GetSensorValues(self._numbers[Ref("sensor", name)]), dtype=float, ndmin=1)
-            for name in self.sensors
-        }
+        readings = {}
+        for name in self.sensors:
+            number = self._numbers[Ref("sensor", name)]
+            readings[name] = np.array(self._mbs.GetSensorValues(number), dtype=float, ndmin=1)
+        return readings
 
     def _solve(self, solver: Any, settings: Any, stages: int, total: Integration) -> str:
         """Run the solver from start to end time, its work counted in `total`; why it failed, or "". stages: evaluations
@@ -350,7 +354,8 @@ def _settings(scheme: Scheme, coordinates: int, constraints: int) -> Any:
     integration.adaptiveStep = False
     for path, value in scheme.options.items():
         group, _, name = path.rpartition(".")
-        setattr(attrgetter(group)(integration) if group else integration, name, value)
+        place = attrgetter(group)(integration) if group else integration
+        setattr(place, name, value)
     kind = linear_solver(coordinates, constraints)
     settings.linearSolver.solverType = getattr(_engine.LinearSolverType, kind)
     if not constraints and coordinates >= _OLD_JACOBIAN_FROM:

@@ -64,6 +64,7 @@ def parts(scene: Scene, loads: Loads, node: str = "euler_parameters") -> list[Pa
     built = [Part("object", "ground", "ObjectGround")]
     for placed in (hub, *blades):
         built += _body(placed, node)
+        # The engine has no gravity of its own: it is a load on every body.
         if scene.gravity != 0.0 and placed.body.mass:
             mass = Part("marker", f"{placed.name} mass", "MarkerBodyMass", {"bodyNumber": Ref("object", placed.name)})
             weight = {"markerNumber": Ref("marker", mass.name), "loadVector": [0.0, 0.0, -scene.gravity]}
@@ -85,6 +86,7 @@ def parts(scene: Scene, loads: Loads, node: str = "euler_parameters") -> list[Pa
             load["loadVectorUserFunction"] = moment_on(scene, loads, 0).about_y
         detail = "constant" if scene.has_constant_torque else "over time"
         built.append(Part("load", "rotor torque", "LoadTorqueVector", load, detail))
+    # From these the joint angles and rates are found, which are no coordinates of the chain.
     bodies = [hub, *blades]
     for placed in bodies:
         name, of_node = placed.name, Ref("node", placed.name)

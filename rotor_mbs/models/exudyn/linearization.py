@@ -1,6 +1,9 @@
-"""The engine's models linearized by it, its one-sided quotients extrapolated. For joints it leaves out the geometric
-stiffness, by which constraint forces turn with the bodies: that is added from its constraint Jacobian beside the state.
-(Without it the chain's frequencies under gravity are wrong by several percent.)"""
+"""The engine's models linearized by it, its one-sided quotients extrapolated.
+
+For joints the engine leaves out the geometric stiffness, by which constraint forces turn with the bodies: that is added
+from its constraint Jacobian beside the state. Without it the chain's frequencies under gravity are wrong by several
+percent.
+"""
 
 from __future__ import annotations
 
@@ -21,8 +24,20 @@ _STEPS = tuple(1e-3 * 2.0**k for k in range(6))
 
 
 def linearize_tree(scene: Scene, angles: Sequence[float] | Array, speed: float, torque: float) -> Linearization:
-    """The tree about `angles` (1 + blades,) rad, its rotor turning at `speed` rad/s under `torque` N m. Raises
-    MethodRefusal where the engine does not take the scene."""
+    """Linearize the tree.
+
+    Parameters
+    ----------
+    scene : the rotor.
+    angles : (1 + blades,) rad.
+    speed : rad/s, of the rotor.
+    torque : N m, on the rotor.
+
+    Raises
+    ------
+    MethodRefusal
+        Where the engine does not take the scene.
+    """
     state = scene_at(scene, angles, speed, torque)
     system = System(tree.parts(state, Loads(state)))
     linear = _extrapolated(system.linearized)
@@ -31,14 +46,28 @@ def linearize_tree(scene: Scene, angles: Sequence[float] | Array, speed: float, 
 
 
 def linearize_chain(scene: Scene, angles: Sequence[float] | Array, speed: float, torque: float) -> Linearization:
-    """The chain at rest at `angles`: with N a basis of what the joints allow and λ their forces, its stiffness is Nᵀ (K
-    + ∂(C λ)/∂q) N. Raises MethodRefusal, also where the state is not at rest."""
+    """Linearize the chain at rest.
+
+    With N a basis of what the joints allow and λ their forces, its stiffness is Nᵀ (K + ∂(C λ)/∂q) N.
+
+    Parameters
+    ----------
+    scene : the rotor.
+    angles : (1 + blades,) rad.
+    speed, torque : 0 rad/s, 0 N m.
+
+    Raises
+    ------
+    MethodRefusal
+        Where the engine does not take the scene, or the state is not an equilibrium at rest.
+    """
     if speed or torque:
         raise MethodRefusal("exudyn_chain: can be linearized at rest only")
     state = scene_at(scene, angles, 0.0, 0.0)
     system = System(chain.parts(state, Loads(state), "euler_parameters"))
     linear = _extrapolated(system.linearized)
     force = system.forces()
+    # In equilibrium the forces on the bodies are those of the joints alone.
     multipliers = np.asarray(np.linalg.lstsq(linear.C, force, rcond=None)[0], dtype=np.float64)
     residual = np.abs(force - linear.C @ multipliers).max()
     if residual > 1e-7 * np.abs(force).max(initial=0.0) + 1e-12 * np.abs(linear.K).max():
@@ -48,15 +77,7 @@ def linearize_chain(scene: Scene, angles: Sequence[float] | Array, speed: float,
     rank = int(np.count_nonzero(singular_values > 1e-10 * singular_values[0]))
     N: Array = np.asarray(vectors[:, rank:])
     geometric = limit_at_zero([_geometric_stiffness(system, multipliers, N, step) for step in _STEPS], 2.0)
-    # Rates of the joint angles from those of the bodies' coordinates, positions and Euler parameters p; the angular
-    # velocity is 2 (e0 ė - ė0 e + e × ė).
-    bodies = chain.placed_bodies(state)
-    by_coordinates = np.zeros((len(bodies), 7 * len(bodies)))
-    for k, placed in enumerate(bodies):
-        p = quaternion(placed.about_shaft, placed.pitch)
-        spin = np.column_stack([-p[1:], p[0] * np.eye(3) + np.cross(p[1:], np.eye(3)).T])
-        by_coordinates[k, 7 * k + 3 : 7 * k + 7] = 2.0 * placed.axis @ spin
-    joint = by_coordinates @ N
+    joint = _joint_rates(chain.placed_bodies(state)) @ N
     mass = N.T @ linear.M @ N
 
     def in_joint_angles(matrix: Array) -> Array:
@@ -67,12 +88,35 @@ def linearize_chain(scene: Scene, angles: Sequence[float] | Array, speed: float,
     return Linearization(stiffness, damping, joint @ np.linalg.solve(mass, N.T @ force))
 
 
+def _joint_rates(bodies: Sequence[chain.Placed]) -> Array:
+    """Return the joints' rates as a linear function of the rates of all bodies' coordinates, (bodies, 7 bodies).
+
+    Coordinates are positions and Euler parameters (e0, e); the angular velocity is 2 (e0 ė - ė0 e + e × ė).
+    """
+    rows = np.zeros((len(bodies), 7 * len(bodies)))
+    for k, placed in enumerate(bodies):
+        p = quaternion(placed.about_shaft, placed.pitch)
+        spin = np.column_stack([-p[1:], p[0] * np.eye(3) + np.cross(p[1:], np.eye(3)).T])
+        rows[k, 7 * k + 3 : 7 * k + 7] = 2.0 * placed.axis @ spin
+    return rows
+
+
 def _extrapolated(linearized: Callable[[float], Linearized]) -> Linearized:
-    return Linearized(*(limit_at_zero(matrices, 2.0) for matrices in zip(*map(linearized, _STEPS), strict=True)))
+    """Return the limit of the engine's linearization for a step of 0."""
+    by_step = [linearized(step) for step in _STEPS]
+    return Linearized(*(limit_at_zero(matrices, 2.0) for matrices in zip(*by_step, strict=True)))
 
 
 def _geometric_stiffness(system: System, multipliers: Array, N: Array, step: float) -> Array:
-    """(n, free): difference quotients of C λ along each column of N."""
+    """Return ∂(C λ)/∂q N, (n, free): difference quotients along each column of N.
+
+    Parameters
+    ----------
+    system : at the state.
+    multipliers : (constraints,) λ.
+    N : (n, free).
+    step : rad, m.
+    """
     start = system.coordinates
     here = system.linearized(_STEPS[0]).C @ multipliers
     columns = []

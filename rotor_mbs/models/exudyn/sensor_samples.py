@@ -39,13 +39,16 @@ class _Reader:
         tables = {name: recorded(name) for name in state}
         time = next(iter(tables.values()))[:, 0]
         # Two intervals share the row they meet at.
-        is_distinct = np.diff(time) > 1e-9 * scene.duration / (scene.samples - 1)
+        spacing = scene.duration / (scene.samples - 1)
+        is_distinct = np.diff(time) > 1e-9 * spacing
         distinct = np.flatnonzero(np.concatenate([[True], is_distinct]))
-        self._rows = distinct[: finite_rows(*(table[distinct] for table in tables.values()))]
+        count = finite_rows(*(table[distinct] for table in tables.values()))
+        self._rows = distinct[:count]
         self._tables, self._recorded = tables, recorded
         self.time = time[self._rows]
         # The row of each sample, as far as they were reached without a gap.
-        wanted, slack = sample_times(scene), 1e-6 * scene.duration / (scene.samples - 1)
+        wanted = sample_times(scene)
+        slack = 1e-6 * spacing
         rows = np.searchsorted(self.time, wanted - slack)
         met = rows < len(self.time)
         met[met] = np.abs(self.time[rows[met]] - wanted[met]) <= slack
@@ -97,7 +100,8 @@ def chain_trajectory(scene: Scene, recorded: Callable[[str], Array], has_work: b
         centres.append(read.sampled(f"{name} position") - rotations @ body.com)
     hub, *blades = centres
     gaps = [hub, *(blade - hub for blade in blades)]
-    fields["constraint_error"] = np.asarray(np.max([np.linalg.norm(gap, axis=1) for gap in gaps], axis=0))
+    distances = [np.linalg.norm(gap, axis=1) for gap in gaps]
+    fields["constraint_error"] = np.asarray(np.max(distances, axis=0))
     if scene.wants("loads"):
         fields |= chain_loads(scene, read.sampled)
     return finite_samples(scene, fields)
@@ -105,13 +109,21 @@ def chain_trajectory(scene: Scene, recorded: Callable[[str], Array], has_work: b
 
 def _joint_motion(scene: Scene, read: _Reader) -> tuple[Array, Array]:
     """Return the chain's angles and rates in all rows, (rows, 1 + blades) rad and rad/s."""
-    hub, rates = matrices(read.all("hub rotation")), joint_rates(scene, read.all)
-    wrapped = np.arctan2(hub[:, 0, 2] - hub[:, 2, 0], hub[:, 0, 0] + hub[:, 2, 2])
+    hub = matrices(read.all("hub rotation"))
+    rates = joint_rates(scene, read.all)
+    # A turn about y has its sine and its cosine twice.
+    twice_sine = hub[:, 0, 2] - hub[:, 2, 0]
+    twice_cosine = hub[:, 0, 0] + hub[:, 2, 2]
+    wrapped = np.arctan2(twice_sine, twice_cosine)
     angles = [unwrap(read.time, wrapped, rates[:, 0], scene.initial_angles[0])]
     for column, i in enumerate(movable_blades(scene), start=1):
+        # Axes of the blade, and of its seat on the hub at a pitch of zero.
         x, y, _ = np.moveaxis(matrices(read.all(f"blade {i + 1} rotation")), 2, 0)
-        seat_x, seat_y = hub @ mounting(i, len(scene.blades))[:, 0], hub[:, :, 1]
-        wrapped = np.arctan2(_dot(seat_y, x) - _dot(seat_x, y), _dot(seat_x, x) + _dot(seat_y, y))
+        seat_x = hub @ mounting(i, len(scene.blades))[:, 0]
+        seat_y = hub[:, :, 1]
+        twice_sine = _dot(seat_y, x) - _dot(seat_x, y)
+        twice_cosine = _dot(seat_x, x) + _dot(seat_y, y)
+        wrapped = np.arctan2(twice_sine, twice_cosine)
         angles.append(unwrap(read.time, wrapped, rates[:, column], scene.initial_angles[1 + i]))
     return all_coordinates(scene, np.stack(angles, axis=1), rates)
 
@@ -124,7 +136,8 @@ def joint_rates(scene: Scene, values: Callable[[str], Array]) -> Array:
     scene : the rotor.
     values : the (n, k) values of a sensor by its name.
     """
-    hub, hub_spin = matrices(values("hub rotation")), values("hub spin")
+    hub = matrices(values("hub rotation"))
+    hub_spin = values("hub spin")
     hub_omega = (hub @ hub_spin[:, :, None])[:, :, 0]
     rates = [hub_spin[:, 1]]
     for i in movable_blades(scene):
@@ -192,7 +205,8 @@ def unwrap(time: Array, wrapped: Array, rates: Array, start: float) -> Array:
     turn = 2.0 * np.pi
     predicted = 0.5 * np.diff(time) * (rates[1:] + rates[:-1])
     gained = np.round((predicted - np.diff(wrapped)) / turn)
-    turns = np.round((start - wrapped[0]) / turn) + np.concatenate([[0.0], np.cumsum(gained)])
+    first_turns = np.round((start - wrapped[0]) / turn)
+    turns = first_turns + np.concatenate([[0.0], np.cumsum(gained)])
     return np.asarray(wrapped + turn * turns)
 
 
@@ -214,7 +228,8 @@ def springs(scene: Scene, angles: Array) -> tuple[Array, Array]:
     """
     energy, of_rests = np.zeros((2, len(angles)))
     for i in movable_blades(scene):
-        stiffness, table = scene.bearings[i][0], scene.pitch_loads[i][1]
+        stiffness, _ = scene.bearings[i]
+        _, table = scene.pitch_loads[i]
         if stiffness:
             rest = values_at(table, sample_times(scene)[: len(angles)])
             energy += 0.5 * stiffness * (angles[:, 1 + i] - rest) ** 2
@@ -246,7 +261,7 @@ def work(scene: Scene, time: Array, angles: Array, rates: Array) -> Array:
 
     # The power jumps with a load, so that no polynomial may go through both sides of a jump.
     out, done = np.zeros(len(time)), 0.0
-    slack = 1e-9 * scene.duration / (scene.samples - 1)
+    slack = 1e-9 * scene.duration / (scene.samples - 1)  # s, by which rounding may put a row beside a jump
     for segment in scene.load_segments:
         first, last = np.searchsorted(time, [segment.start - slack, segment.end + slack])
         if last - first < 2:
@@ -286,12 +301,14 @@ def cumulative_integral(time: Array, values: Array) -> Array:
     values : (n,) integrand.
     """
     points = min(_POINTS, len(time))
+    # Of each interval: the rows that its polynomial goes through, as many on both sides as there are.
     first = np.clip(np.arange(len(time) - 1) - (points // 2 - 1), 0, len(time) - points)
     window = first[:, None] + np.arange(points)
     nodes, known = time[window], values[window]
     abscissae, weights = np.polynomial.legendre.leggauss((points + 1) // 2)
     half = 0.5 * np.diff(time)
     at = (time[:-1] + half)[:, None] + half[:, None] * abscissae
+    # In Lagrange's form: basis j is one at node j and zero at the others.
     polynomial = np.zeros_like(at)
     for j in range(points):
         basis = np.ones_like(at)
@@ -299,4 +316,5 @@ def cumulative_integral(time: Array, values: Array) -> Array:
             if k != j:
                 basis *= (at - nodes[:, k, None]) / (nodes[:, j] - nodes[:, k])[:, None]
         polynomial += basis * known[:, j, None]
-    return np.concatenate([[0.0], np.cumsum((polynomial * (half[:, None] * weights)).sum(axis=1))])
+    parts = (polynomial * (half[:, None] * weights)).sum(axis=1)
+    return np.concatenate([[0.0], np.cumsum(parts)])

@@ -168,7 +168,8 @@ class ExtrapolatedSolver:
                 return failure
             self._halvings = halvings + 1
         middle = 0.5 * (start + end)
-        return self._cross(interval, start, middle, halvings + 1) or self._cross(interval, middle, end, halvings + 1)
+        failure = self._cross(interval, start, middle, halvings + 1)
+        return failure or self._cross(interval, middle, end, halvings + 1)
 
     def _part(self, interval: Interval, start: float, end: float) -> str:
         """Extrapolate over a part of an interval, adding columns until the estimated error is small enough.
@@ -192,7 +193,8 @@ class ExtrapolatedSolver:
                 state, gained = row[-1], 0.0
                 if self._integrates_work:
                     state, gained = state[:-1], float(state[-1])
-                self._keep(end, interval, self._consistent(state), self.system.turns(), self.kept[-1].work + gained)
+                work = self.kept[-1].work + gained
+                self._keep(end, interval, self._consistent(state), self.system.turns(), work)
                 return ""
         return f"near t = {start:.6g} s the error of an interval of {end - start:.3g} s remains above the tolerance"
 
@@ -242,8 +244,10 @@ class ExtrapolatedSolver:
         sizes = np.abs(kinds)
         for columns in (slice(0, 3), slice(3, 7)):
             largest = sizes[:, :, columns].max(axis=(1, 2))
+            # Coordinates are displacements: their rounding is that of what they are displacements from.
             largest[0] = max(largest[0], self._sizes[columns].max())
-            kinds[:, :, columns][sizes[:, :, columns] < _INSIGNIFICANT * largest[:, None, None]] = 0.0
+            insignificant = sizes[:, :, columns] < _INSIGNIFICANT * largest[:, None, None]
+            kinds[:, :, columns][insignificant] = 0.0
         return values
 
     def _keep(self, time: float, interval: Interval, values: Array, turns: Array, work: float) -> None:

@@ -56,18 +56,21 @@ def solve_many(scenes: Sequence[Scene], tolerance: float) -> RunBlock:
         Where heyoka is not installed.
     """
     first, runs = scenes[0], len(scenes)
-    time = np.linspace(0.0, np.array([scene.duration for scene in scenes]), first.samples, axis=1)
+    durations = np.array([scene.duration for scene in scenes])
+    time = np.linspace(0.0, durations, first.samples, axis=1)
     blades = len(first.blades)
     shapes: dict[str, tuple[int, ...]] = dict.fromkeys(("angles", "rates"), (1 + blades,))
     if first.wants("tip"):
         shapes["tip"] = (blades, 3)
     if first.wants("energy"):
         shapes |= dict.fromkeys(_ENERGIES, ())
-    arrays = {name: np.empty((*time.shape, *shape)) for name, shape in shapes.items()}
+    arrays = {}
+    for name, shape in shapes.items():
+        arrays[name] = np.empty((*time.shape, *shape))
     block = RunBlock(time, arrays, [Integration(False)] * runs, [0] * runs)
 
-    # What runs of one rotor share: (parameters,) of the equations, then of the tips; the structure, in which rotors
-    # agree that share compiled code.
+    # By rotor: (parameters,) of the equations, then of the tips; and the structure, in which rotors agree that share
+    # compiled code.
     rotors: dict[tuple[object, ...], tuple[Array, tuple[int, ...]]] = {}
     groups: dict[tuple[int, ...], list[int]] = {}
     keys: dict[int, tuple[object, ...]] = {}  # of each run: its rotor, and its unit of work
@@ -89,11 +92,13 @@ def solve_many(scenes: Sequence[Scene], tolerance: float) -> RunBlock:
             structure = (*parameters.structure, scene.work_needs_path, *scene.moving_coordinates)
             rotors[key] = array_of(parameters.values, quad=False), structure
         keys[i] = key
-        groups.setdefault(rotors[key][1], []).append(i)
+        _, structure = rotors[key]
+        groups.setdefault(structure, []).append(i)
     for structure, places in groups.items():
         of_group = [scenes[i] for i in places]
         numbers = np.stack([rotors[keys[i]][0] for i in places], axis=1)
-        _Group(places, of_group, structure, numbers, tolerance).run(block)
+        group = _Group(places, of_group, structure, numbers, tolerance)
+        group.run(block)
     return block
 
 
@@ -123,7 +128,13 @@ def _observables(example: Scene) -> Any:
     angles, momenta = taylor.state_symbols(form)
     rates = hamilton.rates(angles, momenta, form, engine.sin, engine.cos)
     moving = dict(zip(example.moving_coordinates, angles, strict=True))
-    pitches = [moving[i] if i in moving else parameters.own(Fraction(0)) for i in range(1, 1 + len(example.blades))]
+    # The angle of a pitch that is fixed is a parameter: it differs from run to run.
+    pitches = []
+    for coordinate in range(1, 1 + len(example.blades)):
+        if coordinate in moving:
+            pitches.append(moving[coordinate])
+        else:
+            pitches.append(parameters.own(Fraction(0)))
     observables: list[Any] = [*rates]
     for i, point in enumerate(points):
         azimuth = angles[0] + example.phases[i]
@@ -159,10 +170,13 @@ def _observed(function: Any, states: Array, numbers: Array) -> Array:
     parts = []
     for i in range(0, samples, _OBSERVED_PER_CALL):
         part = states[: function.nvars, :, i : i + _OBSERVED_PER_CALL]
-        spread = np.broadcast_to(numbers[: function.nparams, :, None], (function.nparams, runs, part.shape[2]))
+        count = part.shape[2]
+        # The engine wants the parameters anew for every state.
+        spread = np.broadcast_to(numbers[: function.nparams, :, None], (function.nparams, runs, count))
         inputs = np.ascontiguousarray(part).reshape(len(part), -1)
         pars = np.ascontiguousarray(spread).reshape(len(spread), -1)
-        parts.append(function(inputs, pars=pars, batch_parallel=False).reshape(-1, runs, part.shape[2]))
+        rows = function(inputs, pars=pars, batch_parallel=False)
+        parts.append(rows.reshape(-1, runs, count))
     return np.concatenate(parts, axis=2)
 
 
@@ -223,7 +237,9 @@ class _Group:
                 # One lane's failure ends all lanes: each runs again with itself alone in every lane.
                 alone = [columns[i]] * width
                 states, observed, integrations = self.solve(alone)
-                states[:, np.maximum.accumulate(~np.isfinite(states).all(axis=0), axis=1)] = np.nan
+                # What follows the first sample that is not finite is no motion.
+                is_lost = ~np.isfinite(states).all(axis=0)
+                states[:, np.maximum.accumulate(is_lost, axis=1)] = np.nan
                 self.put(block, alone, states, observed, integrations[:1])
 
     def solve(self, columns: Sequence[int]) -> tuple[Array, Array, list[Integration]]:
@@ -243,9 +259,11 @@ class _Group:
             The engine's status of each column.
         """
         width = self.integrator.state.shape[1]
-        initial, times, numbers = self.initial[:, columns], self.times[:, columns], self.numbers[:, columns]
+        initial, times = self.initial[:, columns], self.times[:, columns]
+        numbers = self.numbers[:, columns]
         states = np.empty((len(initial), len(columns), len(times)))
         half, integrations = len(self.moving), []
+        # The equations are in momenta.
         start = initial.copy()
         start[half : 2 * half] = _observed(self.momenta, initial[:, :, None], numbers)[:, :, 0]
         for i in range(0, len(columns), width):
@@ -253,7 +271,8 @@ class _Group:
             self.integrator.set_time(np.zeros(width))
             self.integrator.state[:] = start[:, lanes]
             taylor.set_parameters(self.integrator, numbers[:, lanes])
-            states[:, lanes] = self.integrator.propagate_grid(times[:, lanes])[1].transpose(1, 2, 0)
+            _, samples = self.integrator.propagate_grid(times[:, lanes])
+            states[:, lanes] = samples.transpose(1, 2, 0)
             for result in self.integrator.propagate_res:
                 message = failure(result[0])
                 integrations.append(Integration(not message, message, 0.0, int(result[3])))
@@ -274,7 +293,8 @@ class _Group:
         """Write the runs of the first len(integrations) columns to the block; states, observed: as of `solve`."""
         runs, count = len(integrations), len(self.moving)
         states, observed = states[:, :runs], observed[:, :runs]
-        places, scenes = [self.places[i] for i in columns[:runs]], [self.scenes[i] for i in columns[:runs]]
+        places = [self.places[i] for i in columns[:runs]]
+        scenes = [self.scenes[i] for i in columns[:runs]]
         angles, rates = block.quantities["angles"], block.quantities["rates"]
         angles[places] = np.array([scene.initial_angles for scene in scenes])[:, None]
         rates[places] = 0.0

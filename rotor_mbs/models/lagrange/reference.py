@@ -235,14 +235,16 @@ def reference_at(scene: Scene, times: Array) -> TimedReference:
     growth[:, columns[free]] = np.inf
     known = min(rows, len(matrices))
     with np.errstate(all="ignore"):
-        norms = np.linalg.norm(_in_units(scene, matrices[:known])[:, free[:, None], free], axis=2)
+        scaled = _in_units(scene, matrices[:known])[:, free[:, None], free]
+        norms = np.linalg.norm(scaled, axis=2)
     growth[np.ix_(np.arange(known), columns[free])] = np.where(np.isfinite(norms), norms, np.inf)
     return TimedReference(trajectory, growth, units)
 
 
 def with_azimuths(scene: Scene, azimuths: Sequence[float]) -> Accelerations:
     """Return the closed form with the blades at other angles about the shaft than `Scene.phases`, (blades,) rad."""
-    form = rotor_form(scene, phases=[(Fraction(math.cos(angle)), Fraction(math.sin(angle))) for angle in azimuths])
+    phases = [(Fraction(math.cos(azimuth)), Fraction(math.sin(azimuth))) for azimuth in azimuths]
+    form = rotor_form(scene, phases=phases)
     return lambda angles, rates, _form, *rest: closed_form.accelerations(angles, rates, form, *rest)
 
 

@@ -88,6 +88,7 @@ def over_segments(
     state, rows = initial, [initial[None, :]]
     steps, evaluations, message = 0, None, ""
     for segment in segments:
+        # A sample at which two segments meet belongs to the one before.
         inside = times[(times > segment.start) & (times <= segment.end)]
         part = advance(segment, state, inside)
         rows.append(part.states)
@@ -115,11 +116,12 @@ def trajectory(scene: Scene, times: Array, states: Array) -> Trajectory:
     angles, rates = all_coordinates(scene, states[:, :count], states[:, count : 2 * count])
     fields: dict[str, Array] = {}
     if scene.wants("tip"):
-        paths = [
-            closed_form.point_path(angles[:, 0] + phase, angles[:, 1 + i], blade.tip, np.sin, np.cos)
-            for i, (blade, phase) in enumerate(zip(scene.blades, scene.phases, strict=True))
-        ]
-        rows = np.array([np.broadcast_arrays(*path) for path in paths])
+        paths = []
+        for i, (blade, phase) in enumerate(zip(scene.blades, scene.phases, strict=True)):
+            azimuth, pitch = angles[:, 0] + phase, angles[:, 1 + i]
+            path = closed_form.point_path(azimuth, pitch, blade.tip, np.sin, np.cos)
+            paths.append(np.broadcast_arrays(*path))
+        rows = np.array(paths)
         fields["tip"] = np.ascontiguousarray(rows.transpose(2, 0, 1))
     if scene.wants("energy"):
         fields |= _energies(scene, time, angles, rates, states)
@@ -139,7 +141,8 @@ def _energies(scene: Scene, time: Array, all_angles: Array, all_rates: Array, st
     states : as of `trajectory`, which may have the work.
     """
     form, columns = rotor_form(scene), scene.moving_coordinates
-    angles, rates = list(all_angles[:, columns].T), list(all_rates[:, columns].T)
+    angles = list(all_angles[:, columns].T)
+    rates = list(all_rates[:, columns].T)
     loads = loads_at(scene, time)
     with np.errstate(over="ignore", invalid="ignore"):  # of rates like 1e200; the judgement sees what is not finite
         kinetic, potential = closed_form.energies(angles, rates, form, loads, np.sin, np.cos)
@@ -209,7 +212,8 @@ def load_rounding(scene: Scene, times: Array, angles: Array, rates: Array) -> di
         moved = numbers.copy()
         moved[:, column] -= _DIFFERENCE  # back in time, so that a jump of a load counts from its own sample on
         last_digits = np.finfo(float).eps * np.abs(values) / _DIFFERENCE
-        others = sampled_loads(scene, moved[:, 0], moved[:, 1 : 1 + count], moved[:, 1 + count :])
+        moved_times, moved_angles, moved_rates = np.split(moved, [1, 1 + count], axis=1)
+        others = sampled_loads(scene, moved_times[:, 0], moved_angles, moved_rates)
         for name, other in others.items():
             rounding[name] += (np.abs(other - loads[name]).T * last_digits).T
     return rounding

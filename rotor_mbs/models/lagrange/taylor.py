@@ -129,12 +129,15 @@ class Propagation:
             Where heyoka is not installed.
         """
         engine, self._scene = heyoka(), scene
-        columns, count = scene.moving_coordinates, 2 * len(scene.moving_coordinates)
+        columns = scene.moving_coordinates
+        count = 2 * len(columns)
         equations, parameters = build_system(scene)
         self._changing = changing_loads(scene)
         structure = (*parameters.structure, len(equations), *self._changing)
         values = [scene.initial_angles[i] for i in columns] + [scene.initial_rates[i] for i in columns]
-        start = array_of([Fraction(value) for value in [*values, *[0.0] * (len(equations) - count)]], quad=quad)
+        values += [0.0] * (len(equations) - count)  # the work, where it is a variable
+        start = array_of([Fraction(value) for value in values], quad=quad)
+        # What the compiled code depends on.
         key = (quad, variational, *options.items(), structure)
         if quad:
             options |= {"tol": engine.real128(options["tol"]), "fp_type": engine.real128}
@@ -165,6 +168,7 @@ class Propagation:
         """Integrate over a segment from where the integrator is, the end of the segment before."""
         integrator, kind = self.integrator, self._initial.dtype
         self.set_segment(segment)
+        # Up to the end of the segment, where the next one starts, also where no sample is there.
         end = [] if len(times) and times[-1] == segment.end else [segment.end]
         grid = np.concatenate([[segment.start], times, end]).astype(kind)
         with time_limit.samples_kept_at_limit():

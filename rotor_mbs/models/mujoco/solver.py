@@ -112,6 +112,7 @@ class Engine:
         """
         model, data = self._model, self._data
         model.opt.timestep = step
+        # The engine integrates activations with the state, so that a load is right at every stage of a step.
         if loads:
             data.act[:], data.ctrl[:] = loads, slopes
         taken = 0
@@ -136,7 +137,8 @@ class Engine:
     def poses(self, angles: Array, rates: Array, loads: Array) -> Poses:
         """Return bodies and sites at given states, (n, coordinates) rad and rad/s, (n, actuators) N m or rad."""
         rows = [self._pose(*state) for state in zip(angles, rates, loads, strict=True)]
-        return Poses(*map(np.array, zip(*rows, strict=True)))
+        fields = [np.array(values) for values in zip(*rows, strict=True)]
+        return Poses(*fields)
 
     def _pose(self, angles: Array, rates: Array, loads: Array) -> tuple[Array, ...]:
         """Return the fields of `Poses` at one state."""
@@ -146,13 +148,16 @@ class Engine:
         motion = np.empty((model.nbody - 1, 6))
         for body, velocity in enumerate(motion, start=1):
             _engine.mj_objectVelocity(model, data, _engine.mjtObj.mjOBJ_BODY, body, velocity, 1)
+        # Copies, because the next call computes other numbers in their place.
         centres, sites = data.xipos[1:].copy(), data.site_xpos.copy()
-        accelerations, frames = data.qacc.copy(), data.xmat[1:].reshape(-1, 3, 3).copy()
+        accelerations = data.qacc.copy()
+        frames = data.xmat[1:].reshape(-1, 3, 3).copy()
         # The engine gives moments about the centre of mass of a body's whole tree.
         _engine.mj_rnePostConstraint(model, data)
         wrench = np.array(data.cfrc_int[1:])
         wrench[:, :3] += np.cross(data.subtree_com[model.body_rootid[1:]], wrench[:, 3:])
-        return centres, motion[:, 3:], motion[:, :3], sites, accelerations, frames, wrench
+        velocities, spins = motion[:, 3:], motion[:, :3]
+        return centres, velocities, spins, sites, accelerations, frames, wrench
 
 
 # rad, rad/s: steps of the difference quotients of `linearize`, whose error is a power series of the step's square.
@@ -255,11 +260,13 @@ class MujocoSolver:
                 twice = masses[:, None] * poses.velocity**2 + moments * poses.spin**2
                 weights = scene.gravity * (poses.centre[:, :, 2] @ masses)  # zero at the height of the shaft
                 springs, of_rests = _springs(scene, fields["angles"])
+                work = self._work(angles, rates, poses.acceleration, values)
                 fields["kinetic_energy"] = 0.5 * twice.sum(axis=(1, 2))[at]
                 fields["potential_energy"] = weights[at] + springs
-                fields["work"] = self._work(angles, rates, poses.acceleration, values)[at] + of_rests
+                fields["work"] = work[at] + of_rests
             if scene.wants("loads"):
-                fields |= {name: table[at] for name, table in self._root_loads(poses, values).items()}
+                for name, loads in self._root_loads(poses, values).items():
+                    fields[name] = loads[at]
         return finite_samples(scene, fields)
 
     def _root_loads(self, poses: Poses, values: Array) -> dict[str, Array]:
@@ -298,11 +305,15 @@ class MujocoSolver:
         dampings = np.array(self._scene.dampings)[self._moving]
         controls = [[load.control(row.segment) for load in self._loads] for row in self._rows]
         slopes = gains * np.array(controls).reshape(values.shape)
-        power = (torques * rates[:, columns]).sum(axis=1) - (dampings * rates**2).sum(axis=1)
+        power = (torques * rates[:, columns]).sum(axis=1)
+        power = power - (dampings * rates**2).sum(axis=1)
+        # Its time derivative.
         change = (slopes * rates[:, columns] + torques * accelerations[:, columns]).sum(axis=1)
         change -= 2.0 * (dampings * rates * accelerations).sum(axis=1)
+        # Where a load jumps there are two rows of one time, and a part of length zero between them.
         h = np.diff([row.time for row in self._rows])
-        parts = 0.5 * h * (power[1:] + power[:-1]) + h * h / 12.0 * (change[:-1] - change[1:])
+        trapezoids = 0.5 * h * (power[1:] + power[:-1])
+        parts = trapezoids + h * h / 12.0 * (change[:-1] - change[1:])
         return np.concatenate([[0.0], np.cumsum(parts)])
 
 
@@ -359,9 +370,13 @@ def linearize(scene: Scene, angles: Sequence[float] | Array, speed: float, torqu
     loads = np.array([load.activation(first, first.start) for load in mjcf.loads_of(state)])
 
     def accelerations(states: Array) -> Array:
-        return engine.poses(states[:, :n], states[:, n:], np.tile(loads, (len(states), 1))).acceleration
+        applied = np.tile(loads, (len(states), 1))
+        return engine.poses(states[:, :n], states[:, n:], applied).acceleration
 
     unit = np.eye(2 * n)
-    quotients = [(accelerations(here + h * unit) - accelerations(here - h * unit)).T / (2.0 * h) for h in _STEPS]
+    quotients = []
+    for step in _STEPS:
+        difference = accelerations(here + step * unit) - accelerations(here - step * unit)
+        quotients.append(difference.T / (2.0 * step))
     slopes = limit_at_zero(quotients, 4.0)
     return Linearization(-slopes[:, :n], -slopes[:, n:], accelerations(here[None])[0])

@@ -73,14 +73,15 @@ class PrintedSolver:
                 if table:
                     fields["work"] += torque_work(scene, result, coordinate, time)
         if scene.wants("loads"):
-            before = np.nextafter(time, 0.0)  # where a torque jumps, the value before it
-            torque = np.array([scene.torque_at(t) for t in before.tolist()])
+            before = np.nextafter(time, 0.0).tolist()  # where a torque jumps, the value before it
+            torque = np.array([scene.torque_at(t) for t in before])
             accelerations = np.zeros((len(time), len(scene.initial_angles)))  # zero of a fixed pitch
-            for k, (t, state) in enumerate(zip(before.tolist(), states.tolist(), strict=True)):
-                accelerations[k, : self._moving] = self._right_hand_side(t, state)[self._moving :]
+            for row, t, state in zip(accelerations, before, states.tolist(), strict=True):
+                row[: self._moving] = self._right_hand_side(t, state)[self._moving :]
             fields |= rotor.loads(angles, rates, accelerations, torque)
         trajectory = Trajectory(time, angles, rates, **fields)
-        if not self._errata:  # ode45's own output points: the paper's numbers are read off at them
+        if not self._errata:
+            # The paper's numbers are read off at ode45's own output points.
             own_time, states = result.refined()
             refined = all_coordinates(scene, states[:, : self._moving], states[:, self._moving :])
             trajectory.refined = Trajectory(own_time, *refined)
@@ -119,6 +120,7 @@ def point_mass_rotor(name: str, errata: Errata | None, scene: Scene) -> PointMas
     for sentence, refused in refusals.items():
         if refused:
             raise MethodRefusal(sentence)
+    # Frame 3 has its origin in the mass.
     tip = (blade.tip[0] - x, blade.tip[1] - y, blade.tip[2] - z)
     return PointMassRotor(blade.mass, x, z, scene.gravity, scene.phases, tip)
 
@@ -160,6 +162,7 @@ def right_hand_side(scene: Scene, accelerations: Accelerations, moving: int) -> 
     """Return y' = f(t, y) of y = (angles, rates) of the `moving` coordinates; NaN where the equations are singular."""
     undefined = [math.nan] * (2 * moving)
     tables = _torque_tables(scene, moving)
+    # Looked up once where they are constant, as in all scenes of the paper.
     constant = [value_at(table, 0.0) for table in tables] if all(map(is_constant, tables)) else None
 
     def f(t: float, y: Sequence[float]) -> list[float]:

@@ -53,8 +53,10 @@ class PointMassRotor:
         x, y, z = self.tip
         paths = []
         for sines in self._sines(angles):
-            rows = derivation.a3(*sines, self.c, self.d)[:3]
-            paths.append(np.stack([row[0] * x + row[1] * y + row[2] * z + row[3] for row in rows], axis=-1))
+            place = []
+            for row in derivation.a3(*sines, self.c, self.d)[:3]:
+                place.append(row[0] * x + row[1] * y + row[2] * z + row[3])
+            paths.append(np.stack(place, axis=-1))
         return np.stack(paths, axis=1)
 
     def kinetic_energy(self, angles: Array, rates: Array) -> Array:
@@ -64,14 +66,16 @@ class PointMassRotor:
             u32 = derivation.u32(*sines, self.c, self.d, CORRECTED)
             u33 = derivation.u33(*sines, self.c)
             for by_q2, by_q3 in zip(u32[:3], u33[:3], strict=True):
-                total += 0.5 * self.m * (by_q2[3] * rates[:, 0] + by_q3[3] * rates[:, pitch]) ** 2
+                velocity = by_q2[3] * rates[:, 0] + by_q3[3] * rates[:, pitch]
+                total += 0.5 * self.m * velocity**2
         return total
 
     def potential_energy(self, angles: Array) -> Array:
         """Return the energy of the weights, (n,) J, zero at the height of the shaft."""
         total = np.zeros(len(angles))
         for sines in self._sines(angles):
-            total += self.m * self.g * derivation.a3(*sines, self.c, self.d)[2][3]
+            height = derivation.a3(*sines, self.c, self.d)[2][3]
+            total += self.m * self.g * height
         return total
 
     def loads(self, angles: Array, rates: Array, accelerations: Array, torque: Array) -> dict[str, Array]:
@@ -117,12 +121,19 @@ class PointMassRotor:
             (derivation.u33_2(*sines, c), w2 * w3),
             (derivation.u33_3(*sines, c, CORRECTED), w3 * w3),
         )
-        return np.stack([sum((u[row][3] * rate for u, rate in terms), np.zeros(len(w2))) for row in range(3)], axis=1)
+        acceleration = np.zeros((3, len(w2)))
+        for u, rate in terms:
+            for row in range(3):
+                acceleration[row] += u[row][3] * rate
+        return np.ascontiguousarray(acceleration.T)
 
     def _sines(self, angles: Array) -> list[tuple[Array, Array, Array, Array]]:
         """Return s2, c2, s3, c3 of every blade, each (n,)."""
-        turns = [(angles[:, 0] + phase, angles[:, 1 + i]) for i, phase in enumerate(self.phases)]
-        return [(np.sin(q2), np.cos(q2), np.sin(q3), np.cos(q3)) for q2, q3 in turns]
+        sines = []
+        for i, phase in enumerate(self.phases):
+            q2, q3 = angles[:, 0] + phase, angles[:, 1 + i]
+            sines.append((np.sin(q2), np.cos(q2), np.sin(q3), np.cos(q3)))
+        return sines
 
 
 def torque_work(scene: Scene, run: Ode45Result, coordinate: int, times: Array) -> Array:
@@ -152,7 +163,8 @@ def torque_work(scene: Scene, run: Ode45Result, coordinate: int, times: Array) -
     before = values_before(scene.load_segments, grid[1:])[place]
     after = values_at(scene.load_tables[place], grid[:-1])
     points = grid[:-1, None] + np.diff(grid)[:, None] * _GAUSS_POINTS
-    mean = run.at(points.ravel())[:, coordinate].reshape(points.shape) @ _GAUSS_WEIGHTS
+    angles_at_points = run.at(points.ravel())[:, coordinate].reshape(points.shape)
+    mean = angles_at_points @ _GAUSS_WEIGHTS
     angles = run.at(grid)[:, coordinate]
     done = np.cumsum(before * (angles[1:] - mean) + after * (mean - angles[:-1]))
     return np.asarray(np.append(0.0, done)[np.searchsorted(grid, times)])
