@@ -282,7 +282,7 @@ def report(arguments: argparse.Namespace) -> int:
 
 def figures(arguments: argparse.Namespace) -> int:
     """The paper's figures as files for a manuscript into `arguments.output`."""
-    from rotor_mbs.report.pages.paper import write_figures
+    from rotor_mbs.report.figures import write_figures
 
     print(*write_figures(arguments.file, arguments.output, arguments.format, arguments.figure or ()), sep="\n")
     return 0

@@ -57,7 +57,15 @@ def write_animation(results: Path, name: str, output: Path, magnified: float | N
         options = webp if kind == ".webp" else other
         stream = io.BytesIO()
         first, suffix = next(pictures), kind.removeprefix(".")
-        first.save(stream, suffix, save_all=True, append_images=pictures, duration=1000 // RATE, loop=0, **options)
+        first.save(
+            stream,
+            suffix,
+            save_all=True,
+            append_images=pictures,
+            duration=1000 // RATE,
+            loop=0,
+            **options,
+        )
     replace_file(output, stream.getvalue(), _MARK)
     return output
 
@@ -93,7 +101,12 @@ def frames(stored: StoredScene, magnified: float | None) -> Iterator[Image.Image
     def picture(frame: int) -> Image.Image:
         for axes, name, corners, ended, paths, blades in moving:
             last = min(frame, ended - 1)
-            axes.set_title(f"{name}, ended at {at[last]:.2f} s" if frame > last else name, loc="left", x=0.02, y=1.03)
+            axes.set_title(
+                f"{name}, ended at {at[last]:.2f} s" if frame > last else name,
+                loc="left",
+                x=0.02,
+                y=1.03,
+            )
             for i, (path, blade) in enumerate(zip(paths, blades, strict=True)):
                 path.set_data(*corners[: last + 1, i, 1].T)
                 blade.set_xy([(0.0, 0.0), *corners[last, i]])

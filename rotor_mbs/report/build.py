@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
@@ -13,11 +13,14 @@ import numpy as np
 
 from rotor_mbs.errors import StoreError
 from rotor_mbs.report import files
+from rotor_mbs.report.elements import PageContent
+from rotor_mbs.report.figures import available
 from rotor_mbs.report.pages import Report
 from rotor_mbs.report.pages.bench import bench_page
+from rotor_mbs.report.pages.figures import figures_page
 from rotor_mbs.report.pages.index import index_page
-from rotor_mbs.report.pages.paper import available, errata_page, figures_page
-from rotor_mbs.report.pages.scene import scene_page
+from rotor_mbs.report.pages.paper import claims_page, errata_page
+from rotor_mbs.report.pages.scene import scene_page, short_name
 from rotor_mbs.report.pages.stability import stability_page
 from rotor_mbs.runs.pool import Workers, pool_of, run_in
 from rotor_mbs.runs.read import is_sweep, open_results, read_records
@@ -31,12 +34,11 @@ OnPage = Callable[[int, int], None]  # with how many are drawn, of how many
 
 
 class Page(NamedTuple):
-    """A page before it is made: template, label in the navigation ("": it is not there), content, and its file."""
+    """A page before it is made: its file, label in the navigation ("": it is not there), and content."""
 
-    template: str
+    file: str
     label: str
-    content: Callable[[], Mapping[str, object]]
-    file: str = ""  # by default named like the template
+    content: Callable[[], PageContent]
 
 
 def write_report(results: Path, output: Path, jobs: Workers = 1, on_page: OnPage = lambda *_: None) -> Path:
@@ -54,12 +56,14 @@ def write_report(results: Path, output: Path, jobs: Workers = 1, on_page: OnPage
         Where the file cannot be read or has nothing to report, or the folder cannot be written.
     """
     if is_sweep(results):
-        from rotor_mbs.report.pages.sweep import sweep_page  # late: workers load what most files need
+        from rotor_mbs.report.pages.sweep import (
+            sweep_page,
+        )  # late: workers load what most files need
 
         sweep = StoredSweep(results)
         with reading(results), _without_warnings():
             page = sweep_page(sweep)
-        return files.write_page(output, "sweep", page, sweep.attributes)
+        return files.write_page(output, page, sweep.attributes)
     with open_results(results) as opened:
         count = len(pages_of(Report(**vars(opened))))
     made: dict[str, str] = {}
@@ -77,15 +81,16 @@ def write_report(results: Path, output: Path, jobs: Workers = 1, on_page: OnPage
 
 
 def make_pages(results: Path, numbers: Sequence[int]) -> dict[str, str]:
-    """The work of a process: the pages of these numbers, by file name. Raises StoreError."""
+    """Return the pages of these numbers by file name: the work of a process. Raises StoreError."""
     with open_results(results) as opened, _without_warnings():
         pages = pages_of(Report(**vars(opened)))
         made_with = files.made_with(opened.attributes)
         links = [(page.file, page.label) for page in pages if page.label]
-        return {
-            page.file: files.render(page.template, page.content(), made_with, links, page.file)
-            for page in (pages[number] for number in numbers)
-        }
+        made = {}
+        for number in numbers:
+            page = pages[number]
+            made[page.file] = files.render(page.content(), made_with, links, page.file)
+        return made
 
 
 @contextmanager
@@ -97,33 +102,40 @@ def _without_warnings() -> Iterator[None]:
 
 
 def pages_of(report: Report) -> list[Page]:
-    """The pages for what the file has. The first of the main pages is the index."""
+    """Return the pages for what the file has. The first one is the index; of a file of one scene it is that scene."""
     modes, bench, compared = (read_records(report.path, kind) for kind in ("modes", "bench", "comparison"))
     has_runs = any(scene.methods for scene in report.scenes.values()) or not (modes or bench or compared)
     if has_runs and not report.scenes:
         raise StoreError(f"{report.path}: no scene in it, nothing to report")
     pages: list[Page] = []
+    scenes: list[Page] = []
+    if has_runs:
+        scenes = [Page(file, "", partial(scene_page, name, report)) for name, file in report.files.items()]
     if has_runs and report.is_suite:
-        pages.append(Page("stability", "Stability suite", partial(stability_page, report)))
+        pages.append(Page("stability.html", "Stability suite", partial(stability_page, report)))
+    elif has_runs and len(scenes) == 1:
+        scene = next(iter(report.files))
+        pages.append(scenes.pop()._replace(label=short_name(scene)))
     elif has_runs:
-        pages.append(Page("index", "Overview", partial(index_page, report)))
+        pages.append(Page("index.html", "Overview", partial(index_page, report)))
+    if has_runs and not report.is_suite:
+        if report.claims:
+            pages.append(Page("claims.html", "Published claims", partial(claims_page, report)))
         if available(report.scenes):
-            pages.append(Page("figures", "The paper's figures", partial(figures_page, report)))
+            pages.append(Page("figures.html", "The paper's figures", partial(figures_page, report)))
         if report.errata:
-            pages.append(Page("errata", "Errata", partial(errata_page, report)))
+            pages.append(Page("errata.html", "Errors in the paper", partial(errata_page, report)))
     if bench:
-        pages.append(Page("bench", "Error and run time", partial(bench_page, report)))
+        pages.append(Page("bench.html", "Error and run time", partial(bench_page, report)))
     if modes:
-        from rotor_mbs.analysis.modes import read_modes  # late, as above
+        from rotor_mbs.analysis.modes import read_modes  # late: workers load what most files need
         from rotor_mbs.report.pages.modes import modes_page
 
-        pages.append(Page("modes", "Modes", partial(modes_page, list(read_modes(report.path).values()))))
+        pages.append(Page("modes.html", "Modes", partial(modes_page, list(read_modes(report.path).values()))))
     for number, record in enumerate(compared, 1):
         from rotor_mbs.report.pages.comparison import comparison_page
 
-        label, file = f"Data against {record.scene}", f"data--{number}.html"
-        pages.append(Page("comparison", label, partial(comparison_page, record), file))
+        label = f"Data against {record.scene}"
+        pages.append(Page(f"data--{number}.html", label, partial(comparison_page, record)))
     pages[0] = pages[0]._replace(file=files.INDEX)
-    if has_runs:
-        pages += [Page("scene", "", partial(scene_page, name, report), file) for name, file in report.files.items()]
-    return [page._replace(file=page.file or f"{page.template}.html") for page in pages]
+    return pages + scenes

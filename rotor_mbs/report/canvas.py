@@ -6,19 +6,23 @@ import io
 import logging
 import math
 import os
+import re
 import sys
 from collections.abc import Iterator, Mapping
 from contextlib import AbstractContextManager, contextmanager, suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from html import escape
 from os import PathLike
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from markupsafe import Markup
 from numpy.typing import NDArray
 
 from rotor_mbs.errors import InputError
-from rotor_mbs.report.looks import PAPER, Look
+from rotor_mbs.report.elements import Plot
+from rotor_mbs.report.looks import GREY, PAPER, Look, name_of_colour
 from rotor_mbs.report.numbers import power
 from rotor_mbs.runs.output_files import replace_file
 from rotor_mbs.scenario.toml_file import file_path
@@ -47,10 +51,7 @@ _is_imported_here = "matplotlib" not in sys.modules
 with _unaffected_by_environment():
     import matplotlib
     from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.colors import to_hex
     from matplotlib.figure import Figure
-    from matplotlib.lines import Line2D
-    from matplotlib.markers import MarkerStyle
     from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
 if _is_imported_here and os.environ.get("MPLBACKEND"):  # for what else is drawn in this process
     with suppress(ValueError):
@@ -62,11 +63,6 @@ WIDE = 11.0  # in; a picture as wide as a page
 PRINT_WIDTH = 174.0 / 25.4  # in; two columns of a journal
 MARK = b"rotor_mbs pictures"  # in the metadata of every picture that is a file
 KINDS = ("pdf", "svg", "png")
-_DASHES = {  # matplotlib's patterns, in widths of the line
-    "--": matplotlib.rcParamsDefault["lines.dashed_pattern"],
-    "-.": matplotlib.rcParamsDefault["lines.dashdot_pattern"],
-    ":": matplotlib.rcParamsDefault["lines.dotted_pattern"],
-}
 _PAGE_STYLE, _PRINT_STYLE = (  # without matplotlib's defaults
     matplotlib.rc_params_from_file(Path(__file__).with_name(f"{name}.mplstyle"), use_default_template=False)
     for name in ("page", "print")
@@ -163,39 +159,119 @@ def style(*, for_print: bool = False) -> AbstractContextManager[None]:
     return matplotlib.rc_context(_PRINT_STYLE if for_print else _PAGE_STYLE)
 
 
-def encoded(figure: Figure, kind: str, *, for_print: bool = True) -> bytes:
-    """The figure as a file of one of KINDS; the same bytes every time."""
-    metadata: dict[str, Any] = {"pdf": {"CreationDate": None}, "svg": {"Date": None}, "png": {"Software": None}}[kind]
+def encoded(figure: Figure, kind: str, *, for_print: bool = True, title: str = "", description: str = "") -> bytes:
+    """Return the figure as a file of one of KINDS, with a title and a description; the same bytes every time."""
+    metadata: dict[str, Any] = {
+        "pdf": {"CreationDate": None},
+        "svg": {"Date": None},
+        "png": {"Software": None},
+    }[kind]
     if for_print:
         metadata["Software" if kind == "png" else "Creator"] = MARK.decode()
-    with style(for_print=for_print), np.errstate(over="ignore", invalid="ignore"):  # numbers of a runaway
+    if title:
+        metadata["Title"] = title
+    if description:
+        metadata["Subject" if kind == "pdf" else "Description"] = description
+    with (
+        style(for_print=for_print),
+        np.errstate(over="ignore", invalid="ignore"),
+    ):  # numbers of a runaway
         stream = io.BytesIO()
         figure.savefig(stream, format=kind, metadata=metadata)
     return stream.getvalue()
 
 
-def swatch(artist: Any) -> str:
-    """A piece of a curve with its marker, or of an area, for a legend: what is inside an `svg` of 24 by 8 points."""
-    if not isinstance(artist, Line2D):
-        rgba: list[float] = np.ravel(artist.get_facecolor()).tolist()
-        area, opacity = to_hex((rgba[0], rgba[1], rgba[2])), rgba[3]
-        return f'<path d="M0 1H24V7H0z" style="fill: {area}; fill-opacity: {opacity:g}"/>'
-    colour, line, marker = str(artist.get_color()), str(artist.get_linestyle()), str(artist.get_marker())
-    drawn = ""
-    if line not in ("", "None"):
-        width, opacity = artist.get_linewidth(), artist.get_alpha() or 1.0
-        style_of_line = f"stroke: {colour}; stroke-width: {width:g}; stroke-opacity: {opacity:g}"
-        if line in _DASHES:
-            style_of_line += f"; stroke-dasharray: {' '.join(f'{width * dash:.2f}' for dash in _DASHES[line])}"
-        drawn += f'<path d="M0 4H24" style="{style_of_line}"/>'
-    if marker not in ("", "None"):
-        form, size = MarkerStyle(marker), artist.get_markersize()
-        outline = ""
-        polygons: list[Any] = form.get_path().transformed(form.get_transform()).to_polygons(closed_only=False)
-        for polygon in polygons:
-            outline += "M" + "L".join(f"{12.0 + size * x:.1f} {4.0 - size * y:.1f}" for x, y in polygon)
-        drawn += f'<path d="{outline}" style="stroke: {colour}; fill: {artist.get_markerfacecolor()}"/>'
-    return drawn
+# What an SVG file has and a part of a page does not need: metadata, comments, names of groups, spaces between elements.
+_SUPERFLUOUS = re.compile(
+    r"<metadata>.*?</metadata>|<defs>\s*<style.*?</style>\s*</defs>|<!--.*?-->|(?<=>)\s+(?=<)"
+    r'| id="[a-zA-Z0-9.]+_\d+"| transform="rotate\(-0 [^"]*"|font-size: \d+px; |font-family: [^;"]*(; )?',
+    re.DOTALL,
+)
+_NAME = re.compile(r'(id="|="#|\(#)(?=[a-zA-Z]+[0-9a-f]{10})')  # of a marker or an area that is referred to
+_COLOUR = re.compile(r"#[0-9a-f]{6}\b")
+_STILL_WIDTH = 3.4  # in, of 100 px: 12 px are 12 px on a telephone's page
+_STILL_POINTS = 300  # of a curve: about one a pixel
+
+
+def still(plot: Plot) -> Markup:
+    """Return a picture of a plot for a page without scripts, an `svg` element."""
+    height = plot.height
+    with style():
+        figure = Figure(figsize=(_STILL_WIDTH, height / 100.0), dpi=100, facecolor="none")
+        axes: Any = figure.add_axes((0.15, 24.0 / height, 0.82, 1.0 - 32.0 / height), facecolor="none")
+        axes.tick_params(labelsize=9.0, colors=GREY)
+        for drawn in plot.curves:
+            x, y = drawn.x, drawn.y if drawn.y.ndim == 1 else drawn.y[0]
+            if plot.log:
+                y = np.where(y > 0.0, y, np.nan)
+            index = extremes(y, _STILL_POINTS)
+            x, y = x[index], y[index]
+            after = np.searchsorted(index, drawn.breaks)  # a jump is a gap
+            x, y = np.insert(x, after, x[after]), np.insert(y, after, np.nan)
+            width = 3.0 if drawn.look.css == "reference" else 1.3
+            look = replace(
+                drawn.look,
+                marker="o" if drawn.dots else "",
+                line="" if drawn.dots == "only" else drawn.look.line,
+            )
+            curve(axes, x, y, look, width)
+        for mark in plot.marks:
+            line, place = (axes.axvline, mark.x) if mark.y is None else (axes.axhline, mark.y)
+            line(place, color=GREY, linestyle="--", linewidth=0.8)
+        if plot.x.log:
+            axes.set_xscale("log")
+        if plot.log:
+            axes.set_yscale("log")
+        elif plot.clip is not None:
+            low, high = axes.get_ylim()
+            axes.set_ylim(max(low, plot.clip[0]), min(high, plot.clip[1]))
+        axes.set_xlim(plot.x.first, plot.x.last)
+    name = re.sub(r"\W+", "-", plot.name)
+    inside = inside_of(encoded(figure, "svg", for_print=False), name)
+    return Markup(
+        f'<svg viewBox="0 0 {72.0 * _STILL_WIDTH:g} {0.72 * height:g}" role="img" '
+        f'aria-label="{escape(plot.name)}">{inside}</svg>'
+    )
+
+
+def path_picture(panels: Panels, name: str, caption: str) -> Markup:
+    """Return a picture of paths for a page, with its caption; `name` is unique on the page."""
+    for patch in (panels.figure.patch, *(axes.patch for axes in panels.figure.axes)):
+        patch.set_visible(False)
+    width, height = (72.0 * size for size in panels.figure.get_size_inches())
+    inside = inside_of(encoded(panels.figure, "svg", for_print=False), re.sub(r"\W+", "-", name))
+    return Markup(
+        f'<figure class="paths"><figcaption>{escape(caption)}</figcaption>'
+        f'<svg viewBox="0 0 {width:g} {height:g}" role="img" aria-label="{escape(caption)}: paths of the tips">{inside}</svg>'
+        "</figure>"
+    )
+
+
+def inside_of(file: bytes, name: str) -> str:
+    """Return what is inside the `svg` element of a file, for a page: names of its own, variables for the palette."""
+    _, _, text = file.decode().partition("<svg")
+    _, _, text = text.partition(">")
+    text = _SUPERFLUOUS.sub("", text.rpartition("</svg>")[0]).replace("\n", "")
+    text = re.sub(r"(\d\.\d)\d+", r"\1", text)
+
+    def variable(colour: re.Match[str]) -> str:
+        known = name_of_colour(colour[0])
+        return f"var(--{known})" if known else colour[0]
+
+    return _NAME.sub(rf"\g<1>{name}", _COLOUR.sub(variable, text))
+
+
+def extremes(values: Any, most: int) -> NDArray[np.int64]:
+    """Return which samples to draw: the ends, and the smallest and largest of equal intervals, about `most` in all."""
+    count = len(values)
+    if count <= most:
+        return np.arange(count)
+    chosen = [0, count - 1]
+    for interval in np.array_split(np.arange(count), most // 2):
+        known = np.isfinite(values[interval])
+        low, high = (np.where(known, values[interval], replaced) for replaced in (np.inf, -np.inf))
+        chosen += [int(interval[low.argmin()]), int(interval[high.argmax()])]
+    return np.unique(chosen)
 
 
 def log_axis(axes: Any, lowest: float, highest: float, which: str = "y") -> None:

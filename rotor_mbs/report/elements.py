@@ -1,33 +1,46 @@
-"""What pages are made of: tables, pictures, sections. A picture is matplotlib's SVG, in which variables of the style
-sheet stand for the palette's colours."""
+"""What pages are made of: sentences, facts, plots, tables, sections. Plain data; templates turn them into HTML."""
 
 from __future__ import annotations
 
-import re
-from collections.abc import Sequence
-from dataclasses import dataclass
-from html import escape
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import Any
 
-import markupsafe
+import numpy as np
 from markupsafe import Markup
+from numpy.typing import NDArray
 
-from rotor_mbs.report.canvas import TIME_AXIS, Panels, encoded, swatch
-from rotor_mbs.report.looks import name_of_colour
-from rotor_mbs.report.numbers import NOTHING, SPACE, power
+from rotor_mbs.report.curves import CurveStore
+from rotor_mbs.report.looks import Look
+from rotor_mbs.report.numbers import NOTHING
+
+Array = NDArray[np.float64]
+
+# ---- Tables
 
 
 @dataclass(frozen=True)
 class TableCell:
-    """A cell of a table that is more than a text."""
+    """A cell of a table that is more than a text.
+
+    tone : "good" or "bad", the colour of a verdict.
+    href : address of a link.
+    note, note_language : small text below, and its language where it is not English.
+    mark : classes of the whole cell.
+    title : what a pointer on it, or a screen reader, is told.
+    order : the number by which the column is sorted; None: by the text.
+    picture : a drawing above the text.
+    """
 
     text: str
-    tone: str = ""  # "good" or "bad": the colour of a verdict
+    tone: str = ""
     href: str = ""
-    note: str = ""  # small text below
-    note_language: str = ""  # where it is not English
-    shade: str = ""  # classes of the whole cell, in a map of scenes and methods
-    title: str = ""  # what a pointer on it, or a screen reader, is told
+    note: str = ""
+    note_language: str = ""
+    mark: str = ""
+    title: str = ""
+    order: float | None = None
+    picture: str = ""
 
 
 Row = Sequence[TableCell | str]
@@ -35,123 +48,291 @@ Row = Sequence[TableCell | str]
 
 @dataclass(frozen=True)
 class PageTable:
-    """A table. The first cell of a row is its heading; a column in which no row has anything is left out."""
+    """A table. The first cell of a row is its heading; a column in which no row has anything is left out.
+
+    caption : for a screen reader.
+    wide : places of the columns that a narrow page does not show.
+    sortable : whether a click on a heading sorts the rows.
+    """
 
     caption: str
     head: Row
     rows: Sequence[Row]
+    wide: Sequence[int] = ()
+    sortable: bool = False
+    kind: str = field(default="table", init=False)
 
-    def columns(self) -> list[tuple[int, TableCell | str, bool]]:
-        """Place, heading, and whether most cells are numbers (on the right), of each column that is shown."""
+    def columns(self) -> list[tuple[int, TableCell | str, str]]:
+        """Return place, heading and classes ("n": numbers, on the right) of each column that is shown."""
         shown = []
         for place, heading in enumerate(self.head):
-            texts = [cell if isinstance(cell, str) else cell.text for cell in (row[place] for row in self.rows)]
+            texts = []
+            for row in self.rows:
+                cell = row[place]
+                if isinstance(cell, str):
+                    texts.append(cell)
+                else:
+                    texts.append(cell.text or cell.note or str(cell.picture))
             known = [text for text in texts if text not in ("", NOTHING)]
-            count = sum(text.lstrip("−-")[:1].isdigit() for text in known)
+            count = sum(text.lstrip("−-≤≥×✓✗ ")[:1].isdigit() for text in known)
+            classes = []
+            if place > 0 and 2 * count > len(known):
+                classes.append("n")
+            if place in self.wide:
+                classes.append("wide")
             if known or not place:
-                shown.append((place, heading, place > 0 and 2 * count > len(known)))
+                shown.append((place, heading, " ".join(classes)))
         return shown
 
 
-@dataclass(frozen=True)
-class Picture:
-    """A figure as SVG for the inside of a page, its caption, notes below the caption, and its legend as HTML."""
+# ---- Plots
 
-    svg: Markup
-    caption: str
-    notes: Sequence[str]
-    legend: Markup
+
+@dataclass(frozen=True)
+class Horizontal:
+    """The horizontal axis of plots. Plots with the same name are zoomed and read together.
+
+    name, unit : "time" and "s"; symbol : what stands before a value that is read, "t".
+    """
+
+    name: str
+    unit: str
+    symbol: str
+    first: float
+    last: float
+    log: bool = False
+
+
+@dataclass(frozen=True)
+class Curve:
+    """A curve of a plot.
+
+    key : by which a legend switches it, the same in all plots of a section.
+    look : its colour and line; the label is its name.
+    x : (n,) ascending; y : (n,), or (runs, n) of which one row is shown.
+    breaks : samples before which the line is interrupted: the first one after a jump.
+    dots : whether its points are marked; "only": no line joins them.
+    """
+
+    key: str
+    look: Look
+    x: Array
+    y: Array
+    breaks: Sequence[int] = ()
+    dots: str = ""
+
+
+@dataclass(frozen=True)
+class Mark:
+    """A line across a plot, vertical at x or horizontal at y, with a text."""
+
+    text: str = ""
+    x: float | None = None
+    y: float | None = None
+
+
+@dataclass(frozen=True)
+class Plot:
+    """A plot that the page's script draws.
+
+    name, unit : what is on the vertical axis; note : more of it, in small letters.
+    height : of the drawing, px.
+    log : whether the vertical axis is logarithmic; values that are not positive are gaps.
+    clip : range beyond which curves are cut off, until the reader asks for it; None: there is none.
+    least : a smaller range of the values is rounding error and not magnified.
+    still : whether a picture of it stands there for a page without scripts.
+    """
+
+    name: str
+    unit: str
+    x: Horizontal
+    curves: Sequence[Curve]
+    height: int = 160
+    note: str = ""
+    log: bool = False
+    clip: tuple[float, float] | None = None
+    marks: Sequence[Mark] = ()
+    least: float = 0.0
+    still: bool = False
+    kind: str = field(default="plot", init=False)
+
+    def described(self, store: CurveStore) -> dict[str, Any]:
+        """Return what the script needs, as JSON; the numbers go to the store."""
+        x = self.x
+        plot: dict[str, Any] = {
+            "name": self.name,
+            "height": self.height,
+            "x": {"name": x.name, "unit": x.unit, "symbol": x.symbol, "range": [x.first, x.last]},
+            "curves": [],
+        }
+        if x.log:
+            plot["x"]["log"] = True
+        for curve in self.curves:
+            described: dict[str, Any] = {
+                "key": curve.key,
+                "name": curve.look.label,
+                "style": curve.look.css,
+            }
+            described["x"] = store.add(curve.x)
+            described["y"] = store.add(curve.y)
+            if len(curve.breaks):
+                described["breaks"] = [int(place) for place in curve.breaks]
+            if curve.dots:
+                described["dots"] = curve.dots
+            plot["curves"].append(described)
+        marks = []
+        for mark in self.marks:
+            place = {"x": mark.x} if mark.y is None else {"y": mark.y}
+            marks.append({"text": mark.text, **place})
+        optional = {"log": self.log, "clip": self.clip, "marks": marks, "least": self.least}
+        return plot | {name: value for name, value in optional.items() if value}
+
+
+# ---- Sections
+
+
+@dataclass(frozen=True)
+class Legend:
+    """The curves of a section: (key, look) each. Buttons that switch them; without keys a mere list.
+
+    hidden : keys of the curves that are off at first.
+    """
+
+    items: Sequence[tuple[str, Look]]
+    hidden: Sequence[str] = ()
+    kind: str = field(default="legend", init=False)
+
+
+@dataclass(frozen=True)
+class Note:
+    """A small text."""
+
+    text: str | Markup
+    kind: str = field(default="note", init=False)
+
+
+@dataclass(frozen=True)
+class Viewer:
+    """The rotor moving: what `pages.viewer` makes for the script, and the title of the scene."""
+
+    data: Mapping[str, Any]
+    title: str
+    kind: str = field(default="viewer", init=False)
+
+
+@dataclass(frozen=True)
+class SourceText:
+    """A file's text."""
+
+    text: str
+    kind: str = field(default="source", init=False)
+
+
+@dataclass(frozen=True)
+class Listing:
+    """A list of (what, text)."""
+
+    items: Sequence[tuple[str, str | Markup]]
+    kind: str = field(default="listing", init=False)
+
+
+@dataclass(frozen=True)
+class Matrix:
+    """A matrix of formulas, with a text above: entries as printed, and the correct one where that is faulty."""
+
+    text: str
+    rows: Sequence[Sequence[tuple[Markup, Markup | None]]]
+    kind: str = field(default="matrix", init=False)
+
+
+@dataclass(frozen=True)
+class HeatMap:
+    """A map of runs over two parameters: a cell of equal size for each pair of values, in which the script writes a
+    quantity of the run.
+
+    quantities : names of what may be shown.
+    columns, rows : values of the parameters as text, from left to right, from top to bottom.
+    cells : a row of (number of the run, class) for each of `rows`; None where there is no run.
+    """
+
+    label: str
+    quantities: Sequence[str]
+    columns: Sequence[str]
+    rows: Sequence[str]
+    cells: Sequence[Sequence[tuple[int, str] | None]]
+    note: str
+    kind: str = field(default="map", init=False)
+
+
+@dataclass(frozen=True)
+class RunChoice:
+    """A list of runs (number, text), one of which is shown."""
+
+    runs: Sequence[tuple[int, str]]
+    kind: str = field(default="choice", init=False)
+
+
+Element = PageTable | Plot | Legend | Note | Viewer | SourceText | Listing | Matrix | HeatMap | RunChoice | Markup
+
+
+@dataclass(frozen=True)
+class Grid:
+    """Cards side by side, `columns` in a row on a wide page; what is in a card stands one below the other."""
+
+    columns: int
+    cards: Sequence[Sequence[Element]]
+    kind: str = field(default="grid", init=False)
+
+
+@dataclass(frozen=True)
+class Fold:
+    """What a click unfolds: a heading with a hint, and what is below."""
+
+    heading: str
+    hint: str
+    elements: Sequence[Grid | Element]
+    is_open: bool = False
+    kind: str = field(default="fold", init=False)
 
 
 @dataclass(frozen=True)
 class Section:
-    """Pictures side by side, then tables and notes. A section without picture and row is left out."""
+    """A part of a page. One without elements is left out.
 
-    pictures: Sequence[Picture] = ()
-    tables: Sequence[PageTable] = ()
-    notes: Sequence[str] = ()
+    say : a line below the heading. A legend switches the curves of its own section.
+    """
 
-
-_LETTER = 5.3  # points, the mean width of a letter
-# What an SVG file has and a part of a page does not need: metadata, comments, names of groups, what is the default,
-# spaces between elements.
-_SUPERFLUOUS = re.compile(
-    r"<metadata>.*?</metadata>|<defs>\s*<style.*?</style>\s*</defs>|<!--.*?-->|(?<=>)\s+(?=<)"
-    r'| id="[a-zA-Z0-9.]+_\d+"| transform="rotate\(-0 [^"]*"|font-size: 9.5px; |font-family: [^;"]*(; )?',
-    re.DOTALL,
-)
-_EMPTY = re.compile(r"<g>(<g/>)*</g>|<g/>")
-_NAME = re.compile(r'(id="|="#|\(#)(?=[a-zA-Z]+[0-9a-f]{10})')  # of a marker or an area that is referred to
-_PLACES = re.compile(r' (?:d|x|y)="[^"]*"')
-_COLOUR = re.compile(r"#[0-9a-f]{6}\b")
+    id: str
+    heading: str
+    elements: Sequence[Grid | Fold | Element]
+    say: str | Markup = ""
 
 
-def picture(panels: Panels, name: str, caption: str, notes: Sequence[str] = ()) -> Picture:
-    """The figure for a page, an `svg` element whose alternative text is the caption; `name` is unique on the page. Its
-    legend has the labels of what is drawn."""
-    panels.figure.patch.set_visible(False)
-    for axes in panels.figure.axes:
-        axes.patch.set_visible(False)
-        axes.set_xlabel(_with_factor(axes.xaxis))
-        axes.set_ylabel(_with_factor(axes.yaxis))
-        if _LETTER * len(axes.get_ylabel()) > 72.0 * axes.bbox.height / panels.figure.dpi:
-            axes.set_ylabel(axes.get_ylabel().replace(" (", "\n(", 1))
-    width, height = (72.0 * size for size in panels.figure.get_size_inches())
-    drawn = _inside(encoded(panels.figure, "svg", for_print=False), name)
-    svg = (
-        f'<svg viewBox="0 0 {width:g} {height:g}" role="img" aria-labelledby="{name}-t">'
-        f'<title id="{name}-t">{escape(caption)}</title>{drawn}{_cursor(panels)}</svg>'
-    )
-    items = []
-    for label, artist in panels.labelled().items():
-        shown = _with_variables(swatch(artist))
-        items.append(f'<li><svg viewBox="0 0 24 8" width="34" height="12" aria-hidden="true">{shown}</svg> ')
-        items.append(f"{markupsafe.escape(label)}</li>")
-    legend = f'<ul class="legend">{"".join(items)}</ul>' if items else ""
-    return Picture(Markup(svg), caption, notes, Markup(legend))
+@dataclass(frozen=True)
+class Fact:
+    """One of the numbers at the top of a page: what it is, the number, and what else is to know of it."""
+
+    name: str
+    value: str
+    note: str | Markup = ""
+    tone: str = ""
 
 
-def _inside(file: bytes, name: str) -> str:
-    """What is inside the `svg` element of a file, with names of its own, and places to a tenth of a point."""
-    _, _, text = file.decode().partition("<svg")
-    _, _, text = text.partition(">")
-    text = _SUPERFLUOUS.sub("", text.rpartition("</svg>")[0])
-    text = _EMPTY.sub("", text).replace("\n", "")
-    text = _PLACES.sub(lambda places: re.sub(r"\.(\d)\d+", r".\1", places[0]), text)
-    return _NAME.sub(rf"\g<1>{name}", _with_variables(text))
+@dataclass(frozen=True)
+class PageContent:
+    """The content of a page.
 
+    title, about : the heading and the small line below it.
+    answer : sentences of what was found, from the file's numbers.
+    facts : at most four of these numbers.
+    data : for a script of this page alone, by the id of its element.
+    """
 
-def _with_variables(drawing: str) -> str:
-    """The drawing with variables of the style sheet in place of the palette's colours."""
-
-    def variable(colour: re.Match[str]) -> str:
-        name = name_of_colour(colour[0])
-        return f"var(--{name})" if name else colour[0]
-
-    return _COLOUR.sub(variable, drawing)
-
-
-def _cursor(panels: Panels) -> str:
-    """A line over panels above a time axis, which the viewer moves: where 0 s is, points per second, the end."""
-    last = panels.axes[-1]
-    if last.get_xlabel() != TIME_AXIS:
-        return ""
-    width, height = (72.0 * size for size in panels.figure.get_size_inches())
-    box, (start, end) = last.get_position(), last.get_xlim()
-    scale = width * box.width / (end - start)
-    zero = width * box.x0 - start * scale
-    ends = f"M0 {height * (1.0 - panels.axes[0].get_position().y1):.1f}V{height * (1.0 - box.y0):.1f}"
-    return f'<path class="now" data-time="{zero:.2f} {scale:.6g} {end:.6g}" d="{ends}"/>'
-
-
-def _with_factor(axis: Any) -> str:
-    """The axis' label, with the power of ten that its tick labels leave out: "rate (10⁻³ rad/s)"."""
-    label, formatter = str(axis.get_label_text()), axis.get_major_formatter()
-    formatter.format_ticks(axis.get_majorticklocs())
-    factor = re.fullmatch(r"1e(-?\d+)", str(formatter.get_offset()).replace("−", "-"))
-    if factor is None:
-        return label
-    axis.offsetText.set_visible(False)
-    name, _, unit = label.partition(" (")
-    unit = SPACE.join(filter(None, [power(int(factor[1])), unit.rstrip(")")]))
-    return f"{name} ({unit})"
+    title: str
+    about: str | Markup
+    answer: Sequence[Markup]
+    facts: Sequence[Fact]
+    sections: Sequence[Section]
+    previous: tuple[str, str] | None = None  # file and name of the page before
+    following: tuple[str, str] | None = None
+    data: Mapping[str, object] = field(default_factory=dict)

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import base64
 import hashlib
+import json
 import re
 from collections.abc import Iterable, Mapping, Sequence
-from functools import cache
+from functools import cache, partial
 from os import PathLike
 from pathlib import Path
 
@@ -15,6 +16,8 @@ from markupsafe import Markup, escape
 
 from rotor_mbs.errors import StoreError
 from rotor_mbs.report import numbers
+from rotor_mbs.report.curves import CurveStore
+from rotor_mbs.report.elements import PageContent, Plot
 from rotor_mbs.report.looks import palette_css
 from rotor_mbs.runs.output_files import refuse_foreign, replace_file
 
@@ -24,12 +27,39 @@ INDEX = "index.html"
 _TEMPLATES = Path(__file__).resolve().parent / "templates"
 _LONGEST = 100  # characters; file systems allow 255 bytes
 _OTHERS = "data--"  # the beginning of the names of other pages than those of scenes
-_CONTENTS = "<!-- contents -->"  # its place in a template
-_SECTION = re.compile(r'<section id="([^"]+)"[^>]*>\s*(?:<details><summary>)?<h2>(.*?)</h2>')
-_MANY_SECTIONS = 3
+# The pages that are not scenes, by their name.
+MAIN_PAGES = (
+    "index",
+    "claims",
+    "figures",
+    "errata",
+    "bench",
+    "modes",
+    "stability",
+    "sweep",
+    "comparison",
+)
+_SCRIPTS = {  # by file, what a page has that needs it
+    "plots": 'class="plot"',
+    "tables": "aria-sort=",
+    "viewer": 'class="viewer"',
+    "map": 'id="sweep"',
+}
+_PLACE_OF_SCRIPTS = "<!-- scripts -->"
 Pairs = Sequence[tuple[str, str]]
 # Attributes of a results file that say what made it.
-_VERSIONS = ("rotor_mbs", "python", "exudyn", "heyoka", "mujoco", "numpy", "scipy", "h5py", "platform", "cpu")
+_VERSIONS = (
+    "rotor_mbs",
+    "python",
+    "exudyn",
+    "heyoka",
+    "mujoco",
+    "numpy",
+    "scipy",
+    "h5py",
+    "platform",
+    "cpu",
+)
 # Control characters but those of lines and tabs, and halves of surrogate pairs: names and messages come from any file.
 _UNPRINTABLE = re.compile(r"[\x00-\x08\x0b\x0c\x0e-\x1f\x7f-\x9f\ud800-\udfff]")
 
@@ -47,7 +77,7 @@ def page_names(scenes: Iterable[str]) -> dict[str, str]:
     Raises StoreError for a name with a part ".." or ".": no file of this program has one.
     """
     names: dict[str, str] = {}
-    taken = {path.stem for path in _TEMPLATES.glob("*.html.j2")}  # other pages are named like their templates
+    taken = {*MAIN_PAGES}
     for scene in scenes:
         if {"..", "."} & set(re.split(r"[/\\]", scene)):
             raise StoreError(f"scene name {scene!r} cannot be made a file name; allowed: no part .. or .")
@@ -80,30 +110,47 @@ def write_pages(folder: Path, pages: Mapping[str, str]) -> None:
         raise StoreError(f"{folder}: the report cannot be written: {exc.strerror or exc}") from exc
 
 
-def render(
-    template: str, page: Mapping[str, object], made: Pairs = (), links: Pairs = (), here: str = ""
-) -> str:  # fmt: skip
-    """The HTML of `page` by templates/`template`.html.j2, with a table of contents where it has many sections.
+def render(page: PageContent, made: Pairs = (), links: Pairs = (), here: str = "") -> str:
+    """Return the HTML of a page: text, numbers of its plots, and the scripts that it needs.
 
-    made: what made the results, see `made_with`. links: (file, label) of the main pages; here: the file of this one.
+    Parameters
+    ----------
+    page : its content.
+    made : what made the results, see `made_with`.
+    links : (file, label) of the main pages.
+    here : the file of this one.
     """
-    shown = [] if all(file == here for file, _ in links) else [(file, label, file == here) for file, label in links]
-    html = _environment().get_template(f"{template}.html.j2").render(page=page, links=shown, versions=made)
-    sections = _SECTION.findall(html)
-    contents = ""
-    if len(sections) >= _MANY_SECTIONS:
-        entries = "".join(f'<a href="#{name}">{heading}</a>' for name, heading in sections)
-        contents = f'<nav class="contents" aria-label="Contents">{entries}</nav>'
-    return html.replace(_CONTENTS, contents, 1)
+    shown = []
+    if any(file != here for file, _ in links):
+        shown = [(file, label, file == here) for file, label in links]
+    store = CurveStore()
+    html = _environment().get_template("page.html.j2").render(page=page, links=shown, versions=made, store=store)
+    scripts = "".join(f"<script>{_script(name)}</script>\n" for name, sign in _SCRIPTS.items() if sign in html)
+    return html.replace(_PLACE_OF_SCRIPTS, scripts, 1)
 
 
-def write_page(
-    folder: str | PathLike[str], template: str, page: Mapping[str, object], attributes: Mapping[str, object]
-) -> Path:
-    """One page as the index of a folder; its path. attributes: of what it shows, with what made it. Raises StoreError
-    where it cannot be written."""
-    write_pages(Path(folder), {INDEX: render(template, page, made_with(attributes))})
+def write_page(folder: str | PathLike[str], page: PageContent, attributes: Mapping[str, object]) -> Path:
+    """Write one page as the index of a folder, and return its path.
+
+    attributes: of what it shows, with what made it. Raises StoreError where it cannot be written.
+    """
+    write_pages(Path(folder), {INDEX: render(page, made_with(attributes))})
     return Path(folder) / INDEX
+
+
+def script_json(data: object) -> Markup:
+    """Return JSON in which no character can end a script element or begin a comment."""
+    text = json.dumps(data, separators=(",", ":"), ensure_ascii=True, allow_nan=False)
+    for sign in "<>&":
+        text = text.replace(sign, f"\\u{ord(sign):04x}")
+    return Markup(text)
+
+
+@cache
+def _script(name: str) -> str:
+    """Return a script without indentation and without lines that are comments."""
+    lines = (line.strip() for line in (_TEMPLATES / f"{name}.js").read_text(encoding="utf-8").splitlines())
+    return "\n".join(line for line in lines if line and not line.startswith("//"))
 
 
 @cache
@@ -116,25 +163,30 @@ def _environment() -> jinja2.Environment:
         lstrip_blocks=True,
         keep_trailing_newline=True,
     )
-    style = (_TEMPLATES / "style.css").read_text(encoding="utf-8")
-    # Without indentation and without lines that are comments.
-    lines = (line.strip() for line in (_TEMPLATES / "viewer.js").read_text(encoding="utf-8").splitlines())
-    script = "\n".join(line for line in lines if line and not line.startswith("//"))
+    # The policy allows these scripts and no others: nothing that a file's text might bring is run.
+    digests = []
+    for name in _SCRIPTS:
+        digest = hashlib.sha256(_script(name).encode()).digest()
+        digests.append(f"'sha256-{base64.b64encode(digest).decode('ascii')}'")
     environment.globals.update(
         generator=GENERATOR,
-        style=Markup(palette_css() + style),
-        script=Markup(script),
-        # For the content security policy of a page, which allows its script alone.
-        script_digest=base64.b64encode(hashlib.sha256(script.encode()).digest()).decode("ascii"),
+        style=Markup(palette_css() + (_TEMPLATES / "style.css").read_text(encoding="utf-8")),
+        policy=Markup(" ".join(digests)),
     )
     environment.filters.update(
-        number=numbers.number,
-        with_unit=numbers.with_unit,
         typeset=numbers.typeset,
-        formula=numbers.formula,
         breakable=_breakable,
+        still=_still,
+        as_json=script_json,
+        as_text=partial(json.dumps, separators=(",", ":"), ensure_ascii=False, allow_nan=False),
     )
     return environment
+
+
+def _still(plot: Plot) -> Markup:
+    from rotor_mbs.report.canvas import still  # late: matplotlib, which many pages do not need
+
+    return still(plot)
 
 
 def _breakable(text: str) -> Markup:

@@ -7,8 +7,66 @@ import zlib
 from collections import Counter
 from dataclasses import dataclass, replace
 
-from rotor_mbs.methods.catalogue import REFERENCE, is_corrected, ladders, method_names
+from rotor_mbs.methods.catalogue import (
+    PRINTED,
+    REFERENCE,
+    errata_methods,
+    is_corrected,
+    ladders,
+    method_names,
+)
 from rotor_mbs.methods.catalogue import label_of as label_of
+
+# Colours by their name in the style sheet, on a light and on a dark page. Curves have a contrast of at least 3 to the
+# card that they are drawn on, texts one of at least 4.5 (a test computes them).
+PALETTE = {
+    "ink": ("#1b1f24", "#e6e9ed"),
+    "card": ("#ffffff", "#1c2025"),
+    "grey": ("#666666", "#a3adb8"),
+    "grid": ("#e4e4e4", "#2a3037"),
+    "ring": ("#c8ccd1", "#4d5560"),
+    "heat": ("#0b5a8f", "#4fa8e0"),
+    # Models: after Okabe and Ito, distinguishable with colour blindness, darkened where white asks for it.
+    "reference": ("#5793c1", "#477ca6"),
+    "blue": ("#0072b2", "#5cb3ec"),
+    "petrol": ("#0f7c8a", "#4fc3d9"),
+    "vermillion": ("#d55e00", "#ff8a3d"),
+    "brown": ("#8f6a1f", "#e0ad4e"),
+    "green": ("#00845f", "#2fc498"),
+    "purple": ("#a34f96", "#e79cc6"),
+    "error-1": ("#b0568c", "#f2a3c8"),
+    "error-2": ("#8a6a00", "#e3c04a"),
+    "error-3": ("#7a5cc2", "#b6a2f7"),
+    # Coordinates: Tol's muted ones, the rotor, then a blade each.
+    "rotor": ("#4a5058", "#c9ced4"),
+    "blade-1": ("#882255", "#e583b2"),
+    "blade-2": ("#2a8a7e", "#62cdbf"),
+    "blade-3": ("#5a46b5", "#ab9ff5"),
+    "blade-4": ("#8a7a1c", "#d6c75c"),
+    "blade-5": ("#b5505f", "#f2a3ae"),
+    # A parameter that is varied, from small to large: viridis, its yellow end darkened.
+    "step-0": ("#440154", "#c08be0"),
+    "step-1": ("#46327e", "#9a86e8"),
+    "step-2": ("#365c8d", "#7ba6de"),
+    "step-3": ("#277f8e", "#3fa9b8"),
+    "step-4": ("#178f78", "#1fa187"),
+    "step-5": ("#2f9147", "#4ac16d"),
+    "step-6": ("#648a00", "#8fbf28"),
+    "step-7": ("#957400", "#c9a400"),
+    "step-8": ("#c9591a", "#e8763a"),
+}
+STEPS = 9
+INK, PAPER, GREY, GRID, BLUE, VERMILLION = (
+    PALETTE[name][0] for name in ("ink", "card", "grey", "grid", "blue", "vermillion")
+)
+COORDINATES = tuple(PALETTE[name][0] for name in PALETTE if name == "rotor" or name.startswith("blade-"))
+_NAMES = {light: name for name, (light, _) in PALETTE.items()}
+# Of the models in the order of the catalogue, for their methods in turn; those of other packages are grey.
+_MODEL_COLOURS = (("blue", "petrol"), ("brown", "vermillion"), ("green",), ("purple",))
+_ERRATA_COLOURS = ("error-1", "error-2", "error-3")
+# matplotlib's line styles, and what the style sheet calls them.
+_DASHES = {"-": "solid", "--": "dashed", "-.": "dashdot", ":": "dotted"}
+_MARKERS = ("o", "s", "^", "D", "v", "P", "X", "h", "p", "<", ">")
 
 
 @dataclass(frozen=True)
@@ -20,53 +78,45 @@ class Look:
 
     colour: str
     line: str
-    marker: str
+    marker: str = ""
     label: str = ""
 
-
-# Every colour of a picture, and what stands for it on a dark page. A picture has colours of methods or of coordinates,
-# never of both.
-INK, PAPER, GREY, GRID = "#000000", "#ffffff", "#666666", "#e4e4e4"
-BLUE, VERMILLION, GREEN, PURPLE = "#0072b2", "#d55e00", "#009e73", "#cc79a7"
-ORANGE, LIGHT_BLUE = "#e69f00", "#56b4e9"
-_METHODS = {  # Okabe & Ito's, distinguishable with colour blindness; without the yellow, which does not show on white
-    INK: "#e6e9ed", BLUE: "#4fa8e0", VERMILLION: "#ff8a3d", GREEN: "#2fc498", PURPLE: "#e79cc6",
-    ORANGE: "#f7bd45", LIGHT_BLUE: "#9bd6f8",
-}  # fmt: skip
-_COORDINATES = {  # Tol's muted ones: the rotor, then a blade each
-    "#4a5058": "#c9ced4", "#882255": "#e583b2", "#2a8a7e": "#62cdbf", "#5a46b5": "#ab9ff5", "#8a7a1c": "#d6c75c",
-    "#b5505f": "#f2a3ae",
-}  # fmt: skip
-_OTHERS = {
-    GREY: "#a3adb8",
-    PAPER: "#1d2127",
-    "#c8c8c8": "#4d5560",
-    "#dddddd": "#3a424b",
-    "#f2e3de": "#3a2e2a",
-    GRID: "#333b44",
-}
-PALETTE = {**_METHODS, **_COORDINATES, **_OTHERS}
-COLOURS, COORDINATES = tuple(_METHODS), tuple(_COORDINATES)
-# The variables of the style sheet.
-_NAMES = {colour: f"k{place}" for place, colour in enumerate(PALETTE)} | {INK: "ink", PAPER: "sheet", GRID: "grid"}
-
-# Of the printed equations, then of the other models in the order of the catalogue; those of other packages are grey.
-_MODEL_COLOURS = ((INK,), (BLUE, LIGHT_BLUE), (VERMILLION, ORANGE), (GREEN,), (PURPLE,))
-_LINES = ("-", "--", "-.", ":")
-_MARKERS = ("o", "s", "^", "D", "v", "P", "X", "h", "p", "<", ">")
+    @property
+    def css(self) -> str:
+        """Classes of the style sheet that draw it on a page: "blue dashed"."""
+        name = _NAMES.get(self.colour, "grey")
+        if name == "reference":
+            return "reference"  # a wide band, on which other curves can be seen
+        if name == "ring":
+            return "ring front"
+        return f"{name} {_DASHES.get(self.line, 'solid')}"
 
 
 @functools.cache
 def _catalogue_looks() -> dict[str, Look]:
-    """By the name of each method and of each curve of the bench: within a model lines and markers take turns."""
-    models, counts = {"printed": 0}, Counter[str]()
-    looks = {REFERENCE: Look(BLUE, "-.", "*")}
+    """Return the looks of all methods, and of all curves of the bench, by name.
+
+    A model has its colours, and a line and a marker for each method. Of the corrected models the first method's line
+    is solid, that of the printed equations is dashed.
+    """
+    looks = {REFERENCE: Look(PALETTE["reference"][0], "-", "*"), PRINTED: Look(INK, "--", "o")}
+    for colour, method in zip(_ERRATA_COLOURS, errata_methods().values(), strict=False):
+        looks[method] = Look(PALETTE[colour][0], "-", _MARKERS[1 + len(looks) % 3])
+    models: dict[str, int] = {}
+    counts = Counter[str]()
     for curve in dict.fromkeys([*method_names(), *ladders()]):
+        if curve in looks:
+            continue
         model = curve.partition("/")[0] if is_corrected(curve) else "printed"
+        if model == "printed":
+            looks[curve] = Look(INK, ":", _MARKERS[(5 + counts[model]) % len(_MARKERS)])
+            counts[model] += 1
+            continue
         place, turn = models.setdefault(model, len(models)), counts[model]
-        colours = _MODEL_COLOURS[place] if place < len(_MODEL_COLOURS) else (GREY,)
+        colours = _MODEL_COLOURS[place] if place < len(_MODEL_COLOURS) else ("grey",)
         marker = _MARKERS[(turn + 3 * place) % len(_MARKERS)]
-        looks[curve] = Look(colours[turn % len(colours)], _LINES[turn // len(colours) % len(_LINES)], marker)
+        line = list(_DASHES)[turn // len(colours) % len(_DASHES)]
+        looks[curve] = Look(PALETTE[colours[turn % len(colours)]][0], line, marker)
         counts[model] += 1
     return looks
 
@@ -76,30 +126,36 @@ def look_of(curve: str) -> Look:
     look = _catalogue_looks().get(curve)
     if look is None:
         code = zlib.crc32(curve.encode("utf-8", "replace"))
-        look = Look(GREY, _LINES[code % 4], _MARKERS[code // 4 % len(_MARKERS)])
+        look = Look(GREY, list(_DASHES)[code % 4], _MARKERS[code // 4 % len(_MARKERS)])
     return replace(look, label=label_of(curve))
 
 
-def name_of_colour(colour: str) -> str:
-    """The variable of the style sheet, "k1", that stands for a colour of the palette; "" for another colour."""
-    return _NAMES.get(colour, "")
-
-
-def palette_css() -> str:
-    """The palette as variables of a style sheet, light and, where the page is dark, dark."""
-    light = ";".join(f"--{name}:{colour}" for colour, name in _NAMES.items())
-    dark = ";".join(f"--{name}:{PALETTE[colour]}" for colour, name in _NAMES.items())
-    return f":root{{{light}}}\n@media screen and (prefers-color-scheme:dark){{:root{{{dark}}}}}\n"
-
-
-def with_capital(text: str) -> str:
-    """`text` with a capital first letter; the others stay as they are."""
-    return text[:1].upper() + text[1:]
-
-
 def coordinate_look(index: int, label: str = "") -> Look:
-    """Line of a coordinate: 0 the rotor, i the pitch (and the tip) of blade i."""
+    """Return the look of a coordinate: 0 the rotor, i the pitch (and the tip) of blade i."""
     if not index:
         return Look(COORDINATES[0], "-", "", label or "rotor")
     colour = COORDINATES[1 + (index - 1) % (len(COORDINATES) - 1)]
     return Look(colour, ("-", "--", "-.")[(index - 1) % 3], "", label or f"pitch {index}")
+
+
+def step_look(place: int, count: int, label: str) -> Look:
+    """Return the look of the curve `place` of `count` values of a varied parameter, in ascending order."""
+    step = round(place * (STEPS - 1) / max(count - 1, 1)) if count > 1 else 0
+    return Look(PALETTE[f"step-{step}"][0], ("-", "--", "-.", ":")[place // STEPS % 4], "", label)
+
+
+def name_of_colour(colour: str) -> str:
+    """Return the name in the style sheet of a colour of the light palette, "blade-1"; "" for another colour."""
+    return _NAMES.get(colour, "")
+
+
+def palette_css() -> str:
+    """Return the palette as a style sheet: a variable for each colour, light and dark, and a class that draws in it."""
+    light, dark = (";".join(f"--{name}:{pair[shade]}" for name, pair in PALETTE.items()) for shade in (0, 1))
+    classes = "".join(f".{name}{{--c:var(--{name})}}" for name in PALETTE)
+    return f":root{{{light}}}\n@media screen and (prefers-color-scheme:dark){{:root{{{dark}}}}}\n{classes}\n"
+
+
+def with_capital(text: str) -> str:
+    """Return `text` with a capital first letter; the others stay as they are."""
+    return text[:1].upper() + text[1:]

@@ -9,10 +9,8 @@ from markupsafe import Markup, escape
 
 NOTHING = "–"  # a number that does not exist
 _SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
-_PREFIXES = (
-    (1e12, "T"), (1e9, "G"), (1e6, "M"), (1e3, "k"), (1.0, ""), (1e-3, "m"), (1e-6, "µ"), (1e-9, "n"),
-    (1e-12, "p"),
-)  # fmt: skip
+# Of mechanical quantities: a moment of 1e-3 N m beside others of 1e3 N m is small, not "1 mN m".
+_PREFIXES = ((1e9, "G"), (1e6, "M"), (1e3, "k"), (1.0, ""))
 SPACE = "\N{NO-BREAK SPACE}"
 _COMPUTED = re.compile(r"(?<![\w./-])(-?\d+(?:\.\d+)?)e([+-]?\d+)\b")
 # A symbol with its index: c, q̇2, U33,3. In prose "a" may be a word, E1 is an erratum, and "kg m²" is a unit.
@@ -54,22 +52,72 @@ def with_unit(value: float | None, unit: str, digits: int = 2) -> str:
     return number(value, digits) if value is None else f"{number(value, digits)}{SPACE}{unit}"
 
 
+def prefix_of(largest: float) -> tuple[float, str]:
+    """Return the number by which a channel up to `largest` is divided, and the prefix of its unit: k, M, G or none.
+
+    >>> prefix_of(4.2e4)
+    (1000.0, 'k')
+    """
+    for scale, prefix in _PREFIXES[:-1]:
+        if largest >= scale:
+            return scale, prefix
+    return 1.0, ""
+
+
 def prefixed(value: float | None, unit: str, digits: int = 3) -> str:
-    """With an SI prefix: 1.12 MJ, 687 J, 4.1 mJ; powers of ten beyond tera and below pico."""
+    """Return a number with a prefix of its unit where it is large: "1.12 MJ", "687 J", "0.0041 J"."""
     if value is None or not math.isfinite(value) or value == 0.0:
         return with_unit(value, unit, digits)
+    # 999.9 with three digits is 1.00 k.
     rounded = float(f"{value:.{digits - 1}e}")
-    if not 1e-12 <= abs(rounded) < 1e15:
-        return with_unit(value, unit, min(digits, 2))
-    scale, prefix = next((s, p) for s, p in _PREFIXES if abs(rounded) >= s)
-    scaled = rounded / scale
-    decimals = max(digits - 1 - math.floor(math.log10(abs(scaled))), 0)
-    return f"{minus(f'{scaled:.{decimals}f}')}{SPACE}{prefix}{unit}"
+    scale, prefix = prefix_of(abs(rounded))
+    return f"{number(value / scale, digits)}{SPACE}{prefix}{unit}"
 
 
-def scaled(largest: float) -> tuple[float, str]:
-    """What an axis up to `largest` is divided by, and the prefix of its unit for that."""
-    return next(((scale, prefix) for scale, prefix in _PREFIXES[2:4] if largest >= scale), (1.0, ""))
+def up_to(value: float | None, digits: int = 2) -> str:
+    """Return a size rounded up, for "within" and "below": 2.33e-6 is within 2.4×10⁻⁶.
+
+    >>> up_to(2.33e-6), up_to(5.19e-6, 1), up_to(0.0)
+    ('2.4×10⁻⁶', '6×10⁻⁶', '0')
+    """
+    if value is None or not math.isfinite(value) or value == 0.0:
+        return number(value, digits)
+    step = 10.0 ** (math.floor(math.log10(value)) - digits + 1)
+    # The quotient of a number that has these digits may lie above a whole number by its rounding alone.
+    return number(math.ceil(value / step * (1.0 - 1e-12)) * step, digits)
+
+
+def shortest(value: float) -> str:
+    """Return a number that somebody chose as briefly as it can be written: 0, 300, 10⁵, 3.2×10⁴, 9.81.
+
+    >>> shortest(1e5), shortest(300.0), shortest(-3.2e4), shortest(1e-3)
+    ('10⁵', '300', '−3.2×10⁴', '0.001')
+    """
+    if value == 0.0 or not math.isfinite(value) or 1e-3 <= abs(value) < 1e4:
+        return minus(f"{value:.6g}")
+    mantissa, exponent = f"{value:.5e}".split("e")
+    mantissa = mantissa.rstrip("0").rstrip(".")
+    ten = power(int(exponent))
+    return minus({"1": ten, "-1": f"-{ten}"}.get(mantissa, f"{mantissa}×{ten}"))
+
+
+def seconds(value: float) -> str:
+    """Return a time of at most three digits with its unit: "20 s", "3.45 s".
+
+    >>> seconds(20.0).replace(SPACE, " "), seconds(3.449).replace(SPACE, " ")
+    ('20 s', '3.45 s')
+    """
+    return f"{shortest(float(f'{value:.3g}'))}{SPACE}s"
+
+
+def in_words(count: int) -> str:
+    """Return a small count as a word: "three"; larger ones in digits.
+
+    >>> in_words(3), in_words(17)
+    ('three', '17')
+    """
+    words = ("no", "one", "two", "three", "four", "five", "six", "seven", "eight", "nine", "ten")
+    return words[count] if count < len(words) else str(count)
 
 
 def typeset(text: str) -> str:

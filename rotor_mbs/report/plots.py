@@ -14,7 +14,7 @@ from rotor_mbs.models.lagrange.defects import interval_defects
 from rotor_mbs.report import canvas
 from rotor_mbs.report.canvas import TIME_AXIS, Panels
 from rotor_mbs.report.looks import BLUE, GREY, INK, VERMILLION, Look, coordinate_look, look_of
-from rotor_mbs.report.numbers import scaled, with_unit
+from rotor_mbs.report.numbers import prefix_of, with_unit
 from rotor_mbs.solution.metrics import angle_error, energy_scale, horizon
 from rotor_mbs.solution.quantities import LOADS, Plot, Quantity
 from rotor_mbs.solution.trajectory import Array, Solution, Trajectory
@@ -28,7 +28,7 @@ _RUNAWAY = 8.0
 _STILL = 10.0  # times what it is in the last samples, at most, where it has not passed
 # A range (rad, rad/s) that is rounding error.
 _ROUNDING = 1e-9
-_BINS = 130  # intervals of a curve that is drawn: one in some four pixels of a page
+_MAX_POINTS = 4000  # of a curve that is drawn; of more the smallest and the largest of equal intervals
 _AZIMUTH, _ELEVATION = np.radians((-62.0, 14.0))  # of the direction from which paths are seen
 
 
@@ -60,7 +60,7 @@ def draw_lines(axes: Any, series: Sequence[Series], label: str) -> None:
     """The curves over one vertical axis: of angles and rates in their range, of others in k or M of a unit."""
     shortest = min(len(curve.values) for curve in series)
     values = np.stack([curve.values[:shortest] for curve in series], axis=1)
-    scale, prefix = scaled(float(np.abs(values).max()) if "(" in label and "(rad" not in label else 1.0)
+    scale, prefix = prefix_of(float(np.abs(values).max()) if "(" in label and "(rad" not in label else 1.0)
     for curve in series:
         canvas.curve(axes, *thin(curve.time, curve.values / scale), curve.look)
     if "(rad" in label:
@@ -80,7 +80,9 @@ def set_range(axes: Any, values: Array) -> None:
 
 
 def lines(
-    rows: Sequence[tuple[str, Sequence[Series]]], horizon: float | None = None, heights: Sequence[float] = ()
+    rows: Sequence[tuple[str, Sequence[Series]]],
+    horizon: float | None = None,
+    heights: Sequence[float] = (),
 ) -> Panels:
     """Panels one above the other: (label with a unit, curves) each."""
     panels = canvas.panels(tuple(heights) or (2.3,) * len(rows), TIME_AXIS)
@@ -91,7 +93,12 @@ def lines(
 
 
 def component_panels(
-    quantity: Quantity, plot: Plot, time: Array, values: Array, labels: Sequence[str] = (), horizon: float | None = None
+    quantity: Quantity,
+    plot: Plot,
+    time: Array,
+    values: Array,
+    labels: Sequence[str] = (),
+    horizon: float | None = None,
 ) -> Panels:
     """A panel per axis with a line per blade, or one panel with a line per component."""
     rows: dict[str, list[Series]] = {}
@@ -117,14 +124,17 @@ def errors(series: Sequence[Series], label: str, horizon: float | None = None) -
     panels = canvas.panels((2.9,), TIME_AXIS)
     axes, known = panels.axes[0], []
     for curve in series:
-        time, values = curve.time, curve.values
-        if len(time) > 2 * _BINS:  # of each interval the sample of the largest magnitude
-            intervals = np.array_split(np.arange(len(time)), _BINS)
-            index = [interval[np.abs(values[interval]).argmax()] for interval in intervals]
-            time, values = time[index], values[index]
+        time, values = thin(curve.time, np.abs(curve.values))
         sizes = np.where(np.abs(values) > LOWEST, np.minimum(np.abs(values), HIGHEST), np.nan)
         first, step = len(time) // 30, max(1, len(time) // 8)
-        canvas.curve(axes, time, sizes, curve.look, 1.0 if curve.look.marker else 1.8, markevery=(first, step))
+        canvas.curve(
+            axes,
+            time,
+            sizes,
+            curve.look,
+            1.0 if curve.look.marker else 1.8,
+            markevery=(first, step),
+        )
         known += sizes[np.isfinite(sizes)].tolist()
     # A little below, so that a curve at a power of ten does not lie on the axis.
     lowest = 0.7 * max(min([*known, 1.0] if known else [LOWEST]), LOWEST)
@@ -136,13 +146,8 @@ def errors(series: Sequence[Series], label: str, horizon: float | None = None) -
 
 
 def thin(time: Array, values: Array) -> tuple[Array, Array]:
-    """The ends, and the smallest and the largest sample of each of some equal intervals: no peak is lost."""
-    if len(time) <= 2 * _BINS:
-        return time, values
-    chosen = [0, len(time) - 1]
-    for interval in np.array_split(np.arange(len(time)), _BINS):
-        chosen += [interval[values[interval].argmin()], interval[values[interval].argmax()]]
-    index = np.unique(chosen)
+    """Return the ends, and the smallest and the largest sample of equal intervals: no peak is lost."""
+    index = canvas.extremes(values, _MAX_POINTS)
     return time[index], values[index]
 
 
@@ -156,7 +161,13 @@ def is_cut(values: Array) -> bool:
 def mark_time(axes: Any, end: float, horizon: float | None) -> None:
     """A vertical line where the horizon lies before the end (s) of what is drawn."""
     if horizon is not None and horizon < end:
-        axes.axvline(horizon, color=GREY, linestyle="--", linewidth=1.3, label=f"horizon {with_unit(horizon, 's', 3)}")
+        axes.axvline(
+            horizon,
+            color=GREY,
+            linestyle="--",
+            linewidth=1.3,
+            label=f"horizon {with_unit(horizon, 's', 3)}",
+        )
 
 
 def paths(tip: Array) -> Panels:
@@ -174,21 +185,36 @@ def draw_paths(axes: Any, tip: Array) -> None:
     angle = np.linspace(0.0, 2.0 * np.pi, 37)
     ring = reach * np.stack([np.sin(angle), 0.0 * angle, np.cos(angle)], axis=1)
     axes.plot(*projected(ring).T, color="#dddddd", linewidth=0.7)
-    axes.plot(*projected(np.array([[0.0, 0.0, 0.0], [0.0, -0.3 * reach, 0.0]])).T, color=GREY, linewidth=3.0)
+    axes.plot(
+        *projected(np.array([[0.0, 0.0, 0.0], [0.0, -0.3 * reach, 0.0]])).T,
+        color=GREY,
+        linewidth=3.0,
+    )
     ten = 10.0 ** math.floor(math.log10(reach))
     length = next(step * ten for step in (5.0, 2.0, 1.0, 0.5, 0.2) if reach >= 3.0 * step * ten)
     corner = np.array([-0.88, -0.86]) * reach
     for end, name in zip(projected(length * np.eye(3)), "xyz", strict=True):
         axes.plot(*np.stack([corner, corner + end]).T, color=GREY, linewidth=0.8)
         axes.text(*(corner + 1.2 * end), name, color=GREY, ha="center", va="center", fontsize="small")
-    axes.text(*(corner - [0.0, 0.12 * reach]), f"{length:g} m", color=GREY, ha="left", va="center", fontsize="small")
+    axes.text(
+        *(corner - [0.0, 0.12 * reach]),
+        f"{length:g} m",
+        color=GREY,
+        ha="left",
+        va="center",
+        fontsize="small",
+    )
     for blade in range(tip.shape[1]):
         colour, path = coordinate_look(blade + 1).colour, projected(tip[:, blade])
         axes.plot(*path.T, color=colour, linewidth=0.8, label=f"blade {blade + 1}")
         for end, dashes, fill in ((path[0], (0, (3, 2)), "white"), (path[-1], "-", colour)):
             axes.plot((0.0, end[0]), (0.0, end[1]), color=colour, linestyle=dashes, linewidth=1.6)
             axes.plot(*end[:, None], color=colour, marker="o", markersize=4, markerfacecolor=fill)
-    for dashes, width, label in (("--", 1.6, "blade at the start"), ("-", 1.6, "at the end"), ("-", 3.0, "shaft")):
+    for dashes, width, label in (
+        ("--", 1.6, "blade at the start"),
+        ("-", 1.6, "at the end"),
+        ("-", 3.0, "shaft"),
+    ):
         axes.plot([], [], color=GREY, linestyle=dashes, linewidth=width, label=label)
 
 

@@ -1,9 +1,10 @@
 """One module per page: a report's data to the content of the page. Here what several pages have: the report itself,
-cells and tables of stored runs."""
+cells, tables and sentences about stored runs."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+import math
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from functools import cached_property
 
 from rotor_mbs.analysis import published
@@ -12,9 +13,9 @@ from rotor_mbs.analysis.published import ClaimStudy, Erratum, Published, claims
 from rotor_mbs.analysis.work_precision import by_scene
 from rotor_mbs.methods.catalogue import PRINTED, REFERENCE, errata_methods, is_corrected, look_up
 from rotor_mbs.report.elements import PageTable, Row, TableCell
-from rotor_mbs.report.files import page_names
+from rotor_mbs.report.files import INDEX, page_names
 from rotor_mbs.report.looks import label_of, with_capital
-from rotor_mbs.report.numbers import number, with_unit
+from rotor_mbs.report.numbers import NOTHING, in_words, number, seconds, up_to, with_unit
 from rotor_mbs.runs.design import metric_columns
 from rotor_mbs.runs.read import OpenResults, Record, StoredRun, StoredScene, read_records
 from rotor_mbs.solution.status import GOOD
@@ -32,8 +33,11 @@ class Report(OpenResults):
 
     @cached_property
     def files(self) -> Mapping[str, str]:
-        """The file of each scene's page, in order."""
-        return page_names(name for name, scene in self.scenes.items() if scene.methods or not self.is_suite)
+        """The file of each scene's page, in order; of a file with one scene it is the index."""
+        names = [name for name, scene in self.scenes.items() if scene.methods or not self.is_suite]
+        if len(names) == 1 and not self.is_suite:
+            return {names[0]: INDEX}
+        return page_names(names)
 
     @cached_property
     def claims(self) -> Sequence[Published]:
@@ -67,17 +71,18 @@ class Report(OpenResults):
 
 
 METRICS = (
-    "defect_max", "defect_median", "defect_time", "angle_error_max", "angle_error_predicted", "angle_error_whole",
-    "tip_error_max", "energy_gain_J", "energy_drift_max", "angular_impulse_error_max",
-    "zero_pitch_max", "zero_pitch_left_s", "zero_pitch_growth_per_s", "time_reached", "steps",
-    "rhs_evaluations", "setup_time_s", "run_time_s",
+    "angle_error_max", "angle_error_whole", "angle_error_predicted", "defect_max", "defect_median", "defect_time",
+    "tip_error_max", "energy_gain_J", "energy_drift_max", "angular_impulse_error_max", "constraint_error_max",
+    "zero_pitch_max", "zero_pitch_left_s", "zero_pitch_growth_per_s", "time_reached", "steps", "rhs_evaluations",
+    "run_time_s", "setup_time_s",
 )  # fmt: skip
 # Against the reference, which has none itself.
 _ERRORS_OF_RUNS = ("angle_error_max", "angle_error_predicted", "angle_error_whole", "tip_error_max")
+_METHODS_IN_A_TABLE = 8  # side by side on a page of 1440 px
 
 
 def status_text(run: StoredRun) -> str:
-    """ "solver failed" of "solver_failed"; of equations that are not claimed to be correct never "ok"."""
+    """Return "solver failed" for "solver_failed"; for equations that are not claimed to be correct never "ok"."""
     return words_of("completed" if run.status == "ok" and not is_corrected(run.method) else run.status)
 
 
@@ -86,24 +91,26 @@ def words_of(status: str) -> str:
 
 
 def status_cell(run: StoredRun, suite_run: SuiteRun | None = None) -> TableCell:
-    """The status, and below it the reason where it is not ok; of a run of the suite also what its ladder found."""
+    """Return the status, and the reason where it is not ok; of a run of the suite also what its ladder found."""
     text, message = status_text(run), str(run.attributes.get("message", ""))
     tone = "good" if text == "ok" else "" if run.status in GOOD else "bad"
     if suite_run is not None and suite_run.outcome != run.status:
         text, message = OUTCOMES[suite_run.outcome][1], suite_run.message
         if suite_run.step is not None:
             message += f"; step for 10⁻⁶ rad: {with_unit(suite_run.step, 's')}"
-    return TableCell(text, tone, note="" if text == "ok" else message)
+    if text == "ok":
+        return TableCell("✓ ok", tone)
+    return TableCell(text, tone, note=message)
 
 
 def method_cell(name: str) -> TableCell | str:
-    """A method's label, and below it the name that the command line and the file have."""
+    """Return a method's label, and below it the name that the command line and the file have."""
     label = label_of(name)
     return label if label == name else TableCell(label, note=name)
 
 
 def run_cell(run: StoredRun) -> TableCell | str:
-    """A run's method, and below it the settings that are not the method's defaults."""
+    """Return a run's method, and below it the settings that are not the method's defaults."""
     method = look_up(run.method)
     defaults = {} if method is None else method.defaults
     own = [f"{name} = {value}" for name, value in run.settings.items() if defaults.get(name, value) != value]
@@ -112,19 +119,28 @@ def run_cell(run: StoredRun) -> TableCell | str:
 
 
 def metric(run: StoredRun, name: str) -> float | None:
-    """A number stored with the run; None where it has none."""
+    """Return a number stored with the run; None where it has none."""
     value = run.attributes.get(name)
     return float(value) if isinstance(value, float | int) else None
 
 
+def number_cell(value: float | None, digits: int = 2, tone: str = "") -> TableCell:
+    """Return a number that a table sorts by."""
+    return TableCell(
+        number(value, digits),
+        tone,
+        order=value if value is not None and math.isfinite(value) else None,
+    )
+
+
 def horizon_of(scene: StoredScene) -> float | None:
-    """s; None where no run was compared with a reference."""
+    """Return the scene's horizon in s; None where no run was compared with a reference."""
     known = [metric(run, "horizon_s") for run in scene.runs.values()]
     return next((value for value in known if value is not None), None)
 
 
 def compared_time(scenes: Iterable[StoredScene]) -> tuple[float, float]:
-    """s: how much of the scenes' time lies before their horizons, and how much they have in all."""
+    """Return how much of the scenes' time (s) lies before their horizons, and how much they have in all."""
     compared = whole = 0.0
     for scene in scenes:
         if scene.reference is not None and scene.reference.samples:
@@ -134,25 +150,92 @@ def compared_time(scenes: Iterable[StoredScene]) -> tuple[float, float]:
     return compared, whole
 
 
-def metrics_table(scene: StoredScene, suite_runs: Sequence[SuiteRun] = ()) -> PageTable:
-    """Every run of the scene: how it ended, and the metrics that its file describes."""
+def models_of(methods: Collection[str]) -> int:
+    """Return how many models, which share no code, these methods belong to."""
+    return len({method.partition("/")[0] for method in methods})
+
+
+def computations(methods: Collection[str]) -> str:
+    """Return what these methods are, as the subject of a sentence: "three independent computations".
+
+    >>> computations(["lagrange/taylor", "exudyn_tree/rk67"])
+    'two independent computations'
+    >>> computations(["lagrange/taylor", "lagrange/dop853", "exudyn_tree/rk67"])
+    'three methods of two independent models'
+    """
+    count, models = len(methods), models_of(methods)
+    if count == 1:
+        return f"{label_of(next(iter(methods)))}"
+    if models == count:
+        return f"{in_words(count)} independent computations"
+    if models == 1:
+        return f"{in_words(count)} methods of one model"
+    return f"{in_words(count)} methods of {in_words(models)} independent models"
+
+
+def agreement(scene: StoredScene) -> tuple[list[str], float | None]:
+    """Return the corrected methods of a scene that are ok, and the largest of their angle errors up to the horizon.
+
+    None instead of the error (rad) where none was compared with a reference.
+    """
+    good = {name: run for name, run in scene.corrected_runs.items() if run.status == "ok"}
+    errors = [error for run in good.values() if (error := metric(run, "angle_error_max")) is not None]
+    return list(good), max(errors) if errors else None
+
+
+def agreement_text(scene: StoredScene) -> str:
+    """Return a sentence about how near the scene's corrected methods are to each other; "" where nothing is known."""
+    methods, error = agreement(scene)
+    if error is None:
+        return ""
+    verb = "agrees" if len(methods) == 1 else "agree"
+    within = "exactly" if error == 0.0 else f"within {up_to(error, 1)} rad"
+    compared, whole = compared_time([scene])
+    until = "" if compared >= whole else f" up to {seconds(compared)}"
+    other = " with the reference" if len(methods) == 1 else ""
+    return f"{with_capital(computations(methods))} {verb}{other} {within}{until}."
+
+
+def method_table(scene: StoredScene, suite_runs: Sequence[SuiteRun] = ()) -> PageTable:
+    """Return the table of agreement: a row per run of a scene, six columns."""
     of_suite = {run.method: run for run in suite_runs}
-    columns = metric_columns(scene.scene.outputs)
-    judged = [name for name in columns if name.endswith("_error_max") and name not in METRICS]
-    shown = {name: columns[name] for name in (*METRICS, *judged) if name in columns}
     rows: list[Row] = []
     for run in scene.runs.values():
         row = [run_cell(run), status_cell(run, of_suite.get(run.method))]
-        for name in shown:
+        for name in ("angle_error_max", "defect_max", "energy_drift_max", "run_time_s"):
             value = metric(run, name)
+            if run.method == REFERENCE and name == "angle_error_max":
+                row.append(NOTHING)
+                continue
             is_over = name == "angle_error_max" and value is not None and not value <= OK_ERROR
-            if run.method == REFERENCE and name in _ERRORS_OF_RUNS:
-                row.append("")
-            else:
-                row.append(TableCell(number(value, 3), tone="bad" if is_over and is_corrected(run.method) else ""))
+            row.append(number_cell(value, tone="bad" if is_over and is_corrected(run.method) else ""))
         rows.append(row)
-    names = []
-    for name, column in shown.items():
-        unit = f"{column.units}, at most {OK_ERROR:g}" if name == "angle_error_max" else column.units
-        names.append(with_capital(column.long_name.partition("; -1")[0]) + (f" ({unit})" if unit != "1" else ""))
-    return PageTable("", ("Method", "Status", *names), rows)
+    head = (
+        "Method", "Status", "Largest angle error up to the horizon (rad)", "Largest interval defect (rad)",
+        "Energy error / energy scale", "Run time (s)",
+    )  # fmt: skip
+    return PageTable("Runs of this scene", head, rows, wide=(3, 5), sortable=True)
+
+
+def metrics_tables(scene: StoredScene) -> list[PageTable]:
+    """Return every number of every run: a row per quantity, a column per run, in tables that fit a page."""
+    columns = metric_columns(scene.scene.outputs)
+    judged = [name for name in columns if name.endswith(("_error_max", "_error")) and name not in METRICS]
+    names = [name for name in (*METRICS, *judged) if name in columns]
+    runs = list(scene.runs.values())
+    tables = []
+    for first in range(0, len(runs), _METHODS_IN_A_TABLE):
+        shown = runs[first : first + _METHODS_IN_A_TABLE]
+        rows: list[Row] = []
+        for name in names:
+            unit = "" if columns[name].units == "1" else f" ({columns[name].units})"
+            row: list[TableCell | str] = [with_capital(columns[name].long_name.partition("; -1")[0]) + unit]
+            for run in shown:
+                is_its_own = run.method == REFERENCE and name in _ERRORS_OF_RUNS
+                value = None if is_its_own else metric(run, name)
+                is_count = columns[name].kind == "<i8" and value is not None
+                row.append(str(int(value or 0)) if is_count else number(value, 3))
+            if any(cell != NOTHING for cell in row[1:]):
+                rows.append(row)
+        tables.append(PageTable("All numbers of every method", ("Quantity", *map(run_cell, shown)), rows))
+    return tables

@@ -5,12 +5,13 @@ from __future__ import annotations
 import json
 import os
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from html import escape
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from markupsafe import Markup
 
 from rotor_mbs.analysis.text_tables import TextTable
 from rotor_mbs.comparison.data import load_data
@@ -20,10 +21,28 @@ from rotor_mbs.comparison.verdict import DEFAULT_TOLERANCE, LEVELS, ChannelError
 from rotor_mbs.methods.time_limit import valid_seconds
 from rotor_mbs.report import canvas, plots
 from rotor_mbs.report.canvas import Panels
-from rotor_mbs.report.elements import PageTable, Picture, Row, Section, TableCell, picture
+from rotor_mbs.report.elements import (
+    Curve,
+    Element,
+    Fact,
+    Fold,
+    Grid,
+    Horizontal,
+    Legend,
+    Listing,
+    Mark,
+    Note,
+    PageContent,
+    PageTable,
+    Plot,
+    Row,
+    Section,
+    TableCell,
+)
 from rotor_mbs.report.files import write_page
-from rotor_mbs.report.looks import GREY, Look, coordinate_look
-from rotor_mbs.report.numbers import number, typeset, with_unit
+from rotor_mbs.report.looks import GREY, INK, PALETTE, Look, coordinate_look, with_capital
+from rotor_mbs.report.numbers import shortest, typeset, up_to, with_unit
+from rotor_mbs.report.pages import scene_plots as draw
 from rotor_mbs.report.plots import Series
 from rotor_mbs.runs.read import Record, write_records
 from rotor_mbs.runs.versions import machine, versions
@@ -31,7 +50,11 @@ from rotor_mbs.scenario.catalogue import scene_of
 from rotor_mbs.scenario.keys import as_float, positive
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.scenario.toml_file import file_path
+from rotor_mbs.solution.defects import FLOOR_SAFETY
 from rotor_mbs.solution.trajectory import need_xarray
+
+_REFERENCE = Look(PALETTE["reference"][0], "-", "", "reference")
+_CHANNELS_SHOWN = 8  # plots; those of further channels are folded
 
 
 def compare(
@@ -128,7 +151,11 @@ class DataComparison:
         """
         record = self.record
         variables = {
-            name: (column.dimensions, record.arrays[name], {"units": column.units, "long_name": column.long_name})
+            name: (
+                column.dimensions,
+                record.arrays[name],
+                {"units": column.units, "long_name": column.long_name},
+            )
             for name, column in record.columns.items()
         }
         facts = {name: record.attributes[name] for name in ("source", "status", "message", "tolerance")}
@@ -136,8 +163,7 @@ class DataComparison:
 
     def to_html(self, folder: str | os.PathLike[str]) -> Path:
         """Write the page into a folder. Returns its path."""
-        page = comparison_page(self.record)
-        return write_page(file_path(folder), "comparison", page, versions() | machine())
+        return write_page(file_path(folder), comparison_page(self.record), versions() | machine())
 
     def save(self, path: str | os.PathLike[str]) -> Path:
         """Save data, reference, errors and verdict as a results file.
@@ -152,7 +178,10 @@ class DataComparison:
     def __repr__(self) -> str:
         """Says how columns were read, numbers by channel, and the verdict."""
         verdict = self.verdict
-        lines = [f"{verdict.source}: {verdict.rows} rows against {verdict.scene}", *map("  {}".format, verdict.read)]
+        lines = [
+            f"{verdict.source}: {verdict.rows} rows against {verdict.scene}",
+            *map("  {}".format, verdict.read),
+        ]
         if verdict.unused:
             lines.append(f"  not used: {', '.join(verdict.unused[:12])}{', ...' * (len(verdict.unused) > 12)}")
         lines += ["", str(self.table()), ""]
@@ -171,41 +200,231 @@ class DataComparison:
         )
 
 
-def comparison_page(record: Record) -> dict[str, object]:
-    """The content of the page: verdict, pictures, tables."""
+def comparison_page(record: Record) -> PageContent:
+    """Return the content of the page: the verdict and the onset of a fault, plots, channels, how the data were read."""
     verdict = verdict_of(record)
-    facts = [
-        ("Channels compared", ", ".join(channel.name for channel in verdict.channels)),
-        ("Rows", f"{verdict.rows}, up to {with_unit(verdict.compared_until, _axis_unit(verdict), 4)}"),
+    is_time = verdict.axis == "time"
+    sections = [
+        _channel_section(record, verdict),
+        _error_section(record, verdict),
+        _table_section(verdict),
     ]
-    if verdict.horizon_s is not None:
-        facts.append(("Errors checked up to the horizon", with_unit(verdict.horizon_s, "s", 4)))
-    units = dict.fromkeys(channel.defect_unit for channel in verdict.channels)
-    allowed = " or ".join("rad in an interval" if unit == "rad" else unit for unit in units)
-    facts.append(("Tolerance", f"{number(verdict.tolerance)} {allowed}, beyond rounding"))
-    if verdict.unused:
-        facts.append(("Columns not used", ", ".join(verdict.unused)))
+    sections.append(_reading_section(verdict))
+    about = f"{record.attributes['title']} · {verdict.rows} rows"
+    facts = [
+        Fact(
+            "Verdict",
+            "✓ agrees" if verdict.agrees else f"✗ {verdict.status}",
+            tone="good" if verdict.agrees else "bad",
+        )
+    ]
+    onset = onset_of(record, verdict)
+    if onset is not None:
+        name = "First outside the tolerance" if is_time else "First speed outside the tolerance"
+        facts.append(Fact(name, with_unit(onset[0], _axis_unit(verdict), 4), onset[1]))
+    largest = max(verdict.channels, key=lambda channel: channel.error_max, default=None)
+    if largest is not None:
+        facts.append(Fact("Largest error", with_unit(largest.error_max, largest.unit), largest.name))
+    compared = f"{verdict.rows} rows"
+    if verdict.horizon_s is not None and verdict.horizon_s < verdict.compared_until:
+        compared += f"; errors checked up to the horizon at {with_unit(verdict.horizon_s, 's', 4)}"
+    facts.append(Fact("Compared up to", with_unit(verdict.compared_until, _axis_unit(verdict), 4), compared))
+    title = f"{Path(verdict.source).name} against {verdict.scene}"
+    return PageContent(title, about, comparison_answer(record), facts, sections)
+
+
+def comparison_answer(record: Record) -> list[Markup]:
+    """Return whether the data agree, from when on they do not, why, and what it looks like."""
+    verdict = verdict_of(record)
+    onset = onset_of(record, verdict)
+    unit = _axis_unit(verdict)
+    if verdict.agrees:
+        defects = [channel.defect for channel in verdict.channels if channel.defect is not None]
+        text = Markup("The data <b>agree</b> with {}").format(verdict.scene)
+        if defects and not any(defects):
+            text += " to the rounding of their own digits"
+        elif defects:
+            text += Markup(": beyond rounding no channel differs by more than <b>{}</b>, allowed {}").format(
+                up_to(max(defects)), shortest(verdict.tolerance)
+            )
+        sentences = [text + "."]
+    elif onset is not None:
+        text = Markup('<span class="bad">The data differ from {}</span> from <b>{}</b> on, first in {}.')
+        sentences = [text.format(verdict.scene, with_unit(onset[0], unit, 4), onset[1])]
+    else:
+        sentences = [Markup('<span class="bad">The data are {}</span>.').format(verdict.status)]
+    good = [channel.name for channel in verdict.channels if not _is_outside(channel, verdict)]
+    if not verdict.agrees and good and len(good) < len(verdict.channels):
+        sentences.append(
+            Markup("{} within the tolerance: {}.").format("Channel" if len(good) == 1 else "Channels", ", ".join(good))
+        )
     if verdict.message:
-        facts.append(("Reason", verdict.message))
-    facts += [("Probable cause", cause) for cause in verdict.likely]
-    facts += [("Note", note) for note in verdict.notes]
+        sentences.append(Markup("{}.").format(with_capital(typeset(verdict.message.rstrip(".")))))
+    for cause in verdict.likely[:2]:
+        sentences.append(Markup("Probable cause: <b>{}</b>.").format(typeset(cause)))
+    return sentences
+
+
+def _is_outside(channel: ChannelErrors, verdict: DataVerdict) -> bool:
+    """Whether a channel's defect is beyond the tolerance; one that cannot be judged is not."""
+    return channel.defect is not None and not channel.defect <= verdict.tolerance
+
+
+def onset_of(record: Record, verdict: DataVerdict) -> tuple[float, str] | None:
+    """Return the first time, or speed, at which a channel is outside the tolerance, and its name; None where none is.
+
+    Of an angle or a rate it is the beginning of the first interval with a defect beyond tolerance and rounding; of a
+    load the first row with such an error.
+    """
+    rows = record.arrays[verdict.axis]
+    found: list[tuple[float, str]] = []
+    for channel in verdict.channels:
+        if not _is_outside(channel, verdict):
+            continue
+        allowed = verdict.tolerance + FLOOR_SAFETY * (channel.floor or 0.0)
+        name = channel.name.replace(" ", "_")
+        if f"{name}_defect" in record.arrays:
+            sizes = np.abs(record.arrays[f"{name}_defect"])
+        elif f"{name}_error" in record.arrays:
+            reference = np.abs(record.arrays.get(f"{name}_reference", np.ones(1)))
+            largest = float(reference[np.isfinite(reference)].max(initial=0.0)) or 1.0
+            scale = 1.0 if channel.defect_unit == channel.unit else largest
+            sizes = np.abs(record.arrays[f"{name}_error"]) / scale
+        else:
+            continue
+        outside = np.flatnonzero(~(sizes <= allowed) & ~np.isnan(sizes))
+        if len(outside):
+            # A defect belongs to the interval that ends in its row.
+            first = int(outside[0])
+            if f"{name}_defect" in record.arrays:
+                first = max(first - 1, 0)
+            found.append((float(rows[first]), channel.name))
+    return min(found) if found else None
+
+
+def _axis_of(record: Record, verdict: DataVerdict) -> Horizontal:
+    rows = record.arrays[verdict.axis]
+    first, last = (float(rows[0]), float(rows[-1])) if len(rows) else (0.0, 1.0)
+    last = max(last, first + 1e-12)
+    if verdict.axis == "time":
+        return Horizontal("time", "s", "t", first, last)
+    return Horizontal("rotor speed", "rad/s", "speed", first, last)
+
+
+def _marks(record: Record, verdict: DataVerdict, *, with_horizon: bool = False) -> list[Mark]:
+    onset = onset_of(record, verdict)
+    marks = [] if onset is None else [Mark("first outside", onset[0])]
+    horizon, axis = verdict.horizon_s, _axis_of(record, verdict)
+    if with_horizon and horizon is not None and axis.first < horizon < axis.last:
+        marks.append(Mark("horizon", horizon))
+    return marks
+
+
+def _channel_section(record: Record, verdict: DataVerdict) -> Section:
+    """Return every channel's data upon the reference, those outside the tolerance first."""
+    rows, axis = record.arrays[verdict.axis], _axis_of(record, verdict)
+    marks = _marks(record, verdict)
+    plots: list[Plot] = []
+    channels = sorted(verdict.channels, key=lambda channel: not _is_outside(channel, verdict))
+    for channel in channels:
+        name = channel.name.replace(" ", "_")
+        curves = []
+        if f"{name}_reference" in record.arrays:
+            reference = record.arrays[f"{name}_reference"]
+            curves.append(Curve("reference", _REFERENCE, rows, np.asarray(reference, float)))
+        data = np.asarray(record.arrays[name], float)
+        curves.append(Curve("data", Look(INK, "-", "", "data"), rows, data))
+        clip = None
+        if len(curves) == 2:
+            clip = draw.range_of(curves[0].y, data)
+        state = " · outside the tolerance" if _is_outside(channel, verdict) else ""
+        plots.append(Plot(
+            with_capital(channel.name), f"{channel.unit}{state}", axis, curves, 170, clip=clip,
+            marks=marks if not plots else [Mark("", mark.x) for mark in marks], still=len(plots) < 2,
+        ))  # fmt: skip
+    legend = Legend([("reference", _REFERENCE), ("data", Look(INK, "-", "", "data"))])
+    first, others = plots[:_CHANNELS_SHOWN], plots[_CHANNELS_SHOWN:]
+    elements: list[Grid | Fold | Element] = [legend, Grid(2, [[plot] for plot in first])]
+    if others:
+        elements.append(Fold("Other channels", str(len(others)), [Grid(2, [[plot] for plot in others])]))
+    heading = "Data and reference" if verdict.axis == "time" else "Frequencies of the data and of the reference"
+    say = "" if verdict.axis == "time" else "Horizontally: rotor speed (rad/s)."
+    return Section("channels", heading, elements if plots else [], say)
+
+
+def _error_section(record: Record, verdict: DataVerdict) -> Section:
+    """Return the errors of the channels, and their interval defects with the tolerance."""
+    rows, axis = record.arrays[verdict.axis], _axis_of(record, verdict)
+    channels = _drawn(verdict)
+    marks = _marks(record, verdict, with_horizon=True)
+    errors, defects = [], []
+    for channel in channels:
+        look = replace(_look(channel), label=channel.name)
+        name = channel.name.replace(" ", "_")
+        if f"{name}_error" in record.arrays:
+            errors.append(Curve(channel.name, look, rows, draw.positive(_array(record, channel, "_error"))))
+        if channel.defect_unit == "rad" and f"{name}_defect" in record.arrays:
+            defects.append(Curve(channel.name, look, rows, draw.positive(_array(record, channel, "_defect"))))
+    plots: list[list[Element]] = []
+    if errors:
+        plots.append([Plot("Error", channels[0].unit, axis, errors, 240, log=True, marks=marks)])
+    if defects:
+        allowed = [
+            *marks,
+            Mark(f"tolerance {shortest(verdict.tolerance)} rad", y=verdict.tolerance),
+        ]
+        note = "including the rounding of the data"
+        plots.append([Plot("Interval defect", "rad", axis, defects, 240, note, log=True, marks=allowed)])
+    legend = Legend([(channel.name, replace(_look(channel), label=channel.name)) for channel in channels])
+    say = (
+        "The defect of an interval tells where in time the data depart from the equations of motion." if defects else ""
+    )
+    return Section("errors", "Errors", [legend, Grid(len(plots), plots)] if plots else [], say)
+
+
+def _table_section(verdict: DataVerdict) -> Section:
     table = channel_table(verdict)
     rows: list[Row] = []
     for channel, (name, error, defect, *others) in zip(verdict.channels, table.rows, strict=True):
-        tone = "" if channel.defect is None else "good" if channel.defect <= verdict.tolerance else "bad"
-        rows.append([name, error, TableCell(typeset(defect), tone), *others])
-    return {
-        "verdict": verdict,
-        "title": record.attributes["title"],
-        "source": Path(verdict.source).name,
-        "facts": facts,
-        "errors": Section(_pictures(record, verdict)),
-        "channels": Section(tables=[PageTable("", table.head, rows)]),
-    }
+        tone = "" if channel.defect is None else "bad" if _is_outside(channel, verdict) else "good"
+        sign = {"good": "✓ ", "bad": "✗ "}.get(tone, "")
+        rows.append([name, error, TableCell(f"{sign}{typeset(defect)}", tone), *others])
+    heading = "Channels up to the horizon" if verdict.axis == "time" else "Channels"
+    head = tuple(with_capital(text) for text in table.head)
+    elements: list[Element] = [PageTable("Channels", head, rows, wide=(3, 5))]
+    if verdict.axis == "time":
+        elements.append(Note("Loads: compared in all rows with those at the states of the data."))
+    return Section("table", heading, elements)
+
+
+def _reading_section(verdict: DataVerdict) -> Section:
+    """Return how the data were read, and what else is to know."""
+    read = Listing([(place, line) for place, line in enumerate_lines(verdict.read)])
+    folds: list[Fold | Grid | Element] = [Fold("Columns", f"{len(verdict.read)} that were read", [read])]
+    if verdict.unused:
+        folds.append(Fold("Columns not used", str(len(verdict.unused)), [Note(", ".join(verdict.unused))]))
+    others = [*(f"Probable cause: {cause}" for cause in verdict.likely[2:]), *verdict.notes]
+    if others:
+        folds.append(Fold("Notes", str(len(others)), [Note(text) for text in others], is_open=True))
+    return Section("columns", "How the data were read", folds)
+
+
+def enumerate_lines(lines: Sequence[str]) -> list[tuple[str, str]]:
+    """Return "what = column" lines as pairs."""
+    pairs = []
+    for line in lines:
+        what, _, column = line.partition(" = ")
+        pairs.append((what, column) if column else ("", line))
+    return pairs
 
 
 def channel_table(verdict: DataVerdict) -> TextTable:
-    head = ("channel", "largest error", "largest defect", *(f"within {level:g} up to" for level in LEVELS))
+    head = (
+        "channel",
+        "largest error",
+        "largest defect",
+        *(f"within {level:g} up to" for level in LEVELS),
+    )
     rows = []
     for channel in verdict.channels:
         errors = (f"{channel.error_max:.1e} {channel.unit}", _defect(channel))
@@ -270,30 +489,3 @@ def _look(channel: ChannelErrors) -> Look:
     """The look of the channel's coordinate: 0 the rotor, 1 the pitch of blade 1, ..."""
     digits = "".join(filter(str.isdigit, channel.name))
     return coordinate_look(int(digits or 0))
-
-
-def _pictures(record: Record, verdict: DataVerdict) -> list[Picture]:
-    """Angles of the data upon those of the reference; errors; defects."""
-    pictures = []
-    channels, time = _drawn(verdict), record.arrays[verdict.axis]
-    is_modes = verdict.axis == "speed"
-    if is_modes or channels[0].unit == "rad":
-        panels = canvas.panels((2.9,), canvas.SPEED_AXIS if is_modes else canvas.TIME_AXIS)
-        axes = panels.axes[0]
-        drawn = []
-        for channel in channels:
-            data, reference = _array(record, channel), _array(record, channel, "_reference")
-            drawn += [data, reference]
-            canvas.curve(axes, *plots.thin(time, reference), Look(GREY, "-", "", "reference"), 4.0, alpha=0.4)
-            canvas.curve(axes, *plots.thin(time, data), _look(channel))
-        plots.set_range(axes, np.stack(drawn, axis=1))
-        axes.set_ylabel("frequency (rad/s)" if is_modes else plots.ANGLE_AXIS)
-        what = "Frequencies" if is_modes else "Angles"
-        pictures.append(picture(panels, "motion", f"{what} of the data and of the reference"))
-    caption = "Error against the reference" + ("" if is_modes else "; vertical line: horizon")
-    pictures.append(picture(error_panels(record), "errors-0", caption))
-    defects = defect_panels(record)
-    if defects is not None:
-        caption = "Interval defects, including rounding of the data, and tolerance"
-        pictures.append(picture(defects, "defects", caption))
-    return pictures

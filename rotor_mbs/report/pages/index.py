@@ -1,131 +1,473 @@
-"""The index: the rotor, the published crest, defects of all methods; then numbers, claims and all scenes."""
+"""The index of a file with several scenes: what was found, then every scene in a row. Of the paper's scenes the finding
+about the paper; of a user's own scenes how they ended, those that failed first."""
 
 from __future__ import annotations
 
-import math
-from collections.abc import Mapping
+from collections.abc import Sequence
 
-from rotor_mbs.analysis.published import finding
-from rotor_mbs.analysis.text_tables import method_table
-from rotor_mbs.methods.catalogue import PRINTED, REFERENCE
-from rotor_mbs.report import plots
-from rotor_mbs.report.elements import PageTable, Row, Section, TableCell, picture
-from rotor_mbs.report.looks import label_of
-from rotor_mbs.report.numbers import SPACE, number, power, prefixed
+import numpy as np
+from markupsafe import Markup
+
+from rotor_mbs.analysis.published import ENERGY_RISE, Published, rounds_to
+from rotor_mbs.methods.catalogue import errata_methods, is_corrected
+from rotor_mbs.report.elements import (
+    Element,
+    Fact,
+    Fold,
+    Grid,
+    Legend,
+    Note,
+    PageContent,
+    PageTable,
+    Row,
+    Section,
+    TableCell,
+)
+from rotor_mbs.report.looks import coordinate_look, with_capital
+from rotor_mbs.report.numbers import NOTHING, formula, in_words, number, prefixed, up_to, with_unit
 from rotor_mbs.report.pages import (
     Report,
+    agreement,
     compared_time,
-    horizon_of,
+    computations,
     method_cell,
     metric,
+    number_cell,
     paper,
     status_text,
 )
-from rotor_mbs.report.pages.bench import cost_picture
-from rotor_mbs.report.pages.scene import defects, error_picture, key_picture
-from rotor_mbs.report.pages.viewer import viewer
-from rotor_mbs.runs.read import StoredScene
+from rotor_mbs.report.pages import scene_plots as draw
+from rotor_mbs.report.pages.scene import HORIZON_NOTE, paper_plots, short_name, typeset_title
+from rotor_mbs.report.pages.scene_plots import CORRECTED, PRINTED
+from rotor_mbs.runs.read import StoredRun, StoredScene
 from rotor_mbs.solution.status import GOOD
-from rotor_mbs.studies.stability import OUTCOMES
-
-Scenes = Mapping[str, StoredScene]
-# Errors: a shade for each of these powers of ten and below, the last for all that is larger.
-_SHADES = (-12, -10, -8, -6, -4, -2, 0)
 
 
-def index_page(report: Report) -> dict[str, object]:
-    """The content of the index; what the file has no data for is None or empty. Its last tables are folded."""
-    scenes, claims, study = report.scenes, report.claims, report.study
-    model = "Corrected model" if claims else "Model"  # of a user's own rotor nothing was corrected
-    # The scene with a published extreme that is no rounding error; else one with both models; else the first.
-    both = [name for name, scene in scenes.items() if len(scene.sides) > 1]
-    shown = next(iter([*both, *scenes]))
-    for claim in claims:
-        if claim.is_number and not claim.rounding:
-            shown = claim.scene
-            break
-    sides = list(scenes[shown].sides.values())
-    own_claims = [claim for claim in claims if shown in claim.scenes]
-    printed = scenes[shown].printed
-    judged = {} if printed is None else {printed.method: printed}
-    judged |= scenes[shown].corrected_runs
-    still = None
-    for run in sides:
-        if "tip" in run:
-            still = picture(plots.paths(run.array("tip")), "still", f"{shown}: paths of the tips")
-    benched = next((scene for scene in report.curves if scene in scenes), "")
-    methods = method_table(run for scene in scenes.values() for run in scene.corrected_runs.values())
-    method_rows = [(method_cell(name), *cells) for name, *cells in methods.rows]
-    compared, whole = compared_time(scenes.values())
-    notes = []
-    if compared:
-        notes.append(
-            f"Compared with the reference over {number(compared, 3)} of {number(whole, 3)} s of simulated time, "
-            f"{100.0 * compared / whole:.0f}{SPACE}%: each scene up to its horizon."
+def index_page(report: Report) -> PageContent:
+    """Return the content of the index."""
+    return _paper_index(report) if report.claims else _own_index(report)
+
+
+# ---- Scenes of the paper
+
+
+def created_energy(scene: StoredScene) -> float | None:
+    """Return the energy (J) that the printed equations create in a scene; None where it is below a thousandth of the
+    energy scale, or not known."""
+    run = scene.printed
+    if run is None:
+        return None
+    gain, scale = metric(run, "energy_gain_J"), metric(run, "energy_scale_J")
+    return gain if gain is not None and scale is not None and gain > ENERGY_RISE * scale else None
+
+
+def paper_answer(report: Report) -> list[Markup]:
+    """Return what was found of the paper, from the file's runs."""
+    scenes = report.scenes.values()
+    with_printed = [scene for scene in scenes if scene.printed is not None]
+    rising = [scene for scene in with_printed if created_energy(scene) is not None]
+    sentences = []
+    if report.errata and with_printed:
+        text = Markup(
+            "The paper's printed equations contain <b>{} errors</b> and create energy in <b>{} of {} scenes</b>."
         )
-    table, marks = scene_table(scenes, report.files)
-    shades = [*(f"≤{SPACE}{power(exponent)}" for exponent in _SHADES), f">{SPACE}{power(_SHADES[-1])}"]
-    return {
-        "paper": PageTable("", ("Result", "As printed", model), finding(scenes, claims)),
-        "scene": shown,
-        "viewer": viewer(scenes[shown], {label_of(run.method): run for run in sides}),
-        "still": still,
-        "pictures": [
-            *key_picture(sides, own_claims, horizon_of(scenes[shown]), "crest"),
-            *error_picture(
-                defects(scenes[shown].scene, judged),
-                "defect of an interval (rad)",
-                "defects",
-                f"{shown}: interval defects",
-            ),
-            *cost_picture(report.curves.get(benched, ()), f"Error and run time of all methods, {benched}"),
-        ],
-        "methods": Section(tables=[PageTable("", methods.head, method_rows)], notes=notes),
-        "scenes": table,
-        "marks": sorted(marks.items()),
-        "shades": shades if compared else [],
-        "numbers": Section(
-            tables=[paper.number_table(claims)],
-            notes=[text for key, text in report.conditions.items() if not key.startswith("fig")],
-        ),
-        "claims": Section(tables=[] if study is None else [paper.claim_table(claims, study)]),
-        "study": study,
-        "is_paper": bool(claims),
-    }
+        sentences.append(text.format(in_words(len(report.errata)), len(rising), len(with_printed)))
+    methods, error, agreeing = _agreement(report)
+    if error is not None:
+        verb = "agrees" if len(methods) == 1 else "agree"
+        text = Markup("Corrected, {} {} within <b>{} rad</b> in {} {} scenes.")
+        sentences.append(text.format(
+            computations(methods), verb, up_to(error, 1), "all" if agreeing == len(scenes) else f"{agreeing} of", len(scenes)
+        ))  # fmt: skip
+    numbers = [claim for claim in report.claims if claim.is_number]
+    printed, corrected = (_reproduced(numbers, side) for side in (PRINTED, CORRECTED))
+    if numbers and printed == len(numbers) and corrected == 0:
+        count = in_words(len(numbers))
+        text = Markup("All {} numbers that the paper publishes come out of the printed equations and none out of the ")
+        text += Markup("corrected ones: its curves show the errors, not the rotor.")
+        sentences.append(text.format(count))
+    elif numbers:
+        text = Markup("Of {} numbers that the paper publishes {} come out of the printed equations and {} out of the ")
+        text += Markup("corrected ones.")
+        sentences.append(
+            text.format(
+                in_words(len(numbers)), *(in_words(count) if count else "none" for count in (printed, corrected))
+            )
+        )
+    return sentences
 
 
-def scene_table(scenes: Scenes, files: Mapping[str, str]) -> tuple[PageTable, dict[str, str]]:
-    """A row per scene: errors of all methods, and the energy gain of the printed model.
+def _reproduced(numbers: Sequence[Published], side: str) -> int:
+    values = [(claim.printed if side == PRINTED else claim.corrected, claim) for claim in numbers]
+    return sum(value is not None and rounds_to(value, claim) for value, claim in values)
 
-    Returns the table, and what its marks stand for.
-    """
-    names = dict.fromkeys(name for scene in scenes.values() for name in scene.runs)
-    methods = [name for name in names if name != REFERENCE]
-    marks: dict[str, str] = {}
+
+def _agreement(report: Report) -> tuple[list[str], float | None, int]:
+    """Return the corrected methods that are ok in some scene, the largest error of such a run (rad), and how many
+    scenes have one."""
+    methods: dict[str, None] = {}
+    errors = []
+    for scene in report.scenes.values():
+        names, error = agreement(scene)
+        if error is not None:
+            methods |= dict.fromkeys(names)
+            errors.append(error)
+    return list(methods), max(errors, default=None), len(errors)
+
+
+def _paper_index(report: Report) -> PageContent:
+    scenes = report.scenes
+    facts = _paper_facts(report)
+    sections = []
+    hero = _hero_scene(report)
+    if hero is not None:
+        sections.append(_hero_section(hero, report))
+    table = scene_table(report)
+    say = "Sorted as in the paper; click a heading to sort."
+    sections.append(
+        Section(
+            "scenes",
+            f"All {len(scenes)} scenes",
+            [table, Fold("Horizon and energy", "what they are", [Note(HORIZON_NOTE)])],
+            say,
+        )
+    )
+    sections += [_errata_section(report), _published_section(report), _methods_section(report)]
+    return PageContent("A published rotor model, checked", paper.PAPER, paper_answer(report), facts, sections)
+
+
+def _paper_facts(report: Report) -> list[Fact]:
+    facts: list[Fact] = []
+    if report.errata:
+        names = ", ".join(erratum.id for erratum in report.errata)
+        link = Markup('<a href="errata.html">{}</a>; each found by differentiation').format(names)
+        facts.append(Fact("Errors in the printed equations", str(len(report.errata)), link))
+    with_printed = [scene for scene in report.scenes.values() if scene.printed is not None]
+    if with_printed:
+        gains = {scene.name: created_energy(scene) for scene in with_printed}
+        complete = {scene.name for scene in with_printed if scene.printed is not None and scene.printed.status in GOOD}
+        known = [(gain, name) for name, gain in gains.items() if gain is not None and name in complete]
+        note = f"up to {prefixed(max(known)[0], 'J', 2)} ({short_name(max(known)[1])})" if known else ""
+        count = sum(gain is not None for gain in gains.values())
+        facts.append(Fact("Scenes in which energy is created", f"{count} of {len(with_printed)}", note))
+    _, error, _ = _agreement(report)
+    if error is not None:
+        runs = [run for scene in report.scenes.values() for run in scene.corrected_runs.values()]
+        good = sum(run.status == "ok" for run in runs)
+        compared, whole = compared_time(report.scenes.values())
+        note = f"{good} of {len(runs)} runs ok; {compared:.0f} of {whole:.0f} s compared"
+        is_bad = any(run.status not in GOOD for run in runs)
+        facts.append(
+            Fact(
+                "Corrected: largest disagreement",
+                f"{number(error)} rad",
+                note,
+                "bad" if is_bad else "",
+            )
+        )
+    numbers = [claim for claim in report.claims if claim.is_number]
+    if numbers:
+        rounding = sum(claim.rounding for claim in numbers)
+        note = "by the printed equations"
+        if rounding:
+            verb = "are" if rounding > 1 else "is"
+            note += f"; {in_words(rounding)} of them {verb} amplified rounding error"
+        reproduced = _reproduced(numbers, PRINTED)
+        facts.append(Fact("Published numbers reproduced", f"{reproduced} of {len(numbers)}", note))
+    return facts
+
+
+def _hero_scene(report: Report) -> StoredScene | None:
+    """Return the scene with a published number that is no rounding error; else one with both models."""
+    both = [
+        scene
+        for scene in report.scenes.values()
+        if len(scene.sides) == 2 and all("angles" in run for run in scene.sides.values())
+    ]
+    for claim in report.claims:
+        if claim.is_number and not claim.rounding and report.scenes[claim.scene] in both:
+            return report.scenes[claim.scene]
+    return both[0] if both else None
+
+
+def _hero_section(scene: StoredScene, report: Report) -> Section:
+    claims = [claim for claim in report.claims if scene.name in claim.scenes]
+    hero, _, _ = paper_plots(scene, claims)
+    printed, corrected = scene.sides[PRINTED], scene.sides[CORRECTED]
+    link = Markup('<a href="{}">More on this scene</a>').format(report.files[scene.name])
+    say = Markup("{}. ").format(typeset_title(scene))
+    for claim in claims:
+        if claim.is_number and claim.printed is not None and rounds_to(claim.printed, claim):
+            ends = [float(run.array("angles")[-1, 0]) for run in (printed, corrected)]
+            say = Markup(
+                "From the same start the printed equations stop the rotor at {} rad, the paper's {}, and end at {} rad; "
+                "the corrected ones end at {} rad. "
+            ).format(
+                number(claim.printed, 3),
+                paper.quantity_of(claim),
+                *(number(end, 3) for end in ends),
+            )
+            break
+    legend = Legend([(CORRECTED, draw.CORRECTED_LOOK), (PRINTED, draw.PRINTED_LOOK)])
+    figure = scene.figures.partition(",")[0]
+    heading = f"Figure {figure}, as printed and corrected" if figure else "As printed and corrected"
+    return Section("hero", heading, [legend, hero], say + link)
+
+
+def scene_table(report: Report) -> PageTable:
+    """Return a row per scene of the paper: the angle that differs most, when and by how much energy; agreement."""
     rows: list[Row] = []
-    for name, scene in scenes.items():
+    for name, scene in report.scenes.items():
+        note = typeset_title(scene)
+        row: list[TableCell | str] = [TableCell(short_name(name), href=report.files[name], note=note)]
+        row += _departure_cells(scene)
+        _, error = agreement(scene)
+        failed = [run for run in scene.corrected_runs.values() if run.status not in GOOD]
+        notes = ", ".join(f"{run.method}: {status_text(run)}" for run in failed)
+        if error is None:
+            row.append(TableCell(NOTHING, note=notes))
+        else:
+            text = number(error) if error else "exact"
+            row.append(TableCell(text, "bad" if failed else "", note=notes, order=error))
         compared, whole = compared_time([scene])
-        row: list[TableCell | str] = [TableCell(name, href=files[name], note=scene.title)]
-        row += [
-            scene.figures,
-            f"{number(compared, 3)} of {number(whole, 3)}" * (whole > 0.0),
-        ]
-        for method in methods:
-            run = scene.methods.get(method)
-            if run is None:
-                row.append("")
-                continue
-            error, shade, mark = metric(run, "angle_error_max"), "n", ""
-            if error is not None:
-                is_finite = math.isfinite(error)
-                shade = f"n h{sum(error > 10.0**exponent for exponent in _SHADES) if is_finite else len(_SHADES)}"
-            if run.status not in GOOD:
-                mark = OUTCOMES[run.status][0]
-                marks[mark] = status_text(run)
-            title = f"{label_of(method)}: {'error unknown' if error is None else number(error)}, {status_text(run)}"
-            row.append(TableCell(f"{number(error)} {mark}".rstrip(), shade=shade, title=title))
-        printed = scene.methods.get(PRINTED)
-        row.append("" if printed is None else prefixed(metric(printed, "energy_gain_J"), "J"))
+        row.append(TableCell(f"{compared:.3g} of {whole:g} s", order=compared) if whole else "")
         rows.append(row)
-    head = ("Scene", "Figure", "Compared (s)", *map(method_cell, methods), "As printed: energy gain")
-    return PageTable("Largest angle error up to the horizon (rad), by method", head, rows), marks
+    count = in_words(max((len(agreement(scene)[0]) for scene in report.scenes.values()), default=0))
+    head = (
+        "Scene", "The angle that differs most: corrected, as printed", f"Printed model is {draw.VISIBLE:g} rad off after",
+        "Energy it creates", f"Corrected: {count} methods agree within (rad)", "Compared",
+    )  # fmt: skip
+    return PageTable("All scenes", head, rows, wide=(5,), sortable=True)
+
+
+def _departure_cells(scene: StoredScene) -> list[TableCell | str]:
+    """Return the cells about the printed model: a drawing, when it departs, the energy that it creates."""
+    sides = scene.sides
+    if len(sides) < 2 or not all("angles" in run for run in sides.values()):
+        return ["", "", ""]
+    printed, corrected = sides[PRINTED], sides[CORRECTED]
+    coordinate = draw.differing_coordinate(printed, corrected)
+    right = corrected.array("angles")[:, coordinate]
+    low, high = float(right.min()), float(right.max())
+    room = max(0.6 * (high - low), 0.2)
+    picture = draw.spark(
+        [
+            (corrected.array("time"), right, draw.CORRECTED_LOOK),
+            (printed.array("time"), printed.array("angles")[:, coordinate], draw.PRINTED_LOOK),
+        ],
+        low - room,
+        high + room,
+    )
+    left, _ = draw.parting(printed, corrected)
+    cells: list[TableCell | str] = [TableCell("", note=corrected.labels[coordinate], picture=picture, order=coordinate)]
+    cells.append(TableCell("never", order=1e9) if left is None else TableCell(with_unit(left, "s"), order=left))
+    gain = metric(printed, "energy_gain_J")
+    if gain is None:
+        cells.append("")
+    elif printed.status not in GOOD:
+        cells.append(TableCell("runs away", order=gain))
+    elif created_energy(scene) is None:
+        cells.append(TableCell("none", note=f"{prefixed(gain, 'J', 2) if gain >= 1.0 else 'below 1 J'}", order=gain))
+    else:
+        cells.append(TableCell(prefixed(gain, "J"), order=gain))
+    return cells
+
+
+def _errata_section(report: Report) -> Section:
+    """Return the errors with their places, and the effect of each alone."""
+    rows: list[Row] = []
+    methods = errata_methods()
+    for erratum in report.errata:
+        where = TableCell(
+            f"{erratum.id}, {', '.join(erratum.stands_in)}",
+            href=f"errata.html#{erratum.id}",
+            note=erratum.entry,
+        )
+        cells: list[TableCell | str] = [
+            where,
+            TableCell("", picture=_printed_and_right(erratum.printed, erratum.right)),
+        ]
+        for name in ("angle_error_max", "energy_drift_max"):
+            found = paper.largest_of(report, methods.get(erratum.id, ""), name)
+            if found is None:
+                cells.append(NOTHING)
+            else:
+                cells.append(TableCell(number(found[0]), note=short_name(found[1]), order=found[0]))
+        rows.append(cells)
+    head = (
+        "Where",
+        "Printed, and what is right",
+        "Largest angle error (rad)",
+        "Energy error / energy scale",
+    )
+    table = PageTable("The errors", head, rows)
+    say = "Effect of each alone, in otherwise right equations: the largest over all scenes."
+    heading = f"The {in_words(len(report.errata))} errors"
+    return Section("errors", heading, [table] if rows else [], say)
+
+
+def _printed_and_right(printed: str, right: str) -> Markup:
+    """Return what an erratum prints and what is right, in two lines."""
+    lines = Markup('<span class="formula">{}</span><small>right: {}</small>')
+    return lines.format(formula(printed, in_prose=True), formula(right, in_prose=True))
+
+
+def _published_section(report: Report) -> Section:
+    """Return the published numbers beside the counts of the claims."""
+    numbers = paper.number_table(report.claims)
+    cards: list[list[Element]] = [[numbers]] if numbers.rows else []
+    study = report.study
+    if study is not None:
+        link = Markup('<a href="claims.html">Each claim with its quotation</a>')
+        cards.append(
+            [
+                paper.count_table(study),
+                Note(Markup("{} runs of each scene with moved starts. ").format(study.runs) + link),
+            ]
+        )
+    return Section("published", "Published numbers and claims", [Grid(len(cards), cards)] if cards else [])
+
+
+def _methods_section(report: Report) -> Section:
+    """Return what each corrected method reaches over all scenes."""
+    runs: dict[str, list[StoredRun]] = {}
+    for scene in report.scenes.values():
+        for method, run in scene.corrected_runs.items():
+            runs.setdefault(method, []).append(run)
+    rows: list[Row] = []
+    for method, own in runs.items():
+        good = sum(run.status == "ok" for run in own)
+        sign = "✓ " if good == len(own) else ""
+        row = [
+            method_cell(method),
+            TableCell(f"{sign}{good} of {len(own)}", "good" if sign else "bad"),
+        ]
+        for name in ("angle_error_max", "defect_max", "energy_drift_max", "run_time_s"):
+            values = [value for run in own if (value := metric(run, name)) is not None]
+            row.append(number_cell(max(values, default=None)))
+        rows.append(row)
+    head = (
+        "Method", "ok", "Largest angle error (rad)", "Largest interval defect (rad)", "Energy error / energy scale",
+        "Longest run (s)",
+    )  # fmt: skip
+    elements: list[Element] = (
+        [PageTable("Methods over all scenes", head, rows, wide=(3, 5), sortable=True)] if rows else []
+    )
+    if report.curves:
+        elements.append(Note(Markup('<a href="bench.html">Error against run time for all methods and steps</a>')))
+    return Section("methods", f"The {in_words(len(rows))} computations", elements)
+
+
+# ---- A user's own scenes
+
+
+def _own_index(report: Report) -> PageContent:
+    scenes = list(report.scenes.values())
+    failed = [scene for scene in scenes if _is_bad(scene)]
+    count = len(scenes)
+    good = count - len(failed)
+    if failed:
+        text = Markup('<span class="bad">{} of {} scenes are not ok</span>: {}. {} are ok.')
+        answer = [
+            text.format(
+                len(failed),
+                count,
+                ", ".join(scene.name for scene in failed[:5]),
+                in_words(good).capitalize(),
+            )
+        ]
+    else:
+        answer = [Markup("All <b>{} scenes</b> are ok.").format(in_words(count))]
+    methods, error, agreeing = _agreement(report)
+    if error is not None:
+        verb = "agrees with the reference" if len(methods) == 1 else "agree"
+        text = Markup("{} {} within <b>{} rad</b> in {} of {} scenes.")
+        answer.append(text.format(with_capital(computations(methods)), verb, up_to(error, 1), agreeing, count))
+    say = "Those that are not ok first; click a heading to sort." if failed else "Click a heading to sort."
+    table = own_table(report, [*failed, *(scene for scene in scenes if scene not in failed)])
+    sections = [Section("scenes", f"{count} scenes", [table], say), _methods_section(report)]
+    facts = [Fact("Scenes", f"{good} of {count} ok", "", "bad" if failed else "good")]
+    largest = _largest_moment(scenes)
+    if largest is not None:
+        facts.append(Fact("Largest blade root moment", prefixed(largest[0], "N m"), largest[1]))
+    if error is not None:
+        compared, whole = compared_time(scenes)
+        facts.append(
+            Fact(
+                "Largest disagreement",
+                f"{number(error)} rad",
+                f"{number(compared, 3)} of {number(whole, 3)} s compared",
+            )
+        )
+    return PageContent("Rotor scenes", report.path.name, answer, facts, sections)
+
+
+def _is_bad(scene: StoredScene) -> bool:
+    return any(run.status not in GOOD for run in scene.runs.values() if is_corrected(run.method))
+
+
+def _largest_moment(scenes: Sequence[StoredScene]) -> tuple[float, str] | None:
+    found = []
+    for scene in scenes:
+        run = scene.corrected
+        value = None if run is None else metric(run, "blade_root_moment_max")
+        if value is not None:
+            found.append((value, scene.name))
+    return max(found) if found else None
+
+
+def own_table(report: Report, scenes: Sequence[StoredScene]) -> PageTable:
+    """Return a row per scene: its rotor speed, how its runs ended, its largest load, and how its methods agree."""
+    rows: list[Row] = []
+    for scene in scenes:
+        row: list[TableCell | str] = [TableCell(scene.name, href=report.files[scene.name], note=typeset_title(scene))]
+        run = scene.corrected or scene.printed
+        name = "" if run is None else next((name for name in ("rates", "angles") if name in run), "")
+        if run is not None and name:
+            values = run.array(name)[:, 0]
+            low, high = float(np.nanmin(values)), float(np.nanmax(values))
+            picture = draw.spark([(run.array("time"), values, coordinate_look(0))], low, high)
+            unit = "rad/s" if name == "rates" else "rad"
+            row.append(
+                TableCell(
+                    "",
+                    note=f"{number(low, 3)} to {number(high, 3)} {unit}",
+                    picture=picture,
+                    order=high,
+                )
+            )
+        else:
+            row.append("")
+        good = sum(run.status in GOOD for run in scene.methods.values())
+        bad = [run for run in scene.methods.values() if run.status not in GOOD]
+        if bad:
+            notes = "; ".join(f"{run.method}: {run.attributes.get('message', '')}" for run in bad)
+            row.append(
+                TableCell(
+                    ", ".join(dict.fromkeys(map(status_text, bad))),
+                    "bad",
+                    note=notes,
+                    order=-len(bad),
+                )
+            )
+        else:
+            row.append(
+                TableCell(
+                    f"✓ {good} of {len(scene.methods)}" if scene.methods else "reference only",
+                    "good",
+                    order=good,
+                )
+            )
+        load = None if run is None else metric(run, "blade_root_moment_max")
+        row.append("" if load is None else TableCell(prefixed(load, "N m"), order=load))
+        _, error = agreement(scene)
+        row.append(number_cell(error))
+        rows.append(row)
+    head = (
+        "Scene",
+        "Rotor speed",
+        "Runs ok",
+        "Largest blade root moment",
+        "Methods agree within (rad)",
+    )
+    return PageTable("All scenes", head, rows, sortable=True)

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from html import escape
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from markupsafe import Markup
 
 from rotor_mbs.analysis.modes import (
     GROWTH,
@@ -26,19 +27,39 @@ from rotor_mbs.analysis.modes import (
 from rotor_mbs.analysis.text_tables import TextTable
 from rotor_mbs.errors import InputError, shown_value
 from rotor_mbs.report.canvas import SPEED_AXIS, Panels, curve, log_axis, panels
-from rotor_mbs.report.elements import PageTable, Picture, Row, Section, TableCell, picture
+from rotor_mbs.report.elements import (
+    Curve,
+    Element,
+    Fact,
+    Fold,
+    Grid,
+    Horizontal,
+    Legend,
+    Mark,
+    Note,
+    PageContent,
+    PageTable,
+    Plot,
+    Row,
+    Section,
+    TableCell,
+)
 from rotor_mbs.report.files import write_page
 from rotor_mbs.report.looks import BLUE, GREY, VERMILLION, Look, coordinate_look
-from rotor_mbs.report.numbers import NOTHING, number
+from rotor_mbs.report.numbers import NOTHING, SPACE, in_words, number, up_to
 from rotor_mbs.runs.read import write_records
 from rotor_mbs.runs.versions import machine, versions
 from rotor_mbs.scenario.catalogue import scene_of
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.scenario.toml_file import file_path
-from rotor_mbs.solution.trajectory import need_xarray
+from rotor_mbs.solution.trajectory import Array, need_xarray
 from rotor_mbs.studies.modes import compute_modes, increasing_speeds
 
 _MARKS = ("o", "s", "^", "D", "v", "P", "x")
+_TURN = 2.0 * math.pi
+_ZERO = 1e-6  # of the largest frequency: a smaller one is that of a rigid motion
+_NOTHING = 1e-9  # 1/s, or of a frequency: a smaller growth or damping is rounding error
+_SPAN = 30.0  # between the smallest and the largest value, beyond which an axis is logarithmic
 
 
 def modes(scene: Scene | str | os.PathLike[str], speeds: Sequence[float] = ()) -> Modes:
@@ -114,7 +135,7 @@ class Modes(SceneModes):
 
     def to_html(self, folder: str | os.PathLike[str]) -> Path:
         """Write the page into a folder. Returns its path."""
-        return write_page(file_path(folder), "modes", modes_page([self]), versions() | machine())
+        return write_page(file_path(folder), modes_page([self]), versions() | machine())
 
     def _repr_html_(self) -> str:
         drawn = self.plot()._repr_svg_() if self.rotation else ""
@@ -146,7 +167,14 @@ class ModePlots:
             change = np.where(np.nanmax(known) > 1e-6 * top, known - first, np.nan)
             every = (k, frequencies.shape[1] * max(1, len(speeds) // 24))
             for axes, values in zip(panel.axes, (known, change), strict=True):
-                curve(axes, speeds, values, mode_look(k, modes.names[k]), markevery=every, markersize=4.0)
+                curve(
+                    axes,
+                    speeds,
+                    values,
+                    mode_look(k, modes.names[k]),
+                    markevery=every,
+                    markersize=4.0,
+                )
         panel.axes[0].set_ylim(0.0, top)
         panel.axes[0].set_ylabel("frequency (rad/s)")
         panel.axes[1].set_ylabel("change (rad/s)")
@@ -196,56 +224,245 @@ def mode_look(index: int, name: str) -> Look:
     return replace(coordinate_look(index, name), marker=_MARKS[index % len(_MARKS)])
 
 
-def modes_page(modes: Sequence[SceneModes]) -> dict[str, object]:
-    """The content of the page: a part for each scene, of which each id is unique on the page."""
-    parts = []
+def modes_page(modes: Sequence[SceneModes]) -> PageContent:
+    """Return the content of the page: of each scene its modes at rest, over speed, and under gravity."""
+    sections: list[Section] = []
+    answer: list[Markup] = []
+    facts: list[Fact] = []
     for place, scene in enumerate(modes):
-        name, plots = f"scene{place}", ModePlots(scene)
-        rest, rotation = (next(iter(kind.values()), None) for kind in (scene.rest, scene.rotation))
-        campbell: list[Picture] = []
-        fastest: list[PageTable] = []
-        if rotation is not None and not np.isnan(rotation.growth_rates).all():
-            last = len(rotation.speeds) - 1
-            fastest = _tables(rotation, last, f"{scene.scene}, {number(float(rotation.speeds[last]), 4)} rad/s")
-            if last > 0:
-                caption = "Damped frequencies in the rotor's frame; 1P, 2P: multiples of the rotor speed"
-                campbell.append(picture(plots(), f"{name}-campbell", caption))
-                if (
-                    max(np.nanmax(np.abs(rotation.damping_ratios), initial=0.0), np.nanmax(rotation.growth_rates))
-                    > 1e-9
-                ):
-                    campbell.append(picture(plots.damping(), f"{name}-damping", "Damping ratios and growth rates"))
-        turning: list[Picture] = []
-        if scene.floquet is not None and len(scene.floquet.speeds) > 1 and np.isfinite(scene.floquet.largest).any():
-            caption = "Floquet multipliers in rotation under gravity; above 1 the motion is unstable"
-            turning.append(picture(plots.multipliers(), f"{name}-multipliers", caption))
-        sources = max((list(kind.values()) for kind in (scene.rest, scene.rotation)), key=len)
-        parts.append({
-            "id": name,
-            "modes": scene,
-            "models": [f"{linear.label} ({linear.source})" for linear in sources],
-            "notes": scene.notes,
-            "rest": Section(tables=[] if rest is None else _tables(rest, 0, f"{scene.scene}, at rest")),
-            "campbell": Section(campbell),
-            "fastest": Section(tables=fastest),
-            "turning": Section(turning, [] if scene.floquet is None else [_multipliers(scene.scene, scene.floquet)]),
-        })  # fmt: skip
-    return {"scenes": parts}
+        answer += mode_answer(scene)
+        if not facts:
+            facts = _facts(scene)
+        sections += _scene_sections(scene, f"scene{place}", with_name=len(modes) > 1)
+    title = modes[0].title if len(modes) == 1 else f"Modes of {in_words(len(modes))} scenes"
+    about = ", ".join(scene.scene for scene in modes)
+    return PageContent(title, f"Modes and Campbell diagram of {about}", answer, facts, sections)
 
 
-def _multipliers(scene: str, table: FloquetTable) -> PageTable:
+def _first(kind: Mapping[str, LinearModes]) -> LinearModes | None:
+    return next(iter(kind.values()), None)
+
+
+def mode_answer(scene: SceneModes) -> list[Markup]:
+    """Return the lowest frequencies, whether the models agree, and whether the rotation is stable."""
+    sentences = []
+    models = max(len(scene.rest), len(scene.rotation))
+    if models > 1:
+        how = Markup("agree within <b>{}</b> of a frequency").format(up_to(scene.disagreement))
+        if not scene.agrees:
+            how = Markup('<span class="bad">do not agree: they differ by {} of a frequency</span>')
+            how = how.format(number(scene.disagreement))
+        sentences.append(Markup("{}: the modes of {} models {}.").format(scene.scene, in_words(models), how))
+    rest = _first(scene.rest)
+    if rest is not None:
+        known = [value for value in rest.undamped_frequencies[0].tolist() if math.isfinite(value) and value > 0.0]
+        known = [value for value in known if value > _ZERO * max(known)]
+        if known:
+            low, high = min(known), max(known)
+            text = f"{number(low / _TURN, 4)}{SPACE}Hz"
+            if high > 1.001 * low:
+                text = f"{number(low / _TURN, 4)} to {number(high / _TURN, 4)}{SPACE}Hz"
+            sentences.append(Markup("At rest its natural frequencies are <b>{}</b>.").format(text))
+    table = scene.floquet
+    if table is not None and len(table.speeds):
+        unstable = table.speeds[table.stable == 0]
+        known_count = int((table.stable != -1).sum())
+        if len(unstable):
+            text = Markup('Under gravity its rotation is <span class="bad">unstable at {} of {} speeds</span>, {}.')
+            where = f"{number(float(unstable.min()), 3)} to {number(float(unstable.max()), 3)}{SPACE}rad/s"
+            sentences.append(text.format(len(unstable), known_count, where))
+        elif known_count:
+            every = "all" if known_count == len(table.speeds) else f"{known_count} of"
+            text = Markup("Under gravity its rotation is <b>stable at {} {} speeds</b>, up to {}.")
+            highest = f"{number(float(table.speeds[table.stable != -1].max()), 3)}{SPACE}rad/s"
+            sentences.append(text.format(every, len(table.speeds), highest))
+    return sentences
+
+
+def _facts(scene: SceneModes) -> list[Fact]:
+    facts = []
+    models = max(len(scene.rest), len(scene.rotation))
+    if models > 1:
+        tone = "good" if scene.agrees else "bad"
+        text = "✓ agree" if scene.agrees else "✗ do not agree"
+        facts.append(
+            Fact(
+                "Models",
+                text,
+                f"{models}; largest relative difference {number(scene.disagreement)}",
+                tone,
+            )
+        )
+    rotation = _first(scene.rotation)
+    if rotation is not None and len(rotation.speeds) > 1:
+        low, high = float(rotation.speeds[0]), float(rotation.speeds[-1])
+        rpm = f"{number(low * 60.0 / _TURN, 3)} to {number(high * 60.0 / _TURN, 3)} rev/min"
+        facts.append(Fact("Rotor speeds", f"{number(low, 3)} to {number(high, 3)} rad/s", rpm))
+        damped = rotation.damping_ratios[np.isfinite(rotation.damping_ratios)]
+        if len(damped) and float(np.abs(damped).max()) > _NOTHING:
+            low, high = float(damped.min()), float(damped.max())
+            facts.append(Fact("Damping ratio", f"{_shown(low, 3)} to {_shown(high, 3)}", "over all speeds"))
+    if scene.floquet is not None and np.isfinite(scene.floquet.largest).any():
+        largest = float(np.nanmax(scene.floquet.largest))
+        is_bad = bool((scene.floquet.stable == 0).any())
+        note = "of a Floquet multiplier under gravity; above 1 is unstable"
+        facts.append(Fact("Largest modulus", number(largest, 6), note, "bad" if is_bad else ""))
+    return facts
+
+
+def _scene_sections(scene: SceneModes, name: str, *, with_name: bool) -> list[Section]:
+    """Return the sections of one scene; `name` begins their ids, the scene's own name their headings."""
+    before = f"{scene.scene}: " if with_name else ""
+    sections = []
+    rest, rotation = _first(scene.rest), _first(scene.rotation)
+    if rotation is not None and len(rotation.speeds) > 1 and not np.isnan(rotation.growth_rates).all():
+        legend, cards = _campbell(rotation, name)
+        say = (
+            "Horizontally: rotor speed (rad/s), in steady rotation without gravity; a torque keeps the speed. "
+            "Frequencies are in the rotor's frame; 1P, 2P: multiples of the rotor speed."
+        )
+        sections.append(Section(f"{name}-rotation", f"{before}Campbell diagram", [legend, Grid(2, cards)], say))
+    turning = _turning(scene, name)
+    if turning is not None:
+        sections.append(replace_heading(turning, before))
+    if rest is not None:
+        sections.append(Section(f"{name}-rest", f"{before}At rest", [*_tables(rest, 0), Note(_AT_REST)]))
+    folds: list[Grid | Fold | Element] = []
+    if rotation is not None:
+        last = len(rotation.speeds) - 1
+        hint = f"{number(float(rotation.speeds[last]), 4)} rad/s"
+        folds.append(Fold("Modes at the highest speed", hint, [*_tables(rotation, last), Note(_FRAMES)]))
+    if scene.floquet is not None:
+        folds.append(
+            Fold(
+                "Floquet multipliers",
+                f"{len(scene.floquet.speeds)} speeds",
+                [_multipliers(scene.floquet)],
+            )
+        )
+    if scene.notes:
+        folds.append(Fold("Not computed", f"{len(scene.notes)} notes", [Note(text) for text in scene.notes]))
+    sources = max((list(kind.values()) for kind in (scene.rest, scene.rotation)), key=len)
+    models = ", ".join(f"{linear.label} ({linear.source})" for linear in sources)
+    folds.append(Fold("Models", models, [Note(_SMALL_MOTIONS)]))
+    sections.append(Section(f"{name}-details", f"{before}In detail", folds))
+    return sections
+
+
+def replace_heading(section: Section, before: str) -> Section:
+    return replace(section, heading=f"{before}{section.heading}")
+
+
+def _campbell(rotation: LinearModes, name: str) -> tuple[Legend, list[list[Element]]]:
+    """Return the legend and the plots over speed: frequencies with multiples of the speed, their change, damping."""
+    speeds = rotation.speeds
+    axis = Horizontal(f"rotor speed of {name}", "rad/s", "speed", float(speeds[0]), float(speeds[-1]))
+    looks = [mode_look(k, mode) for k, mode in enumerate(rotation.names)]
+    frequencies = rotation.damped_frequencies
+    top = float(np.nanmax(frequencies, initial=0.0)) * 1.08 or 1.0
+
+    def curves(values: Array) -> list[Curve]:
+        return [Curve(f"{name} {k}", look, speeds, values[:, k]) for k, look in enumerate(looks)]
+
+    harmonics = []
+    for k in sorted({1, 2, rotation.blades, 2 * rotation.blades}):
+        line = np.where(k * speeds <= top, k * speeds, np.nan)
+        harmonics.append(Curve(f"{name} harmonics", Look(GREY, ":", "", f"{k}P"), speeds, line))
+    first = np.array([column[np.flatnonzero(np.isfinite(column))[:1]].sum() for column in frequencies.T])
+    plots = [
+        Plot("Damped frequency", "rad/s", axis, [*harmonics, *curves(frequencies)], 300, still=True),
+        Plot(
+            "Change from the lowest speed",
+            "rad/s",
+            axis,
+            curves(frequencies - first),
+            300,
+            least=1e-9 * top,
+        ),
+    ]
+    damping, growth = rotation.damping_ratios, rotation.growth_rates
+    if max(np.nanmax(np.abs(damping), initial=0.0), np.nanmax(np.abs(growth), initial=0.0)) > _NOTHING:
+        plots.append(Plot("Damping ratio", "", axis, curves(damping), 200, least=_NOTHING))
+        plots.append(Plot("Growth rate", "1/s", axis, curves(growth), 200, least=_NOTHING))
+    items = [(f"{name} {k}", look) for k, look in enumerate(looks)]
+    items.append((f"{name} harmonics", Look(GREY, ":", "", "multiples of the speed")))
+    return Legend(items), [[plot] for plot in plots]
+
+
+def _turning(scene: SceneModes, name: str) -> Section | None:
+    """Return the Floquet multipliers over speed; None without any."""
+    table = scene.floquet
+    if table is None or len(table.speeds) < 2 or not np.isfinite(table.largest).any():
+        return None
+    speeds = table.speeds
+    axis = Horizontal(f"rotor speed of {name}", "rad/s", "speed", float(speeds[0]), float(speeds[-1]))
+    sizes = np.abs(table.multipliers)
+    shown = np.where(sizes > 0.0, sizes, np.nan)
+    each = [Curve(f"{name} each", Look(BLUE, "-", "", "each"), speeds, column, dots="only") for column in shown.T]
+    largest = Curve(f"{name} largest", Look(VERMILLION, "-", "", "largest"), speeds, table.largest)
+    known = shown[np.isfinite(shown)]
+    is_log = bool(len(known)) and bool(known.max() > _SPAN * known.min())
+    mark = [Mark("1: above it the motion is unstable", y=1.0)]
+    plot = Plot(
+        "Modulus of the multipliers",
+        "",
+        axis,
+        [*each, largest],
+        240,
+        log=is_log,
+        marks=mark,
+        least=10.0 * GROWTH,
+    )
+    rates = Plot(
+        "Growth rate", "1/s", axis, [Curve("growth", Look(VERMILLION, "-", "", "largest"), speeds, table.growth_rates)],
+        240, least=_NOTHING,
+    )  # fmt: skip
+    say = (
+        "Under gravity a rotating rotor has no equilibrium but a periodic motion. Multipliers are the eigenvalues of its "
+        "state transition matrix over one revolution; the largest excludes those that are 1 for every such motion. For "
+        "0 rad/s see the modes at rest."
+    )
+    return Section(f"{name}-turning", "Rotation under gravity", [Grid(2, [[plot], [rates]])], say)
+
+
+_AT_REST = (
+    "Small motions about the equilibrium that is found from the initial angles by decreasing the potential energy, "
+    "without the torque on the rotor. The shapes of modes with equal frequencies are not unique: any linear combination "
+    "of them is a mode shape."
+)
+_FRAMES = (
+    "Frequencies are in the rotor's frame; in the base frame a pair of cosine and sine modes is a backward and a forward "
+    "whirl, with the frequency decreased and increased by the rotor speed times its number. Undamped frequency: square "
+    "root of the product of a mode's two eigenvalues. Damping ratio: minus their mean, relative to that."
+)
+_SMALL_MOTIONS = "The geometric stiffness of the chain's constraint forces is included."
+
+
+def _multipliers(table: FloquetTable) -> PageTable:
     rows: list[Row] = []
     for i, (speed, largest) in enumerate(zip(table.speeds.tolist(), table.largest.tolist(), strict=True)):
         text = "unknown" if table.stable[i] == -1 else _shown(largest, 7)
         cell = TableCell(text, "bad" if table.stable[i] == 0 else "", note=table.messages[i])
         numbers = ((table.growth_rates, 4), (table.product_error, 2), (table.torque, 4))
-        rows.append([number(speed, 4), cell, *(_shown(float(values[i]), digits) for values, digits in numbers)])
-    head = ("Speed (rad/s)", "largest multiplier", "growth rate (1/s)", "product minus trace", "torque (N m)")
-    return PageTable(f"{scene}: multipliers", head, rows)
+        rows.append(
+            [
+                number(speed, 4),
+                cell,
+                *(_shown(float(values[i]), digits) for values, digits in numbers),
+            ]
+        )
+    head = (
+        "Speed (rad/s)",
+        "largest multiplier",
+        "growth rate (1/s)",
+        "product minus trace",
+        "torque (N m)",
+    )
+    return PageTable("Multipliers over speed", head, rows)
 
 
-def _tables(linear: LinearModes, i: int, state: str) -> list[PageTable]:
-    """Frequencies and shapes at the i-th speed; state: the beginning of captions, which differ on the whole page."""
+def _tables(linear: LinearModes, i: int) -> list[PageTable]:
+    """Return frequencies and shapes at the i-th speed."""
     columns = {
         "undamped (Hz)": linear.undamped_frequencies / (2.0 * math.pi),
         "undamped (rad/s)": linear.undamped_frequencies,
@@ -261,13 +478,16 @@ def _tables(linear: LinearModes, i: int, state: str) -> list[PageTable]:
         amplitudes = np.abs(linear.multiblade_shapes[i][k])
         largest = max(float(amplitudes.max()), 1e-300)
         shapes.append([name, *(_shown(float(amplitude) / largest, 3) for amplitude in amplitudes)])
-    caption = f"{state}: modes by the {linear.label} ({linear.source})"
-    head = ("Shape", "rotor", *multiblade(linear.blades)[0])
-    shape_caption = f"{state}: shapes, the largest amplitude 1"
-    return [PageTable(caption, ("Mode", *columns), frequencies), PageTable(shape_caption, head, shapes)]
+    head = ("Shape (largest amplitude 1)", "rotor", *multiblade(linear.blades)[0])
+    caption = f"Modes by the {linear.label} ({linear.source})"
+    return [
+        PageTable(caption, ("Mode", *columns), frequencies),
+        PageTable("Mode shapes", head, shapes),
+    ]
 
 
 def _shown(value: float, digits: int) -> str:
+    """Return a number; what is rounding error of an eigenvalue is 0."""
     if not math.isfinite(value):
         return NOTHING
-    return number(0.0 if abs(value) < 1e-12 else value, digits)
+    return number(0.0 if abs(value) < _NOTHING else value, digits)

@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
+import math
 import re
-import tomllib
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import replace
-from pathlib import Path
-from typing import Any, NamedTuple
+from collections.abc import Iterable, Sequence
 
 from markupsafe import Markup
 
@@ -21,101 +18,272 @@ from rotor_mbs.analysis.published import (
     checked_entries,
     rounds_to,
 )
-from rotor_mbs.errors import InputError
-from rotor_mbs.methods.catalogue import look_up
-from rotor_mbs.report import canvas, plots
-from rotor_mbs.report.elements import PageTable, Row, Section, TableCell, picture
-from rotor_mbs.report.looks import COLOURS, Look, label_of
-from rotor_mbs.report.numbers import NOTHING, fixed, formula, number
-from rotor_mbs.report.pages import Report
+from rotor_mbs.methods.catalogue import errata_methods
+from rotor_mbs.report.elements import (
+    Element,
+    Fact,
+    Fold,
+    Grid,
+    Listing,
+    Matrix,
+    Note,
+    PageContent,
+    PageTable,
+    Row,
+    Section,
+    TableCell,
+)
+from rotor_mbs.report.numbers import NOTHING, fixed, formula, in_words, number, up_to
+from rotor_mbs.report.pages import Report, metric, number_cell
 from rotor_mbs.runs.design import COLUMNS
-from rotor_mbs.runs.output_files import replace_file
-from rotor_mbs.runs.read import StoredRun, StoredScene, open_results
+from rotor_mbs.runs.read import StoredScene
 
 ROUNDING = "amplified rounding error, which depends on how the equations are written"
 _TONES = {HOLDS: "good", FAILS: "bad", UNDECIDED: ""}
 
 
-def number_table(claims: Iterable[Published]) -> PageTable:
-    """The published numbers, a row each."""
-    head = ("Figure", "Quantity", "Published", "As printed", "Reproduced?", "Corrected model", "Same number?")
+PAPER = Markup(
+    'Aguilar-Acevedo et al., <span lang="es">Modelado Euler-Lagrange del rotor de un aerogenerador tripala como sistema '
+    "multicuerpo</span>, Revista UIS Ingenierías 19(1), 25-36, 2020, "
+    '<a href="https://doi.org/10.18273/revuin.v19n1-2020002">doi&nbsp;10.18273/revuin.v19n1-2020002</a>'
+)
+
+
+def quantity_of(claim: Published) -> str:
+    """Return what a published number is: "crest" of a rotor angle's maximum, "largest rotor rate"."""
+    if claim.id.endswith("-crest"):
+        return "crest"
+    return COLUMNS[claim.metric].long_name.partition(" (")[0].partition(" over")[0].replace("magnitude of the ", "")
+
+
+def unit_of_claim(claim: Published) -> str:
+    return COLUMNS[claim.metric].units
+
+
+def number_table(claims: Iterable[Published], *, with_figure: bool = True) -> PageTable:
+    """Return the published numbers, a row each: as published, as printed, corrected."""
     rows: list[Row] = []
     for claim in claims:
         if not claim.is_number:
             continue
-        verdict = _verdict(claim.printed, claim)
-        if claim.rounding and verdict.tone == "good":
-            verdict = replace(verdict, note=ROUNDING)
-        column = COLUMNS[claim.metric]
-        description = f"{column.long_name.partition(',')[0]} ({column.units})"
-        rows.append([
-            claim.figure,
-            TableCell(description, note=f"«{claim.quote}»", note_language="es"),
-            fixed(claim.value, claim.decimals),
-            fixed(claim.printed, claim.decimals + 2),
-            verdict,
-            fixed(claim.corrected, claim.decimals + 2),
-            _verdict(claim.corrected, claim),
-        ])  # fmt: skip
-    return PageTable("Published numbers", head, rows)
+        note = f"Fig. {claim.figure}" if with_figure else ""
+        if claim.rounding:
+            note = "; ".join(filter(None, [note, ROUNDING]))
+        cells = [_verdict(value, claim) for value in (claim.printed, claim.corrected)]
+        quantity = TableCell(f"{quantity_of(claim)} ({unit_of_claim(claim)})", note=note)
+        rows.append([quantity, fixed(claim.value, claim.decimals), *cells])
+    return PageTable("Published numbers", ("Quantity", "Published", "As printed", "Corrected"), rows)
+
+
+def _verdict(value: float | None, item: Published) -> TableCell:
+    """Return a computed number, and whether it has the printed digits."""
+    if value is None:
+        return TableCell(NOTHING)
+    holds = rounds_to(value, item)
+    return TableCell(f"{'✓' if holds else '✗'} {fixed(value, item.decimals + 1)}", "good" if holds else "bad")
+
+
+def _claim_cell(verdict: str) -> TableCell:
+    sign = {HOLDS: "✓ ", FAILS: "✗ "}.get(verdict, "")
+    return TableCell(f"{sign}{verdict}", tone=_TONES[verdict])
 
 
 def claim_table(claims: Iterable[Published], study: ClaimStudy) -> PageTable:
-    """The claims in words, a row each, with their verdicts."""
+    """Return the claims in words, a row each, with their quotations and verdicts."""
     rows: list[Row] = []
     for claim in claims:
         if claim.is_number:
             continue
-        statement = TableCell(claim.statement, note=f"«{claim.quote}»", note_language="es")
-        row: list[TableCell | str] = [claim.figure, statement]
-        for method in study.methods:
-            verdict = study.verdicts[claim.id][method]
-            row.append(TableCell(verdict, tone=_TONES[verdict]))
-        rows.append(row)
-    return PageTable("Published claims", ("Figure", "Claim", "As printed", "Corrected model"), rows)
+        statement = TableCell(claim.statement, note=f"Fig. {claim.figure}: «{claim.quote}»", note_language="es")
+        rows.append(
+            [
+                statement,
+                *(_claim_cell(study.verdicts[claim.id][method]) for method in study.methods),
+            ]
+        )
+    return PageTable("Published claims", ("Claim", "As printed", "Corrected"), rows)
 
 
-def _verdict(value: float | None, item: Published) -> TableCell:
-    """Whether a value has the printed digits."""
-    if value is None:
-        return TableCell(NOTHING)
-    holds = rounds_to(value, item)
-    return TableCell("yes" if holds else "no", tone="good" if holds else "bad")
+def count_table(study: ClaimStudy) -> PageTable:
+    """Return how many claims hold, fail or are undecided, for each model."""
+    names = {HOLDS: "hold", FAILS: "fail", UNDECIDED: "undecided: rounding decides"}
+    rows = [[text, *(str(study.count(method, verdict)) for method in study.methods)] for verdict, text in names.items()]
+    return PageTable("Published claims", (f"{len(study.verdicts)} claims", "As printed", "Corrected"), rows)
+
+
+def study_note(study: ClaimStudy) -> str:
+    durations = ", ".join(f"{duration:g}" for duration in study.durations)
+    return (
+        f"Based on {study.runs} runs of each scene for each of the durations {durations} s, with initial angles moved "
+        f"by up to {number(study.spread)} rad. A run is deciding if it reached its end without a large energy gain. "
+        f"{study.rule}"
+    )
+
+
+def claims_section(claims: Sequence[Published], report: Report, scene: StoredScene) -> Section:
+    """Return what the paper says of one scene, a row per number and claim, with verdicts."""
+    rows: list[Row] = []
+    study = report.study
+    for claim in claims:
+        if claim.is_number:
+            what = f"Published {quantity_of(claim)}: {fixed(claim.value, claim.decimals)} {unit_of_claim(claim)}"
+            note = f"Fig. {claim.figure}: «{claim.quote}»"
+            if claim.rounding:
+                what += f"; {ROUNDING}"
+            statement = TableCell(what, note=note, note_language="es")
+            rows.append([statement, *(_verdict(value, claim) for value in (claim.printed, claim.corrected))])
+        elif study is not None:
+            statement = TableCell(claim.statement, note=f"Fig. {claim.figure}: «{claim.quote}»", note_language="es")
+            rows.append([statement, *(_claim_cell(study.verdicts[claim.id][method]) for method in study.methods)])
+    elements: list[Grid | Fold | Element] = []
+    if rows:
+        elements.append(PageTable("What the paper says", ("Statement", "As printed", "Corrected"), rows))
+    notes: list[Element] = []
+    if study is not None and any(not claim.is_number for claim in claims):
+        notes.append(Note(study_note(study)))
+    condition = report.conditions.get(scene.name.rpartition("/")[2]) if scene.is_shipped else None
+    if condition:
+        notes.append(Note(condition))
+    if notes:
+        elements.append(Fold("How this was decided", "runs from moved starts; conditions", notes))
+    return Section("paper", "What the paper says of this scene", elements)
+
+
+def claims_page(report: Report) -> PageContent:
+    """Return the content of the page of published numbers and claims."""
+    study, claims = report.study, report.claims
+    answer = []
+    numbers = [claim for claim in claims if claim.is_number]
+    printed = sum(claim.printed is not None and rounds_to(claim.printed, claim) for claim in numbers)
+    corrected = sum(claim.corrected is not None and rounds_to(claim.corrected, claim) for claim in numbers)
+    if numbers:
+        text = Markup("Of {} published numbers <b>{}</b> come out of the printed equations and <b>{}</b> out of the ")
+        text += Markup("corrected ones.")
+        answer.append(
+            text.format(
+                in_words(len(numbers)), *(in_words(count) if count else "none" for count in (printed, corrected))
+            )
+        )
+    sections = []
+    if study is not None:
+        holds = [study.count(method, HOLDS) for method in study.methods]
+        text = Markup("Of {} claims in words {} hold for the printed equations and {} for the corrected ones.")
+        answer.append(text.format(len(study.verdicts), *(in_words(count) for count in holds)))
+        words = [claim for claim in claims if not claim.is_number]
+        count = Grid(2, [[number_table(claims)], [count_table(study)]])
+        sections.append(Section("numbers", "Numbers and counts", [count]))
+        sections.append(Section("claims", "Claims", [claim_table(words, study), Note(study_note(study))]))
+    elif numbers:
+        sections.append(Section("numbers", "Numbers", [number_table(claims)]))
+    notes = [Note(text) for text in report.conditions.values()]
+    how = "What had to be found out to reproduce the numbers, since the paper does not print it."
+    sections.append(Section("conditions", "Conditions", notes, how))
+    return PageContent("Published numbers and claims", PAPER, answer, [], sections)
 
 
 _PLACE = re.compile(r"row (\d) column (\d)")
 Cell = tuple[Markup, Markup | None]  # an entry as printed; the correct one where it is faulty
 
 
-def errata_page(report: Report) -> dict[str, object]:
-    """The content of the page of errata."""
+def errata_page(report: Report) -> PageContent:
+    """Return the content of the page of errata."""
     entries = checked_entries()
     largest_agreeing = max((entry.difference for entry in entries if entry.agrees), default=0.0)
     differing = [entry for entry in entries if not entry.agrees]
-    differing_table = PageTable(
-        f"{len(differing)} of {len(entries)} printed entries differ from what follows from (3); the errata explain "
-        f"{sum(bool(entry.explained_by) for entry in differing)}; the others agree to {number(largest_agreeing)}",
-        ("Equation", "Entry", "Printed", "Correct", "Difference / max(1, |printed|, |correct|)", "Explained by"),
-        [
-            (
-                e.equation,
-                e.entry,
-                formula(e.printed),
-                formula(e.right),
-                number(e.difference),
-                e.explained_by or "nothing",
+    explained = sum(bool(entry.explained_by) for entry in differing)
+    count = len(report.errata)
+    answer = [
+        Markup("The printed equations contain <b>{} errors</b>.").format(in_words(count)),
+        Markup("With them {} of {} printed entries differ from what follows from the paper's own transformation (3).")
+        .format(len(differing), len(entries)),
+        Markup("The {} errors explain <b>{} of these {}</b>; the other entries agree to {}.").format(
+            in_words(count), "all" if explained == len(differing) else explained, len(differing),
+            up_to(largest_agreeing),
+        ),
+    ]  # fmt: skip
+    facts = []
+    for erratum in report.errata:
+        effect = _effect(report, erratum.id)
+        facts.append(Fact(f"{erratum.id}: {', '.join(erratum.stands_in)}", *effect))
+    sections = []
+    for erratum in report.errata:
+        items = [
+            ("Where", formula(f"{erratum.entry} (pages {erratum.pages})", in_prose=True)),
+            ("Printed", formula(erratum.printed, in_prose=True)),
+            ("Correct", formula(erratum.right, in_prose=True)),
+            ("Reason", formula(erratum.reason, in_prose=True)),
+        ]
+        if erratum.evidence:
+            listed = Markup("").join(
+                Markup("<li>{}</li>").format(formula(text, in_prose=True)) for text in erratum.evidence
             )
-            for e in differing
-        ],
-    )
-    return {
-        "errata": [(erratum, matrices(entries, erratum.stands_in)) for erratum in report.errata],
-        "differing": Section(tables=[differing_table]),
-    }
+            items.append(("Evidence", Markup("<ul>{}</ul>").format(listed)))
+        if erratum.reaches:
+            items.append(("Equations affected", Markup("{}").format(", ".join(erratum.reaches))))
+        elements: list[Element] = [Listing(items)]
+        for equation, rows in matrices(entries, erratum.stands_in):
+            text = f"{equation} as printed; wrong entries are struck out and followed by the correct ones"
+            elements.append(Matrix(text, rows))
+        sections.append(Section(erratum.id, f"{erratum.id}: {', '.join(erratum.stands_in)}", [Grid(1, [elements])]))
+    head = ("Equation", "Entry", "Printed", "Correct", "Difference", "Explained by")
+    rows_of_entries: list[Row] = []
+    for entry in differing:
+        printed, right = (TableCell("", picture=formula(text)) for text in (entry.printed, entry.right))
+        difference = number_cell(entry.difference)
+        rows_of_entries.append(
+            [
+                entry.equation,
+                entry.entry,
+                printed,
+                right,
+                difference,
+                entry.explained_by or "nothing",
+            ]
+        )
+    hint = f"{len(differing)} that differ"
+    say = "Difference: the largest over random states, relative to the larger of 1, the printed and the correct value."
+    table = PageTable("Printed entries that differ", head, rows_of_entries, wide=(4,))
+    sections.append(Section("entries", "Checked entries", [Fold("Entries", hint, [table])], say))
+    sections.append(Section("method", "How they were found", [Note(_METHOD), Note(_ALONE)]))
+    return PageContent("Errors in the printed equations", PAPER, answer, facts, sections)
+
+
+_METHOD = Markup(
+    "By the paper's own definition the printed matrices U, (8), (9) and (16) to (19), are the first and second "
+    "derivatives of its transformation (3) with respect to the angles; mass, rate and gravity terms follow from the same "
+    "transformation by Lagrange's equations. Each printed entry was compared, at random states, with the entry derived "
+    "from (3). Notation: s<sub>i</sub> = sin q<sub>i</sub>, c<sub>i</sub> = cos q<sub>i</sub>; c and d without index: "
+    "distances of the centre of mass from the pitch axis and, along that axis, from the shaft; d<sub>2</sub>: constant "
+    "offset along the shaft."
+)
+_ALONE = (
+    "Each erratum alone in the corrected equations is integrated with ode45 at the paper's tolerances; these numbers "
+    "include the error of ode45, amplified by the error growth."
+)
+
+
+def _effect(report: Report, erratum: str) -> tuple[str, str]:
+    """Return the largest angle error that one erratum alone makes, and where; "–" where no run has it."""
+    largest = largest_of(report, errata_methods().get(erratum, ""), "angle_error_max")
+    if largest is None:
+        return NOTHING, "no run with it alone"
+    value, scene = largest
+    return f"{number(value)} rad", f"largest angle error alone, {scene.rpartition('/')[2]}"
+
+
+def largest_of(report: Report, method: str, name: str) -> tuple[float, str] | None:
+    """Return the largest finite number `name` of a method's runs, and the scene; None where there is none."""
+    found = []
+    for scene in report.scenes.values():
+        run = scene.runs.get(method)
+        value = None if run is None else metric(run, name)
+        if value is not None and math.isfinite(value):
+            found.append((value, scene.name))
+    return max(found) if found else None
 
 
 def matrices(entries: Sequence[CheckedEntry], equations: Sequence[str]) -> list[tuple[str, list[list[Cell]]]]:
-    """(equation, rows of its matrix) of those of `equations` that are matrices."""
+    """Return (equation, rows of its matrix) of those of `equations` that are matrices."""
     shown = []
     for equation in equations:
         places = {}
@@ -131,180 +299,12 @@ def matrices(entries: Sequence[CheckedEntry], equations: Sequence[str]) -> list[
                 for column in columns:
                     checked = places.get((row, column))
                     printed = Markup() if checked is None else formula(checked.printed)
-                    cells.append((printed, None if checked is None or checked.agrees else formula(checked.right)))
+                    cells.append(
+                        (
+                            printed,
+                            None if checked is None or checked.agrees else formula(checked.right),
+                        )
+                    )
                 matrix.append(cells)
             shown.append((equation, matrix))
     return shown
-
-
-MOTION, PATHS, TORQUES = "motion", "paths", "torques"
-# The models that are compared, by key, in order from left to right.
-HEADINGS = {"printed": "As printed", "corrected": "Corrected model", "exudyn": "Exudyn"}
-
-
-class PaperFigure(NamedTuple):
-    """A figure of the paper."""
-
-    number: str
-    kind: str
-    panels: tuple[tuple[str, str], ...]  # the letter ("" where it has none; a torque) and the scene of each
-
-
-FIGURES = (
-    PaperFigure("3", MOTION, (("", "paper/fig03"),)),
-    PaperFigure("4", PATHS, (("a", "paper/fig03"), ("b", "paper/fig04b"))),
-    PaperFigure("5", MOTION, (("", "paper/fig05"),)),
-    PaperFigure("6", MOTION, (("", "paper/fig06"),)),
-    PaperFigure("7", PATHS, (("a", "paper/fig05"), ("b", "paper/fig06"))),
-    PaperFigure("8", MOTION, (("", "paper/fig08"),)),
-    PaperFigure("9", MOTION, (("", "paper/fig09"),)),
-    PaperFigure("10", PATHS, (("a", "paper/fig08"), ("b", "paper/fig09"))),
-    PaperFigure("11", MOTION, (("", "paper/fig11"),)),
-    PaperFigure("12", MOTION, (("", "paper/fig12"),)),
-    PaperFigure("13", PATHS, (("a", "paper/fig11"), ("b", "paper/fig13b"))),
-    PaperFigure("14", PATHS, (("a", "paper/fig14a"), ("b", "paper/fig14b"), ("c", "paper/fig14c"))),
-    PaperFigure("15", TORQUES, tuple((f"{n} kN m", f"paper/fig15-{n}kNm") for n in (1, 10, 50, 100))),
-    PaperFigure("16", PATHS, (("a", "paper/fig15-1kNm"), ("b", "paper/fig15-100kNm"))),
-)
-
-
-def available(scenes: Mapping[str, StoredScene]) -> tuple[PaperFigure, ...]:
-    """The figures of which `scenes` has a panel, with the panels that it has; none of a scene that was changed."""
-    figures = []
-    for figure in FIGURES:
-        panels = tuple(panel for panel in figure.panels if panel[1] in scenes and scenes[panel[1]].is_shipped)
-        if panels:
-            figures.append(figure._replace(panels=panels))
-    return tuple(figures)
-
-
-def compared_runs(scene: StoredScene) -> dict[str, StoredRun]:
-    """The scene's runs by the keys of HEADINGS, those that have samples of angles and rates."""
-    candidates = scene.sides
-    for name, run in scene.corrected_runs.items():
-        method = look_up(name)
-        if method and "exudyn" in method.distributions and run.samples:
-            if run not in candidates.values():
-                candidates["exudyn"] = run
-            break
-    return {key: run for key, run in candidates.items() if "angles" in run and "rates" in run}
-
-
-def panel_runs(figure: PaperFigure, scenes: Mapping[str, StoredScene]) -> dict[str, dict[str, dict[str, StoredRun]]]:
-    """The runs of each picture by label, row by row: by letter, then by key of HEADINGS."""
-    rows: dict[str, dict[str, dict[str, StoredRun]]] = {}
-    for label, name in figure.panels:
-        letter = "" if figure.kind == TORQUES else label
-        for key, run in compared_runs(scenes[name]).items():
-            if figure.kind != PATHS or "tip" in run:
-                rows.setdefault(letter, {}).setdefault(key, {})[label] = run
-    return rows
-
-
-def draw(figure: PaperFigure, axes: Sequence[Any], runs: Mapping[str, StoredRun]) -> None:
-    """A picture on `axes`: one for paths, else two, position above velocity."""
-    if figure.kind == PATHS:
-        plots.draw_paths(axes[0], next(iter(runs.values())).array("tip"))
-        return
-    labels = (plots.ANGLE_AXIS, plots.RATE_AXIS)
-    for panel, name, label in zip(axes, ("angles", "rates"), labels, strict=True):
-        series = []
-        for place, (torque, run) in enumerate(runs.items()):
-            of_run = plots.coordinate_series(run.array("time"), run.array(name))
-            if figure.kind == TORQUES:
-                look = Look(COLOURS[place], ("-", "--", "-.", ":")[place], "", torque)
-                of_run = [of_run[0]._replace(look=look)]
-            series += of_run
-        plots.draw_lines(panel, series, label)
-    axes[0].set_title("(a) position", loc="left")
-    axes[0].tick_params(labelbottom=False)
-    axes[1].set_title("(b) angular velocity", loc="left")
-    axes[1].set_xlabel(canvas.TIME_AXIS)
-
-
-def write_figures(results: Path, folder: Path, kind: str, numbers: Iterable[str] = ()) -> list[Path]:
-    """Write figures of the paper for a manuscript, and return their files.
-
-    Parameters
-    ----------
-    results, folder : the results file; where figNN.pdf and so on are written.
-    kind : "pdf", "svg" or "png".
-    numbers : of the figures, such as "11"; all that the file has where none is given.
-
-    Raises
-    ------
-    InputError
-        For a figure that the file does not have.
-    StoreError
-        Where the file cannot be read or the folder cannot be written.
-    """
-    with open_results(results) as opened:
-        have = {figure.number: figure for figure in available(opened.scenes) if panel_runs(figure, opened.scenes)}
-        asked = list(dict.fromkeys(numbers)) or list(have)
-        unknown = [number for number in asked if number not in have]
-        if not have:
-            raise InputError(f"{results}: no figure of the paper in the file; allowed: a file of rotor-mbs reproduce")
-        if unknown:
-            raise InputError(f"{results}: figure {', '.join(unknown)}: not in the file; allowed: {', '.join(have)}")
-        made = {f"fig{int(n):02d}.{kind}": canvas.encoded(composed(have[n], opened.scenes).figure, kind) for n in asked}
-    for name, content in made.items():
-        replace_file(folder / name, content, canvas.MARK)
-    return [folder / name for name in made]
-
-
-def composed(figure: PaperFigure, scenes: Mapping[str, StoredScene], *, for_print: bool = True) -> canvas.Panels:
-    """The whole figure, a column per model: position above velocity, or a row per panel where paths are shown.
-
-    for_print: for a manuscript, with its legend; else for a page, which has the legend beside the picture.
-    """
-    pictures = panel_runs(figure, scenes)
-    keys = [key for key in HEADINGS if any(key in row for row in pictures.values())]
-    is_paths = figure.kind == PATHS
-    with canvas.style(for_print=for_print):
-        rows, height, heading = (len(pictures), 1.8, 1.02) if is_paths else (2, 1.55, 1.16)
-        panels = canvas.grid(rows, len(keys), height if for_print else 1.4 * height, for_print=for_print)
-        table = [panels.axes[i : i + len(keys)] for i in range(0, len(panels.axes), len(keys))]
-        for i, row_of_runs in enumerate(pictures.values()):
-            for key, runs in row_of_runs.items():
-                column = [row[keys.index(key)] for row in table]
-                draw(figure, [column[i]] if is_paths else column, runs)
-        for axes, key in zip(table[0], keys, strict=True):
-            axes.text(0.5, heading, HEADINGS[key], transform=axes.transAxes, ha="center", weight="bold")
-        for axes in panels.axes:
-            if not axes.has_data():
-                axes.set_axis_off()
-            if axes not in [row[0] for row in table]:  # the labels of the first column are for all
-                axes.set_ylabel("")
-        for row, letter in zip(table, pictures if is_paths else (), strict=False):
-            row[0].text(-0.08, 0.94, f"({letter})", transform=row[0].transAxes)
-        if for_print:
-            labelled = panels.labelled()
-            columns = min(len(labelled), 5)
-            panels.figure.legend(labelled.values(), labelled, loc="lower center", ncols=columns, handlelength=2.6)
-    return panels
-
-
-def figures_page(report: Report) -> dict[str, object]:
-    """The content of the page that goes through the figures."""
-    figures = []
-    for figure in available(report.scenes):
-        labels: dict[str, str] = {}  # by key of HEADINGS
-        for row_of_runs in panel_runs(figure, report.scenes).values():
-            for key, runs in row_of_runs.items():
-                labels.setdefault(key, label_of(next(iter(runs.values())).method))
-        if not labels:  # neither angles nor rates
-            continue
-        caption = f"Columns: {'; '.join(labels[key] for key in HEADINGS if key in labels)}"
-        panels = []
-        for letter, name in figure.panels:
-            stored = report.scenes[name]
-            initial = tomllib.loads(stored.scene.text)["initial"]  # pi/6 as it is written
-            panels.append((letter, name, stored.title, initial, report.files[name]))
-        figures.append({
-            "number": figure.number,
-            "kind": figure.kind,
-            "panels": panels,
-            "picture": picture(composed(figure, report.scenes, for_print=False), f"f{figure.number}", caption),
-            "numbers": number_table([claim for claim in report.claims if claim.figure == figure.number]),
-        })  # fmt: skip
-    return {"figures": figures}

@@ -1,333 +1,732 @@
-"""The page of a scene: pictures and tables from its stored runs. Sections for which it has no data are empty."""
+"""The page of a scene: what happened, loads, agreement of the methods, and all numbers. A scene of the paper shows the
+printed model beside the corrected one; any other one the motion and the loads of its best run."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import math
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
+from markupsafe import Markup
 
-from rotor_mbs.analysis.published import Published
+from rotor_mbs.analysis.judgement import OK_ERROR
+from rotor_mbs.analysis.published import ENERGY_RISE, Published
 from rotor_mbs.methods.catalogue import REFERENCE, is_corrected
-from rotor_mbs.models.lagrange.defects import interval_defects
-from rotor_mbs.report import plots
-from rotor_mbs.report.canvas import Panels
-from rotor_mbs.report.elements import PageTable, Picture, Section, picture
-from rotor_mbs.report.looks import GREY, VERMILLION, Look, coordinate_look, label_of, look_of, with_capital
-from rotor_mbs.report.numbers import fixed, number, prefixed, with_unit
-from rotor_mbs.report.pages import Report, horizon_of, metric, metrics_table, paper
-from rotor_mbs.report.pages.bench import cost_picture
+from rotor_mbs.report.elements import (
+    Array,
+    Curve,
+    Element,
+    Fact,
+    Fold,
+    Grid,
+    Legend,
+    Mark,
+    Note,
+    PageContent,
+    PageTable,
+    Plot,
+    Row,
+    Section,
+    SourceText,
+    TableCell,
+    Viewer,
+)
+from rotor_mbs.report.looks import (
+    BLUE,
+    GREY,
+    VERMILLION,
+    Look,
+    coordinate_look,
+    label_of,
+    look_of,
+    with_capital,
+)
+from rotor_mbs.report.numbers import SPACE, fixed, number, prefixed, seconds, up_to, with_unit
+from rotor_mbs.report.pages import (
+    Report,
+    agreement,
+    agreement_text,
+    compared_time,
+    computations,
+    horizon_of,
+    method_table,
+    metric,
+    metrics_tables,
+    paper,
+    status_text,
+)
+from rotor_mbs.report.pages import scene_plots as draw
+from rotor_mbs.report.pages.scene_plots import CORRECTED, PRINTED, Channel, Jumps
 from rotor_mbs.report.pages.viewer import viewer
-from rotor_mbs.report.plots import LOWEST, Series
 from rotor_mbs.runs.read import StoredRun, StoredScene
+from rotor_mbs.scenario.catalogue import shipped_scene
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.scenario.time_table import values_at
-from rotor_mbs.solution.quantities import Plot, Quantity, known_quantities, sizes
 from rotor_mbs.solution.status import GOOD
-from rotor_mbs.solution.trajectory import Array
 
-Runs = Mapping[str, StoredRun]
-VISIBLE = 0.05  # rad: what one can see in a figure of the paper's size
-COMMAND, TAKEN = Look(GREY, ":", "", "command"), Look(VERMILLION, "--", "", "dissipated by the shaft damper")
-EXTREMES = ("rotor_angle_min", "rotor_angle_max", "rotor_rate_max")
+HORIZON_NOTE = (
+    "Horizon: the time until which an error of the initial state has grown by less than a factor of 100 000; after it "
+    "two accurate solutions may differ visibly. Energy error: change of the total energy minus the work, relative to "
+    "the energy scale: sum over the blades of weight times distance of the centre of mass from the hub centre, plus "
+    "the initial kinetic and spring energy, plus the largest work."
+)
+DEFECT_NOTE = (
+    "From each sample the corrected equations are integrated to the next one; the defect is the difference from the "
+    "method's own next sample, for the angles, and for the rates times the interval. Defects do not depend on the "
+    "growth of errors over the run and cover all of it."
+)
+_TURN = 2.0 * math.pi
+_RPM = 30.0 / math.pi  # rev/min of a rad/s
 
 
-def scene_page(name: str, report: Report) -> dict[str, object]:
-    """The content of the page of a scene."""
+def scene_page(name: str, report: Report) -> PageContent:
+    """Return the content of the page of a scene."""
     scene = report.scenes[name]
-    horizon = horizon_of(scene)
-    # The printed run and the one that stands for the corrected model, then the others of corrected models.
-    sides = scene.sides
-    runs = list(sides.values())
-    drawn = {run.method: run for run in runs}
-    for method, run in scene.corrected_runs.items():
-        if run.samples:
-            drawn[method] = run
-    pages = ["", *report.files.values(), ""]
-    place = pages.index(report.files[name])
+    is_paper = bool(scene.figures) and len(scene.sides) == 2 and all("angles" in run for run in scene.sides.values())
     claims = [claim for claim in report.claims if name in claim.scenes]
-    study = report.study
-    tables = [paper.number_table(claims)]
-    if study is not None:
-        tables.append(paper.claim_table(claims, study))
-    condition = report.conditions.get(name.rpartition("/")[2]) if scene.is_shipped else None
-    suite_runs = [run for run in report.suite_runs if run.scene == name]
-    has_zero_pitch = any("zero_pitch_max" in run.attributes for run in scene.runs.values())
-    motion, paths = [], []
-    for i, run in enumerate(runs):
-        caption = with_capital(label_of(run.method))
-        if "angles" in run or "rates" in run:
-            drawn_motion = plots.motion(run.array("time"), run.get("angles"), run.get("rates"), horizon)
-            motion.append(picture(drawn_motion, f"motion-{i}", caption))
-        if "tip" in run:
-            paths.append(picture(plots.paths(run.array("tip")), f"paths-{i}", caption))
-    return {
-        "scene": scene,
-        "claims": Section(tables=[table for table in tables if table.rows], notes=[condition] if condition else []),
-        "study": study if any(not claim.is_number for claim in claims) else None,
-        "viewer": viewer(scene, {label_of(run.method): run for run in runs}),
-        "key": key_picture(runs, claims, horizon),
-        "paths": Section(paths),
-        "motion": Section(motion, [range_table(runs)] if motion else []),
-        "difference": _difference_section(scene, drawn, horizon),
-        "defects": Section(error_picture(defects(scene.scene, drawn), "defect (rad)", "defects", "Interval defects")),
-        "drive": _drive_section(scene.scene, sides.get("corrected")),
-        "cost": Section(cost_picture(report.curves.get(name, ()), f"Error and run time, {name}")),
-        "quantities": quantity_sections(scene, drawn, horizon),
-        "metrics": Section(tables=[metrics_table(scene, suite_runs)]),
-        "has_horizon": horizon is not None,
-        "has_printed": any(run.status in GOOD and not is_corrected(run.method) for run in scene.runs.values()),
-        "has_zero_pitch": has_zero_pitch,
-        "previous": pages[place - 1],
-        "next": pages[place + 1],
-    }
+    content = _paper_page(scene, report, claims) if is_paper else _own_page(scene, report)
+    pages = list(report.files.items())
+    place = list(report.files).index(name)
+    previous = pages[place - 1] if place > 0 else None
+    following = pages[place + 1] if place + 1 < len(pages) else None
+    return replace(
+        content,
+        previous=None if previous is None else (previous[1], short_name(previous[0])),
+        following=None if following is None else (following[1], short_name(following[0])),
+    )
 
 
-def key_picture(
-    sides: Sequence[StoredRun], claims: Sequence[Published], horizon: float | None, name: str = "key"
-) -> list[Picture]:
-    """The rotor's angle and the pitch that differs most, printed and corrected, with published values.
+def short_name(scene: str) -> str:
+    """Return "fig11" for "paper/fig11"."""
+    return scene.rpartition("/")[2]
 
-    Of one model alone all its angles. Empty where no run has angles.
-    """
-    runs = [run for run in sides if "angles" in run]
-    if not runs:
-        return []
-    if len(runs) == 1:
-        panels = plots.motion(runs[0].array("time"), runs[0].array("angles"), None, horizon)
-        return [picture(panels, name, f"{with_capital(label_of(runs[0].method))}: angles over time")]
-    # Beside the rotor the pitch that differs most, or moves most.
-    shown = [0]
-    printed, corrected = (run.array("angles") for run in runs)
-    count = min(len(printed), len(corrected))
-    for values in (printed[:count] - corrected[:count], corrected):
-        largest = np.abs(values[:, 1:]).max(axis=0, initial=0.0)
-        if largest.size and largest.max() > 1e-6:
-            shown.append(1 + int(largest.argmax()))
+
+def typeset_title(scene: StoredScene) -> str:
+    """Return the scene's title with π and ° in place of "pi" and "degrees"."""
+    title = scene.title.replace(" degrees", "°")
+    return title.replace("pi/", "π/")
+
+
+def described(scene: StoredScene) -> str:
+    """Return what the scene is, for the line below the title."""
+    parts = [scene.name]
+    if scene.figures:
+        parts.append(f"Figure{'s' if ',' in scene.figures else ''} {scene.figures} of the paper")
+    elif not scene.is_shipped and shipped_scene(scene.name) is not None:
+        parts.append("changed: not the scene of this name that is shipped")
+    blades = len(scene.scene.blades)
+    parts.append(f"{blades} blade{'s' if blades != 1 else ''}")
+    parts.append(f"{scene.scene.duration:g} s, {scene.scene.samples} samples")
+    return " · ".join(parts)
+
+
+def _drawn_runs(scene: StoredScene) -> dict[str, StoredRun]:
+    """Return the runs with samples: the printed model and the one that stands for the corrected one, then others."""
+    drawn = {run.method: run for run in scene.sides.values()}
+    for method, run in scene.runs.items():
+        if run.samples:
+            drawn.setdefault(method, run)
+    return drawn
+
+
+# ---- A scene of the paper
+
+
+def _paper_page(scene: StoredScene, report: Report, claims: Sequence[Published]) -> PageContent:
+    sections = [
+        paper_motion(scene, claims),
+        _agreement_section(scene, report),
+        paper.claims_section(claims, report, scene),
+        _details_section(scene),
+    ]
+    return PageContent(
+        typeset_title(scene),
+        described(scene),
+        paper_answer(scene),
+        _paper_facts(scene, claims),
+        sections,
+    )
+
+
+def paper_answer(scene: StoredScene) -> list[Markup]:
+    """Return what was found of a scene of the paper: how the corrected runs agree, and what the printed one does."""
+    printed, corrected = scene.sides[PRINTED], scene.sides[CORRECTED]
+    sentences = _faults(scene)
+    methods, error = agreement(scene)
+    if error is not None:
+        compared, whole = compared_time([scene])
+        verb = "agrees" if len(methods) == 1 else "agree"
+        text = Markup("{} of the corrected model {}").format(with_capital(computations(methods)), verb)
+        text += Markup(" <b>exactly</b>") if error == 0.0 else Markup(" within <b>{} rad</b>").format(up_to(error))
+        if compared < whole:
+            whole_errors = [metric(scene.runs[method], "angle_error_whole") for method in methods]
+            at_end = max((value for value in whole_errors if value is not None), default=None)
+            text += f" up to {seconds(compared)}"
+            if at_end is not None:
+                text += f" and within {up_to(at_end)} rad to the end"
+        sentences.append(text + ".")
+    left, difference = draw.parting(printed, corrected)
+    if left is None:
+        text = Markup("The equations as printed stay within <b>{} rad</b> of them").format(up_to(difference))
+    else:
+        text = Markup("The equations as printed depart from them by more than {} rad at <b>{}</b>").format(
+            f"{draw.VISIBLE:g}", with_unit(left, "s")
+        )
+    gain, scale = metric(printed, "energy_gain_J"), metric(printed, "energy_scale_J")
+    if printed.status not in GOOD:
+        end = float(printed.array("time")[-1])
+        text += Markup(" and break off at <b>{}</b> ({})").format(seconds(end), status_text(printed))
+    elif gain is not None and scale and gain > ENERGY_RISE * scale:
+        share = f"{number(100.0 * gain / scale)}{SPACE}%"
+        text += Markup(" and create <b>{}</b> of energy, {} of what the scene contains").format(
+            prefixed(gain, "J"), share
+        )
+    sentences.append(text + ".")
+    return sentences
+
+
+def _paper_facts(scene: StoredScene, claims: Sequence[Published]) -> list[Fact]:
+    printed, corrected = scene.sides[PRINTED], scene.sides[CORRECTED]
+    facts = [_result_fact(scene, "Corrected model", "✓ verified")]
+    left, difference = draw.parting(printed, corrected)
+    note = f"largest difference {number(difference, 3)} rad"
+    facts.append(Fact("Printed model leaves it after", "never" if left is None else with_unit(left, "s"), note))
+    gain = metric(printed, "energy_gain_J")
+    if gain is not None:
+        others = [metric(run, "energy_gain_J") for run in scene.corrected_runs.values() if run.status == "ok"]
+        below = max((value for value in others if value is not None), default=None)
+        note = "" if below is None else f"corrected: at most {up_to(below, 1)} J"
+        is_complete = printed.status in GOOD
+        value = prefixed(gain, "J") if is_complete else "runs away"
+        facts.append(Fact("Energy created by the printed model", value, note))
+    for claim in claims:
+        if claim.is_number and claim.printed is not None:
+            name = f"Published {paper.quantity_of(claim)}"
+            value = f"{fixed(claim.value, claim.decimals)} {paper.unit_of_claim(claim)}"
+            note = f"as printed {fixed(claim.printed, claim.decimals)}, corrected {number(claim.corrected, 5)}"
+            if claim.rounding:
+                note += "; amplified rounding error"
+            facts.append(Fact(name, value, note))
             break
-    rows, marks = [], []
-    for place, i in enumerate(shown):
-        series = []
-        for run, line in zip(reversed(runs), ("-", "--"), strict=True):  # the printed model is dashed upon the other
-            look = replace(look_of(run.method), line=line, marker="")
-            series.append(Series(run.array("time"), run.array("angles")[:, i], look))
-        rows.append((f"{runs[0].labels[i]} angle (rad)", series))
-        for claim in claims:
-            if i == 0 and claim.metric in ("rotor_angle_min", "rotor_angle_max"):
-                marks.append((place, claim.value, f"published {fixed(claim.value, claim.decimals)} rad"))
-    parted, difference = parting(*runs)
-    caption = f"Rotor and pitch angles of both models; largest difference {with_unit(difference, 'rad')}"
-    if parted is not None:
-        caption += f"; {VISIBLE:g} rad apart at {with_unit(parted, 's')}"
-    return [picture(departure(rows, marks, horizon), name, caption)]
+    return facts
 
 
-def departure(
-    rows: Sequence[tuple[str, Sequence[Series]]], marks: Sequence[tuple[int, float, str]], horizon: float | None
-) -> Panels:
-    """A panel per (axis label, curves), with published values (panel, value, text)."""
-    panels = plots.lines(rows, horizon, [1.75] * len(rows))
-    for axes in panels.axes:
-        for line in axes.get_lines():  # a dashed curve lies upon a wide one
-            line.set_linewidth(2.4 if line.get_linestyle() == "-" else 1.3)
-    for place, value, text in marks:
-        low, high = panels.axes[place].get_ylim()
-        panels.axes[place].set_ylim(min(low, value), max(high, value))
-        panels.axes[place].axhline(value, color=GREY, linewidth=1.0, linestyle=":", label=text)
-    return panels
+def paper_motion(scene: StoredScene, claims: Sequence[Published], heading: str = "Motion") -> Section:
+    """Return the rotor moving beside its angle and the pitch that differs most; the other angles, and the rates."""
+    sides = scene.sides
+    axis = draw.whole_time(list(sides.values()))
+    assert axis is not None  # both have samples
+    hero, others, rates = paper_plots(scene, claims)
+    elements: list[Grid | Fold | Element] = [
+        Legend([(CORRECTED, draw.CORRECTED_LOOK), (PRINTED, draw.PRINTED_LOOK)]),
+        hero,
+    ]
+    if others:
+        elements.append(Grid(2, [[plot] for plot in others]))
+    if rates:
+        count = len(rates) - 1
+        hint = f"of the rotor and {count} pitch{'es' if count != 1 else ''}"
+        elements.append(Fold("Rates", hint, [Grid(2, [[plot] for plot in rates])]))
+    return Section("motion", heading, elements)
 
 
-def range_table(runs: Sequence[StoredRun]) -> PageTable:
-    """Extremes of each coordinate in each of the runs; of the rotor at the integrator's own points, if stored."""
-    head = ["Coordinate"]
-    # A reference has angles and rates also where the scene does not ask for them.
-    rows = [[label] for label in max((run.labels for run in runs), key=len)]
-    for run in runs:
-        lowest, highest, fastest = (metric(run, name) for name in EXTREMES)
-        if "angles" in run:
-            head.append(f"{with_capital(label_of(run.method))}: angle (rad)")
-            angles = run.array("angles")
-            low, high = angles.min(axis=0), angles.max(axis=0)
-            low[0] = low[0] if lowest is None else lowest
-            high[0] = high[0] if highest is None else highest
-            for row, least, most in zip(rows, low, high, strict=True):
-                row.append(f"{number(least, 4)} to {number(most, 4)}")
+def paper_plots(scene: StoredScene, claims: Sequence[Published]) -> tuple[Grid, list[Plot], list[Plot]]:
+    """Return the moving rotor with two plots beside it, the plots of the other angles, and those of the rates."""
+    sides = scene.sides
+    printed, corrected = sides[PRINTED], sides[CORRECTED]
+    axis = draw.whole_time(list(sides.values()))
+    assert axis is not None
+    marks: list[Mark] = []
+    for claim in claims:
+        if claim.is_number and claim.scene == scene.name and claim.metric in ("rotor_angle_min", "rotor_angle_max"):
+            text = f"published {paper.quantity_of(claim)} {fixed(claim.value, claim.decimals)} rad"
+            marks.append(Mark(text if not marks else "", y=claim.value))
+    coordinates = range(corrected.array("angles").shape[1])
+    shown = draw.differing_coordinate(printed, corrected, 1)
+    plots = {}
+    for k in coordinates:
+        is_main = k in (0, shown)
+        plots[k] = draw.models_plot(
+            sides,
+            k,
+            "angles",
+            axis,
+            height=158 if is_main else 150,
+            marks=marks if k == 0 else (),
+            still=is_main,
+        )
+    moving = viewer(scene, {"as printed": printed, "corrected": corrected})
+    stack = [plots[k] for k in dict.fromkeys([0, shown])]
+    cards: list[list[Element]] = [] if moving is None else [[Viewer(moving, scene.title)]]
+    hero = Grid(len(cards) + 1, [*cards, [*stack]])
+    rates = []
+    if all("rates" in run for run in sides.values()):
+        rates = [draw.models_plot(sides, k, "rates", axis, height=150) for k in coordinates]
+    return hero, [plots[k] for k in coordinates if k not in (0, shown)], rates
+
+
+# ---- Any other scene
+
+
+def _own_page(scene: StoredScene, report: Report) -> PageContent:
+    run = scene.corrected or scene.printed
+    jumps = draw.jumps_of(scene.scene)
+    sections = []
+    facts = [_result_fact(scene, "Result", "✓ ok")]
+    if run is not None and ("angles" in run or "rates" in run):
+        motion, others = motion_channels(scene, run, jumps)
+        loads = draw.load_channels(scene, run, jumps)
+        energies = _energy_channel(run)
+        sections.append(_motion_section(scene, run, jumps, motion, others))
+        sections.append(_loads_section(run, jumps, loads, energies))
+        sections.append(_extremes_section(run, [*motion, *others, *loads]))
+        facts += _own_facts(scene, run)
+    sections += [_agreement_section(scene, report), _details_section(scene)]
+    return PageContent(typeset_title(scene), described(scene), own_answer(scene, run), facts[:4], sections)
+
+
+def _faults(scene: StoredScene) -> list[Markup]:
+    """Return a sentence about each corrected method of the scene whose status is not ok."""
+    sentences = []
+    for method, run in scene.corrected_runs.items():
+        if run.status in GOOD:
+            continue
+        reason = str(run.attributes.get("message", ""))
+        text = Markup('<span class="bad">{} is {}</span>').format(with_capital(label_of(method)), status_text(run))
+        if run.status == "timed_out":
+            text = Markup('<span class="bad">{} timed out</span>').format(with_capital(label_of(method)))
+        if run.status in ("solver_failed", "worker_died", "diverged"):
+            text = Markup('<span class="bad">{}: {}</span>').format(with_capital(label_of(method)), status_text(run))
+        sentences.append(text + (f": {reason}." if reason else "."))
+    if len(sentences) > 2:
+        names = [label_of(method) for method, run in scene.corrected_runs.items() if run.status not in GOOD]
+        text = Markup('<span class="bad">{} of {} methods are not ok</span>: {}.')
+        return [text.format(len(names), len(scene.corrected_runs), ", ".join(names))]
+    return sentences
+
+
+def own_answer(scene: StoredScene, run: StoredRun | None) -> list[Markup]:
+    """Return what a rotor does: its turns and speed, its pitch, its largest root moment; then how this was checked."""
+    sentences = _faults(scene)
+    if run is None:
+        return [*sentences, Markup("No run of this scene has samples.")]
+    time = run.array("time")
+    whole = seconds(float(time[-1]))
+    if "angles" in run:
+        angles = run.array("angles")
+        turns = float(angles[-1, 0] - angles[0, 0]) / _TURN
+        if abs(turns) >= 1.0:
+            backwards = " backwards" if turns < 0.0 else ""
+            text = Markup("The rotor turns{} <b>{} times in {}</b>").format(backwards, number(abs(turns), 3), whole)
+        else:
+            low, high = (number(float(value), 3) for value in np.degrees([angles[:, 0].min(), angles[:, 0].max()]))
+            text = Markup("In {} the rotor moves between <b>{}° and {}°</b>").format(whole, low, high)
         if "rates" in run:
-            head.append("largest rate (rad/s)")
-            largest = np.abs(run.array("rates")).max(axis=0)
-            largest[0] = largest[0] if fastest is None else fastest
-            for row, rate in zip(rows, largest, strict=True):
-                row.append(number(rate, 3))
-    return PageTable("Extremes", head, rows)
+            speed = run.array("rates")[:, 0]
+            slowest, fastest = (number(float(value), 3) for value in (speed.min(), speed.max()))
+            text += Markup(", at {} to {} rad/s").format(slowest, fastest)
+        sentences.append(text + ".")
+        if angles.shape[1] > 1:
+            pitch = np.degrees(angles[:, 1:])
+            low, high = (number(float(value), 3) for value in (pitch.min(), pitch.max()))
+            text = Markup("Pitch stays between <b>{}° and {}°</b>.").format(low, high)
+            if low == high:
+                text = Markup("Pitch stays at <b>{}°</b>.").format(low)
+            sentences.append(text)
+    moment = _peak(run, "blade_root_moment")
+    if moment is not None:
+        size, blade, at = moment
+        text = Markup("The largest blade root moment is <b>{}</b>, blade {} at {}.")
+        sentences.append(text.format(prefixed(size, "N m"), blade, seconds(at)))
+    sentences.append(Markup("{}").format(agreement_text(scene)))
+    return [sentence for sentence in sentences if sentence]
 
 
-def _difference_section(scene: StoredScene, drawn: Runs, horizon: float | None) -> Section:
-    """Each run's largest angle difference from the reference, and the reference's uncertainty."""
-    reference = scene.reference
-    if reference is None or "angles" not in reference or not len(reference.array("time")):
-        return Section()
-    runs = {method: run for method, run in drawn.items() if method != REFERENCE}
-    others = []
-    if "error_growth" in reference:
-        growth = np.maximum(np.maximum.accumulate(reference.array("error_growth")), 1.0)
-        look = Look(GREY, ":", "", "rounding error of the initial state times error growth")
-        others.append(Series(reference.array("time"), float(np.finfo(float).eps) * growth, look))
-    if "angle_uncertainty" in reference and reference.array("angle_uncertainty").max() > LOWEST:
-        look = Look(GREY, "-", "", f"{label_of(REFERENCE)}: uncertainty")
-        others.append(Series(reference.array("time"), reference.array("angle_uncertainty"), look))
-    differences = {method: angle_difference(run, reference) for method, run in runs.items() if "angles" in run}
-    return Section(error_picture(
-        over_time(runs, differences), "largest angle difference (rad)", "difference",
-        "Largest difference from the reference, over all angles", horizon, others,
-    ))  # fmt: skip
+def _peak(run: StoredRun, name: str) -> tuple[float, int, float] | None:
+    """Return the largest size of a load of the blades, the blade, from 1, and its time (s); None where it is unknown."""
+    if name not in run:
+        return None
+    values = run.array(name)
+    sizes = np.linalg.norm(values, axis=2) if values.ndim == 3 else np.abs(values)
+    if not np.isfinite(sizes).any():
+        return None
+    sample, blade = np.unravel_index(int(np.nanargmax(sizes)), sizes.shape)
+    return float(sizes[sample, blade]), int(blade) + 1, float(run.array("time")[sample])
 
 
-def _drive_section(scene: Scene, run: StoredRun | None) -> Section:
-    """Torque and power at the shaft; pitches, their commands and the power of their actuators."""
-    if run is None or "rates" not in run or "angles" not in run or not len(run.array("time")):
-        return Section()
-    time, angles, rates = run.array("time"), run.array("angles"), run.array("rates")
-    drawn: dict[str, list[tuple[str, list[Series]]]] = {}  # by caption
-    numbers: list[tuple[str, Array, str]] = []
+def _result_fact(scene: StoredScene, name: str, good: str) -> Fact:
+    """Return how many of the corrected methods are ok; in red, and what is wrong, where not all are."""
+    runs = scene.corrected_runs
+    if not runs:
+        text = "reference only" if scene.reference is not None else "not checked"
+        return Fact(name, text, "no run of a corrected model")
+    good_runs = [run for run in runs.values() if run.status == "ok"]
+    note = f"{len(good_runs)} of {len(runs)} method{'s' if len(runs) != 1 else ''} ok, limit {OK_ERROR:g} rad"
+    if len(good_runs) == len(runs):
+        return Fact(name, good, note, "good")
+    statuses = dict.fromkeys(status_text(run) for run in runs.values() if run.status != "ok")
+    is_bad = any(run.status not in GOOD for run in runs.values())
+    return Fact(name, ", ".join(statuses), note, "bad" if is_bad else "")
+
+
+def _own_facts(scene: StoredScene, run: StoredRun) -> list[Fact]:
+    """Return the numbers of a rotor's run, the most asked for first."""
+    facts = []
+    if "rates" in run:
+        low, high = (float(value) for value in (run.array("rates")[:, 0].min(), run.array("rates")[:, 0].max()))
+        turns = f"{number(low * _RPM, 3)} to {number(high * _RPM, 3)} rev/min"
+        facts.append(Fact("Rotor speed", f"{number(low, 3)} to {number(high, 3)} rad/s", turns))
+    for name, title in (
+        ("blade_root_moment", "root moment"),
+        ("pitch_actuator_moment", "actuator moment"),
+    ):
+        peak = _peak(run, name)
+        if peak is not None and peak[0] > 0.0:
+            size, blade, at = peak
+            facts.append(
+                Fact(
+                    f"Largest {title}",
+                    prefixed(size, "N m"),
+                    f"blade {blade}, at {seconds(at)}",
+                )
+            )
+    if "angles" in run and run.array("angles").shape[1] > 1:
+        pitch = run.array("angles")[:, 1:]
+        ends = [number(float(value), 3) for value in np.degrees([pitch.min(), pitch.max()])]
+        blades = f"of {pitch.shape[1]} blade{'s' if pitch.shape[1] > 1 else ''}"
+        facts.append(Fact("Pitch", f"{ends[0]}° to {ends[1]}°", blades))
+    compared, whole = compared_time([scene])
+    if compared:
+        note = "the reference's horizon" if compared < whole else "the whole run"
+        facts.append(Fact("Compared with a reference", seconds(compared), note))
+    return facts
+
+
+def motion_channels(scene: StoredScene, run: StoredRun, jumps: Jumps) -> tuple[list[Channel], list[Channel]]:
+    """Return the two main channels of a motion, speed of the rotor and pitch angles, and the others."""
+    time = run.array("time")
+    main, others = [], []
+    rotor = coordinate_look(0)
+    if "rates" in run:
+        main.append(
+            Channel(
+                "Rotor speed",
+                "rad/s",
+                [("rotor", rotor, run.array("rates")[:, 0])],
+                draw._LEAST_ANGLE,
+            )
+        )
+    if "angles" in run:
+        angles = run.array("angles")
+        if angles.shape[1] > 1:
+            curves = _blade_curves(np.degrees(angles[:, 1:]))
+            curves += _commands(scene.scene, time)
+            main.append(Channel("Pitch angle", "degrees", curves, math.degrees(draw._LEAST_ANGLE)))
+        turns = Channel(
+            "Rotor angle",
+            "revolutions",
+            [("rotor", rotor, angles[:, 0] / _TURN)],
+            draw._LEAST_ANGLE,
+        )
+        if abs(float(angles[-1, 0] - angles[0, 0])) < _TURN:
+            degrees = np.degrees(angles[:, 0])
+            turns = Channel(
+                "Rotor angle",
+                "degrees",
+                [("rotor", rotor, degrees)],
+                math.degrees(draw._LEAST_ANGLE),
+            )
+        others.append(turns)
+    if "rates" in run:
+        rates = run.array("rates")
+        others = [*_powers(scene.scene, run, jumps), *others]
+        if rates.shape[1] > 1:
+            others.append(Channel("Pitch rate", "rad/s", _blade_curves(rates[:, 1:]), draw._LEAST_ANGLE))
+    return main, others
+
+
+def _blade_curves(values: Array) -> list[tuple[str, Look, Array]]:
+    return [(f"blade-{i + 1}", draw.blade_look(i), column) for i, column in enumerate(values.T)]
+
+
+def _commands(scene: Scene, time: Array) -> list[tuple[str, Look, Array]]:
+    """Return the pitch commands that change over time, in degrees; equal ones once."""
+    tables = dict.fromkeys(rest for _, rest in scene.pitch_loads if len({value for _, value in rest}) > 1)
+    look = Look(GREY, ":", "", "command")
+    return [("command", look, np.degrees(values_at(table, time))) for table in tables]
+
+
+def _powers(scene: Scene, run: StoredRun, jumps: Jumps) -> list[Channel]:
+    """Return the power of the torque on the rotor and of its damper, and of driven pitch actuators."""
+    time, rates = run.array("time"), run.array("rates")
+    before = time * (1.0 - 1e-12)  # at a jump the value before it, as stored loads have it
+    breaks = jumps.breaks(time)
+    channels = []
+    curves = []
     if scene.has_torque:
-        look, torque = coordinate_look(0, "torque on the rotor"), values_at(scene.rotor_torque, time)
-        powers = [Series(time, torque * rates[:, 0], look)]
-        numbers += [("Torque on the rotor", torque, "N m"), ("Its power", powers[0].values, "W")]
+        torque = values_at(scene.rotor_torque, before)
+        curves.append(("rotor", coordinate_look(0, "torque"), torque * rates[:, 0]))
         if scene.shaft_damping:
-            powers.append(Series(time, scene.shaft_damping * rates[:, 0] ** 2, TAKEN))
-            numbers.append(("Dissipated by the shaft damper", powers[1].values, "W"))
-        torques = [Series(time, torque, look)]
-        drawn["Rotor torque and its power"] = [("torque (N m)", torques), ("power (W)", powers)]
-    driven = [i for i, tables in enumerate(scene.pitch_loads) if any(tables)]
-    if driven:
-        pitches, powers = plots.coordinate_series(time, angles)[1:], []
-        for i in driven:
-            torque, rest = (values_at(table, time) for table in scene.pitch_loads[i])
+            look = Look(VERMILLION, "-", "", "shaft damper")
+            curves.append(("damper", look, -scene.shaft_damping * rates[:, 0] ** 2))
+        channels.append(_in_units("Power of the torque", "W", curves, breaks))
+    driven = []
+    if "angles" in run:
+        angles = run.array("angles")
+        for i, (torque_table, rest_table) in enumerate(scene.pitch_loads):
+            if not any(len({value for _, value in table}) > 1 for table in (torque_table, rest_table)):
+                continue
+            torque, rest = (values_at(table, before) for table in (torque_table, rest_table))
             stiffness, damping = scene.bearings[i]
             moment = torque + stiffness * (rest - angles[:, 1 + i]) - damping * rates[:, 1 + i]
-            powers.append(Series(time, moment * rates[:, 1 + i], coordinate_look(1 + i)))
-            if scene.pitch_loads[i][1]:
-                pitches.append(Series(time, rest, COMMAND))
-            numbers += [
-                (f"Pitch {i + 1}", angles[:, 1 + i], "rad"),
-                (f"Actuator {i + 1}, power", powers[-1].values, "W"),
-            ]
-        drawn["Pitches, their commands and actuators"] = [("pitch (rad)", pitches), ("actuators' power (W)", powers)]
-    pictures: list[Picture] = []
-    for caption, panels_of in drawn.items():
-        panels = plots.lines(panels_of, heights=[1.3] * len(panels_of))
-        for axes in panels.axes:  # they have the zero
-            low, high = axes.get_ylim()
-            axes.set_ylim(min(low, 0.0), max(high, 0.0))
-        pictures.append(picture(panels, f"drive-{len(pictures)}", caption))
-    rows = []
-    for name, values, unit in numbers:
-        work = prefixed(float(np.trapezoid(values, time)), "J") if unit == "W" else ""
-        rows.append((name, *(prefixed(float(x), unit) for x in (np.abs(values).max(), values[-1])), work))
-    table = PageTable("", ("Quantity", "Largest", "At the end", "Work"), rows)
-    return Section(pictures, [table] if rows else [])
+            driven.append((f"blade-{i + 1}", draw.blade_look(i), moment * rates[:, 1 + i]))
+    if driven:
+        channels.append(_in_units("Power of the pitch actuators", "W", driven, breaks))
+    return channels
 
 
-def quantity_sections(scene: StoredScene, runs: Runs, horizon: float | None) -> list[tuple[str, str, Section]]:
-    """(id, heading, section) of each quantity with a plot that one of `runs` has."""
-    sections = []
-    for quantity in known_quantities(scene.scene.outputs):
-        plot, own = quantity.plot, {method: run for method, run in runs.items() if quantity.name in run}
-        if plot is None or not own:
-            continue
-        name = f"quantity-{quantity.name}"
-        if plot.logarithmic:
-            curves = over_time(own, {m: _largest(np.abs(run.array(quantity.name))) for m, run in own.items()})
-            section = Section(error_picture(curves, plot.axis, name, plot.title, horizon))
-        elif len(quantity.dimensions) == 1:
-            curves = over_time(own, {method: run.array(quantity.name) for method, run in own.items()})
-            curves = [curve._replace(look=replace(curve.look, marker="")) for curve in curves]
-            section = Section([picture(plots.lines([(plot.axis, curves)], horizon), name, plot.title)])
-        else:
-            section = _components_section(quantity, plot, own, name, horizon)
-        sections.append((name, plot.title, section))
-    return sections
+def _in_units(name: str, unit: str, curves: Sequence[tuple[str, Look, Array]], breaks: Sequence[int] = ()) -> Channel:
+    scale, prefixed_unit = draw.in_units([values for _, _, values in curves], unit)
+    return Channel(
+        name,
+        prefixed_unit,
+        [(key, look, values / scale) for key, look, values in curves],
+        breaks=breaks,
+    )
 
 
-def _components_section(quantity: Quantity, plot: Plot, runs: Runs, name: str, horizon: float | None) -> Section:
-    """Every run; of a quantity that is judged against the reference that one alone, the errors and its extremes."""
-    rule = quantity.judgement
-    is_compared = rule is not None and rule.with_reference and REFERENCE in runs
-    pictures: list[Picture] = []
-    for i, run in enumerate([runs[REFERENCE]] if is_compared else runs.values()):
-        panels = plots.component_panels(
-            quantity, plot, run.array("time"), run.array(quantity.name), run.labels, horizon
-        )
-        caption = f"{with_capital(label_of(run.method))}: {quantity.long_name}"
-        pictures.append(picture(panels, f"{name}-{i}", caption))
-    if not is_compared:
-        return Section(pictures)
-    time, exact = runs[REFERENCE].array("time"), runs[REFERENCE].array(quantity.name)
-    differences = {}
-    for method, run in runs.items():
-        if method != REFERENCE:  # at the samples that both have; the largest over blades, of vectors the length
-            values = run.array(quantity.name)
-            n = min(len(values), len(exact))
-            differences[method] = _largest(sizes(quantity, values[:n] - exact[:n]))
-    axis, caption = f"difference ({quantity.units})", "Largest difference from the reference"
-    pictures += error_picture(over_time(runs, differences), axis, f"{name}-error", caption, horizon)
-    rows = []
-    for panel, look, values in plots.components(quantity, exact, runs[REFERENCE].labels):
-        row = [f"{look.label} {panel}".strip()]
-        for k in (int(values.argmin()), int(values.argmax())):
-            row += [prefixed(float(values[k]), quantity.units), number(float(time[k]), 4)]
-        rows.append(row)
-    head = ("Component", "Smallest", "at (s)", "Largest", "at (s)")
-    return Section(pictures, [PageTable("Extremes in the reference", head, rows)])
+def _torque_plot(scene: Scene, run: StoredRun, jumps: Jumps) -> Plot | None:
+    """Return the prescribed torque by its own points, or None where there is none."""
+    if not scene.has_torque:
+        return None
+    time = run.array("time")
+    times, values = draw.values_over(scene.rotor_torque, time)
+    scale, unit = draw.in_units([values], "N m")
+    curve = Curve("rotor", coordinate_look(0, "torque"), times, values / scale)
+    return Plot(
+        "Torque on the rotor",
+        unit,
+        draw.time_axis(time),
+        [curve],
+        150,
+        "the scene's table",
+        marks=jumps.marks(),
+    )
 
 
-def over_time(runs: Runs, values: Mapping[str, Array]) -> list[Series]:
-    """The values (n,) of runs, by method, over their first samples."""
-    return [Series(runs[method].array("time")[: len(x)], x, look_of(method)) for method, x in values.items()]
+def _motion_section(
+    scene: StoredScene,
+    run: StoredRun,
+    jumps: Jumps,
+    main: Sequence[Channel],
+    others: Sequence[Channel],
+) -> Section:
+    time = run.array("time")
+    axis = draw.time_axis(time)
+    moving = viewer(scene, {scene.name: run})
+    height = 206 if moving is not None else 180
+    marks = jumps.marks(with_text=True)
+    stack: list[Element] = []
+    for channel in main:
+        stack.append(channel.plot(axis, time, height=height, marks=marks, still=True))
+        marks = jumps.marks()
+    if len(stack) == 1:
+        stack = [replace(stack[0], height=2 * height)] if isinstance(stack[0], Plot) else stack
+    cards: list[list[Element]] = [] if moving is None else [[Viewer(moving, scene.title)]]
+    if stack and moving is not None:
+        cards.append(stack)
+    else:
+        cards += [[plot] for plot in stack]
+    rest = [channel.plot(axis, time, height=150, marks=jumps.marks()) for channel in others]
+    torque = _torque_plot(scene.scene, run, jumps)
+    if torque is not None:
+        rest = [torque, *rest]
+    keys: dict[str, Look] = {}
+    for channel in [*main, *others]:
+        for key, look, _ in channel.curves:
+            label = "rotor" if key == "rotor" else look.label
+            keys.setdefault(key, replace(look, label=label))
+    elements: list[Grid | Fold | Element] = [
+        Legend(list(keys.items())),
+        Grid(min(len(cards), 2), cards),
+    ]
+    if rest:
+        elements.append(Grid(2 if len(rest) in (2, 4) else 3, [[plot] for plot in rest]))
+    say = f"By {label_of(run.method)}." if run.method != REFERENCE else ""
+    return Section("motion", "Motion", elements, say)
 
 
-def _largest(values: Array) -> Array:
-    """(n,) of (n, ...): the largest over the components."""
-    largest: Array = values.reshape(len(values), -1).max(axis=1)
-    return largest
+def _energy_channel(run: StoredRun) -> Channel | None:
+    names = ("kinetic_energy", "potential_energy", "work")
+    if not all(name in run for name in names):
+        return None
+    looks = (
+        Look(VERMILLION, "-", "", "kinetic"),
+        Look(BLUE, "-", "", "potential"),
+        Look(GREY, "-", "", "work"),
+    )
+    curves = [(name, look, run.array(name)) for name, look in zip(names, looks, strict=True)]
+    return _in_units("Energy", "J", curves)
 
 
-def error_picture(
-    curves: Sequence[Series], axis: str, name: str, caption: str, horizon: float | None = None,
-    others: Sequence[Series] = (),
-) -> list[Picture]:  # fmt: skip
-    """A picture of the curves and of `others`, which have no marker; none where there is no curve."""
-    shown, exact, notes = [], [], []
-    for curve in curves:
-        if np.abs(curve.values).max() > LOWEST:
-            shown.append(curve)
-        else:
-            exact.append(curve.look.label)
-    if exact:
-        notes.append(f"Below 10⁻¹⁸ everywhere, not plotted: {'; '.join(exact)}.")
-    panels = plots.errors([*others, *shown], axis, horizon)
-    return [picture(panels, name, caption, notes)] if curves else []
+def _loads_section(run: StoredRun, jumps: Jumps, loads: Sequence[Channel], energy: Channel | None) -> Section:
+    """Return the loads, three components in a row, then actuators and energy."""
+    time = run.array("time")
+    axis = draw.time_axis(time)
+    vectors = [channel for channel in loads if channel.name[-2:] in (" x", " y", " z")]
+    others = [channel for channel in loads if channel not in vectors]
+    elements: list[Grid | Fold | Element] = []
+    keys: dict[str, Look] = {}
+    for channel in loads:
+        for key, look, _ in channel.curves:
+            keys.setdefault(key, replace(look, label="shaft") if key == "rotor" else look)
+    if keys:
+        elements.append(Legend(list(keys.items())))
+    if vectors:
+        cards = []
+        for channel in vectors:
+            is_still = channel.name == "Blade root moment y"
+            cards.append([channel.plot(axis, time, marks=jumps.marks(), still=is_still)])
+        elements.append(Grid(3, cards))
+    last: list[list[Element]] = [[channel.plot(axis, time, height=176, marks=jumps.marks())] for channel in others]
+    if energy is not None:
+        legend = Legend([("", look) for _, look, _ in energy.curves])
+        last.append([energy.plot(axis, time, height=176, marks=jumps.marks()), legend])
+    if last:
+        elements.append(Grid(min(len(last), 2), last))
+    heading = "Loads and energy" if loads and energy is not None else "Loads" if loads else "Energy"
+    say = "Drag over a plot to zoom all of them in time; double-click to go back."
+    if jumps.times and loads:
+        say += " Loads that jump with the torque or a command are interrupted there."
+    return Section("loads", heading, elements, say)
 
 
-def defects(scene: Scene, runs: Runs) -> list[Series]:
-    """The size (rad) of the defect of every interval, at its end; a fault in time stands out in its own intervals."""
-    curves = []
-    for method, run in runs.items():
-        time = run.array("time") if "angles" in run and "rates" in run else np.empty(0)
-        if len(time) >= 2:
-            sizes = interval_defects(scene, time, run.array("angles"), run.array("rates")).sizes
-            curves.append(Series(time[1:], sizes, look_of(method)))
-    return curves
+def _extremes_section(run: StoredRun, channels: Sequence[Channel]) -> Section:
+    """Return smallest, largest, mean and standard deviation of every curve, with times."""
+    time = run.array("time")
+    rows: list[Row] = []
+    for channel in channels:
+        for key, look, values in channel.curves:
+            if key == "command" or not np.isfinite(values).any():
+                continue
+            low, high = int(np.nanargmin(values)), int(np.nanargmax(values))
+            name = channel.name if len(channel.curves) == 1 else f"{channel.name}, {look.label}"
+            row: list[TableCell | str] = [name, channel.unit]
+            for sample in (low, high):
+                row += [
+                    _floored(float(values[sample]), channel.floor),
+                    _time_cell(float(time[sample])),
+                ]
+            row += [_floored(float(statistic(values)), channel.floor) for statistic in (np.nanmean, np.nanstd)]
+            rows.append(row)
+    head = ("Quantity", "Unit", "Smallest", "at (s)", "Largest", "at (s)", "Mean", "Std. deviation")
+    table = PageTable("Extremes", head, rows, wide=(3, 5, 7), sortable=True)
+    return Section("extremes", "Extremes", [table] if rows else [])
 
 
-def angle_difference(first: StoredRun, second: StoredRun) -> Array:
-    """(common samples,) rad: the largest over the coordinates."""
-    n = min(len(first.array("time")), len(second.array("time")))
-    return _largest(np.abs(first.array("angles")[:n] - second.array("angles")[:n]))
+def _floored(value: float, floor: float) -> TableCell:
+    """Return a value of four digits; what is below the channel's rounding error is 0."""
+    shown = 0.0 if abs(value) <= floor else value
+    return TableCell(number(shown, 4), order=shown)
 
 
-def parting(printed: StoredRun, corrected: StoredRun) -> tuple[float | None, float]:
-    """When the angles of both first differ by VISIBLE (s; None: never), and the largest difference (rad)."""
-    gap = angle_difference(printed, corrected)
-    apart = np.flatnonzero(gap > VISIBLE)
-    return (float(printed.array("time")[apart[0]]) if len(apart) else None), float(gap.max(initial=0.0))
+def _time_cell(time: float) -> TableCell:
+    return TableCell(fixed(time, 2), order=time)
+
+
+# ---- Parts of both
+
+
+def _agreement_section(scene: StoredScene, report: Report) -> Section:
+    """Return the table of all runs, and their errors over time."""
+    runs = _drawn_runs(scene)
+    suite_runs = [run for run in report.suite_runs if run.scene == scene.name]
+    elements: list[Grid | Fold | Element] = [method_table(scene, suite_runs)]
+    axis = draw.whole_time(list(runs.values()))
+    horizon = horizon_of(scene)
+    marks = []
+    if axis is not None and horizon is not None and horizon < axis.last:
+        marks = [Mark(f"horizon {with_unit(horizon, 's', 3)}", horizon)]
+    plots: list[list[Element]] = []
+    methods: dict[str, None] = {}
+    if axis is not None:
+        angles = draw.error_curves(runs, draw.angle_errors(scene, runs))
+        energies = draw.error_curves(runs, draw.energy_errors(runs))
+        methods = dict.fromkeys(curve.key for curve in [*angles, *energies])
+        if angles:
+            extra = _uncertainty(scene)
+            still = len(scene.corrected_runs) > 0
+            plots.append([
+                draw.error_plot(
+                    "Angle error", "rad", [*extra, *angles], axis, note="largest over all angles", marks=marks,
+                    still=still,
+                )
+            ])  # fmt: skip
+        if energies:
+            note = "kinetic + potential − work − initial"
+            plots.append([draw.error_plot("Energy error / energy scale", "", energies, axis, note=note)])
+    if plots:
+        items = [(method, look_of(method)) for method in methods]
+        if any(curve.key == "uncertainty" for curve in _uncertainty(scene)):
+            items.append(("uncertainty", _UNCERTAINTY))
+        elements += [Legend(items), Grid(2, plots)]
+    benched = scene.name in report.curves
+    if benched:
+        link = Markup('<a href="bench.html">Error against run time of this scene\'s methods</a>')
+        elements.append(Note(link))
+    if len(scene.runs) < 2:
+        return Section("agreement", "Accuracy", elements)
+    say = ""
+    if scene.reference is not None and scene.methods:
+        say = "Every method against the reference, which is computed in quad precision."
+        if marks:
+            say += (
+                " After the horizon an initial rounding error has grown 100 000 times, and two right solutions may "
+                "differ."
+            )
+    return Section("agreement", "Agreement between methods", elements, say)
+
+
+_UNCERTAINTY = Look(GREY, ":", "", "uncertainty of the reference")
+
+
+def _uncertainty(scene: StoredScene) -> list[Curve]:
+    """Return the reference's own uncertainty, where it could be seen."""
+    reference = scene.reference
+    if reference is None or "angle_uncertainty" not in reference:
+        return []
+    values = reference.array("angle_uncertainty")
+    if not values.size or not values.max() > draw._LOWEST:
+        return []
+    return [Curve("uncertainty", _UNCERTAINTY, reference.array("time"), draw.positive(values))]
+
+
+def _details_section(scene: StoredScene) -> Section:
+    """Return what is folded: interval defects, joints, every number, the scene's file."""
+    runs = {name: run for name, run in _drawn_runs(scene).items() if name != REFERENCE}
+    folds: list[Grid | Fold | Element] = []
+    axis = draw.whole_time(list(runs.values()))
+    if axis is not None:
+        curves = draw.error_curves(runs, draw.interval_errors(scene.scene, runs), first=1)
+        if curves:
+            plot = draw.error_plot("Interval defect", "rad", curves, axis)
+            legend = Legend([(f"{curve.key} ", curve.look) for curve in curves])
+            plot = replace(plot, curves=[replace(curve, key=f"{curve.key} ") for curve in curves])
+            hint = "where in time a method departs from the equations of motion"
+            folds.append(Fold("Interval defects", hint, [legend, plot, Note(DEFECT_NOTE)]))
+        gaps = {name: run.array("constraint_error") for name, run in runs.items() if "constraint_error" in run}
+        if gaps:
+            plot = draw.error_plot("Largest gap of a joint", "m", draw.error_curves(runs, gaps), axis)
+            folds.append(Fold("Joints", "how far they open in models with joints", [plot]))
+    tables = metrics_tables(scene)
+    if any(table.rows for table in tables):
+        notes = [Note(HORIZON_NOTE)] if horizon_of(scene) is not None else []
+        if any(run.status in GOOD and not is_corrected(run.method) for run in scene.runs.values()):
+            notes.append(Note("Completed: the printed equations reached the end; nothing is claimed of them."))
+        hint = f"{max(len(table.rows) for table in tables)} quantities"
+        folds.append(Fold("All numbers of every method", hint, [*tables, *notes]))
+    text = scene.attributes.get("scene_toml")
+    if text:
+        folds.append(Fold("Scene file", f"{scene.name}.toml", [SourceText(str(text))]))
+    return Section("details", "Verification in detail", folds)

@@ -1,70 +1,178 @@
-"""The page of a sweep, from its dataset alone: what was varied, how the runs ended, what they have over it."""
+"""The page of a sweep, from its dataset alone: how the runs ended, a map of a quantity over two parameters beside the
+curves of a chosen run, quantities over each parameter, and the runs that are not ok with their reasons."""
 
 from __future__ import annotations
 
+import math
 import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
+from markupsafe import Markup
 from numpy.typing import NDArray
 
-from rotor_mbs.report.canvas import Panels, curve, log_axis, panels, style
-from rotor_mbs.report.elements import PageTable, Picture, Section, picture
-from rotor_mbs.report.looks import BLUE, Look, with_capital
-from rotor_mbs.report.numbers import SPACE
+from rotor_mbs.report.elements import (
+    Array,
+    Curve,
+    Element,
+    Fact,
+    Fold,
+    Grid,
+    HeatMap,
+    Horizontal,
+    Legend,
+    Note,
+    PageContent,
+    PageTable,
+    Plot,
+    Row,
+    RunChoice,
+    Section,
+    SourceText,
+    TableCell,
+)
+from rotor_mbs.report.looks import BLUE, Look, coordinate_look, step_look, with_capital
+from rotor_mbs.report.numbers import number, prefix_of, shortest
 from rotor_mbs.report.pages import words_of
+from rotor_mbs.report.pages.scene_plots import Jumps, blade_look, jumps_of
 from rotor_mbs.runs.sweeps import StoredSweep, parameter_name
+from rotor_mbs.scenario.scene import parse_scene
+from rotor_mbs.solution.quantities import LOADS
 from rotor_mbs.solution.status import GOOD, STATUSES
-from rotor_mbs.solution.trajectory import Array
 
-_SPAN = 50.0  # between the smallest and the largest value, beyond which an axis is logarithmic
+_SPAN = 30.0  # between the smallest and the largest value, beyond which an axis is logarithmic
 _COUNTS = ("steps", "rhs_evaluations", "time_reached")  # columns that say nothing of the motion
-# What is drawn over the parameters: the first of these that differs from run to run.
-_RESPONSES = ("pitch_max", "rotor_rate_max", "rotor_angle_max")
-_MAX_RESPONSES = 3
-_MAX_RUNS = 1000  # that have a point
+_MAX_NUMBERS = 150_000  # of curves on a page: 800 kB
+_MAX_ROWS = 500  # of the table of all runs
+_MAX_CELLS = 24  # of a map in each direction
+_DECIDES = 0.6  # share of the variance of a quantity that a parameter explains, when it is said to decide
 _COORDINATE = re.compile(r"initial\.(angles|rates)\[(\d+)\]")
 
 
-def sweep_page(sweep: StoredSweep) -> dict[str, object]:
-    """The content of the page."""
-    statuses = np.asarray(sweep.column("status"))
-    ok = np.isin(statuses, [code for code, status in enumerate(STATUSES) if status in GOOD])
-    parameter_rows = []
-    for key in sweep.keys:
-        name = parameter_name(key)
-        values, unit = sweep.column(name), sweep.columns[name].units
-        limits = [f"{value:.12g}{SPACE}{unit}" for value in (np.nanmin(values), np.nanmax(values))]
-        parameter_rows.append((field_name(key), key, *limits, str(len(np.unique(values)))))
-    result_rows = []
-    left_out = {*map(parameter_name, sweep.keys), *_COUNTS}
-    for name, column in sweep.columns.items():
-        if column.dimensions != ("run",) or name in left_out or sweep.column(name).dtype.kind != "f":
-            continue
-        values = sweep.column(name)[ok]
-        values = values[np.isfinite(values)]
-        if len(values) > 1 and np.ptp(values):
-            quantiles = (f"{value:.6g}" for value in np.quantile(values, (0.0, 0.05, 0.5, 0.95, 1.0)))
-            result_rows.append((_axis(with_capital(column.long_name), column.units), name, *quantiles))
-    codes, counts = np.unique(statuses, return_counts=True)
-    status_rows = [
-        (words_of(STATUSES[code]) if code >= 0 else "missing", str(count), f"{100.0 * count / len(statuses):.1f} %")
-        for code, count in sorted(zip(codes.tolist(), counts.tolist(), strict=True), key=lambda pair: -pair[1])
-    ]
-    head = ("Parameter", "Key", "From", "To", "Values")
-    result_head = ("Result", "Column", "Smallest", f"5{SPACE}%", "Median", f"95{SPACE}%", "Largest")
-    return {
-        "title": sweep.attributes["title"],
-        "summary": [with_capital(sweep.attributes["summary"].rstrip(".")) + "."],
-        "plots": Section(_responses(sweep, ok)),
-        "statuses": Section(tables=[PageTable("", ("Status", "Runs", "Share"), status_rows)]),
-        "parameters": Section(tables=[PageTable("", head, parameter_rows)]),
-        "results": Section(tables=[PageTable("", result_head, result_rows)]),
-        "toml": str(sweep.attributes.get("sweep_toml", "")),
-    }
+@dataclass(frozen=True)
+class RunQuantity:
+    """A number of each run: its name, unit and values (runs,)."""
+
+    name: str
+    unit: str
+    values: Array
+
+    @property
+    def title(self) -> str:
+        return f"{self.name} ({self.unit})" if self.unit else self.name
+
+
+class _Sweep:
+    """A stored sweep and what several parts of its page need."""
+
+    def __init__(self, stored: StoredSweep) -> None:
+        self.stored = stored
+        self.statuses = np.asarray(stored.column("status"))
+        self.numbers = np.asarray(stored.column("run"))
+        self.keys = list(stored.keys)
+        self.parameters = {key: np.asarray(stored.column(parameter_name(key)), float) for key in self.keys}
+        self.codes = np.asarray(stored.column("method_code"))
+
+    def unit(self, key: str) -> str:
+        unit = self.stored.columns[parameter_name(key)].units.replace("^2", "²")
+        return "" if unit == "1" else unit
+
+    def axis_name(self, key: str) -> str:
+        unit = self.unit(key)
+        return f"{field_name(key)} ({unit})" if unit else field_name(key)
+
+    def status_of(self, run: int) -> str:
+        code = int(self.statuses[run])
+        return words_of(STATUSES[code]) if code >= 0 else "missing"
+
+    @cached_property
+    def is_good(self) -> NDArray[np.bool_]:
+        return np.isin(self.statuses, [code for code, status in enumerate(STATUSES) if status in GOOD])
+
+    @cached_property
+    def varied(self) -> list[str]:
+        """The parameters with more than one value."""
+        return [key for key in self.keys if len(np.unique(self.parameters[key])) > 1]
+
+    @cached_property
+    def grid_keys(self) -> list[str]:
+        """The parameters of a grid, slowest first; none where the runs are no grid."""
+        return self.varied if len(self.stored.shape) == len(self.keys) else []
+
+    def described(self, run: int) -> str:
+        """Return the values of a run's parameters in words."""
+        parts = [f"{field_name(key)} {brief(self.parameters[key][run])}" for key in self.varied]
+        if len(self.stored.methods) > 1:
+            parts.append(self.stored.methods[int(self.codes[run])])
+        return ", ".join(parts)
+
+
+def sweep_page(stored: StoredSweep) -> PageContent:
+    """Return the content of the page."""
+    sweep = _Sweep(stored)
+    quantities = run_quantities(sweep)
+    first_method = sweep.codes == sweep.codes[0] if len(sweep.codes) else np.zeros(0, bool)
+    curves, places = _curves(sweep, first_method)
+    sections = []
+    map_element = _map(sweep, quantities, first_method)
+    top: list[list[Element]] = []
+    if map_element is not None:
+        top.append([map_element])
+    if curves:
+        legend = Legend(list({curve.key: curve.look for plot in curves for curve in plot.curves}.items()))
+        shown = np.flatnonzero(places >= 0)
+        choice = RunChoice([(int(run), f"{sweep.numbers[run]}: {sweep.described(int(run))}") for run in shown])
+        heading = Markup('<h3 id="picked" aria-live="polite"></h3>')
+        top.append([*([] if map_element is not None else [choice]), heading, legend, *curves])
+    if top:
+        say = ""
+        if curves and (places < 0).any():
+            count = int((places >= 0).sum())
+            say = f"Curves of {count} of {len(places)} runs: those that are not ok, the corners, and every few."
+        sections.append(
+            Section(
+                "map",
+                "Map and curves" if map_element is not None else "Curves of a run",
+                [Grid(len(top), top)],
+                say,
+            )
+        )
+    sections.append(_over_parameters(sweep, quantities, first_method))
+    sections.append(_faults_section(sweep))
+    sections.append(_runs_section(sweep, quantities))
+    sections.append(_details_section(sweep, quantities))
+    known = {"start": _start(sweep, quantities, places)} if map_element is not None or curves else {}
+    data: dict[str, object] = {}
+    if known:
+        data = {
+            "values": [[_json_number(value) for value in quantity.values.tolist()] for quantity in quantities],
+            "labels": [sweep.described(run) for run in range(len(sweep.statuses))],
+            "statuses": [sweep.status_of(run) for run in range(len(sweep.statuses))],
+            "numbers": sweep.numbers.tolist(),
+            "places": places.tolist(),
+            **known,
+        }
+    title = str(stored.attributes["title"])
+    about = with_capital(str(stored.attributes["summary"]).rstrip("."))
+    return PageContent(
+        title, about, sweep_answer(sweep, quantities), _facts(sweep, quantities), sections,
+        data={"sweep": data} if data else {},
+    )  # fmt: skip
+
+
+def _json_number(value: float) -> float | None:
+    return float(f"{value:.4g}") if math.isfinite(value) else None
+
+
+def brief(value: float) -> str:
+    """Return a parameter's value in at most four digits."""
+    return shortest(float(f"{value:.4g}"))
 
 
 def field_name(key: str) -> str:
-    """A varied parameter as one speaks of it: "initial pitch angle of blade 2" for "initial.angles[2]"."""
+    """Return a varied parameter as one speaks of it: "initial pitch angle of blade 2" for "initial.angles[2]"."""
     parts = _COORDINATE.fullmatch(key)
     if parts is None:
         return re.sub(r"[._]", " ", key)
@@ -74,78 +182,487 @@ def field_name(key: str) -> str:
     return f"initial pitch {'rate' if is_rate else 'angle'} of blade {coordinate}"
 
 
-def _responses(sweep: StoredSweep, ok: NDArray[np.bool_]) -> list[Picture]:
-    """A number of each run that ended well over what was varied: a map of a grid of two axes, else points."""
-    for name in _RESPONSES:
-        values = np.where(ok, sweep.column(name), np.nan) if name in sweep.columns else np.empty(0)
-        if np.isfinite(values).sum() > 1 and np.nanmax(values) > np.nanmin(values):
-            break
-    else:
-        return []
-    quantity = sweep.columns[name].long_name
-    label = _axis(quantity, sweep.columns[name].units)
-    axes = {key: sweep.column(parameter_name(key)) for key in sweep.keys}
-    labels = {key: _axis(field_name(key), sweep.columns[parameter_name(key)].units) for key in sweep.keys}
-    if len(sweep.shape) == len(axes) == 2:
-        # By one method, as those of the others would look the same; runs that a part of a sweep does not have are NaN.
-        codes = np.asarray(sweep.column("method_code"))
-        shown = codes == codes[np.isfinite(values)][0]
-        (y, rows), (x, columns) = (np.unique(numbers[shown], return_inverse=True) for numbers in axes.values())
-        if min(len(y), len(x)) > 1:
-            grid = np.full((len(y), len(x)), np.nan)
-            grid[rows, columns] = values[shown]
-            y_label, x_label = labels.values()
-            drawn = panels((3.8,), x_label)
-            (x_edges, x_scale), (y_edges, y_scale) = _edges(x), _edges(y)
-            norm = "log" if _is_wide(grid) else "linear"
-            drawn.axes[0].set(xscale=x_scale, yscale=y_scale, ylabel=y_label)
-            drawn.axes[0].grid(visible=False)
-            if x_scale == "linear":
-                drawn.axes[0].locator_params("x", nbins=4)
-            mesh = drawn.axes[0].pcolormesh(x_edges, y_edges, grid, cmap="cividis", norm=norm, rasterized=True)
-            with style():
-                drawn.figure.colorbar(mesh, ax=drawn.axes[0]).set_label(label)
-            drawn.figure.subplots_adjust(left=0.18)
-            method = f", by {sweep.methods[codes[shown][0]]}" if len(sweep.methods) > 1 else ""
-            return [picture(drawn, "grid", with_capital(quantity) + method)]
-    pictures = []
+# ---- Numbers of the runs
+
+
+def run_quantities(sweep: _Sweep) -> list[RunQuantity]:
+    """Return the numbers of each run that differ from run to run: of pitch, loads, rotor, then the stored metrics."""
+    stored = sweep.stored
+    complete = sweep.statuses >= 0
+    found = []
+    if "angles" in stored.columns:
+        pitch = np.degrees(np.asarray(stored.column("angles"), float)[:, :, 1:])
+        if pitch.shape[2]:
+            with np.errstate(all="ignore"):
+                ranges = _over(np.nanmax, pitch, 1) - _over(np.nanmin, pitch, 1)
+            found.append(RunQuantity("range of a pitch angle", "degrees", _over(np.nanmax, ranges, 1)))
+    for load in sorted(LOADS, key=lambda load: not load.name.endswith("root_moment")):
+        if load.name in stored.columns:
+            values = np.asarray(stored.column(load.name), float)
+            sizes = np.linalg.norm(values, axis=-1) if load.dimensions[-1] == "axis" else np.abs(values)
+            largest = _over(np.nanmax, sizes.reshape(len(sizes), -1), 1)
+            known = largest[np.isfinite(largest)]
+            scale, prefix = prefix_of(float(known.max(initial=0.0)))
+            found.append(
+                RunQuantity(
+                    f"largest {load.name.replace('_', ' ')}",
+                    f"{prefix}{load.units}",
+                    largest / scale,
+                )
+            )
+    if "rates" in stored.columns:
+        speed = np.asarray(stored.column("rates"), float)[:, -1, 0]
+        found.append(RunQuantity("rotor speed at the end", "rad/s", speed))
+    left_out = {*map(parameter_name, sweep.keys), *_COUNTS, "time_limit_s", "code", "crc32"}
+    order = ("pitch_max", "rotor_rate_max", "rotor_angle_max")
+    names = [name for name, column in stored.columns.items() if column.dimensions == ("run",) and name not in left_out]
+    for name in sorted(names, key=lambda name: order.index(name) if name in order else len(order)):
+        values = np.asarray(stored.column(name))
+        if values.dtype.kind == "f":
+            column = stored.columns[name]
+            unit = "" if column.units == "1" else column.units
+            numbers = values.astype(float)
+            if name == "pitch_max":  # as pitch angles are shown everywhere
+                numbers, unit = np.degrees(numbers), "degrees"
+            found.append(RunQuantity(column.long_name.partition("; ")[0], unit, numbers))
+    shown = []
+    for quantity in found:
+        values = np.where(complete, quantity.values, np.nan)
+        known = values[np.isfinite(values)]
+        # A range that is rounding error says nothing.
+        if len(known) > 1 and float(np.ptp(known)) > 1e-9 * float(np.abs(known).max()):
+            shown.append(RunQuantity(quantity.name, quantity.unit, values))
+    return shown
+
+
+def _over(statistic: object, values: Array, axis: int) -> Array:
+    """Return a statistic along an axis, NaN where no number is finite, without a warning."""
+    assert callable(statistic)
+    known = np.isfinite(values).any(axis=axis)
+    filled = np.where(np.expand_dims(known, axis), values, 0.0)
+    return np.where(known, statistic(filled, axis=axis), np.nan)
+
+
+def is_wide(values: Array) -> bool:
+    """Whether positive values span so much that a logarithmic axis shows more; zeros are left to a curve of their own."""
+    known = values[np.isfinite(values)]
+    return bool(len(known)) and bool(known.min() > 0.0) and bool(known.max() > _SPAN * known.min())
+
+
+def explained(values: Array, parameter: Array) -> float:
+    """Return the share of the variance of `values` (their logarithms where they are wide) between a parameter's values."""
     known = np.isfinite(values)
-    for key in sweep.keys[:_MAX_RESPONSES]:
-        parameter = axes[key][known]
-        if np.ptp(parameter):
-            caption = f"{with_capital(quantity)} of each run over the {field_name(key)}"
-            drawn = response(parameter, values[known], labels[key], label)
-            pictures.append(picture(drawn, f"over-{parameter_name(key)}", caption))
-    return pictures
+    y = np.log(values[known]) if is_wide(values) else values[known]
+    whole = float(((y - y.mean()) ** 2).sum())
+    if not whole:
+        return 0.0
+    between = 0.0
+    for value in np.unique(parameter[known]):
+        group = y[parameter[known] == value]
+        between += len(group) * float((group.mean() - y.mean()) ** 2)
+    return between / whole
 
 
-def _axis(label: str, unit: str) -> str:
-    return label if unit == "1" else f"{label} ({unit})"
+# ---- What was found
 
 
-def _is_wide(values: Array) -> bool:
-    """Whether a logarithmic axis shows more."""
-    low, high = np.nanmin(values), np.nanmax(values)
-    return bool(low > 0.0 and high > _SPAN * low)
+def sweep_answer(sweep: _Sweep, quantities: Sequence[RunQuantity]) -> list[Markup]:
+    """Return how many runs are ok, which are not, and what the parameters do to the first quantities."""
+    count = len(sweep.statuses)
+    good = int(sweep.is_good.sum())
+    text = (
+        Markup("<b>{} of {} runs are ok</b>").format(good, count)
+        if good < count
+        else Markup("<b>All {} runs are ok</b>").format(count)
+    )
+    for code in np.unique(sweep.statuses[~sweep.is_good]):
+        runs = np.flatnonzero(sweep.statuses == code)
+        name = words_of(STATUSES[code]) if code >= 0 else "not computed"
+        text += Markup(", {} {} {}").format(len(runs), "is" if len(runs) == 1 else "are", name)
+        where = common_values(sweep, runs)
+        if where:
+            text += f", all at {where}"
+    sentences = [text + "."]
+    for quantity in quantities[:2]:
+        values = np.where(sweep.is_good, quantity.values, np.nan)
+        if np.isfinite(values).sum() < 2:
+            continue
+        low, high = int(np.nanargmin(values)), int(np.nanargmax(values))
+        unit = _unit_after(quantity.unit)
+        name = with_capital(quantity.name)
+        if is_wide(values):
+            text = Markup("The {} is largest, <b>{}{}</b>, at {}, and smallest, <b>{}{}</b>, at {}")
+            text = text.format(
+                quantity.name, number(float(values[high])), unit, sweep.described(high), number(float(values[low])),
+                unit, sweep.described(low),
+            )  # fmt: skip
+        else:
+            ends = (number(float(values[run]), 3) for run in (low, high))
+            text = Markup("{} stays between <b>{} and {}{}</b>").format(name, *ends, unit)
+        sentences.append(text + _deciding(sweep, values) + ".")
+    return sentences
 
 
-def _edges(values: Array) -> tuple[Array, str]:
-    """(n + 1,) Edges of the cells about ascending values, and the scale of their axis: logarithmic where ratios are
-    equal."""
-    is_geometric = _is_wide(values) and np.ptp(np.diff(np.log(values))) < 0.01 * np.log(values[-1] / values[0])
-    places = np.log(values) if is_geometric else values
-    middles = 0.5 * (places[1:] + places[:-1])
-    edges = np.concatenate([[2.0 * places[0] - middles[0]], middles, [2.0 * places[-1] - middles[-1]]])
-    return (np.exp(edges), "log") if is_geometric else (edges, "linear")
+def _unit_after(unit: str) -> str:
+    return "°" if unit == "degrees" else f" {unit}" if unit else ""
 
 
-def response(parameter: Array, values: Array, x_label: str, y_label: str) -> Panels:
-    """A number of each run over a parameter that was varied, a point per run."""
-    panel = panels((3.0,), x_label)
-    shown = np.linspace(0, len(values) - 1, min(len(values), _MAX_RUNS)).round().astype(int)
-    curve(panel.axes[0], parameter[shown], values[shown], Look(BLUE, "", "o"), markersize=3.5, markerfacecolor=BLUE)
-    if _is_wide(parameter):
-        log_axis(panel.axes[0], float(parameter.min()), float(parameter.max()), "x")
-    panel.axes[0].margins(0.03)
-    panel.axes[0].set_ylabel(y_label)
-    return panel
+def _deciding(sweep: _Sweep, values: Array) -> str:
+    """Return which parameter decides; "" where none does, or there is only one."""
+    if len(sweep.varied) < 2 or not sweep.grid_keys:
+        return ""
+    shares = {key: explained(values, sweep.parameters[key]) for key in sweep.varied}
+    key = max(shares, key=lambda key: shares[key])
+    return f"; {field_name(key)} decides" if shares[key] > _DECIDES else ""
+
+
+def common_values(sweep: _Sweep, runs: NDArray[np.int64]) -> str:
+    """Return the values of the parameters that all of these runs share and other runs do not; "" where none."""
+    parts = []
+    for key in sweep.varied:
+        own = np.unique(sweep.parameters[key][runs])
+        if len(own) == 1:
+            parts.append(f"{field_name(key)} {brief(own[0])}")
+    return " and ".join(parts)
+
+
+def _facts(sweep: _Sweep, quantities: Sequence[RunQuantity]) -> list[Fact]:
+    count, good = len(sweep.statuses), int(sweep.is_good.sum())
+    facts = [Fact("Runs that are ok", f"{good} of {count}", tone="good" if good == count else "bad")]
+    for key in sweep.varied[:2]:
+        values = sweep.parameters[key]
+        low, high = brief(values.min()), brief(values.max())
+        note = f"{len(np.unique(values))} values"
+        facts.append(Fact(with_capital(field_name(key)), f"{low} to {high} {sweep.unit(key)}".rstrip(), note))
+    for quantity in quantities[: 4 - len(facts)]:
+        known = quantity.values[np.isfinite(quantity.values)]
+        ends = f"{number(float(known.min()))} to {number(float(known.max()))}{_unit_after(quantity.unit)}"
+        facts.append(Fact(with_capital(quantity.name), ends))
+    return facts
+
+
+# ---- Map and curves
+
+
+def _map(sweep: _Sweep, quantities: Sequence[RunQuantity], shown: NDArray[np.bool_]) -> HeatMap | None:
+    """Return the map of a grid of two parameters, by the first method; None for another sweep."""
+    if len(sweep.grid_keys) != 2 or not quantities:
+        return None
+    rows_key, columns_key = sweep.grid_keys
+    rows, columns = (np.unique(sweep.parameters[key]) for key in (rows_key, columns_key))
+    if max(len(rows), len(columns)) > _MAX_CELLS:
+        return None
+    cells: list[list[tuple[int, str] | None]] = []
+    for row in rows[::-1]:
+        line: list[tuple[int, str] | None] = []
+        for column in columns:
+            is_here = (sweep.parameters[rows_key] == row) & (sweep.parameters[columns_key] == column) & shown
+            runs = np.flatnonzero(is_here)
+            if not len(runs):
+                line.append(None)
+                continue
+            run = int(runs[0])
+            status = STATUSES[int(sweep.statuses[run])] if sweep.statuses[run] >= 0 else "missing"
+            kind = "" if status in GOOD else "warn" if status in ("inaccurate", "unchecked") else "failed"
+            line.append((run, kind))
+        cells.append(line)
+    note = f"Down: {sweep.axis_name(rows_key)}. Across: {sweep.axis_name(columns_key)}."
+    if any(cell is not None and cell[1] == "warn" for line in cells for cell in line):
+        note += " !: inaccurate or unchecked."
+    if any(cell is not None and cell[1] == "failed" for line in cells for cell in line):
+        note += " ✗: failed."
+    if len(sweep.stored.methods) > 1:
+        note += f" By {sweep.stored.methods[int(sweep.codes[shown][0])]}."
+    label = f"Runs by {field_name(rows_key)} and {field_name(columns_key)}; arrow keys move, the curves follow"
+    names = [with_capital(quantity.title) for quantity in quantities]
+    texts = ([brief(value) for value in values] for values in (columns, rows[::-1]))
+    columns_text, rows_text = texts
+    return HeatMap(label, names, columns_text, rows_text, cells, f"{note} Click a cell for its curves.")
+
+
+def _curves(sweep: _Sweep, shown: NDArray[np.bool_]) -> tuple[list[Plot], NDArray[np.int64]]:
+    """Return the plots of one run, whose curves are tables of runs, and where in them each run is (-1: nowhere)."""
+    stored = sweep.stored
+    places = np.full(len(sweep.statuses), -1)
+    if "time" not in stored.columns:
+        return [], places
+    time = np.asarray(stored.column("time"), float)
+    wanted: list[tuple[str, str, list[tuple[str, Look, str, int]]]] = []
+    blades = stored.columns.get("angles") and stored.column("angles").shape[2] - 1
+    if blades:
+        wanted.append(
+            (
+                "Pitch angle",
+                "degrees",
+                [(f"blade-{i + 1}", blade_look(i), "angles", 1 + i) for i in range(blades)],
+            )
+        )
+    if "pitch_actuator_moment" in stored.columns:
+        count = stored.column("pitch_actuator_moment").shape[2]
+        curves = [(f"blade-{i + 1}", blade_look(i), "pitch_actuator_moment", i) for i in range(count)]
+        wanted.append(("Pitch actuator moment", "N m", curves))
+    if "rates" in stored.columns:
+        wanted.append(("Rotor speed", "rad/s", [("rotor", coordinate_look(0), "rates", 0)]))
+    elif "angles" in stored.columns:
+        wanted.append(("Rotor angle", "rad", [("rotor", coordinate_look(0), "angles", 0)]))
+    if not wanted or len(time) < 2:
+        return [], places
+    columns = sum(len(curves) for _, _, curves in wanted)
+    every = max(1, math.ceil(len(time) * columns / (_MAX_NUMBERS // 4)))
+    samples = time[::every]
+    runs = chosen_runs(sweep, shown, max(4, _MAX_NUMBERS // (columns * len(samples))))
+    places[runs] = np.arange(len(runs))
+    axis = Horizontal("time", "s", "t", float(time[0]), float(time[-1]))
+    jumps = _jumps(sweep)
+    plots: list[Plot] = []
+    for title, unit, curves in wanted:
+        tables = []
+        for _, _, name, k in curves:
+            values = np.asarray(stored.column(name)[runs], float)[:, ::every, k]
+            tables.append(np.degrees(values) if unit == "degrees" else values)
+        scale, prefix = (1.0, "")
+        if unit == "N m":
+            known = [float(np.abs(table[np.isfinite(table)]).max(initial=0.0)) for table in tables]
+            scale, prefix = prefix_of(max(known))
+        # What follows from a load is interrupted at its jumps.
+        breaks = [-(-place // every) for place in jumps.breaks(time)] if title.endswith("moment") else []
+        drawn = []
+        for (key, look, _, _), table in zip(curves, tables, strict=True):
+            drawn.append(Curve(key, look, samples, table / scale, breaks))
+        note = f"every {every}th sample" if every > 1 else ""
+        marks = jumps.marks(with_text=not plots)
+        plots.append(Plot(title, f"{prefix}{unit}", axis, drawn, 138, note, marks=marks, least=1e-9))
+    return plots, places
+
+
+def _jumps(sweep: _Sweep) -> Jumps:
+    """Return the jumps of the base scene's loads, where the sweep does not vary them."""
+    attributes = sweep.stored.attributes
+    if not attributes.get("scene_toml") or any(
+        key.startswith(("torque", "bearing.rest", "duration")) for key in sweep.keys
+    ):
+        return Jumps([], [])
+    return jumps_of(parse_scene(str(attributes["scene_toml"]), str(attributes["base_scene"])))
+
+
+def chosen_runs(sweep: _Sweep, shown: NDArray[np.bool_], most: int) -> NDArray[np.int64]:
+    """Return the runs whose curves are on the page: all, or those that are not ok, the corners, and every k-th."""
+    runs = np.flatnonzero(shown & (sweep.statuses >= 0))
+    if len(runs) <= most:
+        return runs
+    is_corner = np.ones(len(sweep.statuses), bool)
+    for key in sweep.varied:
+        values = sweep.parameters[key]
+        is_corner &= (values == values.min()) | (values == values.max())
+    first = [*np.flatnonzero(shown & is_corner), *runs[~sweep.is_good[runs]]]
+    first = list(dict.fromkeys(int(run) for run in first if sweep.statuses[run] >= 0))[: most // 2]
+    others = runs[np.linspace(0, len(runs) - 1, most - len(first)).astype(int)]
+    return np.unique([*first, *others.tolist()])
+
+
+def _start(sweep: _Sweep, quantities: Sequence[RunQuantity], places: NDArray[np.int64]) -> int:
+    """Return the run that is shown first: of those that are ok and have curves, the one with the median quantity."""
+    candidates = np.flatnonzero((places >= 0) & sweep.is_good)
+    if not len(candidates):
+        candidates = np.flatnonzero(places >= 0) if (places >= 0).any() else np.arange(len(places))
+    if sweep.grid_keys:
+        # The middle of the grid.
+        away = np.zeros(len(candidates))
+        for key in sweep.grid_keys:
+            values, index = np.unique(sweep.parameters[key], return_inverse=True)
+            away += np.abs(index[candidates] - (len(values) - 1) / 2.0)
+        return int(candidates[away.argmin()])
+    if not quantities:
+        return int(candidates[0])
+    values = quantities[0].values[candidates]
+    middle = np.nanmedian(values) if np.isfinite(values).any() else 0.0
+    return int(candidates[np.nan_to_num(np.abs(values - middle), nan=np.inf).argmin()])
+
+
+# ---- Over the parameters
+
+
+def _over_parameters(sweep: _Sweep, quantities: Sequence[RunQuantity], shown: NDArray[np.bool_]) -> Section:
+    """Return quantities over each parameter: a curve per value of the other one of a grid, else a point per run."""
+    chosen = quantities[:3]
+    elements: list[Grid | Fold | Element] = []
+    if not sweep.varied or not chosen:
+        return Section("slices", "", [])
+    keys = sweep.grid_keys
+    if len(keys) == 2:
+        key, other = keys
+        others = np.unique(sweep.parameters[other])
+        items = [(f"step-{i}", step_look(i, len(others), brief(value))) for i, value in enumerate(others)]
+        cards: list[list[Element]] = []
+        for quantity in chosen:
+            curves = []
+            for i, value in enumerate(others):
+                mine = shown & (sweep.parameters[other] == value)
+                curves.append(
+                    _parameter_curve(f"step-{i}", items[i][1], sweep.parameters[key][mine], quantity.values[mine])
+                )
+            cards.append([_parameter_plot(sweep, key, quantity, curves)])
+        say = f"Horizontally: {sweep.axis_name(key)}. A curve per {sweep.axis_name(other)}."
+        return Section("slices", f"Over {field_name(key)}", [Legend(items), Grid(3, cards)], say)
+    for key in sweep.varied[:3]:
+        cards = []
+        for quantity in chosen:
+            look = Look(BLUE, "-", "", "runs")
+            curve = _parameter_curve("runs", look, sweep.parameters[key][shown], quantity.values[shown])
+            is_line = len(sweep.varied) == 1
+            curve = Curve(curve.key, curve.look, curve.x, curve.y, dots="line" if is_line else "only")
+            cards.append([_parameter_plot(sweep, key, quantity, [curve])])
+        elements += [Note(f"Horizontally: {sweep.axis_name(key)}."), Grid(3, cards)]
+    heading = f"Over {field_name(sweep.varied[0])}" if len(sweep.varied) == 1 else "Over each parameter"
+    return Section("slices", heading, elements)
+
+
+def _parameter_curve(key: str, look: Look, parameter: Array, values: Array) -> Curve:
+    order = np.argsort(parameter, kind="stable")
+    return Curve(key, look, parameter[order], values[order], dots="line")
+
+
+def _parameter_plot(sweep: _Sweep, key: str, quantity: RunQuantity, curves: Sequence[Curve]) -> Plot:
+    """Return a quantity over a parameter; zero has no place on a logarithmic axis and is left to the map."""
+    parameter = sweep.parameters[key]
+    positive = parameter[parameter > 0.0]
+    is_log = bool(len(positive)) and bool((parameter >= 0.0).all()) and bool(positive.max() > _SPAN * positive.min())
+    shown = positive if is_log else parameter
+    if is_log and len(positive) < len(parameter):
+        kept = []
+        for curve in curves:
+            mask = curve.x > 0.0
+            kept.append(Curve(curve.key, curve.look, curve.x[mask], curve.y[mask], dots=curve.dots))
+        curves = kept
+    unit = sweep.unit(key)
+    low, high = float(shown.min()), float(shown.max())
+    room = 0.02 * (high - low) if any(curve.dots == "only" for curve in curves) and not is_log else 0.0
+    axis = Horizontal(field_name(key), unit, field_name(key), low - room, high + room, is_log)
+    return Plot(
+        with_capital(quantity.name),
+        quantity.unit,
+        axis,
+        curves,
+        220,
+        log=is_wide(quantity.values),
+        still=True,
+    )
+
+
+# ---- Tables
+
+
+def _faults_section(sweep: _Sweep) -> Section:
+    """Return the runs that are not ok, grouped by status and reason, with the ranges of their parameters."""
+    groups: dict[tuple[int, str], list[int]] = {}
+    messages = _messages(sweep)
+    for run in np.flatnonzero(~sweep.is_good).tolist():
+        # Reasons that differ by their numbers alone are one.
+        words = re.sub(r"[-+]?\d[\d.]*(e[-+]?\d+)?", "#", messages[run])
+        groups.setdefault((int(sweep.statuses[run]), words), []).append(run)
+    rows: list[Row] = []
+    for (code, _), runs in sorted(groups.items(), key=lambda group: -len(group[1])):
+        name = words_of(STATUSES[code]) if code >= 0 else "not computed"
+        row: list[TableCell | str] = [TableCell(name, "bad"), str(len(runs))]
+        for key in sweep.varied[:4]:
+            values = sweep.parameters[key][runs]
+            low, high = brief(values.min()), brief(values.max())
+            row.append(low if low == high else f"{low} to {high}")
+        sizes = (
+            np.asarray(sweep.stored.column("defect_max"))[runs]
+            if "defect_max" in sweep.stored.columns
+            else np.zeros(len(runs))
+        )
+        worst = runs[int(np.nan_to_num(sizes, nan=-1.0).argmax())]
+        reason = messages[worst] or "no reason is stored"
+        row.append(TableCell(reason, mark="across"))
+        row.append(TableCell(str(sweep.numbers[worst]), href=f"#run-{worst}"))
+        rows.append(row)
+    head = (
+        "Status",
+        "Runs",
+        *(with_capital(sweep.axis_name(key)) for key in sweep.varied[:4]),
+        "Reason",
+        "Example",
+    )
+    return Section(
+        "faults",
+        "Runs that are not ok",
+        [PageTable("Runs that are not ok", head, rows)] if rows else [],
+    )
+
+
+def _messages(sweep: _Sweep) -> list[str]:
+    if "message" not in sweep.stored.columns:
+        return [""] * len(sweep.statuses)
+    texts = []
+    for characters in np.asarray(sweep.stored.column("message")):
+        texts.append(b"".join(characters.ravel().tolist()).decode("utf-8", "replace").strip("\0 "))
+    return texts
+
+
+def _runs_section(sweep: _Sweep, quantities: Sequence[RunQuantity]) -> Section:
+    """Return all runs in a table that is folded, those that are not ok first."""
+    chosen = quantities[: max(1, 6 - len(sweep.varied))]
+    order = [*np.flatnonzero(~sweep.is_good).tolist(), *np.flatnonzero(sweep.is_good).tolist()][:_MAX_ROWS]
+    several = len(sweep.stored.methods) > 1
+    rows: list[Row] = []
+    for run in order:
+        tone = "good" if sweep.is_good[run] else "bad"
+        sign = "✓ " if tone == "good" else ""
+        row: list[TableCell | str] = [
+            TableCell(str(sweep.numbers[run]), href=f"#run-{run}", order=float(sweep.numbers[run]))
+        ]
+        if several:
+            row.append(sweep.stored.methods[int(sweep.codes[run])])
+        for key in sweep.varied[:4]:
+            value = float(sweep.parameters[key][run])
+            row.append(TableCell(brief(value), order=value))
+        row.append(TableCell(f"{sign}{sweep.status_of(run)}", tone))
+        for quantity in chosen[: max(1, 7 - len(row))]:
+            value = float(quantity.values[run])
+            known = value if math.isfinite(value) else None
+            row.append(TableCell(number(known, 3), order=known))
+        rows.append(row)
+    width = len(rows[0]) if rows else 0
+    parameters = [with_capital(sweep.axis_name(key)) for key in sweep.varied[:4]]
+    head = ["Run", *(["Method"] if several else []), *parameters, "Status"]
+    head += [with_capital(quantity.title) for quantity in chosen][: width - len(head)]
+    table = PageTable("All runs", head, rows, sortable=True)
+    count = len(sweep.statuses)
+    hint = (
+        "click a heading to sort"
+        if count <= _MAX_ROWS
+        else f"the first {_MAX_ROWS}, those that are not ok before the others"
+    )
+    return Section("runs", "All runs", [Fold(f"{count} runs", hint, [table])] if rows else [])
+
+
+def _details_section(sweep: _Sweep, quantities: Sequence[RunQuantity]) -> Section:
+    """Return what was varied, the distribution of every number, and the sweep's file, folded."""
+    stored = sweep.stored
+    parameters: list[Row] = []
+    for key in sweep.keys:
+        values, unit = sweep.parameters[key], sweep.unit(key)
+        limits = [f"{brief(value)} {unit}".strip() for value in (np.nanmin(values), np.nanmax(values))]
+        parameters.append((field_name(key), key, *limits, str(len(np.unique(values)))))
+    rows: list[Row] = []
+    for quantity in quantities:
+        values = quantity.values[sweep.is_good & np.isfinite(quantity.values)]
+        if len(values) > 1:
+            quantiles = [number(float(value), 3) for value in np.quantile(values, (0.0, 0.05, 0.5, 0.95, 1.0))]
+            rows.append((with_capital(quantity.title), *quantiles))
+    head = ("Result of the ok runs", "Smallest", "5 %", "Median", "95 %", "Largest")
+    folds: list[Grid | Fold | Element] = [
+        Fold(
+            "Parameters",
+            f"{len(sweep.keys)} that were varied",
+            [PageTable("Parameters", ("Parameter", "Key", "From", "To", "Values"), parameters)],
+        ),
+    ]
+    if rows:
+        folds.append(Fold("Distributions", f"{len(rows)} numbers", [PageTable("Results", head, rows)]))
+    toml = str(stored.attributes.get("sweep_toml", ""))
+    if toml:
+        folds.append(Fold("Sweep file", "", [SourceText(toml)]))
+    return Section("details", "In detail", folds)

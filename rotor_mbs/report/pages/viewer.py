@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-from markupsafe import Markup
 
+from rotor_mbs.report.files import script_json
 from rotor_mbs.report.looks import coordinate_look, name_of_colour, with_capital
 from rotor_mbs.report.numbers import with_unit
 from rotor_mbs.runs.read import StoredRun, StoredScene
@@ -56,7 +55,12 @@ def viewer(stored: StoredScene, runs: Mapping[str, StoredRun]) -> dict[str, Any]
         if largest > _COARSE:
             turned = f"{with_capital(name)} turns by up to {with_unit(largest, 'rad')} from one frame to the next"
             notes.append(f"{turned}: the animation interpolates linearly in between.")
-    return {"data": script_json(data), "models": list(moves), "magnified": magnification(scene), "notes": notes}
+    return {
+        "data": script_json(data),
+        "models": list(moves),
+        "magnified": magnification(scene),
+        "notes": notes,
+    }
 
 
 def angles_at(time: Array, angles: Array, step: float) -> Array:
@@ -73,11 +77,3 @@ def magnification(scene: Scene) -> int | None:
         return None
     length = max(math.hypot(*blade.tip) for blade in scene.blades)
     return max(1, round(_VISIBLE * length / offset))
-
-
-def script_json(data: object) -> Markup:
-    """JSON in which no character can end a script element or begin a comment."""
-    text = json.dumps(data, separators=(",", ":"), ensure_ascii=True, allow_nan=False)
-    for sign in "<>&":
-        text = text.replace(sign, f"\\u{ord(sign):04x}")
-    return Markup(text)

@@ -32,7 +32,7 @@
     const part = (name) => box.querySelector(`[data-part=${name}]`);
     const reach = Math.max(...data.blades.map((blade) => Math.hypot(...blade.tip)));
     const end = (Math.max(...models.map((one) => one.frames.length)) - 1) * data.step;
-    let now = 0, playing = false, before = 0, [azimuth, elevation] = VIEWS.oblique, trails = [], waiting = false;
+    let now = 0, told = 0, playing = false, before = 0, [azimuth, elevation] = VIEWS.oblique, trails = [], waiting = false;
 
     const value = (name, otherwise) => (part(name) ? part(name).value : otherwise);
     const magnified = () => Number(value("offset", 1));
@@ -73,8 +73,8 @@
 
     const room = (see) => {
       const ring = Array.from({ length: RING + 1 }, (_, i) => (2 * Math.PI * i) / RING);
-      line(see, ring.map((w) => [reach * Math.sin(w), 0, reach * Math.cos(w)]), shade("k16"), 1);
-      line(see, [[0, 0, 0], [0, -0.3 * reach, 0]], shade("k13"), 6);
+      line(see, ring.map((w) => [reach * Math.sin(w), 0, reach * Math.cos(w)]), shade("ring"), 1);
+      line(see, [[0, 0, 0], [0, -0.3 * reach, 0]], shade("grey"), 6);
     };
 
     const paths = (see, index, plain) => {
@@ -112,7 +112,7 @@
         [[mass, 4], [tip, 2.5]].forEach(([point, size]) => {
           pen.beginPath();
           pen.arc(...see.at(point), size, 0, 2 * Math.PI);
-          pen.fillStyle = plain ? shade("sheet") : colour;
+          pen.fillStyle = plain ? shade("card") : colour;
           pen.fill();
           pen.setLineDash([]);
           Object.assign(pen, { strokeStyle: colour, lineWidth: 1.5 });
@@ -135,9 +135,9 @@
 
     const draw = () => {
       const width = canvas.clientWidth, over = models.length > 1 && value("mode", "side") === "over";
-      const views = over ? 1 : models.length, stacked = views > 1 && width < 560;
+      const views = over ? 1 : models.length, stacked = views > 1 && width < 300;
       const across = stacked ? 1 : views, down = stacked ? views : 1;
-      const cell = [width / across, Math.min(width / across, 460)], height = cell[1] * down + 8;
+      const cell = [width / across, Math.min(width / across, 400)], height = cell[1] * down + 8;
       const sharp = window.devicePixelRatio || 1;
       if (canvas.width !== Math.round(width * sharp) || canvas.height !== Math.round(height * sharp)) {
         canvas.style.height = `${height}px`;
@@ -156,11 +156,6 @@
         shown.forEach((index) => blades(see, index, over && index === 0));
         shown.forEach((index, row) => label(index, x + 6, y + 16 + 18 * row, over && index === 0));
       }
-      document.querySelectorAll(".now").forEach((line) => {
-        const [zero, scale, last] = line.dataset.time.split(" ").map(Number);
-        line.style.visibility = now > 0 && now <= last ? "visible" : "hidden";
-        line.style.transform = `translateX(${zero + scale * now}px)`;
-      });
       part("time").value = Math.round((1000 * now) / end);
       part("time").setAttribute("aria-valuetext", `${now.toFixed(2)} s`);
       part("clock").textContent = `${now.toFixed(2)} s`;
@@ -178,6 +173,9 @@
         }
       }
       draw();
+      // The page's plots show the same time.
+      if (now !== told) document.dispatchEvent(new CustomEvent("viewer-time", { detail: now }));
+      told = now;
       if (playing) refresh();
     };
 
@@ -205,6 +203,11 @@
       refresh();
     };
 
+    document.addEventListener("plot-time", (event) => {
+      if (playing) return;
+      seek(event.detail);
+      told = now;
+    });
     part("play").addEventListener("click", () => play(!playing));
     part("time").addEventListener("input", (event) => seek((end * event.target.value) / 1000));
     if (part("mode")) part("mode").addEventListener("input", refresh);

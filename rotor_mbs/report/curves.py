@@ -1,0 +1,63 @@
+"""The numbers of a page's plots: columns as single precision, each once, in base64, with where each of them lies."""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+# Where values are so many times their range, as a rotor angle after an hour, single precision would show steps: what is
+# stored is the difference from the first value.
+_FAR_FROM_ZERO = 1000.0
+# Single precision has no larger number.
+_LARGEST = 3.0e38
+
+
+class CurveStore:
+    """Columns of numbers for the script of a page.
+
+    A column is described by where it lies: {"at": [first, count]} in numbers from the beginning, in a table of several
+    runs [first, count, stride], with the stride from a run to the next; "from": a number to be added to each.
+    """
+
+    def __init__(self) -> None:
+        self._parts: list[NDArray[np.float32]] = []
+        self._places: dict[bytes, int] = {}
+        self.size = 0
+
+    def add(self, values: NDArray[Any] | Sequence[float]) -> dict[str, Any]:
+        """Store a column, or the rows of a table, and return its description.
+
+        Parameters
+        ----------
+        values : (n,) the column; or (runs, n), of which the page shows one row at a time. NaN is a gap.
+        """
+        table = np.asarray(values, dtype=np.float64)
+        count = int(table.shape[-1])
+        known = table[np.isfinite(table)]
+        origin = 0.0
+        if len(known) and float(np.abs(known).max()) > _FAR_FROM_ZERO * float(np.ptp(known)) > 0.0:
+            origin = float(known[0])
+        with np.errstate(invalid="ignore"):
+            column = np.clip(table - origin, -_LARGEST, _LARGEST).astype("<f4").ravel()
+        column[~np.isfinite(table.ravel())] = np.nan
+        digest = hashlib.sha256(column.tobytes()).digest()
+        if digest not in self._places:
+            self._places[digest] = self.size
+            self._parts.append(column)
+            self.size += len(column)
+        first = self._places[digest]
+        place: dict[str, Any] = {"at": [first, count] if table.ndim == 1 else [first, count, count]}
+        if origin:
+            place["from"] = origin
+        return place
+
+    def text(self) -> str:
+        """Return all columns in base64, little endian; "" where none is stored."""
+        if not self._parts:
+            return ""
+        return base64.b64encode(np.concatenate(self._parts).tobytes()).decode("ascii")

@@ -1,0 +1,342 @@
+"""The paper's figures as files for a manuscript: the printed model, the corrected one, and how far the printed one and
+an independent computation are from it; each with a title, a description, and a caption in a file beside it. Scenes that
+are not the paper's, or were changed, have a figure of the same layout."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from rotor_mbs.errors import InputError
+from rotor_mbs.methods.catalogue import PRINTED, REFERENCE, errata_methods, look_up
+from rotor_mbs.report import canvas, plots
+from rotor_mbs.report.files import made_with
+from rotor_mbs.report.looks import Look, label_of, look_of, step_look, with_capital
+from rotor_mbs.report.numbers import up_to
+from rotor_mbs.runs.output_files import replace_file
+from rotor_mbs.runs.read import StoredRun, StoredScene, open_results
+from rotor_mbs.scenario.scene import scene_tables
+from rotor_mbs.solution.trajectory import Array
+
+MOTION, PATHS, TORQUES = "motion", "paths", "torques"
+# The models that are compared, by key, in order from left to right; the last one is drawn by its difference.
+HEADINGS = {"printed": "As printed", "corrected": "Corrected model"}
+DIFFERENCE = "Difference from the corrected model"
+PRINTED_SIDE, CORRECTED, INDEPENDENT = "printed", "corrected", "independent"
+_PAPER = "Aguilar-Acevedo et al., Revista UIS Ingenierías 19(1), 25-36, 2020"
+_LOWEST = 1e-17  # rad, m: a smaller difference is a gap on the logarithmic axis
+
+
+class PaperFigure(NamedTuple):
+    """A figure of the paper."""
+
+    number: str
+    kind: str
+    panels: tuple[tuple[str, str], ...]  # the letter ("" where it has none; a torque) and the scene of each
+
+
+FIGURES = (
+    PaperFigure("3", MOTION, (("", "paper/fig03"),)),
+    PaperFigure("4", PATHS, (("a", "paper/fig03"), ("b", "paper/fig04b"))),
+    PaperFigure("5", MOTION, (("", "paper/fig05"),)),
+    PaperFigure("6", MOTION, (("", "paper/fig06"),)),
+    PaperFigure("7", PATHS, (("a", "paper/fig05"), ("b", "paper/fig06"))),
+    PaperFigure("8", MOTION, (("", "paper/fig08"),)),
+    PaperFigure("9", MOTION, (("", "paper/fig09"),)),
+    PaperFigure("10", PATHS, (("a", "paper/fig08"), ("b", "paper/fig09"))),
+    PaperFigure("11", MOTION, (("", "paper/fig11"),)),
+    PaperFigure("12", MOTION, (("", "paper/fig12"),)),
+    PaperFigure("13", PATHS, (("a", "paper/fig11"), ("b", "paper/fig13b"))),
+    PaperFigure("14", PATHS, (("a", "paper/fig14a"), ("b", "paper/fig14b"), ("c", "paper/fig14c"))),
+    PaperFigure("15", TORQUES, tuple((f"{n} kN m", f"paper/fig15-{n}kNm") for n in (1, 10, 50, 100))),
+    PaperFigure("16", PATHS, (("a", "paper/fig15-1kNm"), ("b", "paper/fig15-100kNm"))),
+)
+
+
+def available(scenes: Mapping[str, StoredScene]) -> tuple[PaperFigure, ...]:
+    """Return the figures of which `scenes` has a panel, with the panels that it has; none of a scene that was changed."""
+    figures = []
+    for figure in FIGURES:
+        panels = tuple(panel for panel in figure.panels if panel[1] in scenes and scenes[panel[1]].is_shipped)
+        if panels:
+            figures.append(figure._replace(panels=panels))
+    return tuple(figures)
+
+
+def all_figures(scenes: Mapping[str, StoredScene]) -> dict[str, PaperFigure]:
+    """Return the figures of the paper by number, and one by name for each scene that is in none: changed, or one's own."""
+    figures = {figure.number: figure for figure in available(scenes)}
+    shown = {name for figure in figures.values() for _, name in figure.panels}
+    for name in scenes:
+        if name not in shown:
+            figures[name] = PaperFigure("", MOTION, (("", name),))
+    return figures
+
+
+def compared_runs(scene: StoredScene) -> dict[str, StoredRun]:
+    """Return the scene's runs with angles and rates: "printed", "corrected", and "independent", by another model than
+    the corrected one's."""
+    candidates = scene.sides
+    for name, run in scene.corrected_runs.items():
+        method = look_up(name)
+        is_other = not name.startswith("lagrange/") and (method is None or method.name != REFERENCE)
+        if is_other and run.samples and run not in candidates.values():
+            candidates[INDEPENDENT] = run
+            break
+    return {key: run for key, run in candidates.items() if "angles" in run and "rates" in run}
+
+
+def panel_runs(figure: PaperFigure, scenes: Mapping[str, StoredScene]) -> dict[str, dict[str, dict[str, StoredRun]]]:
+    """Return the runs of each picture by label, row by row: by letter, then by "printed", "corrected", "independent"."""
+    rows: dict[str, dict[str, dict[str, StoredRun]]] = {}
+    for label, name in figure.panels:
+        letter = "" if figure.kind == TORQUES else label
+        for key, run in compared_runs(scenes[name]).items():
+            if figure.kind != PATHS or "tip" in run:
+                rows.setdefault(letter, {}).setdefault(key, {})[label] = run
+    return rows
+
+
+# ---- Drawing
+
+
+def draw(figure: PaperFigure, axes: Sequence[Any], runs: Mapping[str, StoredRun]) -> None:
+    """Draw one model on `axes`: one for paths, else two, position above velocity."""
+    if figure.kind == PATHS:
+        plots.draw_paths(axes[0], next(iter(runs.values())).array("tip"))
+        return
+    is_rotor = figure.kind == TORQUES
+    labels = ("rotor angle (rad)", "rotor rate (rad/s)") if is_rotor else (plots.ANGLE_AXIS, plots.RATE_AXIS)
+    for panel, name, label in zip(axes, ("angles", "rates"), labels, strict=True):
+        series = []
+        for place, (torque, run) in enumerate(runs.items()):
+            of_run = plots.coordinate_series(run.array("time"), run.array(name))
+            if is_rotor:
+                of_run = [of_run[0]._replace(look=step_look(place, len(runs), torque))]
+            series += of_run
+        plots.draw_lines(panel, series, label)
+    axes[0].set_title("(a) position", loc="left")
+    axes[0].tick_params(labelbottom=False)
+    axes[1].set_title("(b) angular velocity", loc="left")
+    axes[1].set_xlabel(canvas.TIME_AXIS)
+
+
+def draw_differences(figure: PaperFigure, axes: Sequence[Any], runs: Mapping[str, Mapping[str, StoredRun]]) -> None:
+    """Draw how far the printed model and an independent computation are from the corrected model, over time."""
+    names = ("tip",) if figure.kind == PATHS else ("angles", "rates")
+    units = {"tip": "tip distance (m)", "angles": "angle (rad)", "rates": "rate (rad/s)"}
+    for panel, name in zip(axes, names, strict=True):
+        known = []
+        for side in (PRINTED_SIDE, INDEPENDENT):
+            for place, (label, run) in enumerate(runs.get(side, {}).items()):
+                other = runs[CORRECTED].get(label)
+                if other is None or name not in other:
+                    continue
+                sizes = differences(name, run, other)
+                if figure.kind == TORQUES:
+                    look = step_look(place, len(runs[side]), "")
+                    look = Look(look.colour, "-" if side == PRINTED_SIDE else ":", "")
+                else:
+                    look = look_of(run.method)
+                    look = Look(
+                        look.colour,
+                        look.line,
+                        "",
+                        "as printed" if side == PRINTED_SIDE else look.label,
+                    )
+                shown = np.where(sizes > _LOWEST, sizes, np.nan)
+                canvas.curve(panel, run.array("time")[: len(shown)], shown, look)
+                known += shown[np.isfinite(shown)].tolist()
+        if known:
+            canvas.log_axis(panel, 0.7 * min(known), max(known))
+        panel.set_ylabel(units[name])
+    axes[-1].set_xlabel(canvas.TIME_AXIS)
+    if len(axes) > 1:
+        axes[0].tick_params(labelbottom=False)
+
+
+def differences(name: str, run: StoredRun, other: StoredRun) -> Array:
+    """Return the largest difference over the coordinates, or distance of a tip, at the samples that both have: (n,)."""
+    n = min(run.samples, other.samples)
+    gap = run.array(name)[:n] - other.array(name)[:n]
+    sizes = np.linalg.norm(gap, axis=2) if name == "tip" else np.abs(gap)
+    result: Array = sizes.reshape(n, -1).max(axis=1)
+    return result
+
+
+def composed(figure: PaperFigure, scenes: Mapping[str, StoredScene]) -> canvas.Panels:
+    """Return the whole figure: a column per model and one for the differences; position above velocity, or a row per
+    panel where paths are shown."""
+    pictures = panel_runs(figure, scenes)
+    keys = [key for key in HEADINGS if any(key in row for row in pictures.values())]
+    has_differences = any(len(row) > 1 and CORRECTED in row for row in pictures.values())
+    columns = len(keys) + has_differences
+    is_paths = figure.kind == PATHS
+    with canvas.style(for_print=True):
+        rows, height, heading = (len(pictures), 1.8, 1.02) if is_paths else (2, 1.55, 1.16)
+        panels = canvas.grid(rows, columns, height, for_print=True)
+        table = [panels.axes[i : i + columns] for i in range(0, len(panels.axes), columns)]
+        for i, row_of_runs in enumerate(pictures.values()):
+            for key in keys:
+                if key in row_of_runs:
+                    column = [row[keys.index(key)] for row in table]
+                    draw(figure, [column[i]] if is_paths else column, row_of_runs[key])
+            if has_differences and CORRECTED in row_of_runs:
+                column = [row[-1] for row in table]
+                draw_differences(figure, [column[i]] if is_paths else column, row_of_runs)
+        headings = [HEADINGS[key] for key in keys] + [DIFFERENCE] * has_differences
+        for axes, text in zip(table[0], headings, strict=True):
+            axes.text(0.5, heading, text, transform=axes.transAxes, ha="center", weight="bold")
+        for axes in panels.axes:
+            if not axes.has_data():
+                axes.set_axis_off()
+        for row in table:  # the labels of the first column are for all models
+            for axes in row[1 : len(keys)]:
+                axes.set_ylabel("")
+        for row, letter in zip(table, pictures if is_paths else (), strict=False):
+            row[0].text(-0.08, 0.94, f"({letter})", transform=row[0].transAxes)
+        labelled = panels.labelled()
+        count = min(len(labelled), 5)
+        panels.figure.legend(labelled.values(), labelled, loc="lower center", ncols=count, handlelength=2.6)
+    return panels
+
+
+# ---- What a figure says of itself
+
+
+def title_of(figure: PaperFigure, scenes: Mapping[str, StoredScene]) -> str:
+    """Return the title of a figure: which one of the paper it recomputes, else the scene's own."""
+    if figure.number:
+        return f"Figure {figure.number} of {_PAPER}, recomputed"
+    scene = scenes[figure.panels[0][1]]
+    return f"{scene.title} ({scene.name})"
+
+
+def caption_of(figure: PaperFigure, scenes: Mapping[str, StoredScene]) -> str:
+    """Return the caption: what is shown, the scenes, by which methods with which settings, and what of it is right."""
+    pictures = panel_runs(figure, scenes)
+    what = {
+        MOTION: "(a) Angles (rad) and (b) rates (rad/s) of the rotor and of the pitch of each blade over time (s).",
+        PATHS: "Paths of the blade tips in space; blades at the start (dashed) and at the end (solid); equal scales.",
+        TORQUES: "(a) Rotor angle (rad) and (b) rotor rate (rad/s) over time (s) for each torque on the rotor.",
+    }[figure.kind]
+    lines = [f"{title_of(figure, scenes)}.", what]
+    for label, name in figure.panels:
+        lines.append(_scene_line(label, scenes[name]))
+    sides: dict[str, list[StoredRun]] = {}
+    for row in pictures.values():
+        for key, runs in row.items():
+            sides.setdefault(key, []).extend(runs.values())
+    if PRINTED_SIDE in sides:
+        run = sides[PRINTED_SIDE][0]
+        count = len(errata_methods())
+        what = (
+            f"the equations as printed, with their {count} errors; wrong"
+            if run.method == PRINTED
+            else label_of(run.method)
+        )
+        lines.append(f"{HEADINGS[PRINTED_SIDE]}: {what}. {_method_line(run)}")
+    if CORRECTED in sides:
+        text = f"{HEADINGS[CORRECTED]}: right. {_method_line(sides[CORRECTED][0])}"
+        bound = _uncertainty(sides[CORRECTED])
+        if bound is not None:
+            text += f" Its angles are uncertain by at most {up_to(bound)} rad."
+        lines.append(text)
+    if INDEPENDENT in sides:
+        text = f"{DIFFERENCE}: the largest over all coordinates, logarithmic; "
+        if figure.kind == PATHS:
+            text = f"{DIFFERENCE}: the largest distance of a tip (m) over time (s), logarithmic; "
+        worst = _largest_difference(pictures)
+        independent = sides[INDEPENDENT][0]
+        text += f"of the printed model and of an independent computation, {label_of(independent.method)}"
+        if figure.kind == TORQUES:
+            text += " (dotted)"
+        text += f", which agrees within {up_to(worst)} rad. " if worst is not None else ". "
+        lines.append(text + _method_line(independent))
+    return "\n".join(lines) + "\n"
+
+
+def _scene_line(label: str, scene: StoredScene) -> str:
+    """Return what a scene is: its start, gravity, duration and samples, and whether it is the paper's."""
+    initial = scene_tables(scene.scene)["initial"]
+    angles, rates = (", ".join(map(str, initial[key])) for key in ("angles", "rates"))
+    before = f"({label}) " if label else ""
+    state = "" if scene.is_shipped or not scene.name.startswith("paper/") else ", changed: not the scene of the paper"
+    return (
+        f"{before}{scene.title} (scene {scene.name}{state}): initial angles {angles} rad and rates {rates} rad/s, rotor "
+        f"first; gravity {scene.scene.gravity:g} m/s^2; {scene.scene.duration:g} s, {scene.scene.samples} samples."
+    )
+
+
+def _method_line(run: StoredRun) -> str:
+    settings = ", ".join(f"{name} = {value}" for name, value in run.settings.items())
+    name = f"{with_capital(label_of(run.method))} ({run.method})"
+    return f"{name}: {settings}." if settings else f"{name}."
+
+
+def _uncertainty(runs: Iterable[StoredRun]) -> float | None:
+    known = [float(run.array("angle_uncertainty").max()) for run in runs if "angle_uncertainty" in run and run.samples]
+    # Stored in double precision: half a unit in the last place of an angle is its own.
+    angles = [float(np.abs(run.array("angles")).max()) for run in runs if "angle_uncertainty" in run and run.samples]
+    if not known:
+        return None
+    return max(max(known), 0.5 * float(np.spacing(max(angles))))
+
+
+def _largest_difference(
+    pictures: Mapping[str, Mapping[str, Mapping[str, StoredRun]]],
+) -> float | None:
+    """Return the largest angle difference of the independent computations from the corrected model: rad."""
+    largest = []
+    for row in pictures.values():
+        for label, run in row.get(INDEPENDENT, {}).items():
+            other = row.get(CORRECTED, {}).get(label)
+            if other is not None and run.samples and other.samples:
+                largest.append(float(differences("angles", run, other).max()))
+    return max(largest, default=None)
+
+
+# ---- Files
+
+
+def write_figures(results: Path, folder: Path, kind: str, numbers: Iterable[str] = ()) -> list[Path]:
+    """Write figures for a manuscript with their captions, and return their files.
+
+    Parameters
+    ----------
+    results, folder : the results file; where figNN.pdf and figNN.txt, and so on, are written.
+    kind : "pdf", "svg" or "png".
+    numbers : of the paper's figures, such as "11", or names of other scenes; all that the file has where none is given.
+
+    Raises
+    ------
+    InputError
+        For a figure that the file does not have.
+    StoreError
+        Where the file cannot be read or the folder cannot be written.
+    """
+    with open_results(results) as opened:
+        known = all_figures(opened.scenes)
+        have = {name: figure for name, figure in known.items() if panel_runs(figure, opened.scenes)}
+        asked = list(dict.fromkeys(numbers)) or list(have)
+        unknown = [name for name in asked if name not in have]
+        if not have:
+            raise InputError(f"{results}: no run with angles and rates in the file; allowed: a file that has one")
+        if unknown:
+            raise InputError(f"{results}: figure {', '.join(unknown)}: not in the file; allowed: {', '.join(have)}")
+        software = ", ".join(f"{name} {version}" for name, version in made_with(opened.attributes) if name != "created")
+        made: dict[str, bytes] = {}
+        for name in asked:
+            figure = have[name]
+            title, caption = title_of(figure, opened.scenes), caption_of(figure, opened.scenes)
+            caption += f"{canvas.MARK.decode()}, from {results.name}: {software}\n"
+            stem = f"fig{int(name):02d}" if figure.number else name.replace("/", "-")
+            panels = composed(figure, opened.scenes)
+            made[f"{stem}.{kind}"] = canvas.encoded(panels.figure, kind, title=title, description=caption)
+            made[f"{stem}.txt"] = caption.encode()
+    for name, content in made.items():
+        replace_file(folder / name, content, canvas.MARK)
+    return [folder / name for name in made]

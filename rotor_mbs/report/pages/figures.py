@@ -1,0 +1,186 @@
+"""The page that goes through the paper's figures, each in the paper's own layout beside the corrected model."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from markupsafe import Markup
+
+from rotor_mbs.report.elements import (
+    Curve,
+    Element,
+    Fold,
+    Grid,
+    Legend,
+    Note,
+    PageContent,
+    Plot,
+    Section,
+)
+from rotor_mbs.report.figures import (
+    CORRECTED,
+    HEADINGS,
+    MOTION,
+    PATHS,
+    PRINTED_SIDE,
+    TORQUES,
+    PaperFigure,
+    available,
+    panel_runs,
+)
+from rotor_mbs.report.looks import Look, coordinate_look, label_of, step_look
+from rotor_mbs.report.numbers import in_words
+from rotor_mbs.report.pages import Report, paper
+from rotor_mbs.report.pages.scene_plots import parting, range_of, whole_time
+from rotor_mbs.runs.read import StoredRun
+
+_KINDS = {
+    MOTION: "position and velocity",
+    PATHS: "paths of the tips",
+    TORQUES: "a constant torque on the rotor",
+}
+_NOTES = {
+    "6": "The caption prints π/10 rad/s, the running text 1/10; the caption's value is plotted.",
+    "13": "According to the text, panel (b) is the run of Fig. 12 (blade 1 at π/5 rad/s), the caption prints π/8; the "
+    "caption's value is plotted.",
+    "14": "As read from the PDF, the caption gives three initial states for four panels: which one belongs to which panel "
+    "is uncertain, and that of panel (d) is not known. Nothing is drawn for it.",
+    "15": "1 and 100 kN m are printed in the caption of Fig. 16; the paper's other torques are not known, 10 and 50 kN m "
+    "were chosen.",
+}
+SIDES = (PRINTED_SIDE, CORRECTED)
+
+
+def figures_page(report: Report) -> PageContent:
+    """Return the content of the page."""
+    sections = []
+    for figure in available(report.scenes):
+        pictures = panel_runs(figure, report.scenes)
+        if pictures:
+            sections.append(_figure_section(figure, pictures, report))
+    departing = []
+    for figure in available(report.scenes):
+        for _, name in figure.panels:
+            sides = report.scenes[name].sides
+            if len(sides) == 2 and all("angles" in run for run in sides.values()):
+                left, _ = parting(sides[PRINTED_SIDE], sides[CORRECTED])
+                departing.append((name, left is not None))
+    known = dict(departing)
+    answer = []
+    if known:
+        count = sum(known.values())
+        text = Markup(
+            "In <b>{} of {} scenes</b> of these figures the printed equations depart visibly from the corrected ones."
+        )
+        answer.append(text.format(count, len(known)))
+    answer.append(Markup("Each of the {} figures stands in the paper's own layout.").format(in_words(len(sections))))
+    sections.append(
+        Section(
+            "files",
+            "For a manuscript",
+            [Note("As PDF, SVG or PNG, with captions: rotor-mbs figures.")],
+        )
+    )
+    return PageContent("The paper's figures", paper.PAPER, answer, [], sections)
+
+
+def _figure_section(
+    figure: PaperFigure,
+    pictures: Mapping[str, Mapping[str, Mapping[str, StoredRun]]],
+    report: Report,
+) -> Section:
+    """Return one figure: a column per model, the numbers that the paper prints, and what its panels are."""
+    elements: list[Grid | Fold | Element] = []
+    numbers = paper.number_table([claim for claim in report.claims if claim.figure == figure.number], with_figure=False)
+    if figure.kind == PATHS:
+        elements.append(_path_plots(pictures))
+    else:
+        for row in pictures.values():
+            elements += _motion_plots(figure, row)
+    if numbers.rows:
+        elements.append(numbers)
+    for letter, name in figure.panels:
+        stored = report.scenes[name]
+        initial = tomllib.loads(stored.scene.text)["initial"]  # pi/6 as it is written
+        angles, rates = (", ".join(map(str, initial[key])) for key in ("angles", "rates"))
+        before = f"({letter}) " if letter else ""
+        text = Markup('{}{}; initial state {} rad and {} rad/s: <a href="{}">{}</a>')
+        elements.append(Note(text.format(before, stored.title, angles, rates, report.files[name], name)))
+    if figure.number in _NOTES:
+        elements.append(Note(_NOTES[figure.number]))
+    methods = {
+        key: label_of(next(iter(runs.values())).method) for row in pictures.values() for key, runs in row.items()
+    }
+    say = "; ".join(f"{HEADINGS[key]}: {methods[key]}" for key in SIDES if key in methods)
+    return Section(
+        f"figure-{figure.number}",
+        f"Figure {figure.number}: {_KINDS[figure.kind]}",
+        elements,
+        f"{say}.",
+    )
+
+
+def _motion_plots(figure: PaperFigure, row: Mapping[str, Mapping[str, StoredRun]]) -> tuple[Legend, Grid]:
+    """Return position above velocity, a column per model, over one time."""
+    runs = [run for side in SIDES for run in row.get(side, {}).values()]
+    axis = whole_time(runs)
+    assert axis is not None
+    looks: dict[str, Look] = {}
+    cards: list[list[Element]] = []
+    for name, what, unit in (("angles", "position", "rad"), ("rates", "angular velocity", "rad/s")):
+        for side in SIDES:
+            curves = []
+            for place, (label, run) in enumerate(row.get(side, {}).items()):
+                values, time = run.array(name), run.array("time")
+                if figure.kind == TORQUES:
+                    look = step_look(place, len(row[side]), label)
+                    curves.append(Curve(label, look, time, values[:, 0]))
+                else:
+                    for k, coordinate in enumerate(run.labels):
+                        curves.append(Curve(coordinate, coordinate_look(k, coordinate), time, values[:, k]))
+            for curve in curves:
+                looks.setdefault(curve.key, curve.look)
+            if curves:
+                clip = _usual_range(curves, row, name)
+                title = f"{HEADINGS[side]}: {what}"
+                cards.append(
+                    [
+                        Plot(
+                            title,
+                            unit,
+                            axis,
+                            curves,
+                            190,
+                            clip=clip,
+                            least=1e-6,
+                            still=name == "angles",
+                        )
+                    ]
+                )
+    return Legend(list(looks.items())), Grid(2, cards)
+
+
+def _usual_range(
+    curves: Sequence[Curve], row: Mapping[str, Mapping[str, StoredRun]], name: str
+) -> tuple[float, float] | None:
+    """Return the range of the corrected model where one of these curves runs away from it."""
+    right = [run.array(name).ravel() for run in row.get(CORRECTED, {}).values()]
+    if not right:
+        return None
+    return range_of(np.concatenate(right), np.concatenate([curve.y for curve in curves]))
+
+
+def _path_plots(pictures: Mapping[str, Mapping[str, Mapping[str, StoredRun]]]) -> Grid:
+    """Return the paths of the tips by each model, still pictures."""
+    from rotor_mbs.report import canvas, plots  # late: matplotlib
+
+    cards: list[list[Element]] = []
+    for letter, row in pictures.items():
+        for side in SIDES:
+            for label, run in row.get(side, {}).items():
+                text = f"({label}) {HEADINGS[side]}" if label else HEADINGS[side]
+                drawn = canvas.path_picture(plots.paths(run.array("tip")), f"{side}-{letter}-{run.scene}", text)
+                cards.append([drawn])
+    return Grid(4, cards)

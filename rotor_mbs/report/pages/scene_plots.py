@@ -1,0 +1,361 @@
+"""Plots of a scene's stored runs: motion, loads, errors. Each is data for the page's script."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+from markupsafe import Markup
+
+from rotor_mbs.methods.catalogue import REFERENCE
+from rotor_mbs.report.elements import Array, Curve, Horizontal, Mark, Plot
+from rotor_mbs.report.looks import INK, PALETTE, Look, coordinate_look, look_of, with_capital
+from rotor_mbs.report.numbers import prefix_of, prefixed, shortest
+from rotor_mbs.runs.read import StoredRun, StoredScene
+from rotor_mbs.scenario.scene import Scene
+from rotor_mbs.scenario.time_table import kink_times, values_at
+from rotor_mbs.solution.quantities import LOADS, Quantity, known_quantities
+
+Runs = Mapping[str, StoredRun]
+VISIBLE = 0.05  # rad: what one can see in a figure of the paper's size
+CORRECTED, PRINTED = "corrected", "printed"  # keys of their curves
+CORRECTED_LOOK = Look(PALETTE["reference"][0], "-", "", "corrected")
+PRINTED_LOOK = Look(INK, "--", "", "as printed")
+# A curve that goes so many heights of the other one's range beyond it runs away, and is cut off.
+_RUNAWAY = 2.0
+_LEAST_HEIGHT = 0.5  # rad, rad/s: of one that hardly moves
+_ROUNDING = 1e-9  # of the largest component of a vector: what is smaller is zero
+_LEAST_ANGLE = 1e-6  # rad, rad/s: a smaller range of an angle or a rate is not magnified
+# What is below a thousandth of a double's rounding error is a gap on a logarithmic axis, as an exact zero is.
+_LOWEST = 1e-18
+_SPARK_WIDTH, _SPARK_HEIGHT, _SPARK_POINTS = 150.0, 34.0, 75
+_ALIGNED = 1e-9  # of a time: a sample nearer to a jump is the one before it
+
+
+def time_axis(time: Array) -> Horizontal:
+    return Horizontal("time", "s", "t", float(time[0]), max(float(time[-1]), float(time[0]) + 1e-12))
+
+
+def whole_time(runs: Sequence[StoredRun]) -> Horizontal | None:
+    """Return the time axis of the longest of these runs; None without samples."""
+    times = [run.array("time") for run in runs if run.samples]
+    return time_axis(max(times, key=lambda time: float(time[-1]))) if times else None
+
+
+# ---- Jumps
+
+
+class Jumps(NamedTuple):
+    """Where prescribed loads jump: times (s), and what happens there."""
+
+    times: Sequence[float]
+    texts: Sequence[str]
+
+    def marks(self, *, with_text: bool = False) -> list[Mark]:
+        """Return a mark for each; texts stand in the first plot alone."""
+        return [Mark(text if with_text else "", time) for time, text in zip(self.times, self.texts, strict=True)]
+
+    def breaks(self, time: Array) -> list[int]:
+        """Return the first sample after each jump: a value that follows from the load jumps before it."""
+        places = []
+        for jump in self.times:
+            place = int(np.searchsorted(time, jump * (1.0 + _ALIGNED), side="right"))
+            if 0 < place < len(time):
+                places.append(place)
+        return places
+
+
+def jumps_of(scene: Scene) -> Jumps:
+    """Return the jumps of the scene's torques and pitch commands."""
+    tables = {"torque": [scene.rotor_torque], "pitch torque": [], "pitch command": []}
+    for torque, rest in scene.pitch_loads:
+        tables["pitch torque"].append(torque)
+        tables["pitch command"].append(rest)
+    found: dict[float, str] = {}
+    for what, loads in tables.items():
+        for time in kink_times(loads, scene.duration):
+            for table in loads:
+                values = [value for at, value in table if at == time]
+                if len(values) > 1 and values[0] != values[-1]:
+                    is_angle = what == "pitch command"
+                    shown = (
+                        f"{shortest(round(math.degrees(values[-1]), 6))}°" if is_angle else prefixed(values[-1], "N m")
+                    )
+                    found.setdefault(time, f"{what} {shown}")
+                    break
+    times = sorted(found)
+    return Jumps(times, [found[time] for time in times])
+
+
+# ---- The printed and the corrected model
+
+
+def range_of(right: Array, other: Array) -> tuple[float, float] | None:
+    """Return the range of the right curve and its own height on both sides, where the other one runs away from it."""
+    known, others = right[np.isfinite(right)], other[np.isfinite(other)]
+    if not len(known) or not len(others):
+        return None
+    low, high = float(known.min()), float(known.max())
+    height = max(high - low, _LEAST_HEIGHT)
+    if others.max() > high + _RUNAWAY * height or others.min() < low - _RUNAWAY * height:
+        return low - height, high + height
+    return None
+
+
+def models_plot(
+    sides: Runs, coordinate: int, name: str, axis: Horizontal, *, height: int = 158, marks: Sequence[Mark] = (),
+    still: bool = False,
+) -> Plot:  # fmt: skip
+    """Return a coordinate's angle or rate by the corrected and the printed model.
+
+    Parameters
+    ----------
+    sides : the runs by "corrected" and "printed".
+    coordinate : 0 the rotor, i the pitch of blade i.
+    name : "angles" or "rates".
+    """
+    curves, values = [], {}
+    for side, look in ((CORRECTED, CORRECTED_LOOK), (PRINTED, PRINTED_LOOK)):
+        if side in sides:
+            values[side] = sides[side].array(name)[:, coordinate]
+            curves.append(Curve(side, look, sides[side].array("time"), values[side]))
+    clip = range_of(values[CORRECTED], values[PRINTED]) if len(values) == 2 else None
+    label = next(iter(sides.values())).labels[coordinate]
+    what, unit = ("angle", "rad") if name == "angles" else ("rate", "rad/s")
+    return Plot(
+        f"{with_capital(label)} {what}", unit, axis, curves, height, clip=clip, marks=marks, least=_LEAST_ANGLE,
+        still=still,
+    )  # fmt: skip
+
+
+def largest(values: Array) -> Array:
+    """Return (n,) of (n, ...): the largest over the components."""
+    result: Array = values.reshape(len(values), -1).max(axis=1)
+    return result
+
+
+def angle_difference(first: StoredRun, second: StoredRun) -> Array:
+    """Return the largest difference over the coordinates at the samples that both runs have: (n,) rad."""
+    n = min(len(first.array("time")), len(second.array("time")))
+    return largest(np.abs(first.array("angles")[:n] - second.array("angles")[:n]))
+
+
+def parting(printed: StoredRun, corrected: StoredRun) -> tuple[float | None, float]:
+    """Return when the angles of both first differ by VISIBLE (s; None: never), and the largest difference (rad)."""
+    gap = angle_difference(printed, corrected)
+    apart = np.flatnonzero(gap > VISIBLE)
+    return (float(printed.array("time")[apart[0]]) if len(apart) else None), float(gap.max(initial=0.0))
+
+
+def differing_coordinate(printed: StoredRun, corrected: StoredRun, first: int = 0) -> int:
+    """Return the coordinate, from `first` on, whose angles differ most; where none differs, the one that moves most."""
+    angles = printed.array("angles"), corrected.array("angles")
+    n = min(map(len, angles))
+    for values in (angles[0][:n] - angles[1][:n], angles[1]):
+        sizes = np.abs(values[:, first:]).max(axis=0, initial=0.0)
+        if sizes.size and sizes.max() > _LEAST_ANGLE:
+            return first + int(sizes.argmax())
+    return min(first, int(angles[1].shape[1]) - 1)
+
+
+def spark(curves: Sequence[tuple[Array, Array, Look]], low: float, high: float) -> Markup:
+    """Return a small drawing of curves (time, values, look), cut off beyond the range from `low` to `high`."""
+    end = max((float(time[-1]) for time, _, _ in curves if len(time)), default=0.0) or 1.0
+    room = 0.12 * (high - low) or 1.0
+    low, high = low - room, high + room
+    drawn = ""
+    for time, values, look in curves:
+        if not len(time):
+            continue
+        index = np.unique(np.linspace(0, len(time) - 1, _SPARK_POINTS).astype(int))
+        points = []
+        for at, value in zip(time[index].tolist(), values[index].tolist(), strict=True):
+            if np.isfinite(value):
+                share = (min(max(value, low), high) - low) / (high - low)
+                points.append(f"{2.0 + (_SPARK_WIDTH - 4.0) * at / end:.1f} {31.0 - 28.0 * share:.1f}")
+        drawn += f'<path class="curve {look.css}" d="M{"L".join(points)}"/>' if points else ""
+    box = f"0 0 {_SPARK_WIDTH:g} {_SPARK_HEIGHT:g}"
+    return Markup(f'<svg class="spark" viewBox="{box}" aria-hidden="true">{drawn}</svg>')
+
+
+# ---- Channels of one run
+
+
+class Channel(NamedTuple):
+    """Components of a quantity that share an axis: values (n,) by curve, in units of `unit`.
+
+    floor : what is smaller is rounding error, and zero.
+    breaks : samples before which the curves are interrupted.
+    """
+
+    name: str
+    unit: str
+    curves: Sequence[tuple[str, Look, Array]]
+    floor: float = 0.0
+    note: str = ""
+    breaks: Sequence[int] = ()
+
+    def plot(
+        self,
+        axis: Horizontal,
+        time: Array,
+        *,
+        height: int = 160,
+        marks: Sequence[Mark] = (),
+        still: bool = False,
+    ) -> Plot:
+        curves = [Curve(key, look, time, values, self.breaks) for key, look, values in self.curves]
+        return Plot(
+            self.name,
+            self.unit,
+            axis,
+            curves,
+            height,
+            self.note,
+            marks=marks,
+            least=self.floor,
+            still=still,
+        )
+
+
+def blade_look(blade: int) -> Look:
+    """Return the look of what belongs to a blade, 0 the first."""
+    return coordinate_look(blade + 1, f"blade {blade + 1}")
+
+
+def in_units(values: Sequence[Array], unit: str) -> tuple[float, str]:
+    """Return by what the values of a channel are divided, and their unit with its prefix: k, M or G."""
+    known = [float(np.abs(array[np.isfinite(array)]).max(initial=0.0)) for array in values]
+    scale, prefix = prefix_of(max(known, default=0.0))
+    return scale, f"{prefix}{unit}"
+
+
+def quantity_channels(quantity: Quantity, run: StoredRun, jumps: Jumps) -> list[Channel]:
+    """Return a stored quantity's channels: one for each axis of vectors, else one.
+
+    What follows from a load is interrupted at its jumps. A component that is below 1e-9 of the largest is rounding
+    error.
+    """
+    values = run.array(quantity.name)
+    breaks = jumps.breaks(run.array("time")) if quantity.output == "loads" else []
+    floor = _ROUNDING * float(np.abs(values[np.isfinite(values)]).max(initial=0.0))
+    title = with_capital(quantity.name.replace("_", " "))
+    if quantity not in LOADS and quantity.plot is not None:
+        title = quantity.plot.title
+    frame = ", blade frame" if quantity.dimensions[1:2] == ("blade",) and "axis" in quantity.dimensions else ""
+    if quantity.dimensions[1:] == ("axis",):
+        frame = ", base frame"
+    if values.ndim == 1:
+        parts = {"": [(quantity.name, coordinate_look(0, title.lower()), values)]}
+    elif quantity.dimensions[1:] == ("blade", "axis"):
+        blades = range(values.shape[1])
+        parts = {
+            axis: [(f"blade-{i + 1}", blade_look(i), values[:, i, k]) for i in blades] for k, axis in enumerate("xyz")
+        }
+    elif quantity.dimensions[1:] == ("axis",):
+        what = quantity.name.partition("_")[0]
+        parts = {axis: [("rotor", coordinate_look(0, what), values[:, k])] for k, axis in enumerate("xyz")}
+    elif quantity.dimensions[1:] == ("coordinate",):
+        looks = [coordinate_look(i, label) for i, label in enumerate(run.labels)]
+        parts = {"": [(f"blade-{i}" if i else "rotor", look, values[:, i]) for i, look in enumerate(looks)]}
+    else:
+        flat = values.reshape(len(values), -1)
+        parts = {"": [(f"blade-{i + 1}", blade_look(i), flat[:, i]) for i in range(flat.shape[1])]}
+    channels = []
+    for axis, curves in parts.items():
+        scale, unit = in_units([array for _, _, array in curves], quantity.units)
+        scaled = [(key, look, array / scale) for key, look, array in curves]
+        channels.append(Channel(f"{title} {axis}".strip(), unit, scaled, floor / scale, frame.lstrip(", "), breaks))
+    return channels
+
+
+def load_channels(stored: StoredScene, run: StoredRun, jumps: Jumps) -> list[Channel]:
+    """Return the channels of the loads that a run has, and of quantities of installed packages."""
+    channels = []
+    built_in = {"angles", "rates", "tip", "energy", ""}
+    quantities = known_quantities(stored.scene.outputs)
+    # Moments first: they are what a root or a shaft is designed for.
+    for quantity in sorted(
+        quantities, key=lambda quantity: not quantity.name.endswith(("root_moment", "shaft_moment"))
+    ):
+        is_shown = quantity in LOADS or (quantity.output not in built_in and quantity.plot is not None)
+        if is_shown and quantity.name in run:
+            channels += quantity_channels(quantity, run, jumps)
+    return channels
+
+
+def values_over(table: Sequence[tuple[float, float]], time: Array) -> tuple[Array, Array]:
+    """Return a prescribed load by its own points, within the time: (times, values)."""
+    end = float(time[-1])
+    inside = [(at, value) for at, value in table if 0.0 <= at <= end]
+    first, last = (float(values_at(tuple(table), np.array([at]))[0]) for at in (0.0, end))
+    points = [(0.0, first), *inside, (end, last)] if not inside or inside[0][0] > 0.0 else [*inside, (end, last)]
+    times, values = np.array(points, dtype=float).T
+    return times, values
+
+
+# ---- Errors
+
+
+def positive(values: Array) -> Array:
+    """Return magnitudes for a logarithmic axis: exact zeros are gaps."""
+    sizes = np.abs(values)
+    result: Array = np.where(sizes > _LOWEST, sizes, np.nan)
+    return result
+
+
+def error_curves(runs: Runs, values: Mapping[str, Array], first: int = 0) -> list[Curve]:
+    """Return a curve per method over the samples from `first` on; one that is zero everywhere has no line."""
+    curves = []
+    for method, array in values.items():
+        time = runs[method].array("time")[first : first + len(array)]
+        curves.append(Curve(method, look_of(method), time, positive(array)))
+    return curves
+
+
+def error_plot(name: str, unit: str, curves: Sequence[Curve], axis: Horizontal, **more: object) -> Plot:
+    plot = Plot(name, unit, axis, curves, 240, log=True)
+    return replace(plot, **more)  # type: ignore[arg-type]
+
+
+def angle_errors(scene: StoredScene, runs: Runs) -> dict[str, Array]:
+    """Return each run's difference from the reference: (n,) rad, the largest over the coordinates."""
+    reference = scene.reference
+    if reference is None or "angles" not in reference:
+        return {}
+    others = {method: run for method, run in runs.items() if method != REFERENCE and "angles" in run}
+    return {method: angle_difference(run, reference) for method, run in others.items()}
+
+
+def energy_errors(runs: Runs) -> dict[str, Array]:
+    """Return each run's energy error relative to its energy scale: (n,)."""
+    errors = {}
+    for method, run in runs.items():
+        scale = None if method == REFERENCE else run.attributes.get("energy_scale_J")
+        if "energy_error" in run and isinstance(scale, float):
+            errors[method] = np.abs(run.array("energy_error")) / (scale or 1.0)
+    return errors
+
+
+def interval_errors(scene: Scene, runs: Runs) -> dict[str, Array]:
+    """Return the size of the defect of every interval of each run, from its second sample on: (n - 1,) rad.
+
+    They are read where the file has them, else computed, which needs SciPy.
+    """
+    sizes = {}
+    for method, run in runs.items():
+        if "angles" not in run or "rates" not in run or run.samples < 2:
+            continue
+        if "defect" in run:
+            sizes[method] = np.asarray(run.array("defect")[1:], dtype=float)
+            continue
+        from rotor_mbs.models.lagrange.defects import (
+            interval_defects,
+        )  # late: SciPy, and an engine where there is one
+
+        time, angles, rates = (run.array(name) for name in ("time", "angles", "rates"))
+        sizes[method] = interval_defects(scene, time, angles, rates).sizes
+    return sizes

@@ -1,0 +1,397 @@
+"use strict";
+(() => {
+  // Draws every .plot of the page from the numbers in #curves. Plots over the same quantity, time above all, are read
+  // and zoomed together; a section's legend switches curves in all its plots.
+  const store = document.getElementById("curves");
+  const bytes = store ? Uint8Array.from(atob(store.textContent), (letter) => letter.charCodeAt(0)) : new Uint8Array(0);
+  const numbers = new Float32Array(bytes.buffer);
+  const TOP = 6, RIGHT = 12, BOTTOM = 24;  // px around the curves
+  const LETTER = 7.3;                      // px, the width of a digit of 12 px
+  const DRAG = 6;                          // px: a shorter way of the pointer is a click
+  const DENSE = 4;                         // samples a pixel, beyond which smallest and largest are drawn
+  const FAR = 1e4;                         // px: curves do not go farther beyond the edge
+  const TIME = "time";
+  const zooms = {};                        // by the name of the horizontal axis: what is shown of it
+  const hidden = new Set();                // groups and keys of the curves that are switched off
+  const plots = [];
+  let run = 0;                             // of a table of runs, the row that is shown
+
+  // ---- Numbers as text
+
+  const raised = (exponent) => String(exponent).replace(/[-\d]/g, (sign) => (sign === "-" ? "⁻" : "⁰¹²³⁴⁵⁶⁷⁸⁹"[sign]));
+  const text = (value, digits = 4) => {
+    if (!Number.isFinite(value)) return "–";
+    const exponent = value ? Math.floor(Math.log10(Math.abs(value))) : 0;
+    const isPlain = exponent >= -3 && exponent < 6;
+    const written = isPlain
+      ? String(Number(value.toPrecision(digits)))
+      : `${(value / 10 ** exponent).toFixed(digits - 1)}×10${raised(exponent)}`;
+    return written.replace(/^-/, "−");
+  };
+
+  // ---- Axes
+
+  const scale = (from, to, start, end, isLog) => {
+    const f = isLog ? Math.log10 : (value) => value;
+    const a = f(from), factor = (end - start) / (f(to) - a);
+    return {
+      at: (value) => start + factor * (f(value) - a),
+      value: (pixel) => (isLog ? 10 ** ((pixel - start) / factor + a) : (pixel - start) / factor + a),
+    };
+  };
+
+  // Places and texts of at most `most` round ticks; of a short logarithmic axis those of a linear one.
+  const ticks = (from, to, most, isLog) => {
+    const found = [];
+    if (isLog) {
+      const step = Math.max(1, Math.ceil((Math.log10(to) - Math.log10(from)) / most));
+      const exponents = [];
+      for (let e = Math.ceil(Math.log10(from) - 1e-9); e <= Math.log10(to) + 1e-9; e += step) exponents.push(e);
+      const isPlain = exponents.every((e) => e >= -2 && e < 4);
+      if (exponents.length > 1) return exponents.map((e) => [10 ** e, isPlain ? String(Number(`1e${e}`)) : `10${raised(e)}`]);
+    }
+    const rough = (to - from) / most, ten = 10 ** Math.floor(Math.log10(rough));
+    const step = ten * [1, 2, 5, 10].find((factor) => factor * ten >= rough * (1 - 1e-9));
+    for (let i = Math.ceil(from / step - 1e-9); i <= to / step + 1e-9; i++) {
+      const value = Number((i * step).toPrecision(9));
+      if (value > 0 || !isLog) found.push([value, text(value, 6)]);
+    }
+    return found;
+  };
+
+  // ---- Columns
+
+  const column = ({ at: [first, count, stride = 0], from = 0 }) => {
+    const start = first + run * stride, values = numbers.subarray(start, start + count);
+    return from ? Float64Array.from(values, (value) => value + from) : values;
+  };
+
+  // The sample nearest to a value; -1 where the curve does not reach there, or has a gap.
+  const nearest = (xs, ys, value) => {
+    let low = 0, high = xs.length - 1;
+    if (high < 0) return -1;
+    while (high - low > 1) {
+      const middle = (low + high) >> 1;
+      if (xs[middle] > value) high = middle;
+      else low = middle;
+    }
+    const place = Math.abs(xs[low] - value) <= Math.abs(xs[high] - value) ? low : high;
+    const room = xs.length > 1 ? Math.abs(xs[high] - xs[low]) : Infinity;
+    return Math.abs(xs[place] - value) <= room && Number.isFinite(ys[place]) ? place : -1;
+  };
+
+  // Whether a sample, or the line to a neighbour, lies in what is shown.
+  const isNear = (xs, i, from, to) => !(xs[i + 1] < from || xs[i - 1] > to);
+
+  // ---- Elements
+
+  const draw = (parent, name, attributes, content = "") => {
+    const made = document.createElementNS("http://www.w3.org/2000/svg", name);
+    Object.entries(attributes).forEach(([key, value]) => made.setAttribute(key, value));
+    made.textContent = content;
+    parent.append(made);
+    return made;
+  };
+  const make = (parent, name, className, content = "") => {
+    const made = document.createElement(name);
+    made.className = className;
+    made.textContent = content;
+    parent.append(made);
+    return made;
+  };
+
+  const unzoom = make(document.body, "button", "unzoom");
+  unzoom.type = "button";
+  unzoom.hidden = true;
+
+  const start = (box) => {
+    const plot = JSON.parse(box.dataset.plot), axis = plot.x, bottom = plot.height - BOTTOM;
+    const group = box.closest("[data-group]")?.dataset.group ?? "";
+    const svg = draw(box, "svg", { tabindex: 0, role: "slider", "aria-label": `${plot.name} over ${axis.name}`,
+      "aria-valuemin": axis.range[0], "aria-valuemax": axis.range[1], "aria-valuenow": axis.range[0] });
+    const tip = make(box, "div", "tip"), output = box.querySelector("output"), full = box.querySelector(".full");
+    tip.hidden = true;
+    let sx, sy, left = 0, width = 0, shown = [], here = null, cursor = null;
+
+    const extent = () => zooms[axis.name] ?? axis.range;
+
+    // The vertical range of what is shown, and what of it lies beyond the clip.
+    const range = (from, to) => {
+      let low = Infinity, high = -Infinity;
+      shown.forEach(({ xs, ys }) => {
+        for (let i = 0; i < ys.length; i++) {
+          if (!isNear(xs, i, from, to) || !Number.isFinite(ys[i]) || (plot.log && ys[i] <= 0)) continue;
+          low = Math.min(low, ys[i]);
+          high = Math.max(high, ys[i]);
+        }
+      });
+      if (plot.clip && full?.getAttribute("aria-pressed") !== "true") {
+        low = Math.max(low, plot.clip[0]);
+        high = Math.min(high, plot.clip[1]);
+      }
+      if (low > high) return plot.log ? [1e-12, 1] : [0, 1];
+      (plot.marks ?? []).forEach(({ y }) => {
+        if (y === undefined) return;
+        low = Math.min(low, y);
+        high = Math.max(high, y);
+      });
+      if (plot.log) {
+        const decade = Math.floor(Math.log10(low) + 1e-9);
+        return [10 ** decade, 10 ** Math.max(Math.ceil(Math.log10(high) - 1e-9), decade + 1)];
+      }
+      // A constant, and what is rounding error, is not magnified.
+      const size = Math.max(Math.abs(low), Math.abs(high)), least = Math.max(plot.least ?? 0, 1e-6 * size);
+      if (high - low > least) return [low - 0.06 * (high - low), high + 0.06 * (high - low)];
+      const room = size > least ? 0.1 * size : 1;
+      return [low - room, high + room];
+    };
+
+    // The path of a curve, and its first sample that is in sight horizontally but not vertically.
+    const trace = ({ xs, ys, breaks = [], dots }, from, to, [low, high]) => {
+      const isDense = xs.length * (to - from) > DENSE * width * (axis.range[1] - axis.range[0]);
+      const jumps = new Set(breaks);
+      let path = "", pen = "M", pixel = NaN, smallest = NaN, largest = NaN, last = NaN, outside = -1;
+      const flush = () => {
+        if (smallest < largest) path += `V${smallest.toFixed(1)}V${largest.toFixed(1)}V${last.toFixed(1)}`;
+      };
+      for (let i = 0; i < ys.length; i++) {
+        if (jumps.has(i)) pen = "M";
+        const y = plot.log && !(ys[i] > 0) ? NaN : ys[i];
+        if (!Number.isFinite(y)) {
+          pen = "M";
+          continue;
+        }
+        if (!isNear(xs, i, from, to)) continue;
+        if (outside < 0 && xs[i] >= from && xs[i] <= to && (y < low || y > high)) outside = i;
+        const px = sx.at(xs[i]), py = Math.min(Math.max(sy.at(y), -FAR), FAR), half = Math.round(2 * px);
+        if (isDense && half === pixel && pen === "L") {
+          smallest = Math.min(smallest, py);
+          largest = Math.max(largest, py);
+          last = py;
+          continue;
+        }
+        flush();
+        path += `${pen}${px.toFixed(1)} ${py.toFixed(1)}`;
+        pixel = half;
+        smallest = largest = last = py;
+        pen = dots === "only" ? "M" : "L";
+      }
+      flush();
+      return { path, outside };
+    };
+
+    const redraw = () => {
+      width = Math.max(box.clientWidth, 200);
+      const [from, to] = extent();
+      shown = plot.curves.filter((curve) => !hidden.has(`${group} ${curve.key}`));
+      shown = shown.map((curve) => ({ ...curve, xs: column(curve.x), ys: column(curve.y) }));
+      const limits = range(from, to), [low, high] = limits;
+      const labels = ticks(low, high, plot.log ? 5 : Math.max(2, Math.floor(plot.height / 38)), plot.log);
+      left = Math.max(34, 13 + LETTER * Math.max(0, ...labels.map(([, label]) => label.length)));
+      const right = width - RIGHT;
+      sx = scale(from, to, left, right, axis.log);
+      sy = scale(low, high, bottom, TOP, plot.log);
+      svg.replaceChildren();
+      svg.setAttribute("viewBox", `0 0 ${width} ${plot.height}`);
+      labels.forEach(([value, label]) => {
+        draw(svg, "path", { class: "grid", d: `M${left} ${sy.at(value)}H${right}` });
+        draw(svg, "text", { x: left - 6, y: sy.at(value) + 4, "text-anchor": "end" }, label);
+      });
+      ticks(from, to, Math.max(2, Math.floor((width - left) / 62)), axis.log).forEach(([value, label]) => {
+        const x = sx.at(value), half = (LETTER * label.length) / 2;
+        draw(svg, "path", { class: "grid", d: `M${x} ${TOP}V${bottom}` });
+        draw(svg, "text", { x: Math.min(x, width - half), y: plot.height - 7, "text-anchor": "middle" }, label);
+      });
+      // What leaves the frame is cut off by an svg of the frame's size.
+      const size = { x: left, y: TOP, width: right - left, height: bottom - TOP };
+      const area = draw(svg, "svg", { ...size, viewBox: `${left} ${TOP} ${size.width} ${size.height}` });
+      const marks = (plot.marks ?? []).filter(({ x }) => x === undefined || (x >= from && x <= to));
+      marks.forEach(({ x, y }) => {
+        const d = x === undefined ? `M${left} ${sy.at(y)}H${right}` : `M${sx.at(x)} ${TOP}V${bottom}`;
+        draw(area, "path", { class: "mark", d });
+      });
+      shown.forEach((curve) => {
+        const { path, outside } = trace(curve, from, to, limits);
+        const only = curve.dots === "only" ? " only" : "";
+        draw(area, "path", { class: `curve ${curve.style}${only}`, d: path });
+        if (curve.dots) point(area, curve, from, to);
+        if (outside >= 0 && !plot.log) leave(area, curve, outside, limits);
+      });
+      marks.filter((mark) => mark.text).forEach((mark) => describe(area, mark, right));
+      draw(svg, "path", { class: "axis", d: `M${left} ${TOP}V${bottom}H${right}` });
+      cursor = draw(svg, "g", { class: "cursor" });
+      read(here, false);
+    };
+
+    const point = (area, { xs, ys, style }, from, to) => {
+      for (let i = 0; i < xs.length; i++) {
+        if (!(xs[i] >= from && xs[i] <= to && Number.isFinite(ys[i])) || (plot.log && ys[i] <= 0)) continue;
+        draw(area, "circle", { class: style, cx: sx.at(xs[i]).toFixed(1), cy: sy.at(ys[i]).toFixed(1), r: 3 });
+      }
+    };
+
+    // A curve that leaves the range says how far it goes.
+    const leave = (area, { xs, ys, name }, first, [, high]) => {
+      const isAbove = ys[first] > high, known = Array.from(ys).filter(Number.isFinite);
+      const end = known.reduce((one, other) => (isAbove ? Math.max(one, other) : Math.min(one, other)));
+      const content = `${isAbove ? "▲" : "▼"} ${name}: to ${text(end, 3)}`;
+      const last = width - RIGHT - LETTER * content.length;
+      const x = Math.max(Math.min(sx.at(xs[first]) + 6, last), left + 6);
+      draw(area, "text", { class: "quiet", x, y: isAbove ? TOP + 12 : bottom - 6 }, content);
+    };
+
+    const describe = (area, { x, y, text: content }, right) => {
+      if (x === undefined) {
+        draw(area, "text", { class: "quiet", x: left + 6, y: Math.max(sy.at(y) - 5, TOP + 12) }, content);
+        return;
+      }
+      const isLeft = sx.at(x) + LETTER * content.length > right;
+      const place = { x: sx.at(x) + (isLeft ? -5 : 5), y: TOP + 12, "text-anchor": isLeft ? "end" : "start" };
+      draw(area, "text", { class: "quiet", ...place }, content);
+    };
+
+    // The values of all curves at a place of the horizontal axis; a box with them where the pointer or the keys are.
+    const read = (value, isMine) => {
+      here = value;
+      cursor.replaceChildren();
+      const [from, to] = extent(), isShown = value !== null && value >= from && value <= to && shown.length > 0;
+      tip.hidden = !(isMine && isShown);
+      if (output) output.textContent = "";
+      if (!isShown) return;
+      draw(cursor, "path", { d: `M${sx.at(value)} ${TOP}V${bottom}` });
+      const rows = shown.map(({ xs, ys, style, name }) => {
+        const i = nearest(xs, ys, value), y = i < 0 ? NaN : ys[i];
+        const place = plot.log && y <= 0 ? NaN : sy.at(y);
+        if (place >= TOP && place <= bottom) draw(cursor, "circle", { class: style, cx: sx.at(xs[i]), cy: place, r: 3.5 });
+        return { style, name, y };
+      });
+      if (output && rows.length < 4) output.textContent = rows.map(({ y }) => text(y)).join("  ·  ");
+      svg.setAttribute("aria-valuenow", Number(value.toPrecision(6)));
+      const values = rows.map(({ name, y }) => `${name} ${text(y)}`).join(", ");
+      svg.setAttribute("aria-valuetext", `${text(value)} ${axis.unit}: ${values}`);
+      if (!isMine) return;
+      tip.replaceChildren();
+      make(tip, "b", "", `${axis.symbol} = ${text(value)} ${axis.unit}`);
+      const table = make(tip, "table", "");
+      rows.forEach(({ style, name, y }) => {
+        const row = table.insertRow(), swatch = draw(row.insertCell(), "svg", { width: 18, height: 8 });
+        draw(swatch, "path", { class: `curve ${style}`, d: "M0 4H18" });
+        row.insertCell().textContent = name;
+        row.insertCell().textContent = text(y, 5);
+      });
+      // On the side away from the pointer, so that the box covers no curve there.
+      const x = sx.at(value), isRight = x > box.clientWidth / 2;
+      tip.style.left = isRight ? "auto" : `${x + 14}px`;
+      tip.style.right = isRight ? `${box.clientWidth - x + 14}px` : "auto";
+    };
+
+    // ---- What the reader does
+
+    const together = () => plots.filter((other) => other.axis.name === axis.name);
+
+    // All plots over the same axis are read at the stored sample that is nearest.
+    const show = (wanted) => {
+      let value = wanted;
+      if (value !== null && shown.length > 0) {
+        const { xs } = shown.reduce((one, other) => (other.xs.length > one.xs.length ? other : one));
+        const place = nearest(xs, xs, value);
+        if (place >= 0) value = xs[place];
+      }
+      together().forEach((other) => other.read(value, other.box === box));
+      if (axis.name === TIME && value !== null) document.dispatchEvent(new CustomEvent("plot-time", { detail: value }));
+    };
+
+    const zoom = (wanted) => {
+      if (wanted) zooms[axis.name] = wanted;
+      else delete zooms[axis.name];
+      unzoom.hidden = !wanted;
+      unzoom.onclick = () => zoom(null);
+      if (wanted) unzoom.textContent = `${wanted.map((end) => text(end)).join(" to ")} ${axis.unit} · show all`;
+      together().forEach((other) => other.redraw());
+    };
+
+    const place = (event) => {
+      const rectangle = svg.getBoundingClientRect(), [from, to] = extent();
+      return Math.min(Math.max(sx.value((event.clientX - rectangle.left) * (width / rectangle.width)), from), to);
+    };
+
+    let pressed = null, band = null;
+    svg.addEventListener("pointerdown", (event) => {
+      pressed = place(event);
+      svg.setPointerCapture(event.pointerId);
+      show(pressed);
+    });
+    svg.addEventListener("pointermove", (event) => {
+      const value = place(event);
+      show(value);
+      if (pressed === null) return;
+      const [start, end] = [sx.at(pressed), sx.at(value)].sort((one, other) => one - other);
+      band ??= draw(svg, "rect", { class: "band", y: TOP, height: bottom - TOP });
+      band.setAttribute("x", start);
+      band.setAttribute("width", end - start);
+    });
+    const release = (event) => {
+      const from = pressed, to = from === null || event.type === "pointercancel" ? null : place(event);
+      band?.remove();
+      pressed = band = null;
+      if (to === null || Math.abs(sx.at(to) - sx.at(from)) <= DRAG) return;
+      zoom([from, to].sort((one, other) => one - other));
+    };
+    svg.addEventListener("pointerup", release);
+    svg.addEventListener("pointercancel", release);
+    // A finger that leaves keeps its reading; a mouse takes it away.
+    svg.addEventListener("pointerleave", (event) => {
+      if (pressed === null && event.pointerType === "mouse") show(null);
+    });
+    svg.addEventListener("dblclick", () => zoom(null));
+    full?.addEventListener("click", () => {
+      full.setAttribute("aria-pressed", full.getAttribute("aria-pressed") !== "true");
+      redraw();
+    });
+    svg.addEventListener("keydown", (event) => {
+      if (shown.length === 0 || event.ctrlKey || event.altKey || event.metaKey) return;
+      const [from, to] = extent(), at = here ?? from, { xs } = shown[0], step = event.shiftKey ? 20 : 1;
+      const walk = (count) => show(xs[Math.min(Math.max(nearest(xs, xs, at) + count, 0), xs.length - 1)]);
+      const widen = (factor) => {
+        const [first, last] = axis.range;
+        const wanted = [Math.max(first, at - factor * (at - from)), Math.min(last, at + factor * (to - at))];
+        zoom(wanted[0] <= first && wanted[1] >= last ? null : wanted);
+      };
+      const keys = {
+        ArrowLeft: () => walk(-step), ArrowRight: () => walk(step), Home: () => show(from), End: () => show(to),
+        "+": () => widen(0.5), "-": () => widen(2), Escape: () => zoom(null),
+      };
+      if (!(event.key in keys)) return;
+      keys[event.key]();
+      event.preventDefault();
+    });
+    plots.push({ axis, box, redraw, read });
+    redraw();
+    // Text stays 12 px high at every width: the drawing is made anew, not scaled.
+    new ResizeObserver(() => {
+      if (box.clientWidth && Math.max(box.clientWidth, 200) !== width) redraw();
+    }).observe(box);
+  };
+
+  const buttons = document.querySelectorAll("[data-group] button[data-curve]");
+  const nameOf = (button) => `${button.closest("[data-group]").dataset.group} ${button.dataset.curve}`;
+  buttons.forEach((button) => {
+    if (button.getAttribute("aria-pressed") === "false") hidden.add(nameOf(button));
+    button.addEventListener("click", () => {
+      const name = nameOf(button), isOn = hidden.delete(name);
+      if (!isOn) hidden.add(name);
+      button.setAttribute("aria-pressed", isOn);
+      plots.filter(({ box }) => button.closest("[data-group]").contains(box)).forEach((plot) => plot.redraw());
+    });
+  });
+  document.documentElement.classList.add("live");
+  document.querySelectorAll(".plot").forEach(start);
+  // The clock of the viewer, and the run that a map shows.
+  document.addEventListener("viewer-time", (event) => {
+    plots.filter(({ axis }) => axis.name === TIME).forEach((plot) => plot.read(event.detail, false));
+  });
+  document.addEventListener("shown-run", (event) => {
+    run = event.detail;
+    plots.forEach((plot) => plot.redraw());
+  });
+})();
