@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 # Where values are so many times their range, as a rotor angle after an hour, single precision would show steps: what is
 # stored is the difference from the first value.
 _FAR_FROM_ZERO = 1000.0
+_LONG = 2000  # samples, two a pixel of a page
 # Single precision has no larger number.
 _LARGEST = 3.0e38
 
@@ -22,9 +23,12 @@ class CurveStore:
 
     A column is described by where it lies: {"at": [first, count]} in numbers from the beginning, in a table of several
     runs [first, count, stride], with the stride from a run to the next; "from": a number to be added to each.
+
+    every : of columns that are long only so many-th samples are stored, so that a page does not become too large.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, every: int = 1) -> None:
+        self.every = every
         self._parts: list[NDArray[np.float32]] = []
         self._places: dict[bytes, int] = {}
         self.size = 0
@@ -36,7 +40,7 @@ class CurveStore:
         ----------
         values : (n,) the column; or (runs, n), of which the page shows one row at a time. NaN is a gap.
         """
-        table = np.asarray(values, dtype=np.float64)
+        table = np.asarray(values, dtype=np.float64)[..., :: self.step(values)]
         count = int(table.shape[-1])
         known = table[np.isfinite(table)]
         origin = 0.0
@@ -55,6 +59,10 @@ class CurveStore:
         if origin:
             place["from"] = origin
         return place
+
+    def step(self, values: NDArray[Any] | Sequence[float]) -> int:
+        """Return how many samples of a column make one that is stored: 1 for a short column."""
+        return self.every if np.shape(values)[-1] > _LONG else 1
 
     def text(self) -> str:
         """Return all columns in base64, little endian; "" where none is stored."""

@@ -176,7 +176,8 @@ class Plot:
             described["x"] = store.add(curve.x)
             described["y"] = store.add(curve.y)
             if len(curve.breaks):
-                described["breaks"] = [int(place) for place in curve.breaks]
+                step = store.step(curve.y)
+                described["breaks"] = [-(-int(place) // step) for place in curve.breaks]
             if curve.dots:
                 described["dots"] = curve.dots
             plot["curves"].append(described)

@@ -45,6 +45,7 @@ _SCRIPTS = {  # by file, what a page has that needs it
     "viewer": 'class="viewer"',
     "map": 'id="sweep"',
 }
+_MAX_NUMBERS = 150_000  # of a page's curves: 800 kB, so that a page has at most 1 MB
 _PLACE_OF_SCRIPTS = "<!-- scripts -->"
 Pairs = Sequence[tuple[str, str]]
 # Attributes of a results file that say what made it.
@@ -123,8 +124,11 @@ def render(page: PageContent, made: Pairs = (), links: Pairs = (), here: str = "
     shown = []
     if any(file != here for file, _ in links):
         shown = [(file, label, file == here) for file, label in links]
-    store = CurveStore()
-    html = _environment().get_template("page.html.j2").render(page=page, links=shown, versions=made, store=store)
+    template, store = _environment().get_template("page.html.j2"), CurveStore()
+    html = template.render(page=page, links=shown, versions=made, store=store)
+    if store.size > _MAX_NUMBERS:
+        store = CurveStore(every=-(-store.size // _MAX_NUMBERS))
+        html = template.render(page=page, links=shown, versions=made, store=store)
     scripts = "".join(f"<script>{_script(name)}</script>\n" for name, sign in _SCRIPTS.items() if sign in html)
     return html.replace(_PLACE_OF_SCRIPTS, scripts, 1)
 

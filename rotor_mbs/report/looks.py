@@ -29,7 +29,7 @@ PALETTE = {
     # Models: after Okabe and Ito, distinguishable with colour blindness, darkened where white asks for it.
     "reference": ("#5793c1", "#477ca6"),
     "blue": ("#0072b2", "#5cb3ec"),
-    "petrol": ("#0f7c8a", "#4fc3d9"),
+    "navy": ("#1f3f8f", "#9db4ff"),
     "vermillion": ("#d55e00", "#ff8a3d"),
     "brown": ("#8f6a1f", "#e0ad4e"),
     "green": ("#00845f", "#2fc498"),
@@ -62,7 +62,7 @@ INK, PAPER, GREY, GRID, BLUE, VERMILLION = (
 COORDINATES = tuple(PALETTE[name][0] for name in PALETTE if name == "rotor" or name.startswith("blade-"))
 _NAMES = {light: name for name, (light, _) in PALETTE.items()}
 # Of the models in the order of the catalogue, for their methods in turn; those of other packages are grey.
-_MODEL_COLOURS = (("blue", "petrol"), ("brown", "vermillion"), ("green",), ("purple",))
+_MODEL_COLOURS = (("blue", "navy"), ("brown", "vermillion"), ("green",), ("purple",))
 _ERRATA_COLOURS = ("error-1", "error-2", "error-3")
 # matplotlib's line styles, and what the style sheet calls them.
 _DASHES = {"-": "solid", "--": "dashed", "-.": "dashdot", ":": "dotted"}

@@ -41,7 +41,7 @@ from rotor_mbs.report.elements import (
 )
 from rotor_mbs.report.files import write_page
 from rotor_mbs.report.looks import GREY, INK, PALETTE, Look, coordinate_look, with_capital
-from rotor_mbs.report.numbers import shortest, typeset, up_to, with_unit
+from rotor_mbs.report.numbers import SPACE, seconds, shortest, typeset, up_to, with_unit
 from rotor_mbs.report.pages import scene_plots as draw
 from rotor_mbs.report.plots import Series
 from rotor_mbs.runs.read import Record, write_records
@@ -221,14 +221,14 @@ def comparison_page(record: Record) -> PageContent:
     onset = onset_of(record, verdict)
     if onset is not None:
         name = "First outside the tolerance" if is_time else "First speed outside the tolerance"
-        facts.append(Fact(name, with_unit(onset[0], _axis_unit(verdict), 4), onset[1]))
+        facts.append(Fact(name, _place(onset[0], verdict), onset[1]))
     largest = max(verdict.channels, key=lambda channel: channel.error_max, default=None)
     if largest is not None:
         facts.append(Fact("Largest error", with_unit(largest.error_max, largest.unit), largest.name))
     compared = f"{verdict.rows} rows"
     if verdict.horizon_s is not None and verdict.horizon_s < verdict.compared_until:
-        compared += f"; errors checked up to the horizon at {with_unit(verdict.horizon_s, 's', 4)}"
-    facts.append(Fact("Compared up to", with_unit(verdict.compared_until, _axis_unit(verdict), 4), compared))
+        compared += f"; errors checked up to the horizon at {seconds(verdict.horizon_s)}"
+    facts.append(Fact("Compared up to", _place(verdict.compared_until, verdict), compared))
     title = f"{Path(verdict.source).name} against {verdict.scene}"
     return PageContent(title, about, comparison_answer(record), facts, sections)
 
@@ -237,7 +237,6 @@ def comparison_answer(record: Record) -> list[Markup]:
     """Return whether the data agree, from when on they do not, why, and what it looks like."""
     verdict = verdict_of(record)
     onset = onset_of(record, verdict)
-    unit = _axis_unit(verdict)
     if verdict.agrees:
         defects = [channel.defect for channel in verdict.channels if channel.defect is not None]
         text = Markup("The data <b>agree</b> with {}").format(verdict.scene)
@@ -250,7 +249,7 @@ def comparison_answer(record: Record) -> list[Markup]:
         sentences = [text + "."]
     elif onset is not None:
         text = Markup('<span class="bad">The data differ from {}</span> from <b>{}</b> on, first in {}.')
-        sentences = [text.format(verdict.scene, with_unit(onset[0], unit, 4), onset[1])]
+        sentences = [text.format(verdict.scene, _place(onset[0], verdict), onset[1])]
     else:
         sentences = [Markup('<span class="bad">The data are {}</span>.').format(verdict.status)]
     good = [channel.name for channel in verdict.channels if not _is_outside(channel, verdict)]
@@ -300,6 +299,11 @@ def onset_of(record: Record, verdict: DataVerdict) -> tuple[float, str] | None:
                 first = max(first - 1, 0)
             found.append((float(rows[first]), channel.name))
     return min(found) if found else None
+
+
+def _place(value: float, verdict: DataVerdict) -> str:
+    """Return a time, or a speed, of at most four digits with its unit."""
+    return f"{shortest(float(f'{value:.4g}'))}{SPACE}{_axis_unit(verdict)}"
 
 
 def _axis_of(record: Record, verdict: DataVerdict) -> Horizontal:

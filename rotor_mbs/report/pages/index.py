@@ -237,7 +237,7 @@ def scene_table(report: Report) -> PageTable:
         "Scene", "The angle that differs most: corrected, as printed", f"Printed model is {draw.VISIBLE:g} rad off after",
         "Energy it creates", f"Corrected: {count} methods agree within (rad)", "Compared",
     )  # fmt: skip
-    return PageTable("All scenes", head, rows, wide=(5,), sortable=True)
+    return PageTable("All scenes", head, rows, wide=(1, 5), sortable=True)
 
 
 def _departure_cells(scene: StoredScene) -> list[TableCell | str]:

@@ -276,11 +276,13 @@ def load_channels(stored: StoredScene, run: StoredRun, jumps: Jumps) -> list[Cha
     """Return the channels of the loads that a run has, and of quantities of installed packages."""
     channels = []
     built_in = {"angles", "rates", "tip", "energy", ""}
-    quantities = known_quantities(stored.scene.outputs)
     # Moments first: they are what a root or a shaft is designed for.
-    for quantity in sorted(
-        quantities, key=lambda quantity: not quantity.name.endswith(("root_moment", "shaft_moment"))
-    ):
+    first = ("blade_root_moment", "blade_root_force", "shaft_moment", "shaft_force")
+    quantities = sorted(
+        known_quantities(stored.scene.outputs),
+        key=lambda quantity: first.index(quantity.name) if quantity.name in first else len(first),
+    )
+    for quantity in quantities:
         is_shown = quantity in LOADS or (quantity.output not in built_in and quantity.plot is not None)
         if is_shown and quantity.name in run:
             channels += quantity_channels(quantity, run, jumps)

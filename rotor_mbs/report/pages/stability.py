@@ -5,9 +5,8 @@ from __future__ import annotations
 from markupsafe import Markup
 
 from rotor_mbs.report.elements import (
+    Element,
     Fact,
-    Fold,
-    Listing,
     Note,
     PageContent,
     PageTable,
@@ -15,8 +14,7 @@ from rotor_mbs.report.elements import (
     Section,
     TableCell,
 )
-from rotor_mbs.report.looks import label_of
-from rotor_mbs.report.numbers import in_words
+from rotor_mbs.report.looks import label_of, with_capital
 from rotor_mbs.report.pages import Report, method_cell
 from rotor_mbs.studies.stability import OUTCOMES, suite_table
 
@@ -38,7 +36,9 @@ def stability_page(report: Report) -> PageContent:
         names = [label_of(method) for method in methods if good[method] == best]
         whole = max(counts.values())
         text = Markup("<b>{}</b> {} ok on <b>{} of {} scenes</b> at default settings, the most.")
-        answer.append(text.format(" and ".join(names[:3]), "is" if len(names) == 1 else "are", best, whole))
+        answer.append(
+            text.format(with_capital(" and ".join(names[:3])), "is" if len(names) == 1 else "are", best, whole)
+        )
         worst = min(methods, key=lambda method: good[method] / max(counts[method], 1))
         if good[worst] < best:
             text = Markup("The fewest: {}, {} of {}.")
@@ -102,13 +102,7 @@ def stability_page(report: Report) -> PageContent:
         "in joints, difference from a quad-precision reference up to the horizon. A reported success is not relied on. "
         "The page of a scene has the reasons."
     )
-    sections = [
-        Section(
-            "map",
-            "Statuses",
-            [*tables, Fold("Key", f"{in_words(len(key))} marks", [Listing(key)], is_open=True)],
-            how,
-        ),
-        Section("summary", "Number of ok runs", [count_table, Note(note)] if len(scenes) > 1 else []),
-    ]
+    meaning = Note(" · ".join(f"{symbol} {words}" for symbol, words in key))
+    summary: list[Element] = [count_table, Note(note)] if len(scenes) > 1 else []
+    sections = [Section("map", "Statuses", [*tables, meaning], how), Section("summary", "Number of ok runs", summary)]
     return PageContent("Stiff and extreme scenes: range of each method", report.path.name, answer, facts, sections)

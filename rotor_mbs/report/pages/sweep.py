@@ -536,7 +536,7 @@ def _parameter_plot(sweep: _Sweep, key: str, quantity: RunQuantity, curves: Sequ
         curves = kept
     unit = sweep.unit(key)
     low, high = float(shown.min()), float(shown.max())
-    room = 0.02 * (high - low) if any(curve.dots == "only" for curve in curves) and not is_log else 0.0
+    room = 0.02 * (high - low) if any(curve.dots for curve in curves) and not is_log else 0.0
     axis = Horizontal(field_name(key), unit, field_name(key), low - room, high + room, is_log)
     return Plot(
         with_capital(quantity.name),

@@ -217,7 +217,8 @@
         if (curve.dots) point(area, curve, from, to);
         if (outside >= 0 && !plot.log) leave(area, curve, outside, limits);
       });
-      marks.filter((mark) => mark.text).forEach((mark) => describe(area, mark, right));
+      const taken = [];  // of each line of texts, where the last one ends
+      marks.filter((mark) => mark.text).forEach((mark) => describe(area, mark, right, taken));
       draw(svg, "path", { class: "axis", d: `M${left} ${TOP}V${bottom}H${right}` });
       cursor = draw(svg, "g", { class: "cursor" });
       read(here, false);
@@ -240,13 +241,18 @@
       draw(area, "text", { class: "quiet", x, y: isAbove ? TOP + 12 : bottom - 6 }, content);
     };
 
-    const describe = (area, { x, y, text: content }, right) => {
+    // The text of a mark; vertical ones in a line of their own where the text before would be covered.
+    const describe = (area, { x, y, text: content }, right, taken) => {
       if (x === undefined) {
         draw(area, "text", { class: "quiet", x: left + 6, y: Math.max(sy.at(y) - 5, TOP + 12) }, content);
         return;
       }
-      const isLeft = sx.at(x) + LETTER * content.length > right;
-      const place = { x: sx.at(x) + (isLeft ? -5 : 5), y: TOP + 12, "text-anchor": isLeft ? "end" : "start" };
+      const length = LETTER * content.length, isLeft = sx.at(x) + length > right;
+      const from = isLeft ? sx.at(x) - length : sx.at(x);
+      let line = 0;
+      while (taken[line] > from) line++;
+      taken[line] = from + length;
+      const place = { x: sx.at(x) + (isLeft ? -5 : 5), y: TOP + 12 + 14 * line, "text-anchor": isLeft ? "end" : "start" };
       draw(area, "text", { class: "quiet", ...place }, content);
     };
 
