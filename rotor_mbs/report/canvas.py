@@ -193,8 +193,8 @@ _STILL_WIDTH = 3.4  # in, of 100 px: 12 px are 12 px on a telephone's page
 _STILL_POINTS = 300  # of a curve: about one a pixel
 
 
-def still(plot: Plot) -> Markup:
-    """Return a picture of a plot for a page without scripts, an `svg` element."""
+def still(plot: Plot, name: str) -> Markup:
+    """Return a picture of a plot for a page without scripts, an `svg` element; names in it begin with `name`."""
     height = plot.height
     with style():
         figure = Figure(figsize=(_STILL_WIDTH, height / 100.0), dpi=100, facecolor="none")
@@ -226,7 +226,6 @@ def still(plot: Plot) -> Markup:
             low, high = axes.get_ylim()
             axes.set_ylim(max(low, plot.clip[0]), min(high, plot.clip[1]))
         axes.set_xlim(plot.x.first, plot.x.last)
-    name = re.sub(r"\W+", "-", plot.name)
     inside = inside_of(encoded(figure, "svg", for_print=False), name)
     return Markup(
         f'<svg viewBox="0 0 {72.0 * _STILL_WIDTH:g} {0.72 * height:g}" role="img" '

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import hashlib
+import itertools
 import json
 import re
 from collections.abc import Iterable, Mapping, Sequence
@@ -78,7 +79,7 @@ def page_names(scenes: Iterable[str]) -> dict[str, str]:
     Raises StoreError for a name with a part ".." or ".": no file of this program has one.
     """
     names: dict[str, str] = {}
-    taken = {*MAIN_PAGES}
+    taken = {f"{name}.html" for name in MAIN_PAGES}
     for scene in scenes:
         if {"..", "."} & set(re.split(r"[/\\]", scene)):
             raise StoreError(f"scene name {scene!r} cannot be made a file name; allowed: no part .. or .")
@@ -125,10 +126,11 @@ def render(page: PageContent, made: Pairs = (), links: Pairs = (), here: str = "
     if any(file != here for file, _ in links):
         shown = [(file, label, file == here) for file, label in links]
     template, store = _environment().get_template("page.html.j2"), CurveStore()
-    html = template.render(page=page, links=shown, versions=made, store=store)
+    known = {"page": page, "links": shown, "versions": made}
+    html = template.render(known, store=store, numbered=itertools.count(1).__next__)
     if store.size > _MAX_NUMBERS:
         store = CurveStore(every=-(-store.size // _MAX_NUMBERS))
-        html = template.render(page=page, links=shown, versions=made, store=store)
+        html = template.render(known, store=store, numbered=itertools.count(1).__next__)
     scripts = "".join(f"<script>{_script(name)}</script>\n" for name, sign in _SCRIPTS.items() if sign in html)
     return html.replace(_PLACE_OF_SCRIPTS, scripts, 1)
 
@@ -187,10 +189,11 @@ def _environment() -> jinja2.Environment:
     return environment
 
 
-def _still(plot: Plot) -> Markup:
+def _still(plot: Plot, number: int) -> Markup:
+    """Return a still picture of a plot; the number is that of no other picture of the page."""
     from rotor_mbs.report.canvas import still  # late: matplotlib, which many pages do not need
 
-    return still(plot)
+    return still(plot, f"still-{number}-")
 
 
 def _breakable(text: str) -> Markup:

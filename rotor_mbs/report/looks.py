@@ -56,14 +56,14 @@ PALETTE = {
     "step-8": ("#c9591a", "#e8763a"),
 }
 STEPS = 9
-INK, PAPER, GREY, GRID, BLUE, VERMILLION = (
-    PALETTE[name][0] for name in ("ink", "card", "grey", "grid", "blue", "vermillion")
+INK, PAPER, GREY, RING, BLUE, VERMILLION = (
+    PALETTE[name][0] for name in ("ink", "card", "grey", "ring", "blue", "vermillion")
 )
 COORDINATES = tuple(PALETTE[name][0] for name in PALETTE if name == "rotor" or name.startswith("blade-"))
-_NAMES = {light: name for name, (light, _) in PALETTE.items()}
+_NAMES = {light: name for name, (light, _) in PALETTE.items()} | {"#000000": "ink"}  # matplotlib's own black
 # Of the models in the order of the catalogue, for their methods in turn; those of other packages are grey.
 _MODEL_COLOURS = (("blue", "navy"), ("brown", "vermillion"), ("green",), ("purple",))
-_ERRATA_COLOURS = ("error-1", "error-2", "error-3")
+_ERRATA = (("error-1", "^"), ("error-2", "P"), ("error-3", "h"))  # colour and marker
 # matplotlib's line styles, and what the style sheet calls them.
 _DASHES = {"-": "solid", "--": "dashed", "-.": "dashdot", ":": "dotted"}
 _MARKERS = ("o", "s", "^", "D", "v", "P", "X", "h", "p", "<", ">")
@@ -100,8 +100,8 @@ def _catalogue_looks() -> dict[str, Look]:
     is solid, that of the printed equations is dashed.
     """
     looks = {REFERENCE: Look(PALETTE["reference"][0], "-", "*"), PRINTED: Look(INK, "--", "o")}
-    for colour, method in zip(_ERRATA_COLOURS, errata_methods().values(), strict=False):
-        looks[method] = Look(PALETTE[colour][0], "-", _MARKERS[1 + len(looks) % 3])
+    for (colour, marker), method in zip(_ERRATA, errata_methods().values(), strict=False):
+        looks[method] = Look(PALETTE[colour][0], "-", marker)
     models: dict[str, int] = {}
     counts = Counter[str]()
     for curve in dict.fromkeys([*method_names(), *ladders()]):
@@ -109,7 +109,7 @@ def _catalogue_looks() -> dict[str, Look]:
             continue
         model = curve.partition("/")[0] if is_corrected(curve) else "printed"
         if model == "printed":
-            looks[curve] = Look(INK, ":", _MARKERS[(5 + counts[model]) % len(_MARKERS)])
+            looks[curve] = Look(INK, ":", _MARKERS[counts[model] % len(_MARKERS)])
             counts[model] += 1
             continue
         place, turn = models.setdefault(model, len(models)), counts[model]

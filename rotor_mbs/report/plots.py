@@ -13,7 +13,7 @@ from rotor_mbs.errors import InputError, shown_value
 from rotor_mbs.models.lagrange.defects import interval_defects
 from rotor_mbs.report import canvas
 from rotor_mbs.report.canvas import TIME_AXIS, Panels
-from rotor_mbs.report.looks import BLUE, GREY, INK, VERMILLION, Look, coordinate_look, look_of
+from rotor_mbs.report.looks import BLUE, GREY, INK, RING, VERMILLION, Look, coordinate_look, look_of
 from rotor_mbs.report.numbers import prefix_of, with_unit
 from rotor_mbs.solution.metrics import angle_error, energy_scale, horizon
 from rotor_mbs.solution.quantities import LOADS, Plot, Quantity
@@ -184,7 +184,7 @@ def draw_paths(axes: Any, tip: Array) -> None:
     axes.set_axis_off()
     angle = np.linspace(0.0, 2.0 * np.pi, 37)
     ring = reach * np.stack([np.sin(angle), 0.0 * angle, np.cos(angle)], axis=1)
-    axes.plot(*projected(ring).T, color="#dddddd", linewidth=0.7)
+    axes.plot(*projected(ring).T, color=RING, linewidth=0.7)
     axes.plot(
         *projected(np.array([[0.0, 0.0, 0.0], [0.0, -0.3 * reach, 0.0]])).T,
         color=GREY,

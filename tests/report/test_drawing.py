@@ -1,4 +1,4 @@
-"""What is drawn, from plain arrays: data, axes, labels, colours; pictures as SVG; numbers as text."""
+"""What is drawn, from plain arrays: data, axes, labels, colours; still pictures; numbers as text."""
 
 from __future__ import annotations
 
@@ -12,10 +12,8 @@ from support.stored import rotor
 from rotor_mbs.methods.catalogue import ladders, method_names
 from rotor_mbs.report import canvas, numbers
 from rotor_mbs.report import plots as figures
-from rotor_mbs.report.canvas import panels
-from rotor_mbs.report.elements import picture as picture_in_page
-from rotor_mbs.report.looks import COLOURS, Look, coordinate_look, look_of, name_of_colour
-from rotor_mbs.report.pages import scene as scene_page
+from rotor_mbs.report.elements import Curve, Horizontal, Mark, Plot
+from rotor_mbs.report.looks import PALETTE, Look, coordinate_look, look_of
 from rotor_mbs.report.plots import Series, paths
 
 LOOK = Look("#0072b2", "-", "o")
@@ -42,14 +40,15 @@ def test_motion_gives_rotor_and_pitches_axes_of_their_own() -> None:
     assert len(figures.motion(TIME, SWING(TIME)[:, :1], None).axes) == 1
 
 
-def test_thinning_loses_no_peak() -> None:
+def test_thinning_loses_no_peak_and_no_sample_of_an_ordinary_run() -> None:
     values = np.sin(np.arange(100_000.0))
     values[54_321], values[77_777] = 9.0, -8.0
     time, thin = figures.thin(np.arange(100_000.0), values)
-    assert len(time) <= 1001
+    assert len(time) <= 4002
     assert (thin.max(), thin.min()) == (9.0, -8.0)
     assert time[thin.argmax()] == 54_321.0
     assert (np.diff(time) > 0).all()
+    np.testing.assert_array_equal(figures.thin(TIME, np.sin(TIME)), (TIME, np.sin(TIME)))
 
 
 def test_differences_are_drawn_at_their_largest_and_zero_is_a_gap() -> None:
@@ -99,27 +98,6 @@ def test_paths_have_equal_scales_and_an_axis_of_stated_length() -> None:
     assert any(np.allclose(span, [0.0, 10.0 * np.cos(np.radians(14.0))]) for span in spans)
 
 
-def test_the_legend_of_a_picture_has_what_is_labelled_once_as_it_is_drawn() -> None:
-    series = [Series(TIME, 1e-9 + TIME, CORRECTED), Series(TIME, 2.0 + TIME, CORRECTED), Series(TIME, 3.0 + TIME, LOOK)]
-    picture = figures.errors(series, "error (rad)", horizon=6.0)
-    picture.axes[0].fill_between(TIME, 1.0, 2.0, color=COLOURS[2], label="between")
-    legend = str(picture_in_page(picture, "n", "t").legend).replace(numbers.SPACE, " ")
-    entries = {label: mark for mark, label in re.findall(r"<li>(.*?)</svg> (.*?)</li>", legend)}
-    assert set(entries) == {"closed form, Taylor", "horizon 6.00 s", "between"}
-    assert f"stroke: var(--{name_of_colour(CORRECTED.colour)})" in entries["closed form, Taylor"]
-    assert "stroke-dasharray" in entries["horizon 6.00 s"]
-    assert f"fill: var(--{name_of_colour(COLOURS[2])})" in entries["between"]
-
-
-def test_a_published_value_stands_in_the_plot_at_its_height() -> None:
-    series = [Series(TIME, 2.7 * np.sin(0.2 * TIME), PRINTED), Series(TIME, 0.3 * TIME, CORRECTED)]
-    mark = (0, 2.7315, "published 2.7315 rad")
-    (axes,) = scene_page.departure([("rotor angle (rad)", series)], [mark], 6.0).axes
-    assert [line.get_ydata()[0] for line in axes.get_lines() if line.get_linestyle() == ":"] == [2.7315]
-    assert "published 2.7315 rad" in axes.get_legend_handles_labels()[1]
-    assert axes.get_ylabel() == "rotor angle (rad)"
-
-
 # Looks
 
 
@@ -127,36 +105,61 @@ def test_every_method_and_every_curve_of_a_bench_has_a_look_of_its_own() -> None
     names = {"reference", *method_names(), *ladders()}
     looks = {name: look_of(name) for name in names}
     assert len(set(looks.values())) == len(looks)
-    for first, second in combinations(method_names(), 2):  # methods differ by more than a colour
+    for first, second in combinations(method_names(), 2):
+        # On a page, where there are no markers, by colour or dashes; in a figure by one thing more.
+        assert looks[first].css != looks[second].css, (first, second)
         a, b = looks[first], looks[second]
         assert (a.colour != b.colour) + (a.line != b.line) + (a.marker != b.marker) >= 2, (first, second)
-    assert {look.colour for look in looks.values()} <= set(COLOURS)
+    assert {look.colour for look in looks.values()} <= {light for light, _ in PALETTE.values()}
+    assert [name for name in ("printed/ode45", "lagrange/taylor", "exudyn_tree/rk67", "exudyn_chain/extrapolated")
+            if looks[name].line != "-"] == ["printed/ode45"]  # of the default methods it alone is dashed  # fmt: skip
 
 
-# Pictures as SVG
+def luminance(colour: str) -> float:
+    """Relative luminance of sRGB, as WCAG 2.1 defines it."""
+    channels = [int(colour[i : i + 2], 16) / 255.0 for i in (1, 3, 5)]
+    linear = [c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4 for c in channels]
+    return float(np.dot([0.2126, 0.7152, 0.0722], linear))
 
 
-def test_a_picture_in_a_page_has_its_labels_its_title_and_the_colours_of_the_page() -> None:
-    picture = panels((2.0,), "time (s)")
-    picture.axes[0].plot([0.0, 1.0, 2.0], [0.1234567, 0.5, 0.25], color=COLOURS[2], marker="s")
-    canvas.ticks(picture.axes[0].yaxis, {0.125: "0.125", 0.625: "0.625"})
-    picture.axes[0].set_ylabel("angle (rad)")
-    text = str(picture_in_page(picture, "motion", "title <b>").svg)
-    for shown in (">0.125<", ">time (s)<", ">angle (rad)<", "title &lt;b&gt;"):
-        assert shown in text
-    colours = set(re.findall(r"#[0-9a-f]{6}|var\(--\w+\)", text))
-    assert colours == {f"var(--{name})" for name in (name_of_colour(COLOURS[2]), "ink", "grid")}
-    assert all(name.startswith("motion") for name in re.findall(r' id="([^"]*)"', text))
+@pytest.mark.parametrize("scheme", [0, 1])
+def test_curves_can_be_seen_on_their_card_in_both_schemes(scheme: int) -> None:
+    """WCAG asks for a contrast of 3 of what is not text."""
+    card = luminance(PALETTE["card"][scheme])
+    for name, pair in PALETTE.items():
+        if name in ("card", "grid", "ring", "heat"):  # behind the curves
+            continue
+        bright, dark = sorted((card, luminance(pair[scheme])), reverse=True)
+        assert (bright + 0.05) / (dark + 0.05) >= 3.0, name
 
 
-def test_a_factor_of_the_tick_labels_stands_with_the_unit() -> None:
-    picture = panels((2.0,), "time (s)")
-    picture.axes[0].plot([0.0, 1.0], [0.0, 3e-4])
-    picture.axes[0].set_ylabel("pitch angle (rad)")
-    text = str(picture_in_page(picture, "a", "b").svg).replace(numbers.SPACE, " ")
-    assert ">pitch angle (10⁻⁴ rad)<" in text
-    assert ">3.0<" in text
-    assert "1e" not in text
+# Still pictures
+
+
+def test_a_still_picture_has_the_curves_the_range_and_the_colours_of_the_page() -> None:
+    axis = Horizontal("time", "s", "t", 0.0, 10.0)
+    jump = Curve("one", coordinate_look(1, "first"), TIME, np.where(TIME < 5.0, 0.0, 1.0), breaks=[500])
+    runaway = Curve("two", coordinate_look(2, "second"), TIME, np.exp(TIME))
+    plot = Plot("angle <b>", "rad", axis, [jump, runaway], marks=[Mark("x", y=0.5)], clip=(-1.0, 2.0), still=True)
+    text = str(canvas.still(plot, "still-1-"))
+    assert "var(--blade-1)" in text
+    assert 'aria-label="angle &lt;b&gt;"' in text
+    assert not re.search(r"#[0-9a-f]{6}\b", text)
+    assert all(name.startswith("still-1-") for name in re.findall(r' id="([^"]*)"', text))
+    ticks = [float(tick.replace("−", "-")) for tick in re.findall(r">([−\d.]+)</text>", text)]
+    assert max(tick for tick in ticks if tick not in (4.0, 6.0, 8.0, 10.0)) <= 2.0  # not exp(10)
+
+
+def test_extremes_of_intervals_are_drawn_and_gaps_are_left_out() -> None:
+    values = np.sin(np.arange(10_000.0))
+    values[4321], values[100:200] = 9.0, np.nan
+    chosen = canvas.extremes(values, 300)
+    assert 4321 in chosen
+    assert len(chosen) <= 302
+    assert (chosen[0], chosen[-1]) == (0, 9999)
+
+
+# Numbers
 
 
 @pytest.mark.parametrize(
@@ -169,7 +172,14 @@ def test_a_factor_of_the_tick_labels_stands_with_the_unit() -> None:
         (numbers.number(None), "–"),
         (numbers.fixed(-0.00001, 4), "0.0000"),
         (numbers.prefixed(999.9, "J"), "1.00 kJ"),
-        (numbers.prefixed(3e-13, "J"), "3.0×10⁻¹³ J"),
+        (numbers.prefixed(3e-13, "J"), "3.00×10⁻¹³ J"),
+        (numbers.prefixed(-0.692, "W"), "−0.692 W"),  # never milli of a mechanical quantity
+        (numbers.prefixed(9.6e4, "N m"), "96.0 kN m"),
+        (numbers.up_to(2.33e-6), "2.4×10⁻⁶"),  # rounded up, for "within"
+        (numbers.up_to(5.19e-6, 1), "6×10⁻⁶"),
+        (numbers.up_to(3e-5, 1), "3×10⁻⁵"),
+        (numbers.shortest(3.2e5), "3.2×10⁵"),
+        (numbers.shortest(300.0), "300"),
         (
             numbers.typeset("off by 8.1e+00 rad, 1e-06 of it, -5.3e-06 s, in stiff/torque-1e9"),
             "off by 8.1 rad, 10⁻⁶ of it, −5.3×10⁻⁶ s, in stiff/torque-1e9",

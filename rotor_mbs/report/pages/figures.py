@@ -95,7 +95,7 @@ def _figure_section(
     elements: list[Grid | Fold | Element] = []
     numbers = paper.number_table([claim for claim in report.claims if claim.figure == figure.number], with_figure=False)
     if figure.kind == PATHS:
-        elements.append(_path_plots(pictures))
+        elements.append(_path_plots(figure.number, pictures))
     else:
         for row in pictures.values():
             elements += _motion_plots(figure, row)
@@ -172,7 +172,7 @@ def _usual_range(
     return range_of(np.concatenate(right), np.concatenate([curve.y for curve in curves]))
 
 
-def _path_plots(pictures: Mapping[str, Mapping[str, Mapping[str, StoredRun]]]) -> Grid:
+def _path_plots(number: str, pictures: Mapping[str, Mapping[str, Mapping[str, StoredRun]]]) -> Grid:
     """Return the paths of the tips by each model, still pictures."""
     from rotor_mbs.report import canvas, plots  # late: matplotlib
 
@@ -181,6 +181,6 @@ def _path_plots(pictures: Mapping[str, Mapping[str, Mapping[str, StoredRun]]]) -
         for side in SIDES:
             for label, run in row.get(side, {}).items():
                 text = f"({label}) {HEADINGS[side]}" if label else HEADINGS[side]
-                drawn = canvas.path_picture(plots.paths(run.array("tip")), f"{side}-{letter}-{run.scene}", text)
+                drawn = canvas.path_picture(plots.paths(run.array("tip")), f"f{number}-{letter}-{side}-", text)
                 cards.append([drawn])
     return Grid(4, cards)

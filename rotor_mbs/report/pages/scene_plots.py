@@ -292,9 +292,12 @@ def load_channels(stored: StoredScene, run: StoredRun, jumps: Jumps) -> list[Cha
 def values_over(table: Sequence[tuple[float, float]], time: Array) -> tuple[Array, Array]:
     """Return a prescribed load by its own points, within the time: (times, values)."""
     end = float(time[-1])
-    inside = [(at, value) for at, value in table if 0.0 <= at <= end]
+    points = [(at, value) for at, value in table if 0.0 <= at <= end]
     first, last = (float(values_at(tuple(table), np.array([at]))[0]) for at in (0.0, end))
-    points = [(0.0, first), *inside, (end, last)] if not inside or inside[0][0] > 0.0 else [*inside, (end, last)]
+    if not points or points[0][0] > 0.0:
+        points.insert(0, (0.0, first))
+    if points[-1][0] < end:
+        points.append((end, last))
     times, values = np.array(points, dtype=float).T
     return times, values
 
