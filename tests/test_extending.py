@@ -132,7 +132,7 @@ def test_a_quantity_is_stored_judged_and_drawn_for_every_method() -> None:
         column = file["two/shaft_momentum"]
         assert (column.attrs["units"], column.shape) == ("N m s", (len(stored), 51))
     assert "momentum" in command("check", "two.h5", "-v")
-    page = (write_report(Path("two.h5"), Path("pages")).parent / "two.html").read_text()
+    page = write_report(Path("two.h5"), Path("pages")).read_text()
     assert "from outside, RK4" in page
     assert "Angular momentum about the shaft" in page
 

@@ -24,9 +24,11 @@ from rotor_mbs.solution.trajectory import Array
 MOTION, PATHS, TORQUES = "motion", "paths", "torques"
 # The models that are compared, by key, in order from left to right; the last one is drawn by its difference.
 HEADINGS = {"printed": "As printed", "corrected": "Corrected model"}
-DIFFERENCE = "Difference from the corrected model"
+DIFFERENCE = "Difference"  # from the corrected model; the caption says so
+REFERENCE_HEADING = "Motion"  # of a scene without a printed model, in which nothing was corrected
 PRINTED_SIDE, CORRECTED, INDEPENDENT = "printed", "corrected", "independent"
 _PAPER = "Aguilar-Acevedo et al., Revista UIS Ingenierías 19(1), 25-36, 2020"
+_LEGEND_HEIGHT = 0.95  # in, of a legend of two lines with the label of the axis above
 _LOWEST = 1e-17  # rad, m: a smaller difference is a gap on the logarithmic axis
 
 
@@ -187,7 +189,10 @@ def composed(figure: PaperFigure, scenes: Mapping[str, StoredScene]) -> canvas.P
             if has_differences and CORRECTED in row_of_runs:
                 column = [row[-1] for row in table]
                 draw_differences(figure, [column[i]] if is_paths else column, row_of_runs)
-        headings = [HEADINGS[key] for key in keys] + [DIFFERENCE] * has_differences
+        names = HEADINGS if PRINTED_SIDE in keys else {CORRECTED: REFERENCE_HEADING}
+        headings = [names[key] for key in keys]
+        if has_differences:
+            headings.append(DIFFERENCE)
         for axes, text in zip(table[0], headings, strict=True):
             axes.text(0.5, heading, text, transform=axes.transAxes, ha="center", weight="bold")
         for axes in panels.axes:
@@ -200,6 +205,9 @@ def composed(figure: PaperFigure, scenes: Mapping[str, StoredScene]) -> canvas.P
             row[0].text(-0.08, 0.94, f"({letter})", transform=row[0].transAxes)
         labelled = panels.labelled()
         count = min(len(labelled), 5)
+        if len(labelled) > count:  # room for a second line of the legend
+            figure_height = float(panels.figure.get_figheight())
+            panels.figure.subplots_adjust(bottom=_LEGEND_HEIGHT / figure_height)
         panels.figure.legend(labelled.values(), labelled, loc="lower center", ncols=count, handlelength=2.6)
     return panels
 
@@ -239,30 +247,37 @@ def caption_of(figure: PaperFigure, scenes: Mapping[str, StoredScene]) -> str:
             else label_of(run.method)
         )
         lines.append(f"{HEADINGS[PRINTED_SIDE]}: {what}. {_method_line(run)}")
+    name = HEADINGS[CORRECTED] if PRINTED_SIDE in sides else REFERENCE_HEADING
     if CORRECTED in sides:
-        text = f"{HEADINGS[CORRECTED]}: right. {_method_line(sides[CORRECTED][0])}"
+        text = f"{name}: right. {_method_line(sides[CORRECTED][0])}"
         bound = _uncertainty(sides[CORRECTED])
         if bound is not None:
             text += f" Its angles are uncertain by at most {up_to(bound)} rad."
         lines.append(text)
+    others = []
+    if PRINTED_SIDE in sides:
+        others.append("of the printed model")
     if INDEPENDENT in sides:
-        text = f"{DIFFERENCE}: the largest over all coordinates, logarithmic; "
-        if figure.kind == PATHS:
-            text = f"{DIFFERENCE}: the largest distance of a tip (m) over time (s), logarithmic; "
+        dotted = " (dotted)" if figure.kind == TORQUES else ""
+        others.append(f"of an independent computation{dotted}")
+    if CORRECTED in sides and others:
+        what = "the largest distance of a tip (m)" if figure.kind == PATHS else "the largest over all coordinates"
+        other = "the corrected model" if PRINTED_SIDE in sides else "the reference"
+        text = f"{DIFFERENCE}: {what}, on a logarithmic axis over time (s), {' and '.join(others)} from {other}."
         worst = _largest_difference(pictures)
-        independent = sides[INDEPENDENT][0]
-        text += f"of the printed model and of an independent computation, {label_of(independent.method)}"
-        if figure.kind == TORQUES:
-            text += " (dotted)"
-        text += f", which agrees within {up_to(worst)} rad. " if worst is not None else ". "
-        lines.append(text + _method_line(independent))
+        if INDEPENDENT in sides:
+            independent = sides[INDEPENDENT][0]
+            text += f" {_method_line(independent)}"
+            if worst is not None:
+                text += f" It agrees within {up_to(worst)} rad in all angles."
+        lines.append(text)
     return "\n".join(lines) + "\n"
 
 
 def _scene_line(label: str, scene: StoredScene) -> str:
     """Return what a scene is: its start, gravity, duration and samples, and whether it is the paper's."""
     initial = scene_tables(scene.scene)["initial"]
-    angles, rates = (", ".join(map(str, initial[key])) for key in ("angles", "rates"))
+    angles, rates = (", ".join(f"{value:.6g}" for value in initial[key]) for key in ("angles", "rates"))
     before = f"({label}) " if label else ""
     state = "" if scene.is_shipped or not scene.name.startswith("paper/") else ", changed: not the scene of the paper"
     return (

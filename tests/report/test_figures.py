@@ -10,15 +10,14 @@ import numpy as np
 import pytest
 from PIL import Image
 from support.commands import refusal, rotor_mbs
+from support.report_pages import plots_of, section_of, text_of
 from support.scenes import paper
 from support.stored import Made, rotor, store
 
 from rotor_mbs.cli import main
 from rotor_mbs.report.animation import wires
-from rotor_mbs.report.elements import TableCell
-from rotor_mbs.report.pages.index import scene_table
-from rotor_mbs.report.pages.paper import FIGURES, available, composed
-from rotor_mbs.report.pages.scene import parting
+from rotor_mbs.report.figures import FIGURES, all_figures, available, caption_of, composed, differences
+from rotor_mbs.report.pages.scene_plots import parting
 from rotor_mbs.runs.read import open_results
 from rotor_mbs.scenario.catalogue import find_scenes
 
@@ -44,42 +43,40 @@ def test_the_set_is_every_figure_from_3_to_16_and_every_scene_is_shipped() -> No
             assert own in shipped[scene].figures, (figure.number, scene)
 
 
-def test_models_are_compared_in_numbers(tmp_path: Path) -> None:
-    """Printed: 0.02 t off, so 0.05 rad at 2.5 s and, at the next of 301 samples, more; Exudyn: 1e-9 t."""
+def test_models_part_when_their_angles_visibly_differ(tmp_path: Path) -> None:
+    """Printed: 0.02 t off, so 0.05 rad at 2.5 s and, at the next of 301 samples, more."""
     scene = paper("fig11", samples=301)
     runs = [
         Made(scene, "reference", rotor(lambda t: 0.5 + 0.1 * t, np.sin)),
-        Made(scene, "printed/ode45", rotor(lambda t: 0.5 + 0.12 * t, np.sin), gain=2e3),
-        Made(scene, "exudyn_tree/rk67", rotor(lambda t: 0.5 + (0.1 + 1e-9) * t, np.sin)),
+        Made(scene, "printed/ode45", rotor(lambda t: 0.5 + 0.12 * t, np.sin)),
         Made(replace(scene, name="paper/fig12"), "reference", RIGHT),
         Made(replace(scene, name="paper/fig12"), "printed/ode45", RIGHT),
     ]
     with open_results(store(tmp_path / "r.h5", runs)) as opened:
-        table, _ = scene_table(opened.scenes, dict.fromkeys(opened.scenes, "x.html"))
         parted, same = (parting(*scene.sides.values()) for scene in opened.scenes.values())
-    head = [cell if isinstance(cell, str) else cell.note for cell in table.head]
-    row, _ = (dict(zip(head, row, strict=True)) for row in table.rows)
     assert parted == (pytest.approx(2.5, abs=0.04), pytest.approx(0.2))
     assert same == (None, 0.0)
-    assert str(row["As printed: energy gain"]).replace("\N{NO-BREAK SPACE}", " ") == "2.00 kJ"
-    error = row["exudyn_tree/rk67"]
-    assert isinstance(error, TableCell)
-    assert (error.text, error.shade[:3]) == ("1.0×10⁻⁸", "n h")
 
 
 def test_a_figure_has_its_models_its_scenes_and_the_published_number(report: Path) -> None:
-    text = (report / "figures.html").read_text(encoding="utf-8").replace("\N{NO-BREAK SPACE}", " ")
-    section = re.search(r'<section id="figure-11".*?</section>', text, re.S)
-    assert section is not None
-    assert section[0].count("<figure>") == 1
-    assert all(f">{heading}<" in section[0] for heading in ("As printed", "Corrected model", "Exudyn"))
-    assert "Columns: as printed, ode45; reference, quad precision; Exudyn tree, RK67" in section[0]
-    assert ">2.7315<" in section[0]
-    assert "initial state pi/6, pi/4, pi/6, pi/2 rad and pi/10, 0, 0, 0 rad/s" in section[0]
+    section = section_of(text_of(report, "figures.html"), "figure-11")
+    assert section.count('<figure class="plot"') == 4  # position and velocity, as printed and corrected
+    assert "As printed: as printed, ode45; Corrected model: reference, quad precision" in section
+    assert ">2.7315<" in section
+    assert "initial state pi/6, pi/4, pi/6, pi/2 rad and pi/10, 0, 0, 0 rad/s" in section
     # Fig. 13a is the same run; 13b is not in the file.
-    figure_13 = re.search(r'<section id="figure-13".*?</section>', text, re.S)
-    assert figure_13 is not None
-    assert (">(a) " in figure_13[0], ">(b) " in figure_13[0]) == (True, False)
+    paths = section_of(text_of(report, "figures.html"), "figure-13")
+    assert ("(a) As printed" in paths, "(b) As printed" in paths) == (True, False)
+
+
+def test_the_plots_of_a_figure_have_every_sample(results: Path, report: Path) -> None:
+    plots = plots_of(section_of(text_of(report, "figures.html"), "figure-11") + text_of(report, "figures.html"))
+    with open_results(results) as opened:
+        run = opened.scenes["paper/fig11"].runs["printed/ode45"]
+        time, rates = run.array("time"), run.array("rates")
+    x, y = plots["As printed: angular velocity"].curves["pitch 2"]
+    np.testing.assert_allclose(x, time, rtol=1e-7)
+    np.testing.assert_allclose(y, rates[:, 2], rtol=1e-6, atol=1e-12)
 
 
 # As files
@@ -87,8 +84,8 @@ def test_a_figure_has_its_models_its_scenes_and_the_published_number(report: Pat
 
 def test_every_figure_the_file_has_is_written(drawn: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["figures", str(drawn), "-o", str(tmp_path), "--format", "svg"]) == 0
-    names = [f"fig{number:02d}.svg" for number in (8, 9, 10, 11, 13, 15, 16)]
-    assert sorted(path.name for path in tmp_path.iterdir()) == names
+    names = [f"fig{number:02d}.{ending}" for number in (8, 9, 10, 11, 13, 15, 16) for ending in ("svg", "txt")]
+    assert sorted(path.name for path in tmp_path.iterdir()) == sorted(names)
     assert capsys.readouterr().out.split() == [str(tmp_path / name) for name in names]
     head = (tmp_path / "fig11.svg").read_text(encoding="utf-8")[:2000]
     width = re.search(r'width="([\d.]+)pt"', head)
@@ -96,27 +93,81 @@ def test_every_figure_the_file_has_is_written(drawn: Path, tmp_path: Path, capsy
     assert float(width[1]) / 72 * 25.4 == pytest.approx(174.0, abs=0.01)  # two columns of a journal
 
 
-@pytest.mark.parametrize(("kind", "start"), [("pdf", b"%PDF"), ("png", b"\x89PNG")])
-def test_formats_have_the_same_bytes_every_time(drawn: Path, tmp_path: Path, kind: str, start: bytes) -> None:
+@pytest.mark.parametrize(("kind", "start"), [("pdf", b"%PDF"), ("png", b"\x89PNG"), ("svg", b"<?xml")])
+def test_formats_have_the_same_bytes_every_time_and_say_what_they_show(
+    drawn: Path, tmp_path: Path, kind: str, start: bytes
+) -> None:
     for folder in ("a", "b"):
-        assert main(["figures", str(drawn), "--format", kind, "--figure", "13", "-o", str(tmp_path / folder)]) == 0
-    content = (tmp_path / "a" / f"fig13.{kind}").read_bytes()
+        assert main(["figures", str(drawn), "--format", kind, "--figure", "11", "-o", str(tmp_path / folder)]) == 0
+    content = (tmp_path / "a" / f"fig11.{kind}").read_bytes()
     assert content.startswith(start)
-    assert content == (tmp_path / "b" / f"fig13.{kind}").read_bytes()
-    assert [path.name for path in (tmp_path / "a").iterdir()] == [f"fig13.{kind}"]
+    assert content == (tmp_path / "b" / f"fig11.{kind}").read_bytes()
+    assert sorted(path.name for path in (tmp_path / "a").iterdir()) == [f"fig11.{kind}", "fig11.txt"]
+    title = "Figure 11 of Aguilar-Acevedo et al."
+    if kind == "pdf":  # texts beyond Latin letters are UTF-16 in a PDF
+        assert title.encode("utf-16-be") in content or title.encode() in content
+        assert b"/Subject" in content
+    elif kind == "svg":
+        assert f"<title>{title}" in content.decode()
+        assert "the equations as printed" in content.decode()
+    else:
+        with Image.open(tmp_path / "a" / "fig11.png") as image:
+            assert str(image.info["Title"]).startswith(title)
+            assert "the equations as printed" in str(image.info["Description"])
 
 
-def test_a_figure_shows_each_model_in_a_column_as_it_was_stored(drawn: Path) -> None:
+def test_the_caption_has_scene_methods_settings_and_what_is_right(drawn: Path) -> None:
     with open_results(drawn) as opened:
+        text = caption_of(all_figures(opened.scenes)["11"], opened.scenes)
+        run, other = (opened.scenes["paper/fig11"].runs[name] for name in ("exudyn_tree/rk67", "reference"))
+        assert differences("angles", run, other).max() == 0.0
+    for piece in (
+        "Figure 11 of", "scene paper/fig11", "initial angles 0.523599, 0.785398, 0.523599, 1.5708 rad",
+        "gravity 9.8 m/s^2; 10 s, 1001 samples", "with their 3 errors; wrong", "(printed/ode45)",
+        "Corrected model: right", "(reference)", "of an independent computation from the corrected model",
+        "(exudyn_tree/rk67)", "It agrees within 0 rad",
+    ):  # fmt: skip
+        assert piece in text, piece
+
+
+def test_a_figure_shows_each_model_as_it_was_stored_and_how_far_the_others_are(tmp_path: Path) -> None:
+    """The printed rotor is 0.2 t, the independent one 1e-9 off."""
+    scene = paper("fig11", samples=101)
+    runs = [
+        Made(scene, "reference", RIGHT),
+        Made(scene, "printed/ode45", lambda t: RIGHT(t) + 0.2 * t[:, None]),
+        Made(scene, "exudyn_tree/rk67", lambda t: RIGHT(t) + 1e-9),
+    ]
+    with open_results(store(tmp_path / "r.h5", runs)) as opened:
         figure = next(figure for figure in available(opened.scenes) if figure.number == "11")
         panels = composed(figure, opened.scenes)
         run = opened.scenes["paper/fig11"].runs["printed/ode45"]
         time, angles, rates = run.array("time"), run.array("angles"), run.array("rates")
     assert len(panels.axes) == 6
-    assert [axes.texts[0].get_text() for axes in panels.axes[:3]] == ["As printed", "Corrected model", "Exudyn"]
+    assert [axes.texts[0].get_text() for axes in panels.axes[:3]] == ["As printed", "Corrected model", "Difference"]
     for axes, values in ((panels.axes[0], angles), (panels.axes[3], rates)):
         for line, column in zip(axes.get_lines(), values.T, strict=True):
             np.testing.assert_array_equal(line.get_xydata(), np.column_stack([time, column]))
+    printed, independent = panels.axes[2].get_lines()
+    assert panels.axes[2].get_yscale() == "log"
+    np.testing.assert_allclose(printed.get_ydata()[1:], 0.2 * time[1:], rtol=1e-9)
+    np.testing.assert_allclose(independent.get_ydata(), 1e-9, rtol=1e-5)  # eight digits are left of the difference
+
+
+def test_a_changed_scene_and_ones_own_have_figures_that_say_so(tmp_path: Path) -> None:
+    changed = paper("fig11", samples=11).replace(gravity=9.0)
+    own = replace(changed, name="mine", title="Mine", figures=())
+    path = store(tmp_path / "r.h5", [Made(changed, "reference", RIGHT), Made(own, "reference", RIGHT)])
+    assert main(["figures", str(path), "-o", str(tmp_path / "out")]) == 0
+    names = ["mine.pdf", "mine.txt", "paper-fig11.pdf", "paper-fig11.txt"]
+    assert sorted(file.name for file in (tmp_path / "out").iterdir()) == names
+    text = (tmp_path / "out" / "paper-fig11.txt").read_text(encoding="utf-8")
+    assert "changed: not the scene of the paper" in text
+    assert "Figure 11" not in text
+    assert "gravity 9 m/s^2" in text
+    assert "changed" not in (tmp_path / "out" / "mine.txt").read_text(encoding="utf-8")
+    assert main(["figures", str(path), "--figure", "mine", "-o", str(tmp_path / "one")]) == 0
+    assert len([*(tmp_path / "one").iterdir()]) == 2
 
 
 def test_paths_without_tips_are_no_figure(tmp_path: Path) -> None:

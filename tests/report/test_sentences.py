@@ -1,0 +1,232 @@
+"""The sentences and facts at the top of pages against the numbers of their files, computed here once more."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from support.checking import results_file
+from support.report_pages import answer_of, facts_of, section_of, text_of
+from support.scenes import paper
+from support.stored import Made, rotor, store
+
+from rotor_mbs.report.build import write_report
+from rotor_mbs.report.numbers import number
+from rotor_mbs.report.pages import computations
+from rotor_mbs.report.pages.comparison import compare, onset_of
+from rotor_mbs.report.pages.modes import modes_page
+from rotor_mbs.runs.read import open_results
+from rotor_mbs.scenario.scene import scene_toml
+from rotor_mbs.studies.modes import compute_modes
+
+TAYLOR, DOP853, TREE = "lagrange/taylor", "lagrange/dop853", "exudyn_tree/rk67"
+MARK = r"([\d.]+(?:×10[⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+)?)"
+DIGITS = str.maketrans("⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "-0123456789")
+
+
+def value(text: str) -> float:
+    """The number that was written as 2.4×10⁻⁶, 96.0 or −3.2."""
+    mantissa, _, power = text.replace("−", "-").partition("×10")
+    return float(mantissa) * 10.0 ** int(power.translate(DIGITS) or 0)
+
+
+def found(pattern: str, text: str) -> list[float]:
+    match = re.search(pattern.replace("NUMBER", MARK), text)
+    assert match is not None, (pattern, text)
+    return [value(group) for group in match.groups()]
+
+
+# A scene of the paper
+
+
+def test_the_sentence_of_a_scene_of_the_paper_has_its_numbers(results: Path, report: Path) -> None:
+    text = answer_of(text_of(report, "paper-fig11.html"))
+    with open_results(results) as opened:
+        scene = opened.scenes["paper/fig11"]
+        printed, reference, taylor = (scene.runs[name] for name in ("printed/ode45", "reference", TAYLOR))
+        gap = np.abs(printed.array("angles") - reference.array("angles")).max(axis=1)
+        left = printed.array("time")[np.flatnonzero(gap > 0.05)[0]]
+        gain, scale = (printed.attributes[name] for name in ("energy_gain_J", "energy_scale_J"))
+        error = taylor.attributes["angle_error_max"]
+    within = found(r"within NUMBER rad", text)[0]
+    assert error <= within <= 1.1 * error  # rounded up, two digits
+    (departs,) = found(r"by more than 0\.05 rad at NUMBER s", text)
+    assert departs == pytest.approx(left, rel=0.01)
+    megajoules, percent = found(r"create NUMBER MJ of energy, NUMBER % of what", text)
+    assert megajoules * 1e6 == pytest.approx(gain, rel=5e-3)
+    assert percent == pytest.approx(100.0 * gain / scale, rel=0.05)
+    # The tree run is inaccurate: it stands first, in red, and is not counted among what agrees.
+    assert text.startswith("Exudyn tree, RK67 is inaccurate")
+    assert "Closed form, Taylor of the corrected model agrees" in text
+    facts = facts_of(text_of(report, "paper-fig11.html"))
+    assert facts["Corrected model"] == "inaccurate | 1 of 2 methods ok, limit 0.01 rad"
+    assert facts["Printed model leaves it after"].startswith(f"{number(left)} s | largest difference")
+    assert facts["Published crest"] == "2.7315 rad | as printed 2.7315, corrected 3.6000"
+
+
+def test_a_bound_is_never_below_its_number(tmp_path: Path) -> None:
+    """2.33e-6 is not within 2.3e-6."""
+    scene = paper("fig11", samples=101)
+    for error in (2.31e-6, 9.97e-6, 1.0e-5):
+        runs = [
+            Made(scene, "reference", rotor(lambda t: t)),
+            Made(scene, "printed/ode45", rotor(lambda t: 2.0 * t)),
+            Made(scene, TAYLOR, rotor(lambda t, e=error: t + e * t / 10.0)),
+        ]
+        folder = write_report(store(tmp_path / f"{error}.h5", runs), tmp_path / f"{error}").parent
+        (within,) = found(r"within NUMBER rad", answer_of(text_of(folder)))
+        assert error * (1.0 - 1e-9) <= within < 1.1 * error
+
+
+def test_a_printed_run_that_creates_nothing_is_not_said_to(report: Path) -> None:
+    text = answer_of(text_of(report, "paper-fig14a.html"))
+    assert "stay within 0 rad of them." in text
+    assert "energy" not in text
+
+
+# The index
+
+
+def test_the_index_says_what_was_found(results: Path, report: Path) -> None:
+    text = answer_of(text_of(report, "index.html"))
+    assert text.startswith("The paper's printed equations contain three errors and create energy in 2 of 4 scenes.")
+    with open_results(results) as opened:
+        error = opened.scenes["paper/fig11"].runs[TAYLOR].attributes["angle_error_max"]
+    (within,) = found(r"Corrected, closed form, Taylor agrees within NUMBER rad in 1 of 4 scenes", text)
+    assert error <= within < 2.0 * error
+    assert "Of four numbers that the paper publishes three come out of the printed equations and none" in text
+    facts = facts_of(text_of(report, "index.html"))
+    assert facts["Published numbers reproduced"].startswith("3 of 4 | by the printed equations; three of them")
+    assert facts["Scenes in which energy is created"] == "2 of 4 | up to 1.0 MJ (fig11)"  # fig12 broke off
+
+
+def test_methods_are_counted_as_independent_by_their_models() -> None:
+    assert computations([TAYLOR, TREE, "exudyn_chain/extrapolated"]) == "three independent computations"
+    assert computations([TAYLOR, DOP853]) == "two methods of one model"
+
+
+# A scene of one's own
+
+
+def own(folder: Path, **changes: object) -> tuple[Path, Path]:
+    """A rotor that turns and pitches in known ways: its file and the folder of its page."""
+    scene = replace(paper("fig11"), name="mine", title="Mine", figures=(), samples=1001, **changes)  # type: ignore[arg-type]
+    scene = replace(scene, text=scene_toml(scene))
+    angles = rotor(lambda t: 3.0 * t, lambda t: 0.1 * np.sin(t), lambda t: 0.05 + 0.0 * t)
+    path = store(folder / "r.h5", [Made(scene, "reference", angles), Made(scene, TAYLOR, angles)])
+    return path, write_report(path, folder / "out").parent
+
+
+def test_the_sentence_of_ones_own_scene_says_what_happened_before_how_it_was_checked(tmp_path: Path) -> None:
+    _, folder = own(tmp_path)
+    text = answer_of(text_of(folder))
+    turns, seconds, slow, fast = found(r"^The rotor turns NUMBER times in NUMBER s, at NUMBER to NUMBER rad/s", text)
+    assert (turns, seconds, slow, fast) == pytest.approx((30.0 / (2.0 * np.pi), 10.0, 3.0, 3.0), rel=2e-3)
+    low, high = re.search(r"Pitch stays between (\S+)° and (\S+)°", text).groups()  # type: ignore[union-attr]
+    assert (value(low), value(high)) == pytest.approx((-np.degrees(0.1), np.degrees(0.1)), rel=2e-3)
+    assert text.endswith("Closed form, Taylor agrees with the reference exactly.")
+
+
+def test_a_rotor_that_does_not_turn_is_said_to_move_between_two_angles(tmp_path: Path) -> None:
+    scene = replace(paper("fig11"), name="mine", figures=())
+    scene = replace(scene, text=scene_toml(scene))
+    path = store(tmp_path / "r.h5", [Made(scene, TAYLOR, rotor(lambda t: 0.5 * np.sin(t)))])
+    text = answer_of(text_of(write_report(path, tmp_path / "out").parent))
+    assert text.startswith("In 10 s the rotor moves between −28.6° and 28.6°, at −0.500 to 0.500 rad/s.")
+
+
+def test_the_largest_root_moment_is_that_of_the_file(tmp_path: Path) -> None:
+    path = results_file(tmp_path / "r.h5", ["check/loads"], [DOP853])
+    text = text_of(write_report(path, tmp_path / "out").parent)
+    with open_results(path) as opened:
+        run = opened.scenes["check/loads"].reference
+        assert run is not None
+        sizes = np.linalg.norm(run.array("blade_root_moment"), axis=2)
+        sample, blade = np.unravel_index(sizes.argmax(), sizes.shape)
+        time = run.array("time")[sample]
+    moment, at = found(rf"largest blade root moment is NUMBER kN m, blade {blade + 1} at NUMBER s", answer_of(text))
+    assert (moment * 1e3, at) == pytest.approx((sizes.max(), time), rel=5e-3)
+    assert facts_of(text)["Largest root moment"].startswith(f"{number(sizes.max() / 1e3, 3)} kN m | blade {blade + 1}")
+
+
+def test_a_status_that_is_not_ok_stands_above_all(tmp_path: Path) -> None:
+    scene = replace(paper("fig11", samples=101), name="mine", figures=())
+    scene = replace(scene, text=scene_toml(scene))
+    bad = {"status": "inaccurate", "message": "defect of 3e-2 rad, allowed 1e-6"}
+    runs = [
+        Made(scene, "reference", rotor(lambda t: t)),
+        Made(scene, TAYLOR, rotor(lambda t: t)),
+        Made(scene, TREE, rotor(lambda t: 1.1 * t), attributes=bad),
+    ]
+    text = text_of(write_report(store(tmp_path / "r.h5", runs), tmp_path / "out").parent)
+    assert answer_of(text).startswith("Exudyn tree, RK67 is inaccurate: defect of 3e-2 rad, allowed 1e-6.")
+    (name, fact), *_ = facts_of(text).items()
+    assert (name, fact) == ("Result", "inaccurate | 1 of 2 methods ok, limit 0.01 rad")
+    assert '<dd class="bad">inaccurate' in text
+
+
+def test_a_run_without_samples_is_said_to_have_none(tmp_path: Path) -> None:
+    scene = replace(paper("fig11", samples=11), name="mine", figures=())
+    failed = {"status": "solver_failed", "message": "no step was possible"}
+    path = store(tmp_path / "r.h5", [Made(scene, TAYLOR, rotor(lambda t: t), until=0.0, attributes=failed)])
+    text = text_of(write_report(path, tmp_path / "out").parent)
+    assert (
+        answer_of(text) == "Closed form, Taylor: solver failed: no step was possible. No run of this scene has samples."
+    )
+    assert 'class="plot"' not in text
+
+
+# Comparison
+
+
+def test_a_comparison_names_the_onset_of_a_fault_and_crosses_only_what_differs(tmp_path: Path) -> None:
+    """Of Fig. 3 the rotor is 0.02 rad off from 4 s on; the pitch is right."""
+    scene = paper("fig03")
+    (reference,) = [results_file(tmp_path / "r.h5", ["paper/fig03"], [])]
+    with open_results(reference) as opened:
+        run = opened.scenes["paper/fig03"].reference
+        assert run is not None
+        time, angles, rates = (run.array(name).copy() for name in ("time", "angles", "rates"))
+    angles[time > 4.0, 0] += 0.02
+    compared = compare({"time": time, "angles": angles, "rates": rates}, scene)
+    onset = onset_of(compared.record, compared.verdict)
+    assert onset is not None
+    assert onset[0] == pytest.approx(4.0, abs=1e-9)  # the last row that is right
+    text = text_of(compared.to_html(tmp_path / "out").parent)
+    assert "The data differ from paper/fig03 from 4 s on" in answer_of(text)
+    assert facts_of(text)["First outside the tolerance"].startswith("4 s")
+    rows = dict(
+        re.findall(r'<th scope="row">(.*?)</th><td[^>]*>.*?</td><td[^>]*>(.*?)</td>', section_of(text, "table"))
+    )
+    assert "✗" in rows["rotor"]
+    assert "✓" in rows["pitch 1"]
+
+
+def test_data_that_agree_are_said_to(tmp_path: Path) -> None:
+    with open_results(results_file(tmp_path / "r.h5", ["paper/fig03"], [])) as opened:
+        run = opened.scenes["paper/fig03"].reference
+        assert run is not None
+        data = {name: run.array(name) for name in ("time", "angles", "rates")}
+    text = text_of(compare(data, paper("fig03")).to_html(tmp_path / "out").parent)
+    assert answer_of(text).startswith("The data agree with paper/fig03")
+    assert facts_of(text)["Verdict"] == "✓ agrees"
+    assert "✗" not in text
+
+
+# Modes
+
+
+def test_the_sentence_of_modes_has_their_frequencies_and_stability() -> None:
+    modes = compute_modes(paper("fig11").replace(bearing={"stiffness": 1e4}), [0.0, 1.0, 2.0])
+    page = modes_page([modes])
+    text = " ".join(re.sub("<[^>]*>", "", str(sentence)) for sentence in page.answer).replace("\u00a0", " ")
+    rest = next(iter(modes.rest.values())).undamped_frequencies[0] / (2.0 * np.pi)
+    known = rest[rest > 1e-6 * rest.max()]
+    numbers = [value(text) for text in re.search(r"natural frequencies are (.*?) Hz", text)[1].split(" to ")]  # type: ignore[index]
+    assert numbers[0] == pytest.approx(known.min(), rel=1e-3)
+    assert numbers[-1] == pytest.approx(known.max(), rel=1e-3)
+    assert "agree within" in text
+    assert ("stable at all" in text) == bool((modes.floquet is not None) and (modes.floquet.stable == 1).all())
