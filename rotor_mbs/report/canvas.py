@@ -241,7 +241,8 @@ def path_picture(panels: Panels, name: str, caption: str) -> Markup:
     inside = inside_of(encoded(panels.figure, "svg", for_print=False), re.sub(r"\W+", "-", name))
     return Markup(
         f'<figure class="paths"><figcaption>{escape(caption)}</figcaption>'
-        f'<svg viewBox="0 0 {width:g} {height:g}" role="img" aria-label="{escape(caption)}: paths of the tips">{inside}</svg>'
+        f'<svg viewBox="0 0 {width:g} {height:g}" role="img" '
+        f'aria-label="{escape(caption)}: paths of the tips">{inside}</svg>'
         "</figure>"
     )
 

@@ -59,7 +59,7 @@ FIGURES = (
 
 
 def available(scenes: Mapping[str, StoredScene]) -> tuple[PaperFigure, ...]:
-    """Return the figures of which `scenes` has a panel, with the panels that it has; none of a scene that was changed."""
+    """Return the figures of which `scenes` has a panel, with these panels; none of a changed scene."""
     figures = []
     for figure in FIGURES:
         panels = tuple(panel for panel in figure.panels if panel[1] in scenes and scenes[panel[1]].is_shipped)
@@ -69,7 +69,7 @@ def available(scenes: Mapping[str, StoredScene]) -> tuple[PaperFigure, ...]:
 
 
 def all_figures(scenes: Mapping[str, StoredScene]) -> dict[str, PaperFigure]:
-    """Return the figures of the paper by number, and one by name for each scene that is in none: changed, or one's own."""
+    """Return the paper's figures by number, and one by name for each scene that is in none of them."""
     figures = {figure.number: figure for figure in available(scenes)}
     shown = {name for figure in figures.values() for _, name in figure.panels}
     for name in scenes:
@@ -92,7 +92,7 @@ def compared_runs(scene: StoredScene) -> dict[str, StoredRun]:
 
 
 def panel_runs(figure: PaperFigure, scenes: Mapping[str, StoredScene]) -> dict[str, dict[str, dict[str, StoredRun]]]:
-    """Return the runs of each picture by label, row by row: by letter, then by "printed", "corrected", "independent"."""
+    """Return the runs of each picture by label: by letter of the row, then by model."""
     rows: dict[str, dict[str, dict[str, StoredRun]]] = {}
     for label, name in figure.panels:
         letter = "" if figure.kind == TORQUES else label
@@ -281,8 +281,9 @@ def _scene_line(label: str, scene: StoredScene) -> str:
     before = f"({label}) " if label else ""
     state = "" if scene.is_shipped or not scene.name.startswith("paper/") else ", changed: not the scene of the paper"
     return (
-        f"{before}{scene.title} (scene {scene.name}{state}): initial angles {angles} rad and rates {rates} rad/s, rotor "
-        f"first; gravity {scene.scene.gravity:g} m/s^2; {scene.scene.duration:g} s, {scene.scene.samples} samples."
+        f"{before}{scene.title} (scene {scene.name}{state}): "
+        f"initial angles {angles} rad and rates {rates} rad/s, rotor first; "
+        f"gravity {scene.scene.gravity:g} m/s^2; {scene.scene.duration:g} s, {scene.scene.samples} samples."
     )
 
 

@@ -127,7 +127,7 @@ def test_every_plot_is_drawn_text_is_legible_and_tables_fit_their_cards(
             "[...document.querySelectorAll('body *')].filter(e => [...e.childNodes].some(n => n.nodeType === 3 &&"
             "n.textContent.trim()) && e.getClientRects().length && !e.closest('noscript, sub, script')).filter(e => {"
             "const svg = e.closest('svg'), box = svg && (svg.ownerSVGElement ?? svg);"
-            "const scale = box && box.viewBox.baseVal ? box.getBoundingClientRect().width / box.viewBox.baseVal.width : 1;"
+            "const view = box?.viewBox.baseVal, scale = view ? box.getBoundingClientRect().width / view.width : 1;"
             "return parseFloat(getComputedStyle(e).fontSize) * scale < 11.9; }).map(e => e.textContent.slice(0, 40))"
         )
         assert small == [], path.name
@@ -221,9 +221,11 @@ def test_the_viewer_obeys_the_keyboard(page: Page, report: Path) -> None:
     assert {"play", "time", "speed", "mode", "offset", "CANVAS", "BUTTON"} <= reached
 
 
-_CURSORS = """[...document.querySelectorAll('.plot')].filter(p => JSON.parse(p.dataset.plot).x.name === 'time').map(p => {
+_CURSORS = """[...document.querySelectorAll('.plot')].filter(p =>
+  p.dataset.plot.includes('"x":{"name":"time"')).map(p => {
   const line = p.querySelector('.cursor path'), svg = p.querySelector(':scope > svg');
-  const [left, , right] = svg.querySelector('.axis').getAttribute('d').match(/[\\d.]+/g).map(Number).filter((_, i) => i !== 1);
+  const corners = svg.querySelector('.axis').getAttribute('d').match(/[\\d.]+/g).map(Number);
+  const left = corners[0], right = corners[3];
   const at = line && Number(line.getAttribute('d').match(/[\\d.]+/)[0]);
   return line ? 10 * (at - left) / (right - left) : null; })"""
 

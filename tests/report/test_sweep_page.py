@@ -159,7 +159,8 @@ def test_runs_that_are_not_ok_are_grouped_by_status_and_reason_with_their_ranges
     """A step that is far too long for the two stiffest bearings."""
     path = made_sweep(
         tmp_path,
-        'title = "t"\nscene = "paper/fig08"\nsamples = 11\nmethods = ["exudyn_tree/rk44"]\noutputs = ["angles", "rates"]\n'
+        'title = "t"\nscene = "paper/fig08"\nsamples = 11\nmethods = ["exudyn_tree/rk44"]\n'
+        'outputs = ["angles", "rates"]\n'
         'change = { "initial.angles[1]" = 0.2, duration = 1 }\nsettings = { step = 0.05 }\n'
         '[[axis]]\nkey = "bearing.stiffness"\nvalues = [0, 1e6, 1e7]\n[[axis]]\nkey = "gravity"\nvalues = [9, 10]\n',
     )

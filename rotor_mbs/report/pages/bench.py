@@ -90,8 +90,9 @@ def bench_page(results: OpenResults) -> PageContent:
 
 
 _LOWER_LEFT = (
-    "Each point is one method at one setting: the median of its run times, and the error of the same runs. The lower "
-    "left is best. Settings that another one of the same method beats in both, and runs that failed, are in the tables."
+    "Each point is one method at one setting: the median of its run times, and the error of the "
+    "same runs. The lower left is best. Settings that another one of the same method beats in "
+    "both, and runs that failed, are in the tables."
 )
 
 
@@ -249,7 +250,7 @@ def _reach_table(curves: Sequence[Record]) -> PageTable:
 
 
 def _reach_section(scenes: Mapping[str, Sequence[Record]]) -> Section:
-    """Return a row per scene, a column per method: whether it reaches 1e-6 rad, and how much slower than the fastest."""
+    """Return which method reaches 1e-6 rad on which scene, and how much slower than the fastest."""
     target = 1e-6
     methods = list(dict.fromkeys(curve.method for curves in scenes.values() for curve in curves))
     tables = []
@@ -278,7 +279,10 @@ def _reach_section(scenes: Mapping[str, Sequence[Record]]) -> Section:
                     row.append(TableCell("✗ not reached", "bad"))
             rows.append(row)
         tables.append(PageTable("Time to 1e-6 rad", ("Scene", *(label_of(method) for method in shown)), rows))
-    say = "✓: reaches 10⁻⁶ rad, with its run time relative to the fastest there. Not measured: finer settings did not fit the time budget."
+    say = (
+        "✓: reaches 10⁻⁶ rad, with its run time relative to the fastest there. Not measured: finer "
+        "settings did not fit the time budget."
+    )
     return Section("reach", "Scenes and methods", tables, say)
 
 
@@ -311,14 +315,16 @@ def _in_a_line(cell: TableCell | str) -> str:
 
 
 _EXPLAINED = (
-    "Ok on scenes: at least one setting has the status ok. Best defect, best error: of the most accurate setting, on the "
-    'scene where it is largest; "fails": no setting on that many scenes ends with an error below 1 rad. Time to an error: '
-    "on how many scenes it is reached, and the run time relative to the fastest method there, median over these scenes. "
-    "Energy drift: relative to the energy scale, for a run of 100 s or more with default settings, if the file has one. "
-    "Zero pitch: whether pitch angles that are exactly zero in the reference remain zero. Wrong but reported as success: "
-    "of the finished runs of the stability suite that are not ok (without these in the file: of the points on this page "
-    "that failed), those that the engine reported as successful although they are far from the motion. ≤, ≥ and not "
-    "measured: finer settings were omitted because of the time budget."
+    "Ok on scenes: at least one setting has the status ok. Best defect, best error: of the most "
+    'accurate setting, on the scene where it is largest; "fails": no setting on that many scenes '
+    "ends with an error below 1 rad. Time to an error: on how many scenes it is reached, and the "
+    "run time relative to the fastest method there, median over these scenes. Energy drift: "
+    "relative to the energy scale, for a run of 100 s or more with default settings, if the file "
+    "has one. Zero pitch: whether pitch angles that are exactly zero in the reference remain "
+    "zero. Wrong but reported as success: of the finished runs of the stability suite that are "
+    "not ok (without these in the file: of the points on this page that failed), those that the "
+    "engine reported as successful although they are far from the motion. ≤, ≥ and not measured: "
+    "finer settings were omitted because of the time budget."
 )
 
 

@@ -43,12 +43,12 @@ _KINDS = {
 }
 _NOTES = {
     "6": "The caption prints π/10 rad/s, the running text 1/10; the caption's value is plotted.",
-    "13": "According to the text, panel (b) is the run of Fig. 12 (blade 1 at π/5 rad/s), the caption prints π/8; the "
-    "caption's value is plotted.",
-    "14": "As read from the PDF, the caption gives three initial states for four panels: which one belongs to which panel "
-    "is uncertain, and that of panel (d) is not known. Nothing is drawn for it.",
-    "15": "1 and 100 kN m are printed in the caption of Fig. 16; the paper's other torques are not known, 10 and 50 kN m "
-    "were chosen.",
+    "13": "According to the text, panel (b) is the run of Fig. 12 (blade 1 at π/5 rad/s), the caption "
+    "prints π/8; the caption's value is plotted.",
+    "14": "As read from the PDF, the caption gives three initial states for four panels: which one "
+    "belongs to which panel is uncertain, and that of panel (d) is not known. Nothing is drawn for it.",
+    "15": "1 and 100 kN m are printed in the caption of Fig. 16; the paper's other torques are not "
+    "known, 10 and 50 kN m were chosen.",
 }
 SIDES = (PRINTED_SIDE, CORRECTED)
 

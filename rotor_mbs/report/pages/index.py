@@ -75,10 +75,9 @@ def paper_answer(report: Report) -> list[Markup]:
     methods, error, agreeing = _agreement(report)
     if error is not None:
         verb = "agrees" if len(methods) == 1 else "agree"
-        text = Markup("Corrected, {} {} within <b>{} rad</b> in {} {} scenes.")
-        sentences.append(text.format(
-            computations(methods), verb, up_to(error, 1), "all" if agreeing == len(scenes) else f"{agreeing} of", len(scenes)
-        ))  # fmt: skip
+        where = f"all {len(scenes)}" if agreeing == len(scenes) else f"{agreeing} of {len(scenes)}"
+        text = Markup("Corrected, {} {} within <b>{} rad</b> in {} scenes.")
+        sentences.append(text.format(computations(methods), verb, up_to(error, 1), where))
     numbers = [claim for claim in report.claims if claim.is_number]
     printed, corrected = (_reproduced(numbers, side) for side in (PRINTED, CORRECTED))
     if numbers and printed == len(numbers) and corrected == 0:
@@ -200,8 +199,8 @@ def _hero_section(scene: StoredScene, report: Report) -> Section:
         if claim.is_number and claim.printed is not None and rounds_to(claim.printed, claim):
             ends = [float(run.array("angles")[-1, 0]) for run in (printed, corrected)]
             say = Markup(
-                "From the same start the printed equations stop the rotor at {} rad, the paper's {}, and end at {} rad; "
-                "the corrected ones end at {} rad. "
+                "From the same start the printed equations stop the rotor at {} rad, the paper's "
+                "{}, and end at {} rad; the corrected ones end at {} rad. "
             ).format(
                 number(claim.printed, 3),
                 paper.quantity_of(claim),
@@ -234,8 +233,9 @@ def scene_table(report: Report) -> PageTable:
         rows.append(row)
     count = in_words(max((len(agreement(scene)[0]) for scene in report.scenes.values()), default=0))
     head = (
-        "Scene", "The angle that differs most: corrected, as printed", f"Printed model is {draw.VISIBLE:g} rad off after",
-        "Energy it creates", f"Corrected: {count} methods agree within (rad)", "Compared",
+        "Scene", "The angle that differs most: corrected, as printed",
+        f"Printed model is {draw.VISIBLE:g} rad off after", "Energy it creates",
+        f"Corrected: {count} methods agree within (rad)", "Compared",
     )  # fmt: skip
     return PageTable("All scenes", head, rows, wide=(1, 5), sortable=True)
 

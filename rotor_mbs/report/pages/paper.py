@@ -43,9 +43,10 @@ _TONES = {HOLDS: "good", FAILS: "bad", UNDECIDED: ""}
 
 
 PAPER = Markup(
-    'Aguilar-Acevedo et al., <span lang="es">Modelado Euler-Lagrange del rotor de un aerogenerador tripala como sistema '
-    "multicuerpo</span>, Revista UIS Ingenierías 19(1), 25-36, 2020, "
-    '<a href="https://doi.org/10.18273/revuin.v19n1-2020002">doi&nbsp;10.18273/revuin.v19n1-2020002</a>'
+    'Aguilar-Acevedo et al., <span lang="es">Modelado Euler-Lagrange del rotor de un '
+    "aerogenerador tripala como sistema multicuerpo</span>, Revista UIS Ingenierías 19(1), "
+    "25-36, 2020, <a "
+    'href="https://doi.org/10.18273/revuin.v19n1-2020002">doi&nbsp;10.18273/revuin.v19n1-2020002</a>'
 )
 
 
@@ -249,16 +250,17 @@ def errata_page(report: Report) -> PageContent:
 
 
 _METHOD = Markup(
-    "By the paper's own definition the printed matrices U, (8), (9) and (16) to (19), are the first and second "
-    "derivatives of its transformation (3) with respect to the angles; mass, rate and gravity terms follow from the same "
-    "transformation by Lagrange's equations. Each printed entry was compared, at random states, with the entry derived "
-    "from (3). Notation: s<sub>i</sub> = sin q<sub>i</sub>, c<sub>i</sub> = cos q<sub>i</sub>; c and d without index: "
-    "distances of the centre of mass from the pitch axis and, along that axis, from the shaft; d<sub>2</sub>: constant "
-    "offset along the shaft."
+    "By the paper's own definition the printed matrices U, (8), (9) and (16) to (19), are the "
+    "first and second derivatives of its transformation (3) with respect to the angles; mass, "
+    "rate and gravity terms follow from the same transformation by Lagrange's equations. Each "
+    "printed entry was compared, at random states, with the entry derived from (3). Notation: "
+    "s<sub>i</sub> = sin q<sub>i</sub>, c<sub>i</sub> = cos q<sub>i</sub>; c and d without "
+    "index: distances of the centre of mass from the pitch axis and, along that axis, from the "
+    "shaft; d<sub>2</sub>: constant offset along the shaft."
 )
 _ALONE = (
-    "Each erratum alone in the corrected equations is integrated with ode45 at the paper's tolerances; these numbers "
-    "include the error of ode45, amplified by the error growth."
+    "Each erratum alone in the corrected equations is integrated with ode45 at the paper's "
+    "tolerances; these numbers include the error of ode45, amplified by the error growth."
 )
 
 

@@ -66,15 +66,16 @@ from rotor_mbs.scenario.time_table import values_at
 from rotor_mbs.solution.status import GOOD
 
 HORIZON_NOTE = (
-    "Horizon: the time until which an error of the initial state has grown by less than a factor of 100 000; after it "
-    "two accurate solutions may differ visibly. Energy error: change of the total energy minus the work, relative to "
-    "the energy scale: sum over the blades of weight times distance of the centre of mass from the hub centre, plus "
-    "the initial kinetic and spring energy, plus the largest work."
+    "Horizon: the time until which an error of the initial state has grown by less than a factor "
+    "of 100 000; after it two accurate solutions may differ visibly. Energy error: change of the "
+    "total energy minus the work, relative to the energy scale: sum over the blades of weight "
+    "times distance of the centre of mass from the hub centre, plus the initial kinetic and "
+    "spring energy, plus the largest work."
 )
 DEFECT_NOTE = (
-    "From each sample the corrected equations are integrated to the next one; the defect is the difference from the "
-    "method's own next sample, for the angles, and for the rates times the interval. Defects do not depend on the "
-    "growth of errors over the run and cover all of it."
+    "From each sample the corrected equations are integrated to the next one; the defect is the "
+    "difference from the method's own next sample, for the angles, and for the rates times the "
+    "interval. Defects do not depend on the growth of errors over the run and cover all of it."
 )
 _TURN = 2.0 * math.pi
 _RPM = 30.0 / math.pi  # rev/min of a rad/s
@@ -344,7 +345,7 @@ def own_answer(scene: StoredScene, run: StoredRun | None) -> list[Markup]:
 
 
 def _peak(run: StoredRun, name: str) -> tuple[float, int, float] | None:
-    """Return the largest size of a load of the blades, the blade, from 1, and its time (s); None where it is unknown."""
+    """Return the largest size of a load of the blades, the blade, from 1, and its time (s)."""
     if name not in run:
         return None
     values = run.array(name)
@@ -682,8 +683,8 @@ def _agreement_section(scene: StoredScene, report: Report) -> Section:
         say = "Every method against the reference, which is computed in quad precision."
         if marks:
             say += (
-                " After the horizon an initial rounding error has grown 100 000 times, and two right solutions may "
-                "differ."
+                " After the horizon an initial rounding error has grown 100 000 times, and two "
+                "right solutions may differ."
             )
     return Section("agreement", "Agreement between methods", elements, say)
 

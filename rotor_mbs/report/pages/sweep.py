@@ -244,13 +244,16 @@ def _over(statistic: object, values: Array, axis: int) -> Array:
 
 
 def is_wide(values: Array) -> bool:
-    """Whether positive values span so much that a logarithmic axis shows more; zeros are left to a curve of their own."""
+    """Whether positive values span so much that a logarithmic axis shows more."""
     known = values[np.isfinite(values)]
     return bool(len(known)) and bool(known.min() > 0.0) and bool(known.max() > _SPAN * known.min())
 
 
 def explained(values: Array, parameter: Array) -> float:
-    """Return the share of the variance of `values` (their logarithms where they are wide) between a parameter's values."""
+    """Return the share of the variance of `values` that lies between the values of a parameter.
+
+    Of values that span decades it is that of their logarithms.
+    """
     known = np.isfinite(values)
     y = np.log(values[known]) if is_wide(values) else values[known]
     whole = float(((y - y.mean()) ** 2).sum())
