@@ -61,8 +61,8 @@ def test_every_method_has_run_and_those_of_the_correct_equations_are_ok(calls: C
 
 def test_the_report_is_whole(calls: Calls) -> None:
     pages = {path.name for path in (calls.folder / "report").glob("*.html")}
-    assert {"index.html", "errata.html"} <= pages
-    assert len(pages) == len(SCENES) + 4  # index, errata, the figures one by one, the benches
+    of_scenes = {f"{name.replace('/', '-')}.html" for name in SCENES}
+    assert pages == {"index.html", "claims.html", "figures.html", "errata.html", "bench.html"} | of_scenes
 
 
 def test_the_second_call_has_nothing_to_do_and_shows_the_same(calls: Calls) -> None:
