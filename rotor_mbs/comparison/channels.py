@@ -58,6 +58,11 @@ _UNIT_ENDING = re.compile(
 _BEYOND_INDICES = 10**10
 
 
+def channel_key(name: str) -> str:
+    """Return the key of a channel in mapping files and its variable in records: "pitch_1_rate"."""
+    return name.replace(",", "").replace(" ", "_")
+
+
 @dataclass(frozen=True)
 class Channel:
     """What a column of data may be: "rotor", "pitch 1 rate", "shaft force x"; "frequency 1".
@@ -81,7 +86,7 @@ class Channel:
     @property
     def key(self) -> str:
         """Its key in a mapping file: "pitch_1_rate"."""
-        return self.name.replace(",", "").replace(" ", "_")
+        return channel_key(self.name)
 
     @property
     def unit(self) -> str:

@@ -147,9 +147,9 @@ def test_a_row_for_each_run_and_of_many_runs_one_for_each_method(tmp_path: Path)
         few = table_of_runs(results.scenes, {"paper/s0": [GOOD, BAD], "not there": [GOOD]})
         many = table_of_runs(results.scenes, {name: [GOOD, BAD] for name in results.scenes})
     assert few.rows == [
-        ("paper/s0", "reference", "ok", "", "", "0.0e+00", "read"),  # shipped, and no error against itself
-        ("paper/s0", GOOD, "ok", "3.0e-12", "1.0e-09", "0.0e+00", "0.002"),
-        ("paper/s0", BAD, "inaccurate", "", "2.5e-01", "0.0e+00", "0.002"),
+        ("paper/s0", "reference", "ok", "", "", "", "", "0.0e+00", "read"),  # shipped, and no error against itself
+        ("paper/s0", GOOD, "ok", "3.0e-12", "", "1.0e-09", "12 of 12 s", "0.0e+00", "0.002"),
+        ("paper/s0", BAD, "inaccurate", "", "", "2.5e-01", "12 of 12 s", "0.0e+00", "0.002"),
     ]
     assert many.rows == [  # with the largest of those that are ok
         (GOOD, "14 of 14 ok", "3.0e-12", "1.0e-09", "0.0e+00", "0.002"),

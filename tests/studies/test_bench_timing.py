@@ -41,7 +41,7 @@ class Clock:
 
 @dataclass
 class FakeMethod:
-    """Takes 10 s to build, 3 s to read out, and the next of `durations` to run; stands `error` rad off."""
+    """Takes 10 s to build, 3 s to read out, the next of `durations` to run; moves off by `error` rad after its start."""
 
     clock: Clock
     durations: list[float]
@@ -67,7 +67,9 @@ class FakeMethod:
     def observe(self) -> Trajectory:
         self.clock.now += 3.0
         time_ = np.linspace(0.0, self.scene.duration, self.scene.samples)[: self.rows]
-        return Trajectory(time_, still(self.rows).angles + self.error, still(self.rows).rates)
+        angles = still(self.rows).angles
+        angles[1:] += self.error
+        return Trajectory(time_, angles, still(self.rows).rates)
 
 
 def still(rows: int = SCENE.samples) -> Trajectory:

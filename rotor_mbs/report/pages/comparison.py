@@ -14,6 +14,7 @@ import numpy as np
 from markupsafe import Markup
 
 from rotor_mbs.analysis.text_tables import TextTable
+from rotor_mbs.comparison.channels import channel_key
 from rotor_mbs.comparison.data import load_data
 from rotor_mbs.comparison.modes import compare_modes
 from rotor_mbs.comparison.trajectory import compare_with_reference
@@ -281,7 +282,7 @@ def onset_of(record: Record, verdict: DataVerdict) -> tuple[float, str] | None:
         if not _is_outside(channel, verdict):
             continue
         allowed = verdict.tolerance + FLOOR_SAFETY * (channel.floor or 0.0)
-        name = channel.name.replace(" ", "_")
+        name = channel_key(channel.name)
         if f"{name}_defect" in record.arrays:
             sizes = np.abs(record.arrays[f"{name}_defect"])
         elif f"{name}_error" in record.arrays:
@@ -331,7 +332,7 @@ def _channel_section(record: Record, verdict: DataVerdict) -> Section:
     plots: list[Plot] = []
     channels = sorted(verdict.channels, key=lambda channel: not _is_outside(channel, verdict))
     for channel in channels:
-        name = channel.name.replace(" ", "_")
+        name = channel_key(channel.name)
         curves = []
         if f"{name}_reference" in record.arrays:
             reference = record.arrays[f"{name}_reference"]
@@ -364,7 +365,7 @@ def _error_section(record: Record, verdict: DataVerdict) -> Section:
     errors, defects = [], []
     for channel in channels:
         look = replace(_look(channel), label=channel.name)
-        name = channel.name.replace(" ", "_")
+        name = channel_key(channel.name)
         if f"{name}_error" in record.arrays:
             errors.append(Curve(channel.name, look, rows, draw.positive(_array(record, channel, "_error"))))
         if channel.defect_unit == "rad" and f"{name}_defect" in record.arrays:
@@ -479,7 +480,7 @@ def _defect(channel: ChannelErrors) -> str:
 
 
 def _array(record: Record, channel: ChannelErrors, ending: str = "") -> Any:
-    return record.arrays[channel.name.replace(" ", "_") + ending]
+    return record.arrays[channel_key(channel.name) + ending]
 
 
 def _drawn(verdict: DataVerdict) -> Sequence[ChannelErrors]:
