@@ -26,7 +26,7 @@ from rotor_mbs.solution.trajectory import Integration, Trajectory
 from rotor_mbs.studies import bench
 from rotor_mbs.studies.bench import Curve, Point, PointTimer, allot, conduct, measure
 
-SCENE = paper("fig05", duration=1.0, samples=11)
+SCENE = paper("fig05", duration=1.0, samples=11, initial_angles=(0.0,) * 4)
 
 
 @dataclass
@@ -41,7 +41,7 @@ class Clock:
 
 @dataclass
 class FakeMethod:
-    """Takes 10 s to build, 3 s to read out, the next of `durations` to run; moves off by `error` rad after its start."""
+    """Takes 10 s to build, 3 s to read out, the next of `durations` to run; after its start it is `error` rad off."""
 
     clock: Clock
     durations: list[float]
