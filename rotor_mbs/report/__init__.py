@@ -1,7 +1,12 @@
-"""Pages, figures and animations from stored files alone; no engine is needed.
+"""Render pages, figures and animations from stored files.
 
-core       the canvas (matplotlib), looks of curves, SVG for a page, templates, number formats, writing of files
-plots      what several pages draw: curves over time, paths of tips; plain arrays
-pages      one module per page: stored data to the content of the page, and the pictures that it alone has
+elements   what a page is made of, as data: sentences, facts, plots, tables, sections
+curves     the numbers of a page's plots
+files      pages as HTML by the template, and their writing
+looks      colours and lines; numbers: numbers as text
+pages      one module per page: stored data to the content of the page
+canvas     matplotlib: still pictures, figures for a manuscript (figures), notebooks (plots), animations (animation)
 templates  the pages' HTML, style and scripts
+
+Interval defects that a file does not have are computed when a page shows them, which needs SciPy.
 """
