@@ -200,10 +200,12 @@ def still(plot: Plot, name: str) -> Markup:
         figure = Figure(figsize=(_STILL_WIDTH, height / 100.0), dpi=100, facecolor="none")
         axes: Any = figure.add_axes((0.15, 24.0 / height, 0.82, 1.0 - 32.0 / height), facecolor="none")
         axes.tick_params(labelsize=9.0, colors=GREY)
+        has_values = False
         for drawn in plot.curves:
             x, y = drawn.x, drawn.y if drawn.y.ndim == 1 else drawn.y[0]
             if plot.log:
                 y = np.where(y > 0.0, y, np.nan)
+            has_values = has_values or bool(np.isfinite(y).any())
             index = extremes(y, _STILL_POINTS)
             x, y = x[index], y[index]
             after = np.searchsorted(index, drawn.breaks)  # a jump is a gap
@@ -220,7 +222,7 @@ def still(plot: Plot, name: str) -> Markup:
             line(place, color=GREY, linestyle="--", linewidth=0.8)
         if plot.x.log:
             axes.set_xscale("log")
-        if plot.log:
+        if plot.log and has_values:  # matplotlib refuses a logarithmic axis of nothing
             axes.set_yscale("log")
         elif plot.clip is not None:
             low, high = axes.get_ylim()

@@ -345,14 +345,16 @@ def write_figures(results: Path, folder: Path, kind: str, numbers: Iterable[str]
             raise InputError(f"{results}: figure {', '.join(unknown)}: not in the file; allowed: {', '.join(have)}")
         software = ", ".join(f"{name} {version}" for name, version in made_with(opened.attributes) if name != "created")
         made: dict[str, bytes] = {}
-        for name in asked:
-            figure = have[name]
-            title, caption = title_of(figure, opened.scenes), caption_of(figure, opened.scenes)
-            caption += f"{canvas.MARK.decode()}, from {results.name}: {software}\n"
-            stem = f"fig{int(name):02d}" if figure.number else name.replace("/", "-")
-            panels = composed(figure, opened.scenes)
-            made[f"{stem}.{kind}"] = canvas.encoded(panels.figure, kind, title=title, description=caption)
-            made[f"{stem}.txt"] = caption.encode()
+        # Numbers of a runaway overflow in a caption or a difference; they are drawn as they are.
+        with np.errstate(over="ignore", invalid="ignore"):
+            for name in asked:
+                figure = have[name]
+                title, caption = title_of(figure, opened.scenes), caption_of(figure, opened.scenes)
+                caption += f"{canvas.MARK.decode()}, from {results.name}: {software}\n"
+                stem = f"fig{int(name):02d}" if figure.number else name.replace("/", "-")
+                panels = composed(figure, opened.scenes)
+                made[f"{stem}.{kind}"] = canvas.encoded(panels.figure, kind, title=title, description=caption)
+                made[f"{stem}.txt"] = caption.encode()
     for name, content in made.items():
         replace_file(folder / name, content, canvas.MARK)
     return [folder / name for name in made]

@@ -187,7 +187,7 @@ def test_pages_figures_and_saved_runs_replace_no_other_file(tmp_path: Path) -> N
         if (ended := rotor_mbs("figures", path, "-o", folder, "--format", "svg")).status:
             raise InputError(ended.err)
 
-    for write, name in ((rm.open(path).to_html, "paper-fig08.html"), (figures, "fig08.svg")):
+    for write, name in ((rm.open(path).to_html, "index.html"), (figures, "fig08.svg")):
         folder = tmp_path / name
         folder.mkdir()
         (folder / name).write_text("<title>mine</title>")
