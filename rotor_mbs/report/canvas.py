@@ -59,7 +59,6 @@ if _is_imported_here and os.environ.get("MPLBACKEND"):  # for what else is drawn
 
 WIDTH = 5.2  # in; on a telephone's 360 px a text of 9.5 points is then 9 px high
 TIME_AXIS, SPEED_AXIS = "time (s)", "rotor speed (rad/s)"
-WIDE = 11.0  # in; a picture as wide as a page
 PRINT_WIDTH = 174.0 / 25.4  # in; two columns of a journal
 MARK = b"rotor_mbs pictures"  # in the metadata of every picture that is a file
 KINDS = ("pdf", "svg", "png")
@@ -123,16 +122,15 @@ def panels(heights: tuple[float, ...], x_label: str) -> Panels:
     return Panels(figure, axes)
 
 
-def grid(rows: int, columns: int, height: float, *, for_print: bool) -> Panels:
-    """Axes row by row, `height` inches each: in the style for manuscripts at a journal's page width, or for a page."""
-    width, margin = (PRINT_WIDTH, 0.75) if for_print else (WIDE, 0.45)
-    with style(for_print=for_print):
-        whole = rows * height + margin + 0.5
-        figure = Figure(figsize=(width, whole), facecolor="white")
+def grid(rows: int, columns: int, height: float) -> Panels:
+    """Return axes row by row for a manuscript, `height` inches each, at a journal's page width."""
+    with style(for_print=True):
+        whole = rows * height + 1.25
+        figure = Figure(figsize=(PRINT_WIDTH, whole), facecolor="white")
         made = figure.subplots(rows, columns, squeeze=False)
         figure.subplots_adjust(
-            left=0.8 / width, right=1.0 - 0.12 / width, bottom=margin / whole, top=1.0 - 0.5 / whole,
-            hspace=0.26 / height, wspace=0.34,
+            left=0.8 / PRINT_WIDTH, right=1.0 - 0.12 / PRINT_WIDTH, bottom=0.75 / whole,
+            top=1.0 - 0.5 / whole, hspace=0.26 / height, wspace=0.34,
         )  # fmt: skip
     return Panels(figure, list(made.flat))
 

@@ -179,7 +179,7 @@ def composed(figure: PaperFigure, scenes: Mapping[str, StoredScene]) -> canvas.P
     is_paths = figure.kind == PATHS
     with canvas.style(for_print=True):
         rows, height, heading = (len(pictures), 1.8, 1.02) if is_paths else (2, 1.55, 1.16)
-        panels = canvas.grid(rows, columns, height, for_print=True)
+        panels = canvas.grid(rows, columns, height)
         table = [panels.axes[i : i + columns] for i in range(0, len(panels.axes), columns)]
         for i, row_of_runs in enumerate(pictures.values()):
             for key in keys:

@@ -10,7 +10,6 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from rotor_mbs.errors import InputError, shown_value
-from rotor_mbs.models.lagrange.defects import interval_defects
 from rotor_mbs.report import canvas
 from rotor_mbs.report.canvas import TIME_AXIS, Panels
 from rotor_mbs.report.looks import BLUE, GREY, INK, RING, VERMILLION, Look, coordinate_look, look_of
@@ -248,6 +247,8 @@ class ComparisonPlots:
 
     def defects(self) -> Panels:
         """Plot the interval defects (rad) of each run over time. Raises InputError for fewer than two samples."""
+        from rotor_mbs.models.lagrange.defects import interval_defects  # late: SciPy, and an engine
+
         series = []
         for run in self._runs:
             if len(run.time) < 2:

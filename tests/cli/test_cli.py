@@ -14,7 +14,7 @@ from support.commands import Ended, refusal, rotor_mbs
 from support.scenes import paper
 
 import rotor_mbs as rm
-from rotor_mbs.report.pages import method_table
+from rotor_mbs.report.pages import agreement_table
 from rotor_mbs.runs.read import open_results
 from rotor_mbs.scenario.scene import OUTPUTS, scene_toml
 
@@ -91,7 +91,7 @@ def test_settings_are_stored_and_unknown_ones_refused(quick: Path, stored: Path)
     assert "1 run computed" in ended.out
     with open_results(stored) as results:
         assert results.scenes["quick"].runs["lagrange/dop853"].settings["relative_tolerance"] == 1e-6
-        notes = [str(cell.note) for cell, *_ in method_table(results.scenes["quick"]).rows]
+        notes = [str(cell.note) for cell, *_ in agreement_table(results.scenes["quick"]).rows]
         assert "lagrange/dop853, relative_tolerance = 1e-06" in notes
     assert "NAME=VALUE" in refusal(*command, "x")
 

@@ -196,7 +196,7 @@ def agreement_text(scene: StoredScene) -> str:
     return f"{with_capital(computations(methods))} {verb}{other} {within}{until}."
 
 
-def method_table(scene: StoredScene, suite_runs: Sequence[SuiteRun] = ()) -> PageTable:
+def agreement_table(scene: StoredScene, suite_runs: Sequence[SuiteRun] = ()) -> PageTable:
     """Return the table of agreement: a row per run of a scene, six columns."""
     of_suite = {run.method: run for run in suite_runs}
     rows: list[Row] = []

@@ -46,11 +46,11 @@ from rotor_mbs.report.numbers import SPACE, fixed, number, prefixed, seconds, up
 from rotor_mbs.report.pages import (
     Report,
     agreement,
+    agreement_table,
     agreement_text,
     compared_time,
     computations,
     horizon_of,
-    method_table,
     metric,
     metrics_tables,
     paper,
@@ -77,6 +77,7 @@ DEFECT_NOTE = (
     "difference from the method's own next sample, for the angles, and for the rates times the "
     "interval. Defects do not depend on the growth of errors over the run and cover all of it."
 )
+_PITCH = "Pitch angle"
 _TURN = 2.0 * math.pi
 _RPM = 30.0 / math.pi  # rev/min of a rad/s
 
@@ -406,44 +407,26 @@ def _own_facts(scene: StoredScene, run: StoredRun) -> list[Fact]:
 
 def motion_channels(scene: StoredScene, run: StoredRun, jumps: Jumps) -> tuple[list[Channel], list[Channel]]:
     """Return the two main channels of a motion, speed of the rotor and pitch angles, and the others."""
-    time = run.array("time")
     main, others = [], []
     rotor = coordinate_look(0)
     if "rates" in run:
-        main.append(
-            Channel(
-                "Rotor speed",
-                "rad/s",
-                [("rotor", rotor, run.array("rates")[:, 0])],
-                draw._LEAST_ANGLE,
-            )
-        )
+        speed = run.array("rates")[:, 0]
+        main.append(Channel("Rotor speed", "rad/s", [("rotor", rotor, speed)], draw.LEAST_ANGLE))
     if "angles" in run:
         angles = run.array("angles")
         if angles.shape[1] > 1:
-            curves = _blade_curves(np.degrees(angles[:, 1:]))
-            curves += _commands(scene.scene, time)
-            main.append(Channel("Pitch angle", "degrees", curves, math.degrees(draw._LEAST_ANGLE)))
-        turns = Channel(
-            "Rotor angle",
-            "revolutions",
-            [("rotor", rotor, angles[:, 0] / _TURN)],
-            draw._LEAST_ANGLE,
-        )
+            pitches = _blade_curves(np.degrees(angles[:, 1:]))
+            main.append(Channel(_PITCH, "degrees", pitches, math.degrees(draw.LEAST_ANGLE)))
+        unit, factor = "revolutions", 1.0 / _TURN
         if abs(float(angles[-1, 0] - angles[0, 0])) < _TURN:
-            degrees = np.degrees(angles[:, 0])
-            turns = Channel(
-                "Rotor angle",
-                "degrees",
-                [("rotor", rotor, degrees)],
-                math.degrees(draw._LEAST_ANGLE),
-            )
-        others.append(turns)
+            unit, factor = "degrees", math.degrees(1.0)
+        turned = [("rotor", rotor, factor * angles[:, 0])]
+        others.append(Channel("Rotor angle", unit, turned, factor * draw.LEAST_ANGLE))
     if "rates" in run:
         rates = run.array("rates")
         others = [*_powers(scene.scene, run, jumps), *others]
         if rates.shape[1] > 1:
-            others.append(Channel("Pitch rate", "rad/s", _blade_curves(rates[:, 1:]), draw._LEAST_ANGLE))
+            others.append(Channel("Pitch rate", "rad/s", _blade_curves(rates[:, 1:]), draw.LEAST_ANGLE))
     return main, others
 
 
@@ -451,11 +434,15 @@ def _blade_curves(values: Array) -> list[tuple[str, Look, Array]]:
     return [(f"blade-{i + 1}", draw.blade_look(i), column) for i, column in enumerate(values.T)]
 
 
-def _commands(scene: Scene, time: Array) -> list[tuple[str, Look, Array]]:
-    """Return the pitch commands that change over time, in degrees; equal ones once."""
-    tables = dict.fromkeys(rest for _, rest in scene.pitch_loads if len({value for _, value in rest}) > 1)
+def _commands(scene: Scene, time: Array) -> list[Curve]:
+    """Return the pitch commands that change over time, by their own points, in degrees; equal ones once."""
+    curves = []
     look = Look(GREY, ":", "", "command")
-    return [("command", look, np.degrees(values_at(table, time))) for table in tables]
+    for table in dict.fromkeys(rest for _, rest in scene.pitch_loads):
+        if len({value for _, value in table}) > 1:
+            times, values = draw.values_over(table, time)
+            curves.append(Curve("command", look, times, np.degrees(values)))
+    return curves
 
 
 def _powers(scene: Scene, run: StoredRun, jumps: Jumps) -> list[Channel]:
@@ -529,11 +516,13 @@ def _motion_section(
     height = 206 if moving is not None else 180
     marks = jumps.marks(with_text=True)
     stack: list[Element] = []
+    commands = _commands(scene.scene, time)
     for channel in main:
-        stack.append(channel.plot(axis, time, height=height, marks=marks, still=True))
+        plot = channel.plot(axis, time, height=height * (3 - len(main)), marks=marks, still=True)
+        if channel.name == _PITCH:
+            plot = replace(plot, curves=[*plot.curves, *commands])
+        stack.append(plot)
         marks = jumps.marks()
-    if len(stack) == 1:
-        stack = [replace(stack[0], height=2 * height)] if isinstance(stack[0], Plot) else stack
     cards: list[list[Element]] = [] if moving is None else [[Viewer(moving, scene.title)]]
     if stack and moving is not None:
         cards.append(stack)
@@ -548,10 +537,11 @@ def _motion_section(
         for key, look, _ in channel.curves:
             label = "rotor" if key == "rotor" else look.label
             keys.setdefault(key, replace(look, label=label))
-    elements: list[Grid | Fold | Element] = [
-        Legend(list(keys.items())),
-        Grid(min(len(cards), 2), cards),
-    ]
+    for curve in commands:
+        keys.setdefault(curve.key, curve.look)
+    elements: list[Grid | Fold | Element] = [Legend(list(keys.items()))]
+    if cards:
+        elements.append(Grid(min(len(cards), 2), cards))
     if rest:
         elements.append(Grid(2 if len(rest) in (2, 4) else 3, [[plot] for plot in rest]))
     say = f"By {label_of(run.method)}." if run.method != REFERENCE else ""
@@ -575,8 +565,9 @@ def _loads_section(run: StoredRun, jumps: Jumps, loads: Sequence[Channel], energ
     """Return the loads, three components in a row, then actuators and energy."""
     time = run.array("time")
     axis = draw.time_axis(time)
-    vectors = [channel for channel in loads if channel.name[-2:] in (" x", " y", " z")]
-    others = [channel for channel in loads if channel not in vectors]
+    components = (" x", " y", " z")
+    vectors = [channel for channel in loads if channel.name.endswith(components)]
+    others = [channel for channel in loads if not channel.name.endswith(components)]
     elements: list[Grid | Fold | Element] = []
     keys: dict[str, Look] = {}
     for channel in loads:
@@ -608,8 +599,8 @@ def _extremes_section(run: StoredRun, channels: Sequence[Channel]) -> Section:
     time = run.array("time")
     rows: list[Row] = []
     for channel in channels:
-        for key, look, values in channel.curves:
-            if key == "command" or not np.isfinite(values).any():
+        for _, look, values in channel.curves:
+            if not np.isfinite(values).any():
                 continue
             low, high = int(np.nanargmin(values)), int(np.nanargmax(values))
             name = channel.name if len(channel.curves) == 1 else f"{channel.name}, {look.label}"
@@ -643,7 +634,7 @@ def _agreement_section(scene: StoredScene, report: Report) -> Section:
     """Return the table of all runs, and their errors over time."""
     runs = _drawn_runs(scene)
     suite_runs = [run for run in report.suite_runs if run.scene == scene.name]
-    elements: list[Grid | Fold | Element] = [method_table(scene, suite_runs)]
+    elements: list[Grid | Fold | Element] = [agreement_table(scene, suite_runs)]
     axis = draw.whole_time(list(runs.values()))
     horizon = horizon_of(scene)
     marks = []
@@ -698,7 +689,7 @@ def _uncertainty(scene: StoredScene) -> list[Curve]:
     if reference is None or "angle_uncertainty" not in reference:
         return []
     values = reference.array("angle_uncertainty")
-    if not values.size or not values.max() > draw._LOWEST:
+    if not values.size or not values.max() > draw.LOWEST:
         return []
     return [Curve("uncertainty", _UNCERTAINTY, reference.array("time"), draw.positive(values))]
 

@@ -28,9 +28,9 @@ PRINTED_LOOK = Look(INK, "--", "", "as printed")
 _RUNAWAY = 2.0
 _LEAST_HEIGHT = 0.5  # rad, rad/s: of one that hardly moves
 _ROUNDING = 1e-9  # of the largest component of a vector: what is smaller is zero
-_LEAST_ANGLE = 1e-6  # rad, rad/s: a smaller range of an angle or a rate is not magnified
+LEAST_ANGLE = 1e-6  # rad, rad/s: a smaller range of an angle or a rate is not magnified
 # What is below a thousandth of a double's rounding error is a gap on a logarithmic axis, as an exact zero is.
-_LOWEST = 1e-18
+LOWEST = 1e-18
 _SPARK_WIDTH, _SPARK_HEIGHT, _SPARK_POINTS = 150.0, 34.0, 75
 _ALIGNED = 1e-9  # of a time: a sample nearer to a jump is the one before it
 
@@ -126,7 +126,7 @@ def models_plot(
     label = next(iter(sides.values())).labels[coordinate]
     what, unit = ("angle", "rad") if name == "angles" else ("rate", "rad/s")
     return Plot(
-        f"{with_capital(label)} {what}", unit, axis, curves, height, clip=clip, marks=marks, least=_LEAST_ANGLE,
+        f"{with_capital(label)} {what}", unit, axis, curves, height, clip=clip, marks=marks, least=LEAST_ANGLE,
         still=still,
     )  # fmt: skip
 
@@ -156,7 +156,7 @@ def differing_coordinate(printed: StoredRun, corrected: StoredRun, first: int = 
     n = min(map(len, angles))
     for values in (angles[0][:n] - angles[1][:n], angles[1]):
         sizes = np.abs(values[:, first:]).max(axis=0, initial=0.0)
-        if sizes.size and sizes.max() > _LEAST_ANGLE:
+        if sizes.size and sizes.max() > LEAST_ANGLE:
             return first + int(sizes.argmax())
     return min(first, int(angles[1].shape[1]) - 1)
 
@@ -308,7 +308,7 @@ def values_over(table: Sequence[tuple[float, float]], time: Array) -> tuple[Arra
 def positive(values: Array) -> Array:
     """Return magnitudes for a logarithmic axis: exact zeros are gaps."""
     sizes = np.abs(values)
-    result: Array = np.where(sizes > _LOWEST, sizes, np.nan)
+    result: Array = np.where(sizes > LOWEST, sizes, np.nan)
     return result
 
 
