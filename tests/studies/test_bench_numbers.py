@@ -209,6 +209,6 @@ def test_pages_are_written(tmp_path: Path) -> None:
     page = index.read_text()
     assert "ended after 10 s" in page
     assert "evaluated up to 6.00" in page
-    assert page.count('<figure class="plot"') == 1  # of angle errors: these points have no interval defects
+    assert page.count('<figure class="plot"') == 1  # these curves have no defects
     # The diagram stands before every table.
     assert page.index('id="diagram"') < page.index("<table")
