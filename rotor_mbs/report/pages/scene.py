@@ -78,6 +78,7 @@ DEFECT_NOTE = (
     "interval. Defects do not depend on the growth of errors over the run and cover all of it."
 )
 _PITCH = "Pitch angle"
+_NO_ENERGY = 1e-15  # of the energy scale: a smaller gain is rounding error
 _TURN = 2.0 * math.pi
 _RPM = 30.0 / math.pi  # rev/min of a rad/s
 
@@ -194,13 +195,18 @@ def _paper_facts(scene: StoredScene, claims: Sequence[Published]) -> list[Fact]:
     left, difference = draw.parting(printed, corrected)
     note = f"largest difference {number(difference, 3)} rad"
     facts.append(Fact("Printed model leaves it after", "never" if left is None else with_unit(left, "s"), note))
-    gain = metric(printed, "energy_gain_J")
-    if gain is not None:
+    gain, scale = metric(printed, "energy_gain_J"), metric(printed, "energy_scale_J")
+    if gain is not None and scale:
         others = [metric(run, "energy_gain_J") for run in scene.corrected_runs.values() if run.status == "ok"]
         below = max((value for value in others if value is not None), default=None)
+        if below is not None and below < _NO_ENERGY * scale:
+            below = 0.0
         note = "" if below is None else f"corrected: at most {up_to(below, 1)} J"
-        is_complete = printed.status in GOOD
-        value = prefixed(gain, "J") if is_complete else "runs away"
+        value = prefixed(gain, "J")
+        if printed.status not in GOOD:
+            value = "runs away"
+        elif gain <= ENERGY_RISE * scale:
+            value, note = "none", f"{prefixed(gain, 'J')} is {number(gain / scale, 1)} of the energy scale"
         facts.append(Fact("Energy created by the printed model", value, note))
     for claim in claims:
         if claim.is_number and claim.printed is not None:
