@@ -27,7 +27,7 @@ import rotor_mbs.testing
 from rotor_mbs.cli import arguments, main
 from rotor_mbs.methods.catalogue import methods
 from rotor_mbs.runs.versions import versions
-from rotor_mbs.scenario import catalogue, keys
+from rotor_mbs.scenario import catalogue, expressions, keys
 from rotor_mbs.scenario.scene import BLADE_KEYS, SCENE_KEYS, new_scene_text
 from rotor_mbs.scenario.sweep import DESIGN_KEYS, Axis, Range
 from rotor_mbs.solution.quantities import BUILT_IN
@@ -207,7 +207,7 @@ def _scene_file() -> str:
     return page(
         "Scene file",
         "A TOML file. `a.b` is the key `b` of the table `[a]`. "
-        f"A number may be arithmetic in quotes: {keys.ALLOWED}; it is parsed, not executed as code.",
+        f"A number may be arithmetic in quotes: {expressions.ALLOWED}; it is parsed, not executed as code.",
         "## Keys",
         _keys(top),
         "## Blades",
@@ -258,8 +258,8 @@ def _methods() -> str:
         ]
         defaults = method.settings().as_dict()
         rows = [
-            [code(name), allowed, allowed.doc, code(defaults[name])]
-            for name, allowed in method.settings.allowed().items()
+            [code(name), setting["allowed"], setting["doc"], code(defaults[name])]
+            for name, setting in method.settings.declared().items()
         ]
         parts += [f"## {method.name}", _sentence(method.label), _sentence("; ".join(filter(None, facts)))]
         parts += [table(["setting", "allowed", "meaning", "default"], rows)] if rows else []

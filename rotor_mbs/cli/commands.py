@@ -71,16 +71,21 @@ def show(arguments: argparse.Namespace) -> int:
     if method is None:
         _show_scene(arguments)
         return 0
-    allowed, defaults = method.settings.allowed(), method.defaults
+    declared, defaults = method.settings.declared(), method.defaults
     if arguments.json:
-        rules = {name: {"allowed": str(rule), "doc": rule.doc} for name, rule in allowed.items()}
+        rules = {}
+        for name, setting in declared.items():
+            rules[name] = {"allowed": setting["allowed"], "doc": setting["doc"]}
         facts = {"name": method.name, "label": method.label, "settings": defaults, "allowed": rules}
         print_json(facts, indent=1)
         return 0
     print(f"{method.name}: {method.label}\n")
-    for name, rule in allowed.items():
-        print(f"  {name:26} {defaults[name]!s:>16}  {rule}; {rule.doc}".rstrip("; "))
-    print(f"\nto change a setting: rotor-mbs run SCENE -m {method.name} --set NAME=VALUE" if allowed else "no settings")
+    for name, setting in declared.items():
+        rule = f"{setting['allowed']}; {setting['doc']}".rstrip("; ")
+        print(f"  {name:26} {defaults[name]!s:>16}  {rule}")
+    print(
+        f"\nto change a setting: rotor-mbs run SCENE -m {method.name} --set NAME=VALUE" if declared else "no settings"
+    )
     return 0
 
 

@@ -32,7 +32,7 @@ from rotor_mbs.scenario.keys import Kind, file_key
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.scenario.toml_file import TableError, read_toml
 
-_SIGN = keys.where(keys.whole(-1, 1), bool, "1, -1")
+_SIGN = keys.restricted(keys.whole(-1, 1), bool, "1, -1")
 
 
 @dataclass(frozen=True)
@@ -115,7 +115,7 @@ def read_mapping(
             raise InputError(f"columns: {problem}" for problem in error.problems) from error
     else:
         file, source = read_toml(Path(columns)), str(columns)
-        with file.located():
+        with file.with_line_numbers():
             values = keys.read_keys(declared, file.tables)
     group = values.pop("group")
     omitted = tuple(names[key] for key in values.pop("omit"))

@@ -150,7 +150,7 @@ def settings_for(names: Sequence[str], given: Mapping[str, object]) -> dict[str,
     allowed."""
     if len(names) == 1:
         find_method(names[0]).settings.of(names[0], given)
-    own = {name: find_method(name).settings.allowed() for name in names}
+    own = {name: find_method(name).settings.declared() for name in names}
     known = list(dict.fromkeys(setting for allowed in own.values() for setting in allowed))
     unknown = [setting for setting in given if setting not in known]
     if unknown and names:
@@ -165,7 +165,7 @@ def settings_for(names: Sequence[str], given: Mapping[str, object]) -> dict[str,
 
 def settings_of_any(names: Iterable[str], given: Mapping[str, object]) -> dict[str, object]:
     """Return those of the `given` settings that at least one of some methods has."""
-    known = {setting for name in names for setting in find_method(name).settings.allowed()}
+    known = {setting for name in names for setting in find_method(name).settings.declared()}
     return {setting: value for setting, value in given.items() if setting in known}
 
 

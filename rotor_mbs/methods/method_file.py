@@ -31,7 +31,11 @@ if TYPE_CHECKING:
 ENDING = ".py"
 _LOAD_S = 300.0  # large engines load in seconds, on a busy machine in minutes
 _NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.-]*")
-_TOLERANCES = ("tolerance", "relative_tolerance", "accuracy")  # settings that make a ladder where there is no step
+_TOLERANCES = (
+    "tolerance",
+    "relative_tolerance",
+    "accuracy",
+)  # settings that make a ladder where there is no step
 _SERVING = "from rotor_mbs.methods.method_file import answer_questions; answer_questions()"
 _END_S = 5.0  # until such a process has ended
 
@@ -77,13 +81,15 @@ class MethodFile:
         name = f"{self.model}/{method.name.rpartition('/')[2]}"
         ladders = method.ladders
         if not ladders:
-            allowed = method.settings.allowed()
-            tolerance = next((setting for setting in _TOLERANCES if setting in allowed), "")
-            if "step" in allowed:
+            declared = method.settings.declared()
+            tolerance = next((setting for setting in _TOLERANCES if setting in declared), "")
+            if "step" in declared:
                 ladders = (step_ladder(6),)
             elif tolerance:
-                steps = [10.0**-k for k in range(3, 14) if allowed[tolerance].at_least <= 10.0**-k]
-                ladders = (tolerance_ladder(lambda value: {tolerance: value}, *steps),)
+                kind = declared[tolerance]["kind"]
+                values = [10.0**-k for k in range(3, 14) if kind.accepts(10.0**-k)]
+                if values:
+                    ladders = (tolerance_ladder(lambda value: {tolerance: value}, *values),)
         return replace(
             method,
             name=name,
@@ -136,7 +142,12 @@ def read_file(path: str) -> MethodFile:
         file = MethodFile(path, Path(path).read_text(encoding="utf-8"))
     except (OSError, ValueError) as exc:
         raise InputError(f"{path}: {getattr(exc, 'strerror', None) or exc}; allowed: a Python file") from exc
-    _ask(file, None, f"{path}: not loaded within {_LOAD_S:g} s", f"{path}: ended the process that loaded it")
+    _ask(
+        file,
+        None,
+        f"{path}: not loaded within {_LOAD_S:g} s",
+        f"{path}: ended the process that loaded it",
+    )
     return file
 
 
@@ -237,7 +248,11 @@ def _without_folder(path: str) -> Iterator[None]:
 @contextmanager
 def quiet() -> Iterator[None]:
     """What is printed in the block goes nowhere, also what compiled code prints. For one thread at a time."""
-    with Path(os.devnull).open("w", encoding="utf-8") as nowhere, redirect_stdout(nowhere), redirect_stderr(nowhere):
+    with (
+        Path(os.devnull).open("w", encoding="utf-8") as nowhere,
+        redirect_stdout(nowhere),
+        redirect_stderr(nowhere),
+    ):
         kept: dict[int, int] = {}
         for number in (1, 2):
             with suppress(OSError):  # closed

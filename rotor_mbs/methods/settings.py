@@ -1,65 +1,19 @@
-"""Settings of a method: name, unit, default and allowed values of each, declared once, checked on every use."""
+"""Settings of a method: unit, default and allowed values, declared once, checked on every use.
+
+What a value may be is a `Kind` of `scenario.keys`, as for the keys of a scene file.
+"""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field, fields
-from numbers import Real
 from typing import Any, Self
 
 from rotor_mbs.errors import InputError, nearest, shown_value
-
-
-@dataclass(frozen=True)
-class Allowed:
-    """Allowed values of a setting: one of `options`, or a finite number within the limits.
-
-    Attributes
-    ----------
-    unit : SI unit of a number; "" for none.
-    above, at_least, at_most : limits of a number: exclusive lower, inclusive lower and inclusive upper one.
-    whole : whether only whole numbers are allowed.
-    options : allowed values of a choice; () for a number.
-    doc : description in one line.
-    """
-
-    unit: str = ""
-    above: float = -math.inf
-    at_least: float = -math.inf
-    at_most: float = math.inf
-    whole: bool = False
-    options: tuple[object, ...] = ()
-    doc: str = ""
-
-    def convert(self, value: object) -> object:
-        """Return the value in the form that is stored. Raises ValueError if it is not allowed."""
-        if self.options:
-            if value not in self.options or isinstance(value, bool) != isinstance(self.options[0], bool):
-                raise ValueError
-            return value
-        if isinstance(value, bool) or not isinstance(value, Real):
-            raise ValueError
-        try:
-            number = float(value)
-        except OverflowError as error:  # a whole number above 1e308
-            raise ValueError from error
-        if not (math.isfinite(number) and number > self.above and self.at_least <= number <= self.at_most):
-            raise ValueError
-        if self.whole and number != int(number):
-            raise ValueError
-        return int(number) if self.whole else number
-
-    def __str__(self) -> str:
-        """ "a number above 0, in s"."""
-        if self.options:
-            return " or ".join(map(str, self.options))
-        limits = {"above": self.above, "at least": self.at_least, "at most": self.at_most}
-        text = "a whole number" if self.whole else "a number"
-        ranges = [f"{word} {limit:g}" for word, limit in limits.items() if math.isfinite(limit)]
-        if ranges:
-            text += " " + " and ".join(ranges)
-        return f"{text}, in {self.unit}" if self.unit else text
+from rotor_mbs.scenario import keys
+from rotor_mbs.scenario.keys import Kind
+from rotor_mbs.scenario.toml_file import TableError
 
 
 def number(
@@ -71,24 +25,54 @@ def number(
     at_most: float = math.inf,
     doc: str = "",
 ) -> Any:
-    """Declare a field of a `Settings` class: a finite number, an integer if `default` is an int."""
-    allowed = Allowed(unit, above, at_least, at_most, isinstance(default, int), (), doc)
-    return field(default=default, metadata={"allowed": allowed})
+    """Declare a field of a `Settings` class: a finite number.
+
+    Parameters
+    ----------
+    default : if it is an int, whole numbers alone are allowed.
+    unit : SI unit; "" for none.
+    above, at_least, at_most : exclusive lower, inclusive lower and inclusive upper limit.
+    doc : description in one line.
+    """
+    kind = keys.PYTHON_WHOLE if isinstance(default, int) else keys.PYTHON_NUMBER
+    limited = keys.within(kind, above=above, at_least=at_least, at_most=at_most)
+    return field(default=default, metadata=_declaration(limited, unit, doc))
 
 
 def step(default: float) -> Any:
-    return number(default, unit="s", above=0.0, doc="time step; shortened to fit the sample interval")
+    """Declare a field of a `Settings` class: a time step in s."""
+    doc = "time step; shortened to fit the sample interval"
+    return number(default, unit="s", above=0.0, doc=doc)
 
 
 def choice(default: object, options: Sequence[object], *, doc: str = "") -> Any:
-    return field(default=default, metadata={"allowed": Allowed(options=tuple(options), doc=doc)})
+    """Declare a field of a `Settings` class: one of several values.
+
+    Parameters
+    ----------
+    default, options : one of the allowed values, and all of them: texts, numbers or flags.
+    doc : description in one line.
+    """
+    kind = keys.choice(options, " or ".join(map(str, options)))
+    return field(default=default, metadata=_declaration(kind, "", doc))
+
+
+def _declaration(kind: Kind, unit: str, doc: str) -> dict[str, Any]:
+    """Return the metadata of a field, as `Settings.declared` gives them."""
+    # What is allowed stands in parentheses behind the name: the unit needs other marks there.
+    return keys.declaration(kind, unit, f", in {unit}" if unit else "", doc=doc)
+
+
+# Of a field that a class declares without these functions.
+_UNDECLARED = _declaration(keys.PYTHON_NUMBER, "", "")
 
 
 @dataclass(frozen=True)
 class Settings:
     """Base class of the settings of a method, and the class for methods without settings.
 
-    The settings of a method are a frozen dataclass whose fields are declared by `number` and `choice`:
+    The settings of a method are a frozen dataclass whose fields are declared by `number`, `step`
+    and `choice`:
 
     >>> @dataclass(frozen=True)
     ... class Euler(Settings):
@@ -99,32 +83,57 @@ class Settings:
 
     @classmethod
     def of(cls, method: str, given: Mapping[str, object]) -> Self:
-        """Return the settings of `method`: the `given` values, defaults for others.
+        """Return settings of a method, checked and converted.
 
-        Raises InputError, one line with all settings, for an unknown name or a value that is not allowed, of any type.
+        Parameters
+        ----------
+        method : name of the method, for messages.
+        given : values by the names of settings; the others have their defaults.
+
+        Raises
+        ------
+        InputError
+            One line with all settings, for an unknown name, or a value that is not allowed.
         """
-        known, values, problems = cls.allowed(), {}, []
+        declared = cls.declared()
+        values: dict[str, Any] = {}
+        problems = []
         for name, value in given.items():
-            if name not in known:
-                problems.append(f"no setting {name!r}{nearest(name, known)}")
+            if name not in declared:
+                problems.append(f"no setting {name!r}{nearest(name, declared)}")
                 continue
             try:
-                values[name] = known[name].convert(value)
-            except ValueError:
+                values[name] = declared[name]["kind"].read(value)
+            except TableError:
                 problems.append(f"{name} = {shown_value(value)} is not allowed")
         if problems:
             raise InputError(f"{method}: {'; '.join(problems)}; allowed: {cls.describe()}")
         return cls(**values)
 
     @classmethod
-    def allowed(cls) -> dict[str, Allowed]:
-        return {setting.name: setting.metadata.get("allowed", Allowed()) for setting in fields(cls)}
+    def declared(cls) -> dict[str, Mapping[str, Any]]:
+        """Return what is declared of each setting, by name.
+
+        Returns
+        -------
+        dict
+            Mappings with `kind`, a `Kind`; `unit`; `allowed`, what is allowed in words; `doc`.
+        """
+        declared: dict[str, Mapping[str, Any]] = {}
+        for setting in fields(cls):
+            is_declared = "kind" in setting.metadata
+            declared[setting.name] = setting.metadata if is_declared else _UNDECLARED
+        return declared
 
     @classmethod
     def describe(cls) -> str:
+        """Return all settings with what is allowed and their defaults, in one line."""
         defaults = cls().as_dict()
-        texts = [f"{name} ({allowed}; default {defaults[name]})" for name, allowed in cls.allowed().items()]
+        texts = []
+        for name, setting in cls.declared().items():
+            texts.append(f"{name} ({setting['allowed']}; default {defaults[name]})")
         return ", ".join(texts) or "none"
 
     def as_dict(self) -> dict[str, object]:
+        """Return the values by the names of the settings."""
         return asdict(self)

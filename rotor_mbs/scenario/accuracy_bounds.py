@@ -22,7 +22,7 @@ CHECKS = (
 )  # fmt: skip
 
 
-_BOUND = keys.where(keys.NUMBER, lambda value: value >= 0.0, f"a number from 0 to {keys.MAX_NUMBER:g}")
+_BOUND = keys.within(keys.NUMBER, at_least=0.0, allowed=f"a number from 0 to {keys.MAX_NUMBER:g}")
 _PATTERN = keys.Kind(keys.read_text, "a name; * matches any text")
 _SENTENCE = keys.Kind(keys.read_text, "a sentence")
 
@@ -89,6 +89,6 @@ def shipped_bounds() -> Bounds:
 def read_bounds(path: Path) -> tuple[Bound, ...]:
     """The entries of one TOML file of [[bound]] tables. Raises InputError with every error of the file."""
     file = read_toml(path)
-    with file.located():
+    with file.with_line_numbers():
         entries: tuple[Bound, ...] = keys.read_keys(_FILE, file.tables)["bound"]
     return entries

@@ -12,7 +12,7 @@ from rotor_mbs.errors import InputError, RotorError, nearest
 from rotor_mbs.scenario.toml_file import file_path, parse_toml, shown_path
 
 if TYPE_CHECKING:  # `rotor-mbs list` reads no scene
-    from rotor_mbs.scenario.scene import Check, Scene
+    from rotor_mbs.scenario.scene import Scene, ValuesCheck
 
 # Groups at the top of a results file that are not scenes: no scene may take such a name.
 RESERVED_GROUPS = ("bench", "claims", "comparison", "errata", "modes", "stability", "summary", "sweep")
@@ -52,12 +52,12 @@ def list_sweeps() -> list[tuple[str, str]]:
     return [(f"sweeps/{path.stem}", _title(path)) for path in paths]
 
 
-def find_scenes(arguments: Sequence[str], check: Check | None = None) -> list[Scene]:
+def find_scenes(arguments: Sequence[str], check: ValuesCheck | None = None) -> list[Scene]:
     """The scenes that names, folders and paths of TOML files mean, in their order, each once; a shipped name goes
     before a path (write ./paper for a folder of one's own). check: what else is wrong with the values of a file. A
     shipped file is called `folder/stem`, any other by its stem. Raises InputError with all errors of all arguments and
     files."""
-    from rotor_mbs.scenario.scene import load_scene, no_check
+    from rotor_mbs.scenario.scene import load_scene
 
     problems: list[str] = []
     paths: list[Path] = []
@@ -93,7 +93,7 @@ def find_scenes(arguments: Sequence[str], check: Check | None = None) -> list[Sc
             continue
         by_name[name] = path
         try:
-            scenes.append(load_scene(path, name, check or no_check))
+            scenes.append(load_scene(path, name, check))
         except InputError as error:
             problems += error.problems
     if problems:
@@ -121,10 +121,10 @@ def scene_of(given: Scene | str | os.PathLike[str]) -> Scene:
 
 def shipped_scene(name: str) -> Scene | None:
     """The scene of this package with that name; no file of a user's is read."""
-    from rotor_mbs.scenario.scene import load_scene, no_check
+    from rotor_mbs.scenario.scene import load_scene
 
     path = _shipped().get(name)
-    return None if path is None else load_scene(path, name, no_check)
+    return None if path is None else load_scene(path, name)
 
 
 def _shipped() -> dict[str, Path]:

@@ -1,192 +1,224 @@
-"""Keys of input files: what a value may be, and tables read by the keys that a dataclass declares. Reading returns what
-the program keeps, or raises TableError with all that is wrong."""
+"""What the values of keys and settings may be, declared once, and how they are read.
+
+A `Kind` converts a value and says in words what is allowed; kinds are made from one another: a
+number, a number within limits, a list of them. A field of a dataclass declares a key of a file by
+`file_key`, a setting of a method by the functions of `methods.settings`; both are read through the
+kind. What is wrong is raised as a TableError, all of a file at once.
+"""
 
 from __future__ import annotations
 
-import ast
 import dataclasses
-import json
 import math
-import operator
-import re
 import unicodedata
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
 from dataclasses import MISSING, dataclass
+from numbers import Real
 from typing import Any
 
 from rotor_mbs.errors import InputError, nearest
-from rotor_mbs.scenario.toml_file import KeyProblem, TableError
-
-ALLOWED = "numbers, + - * / ** ( ), pi, sqrt(x), hypot(x, y), deg(x)"
-MAX_LENGTH = 200  # characters
-
-# What Python would read but an expression may not hold: other characters, 0x10, 1j, 2pi, a comma that ends a list.
-_FORBIDDEN = re.compile(r"[^0-9A-Za-z.+\-*/(), \t]|(?<=[0-9.])(?![eE][+-]?[0-9])[A-Za-z]|,(?=[ \t]*\))|//")
-_LEADING_ZEROS = re.compile(r"(?<![0-9A-Za-z.])0+(?=[0-9])")
-_OPERATIONS: dict[type[ast.operator], tuple[str, Callable[[float, float], float]]] = {
-    ast.Add: ("+", operator.add),
-    ast.Sub: ("-", operator.sub),
-    ast.Mult: ("*", operator.mul),
-    ast.Div: ("/", operator.truediv),
-    ast.Pow: ("**", math.pow),
-}
-_FUNCTIONS: dict[str, tuple[Callable[..., float], int]] = {
-    "sqrt": (math.sqrt, 1),
-    "hypot": (math.hypot, 2),
-    "deg": (math.radians, 1),
-}
-
-
-def evaluate(text: str) -> float:
-    """The finite double that arithmetic in quotes, "11*pi/12", stands for; parsed, never run as code. Every step is
-    rounded as Python's floats are. Raises ValueError."""
-    if len(text) > MAX_LENGTH:
-        raise ValueError(f"an expression of {len(text)} characters is longer than {MAX_LENGTH}")
-    forbidden = _FORBIDDEN.search(text)
-    if forbidden:
-        raise ValueError(f"{forbidden[0]!a} has no meaning in an expression")
-    try:
-        return _value(ast.parse(_LEADING_ZEROS.sub("", text.strip(" \t")), mode="eval").body)
-    except (SyntaxError, MemoryError, RecursionError) as error:
-        raise ValueError(f"{shown(text)} is not a complete expression") from error
-
-
-def _value(node: ast.expr) -> float:
-    match node:
-        case ast.Constant(value=int() | float() as number) if not isinstance(number, bool):
-            return _applied(shown(ast.unparse(node)), float, number)
-        case ast.Name(id="pi"):
-            return math.pi
-        case ast.UnaryOp(op=ast.USub(), operand=operand):
-            return -_value(operand)
-        case ast.BinOp(op=op) if type(op) in _OPERATIONS:
-            sign, function = _OPERATIONS[type(op)]
-            x, y = _value(node.left), _value(node.right)
-            return _applied(f"{x:g} {sign} {y:g}", function, x, y)
-        case ast.Call(func=ast.Name(id=name), args=arguments, keywords=[]) if name in _FUNCTIONS:
-            function, count = _FUNCTIONS[name]
-            if len(arguments) != count:
-                raise ValueError(f"{name} takes {count} argument{'s' if count > 1 else ''}, not {len(arguments)}")
-            return _applied(name, function, *(_value(argument) for argument in arguments))
-    raise ValueError(f"{shown(ast.unparse(node))} is not a number or an operation on numbers")
-
-
-def _applied(called: str, function: Callable[..., float], *arguments: float) -> float:
-    try:
-        value = function(*arguments)
-    except (ArithmeticError, ValueError):
-        value = math.nan
-    if not math.isfinite(value):
-        raise ValueError(f"{called} has no finite value")
-    return value
-
+from rotor_mbs.scenario import expressions
+from rotor_mbs.scenario.toml_file import KeyProblem, TableError, as_text
 
 MAX_NUMBER = 1e300
 MAX_TEXT = 200  # characters
-# Of what a rotor is and what acts on it, but for zero: inertias, moments and accelerations, products of up to four such
-# numbers, are then between 1e-100 and 1e100, and the product of any three of these is a normal double.
+# Of what a rotor is and what acts on it, but for zero: inertias, moments and accelerations,
+# products of up to four such numbers, are then between 1e-100 and 1e100, and the product of any
+# three of these is a normal double.
 SMALLEST, LARGEST = 1e-25, 1e25
-_UNPRINTABLE = ("Cc", "Cf", "Cs", "Zl", "Zp")  # Unicode categories: controls, direction marks, line ends
+# Unicode categories: controls, direction marks, line ends. They would spoil a terminal.
+_UNPRINTABLE = ("Cc", "Cf", "Cs", "Zl", "Zp")
 
 
 @dataclass(frozen=True)
 class Kind:
-    """What a value of a file may be."""
+    """What a value may be.
 
-    # from the value; where `in_context`, from the value and the values of the keys before it, by field
+    Attributes
+    ----------
+    read : (value) -> the value as the program keeps it; raises TableError where it is not allowed.
+        With `in_context`: (value, values of the keys before it by field).
+    allowed : what is allowed, for messages; {unit} stands for the unit.
+    in_context : whether what is allowed depends on the keys before it.
+    per_blade : whether a file may have one value for all blades.
+    over_time : whether a value may be a table over time.
+    options : the allowed values of a choice; () for any other kind.
+    """
+
     read: Callable[..., Any]
-    allowed: str  # what a message says is allowed; {unit} stands for the key's unit
+    allowed: str
     in_context: bool = False
-    per_blade: bool = False  # the file may have one value for all blades
-    over_time: bool = False  # a value may be a table over time
+    per_blade: bool = False
+    over_time: bool = False
+    options: tuple[object, ...] = ()
+
+    def accepts(self, value: object) -> bool:
+        """Return whether a value is allowed."""
+        try:
+            self.read(value)
+        except TableError:
+            return False
+        return True
 
 
-def file_key(path: str, kind: Kind, unit: str = "1", note: str = "", *, default: Any = MISSING, **more: Any) -> Any:
-    """A field of a dataclass that is the key `path` of a file ("": not in the file); note: what a user has to know
-    after what is allowed; more: `optional`, the default of a key whose field has none, and what the class adds."""
+# Declarations
+
+
+def declaration(
+    kind: Kind,
+    unit: str,
+    shown_unit: str,
+    note: str = "",
+    **more: Any,
+) -> dict[str, Any]:
+    """Return the metadata of a dataclass field that declares a value.
+
+    Parameters
+    ----------
+    kind : what the value may be.
+    unit : its unit.
+    shown_unit : the unit as it follows a number in messages.
+    note : what a user has to know beyond the kind, after it in messages.
+    **more : what else the class wants to know of its fields.
+    """
+    return {
+        "kind": kind,
+        "unit": unit,
+        "allowed": kind.allowed.replace("{unit}", shown_unit) + note,
+        **more,
+    }
+
+
+def file_key(
+    path: str,
+    kind: Kind,
+    unit: str = "1",
+    note: str = "",
+    *,
+    default: Any = MISSING,
+    **more: Any,
+) -> Any:
+    """Declare a field of a dataclass that is a key of a file.
+
+    Parameters
+    ----------
+    path : the key, with its table: "hub.inertia"; "" for a field that is not in the file.
+    kind : what its value may be.
+    unit : its unit; "1" for none.
+    note : what a user has to know beyond the kind, after it in messages.
+    default : of the field and of the key, which then may be missing in a file.
+    **more : `optional`, the default of a key whose field has none, and what the class adds.
+    """
     shown_unit = "" if unit == "1" else f" ({unit.replace('^2', '²')})"
-    allowed = kind.allowed.replace("{unit}", shown_unit) + note
-    metadata = {"key": path, "kind": kind, "unit": unit, "allowed": allowed, **more}
+    metadata = declaration(kind, unit, shown_unit, note, key=path, **more)
     if default is not MISSING:
-        metadata = {"optional": default, **metadata}
+        metadata.setdefault("optional", default)
     return dataclasses.field(default=default, metadata=metadata)
 
 
-def wrong(what: str, allowed: str = "") -> TableError:
-    """The error that a value is wrong, with what is allowed where that is not the key's own text."""
+def declared_keys(cls: Any) -> dict[str, Mapping[str, Any]]:
+    """Return the metadata of the keys that a dataclass declares, by field."""
+    fields = dataclasses.fields(cls)
+    return {field.name: field.metadata for field in fields if field.metadata["key"]}
+
+
+# Messages
+
+
+def invalid(what: str, allowed: str = "") -> TableError:
+    """Return the error of a value.
+
+    Parameters
+    ----------
+    what : what is wrong.
+    allowed : what is allowed, where that is more than the kind says of all values.
+    """
     return TableError([KeyProblem((), what, allowed)])
 
 
 def counted(count: int, noun: str, plural: str = "") -> str:
+    """Return a number with its noun: "1 entry", "2 entries"; by default the plural has an s."""
     return f"{count} {noun if count == 1 else plural or noun + 's'}"
 
 
-def shown(value: object) -> str:
-    """The value as the file has it, short and on one line."""
-    if isinstance(value, bool):
-        return "true" if value else "false"
-    if isinstance(value, int):
-        return str(value) if abs(value) < 10**30 else "a number of over 30 digits"
-    if isinstance(value, float):
-        return repr(value)
-    if isinstance(value, str):
-        return json.dumps(value if len(value) <= 40 else value[:37] + "...", ensure_ascii=not value.isprintable())
-    if isinstance(value, list | tuple):
-        return "a list"
-    return "a table" if isinstance(value, dict) else "a date or time"
+# Single values
 
 
 def read_number(value: object) -> float:
-    """A finite double, from a number or arithmetic in quotes."""
+    """Return a finite float, from a number or from arithmetic in quotes. Raises TableError."""
     result = value
     if isinstance(value, str):
         try:
-            result = evaluate(value)
+            result = expressions.evaluate(value)
         except ValueError as error:
-            raise wrong(f"{shown(value)}: {error}", f"in quotes {ALLOWED}") from error
-    if isinstance(result, bool) or not isinstance(result, int | float):
-        raise wrong(f"{shown(value)} is not a number")
-    if not abs(result) <= MAX_NUMBER:  # so written that NaN fails, too
-        raise wrong(f"{shown(value)} is out of range", f"finite numbers, |x| <= {MAX_NUMBER:g}")
-    return float(result)
+            allowed = f"in quotes {expressions.ALLOWED}"
+            raise invalid(f"{as_text(value)}: {error}", allowed) from error
+    if isinstance(result, bool) or not isinstance(result, Real):
+        raise invalid(f"{as_text(value)} is not a number")
+    number = as_float(result)
+    if not abs(number) <= MAX_NUMBER:  # so written that NaN fails, too
+        raise invalid(f"{as_text(value)} is out of range", f"finite numbers, |x| <= {MAX_NUMBER:g}")
+    return number
 
 
-def as_float(value: float) -> float:
-    """Return an argument of Python as a float, inf for a whole number above 1e308; raises TypeError for no number."""
+def read_python_number(value: object) -> float:
+    """Return a finite float, from a number alone: Python code writes its own arithmetic."""
+    if isinstance(value, str):
+        raise invalid(f"{as_text(value)} is not a number")
+    return read_number(value)
+
+
+def _read_whole(value: object) -> int:
+    if isinstance(value, bool) or not isinstance(value, int):
+        raise invalid(f"{as_text(value)} is not a whole number")
+    return value
+
+
+def _read_python_whole(value: object) -> int:
+    """Return an int, also from a whole float: settings of a scene file are read as floats."""
+    number = read_python_number(value)
+    if number != int(number):
+        raise invalid(f"{as_text(value)} is not a whole number")
+    return int(number)
+
+
+def as_float(value: float | Real) -> float:
+    """Return a number as a float, inf for an int above 1e308. Raises TypeError for no number."""
     try:
         return math.fsum([value])  # unlike float(value) it takes no text
     except OverflowError:
-        return math.inf if value > 0 else -math.inf
+        return -math.inf if value < 0 else math.inf
 
 
 def positive(name: str, number: float) -> float:
-    """Return the argument called `name`. Raises InputError where it is not above 0, or not finite."""
+    """Return the argument called `name`. Raises InputError unless it is above 0 and finite."""
     if not 0.0 < number < math.inf:
         raise InputError(f"{name}: {number!r}; allowed: a number more than 0")
     return number
 
 
 def read_text(value: object) -> str:
+    """Return a text that is not blank. Raises TableError."""
     if not isinstance(value, str):
-        raise wrong(f"{shown(value)} is not text")
+        raise invalid(f"{as_text(value)} is not text")
     if not value.strip():
-        raise wrong("is empty")
+        raise invalid("is empty")
     return value
 
 
 def _read_line(value: object) -> str:
     text = read_text(value)
     if len(text) > MAX_TEXT:
-        raise wrong(f"is {len(text)} characters long")
-    odd = next((char for char in text if unicodedata.category(char) in _UNPRINTABLE), None)
-    if odd is not None:
-        raise wrong(f"contains the control character {odd!a}")
+        raise invalid(f"is {len(text)} characters long")
+    for character in text:
+        if unicodedata.category(character) in _UNPRINTABLE:
+            raise invalid(f"contains the control character {character!a}")
     return text
 
 
 def _read_flag(value: object) -> bool:
     if not isinstance(value, bool):
-        raise wrong(f"{shown(value)} is not true or false")
+        raise invalid(f"{as_text(value)} is not true or false")
     return value
 
 
@@ -199,29 +231,84 @@ def _read_number_or_text(value: object) -> float | str:
         return read_text(value)
 
 
-def where(
-    kind: Kind, is_right: Callable[[Any], bool], allowed: str, what: str = "{} is out of range", allowed_there: str = ""
+def restricted(
+    kind: Kind,
+    is_right: Callable[[Any], bool],
+    allowed: str,
+    what: str = "{} is out of range",
+    allowed_there: str = "",
 ) -> Kind:
-    """What is of `kind` and right; `what` is the message of the others, with {} for the value."""
+    """Return the kind of those values of a kind that fulfil a condition.
+
+    Parameters
+    ----------
+    kind : the values to choose from.
+    is_right : (value, as `kind` returns it) -> whether it is allowed.
+    allowed : what is allowed, for all messages.
+    what : the message for a value that `is_right` refuses; {} stands for the value.
+    allowed_there : what is allowed, in this message alone.
+    """
 
     def read(value: object) -> Any:
         result = kind.read(value)
         if not is_right(result):
-            raise wrong(what.replace("{}", shown(value)), allowed_there)
+            raise invalid(what.replace("{}", as_text(value)), allowed_there)
         return result
 
     return Kind(read, allowed)
 
 
+def within(
+    kind: Kind,
+    *,
+    above: float = -math.inf,
+    at_least: float = -math.inf,
+    at_most: float = math.inf,
+    allowed: str = "",
+) -> Kind:
+    """Return the kind of those numbers of a kind that lie within limits.
+
+    Parameters
+    ----------
+    kind : the numbers to choose from.
+    above, at_least, at_most : exclusive lower, inclusive lower and inclusive upper limit.
+    allowed : what is allowed; by default the limits are written behind what `kind` allows.
+    """
+
+    def is_within(number: float) -> bool:
+        return number > above and at_least <= number <= at_most
+
+    if not allowed:
+        named_limits = {"above": above, "at least": at_least, "at most": at_most}
+        limits = [f"{name} {x:g}" for name, x in named_limits.items() if math.isfinite(x)]
+        text = " " + " and ".join(limits) if limits else ""
+        allowed = kind.allowed.replace("{unit}", text + "{unit}")
+    return restricted(kind, is_within, allowed)
+
+
+# A finite number; the second one of Python code, which may not be in quotes.
 NUMBER = Kind(read_number, "a number{unit}")
-_SIZES = f"sizes from {SMALLEST:g} to {LARGEST:g}"
+PYTHON_NUMBER = Kind(read_python_number, NUMBER.allowed)
+WHOLE = Kind(_read_whole, "a whole number{unit}")
+PYTHON_WHOLE = Kind(_read_python_whole, WHOLE.allowed)
+
 # Numbers of a rotor.
-SIZE = where(
-    NUMBER, lambda x: x == 0.0 or SMALLEST <= abs(x) <= LARGEST, "a number{unit}", allowed_there=f"0, or {_SIZES}"
+_SIZES = f"sizes from {SMALLEST:g} to {LARGEST:g}"
+SIZE = restricted(
+    NUMBER,
+    lambda x: x == 0.0 or SMALLEST <= abs(x) <= LARGEST,
+    NUMBER.allowed,
+    allowed_there=f"0, or {_SIZES}",
 )
-NOT_NEGATIVE = where(SIZE, lambda x: x >= 0.0, "a number of at least 0{unit}")
-_ABOVE_ZERO = where(NUMBER, lambda x: x > 0.0, "a number above 0{unit}")
-POSITIVE = where(_ABOVE_ZERO, lambda x: SMALLEST <= x <= LARGEST, _ABOVE_ZERO.allowed, allowed_there=_SIZES)
+NOT_NEGATIVE = within(SIZE, at_least=0.0, allowed="a number of at least 0{unit}")
+_ABOVE_ZERO = within(NUMBER, above=0.0)
+POSITIVE = restricted(
+    _ABOVE_ZERO,
+    lambda x: SMALLEST <= x <= LARGEST,
+    _ABOVE_ZERO.allowed,
+    allowed_there=_SIZES,
+)
+
 NUMBER_OR_TEXT = Kind(_read_number_or_text, "a number or a text")
 TEXT = Kind(read_text, "a text")
 LINE = Kind(_read_line, f"a text of 1 to {MAX_TEXT} characters on one line")
@@ -229,125 +316,181 @@ FLAG = Kind(_read_flag, "true or false")
 
 
 def whole(lowest: int, highest: int, allowed: str = "") -> Kind:
-    """A whole number, both ends included."""
+    """Return the kind of whole numbers from `lowest` to `highest`; `allowed`: in other words."""
+    allowed = allowed or f"a whole number from {lowest} to {highest}"
+    return within(WHOLE, at_least=lowest, at_most=highest, allowed=allowed)
 
-    def read(value: object) -> int:
-        if isinstance(value, bool) or not isinstance(value, int):
-            raise wrong(f"{shown(value)} is not a whole number")
-        if not lowest <= value <= highest:
-            raise wrong(f"{shown(value)} is out of range")
+
+def choice(options: Sequence[object], allowed: str = "") -> Kind:
+    """Return the kind of a value that is one of `options`; `allowed`: in other words."""
+    are_texts = all(isinstance(option, str) for option in options)
+    names = [str(option) for option in options]
+
+    def is_option(value: object) -> bool:
+        if not isinstance(value, Hashable):  # the comparison with an array has no truth value
+            return False
+        # True and 1 are equal, and are not the same choice.
+        is_flag = isinstance(value, bool)
+        return any(value == option and isinstance(option, bool) is is_flag for option in options)
+
+    def read(value: object) -> Any:
+        if are_texts and not isinstance(value, str):
+            raise invalid(f"{as_text(value)} is not text")
+        if not is_option(value):
+            hint = nearest(value, names) if isinstance(value, str) else ""
+            raise invalid(f"{as_text(value)} is not one of them{hint}")
         return value
 
-    return Kind(read, allowed or f"a whole number from {lowest} to {highest}")
+    return Kind(read, allowed or f"one of {', '.join(names)}", options=tuple(options))
 
 
-def choice(names: Sequence[str]) -> Kind:
-
-    def read(value: object) -> str:
-        if not isinstance(value, str):
-            raise wrong(f"{shown(value)} is not text")
-        if value not in names:
-            raise wrong(f"{shown(value)} is not one of them{nearest(value, names)}")
-        return value
-
-    return Kind(read, f"one of {', '.join(names)}")
+# Lists and tables
 
 
 def read_each(read: Callable[[Any], Any], values: Iterable[Any]) -> tuple[Any, ...]:
-    """Every value, read. Raises TableError with the problems of all."""
+    """Return every value, read. Raises TableError with the problems of all."""
     return tuple(_read_entries(read, enumerate(values)).values())
 
 
-def _read_entries(read: Callable[[Any], Any], entries: Iterable[tuple[str | int, Any]]) -> dict[Any, Any]:
-    results, problems = {}, []
-    for name, value in entries:
+def _read_entries(
+    read: Callable[[Any], Any],
+    entries: Iterable[tuple[str | int, Any]],
+) -> dict[Any, Any]:
+    """Return every value of a list or table by its place. Raises TableError with all problems."""
+    results: dict[Any, Any] = {}
+    problems: list[KeyProblem] = []
+    for place, value in entries:
         try:
-            results[name] = read(value)
+            results[place] = read(value)
         except TableError as error:
-            problems += error.below(name)
+            problems += error.under(place)
     if problems:
         raise TableError(problems)
     return results
 
 
 def list_of(kind: Kind, allowed: str, least: int = 0, most: int | None = None) -> Kind:
+    """Return the kind of a list, read as a tuple.
+
+    Parameters
+    ----------
+    kind : of each entry.
+    allowed : what is allowed, in words.
+    least, most : how many entries it may have; None: any number.
+    """
 
     def read(value: object) -> tuple[Any, ...]:
         if not isinstance(value, list):
-            raise wrong(f"{shown(value)} is not a list")
+            raise invalid(f"{as_text(value)} is not a list")
         if len(value) < least or (most is not None and len(value) > most):
-            raise wrong(counted(len(value), "entry", "entries"))
+            raise invalid(counted(len(value), "entry", "entries"))
         return read_each(kind.read, value)
 
     return Kind(read, allowed)
 
 
 def dict_of(kind: Kind, allowed: str) -> Kind:
+    """Return the kind of a table of any keys, whose values are of one kind."""
 
     def read(value: object) -> dict[str, Any]:
         if not isinstance(value, dict):
-            raise wrong(f"{shown(value)} is not a table")
+            raise invalid(f"{as_text(value)} is not a table")
         return _read_entries(kind.read, value.items())
 
     return Kind(read, allowed)
 
 
 def table_of(cls: type, allowed: str = "") -> Kind:
-    """A table with the keys that a dataclass declares; its __post_init__ may raise TableError, too."""
+    """Return the kind of a table with the keys that a dataclass declares, read as the dataclass.
+
+    Its __post_init__ may raise TableError for values that do not fit one another.
+    """
     keys = declared_keys(cls)
 
     def read(value: object) -> Any:
         if not isinstance(value, dict):
-            raise wrong(f"{shown(value)} is not a table")
+            raise invalid(f"{as_text(value)} is not a table")
         return cls(**read_keys(keys, value))
 
     return Kind(read, allowed)
 
 
-def declared_keys(cls: Any) -> dict[str, Mapping[str, Any]]:
-    """By field, the metadata of the keys that a dataclass declares."""
-    return {field.name: field.metadata for field in dataclasses.fields(cls) if field.metadata["key"]}
-
-
 def read_keys(
     keys: Mapping[str, Mapping[str, Any]],
     tables: Mapping[str, Any],
-    also: Callable[[dict[str, Any]], Iterable[KeyProblem]] = lambda _: (),
+    extra_check: Callable[[dict[str, Any]], Iterable[KeyProblem]] | None = None,
 ) -> dict[str, Any]:
-    """The values by field. Raises TableError with everything that is wrong, also with what `also` finds in the values
-    that could be read."""
+    """Return the values of a file's tables.
+
+    Parameters
+    ----------
+    keys : metadata of the declared keys by field, as of `declared_keys`; in this order they are
+        read, so that a key in context finds those before it.
+    tables : as the file has them.
+    extra_check : (values that could be read, by field) -> what else is wrong with them.
+
+    Returns
+    -------
+    dict
+        The values by field; that of a key which the file does not have is its default.
+
+    Raises
+    ------
+    TableError
+        With everything that is wrong.
+    """
     values: dict[str, Any] = {}
     problems: list[KeyProblem] = []
-    fields: dict[str, dict[str, str]] = {"": {}}  # by table, "" for the top, the field of each key's name
-    for field, key in keys.items():
-        table, _, name = key["key"].rpartition(".")
-        fields.setdefault(table, {})[name] = field
-    for table, own in fields.items():
-        given = tables.get(table, {}) if table else tables
-        is_needed = any("optional" not in keys[field] for field in own.values())
-        if table and ((table not in tables and is_needed) or not isinstance(given, dict)):
-            what = f"{shown(given)} is not a table" if table in tables else "is missing"
-            problems.append(KeyProblem((table,), what, f"a table with {', '.join(own)}"))
+    fields_by_table = _fields_by_table(keys)
+    for table, fields in fields_by_table.items():
+        entries = tables.get(table, {}) if table else tables
+        is_required = any("optional" not in keys[field] for field in fields.values())
+        is_missing = table not in tables and is_required
+        if table and (is_missing or not isinstance(entries, dict)):
+            what = "is missing" if is_missing else f"{as_text(entries)} is not a table"
+            problems.append(KeyProblem((table,), what, f"a table with {', '.join(fields)}"))
             continue
         path = (table,) if table else ()
-        for name, field in own.items():
+        for name, field in fields.items():
             key = keys[field]
-            if name in given:
+            if name in entries:
                 context = [values] if key["kind"].in_context else []
                 try:
-                    values[field] = key["kind"].read(given[name], *context)
+                    values[field] = key["kind"].read(entries[name], *context)
                 except TableError as error:
-                    problems += error.below(*path, name, allowed=key["allowed"])
-            elif "optional" in key and not (table in tables and len(own) == 1):
+                    problems += error.under(*path, name, allowed=key["allowed"])
+            # A table that has one key alone was written for it: without the key it is a mistake.
+            elif "optional" in key and not (table in tables and len(fields) == 1):
                 values[field] = key["optional"]
             else:
                 problems.append(KeyProblem((*path, name), "is missing", key["allowed"]))
-        known = [*own] if table else [*own, *filter(None, fields)]
-        for name in given:
-            if name not in known:
-                what = f"unknown key{nearest(name, known)}"
-                problems.append(KeyProblem((*path, name), what, ", ".join(known), is_of_key=True))
-    problems += also(values)
+        names = [*fields] if table else [*fields, *filter(None, fields_by_table)]
+        problems += _unknown_names(path, entries, names)
+    if extra_check is not None:
+        problems += extra_check(values)
     if problems:
         raise TableError(problems)
     return values
+
+
+def _fields_by_table(keys: Mapping[str, Mapping[str, Any]]) -> dict[str, dict[str, str]]:
+    """Return the field of each key by table ("" for the top of the file) and name in it."""
+    fields: dict[str, dict[str, str]] = {"": {}}
+    for field, key in keys.items():
+        table, _, name = key["key"].rpartition(".")
+        fields.setdefault(table, {})[name] = field
+    return fields
+
+
+def _unknown_names(
+    path: tuple[str, ...],
+    entries: Mapping[str, Any],
+    names: Sequence[str],
+) -> list[KeyProblem]:
+    """Return a problem for each entry of the table at `path` whose name is none of `names`."""
+    problems = []
+    for name in entries:
+        if name not in names:
+            what = f"unknown key{nearest(name, names)}"
+            problems.append(KeyProblem((*path, name), what, ", ".join(names), is_of_key=True))
+    return problems

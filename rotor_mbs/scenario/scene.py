@@ -20,13 +20,14 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from rotor_mbs.errors import InputError, PlausibilityWarning
 from rotor_mbs.scenario import keys
-from rotor_mbs.scenario.keys import Kind, counted, file_key, list_of, read_each, shown, where, wrong
+from rotor_mbs.scenario.keys import Kind, counted, file_key, invalid, list_of, read_each, restricted
 from rotor_mbs.scenario.time_table import LoadTable, Segment, is_constant, is_one_table, kink_times, segments, value_at
 from rotor_mbs.scenario.toml_file import (
     KEY_FORM,
     KeyPath,
     KeyProblem,
     TableError,
+    as_text,
     parse_key,
     parse_toml,
     plain_value,
@@ -53,14 +54,10 @@ MAX_SAMPLE_BYTES = 2 << 30
 INERTIA_TOLERANCE = 1e-9
 
 # What another layer finds wrong with the values of a file by field: its methods and their settings.
-Check = Callable[[Mapping[str, Any]], list[KeyProblem]]
+ValuesCheck = Callable[[Mapping[str, Any]], list[KeyProblem]]
 
 # label: no number of the scene; run: what is computed; start: initial state; rotor: parameters and loads
-Part = Literal["label", "run", "start", "rotor"]
-
-
-def no_check(_values: Mapping[str, Any]) -> list[KeyProblem]:
-    return []
+FieldRole = Literal["label", "run", "start", "rotor"]
 
 
 @functools.cache
@@ -80,7 +77,7 @@ def _read_outputs(value: object) -> tuple[str, ...]:
     outputs = list_of(keys.choice(known), "").read(value)
     repeated = next((output for output in outputs if outputs.count(output) > 1), None)
     if repeated:
-        raise wrong(f'"{repeated}" is given more than once')
+        raise invalid(f'"{repeated}" is given more than once')
     return (*(name for name in OUTPUTS if name in outputs), *sorted(set(outputs) - set(OUTPUTS)))
 
 
@@ -107,13 +104,13 @@ def _read_load(value: object) -> LoadTable:
     rows: LoadTable = list_of(list_of(keys.SIZE, "", 2, 2), "", 1).read(value)
     times = [time for time, _ in rows]
     if times[0] < 0.0:
-        raise wrong("the first time is below 0")
+        raise invalid("the first time is below 0")
     for before, time in pairwise(times):
         if time < before:
-            raise wrong(f"t = {time:g} comes after t = {before:g}")
+            raise invalid(f"t = {time:g} comes after t = {before:g}")
     for time, after_next in zip(times, times[2:], strict=False):
         if time == after_next:
-            raise wrong(f"three rows have t = {time:g}")
+            raise invalid(f"three rows have t = {time:g}")
     return rows if any(value for _, value in rows) else ()
 
 
@@ -125,7 +122,7 @@ def _per_blade(kind: Kind) -> Kind:
         if not isinstance(value, list) or (kind.over_time and value and is_one_table(value)):
             entries = (kind.read(value),) * (count or 1)
         elif count is not None and len(value) != count:
-            raise wrong(f"{counted(len(value), 'number')} in a list for {counted(count, 'blade')}")
+            raise invalid(f"{counted(len(value), 'number')} in a list for {counted(count, 'blade')}")
         else:
             entries = read_each(kind.read, value)
         _check_bare_pitches("acts on", entries, scene)
@@ -139,7 +136,7 @@ def _per_blade(kind: Kind) -> Kind:
 def _read_angles(value: object, scene: Mapping[str, Any]) -> tuple[float, ...]:
     count = scene.get("blade_count")
     if isinstance(value, list) and count is not None and len(value) != 1 + count:
-        raise wrong(f"{counted(len(value), 'number')} for a rotor and {counted(count, 'blade')}")
+        raise invalid(f"{counted(len(value), 'number')} for a rotor and {counted(count, 'blade')}")
     numbers: tuple[float, ...] = list_of(keys.NUMBER, "").read(value)
     return numbers
 
@@ -160,7 +157,7 @@ def _check_bare_pitches(what: str, entries: Sequence[Any], scene: Mapping[str, A
         if len(bare) <= 5:
             blades = f"blade{'s' if len(bare) > 1 else ''} {', '.join(map(str, bare))}"
         allowed = "0 there: a pitch without inertia is not a coordinate of the model"
-        raise wrong(f"{what} {blades}, whose pitch has no inertia", allowed)
+        raise invalid(f"{what} {blades}, whose pitch has no inertia", allowed)
 
 
 def _read_blades(value: object, scene: Mapping[str, Any]) -> tuple[Blade, ...]:
@@ -168,7 +165,7 @@ def _read_blades(value: object, scene: Mapping[str, Any]) -> tuple[Blade, ...]:
 
     def read_blade(table: object) -> Blade:
         if not isinstance(table, dict):
-            raise wrong(f"{shown(table)} is not a table")
+            raise invalid(f"{as_text(table)} is not a table")
         missing = []
         if "tip" not in table and "tip" in scene.get("outputs", ()):
             missing.append(KeyProblem(("tip",), "is missing", BLADE_KEYS["tip"]["allowed"]))
@@ -180,14 +177,14 @@ def _read_blades(value: object, scene: Mapping[str, Any]) -> tuple[Blade, ...]:
     if not isinstance(value, list):
         return (read_blade(value),) * (count or 1)
     if count is not None and len(value) != count:
-        raise wrong(f"{counted(len(value), '[[blade]] table')} for {counted(count, 'blade')}")
+        raise invalid(f"{counted(len(value), '[[blade]] table')} for {counted(count, 'blade')}")
     return read_each(read_blade, value)
 
 
 OUTPUT_NAMES = Kind(_read_outputs, "any of angles, rates, tip, energy, loads, outputs of packages")
-_OUTPUTS = where(OUTPUT_NAMES, bool, OUTPUT_NAMES.allowed, "0 entries")
+_OUTPUTS = restricted(OUTPUT_NAMES, bool, OUTPUT_NAMES.allowed, "0 entries")
 _POINT = list_of(keys.SIZE, "three numbers x, y, z{unit}, blade frame", 3, 3)
-_INERTIA = where(
+_INERTIA = restricted(
     list_of(keys.SIZE, "", 6, 6),
     is_rigid_body_inertia,
     "six numbers xx yy zz xy xz yz{unit} that a rigid body can have",
@@ -263,9 +260,9 @@ class Blade:
         return x != 0.0 or y != 0.0 or self.inertia[2] != 0.0
 
 
-def _key(path: str, *declared: Any, part: Part = "rotor", added: bool = False, **more: Any) -> Any:
+def _key(path: str, *declared: Any, role: FieldRole = "rotor", added: bool = False, **more: Any) -> Any:
     """As `file_key`; an `added` key, younger than stored hashes, does not enter them at its default."""
-    return file_key(path, *declared, part=part, added=added, **more)
+    return file_key(path, *declared, role=role, added=added, **more)
 
 
 @dataclass(frozen=True, slots=True)
@@ -288,17 +285,17 @@ class Scene:
     `replace` do.
     """
 
-    name: str = _key("", keys.TEXT, part="label")
-    title: str = _key("title", keys.LINE, part="label")
-    figures: tuple[str, ...] = _key("figures", list_of(keys.LINE, 'texts, such as ["5"]'), part="label", optional=())
+    name: str = _key("", keys.TEXT, role="label")
+    title: str = _key("title", keys.LINE, role="label")
+    figures: tuple[str, ...] = _key("figures", list_of(keys.LINE, 'texts, such as ["5"]'), role="label", optional=())
     gravity: float = _key("gravity", keys.NOT_NEGATIVE, "m/s^2", ", along -z")
-    duration: float = _key("duration", keys.POSITIVE, "s", part="run")
-    samples: int = _key("samples", keys.whole(2, MAX_SAMPLES), "1", ": equally spaced, both ends included", part="run")
-    outputs: tuple[str, ...] = _key("outputs", _OUTPUTS, part="run", optional=DEFAULT_OUTPUTS)
+    duration: float = _key("duration", keys.POSITIVE, "s", role="run")
+    samples: int = _key("samples", keys.whole(2, MAX_SAMPLES), "1", ": equally spaced, both ends included", role="run")
+    outputs: tuple[str, ...] = _key("outputs", _OUTPUTS, role="run", optional=DEFAULT_OUTPUTS)
     blades: tuple[Blade, ...] = _key("blade", _BLADES)
     hub_inertia: float = _key("hub.inertia", keys.NOT_NEGATIVE, "kg m^2", ", about the shaft", optional=0.0)
-    initial_angles: tuple[float, ...] = _key("initial.angles", _ANGLES, "rad", part="start")
-    initial_rates: tuple[float, ...] = _key("initial.rates", _RATES, "rad/s", part="start")
+    initial_angles: tuple[float, ...] = _key("initial.angles", _ANGLES, "rad", role="start")
+    initial_rates: tuple[float, ...] = _key("initial.rates", _RATES, "rad/s", role="start")
     rotor_torque: tuple[tuple[float, float], ...] = _key("torque.rotor", _LOAD, "N m", default=())
     bearing_stiffness: tuple[float, ...] = _key(
         "bearing.stiffness", _per_blade(keys.NOT_NEGATIVE), "N m/rad", default=()
@@ -309,9 +306,9 @@ class Scene:
     bearing_rest: tuple[LoadTable, ...] = _key(
         "bearing.rest", _per_blade(_LOAD), "rad", ": pitch at which the spring is unloaded", default=(), added=True
     )
-    methods: tuple[str, ...] = _key("methods", _METHODS, part="label", default=())
-    settings: tuple[tuple[str, float | str], ...] = _key("settings", _SETTINGS, part="label", default=())
-    text: str = _key("", keys.TEXT, part="label", default="")
+    methods: tuple[str, ...] = _key("methods", _METHODS, role="label", default=())
+    settings: tuple[tuple[str, float | str], ...] = _key("settings", _SETTINGS, role="label", default=())
+    text: str = _key("", keys.TEXT, role="label", default="")
 
     @property
     def phases(self) -> tuple[float, ...]:
@@ -439,8 +436,8 @@ _BY_PATH = {declared["key"]: declared for declared in SCENE_KEYS.values()} | {
 }
 
 
-def scene_fields(*parts: Part) -> Iterator[Field[Any]]:
-    return (field for field in fields(Scene) if field.metadata["part"] in parts)
+def scene_fields(*roles: FieldRole) -> Iterator[Field[Any]]:
+    return (field for field in fields(Scene) if field.metadata["role"] in roles)
 
 
 _rotor_values = attrgetter(*(field.name for field in scene_fields("rotor")))
@@ -476,11 +473,11 @@ def values_per_sample(blades: int, outputs: Sequence[str]) -> int:
     return 1 + 2 * (1 + blades) + asked
 
 
-def scene_from_tables(tables: Mapping[str, Any], name: str, text: str = "", check: Check = no_check) -> Scene:
+def scene_from_tables(tables: Mapping[str, Any], name: str, text: str = "", check: ValuesCheck | None = None) -> Scene:
     """The scene in the tables of a scene file. Raises TableError with every error."""
 
-    def also(values: Mapping[str, Any]) -> list[KeyProblem]:
-        problems = check(values)
+    def extra_check(values: Mapping[str, Any]) -> list[KeyProblem]:
+        problems = check(values) if check else []
         if {"blade_count", "samples", "outputs"} <= values.keys():
             of_sample = values_per_sample(values["blade_count"], values["outputs"])
             total = values["samples"] * of_sample * 8
@@ -489,7 +486,7 @@ def scene_from_tables(tables: Mapping[str, Any], name: str, text: str = "", chec
                 problems.append(KeyProblem(("samples",), what, f"at most {MAX_SAMPLE_BYTES >> 30} GiB"))
         return problems
 
-    values = keys.read_keys(SCENE_KEYS, tables, also)
+    values = keys.read_keys(SCENE_KEYS, tables, extra_check)
     del values["blade_count"]
     values["settings"] = tuple(dict(values["settings"]).items())
     return Scene(name=name, text=text, **values)
@@ -599,7 +596,9 @@ def _as_list(tables: Mapping[str, Any], value: Any, path: KeyPath, last: int) ->
     return [0.0] * (last + 1) if value is None else value
 
 
-def load_scene(path: Path | str, name: str | None = None, check: Check = no_check, stacklevel: int = 2) -> Scene:
+def load_scene(
+    path: Path | str, name: str | None = None, check: ValuesCheck | None = None, stacklevel: int = 2
+) -> Scene:
     """The scene in the TOML file `path`, under `name` or the file's own. check: what else is wrong with its values.
     Raises InputError with all errors of the file, a line each: `file:line: key: what is wrong; allowed: ...`; entries
     are counted from 0. Issues a PlausibilityWarning for each number that looks like a slip, but not of shipped scenes,
@@ -608,9 +607,9 @@ def load_scene(path: Path | str, name: str | None = None, check: Check = no_chec
     file = read_toml(path)
     if "axis" in file.tables and "scene" in file.tables:
         raise InputError(f"{file.source}: is a sweep; allowed: a scene, or: rotor-mbs sweep {file.source}")
-    with file.located():
+    with file.with_line_numbers():
         scene = scene_from_tables(file.tables, path.stem if name is None else name, file.text, check)
-    for doubt in doubts(scene) if "/" not in scene.name else ():
+    for doubt in implausible_values(scene) if "/" not in scene.name else ():
         warnings.warn(f"{file.source}: {doubt}", PlausibilityWarning, stacklevel)
     return scene
 
@@ -618,7 +617,7 @@ def load_scene(path: Path | str, name: str | None = None, check: Check = no_chec
 def parse_scene(text: str, name: str) -> Scene:
     """The scene in a TOML text, as it is stored with results. Raises InputError as `load_scene`."""
     file = parse_toml(text, name)
-    with file.located():
+    with file.with_line_numbers():
         return scene_from_tables(file.tables, name, text)
 
 
@@ -682,7 +681,7 @@ MAX_MASS, MIN_MASS = 1e6, 0.01  # kg
 USUAL_GRAVITY = (1.0, 30.0)  # m/s^2: the Moon, Jupiter
 
 
-def doubts(scene: Scene) -> list[str]:
+def implausible_values(scene: Scene) -> list[str]:
     """A line for each number that looks like a slip: key, value, and what may have been meant; [] where all is well."""
     lines = []
     # Where one is more than a turn, other whole numbers are in degrees, too.

@@ -18,12 +18,11 @@ from numpy.typing import NDArray
 from rotor_mbs.errors import InputError
 from rotor_mbs.scenario import keys
 from rotor_mbs.scenario.catalogue import SCENARIOS, SWEEPS, list_scenes, only_scene
-from rotor_mbs.scenario.keys import Kind, file_key, list_of, table_of, where, wrong
+from rotor_mbs.scenario.keys import Kind, file_key, invalid, list_of, restricted, table_of
 from rotor_mbs.scenario.scene import (
     OUTPUT_NAMES,
-    Check,
     Scene,
-    no_check,
+    ValuesCheck,
     put_value,
     scene_fields,
     scene_from_tables,
@@ -59,22 +58,22 @@ def _read_key(value: object) -> str:
     key: str = keys.LINE.read(value)
     table = parse_key(key)[0]
     if table in ("blades", "samples", "duration"):
-        raise wrong(f"all runs of a dataset have the same {table}", "separate sweeps, or another key")
+        raise invalid(f"all runs of a dataset have the same {table}", "separate sweeps, or another key")
     return key
 
 
 _COUNT = keys.whole(2, MAX_COUNT, "a whole number of at least 2")
 _PAIR = list_of(keys.NUMBER, "", 2, 2)
-_RANGE = where(
+_RANGE = restricted(
     _PAIR, lambda pair: pair[0] < pair[1], "two numbers [low, high]", "the first number is not below the second"
 )
-_NORMAL = where(
+_NORMAL = restricted(
     _PAIR,
     lambda pair: pair[1] > 0.0,
     "two numbers [mean, standard deviation], the second one above 0",
     "the standard deviation is not above 0",
 )
-_SHARE = where(keys.NUMBER, lambda share: 0.0 < share < 1.0, "a number between 0 and 1")
+_SHARE = restricted(keys.NUMBER, lambda share: 0.0 < share < 1.0, "a number between 0 and 1")
 _SCENE_NAME = Kind(keys.LINE.read, "the name of a shipped scene (paper/fig11), or a TOML file beside this one")
 
 
@@ -88,7 +87,7 @@ class Range:
 
 
 _LINEAR = table_of(Range, "a table with start, end, count")
-_LOG = where(
+_LOG = restricted(
     _LINEAR,
     lambda range: min(range.start, range.end) > 0.0,
     "a table with start, end, count, both ends above 0",
@@ -112,7 +111,7 @@ class Axis:
         given = [name for name in VARIED if getattr(self, name) is not None]
         if len(given) != 1:
             what = f"has {' and '.join(given)}" if given else "has no values"
-            raise wrong(what, f"exactly one of {', '.join(VARIED)}")
+            raise invalid(what, f"exactly one of {', '.join(VARIED)}")
 
     @property
     def is_drawn(self) -> bool:
@@ -353,7 +352,7 @@ class Sweep:
         return Variants(self.name, {**scene_tables(self.base), "outputs": wanted}, self.keys)
 
 
-def load_sweep(path: Path, check: Check = no_check) -> Sweep:
+def load_sweep(path: Path, check: ValuesCheck | None = None) -> Sweep:
     """The sweep in the TOML file `path`; sweeps/NAME means a shipped one. check: what else is wrong with its values.
     Raises InputError with all errors of the file."""
     path = file_path(path)
@@ -389,17 +388,17 @@ def sweep_of(scene: Scene, axes: Mapping[str, object], **options: object) -> Swe
     for key, values in axes.items():
         table = values if isinstance(values, Mapping) else {"values": values}
         text += "\n[[axis]]\n" + toml_lines({"key": key, **table})
-    return _sweep(Path("sweep"), parse_toml(text, "sweep"), no_check, scene)
+    return _sweep(Path("sweep"), parse_toml(text, "sweep"), None, scene)
 
 
-def _sweep(path: Path, file: TomlFile, check: Check, base: Scene | None = None) -> Sweep:
+def _sweep(path: Path, file: TomlFile, check: ValuesCheck | None, base: Scene | None = None) -> Sweep:
     """The sweep that a file describes; its base is the scene that it names, where none is given."""
-    with file.located():
+    with file.with_line_numbers():
         design = Design(**keys.read_keys(DESIGN_KEYS, file.tables, check))
     if base is None:
         is_shipped = (SCENARIOS / f"{design.scene}.toml").is_file()
         is_beside = design.scene.endswith(".toml") and not is_shipped
-        with file.located("scene"):
+        with file.with_line_numbers("scene"):
             base = only_scene(str(path.parent / design.scene) if is_beside else design.scene)
     changes: dict[str, object] = dict(design.change)
     if design.samples is not None:
@@ -407,7 +406,7 @@ def _sweep(path: Path, file: TomlFile, check: Check, base: Scene | None = None) 
     if design.outputs:
         changes["outputs"] = design.outputs
     if changes:
-        with file.located(next(key for key in ("change", "samples", "outputs") if getattr(design, key))):
+        with file.with_line_numbers(next(key for key in ("change", "samples", "outputs") if getattr(design, key))):
             base = base.replace(**changes)
     sweep = Sweep(design, base, file, path)
     faults: dict[KeyProblem, None] = {}
@@ -421,7 +420,7 @@ def _sweep(path: Path, file: TomlFile, check: Check, base: Scene | None = None) 
                 faults.setdefault(KeyProblem(("axis", i, "key"), what))
             if len(faults) >= _MAX_ROW_ERRORS:
                 break
-    with file.located():
+    with file.with_line_numbers():
         if faults:
             raise TableError(faults)
     return sweep

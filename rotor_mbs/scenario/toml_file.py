@@ -59,7 +59,7 @@ class TableError(InputError):
         self.faults = tuple(faults)
         super().__init__(fault.message for fault in self.faults)
 
-    def below(self, *path: str | int, allowed: str = "") -> list[KeyProblem]:
+    def under(self, *path: str | int, allowed: str = "") -> list[KeyProblem]:
         """The faults of a value that stands at `path`, where `allowed` is what its key allows."""
         return [fault._replace(path=(*path, *fault.path), allowed=fault.allowed or allowed) for fault in self.faults]
 
@@ -71,7 +71,7 @@ class TomlFile:
     tables: dict[str, Any]
 
     @contextmanager
-    def located(self, *path: str) -> Iterator[None]:
+    def with_line_numbers(self, *path: str) -> Iterator[None]:
         """What is wrong with the key at `path`, an InputError of the block, gets lines `source:line: key: what is
         wrong; allowed: ...`, in the order of the file."""
         try:
@@ -79,7 +79,7 @@ class TomlFile:
         except InputError as error:
             faults = [KeyProblem(path, problem) for problem in error.problems]
             if isinstance(error, TableError):
-                faults = error.below(*path)
+                faults = error.under(*path)
             lines = find_lines(self.text)
             messages = sorted(((line_of(lines, fault.path), fault.message) for fault in faults), key=itemgetter(0))
             shown = [f"{self.source}:{line}: {message}" for line, message in messages[:MAX_PROBLEMS]]
@@ -199,6 +199,22 @@ def plain_value(value: Any) -> Any:
     if isinstance(value, Iterable) and not isinstance(value, bytes | bytearray):
         return [plain_value(entry) for entry in value]
     raise TypeError(f"{shown_value(value)}: a file has no {type(value).__name__}")
+
+
+def as_text(value: object) -> str:
+    """Return a value for a message as its file has it, short and on one line."""
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, int):
+        return str(value) if abs(value) < 10**30 else "a number of over 30 digits"
+    if isinstance(value, float):
+        return repr(value)
+    if isinstance(value, str):
+        shortened = value if len(value) <= 40 else value[:37] + "..."
+        return json.dumps(shortened, ensure_ascii=not value.isprintable())
+    if isinstance(value, list | tuple):
+        return "a list"
+    return "a table" if isinstance(value, dict) else "a date or time"
 
 
 def toml_value(value: object) -> str:

@@ -305,7 +305,7 @@ def plan_sweep(
         If all methods refuse the base scene.
     """
     named = check_names(methods or sweep.design.methods)
-    with sweep.file.located("settings"):
+    with sweep.file.with_line_numbers("settings"):
         settings = settings_for(named, sweep.design.settings)
     able, refused = able_methods(sweep.base, named, settings)
     if not able:

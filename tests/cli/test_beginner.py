@@ -10,7 +10,7 @@ from support.commands import refusal, rotor_mbs
 import rotor_mbs as rm
 from rotor_mbs.errors import PlausibilityWarning
 from rotor_mbs.scenario.catalogue import list_scenes
-from rotor_mbs.scenario.scene import doubts, new_scene_text
+from rotor_mbs.scenario.scene import implausible_values, new_scene_text
 
 # Mistake: (edits of the template, the command with {file} for the scene file, what the one line must say).
 MISTAKES: dict[str, tuple[dict[str, str], str, str]] = {
@@ -93,13 +93,13 @@ def test_plausible_numbers_are_not_warned_of(folder: Path) -> None:
 
 def test_all_angles_in_degrees_are_named_and_rest_angles_and_inertias_in_other_units() -> None:
     scene = rm.scene("paper/fig11").replace(**{"initial.angles": [30, 5, 0.1, -45], "bearing.stiffness": 1e3})
-    assert [line[:17] for line in doubts(scene)] == [f"initial.angles[{i}]" for i in (0, 1, 3)]
-    (line,) = doubts(rm.scene("turbine/pitch-step").replace(**{"bearing.rest": 5.0}))[:1]
+    assert [line[:17] for line in implausible_values(scene)] == [f"initial.angles[{i}]" for i in (0, 1, 3)]
+    (line,) = implausible_values(rm.scene("turbine/pitch-step").replace(**{"bearing.rest": 5.0}))[:1]
     assert line.startswith("bearing.rest[0]: 5 rad are 0.8 turns")
-    (line,) = doubts(rm.scene("paper/fig11").replace(**{"blade.inertia": [9e7, 9e7, 1e3, 0, 0, 0]}))
+    (line,) = implausible_values(rm.scene("paper/fig11").replace(**{"blade.inertia": [9e7, 9e7, 1e3, 0, 0, 0]}))
     assert line.startswith("blade.inertia: a radius of gyration of 77.5 m")  # sqrt(9e7 / 15000)
     for name, _ in list_scenes():
-        assert not [line for line in doubts(rm.scene(name)) if "gyration" in line or "rest" in line], name
+        assert not [line for line in implausible_values(rm.scene(name)) if "gyration" in line or "rest" in line], name
 
 
 def test_an_inaccurate_run_names_the_next_step_to_try_until_it_is_accurate() -> None:

@@ -72,6 +72,23 @@ def run(*words: str) -> str:
     return ended.out
 
 
+def test_the_ladder_of_a_files_method_has_the_values_that_its_setting_allows() -> None:
+    text = """
+from dataclasses import dataclass
+from rotor_mbs.methods.base import Method
+from rotor_mbs.methods.settings import Settings, number
+
+@dataclass(frozen=True)
+class Accuracy(Settings):
+    tolerance: float = number(1e-8, at_least=5e-13, at_most=2e-5, doc="relative tolerance")
+
+METHOD = Method(name="own", label="own", build=lambda scene, settings: None, settings=Accuracy)
+"""
+    (method,) = method_file.MethodFile("mine.py", text).load(()).values()
+    (ladder,) = method.ladders
+    assert ladder.values == tuple(10.0**-k for k in range(5, 13))
+
+
 def test_the_documents_example_is_short_complete_and_right() -> None:
     """40 lines of code; its tolerance leaves 1e-12 an interval, on a scene with every term."""
     assert len([line for line in EXAMPLE.splitlines() if line.strip()]) <= 40
@@ -108,11 +125,27 @@ def test_a_run_is_keyed_by_the_code_of_its_file() -> None:
     ("name", "text", "line"),
     [
         ("mine.py", "a = 1\nb = (\n", "mine.py:2: SyntaxError: '(' was never closed"),
-        ("mine.py", "import os\nos._exit(0)\n", "mine.py: ended the process that loaded it (exit code 0)"),
+        (
+            "mine.py",
+            "import os\nos._exit(0)\n",
+            "mine.py: ended the process that loaded it (exit code 0)",
+        ),
         ("mine.py", "while True: pass\n", "mine.py: not loaded within 0.5 s"),
-        ("mine.py", "METHOD = 1\n", "mine.py: defines no Method; allowed: at least one (docs/your-engine.md)"),
-        ("lagrange.py", EXAMPLE, "lagrange.py: lagrange/taylor has this name; allowed: another file name"),
-        ("other/mine.py", EXAMPLE, "other/mine.py: methods mine/... are those of mine.py; allowed: another file name"),
+        (
+            "mine.py",
+            "METHOD = 1\n",
+            "mine.py: defines no Method; allowed: at least one (docs/your-engine.md)",
+        ),
+        (
+            "lagrange.py",
+            EXAMPLE,
+            "lagrange.py: lagrange/taylor has this name; allowed: another file name",
+        ),
+        (
+            "other/mine.py",
+            EXAMPLE,
+            "other/mine.py: methods mine/... are those of mine.py; allowed: another file name",
+        ),
     ],
     ids=["syntax", "ends", "hangs", "no method", "a shipped name", "a name twice"],
 )
@@ -128,9 +161,24 @@ def test_a_file_that_cannot_be_used_is_one_line(
     assert not Path("o.h5").exists()
 
 
-def test_whatever_a_method_does_is_one_line_and_loses_nothing(capfd: pytest.CaptureFixture[str]) -> None:
+def test_whatever_a_method_does_is_one_line_and_loses_nothing(
+    capfd: pytest.CaptureFixture[str],
+) -> None:
     Path("bad.py").write_text("import os; print('x' * 10**6); os.write(1, b'x' * 10**6)\n" + BAD)
-    ended = rotor_mbs("run", "one.toml", "-m", "bad.py", "-m", "mine.py", "-o", "o.h5", "-j", "1", "--timeout", "2")
+    ended = rotor_mbs(
+        "run",
+        "one.toml",
+        "-m",
+        "bad.py",
+        "-m",
+        "mine.py",
+        "-o",
+        "o.h5",
+        "-j",
+        "1",
+        "--timeout",
+        "2",
+    )
     printed = "".join(capfd.readouterr())
     assert ended.status == 1
     assert len(ended.out + ended.err + printed) < 3000
@@ -162,7 +210,9 @@ def test_a_build_that_ends_or_hangs_its_process_is_one_line(
     assert (ended.status, ended.out, ended.err) == (2, "", f"not run: bad/bad on one: {line}\n")
 
 
-def test_the_answer_to_an_interrupted_question_is_not_the_next_ones(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_answer_to_an_interrupted_question_is_not_the_next_ones(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     def interrupted(_: object) -> None:
         raise KeyboardInterrupt
 

@@ -17,8 +17,8 @@ ALL = [*methods(), find_method("reference")]
 NUMBERS = [
     pytest.param(method, name, id=f"{method.name}-{name}")
     for method in ALL
-    for name, allowed in method.settings.allowed().items()
-    if not allowed.options
+    for name, setting in method.settings.declared().items()
+    if not setting["kind"].options
 ]
 
 
@@ -51,7 +51,7 @@ def test_defaults_and_the_settings_of_every_ladder_are_allowed(method: Method) -
     given = [settings for ladder in method.ladders for settings in ladder.rungs(0.1).values()]
     for settings in given:
         assert method.settings.of(method.name, settings).as_dict() == {**method.defaults, **settings}
-    assert all(allowed.doc for allowed in method.settings.allowed().values())
+    assert all(setting["doc"] for setting in method.settings.declared().values())
 
 
 def test_the_range_of_scipys_tolerance_starts_where_scipy_would_change_it() -> None:

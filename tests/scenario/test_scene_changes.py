@@ -74,7 +74,7 @@ def test_every_key_of_the_scene_file_can_be_changed() -> None:
 def test_a_change_reaches_its_field_alone_and_the_text(general: Scene, key: str) -> None:
     value, name = CHANGES[key]
     changed = general.replace(**{key: value})
-    parts = {field.name: field.metadata["part"] for field in fields(Scene)}
+    parts = {field.name: field.metadata["role"] for field in fields(Scene)}
     assert {each for each in parts if getattr(changed, each) != getattr(general, each)} == {name, "text"}
     assert (scene_hash(changed) != scene_hash(general)) == (parts[name] != "label")
     assert (changed.rotor_key != general.rotor_key) == (parts[name] == "rotor")

@@ -10,7 +10,8 @@ from hypothesis import assume, example, given
 from hypothesis import strategies as st
 
 from rotor_mbs.errors import InputError
-from rotor_mbs.scenario.keys import ALLOWED, MAX_LENGTH, evaluate, read_number
+from rotor_mbs.scenario.expressions import ALLOWED, MAX_LENGTH, evaluate
+from rotor_mbs.scenario.keys import read_number
 
 
 @pytest.mark.parametrize(
