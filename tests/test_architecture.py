@@ -15,7 +15,14 @@ TEXT = (ROOT / "docs" / "architecture.md").read_text()
 SOURCES = {path.relative_to(PACKAGE).as_posix(): path.read_text() for path in sorted(PACKAGE.rglob("*.py"))}
 CONTRACTS = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["importlinter"]["contracts"]
 # Where a method is chosen by its name: the selection rule, the check, the suite's patient method, defaults of the API.
-CHOSEN = {"methods/catalogue.py", "studies/check.py", "studies/stability.py", "api.py", "scenario/sweep.py"}
+CHOSEN = {
+    "methods/catalogue.py",
+    "methods/selection.py",
+    "studies/check.py",
+    "studies/stability.py",
+    "api.py",
+    "scenario/sweep.py",
+}
 
 
 def code_of(text: str) -> str:

@@ -18,7 +18,7 @@ from rotor_mbs.analysis.run_checks import Check as Check
 from rotor_mbs.analysis.run_checks import RunSamples, run_checks
 from rotor_mbs.analysis.run_checks import Where as Where
 from rotor_mbs.errors import InputError, StoreError
-from rotor_mbs.methods.catalogue import PRINTED, REFERENCE, is_corrected, look_up, methods
+from rotor_mbs.methods.catalogue import PRINTED, REFERENCE, find_method_or_none, is_corrected, methods
 from rotor_mbs.methods.solve import solve
 from rotor_mbs.runs.read import OpenResults, StoredRun, StoredScene
 from rotor_mbs.runs.table import reading
@@ -210,7 +210,7 @@ def _own_extremes(solution: Solution) -> dict[str, float]:
 
 def settings_faults(run: StoredRun) -> list[str]:
     """What is wrong with the stored settings: each of the method's must be there, none else, each within its range."""
-    method = look_up(run.method)
+    method = find_method_or_none(run.method)
     if method is None:
         return []
     stored = run.settings

@@ -25,7 +25,7 @@ from rotor_mbs.analysis.run_checks import (
     run_checks,
     symmetry_loss,
 )
-from rotor_mbs.methods.catalogue import is_corrected, look_up
+from rotor_mbs.methods.catalogue import find_method_or_none, is_corrected
 from rotor_mbs.models.lagrange.defects import interval_defects
 from rotor_mbs.models.lagrange.singularity import rotor_inertia_shares
 from rotor_mbs.scenario.accuracy_bounds import Bound, Bounds, shipped_bounds
@@ -77,7 +77,7 @@ def defects_of(scene: Scene, run: Trajectory) -> Defects | None:
 
 def bounds_of(method: str) -> Bounds:
     """Return the bounds of any scene that a status is judged by, a method's own first."""
-    known = look_up(method)
+    known = find_method_or_none(method)
     return shipped_bounds().with_entries(known.bounds if known else ())
 
 

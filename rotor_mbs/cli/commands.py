@@ -20,7 +20,7 @@ from rotor_mbs.cli import EXIT_BAD_INPUT, EXIT_FAILED, EXIT_OK, print_line
 from rotor_mbs.cli.arguments import pages_beside
 from rotor_mbs.cli.terminal import ProgressLine, print_json, print_not_computed, print_table
 from rotor_mbs.errors import InputError, MethodRefusal, StoreError
-from rotor_mbs.methods.catalogue import look_up, methods, problems_of_methods
+from rotor_mbs.methods.catalogue import find_method_or_none, methods, problems_of_methods
 from rotor_mbs.runs import cores
 from rotor_mbs.scenario.catalogue import find_scenes, list_scenes, list_sweeps, only_scene
 from rotor_mbs.scenario.keys import counted
@@ -67,7 +67,7 @@ def new(arguments: argparse.Namespace) -> int:
 
 def show(arguments: argparse.Namespace) -> int:
     """One scene's data and the methods of each model, with --build its items; or the settings of a method."""
-    method = look_up(arguments.scene)
+    method = find_method_or_none(arguments.scene)
     if method is None:
         _show_scene(arguments)
         return 0

@@ -1,4 +1,4 @@
-"""What a method is: one object that says all there is to know of it; its ladder of settings in the bench."""
+"""What a method is: one object that says all there is to know of it, with ladders of settings."""
 
 from __future__ import annotations
 
@@ -26,48 +26,92 @@ MAX_STEPS = 1e9  # of a run; the engines count them in 32 bits
 
 @dataclass(frozen=True)
 class Ladder:
-    """A curve of the diagram: one method with its fixed choices, over a falling step or tolerance."""
+    """A curve of the work-precision diagram: a method over a falling step or tolerance.
 
-    kind: str  # STEP or TOLERANCE
-    values: tuple[float, ...]  # steps as shares of the sample interval, or tolerances; coarse to fine
-    fill: Callable[[float], Mapping[str, float]]  # the settings that go with one value
-    choices: Mapping[str, object] = field(default_factory=dict)  # settings that stay the same along the ladder
-    variant: str = ""  # what follows the method's name in the curve's name; "" where the choices are the default ones
-    label: str = ""  # of the variant, which follows the method's
+    Attributes
+    ----------
+    kind : STEP or TOLERANCE.
+    values : steps as shares of the sample interval, or tolerances, from coarse to fine.
+    settings_at : (step in s, or tolerance) -> the settings that go with it.
+    choices : settings that stay the same along the ladder.
+    variant : what follows the method's name in the name of the curve; "" for the default choices.
+    label : what follows the method's label in the label of the curve.
+    """
+
+    kind: str
+    values: tuple[float, ...]
+    settings_at: Callable[[float], Mapping[str, float]]
+    choices: Mapping[str, object] = field(default_factory=dict)
+    variant: str = ""
+    label: str = ""
 
     @property
-    def short(self) -> Ladder:
+    def coarse(self) -> Ladder:
         """This ladder with every second value, without the coarsest third."""
         return replace(self, values=self.values[len(self.values) // 3 :: 2])
 
-    def rungs(self, interval: float) -> dict[float, dict[str, object]]:
-        """All that the method is given at each rung, by step (s) or tolerance; interval: s, between samples."""
-        numbers = [value * interval if self.kind == STEP else value for value in self.values]
-        return {number: {**self.choices, **self.fill(number)} for number in numbers}
+    def settings_by_value(self, interval: float) -> dict[float, dict[str, object]]:
+        """Return the settings of every point of the ladder.
+
+        Parameters
+        ----------
+        interval : s, between samples.
+
+        Returns
+        -------
+        dict
+            By step (s) or tolerance, from coarse to fine, all settings that the method is given.
+        """
+        settings: dict[float, dict[str, object]] = {}
+        for value in self.values:
+            number = value * interval if self.kind == STEP else value
+            settings[number] = {**self.choices, **self.settings_at(number)}
+        return settings
 
 
-def step_ladder(count: int, first: int = 0, **facts: Any) -> Ladder:
-    """Return a ladder of steps: the sample interval times 0.5**first, ..., 0.5**(first + count - 1). `facts` are
-    other fields of the `Ladder`."""
+def step_ladder(count: int, first: int = 0, **others: Any) -> Ladder:
+    """Return a ladder of steps, each half as long as the one before.
+
+    Parameters
+    ----------
+    count : number of steps.
+    first : the first step is the sample interval times 0.5**first.
+    **others : other fields of the `Ladder`.
+    """
     shares = tuple(0.5**k for k in range(first, first + count))
-    return Ladder(STEP, shares, lambda step: {"step": step}, **facts)
+    return Ladder(STEP, shares, lambda step: {"step": step}, **others)
 
 
-def tolerance_ladder(fill: Callable[[float], Mapping[str, float]], *tolerances: float) -> Ladder:
-    """The settings that `fill` gives for each tolerance, coarse to fine."""
-    return Ladder(TOLERANCE, tolerances, fill)
+def tolerance_ladder(
+    settings_at: Callable[[float], Mapping[str, float]],
+    *tolerances: float,
+) -> Ladder:
+    """Return a ladder of tolerances.
+
+    Parameters
+    ----------
+    settings_at : (tolerance) -> the settings that go with it.
+    *tolerances : from coarse to fine.
+    """
+    return Ladder(TOLERANCE, tolerances, settings_at)
 
 
 def tolerance_pair(tolerance: float) -> Mapping[str, float]:
-    """Relative and absolute tolerance of the same work.
-
-    Angles and rates of order one: a hundredth of the relative tolerance is nowhere the larger of the two."""
+    """Return relative and absolute tolerance of the same work."""
+    # Angles and rates are of order one: a hundredth of the relative tolerance is nowhere the larger
+    # of the two.
     return {"relative_tolerance": tolerance, "absolute_tolerance": 0.01 * tolerance}
 
 
 @dataclass(frozen=True, slots=True)
 class BuiltItem:
-    """Item of a model: its `kind` (node, object, marker, load, sensor, equation or term), name and details."""
+    """Item of a model.
+
+    Attributes
+    ----------
+    kind : node, object, marker, load, sensor, equation or term.
+    name, detail : what it is called, and what else there is to say of it.
+    """
 
     kind: str
     name: str
@@ -75,13 +119,16 @@ class BuiltItem:
 
 
 class Solver(Protocol):
-    """A model built for one scene with one integrator, ready to run from the initial state as often as wanted."""
+    """A model built for one scene with one integrator, which runs from the start repeatedly."""
 
     def integrate(self) -> Integration:
-        """Run from the initial state to the end. Only this is timed; it does no work that is not integration."""
+        """Run from the initial state to the end.
+
+        Only this is timed; it does no work that is not integration.
+        """
 
     def observe(self) -> Trajectory:
-        """Samples of the last integration, cut before the first row that is not finite."""
+        """Return samples of the last integration, cut before the first row that is not finite."""
 
 
 def no_items(_scene: Scene) -> list[BuiltItem]:
@@ -97,11 +144,12 @@ class Method:
     ----------
     name : "model/integrator", as on the command line and in files.
     label : name in tables and figures: "model, integrator".
-    build : (scene, settings) -> Solver; settings is an instance of `settings`. Raises MethodRefusal if the method
-        cannot represent the scene.
+    build : (scene, settings) -> Solver; settings is an instance of `settings`. Raises MethodRefusal
+        if the method cannot represent the scene.
     items : (scene) -> list of BuiltItem, the items of the model; raises MethodRefusal like `build`.
     settings : class of its settings, with units, defaults and ranges.
-    is_corrected : whether it solves the corrected equations; if not, the accuracy of its runs is not assessed.
+    is_corrected : whether it solves the corrected equations; if not, the accuracy of its runs is
+        not assessed.
     is_default : whether it is in the default selection.
     erratum : "E1", "E2" or "E3" if it has this erratum of the printed equations only; else "".
     distributions : names of the packages it needs.
@@ -109,15 +157,19 @@ class Method:
     order : order of convergence; None if it is not fixed.
     fixed_step : whether the step is the setting `step`.
     ladders : series of settings used by `bench`.
-    relative_cost : run time relative to the fastest method, roughly. Expensive methods are started first.
-    bounds : accuracy bounds of a method of another package; those of built-in methods are in reference/accuracy.toml.
-    solve_many : (scenes, settings) -> RunBlock: several runs of a sweep at once, for the outputs angles, rates, tip and
-        energy only; or None.
-    linearize : (scene, steady angles, rotor speed, rotor torque) -> Linearization, or None; for one method of each
-        model. Raises MethodRefusal for a state about which the model cannot be linearized.
+    relative_cost : run time relative to the fastest method, roughly. Expensive methods are started
+        first.
+    bounds : accuracy bounds of a method of another package; those of built-in methods are in
+        reference/accuracy.toml.
+    solve_many : (scenes, settings) -> RunBlock: several runs of a sweep at once, for the outputs
+        angles, rates, tip and energy only; or None.
+    linearize : (scene, steady angles, rotor speed, rotor torque) -> Linearization, or None; for one
+        method of each model. Raises MethodRefusal for a state about which the model cannot be
+        linearized.
     arrays : names of optional quantities that it stores, such as "constraint_error".
     sources : source files of a method of another package, or its code.
-    load : imports the packages it needs, and ignores code compiled by earlier processes; called before a timing.
+    import_engine : imports the packages it needs, and ignores code compiled by earlier processes;
+        called before a timing.
     """
 
     name: str
@@ -139,7 +191,7 @@ class Method:
     linearize: Callable[[Scene, Any, float, float], Linearization] | None = None
     arrays: tuple[str, ...] = ()
     sources: tuple[Path | str, ...] = ()
-    load: Callable[[], object] = lambda: None
+    import_engine: Callable[[], object] = lambda: None
 
     @property
     def model(self) -> str:
@@ -153,16 +205,35 @@ class Method:
 
     @property
     def defaults(self) -> dict[str, object]:
+        """Values of its settings where none are given."""
         return self.settings().as_dict()
 
+    @property
+    def is_installed(self) -> bool:
+        """Whether all packages that it needs are installed."""
+        return all(_is_distribution_installed(distribution) for distribution in self.distributions)
+
     def chosen(self, scene: Scene, given: Mapping[str, object]) -> Settings:
-        """Return the settings: the `given` values, defaults for others. Raises InputError for an unknown name, an
-        invalid value, and a step that is less than the scene's duration divided by MAX_STEPS."""
+        """Return the settings for a run.
+
+        Parameters
+        ----------
+        scene : the scene to run.
+        given : values by name; the others have their defaults.
+
+        Raises
+        ------
+        InputError
+            For an unknown name, an invalid value, and a step that is less than the scene's duration
+            divided by MAX_STEPS.
+        """
         chosen = self.settings.of(self.name, given)
         step = getattr(chosen, STEP) if self.fixed_step else scene.duration
         if scene.duration / step > MAX_STEPS:
-            what = f"step = {step:g} requires more than {MAX_STEPS:g} steps for {scene.duration:g} s"
-            raise InputError(f"{self.name}: {what}; allowed: a step of at least {scene.duration / MAX_STEPS:g} s")
+            limit = f"{MAX_STEPS:g} steps for {scene.duration:g} s"
+            allowed = f"a step of at least {scene.duration / MAX_STEPS:g} s"
+            what = f"step = {step:g} requires more than {limit}"
+            raise InputError(f"{self.name}: {what}; allowed: {allowed}")
         return chosen
 
     def finer(self, settings: Mapping[str, object], interval: float) -> dict[str, object]:
@@ -174,14 +245,15 @@ class Method:
         interval : s, between samples.
         """
         for ladder in self.ladders:
+            # A variant has other choices: its settings are not finer, but other ones.
             if ladder.variant:
                 continue
-            for rung in ladder.rungs(interval):
-                finer = ladder.fill(rung)
+            for number in ladder.settings_by_value(interval):
+                finer = ladder.settings_at(number)
                 lower: dict[str, object] = {}
                 for name, value in finer.items():
                     current = settings[name]
-                    # By more than the rounding of a rung that was given with three digits.
+                    # By more than the rounding of a value that was given with three digits.
                     if isinstance(current, int | float) and value < 0.99 * current:
                         lower[name] = value
                 first_setting = next(iter(finer))
@@ -189,21 +261,18 @@ class Method:
                     return lower
         return {}
 
-    @property
-    def is_installed(self) -> bool:
-        return all(_is_distribution_installed(distribution) for distribution in self.distributions)
-
 
 def _is_distribution_installed(distribution: str) -> bool:
+    """Return whether a package is installed, without importing it."""
     module = distribution.replace("-", "_")
     if module in sys.modules:
-        return bool(sys.modules[module])
+        return bool(sys.modules[module])  # None where its import is blocked
     try:
         return find_spec(module) is not None or metadata.distribution(distribution) is not None
     except metadata.PackageNotFoundError:
         return False
 
 
-def late(place: str) -> Callable[..., Any]:
-    """The function at "package.module:name", whose module is imported when it is first called."""
+def lazy(place: str) -> Callable[..., Any]:
+    """Return the function at "package.module:name", imported when it is first called."""
     return lambda *arguments: resolve_name(place)(*arguments)

@@ -1,4 +1,4 @@
-"""The one loop that builds a method's solver, times it and takes its samples."""
+"""A run of one method on one scene: the solver is built, timed and asked for its samples."""
 
 from __future__ import annotations
 
@@ -27,24 +27,52 @@ def solve(
     budget_s: float = float("inf"),
     time_limit_s: float = float("inf"),
 ) -> Solution:
-    """Build once, integrate up to `repeats` times within `budget_s`, the garbage collector off, and observe once;
-    `settings` that differ from the defaults; `time_limit_s` is for the integrations together. The Solution is not yet
-    judged, and holds a failure of the engine. Raises InputError for an unknown method or setting, MethodRefusal,
-    OutOfTimeError where a method cannot keep the samples it reached, RotorError where an array has a wrong shape, one
-    of SYSTEM_ERRORS where the system lacks something or a library cannot be loaded, and what the method raises."""
+    """Build a method's solver for a scene, integrate, and take the samples.
+
+    Parameters
+    ----------
+    method : the method, or its name.
+    scene : the scene.
+    settings : those that differ from the method's defaults.
+    repeats : how often to integrate at most; the samples are those of the last time.
+    budget_s : s, of all integrations together: another one is begun only if it is expected to end
+        within it. The first one is not limited by it.
+    time_limit_s : s, of all integrations together, after which the running one is stopped.
+
+    Returns
+    -------
+    Solution
+        Without a status: it is not yet judged, and has a failure that the engine reports.
+
+    Raises
+    ------
+    InputError
+        For an unknown method or setting, or a value that is not allowed.
+    MethodRefusal
+        If the method cannot represent the scene.
+    OutOfTimeError
+        If the method cannot keep the samples that it had reached at the time limit.
+    RotorError
+        If an array of the samples has a wrong shape.
+    Exception
+        One of SYSTEM_ERRORS if the system lacks something or a library cannot be loaded; whatever
+        else the method raises.
+    """
     method = find_method(method) if isinstance(method, str) else method
     chosen = method.chosen(scene, settings)
     with system_errors_apart(OutOfTimeError):
         start = time.perf_counter()
         solver = method.build(scene, chosen)
-        setup = time.perf_counter() - start
+        setup_s = time.perf_counter() - start
+
         run_times: list[float] = []
+        # A collection of garbage within an integration would be timed with it.
         gc_was_on = gc.isenabled()
-        begun = time.monotonic()
+        begin = time.monotonic()
         try:
             gc.disable()
             with time_limit(time_limit_s):
-                while not run_times or (len(run_times) < repeats and sum(run_times) + run_times[-1] < budget_s):
+                while not run_times or _has_time(run_times, repeats, budget_s):
                     start = time.perf_counter()
                     integration = solver.integrate()
                     run_times.append(time.perf_counter() - start)
@@ -53,14 +81,27 @@ def solve(
         finally:
             if gc_was_on:
                 gc.enable()
+
         start = time.perf_counter()
-        left = max(begun + time_limit_s - time.monotonic(), _OBSERVING_S)
-        with (
-            time_limit(left),
-            np.errstate(over="ignore", invalid="ignore"),
-        ):  # of a runaway: the judgement sees what is not finite
+        remaining_s = max(begin + time_limit_s - time.monotonic(), _OBSERVING_S)
+        # Samples of a motion that runs away overflow: the judgement sees what is not finite.
+        with time_limit(remaining_s), np.errstate(over="ignore", invalid="ignore"):
             trajectory = solver.observe()
-        output = time.perf_counter() - start
+        output_s = time.perf_counter() - start
     if fault := shape_fault(scene, trajectory):
         raise RotorError(f"{method.name}: {fault}")
-    return Solution(scene, method.name, trajectory, integration, chosen.as_dict(), setup, run_times, output)
+    return Solution(
+        scene,
+        method.name,
+        trajectory,
+        integration,
+        chosen.as_dict(),
+        setup_s,
+        run_times,
+        output_s,
+    )
+
+
+def _has_time(run_times: list[float], repeats: int, budget_s: float) -> bool:
+    """Return whether to integrate once more, expected to take as long as the last time."""
+    return len(run_times) < repeats and sum(run_times) + run_times[-1] < budget_s

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from rotor_mbs.errors import InputError
-from rotor_mbs.methods.catalogue import PRINTED, REFERENCE, errata_methods, look_up
+from rotor_mbs.methods.catalogue import PRINTED, REFERENCE, errata_methods, find_method_or_none
 from rotor_mbs.report import canvas, plots
 from rotor_mbs.report.files import made_with
 from rotor_mbs.report.looks import Look, label_of, look_of, step_look, with_capital
@@ -83,7 +83,7 @@ def compared_runs(scene: StoredScene) -> dict[str, StoredRun]:
     the corrected one's."""
     candidates = scene.sides
     for name, run in scene.corrected_runs.items():
-        method = look_up(name)
+        method = find_method_or_none(name)
         is_other = not name.startswith("lagrange/") and (method is None or method.name != REFERENCE)
         if is_other and run.samples and run not in candidates.values():
             candidates[INDEPENDENT] = run

@@ -124,7 +124,7 @@ def curve_of(scene: Scene, method: Method, ladder: Ladder, options: Mapping[str,
         "order_expected": math.nan if method.order is None or ladder.kind != STEP else method.order,
     }
     points = []
-    for setting, chosen in ladder.rungs(short.duration / (short.samples - 1)).items():
+    for setting, chosen in ladder.settings_by_value(short.duration / (short.samples - 1)).items():
         try:
             known = Asked(scene, method.name, chosen).known | of_all
         except InputError:  # a step that is too small for the scene's duration; all finer ones are
@@ -312,7 +312,7 @@ def measure(
     repeats, budget_s : timed runs of a point at most, and s for all of them.
     """
     for method in dict.fromkeys(curve.method for curve in curves):
-        catalogue.find_method(method).load()
+        catalogue.find_method(method).import_engine()
     gc.disable()
     timers = [[PointTimer(point, scene, reference, _RUN_LIMIT_S) for point in curve.points] for curve in curves]
     conduct(timers, budget_s, repeats, time.perf_counter)
@@ -466,7 +466,7 @@ def run_bench(
                 reason = str(exc).removeprefix(f"{scene.name}: ")
                 refused.append(catalogue.Refusal(scene.name, "", reason))
                 continue
-            able, others = catalogue.able_methods(scene, names, are_named=bool(methods))
+            able, others = catalogue.supporting_methods(scene, names, are_named=bool(methods))
             curves += [curve_of(scene, method, ladder, options) for method, ladder in chosen if method.name in able]
             refused += others
         if not curves:

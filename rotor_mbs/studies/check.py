@@ -19,11 +19,11 @@ from rotor_mbs.analysis.checks import Check, Where, checks_of, make_check
 from rotor_mbs.errors import InputError
 from rotor_mbs.methods.catalogue import (
     REFERENCE,
-    able_methods,
     check_names,
     default_methods,
     find_method,
     method_names,
+    supporting_methods,
 )
 from rotor_mbs.methods.method_file import ENDING
 from rotor_mbs.runs.design import MISSING, RUNS
@@ -82,7 +82,7 @@ def check_default_set(
     asked: dict[str, Sequence[str]] = {}
     for scene in (*paper, *own):
         if methods:
-            asked[scene.name] = able_methods(scene, methods, {})[0]
+            asked[scene.name] = supporting_methods(scene, methods, {})[0]
         else:
             asked[scene.name] = corrected if scene in own else default_methods()
     with tempfile.TemporaryDirectory() as folder:

@@ -21,7 +21,7 @@ from rotor_mbs.comparison.defect_search import DefectSearch
 from rotor_mbs.comparison.faults import faults_in_time
 from rotor_mbs.errors import MethodRefusal, RotorError
 from rotor_mbs.methods.base import STEP, Method
-from rotor_mbs.methods.catalogue import find_method, line_of, with_method_files
+from rotor_mbs.methods.catalogue import error_line, find_method, with_method_files
 from rotor_mbs.methods.solve import solve
 from rotor_mbs.methods.time_limit import OutOfTimeError, caller_signals
 from rotor_mbs.runs.pool import TaskLostError, TaskPool, WorkerPool
@@ -103,7 +103,7 @@ def _run(task: tuple[str, Scene, Mapping[str, object], int, float]) -> Solution:
     except OutOfTimeError as exc:
         status, message = "timed_out", str(exc)
     except Exception as exc:  # whatever an engine raises is what is asked
-        status, message = "solver_failed", str(exc) if isinstance(exc, RotorError) else line_of(exc)
+        status, message = "solver_failed", str(exc) if isinstance(exc, RotorError) else error_line(exc)
     return without_samples(scene, name, settings, status, message)
 
 
@@ -156,7 +156,7 @@ class _Examination:
         except TaskLostError as exc:
             status, message = "worker_died", str(exc)
         except Exception as exc:  # what cannot be sent from one process to the other
-            status, message = "solver_failed", line_of(exc)
+            status, message = "solver_failed", error_line(exc)
         return without_samples(scene, name, settings, status, message)
 
     def _scene(self, scene: Scene, allowance: float) -> None:
@@ -272,7 +272,7 @@ class _Examination:
         if ladder is None or self._method.order is None:
             return
         steps, sizes = [], []
-        for step, settings in ladder.rungs(_COARSEST).items():
+        for step, settings in ladder.settings_by_value(_COARSEST).items():
             run = self._ask(scene, settings).trajectory
             if len(run.time) == scene.samples and (defects := defects_of(scene, run)) is not None:
                 steps.append(step)

@@ -13,7 +13,7 @@ from pathlib import Path
 import rotor_mbs
 from rotor_mbs.analysis.published import claims, finding
 from rotor_mbs.analysis.text_tables import TextTable, method_table
-from rotor_mbs.methods.catalogue import REFERENCE, Refusal, able_methods, default_methods, errata_methods, ladders
+from rotor_mbs.methods.catalogue import REFERENCE, Refusal, default_methods, errata_methods, ladders, supporting_methods
 from rotor_mbs.runs.output_files import locked
 from rotor_mbs.runs.pool import Workers, pool_of
 from rotor_mbs.runs.read import open_results
@@ -58,7 +58,7 @@ def reproduce(
     methods: dict[str, list[str]] = {}
     refused: list[Refusal] = []
     for scene in scenes:
-        methods[scene.name], others = able_methods(scene, names, {}, are_named=False)
+        methods[scene.name], others = supporting_methods(scene, names, {}, are_named=False)
         refused += others
     curves = short_curves(benched)
     asked = asked_runs(scenes, methods, {})
@@ -96,10 +96,10 @@ def summary_of(path: Path) -> str:
 
 def short_curves(scene: Scene) -> list[Curve]:
     """A short curve of each method on `scene`."""
-    able, _ = able_methods(scene, list(dict.fromkeys(method.name for method, _ in ladders().values())))
+    able, _ = supporting_methods(scene, list(dict.fromkeys(method.name for method, _ in ladders().values())))
     options = {"budget_s": _LONGEST_S, "is_short": True}
     return [
-        curve_of(scene, method, ladder.short, options)
+        curve_of(scene, method, ladder.coarse, options)
         for method, ladder in ladders(able).values()
         if not ladder.variant
     ]

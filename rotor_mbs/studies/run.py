@@ -15,10 +15,10 @@ from rotor_mbs.errors import SYSTEM_ERRORS, MethodRefusal, RotorError
 from rotor_mbs.methods.catalogue import (
     REFERENCE,
     default_methods,
+    error_line,
     find_method,
+    find_method_or_none,
     is_corrected,
-    line_of,
-    look_up,
     own_settings,
     settings_for,
 )
@@ -67,7 +67,7 @@ class RunTask(Task):
         except OutOfTimeError as exc:  # from a method that cannot be stopped with its samples
             return self.failed("timed_out", str(exc))
         except Exception as exc:
-            return self.failed("solver_failed", str(exc) if isinstance(exc, RotorError) else line_of(exc))
+            return self.failed("solver_failed", str(exc) if isinstance(exc, RotorError) else error_line(exc))
         reference = run.trajectory if asked.method == REFERENCE else None
         if self.reference is not None:
             reference = read_reference(self.reference, asked.scene)
@@ -238,7 +238,7 @@ def _judged(run: Solution, reference: Trajectory | None, end: float) -> tuple[So
 def next_to_try(scene: Scene, method: str, settings: Mapping[str, object], status: str) -> str:
     """What would make an inaccurate run better: the next rung of the method's ladder, or another method; else "". Of a
     reference, which nothing else can stand for, ""."""
-    known = look_up(method)
+    known = find_method_or_none(method)
     if status != "inaccurate" or known is None or not known.is_corrected or method == REFERENCE:
         return ""
     finer = known.finer(settings, scene.duration / (scene.samples - 1))

@@ -12,12 +12,12 @@ from rotor_mbs.errors import InputError
 from rotor_mbs.methods.base import STEP
 from rotor_mbs.methods.catalogue import (
     Refusal,
-    able_methods,
     find_method,
     is_corrected,
     method_names,
     settings_for,
     settings_of_any,
+    supporting_methods,
 )
 from rotor_mbs.methods.time_limit import caller_signals
 from rotor_mbs.runs.design import Asked
@@ -176,7 +176,7 @@ def run_suite(
     asked: dict[str, list[str]] = {}
     refused: list[Refusal] = []
     for scene in scenes:
-        able, others = able_methods(scene, names, chosen_settings, are_named=bool(methods))
+        able, others = supporting_methods(scene, names, chosen_settings, are_named=bool(methods))
         asked[scene.name] = able
         refused += others
     if not any(asked.values()):

@@ -17,11 +17,11 @@ from rotor_mbs.analysis.judgement import clearly_ok, defects_of, judge
 from rotor_mbs.errors import InputError, MethodRefusal
 from rotor_mbs.methods.catalogue import (
     Refusal,
-    able_methods,
     check_names,
     find_method,
     is_corrected,
     settings_for,
+    supporting_methods,
 )
 from rotor_mbs.methods.solve import solve
 from rotor_mbs.methods.time_limit import OutOfTimeError, caller_signals, time_limit
@@ -307,7 +307,7 @@ def plan_sweep(
     named = check_names(methods or sweep.design.methods)
     with sweep.file.with_line_numbers("settings"):
         settings = settings_for(named, sweep.design.settings)
-    able, refused = able_methods(sweep.base, named, settings)
+    able, refused = supporting_methods(sweep.base, named, settings)
     if not able:
         raise MethodRefusal("\n".join(map(str, refused)))
     chosen = tuple(able)

@@ -12,7 +12,7 @@ from support.random_scenes import random_scene
 
 from rotor_mbs.analysis.judgement import Judgement, judge
 from rotor_mbs.analysis.run_checks import RunSamples, run_checks
-from rotor_mbs.methods.catalogue import able_methods, find_method
+from rotor_mbs.methods.catalogue import find_method, supporting_methods
 from rotor_mbs.methods.solve import solve
 from rotor_mbs.models.lagrange.heyoka_adapter import is_available
 from rotor_mbs.models.lagrange.samples import load_conditioning
@@ -292,7 +292,7 @@ def examine(seed: int, methods: tuple[str, ...]) -> None:
     scene = random_scene(seed)
     with np.errstate(all="ignore"):
         angles, _ = other_code.trajectory(scene, np.linspace(0.0, scene.duration, scene.samples), atol=1e-13)
-    for method in able_methods(scene, [name for name in methods if find_method(name).is_installed])[0]:
+    for method in supporting_methods(scene, [name for name in methods if find_method(name).is_installed])[0]:
         run = solve(method, scene, {}, time_limit_s=LIMIT_S)
         verdict = judge(scene, run, None)
         if verdict.status in ("timed_out", "solver_failed"):

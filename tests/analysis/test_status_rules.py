@@ -136,7 +136,7 @@ def test_the_largest_defect_has_a_bound(method: str, monkeypatch: pytest.MonkeyP
 def test_the_median_of_the_defects_has_the_bound_of_a_methods_own(monkeypatch: pytest.MonkeyPatch) -> None:
     """A tenth of that of the largest defect; without defects nothing is asked."""
     own = Bound("defect median", METHOD, 0.1 * BOUNDS.of("defect", METHOD).value, "none")
-    monkeypatch.setattr(judgement_module, "look_up", lambda _: replace(find_method(METHOD), bounds=(own,)))
+    monkeypatch.setattr(judgement_module, "find_method_or_none", lambda _: replace(find_method(METHOD), bounds=(own,)))
     run = Solution(SCENE, METHOD, moving(), DONE)
     assert judge(SCENE, run, None).status == "ok"
     for side, expected in SIDES:
@@ -178,7 +178,7 @@ def test_a_defect_of_a_hundredth_of_a_radian_is_never_within_an_ok(
 
 def test_a_bound_of_more_than_a_hundredth_of_a_radian_counts_as_that(monkeypatch: pytest.MonkeyPatch) -> None:
     own = Bound("defect", METHOD, 1.0, "none")
-    monkeypatch.setattr(judgement_module, "look_up", lambda _: replace(find_method(METHOD), bounds=(own,)))
+    monkeypatch.setattr(judgement_module, "find_method_or_none", lambda _: replace(find_method(METHOD), bounds=(own,)))
     for side, expected in SIDES:
         defects = made_defects((side * OK_ERROR, -side * OK_ERROR))
         monkeypatch.setattr(judgement_module, "defects_of", lambda *_, defects=defects, **__: defects)

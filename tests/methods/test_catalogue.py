@@ -16,13 +16,12 @@ from rotor_mbs.analysis.judgement import judge
 from rotor_mbs.errors import InputError, MethodRefusal
 from rotor_mbs.methods import catalogue
 from rotor_mbs.methods.catalogue import (
-    choose,
     find_method,
     is_corrected,
     methods,
     selected_methods,
-    singular_reason,
 )
+from rotor_mbs.methods.selection import recommend, singular_reason
 from rotor_mbs.methods.solve import solve
 from rotor_mbs.scenario.catalogue import find_scenes
 
@@ -31,7 +30,7 @@ DEFAULT_METHODS = tuple(method.name for method in methods() if method.is_default
 
 def test_scenes_of_the_paper_keep_the_default_set() -> None:
     for name in PAPER:
-        methods, reason = choose(paper(name), DEFAULT_METHODS)
+        methods, reason = recommend(paper(name), DEFAULT_METHODS)
         assert methods[0] == "lagrange/taylor"  # not the printed model, which comes first in the paper's comparison
         assert set(methods) == set(DEFAULT_METHODS), name
         assert reason.startswith("not stiff, nearly singular or long")
@@ -57,7 +56,7 @@ CHOOSE_THEIR_STEP, IMPLICIT = ("lagrange/taylor", "exudyn_tree/dopri5"), ("lagra
     ],
 )
 def test_stiff_scenes_get_methods_that_stay_within_their_bounds(name: str, expected: tuple[str, ...]) -> None:
-    methods, reason = choose(scene(f"stiff/{name}"), DEFAULT_METHODS)
+    methods, reason = recommend(scene(f"stiff/{name}"), DEFAULT_METHODS)
     assert methods == expected
     assert "\n" not in reason
 
@@ -89,7 +88,7 @@ def test_what_the_rule_takes_holds(name: str) -> None:
         pytest.skip("refused, or beyond every method")
     is_chaos = name == "extreme/hour-chaos"  # for an hour, in samples of 10 s: only the energy is known
     stored = None if is_chaos else reference(name)
-    for method in installed(choose(chosen, DEFAULT_METHODS)[0]):
+    for method in installed(recommend(chosen, DEFAULT_METHODS)[0]):
         if is_corrected(method):
             result = solve(method, chosen, {}, time_limit_s=120.0)
             verdict = judge(chosen, result, stored)
@@ -100,7 +99,7 @@ def test_what_the_rule_takes_holds(name: str) -> None:
     "changes", [{"hub_inertia": 1e-6}, {"bearing_stiffness": (1e6,)}], ids=["with a hub", "held by a spring"]
 )
 def test_one_blade_is_taken_where_it_does_not_end(changes: dict[str, object]) -> None:
-    assert choose(replace(scene("extreme/singular-one-blade"), **changes), DEFAULT_METHODS)[0]
+    assert recommend(replace(scene("extreme/singular-one-blade"), **changes), DEFAULT_METHODS)[0]
 
 
 @pytest.mark.parametrize(("inertia", "hub", "refused"), [(0.0, 0.0, True), (4.0, 0.0, False), (0.0, 4.0, False)])
@@ -113,9 +112,9 @@ def test_balanced_blades_turn_by_themselves_or_with_the_hub(inertia: float, hub:
     )  # fmt: skip
     if refused:
         with pytest.raises(MethodRefusal, match="no inertia about the shaft"):
-            choose(balanced, DEFAULT_METHODS)
+            recommend(balanced, DEFAULT_METHODS)
         return
-    for method in installed(choose(balanced, DEFAULT_METHODS)[0]):
+    for method in installed(recommend(balanced, DEFAULT_METHODS)[0]):
         if not method.startswith("printed"):
             run = solve(method, balanced, {})
             assert abs(run.angles[-1, 0] - 1.0) < 1e-6  # at constant rate; Newton's tolerance leaves the chain 5e-9

@@ -47,8 +47,8 @@ def test_an_impossible_value_is_refused(method: Method, name: str, value: object
 @pytest.mark.parametrize("method", ALL, ids=lambda method: method.name)
 def test_defaults_and_the_settings_of_every_ladder_are_allowed(method: Method) -> None:
     assert method.settings.of(method.name, method.defaults).as_dict() == method.defaults
-    assert all(len(ladder.rungs(0.1)) >= 6 for ladder in method.ladders)
-    given = [settings for ladder in method.ladders for settings in ladder.rungs(0.1).values()]
+    assert all(len(ladder.settings_by_value(0.1)) >= 6 for ladder in method.ladders)
+    given = [settings for ladder in method.ladders for settings in ladder.settings_by_value(0.1).values()]
     for settings in given:
         assert method.settings.of(method.name, settings).as_dict() == {**method.defaults, **settings}
     assert all(setting["doc"] for setting in method.settings.declared().values())

@@ -24,7 +24,7 @@ from support.stored import Made, rotor, store
 
 from rotor_mbs.analysis.published import CheckedEntry, claim_study, published
 from rotor_mbs.errors import StoreError
-from rotor_mbs.methods.catalogue import find_method, look_up
+from rotor_mbs.methods.catalogue import find_method, find_method_or_none
 from rotor_mbs.report import numbers
 from rotor_mbs.report.build import write_report
 from rotor_mbs.report.elements import Matrix, PageContent, Row, Section
@@ -415,7 +415,7 @@ def test_data_cannot_end_the_script_element() -> None:
 
 def test_texts_from_the_file_are_escaped(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Of a method that is not installed, too."""
-    monkeypatch.setattr(design, "find_method", lambda name: look_up(name) or find_method(TAYLOR))
+    monkeypatch.setattr(design, "find_method", lambda name: find_method_or_none(name) or find_method(TAYLOR))
     evil = "<script>alert(1)</script>"
     scene = replace(FIG11, name="a b/<i>", title=f"{evil}\x1b[2J", text=f"# {evil}\n{FIG11.text}\n# </pre>{evil}")
     failed = {"status": "singular", "message": evil}

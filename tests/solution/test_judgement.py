@@ -236,7 +236,7 @@ def test_a_start_turns_away_leaves_ten_units_in_its_last_place_open(
     potential[5] = slack * weights
     wrong = exact.replace(kinetic_energy=np.zeros(11), potential_energy=potential, work=np.zeros(11))
     method = replace(find_method(METHOD), bounds=(Bound("energy", METHOD, 0.0, "none"),))
-    monkeypatch.setattr(judgement_module, "look_up", lambda _: method)
+    monkeypatch.setattr(judgement_module, "find_method_or_none", lambda _: method)
     run = Solution(scene, METHOD, wrong, Integration(True))
     assert judge(scene, run, exact).status == ("ok" if share < 1.0 else "inaccurate")
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from importlib import import_module
 from typing import Any
 
-from rotor_mbs.methods.base import Ladder, Method, late, step_ladder, tolerance_ladder
+from rotor_mbs.methods.base import Ladder, Method, lazy, step_ladder, tolerance_ladder
 from rotor_mbs.models.exudyn import schemes
 
 _LINEARIZATION = "rotor_mbs.models.exudyn.linearization"
@@ -27,12 +27,12 @@ def _method(model: str, integrator: str, label: str, builder: str = "", **facts:
     return Method(
         name=f"{model}/{integrator}",
         label=f"Exudyn {kind}, {label}",
-        build=late(f"{_SOLVERS}:build_{builder or kind}"),
-        items=late(f"rotor_mbs.models.exudyn.{kind}:items"),
+        build=lazy(f"{_SOLVERS}:build_{builder or kind}"),
+        items=lazy(f"rotor_mbs.models.exudyn.{kind}:items"),
         arrays=() if in_tree else ("constraint_error",),
         distributions=("exudyn",),
         relative_cost=10.0 if in_tree else 100.0,
-        load=lambda: import_module("rotor_mbs.models.exudyn.adapter"),
+        import_engine=lambda: import_module("rotor_mbs.models.exudyn.adapter"),
         **facts,
     )
 
@@ -71,7 +71,7 @@ METHODS = (
     _method(
         "exudyn_tree", "rk67", "RK67",
         settings=schemes.Rk67Settings, order=6, fixed_step=True, is_default=True,
-        ladders=(step_ladder(8),), linearize=late(f"{_LINEARIZATION}:linearize_tree"),
+        ladders=(step_ladder(8),), linearize=lazy(f"{_LINEARIZATION}:linearize_tree"),
     ),
     _method(
         "exudyn_tree", "dopri5", "DOPRI5",
@@ -92,7 +92,7 @@ METHODS = (
         "exudyn_chain", "extrapolated", "extrapolated", builder="extrapolated",
         settings=schemes.ExtrapolatedSettings, is_default=True,
         ladders=(tolerance_ladder(lambda tol: {"tolerance": tol}, *(10.0**-k for k in range(3, 12))),),
-        linearize=late(f"{_LINEARIZATION}:linearize_chain"),
+        linearize=lazy(f"{_LINEARIZATION}:linearize_chain"),
     ),
     _method(
         "exudyn_chain", "generalized_alpha", "generalized-α",

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from rotor_mbs.methods.base import Ladder, Method, Solver, late, tolerance_ladder, tolerance_pair
+from rotor_mbs.methods.base import Ladder, Method, Solver, lazy, tolerance_ladder, tolerance_pair
 from rotor_mbs.methods.settings import Settings, number
 from rotor_mbs.models import Ode45Settings, equation_items
 
@@ -94,7 +94,7 @@ def _scipy_method(solver: str, settings: type[Settings], ladder: Ladder, relativ
         items=equation_items,
         distributions=("scipy",),
         ladders=(ladder,),
-        load=lambda: import_module("scipy.integrate"),
+        import_engine=lambda: import_module("scipy.integrate"),
         relative_cost=relative_cost,
     )
 
@@ -105,9 +105,9 @@ METHODS = (
         label="closed form, Taylor",
         settings=TaylorSettings,
         build=_build_taylor,
-        items=late("rotor_mbs.models.lagrange.taylor:items"),
-        solve_many=lambda scenes, settings: late(_SOLVE_MANY)(scenes, settings.tolerance),
-        load=late("rotor_mbs.models.lagrange.heyoka_adapter:compile_anew"),
+        items=lazy("rotor_mbs.models.lagrange.taylor:items"),
+        solve_many=lambda scenes, settings: lazy(_SOLVE_MANY)(scenes, settings.tolerance),
+        import_engine=lazy("rotor_mbs.models.lagrange.heyoka_adapter:compile_anew"),
         distributions=("heyoka",),
         fallback="lagrange/dop853",
         is_default=True,
@@ -140,7 +140,7 @@ METHODS = (
         name="reference",
         label="reference, quad precision",
         settings=ReferenceSettings,
-        build=late("rotor_mbs.models.lagrange.reference:build"),
+        build=lazy("rotor_mbs.models.lagrange.reference:build"),
         arrays=("angle_uncertainty", "error_growth"),
         items=equation_items,
     ),

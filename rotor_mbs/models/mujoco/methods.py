@@ -8,7 +8,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 from rotor_mbs.errors import MethodRefusal
-from rotor_mbs.methods.base import BuiltItem, Method, Solver, late, step_ladder
+from rotor_mbs.methods.base import BuiltItem, Method, Solver, lazy, step_ladder
 from rotor_mbs.methods.settings import Settings, step
 
 if TYPE_CHECKING:
@@ -58,7 +58,7 @@ def _method(integrator: str, label: str, **facts: Any) -> Method:
         distributions=("mujoco",),
         fixed_step=True,
         relative_cost=10.0,
-        load=lambda: import_module("rotor_mbs.models.mujoco.solver"),
+        import_engine=lambda: import_module("rotor_mbs.models.mujoco.solver"),
         **facts,
     )
 
@@ -67,7 +67,7 @@ METHODS = (
     _method(
         "rk4", "RK4", settings=Rk4Settings, order=4,
         ladders=(step_ladder(10),),
-        linearize=late("rotor_mbs.models.mujoco.solver:linearize"),
+        linearize=lazy("rotor_mbs.models.mujoco.solver:linearize"),
     ),
     # First the new rates, with forces at the start of the step and dampers at its end; then angles with these rates.
     # The ladders of these first-order methods begin where something is left of a motion. The engine's Euler has the

@@ -11,7 +11,7 @@ from rotor_mbs.analysis import published
 from rotor_mbs.analysis.judgement import OK_ERROR
 from rotor_mbs.analysis.published import ClaimStudy, Erratum, Published, claims
 from rotor_mbs.analysis.work_precision import by_scene
-from rotor_mbs.methods.catalogue import PRINTED, REFERENCE, errata_methods, is_corrected, look_up
+from rotor_mbs.methods.catalogue import PRINTED, REFERENCE, errata_methods, find_method_or_none, is_corrected
 from rotor_mbs.report.elements import PageTable, Row, TableCell
 from rotor_mbs.report.files import INDEX, page_names
 from rotor_mbs.report.looks import label_of, with_capital
@@ -111,7 +111,7 @@ def method_cell(name: str) -> TableCell | str:
 
 def run_cell(run: StoredRun) -> TableCell | str:
     """Return a run's method, and below it the settings that are not the method's defaults."""
-    method = look_up(run.method)
+    method = find_method_or_none(run.method)
     defaults = {} if method is None else method.defaults
     own = [f"{name} = {value}" for name, value in run.settings.items() if defaults.get(name, value) != value]
     note = ", ".join([run.method, *own])
