@@ -1,4 +1,4 @@
-"""The bounds that statuses and `check` judge by: reference/accuracy.toml, and a user's own file before it."""
+"""Bounds of statuses and of `check`: reference/accuracy.toml, a user's own file before it."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ from rotor_mbs.scenario.keys import file_key
 from rotor_mbs.scenario.toml_file import read_toml
 
 CHECKS = (
-    "complete", "status", "metrics", "times", "start", "defect", "defect median", "error", "tip", "energies", "energy",
-    "impulse", "loads", "gap", "exact", "published", "reference", "growth", "integrity", "settings", "uncertainty",
-    "frozen",
+    "complete", "status", "metrics", "times", "start", "defect", "defect median", "error", "tip",
+    "energies", "energy", "impulse", "loads", "gap", "exact", "published", "reference", "growth",
+    "integrity", "settings", "uncertainty", "frozen",
 )  # fmt: skip
 
 
@@ -54,40 +54,53 @@ _FILE = {"bound": file_key("bound", _BOUND_TABLES).metadata}
 
 @dataclass(frozen=True)
 class Bounds:
-    """The first entry whose check, method and scene fit counts; scene: the shipped one that they are for, "" for
-    any."""
+    """Bounds of all checks of a scene: the first entry whose check, method and scene fit counts.
+
+    Attributes
+    ----------
+    entries : of one file or several, in the order in which they are tried.
+    scene : name of the shipped scene that they are for; "" for any other.
+    """
 
     entries: Sequence[Bound]
     scene: str = ""
 
     def of(self, check: str, method: str) -> Bound:
-        """The first that fits. Raises InputError where none does: a check without a bound would pass anything."""
+        """Return the bound of a check of a method.
+
+        Raises InputError where there is none: a check without a bound would pass anything.
+        """
         bound = self.find(check, method)
         if bound is None:
-            raise InputError(f"no bound for check {check!r} of {method}; allowed: an entry in a file of bounds")
+            what = f"no bound for check {check!r} of {method}"
+            raise InputError(f"{what}; allowed: an entry in a file of bounds")
         return bound
 
     def find(self, check: str, method: str) -> Bound | None:
-        """The first that fits, or None."""
+        """Return the bound of a check of a method, or None where there is none."""
         for bound in self.entries:
-            is_of_scene = any(fnmatchcase(self.scene, pattern) for pattern in bound.scenes.split("|"))
+            patterns = bound.scenes.split("|")
+            is_of_scene = any(fnmatchcase(self.scene, pattern) for pattern in patterns)
             if is_of_scene and bound.check == check and fnmatchcase(method, bound.method):
                 return bound
         return None
 
     def with_entries(self, entries: Iterable[Bound]) -> Bounds:
-        """Bounds that try `entries` first, then these."""
+        """Return bounds that try some entries first, then these."""
         return replace(self, entries=[*entries, *self.entries])
 
 
 @functools.cache
 def shipped_bounds() -> Bounds:
-    """The bounds of reference/accuracy.toml, read once. Raises InputError with every error of the file."""
+    """Return the bounds of reference/accuracy.toml, read once."""
     return Bounds(read_bounds(REFERENCES / "accuracy.toml"))
 
 
 def read_bounds(path: Path) -> tuple[Bound, ...]:
-    """The entries of one TOML file of [[bound]] tables. Raises InputError with every error of the file."""
+    """Return the entries of a TOML file of [[bound]] tables.
+
+    Raises InputError with every error of the file.
+    """
     file = read_toml(path)
     with file.with_line_numbers():
         entries: tuple[Bound, ...] = keys.read_keys(_FILE, file.tables)["bound"]

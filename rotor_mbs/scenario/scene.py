@@ -1,5 +1,8 @@
-"""A scene: what a rotor is, what acts on it, and how it starts, as plain numbers; all that every model gets. A key of
-the scene file is one field, from which reading, hash, keys of sweeps, units and the written file follow."""
+"""A scene: what a rotor is, what acts on it, and how it starts, as plain numbers.
+
+It is all that every model gets. A key of the scene file is one field, from which reading, hash,
+keys of sweeps, units and the written file follow.
+"""
 
 from __future__ import annotations
 
@@ -21,7 +24,15 @@ from typing import TYPE_CHECKING, Any, Literal
 from rotor_mbs.errors import InputError, PlausibilityWarning
 from rotor_mbs.scenario import keys
 from rotor_mbs.scenario.keys import Kind, counted, file_key, invalid, list_of, read_each, restricted
-from rotor_mbs.scenario.time_table import LoadTable, Segment, is_constant, is_one_table, kink_times, segments, value_at
+from rotor_mbs.scenario.time_table import (
+    LoadTable,
+    Segment,
+    is_constant,
+    is_one_table,
+    kink_times,
+    segments,
+    value_at,
+)
 from rotor_mbs.scenario.toml_file import (
     KEY_FORM,
     KeyPath,
@@ -44,25 +55,32 @@ if TYPE_CHECKING:
 
 DEFAULT_OUTPUTS = ("angles", "rates", "tip", "energy")
 OUTPUTS = (*DEFAULT_OUTPUTS, "loads")  # built in
-ENTRY_POINT_GROUP = "rotor_mbs.quantities"  # a package adds the output that its entry point in this group is called
+# A package adds the output that its entry point in this group is called.
+ENTRY_POINT_GROUP = "rotor_mbs.quantities"
 
-MAX_BLADES = 1000  # the names of some 4,000 coordinates have no room in an attribute of an HDF5 file
+# The names of some 4,000 coordinates have no room in an attribute of an HDF5 file.
+MAX_BLADES = 1000
 MAX_SAMPLES = 10_000_000
 MAX_SAMPLE_BYTES = 2 << 30
-# Principal moments may break the triangle inequality by this share of their sum: numbers typed with ten digits do so
-# for a flat body, whose inequality is an equality. It is far above the round-off of the eigenvalues (1e-15).
+# Principal moments may break the triangle inequality by this share of their sum: numbers typed
+# with ten digits do so for a flat body, whose inequality is an equality. It is far above the
+# round-off of the eigenvalues (1e-15).
 INERTIA_TOLERANCE = 1e-9
 
-# What another layer finds wrong with the values of a file by field: its methods and their settings.
+# (values of a file by field) -> what another layer finds wrong with them: methods, their settings.
 ValuesCheck = Callable[[Mapping[str, Any]], list[KeyProblem]]
 
-# label: no number of the scene; run: what is computed; start: initial state; rotor: parameters and loads
+# What a field is to a run. label: no number of the scene; run: what is computed; start: initial
+# state; rotor: parameters and loads.
 FieldRole = Literal["label", "run", "start", "rotor"]
+
+
+# Kinds of values
 
 
 @functools.cache
 def known_outputs() -> tuple[str, ...]:
-    """The outputs that a scene may ask for: the built-in ones, then those of installed packages, sorted."""
+    """Return the outputs that a scene may ask for: built-in ones, then sorted those of packages."""
     from importlib.metadata import entry_points
 
     added = {point.name for point in entry_points(group=ENTRY_POINT_GROUP)}
@@ -70,20 +88,28 @@ def known_outputs() -> tuple[str, ...]:
 
 
 def _read_outputs(value: object) -> tuple[str, ...]:
-    """The built-in outputs in their order, then the others, sorted."""
+    """Return the built-in outputs in their order, then the others, sorted."""
     # Installed packages are searched only for what is not built in.
     is_built_in = isinstance(value, list) and all(name in OUTPUTS for name in value)
     known = OUTPUTS if is_built_in else known_outputs()
     outputs = list_of(keys.choice(known), "").read(value)
-    repeated = next((output for output in outputs if outputs.count(output) > 1), None)
-    if repeated:
-        raise invalid(f'"{repeated}" is given more than once')
-    return (*(name for name in OUTPUTS if name in outputs), *sorted(set(outputs) - set(OUTPUTS)))
+    for output in outputs:
+        if outputs.count(output) > 1:
+            raise invalid(f'"{output}" is given more than once')
+    built_in = [output for output in OUTPUTS if output in outputs]
+    return (*built_in, *sorted(set(outputs) - set(OUTPUTS)))
 
 
 def is_rigid_body_inertia(inertia: Sequence[float]) -> bool:
-    """Whether a distribution of mass >= 0 has this tensor: xx yy zz xy xz yz, kg m². So it is where the second moments
-    ½ tr(J) I - J are positive semidefinite: the triangle inequality of the principal moments."""
+    """Return whether a distribution of mass, nowhere negative, has this inertia.
+
+    So it is where the second moments ½ tr(J) I - J are positive semidefinite: the triangle
+    inequality of the principal moments.
+
+    Parameters
+    ----------
+    inertia : xx yy zz xy xz yz of the tensor about the centre of mass, kg m².
+    """
     if not any(inertia):
         return True
     import numpy as np  # late: a point mass, as in every scene of the paper, does without
@@ -91,13 +117,14 @@ def is_rigid_body_inertia(inertia: Sequence[float]) -> bool:
     xx, yy, zz, xy, xz, yz = inertia
     if min(xx, yy, zz) < 0.0:
         return False
-    J = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]) / max(abs(element) for element in inertia)
+    J = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]) / max(map(abs, inertia))
     trace = float(np.trace(J))
-    return bool(np.linalg.eigvalsh(0.5 * trace * np.eye(3) - J)[0] >= -INERTIA_TOLERANCE * trace)
+    second_moments = 0.5 * trace * np.eye(3) - J
+    return bool(np.linalg.eigvalsh(second_moments)[0] >= -INERTIA_TOLERANCE * trace)
 
 
 def _read_load(value: object) -> LoadTable:
-    """A table over time, from its rows or a constant; () where it is zero at all times."""
+    """Return a table over time from its rows or a constant; () where it is zero at all times."""
     if not isinstance(value, list):
         constant = keys.SIZE.read(value)
         return ((0.0, constant),) if constant else ()
@@ -115,25 +142,35 @@ def _read_load(value: object) -> LoadTable:
 
 
 def _per_blade(kind: Kind) -> Kind:
-    """One value for every pitch bearing, or a list with one for each; kept as a tuple, () where all are zero."""
+    """Return the kind of one value for every pitch bearing, or a list with one for each.
+
+    It is read as a tuple, () where all are zero.
+    """
 
     def read(value: Any, scene: Mapping[str, Any]) -> tuple[Any, ...]:
+        # Where the number of blades is wrong itself, nothing is said of what depends on it.
         count = scene.get("blade_count")
         if not isinstance(value, list) or (kind.over_time and value and is_one_table(value)):
             entries = (kind.read(value),) * (count or 1)
         elif count is not None and len(value) != count:
-            raise invalid(f"{counted(len(value), 'number')} in a list for {counted(count, 'blade')}")
+            numbers = counted(len(value), "number")
+            raise invalid(f"{numbers} in a list for {counted(count, 'blade')}")
         else:
             entries = read_each(kind.read, value)
         _check_bare_pitches("acts on", entries, scene)
         return entries if any(entries) else ()
 
     return Kind(
-        read, f"{kind.allowed}; or a list, one per blade", in_context=True, per_blade=True, over_time=kind.over_time
+        read,
+        f"{kind.allowed}; or a list, one per blade",
+        in_context=True,
+        per_blade=True,
+        over_time=kind.over_time,
     )
 
 
 def _read_angles(value: object, scene: Mapping[str, Any]) -> tuple[float, ...]:
+    """Return a number for the rotor and one for each pitch; `scene` has the keys before it."""
     count = scene.get("blade_count")
     if isinstance(value, list) and count is not None and len(value) != 1 + count:
         raise invalid(f"{counted(len(value), 'number')} for a rotor and {counted(count, 'blade')}")
@@ -142,16 +179,27 @@ def _read_angles(value: object, scene: Mapping[str, Any]) -> tuple[float, ...]:
 
 
 def _read_rates(value: object, scene: Mapping[str, Any]) -> tuple[float, ...]:
+    """Return rates as `_read_angles`, 0 for a pitch without inertia."""
     rates = _read_angles(value, scene)
     _check_bare_pitches("a pitch rate for", rates[1:], scene)
     return rates
 
 
 def _check_bare_pitches(what: str, entries: Sequence[Any], scene: Mapping[str, Any]) -> None:
-    """Raises TableError where an entry is not zero for a blade without pitch inertia."""
+    """Raise TableError if an entry is not zero for a blade without pitch inertia.
+
+    Parameters
+    ----------
+    what : what such an entry is, before the blades in the message.
+    entries : one per blade.
+    scene : values of the keys before it by field; without the blades nothing is checked.
+    """
     if "blade_count" not in scene or "blades" not in scene:
         return
-    bare = [i + 1 for i, blade in enumerate(scene["blades"]) if entries[i] and not blade.has_pitch_inertia]
+    bare = []
+    for number, (blade, entry) in enumerate(zip(scene["blades"], entries, strict=True), 1):
+        if entry and not blade.has_pitch_inertia:
+            bare.append(number)
     if bare:
         blades = f"{len(bare)} blades (number {bare[0]} first)"
         if len(bare) <= 5:
@@ -161,7 +209,13 @@ def _check_bare_pitches(what: str, entries: Sequence[Any], scene: Mapping[str, A
 
 
 def _read_blades(value: object, scene: Mapping[str, Any]) -> tuple[Blade, ...]:
-    """One [blade] table for all, or a [[blade]] table for each."""
+    """Return the blades, from one [blade] table for all or a [[blade]] table for each.
+
+    Parameters
+    ----------
+    value : a table, or a list of them.
+    scene : values of the keys before it by field.
+    """
 
     def read_blade(table: object) -> Blade:
         if not isinstance(table, dict):
@@ -170,6 +224,7 @@ def _read_blades(value: object, scene: Mapping[str, Any]) -> tuple[Blade, ...]:
         if "tip" not in table and "tip" in scene.get("outputs", ()):
             missing.append(KeyProblem(("tip",), "is missing", BLADE_KEYS["tip"]["allowed"]))
         values = keys.read_keys(BLADE_KEYS, table, lambda _: missing)
+        # A tip that no output needs is some point of the blade.
         values["tip"] = values["tip"] or values["centre_of_mass"]
         return Blade(**values)
 
@@ -181,37 +236,77 @@ def _read_blades(value: object, scene: Mapping[str, Any]) -> tuple[Blade, ...]:
     return read_each(read_blade, value)
 
 
-OUTPUT_NAMES = Kind(_read_outputs, "any of angles, rates, tip, energy, loads, outputs of packages")
+OUTPUT_NAMES = Kind(
+    _read_outputs,
+    "any of angles, rates, tip, energy, loads, outputs of packages",
+)
 _OUTPUTS = restricted(OUTPUT_NAMES, bool, OUTPUT_NAMES.allowed, "0 entries")
 _POINT = list_of(keys.SIZE, "three numbers x, y, z{unit}, blade frame", 3, 3)
+_NOT_RIGID = "a principal moment is negative, or above the sum of the others"
 _INERTIA = restricted(
     list_of(keys.SIZE, "", 6, 6),
     is_rigid_body_inertia,
     "six numbers xx yy zz xy xz yz{unit} that a rigid body can have",
-    "no rigid body has this inertia: a principal moment is negative, or above the sum of the others",
+    f"no rigid body has this inertia: {_NOT_RIGID}",
 )
 _LOAD = Kind(_read_load, "a number{unit}, or rows [t, number] with t >= 0 s", over_time=True)
-_ANGLES = Kind(_read_angles, "1 + blades numbers{unit}: rotor, then a pitch per blade", in_context=True)
+_ANGLES = Kind(
+    _read_angles,
+    "1 + blades numbers{unit}: rotor, then a pitch per blade",
+    in_context=True,
+)
 _RATES = Kind(_read_rates, _ANGLES.allowed, in_context=True)
-_BLADES = Kind(_read_blades, "one [blade] table for all blades, or a [[blade]] table for each", in_context=True)
+_BLADES = Kind(
+    _read_blades,
+    "one [blade] table for all blades, or a [[blade]] table for each",
+    in_context=True,
+)
 _METHODS = list_of(keys.TEXT, "a list of methods, as in `rotor-mbs list`")
-_SETTINGS = keys.dict_of(keys.NUMBER_OR_TEXT, "a table of settings of the methods, such as step = 1e-3")
+_SETTINGS = keys.dict_of(
+    keys.NUMBER_OR_TEXT,
+    "a table of settings of the methods, such as step = 1e-3",
+)
+
+
+# The scene
 
 
 @dataclass(frozen=True, slots=True)
 class Blade:
-    """A rigid blade, in its own frame: origin on the shaft axis, z along the pitch axis. `inertia` has the elements xx
-    yy zz xy xz yz of the tensor about the centre of mass (xy = -∫xy dm); `tip` is the point whose path is stored."""
+    """A rigid blade, in its own frame: origin on the shaft axis, z along the pitch axis.
+
+    Attributes
+    ----------
+    mass : kg.
+    centre_of_mass : (3,) m.
+    inertia : xx yy zz xy xz yz of the tensor about the centre of mass (xy = -∫xy dm), kg m².
+    tip : (3,) m, the point whose path is stored.
+    """
 
     mass: float = file_key("mass", keys.POSITIVE, "kg")
-    centre_of_mass: tuple[float, float, float] = file_key("centre_of_mass", _POINT, "m", ": z along the pitch axis")
-    inertia: tuple[float, float, float, float, float, float] = file_key(
-        "inertia", _INERTIA, "kg m^2", optional=(0.0,) * 6
+    centre_of_mass: tuple[float, float, float] = file_key(
+        "centre_of_mass",
+        _POINT,
+        "m",
+        ": z along the pitch axis",
     )
-    tip: tuple[float, float, float] = file_key("tip", _POINT, "m", ', needed for the output "tip"', optional=())
+    inertia: tuple[float, float, float, float, float, float] = file_key(
+        "inertia",
+        _INERTIA,
+        "kg m^2",
+        optional=(0.0,) * 6,
+    )
+    tip: tuple[float, float, float] = file_key(
+        "tip",
+        _POINT,
+        "m",
+        ', needed for the output "tip"',
+        optional=(),
+    )
 
     @property
     def is_point_mass(self) -> bool:
+        """Whether it has no inertia about its centre of mass."""
         return not any(self.inertia)
 
     @property
@@ -223,7 +318,7 @@ class Blade:
         return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
 
     def inertia_about_apex(self, number: Callable[[float], Any] = float) -> tuple[Any, ...]:
-        """Return the inertia about the origin of the blade frame, where the pitch axis meets the shaft.
+        """Return the inertia about the apex, where the pitch axis meets the shaft.
 
         Parameters
         ----------
@@ -232,8 +327,9 @@ class Blade:
         Returns
         -------
         tuple
-            xx yy zz xy xz yz of the tensor J_com + m (r·r I - r rᵀ), kg m², in the blade frame. About the shaft the
-            blade has xx sin²θ + yy cos²θ + 2 xy sin θ cos θ at a pitch of θ, and zz about the pitch axis.
+            xx yy zz xy xz yz of the tensor J_com + m (r·r I - r rᵀ), kg m², in the blade frame.
+            About the shaft the blade has xx sin²θ + yy cos²θ + 2 xy sin θ cos θ at a pitch of θ,
+            and zz about the pitch axis.
         """
         m = number(self.mass)
         x, y, z = map(number, self.centre_of_mass)
@@ -255,25 +351,50 @@ class Blade:
 
     @property
     def has_pitch_inertia(self) -> bool:
-        """Whether the moment of inertia about the pitch axis is not exactly zero (as in the paper's Fig. 4b)."""
+        """Whether the moment of inertia about the pitch axis is not zero.
+
+        It is exactly zero in the paper's Fig. 4b: such a pitch is no coordinate.
+        """
         x, y, _ = self.centre_of_mass
         return x != 0.0 or y != 0.0 or self.inertia[2] != 0.0
 
 
-def _key(path: str, *declared: Any, role: FieldRole = "rotor", added: bool = False, **more: Any) -> Any:
-    """As `file_key`; an `added` key, younger than stored hashes, does not enter them at its default."""
+def _key(
+    path: str,
+    *declared: Any,
+    role: FieldRole = "rotor",
+    added: bool = False,
+    **more: Any,
+) -> Any:
+    """Declare a field of the scene that is a key of its file, as `file_key` does.
+
+    Parameters
+    ----------
+    path, *declared, **more : as of `file_key`.
+    role : what the field is to a run.
+    added : whether the key is younger than stored hashes: at its default it does not enter them.
+    """
     return file_key(path, *declared, role=role, added=added, **more)
 
 
 @dataclass(frozen=True, slots=True)
 class Scene:
-    """A rotor with its loads and initial state. Blade i is mounted at 2π(i-1)/blades about the shaft (+y); z is up.
+    """A rotor with its loads and initial state.
+
+    Blade i is mounted at 2π(i-1)/blades about the shaft (+y); z is up.
 
     Attributes
     ----------
+    name, title, figures : how it is called, in one line, and the paper's figures that show it.
+    gravity : m/s², along -z.
+    duration, samples : s; number of equally spaced samples, both ends included.
+    outputs : what is stored of a run.
+    blades : (blades,) `Blade`.
+    hub_inertia, shaft_damping : kg m² about the shaft; N m s/rad.
     initial_angles, initial_rates : (1 + blades,) rad, rad/s: rotor, then a pitch per blade.
     rotor_torque : a table over time (see time_table), N m.
-    pitch_torque : (blades,) tables over time, N m, between hub and blade; positive in the direction of the pitch.
+    pitch_torque : (blades,) tables over time, N m, between hub and blade; positive in the direction
+        of the pitch.
     bearing_stiffness, bearing_damping : (blades,) N m/rad, N m s/rad.
     bearing_rest : (blades,) tables over time, rad: pitch at which the spring is unloaded.
     methods, settings : methods that `run` uses, and their settings; () for the default selection.
@@ -281,33 +402,74 @@ class Scene:
 
     Notes
     -----
-    Loads, springs and dampers that are zero are stored as (). The constructor does not validate; `load`, `scene` and
-    `replace` do.
+    Loads, springs and dampers that are zero are stored as (). The constructor does not validate;
+    `load`, `scene` and `replace` do.
     """
 
     name: str = _key("", keys.TEXT, role="label")
     title: str = _key("title", keys.LINE, role="label")
-    figures: tuple[str, ...] = _key("figures", list_of(keys.LINE, 'texts, such as ["5"]'), role="label", optional=())
+    figures: tuple[str, ...] = _key(
+        "figures",
+        list_of(keys.LINE, 'texts, such as ["5"]'),
+        role="label",
+        optional=(),
+    )
     gravity: float = _key("gravity", keys.NOT_NEGATIVE, "m/s^2", ", along -z")
     duration: float = _key("duration", keys.POSITIVE, "s", role="run")
-    samples: int = _key("samples", keys.whole(2, MAX_SAMPLES), "1", ": equally spaced, both ends included", role="run")
+    samples: int = _key(
+        "samples",
+        keys.whole(2, MAX_SAMPLES),
+        "1",
+        ": equally spaced, both ends included",
+        role="run",
+    )
     outputs: tuple[str, ...] = _key("outputs", _OUTPUTS, role="run", optional=DEFAULT_OUTPUTS)
     blades: tuple[Blade, ...] = _key("blade", _BLADES)
-    hub_inertia: float = _key("hub.inertia", keys.NOT_NEGATIVE, "kg m^2", ", about the shaft", optional=0.0)
+    hub_inertia: float = _key(
+        "hub.inertia",
+        keys.NOT_NEGATIVE,
+        "kg m^2",
+        ", about the shaft",
+        optional=0.0,
+    )
     initial_angles: tuple[float, ...] = _key("initial.angles", _ANGLES, "rad", role="start")
     initial_rates: tuple[float, ...] = _key("initial.rates", _RATES, "rad/s", role="start")
     rotor_torque: tuple[tuple[float, float], ...] = _key("torque.rotor", _LOAD, "N m", default=())
     bearing_stiffness: tuple[float, ...] = _key(
-        "bearing.stiffness", _per_blade(keys.NOT_NEGATIVE), "N m/rad", default=()
+        "bearing.stiffness",
+        _per_blade(keys.NOT_NEGATIVE),
+        "N m/rad",
+        default=(),
     )
-    bearing_damping: tuple[float, ...] = _key("bearing.damping", _per_blade(keys.NOT_NEGATIVE), "N m s/rad", default=())
+    bearing_damping: tuple[float, ...] = _key(
+        "bearing.damping",
+        _per_blade(keys.NOT_NEGATIVE),
+        "N m s/rad",
+        default=(),
+    )
     shaft_damping: float = _key("shaft.damping", keys.NOT_NEGATIVE, "N m s/rad", default=0.0)
-    pitch_torque: tuple[LoadTable, ...] = _key("torque.pitch", _per_blade(_LOAD), "N m", default=(), added=True)
+    pitch_torque: tuple[LoadTable, ...] = _key(
+        "torque.pitch",
+        _per_blade(_LOAD),
+        "N m",
+        default=(),
+        added=True,
+    )
     bearing_rest: tuple[LoadTable, ...] = _key(
-        "bearing.rest", _per_blade(_LOAD), "rad", ": pitch at which the spring is unloaded", default=(), added=True
+        "bearing.rest",
+        _per_blade(_LOAD),
+        "rad",
+        ": pitch at which the spring is unloaded",
+        default=(),
+        added=True,
     )
     methods: tuple[str, ...] = _key("methods", _METHODS, role="label", default=())
-    settings: tuple[tuple[str, float | str], ...] = _key("settings", _SETTINGS, role="label", default=())
+    settings: tuple[tuple[str, float | str], ...] = _key(
+        "settings",
+        _SETTINGS,
+        role="label",
+        default=(),
+    )
     text: str = _key("", keys.TEXT, role="label", default="")
 
     @property
@@ -317,23 +479,26 @@ class Scene:
 
     @property
     def has_torque(self) -> bool:
+        """Whether a torque acts on the rotor at some time."""
         return any(torque != 0.0 for _, torque in self.rotor_torque)
 
     @property
     def has_constant_torque(self) -> bool:
+        """Whether the torque on the rotor is the same at all times, or none."""
         return is_constant(self.rotor_torque)
 
     @property
     def load_tables(self) -> tuple[LoadTable, ...]:
         """Loads over time: rotor torque, then torque and rest angle of each pitch, fixed ones too.
 
-        This is the one order of the loads of a scene; `time_table.torque_place` and `rest_place` have their places.
+        This is the one order of the loads of a scene; `time_table.torque_place` and `rest_place`
+        have their places.
         """
         return (self.rotor_torque, *(table for pair in self.pitch_loads for table in pair))
 
     @property
     def load_segments(self) -> tuple[Segment, ...]:
-        """The run cut into segments on which all loads are linear, in the order of `load_tables`."""
+        """The run cut into segments with linear loads, in the order of `load_tables`."""
         return segments(self.load_tables, self.duration)
 
     @property
@@ -343,25 +508,33 @@ class Scene:
 
     @property
     def has_constant_loads(self) -> bool:
+        """Whether no load changes over time."""
         return all(map(is_constant, self.load_tables))
 
     @property
     def has_damping(self) -> bool:
+        """Whether the shaft or a bearing has a damper."""
         return self.shaft_damping != 0.0 or any(self.bearing_damping)
 
     @property
     def work_needs_path(self) -> bool:
-        """Whether the work is requested and must be integrated along the path: for dampers, and loads over time."""
+        """Whether the work is requested and must be integrated along the path.
+
+        The work of constant loads follows from the angles; that of dampers and of loads over time
+        does not.
+        """
         return self.wants("energy") and (self.has_damping or not self.has_constant_loads)
 
     @property
     def coordinate_labels(self) -> tuple[str, ...]:
+        """Labels of the coordinates, (1 + blades,): rotor, pitch 1, ..."""
         return coordinate_labels(len(self.blades))
 
     @property
     def moving_coordinates(self) -> list[int]:
-        """Columns of the coordinates with inertia: 0 (rotor), and 1 + i for each blade i with pitch inertia."""
-        return [0, *(1 + i for i, blade in enumerate(self.blades) if blade.has_pitch_inertia)]
+        """Columns of the coordinates with inertia: 0 (rotor), and those of pitches with inertia."""
+        pitches = [i for i, blade in enumerate(self.blades, 1) if blade.has_pitch_inertia]
+        return [0, *pitches]
 
     @property
     def bearings(self) -> list[tuple[float, float]]:
@@ -378,27 +551,45 @@ class Scene:
     def pitch_loads(self) -> list[tuple[LoadTable, LoadTable]]:
         """Torque (N m) and rest angle (rad; none without stiffness) of each pitch over time."""
         none: tuple[LoadTable, ...] = ((),) * len(self.blades)
-        loads = zip(self.pitch_torque or none, self.bearing_rest or none, self.bearings, strict=True)
-        return [(torque, rest if stiffness else ()) for torque, rest, (stiffness, _) in loads]
+        torques, rests = self.pitch_torque or none, self.bearing_rest or none
+        loads = []
+        for torque, rest, (stiffness, _) in zip(torques, rests, self.bearings, strict=True):
+            loads.append((torque, rest if stiffness else ()))
+        return loads
 
     @property
     def rotor_key(self) -> tuple[object, ...]:
-        """Parameters and loads, which are equal for scenes that differ only in initial state, duration or title."""
+        """Parameters and loads: what scenes share that differ in start, run or labels alone."""
         return tuple(_rotor_values(self))
 
     def replace(self, **changes: Any) -> Scene:
         """Return a scene with other values of some keys of the scene file, validated like a file.
 
-        Each keyword is a key; keys with dots or indices are given as a dict. Entries are counted from 0:
-        `initial.angles[1]` is the pitch of blade 1. A value is a number, an expression in quotes, or a list (tuple,
-        array), as in a scene file. `text` is rewritten from the numbers.
+        Parameters
+        ----------
+        **changes
+            Each keyword is a key; keys with dots or indices are given as a dict. Entries are
+            counted from 0: `initial.angles[1]` is the pitch of blade 1. A value is a number, an
+            expression in quotes, or a list (tuple, array), as in a scene file.
 
-        Raises InputError with a line for each error: the key, what is wrong, what is allowed, the most similar key;
-        TypeError for a value that no file can have, such as None.
+        Returns
+        -------
+        Scene
+            Its `text` is rewritten from the numbers.
 
+        Raises
+        ------
+        InputError
+            A line for each error: the key, what is wrong, what is allowed, the most similar key.
+        TypeError
+            For a value that no file can have, such as None.
+
+        Examples
+        --------
         >>> import rotor_mbs.scenario.catalogue
         >>> scene = rotor_mbs.scenario.catalogue.find_scenes(["paper/fig11"])[0]
-        >>> scene.replace(gravity=9.81, **{"initial.angles[1]": "pi/5", "blade.mass": 1e4}).blades[0].mass
+        >>> changes = {"initial.angles[1]": "pi/5", "blade.mass": 1e4}
+        >>> scene.replace(gravity=9.81, **changes).blades[0].mass
         10000.0
         """
         tables = scene_tables(self)
@@ -411,6 +602,7 @@ class Scene:
         return dataclasses.replace(changed, text=scene_toml(changed))
 
     def wants(self, output: str) -> bool:
+        """Return whether an output is asked for."""
         return output in self.outputs
 
     def torque_at(self, time: float) -> float:
@@ -419,17 +611,25 @@ class Scene:
 
 
 def coordinate_labels(blades: int) -> tuple[str, ...]:
+    """Return the labels of the coordinates of a rotor with so many blades."""
     return ("rotor", *(f"pitch {i + 1}" for i in range(blades)))
 
 
 BLADE_KEYS = keys.declared_keys(Blade)
-_OWN_KEYS = keys.declared_keys(Scene)
-_COUNT = file_key("blades", keys.whole(1, MAX_BLADES), "1", ": blade i at 2 pi (i - 1)/blades about the shaft")
+_FIELD_KEYS = keys.declared_keys(Scene)
+_COUNT = file_key(
+    "blades",
+    keys.whole(1, MAX_BLADES),
+    "1",
+    ": blade i at 2 pi (i - 1)/blades about the shaft",
+)
+# In this order keys are read and written. The number of blades is no field of a scene, and has to
+# be known before what depends on it.
 SCENE_KEYS = {
-    "title": _OWN_KEYS["title"],
-    "figures": _OWN_KEYS["figures"],
+    "title": _FIELD_KEYS["title"],
+    "figures": _FIELD_KEYS["figures"],
     "blade_count": _COUNT.metadata,
-    **_OWN_KEYS,
+    **_FIELD_KEYS,
 }
 _BY_PATH = {declared["key"]: declared for declared in SCENE_KEYS.values()} | {
     f"blade.{name}": declared for name, declared in BLADE_KEYS.items()
@@ -437,6 +637,7 @@ _BY_PATH = {declared["key"]: declared for declared in SCENE_KEYS.values()} | {
 
 
 def scene_fields(*roles: FieldRole) -> Iterator[Field[Any]]:
+    """Yield the fields of a scene that have one of some roles."""
     return (field for field in fields(Scene) if field.metadata["role"] in roles)
 
 
@@ -444,21 +645,34 @@ _rotor_values = attrgetter(*(field.name for field in scene_fields("rotor")))
 
 
 def scene_hash(scene: Scene) -> str:
-    """SHA-256, in hexadecimal, over all that a run depends on: numbers bit for bit, and outputs. Name, title, figures
-    and text do not enter; neither does the tip where no tip path is asked for."""
+    """Return a SHA-256, in hexadecimal, over all that a run of a scene depends on.
+
+    These are its numbers, bit for bit, and outputs. Name, title, figures and text do not enter;
+    neither does the tip where no tip path is asked for.
+    """
     content: dict[str, object] = {}
     for field in scene_fields("run", "start", "rotor"):
         value = getattr(scene, field.name)
         if field.name == "blades":
-            numbers = [name for name in BLADE_KEYS if name != "tip" or scene.wants("tip")]
-            content["blades"] = [[_exact(getattr(blade, name), listed=True) for name in numbers] for blade in value]
+            names = [name for name in BLADE_KEYS if name != "tip" or scene.wants("tip")]
+            blades = []
+            for blade in value:
+                # A mass in a list, as the other numbers of a blade are: so it is in stored hashes.
+                blades.append([_exact(getattr(blade, name), listed=True) for name in names])
+            content["blades"] = blades
         elif not (field.metadata["added"] and value == field.default):
             content[field.name] = sorted(value) if field.name == "outputs" else _exact(value)
     return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
 
 
 def _exact(value: object, *, listed: bool = False) -> object:
-    """Doubles in hexadecimal, so that the text tells them apart bit for bit; a single one in a list if `listed`."""
+    """Return a value with its doubles in hexadecimal, which differ wherever a bit does.
+
+    Parameters
+    ----------
+    value : a single value, or a tuple of values.
+    listed : whether a single value is put in a list.
+    """
     if isinstance(value, tuple):
         return [_exact(entry) for entry in value]
     exact = value.hex() if isinstance(value, float) else value
@@ -466,24 +680,58 @@ def _exact(value: object, *, listed: bool = False) -> object:
 
 
 def values_per_sample(blades: int, outputs: Sequence[str]) -> int:
-    """Doubles that a run holds per sample: time, angles and rates always; tips, energies and loads where asked for."""
-    energies = 4  # kinetic, potential, work, energy error
-    loads = 6 * (1 + blades) + blades  # force and moment at every root and at the shaft, moments of the pitch actuators
-    asked = 3 * blades * ("tip" in outputs) + energies * ("energy" in outputs) + loads * ("loads" in outputs)
-    return 1 + 2 * (1 + blades) + asked
+    """Return how many doubles a run holds per sample.
+
+    Parameters
+    ----------
+    blades : number of blades.
+    outputs : what is asked for beyond time, angles and rates.
+    """
+    count = 1 + 2 * (1 + blades)  # time, angles, rates
+    if "tip" in outputs:
+        count += 3 * blades
+    if "energy" in outputs:
+        count += 4  # kinetic, potential, work, energy error
+    if "loads" in outputs:
+        # Force and moment at every root and at the shaft, moments of the pitch actuators.
+        count += 6 * (1 + blades) + blades
+    return count
 
 
-def scene_from_tables(tables: Mapping[str, Any], name: str, text: str = "", check: ValuesCheck | None = None) -> Scene:
-    """The scene in the tables of a scene file. Raises TableError with every error."""
+# Files
+
+
+def scene_from_tables(
+    tables: Mapping[str, Any],
+    name: str,
+    text: str = "",
+    check: ValuesCheck | None = None,
+) -> Scene:
+    """Return the scene in the tables of a scene file.
+
+    Parameters
+    ----------
+    tables : as the file has them.
+    name, text : of the scene.
+    check : what else is wrong with the values.
+
+    Raises
+    ------
+    TableError
+        With every error.
+    """
 
     def extra_check(values: Mapping[str, Any]) -> list[KeyProblem]:
         problems = check(values) if check else []
         if {"blade_count", "samples", "outputs"} <= values.keys():
-            of_sample = values_per_sample(values["blade_count"], values["outputs"])
-            total = values["samples"] * of_sample * 8
+            samples = values["samples"]
+            per_sample = values_per_sample(values["blade_count"], values["outputs"])
+            total = samples * per_sample * 8
             if total > MAX_SAMPLE_BYTES:
-                what = f"{values['samples']} samples of {of_sample} values of 8 bytes are {total / 2**30:.4g} GiB"
-                problems.append(KeyProblem(("samples",), what, f"at most {MAX_SAMPLE_BYTES >> 30} GiB"))
+                size = f"{total / 2**30:.4g} GiB"
+                what = f"{samples} samples of {per_sample} values of 8 bytes are {size}"
+                allowed = f"at most {MAX_SAMPLE_BYTES >> 30} GiB"
+                problems.append(KeyProblem(("samples",), what, allowed))
         return problems
 
     values = keys.read_keys(SCENE_KEYS, tables, extra_check)
@@ -493,7 +741,7 @@ def scene_from_tables(tables: Mapping[str, Any], name: str, text: str = "", chec
 
 
 def scene_tables(scene: Scene) -> dict[str, Any]:
-    """The scene as the tables of a scene file: numbers as they are, keys at their defaults left out."""
+    """Return the scene as tables of a scene file: numbers as they are, without keys at defaults."""
     tables: dict[str, Any] = {"blades": len(scene.blades)}
     for field in fields(Scene):
         value = getattr(scene, field.name)
@@ -502,14 +750,7 @@ def scene_tables(scene: Scene) -> dict[str, Any]:
         table, _, name = field.metadata["key"].rpartition(".")
         written: Any
         if field.name == "blades":
-            # One table for equal blades; a tip that only repeats the centre of mass was not given.
-            written = []
-            for blade in scene.blades if len(set(scene.blades)) > 1 else scene.blades[:1]:
-                of_blade = {key: _listed(getattr(blade, key)) for key in BLADE_KEYS}
-                if blade.tip == blade.centre_of_mass and not scene.wants("tip"):
-                    del of_blade["tip"]
-                written.append(of_blade)
-            written = written if len(written) > 1 else written[0]
+            written = _blade_tables(scene)
         elif field.name == "settings":
             written = dict(value)
         elif field.metadata["kind"].per_blade and len(set(value)) == 1:
@@ -518,16 +759,34 @@ def scene_tables(scene: Scene) -> dict[str, Any]:
             written = [_listed(entry) if entry != () else 0.0 for entry in value]
         else:
             written = _listed(value)
-        (tables.setdefault(table, {}) if table else tables)[name] = written
+        entries = tables.setdefault(table, {}) if table else tables
+        entries[name] = written
     return tables
 
 
+def _blade_tables(scene: Scene) -> dict[str, Any] | list[dict[str, Any]]:
+    """Return the table of a scene's blades, or where they differ the tables of all."""
+    are_equal = len(set(scene.blades)) == 1
+    written = []
+    for blade in scene.blades[:1] if are_equal else scene.blades:
+        table = {key: _listed(getattr(blade, key)) for key in BLADE_KEYS}
+        # A tip that only repeats the centre of mass was not given.
+        if blade.tip == blade.centre_of_mass and not scene.wants("tip"):
+            del table["tip"]
+        written.append(table)
+    return written[0] if are_equal else written
+
+
 def _listed(value: Any) -> Any:
+    """Return a value with lists in place of tuples, as TOML has them."""
     return [_listed(entry) for entry in value] if isinstance(value, tuple) else value
 
 
 def scene_toml(scene: Scene) -> str:
-    """A scene file with the scene's numbers bit for bit; comments and expressions of its first file are not kept."""
+    """Return a scene file with the scene's numbers bit for bit.
+
+    Comments and expressions of the file that it was read from are not kept.
+    """
     top, parts = {}, []
     for name, value in scene_tables(scene).items():
         if isinstance(value, dict):
@@ -540,38 +799,41 @@ def scene_toml(scene: Scene) -> str:
 
 
 def unit_of(path: KeyPath) -> str:
-    """The unit of the number at a path of a scene file, "1" where it has none."""
+    """Return the unit of the number at a path of a scene file, "1" where it has none."""
     declared = _BY_PATH.get(_names(path))
     if declared is None:
         return "1"
     kind = declared["kind"]
-    if kind.over_time and len(path) == (5 if kind.per_blade else 4) and path[-1] == 0:  # the time of a row
-        return "s"
+    row_depth = 5 if kind.per_blade else 4  # torque.rotor[row][0], torque.pitch[blade][row][0]
+    if kind.over_time and len(path) == row_depth and path[-1] == 0:
+        return "s"  # the time of a row
     return str(declared["unit"])
 
 
 def _names(path: KeyPath) -> str:
+    """Return the key that a path goes through, without the numbers of entries."""
     return ".".join(part for part in path if isinstance(part, str))
 
 
 def put_value(tables: dict[str, Any], path: KeyPath, value: object) -> None:
-    """Sets the value at `path`, keys not checked; one value for every blade becomes one for each where the path names
-    one. Raises TableError where the path goes through something that has no such entry."""
+    """Set a value in the tables of a scene file.
+
+    Parameters
+    ----------
+    tables : are changed. One value for every blade becomes one for each where the path names one.
+    path : of the value. Whether there is such a key is not checked.
+    value : as the file would have it.
+
+    Raises
+    ------
+    TableError
+        If the path goes through something that has no such entry.
+    """
     here: Any = tables  # a table or a list
     for depth, part in enumerate(path):
-        has_such_entries = isinstance(here, list) if isinstance(part, int) else isinstance(here, dict)
-        if not has_such_entries:
-            what, allowed = "is a single value", KEY_FORM
-            if isinstance(here, dict | list):
-                what = "is a table" if isinstance(here, dict) else "is a list"
-            if path[:depth] == ("blade",):
-                first, last = (shown_key(("blade", i, *path[depth:])) for i in (0, len(here) - 1))
-                allowed = f"{first} to {last}"
-            raise TableError([KeyProblem(path[:depth], what, allowed, is_of_key=True)])
-        if isinstance(part, int) and part >= len(here):
-            name = shown_key(path[:depth])
-            allowed = f"{name}[0] to {name}[{len(here) - 1}]"
-            raise TableError([KeyProblem(path[:depth], f"has {len(here)} entries", allowed, is_of_key=True)])
+        is_right_type = isinstance(here, list if isinstance(part, int) else dict)
+        if not is_right_type or (isinstance(part, int) and part >= len(here)):
+            raise TableError([_no_such_entry(here, path, depth)])
         if depth == len(path) - 1:
             here[part] = value
             return
@@ -583,8 +845,38 @@ def put_value(tables: dict[str, Any], path: KeyPath, value: object) -> None:
         here = here[part]
 
 
+def _no_such_entry(container: Any, path: KeyPath, depth: int) -> KeyProblem:
+    """Return the problem that what stands at `path[:depth]` has no entry `path[depth]`."""
+    above, part = path[:depth], path[depth]
+    if isinstance(container, list) and isinstance(part, int):
+        name = shown_key(above)
+        what, allowed = (
+            f"has {len(container)} entries",
+            f"{name}[0] to {name}[{len(container) - 1}]",
+        )
+        return KeyProblem(above, what, allowed, is_of_key=True)
+    what, allowed = "is a single value", KEY_FORM
+    if isinstance(container, dict):
+        what = "is a table"
+    elif isinstance(container, list):
+        what = "is a list"
+    if above == ("blade",):
+        first = shown_key(("blade", 0, *path[depth:]))
+        last = shown_key(("blade", len(container) - 1, *path[depth:]))
+        allowed = f"{first} to {last}"
+    return KeyProblem(above, what, allowed, is_of_key=True)
+
+
 def _as_list(tables: Mapping[str, Any], value: Any, path: KeyPath, last: int) -> Any:
-    """What stands at `path`, as one entry per blade where the scene file allows one for all."""
+    """Return what stands at a path, as one entry per blade where a file may have one for all.
+
+    Parameters
+    ----------
+    tables : of the scene file, for the number of blades.
+    value : what stands there; None where the key is missing.
+    path : of the value.
+    last : number of the entry that is to be set.
+    """
     count = tables.get("blades", 0)
     if path == ("blade",) and isinstance(value, dict):
         return [copy.deepcopy(value) for _ in range(count)]
@@ -597,25 +889,51 @@ def _as_list(tables: Mapping[str, Any], value: Any, path: KeyPath, last: int) ->
 
 
 def load_scene(
-    path: Path | str, name: str | None = None, check: ValuesCheck | None = None, stacklevel: int = 2
+    path: Path | str,
+    name: str | None = None,
+    check: ValuesCheck | None = None,
+    stacklevel: int = 2,
 ) -> Scene:
-    """The scene in the TOML file `path`, under `name` or the file's own. check: what else is wrong with its values.
-    Raises InputError with all errors of the file, a line each: `file:line: key: what is wrong; allowed: ...`; entries
-    are counted from 0. Issues a PlausibilityWarning for each number that looks like a slip, but not of shipped scenes,
-    whose names have a folder."""
+    """Read a scene from a TOML file.
+
+    Parameters
+    ----------
+    path : of the file.
+    name : of the scene; by default that of the file without its ending.
+    check : what else is wrong with the values.
+    stacklevel : of warnings, as of `warnings.warn`.
+
+    Raises
+    ------
+    InputError
+        With all errors of the file, a line each: `file:line: key: what is wrong; allowed: ...`.
+        Entries are counted from 0.
+
+    Warns
+    -----
+    PlausibilityWarning
+        For each number that looks like a slip. Shipped scenes, whose names have a folder, are not
+        looked at.
+    """
     path = Path(path)
+    name = path.stem if name is None else name
     file = read_toml(path)
     if "axis" in file.tables and "scene" in file.tables:
-        raise InputError(f"{file.source}: is a sweep; allowed: a scene, or: rotor-mbs sweep {file.source}")
+        allowed = f"a scene, or: rotor-mbs sweep {file.source}"
+        raise InputError(f"{file.source}: is a sweep; allowed: {allowed}")
     with file.with_line_numbers():
-        scene = scene_from_tables(file.tables, path.stem if name is None else name, file.text, check)
-    for doubt in implausible_values(scene) if "/" not in scene.name else ():
-        warnings.warn(f"{file.source}: {doubt}", PlausibilityWarning, stacklevel)
+        scene = scene_from_tables(file.tables, name, file.text, check)
+    if "/" not in scene.name:
+        for line in implausible_values(scene):
+            warnings.warn(f"{file.source}: {line}", PlausibilityWarning, stacklevel)
     return scene
 
 
 def parse_scene(text: str, name: str) -> Scene:
-    """The scene in a TOML text, as it is stored with results. Raises InputError as `load_scene`."""
+    """Return the scene in a TOML text, as it is stored with results.
+
+    Raises InputError as `load_scene`, with `name` in place of the file.
+    """
     file = parse_toml(text, name)
     with file.with_line_numbers():
         return scene_from_tables(file.tables, name, text)
@@ -641,10 +959,14 @@ _EXAMPLE: dict[str, Any] = {
 }
 
 
+_COMMENT_COLUMN = 34
+_LAST_COLUMN = 117
+
+
 def new_scene_text() -> str:
-    """A scene file with every key, a value and what is allowed, to start a scene from."""
-    lines: dict[str, list[str]] = {"": _HEADER.splitlines(), "blade": []}
-    needed = {"blade"}
+    """Return a scene file with every key, a value and what is allowed, to start a scene from."""
+    lines: dict[str, list[str]] = {"": _HEADER.splitlines(), "blade": []}  # by table
+    required = {"blade"}
     for path, declared in _BY_PATH.items():
         if path in ("blade", "settings"):  # tables
             continue
@@ -652,42 +974,66 @@ def new_scene_text() -> str:
         value = _EXAMPLE.get(path, declared.get("optional"))
         if value == () and declared["unit"] != "1":  # no load
             value = 0.0
-        entry = f"{name} = {toml_value(value)}"
         comment = declared["allowed"]
         if "optional" not in declared:
-            needed.add(table)
-        elif table in ("", "blade"):
+            required.add(table)
+        elif table in ("", "blade"):  # the header of another table says so
             comment = f"optional: {comment}"
-        first, *more = textwrap.wrap(comment, 117 - max(34, len(entry)))
-        lines.setdefault(table, []).append(f"{entry:34} # {first}")
-        lines[table] += [f"{'':34} # {rest}" for rest in more]
-    lines["settings"] = [f"{'# step = 1e-3':34} # {SCENE_KEYS['settings']['allowed']}"]
+        entry = f"{name} = {toml_value(value)}"
+        lines.setdefault(table, []).extend(_commented(entry, comment))
+    lines["settings"] = _commented("# step = 1e-3", SCENE_KEYS["settings"]["allowed"])
     parts = []
     for table, entries in lines.items():
-        header = [f"[{table}]" if table in needed else f"{f'[{table}]':34} # optional"] if table else []
+        header = []
+        if table:
+            is_required = table in required
+            header = [f"[{table}]"] if is_required else _commented(f"[{table}]", "optional")
         parts.append("\n".join([*header, *entries, ""]))
     return "\n".join(parts)
+
+
+def _commented(entry: str, comment: str) -> list[str]:
+    """Return the lines of an entry of a TOML file with a comment behind it, wrapped."""
+    width = _LAST_COLUMN - max(_COMMENT_COLUMN, len(entry))
+    first, *others = textwrap.wrap(comment, width)
+    lines = [f"{entry:{_COMMENT_COLUMN}} # {first}"]
+    for text in others:
+        lines.append(f"{'':{_COMMENT_COLUMN}} # {text}")
+    return lines
 
 
 # Numbers that are allowed but implausible: degrees for radians, millimetres for metres, tonnes.
 
 TURN = 2.0 * math.pi
 MAX_RATE = 100.0  # rad/s: a thousand revolutions per minute
-MAX_DISTANCE, MIN_DISTANCE = (
-    300.0,
-    0.01,
-)  # m, from the shaft to the farthest point of a blade: the longest built have 130
-MAX_MASS, MIN_MASS = 1e6, 0.01  # kg
+# m, from the shaft to the farthest point of a blade: the longest built have 130.
+MIN_DISTANCE, MAX_DISTANCE = 0.01, 300.0
+MIN_MASS, MAX_MASS = 0.01, 1e6  # kg
 USUAL_GRAVITY = (1.0, 30.0)  # m/s^2: the Moon, Jupiter
 
 
 def implausible_values(scene: Scene) -> list[str]:
-    """A line for each number that looks like a slip: key, value, and what may have been meant; [] where all is well."""
+    """Return a line for each number that looks like a slip: key, value, what may be meant."""
+    lines = _implausible_motion(scene)
+    # Equal blades stand in the file once.
+    if len(set(scene.blades)) == 1:
+        lines += _implausible_blade("blade", scene.blades[0])
+    else:
+        for i, blade in enumerate(scene.blades):
+            lines += _implausible_blade(f"blade[{i}]", blade)
+    if scene.gravity and not USUAL_GRAVITY[0] <= scene.gravity <= USUAL_GRAVITY[1]:
+        lines.append(f"gravity: {scene.gravity:g} m/s^2; 9.81 is usual, 0 is none")
+    return lines
+
+
+def _implausible_motion(scene: Scene) -> list[str]:
+    """Return a line for each angle and rate that seems to be in degrees."""
     lines = []
     # Where one is more than a turn, other whole numbers are in degrees, too.
     in_degrees = any(abs(angle) > TURN for angle in scene.initial_angles)
     for i, angle in enumerate(scene.initial_angles):
-        if abs(angle) > TURN or (in_degrees and abs(angle) >= 1.0 and angle == round(angle)):
+        is_whole = abs(angle) >= 1.0 and angle == round(angle)
+        if abs(angle) > TURN or (in_degrees and is_whole):
             lines.append(f"initial.angles[{i}]: {_as_degrees(angle)}")
     for i, (_, rests) in enumerate(scene.pitch_loads):
         rest = max((value for _, value in rests), key=abs, default=0.0)
@@ -695,24 +1041,29 @@ def implausible_values(scene: Scene) -> list[str]:
             lines.append(f"bearing.rest[{i}]: {_as_degrees(rest)}")
     for i, rate in enumerate(scene.initial_rates):
         if abs(rate) > MAX_RATE:
-            lines.append(f'initial.rates[{i}]: {rate:g} rad/s; degrees per second? write "deg({rate:g})"')
-    blades = scene.blades[:1] if len(set(scene.blades)) == 1 else scene.blades
-    for i, blade in enumerate(blades):
-        name = "blade" if len(blades) == 1 else f"blade[{i}]"
-        if not MIN_MASS <= blade.mass <= MAX_MASS:
-            lines.append(f"{name}.mass: {blade.mass:g} kg; is it in kg?")
-        for key, point in (("centre_of_mass", blade.centre_of_mass), ("tip", blade.tip)):
-            distance = math.hypot(*point)
-            if not MIN_DISTANCE <= distance <= MAX_DISTANCE:
-                lines.append(f"{name}.{key}: {distance:g} m from the shaft; is it in m?")
-        gyration = math.sqrt(max(blade.inertia[:3]) / blade.mass) if blade.mass else 0.0
-        if gyration > 2.0 * math.hypot(*blade.tip):
-            far = f"a radius of gyration of {gyration:.3g} m, far beyond the tip"
-            lines.append(f"{name}.inertia: {far}; is it in kg m^2, mass in kg?")
-    if scene.gravity and not USUAL_GRAVITY[0] <= scene.gravity <= USUAL_GRAVITY[1]:
-        lines.append(f"gravity: {scene.gravity:g} m/s^2; 9.81 is usual, 0 is none")
+            advice = f'degrees per second? write "deg({rate:g})"'
+            lines.append(f"initial.rates[{i}]: {rate:g} rad/s; {advice}")
     return lines
 
 
 def _as_degrees(angle: float) -> str:
-    return f'{angle:g} rad are {round(abs(angle) / TURN, 1):.6g} turns; degrees? write "deg({angle:g})"'
+    """Return the advice for an angle (rad) that seems to be in degrees."""
+    turns = round(abs(angle) / TURN, 1)
+    return f'{angle:g} rad are {turns:.6g} turns; degrees? write "deg({angle:g})"'
+
+
+def _implausible_blade(name: str, blade: Blade) -> list[str]:
+    """Return a line for each number of a blade, called `name`, that looks like a slip."""
+    lines = []
+    if not MIN_MASS <= blade.mass <= MAX_MASS:
+        lines.append(f"{name}.mass: {blade.mass:g} kg; is it in kg?")
+    for key, point in (("centre_of_mass", blade.centre_of_mass), ("tip", blade.tip)):
+        distance = math.hypot(*point)
+        if not MIN_DISTANCE <= distance <= MAX_DISTANCE:
+            lines.append(f"{name}.{key}: {distance:g} m from the shaft; is it in m?")
+    # No mass is much farther away than the tip, so that no radius of gyration is.
+    gyration = math.sqrt(max(blade.inertia[:3]) / blade.mass) if blade.mass else 0.0
+    if gyration > 2.0 * math.hypot(*blade.tip):
+        far = f"a radius of gyration of {gyration:.3g} m, far beyond the tip"
+        lines.append(f"{name}.inertia: {far}; is it in kg m^2, mass in kg?")
+    return lines

@@ -45,27 +45,36 @@ Array = NDArray[np.float64]
 
 SPLITS = ("train", "validation", "test")
 DRAWN = ("uniform", "normal", "sobol")
-MAX_COUNT = 10**15  # values of a range; too many runs are reported where they are counted
+# Values of a range; too many runs are reported where they are counted.
+MAX_COUNT = 10**15
 MAX_ROWS = 10_000_000
 VARIED = ("values", "linear", "log", *DRAWN)
-# Keys whose rule is an interval of its own: if the ends of an axis keep it, all values between them do.
+# Keys whose rule is an interval of its own: if the ends of an axis keep it, all values between them
+# do.
 _INTERVALS = ("initial", "gravity", "hub", "shaft", "bearing")
-_ROWS_AT_ONCE = 4096
+_ROWS_AT_ONCE = 4096  # that are checked: tables of all rows would take much memory
 _MAX_ROW_ERRORS = 20
 
 
 def _read_key(value: object) -> str:
+    """Return the path of a key that may differ between the runs of a dataset."""
     key: str = keys.LINE.read(value)
     table = parse_key(key)[0]
     if table in ("blades", "samples", "duration"):
-        raise invalid(f"all runs of a dataset have the same {table}", "separate sweeps, or another key")
+        what = f"all runs of a dataset have the same {table}"
+        raise invalid(what, "separate sweeps, or another key")
     return key
 
 
+_KEY = Kind(_read_key, "a key of a number of the scene, such as blade.mass")
+_VALUES = list_of(keys.NUMBER, "a list of numbers", 1)
 _COUNT = keys.whole(2, MAX_COUNT, "a whole number of at least 2")
 _PAIR = list_of(keys.NUMBER, "", 2, 2)
 _RANGE = restricted(
-    _PAIR, lambda pair: pair[0] < pair[1], "two numbers [low, high]", "the first number is not below the second"
+    _PAIR,
+    lambda pair: pair[0] < pair[1],
+    "two numbers [low, high]",
+    "the first number is not below the second",
 )
 _NORMAL = restricted(
     _PAIR,
@@ -74,12 +83,15 @@ _NORMAL = restricted(
     "the standard deviation is not above 0",
 )
 _SHARE = restricted(keys.NUMBER, lambda share: 0.0 < share < 1.0, "a number between 0 and 1")
-_SCENE_NAME = Kind(keys.LINE.read, "the name of a shipped scene (paper/fig11), or a TOML file beside this one")
+_SCENE_NAME = Kind(
+    keys.LINE.read,
+    "the name of a shipped scene (paper/fig11), or a TOML file beside this one",
+)
 
 
 @dataclass(frozen=True)
 class Range:
-    """`linear` or `log`: `count` values from `start` to `end`, both included."""
+    """Values of an axis: `count` of them from `start` to `end`, both included."""
 
     start: float = file_key("start", keys.NUMBER)
     end: float = file_key("end", keys.NUMBER)
@@ -97,15 +109,38 @@ _LOG = restricted(
 
 @dataclass(frozen=True)
 class Axis:
-    """One [[axis]]: a key of the scene, and where its values come from: one of `VARIED`."""
+    """One [[axis]]: a key of the scene, and where its values come from.
 
-    key: str = file_key("key", Kind(_read_key, "a key of a number of the scene, such as blade.mass"))
-    values: tuple[float, ...] | None = file_key("values", list_of(keys.NUMBER, "a list of numbers", 1), default=None)
+    Attributes
+    ----------
+    key : of a number of the scene.
+    values, linear, log, uniform, normal, sobol : one of them is given, the others are None: the
+        values themselves; a range with equal differences or ratios; the ends of a uniform
+        distribution, mean and standard deviation of a normal one, the ends of a Sobol sequence.
+    """
+
+    key: str = file_key("key", _KEY)
+    values: tuple[float, ...] | None = file_key("values", _VALUES, default=None)
     linear: Range | None = file_key("linear", _LINEAR, default=None)
     log: Range | None = file_key("log", _LOG, default=None)
-    uniform: tuple[float, float] | None = file_key("uniform", _RANGE, note=": random values", default=None)
-    normal: tuple[float, float] | None = file_key("normal", _NORMAL, note=": random values", default=None)
-    sobol: tuple[float, float] | None = file_key("sobol", _RANGE, note=": Sobol sequence", default=None)
+    uniform: tuple[float, float] | None = file_key(
+        "uniform",
+        _RANGE,
+        note=": random values",
+        default=None,
+    )
+    normal: tuple[float, float] | None = file_key(
+        "normal",
+        _NORMAL,
+        note=": random values",
+        default=None,
+    )
+    sobol: tuple[float, float] | None = file_key(
+        "sobol",
+        _RANGE,
+        note=": Sobol sequence",
+        default=None,
+    )
 
     def __post_init__(self) -> None:
         given = [name for name in VARIED if getattr(self, name) is not None]
@@ -115,48 +150,90 @@ class Axis:
 
     @property
     def is_drawn(self) -> bool:
+        """Whether its values are random, or those of a Sobol sequence."""
         return any(getattr(self, name) is not None for name in DRAWN)
 
 
 _METHODS = list_of(keys.LINE, "a list of methods, model/integrator", 1)
-_SETTINGS = keys.dict_of(keys.NUMBER, "a table of settings of the methods, such as tolerance = 1e-15")
-_CHANGE = keys.dict_of(keys.NUMBER, 'a table of scene keys with numbers, such as "blade.mass" = 1e4')
+_SETTINGS = keys.dict_of(
+    keys.NUMBER,
+    "a table of settings of the methods, such as tolerance = 1e-15",
+)
+_CHANGE = keys.dict_of(
+    keys.NUMBER,
+    'a table of scene keys with numbers, such as "blade.mass" = 1e4',
+)
 _DRAWS = keys.whole(1, MAX_COUNT, "a whole number of at least 1: number of random values")
+_SEED = keys.whole(0, 2**63 - 1, "a whole number of at least 0")
 _AXES = list_of(table_of(Axis), "one or more [[axis]] tables", 1)
 
 
 @dataclass(frozen=True, kw_only=True)
 class Design:
-    """What a sweep file says, and the rows that follow from it. In a "grid" the last axis is the fastest, and all
-    random axes together are one digit, the draw; "zip" takes all axes together. Every row follows from its number
-    alone, so that any part of a sweep can be computed on any computer."""
+    """What a sweep file says, and the rows that follow from it: values of all axes for each run.
+
+    In a "grid" the last axis is the fastest, and all random axes together are one digit, the draw;
+    "zip" takes all axes together. Every row follows from its number alone, so that any part of a
+    sweep can be computed on any computer.
+
+    Attributes
+    ----------
+    title, scene : of the dataset; the name of a shipped scene, or a file beside the sweep's.
+    methods, settings : names of methods, and settings for those that have them.
+    change : numbers of the scene, by key, that differ from it in all runs.
+    samples, outputs : in place of the scene's; None for these.
+    precision : "float64" or "float32", of stored arrays.
+    error_growth, defects : whether they are computed for every run.
+    combine : "grid" or "zip".
+    draws, seed : number of random values of each random axis; seed of the random numbers.
+    validation, test : shares of the runs.
+    axes : what is varied.
+    """
 
     title: str = file_key("title", keys.LINE)
     scene: str = file_key("scene", _SCENE_NAME)
     methods: Sequence[str] = file_key("methods", _METHODS, default=("lagrange/taylor",))
     settings: Mapping[str, float] = file_key("settings", _SETTINGS, optional={})
     change: Mapping[str, float] = file_key("change", _CHANGE, optional={})
-    samples: int | None = file_key("samples", _COUNT, note="; by default those of the scene", default=None)
+    samples: int | None = file_key(
+        "samples",
+        _COUNT,
+        note="; by default those of the scene",
+        default=None,
+    )
     outputs: Sequence[str] | None = file_key(
-        "outputs", OUTPUT_NAMES, note="; [] stores metrics only; by default those of the scene", default=None
+        "outputs",
+        OUTPUT_NAMES,
+        note="; [] stores metrics only; by default those of the scene",
+        default=None,
     )
     precision: str = file_key("precision", keys.choice(("float64", "float32")), default="float64")
     error_growth: bool = file_key(
-        "error_growth", keys.FLAG, note=": whether error growth and horizon of every run are computed", default=False
+        "error_growth",
+        keys.FLAG,
+        note=": whether error growth and horizon of every run are computed",
+        default=False,
     )
     defects: bool = file_key(
-        "defects", keys.FLAG, note=": whether interval defects are computed also for lagrange/taylor", default=False
+        "defects",
+        keys.FLAG,
+        note=": whether interval defects are computed also for lagrange/taylor",
+        default=False,
     )
     combine: str = file_key(
-        "combine", keys.choice(("grid", "zip")), note=": every combination, or the i-th values", default="grid"
+        "combine",
+        keys.choice(("grid", "zip")),
+        note=": every combination, or the i-th values",
+        default="grid",
     )
     draws: int = file_key("draws", _DRAWS, default=0)
-    seed: int = file_key("seed", keys.whole(0, 2**63 - 1, "a whole number of at least 0"), default=0)
+    seed: int = file_key("seed", _SEED, default=0)
     validation: float = file_key("validation", _SHARE, note=": fraction of the runs", default=0.0)
     test: float = file_key("test", _SHARE, note="; validation + test < 1", default=0.0)
     axes: tuple[Axis, ...] = file_key("axis", _AXES)
 
     def __post_init__(self) -> None:
+        """Raise TableError for values that do not fit one another."""
         axes = [axis.key for axis in self.axes]
         drawn = [axis.key for axis in self.axes if axis.is_drawn]
         repeated = [key for key, count in Counter(axes).items() if count > 1]
@@ -171,11 +248,14 @@ class Design:
             what = f"{drawn[0]} is random, and draws is missing"
             problems.append(KeyProblem(("axis",), what, "draws = N at the top of the file"))
         if self.draws and not drawn:
-            what, allowed = "draws is given, but no axis is random", f"draws with an axis of {', '.join(DRAWN)}"
+            what = "draws is given, but no axis is random"
+            allowed = f"draws with an axis of {', '.join(DRAWN)}"
             problems.append(KeyProblem(("axis",), what, allowed))
         if self.combine == "zip" and len(set(self.counts)) > 1:
-            counts = ", ".join(f"{key} has {count}" for key, count in zip(axes, self.counts, strict=True))
-            problems.append(KeyProblem(("combine",), counts, "with zip as many values in every axis"))
+            pairs = zip(axes, self.counts, strict=True)
+            what = ", ".join(f"{key} has {count}" for key, count in pairs)
+            allowed = "with zip as many values in every axis"
+            problems.append(KeyProblem(("combine",), what, allowed))
         if self.count > MAX_ROWS:
             problems.append(KeyProblem(("axis",), f"{self.count:,} runs", f"at most {MAX_ROWS:,}"))
         if problems:
@@ -197,26 +277,41 @@ class Design:
 
     @property
     def counts(self) -> tuple[int, ...]:
-        """(axes,) values of each axis, counted without making one."""
-        ranges = [axis.linear or axis.log for axis in self.axes]
-        return tuple(
-            len(axis.values) if axis.values else values.count if values else self.draws
-            for axis, values in zip(self.axes, ranges, strict=True)
-        )
+        """Number of values of each axis, (axes,), without making them."""
+        counts = []
+        for axis in self.axes:
+            spaced = axis.linear or axis.log
+            if axis.values:
+                counts.append(len(axis.values))
+            elif spaced:
+                counts.append(spaced.count)
+            else:
+                counts.append(self.draws)
+        return tuple(counts)
 
     @property
     def count(self) -> int:
-        """Rows in all."""
+        """Number of rows."""
         return math.prod(self.shape)
 
     @property
     def shape(self) -> tuple[int, ...]:
-        """Values along every digit of a grid, slowest first."""
+        """Number of values along every digit of a grid, slowest first."""
         counts = self.counts
         return tuple(counts[digit[0]] for digit in self._digits)
 
     def rows(self, first: int, last: int) -> Array:
-        """(last - first, axes) the rows of these numbers; after the last one they begin again."""
+        """Return rows by their numbers.
+
+        Parameters
+        ----------
+        first, last : number of the first row, and the one after the last. After the last row of all
+            they begin again.
+
+        Returns
+        -------
+        ndarray, shape (last - first, axes)
+        """
         numbers = np.arange(first, last)
         table = np.empty((len(numbers), len(self.axes)))
         for digit in reversed(self._digits):
@@ -228,17 +323,18 @@ class Design:
 
     @functools.cached_property
     def values(self) -> list[Array]:
-        """(values,) of each axis."""
+        """Values of each axis, (values,)."""
         sobol = [axis.key for axis in self.axes if axis.sobol]
         if sobol:
             from scipy.stats import qmc  # late: 0.5 s
 
-            # One scrambled sequence over all Sobol axes: points in the unit cube. Its balance belongs to powers of two:
-            # its beginning is taken of the next one.
+            # One scrambled sequence over all Sobol axes: points in the unit cube. Its balance
+            # belongs to powers of two: its beginning is taken of the next one.
             sampler = qmc.Sobol(len(sobol), seed=np.random.default_rng(self.seed))
             points = sampler.random_base2((self.draws - 1).bit_length())[: self.draws]
         columns = []
         for i, axis in enumerate(self.axes):
+            # One generator for each axis: an axis that is added at the end leaves the others alone.
             generator = np.random.default_rng([self.seed, i])
             if axis.linear:
                 columns.append(np.linspace(axis.linear.start, axis.linear.end, axis.linear.count))
@@ -260,11 +356,26 @@ DESIGN_KEYS = keys.declared_keys(Design)
 
 
 def split_rows(count: int, validation: float, test: float, seed: int) -> NDArray[np.int8]:
-    """(count,) numbers of `SPLITS`; shares to the nearest row, rows drawn by `seed`."""
+    """Draw which rows of a sweep are for training, validation and test.
+
+    Parameters
+    ----------
+    count : number of rows.
+    validation, test : shares of the rows, to the nearest row.
+    seed : of the random numbers.
+
+    Returns
+    -------
+    ndarray of int8, shape (count,)
+        Places in `SPLITS`.
+    """
+    # No axis has this number: the rows are drawn independently of the values.
     drawn = np.random.default_rng([seed, 2**32]).permutation(count)
-    first, second = round(validation * count), round(validation * count) + round(test * count)
+    validation_end = round(validation * count)
+    test_end = validation_end + round(test * count)
     codes = np.zeros(count, np.int8)
-    codes[drawn[:first]], codes[drawn[first:second]] = 1, 2
+    codes[drawn[:validation_end]] = SPLITS.index("validation")
+    codes[drawn[validation_end:test_end]] = SPLITS.index("test")
     return codes
 
 
@@ -276,8 +387,16 @@ MAX_ROTORS = 512
 
 
 class Variants:
-    """The scenes of a sweep: `tables` of the base, with a number put in at each of the `varied` keys. A scene is read
-    for each rotor, of which most sweeps have few, then initial states are put in."""
+    """The scenes of a sweep.
+
+    A scene is read for each rotor, of which most sweeps have few; then initial states are put in.
+
+    Parameters
+    ----------
+    name : of the scenes.
+    tables : of the base, as a scene file has them.
+    varied : keys at which a number is put in.
+    """
 
     def __init__(self, name: str, tables: dict[str, Any], varied: Sequence[str]) -> None:
         self.keys = tuple(varied)
@@ -287,10 +406,13 @@ class Variants:
         self._rotors: dict[tuple[float, ...], Scene] = {}
 
     def __getstate__(self) -> dict[str, Any]:
-        """Once a scene was made, a rotor common to all runs is pickled, too: the receiver need not read it."""
-        return self.__dict__ | {"_rotors": self._rotors if all(map(_is_of_start, self._paths)) else {}}
+        """Return what is pickled: the rotor, too, where all runs have the same."""
+        # The process that gets it need not read the rotor again.
+        has_one_rotor = all(map(_is_of_start, self._paths))
+        return self.__dict__ | {"_rotors": self._rotors if has_one_rotor else {}}
 
     def scene(self, values: Sequence[float]) -> Scene:
+        """Return the scene with some values, one for each key. Raises TableError as for a file."""
         pairs = list(zip(self._paths, values, strict=True))
         rotor_numbers = tuple(value for path, value in pairs if not _is_of_start(path))
         if rotor_numbers not in self._rotors:
@@ -300,18 +422,17 @@ class Variants:
         rotor = self._rotors[rotor_numbers]
         start = {name: list(getattr(rotor, name)) for name in _START.values()}
         for path, value in pairs:
-            if _is_of_start(path):  # the rotor was read with these keys: each ends in a valid index
+            if _is_of_start(path):
+                # The rotor was read with these keys: each ends in a valid index.
                 start[_START[path[:2]]][int(path[2])] = value
         changes: dict[str, Any] = {name: tuple(numbers) for name, numbers in start.items()}
         scene = dataclasses.replace(rotor, **changes)
-        rates = zip(scene.initial_rates[1:], scene.blades, strict=True)
-        if any(rate and not blade.has_pitch_inertia for rate, blade in rates) or not all(
-            abs(number) <= keys.MAX_NUMBER for number in (*scene.initial_angles, *scene.initial_rates)
-        ):
-            return self._read(values)  # which raises the error that says so
-        return scene
+        if _is_valid_start(scene):
+            return scene
+        return self._read(values)  # which raises the error that says what is wrong
 
     def _read(self, values: Sequence[float]) -> Scene:
+        """Return the scene with some values, read as from a file."""
         tables = copy.deepcopy(self._tables)
         for path, value in zip(self._paths, values, strict=True):
             put_value(tables, path, value)
@@ -319,26 +440,48 @@ class Variants:
 
 
 def _is_of_start(path: KeyPath) -> bool:
+    """Return whether a key is one of the initial state."""
     return path[:2] in _START
+
+
+def _is_valid_start(scene: Scene) -> bool:
+    """Return whether initial angles and rates are such as a scene file may have."""
+    for number in (*scene.initial_angles, *scene.initial_rates):
+        if not abs(number) <= keys.MAX_NUMBER:  # so written that NaN fails, too
+            return False
+    rates = zip(scene.initial_rates[1:], scene.blades, strict=True)
+    return all(blade.has_pitch_inertia or not rate for rate, blade in rates)
 
 
 @dataclass(frozen=True)
 class Sweep:
+    """A parameter study: a scene, and what is varied.
+
+    Attributes
+    ----------
+    design : what the file says.
+    base : the scene with the sweep's own changes, before any axis.
+    file, path : that it was read from.
+    """
+
     design: Design
-    base: Scene  # the scene with the sweep's own changes, before any axis
+    base: Scene
     file: TomlFile
     path: Path
 
     @property
     def name(self) -> str:
+        """Name of the file, without its ending."""
         return self.path.stem
 
     @property
     def keys(self) -> tuple[str, ...]:
+        """Key of each axis, (axes,)."""
         return tuple(axis.key for axis in self.design.axes)
 
     @property
     def units(self) -> tuple[str, ...]:
+        """Unit of each axis, (axes,); "1" for none."""
         return tuple(unit_of(parse_key(key)) for key in self.keys)
 
     @property
@@ -347,24 +490,39 @@ class Sweep:
         return self.base.outputs if self.design.outputs is None else tuple(self.design.outputs)
 
     def variants(self) -> Variants:
-        """From rows to scenes. They always ask for the energy: every run's balance is checked."""
+        """Return what makes scenes of rows.
+
+        They always ask for the energy: every run's balance is checked.
+        """
         wanted = [*self.outputs, *({"energy"} - set(self.outputs))]
         return Variants(self.name, {**scene_tables(self.base), "outputs": wanted}, self.keys)
 
 
 def load_sweep(path: Path, check: ValuesCheck | None = None) -> Sweep:
-    """The sweep in the TOML file `path`; sweeps/NAME means a shipped one. check: what else is wrong with its values.
-    Raises InputError with all errors of the file."""
+    """Read a sweep from a TOML file.
+
+    Parameters
+    ----------
+    path : of the file; sweeps/NAME means a shipped one.
+    check : what else is wrong with the values.
+
+    Raises
+    ------
+    InputError
+        With all errors of the file.
+    """
     path = file_path(path)
     if not path.exists() and path.parts[:1] == ("sweeps",):
         shipped = (SWEEPS.parent / path).with_suffix(".toml")
         if shipped.is_file():
             path = shipped
     if not path.exists() and str(path) in dict(list_scenes()):
-        raise InputError(f"{path}: is a scene; allowed: a sweep of scenes (rotor-mbs list), or: rotor-mbs run {path}")
+        allowed = f"a sweep of scenes (rotor-mbs list), or: rotor-mbs run {path}"
+        raise InputError(f"{path}: is a scene; allowed: {allowed}")
     file = read_toml(path)
     if "initial" in file.tables and "blade" in file.tables:
-        raise InputError(f"{file.source}: is a scene; allowed: a sweep of scenes, or: rotor-mbs run {file.source}")
+        allowed = f"a sweep of scenes, or: rotor-mbs run {file.source}"
+        raise InputError(f"{file.source}: is a scene; allowed: {allowed}")
     return _sweep(path, file, check)
 
 
@@ -375,7 +533,8 @@ def sweep_of(scene: Scene, axes: Mapping[str, object], **options: object) -> Swe
     ----------
     scene : Scene
     axes : mapping
-        By key of a number of the scene a list of values, or a table as an [[axis]] of a file has it: plain values.
+        By key of a number of the scene a list of values, or a table as an [[axis]] of a file has
+        it: plain values.
     **options
         The other keys of a sweep file, plain values.
 
@@ -391,8 +550,25 @@ def sweep_of(scene: Scene, axes: Mapping[str, object], **options: object) -> Swe
     return _sweep(Path("sweep"), parse_toml(text, "sweep"), None, scene)
 
 
-def _sweep(path: Path, file: TomlFile, check: ValuesCheck | None, base: Scene | None = None) -> Sweep:
-    """The sweep that a file describes; its base is the scene that it names, where none is given."""
+def _sweep(
+    path: Path,
+    file: TomlFile,
+    check: ValuesCheck | None,
+    base: Scene | None = None,
+) -> Sweep:
+    """Return the sweep that a file describes.
+
+    Parameters
+    ----------
+    path, file : its path and what it holds.
+    check : what else is wrong with the values.
+    base : the scene that is varied; by default the one that the file names.
+
+    Raises
+    ------
+    InputError
+        With all errors of the file, and of the scenes that it makes.
+    """
     with file.with_line_numbers():
         design = Design(**keys.read_keys(DESIGN_KEYS, file.tables, check))
     if base is None:
@@ -406,15 +582,19 @@ def _sweep(path: Path, file: TomlFile, check: ValuesCheck | None, base: Scene | 
     if design.outputs:
         changes["outputs"] = design.outputs
     if changes:
-        with file.with_line_numbers(next(key for key in ("change", "samples", "outputs") if getattr(design, key))):
+        # The scene is changed at once: what is wrong stands at the first of these keys.
+        given = [key for key in ("change", "samples", "outputs") if getattr(design, key)]
+        with file.with_line_numbers(given[0]):
             base = base.replace(**changes)
     sweep = Sweep(design, base, file, path)
+    # A problem of many rows is told once; a dict keeps the order.
     faults: dict[KeyProblem, None] = {}
     for i, variants, row in _rows_to_check(sweep):
         try:
             variants.scene(row)
         except TableError as error:
-            values = ", ".join(f"{key} = {value:g}" for key, value in zip(variants.keys, row, strict=True))
+            pairs = zip(variants.keys, row, strict=True)
+            values = ", ".join(f"{key} = {value:g}" for key, value in pairs)
             for fault in error.faults:
                 what = fault.message if fault.is_of_key else f"{values}: {fault.message}"
                 faults.setdefault(KeyProblem(("axis", i, "key"), what))
@@ -427,8 +607,16 @@ def _sweep(path: Path, file: TomlFile, check: ValuesCheck | None, base: Scene | 
 
 
 def _rows_to_check(sweep: Sweep) -> Iterator[tuple[int, Variants, tuple[float, ...]]]:
-    """(axis, variants, a row for them): the ends of each axis, and all rows where numbers depend on one another, which
-    inertias and torque tables alone do."""
+    """Yield the rows that are to be read to be sure that all can be.
+
+    These are the ends of each axis, and all rows where numbers depend on one another, which
+    inertias and torque tables alone do.
+
+    Yields
+    ------
+    axis, variants, row
+        Number of the axis that is named if the row is wrong; what makes a scene of it; its values.
+    """
     tables = {**scene_tables(sweep.base), "outputs": list(sweep.outputs) or ["angles"]}
     for i, axis in enumerate(sweep.design.axes):
         alone = Variants(sweep.name, tables, [axis.key])
@@ -440,13 +628,16 @@ def _rows_to_check(sweep: Sweep) -> Iterator[tuple[int, Variants, tuple[float, .
         together = sweep.variants()
         for first in range(0, sweep.design.count, _ROWS_AT_ONCE):
             rows = sweep.design.rows(first, min(first + _ROWS_AT_ONCE, sweep.design.count))
-            chosen = np.unique(rows[:, dependent], axis=0, return_index=True)[1]
-            for row in rows[np.sort(chosen)]:
+            # Rows with equal values on the dependent axes are right or wrong together.
+            _, distinct = np.unique(rows[:, dependent], axis=0, return_index=True)
+            for row in rows[np.sort(distinct)]:
                 yield dependent[0], together, tuple(row.tolist())
 
 
 def _is_interval(key: str) -> bool:
+    """Return whether the allowed values of a key are an interval, whatever other numbers are."""
     path = parse_key(key)
     if path[0] == "torque" or path[:2] == ("bearing", "rest"):
-        return not any(isinstance(part, int) for part in path[3:])  # a constant, not a row of a table
+        is_of_row = any(isinstance(part, int) for part in path[3:])  # of a table over time
+        return not is_of_row
     return path[0] in _INTERVALS or path[-1] == "mass" or "tip" in path

@@ -1,8 +1,9 @@
-"""Prescribed loads over time: tables, the segments between their kinks and jumps, and where an engine has to stop.
+"""Prescribed loads over time: tables, segments between their kinks, and stops of an engine.
 
-A table has rows (t, value), t in s. A load is linear between the rows, and constant before the first and after the
-last; two rows with equal t are a jump. A step over a kink or a jump would lose its order: a run is cut into segments,
-in each of which all loads are linear, and these into intervals, from one stop of an engine to the next.
+A table has rows (t, value), t in s. A load is linear between the rows, and constant before the
+first and after the last; two rows with equal t are a jump. A step over a kink or a jump would lose
+its order: a run is cut into segments, in each of which all loads are linear, and these into
+intervals, from one stop of an engine to the next.
 """
 
 from __future__ import annotations
@@ -73,7 +74,11 @@ def is_one_table(value: list[Any]) -> bool:
 
     Else it has an entry, a number or rows, for each blade.
     """
-    return all(isinstance(row, list) and not any(isinstance(entry, list) for entry in row) for row in value)
+
+    def is_row(entry: object) -> bool:
+        return isinstance(entry, list) and not any(isinstance(item, list) for item in entry)
+
+    return all(map(is_row, value))
 
 
 def constant_value(table: LoadTable) -> float:
@@ -82,7 +87,7 @@ def constant_value(table: LoadTable) -> float:
 
 
 def kink_times(tables: Iterable[LoadTable], end: float) -> list[float]:
-    """Return the times (s) of all kinks and jumps between 0 and `end`, both excluded, increasing."""
+    """Return the times (s) of kinks and jumps between 0 and `end`, both excluded, increasing."""
     times: set[float] = set()
     for table in tables:
         if not is_constant(table):
@@ -108,7 +113,8 @@ class Segment:
     @functools.cached_property
     def values(self) -> tuple[float, ...]:
         """Loads at the start of the segment, (loads,)."""
-        return tuple(float(offset + slope * Fraction(self.start)) for offset, slope in self.linear_loads)
+        start = Fraction(self.start)
+        return tuple(float(offset + slope * start) for offset, slope in self.linear_loads)
 
     @functools.cached_property
     def slopes(self) -> tuple[float, ...]:
@@ -160,9 +166,10 @@ def segments(tables: Sequence[LoadTable], duration: float) -> tuple[Segment, ...
                 slope = (value1 - value0) / (t1 - t0)
             linear_loads.append((value0 - slope * t0, slope))
         by_table.append(linear_loads)
-    return tuple(
-        Segment(start, end, tuple(linear_loads[i] for linear_loads in by_table)) for i, (start, end) in enumerate(spans)
-    )
+    parts = []
+    for i, (start, end) in enumerate(spans):
+        parts.append(Segment(start, end, tuple(linear_loads[i] for linear_loads in by_table)))
+    return tuple(parts)
 
 
 def values_before(parts: Sequence[Segment], times: Array) -> Array:

@@ -20,20 +20,26 @@ from rotor_mbs.errors import InputError, shown_value
 KeyPath = tuple[str | int, ...]
 
 MAX_BYTES = 1 << 20
-MAX_PROBLEMS = 100  # lines for one file; nobody reads more, and a file of 1 MiB can have 300,000
+# Lines for one file: nobody reads more, and a file of 1 MiB can have 300,000.
+MAX_PROBLEMS = 100
 
-# A dotted key costs the TOML reader the square of its parts in time and memory: 1 MiB of "a.a.a." would need
-# terabytes. Nothing in a scene has more than two parts; the lookbehind keeps this search itself linear.
+# A dotted key costs the TOML reader the square of its parts in time and memory: 1 MiB of "a.a.a."
+# would need terabytes. Nothing in a scene has more than two parts; the lookbehind keeps this search
+# itself linear.
 _MAX_KEY_PARTS = 32
 _LONG_KEY = re.compile(
-    r"(?<![A-Za-z0-9_-])(?:(?:[A-Za-z0-9_-]++|\"[^\"\n]*+\"|'[^'\n]*+')[ \t]*+\.[ \t]*+)" + f"{{{_MAX_KEY_PARTS}}}"
+    r"(?<![A-Za-z0-9_-])"
+    r"(?:(?:[A-Za-z0-9_-]++|\"[^\"\n]*+\"|'[^'\n]*+')[ \t]*+\.[ \t]*+)"
+    f"{{{_MAX_KEY_PARTS}}}"
 )
-KEY_FORM = "the path of a number, such as gravity, blade.mass, initial.angles[1] (entries counted from 0)"
+_EXAMPLES = "gravity, blade.mass, initial.angles[1] (entries counted from 0)"
+KEY_FORM = f"the path of a number, such as {_EXAMPLES}"
 _PART = r"[A-Za-z_][A-Za-z0-9_]{0,59}(?:\[[0-9]{1,6}\])*"
 _KEY = re.compile(rf"{_PART}(?:\.{_PART})*")
 _MARKS = frozenset("[]{}=,.\n")
 _TOKEN = re.compile(
-    r'("{3}(?:[^"\\]|\\.|"{1,2}(?!"))*"{3,5}|\'{3}(?:[^\']|\'{1,2}(?!\'))*\'{3,5}'  # strings of several lines
+    # Strings of several lines, strings of one, marks and bare words; comments.
+    r'("{3}(?:[^"\\]|\\.|"{1,2}(?!"))*"{3,5}|\'{3}(?:[^\']|\'{1,2}(?!\'))*\'{3,5}'
     r'|"(?:[^"\\\n]|\\.)*"|\'[^\'\n]*\''
     r"|[\[\]{}=,.\n]|[^\s\[\]{}=,.#\"']+)|#[^\n]*",
     re.DOTALL,
@@ -41,48 +47,89 @@ _TOKEN = re.compile(
 
 
 class KeyProblem(NamedTuple):
-    path: KeyPath  # where it is, in the tables as they were read
-    wrong: str  # what is wrong
-    allowed: str = ""  # what is allowed; "" for what the key allows
-    is_of_key: bool = False  # whether it is the key that is wrong, whatever the value is
+    """What is wrong with a key or its value.
+
+    Attributes
+    ----------
+    path : where it is, in the tables as they were read.
+    wrong, allowed : what is wrong, and what is allowed; "" for what the key allows.
+    is_of_key : whether it is the key that is wrong, whatever the value is.
+    """
+
+    path: KeyPath
+    wrong: str
+    allowed: str = ""
+    is_of_key: bool = False
 
     @property
     def message(self) -> str:
-        where = f"{shown_key(self.path)}: " if self.path else ""
-        return f"{where}{self.wrong}; allowed: {self.allowed}" if self.allowed else f"{where}{self.wrong}"
+        """The problem in one line."""
+        message = f"{shown_key(self.path)}: {self.wrong}" if self.path else self.wrong
+        return f"{message}; allowed: {self.allowed}" if self.allowed else message
 
 
 class TableError(InputError):
-    """Tables of a file, or a value in them, that are not as they should be; where they stand is not known yet."""
+    """Raised for tables of a file, or a value in them, before it is known where they stand."""
 
     def __init__(self, faults: Iterable[KeyProblem]) -> None:
         self.faults = tuple(faults)
         super().__init__(fault.message for fault in self.faults)
 
     def under(self, *path: str | int, allowed: str = "") -> list[KeyProblem]:
-        """The faults of a value that stands at `path`, where `allowed` is what its key allows."""
-        return [fault._replace(path=(*path, *fault.path), allowed=fault.allowed or allowed) for fault in self.faults]
+        """Return the problems as those of a value that stands somewhere.
+
+        Parameters
+        ----------
+        *path : where it stands.
+        allowed : what its key allows, for problems that do not say what is allowed.
+        """
+        faults = []
+        for fault in self.faults:
+            whole_path = (*path, *fault.path)
+            faults.append(fault._replace(path=whole_path, allowed=fault.allowed or allowed))
+        return faults
 
 
 @dataclass(frozen=True)
 class TomlFile:
-    source: str  # what messages call it
+    """A TOML file that was read.
+
+    Attributes
+    ----------
+    source : what messages call it.
+    text, tables : what it holds.
+    """
+
+    source: str
     text: str
     tables: dict[str, Any]
 
     @contextmanager
     def with_line_numbers(self, *path: str) -> Iterator[None]:
-        """What is wrong with the key at `path`, an InputError of the block, gets lines `source:line: key: what is
-        wrong; allowed: ...`, in the order of the file."""
+        """Give every InputError of the block lines with the file and the line number.
+
+        Parameters
+        ----------
+        *path : of the key that the error is about.
+
+        Raises
+        ------
+        InputError
+            With lines `source:line: key: what is wrong; allowed: ...`, in the order of the file.
+        """
         try:
             yield
         except InputError as error:
-            faults = [KeyProblem(path, problem) for problem in error.problems]
             if isinstance(error, TableError):
                 faults = error.under(*path)
+            else:
+                faults = [KeyProblem(path, problem) for problem in error.problems]
             lines = find_lines(self.text)
-            messages = sorted(((line_of(lines, fault.path), fault.message) for fault in faults), key=itemgetter(0))
-            shown = [f"{self.source}:{line}: {message}" for line, message in messages[:MAX_PROBLEMS]]
+            messages = [(line_of(lines, fault.path), fault.message) for fault in faults]
+            messages.sort(key=itemgetter(0))
+            shown = []
+            for line, message in messages[:MAX_PROBLEMS]:
+                shown.append(f"{self.source}:{line}: {message}")
             if len(messages) > MAX_PROBLEMS:
                 shown.append(f"{self.source}: {len(messages) - MAX_PROBLEMS} more errors")
             raise InputError(shown) from error
@@ -102,21 +149,24 @@ def file_path(path: str | os.PathLike[str]) -> Path:
     try:
         os.lstat(path)
     except ValueError as error:
-        raise InputError(f"{shown_value(str(path))}: not a path of a file; allowed: text without NUL") from error
+        shown = shown_value(str(path))
+        raise InputError(f"{shown}: not a path of a file; allowed: text without NUL") from error
     except OSError as error:
         if error.errno == errno.ENAMETOOLONG:
             shown = shown_value(str(path))
-            raise InputError(f"{shown}: {len(str(path))} characters; allowed: a shorter path") from error
+            what = f"{len(str(path))} characters"
+            raise InputError(f"{shown}: {what}; allowed: a shorter path") from error
     return path
 
 
 def shown_path(path: Path) -> str:
+    """Return a path for a message, in ASCII where it cannot be printed."""
     text = str(path)
     return text if text.isprintable() else ascii(text)
 
 
 def shown_key(path: KeyPath) -> str:
-    """The path as `Scene.replace` and sweeps take it, entries counted from 0: blade[1].mass; odd names in quotes."""
+    """Return a path as `Scene.replace` and sweeps take it: blade[1].mass; odd names in quotes."""
     text = ""
     for part in path:
         if isinstance(part, int):
@@ -129,17 +179,23 @@ def shown_key(path: KeyPath) -> str:
 
 
 def parse_key(text: str) -> KeyPath:
-    """("initial", "angles", 1) of "initial.angles[1]". Raises TableError."""
+    """Return the parts of a path, ("initial", "angles", 1) of "initial.angles[1]".
+
+    Raises TableError where the text is no path.
+    """
     if not _KEY.fullmatch(text):
-        raise TableError([KeyProblem((), f"{text[:60]!a} is not the path of a key", KEY_FORM, is_of_key=True)])
-    return tuple(int(part) if part.isdigit() else part for part in re.findall(r"[A-Za-z_]\w*|[0-9]+", text))
+        what = f"{text[:60]!a} is not the path of a key"
+        raise TableError([KeyProblem((), what, KEY_FORM, is_of_key=True)])
+    parts = re.findall(r"[A-Za-z_]\w*|[0-9]+", text)
+    return tuple(int(part) if part.isdigit() else part for part in parts)
 
 
+_TEXT_ALLOWED = "allowed: TOML text in UTF-8"
 _TOML_ALLOWED = 'allowed: TOML 1.0, with arithmetic in quotes: "pi/6"'
 
 
 def read_toml(path: Path) -> TomlFile:
-    """Raises InputError with one line."""
+    """Read a TOML file with a limit on its size. Raises InputError with one line."""
     shown = shown_path(path)
     try:
         if path.exists() and not path.is_file():  # a pipe or a device would block, or never end
@@ -148,8 +204,11 @@ def read_toml(path: Path) -> TomlFile:
         with path.open("rb") as file:
             content = file.read(MAX_BYTES + 1)
     except (OSError, ValueError) as error:
-        reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
-        raise InputError(f"{shown}: cannot be read: {reason}; allowed: a readable TOML file") from error
+        reason = str(error)
+        if isinstance(error, OSError) and error.strerror:
+            reason = error.strerror
+        what = f"cannot be read: {reason}"
+        raise InputError(f"{shown}: {what}; allowed: a readable TOML file") from error
     if len(content) > MAX_BYTES:
         raise InputError(f"{shown}: is larger than {MAX_BYTES} bytes; allowed: at most that")
     if not content.strip():
@@ -158,27 +217,31 @@ def read_toml(path: Path) -> TomlFile:
         text = content.decode("utf-8-sig")
     except UnicodeDecodeError as error:
         line = content.count(b"\n", 0, error.start) + 1
-        raise InputError(f"{shown}:{line}: is not UTF-8; allowed: TOML text in UTF-8") from error
+        raise InputError(f"{shown}:{line}: is not UTF-8; {_TEXT_ALLOWED}") from error
     if "\0" in text:
         line = text.count("\n", 0, text.index("\0")) + 1
-        raise InputError(f"{shown}:{line}: contains a NUL byte; allowed: TOML text in UTF-8")
+        raise InputError(f"{shown}:{line}: contains a NUL byte; {_TEXT_ALLOWED}")
     return parse_toml(text, shown)
 
 
 def parse_toml(text: str, source: str) -> TomlFile:
-    """A text as a file that messages call `source`. Raises InputError with one line."""
+    """Return a TOML text as a file that messages call `source`. Raises InputError with one line."""
     too_long = _LONG_KEY.search(text)
     if too_long:
         line = text.count("\n", 0, too_long.start()) + 1
-        raise InputError(f"{source}:{line}: key of over {_MAX_KEY_PARTS} parts; allowed: at most that")
+        what = f"key of over {_MAX_KEY_PARTS} parts"
+        raise InputError(f"{source}:{line}: {what}; allowed: at most that")
     try:
         return TomlFile(source, text, tomllib.loads(text))
     except tomllib.TOMLDecodeError as error:
-        raise InputError(f"{source}:{_syntax_error(str(error), text)}; {_TOML_ALLOWED}") from error
+        what = _syntax_error(str(error), text)
+        raise InputError(f"{source}:{what}; {_TOML_ALLOWED}") from error
     except RecursionError as error:
-        raise InputError(f"{source}:1: nested too deep; allowed: tables and arrays of a scene") from error
+        allowed = "allowed: tables and arrays of a scene"
+        raise InputError(f"{source}:1: nested too deep; {allowed}") from error
     except ValueError as error:
-        # The reader does not convert this one to its own error: whole numbers of more digits than Python converts.
+        # The reader does not convert this one to its own error: whole numbers of more digits than
+        # Python converts.
         raise InputError(f"{source}:1: a number is too long; allowed: |x| <= 1e300") from error
 
 
@@ -194,7 +257,9 @@ def plain_value(value: Any) -> Any:
     if isinstance(value, Mapping):
         plain = {}
         for key, entry in value.items():
-            plain[str(key) if isinstance(key, str) else shown_value(key)] = plain_value(entry)
+            # A key that no file has is named in the error of an unknown key.
+            name = str(key) if isinstance(key, str) else shown_value(key)
+            plain[name] = plain_value(entry)
         return plain
     if isinstance(value, Iterable) and not isinstance(value, bytes | bytearray):
         return [plain_value(entry) for entry in value]
@@ -218,9 +283,10 @@ def as_text(value: object) -> str:
 
 
 def toml_value(value: object) -> str:
-    """The value in TOML: text, numbers bit for bit, lists, and mappings as inline tables. Raises InputError."""
+    """Return a value in TOML: numbers bit for bit, mappings as inline tables. Raises InputError."""
     if isinstance(value, Mapping):
-        return f"{{{', '.join(f'{json.dumps(key)} = {toml_value(entry)}' for key, entry in value.items())}}}"
+        entries = [f"{json.dumps(key)} = {toml_value(entry)}" for key, entry in value.items()]
+        return f"{{{', '.join(entries)}}}"
     if isinstance(value, list | tuple):
         return f"[{', '.join(toml_value(entry) for entry in value)}]"
     if isinstance(value, float):
@@ -234,11 +300,23 @@ def toml_value(value: object) -> str:
 
 
 def toml_lines(table: Mapping[str, object]) -> str:
+    """Return the entries of a table in TOML, a line each."""
     return "".join(f"{key} = {toml_value(value)}\n" for key, value in table.items())
 
 
 def _syntax_error(message: str, text: str) -> str:
-    """'12: not TOML: invalid value (column 7)' from the reader's 'Invalid value (at line 12, column 7)'."""
+    """Return an error of the TOML reader in the form of this package's messages.
+
+    Parameters
+    ----------
+    message : such as "Invalid value (at line 12, column 7)".
+    text : that it is about.
+
+    Returns
+    -------
+    str
+        Such as "12: not TOML: invalid value (column 7)".
+    """
     match = re.fullmatch(r"(?s)(.*) \(at line (\d+), column (\d+)\)", message)
     if match:
         reason, line, place = match[1], int(match[2]), f"column {match[3]}"
@@ -250,17 +328,29 @@ def _syntax_error(message: str, text: str) -> str:
 
 
 def find_lines(text: str) -> dict[KeyPath, int]:
-    """Line number, from 1, of every key and array entry of a text that is valid TOML, but for the keys of inline
-    tables; ("blade", 1, "mass") is in the second [[blade]] table. Without valid TOML some are missing or wrong."""
+    """Find the lines on which keys and array entries stand.
+
+    Parameters
+    ----------
+    text : valid TOML; of other texts some lines are missing or wrong.
+
+    Returns
+    -------
+    dict
+        Line number, from 1, by path: ("blade", 1, "mass") is in the second [[blade]] table. Keys of
+        inline tables are not in it.
+    """
     lines: dict[KeyPath, int] = {}
     table_counts: dict[KeyPath, int] = {}  # of every array of tables
     table: KeyPath = ()
     for statement in _statements(text):
         is_header = statement[0][0] == "["
-        of_array = [token for token, _ in statement[:2]] == ["[", "["]
-        end = next((i for i, (token, _) in enumerate(statement) if token == "="), len(statement))
+        tokens = [token for token, _ in statement]
+        of_array = tokens[:2] == ["[", "["]
+        end = tokens.index("=") if "=" in tokens else len(tokens)
         path = () if is_header else table
-        # Escapes in a quoted key are left as they are: its line is then the one of the table around it.
+        # Escapes in a quoted key are left as they are: its line is then the one of the table around
+        # it.
         names = [(token, line) for token, line in statement[:end] if token not in _MARKS]
         for i, (name, line) in enumerate(names):
             path = (*path, name[1:-1] if name[0] in "\"'" else name)
@@ -277,14 +367,20 @@ def find_lines(text: str) -> dict[KeyPath, int]:
 
 
 def _statements(text: str) -> Iterator[list[tuple[str, int]]]:
-    """The tokens of each table header or `key = value` with their lines; newlines inside brackets are left out."""
+    """Yield the tokens of each table header and each `key = value`, with their line numbers.
+
+    Newlines inside brackets are left out.
+    """
     statement: list[tuple[str, int]] = []
     line, depth = 1, 0
     for match in _TOKEN.finditer(text):
         token = match[1]
         if token and token != "\n":
             statement.append((token, line))
-            depth += (token in "[{") - (token in "]}")
+            if token in "[{":
+                depth += 1
+            elif token in "]}":
+                depth -= 1
         elif token and depth <= 0 and statement:
             yield statement
             statement, depth = [], 0
@@ -293,11 +389,24 @@ def _statements(text: str) -> Iterator[list[tuple[str, int]]]:
         yield statement
 
 
-def _number_entries(path: KeyPath, value: Sequence[tuple[str, int]], lines: dict[KeyPath, int]) -> None:
-    numbers: list[int] = []
+def _number_entries(
+    path: KeyPath,
+    value: Sequence[tuple[str, int]],
+    lines: dict[KeyPath, int],
+) -> None:
+    """Add the line of every entry of an array.
+
+    Parameters
+    ----------
+    path : of the array.
+    value : its tokens with their line numbers.
+    lines : by path; entries are added.
+    """
+    numbers: list[int] = []  # of the entry in each of the arrays around it
     for token, line in value:
         if token in "]}":
-            del numbers[-1:]
+            if numbers:
+                numbers.pop()
         elif token == ",":
             if numbers:
                 numbers[-1] += 1
@@ -308,5 +417,8 @@ def _number_entries(path: KeyPath, value: Sequence[tuple[str, int]], lines: dict
 
 
 def line_of(lines: Mapping[KeyPath, int], path: KeyPath) -> int:
-    """The line of `path`, else of the nearest key that encloses it, else 1."""
-    return next((lines[path[:n]] for n in range(len(path), 0, -1) if path[:n] in lines), 1)
+    """Return the line of a path, else of the nearest key that encloses it, else 1."""
+    for length in range(len(path), 0, -1):
+        if path[:length] in lines:
+            return lines[path[:length]]
+    return 1
