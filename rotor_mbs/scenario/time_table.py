@@ -33,6 +33,10 @@ ALIGNMENT = 1e-6
 # steps, or at least half as many as this. Fewer rows of a finer step would make the work of
 # dampers less accurate.
 MAX_ROWS = 100
+# Samples that are far apart need more of them, or the quadrature misses the first decay of a
+# damped pitch: one in so many seconds, up to this number, which bounds the memory.
+_ROW_STEP = 5e-4
+_MOST_ROWS = 1000
 
 # Place of the rotor's torque in `Scene.load_tables`, and in the segments that are cut from it.
 ROTOR_TORQUE = 0
@@ -270,6 +274,7 @@ def steps_and_rows(span: float, step: float, rows_between: bool) -> tuple[int, i
     steps = max(1, math.ceil(span / step * (1.0 - 1e-9)))
     if not rows_between:
         return steps, 1
-    per_row = math.ceil(steps / MAX_ROWS)
+    most_rows = min(max(MAX_ROWS, math.ceil(span / _ROW_STEP)), _MOST_ROWS)
+    per_row = math.ceil(steps / most_rows)
     rows = math.ceil(steps / per_row)
     return per_row * rows, rows

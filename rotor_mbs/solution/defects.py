@@ -104,14 +104,14 @@ class Defects:
         """Largest defects that rounding can cause, per coordinate: (n - 1, m) rad.
 
         That of the row at the start, carried to the end; that of the row at the end; and that of the arithmetic in
-        between, of the size of the largest number.
+        between, which grows as much as any other error.
         """
         with np.errstate(all="ignore"):
             carried = np.empty((len(self.angles), len(self.start)))
             for rows in _blocks(len(carried)):
                 np.einsum("kij,kj->ki", np.abs(self.transitions[rows]), self.rounding[rows], out=carried[rows])
             floors = (carried + self.rounding[1:]) / self._units
-            floors += _UNIT_ROUNDOFF * 2.0 * (self._largest * self.conditioning)[:, None]
+            floors += (self._arithmetic * np.maximum(self.growth, 1.0))[:, None]
             return _with_small_numbers(floors)
 
     @functools.cached_property
@@ -234,8 +234,8 @@ class Defects:
                 floors[stretches] = (carried + self.rounding[ends]) / units
                 # The errors of the arithmetic are independent of each other, and grow as much as any other.
                 growth = np.maximum(_largest_entry(products[:, -1], units), 1.0)
-                size = (self._largest * self.conditioning)[inside].reshape(-1, rows).max(axis=1)
-                floors[stretches] += (2.0 * _UNIT_ROUNDOFF * np.sqrt(rows) * size * growth)[:, None]
+                size = self._arithmetic[inside].reshape(-1, rows).max(axis=1)
+                floors[stretches] += (np.sqrt(rows) * size * growth)[:, None]
             return sums, _with_small_numbers(floors)
 
     def horizon_samples(self, limit: float) -> int:
@@ -255,10 +255,14 @@ class Defects:
         return np.hstack([self.angles[:, columns], self.rates[:, columns]])
 
     @functools.cached_property
-    def _largest(self) -> Array:
-        """(n - 1,) rad, the largest number of the two rows of each interval."""
+    def _arithmetic(self) -> Array:
+        """(n - 1,) rad, rounding of the arithmetic within each interval: of the size of its largest number in every
+        step, independent from step to step. A step is taken to span about a radian of the fastest coordinate."""
         sizes = (np.abs(self.states) / self._units).max(axis=1)
-        return np.asarray(np.maximum(sizes[:-1], sizes[1:]))
+        fastest = np.abs(self.states[:, len(self.moving) :]).max(axis=1)
+        largest, rate = (np.maximum(values[:-1], values[1:]) for values in (sizes, fastest))
+        steps = np.maximum(rate * np.diff(self.time), 1.0)
+        return np.asarray(2.0 * _UNIT_ROUNDOFF * largest * self.conditioning * np.sqrt(steps))
 
     @functools.cached_property
     def _errors_and_drift(self) -> tuple[Array, float]:

@@ -118,3 +118,5 @@ def test_rows_between_samples_are_a_divisor_of_the_steps() -> None:
         assert taken >= steps
         assert taken % rows == 0
         assert 50 <= rows <= 100
+    assert steps_and_rows(0.49, 1e-3, True) == (490, 490)  # far apart: a row for every step
+    assert steps_and_rows(3.6, 1e-3, True) == (3600, 900)
