@@ -192,7 +192,7 @@ def _checks_of_energies(run: RunSamples, bounds: Bounds) -> Iterator[Check]:
 
 
 def _checks_of_motion(run: RunSamples, bounds: Bounds) -> Iterator[Check]:
-    """Yield what is asked of the corrected equations: energy balance, loads, defects, momentum, error, exact motion."""
+    """Yield what is asked of the corrected equations: energy balance, loads, defects, error, exact motion."""
     scene, trajectory, metrics = run.scene, run.trajectory, run.metrics
     if "energy_drift_max" in metrics:
         drift = max(metrics["energy_drift_max"] - energy_slack(scene, trajectory), 0.0)
@@ -212,10 +212,6 @@ def _checks_of_motion(run: RunSamples, bounds: Bounds) -> Iterator[Check]:
         error, where = metrics["angle_error_predicted"], Where(scene.name, run.method, "angles, predicted")
         value, fault = max(error - start_slack(scene), 0.0), _error_fault(run, error, "predicted angle error")
         yield Check("error", where, value, OK_ERROR, "defects, amplified by the motion", "rad", fault)
-    for channel in ("angular", "linear"):
-        if (name := f"{channel}_impulse_error_max") in metrics:
-            hint = "momentum minus the impulses of torque, weights and bearing: a force, an inertia, or too long a step"
-            yield run.check(bounds, "impulse", channel, metrics[name], "of scale", hint)
     exact = kinematics.exact_rotor_angle(scene, trajectory.time) if scene.wants("angles") else None
     if exact is not None:
         name, angle = exact

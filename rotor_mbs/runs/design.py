@@ -104,8 +104,6 @@ COLUMNS = {
             "time of the last sample before the error growth reaches 1e5",
         ),
         "uncertainty_rad": ("rad", "uncertainty of the reference up to the horizon"),
-        "angular_impulse_error_max": ("1", "largest error of the angular momentum balance, relative to its scale"),
-        "linear_impulse_error_max": ("1", "largest error of the linear momentum balance, relative to its scale"),
         "zero_pitch_max": ("rad", "largest magnitude of the pitch angles that stay zero in the reference"),
         "zero_pitch_left_s": ("s", "time at which a pitch angle that stays zero in the reference becomes nonzero"),
         "zero_pitch_growth_per_s": ("1/s", "growth rate of a pitch angle that stays zero in the reference"),
@@ -154,7 +152,6 @@ _RUN_COLUMNS = (
     "angle_error_whole", "angle_error_end", "horizon_s", "defect_max", "defect_median", "defect_time",
     "defect_judged", "defect_excess", "defect_allowed", "defect_mean", "defect_drift", "defect_floor",
     "defects_not_judged",
-    "angular_impulse_error_max", "linear_impulse_error_max",
     "zero_pitch_max", "zero_pitch_left_s", "zero_pitch_growth_per_s", "rotor_angle_min", "rotor_angle_max",
     "rotor_rate_max",
 )  # fmt: skip

@@ -17,7 +17,7 @@ from rotor_mbs.scenario.toml_file import read_toml
 
 CHECKS = (
     "complete", "status", "metrics", "times", "start", "defect", "defect median", "error", "tip",
-    "energies", "energy", "impulse", "loads", "gap", "exact", "published", "reference", "growth",
+    "energies", "energy", "loads", "gap", "exact", "published", "reference", "growth",
     "integrity", "settings", "uncertainty", "frozen",
 )  # fmt: skip
 

@@ -9,7 +9,6 @@ import numpy as np
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.scenario.time_table import value_at
 from rotor_mbs.solution.defects import LEFT_ZERO, OK_ERROR, Defects
-from rotor_mbs.solution.impulse import angular_balance, linear_balance
 from rotor_mbs.solution.quantities import Array, array_of, deviation, energy_error, known_quantities, sizes
 from rotor_mbs.solution.trajectory import Trajectory
 
@@ -89,12 +88,6 @@ def metrics_of(
             metrics |= _angle_errors(run, reference, until)
     if defects is not None:
         metrics |= defect_metrics(defects, metrics.get("horizon_s"), is_corrected=is_corrected)
-    if scene.wants("angles") and scene.wants("rates"):
-        with np.errstate(over="ignore", invalid="ignore"):
-            balances = {"angular": angular_balance(scene, run), "linear": linear_balance(scene, run)}
-        for name, balance in balances.items():
-            if balance is not None:
-                metrics[f"{name}_impulse_error_max"] = balance.largest
     # Of the rotor over the integrator's own output points, where the run has them.
     own = run.refined or run
     metrics["rotor_angle_min"] = float(own.angles[:, 0].min())

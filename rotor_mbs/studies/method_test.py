@@ -200,11 +200,11 @@ class _Examination:
         for name, check in worst.items():
             if name == "error":  # what the defects add up to: of a motion that grows, they alone are the method's
                 continue
-            bound = check.bound * (allowance if name in ("defect", "energy", "impulse") else 1.0)
+            bound = check.bound * (allowance if name in ("defect", "energy") else 1.0)
             hint = check.hint
             if reason and name in ("defect", "defect median"):
                 hint = reason
-            elif reason and name in ("energy", "impulse"):
+            elif reason and name == "energy":
                 hint = "the motion is wrong: see the defect"
             self._add(name, scene.name, check.value, bound, hint, check.unit)
 

@@ -20,7 +20,6 @@ from rotor_mbs.models.lagrange.singularity import rotor_inertia_shares
 from rotor_mbs.scenario.accuracy_bounds import Bound, shipped_bounds
 from rotor_mbs.scenario.catalogue import find_scenes
 from rotor_mbs.scenario.scene import Blade, Scene
-from rotor_mbs.solution import metrics as metrics_module
 from rotor_mbs.solution.metrics import ANGLE_LIMIT, defect_metrics, metrics_of, running_growth
 from rotor_mbs.solution.trajectory import Integration, Solution, Trajectory
 
@@ -52,8 +51,6 @@ def _without_defects(monkeypatch: pytest.MonkeyPatch) -> None:
     for name in ("_checks_of_rows", "_checks_of_outputs"):
         monkeypatch.setattr(run_checks, name, lambda *_: iter(()))
     monkeypatch.setattr(kinematics, "exact_rotor_angle", lambda *_: None)
-    for name in ("angular_balance", "linear_balance"):
-        monkeypatch.setattr(metrics_module, name, lambda *_: None)
 
 
 def status(

@@ -6,15 +6,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from support.scenes import general, paper
+from support.scenes import paper
 
 import rotor_mbs as rm
 from rotor_mbs.analysis.judgement import judge
 from rotor_mbs.errors import InputError
 from rotor_mbs.methods.solve import solve
 from rotor_mbs.scenario.catalogue import find_scenes
-from rotor_mbs.scenario.scene import Scene
-from rotor_mbs.solution.impulse import angular_balance, linear_balance
 from rotor_mbs.solution.metrics import metrics_of
 from rotor_mbs.solution.quantities import LOADS
 from rotor_mbs.solution.trajectory import Array, Solution, Trajectory
@@ -103,75 +101,3 @@ def test_loads_are_drawn_from_python() -> None:
     assert [len(axes.lines) for axes in shaft.axes] == [3]
     with pytest.raises(InputError, match="no load 'angles'"):
         run.plot.loads("angles")
-
-
-# Balances of momentum: 1e-9 by tree and Taylor, by hand where a number is known, none where samples are too few
-
-WITH_LOADS = ("angles", "rates", "energy", "loads")
-JUMPS = ((0.0, 0.0), (0.5, 20000.0), (0.7525, 30000.0), (0.7525, -15000.0), (1.2, 10000.0))
-SCENES = {
-    "fig11": paper("fig11", outputs=WITH_LOADS),
-    "jumps": general(outputs=WITH_LOADS, duration=2.0, samples=401, shaft_damping=4000.0, rotor_torque=JUMPS),
-    "NREL": replace(find_scenes(["stiff/nrel-5mw-damped"])[0], outputs=WITH_LOADS, samples=1001),
-}
-
-
-@pytest.mark.parametrize(
-    ("name", "method"),
-    [
-        *((name, "exudyn_tree/rk67") for name in SCENES),
-        *(pytest.param(name, "lagrange/taylor", marks=() if name == "fig11" else pytest.mark.full) for name in SCENES),
-    ],
-)
-def test_tree_and_taylor_balance_to_a_billionth(name: str, method: str) -> None:
-    """Angular for all; linear, with the bearing's force, where no torque jumps. Seen: 3e-11 after jumps, else 1e-13."""
-    pytest.importorskip("heyoka")
-    scene = SCENES[name]
-    metrics = metrics_of(scene, solve(method, scene, {}).trajectory, None)
-    assert metrics["angular_impulse_error_max"] < 1e-9
-    assert ("linear_impulse_error_max" in metrics) == (name != "jumps")
-    assert metrics.get("linear_impulse_error_max", 0.0) < 1e-9
-
-
-def _turning(scene: Scene, angle) -> Trajectory:
-    """The rotor at `angle` (n,) rad of the samples' times; pitches stay at zero."""
-    time = np.linspace(0.0, scene.duration, scene.samples)
-    angles, rates = np.zeros((2, len(time), 1 + len(scene.blades)))
-    angles[:, 0], rates[:, 0] = angle(time), np.gradient(angle(time), time, edge_order=2)
-    return Trajectory(time, angles, rates)
-
-
-def test_torque_tables_are_integrated_exactly() -> None:
-    """A ramp from 0 to 60 N m with a jump back between samples, under which the rotor turns at constant speed.
-
-    Nothing may act on it: what is left at the end is the area of the table.
-    """
-    table = ((0.0, 0.0), (1.03, 60.0), (1.03, 0.0), (2.0, 20.0))
-    scene = paper("fig15-1kNm", gravity=0.0, duration=2.0, samples=21, rotor_torque=table)
-    balance = angular_balance(scene, _turning(scene, lambda t: 0.3 * t))
-    assert balance is not None
-    assert balance.error[-1] == pytest.approx(0.5 * 1.03 * 60.0 + 0.5 * 0.97 * 20.0, rel=1e-9)
-
-
-def test_samples_that_do_not_resolve_the_motion_give_no_balance() -> None:
-    scene = paper("fig15-1kNm", gravity=0.0, duration=2.0, samples=21)
-    assert angular_balance(scene, _turning(scene, lambda t: 9.0 * t)) is not None
-    assert angular_balance(scene, _turning(scene, lambda t: 11.0 * t)) is None
-
-
-def test_a_bearing_faster_than_the_samples_gives_no_linear_balance() -> None:
-    """189 rad/s against samples 10 ms apart: the force swings in between, which no polynomial through them knows."""
-    scene = replace(SCENES["NREL"], samples=101)
-    metrics = metrics_of(scene, solve("lagrange/dop853", scene, {}).trajectory, None)
-    assert "linear_impulse_error_max" not in metrics
-    assert metrics["angular_impulse_error_max"] < 1e-9
-
-
-def test_a_wrong_force_of_the_bearing_is_noticed() -> None:
-    scene = general(outputs=WITH_LOADS, duration=2.0, samples=401, bearing_damping=(200.0, 100.0, 300.0))
-    run = solve("lagrange/dop853", scene, {}).trajectory
-    force = run.shaft_force
-    right, wrong = (linear_balance(scene, run.replace(shaft_force=force * factor)) for factor in (1.0, 1.0 + 1e-6))
-    assert right is not None
-    assert wrong is not None
-    assert right.largest < 1e-9 < wrong.largest

@@ -164,7 +164,6 @@ def test_a_broken_engine_fails_with_a_right_reason_or_none(fault: str) -> None:
     own = {
         "order": r"measured order",
         "energy": "see the defect|too long a step",
-        "impulse": "see the defect|too long a step",
         "mirror image": "blades or signs",
         "renumbered": "blades or signs",
         "exact": "solved analytically",
@@ -190,7 +189,7 @@ def test_the_command_prints_a_table_and_writes_what_a_script_reads() -> None:
     assert "lagrange/taylor  determinism   paper/fig11" in ended.out
     checks = json.loads(Path("t.json").read_text())
     assert {check["check"] for check in checks} == {
-        "samples", "times", "start", "defect", "energy", "impulse", "tip", "energies", "loads", "determinism",
+        "samples", "times", "start", "defect", "energy", "tip", "energies", "loads", "determinism",
         "builds", "exact", "mirror image", "renumbered", "time limit",
     }  # fmt: skip
     assert b'<testsuites name="rotor-mbs check" tests=' in Path("t.xml").read_bytes()

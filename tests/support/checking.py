@@ -77,7 +77,7 @@ EVERY_SECOND_SAMPLE = 2.0  # in place of a share of gravity: the others are left
 
 # By the name of a check, the number whose fault it shall see.
 WRONG = {
-    "offset": "offset", "error": "offset", "energy": "offset", "impulse": "offset",
+    "offset": "offset", "error": "offset", "energy": "offset",
     "defect": "gravity", "defect median": "gravity",
     "loads": "mass", "exact": "mass", "energies": "mass",
     "tip": "tip", "start": "start",

@@ -72,7 +72,7 @@ class Report(OpenResults):
 
 METRICS = (
     "angle_error_max", "angle_error_whole", "angle_error_predicted", "defect_max", "defect_median", "defect_time",
-    "tip_error_max", "energy_gain_J", "energy_drift_max", "angular_impulse_error_max", "constraint_error_max",
+    "tip_error_max", "energy_gain_J", "energy_drift_max", "constraint_error_max",
     "zero_pitch_max", "zero_pitch_left_s", "zero_pitch_growth_per_s", "time_reached", "steps", "rhs_evaluations",
     "run_time_s", "setup_time_s",
 )  # fmt: skip
