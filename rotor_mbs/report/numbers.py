@@ -39,6 +39,15 @@ def number(value: float | None, digits: int = 2) -> str:
     return minus(f"{mantissa}×{power(int(exponent))}")
 
 
+def typeset_title(title: str) -> str:
+    """Return a scene's title with π and ° in place of "pi" and "degrees".
+
+    >>> typeset_title("Rotor at 30 degrees and pi/10 rad/s")
+    'Rotor at 30° and π/10 rad/s'
+    """
+    return title.replace(" degrees", "°").replace("pi/", "π/")
+
+
 def fixed(value: float | None, decimals: int) -> str:
     """So many decimals, as a paper prints them; without the sign of a zero."""
     if value is None:

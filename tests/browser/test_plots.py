@@ -61,6 +61,8 @@ PLOTS = {
     "log": plot("log", curve(np.where(TIME > 0.0, 10.0 ** (TIME - 8.0), 0.0)), log=True),
     "clip": plot("clip", curve(np.sin(TIME)), curve(-np.exp(TIME), "two", TWO), clip=(-3.0, 3.0)),
     "far": plot("far", curve(1e6 + TIME)),
+    "sides": plot("sides", curve(np.linspace(-420.0, 380.0, 101))),
+    "small": plot("small", curve(1.5e-4 * TIME)),
     "table": plot("table", Curve("one", ONE, np.array([0.0, 4.0, 4.0, 10.0]), np.array([1.0, 1.0, 3.0, 3.0]))),
 }
 SPEED = Plot(
@@ -93,6 +95,9 @@ FIND = "[...document.querySelectorAll('.plot')].find(p => JSON.parse(p.dataset.p
 
 def find(name: str) -> str:
     return FIND.format(name=name)
+
+
+LABELS = "[...{find}.querySelectorAll(':scope > svg > text[text-anchor=end]')].map(label => label.textContent)"
 
 
 def opened(page: Page, path: Path, width: int = 1440, scheme: str = "light") -> None:
@@ -373,3 +378,9 @@ def test_eleven_plots_are_drawn_in_a_moment(page: Page, written: Path) -> None:
         "return performance.now() - t; })()"
     )
     assert spent < 1000.0, json.dumps(spent)
+
+
+def test_an_axis_has_two_numbers_at_least_as_short_as_can_be(page: Page, written: Path) -> None:
+    opened(page, written)
+    assert page.run(LABELS.format(find=find("sides"))) == ["−400", "−200", "0", "200", "400"]
+    assert page.run(LABELS.format(find=find("small")))[:3] == ["0", "5×10⁻⁴", "0.001"]

@@ -203,6 +203,20 @@ def test_a_comparison_names_the_onset_of_a_fault_and_crosses_only_what_differs(t
     assert rows["pitch 1"][1].startswith("✓")
 
 
+def test_what_stays_at_the_reference_is_not_crossed(tmp_path: Path) -> None:
+    """Pitch 1 of Fig. 11 drifts away from 4 s on: the defects of all coordinates are large, their errors are not."""
+    with open_results(results_file(tmp_path / "r.h5", ["paper/fig11"], [])) as opened:
+        run = opened.scenes["paper/fig11"].reference
+        assert run is not None
+        data = {name: run.array(name).copy() for name in ("time", "angles", "rates")}
+    late = data["time"] > 4.0
+    data["angles"][late, 1] += 0.02 * (data["time"][late] - 4.0)
+    compared = compare(data, paper("fig11"))
+    assert all(channel.defect > compared.verdict.tolerance for channel in compared.verdict.channels[1:4])
+    rows = rows_of(section_of(text_of(compared.to_html(tmp_path / "out").parent), "table"))
+    assert [name for name, cells in rows.items() if cells[1].startswith("✗")] == ["pitch 1"]
+
+
 def test_data_that_agree_are_said_to(tmp_path: Path) -> None:
     with open_results(results_file(tmp_path / "r.h5", ["paper/fig03"], [])) as opened:
         run = opened.scenes["paper/fig03"].reference

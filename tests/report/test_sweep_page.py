@@ -50,6 +50,7 @@ def test_a_sweep_opens_with_counts_and_what_its_parameters_do(grid: tuple[Stored
     assert sections_of(text)[:2] == ["map", "slices"]
     assert answer_of(text).startswith("All 6 runs are ok.")
     assert facts_of(text)["Runs that are ok"] == "6 of 6"
+    assert "The axis is logarithmic: runs at 0 are in the map." in section_of(text, "slices")
     assert facts_of(text)["Bearing stiffness"] == "0 to 10⁵ N m/rad | 3 values"
     angles = np.degrees(stored.column("angles")[:, :, 1:])
     ranges = np.ptp(angles, axis=1).max(axis=1)

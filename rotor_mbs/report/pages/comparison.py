@@ -42,7 +42,7 @@ from rotor_mbs.report.elements import (
 )
 from rotor_mbs.report.files import write_page
 from rotor_mbs.report.looks import GREY, INK, PALETTE, Look, coordinate_look, with_capital
-from rotor_mbs.report.numbers import SPACE, seconds, shortest, typeset, up_to, with_unit
+from rotor_mbs.report.numbers import SPACE, seconds, shortest, typeset, typeset_title, up_to, with_unit
 from rotor_mbs.report.pages import scene_plots as draw
 from rotor_mbs.report.plots import Series
 from rotor_mbs.runs.read import Record, write_records
@@ -211,7 +211,7 @@ def comparison_page(record: Record) -> PageContent:
         _table_section(verdict),
     ]
     sections.append(_reading_section(verdict))
-    about = f"{record.attributes['title']} · {verdict.rows} rows"
+    about = f"{typeset_title(record.attributes['title'])} · {verdict.rows} rows"
     facts = [
         Fact(
             "Verdict",
@@ -266,8 +266,17 @@ def comparison_answer(record: Record) -> list[Markup]:
 
 
 def _is_outside(channel: ChannelErrors, verdict: DataVerdict) -> bool:
-    """Whether a channel's defect is beyond the tolerance; one that cannot be judged is not."""
-    return channel.defect is not None and not channel.defect <= verdict.tolerance
+    """Whether a channel's defect is beyond the tolerance; one that cannot be judged is not.
+
+    The defects of a coordinate are wrong, too, where another one's values are: what stays at the reference is not what
+    is wrong, as long as there is a channel that does not.
+    """
+
+    def is_beyond(size: float | None) -> bool:
+        return size is not None and not size <= verdict.tolerance
+
+    is_explained = any(is_beyond(other.defect) and is_beyond(other.error_whole) for other in verdict.channels)
+    return is_beyond(channel.defect) and (is_beyond(channel.error_whole) or not is_explained)
 
 
 def onset_of(record: Record, verdict: DataVerdict) -> tuple[float, str] | None:

@@ -31,7 +31,7 @@ from rotor_mbs.report.figures import (
     panel_runs,
 )
 from rotor_mbs.report.looks import Look, coordinate_look, label_of, step_look
-from rotor_mbs.report.numbers import in_words
+from rotor_mbs.report.numbers import in_words, typeset_title
 from rotor_mbs.report.pages import Report, paper
 from rotor_mbs.report.pages.scene_plots import parting, range_of, whole_time
 from rotor_mbs.runs.read import StoredRun
@@ -107,7 +107,7 @@ def _figure_section(
         angles, rates = (", ".join(map(str, initial[key])) for key in ("angles", "rates"))
         before = f"({letter}) " if letter else ""
         text = Markup('{}{}; initial state {} rad and {} rad/s: <a href="{}">{}</a>')
-        elements.append(Note(text.format(before, stored.title, angles, rates, report.files[name], name)))
+        elements.append(Note(text.format(before, typeset_title(stored.title), angles, rates, report.files[name], name)))
     if figure.number in _NOTES:
         elements.append(Note(_NOTES[figure.number]))
     methods = {

@@ -24,7 +24,7 @@ from rotor_mbs.report.elements import (
     TableCell,
 )
 from rotor_mbs.report.looks import coordinate_look, with_capital
-from rotor_mbs.report.numbers import NOTHING, formula, in_words, number, prefixed, up_to, with_unit
+from rotor_mbs.report.numbers import NOTHING, formula, in_words, number, prefixed, typeset_title, up_to, with_unit
 from rotor_mbs.report.pages import (
     Report,
     agreement,
@@ -37,7 +37,7 @@ from rotor_mbs.report.pages import (
     status_text,
 )
 from rotor_mbs.report.pages import scene_plots as draw
-from rotor_mbs.report.pages.scene import HORIZON_NOTE, paper_plots, short_name, typeset_title
+from rotor_mbs.report.pages.scene import HORIZON_NOTE, paper_plots, short_name
 from rotor_mbs.report.pages.scene_plots import CORRECTED, PRINTED
 from rotor_mbs.runs.read import StoredRun, StoredScene
 from rotor_mbs.solution.status import GOOD
@@ -194,7 +194,7 @@ def _hero_section(scene: StoredScene, report: Report) -> Section:
     hero, _, _ = paper_plots(scene, claims)
     printed, corrected = scene.sides[PRINTED], scene.sides[CORRECTED]
     link = Markup('<a href="{}">More on this scene</a>').format(report.files[scene.name])
-    say = Markup("{}. ").format(typeset_title(scene))
+    say = Markup("{}. ").format(typeset_title(scene.title))
     for claim in claims:
         if claim.is_number and claim.printed is not None and rounds_to(claim.printed, claim):
             ends = [float(run.array("angles")[-1, 0]) for run in (printed, corrected)]
@@ -217,7 +217,7 @@ def scene_table(report: Report) -> PageTable:
     """Return a row per scene of the paper: the angle that differs most, when and by how much energy; agreement."""
     rows: list[Row] = []
     for name, scene in report.scenes.items():
-        note = typeset_title(scene)
+        note = typeset_title(scene.title)
         row: list[TableCell | str] = [TableCell(short_name(name), href=report.files[name], note=note)]
         row += _departure_cells(scene)
         _, error = agreement(scene)
@@ -420,7 +420,9 @@ def own_table(report: Report, scenes: Sequence[StoredScene]) -> PageTable:
     """Return a row per scene: its rotor speed, how its runs ended, its largest load, and how its methods agree."""
     rows: list[Row] = []
     for scene in scenes:
-        row: list[TableCell | str] = [TableCell(scene.name, href=report.files[scene.name], note=typeset_title(scene))]
+        row: list[TableCell | str] = [
+            TableCell(scene.name, href=report.files[scene.name], note=typeset_title(scene.title))
+        ]
         run = scene.corrected or scene.printed
         name = "" if run is None else next((name for name in ("rates", "angles") if name in run), "")
         if run is not None and name:

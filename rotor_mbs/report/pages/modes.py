@@ -46,10 +46,11 @@ from rotor_mbs.report.elements import (
 )
 from rotor_mbs.report.files import write_page
 from rotor_mbs.report.looks import BLUE, GREY, VERMILLION, Look, coordinate_look
-from rotor_mbs.report.numbers import NOTHING, SPACE, in_words, number, up_to
+from rotor_mbs.report.numbers import NOTHING, SPACE, in_words, number, typeset_title, up_to
 from rotor_mbs.runs.read import write_records
 from rotor_mbs.runs.versions import machine, versions
 from rotor_mbs.scenario.catalogue import scene_of
+from rotor_mbs.scenario.keys import counted
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.scenario.toml_file import file_path
 from rotor_mbs.solution.trajectory import Array, need_xarray
@@ -234,7 +235,7 @@ def modes_page(modes: Sequence[SceneModes]) -> PageContent:
         if not facts:
             facts = _facts(scene)
         sections += _scene_sections(scene, f"scene{place}", with_name=len(modes) > 1)
-    title = modes[0].title if len(modes) == 1 else f"Modes of {in_words(len(modes))} scenes"
+    title = typeset_title(modes[0].title) if len(modes) == 1 else f"Modes of {in_words(len(modes))} scenes"
     about = ", ".join(scene.scene for scene in modes)
     return PageContent(title, f"Modes and Campbell diagram of {about}", answer, facts, sections)
 
@@ -342,7 +343,7 @@ def _scene_sections(scene: SceneModes, name: str, *, with_name: bool) -> list[Se
             )
         )
     if scene.notes:
-        folds.append(Fold("Not computed", f"{len(scene.notes)} notes", [Note(text) for text in scene.notes]))
+        folds.append(Fold("Not computed", counted(len(scene.notes), "note"), [Note(text) for text in scene.notes]))
     sources = max((list(kind.values()) for kind in (scene.rest, scene.rotation)), key=len)
     models = ", ".join(f"{linear.label} ({linear.source})" for linear in sources)
     folds.append(Fold("Models", models, [Note(_SMALL_MOTIONS)]))

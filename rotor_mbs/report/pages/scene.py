@@ -42,7 +42,7 @@ from rotor_mbs.report.looks import (
     look_of,
     with_capital,
 )
-from rotor_mbs.report.numbers import SPACE, fixed, number, prefixed, seconds, up_to, with_unit
+from rotor_mbs.report.numbers import SPACE, fixed, number, prefixed, seconds, typeset_title, up_to, with_unit
 from rotor_mbs.report.pages import (
     Report,
     agreement,
@@ -105,12 +105,6 @@ def short_name(scene: str) -> str:
     return scene.rpartition("/")[2]
 
 
-def typeset_title(scene: StoredScene) -> str:
-    """Return the scene's title with π and ° in place of "pi" and "degrees"."""
-    title = scene.title.replace(" degrees", "°")
-    return title.replace("pi/", "π/")
-
-
 def described(scene: StoredScene) -> str:
     """Return what the scene is, for the line below the title."""
     parts = [scene.name]
@@ -144,7 +138,7 @@ def _paper_page(scene: StoredScene, report: Report, claims: Sequence[Published])
         _details_section(scene),
     ]
     return PageContent(
-        typeset_title(scene),
+        typeset_title(scene.title),
         described(scene),
         paper_answer(scene),
         _paper_facts(scene, claims),
@@ -291,7 +285,7 @@ def _own_page(scene: StoredScene, report: Report) -> PageContent:
         sections.append(_extremes_section(run, [*motion, *others, *loads]))
         facts += _own_facts(scene, run)
     sections += [_agreement_section(scene, report), _details_section(scene)]
-    return PageContent(typeset_title(scene), described(scene), own_answer(scene, run), facts[:4], sections)
+    return PageContent(typeset_title(scene.title), described(scene), own_answer(scene, run), facts[:4], sections)
 
 
 def _faults(scene: StoredScene) -> list[Markup]:

@@ -15,6 +15,7 @@ from rotor_mbs.report.elements import (
     TableCell,
 )
 from rotor_mbs.report.looks import label_of, with_capital
+from rotor_mbs.report.numbers import typeset_title
 from rotor_mbs.report.pages import Report, method_cell
 from rotor_mbs.studies.stability import OUTCOMES, suite_table
 
@@ -71,7 +72,7 @@ def stability_page(report: Report) -> PageContent:
         rows: list[Row] = []
         for scene, file in scenes.items():
             own = {run.method: run for run in runs if run.scene == scene}
-            row: list[TableCell | str] = [TableCell(scene, href=file, note=report.scenes[scene].title)]
+            row: list[TableCell | str] = [TableCell(scene, href=file, note=typeset_title(report.scenes[scene].title))]
             for method in shown:
                 if method not in own:
                     row.append("")

@@ -34,7 +34,7 @@ from rotor_mbs.report.elements import (
     TableCell,
 )
 from rotor_mbs.report.looks import BLUE, Look, coordinate_look, step_look, with_capital
-from rotor_mbs.report.numbers import number, prefix_of, shortest
+from rotor_mbs.report.numbers import number, prefix_of, shortest, typeset_title
 from rotor_mbs.report.pages import words_of
 from rotor_mbs.report.pages.scene_plots import Jumps, blade_look, jumps_of
 from rotor_mbs.runs.sweeps import StoredSweep, parameter_name
@@ -154,7 +154,7 @@ def sweep_page(stored: StoredSweep) -> PageContent:
             "places": places.tolist(),
             **known,
         }
-    title = str(stored.attributes["title"])
+    title = typeset_title(str(stored.attributes["title"]))
     about = with_capital(str(stored.attributes["summary"]).rstrip("."))
     return PageContent(
         title, about, sweep_answer(sweep, quantities), _facts(sweep, quantities), sections,
@@ -506,6 +506,8 @@ def _over_parameters(sweep: _Sweep, quantities: Sequence[RunQuantity], shown: ND
                 )
             cards.append([_parameter_plot(sweep, key, quantity, curves)])
         say = f"Horizontally: {sweep.axis_name(key)}. A curve per {sweep.axis_name(other)}."
+        if _is_log(sweep.parameters[key]) and not sweep.parameters[key].all():
+            say += " The axis is logarithmic: runs at 0 are in the map."
         return Section("slices", f"Over {field_name(key)}", [Legend(items), Grid(3, cards)], say)
     for key in sweep.varied[:3]:
         cards = []
@@ -525,11 +527,16 @@ def _parameter_curve(key: str, look: Look, parameter: Array, values: Array) -> C
     return Curve(key, look, parameter[order], values[order], dots="line")
 
 
+def _is_log(parameter: Array) -> bool:
+    """Whether a parameter has a logarithmic axis: no value is negative, and the positive ones span decades."""
+    return bool((parameter >= 0.0).all()) and is_wide(parameter[parameter > 0.0])
+
+
 def _parameter_plot(sweep: _Sweep, key: str, quantity: RunQuantity, curves: Sequence[Curve]) -> Plot:
     """Return a quantity over a parameter; zero has no place on a logarithmic axis and is left to the map."""
     parameter = sweep.parameters[key]
     positive = parameter[parameter > 0.0]
-    is_log = bool(len(positive)) and bool((parameter >= 0.0).all()) and bool(positive.max() > _SPAN * positive.min())
+    is_log = _is_log(parameter)
     shown = positive if is_log else parameter
     if is_log and len(positive) < len(parameter):
         kept = []

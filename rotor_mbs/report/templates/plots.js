@@ -28,6 +28,8 @@
       : `${(value / 10 ** exponent).toFixed(digits - 1)}×10${raised(exponent)}`;
     return written.replace(/^-/, "−");
   };
+  // As short as it can be: 5×10⁻⁴.
+  const brief = (value) => text(value, 6).replace(/(\.\d*?)0+×/, "$1×").replace(".×", "×");
 
   // ---- Axes
 
@@ -51,10 +53,14 @@
       if (exponents.length > 1) return exponents.map((e) => [10 ** e, isPlain ? String(Number(`1e${e}`)) : `10${raised(e)}`]);
     }
     const rough = (to - from) / most, ten = 10 ** Math.floor(Math.log10(rough));
-    const step = ten * [1, 2, 5, 10].find((factor) => factor * ten >= rough * (1 - 1e-9));
+    const steps = [1, 2, 5, 10].map((factor) => factor * ten);
+    const count = (step) => Math.floor(to / step + 1e-9) - Math.ceil(from / step - 1e-9) + 1;
+    let place = steps.findIndex((step) => step >= rough * (1 - 1e-9));
+    if (place > 0 && count(steps[place]) < 2) place -= 1;  // one number tells nothing of the scale
+    const step = steps[place];
     for (let i = Math.ceil(from / step - 1e-9); i <= to / step + 1e-9; i++) {
       const value = Number((i * step).toPrecision(9));
-      if (value > 0 || !isLog) found.push([value, text(value, 6)]);
+      if (value > 0 || !isLog) found.push([value, brief(value)]);
     }
     return found;
   };
