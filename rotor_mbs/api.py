@@ -30,8 +30,8 @@ from rotor_mbs.errors import InputError, MethodRefusal, ResourceError, StoreErro
 from rotor_mbs.methods.catalogue import REFERENCE, check_names, problems_of_scene, selected_methods
 from rotor_mbs.methods.method_file import ENDING
 from rotor_mbs.methods.time_limit import valid_seconds
+from rotor_mbs.processes.pool import check_workers
 from rotor_mbs.runs.design import MISSING, RUNS
-from rotor_mbs.runs.pool import check_workers
 from rotor_mbs.runs.read import StoredRun, StoredScene, is_sweep, open_results
 from rotor_mbs.runs.sweeps import ERROR_GROWTH, METRICS, StoredSweep, parameter_name
 from rotor_mbs.runs.table import TableFile, copy_file, reading, text_of
@@ -133,8 +133,7 @@ def run(
         Whether to compute the quad-precision reference (up to some seconds) if none is shipped. With several methods
         it is always computed. Without a reference the status follows from the samples and the energy balance.
     workers : int
-        Number of worker processes for several methods; 0: everything runs in this process. A script that uses worker
-        processes needs `if __name__ == "__main__":`.
+        Number of worker processes for several methods; 0: everything runs in this process.
     **settings
         Settings of the methods. `rotor-mbs show METHOD` lists names, units, ranges and defaults.
 
@@ -256,8 +255,7 @@ def sweep(
     parameters : for each key of a number in a scene file, such as "bearing.stiffness" or "initial.angles[1]", a list
         of values or a table as in an [[axis]] of a sweep file, such as `{"uniform": [0.0, 1.0]}`.
     output : file of the dataset. A repeated call continues it after an interruption. Default: a temporary file.
-    workers : number of worker processes; 0: everything runs in this process. A script that uses worker processes
-        needs `if __name__ == "__main__":`.
+    workers : number of worker processes; 0: everything runs in this process.
     timeout : time limit of each run (s).
     fresh : whether stored runs are recomputed. By default they are kept, including those of other versions.
     **options : other keys of a sweep file: samples, outputs, draws, seed, combine, validation, settings, ...
@@ -285,7 +283,7 @@ def sweep(
     >>> runs.to_xarray(unstack=True).angles.sel(bearing_stiffness=1e3, coordinate="pitch 1").dims
     ('time',)
     """
-    from rotor_mbs.runs.cluster import open_task_pool
+    from rotor_mbs.runs.engines import open_task_pool
     from rotor_mbs.scenario.sweep import sweep_of
     from rotor_mbs.studies.sweep import plan_sweep, run_sweep
 

@@ -48,7 +48,7 @@ def test_every_place_that_is_named_exists() -> None:
     assert len(places) > 10
     for place in places:
         assert any((base / place).exists() for base in (ROOT, PACKAGE)), place
-    layers = "scenario|studies|comparison|methods|solution|runs|analysis|report"
+    layers = "processes|scenario|studies|comparison|methods|solution|runs|analysis|report"
     for dotted in re.findall(rf"(?<![.\w])((?:{layers})\.(?!py\b)[a-z_]+)\b", TEXT):
         path = PACKAGE / dotted.replace(".", "/")
         assert path.with_suffix(".py").exists() or path.is_dir(), dotted

@@ -13,7 +13,7 @@ from typing import Any, NoReturn
 
 import rotor_mbs
 from rotor_mbs.errors import InputError, nearest, shown_value
-from rotor_mbs.runs import MAX_WORKERS, cores
+from rotor_mbs.processes import MAX_WORKERS, cores
 from rotor_mbs.scenario.toml_file import file_path
 
 REPRODUCED = Path("rotor-mbs-out")  # where `reproduce` writes

@@ -21,7 +21,7 @@ from rotor_mbs.cli.arguments import pages_beside
 from rotor_mbs.cli.terminal import ProgressLine, print_json, print_not_computed, print_table
 from rotor_mbs.errors import InputError, MethodRefusal, StoreError
 from rotor_mbs.methods.catalogue import find_method_or_none, methods, problems_of_methods
-from rotor_mbs.runs import cores
+from rotor_mbs.processes import cores
 from rotor_mbs.scenario.catalogue import find_scenes, list_scenes, list_sweeps, only_scene
 from rotor_mbs.scenario.keys import counted
 from rotor_mbs.scenario.toml_file import KeyPath, file_path, shown_key
@@ -304,7 +304,7 @@ def animate(arguments: argparse.Namespace) -> int:
 
 def sweep(arguments: argparse.Namespace) -> int:
     """A parameter study into one dataset; 1 where a run did not succeed, or the disk is full."""
-    from rotor_mbs.runs.cluster import open_task_pool
+    from rotor_mbs.runs.engines import open_task_pool
 
     with open_task_pool(arguments.engine, arguments.jobs) as pool:  # its workers load their code meanwhile
         from rotor_mbs.scenario.sweep import load_sweep

@@ -1,8 +1,8 @@
 """Which library reads which format: the work of the process that `comparison.files` starts.
 
 A file may be damaged, or made to harm: what it claims to hold is bounded before it is read, and the
-process has limits of memory and processor time for what no check foresees. No regular expression
-here takes longer than a constant times the length of its text.
+process has limits of memory and time for what no check foresees. No regular expression here takes
+longer than a constant times the length of its text.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ import json
 import math
 import re
 import struct
-import sys
+import warnings
 import zipfile
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -56,51 +56,38 @@ Units = Mapping[str, str]
 Lines = Sequence[tuple[int, str]]  # number of the line in the file, its text
 
 
-def write_columns() -> None:
-    """Read a file and write its columns: the whole of the reading process.
+def read_in_worker(arguments: tuple[Path, str, str]) -> DataTable:
+    """Read a file in the process that `comparison.files` starts.
 
-    The arguments of the process are the file, the result's place without suffix, `group`, `scene`,
-    and its limits of memory (bytes) and of processor time (s). The result is a .json file, with
-    names, units and lengths of the columns or the problems with the file; and a .f8 file with the
-    numbers, one column after the other.
+    Parameters
+    ----------
+    arguments : path, group and scene, see `read_columns`.
+
+    Raises
+    ------
+    InputError
+        For what cannot be read, with names and messages of bounded length.
+    MemoryError
+        If it takes more memory than the process has.
     """
-    path, output, group, scene, memory, seconds = sys.argv[1:]
-    _limit_resources(int(memory), math.ceil(float(seconds)))
+    path, group, scene = arguments
     csv.field_size_limit(MAX_BYTES)
-    result: dict[str, Any]
     try:
-        columns = _short_names(read_columns(Path(path), group, scene).columns)
-        with Path(f"{output}.f8").open("wb") as file:
-            for column in columns.values():
-                column.values.tofile(file)
-        lengths = [len(column.values) for column in columns.values()]
-        units = [column.unit[:MAX_NAME] for column in columns.values()]
-        result = {"names": list(columns), "units": units, "lengths": lengths}
+        with warnings.catch_warnings(action="ignore"):
+            table = read_columns(path, group, scene)
+        columns = {}
+        for name, column in _short_names(table.columns).items():
+            columns[name] = DataColumn(column.values, column.unit[:MAX_NAME])
+        return DataTable(table.source, columns)
     except RotorError as exc:
-        result = {"problems": [line[:_MAX_PROBLEM] for line in str(exc).splitlines()]}
+        problems = [line[:_MAX_PROBLEM] for line in str(exc).splitlines()]
     except MemoryError:
-        allowed = f"{int(memory) / 2**30:g} GB; allowed: fewer rows, columns or arrays in one file"
-        result = {"problems": [f"{path}: reading it takes more memory than {allowed}"]}
+        raise
     except RecursionError:
-        result = {"problems": [f"{path}: cannot be read: nested too deeply; allowed: {FORMATS}"]}
+        problems = [f"{path}: cannot be read: nested too deeply; allowed: {FORMATS}"]
     except Exception as exc:  # of any library
-        result = {"problems": [f"{path}: cannot be read: {_line(exc)}; allowed: {FORMATS}"]}
-    Path(f"{output}.json").write_text(json.dumps(result), encoding="ascii")
-
-
-def _limit_resources(memory: int, seconds: int) -> None:
-    """Limit address space (bytes) and processor time (s) of this process, where the system can."""
-    try:
-        import resource
-    except ImportError:  # Windows
-        return
-    for kind, value in ((resource.RLIMIT_AS, memory), (resource.RLIMIT_CPU, seconds)):
-        try:
-            _, hard = resource.getrlimit(kind)
-            limit = value if hard == resource.RLIM_INFINITY else min(value, hard)
-            resource.setrlimit(kind, (limit, hard))
-        except (ValueError, OSError):  # macOS has no limit of address space
-            continue
+        problems = [f"{path}: cannot be read: {_line(exc)}; allowed: {FORMATS}"]
+    raise InputError(problems)
 
 
 def _line(exc: BaseException) -> str:

@@ -8,6 +8,7 @@ here too; which ones to take where none is named, in `selection`.
 from __future__ import annotations
 
 import functools
+import os
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import nullcontext
 from dataclasses import dataclass, replace
@@ -249,16 +250,16 @@ def with_method_files(work: Callable[..., R]) -> Callable[..., R]:
 
     What they print goes nowhere there.
     """
-    return partial(_in_worker, tuple(_files.values()), work) if _files else work
+    if not _files:
+        return work
+    return partial(_with_files_of, os.getpid(), tuple(_files.values()), work)
 
 
-def _in_worker(files: Sequence[MethodFile], work: Callable[..., R], *arguments: object) -> R:
+def _with_files_of(process_id: int, files: Sequence[MethodFile], work: Callable[..., R], *arguments: object) -> R:
     """Call a function where the methods of files are known."""
-    import multiprocessing  # late: `rotor-mbs list` need not wait for it
-
     for file in files:
         _add(file)
-    with quiet() if multiprocessing.parent_process() is not None else nullcontext():
+    with nullcontext() if os.getpid() == process_id else quiet():
         return work(*arguments)
 
 

@@ -8,9 +8,7 @@ from __future__ import annotations
 
 import atexit
 import os
-import pickle
 import re
-import subprocess
 import sys
 import threading
 import traceback
@@ -24,6 +22,7 @@ from typing import TYPE_CHECKING, Any
 
 from rotor_mbs.errors import InputError, RotorError, one_line
 from rotor_mbs.methods.base import BuiltItem, Method, no_items, step_ladder, tolerance_ladder
+from rotor_mbs.processes.worker import TaskLostError, Worker
 
 if TYPE_CHECKING:
     from rotor_mbs.scenario.scene import Scene
@@ -36,8 +35,6 @@ _TOLERANCES = (
     "relative_tolerance",
     "accuracy",
 )  # settings that make a ladder where there is no step
-_SERVING = "from rotor_mbs.methods.method_file import answer_questions; answer_questions()"
-_END_S = 5.0  # until such a process has ended
 
 
 @dataclass(frozen=True)
@@ -153,85 +150,55 @@ def read_file(path: str) -> MethodFile:
 
 _loading = threading.Lock()  # where files are loaded by several threads, their output is restored in order
 _asking = threading.Lock()
-_process: subprocess.Popen[bytes] | None = None  # that loads files; somebody's code may end or hang it
+_worker = Worker(is_silent=True)  # that loads files; somebody's code may end or hang it
+atexit.register(_worker.close)
 
 
 def _ask(file: MethodFile, built: tuple[str, Scene] | None, late: str, ended: str) -> Any:
-    """What the other process builds: a method, by its name, for a scene; None where it only loads the file.
+    """Return what a process of its own builds.
 
-    Raises MethodRefusal and InputError as the file's method does, and InputError where it is `late`, or has `ended` the
-    process.
+    Parameters
+    ----------
+    file : the file to load.
+    built : a method of it, by its name, and the scene for which it is built; None to load alone.
+    late, ended : messages where it takes too long, and where it ends its process.
+
+    Raises
+    ------
+    MethodRefusal, InputError
+        As the file's method does, and for a file that is late or ends the process.
+    ResourceError
+        If the process cannot be started.
     """
-    global _process
-    with _asking:
-        if _process is None:
-            # Without -P, Python would import from this folder.
-            command = [sys.executable, "-P", "-c", _SERVING]
-            pipe, nothing = subprocess.PIPE, subprocess.DEVNULL
-            _process = subprocess.Popen(command, stdin=pipe, stdout=pipe, stderr=nothing)
-        assert _process.stdin is not None
-        assert _process.stdout is not None
-        timer = threading.Timer(_LOAD_S, _process.kill)
-        timer.start()
-        try:
-            pickle.dump((os.getcwd(), file, built), _process.stdin)  # noqa: PTH109  (a text)
-            _process.stdin.flush()
-            answer = pickle.load(_process.stdout)
-        except (OSError, EOFError):
-            is_late, code = not timer.is_alive(), _end_process()
-            raise InputError(late if is_late else f"{ended} (exit code {code})") from None
-        except BaseException:  # an interrupt: the answer that is still to come would be taken for the next one
-            _process.kill()
-            _end_process()
-            raise
-        finally:
-            timer.cancel()
-    if isinstance(answer, RotorError):
-        raise answer
-    return answer
+    try:
+        with _asking:
+            return _worker.run(_answer, (str(Path.cwd()), file, built), _LOAD_S)
+    except TaskLostError as exc:
+        if exc.failure == "timed_out":
+            raise InputError(late) from None
+        raise InputError(f"{ended} (exit code {exc.exit_code})") from None
 
 
-@atexit.register
-def _end_process() -> int | None:
-    """Its exit code; None where there is none."""
-    global _process
-    if _process is None:
+_loaded: dict[MethodFile, dict[str, Method]] = {}  # in the other process
+
+
+def _answer(question: tuple[str, MethodFile, tuple[str, Scene] | None]) -> Any:
+    """Load a file once, and build what is asked, in the other process; see `_ask`.
+
+    What loading raises is raised again where it counts.
+    """
+    folder, file, built = question
+    os.chdir(folder)
+    if file not in _loaded:
+        _loaded[file] = {}
+        with suppress(InputError):
+            _loaded[file] = file.load(())
+    if built is None:
         return None
-    process, _process = _process, None
-    with suppress(subprocess.TimeoutExpired):
-        process.communicate(timeout=_END_S)  # it ends with its input
-    process.kill()
-    return process.wait()
-
-
-def answer_questions() -> None:
-    """What the other process does: loads files, once each, and builds what is asked. What loading raises is raised
-    again where it counts."""
-    answers = os.fdopen(os.dup(1), "wb")
-    with open(os.devnull, "wb") as nowhere:  # noqa: PTH123  (a device)
-        os.dup2(nowhere.fileno(), 1)
-    loaded: dict[MethodFile, dict[str, Method]] = {}
-    while True:
-        try:
-            folder, file, built = pickle.load(sys.stdin.buffer)
-        except EOFError:
-            return
-        answer: object = None
-        os.chdir(folder)
-        if file not in loaded:
-            loaded[file] = {}
-            with suppress(InputError):
-                loaded[file] = file.load(())
-        if built is not None:
-            name, scene = built
-            try:
-                items = loaded[file][name].items
-                assert isinstance(items, partial)
-                answer = file.build_items(items.args[0], scene)
-            except RotorError as exc:
-                answer = exc
-        pickle.dump(answer, answers)
-        answers.flush()
+    name, scene = built
+    items = _loaded[file][name].items
+    assert isinstance(items, partial)
+    return file.build_items(items.args[0], scene)
 
 
 @contextmanager

@@ -16,7 +16,7 @@ import numpy as np
 
 from rotor_mbs.errors import InputError, MethodRefusal, StoreError
 from rotor_mbs.methods.catalogue import with_method_files
-from rotor_mbs.runs.pool import Finished, TaskPool, run_in
+from rotor_mbs.processes.pool import TaskEnd, TaskPool, run_in
 from rotor_mbs.runs.table import Place, Rows
 from rotor_mbs.solution.status import REFUSED
 
@@ -90,7 +90,7 @@ class Task(ABC):
 T = TypeVar("T", bound=Task)
 
 
-def compute(pool: TaskPool, tasks: Iterable[T]) -> Iterator[Finished[T, Rows]]:
+def compute(pool: TaskPool, tasks: Iterable[T]) -> Iterator[TaskEnd[T, Rows]]:
     """Compute tasks in a pool that is open, and store their rows: by the worker where it sees the file.
 
     However the loop ends, the rows of what has ended are in the file. The `value` of a finished task has at least the
@@ -104,7 +104,7 @@ def compute(pool: TaskPool, tasks: Iterable[T]) -> Iterator[Finished[T, Rows]]:
         if isinstance(end.error, InputError | StoreError):
             raise end.error
         if isinstance(end.error, MethodRefusal):
-            yield Finished(task, None, REFUSED, str(end.error).removeprefix(f"{task.method}: "))
+            yield TaskEnd(task, None, REFUSED, str(end.error).removeprefix(f"{task.method}: "))
             continue
         if end.value is not None:
             if not pool.shares_disk:
@@ -115,7 +115,7 @@ def compute(pool: TaskPool, tasks: Iterable[T]) -> Iterator[Finished[T, Rows]]:
         rows = None if end.failure == "worker_died" else task.failed(status, end.message)
         if rows is not None:
             task.place.write(rows)
-        yield Finished(task, rows, end.failure, end.message)
+        yield TaskEnd(task, rows, end.failure, end.message)
 
 
 def perform(task: Task, *, stores: bool) -> Rows:
@@ -135,7 +135,7 @@ def compute_tasks(tasks: Sequence[Task], pool: TaskPool, on_progress: OnProgress
     made: list[Outcome] = []
     total, done = sum(task.work for task in tasks), 0.0
 
-    def note(end: Finished[Task, Rows]) -> None:
+    def note(end: TaskEnd[Task, Rows]) -> None:
         nonlocal done
         done += end.task.work
         if end.value is None:
@@ -158,5 +158,5 @@ def compute_tasks(tasks: Sequence[Task], pool: TaskPool, on_progress: OnProgress
         note(end)
     for task in waiting:
         if task not in ready:
-            note(Finished(task, None, "no_reference", "its reference was not computed"))
+            note(TaskEnd(task, None, "no_reference", "its reference was not computed"))
     return made

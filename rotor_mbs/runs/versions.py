@@ -12,7 +12,7 @@ from pathlib import Path
 import rotor_mbs
 from rotor_mbs.methods.base import Method
 from rotor_mbs.methods.catalogue import methods
-from rotor_mbs.runs import cores
+from rotor_mbs.processes import cores
 
 _LIBRARIES = ("numpy", "h5py")
 NUMERICS = ("scenario", "solution", "methods", "models")  # folders of the package that decide a run's numbers

@@ -26,10 +26,10 @@ from rotor_mbs.errors import SYSTEM_ERRORS, InputError, MethodRefusal, RotorErro
 from rotor_mbs.methods import catalogue
 from rotor_mbs.methods.base import STEP, TOLERANCE, Ladder, Method
 from rotor_mbs.methods.time_limit import OutOfTimeError, caller_signals, time_limit
-from rotor_mbs.runs import last_core
+from rotor_mbs.processes import last_core
+from rotor_mbs.processes.pool import WorkerPool, run_in
 from rotor_mbs.runs.design import Asked
 from rotor_mbs.runs.output_files import locked
-from rotor_mbs.runs.pool import WorkerPool, run_in
 from rotor_mbs.runs.read import Record, points_table
 from rotor_mbs.runs.runner import OnProgress, Outcome, Task, ignore_progress
 from rotor_mbs.runs.table import Place, Rows, Table, TableFile, extend_file

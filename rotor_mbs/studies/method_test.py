@@ -19,12 +19,13 @@ from rotor_mbs.analysis.work_precision import fitted_order
 from rotor_mbs.comparison.data_defects import judged_defects
 from rotor_mbs.comparison.defect_search import DefectSearch
 from rotor_mbs.comparison.faults import faults_in_time
-from rotor_mbs.errors import MethodRefusal, RotorError
+from rotor_mbs.errors import MethodRefusal, ResourceError, RotorError
 from rotor_mbs.methods.base import STEP, Method
 from rotor_mbs.methods.catalogue import error_line, find_method, with_method_files
 from rotor_mbs.methods.solve import solve
 from rotor_mbs.methods.time_limit import OutOfTimeError, caller_signals
-from rotor_mbs.runs.pool import TaskLostError, TaskPool, WorkerPool
+from rotor_mbs.processes.pool import TaskPool, WorkerPool
+from rotor_mbs.processes.worker import TaskLostError
 from rotor_mbs.scenario.catalogue import only_scene
 from rotor_mbs.scenario.scene import Blade, Scene
 from rotor_mbs.scenario.time_table import LoadTable
@@ -153,7 +154,7 @@ class _Examination:
         task = (name, scene, settings, repeats, limit)
         try:
             return self._pool.submit(with_method_files(_run), task, limit + _LOAD_S).result()
-        except TaskLostError as exc:
+        except (TaskLostError, ResourceError) as exc:
             status, message = "worker_died", str(exc)
         except Exception as exc:  # what cannot be sent from one process to the other
             status, message = "solver_failed", error_line(exc)

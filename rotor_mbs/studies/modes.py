@@ -20,8 +20,8 @@ from rotor_mbs.analysis import modes as modal
 from rotor_mbs.errors import InputError, MethodRefusal, RotorError, shown_value
 from rotor_mbs.methods.catalogue import find_method, methods, with_method_files
 from rotor_mbs.methods.time_limit import caller_signals
+from rotor_mbs.processes.pool import local_pool, run_in
 from rotor_mbs.runs.output_files import locked
-from rotor_mbs.runs.pool import local_pool, run_in
 from rotor_mbs.runs.read import write_records
 from rotor_mbs.runs.runner import OnProgress, Outcome, ignore_progress
 from rotor_mbs.runs.trailer import MODES, may_extend

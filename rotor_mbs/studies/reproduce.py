@@ -14,8 +14,8 @@ import rotor_mbs
 from rotor_mbs.analysis.published import claims, finding
 from rotor_mbs.analysis.text_tables import TextTable, method_table
 from rotor_mbs.methods.catalogue import REFERENCE, Refusal, default_methods, errata_methods, ladders, supporting_methods
+from rotor_mbs.processes.pool import Workers, pool_of
 from rotor_mbs.runs.output_files import locked
-from rotor_mbs.runs.pool import Workers, pool_of
 from rotor_mbs.runs.read import open_results
 from rotor_mbs.runs.runner import OnProgress, Task, compute_tasks, ignore_progress
 from rotor_mbs.runs.table import extend_file, results_tables

@@ -24,9 +24,9 @@ from rotor_mbs.methods.catalogue import (
 )
 from rotor_mbs.methods.solve import solve
 from rotor_mbs.methods.time_limit import OutOfTimeError, caller_signals, time_limit
+from rotor_mbs.processes.pool import Workers, pool_of
 from rotor_mbs.runs.design import Asked
 from rotor_mbs.runs.output_files import locked
-from rotor_mbs.runs.pool import Workers, pool_of
 from rotor_mbs.runs.runner import OnProgress, Outcome, Task, compute_tasks, ignore_progress
 from rotor_mbs.runs.table import Place, Rows, extend_file, results_tables, row_of_run, text_of
 from rotor_mbs.scenario.scene import Scene, scene_hash

@@ -20,9 +20,9 @@ from rotor_mbs.methods.catalogue import (
     supporting_methods,
 )
 from rotor_mbs.methods.time_limit import caller_signals
+from rotor_mbs.processes.pool import Workers, pool_of
 from rotor_mbs.runs.design import Asked
 from rotor_mbs.runs.output_files import locked
-from rotor_mbs.runs.pool import Workers, pool_of
 from rotor_mbs.runs.read import open_results, read_records
 from rotor_mbs.runs.runner import OnProgress, Outcome, compute_tasks, ignore_progress
 from rotor_mbs.runs.table import extend_file

@@ -26,8 +26,8 @@ from rotor_mbs.methods.catalogue import (
 from rotor_mbs.methods.solve import solve
 from rotor_mbs.methods.time_limit import OutOfTimeError, caller_signals, time_limit
 from rotor_mbs.models.lagrange.reference import error_growth
+from rotor_mbs.processes.pool import TaskPool
 from rotor_mbs.runs.design import MISSING
-from rotor_mbs.runs.pool import TaskPool
 from rotor_mbs.runs.runner import Task, compute
 from rotor_mbs.runs.sweeps import ERROR_GROWTH, METRICS, code_of_method, open_sweep, sweep_table
 from rotor_mbs.runs.table import IDENTITY, KEYWORDS, Place, Rows, Table, blank_rows, row_of_run

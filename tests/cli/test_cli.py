@@ -69,7 +69,7 @@ def test_list_and_every_help_load_no_library_that_takes_time() -> None:
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     loaded = set(done.stdout.splitlines()[-1].split())
-    assert not loaded & {"numpy", "scipy", "pydantic", "h5py", "matplotlib", "exudyn", "heyoka", "mujoco", "pebble"}
+    assert not loaded & {"numpy", "scipy", "pydantic", "h5py", "matplotlib", "exudyn", "heyoka", "mujoco"}
 
 
 def test_show_build_lists_what_a_scene_needs_and_no_more() -> None:

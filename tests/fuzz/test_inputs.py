@@ -20,7 +20,7 @@ import rotor_mbs as rm
 from rotor_mbs.comparison.data import data_of_table, load_data
 from rotor_mbs.comparison.formats import read_columns
 from rotor_mbs.errors import RotorError
-from rotor_mbs.runs.pool import WorkerPool
+from rotor_mbs.processes.pool import WorkerPool
 from rotor_mbs.scenario.scene import parse_scene, scene_toml
 from rotor_mbs.scenario.sweep import load_sweep
 from rotor_mbs.studies.run import run_scenes

@@ -97,8 +97,7 @@ def end_once(folder: Path, name: str, chance: random.Random) -> bool:
     try:
         process.wait(chance.uniform(0.05, LATEST_SIGNAL_S[name]))
     except subprocess.TimeoutExpired:
-        # Not Python's own resource tracker, which multiprocessing starts anew with a warning.
-        workers = sorted(number for number, line in processes_of(mark).items() if "spawn_main" in line)
+        workers = sorted(number for number, line in processes_of(mark).items() if "import serve" in line)
         if not hits_worker:
             process.send_signal(number)
         elif workers:

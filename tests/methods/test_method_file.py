@@ -217,7 +217,7 @@ def test_the_answer_to_an_interrupted_question_is_not_the_next_ones(
         raise KeyboardInterrupt
 
     with monkeypatch.context() as patched:
-        patched.setattr(method_file.pickle, "load", interrupted)
+        patched.setattr("rotor_mbs.processes.worker.pickle.load", interrupted)
         with pytest.raises(KeyboardInterrupt):
             method_file.read_file("mine.py")
     catalogue.check_names(["mine.py"])

@@ -11,11 +11,11 @@ import pytest
 from support.report_pages import answer_of, facts_of, plots_of, rows_of, section_of, sections_of, text_of
 from support.sweeps import made_sweep
 
+from rotor_mbs.processes.pool import SerialPool
 from rotor_mbs.report.build import write_report
 from rotor_mbs.report.elements import HeatMap
 from rotor_mbs.report.pages import sweep as page_of
 from rotor_mbs.report.pages.sweep import _Sweep, chosen_runs, explained, sweep_page
-from rotor_mbs.runs.pool import SerialPool
 from rotor_mbs.runs.sweeps import StoredSweep
 from rotor_mbs.scenario.sweep import load_sweep
 from rotor_mbs.studies.sweep import plan_sweep, run_sweep

@@ -18,7 +18,7 @@ from support.stored import Made, damage, rotor, store
 from rotor_mbs.analysis.text_tables import run_row
 from rotor_mbs.errors import StoreError
 from rotor_mbs.methods.catalogue import find_method
-from rotor_mbs.runs.pool import SerialPool
+from rotor_mbs.processes.pool import SerialPool
 from rotor_mbs.runs.read import open_results
 from rotor_mbs.runs.runner import Outcome
 from rotor_mbs.runs.table import Rows, TableFile

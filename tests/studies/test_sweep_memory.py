@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 from support.sweeps import starts_file
 
-from rotor_mbs.runs.cluster import open_task_pool
+from rotor_mbs.runs.engines import open_task_pool
 from rotor_mbs.runs.table import Place
 from rotor_mbs.scenario.sweep import load_sweep
 from rotor_mbs.studies.sweep import Chunk, plan_sweep

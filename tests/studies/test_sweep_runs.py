@@ -16,8 +16,8 @@ from support.sweeps import made_sweep, run_local, starts_file
 
 import rotor_mbs as rm
 from rotor_mbs.methods.catalogue import find_method
+from rotor_mbs.processes.pool import SerialPool
 from rotor_mbs.runs.design import MISSING
-from rotor_mbs.runs.pool import SerialPool
 from rotor_mbs.runs.sweeps import StoredSweep
 from rotor_mbs.runs.table import Rows, TableFile, text_of
 from rotor_mbs.runs.versions import code_digest

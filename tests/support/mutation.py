@@ -19,9 +19,10 @@ import os
 import re
 import sys
 import tempfile
-from collections.abc import Iterator
-from concurrent.futures import TimeoutError
-from contextlib import redirect_stderr, redirect_stdout
+from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import redirect_stderr, redirect_stdout, suppress
+from functools import partial
 from importlib.machinery import SourceFileLoader
 from itertools import islice
 from multiprocessing import get_context
@@ -29,7 +30,6 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import pytest
-from pebble import ProcessExpired, ProcessPool
 
 ROOT = Path(__file__).parents[2]
 TIME_LIMIT_S = 120.0
@@ -400,6 +400,23 @@ def first_failure(kind: str, tests: tuple[str, ...]) -> str:
     return ""
 
 
+def answer_of_fork(call: Callable[[], str], limit_s: float | None = None) -> str:
+    """Return what a call returns in a fork of this process, or that it has not returned within the limit."""
+    context = get_context("fork")
+    receiver, sender = context.Pipe(duplex=False)
+    fork = context.Process(target=lambda: sender.send(call()))
+    fork.start()
+    sender.close()
+    with receiver, suppress(EOFError):
+        try:
+            if receiver.poll(limit_s):
+                return str(receiver.recv())
+        finally:
+            fork.kill()
+            fork.join()
+    return "did not end, or took its process with it"
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("pattern", nargs="?", default="", help="mutants whose name has it")
@@ -412,20 +429,16 @@ def main() -> None:
         if importlib.util.find_spec(engine):
             importlib.import_module(engine)
     mutants = all_mutants(arguments.pattern)[:: arguments.every]
-    with ProcessPool(arguments.jobs, max_tasks=1, context=get_context("fork")) as pool:
+    with ThreadPoolExecutor(arguments.jobs) as pool:
         tests = tuple(dict.fromkeys(test for mutant in mutants for test in mutant.target.tests))
         kinds = dict.fromkeys(mutant.target.kind for mutant in mutants)
-        unchanged = [pool.schedule(first_failure, (kind, ())) for kind in kinds]
-        for future in [*unchanged, pool.schedule(first_failure, ("tests alone", tests))]:
-            if future.result():
-                raise SystemExit(f"without any change: {future.result()}")
-        futures = [pool.schedule(noticed_by, (mutant,), timeout=TIME_LIMIT_S) for mutant in mutants]
-        for mutant, future in zip(mutants, futures, strict=True):
-            try:
-                noticed = future.result() or "survived"
-            except (TimeoutError, ProcessExpired):
-                noticed = "did not end, or took its process with it"
-            print(f"{mutant.name}: {noticed}", flush=True)
+        calls = [*(partial(first_failure, kind, ()) for kind in kinds), partial(first_failure, "tests alone", tests)]
+        for failure in pool.map(answer_of_fork, calls):
+            if failure:
+                raise SystemExit(f"without any change: {failure}")
+        answers = pool.map(partial(answer_of_fork, limit_s=TIME_LIMIT_S), [partial(noticed_by, one) for one in mutants])
+        for mutant, noticed in zip(mutants, answers, strict=True):
+            print(f"{mutant.name}: {noticed or 'survived'}", flush=True)
 
 
 if __name__ == "__main__":

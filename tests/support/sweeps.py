@@ -9,7 +9,7 @@ from typing import Any
 import h5py
 import numpy as np
 
-from rotor_mbs.runs.cluster import open_task_pool
+from rotor_mbs.runs.engines import open_task_pool
 from rotor_mbs.scenario.sweep import Sweep, load_sweep
 from rotor_mbs.studies.sweep import SweepResult, plan_sweep, run_sweep
 

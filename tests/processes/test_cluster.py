@@ -17,8 +17,9 @@ from support.sweeps import starts_file, stored_runs
 
 from rotor_mbs.cli import main
 from rotor_mbs.errors import InputError, StoreError
-from rotor_mbs.runs import cluster as dask_cluster
-from rotor_mbs.runs.pool import SerialPool, run_in
+from rotor_mbs.processes.cluster import Cluster, run_as_worker
+from rotor_mbs.processes.pool import SerialPool, run_in
+from rotor_mbs.runs.engines import identity, refuse_other_code
 
 Client = pytest.importorskip("distributed").Client
 pytestmark = pytest.mark.full
@@ -72,7 +73,7 @@ def test_a_killed_worker_of_a_cluster_loses_nothing(
 
 
 def test_a_worker_with_other_code_or_another_version_is_refused() -> None:
-    here = dask_cluster.identity()
+    here = identity()
     assert {"rotor_mbs", "numpy", "heyoka", "python", "code of rotor_mbs"} <= set(here)
     for name in here:
         other = SerialPool().submit(partial(_run_as_worker, here | {name: "other"}), 3, 1.0)
@@ -82,7 +83,7 @@ def test_a_worker_with_other_code_or_another_version_is_refused() -> None:
 
 
 def _run_as_worker(expected: dict[str, str], task: int) -> int:
-    return dask_cluster.run_as_worker(abs, task, 10.0, expected)
+    return run_as_worker(abs, task, 10.0, partial(refuse_other_code, expected))
 
 
 def test_a_scheduler_that_dies_ends_in_one_line(
@@ -104,6 +105,6 @@ def test_a_cluster_that_is_not_there_and_one_without_workers_are_a_line(
     with Client(address, timeout=30, set_as_default=False) as client:
         for worker in workers:
             worker.kill()
-        (end,) = run_in(dask_cluster.Cluster(client, patience_s=0.5), time.sleep, [100.0], 200.0)
+        (end,) = run_in(Cluster(client, dict, patience_s=0.5), time.sleep, [100.0], 200.0)
     assert isinstance(end.error, StoreError)  # which ends a sweep
     assert str(end.error) == "engine dask: no workers for 0.5 s; stored runs are kept"

@@ -8,8 +8,10 @@ import resource
 import signal
 import subprocess
 import sys
+import threading
 import time
 from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from functools import partial
 from importlib import import_module
@@ -19,8 +21,8 @@ from typing import Any
 import pytest
 
 from rotor_mbs.errors import ResourceError
-from rotor_mbs.runs import pool as pool_module
-from rotor_mbs.runs.pool import Finished, SerialPool, TaskLostError, TaskPool, WorkerPool, run_in
+from rotor_mbs.processes.pool import SerialPool, TaskEnd, TaskPool, WorkerPool, run_in
+from rotor_mbs.processes.worker import TaskLostError, Worker
 
 # Beyond any start of a process on a busy machine.
 _LONG_S = 60.0
@@ -132,28 +134,23 @@ def test_a_system_without_room_for_a_process_costs_the_tasks_of_that_time() -> N
         pid = pool.submit(_pid, None, _LONG_S).result()
         with _limited(resource.RLIMIT_NOFILE, 3):
             os.kill(pid, signal.SIGKILL)
-            for _ in range(2):
-                with pytest.raises(TaskLostError, match="died") as refused:
-                    pool.submit(_pid, None, _LONG_S).result()
-                assert refused.value.failure == "worker_died"
+            with pytest.raises((TaskLostError, ResourceError), match=r"died|could not be started"):
+                pool.submit(_pid, None, _LONG_S).result()  # where its end is not yet known
+            with pytest.raises(ResourceError, match=r"a process could not be started: .*open files"):
+                pool.submit(_pid, None, _LONG_S).result()
         assert pool.submit(_pid, None, _LONG_S).result() != pid
 
 
-def test_a_process_that_lacks_a_thread_beside_it_is_started_anew(monkeypatch: pytest.MonkeyPatch) -> None:
-    from pebble.pool import process
+def test_a_system_without_room_for_a_timer_costs_the_tasks_of_that_time(monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuse(*_: object) -> None:
+        raise RuntimeError("can't start new thread")
 
-    launch, refused = process.launch_thread, []
-
-    def launch_but_once(name: str | None, loop: Callable[..., None], *more: object) -> object:
-        if loop is process.pool_manager_loop and not refused:
-            refused.append(loop)
-            raise RuntimeError("can't start new thread")
-        return launch(name, loop, *more)
-
-    monkeypatch.setattr(process, "launch_thread", launch_but_once)
-    with WorkerPool(1, gc.collect) as pool:  # which starts at once
-        assert pool.submit(_pid, None, _LONG_S).result(_LONG_S) != os.getpid()
-    assert refused
+    with WorkerPool(1) as pool:
+        with monkeypatch.context() as patched:
+            patched.setattr(threading.Timer, "start", refuse)
+            with pytest.raises(ResourceError, match="not enough threads: can't start new thread"):
+                pool.submit(_pid, None, _LONG_S).result()
+        assert pool.submit(_pid, None, _LONG_S).result() != os.getpid()
 
 
 def test_a_system_without_room_for_a_thread_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -168,7 +165,7 @@ def test_a_system_without_room_for_a_thread_is_told(monkeypatch: pytest.MonkeyPa
         WorkerPool(1, gc.collect)
 
 
-def _ends(work: Callable[[Any], Any], tasks: Iterable[Any], pool: TaskPool) -> list[Finished[Any, Any]]:
+def _ends(work: Callable[[Any], Any], tasks: Iterable[Any], pool: TaskPool) -> list[TaskEnd[Any, Any]]:
     with pool:
         return list(run_in(pool, work, tasks, _LONG_S))
 
@@ -204,36 +201,72 @@ def test_dead_processes_leave_no_open_files() -> None:
     assert [end.failure for end in ended] == ["worker_died"] * 4
 
 
-_BUSY_PROGRAM = r"""
-import os, time
-from rotor_mbs.runs.pool import WorkerPool
-
-def busy(_):
-    os.write(2, b"%d\n" % os.getpid())  # in one piece: both workers write here
-    end = time.monotonic() + 60
-    while time.monotonic() < end:
-        pass
-
-if __name__ == "__main__":
-    with WorkerPool(2) as pool:
-        tasks = [pool.submit(busy, None, 90) for _ in range(4)]
-        tasks[0].result()
+# Endless, in Python or in C code that keeps the interpreter's lock, after the number of the process.
+_BUSY = {
+    "loop": "import os; os.write(2, b'%d\\n' % os.getpid())\nwhile True: pass",
+    "C code": "import os; os.write(2, b'%d\\n' % os.getpid()); sum(range(10**13))",
+}
+_BUSY_PROGRAM = """
+from rotor_mbs.processes.pool import WorkerPool
+with WorkerPool(2) as pool:
+    tasks = [pool.submit(exec, {!r}, 90) for _ in range(4)]
+    tasks[0].result()
 """
+
+
+@pytest.mark.parametrize("kind", _BUSY)
+def test_a_time_limit_ends_whatever_a_task_does(kind: str) -> None:
+    with WorkerPool(1) as pool:
+        pid = pool.submit(_pid, None, _LONG_S).result()
+        lost = pool.submit(exec, _BUSY[kind], 0.2).exception(_LONG_S)
+        assert isinstance(lost, TaskLostError)
+        assert (lost.failure, str(lost)) == ("timed_out", "ended after 0.2 s")
+        assert pool.submit(_pid, None, _LONG_S).result() != pid
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="only Linux ends a process with a thread")
+def test_a_process_outlives_the_thread_that_first_used_it() -> None:
+    with Worker() as worker:
+        pids = []
+        for _ in range(2):
+            with ThreadPoolExecutor(1) as thread:
+                pids.append(thread.submit(worker.run, _pid, None, _LONG_S).result())
+            time.sleep(0.1)  # until the system has ended the thread
+    assert pids[0] == pids[1]
+
+
+def _fork_and_die(file: Path) -> None:
+    pid = os.fork()
+    if pid == 0:
+        time.sleep(2.0 * _LONG_S)
+    file.write_text(str(pid))
+    os._exit(3)
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="no fork here")
+@pytest.mark.filterwarnings("ignore:This process:DeprecationWarning")  # multi-threaded, says Python 3.12
+def test_a_process_that_a_task_forked_keeps_nobody_waiting(tmp_path: Path) -> None:
+    """It has the pipes of its parent, whose end would not be seen."""
+    with WorkerPool(1) as pool:
+        lost = pool.submit(_fork_and_die, tmp_path / "pid", _LONG_S).exception(0.5 * _LONG_S)
+    os.kill(int((tmp_path / "pid").read_text()), signal.SIGKILL)
+    assert str(lost) == "its process died (exit code 3)"
 
 
 @pytest.mark.skipif(not Path("/proc/self").exists(), reason="looks for processes in /proc")
 @pytest.mark.parametrize(
-    "signals",
+    ("kind", "signals"),
     [
-        [signal.SIGINT],
-        pytest.param([signal.SIGINT, signal.SIGINT], marks=pytest.mark.full),
-        pytest.param([signal.SIGKILL], marks=pytest.mark.full),
+        ("loop", [signal.SIGINT]),
+        pytest.param("loop", [signal.SIGINT, signal.SIGINT], marks=pytest.mark.full),
+        pytest.param("loop", [signal.SIGKILL], marks=pytest.mark.full),
+        ("C code", [signal.SIGKILL]),
     ],
 )
-def test_workers_end_with_their_parent(tmp_path: Path, signals: list[signal.Signals]) -> None:
+def test_workers_end_with_their_parent(tmp_path: Path, kind: str, signals: list[signal.Signals]) -> None:
     """Interrupted once or twice, or killed: no worker goes on."""
     program = tmp_path / "program.py"
-    program.write_text(_BUSY_PROGRAM)
+    program.write_text(_BUSY_PROGRAM.format(_BUSY[kind]))
     with subprocess.Popen([sys.executable, str(program)], stderr=subprocess.PIPE, text=True) as process:
         assert process.stderr is not None
         pids = [int(process.stderr.readline()) for _ in range(2)]
@@ -266,54 +299,55 @@ def test_a_task_that_exits_ends_no_process() -> None:
     assert "SystemExit: 3" in end.message
 
 
+def _answers_of(folder: Path, script: str, *, is_input: bool = False) -> list[str]:
+    """Run a script, by its path or from standard input, and return the lines that it prints."""
+    (folder / "script.py").write_text(script)
+    command = [sys.executable, "-" if is_input else "script.py"]
+    given = script if is_input else ""
+    ended = subprocess.run(command, input=given, capture_output=True, text=True, cwd=folder, timeout=_LONG_S)
+    assert ended.stderr == ""
+    return ended.stdout.splitlines()
+
+
 _SCRIPT = """
-from rotor_mbs.errors import RotorError
-from rotor_mbs.runs.pool import local_pool
+from rotor_mbs.processes.pool import local_pool
 
-def main():
-    with local_pool(1) as pool:
-        try:
-            pool.submit(abs, -3, 60.0).result()
-        except RotorError as exc:
-            print(exc)
+print("begins")
+with local_pool(1) as pool:
+    print(pool.submit(abs, -3, 60.0).result())
 """
-_GUARDED = _SCRIPT + 'if __name__ == "__main__":\n    main()\n'
 
 
-def _answer_of(command: list[str], script: str = "", cwd: Path | None = None) -> str:
-    ended = subprocess.run([sys.executable, *command], input=script, capture_output=True, text=True, cwd=cwd)
-    return ended.stdout.strip()
+@pytest.mark.parametrize("is_input", [False, True], ids=["file", "standard input"])
+def test_a_worker_does_not_run_the_script(tmp_path: Path, is_input: bool) -> None:
+    """A script needs no guard."""
+    assert _answers_of(tmp_path, _SCRIPT, is_input=is_input) == ["begins", "3"]
 
 
-def test_a_script_from_standard_input_is_named_where_a_worker_cannot_run_it() -> None:
-    answer = _answer_of(["-"], _GUARDED)
-    assert "the script <stdin> is no file that it can read; allowed: a script in a file, or workers=0" in answer
-    assert "if __name__" not in answer
-
-
-def test_a_script_without_a_guard_is_asked_for_one(tmp_path: Path) -> None:
-    (tmp_path / "script.py").write_text(_SCRIPT + "main()\n")
-    assert 'in a script, the call belongs under `if __name__ == "__main__":`' in _answer_of(["script.py"], cwd=tmp_path)
-    (tmp_path / "script.py").write_text(_GUARDED)
-    assert _answer_of(["script.py"], cwd=tmp_path) == ""
-
-
-def test_a_working_folder_that_is_gone_is_named(tmp_path: Path) -> None:
-    (tmp_path / "script.py").write_text(_GUARDED)
+def test_a_working_folder_that_is_gone_is_not_needed(tmp_path: Path) -> None:
     (tmp_path / "gone").mkdir()
-    command = 'rmdir ../gone; exec "$@"'  # in the folder that goes
-    ended = subprocess.run(
-        ["sh", "-c", command, "sh", sys.executable, str(tmp_path / "script.py")],
-        cwd=tmp_path / "gone",
-        capture_output=True,
-        text=True,
+    program = """
+import os
+os.chdir("gone")
+os.rmdir("../gone")
+from rotor_mbs.processes.pool import WorkerPool
+with WorkerPool(1) as pool:
+    print(pool.submit(abs, -3, 60.0).result())
+"""
+    assert _answers_of(tmp_path, program) == ["3"]
+
+
+def _end_at_start() -> None:
+    os._exit(4)
+
+
+def test_a_process_that_ends_at_its_start_is_the_systems_fault_and_names_a_memory_limit() -> None:
+    reason = (
+        r"could not be started: it ended at once with exit code 4 under a memory limit \(ulimit -v\) of 67108864 MiB"
     )
-    assert "its process died (the working folder is gone)" in ended.stdout
-    assert "if __name__" not in ended.stdout
-
-
-def test_a_memory_limit_is_named_where_a_worker_dies_at_its_start(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(sys.modules["__main__"], "__file__", None, raising=False)
-    with _limited(resource.RLIMIT_AS, 1 << 46):
-        reason = pool_module._reason_of_death(RuntimeError("All workers expired"), None)
-    assert reason == "All workers expired; under a memory limit (ulimit -v) of 67108864 MiB"
+    with (
+        _limited(resource.RLIMIT_AS, 1 << 46),
+        WorkerPool(1, _end_at_start) as pool,
+        pytest.raises(ResourceError, match=reason),
+    ):
+        pool.submit(_pid, None, _LONG_S).result()

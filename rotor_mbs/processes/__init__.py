@@ -1,0 +1,20 @@
+"""Code in other processes: a worker that can be ended at any time, pools of them, a cluster."""
+
+import os
+
+MAX_WORKERS = 1024  # processes
+
+
+def cores() -> int:
+    """Return the number of cores that this process may use."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
+
+
+def last_core() -> int | None:
+    """Return the core to time on, None where that is not known.
+
+    It is the last allowed one, as the first serves most interrupts.
+    """
+    return max(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else None

@@ -1,0 +1,296 @@
+"""Tasks in parallel worker processes, each task with a time limit."""
+
+from __future__ import annotations
+
+import operator
+import signal
+import threading
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from concurrent.futures import FIRST_COMPLETED, CancelledError, Future, ThreadPoolExecutor, wait
+from contextlib import AbstractContextManager, contextmanager, nullcontext
+from dataclasses import dataclass, replace
+from queue import LifoQueue
+from typing import Any, Generic, Self, TypeAlias, TypeVar
+
+from rotor_mbs.errors import (
+    SYSTEM_ERRORS,
+    InputError,
+    ResourceError,
+    RotorError,
+    one_line,
+    shown_value,
+    system_errors_apart,
+)
+from rotor_mbs.processes import MAX_WORKERS, cores
+from rotor_mbs.processes.worker import TaskLostError, Worker
+
+T = TypeVar("T")
+R = TypeVar("R")
+
+_SIGNALS_OF_END = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)]
+_PER_WORKER = 2  # tasks submitted per worker: one to work on, one waiting
+_MAX_LACKS = 10  # in a row, before all is given up
+
+
+@dataclass(frozen=True, slots=True)
+class TaskEnd(Generic[T, R]):
+    """The end of a task.
+
+    Attributes
+    ----------
+    task : the task.
+    value : its result; None where it has none.
+    failure : "timed_out", "worker_died" or "error" where it has no result; otherwise "".
+    message : why, in one line.
+    error : what the task raised, or what the system lacked.
+    """
+
+    task: T
+    value: R | None = None
+    failure: str = ""
+    message: str = ""
+    error: BaseException | None = None
+
+
+class TaskPool(ABC):
+    """What runs tasks: worker processes of this machine (`WorkerPool`), or a cluster.
+
+    A context manager.
+
+    Attributes
+    ----------
+    workers : how many tasks run at once.
+    shares_disk : whether the workers see the files of this process.
+    """
+
+    workers: int
+    shares_disk = True
+
+    @abstractmethod
+    def submit(self, work: Callable[[T], R], task: T, timeout_s: float) -> Future[R]:
+        """Return the future of `work(task)`."""
+
+    def failure(self, error: BaseException) -> str:
+        """Return why a future failed: "timed_out", "worker_died", or "error" of the task itself."""
+        return error.failure if isinstance(error, TaskLostError) else "error"
+
+    def close(self) -> None:  # noqa: B027  (of this process there is nothing to end)
+        """End what runs the tasks."""
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+
+Workers: TypeAlias = int | TaskPool  # how many processes, or a pool that is open
+
+
+class WorkerPool(TaskPool):
+    """Worker processes, each of which keeps its state between tasks.
+
+    Each starts when there is a task for it; where there is an initializer, as many as there are
+    cores start at once. One that dies, or is ended at a time limit, is replaced.
+
+    Parameters
+    ----------
+    workers : how many processes.
+    initializer : called first in every process; what it raises is the error of a task.
+    core : to which the processes are bound, where the system allows it; None for any.
+
+    Examples
+    --------
+    >>> with WorkerPool(1) as pool:
+    ...     pool.submit(abs, -3, timeout_s=10.0).result()
+    3
+    """
+
+    def __init__(
+        self,
+        workers: int,
+        initializer: Callable[[], object] | None = None,
+        core: int | None = None,
+    ) -> None:
+        self.workers = workers
+        self._threads = ThreadPoolExecutor(workers)
+        self._workers = [Worker(initializer, core=core) for _ in range(workers)]
+        # The last one that became free is taken first: with few tasks, few processes are started.
+        self._free: LifoQueue[Worker] = LifoQueue()
+        for worker in reversed(self._workers):
+            self._free.put(worker)
+        if initializer is not None:
+            for worker in self._workers[: cores()]:
+                self._in_thread(worker.start)
+
+    def submit(self, work: Callable[[T], R], task: T, timeout_s: float) -> Future[R]:
+        """Return the future of `work(task)`, which ends as `Worker.run` does.
+
+        What goes in and out must be picklable; the time limit counts from when a process begins
+        with the task. Raises ResourceError.
+        """
+        return self._in_thread(self._run, work, task, timeout_s)
+
+    def close(self) -> None:
+        """End the processes at once. Futures that were running raise TaskLostError."""
+        with delayed_interrupts():
+            for worker in self._workers:
+                worker.close()
+            self._threads.shutdown(cancel_futures=True)
+
+    def _in_thread(self, function: Callable[..., R], *arguments: Any) -> Future[R]:
+        try:
+            return self._threads.submit(function, *arguments)
+        except RuntimeError as exc:
+            raise ResourceError(f"not enough processes or threads: {exc}") from exc
+
+    def _run(self, work: Callable[[T], R], task: T, timeout_s: float) -> R:
+        worker = self._free.get()
+        try:
+            return worker.run(work, task, timeout_s)
+        finally:
+            self._free.put(worker)
+
+
+class SerialPool(TaskPool):
+    """A pool in this process, one task after the other, without time limits: where scripts must not start processes.
+
+    >>> SerialPool().submit(abs, -3, timeout_s=10.0).result()
+    3
+    """
+
+    workers = 1
+
+    def submit(self, work: Callable[[T], R], task: T, timeout_s: float) -> Future[R]:  # noqa: ARG002
+        future: Future[R] = Future()
+        try:
+            with system_errors_apart():
+                future.set_result(work(task))
+        except (Exception, SystemExit) as exc:  # also of another package's method
+            future.set_exception(RuntimeError(one_line(exc)) if isinstance(exc, SystemExit) else exc)
+        return future
+
+
+def check_workers(workers: int) -> None:
+    """Raise InputError for a wrong number of worker processes, TypeError for what is no whole number."""
+    if not 0 <= operator.index(workers) <= MAX_WORKERS:
+        allowed = f"a whole number from 0 to {MAX_WORKERS}"
+        raise InputError(f"workers: {shown_value(workers)}; allowed: {allowed}")
+
+
+def local_pool(workers: int, initializer: Callable[[], object] | None = None) -> TaskPool:
+    """Return a pool of so many worker processes of this machine.
+
+    With 0 workers, tasks run in this process, without a time limit. Raises InputError for a number
+    that is out of range.
+    """
+    check_workers(workers)
+    return WorkerPool(workers, initializer) if workers else SerialPool()
+
+
+def pool_of(workers: Workers) -> AbstractContextManager[TaskPool]:
+    """A `local_pool` that ends with the block, or one that is given, which does not."""
+    return nullcontext(workers) if isinstance(workers, TaskPool) else local_pool(workers)
+
+
+def run_in(
+    pool: TaskPool,
+    work: Callable[[T], R],
+    tasks: Iterable[T],
+    timeout_s: float | Callable[[T], float],
+    split: Callable[[T], Sequence[T]] | None = None,
+) -> Iterator[TaskEnd[T, R]]:
+    """Call `work(task)` for all tasks in a pool that is open, and yield how each ended.
+
+    A task whose worker died is tried once more at the end, alone. One that can be split is split
+    first, also where it was over its time limit.
+
+    Parameters
+    ----------
+    pool : the pool.
+    work : a function of a task.
+    tasks : taken as workers become free.
+    timeout_s : time limit of a task in s, or a function of the task.
+    split : the parts of a task that stands for many runs; an empty sequence for one that cannot be
+        split.
+
+    Raises
+    ------
+    ResourceError
+        If several tasks in a row find no room on the machine, or no process that starts.
+    """
+    again: dict[str, list[T]] = {"timed_out": [], "worker_died": []}
+    lacks = 0
+
+    def completed(tasks: Iterable[T], at_once: int) -> Iterator[TaskEnd[T, R]]:
+        waiting: dict[Future[R], T] = {}
+        for task in tasks:
+            limit = timeout_s(task) if callable(timeout_s) else timeout_s
+            waiting[pool.submit(work, task, limit)] = task
+            if len(waiting) >= at_once:
+                yield from ended(waiting)
+        while waiting:
+            yield from ended(waiting)
+
+    def ended(waiting: dict[Future[R], T]) -> Iterator[TaskEnd[T, R]]:
+        nonlocal lacks
+        done = wait(waiting, return_when=FIRST_COMPLETED).done
+        # Of several in the order of their tasks.
+        for future in [future for future in waiting if future in done]:
+            end = _end_of(waiting.pop(future), future, pool)
+            is_lack = end.failure == "worker_died" and end.error is not None
+            lacks = lacks + 1 if is_lack else 0
+            if lacks >= _MAX_LACKS:
+                count = f"{lacks} failures in a row"
+                raise ResourceError(f"stopped after {count}: {end.message}; stored runs are kept")
+            yield end
+
+    for source in (tasks, again["timed_out"]):
+        for end in completed(source, _PER_WORKER * pool.workers):
+            parts = split(end.task) if split is not None and end.failure in again else ()
+            if parts or end.failure == "worker_died":
+                again[end.failure].extend(parts or [end.task])
+            else:
+                yield end
+    for end in completed(again["worker_died"], 1):
+        if end.failure == "worker_died":
+            yield replace(end, message=f"{end.message}, also when it was retried alone")
+        else:
+            yield end
+
+
+def _end_of(task: T, future: Future[R], pool: TaskPool) -> TaskEnd[T, R]:
+    """Return how a task ended whose future is done; an error only of the task or of the system."""
+    error = CancelledError() if future.cancelled() else future.exception()
+    if error is None:
+        return TaskEnd(task, future.result())
+    text = str(error) if isinstance(error, RotorError) else one_line(error)
+    if isinstance(error, SYSTEM_ERRORS):
+        what = "not enough memory, files or processes"
+        if isinstance(error, ImportError):
+            what = "code cannot be loaded"
+        return TaskEnd(task, None, "worker_died", f"{what}: {text}", error)
+    failure = pool.failure(error)
+    if failure == "error":
+        return TaskEnd(task, None, failure, one_line(error), error)
+    return TaskEnd(task, None, failure, str(error))
+
+
+@contextmanager
+def delayed_interrupts() -> Iterator[None]:
+    """Delay Ctrl-C, SIGTERM and SIGHUP to the end of the block, which ends all processes or none."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    received: list[int] = []
+    before: dict[signal.Signals, Any] = {}
+    try:
+        for number in _SIGNALS_OF_END:
+            before[number] = signal.signal(number, lambda number, _: received.append(number))
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, signal.SIG_DFL if handler is None else handler)
+        if received:
+            signal.raise_signal(received[0])
