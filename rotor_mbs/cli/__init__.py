@@ -79,6 +79,11 @@ def _run(words: list[str]) -> int:
 
                 arguments = parse(words)
                 load_methods(arguments)
+                read = getattr(arguments, "file", None)
+                if read is not None and read.suffix != ".toml" and read.is_file():
+                    from rotor_mbs.runs.untrusted import prepare_reading
+
+                    prepare_reading()  # beside the loading of the command's own code
                 module, _, function = arguments.command.partition(":")
                 command = getattr(importlib.import_module(f"rotor_mbs.cli.{module}"), function)
                 status = int(command(arguments))

@@ -273,10 +273,14 @@ def _result(answer: bytes) -> Any:
 
 # What the worker process does
 
+_is_worker = False
+
 
 def serve() -> None:
     """Answer requests until the parent ends: the whole of what a worker process does."""
+    global _is_worker
     try:
+        _is_worker = True
         _end_with_parent()
         signal.signal(signal.SIGINT, signal.SIG_IGN)
         # Loading engines and drawing leave few cycles, and collecting took a twentieth.
@@ -340,15 +344,33 @@ def _set_up(core: int | None, memory_limit: int | None, initializer: Callable[[]
     if core is not None and hasattr(os, "sched_setaffinity"):
         os.sched_setaffinity(0, {core})
     if memory_limit is not None:
-        with suppress(ImportError, ValueError, OSError):  # Windows, and macOS, which has none
-            import resource
-
-            _, hard = resource.getrlimit(resource.RLIMIT_AS)
-            if hard != resource.RLIM_INFINITY:
-                memory_limit = min(memory_limit, hard)
-            resource.setrlimit(resource.RLIMIT_AS, (memory_limit, hard))
+        limit_resources(memory_limit)
     if initializer is not None:
         initializer()
+
+
+def limit_resources(memory: int, processor_s: int | None = None) -> None:
+    """Limit address space (bytes) and processor time (s) of this process, where the system can.
+
+    Over the second limit the system ends it.
+    """
+    with suppress(ImportError):  # Windows
+        import resource
+
+        limits = {resource.RLIMIT_AS: memory}
+        if processor_s is not None:
+            limits |= {resource.RLIMIT_CPU: processor_s, resource.RLIMIT_CORE: 0}
+        for kind, limit in limits.items():
+            _, hard = resource.getrlimit(kind)
+            if hard != resource.RLIM_INFINITY:
+                limit = min(limit, hard)
+            with suppress(ValueError, OSError):  # macOS has no limit of address space
+                resource.setrlimit(kind, (limit, hard))
+
+
+def is_worker() -> bool:
+    """Return whether this is a worker process."""
+    return _is_worker
 
 
 def _answer(request: bytes) -> bytes:

@@ -48,6 +48,7 @@ from rotor_mbs.runs.table import (
     values_of,
 )
 from rotor_mbs.runs.trailer import MODES, SWEEP, may_extend, read_trailer
+from rotor_mbs.runs.untrusted import read_apart
 from rotor_mbs.runs.versions import machine, versions
 from rotor_mbs.scenario.catalogue import natural_order, shipped_scene
 from rotor_mbs.scenario.scene import Scene, coordinate_labels, parse_scene, scene_hash
@@ -385,6 +386,11 @@ def read_records(path: Path, kind: str) -> list[Record]:
         tables = TableFile(path, [kind]).tables.values()
         with reading(path):
             return [record for table in tables for record in _point_records(table)]
+    return read_apart(path, _read_groups, kind)
+
+
+def _read_groups(path: Path, kind: str) -> list[Record]:
+    """Return the records of a kind that are groups of arrays."""
     with open_file(path) as (file, trailer), reading(path):
         return [_record(file, group) for group in trailer.groups] if trailer.kind == kind else []
 

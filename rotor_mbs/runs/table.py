@@ -62,10 +62,12 @@ from rotor_mbs.runs.trailer import (
     SPLIT_OF,
     SWEEP,
     Trailer,
+    digest_of,
     may_extend,
     read_trailer,
     trailer_of,
 )
+from rotor_mbs.runs.untrusted import read_apart, trust
 from rotor_mbs.runs.versions import machine, versions
 from rotor_mbs.scenario.catalogue import natural_key
 from rotor_mbs.scenario.scene import Scene, scene_hash
@@ -418,6 +420,7 @@ def laid_out(path: Path, tables: Sequence[Table], attributes: Mapping[str, objec
         kind = SWEEP if "" in rows_of else RESULTS
         with temporary.open("r+b") as laid:
             trailer = trailer_of(laid, kind, rows_of)
+            trust(digest_of(trailer))
             laid.seek(0, os.SEEK_END)
             laid.write(trailer)
         _reserve(temporary, temporary.stat().st_size)
@@ -590,12 +593,8 @@ class TableFile:
 
     def __init__(self, path: Path, only: Collection[str] | None = None) -> None:
         self.path = path
-        with open_file(path) as (file, trailer), reading(path):
-            self.attributes = attributes_of(file)
-            self.groups = list(trailer.groups) if trailer.kind in (RESULTS, SWEEP) else []
-            self.tables = {
-                group: _read_table(file, group, trailer) for group in self.groups if only is None or group in only
-            }
+        self.attributes, self.groups, self.tables = read_apart(path, _read_tables, only)
+        with reading(path):
             self._check_runs()
 
     def _check_runs(self) -> None:
@@ -659,6 +658,14 @@ class TableFile:
             else:
                 kept.append((run, status, text_of(row["message"][0])))
         return missing, kept
+
+
+def _read_tables(path: Path, only: Collection[str] | None) -> tuple[dict[str, Any], list[str], dict[str, Table]]:
+    """Return the attributes of a file, the groups of its tables, and those that are read by their groups."""
+    with open_file(path) as (file, trailer), reading(path):
+        groups = list(trailer.groups) if trailer.kind in (RESULTS, SWEEP) else []
+        tables = {group: _read_table(file, group, trailer) for group in groups if only is None or group in only}
+        return attributes_of(file), groups, tables
 
 
 def _read_table(file: Any, group: str, trailer: Trailer) -> Table:
@@ -993,6 +1000,7 @@ def new_file(path: Path, kind: str) -> Iterator[Any]:
         file.flush()
         image = io.BytesIO(file.id.get_file_image())
     trailer = trailer_of(image, kind, groups)
+    trust(digest_of(trailer))
     image.seek(0, io.SEEK_END)
     image.write(trailer)
     write_file(path, image.getbuffer())

@@ -53,6 +53,7 @@ class Trailer(NamedTuple):
     kind: str
     groups: Regions
     inode: int
+    digest: bytes
 
 
 def trailer_of(file: IO[bytes], kind: str, groups: Regions) -> bytes:
@@ -64,6 +65,11 @@ def trailer_of(file: IO[bytes], kind: str, groups: Regions) -> bytes:
         digest.update(block)
     digest.update(head)
     return head + digest.digest() + MAGIC
+
+
+def digest_of(trailer: bytes) -> bytes:
+    """Return the digest in the bytes of a trailer."""
+    return trailer[-_DIGEST - len(MAGIC) : -len(MAGIC)]
 
 
 def read_trailer(path: Path) -> Trailer:
@@ -103,7 +109,7 @@ def _checked(path: Path, file: IO[bytes]) -> Trailer:
     except (ValueError, TypeError, KeyError, AttributeError, RecursionError):
         raise damaged from None
     digest.update(text + tail[:_LENGTH])
-    if digest.digest() != tail[_LENGTH : _LENGTH + _DIGEST]:
+    if digest.digest() != digest_of(tail):
         raise damaged
     if version != FORMAT_VERSION:
         raise StoreError(
@@ -112,7 +118,7 @@ def _checked(path: Path, file: IO[bytes]) -> Trailer:
         )
     if not isinstance(kind, str) or not _words(kind):
         raise StoreError(f"{path}: damaged: kind {kind!r}; allowed: {', '.join(_KINDS)}, {SPLIT_OF}FILE")
-    return Trailer(kind, groups, os.fstat(file.fileno()).st_ino)
+    return Trailer(kind, groups, os.fstat(file.fileno()).st_ino, digest.digest())
 
 
 def may_extend(path: Path, kind: str) -> bool:

@@ -1,0 +1,99 @@
+"""Reading of files by the HDF5 library in a worker process with limits of time and memory.
+
+A digest is no signature: a forged file can have a right one. The library follows the trees, heaps
+and headers of a file as they are, and some forged ones end the process, or are read without end or
+into endless memory. That happens to the worker then, and this process gets what was read as plain
+values. It reads by itself only what it wrote, or what came with the program.
+"""
+
+from __future__ import annotations
+
+import atexit
+import math
+import os
+import threading
+import time
+from collections.abc import Callable
+from contextlib import suppress
+from importlib import import_module
+from pathlib import Path
+from typing import TypeVar
+
+from rotor_mbs.errors import ResourceError, StoreError
+from rotor_mbs.processes.worker import TaskLostError, Worker, is_worker, limit_resources
+from rotor_mbs.runs.trailer import read_trailer
+from rotor_mbs.scenario.catalogue import REFERENCES
+
+T = TypeVar("T")
+R = TypeVar("R")
+
+# Limits of processor time (s), which are the same on a busy machine, and of address space (bytes):
+# for any file, and for each byte of it outside the rows. Reading takes at most a fortieth of these.
+_TIME_S = 10.0
+_TIME_OF_BYTE_S = 1e-5
+_MEMORY = 1 << 30
+_MEMORY_OF_BYTE = 16
+_WAIT_S = 300.0  # for what takes time without the processor; also the limit where the system has none
+
+
+def _load() -> None:
+    """Load the code that reads files."""
+    import_module("rotor_mbs.runs.read")  # by its name: only the worker imports it
+
+
+_worker = Worker(_load, memory_limit=_MEMORY, is_silent=True)
+_asking = threading.Lock()
+_trusted: set[bytes] = set()
+atexit.register(_worker.close)
+
+
+def prepare_reading() -> None:
+    """Start the worker process, which loads its code meanwhile."""
+    with suppress(ResourceError):  # told when a file is read
+        _worker.start()
+
+
+def trust(digest: bytes) -> None:
+    """Note the digest in the trailer of a file that this process writes."""
+    _trusted.add(digest)
+
+
+def read_apart(path: Path, read: Callable[[Path, T], R], argument: T) -> R:
+    """Return `read(path, argument)` of a file of this program, called in the worker process.
+
+    In a worker process, and for a file that is trusted, it is called in this process.
+
+    Raises
+    ------
+    StoreError
+        If the file cannot be read within the limits, and what `read` raises.
+    ResourceError
+        If the worker process cannot be started.
+    """
+    trailer = read_trailer(path)
+    if is_worker() or trailer.digest in _trusted or path.parent == REFERENCES:
+        return read(path, argument)
+    regions = [region for columns in trailer.groups.values() for region in columns.values()]
+    size = path.stat().st_size - sum(length for _, length in regions)
+    seconds = _TIME_S + _TIME_OF_BYTE_S * size
+    memory = int(_MEMORY + _MEMORY_OF_BYTE * size)
+    folder = ""
+    with suppress(OSError):  # the working folder is gone
+        folder = os.getcwd()  # noqa: PTH109  (a text)
+    try:
+        with _asking:
+            return _worker.run(_read_limited, (folder, seconds, memory, read, path, argument), _WAIT_S + seconds)
+    except TaskLostError:
+        pass
+    limits = f"{seconds:.3g} s or {memory / 2**30:.3g} GB"
+    problem = f"damaged or forged: HDF5 ends the process that reads it, or takes more than {limits}"
+    raise StoreError(f"{path}: {problem}; allowed: a file that rotor-mbs wrote")
+
+
+def _read_limited(arguments: tuple[str, float, int, Callable[[Path, T], R], Path, T]) -> R:
+    """Call `read(path, argument)` in the folder of the parent, within limits of this process."""
+    folder, seconds, memory, read, path, argument = arguments
+    if folder:
+        os.chdir(folder)
+    limit_resources(memory, math.ceil(time.process_time() + seconds))
+    return read(path, argument)
