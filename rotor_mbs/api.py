@@ -32,9 +32,10 @@ from rotor_mbs.methods.method_file import ENDING
 from rotor_mbs.methods.time_limit import valid_seconds
 from rotor_mbs.processes.pool import check_workers
 from rotor_mbs.runs.design import MISSING, RUNS
+from rotor_mbs.runs.hdf5 import reading
 from rotor_mbs.runs.read import StoredRun, StoredScene, is_sweep, open_results
 from rotor_mbs.runs.sweeps import ERROR_GROWTH, METRICS, StoredSweep, parameter_name
-from rotor_mbs.runs.table import TableFile, copy_file, reading, text_of
+from rotor_mbs.runs.table import TableFile, copy_file, text_of
 from rotor_mbs.scenario.catalogue import list_scenes, only_scene, scene_of
 from rotor_mbs.scenario.scene import Scene, load_scene, parse_scene
 from rotor_mbs.scenario.toml_file import file_path, plain_value

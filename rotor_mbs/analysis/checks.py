@@ -20,8 +20,8 @@ from rotor_mbs.analysis.run_checks import Where as Where
 from rotor_mbs.errors import InputError, StoreError
 from rotor_mbs.methods.catalogue import PRINTED, REFERENCE, find_method_or_none, is_corrected, methods
 from rotor_mbs.methods.solve import solve
+from rotor_mbs.runs.hdf5 import reading
 from rotor_mbs.runs.read import OpenResults, StoredRun, StoredScene
-from rotor_mbs.runs.table import reading
 from rotor_mbs.scenario.accuracy_bounds import Bounds
 from rotor_mbs.scenario.catalogue import shipped_scene
 from rotor_mbs.scenario.scene import scene_hash

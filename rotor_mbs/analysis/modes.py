@@ -23,9 +23,8 @@ from numpy.typing import NDArray
 
 from rotor_mbs.analysis.text_tables import TextTable
 from rotor_mbs.errors import InputError, StoreError
-from rotor_mbs.runs.design import Column
+from rotor_mbs.runs.hdf5 import Column, reading
 from rotor_mbs.runs.read import Record, read_records
-from rotor_mbs.runs.table import reading
 from rotor_mbs.solution.trajectory import Array
 
 Complex = NDArray[np.complex128]

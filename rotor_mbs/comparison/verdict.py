@@ -11,7 +11,7 @@ import numpy as np
 
 from rotor_mbs.comparison.channels import Channel
 from rotor_mbs.comparison.data import ForeignData
-from rotor_mbs.runs.design import Column
+from rotor_mbs.runs.hdf5 import Column
 from rotor_mbs.runs.read import Record
 from rotor_mbs.runs.versions import versions
 from rotor_mbs.scenario.scene import Scene, scene_hash

@@ -23,9 +23,9 @@ from rotor_mbs.report.pages.index import index_page
 from rotor_mbs.report.pages.paper import claims_page, errata_page
 from rotor_mbs.report.pages.scene import scene_page, short_name
 from rotor_mbs.report.pages.stability import stability_page
+from rotor_mbs.runs.hdf5 import reading
 from rotor_mbs.runs.read import is_sweep, open_results, read_records
 from rotor_mbs.runs.sweeps import StoredSweep
-from rotor_mbs.runs.table import reading
 
 _GROUPS = 2  # of pages per worker: each opens the file anew, and none waits long for the last one
 _TIMEOUT_S = 600.0

@@ -5,11 +5,12 @@ from __future__ import annotations
 import json
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
 from rotor_mbs.methods.catalogue import REFERENCE, find_method
+from rotor_mbs.runs.hdf5 import CHARACTERS, Column
 from rotor_mbs.runs.versions import row_versions
 from rotor_mbs.scenario.scene import Scene, scene_hash
 from rotor_mbs.solution.quantities import LOADS, quantities
@@ -18,23 +19,11 @@ from rotor_mbs.solution.status import STATUSES
 MISSING = -1  # status of a row that is not stored
 # What the table of a scene's arrays repeats of the run's row in another table; in a row it has this name.
 REPEATED = {"status": "status_repeated", "samples": "samples_repeated"}
-CHARACTERS = "characters"  # the dimension of texts that are filled in later
 CHARACTER = "S1"  # kind of a column of texts that are computed: (run, characters), UTF-8, then zeros
 RUNS = "runs"
 # What a frozen reference stores: it cannot be computed again from angles and rates as precisely.
 FROZEN = ("angles", "rates", "work", *(load.name for load in LOADS), "angle_uncertainty", "error_growth")
 ONCE_A_SCENE = ("angle_uncertainty", "error_growth")  # stored once a scene, over time
-
-
-class Column(NamedTuple):
-    """A dataset: its dimensions (names of scales; a scale has its own name), units, what it is, the type of its values
-    in the file, and further attributes."""
-
-    dimensions: tuple[str, ...]
-    units: str
-    long_name: str
-    kind: str = "<f8"
-    attributes: Mapping[str, Any] = {}
 
 
 def flags(names: Sequence[str], first: int = 0) -> dict[str, Any]:

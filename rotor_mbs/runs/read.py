@@ -24,31 +24,25 @@ from numpy.typing import NDArray
 
 from rotor_mbs.errors import StoreError
 from rotor_mbs.methods.catalogue import PRINTED, REFERENCE, is_built_in, is_corrected
-from rotor_mbs.runs.design import FROZEN, MISSING, NUMBERS, POINT_COLUMNS, REPEATED, RUNS, Column
+from rotor_mbs.runs.design import FROZEN, MISSING, NUMBERS, POINT_COLUMNS, REPEATED, RUNS
+from rotor_mbs.runs.hdf5 import Column, StoredGroup, read_content, reading
 from rotor_mbs.runs.output_files import locked
 from rotor_mbs.runs.table import (
     Place,
     Rows,
     Table,
     TableFile,
-    attributes_of,
     checksums,
     chosen_group,
-    columns_of,
-    group_at,
     known_columns,
     new_file,
     new_group,
-    open_file,
     parsed,
     put,
     put_attributes,
-    reading,
     text_of,
-    values_of,
 )
 from rotor_mbs.runs.trailer import MODES, SWEEP, may_extend, read_trailer
-from rotor_mbs.runs.untrusted import read_apart
 from rotor_mbs.runs.versions import machine, versions
 from rotor_mbs.scenario.catalogue import natural_order, shipped_scene
 from rotor_mbs.scenario.scene import Scene, coordinate_labels, parse_scene, scene_hash
@@ -386,13 +380,8 @@ def read_records(path: Path, kind: str) -> list[Record]:
         tables = TableFile(path, [kind]).tables.values()
         with reading(path):
             return [record for table in tables for record in _point_records(table)]
-    return read_apart(path, _read_groups, kind)
-
-
-def _read_groups(path: Path, kind: str) -> list[Record]:
-    """Return the records of a kind that are groups of arrays."""
-    with open_file(path) as (file, trailer), reading(path):
-        return [_record(file, group) for group in trailer.groups] if trailer.kind == kind else []
+    with reading(path):
+        return [_record(name, group) for name, group in read_content(path, [kind]).groups.items()]
 
 
 def _point_records(stored: Table) -> Iterator[Record]:
@@ -453,11 +442,8 @@ def write_records(path: Path, records: Sequence[Record]) -> None:
                         put_attributes(dataset, {"labels": record.attributes[f"{name}_labels"]})
 
 
-def _record(file: Any, path: str) -> Record:
-    """The group of arrays at `path` in an open file."""
-    group = group_at(file, path)
+def _record(path: str, group: StoredGroup) -> Record:
+    """Return the record of the group at `path`."""
     kind, *scene, owner, name = path.split("/")
-    columns = columns_of(group)
-    arrays = {name: values_of(group[name]) for name in columns}
-    scales_first = dict(sorted(columns.items(), key=lambda column: column[1].dimensions != (column[0],)))
-    return Record(kind, "/".join(scene), f"{owner}/{name}", attributes_of(group), arrays, scales_first)
+    scales_first = dict(sorted(group.columns.items(), key=lambda column: column[1].dimensions != (column[0],)))
+    return Record(kind, "/".join(scene), f"{owner}/{name}", group.attributes, group.values, scales_first)

@@ -22,7 +22,8 @@ from numpy.typing import NDArray
 
 from rotor_mbs.errors import InputError, StoreError, shown_value
 from rotor_mbs.methods.catalogue import find_method
-from rotor_mbs.runs.design import COLUMNS, MISSING, Column, flags
+from rotor_mbs.runs.design import COLUMNS, MISSING, flags
+from rotor_mbs.runs.hdf5 import Column, reading
 from rotor_mbs.runs.output_files import locked
 from rotor_mbs.runs.table import (
     IDENTITY,
@@ -30,7 +31,6 @@ from rotor_mbs.runs.table import (
     TableFile,
     laid_out,
     parsed,
-    reading,
     require_texts,
     scene_scales,
 )

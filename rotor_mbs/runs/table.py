@@ -35,11 +35,10 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-from rotor_mbs.errors import InputError, RotorError, StoreError, one_line
+from rotor_mbs.errors import InputError, StoreError
 from rotor_mbs.methods.catalogue import REFERENCE, method_names
 from rotor_mbs.runs.design import (
     CHARACTER,
-    CHARACTERS,
     COLUMNS,
     KNOWN,
     MISSING,
@@ -49,9 +48,20 @@ from rotor_mbs.runs.design import (
     REPEATED,
     RUNS,
     Asked,
-    Column,
     arrays_of,
     metric_columns,
+)
+from rotor_mbs.runs.hdf5 import (
+    CHARACTERS,
+    WITHOUT_VALUES,
+    Column,
+    StoredGroup,
+    attribute,
+    is_group,
+    place_of,
+    read_content,
+    reading,
+    reason_of,
 )
 from rotor_mbs.runs.output_files import locked, replacing, store_errors, write_file
 from rotor_mbs.runs.trailer import (
@@ -59,15 +69,13 @@ from rotor_mbs.runs.trailer import (
     INTEGRITY,
     MAGIC,
     RESULTS,
-    SPLIT_OF,
     SWEEP,
-    Trailer,
     digest_of,
     may_extend,
     read_trailer,
     trailer_of,
 )
-from rotor_mbs.runs.untrusted import read_apart, trust
+from rotor_mbs.runs.untrusted import trust
 from rotor_mbs.runs.versions import machine, versions
 from rotor_mbs.scenario.catalogue import natural_key
 from rotor_mbs.scenario.scene import Scene, scene_hash
@@ -80,16 +88,9 @@ CONVENTIONS = "CF-1.11, ACDD-1.3"
 # What every file is about: the attribute `keywords` of the ACDD conventions.
 KEYWORDS = "multibody dynamics, wind turbine rotor, Euler-Lagrange equations, model verification"
 IDENTITY = "sweep_identity"  # the attribute of a sweep's file with a hash of all that the design says
-_NOT_ATTRIBUTES = ("CLASS", "NAME", "REFERENCE_LIST", "DIMENSION_LIST", "_Netcdf4Dimid", "_Netcdf4Coordinates")
-# The netCDF-4 library's name for the scale of a dimension without values.
-_WITHOUT_VALUES = "This is a netCDF dimension but not a netCDF variable."
-
-# A text of variable length as it lies in a dataset.
-_REFERENCE = np.dtype([("length", "<u4"), ("heap", "<u8"), ("index", "<u4")])
 _HEAD_BYTES = 1 << 17  # of a file beside its rows, at most: descriptions and texts
 _READ_BYTES = 1 << 25  # read at once when checksums are verified
 _LONGEST_LABEL = 1000  # characters; names of files are shorter
-_ATTEMPTS = 3  # to open a file that is being replaced
 _TEXT_LENGTH = 600  # characters of a message
 
 T = TypeVar("T")
@@ -453,13 +454,8 @@ def _put_table(file: Any, table: Table) -> dict[str, tuple[int, int]]:
     for name, column in table.computed.items():
         kind, shape = table.row_type[name].base, table.shape(name)
         dataset = put_empty(group, name, shape, kind, column, MISSING if name == "status" else None)
-        rows[name] = _place_of(dataset)
+        rows[name] = place_of(dataset)
     return rows
-
-
-def _place_of(dataset: Any) -> tuple[int, int]:
-    """Offset and length in bytes of the values of a contiguous dataset."""
-    return dataset.id.get_offset() or 0, dataset.nbytes
 
 
 def begin_file(place: Path | str, **driver: object) -> Any:
@@ -499,12 +495,7 @@ def _described(dataset: Any, group: Any, column: Column) -> Any:
 def put_dimension(group: Any, name: str, length: int) -> None:
     """A dimension without values, as the netCDF-4 library has them."""
     scale = group.create_dataset(name, (length,), ">f4")
-    scale.make_scale(f"{_WITHOUT_VALUES}{length:10d}")
-
-
-def is_dimension_only(dataset: Any) -> bool:
-    """Whether a dataset is a dimension without values."""
-    return str(attribute(dataset, "NAME", "")).startswith(_WITHOUT_VALUES)
+    scale.make_scale(f"{WITHOUT_VALUES}{length:10d}")
 
 
 def put_empty(group: Any, name: str, shape: tuple[int, ...], kind: Any, column: Column, fill: int | None = None) -> Any:
@@ -537,42 +528,6 @@ def put_attributes(target: Any, values: Mapping[str, object]) -> None:
 # Reading
 
 
-@contextmanager
-def open_file(path: Path) -> Iterator[tuple[Any, Trailer]]:
-    """An existing file of this program, read only, and its trailer, which is checked before HDF5 sees the file. Raises
-    StoreError where it is missing, damaged or another program's."""
-    for _ in range(_ATTEMPTS):
-        trailer = read_trailer(path)
-        try:
-            file = h5py.File(path, "r")
-        except OSError as exc:
-            raise StoreError(
-                f"{path}: not a readable HDF5 file ({_reason(exc)}); allowed: a file that rotor-mbs wrote"
-            ) from exc
-        with file:
-            if path.stat().st_ino != trailer.inode:  # replaced since it was checked
-                continue
-            if trailer.kind.startswith(SPLIT_OF):
-                whole = trailer.kind.removeprefix(SPLIT_OF)
-                raise StoreError(f"{path}: a split for Hugging Face datasets; allowed: the sweep's own file, {whole}")
-            yield file, trailer
-            return
-    raise StoreError(f"{path}: is being replaced by another process")
-
-
-@contextmanager
-def reading(path: Path | str, what: str = "") -> Iterator[None]:
-    """Whatever goes wrong with what a file holds is a StoreError that names the place: HDF5 raises errors of many kinds
-    on damaged files, and so does code with what a forged one says, although its digest is right."""
-    try:
-        yield
-    except (RotorError, ImportError, BrokenPipeError):
-        raise
-    except Exception as exc:
-        place = f"{path}: {what}" if what else f"{path}"
-        raise StoreError(f"{place}: damaged or incomplete ({one_line(exc)[:150]})") from exc
-
-
 def parsed(text: object, kind: type[T], place: object) -> T:
     """The value of a JSON text, of this type. Raises StoreError: a file may hold anything."""
     try:
@@ -593,8 +548,11 @@ class TableFile:
 
     def __init__(self, path: Path, only: Collection[str] | None = None) -> None:
         self.path = path
-        self.attributes, self.groups, self.tables = read_apart(path, _read_tables, only)
+        content = read_content(path, (RESULTS, SWEEP), only)
+        self.attributes = content.attributes
+        self.groups = content.names
         with reading(path):
+            self.tables = {name: _table(path, name, stored, content.inode) for name, stored in content.groups.items()}
             self._check_runs()
 
     def _check_runs(self) -> None:
@@ -660,32 +618,21 @@ class TableFile:
         return missing, kept
 
 
-def _read_tables(path: Path, only: Collection[str] | None) -> tuple[dict[str, Any], list[str], dict[str, Table]]:
-    """Return the attributes of a file, the groups of its tables, and those that are read by their groups."""
-    with open_file(path) as (file, trailer), reading(path):
-        groups = list(trailer.groups) if trailer.kind in (RESULTS, SWEEP) else []
-        tables = {group: _read_table(file, group, trailer) for group in groups if only is None or group in only}
-        return attributes_of(file), groups, tables
-
-
-def _read_table(file: Any, group: str, trailer: Trailer) -> Table:
-    """A table in an open file. Raises StoreError where it is not what was laid out, or is no table."""
-    path, item, rows = Path(file.filename), group_at(file, group), trailer.groups[group]
-    columns = columns_of(item)
-    known = {name: (column, values_of(item[name])) for name, column in columns.items() if name not in rows}
-    computed = {name: columns[name] for name in rows}
-    offsets = {name: offset for name, (offset, _) in rows.items()}
+def _table(path: Path, group: str, stored: StoredGroup, inode: int) -> Table:
+    """Return the table of a group. Raises StoreError where it is not what was laid out, or is no table."""
+    known = {name: (stored.columns[name], values) for name, values in stored.values.items()}
+    computed = {name: stored.columns[name] for name in stored.rows}
+    offsets = {name: rows.offset for name, rows in stored.rows.items()}
     _, runs = known.pop("run")
-    characters = len(item[CHARACTERS]) if CHARACTERS in item else 0
-    table = Table(group, runs, known, computed, attributes_of(item), characters, path, trailer.inode, offsets)
+    table = Table(group, runs, known, computed, stored.attributes, stored.characters, path, inode, offsets)
     for name, column in computed.items():
-        kind, shape, dataset = np.dtype(column.kind), table.shape(name), item[name]
-        is_wrong = dataset.shape != shape or kind.kind not in "fiuS" or _place_of(dataset) != tuple(rows[name])
+        kind, shape, rows = np.dtype(column.kind), table.shape(name), stored.rows[name]
+        is_wrong = rows.shape != shape or kind.kind not in "fiuS" or not rows.is_in_place
         if name in COLUMNS and name not in ONCE_A_SCENE:
             usual = COLUMNS[name]
             is_wrong = is_wrong or kind != np.dtype(usual.kind) or column.dimensions != usual.dimensions
         if is_wrong:
-            raise StoreError(f"{path}: {dataset.name} has shape {dataset.shape} of {kind}; damaged")
+            raise StoreError(f"{path}: {group}/{name} has shape {rows.shape} of {kind}; damaged")
     _check(table)
     return table
 
@@ -736,107 +683,6 @@ def require_texts(attributes: Mapping[str, object], names: Iterable[str], place:
     for name in names:
         if not isinstance(attributes.get(name), str):
             raise StoreError(f"{place}: its attribute {name} is no text; damaged")
-
-
-def group_at(file: Any, path: str) -> Any:
-    """A group by its path. Raises StoreError where there is none, or a link."""
-    for name in path.split("/") if path else ():
-        file = member(file, name)
-    return file
-
-
-def member(group: Any, name: str) -> Any:
-    """A member of a group. Raises StoreError where there is none, or a link."""
-    link = group.get(name, getlink=True)
-    if not isinstance(link, h5py.HardLink):
-        found = "is missing" if link is None else "is a link"
-        raise StoreError(f"{group.file.filename}: {group.name}/{name} {found}; allowed: groups and arrays of this file")
-    return group[name]
-
-
-def values_of(dataset: Any) -> NDArray[Any]:
-    """An array of numbers, or of texts, whole. Raises StoreError where it is not in the file, or claims far more than
-    the file holds."""
-    place = f"{dataset.file.filename}: {dataset.name}"
-    if not isinstance(dataset, h5py.Dataset) or dataset.shape is None:
-        raise StoreError(f"{place} is no array")
-    layout = dataset.id.get_create_plist()
-    if layout.get_external_count() or layout.get_layout() != h5py.h5d.CONTIGUOUS:
-        raise StoreError(f"{place} is not contiguous in this file; allowed: an array as rotor-mbs writes it")
-    kept, size = dataset.id.get_storage_size(), dataset.file.id.get_filesize()
-    if kept > size or kept < dataset.nbytes:
-        raise StoreError(f"{place} claims {dataset.nbytes:.2g} bytes and has {kept:.2g}")
-    if dataset.dtype.kind != "O":
-        values: NDArray[Any] = dataset[()]
-        return values
-    if h5py.check_string_dtype(dataset.dtype) is None:
-        raise StoreError(f"{place} is no array")
-    # Each text is a reference that begins with its length, and all may refer to one text: bounded before it is read.
-    if dataset.size:
-        texts = np.memmap(dataset.file.filename, _REFERENCE, "r", dataset.id.get_offset(), dataset.shape)
-        if int(texts["length"].sum(dtype=np.uint64)) > size:
-            raise StoreError(f"{place} claims more text than the file has")
-    return np.array([plain(text) for text in dataset[()]], dtype=object)
-
-
-def plain(value: Any) -> Any:
-    """An attribute as a plain Python value."""
-    if isinstance(value, np.ndarray):
-        return [plain(item) for item in value]
-    if isinstance(value, bytes):
-        return value.decode()
-    return value.item() if isinstance(value, np.generic) else value
-
-
-def attributes_of(target: Any) -> dict[str, Any]:
-    """As plain Python values, without those that the library writes by itself."""
-    return {name: attribute(target, name) for name in target.attrs if name not in _NOT_ATTRIBUTES}
-
-
-def attribute(target: Any, name: str, default: Any = None) -> Any:
-    """As a plain Python value; the default where there is none. Raises ValueError for a type that no attribute has.
-
-    In a damaged file a text may have become a list of any type: reading it ends the process.
-    """
-    if name not in target.attrs:
-        return default
-    if isinstance(h5py.h5a.open(target.id, name.encode()).get_type(), h5py.h5t.TypeVlenID):
-        raise ValueError(f"attribute {name} is neither a number nor a text")
-    return plain(target.attrs[name])
-
-
-def columns_of(group: Any) -> dict[str, Column]:
-    """What the datasets of a group are, by name."""
-    columns = {}
-    for name in group:
-        dataset = member(group, name)
-        if not is_group(dataset) and not is_dimension_only(dataset):
-            # The names of the scales by their attribute: the library would look for their paths through the whole
-            # file, and its own way to a name ends the process where that is damaged. A scale is its own dimension.
-            scales = [str(attribute(scale[0], "NAME")) if len(scale) else name for scale in dataset.dims]
-            dimensions = tuple(CHARACTERS if scale.startswith(_WITHOUT_VALUES) else scale for scale in scales)
-            # Lists of texts as such; numbers as they are, whose type belongs to the attribute.
-            attributes = {
-                name: dataset.attrs[name] if isinstance(value, list) and not isinstance(value[0], str) else value
-                for name, value in attributes_of(dataset).items()
-                if name != "_Encoding"
-            }
-            units, long_name = (str(attributes.pop(name)) for name in ("units", "long_name"))
-            columns[name] = Column(dimensions, units, long_name, dataset.dtype.str, attributes)
-    return columns
-
-
-def is_group(item: Any) -> bool:
-    return isinstance(item, h5py.Group)
-
-
-def _reason(error: Exception) -> str:
-    """What HDF5 says in brackets, "file signature not found", without the name of its function."""
-    text = str(error).splitlines()[0]
-    return text.partition("(")[2].rpartition(")")[0] or text
-
-
-# Making a file fit what is asked
 
 
 def extend_file(path: Path, wanted: Sequence[Table], replaced: Collection[tuple[str, str, str]] = ()) -> TableFile:
@@ -1057,7 +903,7 @@ def read_arrays(
             arrays = {name: dataset[()] for name, dataset in datasets.items()}
             units = {name: _unit_of(dataset) for name, dataset in datasets.items()}
     except (OSError, RuntimeError, KeyError, ValueError, TypeError) as exc:
-        raise StoreError(f"{path}: not a readable HDF5 file ({_reason(exc)})") from exc
+        raise StoreError(f"{path}: not a readable HDF5 file ({reason_of(exc)})") from exc
     return arrays, {name: unit for name, unit in units.items() if unit}
 
 

@@ -22,7 +22,6 @@ from typing import TypeVar
 from rotor_mbs.errors import ResourceError, StoreError
 from rotor_mbs.processes.worker import TaskLostError, Worker, is_worker, limit_resources
 from rotor_mbs.runs.trailer import read_trailer
-from rotor_mbs.scenario.catalogue import REFERENCES
 
 T = TypeVar("T")
 R = TypeVar("R")
@@ -38,7 +37,7 @@ _WAIT_S = 300.0  # for what takes time without the processor; also the limit whe
 
 def _load() -> None:
     """Load the code that reads files."""
-    import_module("rotor_mbs.runs.read")  # by its name: only the worker imports it
+    import_module("rotor_mbs.runs.hdf5")  # by its name: it imports this module
 
 
 _worker = Worker(_load, memory_limit=_MEMORY, is_silent=True)
@@ -70,6 +69,8 @@ def read_apart(path: Path, read: Callable[[Path, T], R], argument: T) -> R:
     ResourceError
         If the worker process cannot be started.
     """
+    from rotor_mbs.scenario.catalogue import REFERENCES  # late: the worker does without
+
     trailer = read_trailer(path)
     if is_worker() or trailer.digest in _trusted or path.parent == REFERENCES:
         return read(path, argument)

@@ -27,11 +27,12 @@ from rotor_mbs.methods.catalogue import (
 )
 from rotor_mbs.methods.method_file import ENDING
 from rotor_mbs.runs.design import MISSING, RUNS
+from rotor_mbs.runs.hdf5 import reading
 from rotor_mbs.runs.output_files import is_being_written
 from rotor_mbs.runs.read import is_sweep, open_results
 from rotor_mbs.runs.runner import OnProgress, ignore_progress
 from rotor_mbs.runs.sweeps import StoredSweep, parameter_name
-from rotor_mbs.runs.table import TableFile, reading
+from rotor_mbs.runs.table import TableFile
 from rotor_mbs.scenario.accuracy_bounds import Bounds
 from rotor_mbs.scenario.catalogue import find_scenes
 from rotor_mbs.studies.run import run_scenes

@@ -15,7 +15,8 @@ from pathlib import Path
 import jinja2
 import numpy as np
 
-from rotor_mbs.runs.design import MISSING, Column
+from rotor_mbs.runs.design import MISSING
+from rotor_mbs.runs.hdf5 import Column
 from rotor_mbs.runs.output_files import replace_file
 from rotor_mbs.runs.sweeps import StoredSweep
 from rotor_mbs.runs.table import KEYWORDS, new_file

@@ -23,7 +23,7 @@ from support.sweeps import THREE_RUNS, made_sweep
 
 import rotor_mbs as rm
 from rotor_mbs.errors import StoreError
-from rotor_mbs.runs import table, trailer
+from rotor_mbs.runs import hdf5, trailer
 from rotor_mbs.runs.output_files import locked
 from rotor_mbs.runs.read import open_results
 from rotor_mbs.runs.sweeps import StoredSweep
@@ -177,7 +177,7 @@ def test_a_flipped_bit_outside_the_rows_is_refused_before_hdf5_sees_it(
     content = bytearray(copy.read_bytes())
     content[offset] ^= 4
     copy.write_bytes(content)
-    monkeypatch.setattr(table.h5py, "File", None)
+    monkeypatch.setattr(hdf5.h5py, "File", None)
     assert str(copy) in refusal("check", copy)
 
 
@@ -284,7 +284,7 @@ def test_files_that_are_not_ours_are_refused_with_one_line(
         raise PermissionError(13, "Permission denied")
 
     monkeypatch.setattr(Path, "open", refuse)
-    with pytest.raises(StoreError, match="cannot be read: Permission denied"), table.open_file(written):
+    with pytest.raises(StoreError, match="cannot be read: Permission denied"), hdf5.open_file(written):
         pass
 
 

@@ -12,7 +12,8 @@ import pytest
 from support.scenes import paper
 
 from rotor_mbs.errors import InputError, StoreError
-from rotor_mbs.runs.design import CHARACTER, CHARACTERS, COLUMNS, MISSING, Asked, Column
+from rotor_mbs.runs.design import CHARACTER, COLUMNS, MISSING, Asked
+from rotor_mbs.runs.hdf5 import CHARACTERS, Column
 from rotor_mbs.runs.output_files import locked
 from rotor_mbs.runs.read import points_table
 from rotor_mbs.runs.table import (

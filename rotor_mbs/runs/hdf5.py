@@ -1,0 +1,260 @@
+"""Files of this program read by the HDF5 library: attributes, columns and values of groups, not the rows.
+
+The worker process of `runs.untrusted` loads this module, and nothing else of the package.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import h5py
+import numpy as np
+from numpy.typing import NDArray
+
+from rotor_mbs.errors import RotorError, StoreError, one_line
+from rotor_mbs.runs.trailer import SPLIT_OF, Trailer, read_trailer
+from rotor_mbs.runs.untrusted import read_apart
+
+CHARACTERS = "characters"  # the dimension of texts that are filled in later
+# The netCDF-4 library's name for the scale of a dimension without values.
+WITHOUT_VALUES = "This is a netCDF dimension but not a netCDF variable."
+_NOT_ATTRIBUTES = ("CLASS", "NAME", "REFERENCE_LIST", "DIMENSION_LIST", "_Netcdf4Dimid", "_Netcdf4Coordinates")
+# A text of variable length as it lies in a dataset.
+_REFERENCE = np.dtype([("length", "<u4"), ("heap", "<u8"), ("index", "<u4")])
+_ATTEMPTS = 3  # to open a file that is being replaced
+
+
+class Column(NamedTuple):
+    """A dataset: its dimensions (names of scales; a scale has its own name), units, what it is, the type of its values
+    in the file, and further attributes."""
+
+    dimensions: tuple[str, ...]
+    units: str
+    long_name: str
+    kind: str = "<f8"
+    attributes: Mapping[str, Any] = {}
+
+
+class StoredRows(NamedTuple):
+    """A computed column: shape, offset in the file in bytes, and whether that is what the trailer says."""
+
+    shape: tuple[int, ...]
+    offset: int
+    is_in_place: bool
+
+
+class StoredGroup(NamedTuple):
+    """A group of a file.
+
+    Attributes
+    ----------
+    attributes : of the group.
+    columns : its datasets by name.
+    values : of each dataset whose rows are not in the trailer.
+    rows : the others.
+    characters : of each computed text.
+    """
+
+    attributes: Mapping[str, Any]
+    columns: Mapping[str, Column]
+    values: Mapping[str, NDArray[Any]]
+    rows: Mapping[str, StoredRows]
+    characters: int
+
+
+class Content(NamedTuple):
+    """A file without its rows: attributes, names of its groups, those that were read by name, and its inode."""
+
+    attributes: dict[str, Any]
+    names: list[str]
+    groups: dict[str, StoredGroup]
+    inode: int
+
+
+def read_content(path: Path, kinds: Collection[str], only: Collection[str] | None = None) -> Content:
+    """Read a file of this program, apart unless it is trusted.
+
+    Parameters
+    ----------
+    path : the file.
+    kinds : of files; one of another kind has no groups here.
+    only : names of the groups to read, by default all.
+
+    Raises
+    ------
+    StoreError
+        If it is missing, damaged or another program's, or cannot be read within limits.
+    """
+    return read_apart(path, _read_content, (kinds, only))
+
+
+def _read_content(path: Path, asked: tuple[Collection[str], Collection[str] | None]) -> Content:
+    kinds, only = asked
+    with open_file(path) as (file, trailer), reading(path):
+        names = list(trailer.groups) if trailer.kind in kinds else []
+        groups = {}
+        for name in names:
+            if only is None or name in only:
+                groups[name] = _read_group(group_at(file, name), trailer.groups[name])
+        return Content(attributes_of(file), names, groups, trailer.inode)
+
+
+def _read_group(group: Any, regions: Mapping[str, tuple[int, int]]) -> StoredGroup:
+    columns = columns_of(group)
+    values = {name: values_of(group[name]) for name in columns if name not in regions}
+    rows = {}
+    for name, region in regions.items():
+        dataset = group[name]
+        rows[name] = StoredRows(dataset.shape, region[0], place_of(dataset) == tuple(region))
+    characters = len(group[CHARACTERS]) if CHARACTERS in group else 0
+    return StoredGroup(attributes_of(group), columns, values, rows, characters)
+
+
+@contextmanager
+def open_file(path: Path) -> Iterator[tuple[Any, Trailer]]:
+    """An existing file of this program, read only, and its trailer, which is checked before HDF5 sees the file. Raises
+    StoreError where it is missing, damaged or another program's."""
+    for _ in range(_ATTEMPTS):
+        trailer = read_trailer(path)
+        try:
+            file = h5py.File(path, "r")
+        except OSError as exc:
+            raise StoreError(
+                f"{path}: not a readable HDF5 file ({reason_of(exc)}); allowed: a file that rotor-mbs wrote"
+            ) from exc
+        with file:
+            if path.stat().st_ino != trailer.inode:  # replaced since it was checked
+                continue
+            if trailer.kind.startswith(SPLIT_OF):
+                whole = trailer.kind.removeprefix(SPLIT_OF)
+                raise StoreError(f"{path}: a split for Hugging Face datasets; allowed: the sweep's own file, {whole}")
+            yield file, trailer
+            return
+    raise StoreError(f"{path}: is being replaced by another process")
+
+
+@contextmanager
+def reading(path: Path | str, what: str = "") -> Iterator[None]:
+    """Whatever goes wrong with what a file holds is a StoreError that names the place: HDF5 raises errors of many kinds
+    on damaged files, and so does code with what a forged one says, although its digest is right."""
+    try:
+        yield
+    except (RotorError, ImportError, BrokenPipeError):
+        raise
+    except Exception as exc:
+        place = f"{path}: {what}" if what else f"{path}"
+        raise StoreError(f"{place}: damaged or incomplete ({one_line(exc)[:150]})") from exc
+
+
+def group_at(file: Any, path: str) -> Any:
+    """A group by its path. Raises StoreError where there is none, or a link."""
+    for name in path.split("/") if path else ():
+        file = member(file, name)
+    return file
+
+
+def member(group: Any, name: str) -> Any:
+    """A member of a group. Raises StoreError where there is none, or a link."""
+    link = group.get(name, getlink=True)
+    if not isinstance(link, h5py.HardLink):
+        found = "is missing" if link is None else "is a link"
+        raise StoreError(f"{group.file.filename}: {group.name}/{name} {found}; allowed: groups and arrays of this file")
+    return group[name]
+
+
+def values_of(dataset: Any) -> NDArray[Any]:
+    """An array of numbers, or of texts, whole. Raises StoreError where it is not in the file, or claims far more than
+    the file holds."""
+    place = f"{dataset.file.filename}: {dataset.name}"
+    if not isinstance(dataset, h5py.Dataset) or dataset.shape is None:
+        raise StoreError(f"{place} is no array")
+    layout = dataset.id.get_create_plist()
+    if layout.get_external_count() or layout.get_layout() != h5py.h5d.CONTIGUOUS:
+        raise StoreError(f"{place} is not contiguous in this file; allowed: an array as rotor-mbs writes it")
+    kept, size = dataset.id.get_storage_size(), dataset.file.id.get_filesize()
+    if kept > size or kept < dataset.nbytes:
+        raise StoreError(f"{place} claims {dataset.nbytes:.2g} bytes and has {kept:.2g}")
+    if dataset.dtype.kind != "O":
+        values: NDArray[Any] = dataset[()]
+        return values
+    if h5py.check_string_dtype(dataset.dtype) is None:
+        raise StoreError(f"{place} is no array")
+    # Each text is a reference that begins with its length, and all may refer to one text: bounded before it is read.
+    if dataset.size:
+        texts = np.memmap(dataset.file.filename, _REFERENCE, "r", dataset.id.get_offset(), dataset.shape)
+        if int(texts["length"].sum(dtype=np.uint64)) > size:
+            raise StoreError(f"{place} claims more text than the file has")
+    return np.array([plain(text) for text in dataset[()]], dtype=object)
+
+
+def plain(value: Any) -> Any:
+    """An attribute as a plain Python value."""
+    if isinstance(value, np.ndarray):
+        return [plain(item) for item in value]
+    if isinstance(value, bytes):
+        return value.decode()
+    return value.item() if isinstance(value, np.generic) else value
+
+
+def attributes_of(target: Any) -> dict[str, Any]:
+    """As plain Python values, without those that the library writes by itself."""
+    return {name: attribute(target, name) for name in target.attrs if name not in _NOT_ATTRIBUTES}
+
+
+def attribute(target: Any, name: str, default: Any = None) -> Any:
+    """As a plain Python value; the default where there is none. Raises ValueError for a type that no attribute has.
+
+    In a damaged file a text may have become a list of any type: reading it ends the process.
+    """
+    if name not in target.attrs:
+        return default
+    if isinstance(h5py.h5a.open(target.id, name.encode()).get_type(), h5py.h5t.TypeVlenID):
+        raise ValueError(f"attribute {name} is neither a number nor a text")
+    return plain(target.attrs[name])
+
+
+def columns_of(group: Any) -> dict[str, Column]:
+    """What the datasets of a group are, by name."""
+    columns = {}
+    for name in group:
+        dataset = member(group, name)
+        if not is_group(dataset) and not is_dimension_only(dataset):
+            # The names of the scales by their attribute: the library would look for their paths through the whole
+            # file, and its own way to a name ends the process where that is damaged. A scale is its own dimension.
+            scales = [str(attribute(scale[0], "NAME")) if len(scale) else name for scale in dataset.dims]
+            dimensions = tuple(CHARACTERS if scale.startswith(WITHOUT_VALUES) else scale for scale in scales)
+            # Lists of texts as such; numbers as they are, whose type belongs to the attribute.
+            attributes = {
+                name: dataset.attrs[name] if isinstance(value, list) and not isinstance(value[0], str) else value
+                for name, value in attributes_of(dataset).items()
+                if name != "_Encoding"
+            }
+            units, long_name = (str(attributes.pop(name)) for name in ("units", "long_name"))
+            columns[name] = Column(dimensions, units, long_name, dataset.dtype.str, attributes)
+    return columns
+
+
+def is_group(item: Any) -> bool:
+    return isinstance(item, h5py.Group)
+
+
+def reason_of(error: Exception) -> str:
+    """What HDF5 says in brackets, "file signature not found", without the name of its function."""
+    text = str(error).splitlines()[0]
+    return text.partition("(")[2].rpartition(")")[0] or text
+
+
+# Making a file fit what is asked
+
+
+def place_of(dataset: Any) -> tuple[int, int]:
+    """Offset and length in bytes of the values of a contiguous dataset."""
+    return dataset.id.get_offset() or 0, dataset.nbytes
+
+
+def is_dimension_only(dataset: Any) -> bool:
+    """Whether a dataset is a dimension without values."""
+    return str(attribute(dataset, "NAME", "")).startswith(WITHOUT_VALUES)
