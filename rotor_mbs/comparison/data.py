@@ -30,6 +30,7 @@ _MAX_EXCEPTIONS = 0.05  # of the numbers
 _MIN_DISTINCT = 10  # values: fewer may have been chosen, and say nothing of digits
 _SAMPLE = 200  # numbers of a column, at least, where not all are needed
 _EQUAL = 1e-6  # of an interval between rows
+_MOSTLY = 0.9  # of the intervals
 _MIN_ROWS = 3  # fewer have no motion to be compared
 
 
@@ -171,8 +172,11 @@ def data_of_table(
     else:
         _refuse_wrong_times(table.source, arrays[0])
         intervals = np.diff(arrays[0])
-        # Equal intervals are meant as they are written, though the times have few digits.
-        if np.ptp(intervals) <= _EQUAL * float(intervals.mean()):
+        # Equal intervals are meant as they are written, though the times have few digits; a few
+        # that differ are faults of the clock.
+        usual = float(np.median(intervals))
+        is_usual = np.abs(intervals - usual) <= _EQUAL * usual
+        if is_usual.mean() >= _MOSTLY:
             rounding[0] = np.abs(arrays[0]) * 2.0**-53
     used = {source.column for source in sources.values()}
     return ForeignData(

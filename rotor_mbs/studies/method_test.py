@@ -122,6 +122,8 @@ class _Examination:
         self._bound = defect_bound(self._bounds, method.name)
         self._made: list[Check] = []
         self._refused: set[str] = set()
+        # Of the first scene whose defects nothing else explains; None as long as there is none.
+        self._has_faults_in_time: bool | None = None
 
     def checks(self) -> list[Check]:
         self._ask(replace(only_scene(_SMOOTH), duration=0.02, samples=2, outputs=("angles", "rates")), limit=_FIRST_S)
@@ -210,17 +212,16 @@ class _Examination:
             self._add(name, scene.name, check.value, bound, hint, check.unit)
 
     def _cause(self, scene: Scene, run: Trajectory, defects: Defects) -> str:
-        """Return why the defects of a run are too large: its step, rates of other rows, other equations or numbers, or
-        faults at a time."""
-        step = self._method.defaults.get("step")
-        if isinstance(step, float):
-            finer = self._ask(scene, {"step": 0.5 * step})
-            half = defects_of(scene, finer.trajectory) if len(finer.time) == len(run.time) else None
-            if half is not None:
-                order = float(np.log2(root_mean_square(defects) / root_mean_square(half)))
-                if order >= (self._method.order or 1.0) - _ORDER_BAND:
-                    left = float(half.sizes.max())
-                    return f"step of {step:g} s too large: half the step gives {left:.1e} rad, order {order:.1f}"
+        """Return why the defects of a run are too large.
+
+        It is asked for its step, for rates of other rows, and for other equations or numbers; what
+        none of these explains may be faults at a time, or a scheme of lower order.
+        """
+        left, order = self._with_half_step(scene, run, defects)
+        claimed = self._method.order or 1.0
+        if order >= claimed - _ORDER_BAND:
+            step = self._method.defaults["step"]
+            return f"step of {step:g} s too large: half the step gives {left:.1e} rad, order {order:.1f}"
         if lag := _lag_of_rates(scene, run, defects):
             return lag
         try:
@@ -228,9 +229,36 @@ class _Examination:
             alike = DefectSearch(judged).textbook_causes()
             if len(alike) > 1:  # this motion does not tell which
                 return f"{NOT_FOUND}: explained alike by: {'; '.join(alike)}"
-            return (alike or [" and ".join(faults_in_time(judged))])[0] or NOT_FOUND
+            if alike:
+                return alike[0]
+            faults = " and ".join(faults_in_time(judged))
         except RotorError:
-            return NOT_FOUND
+            faults = ""
+        # Wrong equations leave the same at any step: what shrinks is the scheme's.
+        by_order = ""
+        if order >= 1.0 - _ORDER_BAND:
+            look_at = "the scheme's coefficients, or loads of another time within a step"
+            by_order = f"order {order:.1f} where {claimed:g} is expected: {look_at}"
+        # The first scene that fails moves in all its intervals. In one that rests most of the time
+        # whatever is wrong would look like a fault at a time.
+        if self._has_faults_in_time is None:
+            self._has_faults_in_time = bool(faults)
+        return (faults if self._has_faults_in_time else by_order) or NOT_FOUND
+
+    def _with_half_step(self, scene: Scene, run: Trajectory, defects: Defects) -> tuple[float, float]:
+        """Return the largest defect with half the step, rad, and the order by which the defects shrink.
+
+        Both are zero for a method without a step.
+        """
+        step = self._method.defaults.get("step")
+        if not isinstance(step, float):
+            return 0.0, 0.0
+        finer = self._ask(scene, {"step": 0.5 * step})
+        half = defects_of(scene, finer.trajectory) if len(finer.time) == len(run.time) else None
+        if half is None:
+            return 0.0, 0.0
+        ratio = root_mean_square(defects) / root_mean_square(half)
+        return float(half.sizes.max()), float(np.log2(ratio))
 
     def _exact(self, scene: Scene) -> None:
         known = exact_rotor_angle(scene, sample_times(scene))
