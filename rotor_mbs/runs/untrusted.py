@@ -27,11 +27,11 @@ T = TypeVar("T")
 R = TypeVar("R")
 
 # Limits of processor time (s), which are the same on a busy machine, and of address space (bytes):
-# for any file, and for each byte of it outside the rows. Reading takes at most a fortieth of these.
-_TIME_S = 10.0
-_TIME_OF_BYTE_S = 1e-5
-_MEMORY = 1 << 30
-_MEMORY_OF_BYTE = 16
+# for any file, and for each byte of it outside the rows, of which reading takes about 1 us.
+TIME_S = 10.0
+TIME_OF_BYTE_S = 1e-5
+MEMORY = 1 << 30
+MEMORY_OF_BYTE = 16
 _WAIT_S = 300.0  # for what takes time without the processor; also the limit where the system has none
 
 
@@ -40,7 +40,7 @@ def _load() -> None:
     import_module("rotor_mbs.runs.hdf5")  # by its name: it imports this module
 
 
-_worker = Worker(_load, memory_limit=_MEMORY, is_silent=True)
+_worker = Worker(_load, memory_limit=MEMORY, is_silent=True)
 _asking = threading.Lock()
 _trusted: set[bytes] = set()
 atexit.register(_worker.close)
@@ -76,15 +76,15 @@ def read_apart(path: Path, read: Callable[[Path, T], R], argument: T) -> R:
         return read(path, argument)
     regions = [region for columns in trailer.groups.values() for region in columns.values()]
     size = path.stat().st_size - sum(length for _, length in regions)
-    seconds = _TIME_S + _TIME_OF_BYTE_S * size
-    memory = int(_MEMORY + _MEMORY_OF_BYTE * size)
+    seconds = TIME_S + TIME_OF_BYTE_S * size
+    memory = int(MEMORY + MEMORY_OF_BYTE * size)
     folder = ""
     with suppress(OSError):  # the working folder is gone
         folder = os.getcwd()  # noqa: PTH109  (a text)
     try:
         with _asking:
             return _worker.run(_read_limited, (folder, seconds, memory, read, path, argument), _WAIT_S + seconds)
-    except TaskLostError:
+    except (TaskLostError, MemoryError):
         pass
     limits = f"{seconds:.3g} s or {memory / 2**30:.3g} GB"
     problem = f"damaged or forged: HDF5 ends the process that reads it, or takes more than {limits}"

@@ -1,0 +1,177 @@
+"""Files whose HDF5 structures were forged, under a right digest: the HDF5 library hangs on them, ends its process or
+takes all memory, and every command ends with one line within seconds."""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+import signal
+import struct
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import h5py
+import pytest
+from support.checking import results_file
+from support.commands import rotor_mbs
+from support.forging import append_trailer
+from support.sweeps import THREE_RUNS, made_sweep
+
+import rotor_mbs as rm
+from rotor_mbs.errors import StoreError
+from rotor_mbs.runs import untrusted
+from rotor_mbs.runs.trailer import read_trailer
+from rotor_mbs.runs.untrusted import read_apart
+from rotor_mbs.scenario.catalogue import REFERENCES
+
+SCENE = "check/held"
+KINDS = ("results", "s", "modes", "comparison")
+_SOON_S = 60.0  # on a busy machine
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    made = tmp_path_factory.mktemp("untrusted")
+    results_file(made / "results.h5", [SCENE], ["lagrange/dop853"])
+    made_sweep(made, THREE_RUNS)
+    assert rotor_mbs("modes", SCENE, "--speeds", "0.5:1:2", "-j", "1", "-o", made / "modes.h5").status == 0
+    rm.export(SCENE, "csv", made / "data.csv")
+    rm.compare(made / "data.csv", SCENE).save(made / "comparison.h5")
+    return made
+
+
+@pytest.fixture(autouse=True)
+def short_limit(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(untrusted, "TIME_S", 1.0)
+
+
+def heap_without_end(content: bytearray) -> None:
+    """Give the last object of each global heap, the free space, no size: the library stays at it."""
+    for heap in re.finditer(b"GCOL", content):
+        (size,) = struct.unpack_from("<Q", content, heap.start() + 8)
+        place = heap.start() + 16
+        while place < heap.start() + size:
+            (number,) = struct.unpack_from("<H", content, place)
+            (length,) = struct.unpack_from("<Q", content, place + 8)
+            if number == 0:
+                content[place + 8 : place + 16] = bytes(8)
+                break
+            place += 16 + (length + 7) // 8 * 8
+
+
+def lists_of_scales_without_version(content: bytearray) -> None:
+    """Give the dataspace of the attribute that lists an array's scales no version: the library ends the process."""
+    name = b"DIMENSION_LIST\0\0"
+    for attribute in re.finditer(name, content):
+        type_length, space = 16, attribute.end() + 16
+        if content[attribute.start() - 4] == type_length and content[space] == 1:
+            content[space] = 0
+
+
+def endless_units(content: bytearray) -> None:
+    """Give texts of the attribute `units` a length of 2 GB."""
+    for attribute in re.finditer(rb"units\0\0\0", content):
+        type_length, space_length = 24, 8
+        length = attribute.end() + type_length + space_length
+        content[length : length + 4] = (2**31 - 1).to_bytes(4, "little")
+
+
+FORGERIES = {
+    "hangs": heap_without_end,
+    "dies": lists_of_scales_without_version,
+    "takes memory": endless_units,
+}
+
+
+def forge(path: Path, change: Callable[[bytearray], None]) -> None:
+    """Change the bytes of a file outside its rows, and give it a right trailer."""
+    known = read_trailer(path)
+    with h5py.File(path, "r+"):  # cuts the trailer off
+        pass
+    content = bytearray(path.read_bytes())
+    rows = [(start, content[start : start + size]) for all in known.groups.values() for start, size in all.values()]
+    change(content)
+    for start, values in rows:
+        content[start : start + len(values)] = values
+    path.write_bytes(content)
+    append_trailer(path, known.kind, known.groups)
+
+
+@pytest.mark.parametrize("forgery", FORGERIES)
+@pytest.mark.parametrize("kind", [KINDS[0], *(pytest.param(kind, marks=pytest.mark.full) for kind in KINDS[1:])])
+def test_every_command_ends_with_a_line(forgery: str, kind: str, folder: Path, tmp_path: Path) -> None:
+    path = Path(shutil.copy(folder / f"{kind}.h5", tmp_path / "forged.h5"))
+    forge(path, FORGERIES[forgery])
+    before = path.read_bytes()
+    commands: list[list[object]] = [["check", path], ["report", path, "-o", tmp_path / "pages"]]
+    if kind == "results":
+        commands += [["animate", SCENE, path, "-o", tmp_path / "a.webp"], ["figures", path, "-o", tmp_path]]
+        commands += [["run", SCENE, "-m", "lagrange/dop853", "-j", "1", "-o", path]]
+    elif kind == "s":
+        commands += [["sweep", folder / "s.toml", "-j", "1", "-o", path]]
+    elif kind == "modes":
+        commands += [["modes", SCENE, "--speeds", "0.5:1:2", "-j", "1", "-o", path]]
+    for words in commands:
+        begun = time.monotonic()
+        ended = rotor_mbs(*words)
+        assert ended.status == 2, ended
+        *progress, line = ended.err.splitlines()
+        assert all(text.startswith("[") for text in progress), progress
+        assert str(path) in line
+        assert "damaged" in line or "nothing to check" in line
+        assert time.monotonic() - begun < _SOON_S
+    with pytest.raises(rm.RotorError, match=r"damaged|has no runs"):
+        _ = rm.open(path).statuses
+    assert path.read_bytes() == before
+
+
+def _wait(path: Path, seconds: float) -> None:  # noqa: ARG001
+    end = time.process_time() + seconds
+    while time.process_time() < end:
+        pass
+
+
+def _take(path: Path, size: int) -> int:  # noqa: ARG001
+    return len(bytes(size))
+
+
+def _die(path: Path, number: int) -> None:  # noqa: ARG001
+    os.kill(os.getpid(), number)
+
+
+def _process(path: Path, argument: None) -> int:  # noqa: ARG001
+    return os.getpid()
+
+
+@pytest.mark.parametrize(
+    ("read", "argument"), [(_wait, 100.0), (_take, 1 << 31), (_die, signal.SIGSEGV)], ids=["time", "memory", "signal"]
+)
+def test_the_limits_of_the_worker(
+    read: Callable[[Path, object], object], argument: object, folder: Path, tmp_path: Path
+) -> None:
+    path = Path(shutil.copy(folder / "results.h5", tmp_path / "changed.h5"))
+    forge(path, lambda content: content.extend(bytes(8)))
+    with pytest.raises(StoreError, match=r"damaged or forged: .* takes more than .* s or .* GB"):
+        read_apart(path, read, argument)
+    assert read_apart(path, _process, None) != os.getpid()  # a new process reads the next one
+
+
+def test_only_files_of_others_are_read_by_the_worker(folder: Path, tmp_path: Path) -> None:
+    assert read_apart(folder / "results.h5", _process, None) == os.getpid()
+    assert read_apart(sorted(REFERENCES.glob("*.h5"))[0], _process, None) == os.getpid()
+    path = Path(shutil.copy(folder / "results.h5", tmp_path / "changed.h5"))
+    forge(path, lambda content: content.extend(bytes(8)))
+    assert read_apart(path, _process, None) != os.getpid()
+    assert rm.open(path).statuses == rm.open(folder / "results.h5").statuses
+
+
+def test_the_worker_needs_no_more_than_it_reads_with() -> None:
+    """Or each command would wait longer for it."""
+    program = "import sys, rotor_mbs.runs.hdf5; print(*sys.modules)"
+    modules = set(subprocess.run([sys.executable, "-c", program], capture_output=True, text=True).stdout.split())
+    assert "h5py" in modules
+    assert not modules & {"rotor_mbs.scenario.scene", "rotor_mbs.methods.catalogue", "rotor_mbs.runs.table", "scipy"}
