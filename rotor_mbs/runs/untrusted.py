@@ -20,7 +20,8 @@ from pathlib import Path
 from typing import TypeVar
 
 from rotor_mbs.errors import ResourceError, StoreError
-from rotor_mbs.processes.worker import TaskLostError, Worker, is_worker, limit_resources
+from rotor_mbs.processes.serving import is_worker, limit_resources
+from rotor_mbs.processes.worker import TaskLostError, Worker
 from rotor_mbs.runs.trailer import read_trailer
 
 T = TypeVar("T")

@@ -1,0 +1,142 @@
+"""What a worker process does: it answers the requests of its parent, see `processes.worker`."""
+
+from __future__ import annotations
+
+import gc
+import os
+import pickle
+import queue
+import signal
+import sys
+import threading
+from collections.abc import Callable
+from contextlib import suppress
+from typing import BinaryIO
+
+from rotor_mbs.errors import one_line, system_errors_apart
+
+_is_worker = False
+
+
+def serve() -> None:
+    """Answer requests until the parent ends: the whole of what a worker process does."""
+    global _is_worker
+    try:
+        _is_worker = True
+        _end_with_parent()
+        signal.signal(signal.SIGINT, signal.SIG_IGN)
+        # Loading engines and drawing leave few cycles, and collecting took a twentieth.
+        gc.set_threshold(50_000, 20, 20)
+        del sys.argv[1:]
+        requests, answers = _private_pipes()
+        received: queue.SimpleQueue[bytes] = queue.SimpleQueue()
+        # The thread ends this process with its input, whatever the main thread does.
+        threading.Thread(target=_receive, args=(requests, received), daemon=True).start()
+        while True:
+            send(answers, _answer(received.get()))
+    finally:  # an exit or an error: nothing is left to do, and nobody to tell
+        os._exit(1)
+
+
+def _end_with_parent() -> None:
+    """Have Linux end this process with its parent.
+
+    Elsewhere a thread does so, which an engine that keeps the interpreter's lock stops.
+    """
+    if sys.platform == "linux":
+        with suppress(ImportError, OSError, AttributeError):
+            import ctypes
+
+            set_parent_death_signal = 1  # PR_SET_PDEATHSIG of prctl(2)
+            ctypes.CDLL(None).prctl(set_parent_death_signal, signal.SIGKILL)
+
+
+def _private_pipes() -> tuple[BinaryIO, BinaryIO]:
+    """Return the pipes of requests and answers, which code that reads or prints does not reach."""
+    nothing = os.open(os.devnull, os.O_RDWR)
+    while nothing <= 2:  # the parent's standard error may have been closed
+        nothing = os.open(os.devnull, os.O_RDWR)
+    pipes = [os.dup(0), os.dup(1)]
+    os.dup2(nothing, 0)
+    os.dup2(2, 1)
+    sys.stdout = sys.stderr
+    requests, answers = os.fdopen(pipes[0], "rb"), os.fdopen(pipes[1], "wb")
+
+    def close_in_fork() -> None:
+        """Close the pipes in what a method forks, which may outlive this process, and hide its end."""
+        while pipes:
+            os.close(pipes.pop())
+
+    if hasattr(os, "register_at_fork"):
+        os.register_at_fork(after_in_child=close_in_fork)
+    return requests, answers
+
+
+def _receive(requests: BinaryIO, received: queue.SimpleQueue[bytes]) -> None:
+    """Pass requests on; end this process where they end."""
+    try:
+        while True:
+            received.put(pickle.load(requests))
+    finally:
+        os._exit(1)
+
+
+def set_up(core: int | None, memory_limit: int | None, initializer: Callable[[], object] | None) -> None:
+    """Set the core and the limit of memory of this process, and call its initializer."""
+    if core is not None and hasattr(os, "sched_setaffinity"):
+        os.sched_setaffinity(0, {core})
+    if memory_limit is not None:
+        limit_resources(memory_limit)
+    if initializer is not None:
+        initializer()
+
+
+def limit_resources(memory: int, processor_s: int | None = None) -> None:
+    """Limit address space (bytes) and processor time (s) of this process, where the system can.
+
+    Over the second limit the system ends it.
+    """
+    with suppress(ImportError):  # Windows
+        import resource
+
+        limits = {resource.RLIMIT_AS: memory}
+        if processor_s is not None:
+            limits |= {resource.RLIMIT_CPU: processor_s, resource.RLIMIT_CORE: 0}
+        for kind, limit in limits.items():
+            _, hard = resource.getrlimit(kind)
+            if hard != resource.RLIM_INFINITY:
+                limit = min(limit, hard)
+            with suppress(ValueError, OSError):  # macOS has no limit of address space
+                resource.setrlimit(kind, (limit, hard))
+
+
+def is_worker() -> bool:
+    """Return whether this is a worker process."""
+    return _is_worker
+
+
+def _answer(request: bytes) -> bytes:
+    """Return the pickled (result, error) of a pickled (function, argument).
+
+    What cannot be pickled, and an exit, is an error of the task.
+    """
+    try:
+        with system_errors_apart():
+            work, task = pickle.loads(request)
+            result = work(task)
+        return pickle.dumps((result, None))
+    except Exception as exc:
+        try:
+            answer = pickle.dumps((None, exc))
+            pickle.loads(answer)  # not every error arrives as it is sent
+        except Exception:
+            return pickle.dumps((None, RuntimeError(one_line(exc))))
+        return answer
+    except BaseException as exc:  # SystemExit and the like must not end the parent
+        return pickle.dumps((None, RuntimeError(one_line(exc))))
+
+
+def send(stream: BinaryIO, message: bytes) -> None:
+    """Write a message to a pipe, from which `pickle.load` reads it. Raises OSError."""
+    pickle.dump(message, stream)
+    stream.flush()
