@@ -113,7 +113,10 @@ BROKEN = {
     "no jump handling": (
         "intervals(self.scene.load_segments,", "intervals(segments([()] * 9, self.scene.duration),", "load|jump"
     ),
-    "first order": ("return y + h / 6 * (k1 + 2 * k2 + 2 * k3 + k4)", "return y + h * k1", "order (1.0|1.1|0.9)|order 2.* where 4 is expected"),
+    "first order": (
+        "return y + h / 6 * (k1 + 2 * k2 + 2 * k3 + k4)", "return y + h * k1",
+        "order (1.0|1.1|0.9)|order 2.* where 4 is expected",
+    ),
     "state kept": (
         "        y = self.start()",
         "        Rk4.runs = getattr(Rk4, 'runs', 0) + 1\n        y = self.start() + 1e-12 * Rk4.runs",
