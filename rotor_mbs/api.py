@@ -12,6 +12,7 @@ import operator
 import os
 import shutil
 import tempfile
+import textwrap
 import weakref
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -25,18 +26,29 @@ from typing import TYPE_CHECKING, Any, overload
 import numpy as np
 
 from rotor_mbs.analysis.judgement import defects_of
-from rotor_mbs.analysis.text_tables import RUN_HEAD, TextTable, run_row
+from rotor_mbs.analysis.text_tables import (
+    MOST_ROWS,
+    RUN_HEAD,
+    TextTable,
+    bench_table,
+    method_table,
+    run_row,
+    sweep_parameters,
+)
 from rotor_mbs.errors import InputError, MethodRefusal, ResourceError, StoreError, shown_value
 from rotor_mbs.methods.catalogue import REFERENCE, check_names, problems_of_scene, selected_methods
 from rotor_mbs.methods.method_file import ENDING
 from rotor_mbs.methods.time_limit import valid_seconds
 from rotor_mbs.processes.pool import check_workers
-from rotor_mbs.runs.design import MISSING, RUNS
+from rotor_mbs.runs.design import COLUMNS, MISSING, RUNS
 from rotor_mbs.runs.hdf5 import reading
-from rotor_mbs.runs.read import StoredRun, StoredScene, is_sweep, open_results
+from rotor_mbs.runs.progress import progress_of_call
+from rotor_mbs.runs.read import StoredRun, StoredScene, is_sweep, open_results, read_records, run_names
 from rotor_mbs.runs.sweeps import ERROR_GROWTH, METRICS, StoredSweep, parameter_name
 from rotor_mbs.runs.table import TableFile, copy_file, text_of
+from rotor_mbs.runs.trailer import COMPARISON, MODES, RESULTS, read_trailer
 from rotor_mbs.scenario.catalogue import list_scenes, only_scene, scene_of
+from rotor_mbs.scenario.keys import counted
 from rotor_mbs.scenario.scene import Scene, load_scene, parse_scene
 from rotor_mbs.scenario.toml_file import file_path, plain_value
 from rotor_mbs.solution.defects import Defects
@@ -50,6 +62,11 @@ if TYPE_CHECKING:
 
 _NO_LIMIT_S = 1e9
 _SHOWN = 5  # lines of lost runs
+# Of a run on a screen; the others are in `Run.metrics`.
+_MAIN_METRICS = (
+    "energy_drift_max", "energy_gain_J", "horizon_s", "rotor_angle_min", "rotor_angle_max", "rotor_rate_max",
+    "pitch_max",
+)  # fmt: skip
 
 
 def scenes(folder: str = "") -> list[str]:
@@ -98,14 +115,14 @@ def load(path: str | os.PathLike[str]) -> Scene:
 @overload
 def run(  # type: ignore[overload-overlap]
     scene: Scene | str | os.PathLike[str], method: str = ..., *, timeout: float = ..., reference: bool = ...,
-    workers: int = ..., **settings: object,
+    workers: int = ..., progress: bool | None = ..., **settings: object,
 ) -> Run: ...  # fmt: skip
 
 
 @overload
 def run(
     scene: Scene | str | os.PathLike[str], method: Sequence[str], *, timeout: float = ..., reference: bool = ...,
-    workers: int = ..., **settings: object,
+    workers: int = ..., progress: bool | None = ..., **settings: object,
 ) -> Runs: ...  # fmt: skip
 
 
@@ -116,6 +133,7 @@ def run(
     timeout: float = float("inf"),
     reference: bool = False,
     workers: int = 0,
+    progress: bool | None = None,
     **settings: object,
 ) -> Run | Runs:
     """Simulate a scene with one or more methods, and determine the status from the samples.
@@ -135,6 +153,8 @@ def run(
         it is always computed. Without a reference the status follows from the samples and the energy balance.
     workers : int
         Number of worker processes for several methods; 0: everything runs in this process.
+    progress : bool, optional
+        Whether to show the progress of several methods. By default on a terminal and in a notebook.
     **settings
         Settings of the methods. `rotor-mbs show METHOD` lists names, units, ranges and defaults.
 
@@ -189,7 +209,11 @@ def run(
         raise MethodRefusal("\n".join(map(str, refused)))
     folder = _TemporaryFolder()
     path = folder.path / "runs.h5"
-    report = run_scenes([scene], chosen, path, workers=workers, timeout_s=min(timeout, _NO_LIMIT_S), settings=settings)
+    with progress_of_call(progress) as on_progress:
+        report = run_scenes(
+            [scene], chosen, path, workers=workers, timeout_s=min(timeout, _NO_LIMIT_S), settings=settings,
+            on_progress=on_progress,
+        )  # fmt: skip
     refuse_losses([f"{run.label}: {run.message}" for run in report.not_computed])
     return Runs(path, scene.name, _folder=folder)
 
@@ -230,11 +254,34 @@ class Run(Solution):
 
         return RunPlots(self, self.reference)
 
+    def _metrics_shown(self) -> dict[str, str]:
+        """Return the metrics with their units, as text."""
+        shown = {}
+        for name, value in self.metrics.items():
+            unit = COLUMNS[name].units if name in COLUMNS else "1"
+            shown[name] = f"{value:.3g}" if unit == "1" else f"{value:.3g} {unit}"
+        return shown
+
+    def __repr__(self) -> str:
+        known = self._metrics_shown()
+        main = [f"{name} {known[name]}" for name in _MAIN_METRICS if name in known]
+        if not main:
+            return super().__repr__()
+        if len(known) > len(main):
+            main.append(f"... {len(known) - len(main)} more in run.metrics")
+        lines = textwrap.wrap(f"metrics: {', '.join(main)}", 110, initial_indent="  ", subsequent_indent="    ")
+        return "\n".join([super().__repr__(), *lines])
+
     def _repr_html_(self) -> str:
         drawn = ""
         with suppress(InputError):  # without samples, or without angles and rates
             drawn = self.plot()._repr_svg_()
-        return super()._repr_html_() + drawn
+        cells = ""
+        for name, text in self._metrics_shown().items():
+            about = escape(COLUMNS[name].long_name) if name in COLUMNS else ""
+            cells += f"<tr><th>{escape(name)}</th><td>{escape(text)}</td><td style='text-align:left'>{about}</td></tr>"
+        folded = f"<details><summary>{counted(len(self.metrics), 'metric')}</summary><table>{cells}</table></details>"
+        return super()._repr_html_() + (folded if cells else "") + drawn
 
 
 def sweep(
@@ -246,6 +293,7 @@ def sweep(
     workers: int = 0,
     timeout: float = 60.0,
     fresh: bool = False,
+    progress: bool | None = None,
     **options: object,
 ) -> Runs:
     """Run a parameter study: simulate a scene for all combinations of parameter values, into one dataset.
@@ -259,6 +307,7 @@ def sweep(
     workers : number of worker processes; 0: everything runs in this process.
     timeout : time limit of each run (s).
     fresh : whether stored runs are recomputed. By default they are kept, including those of other versions.
+    progress : whether to show the progress. By default on a terminal and in a notebook.
     **options : other keys of a sweep file: samples, outputs, draws, seed, combine, validation, settings, ...
 
     Raises
@@ -300,18 +349,27 @@ def sweep(
     plan = plan_sweep(study, time_limit_s=timeout)
     if plan.refused:
         raise MethodRefusal("\n".join(map(str, plan.refused)))
-    with open_task_pool("local", workers) as pool:
-        result = run_sweep(plan, path, pool, fresh=fresh)
+    with open_task_pool("local", workers) as pool, progress_of_call(progress) as shown:
+        result = run_sweep(plan, path, pool, shown.runs, fresh=fresh)
     if result.refused:
         raise MethodRefusal("\n".join(result.refused))
     refuse_losses(result.lost)
     return Runs(path, _folder=folder)
 
 
-def open(path: str | os.PathLike[str]) -> Runs:
-    """Open the runs in a results file or the file of a sweep.
+def open(path: str | os.PathLike[str]) -> Any:
+    """Open a file that this program wrote.
 
     Raises StoreError for other files, TypeError if `path` is neither text nor a path.
+
+    Returns
+    -------
+    Runs
+        Of a results file or a sweep. The labels of a file with one scene are method names.
+    Modes, DataComparison
+        Of a file of modes, or of comparisons; if it has several, a dict by scene, or by scene and name.
+    BenchCurves
+        Of a results file that has no runs but the curves of `rotor-mbs bench`.
 
     Examples
     --------
@@ -322,9 +380,57 @@ def open(path: str | os.PathLike[str]) -> Runs:
     (1001, 4)
     """
     file = file_path(path)
-    if not is_sweep(file) and RUNS not in TableFile(file, ()).groups:
-        raise StoreError(f"{file}: has no runs; allowed: a file that `rotor-mbs run`, `reproduce` or `sweep` wrote")
-    return Runs(file)
+    kind = read_trailer(file).kind
+    if kind == MODES:
+        from rotor_mbs.report.pages.modes import open_modes  # late: pages
+
+        return open_modes(file)
+    if kind == COMPARISON:
+        from rotor_mbs.report.pages.comparison import open_comparisons  # late: pages
+
+        return open_comparisons(file)
+    groups = TableFile(file, ()).groups
+    if kind == RESULTS and RUNS not in groups and "bench" in groups:
+        return BenchCurves(file)
+    runs = Runs(file)
+    return Runs(file, runs.scenes[0]) if kind == RESULTS and len(runs.scenes) == 1 else runs
+
+
+class BenchCurves(Mapping[str, Mapping[str, Any]]):
+    """Curves of error against run time in a file of `rotor-mbs bench`: arrays by "scene/curve", a value per setting.
+
+    `curves["paper/fig11/exudyn_tree/rk67"]["angle_error_max"]` (rad), `["run_time_s"]` (s), `["setting"]`: a time step
+    in s or a tolerance.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self._records = {f"{record.scene}/{record.name}": record for record in read_records(path, "bench")}
+
+    def __getitem__(self, label: str) -> Mapping[str, Any]:
+        return self._records[label].arrays
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._records)
+
+    def __len__(self) -> int:
+        return len(self._records)
+
+    def table(self) -> TextTable:
+        """Table with a row per curve: the smallest error (rad), and the run time (s) at which errors are reached."""
+        return bench_table(list(self._records.values()))
+
+    def to_html(self, folder: str | os.PathLike[str]) -> Path:
+        """Write the page into a folder. Returns its path."""
+        from rotor_mbs.report.build import write_report  # late: templates
+
+        return write_report(self.path, file_path(folder))
+
+    def __repr__(self) -> str:
+        return f"{self.path}: {counted(len(self), 'curve')} of error against run time\n{self.table()}"
+
+    def _repr_html_(self) -> str:
+        return f"<p>{escape(str(self.path))}</p>{self.table()._repr_html_()}"
 
 
 def texts(values: Iterable[str]) -> list[str]:
@@ -373,13 +479,18 @@ class Runs(Mapping[Any, Any]):
     ) -> None:
         self.path, self.scene, self._folder = file_path(path), os.fsdecode(scene), _folder
         self._is_sweep = is_sweep(self.path)
-        labels: list[Any]
+        self._labels: dict[Any, tuple[str, str]] = {}  # scene and method by label, in this order
         if self._is_sweep:
             stored = self._sweep.column("status") != MISSING
-            labels = self._sweep.column("run")[stored].tolist()
+            self._labels = dict.fromkeys(self._sweep.column("run")[stored].tolist(), ("", ""))
         else:
-            labels = [run.method if self.scene else f"{run.scene}/{run.method}" for run in self._runs()]
-        self._labels = dict.fromkeys(labels)  # in this order
+            names = run_names(self.path)
+            if self.scene and self.scene not in dict(names):
+                allowed = ", ".join(dict(names))
+                raise StoreError(f"{self.path}: has no scene {shown_value(self.scene)}; allowed: {allowed}")
+            for name, method in names:
+                if self.scene in ("", name):
+                    self._labels[method if self.scene else f"{name}/{method}"] = name, method
 
     def __reduce__(self) -> tuple[Any, ...]:
         """A copy, or what another process unpickles, has a file of its own in place of a temporary one."""
@@ -387,28 +498,35 @@ class Runs(Mapping[Any, Any]):
 
     def __getitem__(self, label: Any) -> Any:
         """Raises KeyError for what the file does not have, StoreError for samples that cannot be read."""
+        if self.scene and isinstance(label, str):  # "paper/fig11/lagrange/taylor", as in a file of several scenes
+            label = label.removeprefix(f"{self.scene}/")
         if label not in self._labels:
-            if not self._is_sweep and not self.scene:
-                with open_results(self.path) as results:
-                    if label in results.scenes:
-                        return Runs(self.path, label, _folder=self._folder)
+            if label in self.scenes:
+                return Runs(self.path, label, _folder=self._folder)
             available = ", ".join(map(str, islice(self._labels, 20)))
             raise KeyError(f"{shown_value(label)}; available: {available}")
         if self._is_sweep:
             with reading(self.path):
                 return self._run_of_sweep(int(label))
-        with open_results(self.path) as results:
-            name = self.scene or next((name for name in results.scenes if label.startswith(f"{name}/")), "")
-            if name not in results.scenes or label.removeprefix(f"{name}/") not in results.scenes[name].runs:
-                raise StoreError(f"{self.path}: has no {label} any more: another file has taken its place")
+        name, method = self._labels[label]
+        with open_results(self.path, only=[name]) as results:
+            if name not in results.scenes or method not in results.scenes[name].runs:
+                raise StoreError(f"{self.path}: has no {name}/{method} any more: another file has taken its place")
             scene = results.scenes[name]
-            return _loaded(scene, scene.runs[label.removeprefix(f"{name}/")])
+            return _loaded(scene, scene.runs[method])
 
     def __iter__(self) -> Iterator[Any]:
         return iter(self._labels)
 
     def __len__(self) -> int:
         return len(self._labels)
+
+    @property
+    def scenes(self) -> list[str]:
+        """Names of the scenes, in the order of the file; of a sweep that of its base scene."""
+        if self._is_sweep:
+            return [str(self._sweep.attributes["base_scene"])]
+        return list(dict.fromkeys(scene for scene, _ in self._labels.values()))
 
     @functools.cached_property
     def statuses(self) -> dict[str, int]:
@@ -423,11 +541,8 @@ class Runs(Mapping[Any, Any]):
         return StoredSweep(self.path)
 
     def _runs(self) -> Iterator[StoredRun]:
-        with open_results(self.path) as results:
-            if self.scene and self.scene not in results.scenes:
-                what = f"has no scene {shown_value(self.scene)}"
-                raise StoreError(f"{self.path}: {what}; allowed: {', '.join(results.scenes)}")
-            for scene in [results.scenes[self.scene]] if self.scene else results.scenes.values():
+        with open_results(self.path, only=[self.scene] if self.scene else None) as results:
+            for scene in results.scenes.values():
                 yield from scene.runs.values()
 
     def table(self) -> TextTable:
@@ -442,8 +557,10 @@ class Runs(Mapping[Any, Any]):
     def plot(self) -> ComparisonPlots:
         from rotor_mbs.report.plots import ComparisonPlots  # late: matplotlib
 
+        if self._is_sweep:
+            raise InputError("plot: of a sweep only that of a run, runs[0].plot(), or the pages, to_html(FOLDER)")
         if not self.scene:
-            raise InputError("plot: only of the runs of one scene, such as runs['paper/fig11']")
+            raise InputError(f"plot: only of the runs of one scene, such as runs[{self.scenes[0]!r}]")
         reference = self[REFERENCE].trajectory if REFERENCE in self else None
         return ComparisonPlots({name: self[name] for name in self if name != REFERENCE}, reference)
 
@@ -553,16 +670,26 @@ class Runs(Mapping[Any, Any]):
         )  # fmt: skip
 
     def __repr__(self) -> str:
-        if self._is_sweep:
-            counts = ", ".join(f"{count} {status}" for status, count in self.statuses.items())
-            return f"{self.path}: {len(self)} runs: {counts}"
-        return f"{self.scene or self.path}\n{self.table()}"
+        return f"{self._headline()}\n{self._short_table()}"
 
     def _repr_html_(self) -> str:
         drawn = ""
         with suppress(InputError):  # of several scenes, without a reference or without angles
             drawn = self.plot.error()._repr_svg_()
-        return f"<p>{escape(self.scene or str(self.path))}</p>{self.table()._repr_html_()}{drawn}"
+        return f"<p>{escape(self._headline())}</p>{self._short_table()._repr_html_()}{drawn}"
+
+    def _headline(self) -> str:
+        counts = ", ".join(f"{count} {status}" for status, count in self.statuses.items())
+        return f"{self.scene or self.path}: {counted(len(self), 'run')}: {counts}"
+
+    def _short_table(self) -> TextTable:
+        """Return a table for a screen: of many runs a row per method, of a sweep its parameters."""
+        if self._is_sweep:
+            return sweep_parameters(self._sweep)
+        if len(self) <= MOST_ROWS:
+            return self.table()
+        with open_results(self.path) as results:  # while the table is made, too
+            return method_table(run for scene in results.scenes.values() for run in scene.methods.values())
 
 
 def _restored(path: Path, scene: str, content: bytes | None) -> Runs:

@@ -92,6 +92,20 @@ def shown_value(value: object) -> str:
     return text if len(text) <= 60 else f"{text[:57]}..."
 
 
+# C0 but for tab and line feed, DEL, C1, and the marks that change the direction of writing.
+_CONTROLS = (*range(0x20), *range(0x7F, 0xA0), *range(0x200E, 0x2010), *range(0x202A, 0x202F), *range(0x2066, 0x206A))
+_ESCAPES = {code: ascii(chr(code))[1:-1] for code in _CONTROLS if chr(code) not in "\t\n"}
+
+
+def printable(text: str) -> str:
+    r"""Return the text with every control character but tab and line feed as its escape.
+
+    >>> printable("\x1b[2J")
+    '\\x1b[2J'
+    """
+    return text.translate(_ESCAPES)
+
+
 def one_line(error: BaseException) -> str:
     """The type of an exception and the first line of its text."""
     text = str(error).strip().splitlines()

@@ -12,6 +12,7 @@ Symbols: λ eigenvalue (1/s) of d/dt (δq, δq̇); ω0 = |λ| undamped and ωd =
 from __future__ import annotations
 
 import math
+import textwrap
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
@@ -235,6 +236,8 @@ CLOSED_FORM = "lagrange"  # the source that others are compared with
 FLOQUET = f"{CLOSED_FORM}/floquet"  # name of a record
 # Sources agree where their frequencies and decay rates differ by no more than this share.
 AGREEMENT = 1e-8
+_NOTE_WIDTH = 130  # characters, of a summary's lines: as wide as its table
+_SHOWN_ROWS = 24  # of a summary: three states of eight modes
 # Frequencies below this share of the largest are not compared: they are roots of what is left when stiffnesses cancel,
 # and of a rotor that nothing holds that is rounding.
 _SLOW = 1e-3
@@ -376,9 +379,38 @@ def mode_table(rows: Sequence[Mapping[str, object]]) -> TextTable:
     for row in rows:
         damped = row["damped_frequency"]
         hertz = damped / math.tau if isinstance(damped, float) else None
-        shown = row["state"], row["speed"], row["mode"], row["undamped_frequency"], damped, hertz
+        state = "at rest" if row["state"] == "at rest" else "rotating, no gravity"  # a table as wide as a screen
+        shown = state, row["speed"], row["mode"], row["undamped_frequency"], damped, hertz
         cells.append(tuple(map(cell, (*shown, row["damping_ratio"], row["growth_rate"]))))
     return TextTable(head, cells)
+
+
+def mode_summary(modes: SceneModes) -> str:
+    """Return modes at rest and at the lowest and highest speed, stability, and whether models agree, as text."""
+    rows = mode_rows(modes)
+    ends = {linear.speeds[place] for linear in list(modes.rotation.values())[:1] for place in (0, -1)}
+    shown = [row for row in rows if row["state"] == "at rest" or row["speed"] in ends]
+    lines = [f"{modes.scene}: {modes.title}"]
+    if shown:
+        lines += ["", str(mode_table(shown[:_SHOWN_ROWS]))]
+    if len(shown) > _SHOWN_ROWS:
+        lines.append(f"... {len(shown) - _SHOWN_ROWS} more rows")
+    if modes.floquet is not None:
+        stable = modes.floquet.stable
+        unstable, unknown = int((stable == 0).sum()), int((stable == -1).sum())
+        where = f"unstable in rotation under gravity at {unstable} of"
+        if not unstable and not unknown:
+            where = "stable in rotation under gravity at all"
+        if unknown:
+            where = where.replace(" of", f", unknown at {unknown} of")
+        lines.append(f"{where} {len(stable)} speeds")
+    models = list(dict.fromkeys((*modes.rest, *modes.rotation)))
+    if len(models) > 1:
+        verdict = "agree" if modes.agrees else "DISAGREE"
+        lines.append(f"{', '.join(models)} {verdict}: modes differ by at most {modes.disagreement:.1e} (relative)")
+    for note in modes.notes:
+        lines += textwrap.wrap(note, _NOTE_WIDTH, subsequent_indent="  ")
+    return "\n".join(lines)
 
 
 # Records of a results file

@@ -6,15 +6,18 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from html import escape
 
+import numpy as np
+
 from rotor_mbs.analysis.work_precision import TARGETS_RAD, left_out, points, time_to_reach
 from rotor_mbs.methods.catalogue import REFERENCE, is_corrected
 from rotor_mbs.runs.read import Record, StoredRun, StoredScene
+from rotor_mbs.runs.sweeps import StoredSweep, parameter_name
 from rotor_mbs.solution.status import GOOD, comparison, short_number
 
 RUN_HEAD = (
     "method", "status", "defect (rad)", "allowed", "error (rad), limit 0.01", "compared", "energy drift", "time (s)",
 )  # fmt: skip
-_MOST_ROWS = 40  # of a table with a row for each run
+MOST_ROWS = 40  # of a table with a row for each run
 
 
 def run_row(run: StoredRun) -> tuple[str, ...]:
@@ -37,7 +40,7 @@ def table_of_runs(scenes: Mapping[str, StoredScene], wanted: Mapping[str, Iterab
         for method in (REFERENCE, *methods)
         if method in scenes[name].runs
     ]
-    if len(runs) > _MOST_ROWS:
+    if len(runs) > MOST_ROWS:
         return method_table(run for run in runs if run.method != REFERENCE)
     return TextTable(("scene", *RUN_HEAD), [(run.scene, *run_row(run)) for run in runs])
 
@@ -75,6 +78,18 @@ def bench_table(curves: Sequence[Record]) -> TextTable:
     return TextTable(
         ("scene", "method", "ok", "best error (rad)", *(f"s to {target:.0e} rad" for target in TARGETS_RAD)), rows
     )
+
+
+def sweep_parameters(sweep: StoredSweep) -> TextTable:
+    """Return a row for each varied parameter of a sweep: unit, range, number of values."""
+    rows = []
+    for key in sweep.keys:
+        name = parameter_name(key)
+        values = np.asarray(sweep.column(name), float)
+        unit = sweep.columns[name].units
+        ends = (f"{value:.6g}" for value in (values.min(initial=np.inf), values.max(initial=-np.inf)))
+        rows.append((key, "" if unit == "1" else unit, *ends, str(len(np.unique(values)))))
+    return TextTable(("varied", "unit", "from", "to", "values"), rows)
 
 
 @dataclass(frozen=True)

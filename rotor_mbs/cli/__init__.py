@@ -25,16 +25,13 @@ from rotor_mbs.errors import (
     PlausibilityWarning,
     RotorError,
     StoreError,
+    printable,
     system_errors_apart,
 )
 
 EXIT_OK, EXIT_FAILED, EXIT_BAD_INPUT, EXIT_INTERRUPTED = 0, 1, 2, 130
 # Commands that only print: a reader who has seen enough (`rotor-mbs list | head`) has missed nothing.
 _ONLY_PRINT = ("list", "show")
-
-# C0 but for tab and line feed, DEL, C1, and the marks that change the direction of writing.
-_CONTROLS = (*range(0x20), *range(0x7F, 0xA0), *range(0x200E, 0x2010), *range(0x202A, 0x202F), *range(0x2066, 0x206A))
-_ESCAPES = {code: ascii(chr(code))[1:-1] for code in _CONTROLS if chr(code) not in "\t\n"}
 
 _received_signals: list[int] = []  # that this call was to end by
 
@@ -174,15 +171,6 @@ def _signals_as_interrupts() -> Iterator[None]:
         sys.unraisablehook = hook
         for number, handler in handlers.items():
             signal.signal(number, handler)
-
-
-def printable(text: str) -> str:
-    r"""The text with every control character but tab and line feed as its escape.
-
-    >>> printable("\x1b[2J")
-    '\\x1b[2J'
-    """
-    return text.translate(_ESCAPES)
 
 
 class PlainStream:

@@ -215,10 +215,11 @@ def _parser() -> tuple[_Parser, dict[str, _Parser]]:
     own.flag("--json", help="print JSON")
 
     own = command(
-        "show", "show the data and methods of a scene, or the settings of a method", "commands:show",
-        "paper/fig11", "paper/fig11 --build",
+        "show", "show a scene and its methods, the settings of a method, or what is in a file", "commands:show",
+        "paper/fig11", "paper/fig11 --build", "results.h5",
     )  # fmt: skip
-    own.add_argument("scene", metavar="NAME", help="a scene (paper/fig05), a TOML file, or a method (lagrange/taylor)")
+    what = "a scene (paper/fig05), a TOML file, a method (lagrange/taylor, mine.py), or a file of results (results.h5)"
+    own.add_argument("scene", metavar="NAME", help=what)
     own.flag("--build", help="also list the items that each model builds")
     own.flag("--json", help="print JSON")
 

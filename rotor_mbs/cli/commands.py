@@ -11,21 +11,24 @@ import json
 import sys
 import time
 from collections import Counter
-from collections.abc import Iterator
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
 from rotor_mbs.cli import EXIT_BAD_INPUT, EXIT_FAILED, EXIT_OK, print_line
 from rotor_mbs.cli.arguments import pages_beside
-from rotor_mbs.cli.terminal import ProgressLine, print_json, print_not_computed, print_table
+from rotor_mbs.cli.terminal import print_json, print_not_computed, print_table
 from rotor_mbs.errors import InputError, MethodRefusal, StoreError
-from rotor_mbs.methods.catalogue import find_method_or_none, methods, problems_of_methods
+from rotor_mbs.methods.base import Method
+from rotor_mbs.methods.catalogue import check_names, find_method, find_method_or_none, methods, problems_of_methods
+from rotor_mbs.methods.method_file import ENDING
 from rotor_mbs.processes import cores
+from rotor_mbs.runs.progress import ProgressLine
+from rotor_mbs.runs.trailer import is_of_this_program
 from rotor_mbs.scenario.catalogue import find_scenes, list_scenes, list_sweeps, only_scene
 from rotor_mbs.scenario.keys import counted
-from rotor_mbs.scenario.toml_file import KeyPath, file_path, shown_key
-from rotor_mbs.solution.status import GOOD, REFUSED
+from rotor_mbs.scenario.toml_file import file_path, shown_key
+from rotor_mbs.solution.status import REFUSED
 
 
 def list_all(arguments: argparse.Namespace) -> int:
@@ -66,19 +69,37 @@ def new(arguments: argparse.Namespace) -> int:
 
 
 def show(arguments: argparse.Namespace) -> int:
-    """One scene's data and the methods of each model, with --build its items; or the settings of a method."""
-    method = find_method_or_none(arguments.scene)
-    if method is None:
-        _show_scene(arguments)
+    """Show a scene's data and methods, with --build its items; the settings of a method; or what is in a file."""
+    if arguments.scene.endswith(ENDING):
+        for name in check_names(arguments.scene):
+            _show_method(find_method(name), as_json=arguments.json)
         return 0
+    method, path = find_method_or_none(arguments.scene), Path(arguments.scene)
+    if method is not None:
+        _show_method(method, as_json=arguments.json)
+    elif path.suffix in _HDF5_SUFFIXES or is_of_this_program(path):
+        from rotor_mbs.analysis.file_summary import summary_of
+
+        summary = summary_of(path)
+        if arguments.json:
+            print_json(summary.as_dictionary(), indent=1)
+        else:
+            print(summary)
+    else:
+        _show_scene(arguments)
+    return 0
+
+
+def _show_method(method: Method, *, as_json: bool) -> None:
+    """Print the settings of a method."""
     declared, defaults = method.settings.declared(), method.defaults
-    if arguments.json:
+    if as_json:
         rules = {}
         for name, setting in declared.items():
             rules[name] = {"allowed": setting["allowed"], "doc": setting["doc"]}
         facts = {"name": method.name, "label": method.label, "settings": defaults, "allowed": rules}
         print_json(facts, indent=1)
-        return 0
+        return
     print(f"{method.name}: {method.label}\n")
     for name, setting in declared.items():
         rule = f"{setting['allowed']}; {setting['doc']}".rstrip("; ")
@@ -86,11 +107,10 @@ def show(arguments: argparse.Namespace) -> int:
     print(
         f"\nto change a setting: rotor-mbs run SCENE -m {method.name} --set NAME=VALUE" if declared else "no settings"
     )
-    return 0
 
 
 def _show_scene(arguments: argparse.Namespace) -> None:
-    from rotor_mbs.scenario.scene import scene_tables, unit_of
+    from rotor_mbs.scenario.scene import scene_keys, scene_tables, unit_of, without_times
 
     scene = only_scene(arguments.scene)
     models: dict[str, dict[str, Any]] = {}
@@ -109,9 +129,9 @@ def _show_scene(arguments: argparse.Namespace) -> None:
         print_json({"name": scene.name, "scene": tables, "models": models}, indent=1)
         return
     print(f"{scene.name}\n")
-    for path, value in _keys(tables):
+    for path, value in scene_keys(scene):
         unit = "" if unit_of(path) == "1" else f", {unit_of(path)}"
-        print(f"  {shown_key(path) + unit:28} {_with_constants(value)}")
+        print(f"  {shown_key(path) + unit:28} {without_times(value)}")
     print("\nmethods" + (", and the items that each model builds" if arguments.build else ""))
     for name, model in models.items():
         first, *others = model["methods"]
@@ -125,28 +145,7 @@ def _show_scene(arguments: argparse.Namespace) -> None:
             print(f"    {item['kind']:9} {item['name']:28} {item['detail']}".rstrip())
 
 
-def _keys(value: Any, path: KeyPath = ()) -> Iterator[tuple[KeyPath, Any]]:
-    """The path and the value of each key of a scene file."""
-    if isinstance(value, dict):
-        for name, inner in value.items():
-            yield from _keys(inner, (*path, name))
-    elif isinstance(value, list) and value and isinstance(value[0], dict):  # a table per blade
-        for place, inner in enumerate(value):
-            yield from _keys(inner, (*path, place))
-    else:
-        yield path, value
-
-
-def _with_constants(value: Any) -> Any:
-    """A load over time whose table has one row is that number."""
-    match value:
-        case [[float(), float() as number]]:
-            return number
-        case list():
-            return [_with_constants(entry) for entry in value]
-    return value
-
-
+_HDF5_SUFFIXES = (".h5", ".hdf5", ".nc")
 _DISK_IS_FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 
 
@@ -198,7 +197,7 @@ def stability(arguments: argparse.Namespace) -> int:
 
 def modes(arguments: argparse.Namespace) -> int:
     """The modes of every scene; 1 where two models disagree on a frequency or a scene could not be computed."""
-    from rotor_mbs.analysis.modes import mode_rows, mode_table, read_modes
+    from rotor_mbs.analysis.modes import mode_rows, mode_summary, read_modes
     from rotor_mbs.studies.modes import modes_of_scenes
 
     scenes = find_scenes(arguments.scenes)
@@ -220,21 +219,7 @@ def modes(arguments: argparse.Namespace) -> int:
         print_json({modes.scene: mode_rows(modes) for modes in chosen}, indent=1)
     else:
         for modes in chosen:
-            rows = mode_rows(modes)
-            ends = {modes.rotation[model].speeds[place] for model in modes.rotation for place in (0, -1)}
-            print(f"{modes.scene}: {modes.title}")
-            print_table(mode_table([row for row in rows if row["state"] == "at rest" or row["speed"] in ends]))
-            if modes.floquet is not None:
-                unstable, unknown = (int((modes.floquet.stable == code).sum()) for code in (0, -1))
-                text = f"unstable in rotation under gravity at {unstable}"
-                if unknown:
-                    text += f", unknown at {unknown}"
-                print(f"{text} of {len(modes.floquet.speeds)} speeds")
-            models = [*dict.fromkeys((*modes.rest, *modes.rotation))]
-            if len(models) > 1:
-                verdict = "agree" if modes.agrees else "DISAGREE"
-                print(f"{', '.join(models)} {verdict}: modes differ by at most {modes.disagreement:.1e} (relative)")
-            print(*modes.notes, sep="\n", end="\n" if modes.notes else "")
+            print(mode_summary(modes))
         _write_pages(arguments.output)
     return int(is_incomplete or not all(modes.agrees for modes in chosen))
 
@@ -333,8 +318,7 @@ def sweep(arguments: argparse.Namespace) -> int:
 
         def on_progress(done: int, total: int, statuses: Counter[str]) -> None:
             made.update(statuses)
-            failed = [f", {count} {status}" for status, count in sorted(made.items()) if status not in GOOD]
-            progress.stage("runs", done, total, "".join(failed))
+            progress.runs(done, total, statuses)
 
         try:
             with ProgressLine() as progress:

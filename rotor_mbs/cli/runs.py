@@ -10,11 +10,12 @@ from importlib import import_module
 from pathlib import Path
 
 from rotor_mbs.analysis.text_tables import table_of_runs
-from rotor_mbs.cli.terminal import ProgressLine, print_summary, print_table
+from rotor_mbs.cli.terminal import print_summary, print_table
 from rotor_mbs.errors import InputError
 from rotor_mbs.methods.catalogue import problems_of_scene, selected_methods, settings_of_any
 from rotor_mbs.processes.pool import local_pool
 from rotor_mbs.runs.output_files import is_being_written, replace_file
+from rotor_mbs.runs.progress import ProgressLine
 from rotor_mbs.runs.read import open_results
 from rotor_mbs.scenario.catalogue import find_scenes
 from rotor_mbs.studies.reproduce import made_from, summary_of

@@ -1,42 +1,25 @@
-"""What the commands print alike: progress, spans of time, the summary of runs."""
+"""What the commands print alike: tables, JSON, the summary of runs."""
 
 from __future__ import annotations
 
 import json
-import os
-import re
-import shutil
 import sys
-import time
 from collections import Counter
 from collections.abc import Sequence
-from contextlib import suppress
 from pathlib import Path
-from typing import TYPE_CHECKING, Self, TextIO
+from typing import TYPE_CHECKING
 
-from rotor_mbs.cli import EXIT_BAD_INPUT, EXIT_FAILED, EXIT_OK, printable
+from rotor_mbs.cli import EXIT_BAD_INPUT, EXIT_FAILED, EXIT_OK
+from rotor_mbs.errors import printable
 from rotor_mbs.methods.catalogue import REFERENCE, Refusal
+from rotor_mbs.runs.progress import coloured
 from rotor_mbs.scenario.keys import counted
-from rotor_mbs.solution.status import GOOD, REFUSED, STATUSES
+from rotor_mbs.solution.status import REFUSED
 
 if TYPE_CHECKING:  # a sweep's workers load their code meanwhile
     from rotor_mbs.analysis.text_tables import TextTable
     from rotor_mbs.runs.runner import Outcome
     from rotor_mbs.studies.run import RunReport
-
-
-# How a status is coloured on a terminal: well; open to doubt; anything else went wrong.
-_COLOURS = {"ok": "32", "inaccurate": "33", "unchecked": "33"}
-_BAD = "31"
-_RENEWED_S, _LOGGED_S = 0.1, 10.0  # between two lines of a stage, on a terminal and in a log
-_STATUS = re.compile(rf"\b({'|'.join((*STATUSES, 'no_reference'))})\b")
-
-
-def coloured(text: str, stream: TextIO) -> str:
-    """The statuses in a text each in its colour: on a terminal, unless the user asks for none (https://no-color.org)."""
-    if not stream.isatty() or "NO_COLOR" in os.environ:
-        return text
-    return _STATUS.sub(lambda found: f"\x1b[{_COLOURS.get(found[0], _BAD)}m{found[0]}\x1b[0m", text)
 
 
 def print_table(table: TextTable | str) -> None:
@@ -52,84 +35,6 @@ def print_json(data: object, *, indent: int | None = None) -> None:
     encoding = sys.stdout.encoding or "utf-8"
     is_unicode = encoding.lower().startswith("utf")
     print(json.dumps(data, ensure_ascii=not is_unicode, indent=indent))
-
-
-class ProgressLine:
-    """One line that renews itself on a terminal, plain lines in a log. A context manager that clears it.
-
-    Called after each run. What is left is estimated from the work done, not from the number of runs.
-    """
-
-    def __init__(self, stream: TextIO | None = None) -> None:
-        self._stream = sys.stderr if stream is None else stream
-        self._is_terminal = self._stream.isatty()
-        self._start = self._last = self._stage_start = time.monotonic()
-        self._stage, self._share_before = "", 0.0
-
-    def __enter__(self) -> Self:
-        if self._is_terminal:
-            self._print_over("starting")
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        if self._is_terminal:
-            self._print("\r\x1b[K", end="")
-
-    def __call__(self, done: int, total: int, outcome: Outcome) -> None:
-        if done == 1:
-            self._stage_start, self._share_before = self._last, 0.0
-        self._last = time.monotonic()
-        seconds = f" {outcome.seconds:.3f} s" if outcome.seconds > 0.0 else ""
-        if outcome.is_shipped:
-            seconds = " (read, not computed)"
-        reason = f": {outcome.message}" if outcome.message else ""
-        text = f"[{done:{len(str(total))}d}/{total}] {outcome.label} {outcome.status}{seconds}{reason}"
-        keep = outcome.status not in (*GOOD, "measured")  # a person must not miss it
-        self._show(text if keep else self._estimate(outcome.share) + text, keep=keep)
-
-    def stage(self, name: str, done: int, total: int, note: str = "") -> None:
-        """What has no outcomes of its own, such as drawing pages: called before the first and after each."""
-        now = time.monotonic()
-        if name != self._stage:
-            self._stage, self._stage_start, self._share_before = name, now, done / total
-        elif done < total and now - self._last < (_RENEWED_S if self._is_terminal else _LOGGED_S):
-            return
-        self._last = now
-        self._show(f"{self._estimate(done / total)}{name} {done}/{total}{note}")
-
-    def _estimate(self, share: float) -> str:
-        """ "40%, about 20 s left  ", for a terminal."""
-        if not self._is_terminal or not self._share_before < share < 1.0:
-            return ""
-        left = (self._last - self._stage_start) / (share - self._share_before) * (1.0 - share)
-        return f"{share:4.0%}, about {span(left)} left  "
-
-    def _show(self, text: str, *, keep: bool = False) -> None:
-        """keep: it stays on the terminal, whole."""
-        text = printable(text)
-        if not self._is_terminal:
-            self._print(text)
-        elif keep:
-            self._print(f"\r\x1b[K{coloured(text, self._stream)}")
-        else:
-            self._print_over(text)
-
-    def _print_over(self, text: str) -> None:
-        elapsed = f"  {span(time.monotonic() - self._start)}"
-        width = shutil.get_terminal_size().columns - 1
-        self._print(f"\r\x1b[K{text[: width - len(elapsed)]}{elapsed}", end="")
-
-    def _print(self, text: str, end: str = "\n") -> None:
-        """A progress that nobody can read any more must not end the work."""
-        with suppress(OSError, ValueError):
-            print(text, end=end, file=getattr(self._stream, "unfiltered", self._stream), flush=True)
-
-
-def span(seconds: float) -> str:
-    for length, unit in ((86400.0, "days"), (3600.0, "h"), (60.0, "min")):
-        if seconds >= 2.0 * length:
-            return f"{seconds / length:.1f} {unit}"
-    return f"{seconds:.0f} s" if seconds >= 10.0 else f"{seconds:.1f} s"
 
 
 def print_summary(report: RunReport, output: Path, refused: Sequence[Refusal] = ()) -> int:

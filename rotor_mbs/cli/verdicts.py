@@ -12,9 +12,10 @@ from xml.etree import ElementTree
 
 from rotor_mbs.analysis.checks import Check
 from rotor_mbs.analysis.text_tables import TextTable
-from rotor_mbs.cli.terminal import ProgressLine, print_table
+from rotor_mbs.cli.terminal import print_table
 from rotor_mbs.errors import InputError
 from rotor_mbs.runs.output_files import refuse_foreign, replace_file
+from rotor_mbs.runs.progress import ProgressLine
 from rotor_mbs.runs.read import is_sweep
 from rotor_mbs.scenario.accuracy_bounds import read_bounds, shipped_bounds
 from rotor_mbs.studies import check as study

@@ -196,8 +196,9 @@ def _hdf5(path: Path, group: str, scene: str) -> tuple[Arrays, Units]:
     from rotor_mbs.runs import table  # late: 0.2 s
     from rotor_mbs.runs.design import RUNS
     from rotor_mbs.runs.read import run_arrays
+    from rotor_mbs.runs.trailer import is_of_this_program
 
-    if table.is_of_this_program(path) and RUNS in table.TableFile(path, ()).groups:
+    if is_of_this_program(path) and RUNS in table.TableFile(path, ()).groups:
         return run_arrays(path, group, scene), {}
     return table.read_arrays(path, group, scene, MAX_BYTES)
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from time import monotonic
 
@@ -46,6 +46,7 @@ from rotor_mbs.solution.trajectory import Array, Trajectory
 
 _TIME_ROUNDING = 1e-9  # of the duration: times that are sums of steps may end so far past it
 _MIN_ROWS = 3
+_STAGES = 4  # reference, interval defects, search for causes, loads
 _SAME_START = 1e-3  # rad, rad/s: starts that differ by more are another start
 _STRETCHES = (10, 100)  # rows over which defects are added up, too
 _MAX_GAP = 1.5  # intervals that may be missing at the start or end of the motion
@@ -113,6 +114,7 @@ def compare_with_reference(
     scene: Scene,
     tolerance: float = DEFAULT_TOLERANCE,
     time_limit_s: float = float("inf"),
+    on_stage: Callable[[str, int, int], None] = lambda *_: None,
 ) -> tuple[DataVerdict, Record]:
     """Compare a trajectory with the reference of a scene.
 
@@ -126,6 +128,7 @@ def compare_with_reference(
     scene : the scene that they are meant to be of.
     tolerance : rad, of the defect of an interval beyond rounding.
     time_limit_s : s, for the reference, the defects and the search.
+    on_stage : called with what begins, and how many of how many stages are done.
 
     Returns
     -------
@@ -144,9 +147,11 @@ def compare_with_reference(
     missing_part = "no reference"  # within the time limit
     try:
         with time_limit(time_limit_s):
+            on_stage("reference", 0, _STAGES)
             inside, exact = _reference_for(data, scene)
             raise_if_over()  # a reference that ends early is none
             missing_part = "the rows are not assessed"
+            on_stage("interval defects", 1, _STAGES)
             rows = _rows_with_reference(data, scene, inside, exact)
             raise_if_over()
     except OutOfTimeError:
@@ -160,6 +165,7 @@ def compare_with_reference(
     likely: list[str] = []
     try:
         with time_limit(max(ends - monotonic(), 0.0)):
+            on_stage("search for causes", 2, _STAGES)
             likely = _likely_causes(data, scene, tolerance, rows, errors, is_ok=status == "ok")
     except OutOfTimeError:
         notes.append("the search for causes was stopped at the time limit")
@@ -170,6 +176,7 @@ def compare_with_reference(
 
     channels, expected, compared = errors.channels, rows.expected, rows.compared
     if loads.channels:
+        on_stage("loads", 3, _STAGES)
         loads = loads.rows(slice(len(rows.places)))
         expected_loads = np.full((len(rows.places), len(loads.channels)), np.nan)
         if rows.defects is None:

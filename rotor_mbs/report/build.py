@@ -26,6 +26,7 @@ from rotor_mbs.report.pages.stability import stability_page
 from rotor_mbs.runs.hdf5 import reading
 from rotor_mbs.runs.read import is_sweep, open_results, read_records
 from rotor_mbs.runs.sweeps import StoredSweep
+from rotor_mbs.runs.versions import made_with
 
 _GROUPS = 2  # of pages per worker: each opens the file anew, and none waits long for the last one
 _TIMEOUT_S = 600.0
@@ -84,12 +85,12 @@ def make_pages(results: Path, numbers: Sequence[int]) -> dict[str, str]:
     """Return the pages of these numbers by file name: the work of a process. Raises StoreError."""
     with open_results(results) as opened, _without_warnings():
         pages = pages_of(Report(**vars(opened)))
-        made_with = files.made_with(opened.attributes)
+        versions = made_with(opened.attributes)
         links = [(page.file, page.label) for page in pages if page.label]
         made = {}
         for number in numbers:
             page = pages[number]
-            made[page.file] = files.render(page.content(), made_with, links, page.file)
+            made[page.file] = files.render(page.content(), versions, links, page.file)
         return made
 
 

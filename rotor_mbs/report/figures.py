@@ -13,11 +13,11 @@ import numpy as np
 from rotor_mbs.errors import InputError
 from rotor_mbs.methods.catalogue import PRINTED, REFERENCE, errata_methods, find_method_or_none
 from rotor_mbs.report import canvas, plots
-from rotor_mbs.report.files import made_with
 from rotor_mbs.report.looks import Look, label_of, look_of, step_look, with_capital
 from rotor_mbs.report.numbers import up_to
 from rotor_mbs.runs.output_files import replace_file
 from rotor_mbs.runs.read import StoredRun, StoredScene, open_results
+from rotor_mbs.runs.versions import made_with
 from rotor_mbs.scenario.scene import scene_tables
 from rotor_mbs.solution.trajectory import Array
 

@@ -21,6 +21,7 @@ from rotor_mbs.report.curves import CurveStore
 from rotor_mbs.report.elements import PageContent, Plot
 from rotor_mbs.report.looks import palette_css
 from rotor_mbs.runs.output_files import refuse_foreign, replace_file
+from rotor_mbs.runs.versions import made_with
 
 GENERATOR = "rotor_mbs report"
 _MARK = f'<meta name="generator" content="{GENERATOR}">'.encode()  # of every page
@@ -49,28 +50,8 @@ _SCRIPTS = {  # by file, what a page has that needs it
 _MAX_NUMBERS = 150_000  # of a page's curves: 800 kB, so that a page has at most 1 MB
 _PLACE_OF_SCRIPTS = "<!-- scripts -->"
 Pairs = Sequence[tuple[str, str]]
-# Attributes of a results file that say what made it.
-_VERSIONS = (
-    "rotor_mbs",
-    "python",
-    "exudyn",
-    "heyoka",
-    "mujoco",
-    "numpy",
-    "scipy",
-    "h5py",
-    "platform",
-    "cpu",
-)
 # Control characters but those of lines and tabs, and halves of surrogate pairs: names and messages come from any file.
 _UNPRINTABLE = re.compile(r"[\x00-\x08\x0b\x0c\x0e-\x1f\x7f-\x9f\ud800-\udfff]")
-
-
-def made_with(attributes: Mapping[str, object]) -> list[tuple[str, str]]:
-    """(what, version) of the programs and the computer that made a file, and when."""
-    made = [(name, str(attributes[name])) for name in _VERSIONS if attributes.get(name)]
-    created = str(attributes.get("created", ""))
-    return [*made, ("created", f"{created[:16].replace('T', numbers.SPACE)}{numbers.SPACE}UTC")] if created else made
 
 
 def page_names(scenes: Iterable[str]) -> dict[str, str]:
@@ -118,7 +99,7 @@ def render(page: PageContent, made: Pairs = (), links: Pairs = (), here: str = "
     Parameters
     ----------
     page : its content.
-    made : what made the results, see `made_with`.
+    made : what made the results, see `runs.versions.made_with`.
     links : (file, label) of the main pages.
     here : the file of this one.
     """

@@ -288,7 +288,8 @@ class RunPlots(ComparisonPlots):
         run = self._run
         horizon_s = None if self._reference is None else horizon(self._reference)
         angles, rates = (None if np.isnan(values).all() else values for values in (run.angles, run.rates))
-        return motion(_some(run.time), _quantity(run, "angles") if rates is None else angles, rates, horizon_s)
+        shown = _quantity(run, "angles") if rates is None else angles
+        return motion(_some(run.time), shown, rates, horizon_s).with_legend()
 
     def energy(self) -> Panels:
         """Plot kinetic and potential energy, and their sum minus the work (J). Raises InputError without energies."""
@@ -318,7 +319,7 @@ class RunPlots(ComparisonPlots):
     def tips(self) -> Panels:
         """Plot the paths of the blade tips (m). Raises InputError if the run does not have them."""
         _some(self._run.time)
-        return paths(_quantity(self._run, "tip"))
+        return paths(_quantity(self._run, "tip")).with_legend()
 
 
 def _some(time: Array) -> Array:

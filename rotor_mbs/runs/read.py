@@ -37,6 +37,7 @@ from rotor_mbs.runs.table import (
     known_columns,
     new_file,
     new_group,
+    opened_tables,
     parsed,
     put,
     put_attributes,
@@ -290,15 +291,30 @@ def open_results(path: Path, *, verify: bool = True, only: Collection[str] | Non
     when it is read, but for verify=False; only: names of scenes, by default all. Raises StoreError, also for whatever
     goes wrong in the block with what the file holds."""
     for _ in range(_ATTEMPTS):
-        stored = TableFile(path, None if only is None else {RUNS, *only})
+        stored = opened_tables(path, None if only is None else {RUNS, *only})
         with path.open("rb") as file:
-            if any(table.inode != os.fstat(file.fileno()).st_ino for table in stored.tables.values()):
+            inode = os.fstat(file.fileno()).st_ino
+            if any(table.inode != inode for table in stored.tables.values()):
                 continue
             with reading(path):  # what is made of it, too: rows are read when they are asked for
                 scenes = {scene.name: scene for scene in _scenes(stored, file, verify, only)}
                 yield OpenResults(path, stored.attributes, {name: scenes[name] for name in natural_order(scenes)})
             return
     raise StoreError(f"{path}: is being replaced by another process")
+
+
+def run_names(path: Path) -> list[tuple[str, str]]:
+    """Return scene and method of every stored run, in the order of `open_results`. Raises StoreError."""
+    stored = opened_tables(path, {RUNS})
+    if RUNS not in stored.tables:
+        return []
+    runs = stored.tables[RUNS]
+    methods: dict[str, list[str]] = {}
+    with reading(path):
+        for status, row in zip(runs.column("status").tolist(), runs.known_rows.values(), strict=True):
+            if status != MISSING:
+                methods.setdefault(str(row["scene"]), []).append(str(row["method_name"]))
+    return [(scene, method) for scene in natural_order(methods) for method in methods[scene]]
 
 
 def run_arrays(path: Path, group: str = "", scene: str = "") -> dict[str, NDArray[Any]]:
@@ -321,7 +337,7 @@ def _scenes(stored: TableFile, file: IO[bytes], verify: bool, only: Collection[s
     file.seek(runs.offsets["status"])
     statuses = np.frombuffer(file.read(len(runs.runs)), np.int8)
     by_scene: dict[str, dict[str, StoredRun]] = {}
-    for status, (run, known) in zip(statuses, runs.known_rows().items(), strict=True):
+    for status, (run, known) in zip(statuses, runs.known_rows.items(), strict=True):
         scene, method = str(known["scene"]), str(known["method_name"])
         if status == MISSING or (only is not None and scene not in only):
             continue
@@ -386,7 +402,7 @@ def read_records(path: Path, kind: str) -> list[Record]:
 
 def _point_records(stored: Table) -> Iterator[Record]:
     """The rows of a table that belong to one curve or one ladder."""
-    kind, statuses, rows = stored.group, stored.statuses(), list(stored.known_rows().values())
+    kind, statuses, rows = stored.group, stored.statuses(), list(stored.known_rows.values())
     columns = stored.place().read(len(stored.runs)) | {
         name: stored.column(name) for name in NUMBERS if name in stored.known
     }

@@ -23,6 +23,7 @@ import json
 import math
 import os
 import threading
+import time
 import zlib
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, nullcontext
@@ -67,7 +68,6 @@ from rotor_mbs.runs.output_files import locked, replacing, store_errors, write_f
 from rotor_mbs.runs.trailer import (
     FORMAT_VERSION,
     INTEGRITY,
-    MAGIC,
     RESULTS,
     SWEEP,
     digest_of,
@@ -139,10 +139,16 @@ class Table:
         rows = (len(self.runs),) if "run" in self.computed[name].dimensions else ()
         return (*rows, *self.row_type[name].shape)
 
-    def known_rows(self) -> dict[str, dict[str, Any]]:
+    @functools.cached_property
+    def known_rows(self) -> Mapping[str, Mapping[str, Any]]:
         """By run, what the design says of it."""
         columns = {name: list(values) for name, (_, values) in self.known.items()}
         return {str(run): {name: values[i] for name, values in columns.items()} for i, run in enumerate(self.runs)}
+
+    @functools.cached_property
+    def row_of(self) -> Mapping[str, int]:
+        """By run, the number of its row."""
+        return {str(run): row for row, run in enumerate(self.runs)}
 
     def column(self, name: str) -> NDArray[Any]:
         """(rows, ...) A column, or a scale, of a table in a file; a computed one as it lies there, read where it is
@@ -548,16 +554,28 @@ class TableFile:
 
     def __init__(self, path: Path, only: Collection[str] | None = None) -> None:
         self.path = path
-        content = read_content(path, (RESULTS, SWEEP), only)
+        self.groups: list[str] = []
+        self.tables: dict[str, Table] = {}
+        self.read(only)
+
+    def read(self, only: Collection[str] | None = None) -> None:
+        """Read further tables of the file, by default all that have not been read."""
+        if self.tables:
+            missing = set(self.groups) - set(self.tables)
+            only = missing if only is None else missing & set(only)
+            if not only:
+                return
+        content = read_content(self.path, (RESULTS, SWEEP), only)
         self.attributes = content.attributes
         self.groups = content.names
-        with reading(path):
-            self.tables = {name: _table(path, name, stored, content.inode) for name, stored in content.groups.items()}
+        with reading(self.path):
+            for name, stored in content.groups.items():
+                self.tables[name] = _table(self.path, name, stored, content.inode)
             self._check_runs()
 
     def _check_runs(self) -> None:
         """Raises StoreError where a run has no arrays."""
-        rows = self.tables[RUNS].known_rows() if RUNS in self.tables else {}
+        rows = self.tables[RUNS].known_rows if RUNS in self.tables else {}
         for run, row in rows.items():
             scene, method = row["scene"], row["method_name"]
             is_there = scene in self.groups and (scene not in self.tables or method in self.tables[scene].runs)
@@ -567,14 +585,14 @@ class TableFile:
     def place(self, run: str, group: str = RUNS) -> Place:
         """Where a row is; of a run, together with its arrays."""
         stored = self.tables[group]
-        row = list(stored.runs).index(run)
+        row = stored.row_of[run]
         place = stored.place(row)
         if group != RUNS:
             return place
         scene = str(stored.column("scene")[row])
         arrays = self.tables[scene]
         label = run.removeprefix(f"{scene}/")
-        others = arrays.place(list(arrays.runs).index(label))
+        others = arrays.place(arrays.row_of[label])
         offsets = {REPEATED.get(name, name): offset for name, offset in others.offsets.items()}
         kinds = [(REPEATED.get(name, name), others.row_type[name]) for name in others.row_type.names or ()]
         for name, column in arrays.computed.items():
@@ -616,6 +634,37 @@ class TableFile:
             else:
                 kept.append((run, status, text_of(row["message"][0])))
         return missing, kept
+
+
+_opened: dict[tuple[Path, tuple[int, ...]], TableFile] = {}
+_MAX_OPENED = 4  # files whose tables are kept
+_SETTLED_NS = 100_000_000  # since the last write, which a clock's tick might hide
+
+
+def opened_tables(path: Path, only: Collection[str] | None = None) -> TableFile:
+    """Return the tables of a file, read once for this process as long as it is the same file.
+
+    Rows are not kept, but what the layout says: descriptions, and the design of the runs.
+
+    Parameters
+    ----------
+    path, only : see `TableFile`; the result may have further tables, which an earlier call asked for.
+    """
+    try:
+        state = path.stat()
+    except OSError:
+        return TableFile(path, only)  # says what is wrong
+    stamp = (path.absolute(), (state.st_dev, state.st_ino, state.st_size, state.st_mtime_ns))
+    file = _opened.pop(stamp, None)
+    if file is None:
+        file = TableFile(path, only)
+    else:
+        file.read(only)
+    if time.time_ns() - state.st_mtime_ns > _SETTLED_NS and path.stat().st_mtime_ns == state.st_mtime_ns:
+        _opened[stamp] = file
+        while len(_opened) > _MAX_OPENED:
+            del _opened[next(iter(_opened))]
+    return file
 
 
 def _table(path: Path, group: str, stored: StoredGroup, inode: int) -> Table:
@@ -774,8 +823,8 @@ def copy_file(source: Path, target: Path) -> None:
         write_file(target, source.read_bytes())
 
 
-def _known_rows(table: Table | None) -> dict[str, dict[str, Any]]:
-    return {} if table is None else table.known_rows()
+def _known_rows(table: Table | None) -> Mapping[str, Mapping[str, Any]]:
+    return {} if table is None else table.known_rows
 
 
 def _is_same(stored: Mapping[str, Any], asked: Mapping[str, Any]) -> bool:
@@ -859,15 +908,6 @@ def _groups_with_arrays(group: Any, place: str = "") -> Iterator[str]:
             yield from _groups_with_arrays(item, f"{place}/{name}" if place else name)
         else:
             yield place
-
-
-def is_of_this_program(path: Path) -> bool:
-    """Whether a file ends as those that this program writes; it may be damaged all the same."""
-    if not path.is_file():
-        return False
-    with path.open("rb") as file:
-        file.seek(max(file.seek(0, os.SEEK_END) - len(MAGIC), 0))
-        return file.read() == MAGIC
 
 
 def read_arrays(

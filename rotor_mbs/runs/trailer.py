@@ -72,6 +72,15 @@ def digest_of(trailer: bytes) -> bytes:
     return trailer[-_DIGEST - len(MAGIC) : -len(MAGIC)]
 
 
+def is_of_this_program(path: Path) -> bool:
+    """Return whether a file ends as those that this program writes; it may be damaged all the same."""
+    if not path.is_file():
+        return False
+    with path.open("rb") as file:
+        file.seek(max(file.seek(0, os.SEEK_END) - len(MAGIC), 0))
+        return file.read() == MAGIC
+
+
 def read_trailer(path: Path) -> Trailer:
     """What the trailer of a file says, which is as it was written but for its rows.
 

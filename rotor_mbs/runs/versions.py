@@ -7,6 +7,7 @@ import hashlib
 import importlib.metadata
 import platform
 import re
+from collections.abc import Mapping
 from pathlib import Path
 
 import rotor_mbs
@@ -57,6 +58,19 @@ def machine() -> dict[str, str]:
         processor = named[1] if named else processor
     count = cores()
     return {"platform": platform.platform(), "cpu": f"{processor}, {count} {'core' if count == 1 else 'cores'}"}
+
+
+# Attributes of a file that say what made it, in the order in which they are shown.
+_MADE_WITH = ("rotor_mbs", "python", "exudyn", "heyoka", "mujoco", "numpy", "scipy", "h5py", "platform", "cpu")
+
+
+def made_with(attributes: Mapping[str, object]) -> list[tuple[str, str]]:
+    """Return (what, version) of the programs and the computer that made a file, and when, from its attributes."""
+    made = [(name, str(attributes[name])) for name in _MADE_WITH if attributes.get(name)]
+    created = str(attributes.get("created", ""))
+    if created:
+        made.append(("created", f"{created[:16].replace('T', ' ')} UTC"))
+    return made
 
 
 @functools.cache

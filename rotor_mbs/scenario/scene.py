@@ -14,7 +14,7 @@ import json
 import math
 import textwrap
 import warnings
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import Field, dataclass, fields
 from itertools import pairwise
 from operator import attrgetter
@@ -62,6 +62,7 @@ ENTRY_POINT_GROUP = "rotor_mbs.quantities"
 MAX_BLADES = 1000
 MAX_SAMPLES = 10_000_000
 MAX_SAMPLE_BYTES = 2 << 30
+_SHOWN_KEYS, _SHOWN_ENTRIES = 30, 6  # of a scene on a screen, and of a list
 # Principal moments may break the triangle inequality by this share of their sum: numbers typed
 # with ten digits do so for a flat body, whose inequality is an equality. It is far above the
 # round-off of the eigenvalues (1e-15).
@@ -377,7 +378,7 @@ def _key(
     return file_key(path, *declared, role=role, added=added, **more)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, repr=False)
 class Scene:
     """A rotor with its loads and initial state.
 
@@ -471,6 +472,22 @@ class Scene:
         default=(),
     )
     text: str = _key("", keys.TEXT, role="label", default="")
+
+    def __repr__(self) -> str:
+        """Show the keys of the scene with their units, long tables cut off, on one screen."""
+        lines = [f"{self.name}: {self.title}"]
+        for key, unit, value in _short_keys(self):
+            lines.append(f"  {key + (f', {unit}' if unit else ''):28} {value}".rstrip())
+        return "\n".join(lines)
+
+    def _repr_html_(self) -> str:
+        from html import escape  # late: a scene is read without it
+
+        rows = ""
+        for cells in _short_keys(self):
+            key, unit, value = map(escape, cells)
+            rows += f"<tr><th style='text-align:left'>{key}</th><td>{value}</td><td>{unit}</td></tr>"
+        return f"<table><caption>{escape(f'{self.name}: {self.title}')}</caption>{rows}</table>"
 
     @property
     def phases(self) -> tuple[float, ...]:
@@ -775,6 +792,60 @@ def _blade_tables(scene: Scene) -> dict[str, Any] | list[dict[str, Any]]:
             del table["tip"]
         written.append(table)
     return written[0] if are_equal else written
+
+
+def scene_keys(scene: Scene) -> list[tuple[KeyPath, Any]]:
+    """Return the path and the value of each key of the scene's file, see `scene_tables`."""
+    found: list[tuple[KeyPath, Any]] = []
+
+    def collect(value: Any, path: KeyPath) -> None:
+        entries: Iterable[tuple[Any, Any]] = ()
+        if isinstance(value, dict):
+            entries = value.items()
+        elif isinstance(value, list) and value and isinstance(value[0], dict):  # a table per blade
+            entries = enumerate(value)
+        else:
+            found.append((path, value))
+        for name, entry in entries:
+            collect(entry, (*path, name))
+
+    collect(scene_tables(scene), ())
+    return found
+
+
+def without_times(value: Any) -> Any:
+    """Return a value of a scene file; a load over time whose table has one row as that number."""
+    match value:
+        case [[float(), float() as number]]:
+            return number
+        case list():
+            return [without_times(entry) for entry in value]
+    return value
+
+
+def _short_keys(scene: Scene) -> list[tuple[str, str, str]]:
+    """Return key, unit and value as text of as many keys as a screen has room for."""
+    rows = []
+    for path, value in scene_keys(scene):
+        unit = unit_of(path)
+        if path != ("title",) and value != []:
+            rows.append((shown_key(path), "" if unit == "1" else unit, _short_value(without_times(value))))
+    rows.sort(key=lambda row: row[0].startswith("blade["))  # unequal blades last: there may be hundreds
+    if len(rows) > _SHOWN_KEYS:
+        rows[_SHOWN_KEYS:] = [(f"... {len(rows) - _SHOWN_KEYS} more keys", "", "")]
+    return rows
+
+
+def _short_value(value: Any) -> str:
+    """Return a value of at most six digits, a list of at most six entries."""
+    if isinstance(value, float):
+        return f"{value:.6g}"
+    if not isinstance(value, list):
+        return str(value)
+    shown = [_short_value(entry) for entry in value[:_SHOWN_ENTRIES]]
+    if len(value) > _SHOWN_ENTRIES:
+        shown.append(f"... {len(value) - _SHOWN_ENTRIES} more")
+    return f"[{', '.join(shown)}]"
 
 
 def _listed(value: Any) -> Any:

@@ -281,18 +281,27 @@ class Solution:
         }
         return {name: text for name, text in rows.items() if text}
 
+    def _arrays(self) -> str:
+        """Return "time (1001,) s, angles (1001, 4) rad, ...": the arrays that it has."""
+        units = {quantity.name: quantity.units for quantity in quantities(self.scene.outputs)}
+        shown = [f"time {self.time.shape} s"]
+        for name, values in self.quantities.items():
+            if not np.isnan(values).all():
+                unit = units.get(name, "1")
+                shown.append(f"{name} {values.shape}{'' if unit == '1' else f' {unit}'}")
+        return ", ".join(shown)
+
     def __repr__(self) -> str:
-        metrics = ", ".join(f"{name} {value:.3g}" for name, value in self.metrics.items())
-        lines = [
-            f"{self.scene.name}: {self.scene.title}",
-            *(f"{name}: {text}" for name, text in self._summary().items()),
-        ]
-        return "\n  ".join([*lines, *textwrap.wrap(metrics, 110)[:3]])
+        rows = self._summary() | {"arrays": self._arrays()}
+        lines = [f"{self.scene.name}: {self.scene.title}"]
+        for name, text in rows.items():
+            lines += textwrap.wrap(f"{name}: {text}", 110, initial_indent="  ", subsequent_indent="    ")
+        return "\n".join(lines)
 
     def _repr_html_(self) -> str:
-        rows = self._summary() | {name: f"{value:.3g}" for name, value in self.metrics.items()}
+        rows = self._summary() | {"arrays": self._arrays()}
         cells = "".join(f"<tr><th>{escape(k)}</th><td>{escape(v)}</td></tr>" for k, v in rows.items())
-        return f"<table><caption>{escape(self.scene.title)}</caption>{cells}</table>"
+        return f"<table><caption>{escape(f'{self.scene.name}: {self.scene.title}')}</caption>{cells}</table>"
 
 
 def need_xarray() -> Any:

@@ -44,7 +44,7 @@ def shipped_reference(scene_hash: str) -> ShippedReference | None:
 def _shipped_by_hash(files: tuple[Path, ...]) -> dict[str, ShippedReference]:
     by_hash: dict[str, ShippedReference] = {}
     for path in files:
-        for known in TableFile(path, [RUNS]).tables[RUNS].known_rows().values():
+        for known in TableFile(path, [RUNS]).tables[RUNS].known_rows.values():
             frozen_with = json.loads(known["versions"])["frozen_with"]
             by_hash[known["scene_hash"]] = ShippedReference(path, known["scene"], frozen_with)
     return by_hash

@@ -21,8 +21,8 @@ from support.stored import Made, rotor, store
 from support.sweeps import THREE_RUNS
 
 from rotor_mbs.analysis.text_tables import table_of_runs
-from rotor_mbs.cli.terminal import ProgressLine
 from rotor_mbs.errors import MethodRefusal
+from rotor_mbs.runs.progress import ProgressLine
 from rotor_mbs.runs.read import open_results
 from rotor_mbs.runs.runner import Outcome
 from rotor_mbs.runs.sweeps import StoredSweep

@@ -143,7 +143,7 @@ def stored(path: Path) -> dict[str, object]:
     tables = TableFile(path) if names else None
     for group in names:
         assert tables is not None
-        for run, known in tables.tables[group].known_rows().items():
+        for run, known in tables.tables[group].known_rows.items():
             place = tables.place(run, group)
             if known["scene"] == OTHER and place.is_stored:
                 found |= {f"{group} {run} {name}": values.tobytes() for name, values in place.read().items()}

@@ -19,6 +19,7 @@ from rotor_mbs.comparison.data import load_data
 from rotor_mbs.comparison.modes import compare_modes
 from rotor_mbs.comparison.trajectory import compare_with_reference
 from rotor_mbs.comparison.verdict import DEFAULT_TOLERANCE, LEVELS, ChannelErrors, DataVerdict, from_dictionary
+from rotor_mbs.errors import StoreError
 from rotor_mbs.methods.time_limit import valid_seconds
 from rotor_mbs.report import canvas, plots
 from rotor_mbs.report.canvas import Panels
@@ -45,7 +46,10 @@ from rotor_mbs.report.looks import GREY, INK, PALETTE, Look, coordinate_look, wi
 from rotor_mbs.report.numbers import SPACE, seconds, shortest, typeset, typeset_title, up_to, with_unit
 from rotor_mbs.report.pages import scene_plots as draw
 from rotor_mbs.report.plots import Series
-from rotor_mbs.runs.read import Record, write_records
+from rotor_mbs.runs.hdf5 import reading
+from rotor_mbs.runs.progress import progress_of_call
+from rotor_mbs.runs.read import Record, read_records, write_records
+from rotor_mbs.runs.trailer import COMPARISON
 from rotor_mbs.runs.versions import machine, versions
 from rotor_mbs.scenario.catalogue import scene_of
 from rotor_mbs.scenario.keys import as_float, positive
@@ -65,6 +69,7 @@ def compare(
     columns: str | os.PathLike[str] | Mapping[str, Any] | None = None,
     tolerance: float = DEFAULT_TOLERANCE,
     timeout: float = 600.0,
+    progress: bool | None = None,
 ) -> DataComparison:
     """Compare a trajectory, loads or modes of another program with a scene.
 
@@ -82,6 +87,7 @@ def compare(
         it is wrapped. By default columns are identified by name, see `verdict.read`.
     tolerance : bound on interval defects beyond rounding of the data (rad); relative bound on loads and frequencies.
     timeout : time limit for the reference, the defects and the search for causes (s).
+    progress : whether to show the progress. By default on a terminal and in a notebook.
 
     Raises
     ------
@@ -111,10 +117,22 @@ def compare(
         data = file_path(data)
     if columns is not None and not hasattr(columns, "items"):
         columns = file_path(columns)
-    foreign = load_data(data, scene, columns)
-    if foreign.is_modes:
-        return DataComparison(*compare_modes(foreign, scene, tolerance))
-    return DataComparison(*compare_with_reference(foreign, scene, tolerance, timeout))
+    with progress_of_call(progress) as shown:
+        foreign = load_data(data, scene, columns)
+        if foreign.is_modes:
+            return DataComparison(*compare_modes(foreign, scene, tolerance))
+        return DataComparison(*compare_with_reference(foreign, scene, tolerance, timeout, shown.stage))
+
+
+def open_comparisons(path: Path) -> DataComparison | dict[str, DataComparison]:
+    """Return the comparison in a file; of several ones, by scene and name. Raises StoreError."""
+    found = {}
+    for record in read_records(path, COMPARISON):
+        with reading(path):
+            found[f"{record.scene}/{record.name}"] = DataComparison(verdict_of(record), record)
+    if not found:
+        raise StoreError(f"{path}: no comparison in it; allowed: a file that rotor-mbs compare has written")
+    return found if len(found) > 1 else next(iter(found.values()))
 
 
 @dataclass(repr=False)
@@ -142,7 +160,7 @@ class DataComparison:
 
     def plot(self) -> Panels:
         """Plot the defects of each coordinate over time and the tolerance; without defects, the errors."""
-        return defect_panels(self.record) or error_panels(self.record)
+        return (defect_panels(self.record) or error_panels(self.record)).with_legend()
 
     def to_xarray(self) -> Any:
         """Return data, reference, errors and defects as an xarray.Dataset over time.

@@ -20,8 +20,10 @@ from rotor_mbs.analysis.modes import (
     SceneModes,
     linear_dataset,
     mode_rows,
+    mode_summary,
     mode_table,
     multiblade,
+    read_modes,
     to_records,
 )
 from rotor_mbs.analysis.text_tables import TextTable
@@ -93,7 +95,13 @@ def modes(scene: Scene | str | os.PathLike[str], speeds: Sequence[float] = ()) -
     return Modes(**vars(compute_modes(scene_of(scene), increasing_speeds(speeds))))
 
 
-@dataclass(frozen=True)
+def open_modes(path: Path) -> Modes | dict[str, Modes]:
+    """Return the modes of the scene of a file; of several scenes, by name. Raises StoreError."""
+    found = {name: Modes(**vars(modes)) for name, modes in read_modes(path).items()}
+    return found if len(found) > 1 else next(iter(found.values()))
+
+
+@dataclass(frozen=True, repr=False)
 class Modes(SceneModes):
     """Result of `rotor_mbs.modes`: the modes of a scene.
 
@@ -138,6 +146,9 @@ class Modes(SceneModes):
         """Write the page into a folder. Returns its path."""
         return write_page(file_path(folder), modes_page([self]), versions() | machine())
 
+    def __repr__(self) -> str:
+        return mode_summary(self)
+
     def _repr_html_(self) -> str:
         drawn = self.plot()._repr_svg_() if self.rotation else ""
         return f"<p>{escape(self.scene)}: {escape(self.title)}</p>{self.table()._repr_html_()}{drawn}"
@@ -179,7 +190,7 @@ class ModePlots:
         panel.axes[0].set_ylim(0.0, top)
         panel.axes[0].set_ylabel("frequency (rad/s)")
         panel.axes[1].set_ylabel("change (rad/s)")
-        return panel
+        return panel.with_legend()
 
     def damping(self) -> Panels:
         """Plot damping ratios and growth rates (1/s) over rotor speed. Raises InputError without speeds."""
@@ -190,7 +201,7 @@ class ModePlots:
             for k, values in enumerate(numbers.T):
                 curve(axes, modes.speeds, values, replace(mode_look(k, modes.names[k]), marker=""))
             axes.set_ylabel(label)
-        return panel
+        return panel.with_legend()
 
     def multipliers(self) -> Panels:
         """Plot moduli of the Floquet multipliers over rotor speed. Raises InputError if there are none."""
@@ -212,7 +223,7 @@ class ModePlots:
         elif len(known) and known.max() / known.min() < 1.0 + 10.0 * GROWTH:
             axes.set_ylim(0.9, 1.1)
         axes.set_ylabel("modulus of the multipliers")
-        return panel
+        return panel.with_legend()
 
     def _rotation(self) -> LinearModes:
         for linear in self._modes.rotation.values():

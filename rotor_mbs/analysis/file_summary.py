@@ -1,0 +1,188 @@
+"""What is in a file that this program wrote, and what to do with it next."""
+
+from __future__ import annotations
+
+import textwrap
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from rotor_mbs.analysis.modes import mode_summary, read_modes
+from rotor_mbs.analysis.text_tables import TextTable, bench_table, method_table, sweep_parameters
+from rotor_mbs.methods.catalogue import REFERENCE, is_corrected
+from rotor_mbs.runs.design import MISSING
+from rotor_mbs.runs.hdf5 import read_content
+from rotor_mbs.runs.read import StoredScene, open_results, read_records
+from rotor_mbs.runs.sweeps import StoredSweep
+from rotor_mbs.runs.table import parsed
+from rotor_mbs.runs.trailer import COMPARISON, MODES, RESULTS, SWEEP, read_trailer
+from rotor_mbs.runs.versions import made_with
+from rotor_mbs.scenario.keys import counted
+from rotor_mbs.solution.status import GOOD, STATUSES
+
+_WIDTH = 110  # characters of a line
+_MOST_FAILED = 5  # runs that are not ok, with their reasons
+
+
+@dataclass
+class FileSummary:
+    """What is in a file of this program.
+
+    Attributes
+    ----------
+    path, kind : the file, and "results", "sweep", "modes" or "comparison".
+    attributes : of the file: versions of the programs that made it, the machine, and when.
+    scenes, methods, outputs : names, in the order of the file.
+    statuses : number of runs, or comparisons, with each status.
+    lines, tables : what else there is to say of a file of its kind.
+    next : commands and calls, each with what it does.
+    """
+
+    path: Path
+    kind: str
+    attributes: Mapping[str, Any]
+    scenes: list[str] = field(default_factory=list)
+    methods: list[str] = field(default_factory=list)
+    outputs: list[str] = field(default_factory=list)
+    statuses: dict[str, int] = field(default_factory=dict)
+    lines: list[str] = field(default_factory=list)
+    tables: list[TextTable] = field(default_factory=list)
+    next: list[tuple[str, str]] = field(default_factory=list)
+
+    def as_dictionary(self) -> dict[str, Any]:
+        """Return it as JSON can hold it."""
+        return {
+            "file": str(self.path), "kind": self.kind, "bytes": self.path.stat().st_size, "scenes": self.scenes,
+            "methods": self.methods, "outputs": self.outputs, "statuses": self.statuses,
+            "made_with": dict(made_with(self.attributes)), "next": [command for command, _ in self.next],
+        }  # fmt: skip
+
+    def __str__(self) -> str:
+        size = self.path.stat().st_size
+        parts = [f"{self.path}: {self.kind}, {size / 1e6:.3g} MB"]
+        facts = {
+            "scenes": shortened(self.scenes),
+            "methods": ", ".join(self.methods),
+            "outputs": ", ".join(self.outputs),
+            "status": counts(self.statuses),
+            "made by": ", ".join(f"{name} {text}" for name, text in made_with(self.attributes)),
+        }
+        for name, text in facts.items():
+            if text:
+                parts += textwrap.wrap(text, _WIDTH, initial_indent=f"  {name:9}", subsequent_indent=11 * " ")
+        parts += [f"  {line}".rstrip() for line in self.lines]
+        for table in self.tables:
+            parts += ["", str(table)]
+        width = max(len(command) for command, _ in self.next)
+        parts += ["", "next:", *(f"  {command:{width}}  {what}" for command, what in self.next)]
+        return "\n".join(parts)
+
+
+def counts(statuses: Mapping[str, int]) -> str:
+    """Return "18 ok, 2 inaccurate", the most frequent status first."""
+    return ", ".join(f"{count} {status}" for status, count in Counter(statuses).most_common())
+
+
+def shortened(names: Sequence[str]) -> str:
+    """Return names as a list of at most eight, with how many there are."""
+    shown = ", ".join(names[:8])
+    return f"{shown}, ... ({len(names)} in all)" if len(names) > 8 else shown
+
+
+def summary_of(path: Path) -> FileSummary:
+    """Return what is in a file. Raises StoreError where it cannot be read or is not of this program."""
+    kind = read_trailer(path).kind
+    of_kind = {RESULTS: _results, SWEEP: _sweep, MODES: _modes, COMPARISON: _comparison}
+    summary = of_kind[kind](path)
+    summary.next = [(f"rotor-mbs report {path}", "pages: figures, tables, what was found"), *summary.next]
+    summary.next.append((f'rm.open("{path}")', "in Python, after `import rotor_mbs as rm`"))
+    return summary
+
+
+def _results(path: Path) -> FileSummary:
+    curves, ladders = read_records(path, "bench"), read_records(path, "stability")
+    with open_results(path) as results:
+        summary = FileSummary(path, RESULTS, results.attributes, list(results.scenes))
+        runs = [run for scene in results.scenes.values() for run in scene.methods.values()]
+        summary.methods = list(dict.fromkeys([run.method for run in runs] + [curve.method for curve in curves]))
+        summary.outputs = _unique(output for scene in results.scenes.values() for output in scene.scene.outputs)
+        summary.statuses = dict(Counter(run.status for run in runs))
+        failed = [run for run in runs if run.status not in GOOD and is_corrected(run.method)]
+        for run in failed[:_MOST_FAILED]:
+            reason = str(run.attributes.get("message", ""))
+            text = f"{run.scene} {run.method} {run.status}{': ' if reason else ''}{reason}"
+            summary.lines += textwrap.wrap(text, _WIDTH, subsequent_indent="  ")
+        if len(failed) > _MOST_FAILED:
+            summary.lines.append(f"... {len(failed) - _MOST_FAILED} more runs that are not ok")
+        if results.scenes:
+            summary.tables = [_scene_table(results.scenes.values()), method_table(runs)]
+            summary.next = [(f"rotor-mbs check {path}", "accuracy verdicts; exit status 1 where one fails")]
+    if curves:
+        summary.scenes = _unique([*summary.scenes, *(curve.scene for curve in curves)])
+        summary.lines.append(f"bench: {counted(len(curves), 'curve')} of error against run time")
+        summary.tables.append(bench_table(curves))
+    if ladders:
+        summary.lines.append(f"stability: {counted(len(ladders), 'ladder')} of time steps")
+    summary.tables = [table for table in summary.tables if table.rows]
+    return summary
+
+
+def _unique(names: Iterable[str]) -> list[str]:
+    return list(dict.fromkeys(names))
+
+
+def _scene_table(scenes: Iterable[StoredScene]) -> TextTable:
+    rows: list[tuple[str, ...]] = []
+    for stored in scenes:
+        scene = stored.scene
+        statuses = counts(Counter(run.status for run in stored.methods.values()))
+        reference = stored.reference
+        origin = "none" if reference is None else "shipped" if reference.is_frozen else "computed"
+        rows.append((stored.name, str(len(scene.blades)), f"{scene.duration:g}", str(scene.samples), origin, statuses))
+    return TextTable(("scene", "blades", "duration (s)", "samples", REFERENCE, "runs"), rows)
+
+
+def _sweep(path: Path) -> FileSummary:
+    sweep = StoredSweep(path, allow_damaged_runs=True)
+    codes = sweep.column("status")
+    summary = FileSummary(path, SWEEP, sweep.attributes, [str(sweep.attributes["base_scene"])], list(sweep.methods))
+    summary.statuses = dict(Counter(STATUSES[code] for code in codes.tolist() if code != MISSING))
+    missing = int((codes == MISSING).sum())
+    if missing:
+        summary.statuses["not computed"] = missing
+        summary.next = [("rotor-mbs sweep ...", "the command that made it computes what is missing")]
+    if len(sweep.damaged_runs):
+        summary.statuses["damaged"] = len(sweep.damaged_runs)
+    summary.outputs = [name for name, column in sweep.columns.items() if "time" in column.dimensions and name != "time"]
+    summary.tables = [sweep_parameters(sweep)]
+    summary.next.append((f"rotor-mbs check {path}", "accuracy verdicts; exit status 1 where one fails"))
+    return summary
+
+
+def _modes(path: Path) -> FileSummary:
+    found = read_modes(path)
+    summary = FileSummary(path, MODES, read_content(path, ()).attributes, list(found))
+    summary.methods = _unique(model for modes in found.values() for model in (*modes.rest, *modes.rotation))
+    summary.lines = [line for modes in found.values() for line in ("", *mode_summary(modes).splitlines())]
+    return summary
+
+
+def _comparison(path: Path) -> FileSummary:
+    records = read_records(path, COMPARISON)
+    summary = FileSummary(
+        path, COMPARISON, read_content(path, ()).attributes, _unique(record.scene for record in records)
+    )
+    summary.statuses = dict(Counter(str(record.attributes["status"]) for record in records))
+    rows: list[tuple[str, ...]] = []
+    for record in records:
+        verdict = parsed(record.attributes["verdict"], dict, path)
+        numbers = (f"{verdict[name]:g}" for name in ("rows", "compared_until", "tolerance"))
+        rows.append((record.name, record.scene, *numbers, str(verdict["status"])))
+        reasons = [verdict["message"], *(f"probable cause: {cause}" for cause in verdict["likely"])]
+        for reason in filter(None, reasons):
+            summary.lines += textwrap.wrap(f"{record.name}: {reason}", _WIDTH, subsequent_indent="  ")
+    summary.tables = [TextTable(("data", "scene", "rows", "compared up to (s)", "tolerance", "status"), rows)]
+    summary.next = [("rotor-mbs compare DATA --scene SCENE", "the same for other data")]
+    return summary

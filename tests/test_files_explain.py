@@ -1,0 +1,272 @@
+"""What files, scenes, runs and long calls tell of themselves: `show FILE`, `rotor_mbs.open`, reprs, progress."""
+
+from __future__ import annotations
+
+import io
+import json
+import os
+import shutil
+import sys
+import types
+from collections.abc import Callable
+from contextlib import AbstractContextManager
+from pathlib import Path
+
+import numpy as np
+import pytest
+from support.commands import refusal, rotor_mbs
+from support.scenes import paper
+from support.stored import Made, rotor, store
+
+import rotor_mbs as rm
+from rotor_mbs.runs import progress, table
+from rotor_mbs.runs.runner import Outcome
+from rotor_mbs.runs.trailer import Trailer
+
+SHORT = {"duration": 0.5, "samples": 26}
+SCREEN = (140, 50)  # characters in a line, lines
+METHOD = "lagrange/dop853"
+
+
+@pytest.fixture(scope="module")
+def scene() -> rm.Scene:
+    return rm.scene("paper/fig08").replace(**SHORT)
+
+
+@pytest.fixture(scope="module")
+def files(scene: rm.Scene, tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
+    """A file of every kind."""
+    folder = tmp_path_factory.mktemp("files")
+    data = {"time": np.linspace(0.0, 0.5, 26), "rotor": np.zeros(26)}
+    curve = rotor(np.sin, np.cos, np.sin, np.cos)
+    two = [
+        Made(paper(name, samples=51), method, curve) for name in ("fig08", "fig11") for method in ("reference", METHOD)
+    ]
+    many = []
+    for name in (f"fig{number}" for number in ("08", "09", "11", "12", "13b", "14a")):
+        many += [Made(paper(name, samples=3), method, curve) for method in ("reference", *SEVEN)]
+    rm.run(scene, [METHOD]).save(folder / "one.h5")
+    rm.sweep(scene, {"bearing.stiffness": [0.0, 10.0]}, methods=METHOD, samples=5, output=folder / "sweep.h5")
+    rm.modes(scene, [0.0, 1.0]).save(folder / "modes.h5")
+    rm.compare(data, scene, columns={"omit": ["pitch_1", "pitch_2", "pitch_3"]}).save(folder / "comparison.h5")
+    return {
+        **{path.stem: path for path in folder.iterdir() if path.suffix == ".h5"},
+        "two": store(folder / "two.h5", two),
+        "many": store(folder / "many.h5", many),
+    }
+
+
+SEVEN = (
+    "printed/ode45", "printed_e1/ode45", "lagrange/taylor", "lagrange/ode45", METHOD, "exudyn_tree/rk67",
+    "exudyn_chain/extrapolated",
+)  # fmt: skip
+
+
+def fits(text: str) -> bool:
+    lines = text.splitlines()
+    return len(lines) <= SCREEN[1] and max(map(len, lines)) <= SCREEN[0]
+
+
+@pytest.mark.parametrize(
+    ("name", "parts"),
+    {
+        "one": ("results", "paper/fig08", METHOD, "angles, rates, tip, energy", "1 ok", "rotor-mbs check", "0.5"),
+        "two": ("results", "paper/fig08, paper/fig11", METHOD),
+        "sweep": ("sweep", "bearing.stiffness  N m/rad  0     10  2", "2 ok", METHOD),
+        "modes": ("modes", "lagrange, exudyn_tree, exudyn_chain", "damped (Hz)", "modes differ by at most"),
+        "comparison": ("comparison", "data/trajectory  paper/fig08  26    0.5", "1e-06"),
+    }.items(),
+)
+def test_show_tells_what_is_in_a_file_and_what_to_do_next(
+    name: str, parts: tuple[str, ...], files: dict[str, Path]
+) -> None:
+    shown = rotor_mbs("show", files[name])
+    assert (shown.status, shown.err) == (0, "")
+    for part in (*parts, f"rotor_mbs {rm.__version__}", f"rotor-mbs report {files[name]}", "rm.open("):
+        assert part in shown.out, part
+    assert fits(shown.out)
+    facts = json.loads(rotor_mbs("show", files[name], "--json").out)
+    assert facts["kind"] == parts[0]
+    assert facts["bytes"] == files[name].stat().st_size
+    assert facts["made_with"]["rotor_mbs"] == rm.__version__
+
+
+def test_show_of_runs_that_are_not_ok_has_their_reasons(tmp_path: Path) -> None:
+    failed = {"status": "solver_failed", "message": "the step became too small"}
+    made = [Made(paper("fig08", samples=11), METHOD, rotor(np.sin, np.cos, np.sin, np.cos), attributes=failed)]
+    out = rotor_mbs("show", store(tmp_path / "r.h5", made)).out
+    assert f"paper/fig08 {METHOD} solver_failed: the step became too small" in out
+
+
+def test_show_of_a_file_that_is_none(tmp_path: Path) -> None:
+    assert "no such file" in refusal("show", tmp_path / "missing.h5")
+    (tmp_path / "other.h5").write_bytes(b"x" * 100)
+    assert "not an HDF5 file" in refusal("show", tmp_path / "other.h5")
+
+
+def test_show_of_a_method_file_lists_its_settings(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("mine.py").write_text((Path(__file__).parent / "extension" / "rotor_rk4.py").read_text())
+    out = rotor_mbs("show", "mine.py").out
+    assert "rotor-mbs run SCENE -m" in out
+
+
+def test_what_was_saved_is_opened(scene: rm.Scene, files: dict[str, Path]) -> None:
+    runs = rm.open(files["one"])
+    assert list(runs) == ["reference", METHOD]
+    assert runs[f"paper/fig08/{METHOD}"].status == runs["paper/fig08"][METHOD].status == runs[METHOD].status == "ok"
+    assert list(rm.open(files["two"])) == [
+        f"paper/{name}/{m}" for name in ("fig08", "fig11") for m in ("reference", METHOD)
+    ]
+    modes = rm.open(files["modes"])
+    assert modes.agrees
+    np.testing.assert_array_equal(
+        modes.rotation["lagrange"].eigenvalues, rm.modes(scene, [0.0, 1.0]).rotation["lagrange"].eigenvalues
+    )
+    comparison = rm.open(files["comparison"])
+    assert comparison.verdict.rows == 26
+    assert "rotor" in str(comparison.table())
+    assert rm.open(files["sweep"]).statuses == {"ok": 2}
+
+
+def test_a_file_is_opened_once_and_a_run_reads_its_scene_alone(
+    files: dict[str, Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    opened: list[list[str]] = []
+    read = table._read_table
+
+    def counted(file: object, group: str, trailer: Trailer) -> table.Table:
+        opened[-1].append(group)
+        return read(file, group, trailer)
+
+    def counted_file(path: Path) -> AbstractContextManager[tuple[object, Trailer]]:
+        opened.append([])
+        return open_file(path)
+
+    open_file = table.open_file
+    path = Path(shutil.copy(files["many"], tmp_path / "many.h5"))
+    os.utime(path, (1e9, 1e9))  # long ago
+    monkeypatch.setattr(table, "_read_table", counted)
+    monkeypatch.setattr(table, "open_file", counted_file)
+    runs = rm.open(path)
+    assert [groups for groups in opened if groups] == [["runs"]]
+    opened.clear()
+    label = f"paper/fig11/{METHOD}"
+    first = runs[label].angles
+    assert opened == [["paper/fig11"]]
+    np.testing.assert_array_equal(runs[label].angles, first)
+    assert [run.status for run in runs["paper/fig11"].values()] == ["ok"] * 8
+    assert [groups for groups in opened if groups] == [["paper/fig11"]]
+    # Another file in its place is seen.
+    Path(shutil.copy(files["one"], tmp_path / "other.h5")).replace(path)
+    with pytest.raises(rm.StoreError, match=f"has no {label} any more: another file has taken its place"):
+        _ = runs[label]
+
+
+def test_several_modes_and_comparisons_of_a_file_are_a_dict(tmp_path: Path) -> None:
+    for name in ("paper/fig03", "paper/fig08"):
+        rm.modes(name).save(tmp_path / "modes.h5")
+    assert sorted(rm.open(tmp_path / "modes.h5")) == ["paper/fig03", "paper/fig08"]
+    assert rm.open(tmp_path / "modes.h5")["paper/fig03"].scene == "paper/fig03"
+
+
+def test_reprs_fit_a_screen_and_have_units(scene: rm.Scene, files: dict[str, Path]) -> None:
+    blades = [{"mass": 10.0 + i, "centre_of_mass": [0.1, 0.0, 5.0], "tip": [0.0, 0.0, 9.0]} for i in range(9)]
+    large = rm.scene("paper/fig08").replace(
+        blades=9, blade=blades, torque={"rotor": [[float(i), i + 0.5] for i in range(500)]},
+        initial={"angles": [0.0] * 10, "rates": [0.0] * 10},
+    )  # fmt: skip
+    for shown in (scene, large):
+        assert fits(repr(shown))
+        assert "gravity, m/s^2" in repr(shown)
+        assert "<td>m/s^2</td>" in shown._repr_html_()
+    assert "... 494 more]" in repr(large)
+    run = rm.open(files["one"])[METHOD]
+    assert fits(repr(run))
+    assert "angles (26, 4) rad, rates (26, 4) rad/s, tip (26, 3, 3) m" in " ".join(repr(run).split())
+    assert "rotor_angle_max 0 rad" in repr(run)
+    assert "largest magnitude of a pitch angle" not in repr(run)
+    assert " rad</td>" in run._repr_html_()
+    for name in files:
+        assert fits(repr(rm.open(files[name]))), name
+    assert len(rm.open(files["many"])) == 48
+    assert len(repr(rm.open(files["many"])).splitlines()) == 9  # a row for each method
+    assert "damped (Hz)" in repr(rm.open(files["modes"]))
+
+
+def test_plots_in_a_notebook_have_legends(files: dict[str, Path]) -> None:
+    runs, modes, comparison = (rm.open(files[name]) for name in ("one", "modes", "comparison"))
+    run = runs[METHOD]
+    plots: list[tuple[Callable[[], rm.report.canvas.Panels], str]] = [
+        (run.plot, "pitch 3"), (run.plot.energy, "kinetic"), (run.plot.tips, "blade 1"),
+        (run.plot.error, "closed form"), (runs.plot, "closed form"), (runs.plot.rotor, "closed form"),
+        (modes.plot, "collective pitch"), (modes.plot.damping, "sine pitch"), (modes.plot.multipliers, "largest"),
+        (comparison.plot, "rotor"),
+    ]  # fmt: skip
+    for plot, label in plots:
+        legend = plot().axes[0].get_legend()
+        assert any(label in text.get_text() for text in legend.get_texts()), (plot, label)
+
+
+# Progress
+
+
+class Screen(io.StringIO):
+    def isatty(self) -> bool:
+        return True
+
+
+CALLS: dict[str, Callable[[rm.Scene, bool | None], object]] = {
+    "run": lambda scene, shown: rm.run(scene, [METHOD], progress=shown),
+    "sweep": lambda scene, shown: rm.sweep(scene, {"gravity": [9.7, 9.8]}, methods=METHOD, samples=3, progress=shown),
+    "compare": lambda scene, shown: rm.compare({"time": [0.0, 0.1, 0.2], "rotor": np.zeros(3)}, scene,
+                                               columns={"omit": ["pitch_1", "pitch_2", "pitch_3"]}, progress=shown),
+}  # fmt: skip
+SEEN = {"run": f"[2/2] paper/fig08 {METHOD} ok", "sweep": "runs 2/2", "compare": "interval defects 1/4"}
+
+
+@pytest.mark.parametrize("name", CALLS)
+def test_long_calls_show_their_progress_on_a_terminal_unless_silenced(
+    name: str, scene: rm.Scene, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for stream, asked, is_shown in (
+        (Screen(), None, True), (Screen(), False, False), (io.StringIO(), None, False), (io.StringIO(), True, True),
+    ):  # fmt: skip
+        monkeypatch.setattr(sys, "stderr", stream)
+        CALLS[name](scene, asked)
+        assert (SEEN[name] in stream.getvalue()) == is_shown
+        assert bool(stream.getvalue()) == is_shown
+
+
+def test_a_notebook_shows_a_line_that_is_renewed_and_goes(monkeypatch: pytest.MonkeyPatch) -> None:
+    """By what IPython displays, without a kernel."""
+    shown: list[str] = []
+
+    class Handle:
+        def update(self, data: dict[str, str], *, raw: bool) -> None:
+            assert raw
+            shown.append(data["text/plain"])
+
+    def display(data: dict[str, str], *, raw: bool, display_id: bool) -> Handle:
+        assert raw
+        assert display_id
+        shown.append(data["text/plain"])
+        return Handle()
+
+    module = types.ModuleType("IPython.display")
+    module.display = display  # type: ignore[attr-defined]
+    monkeypatch.setitem(sys.modules, "IPython", types.ModuleType("IPython"))
+    monkeypatch.setitem(sys.modules, "IPython.display", module)
+    stream = type("OutStream", (io.StringIO,), {"__module__": "ipykernel.iostream"})()
+    monkeypatch.setattr(sys, "stdout", stream)
+    with progress.progress_of_call(None) as line:
+        line(1, 4, Outcome("paper/fig05 a/b", "a/b", "ok", share=0.25))
+        line(2, 4, Outcome("paper/fig05 a/c", "a/c", "diverged", "not finite", share=0.5))
+        line.stage("pages", 1, 2)
+    assert shown[0].startswith("starting")
+    assert " 25%, about " in shown[1]
+    assert shown[-1] == ""
+    assert stream.getvalue() == "[2/4] paper/fig05 a/c diverged: not finite\n"  # stays
+    with progress.progress_of_call(False) as line:
+        line.stage("pages", 1, 2)
+    assert shown[-1] == ""
