@@ -748,8 +748,7 @@ def extend_file(path: Path, wanted: Sequence[Table], replaced: Collection[tuple[
     if path.is_symlink():  # a link stays one
         path = path.resolve()
     if not may_extend(path, RESULTS):
-        _write_tables(path, wanted, [])
-        return TableFile(path)
+        return _write_tables(path, wanted, [])
     old, new = TableFile(path), {made.group: made for made in wanted}
     stored = old.tables
     wanted_runs = _known_rows(new.get(RUNS))
@@ -798,8 +797,7 @@ def extend_file(path: Path, wanted: Sequence[Table], replaced: Collection[tuple[
         return old
     places = [(group, run, old.place(run, group)) for group, run in kept]
     rows_kept = [(group, run, place.read()) for group, run, place in places if place.is_stored]
-    _write_tables(path, list(merged.values()), rows_kept)
-    return TableFile(path)
+    return _write_tables(path, list(merged.values()), rows_kept)
 
 
 def copy_file(source: Path, target: Path) -> None:
@@ -850,8 +848,8 @@ def _order(run: str) -> tuple[Any, ...]:
     return natural_key(scene), names.index(method) if method in names else len(names), method
 
 
-def _write_tables(path: Path, tables: Sequence[Table], rows: Sequence[tuple[str, str, Rows]]) -> None:
-    """A new file with these tables; of its rows those that are given, the others blank."""
+def _write_tables(path: Path, tables: Sequence[Table], rows: Sequence[tuple[str, str, Rows]]) -> TableFile:
+    """Write a new file with these tables; of its rows those that are given, the others blank."""
     created = datetime.now(UTC).isoformat(timespec="seconds")
     count, scenes = 0, set[str]()
     others = sorted(made.group for made in tables if made.group != RUNS and "crc32" in made.computed)
@@ -875,6 +873,10 @@ def _write_tables(path: Path, tables: Sequence[Table], rows: Sequence[tuple[str,
                 else:
                     blank = blank_rows(1, place.row_type)
                     place.write({name: values.get(name, blank[name]) for name in place.row_type.names or ()})
+    # It is the same file under its name now, and need not be read again.
+    file.path = path
+    file.tables = {group: replace(table, path=path) for group, table in file.tables.items()}
+    return file
 
 
 # Other HDF5 files

@@ -418,7 +418,11 @@ def _table_section(verdict: DataVerdict) -> Section:
     table = channel_table(verdict)
     rows: list[Row] = []
     for channel, (name, error, defect, *others) in zip(verdict.channels, table.rows, strict=True):
-        tone = "" if channel.defect is None else "bad" if _is_outside(channel, verdict) else "good"
+        tone = ""  # also of a defect that follows from another channel's error
+        if _is_outside(channel, verdict):
+            tone = "bad"
+        elif channel.defect is not None and channel.defect <= verdict.tolerance:
+            tone = "good"
         sign = {"good": "✓ ", "bad": "✗ "}.get(tone, "")
         rows.append([name, error, TableCell(f"{sign}{typeset(defect)}", tone), *others])
     heading = "Channels up to the horizon" if verdict.axis == "time" else "Channels"
