@@ -274,14 +274,14 @@ def extremes(values: Any, most: int) -> NDArray[np.int64]:
     return np.unique(chosen)
 
 
-def log_axis(axes: Any, lowest: float, highest: float, which: str = "y") -> None:
-    """A log axis over whole decades, labelled 10⁻¹²; at most eight labels."""
+def log_axis(axes: Any, lowest: float, highest: float) -> None:
+    """Make the vertical axis logarithmic over whole decades, labelled 10⁻¹²; at most eight labels."""
     low, high = math.floor(math.log10(lowest)), math.ceil(math.log10(highest))
     high = max(high, low + 1)
     # The limits first: a range found by the axes themselves may overflow.
-    axes.set(**{f"{which}lim": (10.0**low, 10.0**high), f"{which}scale": "log"})
+    axes.set(ylim=(10.0**low, 10.0**high), yscale="log")
     exponents = range(low, high + 1, max(1, math.ceil((high - low) / 7)))
-    ticks(getattr(axes, f"{which}axis"), {10.0**e: power(e) for e in exponents})
+    ticks(axes.yaxis, {10.0**e: power(e) for e in exponents})
 
 
 def ticks(axis: Any, labels: Mapping[float, str]) -> None:

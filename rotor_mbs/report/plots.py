@@ -91,31 +91,18 @@ def lines(
     return panels
 
 
-def component_panels(
-    quantity: Quantity,
-    plot: Plot,
-    time: Array,
-    values: Array,
-    labels: Sequence[str] = (),
-    horizon: float | None = None,
-) -> Panels:
-    """A panel per axis with a line per blade, or one panel with a line per component."""
-    rows: dict[str, list[Series]] = {}
-    for panel, look, component in components(quantity, values, labels):
-        rows.setdefault(f"{panel} {plot.axis}".strip(), []).append(Series(time, component, look))
-    return lines(list(rows.items()), horizon, [2.3 if len(rows) == 1 else 1.3] * len(rows))
-
-
-def components(quantity: Quantity, values: Array, labels: Sequence[str] = ()) -> list[tuple[str, Look, Array]]:
-    """(panel, look, values (n,)) of each component: with blades and axes a panel per axis, else one panel."""
+def component_panels(quantity: Quantity, plot: Plot, time: Array, values: Array) -> Panels:
+    """Return a panel per axis with a line per blade, or one panel with a line per axis or blade."""
     first = 1 if quantity.dimensions[1] == "blade" else 0  # a blade has the look of its pitch
-    names = {"coordinate": labels, "axis": "xyz"}.get(quantity.dimensions[1])
-    if names is None:
-        names = [f"blade {i + 1}" for i in range(values.shape[1])]
-    looks = [coordinate_look(first + i, label) for i, label in enumerate(names[: values.shape[1]])]
-    if values.ndim == 2:
-        return [("", look, values[:, i]) for i, look in enumerate(looks)]
-    return [(axis, look, values[:, i, k]) for i, look in enumerate(looks) for k, axis in enumerate("xyz")]
+    names = "xyz" if first == 0 else [f"blade {i + 1}" for i in range(values.shape[1])]
+    panels = "xyz" if values.ndim == 3 else [""]
+    components = values.reshape(*values.shape[:2], -1)
+    rows = []
+    for k, panel in enumerate(panels):
+        looks = [coordinate_look(first + i, name) for i, name in enumerate(names)]
+        curves = [Series(time, components[:, i, k], look) for i, look in enumerate(looks)]
+        rows.append((f"{panel} {plot.axis}".strip(), curves))
+    return lines(rows, heights=[2.3 if len(rows) == 1 else 1.3] * len(rows))
 
 
 def errors(series: Sequence[Series], label: str, horizon: float | None = None) -> Panels:

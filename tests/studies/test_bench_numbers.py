@@ -9,7 +9,9 @@ from typing import Any
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from support.commands import rotor_mbs
 
+import rotor_mbs as rm
 from rotor_mbs.analysis.text_tables import bench_table
 from rotor_mbs.analysis.work_precision import (
     failed,
@@ -200,6 +202,18 @@ def test_curves_are_read_as_they_are_stored_and_one_without_a_point_is_not_shown
         np.testing.assert_array_equal(read.arrays["run_time_s"], curve.arrays["run_time_s"])
     TableFile(tmp_path / "a.h5").place("paper/fig09/lagrange/taylor 0.05", "bench").mark_missing([0])
     assert [curve.name for curve in read_records(tmp_path / "a.h5", "bench")] == ["exudyn_tree/rk67"]
+
+
+def test_a_file_of_curves_alone_is_opened_and_shown(tmp_path: Path) -> None:
+    curves = rm.open(stored(tmp_path / "a.h5", FAST, SLOW))
+    assert list(curves) == ["paper/fig09/lagrange/taylor", "paper/fig09/exudyn_tree/rk67"]
+    np.testing.assert_array_equal(curves["paper/fig09/lagrange/taylor"]["run_time_s"], FAST.arrays["run_time_s"])
+    assert repr(curves).splitlines()[0] == f"{tmp_path / 'a.h5'}: 2 curves of error against run time"
+    assert "lagrange/taylor" in curves._repr_html_()
+    assert curves.to_html(tmp_path / "pages").is_file()
+    shown = rotor_mbs("show", tmp_path / "a.h5").out
+    assert "bench: 2 curves of error against run time" in shown
+    assert "methods  lagrange/taylor, exudyn_tree/rk67" in shown
 
 
 def test_pages_are_written(tmp_path: Path) -> None:

@@ -124,13 +124,10 @@ def metric(run: StoredRun, name: str) -> float | None:
     return float(value) if isinstance(value, float | int) else None
 
 
-def number_cell(value: float | None, digits: int = 2, tone: str = "") -> TableCell:
+def number_cell(value: float | None, tone: str = "") -> TableCell:
     """Return a number that a table sorts by."""
-    return TableCell(
-        number(value, digits),
-        tone,
-        order=value if value is not None and math.isfinite(value) else None,
-    )
+    order = value if value is not None and math.isfinite(value) else None
+    return TableCell(number(value), tone, order=order)
 
 
 def horizon_of(scene: StoredScene) -> float | None:

@@ -214,7 +214,7 @@ def _paper_facts(scene: StoredScene, claims: Sequence[Published]) -> list[Fact]:
     return facts
 
 
-def paper_motion(scene: StoredScene, claims: Sequence[Published], heading: str = "Motion") -> Section:
+def paper_motion(scene: StoredScene, claims: Sequence[Published]) -> Section:
     """Return the rotor moving beside its angle and the pitch that differs most; the other angles, and the rates."""
     sides = scene.sides
     axis = draw.whole_time(list(sides.values()))
@@ -230,7 +230,7 @@ def paper_motion(scene: StoredScene, claims: Sequence[Published], heading: str =
         count = len(rates) - 1
         hint = f"of the rotor and {count} pitch{'es' if count != 1 else ''}"
         elements.append(Fold("Rates", hint, [Grid(2, [[plot] for plot in rates])]))
-    return Section("motion", heading, elements)
+    return Section("motion", "Motion", elements)
 
 
 def paper_plots(scene: StoredScene, claims: Sequence[Published]) -> tuple[Grid, list[Plot], list[Plot]]:

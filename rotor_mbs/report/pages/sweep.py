@@ -13,6 +13,7 @@ import numpy as np
 from markupsafe import Markup
 from numpy.typing import NDArray
 
+from rotor_mbs.analysis.text_tables import sweep_parameters
 from rotor_mbs.report.elements import (
     Array,
     Curve,
@@ -38,6 +39,7 @@ from rotor_mbs.report.numbers import number, prefix_of, shortest, typeset_title
 from rotor_mbs.report.pages import words_of
 from rotor_mbs.report.pages.scene_plots import Jumps, blade_look, jumps_of
 from rotor_mbs.runs.sweeps import StoredSweep, parameter_name
+from rotor_mbs.runs.table import text_of
 from rotor_mbs.scenario.scene import parse_scene
 from rotor_mbs.solution.quantities import LOADS
 from rotor_mbs.solution.status import GOOD, STATUSES
@@ -565,7 +567,7 @@ def _parameter_plot(sweep: _Sweep, key: str, quantity: RunQuantity, curves: Sequ
 def _faults_section(sweep: _Sweep) -> Section:
     """Return the runs that are not ok, grouped by status and reason, with the ranges of their parameters."""
     groups: dict[tuple[int, str], list[int]] = {}
-    messages = _messages(sweep)
+    messages = [text_of(characters) for characters in sweep.stored.column("message")]
     for run in np.flatnonzero(~sweep.is_good).tolist():
         # Reasons that differ by their numbers alone are one.
         words = re.sub(r"[-+]?\d[\d.]*(e[-+]?\d+)?", "#", messages[run])
@@ -578,11 +580,7 @@ def _faults_section(sweep: _Sweep) -> Section:
             values = sweep.parameters[key][runs]
             low, high = brief(values.min()), brief(values.max())
             row.append(low if low == high else f"{low} to {high}")
-        sizes = (
-            np.asarray(sweep.stored.column("defect_max"))[runs]
-            if "defect_max" in sweep.stored.columns
-            else np.zeros(len(runs))
-        )
+        sizes = np.asarray(sweep.stored.column("defect_max"))[runs]
         worst = runs[int(np.nan_to_num(sizes, nan=-1.0).argmax())]
         reason = messages[worst] or "no reason is stored"
         row.append(TableCell(reason, mark="across"))
@@ -600,15 +598,6 @@ def _faults_section(sweep: _Sweep) -> Section:
         "Runs that are not ok",
         [PageTable("Runs that are not ok", head, rows)] if rows else [],
     )
-
-
-def _messages(sweep: _Sweep) -> list[str]:
-    if "message" not in sweep.stored.columns:
-        return [""] * len(sweep.statuses)
-    texts = []
-    for characters in np.asarray(sweep.stored.column("message")):
-        texts.append(b"".join(characters.ravel().tolist()).decode("utf-8", "replace").strip("\0 "))
-    return texts
 
 
 def _runs_section(sweep: _Sweep, quantities: Sequence[RunQuantity]) -> Section:
@@ -651,11 +640,7 @@ def _runs_section(sweep: _Sweep, quantities: Sequence[RunQuantity]) -> Section:
 def _details_section(sweep: _Sweep, quantities: Sequence[RunQuantity]) -> Section:
     """Return what was varied, the distribution of every number, and the sweep's file, folded."""
     stored = sweep.stored
-    parameters: list[Row] = []
-    for key in sweep.keys:
-        values, unit = sweep.parameters[key], sweep.unit(key)
-        limits = [f"{brief(value)} {unit}".strip() for value in (np.nanmin(values), np.nanmax(values))]
-        parameters.append((field_name(key), key, *limits, str(len(np.unique(values)))))
+    parameters = sweep_parameters(stored)
     rows: list[Row] = []
     for quantity in quantities:
         values = quantity.values[sweep.is_good & np.isfinite(quantity.values)]
@@ -667,7 +652,7 @@ def _details_section(sweep: _Sweep, quantities: Sequence[RunQuantity]) -> Sectio
         Fold(
             "Parameters",
             f"{len(sweep.keys)} that were varied",
-            [PageTable("Parameters", ("Parameter", "Key", "From", "To", "Values"), parameters)],
+            [PageTable("Parameters", [with_capital(text) for text in parameters.head], parameters.rows)],
         ),
     ]
     if rows:
