@@ -1,4 +1,8 @@
-"""The progress of long calls: one line that renews itself on a terminal or in a notebook, plain lines in a log."""
+"""The progress of long calls: one line that renews itself on a terminal or in a notebook, plain lines in a log.
+
+What is left is estimated from the work of the runs, which differs a thousandfold, and a run that failed keeps its line:
+tqdm counts iterations, and needs ipywidgets in a notebook.
+"""
 
 from __future__ import annotations
 
@@ -124,7 +128,7 @@ class ProgressLine:
 
 
 class NotebookLine(ProgressLine):
-    """A line below a cell of a Jupyter notebook, which renews itself and goes at the end."""
+    """A line below a cell of a Jupyter notebook, which renews itself; in the end it tells how long the call took."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -144,7 +148,7 @@ class NotebookLine(ProgressLine):
 
     def _clear(self) -> None:
         if self._handle is not None:
-            self._handle.update({"text/plain": ""}, raw=True)
+            self._handle.update({"text/plain": f"done in {span(time.monotonic() - self._start)}"}, raw=True)
 
 
 class SilentProgress(ProgressLine):
