@@ -165,7 +165,7 @@ def with_right_checksums(path: Path) -> None:
 def read_in_every_way(path: Path, kind: str, folder: Path) -> list[str]:
     """What each command says: "" where it ended well."""
     said = []
-    commands: list[list[object]] = [["check", path]]
+    commands: list[list[object]] = [["check", path], ["show", path]]
     if kind == "results":
         commands += [["animate", SCENE, path, "-o", path.with_name("a.webp")], ["figures", path, "-o", path.parent]]
         commands += [["run", SCENE, "-m", "lagrange/dop853", "-j", "1", "-o", path]]

@@ -107,7 +107,7 @@ def test_every_command_ends_with_a_line(forgery: str, kind: str, folder: Path, t
     path = Path(shutil.copy(folder / f"{kind}.h5", tmp_path / "forged.h5"))
     forge(path, FORGERIES[forgery])
     before = path.read_bytes()
-    commands: list[list[object]] = [["check", path], ["report", path, "-o", tmp_path / "pages"]]
+    commands: list[list[object]] = [["check", path], ["show", path], ["report", path, "-o", tmp_path / "pages"]]
     if kind == "results":
         commands += [["animate", SCENE, path, "-o", tmp_path / "a.webp"], ["figures", path, "-o", tmp_path]]
         commands += [["run", SCENE, "-m", "lagrange/dop853", "-j", "1", "-o", path]]
