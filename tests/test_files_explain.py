@@ -8,8 +8,7 @@ import os
 import shutil
 import sys
 import types
-from collections.abc import Callable
-from contextlib import AbstractContextManager
+from collections.abc import Callable, Collection
 from pathlib import Path
 
 import numpy as np
@@ -20,8 +19,8 @@ from support.stored import Made, rotor, store
 
 import rotor_mbs as rm
 from rotor_mbs.runs import progress, table
+from rotor_mbs.runs.hdf5 import Content
 from rotor_mbs.runs.runner import Outcome
-from rotor_mbs.runs.trailer import Trailer
 
 SHORT = {"duration": 0.5, "samples": 26}
 SCREEN = (140, 50)  # characters in a line, lines
@@ -133,21 +132,16 @@ def test_a_file_is_opened_once_and_a_run_reads_its_scene_alone(
     files: dict[str, Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     opened: list[list[str]] = []
-    read = table._read_table
+    read = table.read_content
 
-    def counted(file: object, group: str, trailer: Trailer) -> table.Table:
-        opened[-1].append(group)
-        return read(file, group, trailer)
+    def counted(path: Path, kinds: Collection[str], only: Collection[str] | None = None) -> Content:
+        content = read(path, kinds, only)
+        opened.append([*content.groups])
+        return content
 
-    def counted_file(path: Path) -> AbstractContextManager[tuple[object, Trailer]]:
-        opened.append([])
-        return open_file(path)
-
-    open_file = table.open_file
     path = Path(shutil.copy(files["many"], tmp_path / "many.h5"))
     os.utime(path, (1e9, 1e9))  # long ago
-    monkeypatch.setattr(table, "_read_table", counted)
-    monkeypatch.setattr(table, "open_file", counted_file)
+    monkeypatch.setattr(table, "read_content", counted)
     runs = rm.open(path)
     assert [groups for groups in opened if groups] == [["runs"]]
     opened.clear()

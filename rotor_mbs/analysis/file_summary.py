@@ -95,7 +95,8 @@ def summary_of(path: Path) -> FileSummary:
     """Return what is in a file. Raises StoreError where it cannot be read or is not of this program."""
     kind = read_trailer(path).kind
     of_kind = {RESULTS: _results, SWEEP: _sweep, MODES: _modes, COMPARISON: _comparison}
-    summary = of_kind[kind](path)
+    with reading(path):
+        summary = of_kind[kind](path)
     summary.next = [(f"rotor-mbs report {path}", "pages: figures, tables, what was found"), *summary.next]
     summary.next.append((f'rm.open("{path}")', "in Python, after `import rotor_mbs as rm`"))
     return summary

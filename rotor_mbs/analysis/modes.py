@@ -385,6 +385,7 @@ def mode_table(rows: Sequence[Mapping[str, object]]) -> TextTable:
     return TextTable(head, cells)
 
 
+@np.errstate(all="ignore")
 def mode_summary(modes: SceneModes) -> str:
     """Return modes at rest and at the lowest and highest speed, stability, and whether models agree, as text."""
     rows = mode_rows(modes)
@@ -531,7 +532,7 @@ def read_modes(path: Path) -> dict[str, SceneModes]:
     records = read_records(path, "modes")
     if not records:
         raise StoreError(f"{path}: no modes in it; allowed: a file that rotor-mbs modes has written")
-    with reading(path):
+    with reading(path), np.errstate(all="ignore"):  # a file may hold any number
         return _modes_of(records)
 
 

@@ -165,15 +165,17 @@ def with_right_checksums(path: Path) -> None:
 def read_in_every_way(path: Path, kind: str, folder: Path) -> list[str]:
     """What each command says: "" where it ended well."""
     said = []
-    commands: list[list[object]] = [["check", path], ["show", path]]
+    commands: list[list[object]] = [["check", path], ["show", path], ["show", path, "--json"]]
     if kind == "results":
         commands += [["animate", SCENE, path, "-o", path.with_name("a.webp")], ["figures", path, "-o", path.parent]]
         commands += [["run", SCENE, "-m", "lagrange/dop853", "-j", "1", "-o", path]]
     if kind == "s":
         commands += [["sweep", folder / "s.toml", "-j", "1", "-o", path]]
-    calls: list[Callable[[], object]] = [lambda: write_report(path, path.with_name("pages"))]
+    calls: list[Callable[[], object]] = [
+        lambda: write_report(path, path.with_name("pages")), lambda: repr(rm.open(path)),
+    ]  # fmt: skip
     if kind in ("results", "s"):
-        calls += [lambda: repr(rm.open(path)), lambda: rm.open(path).statuses, lambda: [*rm.open(path).values()]]
+        calls += [lambda: rm.open(path).statuses, lambda: [*rm.open(path).values()]]
     for call in calls:
         try:
             call()
