@@ -13,7 +13,7 @@ from rotor_mbs.analysis.modes import mode_summary, read_modes
 from rotor_mbs.analysis.text_tables import TextTable, bench_table, method_table, sweep_parameters
 from rotor_mbs.methods.catalogue import REFERENCE, is_corrected
 from rotor_mbs.runs.design import MISSING
-from rotor_mbs.runs.hdf5 import read_content
+from rotor_mbs.runs.hdf5 import read_content, reading
 from rotor_mbs.runs.read import StoredScene, open_results, read_records
 from rotor_mbs.runs.sweeps import StoredSweep
 from rotor_mbs.runs.table import parsed
