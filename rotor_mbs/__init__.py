@@ -6,9 +6,12 @@ This is the Python API. Modules are loaded on first use.
     run                      simulate a scene with one method (`Run`) or several (`Runs`)
     sweep                    run a parameter study (`Runs`)
     compare                  compare data of another program with a scene (`DataComparison`)
+    check                    check the accuracy of stored runs (`Checks`)
+    bench                    measure error against run time (`BenchCurves`)
+    test_method              examine a method of one's own (`Checks`)
     export                   export a scene for MuJoCo or Exudyn, or its reference as CSV
     modes                    natural frequencies, damping and mode shapes over rotor speed (`Modes`)
-    open                     open the runs of a results file or a sweep (`Runs`)
+    open                     open any file that the program wrote (`Runs`, `Modes`, ...)
 
 Examples
 --------
@@ -24,32 +27,41 @@ TYPE_CHECKING = False  # what type checkers take for true; importing `typing` wo
 __version__ = "0.1.0"
 
 if TYPE_CHECKING:
-    from rotor_mbs.api import Run as Run
-    from rotor_mbs.api import Runs as Runs
-    from rotor_mbs.api import load as load
-    from rotor_mbs.api import open as open
-    from rotor_mbs.api import run as run
-    from rotor_mbs.api import scene as scene
-    from rotor_mbs.api import scenes as scenes
-    from rotor_mbs.api import sweep as sweep
+    from rotor_mbs.api.benches import BenchCurves as BenchCurves
+    from rotor_mbs.api.benches import bench as bench
+    from rotor_mbs.api.checks import Checks as Checks
+    from rotor_mbs.api.checks import check as check
+    from rotor_mbs.api.checks import test_method as test_method
+    from rotor_mbs.api.comparisons import DataComparison as DataComparison
+    from rotor_mbs.api.comparisons import compare as compare
+    from rotor_mbs.api.files import open as open
+    from rotor_mbs.api.modes import Modes as Modes
+    from rotor_mbs.api.modes import modes as modes
+    from rotor_mbs.api.runs import Run as Run
+    from rotor_mbs.api.runs import Runs as Runs
+    from rotor_mbs.api.runs import load as load
+    from rotor_mbs.api.runs import run as run
+    from rotor_mbs.api.runs import scene as scene
+    from rotor_mbs.api.runs import scenes as scenes
+    from rotor_mbs.api.runs import sweep as sweep
     from rotor_mbs.errors import InputError as InputError
     from rotor_mbs.errors import MethodRefusal as MethodRefusal
     from rotor_mbs.errors import RotorError as RotorError
     from rotor_mbs.errors import StoreError as StoreError
     from rotor_mbs.methods.base import Method as Method
-    from rotor_mbs.report.pages.comparison import DataComparison as DataComparison
-    from rotor_mbs.report.pages.comparison import compare as compare
-    from rotor_mbs.report.pages.modes import modes as modes
     from rotor_mbs.scenario.scene import Blade as Blade
     from rotor_mbs.scenario.scene import Scene as Scene
     from rotor_mbs.studies.export import export as export
 
 _MODULES = {
-    "rotor_mbs.api": "Run Runs load open run scene scenes sweep",
+    "rotor_mbs.api.benches": "bench BenchCurves",
+    "rotor_mbs.api.checks": "check Checks test_method",
+    "rotor_mbs.api.comparisons": "compare DataComparison",
+    "rotor_mbs.api.files": "open",
+    "rotor_mbs.api.modes": "modes Modes",
+    "rotor_mbs.api.runs": "load run Run Runs scene scenes sweep",
     "rotor_mbs.errors": "InputError MethodRefusal RotorError StoreError",
     "rotor_mbs.methods.base": "Method",
-    "rotor_mbs.report.pages.comparison": "DataComparison compare",
-    "rotor_mbs.report.pages.modes": "modes",
     "rotor_mbs.scenario.scene": "Blade Scene",
     "rotor_mbs.studies.export": "export",
 }

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from typing import Any
 
-from rotor_mbs.report.pages.comparison import DataComparison, compare
+from rotor_mbs.api.comparisons import DataComparison, compare
 from rotor_mbs.scenario.catalogue import scene_of
 from rotor_mbs.scenario.keys import as_float
 from rotor_mbs.scenario.scene import Scene

@@ -20,7 +20,7 @@ CHOSEN = {
     "methods/selection.py",
     "studies/check.py",
     "studies/stability.py",
-    "api.py",
+    "api/runs.py",
     "scenario/sweep.py",
 }
 

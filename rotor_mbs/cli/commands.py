@@ -226,8 +226,8 @@ def modes(arguments: argparse.Namespace) -> int:
 
 def compare(arguments: argparse.Namespace) -> int:
     """Data of another program against a scene's reference: a table, its page, the numbers as a results file."""
+    from rotor_mbs.api.comparisons import compare as compare_data
     from rotor_mbs.comparison.verdict import as_dictionary
-    from rotor_mbs.report.pages.comparison import compare as compare_data
     from rotor_mbs.runs.trailer import COMPARISON, may_extend
 
     stored = arguments.output / "comparison.h5"

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from rotor_mbs.analysis.text_tables import TextTable
 from rotor_mbs.comparison.channels import Channel
 from rotor_mbs.comparison.data import ForeignData
 from rotor_mbs.runs.hdf5 import Column
@@ -216,3 +217,34 @@ def comparison_record(
         **versions(),
     }
     return Record("comparison", scene.name, f"data/{content}", attributes, arrays, columns)
+
+
+def channel_table(verdict: DataVerdict) -> TextTable:
+    """Return a table with a row per channel: largest error and defect, ends of agreement."""
+    head = (
+        "channel",
+        "largest error",
+        "largest defect",
+        *(f"within {level:g} up to" for level in LEVELS),
+    )
+    rows = []
+    for channel in verdict.channels:
+        errors = (f"{channel.error_max:.1e} {channel.unit}", _defect(channel))
+        ends = channel.agrees_until.values()
+        until = ("never" if end is None else f"{end:.6g} {axis_unit(verdict)}" for end in ends)
+        rows.append((channel.name, *errors, *until))
+    return TextTable(head, rows)
+
+
+def axis_unit(verdict: DataVerdict) -> str:
+    return "s" if verdict.axis == "time" else "rad/s"
+
+
+def verdict_of(record: Record) -> DataVerdict:
+    """Return the verdict that a stored comparison has."""
+    return from_dictionary(json.loads(record.attributes["verdict"]))
+
+
+def _defect(channel: ChannelErrors) -> str:
+    """Return the largest defect of a channel with its unit; "" where there is none."""
+    return "" if channel.defect is None else f"{channel.defect:.1e} {channel.defect_unit}"

@@ -24,9 +24,9 @@ from support.scenes import paper
 from support.stored import Made, rotor, store
 from support.sweeps import made_sweep
 
+from rotor_mbs.api.comparisons import compare
 from rotor_mbs.report.build import write_report
 from rotor_mbs.report.files import write_page
-from rotor_mbs.report.pages.comparison import compare
 from rotor_mbs.report.pages.modes import modes_page
 from rotor_mbs.studies.modes import compute_modes
 

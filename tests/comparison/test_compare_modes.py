@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 
 import rotor_mbs as rm
+from rotor_mbs.api.comparisons import DataComparison
 from rotor_mbs.cli import main
-from rotor_mbs.report.pages.comparison import DataComparison
 from rotor_mbs.studies.modes import compute_modes
 
 Array = Any

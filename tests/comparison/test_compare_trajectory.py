@@ -14,9 +14,8 @@ from support.data_files import FORMATS
 
 import rotor_mbs as rm
 from rotor_mbs.cli import main
-from rotor_mbs.comparison.verdict import as_dictionary
+from rotor_mbs.comparison.verdict import as_dictionary, verdict_of
 from rotor_mbs.models.lagrange import reference
-from rotor_mbs.report.pages.comparison import verdict_of
 from rotor_mbs.runs.read import read_records, write_records
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.testing import assert_agrees

@@ -13,10 +13,11 @@ from support.report_pages import answer_of, facts_of, rows_of, section_of, text_
 from support.scenes import paper
 from support.stored import Made, rotor, store
 
+from rotor_mbs.api.comparisons import compare
 from rotor_mbs.report.build import write_report
 from rotor_mbs.report.numbers import number
 from rotor_mbs.report.pages import computations
-from rotor_mbs.report.pages.comparison import compare, onset_of
+from rotor_mbs.report.pages.comparison import onset_of
 from rotor_mbs.report.pages.modes import modes_page
 from rotor_mbs.runs.read import open_results
 from rotor_mbs.scenario.scene import scene_toml

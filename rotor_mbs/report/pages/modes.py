@@ -1,14 +1,10 @@
-"""The modes of a scene: what `rotor_mbs.modes` returns, its figures, and the page of modes."""
+"""The page of modes, and their figures."""
 
 from __future__ import annotations
 
 import math
-import os
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
-from html import escape
-from pathlib import Path
-from typing import Any
+from dataclasses import replace
 
 import numpy as np
 from markupsafe import Markup
@@ -18,16 +14,9 @@ from rotor_mbs.analysis.modes import (
     FloquetTable,
     LinearModes,
     SceneModes,
-    linear_dataset,
-    mode_rows,
-    mode_summary,
-    mode_table,
     multiblade,
-    read_modes,
-    to_records,
 )
-from rotor_mbs.analysis.text_tables import TextTable
-from rotor_mbs.errors import InputError, shown_value
+from rotor_mbs.errors import InputError
 from rotor_mbs.report.canvas import SPEED_AXIS, Panels, curve, log_axis, panels
 from rotor_mbs.report.elements import (
     Curve,
@@ -46,112 +35,16 @@ from rotor_mbs.report.elements import (
     Section,
     TableCell,
 )
-from rotor_mbs.report.files import write_page
 from rotor_mbs.report.looks import BLUE, GREY, VERMILLION, Look, coordinate_look
 from rotor_mbs.report.numbers import NOTHING, SPACE, in_words, number, typeset_title, up_to
-from rotor_mbs.runs.read import write_records
-from rotor_mbs.runs.versions import machine, versions
-from rotor_mbs.scenario.catalogue import scene_of
 from rotor_mbs.scenario.keys import counted
-from rotor_mbs.scenario.scene import Scene
-from rotor_mbs.scenario.toml_file import file_path
-from rotor_mbs.solution.trajectory import Array, need_xarray
-from rotor_mbs.studies.modes import compute_modes, increasing_speeds
+from rotor_mbs.solution.trajectory import Array
 
 _MARKS = ("o", "s", "^", "D", "v", "P", "x")
 _TURN = 2.0 * math.pi
 _ZERO = 1e-6  # of the largest frequency: a smaller one is that of a rigid motion
 _NOTHING = 1e-9  # 1/s, or of a frequency: a smaller growth or damping is rounding error
 _SPAN = 30.0  # between the smallest and the largest value, beyond which an axis is logarithmic
-
-
-def modes(scene: Scene | str | os.PathLike[str], speeds: Sequence[float] = ()) -> Modes:
-    """Compute natural frequencies, damping ratios and mode shapes of a scene with every model that can be linearized.
-
-    Modes at rest under gravity, and over `speeds` in steady rotation without gravity (Campbell diagram); Floquet
-    multipliers in rotation under gravity. The scene's torque is not included: a drive torque maintains the speed.
-
-    Parameters
-    ----------
-    scene : a Scene, the name of a shipped scene, or a TOML file.
-    speeds : rotor speeds (rad/s), increasing, at least 0.
-
-    Raises
-    ------
-    InputError
-        For speeds that do not increase, or are negative, and for a scene without a steady state.
-    TypeError
-        If `scene` is neither a scene nor text nor a path, or a speed is no number.
-
-    Examples
-    --------
-    >>> import rotor_mbs as rm
-    >>> study = rm.modes(rm.scene("stiff/nrel-5mw").replace(gravity=0.0), speeds=[0.0, 1.2])
-    >>> study.agrees, list(study.rotation)[:2]
-    (True, ['lagrange', 'exudyn_tree'])
-    >>> study.rotation["lagrange"].names
-    ('rotor', 'collective pitch', 'cosine pitch', 'sine pitch')
-    """
-    return Modes(**vars(compute_modes(scene_of(scene), increasing_speeds(speeds))))
-
-
-def open_modes(path: Path) -> Modes | dict[str, Modes]:
-    """Return the modes of the scene of a file; of several scenes, by name. Raises StoreError."""
-    found = {name: Modes(**vars(modes)) for name, modes in read_modes(path).items()}
-    return found if len(found) > 1 else next(iter(found.values()))
-
-
-@dataclass(frozen=True, repr=False)
-class Modes(SceneModes):
-    """Result of `rotor_mbs.modes`: the modes of a scene.
-
-    Attributes
-    ----------
-    rest, rotation : modes by model, at rest under gravity, and over speed without gravity; the closed form first.
-    floquet : Floquet multipliers under gravity; None if not computed.
-    notes : results that could not be computed, with the reason.
-    agrees, disagreement : whether the modes of the models agree, and the largest difference of a frequency or a decay
-        rate, relative to the frequency.
-    plot : `modes.plot()` draws the Campbell diagram; `.damping()`, `.multipliers()`.
-    """
-
-    @property
-    def plot(self) -> ModePlots:
-        return ModePlots(self)
-
-    def table(self) -> TextTable:
-        """Table with a row per state, speed and mode of the closed form: rad/s, damping ratio, 1/s."""
-        return mode_table(mode_rows(self))
-
-    def to_xarray(self, state: str = "rotation") -> Any:
-        """Return the modes of one state, "rotation" or "rest", as an xarray.Dataset; dimension `solver`: the models.
-
-        Raises InputError for another state, and one that was not computed.
-        """
-        states = {"rotation": self.rotation, "rest": self.rest}
-        if state not in states:
-            raise InputError(f"no state {shown_value(state)}; allowed: {', '.join(states)}")
-        return linear_dataset(states[state], need_xarray())
-
-    def save(self, path: str | os.PathLike[str]) -> Path:
-        """Save the modes in a file that `rotor-mbs report` reads.
-
-        A file of modes is replaced. Raises InputError for other files, TypeError if `path` is neither text nor a path.
-        """
-        target = file_path(path)
-        write_records(target, to_records(self))
-        return target
-
-    def to_html(self, folder: str | os.PathLike[str]) -> Path:
-        """Write the page into a folder. Returns its path."""
-        return write_page(file_path(folder), modes_page([self]), versions() | machine())
-
-    def __repr__(self) -> str:
-        return mode_summary(self)
-
-    def _repr_html_(self) -> str:
-        drawn = self.plot()._repr_svg_() if self.rotation else ""
-        return f"<p>{escape(self.scene)}: {escape(self.title)}</p>{self.table()._repr_html_()}{drawn}"
 
 
 class ModePlots:

@@ -1,8 +1,4 @@
-"""The Python API: what `import rotor_mbs as rm` offers, on the studies that the command line runs, too.
-
-Prints nothing. A wrong value raises `rotor_mbs.errors.InputError`, an unreadable or foreign file `StoreError`, an
-argument of a wrong type `TypeError`.
-"""
+"""Runs and sweeps in Python: `rm.run`, `rm.sweep`, and what they return."""
 
 from __future__ import annotations
 
@@ -30,7 +26,6 @@ from rotor_mbs.analysis.text_tables import (
     MOST_ROWS,
     RUN_HEAD,
     TextTable,
-    bench_table,
     method_table,
     run_row,
     sweep_parameters,
@@ -40,13 +35,12 @@ from rotor_mbs.methods.catalogue import REFERENCE, check_names, problems_of_scen
 from rotor_mbs.methods.method_file import ENDING
 from rotor_mbs.methods.time_limit import valid_seconds
 from rotor_mbs.processes.pool import check_workers
-from rotor_mbs.runs.design import COLUMNS, MISSING, RUNS
+from rotor_mbs.runs.design import COLUMNS, MISSING
 from rotor_mbs.runs.hdf5 import reading
 from rotor_mbs.runs.progress import progress_of_call
-from rotor_mbs.runs.read import StoredRun, StoredScene, is_sweep, open_results, read_records, run_names
+from rotor_mbs.runs.read import StoredRun, StoredScene, is_sweep, open_results, run_names
 from rotor_mbs.runs.sweeps import ERROR_GROWTH, METRICS, StoredSweep, parameter_name
-from rotor_mbs.runs.table import TableFile, copy_file, text_of
-from rotor_mbs.runs.trailer import COMPARISON, MODES, RESULTS, read_trailer
+from rotor_mbs.runs.table import copy_file, text_of
 from rotor_mbs.scenario.catalogue import list_scenes, only_scene, scene_of
 from rotor_mbs.scenario.keys import counted
 from rotor_mbs.scenario.scene import Scene, load_scene, parse_scene
@@ -355,82 +349,6 @@ def sweep(
         raise MethodRefusal("\n".join(result.refused))
     refuse_losses(result.lost)
     return Runs(path, _folder=folder)
-
-
-def open(path: str | os.PathLike[str]) -> Any:
-    """Open a file that this program wrote.
-
-    Raises StoreError for other files, TypeError if `path` is neither text nor a path.
-
-    Returns
-    -------
-    Runs
-        Of a results file or a sweep. The labels of a file with one scene are method names.
-    Modes, DataComparison
-        Of a file of modes, or of comparisons; if it has several, a dict by scene, or by scene and name.
-    BenchCurves
-        Of a results file that has no runs but the curves of `rotor-mbs bench`.
-
-    Examples
-    --------
-    >>> import rotor_mbs as rm
-    >>> runs = rm.open("rotor-mbs-out/results.h5")            # doctest: +SKIP
-    >>> runs["paper/fig11"].table()                           # doctest: +SKIP
-    >>> runs["paper/fig11/lagrange/taylor"].angles.shape      # doctest: +SKIP
-    (1001, 4)
-    """
-    file = file_path(path)
-    kind = read_trailer(file).kind
-    if kind == MODES:
-        from rotor_mbs.report.pages.modes import open_modes  # late: pages
-
-        return open_modes(file)
-    if kind == COMPARISON:
-        from rotor_mbs.report.pages.comparison import open_comparisons  # late: pages
-
-        return open_comparisons(file)
-    groups = TableFile(file, ()).groups
-    if kind == RESULTS and RUNS not in groups and "bench" in groups:
-        return BenchCurves(file)
-    runs = Runs(file)
-    return Runs(file, runs.scenes[0]) if kind == RESULTS and len(runs.scenes) == 1 else runs
-
-
-class BenchCurves(Mapping[str, Mapping[str, Any]]):
-    """Curves of error against run time in a file of `rotor-mbs bench`: arrays by "scene/curve", a value per setting.
-
-    `curves["paper/fig11/exudyn_tree/rk67"]["angle_error_max"]` (rad), `["run_time_s"]` (s), `["setting"]`: a time step
-    in s or a tolerance.
-    """
-
-    def __init__(self, path: Path) -> None:
-        self.path = path
-        self._records = {f"{record.scene}/{record.name}": record for record in read_records(path, "bench")}
-
-    def __getitem__(self, label: str) -> Mapping[str, Any]:
-        return self._records[label].arrays
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(self._records)
-
-    def __len__(self) -> int:
-        return len(self._records)
-
-    def table(self) -> TextTable:
-        """Table with a row per curve: the smallest error (rad), and the run time (s) at which errors are reached."""
-        return bench_table(list(self._records.values()))
-
-    def to_html(self, folder: str | os.PathLike[str]) -> Path:
-        """Write the page into a folder. Returns its path."""
-        from rotor_mbs.report.build import write_report  # late: templates
-
-        return write_report(self.path, file_path(folder))
-
-    def __repr__(self) -> str:
-        return f"{self.path}: {counted(len(self), 'curve')} of error against run time\n{self.table()}"
-
-    def _repr_html_(self) -> str:
-        return f"<p>{escape(str(self.path))}</p>{self.table()._repr_html_()}"
 
 
 def texts(values: Iterable[str]) -> list[str]:

@@ -1,0 +1,111 @@
+"""Error against run time in Python: `rm.bench`, and what it returns."""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from collections.abc import Iterable, Iterator, Mapping
+from html import escape
+from pathlib import Path
+from typing import Any
+
+from rotor_mbs.analysis.text_tables import TextTable, bench_table
+from rotor_mbs.api.runs import texts
+from rotor_mbs.errors import MethodRefusal
+from rotor_mbs.methods.catalogue import check_names
+from rotor_mbs.processes import cores
+from rotor_mbs.runs.progress import progress_of_call
+from rotor_mbs.runs.read import read_records
+from rotor_mbs.scenario.catalogue import scene_of
+from rotor_mbs.scenario.keys import as_float, counted, positive
+from rotor_mbs.scenario.scene import Scene
+from rotor_mbs.scenario.toml_file import file_path
+
+
+def bench(
+    scene: Scene | str | os.PathLike[str],
+    methods: str | Iterable[str] = (),
+    *,
+    output: str | os.PathLike[str] | None = None,
+    repeats: int = 20,
+    budget: float = 28.0,
+    progress: bool | None = None,
+) -> BenchCurves:
+    """Measure the error of methods against their run time, each over its ladder of steps or tolerances.
+
+    Parameters
+    ----------
+    scene : a Scene, the name of a shipped scene, or a TOML file.
+    methods : names of methods, or paths of Python files; by default all that have a ladder.
+    output : file of the curves; what it has is not measured again. Default: none is kept.
+    repeats : number of timed runs of each point, at most.
+    budget : time for all curves (s).
+    progress : whether to show the progress. By default on a terminal and in a notebook.
+
+    Raises
+    ------
+    InputError
+        For a wrong value, a method without a ladder, or a scene without a usable reference.
+    MethodRefusal
+        If a method that is named cannot represent the scene.
+    TypeError
+        For an argument of a wrong type.
+
+    Examples
+    --------
+    >>> import rotor_mbs as rm
+    >>> scene = rm.scene("paper/fig03").replace(duration=0.5, samples=51)
+    >>> curves = rm.bench(scene, "exudyn_tree/rk44", repeats=1, budget=1.0)
+    >>> curve = curves["paper/fig03/exudyn_tree/rk44"]
+    >>> bool(curve["angle_error_max"][curve["setting"].argmin()] < 1e-9)
+    True
+    """
+    from rotor_mbs.studies.bench import run_bench  # late: most users time nothing
+
+    scene, budget = scene_of(scene), positive("budget", as_float(budget))
+    names = list(check_names(methods if isinstance(methods, str) else texts(methods))) if methods else []
+    with tempfile.TemporaryDirectory() as folder, progress_of_call(progress) as shown:
+        path = Path(folder) / "bench.h5" if output is None else file_path(output)
+        _, refused = run_bench(
+            [scene], names, path, repeats=repeats, budget_s=budget, workers=cores(), on_progress=shown
+        )
+        if refused and names:
+            raise MethodRefusal("\n".join(map(str, refused)))
+        return BenchCurves(path)
+
+
+class BenchCurves(Mapping[str, Mapping[str, Any]]):
+    """Curves of error against run time in a file of `rotor-mbs bench`: arrays by "scene/curve", a value per setting.
+
+    `curves["paper/fig11/exudyn_tree/rk67"]["angle_error_max"]` (rad), `["run_time_s"]` (s), `["setting"]`: a time step
+    in s or a tolerance.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self._records = {f"{record.scene}/{record.name}": record for record in read_records(path, "bench")}
+
+    def __getitem__(self, label: str) -> Mapping[str, Any]:
+        return self._records[label].arrays
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._records)
+
+    def __len__(self) -> int:
+        return len(self._records)
+
+    def table(self) -> TextTable:
+        """Table with a row per curve: the smallest error (rad), and the run time (s) at which errors are reached."""
+        return bench_table(list(self._records.values()))
+
+    def to_html(self, folder: str | os.PathLike[str]) -> Path:
+        """Write the page into a folder. Returns its path."""
+        from rotor_mbs.report.build import write_report  # late: templates
+
+        return write_report(self.path, file_path(folder))
+
+    def __repr__(self) -> str:
+        return f"{self.path}: {counted(len(self), 'curve')} of error against run time\n{self.table()}"
+
+    def _repr_html_(self) -> str:
+        return f"<p>{escape(str(self.path))}</p>{self.table()._repr_html_()}"

@@ -1,0 +1,136 @@
+"""Accuracy checks in Python: `rm.check`, `rm.test_method`, and what they return."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable, Sequence
+from html import escape
+from typing import overload
+
+from rotor_mbs.analysis.checks import Check
+from rotor_mbs.analysis.text_tables import TextTable
+from rotor_mbs.api.runs import texts
+from rotor_mbs.methods.catalogue import check_names
+from rotor_mbs.methods.time_limit import valid_seconds
+from rotor_mbs.scenario.accuracy_bounds import read_bounds, shipped_bounds
+from rotor_mbs.scenario.keys import counted
+from rotor_mbs.scenario.toml_file import file_path
+
+
+class Checks(Sequence[Check]):
+    """Verdicts, each a number against its bound. Prints those that fail, then counts.
+
+    Attributes
+    ----------
+    passed : whether all passed.
+    failures : those that did not.
+    """
+
+    def __init__(self, checks: Iterable[Check]) -> None:
+        self._checks = tuple(checks)
+
+    @property
+    def passed(self) -> bool:
+        return not self.failures
+
+    @property
+    def failures(self) -> tuple[Check, ...]:
+        return tuple(check for check in self._checks if not check.passed)
+
+    @overload
+    def __getitem__(self, place: int) -> Check: ...
+    @overload
+    def __getitem__(self, place: slice) -> Checks: ...
+    def __getitem__(self, place: int | slice) -> Check | Checks:
+        return Checks(self._checks[place]) if isinstance(place, slice) else self._checks[place]
+
+    def __len__(self) -> int:
+        return len(self._checks)
+
+    def table(self) -> TextTable:
+        """Table with a row per check: what was checked where, the value, what is allowed, and what to look at."""
+        return _table(self._checks)
+
+    def __repr__(self) -> str:
+        text = f"{counted(len(self) - len(self.failures), 'check')} passed, {len(self.failures)} failed"
+        return f"{_table(self.failures)}\n{text}" if self.failures else text
+
+    def _repr_html_(self) -> str:
+        return f"<pre>{escape(repr(self))}</pre>"
+
+
+def _table(checks: Iterable[Check]) -> TextTable:
+    rows: list[tuple[str, ...]] = []
+    for check in checks:
+        numbers = (f"{check.value:.1e}", f"{check.bound:.1e}", check.unit)
+        rows.append((check.name, *check.where, *numbers, "" if check.passed else check.hint))
+    return TextTable(("check", "scene", "method", "channel", "value", "allowed", "unit", "reason"), rows)
+
+
+def check(
+    path: str | os.PathLike[str],
+    *,
+    bounds: str | os.PathLike[str] | None = None,
+    require: str | Iterable[str] = (),
+) -> Checks:
+    """Check the accuracy of the runs in a results file or a sweep.
+
+    Parameters
+    ----------
+    path : the file.
+    bounds : TOML file of bounds that are added to the shipped ones.
+    require : methods of which every scene is to have a run.
+
+    Raises
+    ------
+    InputError
+        For a file without a run of a method, and for bounds that are none.
+    StoreError
+        If the file cannot be read or is not of this program.
+    TypeError
+        For an argument of a wrong type.
+
+    Examples
+    --------
+    >>> import rotor_mbs as rm
+    >>> scene = rm.scene("paper/fig03").replace(duration=0.5, samples=51)
+    >>> path = rm.run(scene, ["exudyn_tree/rk67"]).save("fig03.h5")      # doctest: +SKIP
+    >>> rm.check("fig03.h5").passed                                      # doctest: +SKIP
+    True
+    """
+    from rotor_mbs.studies.check import check_file  # late: models
+
+    known = shipped_bounds()
+    if bounds is not None:
+        known = known.with_entries(read_bounds(file_path(bounds)))
+    return Checks(check_file(file_path(path), known, [require] if isinstance(require, str) else texts(require)))
+
+
+def test_method(name: str | os.PathLike[str], *, timeout: float = 60.0) -> Checks:  # noqa: PT028  (no test)
+    """Examine a method: order, symmetry, energies, loads, refusals, and why something is wrong.
+
+    Parameters
+    ----------
+    name : a method, or the path of a Python file with methods of one's own; docs/your-engine.md.
+    timeout : time limit of each run (s).
+
+    Raises
+    ------
+    InputError
+        For an unknown method, or a file that has none.
+    TypeError
+        For an argument of a wrong type.
+
+    Examples
+    --------
+    >>> import rotor_mbs as rm
+    >>> rm.test_method("lagrange/dop853").passed                         # doctest: +SKIP
+    True
+    """
+    from rotor_mbs.studies.method_test import examine  # late: models
+
+    seconds = valid_seconds(timeout)
+    return Checks(made for method in check_names(os.fspath(name)) for made in examine(method, seconds))
+
+
+test_method.__test__ = False  # type: ignore[attr-defined]  # of pytest, where it is imported

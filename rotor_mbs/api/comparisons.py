@@ -1,0 +1,193 @@
+"""Data of another program against a scene: `rm.compare`, and what it returns."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass
+from html import escape
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from rotor_mbs.analysis.text_tables import TextTable
+from rotor_mbs.comparison.data import load_data
+from rotor_mbs.comparison.modes import compare_modes
+from rotor_mbs.comparison.trajectory import compare_with_reference
+from rotor_mbs.comparison.verdict import DEFAULT_TOLERANCE, DataVerdict, channel_table, verdict_of
+from rotor_mbs.errors import StoreError
+from rotor_mbs.methods.time_limit import valid_seconds
+from rotor_mbs.runs.hdf5 import reading
+from rotor_mbs.runs.progress import progress_of_call
+from rotor_mbs.runs.read import Record, read_records, write_records
+from rotor_mbs.runs.trailer import COMPARISON
+from rotor_mbs.runs.versions import machine, versions
+from rotor_mbs.scenario.catalogue import scene_of
+from rotor_mbs.scenario.keys import as_float, positive
+from rotor_mbs.scenario.scene import Scene
+from rotor_mbs.scenario.toml_file import file_path
+from rotor_mbs.solution.trajectory import need_xarray
+
+if TYPE_CHECKING:
+    from rotor_mbs.report.canvas import Panels
+
+
+def compare(
+    data: str | os.PathLike[str] | Mapping[str, Any],
+    scene: Scene | str | os.PathLike[str],
+    *,
+    columns: str | os.PathLike[str] | Mapping[str, Any] | None = None,
+    tolerance: float = DEFAULT_TOLERANCE,
+    timeout: float = 600.0,
+    progress: bool | None = None,
+) -> DataComparison:
+    """Compare a trajectory, loads or modes of another program with a scene.
+
+    A trajectory is compared with the reference at the times of the data, loads with those of the closed form at the
+    states of the data, and a table of modes with the frequencies of the closed form.
+
+    Parameters
+    ----------
+    data : a file, or arrays by name: `time` (n,) s, `angles` and `rates` (n, 1 + blades) rad and rad/s, or single
+        columns such as `rotor`, `pitch_1_deg`; angles or rates may be missing. Loads by name (N, N m), see
+        docs/compare.md. For modes: `speed` (m,) rad/s, `frequencies` (m, modes) rad/s. Also an `xarray.Dataset` or a
+        `pandas.DataFrame` with these names.
+    scene : a Scene, the name of a shipped scene, or a TOML file.
+    columns : a mapping file, or a mapping with the same keys: column, unit, sign, offset of each channel, and whether
+        it is wrapped. By default columns are identified by name, see `verdict.read`.
+    tolerance : bound on interval defects beyond rounding of the data (rad); relative bound on loads and frequencies.
+    timeout : time limit for the reference, the defects and the search for causes (s).
+    progress : whether to show the progress. By default on a terminal and in a notebook.
+
+    Raises
+    ------
+    InputError
+        For data that cannot be read or compared, in one line with file, column or row, and what is allowed; or if the
+        reference takes longer than the time limit.
+    TypeError
+        If `data` or `columns` is neither a mapping nor text nor a path, `scene` neither a scene nor text nor a path, or
+        a limit or a tolerance no number.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import rotor_mbs as rm
+    >>> scene = rm.scene("paper/fig03")
+    >>> run = rm.run(scene, "lagrange/dop853")
+    >>> data = {"t": run.time, "rotor_deg": np.degrees(run.angles[:, 0])}
+    >>> comparison = rm.compare(data, scene, columns={"omit": ["pitch_1"]})
+    >>> comparison.status, comparison.verdict.read[1]
+    ('ok', "rotor = 'rotor_deg' [deg]")
+    >>> rm.compare({"t": run.time, "rotor": np.degrees(run.angles[:, 0])}, scene).likely
+    ('rotor: degrees taken as rad',)
+    """
+    scene, timeout = scene_of(scene), valid_seconds(timeout)
+    tolerance = positive("tolerance", as_float(tolerance))
+    if not hasattr(data, "items"):
+        data = file_path(data)
+    if columns is not None and not hasattr(columns, "items"):
+        columns = file_path(columns)
+    with progress_of_call(progress) as shown:
+        foreign = load_data(data, scene, columns)
+        if foreign.is_modes:
+            return DataComparison(*compare_modes(foreign, scene, tolerance))
+        return DataComparison(*compare_with_reference(foreign, scene, tolerance, timeout, shown.stage))
+
+
+def open_comparisons(path: Path) -> DataComparison | dict[str, DataComparison]:
+    """Return the comparison in a file; of several ones, by scene and name. Raises StoreError."""
+    found = {}
+    for record in read_records(path, COMPARISON):
+        with reading(path):
+            found[f"{record.scene}/{record.name}"] = DataComparison(verdict_of(record), record)
+    if not found:
+        raise StoreError(f"{path}: no comparison in it; allowed: a file that rotor-mbs compare has written")
+    return found if len(found) > 1 else next(iter(found.values()))
+
+
+@dataclass(repr=False)
+class DataComparison:
+    """Result of `rotor_mbs.compare`. Prints as a table.
+
+    Attributes
+    ----------
+    verdict : errors and verdict, see `rotor_mbs.comparison.verdict.DataVerdict`.
+    record : data, reference, errors and defects, as `save` stores them.
+    status, message, agrees : status, the reason if it is not "ok", and whether it is "ok".
+    likely : probable causes of a difference.
+    """
+
+    verdict: DataVerdict
+    record: Record
+
+    def __post_init__(self) -> None:
+        self.status, self.message = self.verdict.status, self.verdict.message
+        self.agrees, self.likely = self.verdict.agrees, self.verdict.likely
+
+    def table(self) -> TextTable:
+        """Table with a row per channel: errors (rad, rad/s), end of agreement (s)."""
+        return channel_table(self.verdict)
+
+    def plot(self) -> Panels:
+        """Plot the defects of each coordinate over time and the tolerance; without defects, the errors."""
+        from rotor_mbs.report.pages.comparison import defect_panels, error_panels  # late: matplotlib
+
+        return (defect_panels(self.record) or error_panels(self.record)).with_legend()
+
+    def to_xarray(self) -> Any:
+        """Return data, reference, errors and defects as an xarray.Dataset over time.
+
+        Variables by channel, with units: data `pitch_1`, then `pitch_1_reference`, `pitch_1_error`, and
+        `pitch_1_defect` of the interval before each row (rad). Raises InputError if xarray is not installed.
+        """
+        record = self.record
+        variables = {
+            name: (
+                column.dimensions,
+                record.arrays[name],
+                {"units": column.units, "long_name": column.long_name},
+            )
+            for name, column in record.columns.items()
+        }
+        facts = {name: record.attributes[name] for name in ("source", "status", "message", "tolerance")}
+        return need_xarray().Dataset(variables, attrs={"scene": record.scene} | facts)
+
+    def to_html(self, folder: str | os.PathLike[str]) -> Path:
+        """Write the page into a folder. Returns its path."""
+        from rotor_mbs.report.files import write_page  # late: templates
+        from rotor_mbs.report.pages.comparison import comparison_page
+
+        return write_page(file_path(folder), comparison_page(self.record), versions() | machine())
+
+    def save(self, path: str | os.PathLike[str]) -> Path:
+        """Save data, reference, errors and verdict as a results file.
+
+        An earlier comparison is replaced. Raises InputError for other files, StoreError if it cannot be written,
+        TypeError if `path` is neither text nor a path.
+        """
+        target = file_path(path)
+        write_records(target, [self.record])
+        return target
+
+    def __repr__(self) -> str:
+        """Says how columns were read, numbers by channel, and the verdict."""
+        verdict = self.verdict
+        lines = [
+            f"{verdict.source}: {verdict.rows} rows against {verdict.scene}",
+            *map("  {}".format, verdict.read),
+        ]
+        if verdict.unused:
+            lines.append(f"  not used: {', '.join(verdict.unused[:12])}{', ...' * (len(verdict.unused) > 12)}")
+        lines += ["", str(self.table()), ""]
+        if verdict.horizon_s is not None:
+            lines.append(
+                f"compared up to {verdict.compared_until:g} s; errors up to the horizon at {verdict.horizon_s:g} s"
+            )
+        lines += verdict.notes
+        lines.append(f"{verdict.status}{': ' * bool(verdict.message)}{verdict.message}")
+        lines += [f"probable cause: {cause}" for cause in verdict.likely]
+        return "\n".join(lines)
+
+    def _repr_html_(self) -> str:
+        return (
+            f"<p>{escape(self.status)} {escape(self.message)}</p>{self.table()._repr_html_()}{self.plot()._repr_svg_()}"
+        )

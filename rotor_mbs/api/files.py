@@ -1,0 +1,50 @@
+"""`rm.open`: any file that the program wrote."""
+
+from __future__ import annotations
+
+import os
+from typing import Any
+
+from rotor_mbs.api.benches import BenchCurves
+from rotor_mbs.api.comparisons import open_comparisons
+from rotor_mbs.api.modes import open_modes
+from rotor_mbs.api.runs import Runs
+from rotor_mbs.runs.design import RUNS
+from rotor_mbs.runs.table import TableFile
+from rotor_mbs.runs.trailer import COMPARISON, MODES, RESULTS, read_trailer
+from rotor_mbs.scenario.toml_file import file_path
+
+
+def open(path: str | os.PathLike[str]) -> Any:
+    """Open a file that this program wrote.
+
+    Raises StoreError for other files, TypeError if `path` is neither text nor a path.
+
+    Returns
+    -------
+    Runs
+        Of a results file or a sweep. The labels of a file with one scene are method names.
+    Modes, DataComparison
+        Of a file of modes, or of comparisons; if it has several, a dict by scene, or by scene and name.
+    BenchCurves
+        Of a results file that has no runs but the curves of `rotor-mbs bench`.
+
+    Examples
+    --------
+    >>> import rotor_mbs as rm
+    >>> runs = rm.open("rotor-mbs-out/results.h5")            # doctest: +SKIP
+    >>> runs["paper/fig11"].table()                           # doctest: +SKIP
+    >>> runs["paper/fig11/lagrange/taylor"].angles.shape      # doctest: +SKIP
+    (1001, 4)
+    """
+    file = file_path(path)
+    kind = read_trailer(file).kind
+    if kind == MODES:
+        return open_modes(file)
+    if kind == COMPARISON:
+        return open_comparisons(file)
+    groups = TableFile(file, ()).groups
+    if kind == RESULTS and RUNS not in groups and "bench" in groups:
+        return BenchCurves(file)
+    runs = Runs(file)
+    return Runs(file, runs.scenes[0]) if kind == RESULTS and len(runs.scenes) == 1 else runs
