@@ -60,6 +60,7 @@ class FileSummary:
         }  # fmt: skip
 
     def __str__(self) -> str:
+        """Write the summary as a screen of text."""
         size = self.path.stat().st_size
         parts = [f"{self.path}: {self.kind}, {size / 1e6:.3g} MB"]
         facts = {
@@ -103,6 +104,7 @@ def summary_of(path: Path) -> FileSummary:
 
 
 def _results(path: Path) -> FileSummary:
+    """Return what is in a results file: scenes, methods, statuses, benches and ladders."""
     curves, ladders = read_records(path, "bench"), read_records(path, "stability")
     with open_results(path) as results:
         summary = FileSummary(path, RESULTS, results.attributes, list(results.scenes))
@@ -146,6 +148,7 @@ def _scene_table(scenes: Iterable[StoredScene]) -> TextTable:
 
 
 def _sweep(path: Path) -> FileSummary:
+    """Return what is in a sweep: its parameters, how many runs have which status."""
     sweep = StoredSweep(path, allow_damaged_runs=True)
     codes = sweep.column("status")
     summary = FileSummary(path, SWEEP, sweep.attributes, [str(sweep.attributes["base_scene"])], list(sweep.methods))
@@ -171,6 +174,7 @@ def _modes(path: Path) -> FileSummary:
 
 
 def _comparison(path: Path) -> FileSummary:
+    """Return what is in a file of comparisons: a row for each, and why they do not agree."""
     records = read_records(path, COMPARISON)
     summary = FileSummary(
         path, COMPARISON, read_content(path, ()).attributes, _unique(record.scene for record in records)

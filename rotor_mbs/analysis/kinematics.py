@@ -67,7 +67,8 @@ def _rotated(frames: Array, point: tuple[float, float, float]) -> Array:
 
 
 def exact_rotor_angle(scene: Scene, time: Array) -> tuple[str, Array] | None:
-    """(name, (n,) rad) of the rotor's angle where every pitch stays at zero; None where no exact solution is known.
+    """Return (name, (n,) rad) of the rotor's angle where every pitch stays at zero; None where no exact solution is
+    known.
 
     One blade let go at rest: a pendulum (elliptic functions; Abramowitz & Stegun 22.2). Equal blades in balance:
     gravity cancels, a constant torque gives q0 + Ω0 t + τ t² / (2 I).
@@ -95,6 +96,7 @@ def _inertia_at_zero_pitch(blade: Blade) -> float:
 
 
 def _pendulum(scene: Scene, time: Array) -> tuple[str, Array] | None:
+    """Return 'pendulum' and its angle by elliptic functions, (n,) rad; None for a rotor that is none, or is driven."""
     from scipy.special import ellipj, ellipk
 
     blade = scene.blades[0]

@@ -163,8 +163,8 @@ ENERGY_RISE = 1e-3
 
 
 def claims(scenes: Mapping[str, StoredScene], items: Iterable[Published] | None = None) -> list[Published]:
-    """The numbers that runs of the paper's scenes have, and the claims about those that are all there; of `items`, or
-    of all. A scene that was changed under its name is not the paper's."""
+    """Return the numbers that runs of the paper's scenes have, and the claims about those that are all there; of
+    `items`, or of all. A scene that was changed under its name is not the paper's."""
     results = []
     for item in published() if items is None else items:
         if not all(name in scenes and scenes[name].is_shipped for name in item.scenes):
@@ -185,7 +185,7 @@ def rounds_to(value: float, item: Published) -> bool:
 
 
 def finding(scenes: Mapping[str, StoredScene], claims: Iterable[Published]) -> list[tuple[str, str, str]]:
-    """How much of the paper is reproduced, and the energy that its equations gain; empty for other scenes.
+    """Tell how much of the paper is reproduced, and the energy that its equations gain; empty for other scenes.
 
     A row has a result, and what the equations as printed and the corrected model give; "" where nothing is known.
     """

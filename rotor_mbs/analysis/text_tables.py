@@ -46,7 +46,7 @@ def table_of_runs(scenes: Mapping[str, StoredScene], wanted: Mapping[str, Iterab
 
 
 def method_table(runs: Iterable[StoredRun]) -> TextTable:
-    """A row for each method: how many of its runs ended well, and the largest numbers among those."""
+    """Return a row for each method: how many of its runs ended well, and the largest numbers among those."""
     head = ("method", "runs", "largest defect (rad)", "largest error (rad)", "energy drift", "longest run time (s)")
     by_method: dict[str, list[StoredRun]] = {}
     for run in runs:

@@ -169,7 +169,7 @@ class DataComparison:
         return target
 
     def __repr__(self) -> str:
-        """Says how columns were read, numbers by channel, and the verdict."""
+        """Say how columns were read, numbers by channel, and the verdict."""
         verdict = self.verdict
         lines = [
             f"{verdict.source}: {verdict.rows} rows against {verdict.scene}",

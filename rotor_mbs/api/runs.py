@@ -415,7 +415,8 @@ class Runs(Mapping[Any, Any]):
         return _restored, (self.path, self.scene, self.path.read_bytes() if self._folder is not None else None)
 
     def __getitem__(self, label: Any) -> Any:
-        """Raises KeyError for what the file does not have, StoreError for samples that cannot be read."""
+        """Return runs or a run by label. Raises KeyError for what the file does not have, StoreError for samples that
+        cannot be read."""
         if self.scene and isinstance(label, str):  # "paper/fig11/lagrange/taylor", as in a file of several scenes
             label = label.removeprefix(f"{self.scene}/")
         if label not in self._labels:
@@ -562,6 +563,7 @@ class Runs(Mapping[Any, Any]):
         return write_report(self.path, file_path(folder))
 
     def _run_of_sweep(self, number: int) -> Run:
+        """Return one run of a sweep, read from its row."""
         sweep = self._sweep
         design, row = sweep.attributes, number - int(sweep.column("run")[0])
         values = {key: float(sweep.column(parameter_name(key))[row]) for key in sweep.keys}

@@ -190,6 +190,7 @@ def load_methods(arguments: argparse.Namespace) -> None:
 
 
 def _parser() -> tuple[_Parser, dict[str, _Parser]]:
+    """Build the parser of the command line, each command with its options."""
     formatter = argparse.RawDescriptionHelpFormatter
     parser = _Parser(
         prog="rotor-mbs",

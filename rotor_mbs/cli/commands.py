@@ -32,7 +32,7 @@ from rotor_mbs.solution.status import REFUSED
 
 
 def list_all(arguments: argparse.Namespace) -> int:
-    """Name and title of every shipped scene and sweep, name and label of every method."""
+    """Print name and title of every shipped scene and sweep, name and label of every method."""
     scenes, sweeps = list_scenes(), list_sweeps()
     labels = [(method.name, method.label) for method in methods()]
     if arguments.json:
@@ -52,7 +52,7 @@ def list_all(arguments: argparse.Namespace) -> int:
 
 
 def new(arguments: argparse.Namespace) -> int:
-    """A commented scene file; never in the place of another file."""
+    """Write a commented scene file; never in the place of another file."""
     from rotor_mbs.scenario.scene import new_scene_text
 
     if arguments.file.suffix != ".toml":
@@ -110,6 +110,7 @@ def _show_method(method: Method, *, as_json: bool) -> None:
 
 
 def _show_scene(arguments: argparse.Namespace) -> None:
+    """Print a scene's data, the methods that can run it, and with --build what each model builds."""
     from rotor_mbs.scenario.scene import scene_keys, scene_tables, unit_of, without_times
 
     scene = only_scene(arguments.scene)
@@ -175,7 +176,8 @@ def bench(arguments: argparse.Namespace) -> int:
 
 
 def stability(arguments: argparse.Namespace) -> int:
-    """The stiff and extreme suite, how many runs of each method are ok, its pages; 1 where a run was not computed."""
+    """Run the stiff and extreme suite, how many runs of each method are ok, its pages; 1 where a run was not
+    computed."""
     from rotor_mbs.studies.stability import SUITE, run_suite, suite_runs, suite_table
 
     start, scenes = time.monotonic(), find_scenes(arguments.scenes or SUITE)
@@ -196,7 +198,7 @@ def stability(arguments: argparse.Namespace) -> int:
 
 
 def modes(arguments: argparse.Namespace) -> int:
-    """The modes of every scene; 1 where two models disagree on a frequency or a scene could not be computed."""
+    """Print the modes of every scene; 1 where two models disagree on a frequency or a scene could not be computed."""
     from rotor_mbs.analysis.modes import mode_rows, mode_summary, read_modes
     from rotor_mbs.studies.modes import modes_of_scenes
 
@@ -288,7 +290,7 @@ def animate(arguments: argparse.Namespace) -> int:
 
 
 def sweep(arguments: argparse.Namespace) -> int:
-    """A parameter study into one dataset; 1 where a run did not succeed, or the disk is full."""
+    """Run a parameter study into one dataset; 1 where a run did not succeed, or the disk is full."""
     from rotor_mbs.runs.engines import open_task_pool
 
     with open_task_pool(arguments.engine, arguments.jobs) as pool:  # its workers load their code meanwhile

@@ -46,7 +46,8 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def reproduce(arguments: argparse.Namespace) -> int:
-    """Every scene of the paper, and the report; nothing where the last call ended well with all that decides it equal.
+    """Compute every scene of the paper, and the report; nothing where the last call ended well with all that decides it
+    equal.
 
     That is every bit of the results file, too: a changed one is found as by the checksums inside the file.
     """

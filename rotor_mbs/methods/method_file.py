@@ -48,8 +48,8 @@ class MethodFile:
         return Path(self.path).stem
 
     def load(self, built_in: Iterable[Method]) -> dict[str, Method]:
-        """Its methods by name: "mine/rk4", also where the file calls it "rk4". Raises InputError: a line with file and
-        line number for whatever the file raises."""
+        """Return its methods by name: "mine/rk4", also where the file calls it "rk4". Raises InputError: a line with
+        file and line number for whatever the file raises."""
         if not _NAME.fullmatch(self.model):
             raise InputError(f"{self.path}: allowed: a file's name of letters, digits, - and _")
         taken = next((known for known in built_in if known.model == self.model), None)
@@ -75,6 +75,7 @@ class MethodFile:
         return methods
 
     def _named(self, method: Method) -> Method:
+        """Return a method under the file's name, with a ladder where it has a step or a tolerance and none of its own."""
         name = f"{self.model}/{method.name.rpartition('/')[2]}"
         ladders = method.ladders
         if not ladders:
@@ -214,7 +215,7 @@ def _without_folder(path: str) -> Iterator[None]:
 
 @contextmanager
 def quiet() -> Iterator[None]:
-    """What is printed in the block goes nowhere, also what compiled code prints. For one thread at a time."""
+    """Drop what is printed in the block, also what compiled code prints. For one thread at a time."""
     with (
         Path(os.devnull).open("w", encoding="utf-8") as nowhere,
         redirect_stdout(nowhere),

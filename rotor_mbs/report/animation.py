@@ -71,7 +71,8 @@ def write_animation(results: Path, name: str, output: Path, magnified: float | N
 
 
 def frames(stored: StoredScene, magnified: float | None) -> Iterator[Image.Image]:
-    """The runs side by side: paths up to the frame, then the blades. Raises InputError where nothing can be drawn."""
+    """Draw the runs side by side: paths up to the frame, then the blades. Raises InputError where nothing can be
+    drawn."""
     scene = stored.scene
     runs = {label_of(run.method): run for run in stored.sides.values() if "angles" in run}
     if not runs:
@@ -117,7 +118,7 @@ def frames(stored: StoredScene, magnified: float | None) -> Iterator[Image.Image
 
 
 def wires(scene: Scene, time: Array, angles: Array, at: Array, magnified: float) -> Array:
-    """Corners of the blades at the times `at` (s); distances from the pitch axis are drawn `magnified` times.
+    """Compute corners of the blades at the times `at` (s); distances from the pitch axis are drawn `magnified` times.
 
     Returns (times, blades, 3, 2) m, projected: the pitch axis' end, the tip, and the tip's offset at the hub.
     """

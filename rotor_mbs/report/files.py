@@ -55,7 +55,8 @@ _UNPRINTABLE = re.compile(r"[\x00-\x08\x0b\x0c\x0e-\x1f\x7f-\x9f\ud800-\udfff]")
 
 
 def page_names(scenes: Iterable[str]) -> dict[str, str]:
-    """A file name for each scene: "paper-fig05.html" for "paper/fig05"; all different, also where case is ignored.
+    """Choose a file name for each scene: "paper-fig05.html" for "paper/fig05"; all different, also where case is
+    ignored.
 
     Raises StoreError for a name with a part ".." or ".": no file of this program has one.
     """
@@ -75,7 +76,7 @@ def page_names(scenes: Iterable[str]) -> dict[str, str]:
 
 
 def write_pages(folder: Path, pages: Mapping[str, str]) -> None:
-    """Each page whole or not at all; then removes pages of an earlier report that are no longer made.
+    """Write each page whole or not at all; then remove pages of an earlier report that are no longer made.
 
     Raises StoreError where the folder cannot be written, InputError where it has other pages of these names.
     """
@@ -142,6 +143,7 @@ def _script(name: str) -> str:
 
 @cache
 def _environment() -> jinja2.Environment:
+    """Build the environment of the pages' templates: filters, and what every page has."""
     environment = jinja2.Environment(
         loader=jinja2.FileSystemLoader(_TEMPLATES),
         autoescape=True,

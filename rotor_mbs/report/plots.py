@@ -106,7 +106,7 @@ def component_panels(quantity: Quantity, plot: Plot, time: Array, values: Array)
 
 
 def errors(series: Sequence[Series], label: str, horizon: float | None = None) -> Panels:
-    """Magnitudes on a logarithmic axis from 1 or less."""
+    """Draw magnitudes on a logarithmic axis from 1 or less."""
     panels = canvas.panels((2.9,), TIME_AXIS)
     axes, known = panels.axes[0], []
     for curve in series:
@@ -164,7 +164,8 @@ def paths(tip: Array) -> Panels:
 
 
 def draw_paths(axes: Any, tip: Array) -> None:
-    """The paths of `tip` (n, blades, 3) m, the blades at the start (dashed) and at the end (solid), shaft and scale."""
+    """Draw the paths of `tip` (n, blades, 3) m, the blades at the start (dashed) and at the end (solid), shaft and
+    scale."""
     reach = 1.04 * float(np.linalg.norm(tip, axis=2).max())
     axes.set(xlim=(-0.95 * reach, 0.95 * reach), ylim=(-1.02 * reach, 1.02 * reach), aspect="equal")
     axes.set_axis_off()

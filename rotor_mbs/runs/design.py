@@ -198,7 +198,7 @@ class Asked:
 
 
 def metric_columns(outputs: Iterable[str]) -> dict[str, Column]:
-    """The computed columns of /runs for scenes that ask for these outputs."""
+    """Return the computed columns of /runs for scenes that ask for these outputs."""
     columns = {name: COLUMNS[name] for name in _RUN_COLUMNS}
     for quantity in quantities(outputs):
         name, long_name = quantity.name, quantity.long_name
@@ -216,7 +216,7 @@ def metric_columns(outputs: Iterable[str]) -> dict[str, Column]:
 
 
 def arrays_of(run: Asked) -> dict[str, Column]:
-    """The arrays over time that a run stores, by their name in the file."""
+    """Return the arrays over time that a run stores, by their name in the file."""
     method = find_method(run.method)
     # A reference is read back by its angles and rates, whatever the scene asks for.
     outputs = (*run.scene.outputs, "angles", "rates") if run.method == REFERENCE else run.scene.outputs

@@ -115,8 +115,8 @@ def _read_group(group: Any, regions: Mapping[str, tuple[int, int]]) -> StoredGro
 
 @contextmanager
 def open_file(path: Path) -> Iterator[tuple[Any, Trailer]]:
-    """An existing file of this program, read only, and its trailer, which is checked before HDF5 sees the file. Raises
-    StoreError where it is missing, damaged or another program's."""
+    """Open an existing file of this program, read only, and its trailer, which is checked before HDF5 sees the file.
+    Raises StoreError where it is missing, damaged or another program's."""
     for _ in range(_ATTEMPTS):
         trailer = read_trailer(path)
         try:
@@ -166,8 +166,8 @@ def member(group: Any, name: str) -> Any:
 
 
 def values_of(dataset: Any) -> NDArray[Any]:
-    """An array of numbers, or of texts, whole. Raises StoreError where it is not in the file, or claims far more than
-    the file holds."""
+    """Read an array of numbers, or of texts, whole. Raises StoreError where it is not in the file, or claims far more
+    than the file holds."""
     place = f"{dataset.file.filename}: {dataset.name}"
     if not isinstance(dataset, h5py.Dataset) or dataset.shape is None:
         raise StoreError(f"{place} is no array")
@@ -217,7 +217,7 @@ def attribute(target: Any, name: str, default: Any = None) -> Any:
 
 
 def columns_of(group: Any) -> dict[str, Column]:
-    """What the datasets of a group are, by name."""
+    """Describe the datasets of a group, by name."""
     columns = {}
     for name in group:
         dataset = member(group, name)

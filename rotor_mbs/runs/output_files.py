@@ -27,7 +27,8 @@ _OWNER = rb"(process [0-9]+ on [!-~]*)?\Z"
 
 @contextmanager
 def locked(output: Path) -> Iterator[None]:
-    """No other process writes `output` in the block; its thread may enter it again. Raises InputError, StoreError."""
+    """Keep other processes from writing `output` in the block; its thread may enter it again. Raises InputError,
+    StoreError."""
     from filelock import FileLock, Timeout
 
     place = _resolved(output)
@@ -117,7 +118,7 @@ def write_file(path: Path, content: Buffer) -> None:
 
 
 def refuse_foreign(path: Path, mark: bytes) -> None:
-    """Raises InputError where `path` is a file that this program did not write as an output of the same kind, which is
+    """Raise InputError where `path` is a file that this program did not write as an output of the same kind, which is
     no HDF5 file.
 
     mark: a regular expression that is found in every output of the kind. An empty file may be replaced.
@@ -135,7 +136,7 @@ def refuse_foreign(path: Path, mark: bytes) -> None:
 
 @contextmanager
 def replacing(path: Path) -> Iterator[Path]:
-    """The name of a new, empty file beside `path`, which takes its place after the block. Raises StoreError.
+    """Yield the name of a new, empty file beside `path`, which takes its place after the block. Raises StoreError.
 
     The name cannot be guessed, and a file or link of that name is not opened.
     """

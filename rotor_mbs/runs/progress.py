@@ -30,7 +30,8 @@ _STATUS = re.compile(rf"\b({'|'.join((*STATUSES, 'no_reference'))})\b")
 
 
 def coloured(text: str, stream: TextIO) -> str:
-    """The statuses in a text each in its colour: on a terminal, unless the user asks for none (https://no-color.org)."""
+    """The statuses in a text each in its colour: on a terminal, unless the user asks for none
+    (https://no-color.org)."""
     if not stream.isatty() or "NO_COLOR" in os.environ:
         return text
     return _STATUS.sub(lambda found: f"\x1b[{_COLOURS.get(found[0], _BAD)}m{found[0]}\x1b[0m", text)

@@ -158,8 +158,8 @@ class StoredRun:
         return self._arrays.get(name)
 
     def faults(self, scene: Scene, *, complete: bool = True) -> list[str]:
-        """A line for every array that is missing or wrong; complete: every sample must be there, else as many as there
-        are times. A frozen reference need not have what follows from its angles and rates, a method that is not
+        """Return a line for every array that is missing or wrong; complete: every sample must be there, else as many as
+        there are times. A frozen reference need not have what follows from its angles and rates, a method that is not
         built in no more than these."""
         faults = []
         rows = len(self.array("time")) if "time" in self else scene.samples
@@ -287,7 +287,7 @@ class OpenResults:
 
 @contextmanager
 def open_results(path: Path, *, verify: bool = True, only: Collection[str] | None = None) -> Iterator[OpenResults]:
-    """An open results file; of a file that replaces it meanwhile nothing is seen. A run is compared with its checksum
+    """Open a results file; of a file that replaces it meanwhile nothing is seen. A run is compared with its checksum
     when it is read, but for verify=False; only: names of scenes, by default all. Raises StoreError, also for whatever
     goes wrong in the block with what the file holds."""
     for _ in range(_ATTEMPTS):
@@ -331,6 +331,7 @@ def is_sweep(path: Path) -> bool:
 
 
 def _scenes(stored: TableFile, file: IO[bytes], verify: bool, only: Collection[str] | None) -> Iterator[StoredScene]:
+    """Yield the scenes of an open file with their runs."""
     if RUNS not in stored.tables:
         return
     runs = stored.tables[RUNS]
@@ -401,7 +402,7 @@ def read_records(path: Path, kind: str) -> list[Record]:
 
 
 def _point_records(stored: Table) -> Iterator[Record]:
-    """The rows of a table that belong to one curve or one ladder."""
+    """Yield the rows of a table that belong to one curve or one ladder."""
     kind, statuses, rows = stored.group, stored.statuses(), list(stored.known_rows.values())
     columns = stored.place().read(len(stored.runs)) | {
         name: stored.column(name) for name in NUMBERS if name in stored.known

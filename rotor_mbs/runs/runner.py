@@ -128,7 +128,8 @@ def perform(task: Task, *, stores: bool) -> Rows:
 
 
 def compute_tasks(tasks: Sequence[Task], pool: TaskPool, on_progress: OnProgress = ignore_progress) -> list[Outcome]:
-    """As `compute`, references first; then the other rows whose reference is stored, slow and fast ones in turn.
+    """Compute tasks as `compute` does, references first; then the other rows whose reference is stored, slow and fast
+    ones in turn.
 
     Returns what became of each task, in the order in which they ended.
     """

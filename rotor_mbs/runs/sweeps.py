@@ -72,7 +72,8 @@ def code_of_method(method: str) -> int:
 
 
 def sweep_table(sweep: Sweep, methods: Sequence[str], numbers: range) -> Table:
-    """The table of the runs `numbers` of a sweep; run r is row r mod rows of the design, by method r div rows."""
+    """Return the table of the runs `numbers` of a sweep; run r is row r mod rows of the design, by method r div
+    rows."""
     runs, rows, options = np.arange(numbers.start, numbers.stop), sweep.design.count, sweep.design
     known: dict[str, tuple[Column, Any]] = {}
     values = sweep.design.rows(numbers.start, numbers.stop)
@@ -101,8 +102,8 @@ def sweep_table(sweep: Sweep, methods: Sequence[str], numbers: range) -> Table:
 def open_sweep(
     output: Path, table: Table, attributes: Mapping[str, object], time_limit_s: float = 0.0, *, fresh: bool = False
 ) -> Iterator[tuple[Table, NDArray[np.int8]]]:
-    """The file `output`, laid out where it is not there, which no other process writes in the block: its table, and
-    (runs,) their statuses, MISSING where they are to be computed.
+    """Open the file `output`, laid out where it is not there, which no other process writes in the block: its table,
+    and (runs,) their statuses, MISSING where they are to be computed.
 
     time_limit_s: runs that a shorter limit ended are missing. fresh: all runs are to be computed; what is stored of one
     stays until it is. Raises InputError where the output holds something else, or another process is writing it,
@@ -161,7 +162,7 @@ class StoredSweep:
             )
 
     def _check(self) -> None:
-        """Raises StoreError where something is missing, or does not fit, that every sweep has."""
+        """Raise StoreError where something is missing, or does not fit, that every sweep has."""
         table, place = self._table, str(self._path)
         texts = ("title", "summary", "sweep_toml", "base_scene", "scene_toml", "scene_hash")
         require_texts(self.attributes, texts, place)

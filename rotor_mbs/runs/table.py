@@ -226,7 +226,7 @@ def runs_table(asked: Sequence[Asked]) -> Table:
 
 
 def scene_table(runs: Sequence[Asked], arrays: Collection[str] | None = None) -> Table:
-    """The table of the arrays of one scene's runs. arrays: names of those that are stored, by default all."""
+    """Return the table of the arrays of one scene's runs. arrays: names of those that are stored, by default all."""
     scene = runs[0].scene
     computed = {
         name: column for run in runs for name, column in arrays_of(run).items() if arrays is None or name in arrays
@@ -274,8 +274,8 @@ class Place:
     row_type: np.dtype[np.void]
 
     def rows_of(self, values: Mapping[str, object], count: int = 1) -> Rows:
-        """Rows with these values, the same in each, by the name of their column: numbers, a text, the name of a status,
-        the first samples of an array. The other columns are blank; what is no column here is left out."""
+        """Return rows with these values, the same in each, by the name of their column: numbers, a text, the name of a
+        status, the first samples of an array. The other columns are blank; what is no column here is left out."""
         rows = blank_rows(count, self.row_type)
         for name, value in values.items():
             if name == "status":
@@ -383,7 +383,7 @@ def text_of(values: NDArray[np.bytes_]) -> str:
 
 
 def row_of_run(run: Solution, place: Place, facts: Mapping[str, object]) -> Rows:
-    """The row of a run: status, metrics, times, arrays. facts: further columns by name."""
+    """Return the row of a run: status, metrics, times, arrays. facts: further columns by name."""
     integration, run_times_s = run.integration, run.run_times_s or [math.nan]
     # A reference is read back by its angles and rates, whatever the scene asks for.
     own = {"angles": run.angles, "rates": run.rates} if run.method == REFERENCE else {}
@@ -415,9 +415,9 @@ def row_of_run(run: Solution, place: Place, facts: Mapping[str, object]) -> Rows
 
 @contextmanager
 def laid_out(path: Path, tables: Sequence[Table], attributes: Mapping[str, object]) -> Iterator[Path]:
-    """A new file with room for all rows, under a temporary name; after the block it is complete under its name, or not
-    there. Its space is reserved twice: HDF5 does not survive a disk that fills up under it, and truncates the file it
-    begins. Raises StoreError."""
+    """Yield a new file with room for all rows, under a temporary name; after the block it is complete under its name,
+    or not there. Its space is reserved twice: HDF5 does not survive a disk that fills up under it, and truncates the
+    file it begins. Raises StoreError."""
     with replacing(path) as temporary:
         rows = sum(len(table.runs) * (table.row_type.itemsize + 8 * (4 + len(table.known))) for table in tables)
         _reserve(temporary, _HEAD_BYTES + rows)
@@ -583,7 +583,7 @@ class TableFile:
                 raise StoreError(f"{self.path}: {run[:_LONGEST_LABEL]} has no arrays; damaged")
 
     def place(self, run: str, group: str = RUNS) -> Place:
-        """Where a row is; of a run, together with its arrays."""
+        """Return where a row is; of a run, together with its arrays."""
         stored = self.tables[group]
         row = stored.row_of[run]
         place = stored.place(row)
@@ -700,7 +700,7 @@ _OF_A_SCENE = (REPEATED, ("time",), ("title", "scene_toml", "scene_hash"))
 
 
 def _check(table: Table) -> None:
-    """Raises StoreError where a table lacks what every table of its kind has, or a column has another length.
+    """Raise StoreError where a table lacks what every table of its kind has, or a column has another length.
 
     A digest can be right although another program wrote the file.
     """
@@ -884,7 +884,7 @@ def _write_tables(path: Path, tables: Sequence[Table], rows: Sequence[tuple[str,
 
 @contextmanager
 def new_file(path: Path, kind: str) -> Iterator[Any]:
-    """A new HDF5 file of a kind, put in the place of `path` when all of it is written and on the disk.
+    """Create an HDF5 file of a kind, put in the place of `path` when all of it is written and on the disk.
 
     It is made in memory: HDF5 does not survive a disk that fills up under it, a plain write does. Raises StoreError
     where the file cannot be written; what stood there before then still stands. Whether it may be replaced is decided
@@ -957,7 +957,7 @@ def _unit_of(dataset: Any) -> str:
 
 
 def chosen_group(path: Path, places: Sequence[str], group: str, scene: str) -> str:
-    """The one of `places` that is meant, see `read_arrays`. Raises StoreError."""
+    """Return the one of `places` that is meant, see `read_arrays`. Raises StoreError."""
     inside = [place for place in places if place.startswith(f"{scene}/")] or list(places)
     if group:
         fitting = [place for place in inside if place == group]
@@ -974,7 +974,7 @@ def chosen_group(path: Path, places: Sequence[str], group: str, scene: str) -> s
 
 
 def _array_places(file: Any) -> dict[str, list[str]]:
-    """Names of the arrays of numbers by their group; groups without any are left out."""
+    """Return the names of the arrays of numbers by their group; groups without any are left out."""
     places: dict[str, list[str]] = {}
 
     def note(path: str, item: Any) -> None:

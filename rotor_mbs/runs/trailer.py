@@ -153,7 +153,7 @@ def _words(kind: str) -> str:
 
 
 def _blocks(file: IO[bytes], end: int, groups: Regions) -> Iterator[bytes]:
-    """The bytes before `end` outside the rows. Raises ValueError, TypeError, AttributeError where `groups` are no
+    """Yield the bytes before `end` outside the rows. Raises ValueError, TypeError, AttributeError where `groups` are no
     regions one behind the other."""
     every = [tuple(region) for columns in groups.values() for region in columns.values()]
     position = 0
@@ -171,7 +171,7 @@ def _blocks(file: IO[bytes], end: int, groups: Regions) -> Iterator[bytes]:
 
 
 def _why_without(path: Path, file: IO[bytes], size: int) -> str:
-    """What a file is that does not end with a trailer."""
+    """Tell what a file is that does not end with a trailer."""
     file.seek(0)
     head = file.read(_HEAD)
     if _OF_A_LAYOUT.fullmatch(path.name):

@@ -323,7 +323,7 @@ class Design:
 
     @functools.cached_property
     def values(self) -> list[Array]:
-        """Values of each axis, (values,)."""
+        """Return the values of each axis, (values,)."""
         sobol = [axis.key for axis in self.axes if axis.sobol]
         if sobol:
             from scipy.stats import qmc  # late: 0.5 s

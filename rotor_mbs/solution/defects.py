@@ -266,7 +266,8 @@ class Defects:
 
     @functools.cached_property
     def _errors_and_drift(self) -> tuple[Array, float]:
-        """Errors of the states that the defects add up to, (n, m), and the largest sum over `DRIFT_ROWS` rows."""
+        """Return the errors of the states that the defects add up to, (n, m), and the largest sum over `DRIFT_ROWS`
+        rows."""
         half = len(self.moving)
         resting = [i for i, coordinate in enumerate(self.moving) if coordinate in self.resting]
         at_zero = [*resting, *(half + i for i in resting)]
@@ -314,7 +315,7 @@ def _with_small_numbers(floors: Array) -> Array:
 
 
 def _carried(matrices: Array, offsets: Array, rows: int) -> tuple[Array, Array]:
-    """Errors e that go on as matrix @ e + offset, in stretches of so many rows, all stretches at once.
+    """Carry on errors e that go on as matrix @ e + offset, in stretches of so many rows, all stretches at once.
 
     Parameters
     ----------

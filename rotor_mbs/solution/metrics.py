@@ -152,7 +152,7 @@ def defect_metrics(defects: Defects, horizon_s: float | None, *, is_corrected: b
 
 
 def _angle_errors(run: Trajectory, reference: Trajectory, until: int) -> Metrics:
-    """Errors only where there is a second sample: the first one is given, and equal in every run."""
+    """Compute errors of angles, only where there is a second sample: the first one is given, and equal in every run."""
     error = angle_error(run, reference)
     metrics: Metrics = {}
     # Pitches that are exactly zero in the reference: whether they stayed so, and if not, when and how fast they left.

@@ -291,7 +291,8 @@ def quantities(outputs: Iterable[str]) -> tuple[Quantity, ...]:
 
 @functools.cache
 def installed(output: str) -> tuple[Quantity, ...]:
-    """The quantities of the entry point called `output`. Raises InputError where there is none, or it is not valid."""
+    """Return the quantities of the entry point called `output`. Raises InputError where there is none, or it is not
+    valid."""
     points = tuple(entry_points(group=ENTRY_POINT_GROUP, name=output))
     if not points:
         raise InputError(

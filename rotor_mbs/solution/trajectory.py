@@ -265,6 +265,7 @@ class Solution:
         return xarray.Dataset(variables, coordinates, {**facts, **self.metrics})
 
     def _summary(self) -> dict[str, str]:
+        """Return the lines that a run prints: scene, method, status and largest values."""
         last = float(self.time[-1]) if len(self.time) else self.integration.time_reached
         reached = f"{last:g} s of {self.scene.duration:g} s, {len(self.time)} samples"
         shown = comparison(self.metrics, self.scene.duration)

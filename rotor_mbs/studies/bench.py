@@ -108,8 +108,8 @@ class Curve:
 
 
 def curve_of(scene: Scene, method: Method, ladder: Ladder, options: Mapping[str, object]) -> Curve:
-    """The curve of a method's ladder. options: of the study, stored with each point, with facts of the method that a
-    page may want."""
+    """Return the curve of a method's ladder. options: of the study, stored with each point, with facts of the method
+    that a page may want."""
     name, (short, _) = method.name + ladder.variant, thinned(scene)
     facts = {
         **options,
@@ -207,7 +207,8 @@ class PointTimer:
         return {"status": status, "message": message, "run_time_s": self.warm_s, **nothing}
 
     def judge(self) -> dict[str, Any]:
-        """Status, message, metrics and steps of the last run, and the time to read out and compute its samples."""
+        """Return status, message, metrics and steps of the last run, and the time to read out and compute its
+        samples."""
         start = self._clock()
         trajectory = self._solver.observe()
         output = self._clock() - start
@@ -266,7 +267,8 @@ def conduct(ladders: Sequence[Sequence[PointTimer]], budget_s: float, repeats: i
 
 
 def _warm_all(ladders: Sequence[Sequence[PointTimer]], budget_s: float, clock: Callable[[], float]) -> None:
-    """The rung expected to be cheapest comes next. What is left over when even that one does not fit is left out."""
+    """Warm up all rungs; the one expected to be cheapest comes next. What is left over when even that one does not fit
+    is left out."""
     start, warm_s = clock(), 0.0
     waiting = [(0.0, 0, number) for number, ladder in enumerate(ladders) if ladder]
     while waiting:
@@ -303,7 +305,7 @@ def allot(seconds: Sequence[float], wanted: Sequence[int], budget_s: float) -> l
 def measure(
     curves: Sequence[Curve], scene: Scene, reference: Trajectory | None, repeats: int, budget_s: float
 ) -> list[list[dict[str, Any]]]:
-    """The columns of every point, by curve: timed in rounds over all points, then the last run of each judged.
+    """Measure the columns of every point, by curve: timed in rounds over all points, then the last run of each judged.
 
     For a process that does nothing else: engines are loaded beforehand, which is part of no run's time, and the garbage
     collector is off.
@@ -419,7 +421,7 @@ def run_bench(
     workers: int,
     on_progress: OnProgress = ignore_progress,
 ) -> tuple[list[Outcome], list[catalogue.Refusal]]:
-    """The curves of every scene into the results file `output`; what it has already is kept.
+    """Measure the curves of every scene into the results file `output`; what it has already is kept.
 
     Parameters
     ----------
@@ -510,7 +512,7 @@ def _measure_scene(
 
 
 def rows_of_curve(place: Place, curve: Curve, points: Sequence[Mapping[str, Any]], facts: Mapping[str, object]) -> Rows:
-    """The rows of a curve, with its order of convergence, or the step for its target.
+    """Return the rows of a curve, with its order of convergence, or the step for its target.
 
     facts: columns that all its points have in common.
     """

@@ -69,7 +69,8 @@ def export(scene: Scene | str | os.PathLike[str], to: str, output: str | os.Path
 
 
 def reference_csv(scene: Scene) -> str:
-    """The scene's reference, shipped or computed, as comma-separated values. StoreError where it does not begin."""
+    """Return the scene's reference, shipped or computed, as comma-separated values. StoreError where it does not
+    begin."""
     solution = frozen_solution(scene) or solve(REFERENCE, scene, {})
     trajectory = solution.trajectory
     if not len(trajectory.time):
@@ -109,7 +110,7 @@ _COMMENTS = {  # by kind; parts of another kind are left out
 
 
 def exudyn_script(scene: Scene) -> str:
-    """The kinematic tree with the same step as a Python script for Exudyn alone; its text is a template."""
+    """Return the kinematic tree with the same step as a Python script for Exudyn alone; its text is a template."""
     parts = [part for part in tree.parts(scene, Loads(scene)) if part.kind in _COMMENTS]
     moving = [0, *(1 + i for i in movable_blades(scene))]
     calls = []

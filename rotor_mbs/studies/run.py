@@ -125,7 +125,7 @@ def run_scenes(
     use_frozen: bool = True,
     on_progress: OnProgress = ignore_progress,
 ) -> RunReport:
-    """Every scene's reference and runs into the results file `output`; what it has already is kept.
+    """Compute every scene's reference and runs into the results file `output`; what it has already is kept.
 
     Parameters
     ----------
@@ -154,8 +154,8 @@ def asked_runs(
     *,
     use_frozen: bool = True,
 ) -> list[Asked]:
-    """The rows of these scenes by their `methods`, the reference of each scene first: the shipped one, where there is
-    one and it may be used, or one to be computed. Raises InputError."""
+    """Return the rows of these scenes by their `methods`, the reference of each scene first: the shipped one, where
+    there is one and it may be used, or one to be computed. Raises InputError."""
     of_call = settings_for(list(dict.fromkeys(name for scene in scenes for name in methods[scene.name])), settings)
     asked: list[Asked] = []
     for scene in scenes:
@@ -166,7 +166,7 @@ def asked_runs(
 
 
 def run_tasks(missing: Sequence[tuple[Asked, Place, Place | None]], timeout_s: float) -> list[RunTask]:
-    """The tasks of runs, each given with its place and that of its reference."""
+    """Return the tasks of runs, each given with its place and that of its reference."""
     return [
         RunTask(
             label=f"{run.scene.name} {run.method}",
@@ -193,7 +193,8 @@ def solve_judged(
     compute_reference: bool = False,
     time_limit_s: float = float("inf"),
 ) -> tuple[Solution, Trajectory | None]:
-    """One run in this process, with status, message and metrics, and the reference it was judged by; stores nothing.
+    """Solve one run in this process, with status, message and metrics, and the reference it was judged by; stores
+    nothing.
 
     The time limit is for the run, then the reference, then the judging.
 

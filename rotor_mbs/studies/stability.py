@@ -68,7 +68,7 @@ class SuiteRun:
 
 
 def suite_runs(path: Path) -> list[SuiteRun]:
-    """Every run of a results file, in its order. Raises StoreError."""
+    """Return every run of a results file, in its order. Raises StoreError."""
     ladders = {(record.scene, record.name): record for record in read_records(path, "stability")}
     runs = []
     with open_results(path) as results:
@@ -95,8 +95,8 @@ def suite_runs(path: Path) -> list[SuiteRun]:
 
 
 def suite_table(runs: Sequence[SuiteRun]) -> TextTable:
-    """A row for each method, a column for each folder of scenes: "12+1 of 14" are ok, of these 1 with a smaller step;
-    of the printed equations "2 of 2 completed".
+    """Return a row for each method, a column for each folder of scenes: "12+1 of 14" are ok, of these 1 with a smaller
+    step; of the printed equations "2 of 2 completed".
 
     Without scenes that are singular and have no reference: there no motion exists.
     """
@@ -201,7 +201,7 @@ def complete_ladders(
     workers: Workers,
     on_progress: OnProgress = ignore_progress,
 ) -> list[Outcome]:
-    """The ladders of steps of these scenes, where the runs in `output` call for them."""
+    """Complete the ladders of steps of these scenes, where the runs in `output` call for them."""
     by_name = {scene.name: scene for scene in scenes}
     # Where a fixed step may matter: the stiff and light scenes, and runs that failed at the default step.
     wanted = [

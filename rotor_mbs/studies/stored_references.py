@@ -89,8 +89,8 @@ def rebuilt_reference(scene: Scene, arrays: Mapping[str, NDArray[Any]]) -> Traje
 
 
 def frozen_solution(scene: Scene) -> Solution | None:
-    """The shipped reference of a scene, with the settings and times of when it was computed; None where there is none.
-    Raises StoreError where it cannot be read."""
+    """Return the shipped reference of a scene, with the settings and times of when it was computed; None where there is
+    none. Raises StoreError where it cannot be read."""
     shipped = shipped_reference(scene_hash(scene))
     if shipped is None:
         return None

@@ -221,7 +221,7 @@ class SweepPlan:
         return sweep_table(self.sweep, self.methods, range(self.first, self.last))
 
     def chunks(self, place: Place, gaps: Sequence[tuple[int, int]], workers: int = 1) -> Iterator[Chunk]:
-        """The runs of `gaps`, cut into what one of `workers` does at once, by one method."""
+        """Cut the runs of `gaps` into what one of `workers` does at once, by one method."""
         variants, design = self.sweep.variants(), self.sweep.design
         for first, _ in gaps[:1]:
             variants.scene(design.rows(first, first + 1)[0].tolist())
@@ -347,7 +347,7 @@ def run_sweep(
     *,
     fresh: bool = False,
 ) -> SweepResult:
-    """Computes the runs that `output` misses. However it is interrupted, the same call continues from there.
+    """Compute the runs that `output` misses. However it is interrupted, the same call continues from there.
 
     on_progress: called when runs have been stored, first with those that were there. fresh: whether runs that are
     stored are computed again. Raises InputError, MethodRefusal where the sweep cannot be done, or the output is another

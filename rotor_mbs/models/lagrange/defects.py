@@ -64,7 +64,7 @@ def interval_defects(
     rounding: Array | None = None,
     time_rounding: Array | None = None,
 ) -> Defects:
-    """The defects of a run's samples, or of anybody's.
+    """Compute the defects of a run's samples, or of anybody's.
 
     Parameters
     ----------
@@ -136,7 +136,7 @@ def _rates_of_change(scene: Scene, time: Array, states: Array) -> Array:
 
 
 def fitted_rates(scene: Scene, time: Array, angles: Array) -> Array:
-    """Rates of data that have angles alone, by the closed form through five rows around each.
+    """Compute rates of data that have angles alone, by the closed form through five rows around each.
 
     Least squares over the state at the first row of every window, carried through it by the transition matrices; from
     differences, until the rates stand still.
@@ -206,7 +206,7 @@ def fitted_rates(scene: Scene, time: Array, angles: Array) -> Array:
 
 
 def interval_ends(scene: Scene, begins: Array, ends: Array, states: Array) -> Array:
-    """Where the closed form gets from each row of states.
+    """Find where the closed form gets from each row of states.
 
     Parameters
     ----------
@@ -353,9 +353,9 @@ def explicit_steps(scene: Scene, intervals: Array, states: Array, most: int) -> 
 def quick_ends(
     scene: Scene, begins: Array, ends: Array, states: Array, steps: int, equations: Accelerations | None = None
 ) -> Array:
-    """The ends of n intervals from (m, ..., n) states, all at once, in steps of order 4; by `equations` in place of the
-    closed form's. Differences of two calls are right to a share of some 1e-5, but where rates change within an
-    interval."""
+    """Compute the ends of n intervals from (m, ..., n) states, all at once, in steps of order 4; by `equations` in
+    place of the closed form's. Differences of two calls are right to a share of some 1e-5, but where rates change
+    within an interval."""
     form, half = rotor_form(scene), len(states) // 2
     equations = equations or closed_form.accelerations
     h = (ends - begins) / steps

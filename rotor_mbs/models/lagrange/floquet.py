@@ -56,7 +56,7 @@ class Turn:
 
 
 def periodic_turn(scene: Scene, speed: float, guess: Turn | None = None) -> Turn:
-    """The periodic motion of `scene` at a mean `speed` above 0 in rad/s, from the scene's initial rotor angle, by
+    """Find the periodic motion of `scene` at a mean `speed` above 0 in rad/s, from the scene's initial rotor angle, by
     Newton's method; the torque is an unknown. `guess` is a motion at a speed nearby, else steady rotation without
     gravity. Where there is no such motion, `message` says why. Raises MethodRefusal where heyoka is not installed."""
     try:

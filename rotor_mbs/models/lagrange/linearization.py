@@ -37,7 +37,7 @@ def slopes(function: Function, values: Sequence[float] | Array) -> Array:
 def linearize(
     scene: Scene, angles: Sequence[float] | Array, rates: Sequence[float] | Array, torque: float
 ) -> Linearization:
-    """The closed form linearized in `scene.moving_coordinates` at (1 + blades,) rad and rad/s, `torque` N m on the
+    """Linearize the closed form in `scene.moving_coordinates` at (1 + blades,) rad and rad/s, `torque` N m on the
     rotor, other loads as at t = 0. Raises ZeroDivisionError at the singular configuration."""
     form, columns, loads = rotor_form(scene), scene.moving_coordinates, loads_at_start(scene, torque)
     n = len(columns)

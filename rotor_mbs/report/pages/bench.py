@@ -134,6 +134,7 @@ def _model(method: str) -> str:
 
 
 def _facts(scenes: Mapping[str, Sequence[Record]]) -> list[Fact]:
+    """Return the facts at the top of the page: how many scenes, methods and settings, and how many failed."""
     curves = [curve for of_scene in scenes.values() for curve in of_scene]
     measured = sum(status != "left_out" for curve in curves for status in curve.statuses)
     count = sum(len(curve.statuses) for curve in curves)
@@ -329,8 +330,8 @@ _EXPLAINED = (
 
 
 def engine_tables(results: OpenResults, scenes: Mapping[str, Sequence[Record]]) -> list[PageTable]:
-    """A row per method: what it reaches over all scenes and what that costs; what it can compute. What the file does
-    not know is a dash."""
+    """Return a row per method: what it reaches over all scenes and what that costs; what it can compute. What the file
+    does not know is a dash."""
     curves = [curve for of_scene in scenes.values() for curve in of_scene]
     parsed = {name: stored.scene for name, stored in results.scenes.items()}
     suite = [run for run in suite_runs(results.path) if run.scene.startswith(("stiff/", "extreme/"))]
@@ -408,7 +409,8 @@ def _worst_cell(own: Mapping[str, Sequence[Record]], column: str) -> TableCell |
 def _reach_cell(
     scenes: Mapping[str, Sequence[Record]], own: Mapping[str, Sequence[Record]], target: float
 ) -> TableCell:
-    """On how many scenes it reaches the target, the median of the ratios of its run times to the fastest, and them."""
+    """Tell on how many scenes it reaches the target, the median of the ratios of its run times to the fastest, and
+    them."""
     reached: dict[str, work_precision.Reach] = {}
     cut = 0  # scenes on which it was not measured to there
     for name, curves in own.items():
@@ -457,7 +459,8 @@ def _zero_pitch_cell(own: Mapping[str, Sequence[Record]]) -> TableCell | str:
 
 
 def _false_success_cell(own: Mapping[str, Sequence[Record]], suite: Sequence[SuiteRun]) -> TableCell | str:
-    """Of the runs of the stability suite that are not ok, where the file has them; else of the settings here."""
+    """Count false successes of the runs of the stability suite that are not ok, where the file has them; else of the
+    settings here."""
     if suite:
         # What the time limit ended is neither right nor wrong.
         finished = [run for run in suite if run.status != "timed_out"]

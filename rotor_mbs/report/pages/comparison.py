@@ -239,6 +239,7 @@ def _error_section(record: Record, verdict: DataVerdict) -> Section:
 
 
 def _table_section(verdict: DataVerdict) -> Section:
+    """Return the section with a row per channel."""
     table = channel_table(verdict)
     rows: list[Row] = []
     for channel, (name, error, defect, *others) in zip(verdict.channels, table.rows, strict=True):

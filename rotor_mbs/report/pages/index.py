@@ -115,6 +115,7 @@ def _agreement(report: Report) -> tuple[list[str], float | None, int]:
 
 
 def _paper_index(report: Report) -> PageContent:
+    """Return the index of a file with scenes of the paper."""
     scenes = report.scenes
     facts = _paper_facts(report)
     sections = []
@@ -136,6 +137,7 @@ def _paper_index(report: Report) -> PageContent:
 
 
 def _paper_facts(report: Report) -> list[Fact]:
+    """Return the facts at the top of the paper's index."""
     facts: list[Fact] = []
     if report.errata:
         names = ", ".join(erratum.id for erratum in report.errata)
@@ -190,6 +192,7 @@ def _hero_scene(report: Report) -> StoredScene | None:
 
 
 def _hero_section(scene: StoredScene, report: Report) -> Section:
+    """Return the section with the plot that shows the finding."""
     claims = [claim for claim in report.claims if scene.name in claim.scenes]
     hero, _, _ = paper_plots(scene, claims)
     printed, corrected = scene.sides[PRINTED], scene.sides[CORRECTED]
@@ -362,6 +365,7 @@ def _methods_section(report: Report) -> Section:
 
 
 def _own_index(report: Report) -> PageContent:
+    """Return the index of a file with scenes of one's own."""
     scenes = list(report.scenes.values())
     failed = [scene for scene in scenes if _is_bad(scene)]
     count = len(scenes)

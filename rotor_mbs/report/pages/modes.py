@@ -185,6 +185,7 @@ def mode_answer(scene: SceneModes) -> list[Markup]:
 
 
 def _facts(scene: SceneModes) -> list[Fact]:
+    """Return the facts at the top of the page of modes."""
     facts = []
     models = max(len(scene.rest), len(scene.rotation))
     if models > 1:
@@ -346,6 +347,7 @@ _SMALL_MOTIONS = "The geometric stiffness of the chain's constraint forces is in
 
 
 def _multipliers(table: FloquetTable) -> PageTable:
+    """Return the table of Floquet multipliers over the speed."""
     rows: list[Row] = []
     for i, (speed, largest) in enumerate(zip(table.speeds.tolist(), table.largest.tolist(), strict=True)):
         text = "unknown" if table.stable[i] == -1 else _shown(largest, 7)

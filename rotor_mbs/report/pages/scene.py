@@ -184,6 +184,7 @@ def paper_answer(scene: StoredScene) -> list[Markup]:
 
 
 def _paper_facts(scene: StoredScene, claims: Sequence[Published]) -> list[Fact]:
+    """Return the facts at the top of the page of a scene of the paper."""
     printed, corrected = scene.sides[PRINTED], scene.sides[CORRECTED]
     facts = [_result_fact(scene, "Corrected model", "✓ verified")]
     left, difference = draw.parting(printed, corrected)
@@ -272,6 +273,7 @@ def paper_plots(scene: StoredScene, claims: Sequence[Published]) -> tuple[Grid, 
 
 
 def _own_page(scene: StoredScene, report: Report) -> PageContent:
+    """Return the page of a scene of one's own: motion and loads first."""
     run = scene.corrected or scene.printed
     jumps = draw.jumps_of(scene.scene)
     sections = []
@@ -510,6 +512,7 @@ def _motion_section(
     main: Sequence[Channel],
     others: Sequence[Channel],
 ) -> Section:
+    """Return the section with the motion: angles, rates, paths of the tips."""
     time = run.array("time")
     axis = draw.time_axis(time)
     moving = viewer(scene, {scene.name: run})

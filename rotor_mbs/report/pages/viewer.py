@@ -22,7 +22,7 @@ _VISIBLE = 0.1  # of the longest blade
 
 
 def viewer(stored: StoredScene, runs: Mapping[str, StoredRun]) -> dict[str, Any] | None:
-    """What the template needs of at most two runs, by the name to be shown; None without bodies or angles."""
+    """Return what the template needs of at most two runs, by the name to be shown; None without bodies or angles."""
     scene = stored.scene
     moves: dict[str, tuple[Array, Array]] = {}
     for name, run in runs.items():
