@@ -75,7 +75,7 @@ class MethodFile:
         return methods
 
     def _named(self, method: Method) -> Method:
-        """Return a method under the file's name, with a ladder where it has a step or a tolerance and none of its own."""
+        """Return a method under the file's name, with a ladder if it has none and a step or a tolerance."""
         name = f"{self.model}/{method.name.rpartition('/')[2]}"
         ladders = method.ladders
         if not ladders:
