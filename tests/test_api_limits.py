@@ -183,6 +183,7 @@ def test_a_misspelt_setting_is_told_before_a_scene_is_refused() -> None:
         rm.run(scene, ["printed/ode45"], relative_tolerance=1e-9)
 
 
+@pytest.mark.full
 def test_limits_of_threads_do_not_end_each_other() -> None:
     """A short run's limit, which is over with it, is not that of a long run in another thread."""
 

@@ -101,7 +101,7 @@ def forge(path: Path, change: Callable[[bytearray], None]) -> None:
     append_trailer(path, known.kind, known.groups)
 
 
-@pytest.mark.parametrize("forgery", FORGERIES)
+@pytest.mark.parametrize("forgery", [pytest.param("hangs", marks=pytest.mark.full), "dies", "takes memory"])
 @pytest.mark.parametrize("kind", [KINDS[0], *(pytest.param(kind, marks=pytest.mark.full) for kind in KINDS[1:])])
 def test_every_command_ends_with_a_line(forgery: str, kind: str, folder: Path, tmp_path: Path) -> None:
     path = Path(shutil.copy(folder / f"{kind}.h5", tmp_path / "forged.h5"))

@@ -248,7 +248,10 @@ OTHERS: dict[str, tuple[Any, Mistakes, str]] = {
 }
 
 
-@pytest.mark.parametrize("name", OTHERS)
+_QUICK = ("right", "Steiner", "half")
+
+
+@pytest.mark.parametrize("name", [pytest.param(one, marks=() if one in _QUICK else pytest.mark.full) for one in OTHERS])
 def test_a_textbook_cause_is_named_alone_and_nothing_else(name: str) -> None:
     changes, mistakes, expected = OTHERS[name]
     motion = other_code.trajectory(replace(FIVE, **changes), sample_times(FIVE), mistakes)
