@@ -265,3 +265,29 @@ def test_a_notebook_shows_a_line_that_is_renewed(monkeypatch: pytest.MonkeyPatch
     with progress.progress_of_call(False) as line:
         line.stage("pages", 1, 2)
     assert len(shown) == count
+
+
+def test_a_changed_scene_says_so_wherever_its_name_stands(tmp_path: Path) -> None:
+    """In `show FILE`, in the tables of runs, in a sweep, in modes, in a comparison; each as it was stored."""
+    label = "paper/fig08, changed: gravity"
+    scene = rm.scene("paper/fig08").replace(gravity=9.0, samples=11)
+    curve = rotor(np.sin, np.cos, np.sin, np.cos)
+    other = Made(paper("fig11", samples=3), METHOD, curve)
+    one = rm.open(store(tmp_path / "one.h5", [Made(scene, METHOD, curve)]))
+    two = rm.open(store(tmp_path / "two.h5", [Made(scene, METHOD, curve), other]))
+    assert repr(one).startswith(f"{label}: ")
+    assert repr(one[METHOD]).startswith(f"{label}: ")
+    assert label in str(two.table())
+    sweep = tmp_path / "sweep.h5"
+    rm.sweep(scene.replace(duration=0.1), {"bearing.stiffness": [0.0, 10.0]}, methods=METHOD, samples=5, output=sweep)
+    modes = rm.modes(scene)
+    modes.save(tmp_path / "modes.h5")
+    assert repr(modes) == repr(rm.open(tmp_path / "modes.h5"))
+    assert repr(modes).startswith(f"{label}: ")
+    data = {"time": np.linspace(0.0, 0.5, 26), "rotor": np.zeros(26)}
+    omitted = {"omit": ["pitch_1", "pitch_2", "pitch_3"]}
+    rm.compare(data, scene, columns=omitted).save(tmp_path / "comparison.h5")
+    assert f"26 rows against {label}" in repr(rm.open(tmp_path / "comparison.h5"))
+    for path in tmp_path.glob("*.h5"):
+        shown = rotor_mbs("show", path)
+        assert "paper/fig08, changed: " in shown.out, path

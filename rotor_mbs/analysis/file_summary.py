@@ -35,6 +35,7 @@ class FileSummary:
     path, kind : the file, and "results", "sweep", "modes" or "comparison".
     attributes : of the file: versions of the programs that made it, the machine, and when.
     scenes, methods, outputs : names, in the order of the file.
+    labels : of scenes of which the file has what was changed in the shipped one, by name.
     statuses : number of runs, or comparisons, with each status.
     lines, tables : what else there is to say of a file of its kind.
     next : commands and calls, each with what it does.
@@ -47,6 +48,7 @@ class FileSummary:
     methods: list[str] = field(default_factory=list)
     outputs: list[str] = field(default_factory=list)
     statuses: dict[str, int] = field(default_factory=dict)
+    labels: dict[str, str] = field(default_factory=dict)
     lines: list[str] = field(default_factory=list)
     tables: list[TextTable] = field(default_factory=list)
     next: list[tuple[str, str]] = field(default_factory=list)
@@ -64,7 +66,7 @@ class FileSummary:
         size = self.path.stat().st_size
         parts = [f"{self.path}: {self.kind}, {size / 1e6:.3g} MB"]
         facts = {
-            "scenes": shortened(self.scenes),
+            "scenes": shortened([self.labels.get(name, name) for name in self.scenes]),
             "methods": ", ".join(self.methods),
             "outputs": ", ".join(self.outputs),
             "status": counts(self.statuses),
@@ -108,6 +110,7 @@ def _results(path: Path) -> FileSummary:
     curves, ladders = read_records(path, "bench"), read_records(path, "stability")
     with open_results(path) as results:
         summary = FileSummary(path, RESULTS, results.attributes, list(results.scenes))
+        summary.labels = {name: scene.label for name, scene in results.scenes.items()}
         runs = [run for scene in results.scenes.values() for run in scene.methods.values()]
         summary.methods = list(dict.fromkeys([run.method for run in runs] + [curve.method for curve in curves]))
         summary.outputs = _unique(output for scene in results.scenes.values() for output in scene.scene.outputs)
@@ -143,7 +146,7 @@ def _scene_table(scenes: Iterable[StoredScene]) -> TextTable:
         statuses = counts(Counter(run.status for run in stored.methods.values()))
         reference = stored.reference
         origin = "none" if reference is None else "shipped" if reference.is_frozen else "computed"
-        rows.append((stored.name, str(len(scene.blades)), f"{scene.duration:g}", str(scene.samples), origin, statuses))
+        rows.append((stored.label, str(len(scene.blades)), f"{scene.duration:g}", str(scene.samples), origin, statuses))
     return TextTable(("scene", "blades", "duration (s)", "samples", REFERENCE, "runs"), rows)
 
 
@@ -151,7 +154,8 @@ def _sweep(path: Path) -> FileSummary:
     """Return what is in a sweep: its parameters, how many runs have which status."""
     sweep = StoredSweep(path, allow_damaged_runs=True)
     codes = sweep.column("status")
-    summary = FileSummary(path, SWEEP, sweep.attributes, [str(sweep.attributes["base_scene"])], list(sweep.methods))
+    summary = FileSummary(path, SWEEP, sweep.attributes, [sweep.base_scene.name], list(sweep.methods))
+    summary.labels = {sweep.base_scene.name: sweep.base_scene.label}
     summary.statuses = dict(Counter(STATUSES[code] for code in codes.tolist() if code != MISSING))
     missing = int((codes == MISSING).sum())
     if missing:
@@ -168,6 +172,7 @@ def _sweep(path: Path) -> FileSummary:
 def _modes(path: Path) -> FileSummary:
     found = read_modes(path)
     summary = FileSummary(path, MODES, read_content(path, ()).attributes, list(found))
+    summary.labels = {name: modes.label for name, modes in found.items()}
     summary.methods = _unique(model for modes in found.values() for model in (*modes.rest, *modes.rotation))
     summary.lines = [line for modes in found.values() for line in ("", *mode_summary(modes).splitlines())]
     return summary
@@ -184,7 +189,8 @@ def _comparison(path: Path) -> FileSummary:
     for record in records:
         verdict = parsed(record.attributes["verdict"], dict, path)
         numbers = (f"{verdict[name]:g}" for name in ("rows", "compared_until", "tolerance"))
-        rows.append((record.name, record.scene, *numbers, str(verdict["status"])))
+        summary.labels[record.scene] = str(record.attributes.get("scene_label", record.scene))
+        rows.append((record.name, summary.labels[record.scene], *numbers, str(verdict["status"])))
         reasons = [verdict["message"], *(f"probable cause: {cause}" for cause in verdict["likely"])]
         for reason in filter(None, reasons):
             summary.lines += textwrap.wrap(f"{record.name}: {reason}", _WIDTH, subsequent_indent="  ")

@@ -307,7 +307,10 @@ class FloquetTable:
 
 @dataclass(frozen=True)
 class SceneModes:
-    """The modes of a scene by model, the closed form first; `notes` has the reason for missing results."""
+    """The modes of a scene by model, the closed form first; `notes` has the reason for missing results.
+
+    label: the scene's name, with what was changed in a shipped one.
+    """
 
     scene: str
     scene_hash: str
@@ -318,6 +321,7 @@ class SceneModes:
     rotation: Mapping[str, LinearModes] = field(default_factory=dict)
     floquet: FloquetTable | None = None
     notes: tuple[str, ...] = ()
+    label: str = ""
 
     @property
     def disagreement(self) -> float:
@@ -391,7 +395,7 @@ def mode_summary(modes: SceneModes) -> str:
     rows = mode_rows(modes)
     ends = {linear.speeds[place] for linear in list(modes.rotation.values())[:1] for place in (0, -1)}
     shown = [row for row in rows if row["state"] == "at rest" or row["speed"] in ends]
-    lines = [f"{modes.scene}: {modes.title}"]
+    lines = [f"{modes.label}: {modes.title}"]
     if shown:
         lines += ["", str(mode_table(shown[:_SHOWN_ROWS]))]
     if len(shown) > _SHOWN_ROWS:
@@ -461,7 +465,7 @@ def _linear_datasets(linear: LinearModes) -> Datasets:
 def to_records(modes: SceneModes) -> list[Record]:
     """The records of a file of modes."""
     common = {name: getattr(modes, name) for name in ("scene_hash", "title", "blades", "gravity")}
-    common["notes"] = "\n".join(modes.notes)
+    common |= {"notes": "\n".join(modes.notes), "scene_label": modes.label}
     linear = [*modes.rest.values(), *modes.rotation.values()]
     records = [_linear_record(modes.scene, source, common) for source in linear]
     if modes.floquet is not None:
@@ -582,5 +586,6 @@ def _modes_of(of_all: Sequence[Record]) -> dict[str, SceneModes]:
             rotation=states[ROTATION],
             floquet=floquet,
             notes=tuple(str(facts["notes"]).splitlines()),
+            label=str(facts.get("scene_label", scene)),
         )
     return modes_by_scene

@@ -33,16 +33,19 @@ def run_row(run: StoredRun) -> tuple[str, ...]:
 
 def table_of_runs(scenes: Mapping[str, StoredScene], wanted: Mapping[str, Iterable[str]]) -> TextTable:
     """A row for each of the `wanted` runs and their references; of many runs, one for each method."""
-    runs = [
-        scenes[name].runs[method]
-        for name, methods in wanted.items()
-        if name in scenes
-        for method in (REFERENCE, *methods)
-        if method in scenes[name].runs
-    ]
+    runs = []
+    rows: list[tuple[str, ...]] = []
+    for name, methods in wanted.items():
+        if name not in scenes:
+            continue
+        for method in (REFERENCE, *methods):
+            if method in scenes[name].runs:
+                run = scenes[name].runs[method]
+                runs.append(run)
+                rows.append((scenes[name].label, *run_row(run)))
     if len(runs) > MOST_ROWS:
         return method_table(run for run in runs if run.method != REFERENCE)
-    return TextTable(("scene", *RUN_HEAD), [(run.scene, *run_row(run)) for run in runs])
+    return TextTable(("scene", *RUN_HEAD), rows)
 
 
 def method_table(runs: Iterable[StoredRun]) -> TextTable:

@@ -172,7 +172,7 @@ class DataComparison:
         """Say how columns were read, numbers by channel, and the verdict."""
         verdict = self.verdict
         lines = [
-            f"{verdict.source}: {verdict.rows} rows against {verdict.scene}",
+            f"{verdict.source}: {verdict.rows} rows against {self.record.attributes.get('scene_label', verdict.scene)}",
             *map("  {}".format, verdict.read),
         ]
         if verdict.unused:

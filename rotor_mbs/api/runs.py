@@ -43,7 +43,7 @@ from rotor_mbs.runs.sweeps import ERROR_GROWTH, METRICS, StoredSweep, parameter_
 from rotor_mbs.runs.table import copy_file, text_of
 from rotor_mbs.scenario.catalogue import list_scenes, only_scene, scene_of
 from rotor_mbs.scenario.keys import counted
-from rotor_mbs.scenario.scene import Scene, load_scene, parse_scene
+from rotor_mbs.scenario.scene import Scene, load_scene
 from rotor_mbs.scenario.toml_file import file_path, plain_value
 from rotor_mbs.solution.defects import Defects
 from rotor_mbs.solution.quantities import known_quantities
@@ -469,7 +469,11 @@ class Runs(Mapping[Any, Any]):
         if self._is_sweep:
             counts: list[tuple[str, ...]] = [(status, str(count)) for status, count in self.statuses.items()]
             return TextTable(("status", "runs"), counts)
-        rows = [run_row(run) if self.scene else (run.scene, *run_row(run)) for run in self._runs()]
+        rows = []
+        with open_results(self.path, only=[self.scene] if self.scene else None) as results:
+            for scene in results.scenes.values():
+                before = () if self.scene else (scene.label,)
+                rows += [(*before, *run_row(run)) for run in scene.runs.values()]
         return TextTable(RUN_HEAD if self.scene else ("scene", *RUN_HEAD), rows)
 
     @property
@@ -565,10 +569,9 @@ class Runs(Mapping[Any, Any]):
     def _run_of_sweep(self, number: int) -> Run:
         """Return one run of a sweep, read from its row."""
         sweep = self._sweep
-        design, row = sweep.attributes, number - int(sweep.column("run")[0])
+        row = number - int(sweep.column("run")[0])
         values = {key: float(sweep.column(parameter_name(key))[row]) for key in sweep.keys}
-        base = parse_scene(str(design["scene_toml"]), str(design["base_scene"]))
-        scene = base.replace(**values, samples=len(sweep.column("time")))
+        scene = sweep.base_scene.replace(**values, samples=len(sweep.column("time")))
         facts = {name: sweep.column(name)[row] for name in METRICS | ERROR_GROWTH if name in sweep.columns}
         arrays: dict[str, Any] = {}
         for quantity in known_quantities(scene.outputs):
@@ -600,7 +603,15 @@ class Runs(Mapping[Any, Any]):
 
     def _headline(self) -> str:
         counts = ", ".join(f"{count} {status}" for status, count in self.statuses.items())
-        return f"{self.scene or self.path}: {counted(len(self), 'run')}: {counts}"
+        return f"{self._scene_label or self.path}: {counted(len(self), 'run')}: {counts}"
+
+    @functools.cached_property
+    def _scene_label(self) -> str:
+        """The scene and what was changed in a shipped one; "" of several scenes, and of a sweep."""
+        if self._is_sweep or not self.scene:
+            return ""
+        with open_results(self.path, only=[self.scene]) as results:
+            return results.scenes[self.scene].label
 
     def _short_table(self) -> TextTable:
         """Return a table for a screen: of many runs a row per method, of a sweep its parameters."""

@@ -303,8 +303,12 @@ def _parser() -> tuple[_Parser, dict[str, _Parser]]:
     )
     text = "fail if a scene of FILE has no run with this method; may be repeated"
     own.add_argument("--require", action="append", metavar="METHOD", help=text)
-    text = "also fail if, compared with this earlier file, a margin has shrunk more than tenfold or a run is missing"
+    text = (
+        "also fail if, compared with this earlier file, a margin has shrunk more than tenfold, a run is missing or a "
+        "scene was changed"
+    )
     own.add_argument("--against", type=path, metavar="OLD", help=text)
+    own.flag("--allow-changed", help="tell what changed in scenes since OLD, and do not fail for it")
     own.add_argument("--junit", type=file, metavar="XML", help="write the verdicts as JUnit XML")
     own.add_argument("--json", type=file, metavar="FILE", help="write the verdicts as JSON; - for standard output")
     own.flag("--github", help="print the ten worst failures as annotations")

@@ -129,7 +129,7 @@ def _show_scene(arguments: argparse.Namespace) -> None:
     if arguments.json:
         print_json({"name": scene.name, "scene": tables, "models": models}, indent=1)
         return
-    print(f"{scene.name}\n")
+    print(f"{scene.label}\n")
     for path, value in scene_keys(scene):
         unit = "" if unit_of(path) == "1" else f", {unit_of(path)}"
         print(f"  {shown_key(path) + unit:28} {without_times(value)}")

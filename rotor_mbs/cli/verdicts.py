@@ -32,6 +32,8 @@ JSON = rb'\A\[\]\Z|\A\[\n \{\n  "check": "'
 def check(arguments: argparse.Namespace) -> int:
     """Prints every verdict that fails (with --verbose all), then a count; status 1 where one fails."""
     _refuse_foreign(arguments)
+    if arguments.allow_changed and arguments.against is None:
+        raise InputError("--allow-changed: allowed: with --against OLD")
     if arguments.require and arguments.file is None:
         raise InputError("--require: allowed: with a FILE that is to have the runs")
     bounds = shipped_bounds().with_entries(read_bounds(arguments.bounds) if arguments.bounds else ())
@@ -45,6 +47,8 @@ def check(arguments: argparse.Namespace) -> int:
             verdicts = study.check_default_set(bounds, arguments.jobs, progress, arguments.method)
     if verdicts and earlier is not None:
         verdicts += study.regressions(verdicts, earlier)
+        scenes, before = (study.scenes_checked(place) for place in (arguments.file, arguments.against))
+        verdicts += study.changed_scenes(scenes, before, are_allowed=arguments.allow_changed)
         if arguments.file is not None and is_sweep(arguments.file):
             verdicts.append(study.runs_gone(arguments.file, arguments.against))
 
@@ -54,6 +58,10 @@ def check(arguments: argparse.Namespace) -> int:
     annotated = worst_first(failures)[:WORST] if arguments.github else []
     for text in report_lines(verdicts, annotated, verbose=arguments.verbose):
         print(text, file=stream)
+    if arguments.file is not None:
+        for scene in study.scenes_checked(arguments.file).values():
+            if scene.label != scene.name:
+                print(escaped(scene.label), file=stream)
     runs = ", ".join(f"{count} {method}" for method, count in study.judged_runs(verdicts).items())
     print(f"runs checked: {runs or 'none'}", file=stream)
     print(f"{len(verdicts) - len(failures)} passed, {len(failures)} failed", file=stream)
@@ -79,7 +87,7 @@ def report_lines(verdicts: Sequence[Check], annotated: Sequence[Check] = (), *, 
     left_out = [] if verbose else shrunk[WORST:]
     lines = []
     for verdict in verdicts:
-        is_wanted = verbose or not verdict.passed
+        is_wanted = verbose or not verdict.passed or (verdict.name == study.CHANGED and verdict.value > 0.0)
         if is_wanted and verdict not in annotated and verdict not in left_out:
             lines.append(line(verdict))
     if left_out:
@@ -141,7 +149,8 @@ def line(check: Check) -> str:
     outcome = "pass" if check.passed else "FAIL"
     margin = "inf" if math.isinf(check.margin) else f"{check.margin:.3g}"
     unit = f" {check.unit}" if check.unit else ""
-    hint = "" if check.passed else f"; {check.hint}"
+    is_told = not check.passed or (check.name == study.CHANGED and check.value > 0.0)  # an allowed change, too
+    hint = f"; {check.hint}" if is_told else ""
     return escaped(
         f"{outcome} {check.name}: {' '.join(check.where)}: {check.value:.2e}, "
         f"bound {check.bound:.2e}{unit}, margin {margin}{hint}"

@@ -208,6 +208,7 @@ def comparison_record(
         "title": scene.title,
         "scene_hash": scene_hash(scene),
         "scene_toml": scene.text,
+        "scene_label": scene.label,
         "source": verdict.source,
         "status": verdict.status,
         "message": verdict.message,

@@ -220,7 +220,7 @@ def title_of(figure: PaperFigure, scenes: Mapping[str, StoredScene]) -> str:
     if figure.number:
         return f"Figure {figure.number} of {_PAPER}, recomputed"
     scene = scenes[figure.panels[0][1]]
-    return f"{scene.title} ({scene.name})"
+    return f"{scene.title} ({scene.label})"
 
 
 def caption_of(figure: PaperFigure, scenes: Mapping[str, StoredScene]) -> str:
@@ -279,9 +279,8 @@ def _scene_line(label: str, scene: StoredScene) -> str:
     initial = scene_tables(scene.scene)["initial"]
     angles, rates = (", ".join(f"{value:.6g}" for value in initial[key]) for key in ("angles", "rates"))
     before = f"({label}) " if label else ""
-    state = "" if scene.is_shipped or not scene.name.startswith("paper/") else ", changed: not the scene of the paper"
     return (
-        f"{before}{scene.title} (scene {scene.name}{state}): "
+        f"{before}{scene.title} (scene {scene.label}): "
         f"initial angles {angles} rad and rates {rates} rad/s, rotor first; "
         f"gravity {scene.scene.gravity:g} m/s^2; {scene.scene.duration:g} s, {scene.scene.samples} samples."
     )

@@ -15,7 +15,7 @@ import functools
 import os
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import IO, Any
 
@@ -45,8 +45,8 @@ from rotor_mbs.runs.table import (
 )
 from rotor_mbs.runs.trailer import MODES, SWEEP, may_extend, read_trailer
 from rotor_mbs.runs.versions import machine, versions
-from rotor_mbs.scenario.catalogue import natural_order, shipped_scene
-from rotor_mbs.scenario.scene import Scene, coordinate_labels, parse_scene, scene_hash
+from rotor_mbs.scenario.catalogue import label_with_changes, moves_as_shipped, natural_order, shipped_scene
+from rotor_mbs.scenario.scene import Scene, SceneChange, coordinate_labels, parse_scene, scene_changes
 from rotor_mbs.solution.quantities import known_quantities, quantities, row_shape
 from rotor_mbs.solution.status import STATUSES, code_of
 from rotor_mbs.solution.trajectory import Integration, Solution, Trajectory
@@ -227,12 +227,20 @@ class StoredScene:
         return None if self.reference is None else self.reference.trajectory(self.scene)
 
     @functools.cached_property
+    def changes(self) -> list[SceneChange] | None:
+        """What differs from this package's scene of its name; None where there is none."""
+        known = shipped_scene(self.name)
+        return None if known is None else scene_changes(known, self.scene)
+
+    @property
+    def label(self) -> str:
+        """Its name, with what was changed in a scene of this package."""
+        return label_with_changes(self.name, self.changes or ())
+
+    @property
     def is_shipped(self) -> bool:
         """Whether its motion is that of this package's scene of its name; samples and outputs may be others."""
-        known = shipped_scene(self.name)
-        if known is None:
-            return False
-        return scene_hash(replace(self.scene, samples=known.samples, outputs=known.outputs)) == scene_hash(known)
+        return moves_as_shipped(self.changes)
 
     @property
     def figures(self) -> str:

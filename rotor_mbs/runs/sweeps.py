@@ -9,6 +9,7 @@ angles ...                         (run, time, coordinate) trajectories, as aske
 
 from __future__ import annotations
 
+import functools
 import json
 import re
 import zlib
@@ -36,6 +37,7 @@ from rotor_mbs.runs.table import (
 )
 from rotor_mbs.runs.trailer import SWEEP, may_extend
 from rotor_mbs.runs.versions import row_versions
+from rotor_mbs.scenario.scene import Scene, parse_scene
 from rotor_mbs.scenario.sweep import SPLITS, Sweep, split_rows
 from rotor_mbs.solution import quantities
 from rotor_mbs.solution.status import code_of
@@ -182,6 +184,11 @@ class StoredSweep:
             raise StoreError(f"{place}: run is no count; damaged")
         if ((codes < 0) | (codes >= len(self.methods))).any():
             raise StoreError(f"{place}: method_code names no method; damaged")
+
+    @functools.cached_property
+    def base_scene(self) -> Scene:
+        """The scene that is varied. Raises InputError where its text is none."""
+        return parse_scene(str(self.attributes["scene_toml"]), str(self.attributes["base_scene"]))
 
     @property
     def methods(self) -> list[str]:

@@ -12,7 +12,7 @@ from rotor_mbs.errors import InputError, RotorError, nearest
 from rotor_mbs.scenario.toml_file import file_path, parse_toml, shown_path
 
 if TYPE_CHECKING:  # `rotor-mbs list` reads no scene
-    from rotor_mbs.scenario.scene import Scene, ValuesCheck
+    from rotor_mbs.scenario.scene import Scene, SceneChange, ValuesCheck
 
 # Groups at the top of a results file that are not scenes: no scene may take such a name.
 RESERVED_GROUPS = (
@@ -36,6 +36,9 @@ REFERENCES = _DATA / "reference"  # published numbers, errata, bounds, trajector
 for _folder in (SCENARIOS, REFERENCES):
     if not _folder.is_dir():
         raise RotorError(f"{_folder}: the folder is missing; install rotor_mbs again")
+
+_NO_MOTION = ("samples", "outputs")  # keys that change what is stored, not how the rotor moves
+_SHOWN_CHANGES = 3  # keys in the label of a changed scene
 
 _PIECE = r"[A-Za-z0-9_-][A-Za-z0-9._-]*"
 _NAME = re.compile(rf"{_PIECE}(?:/{_PIECE})*")
@@ -181,6 +184,42 @@ def shipped_scene(name: str) -> Scene | None:
 
     path = _shipped().get(name)
     return None if path is None else load_scene(path, name)
+
+
+def changes_from_shipped(scene: Scene) -> list[SceneChange] | None:
+    """Return what differs from the shipped scene of the same name; None where there is none."""
+    from rotor_mbs.scenario.scene import scene_changes
+
+    known = shipped_scene(scene.name)
+    return None if known is None else scene_changes(known, scene)
+
+
+def scene_label(scene: Scene) -> str:
+    """Return the name of a scene, with what was changed in a shipped one.
+
+    Samples and outputs are not changes of the motion, and not named.
+
+    Examples
+    --------
+    >>> scene = find_scenes(["paper/fig11"])[0]
+    >>> scene_label(scene), scene_label(scene.replace(**{"blade.mass": 12000.0}))
+    ('paper/fig11', 'paper/fig11, changed: blade.mass')
+    """
+    return label_with_changes(scene.name, changes_from_shipped(scene) or ())
+
+
+def label_with_changes(name: str, changes: Iterable[SceneChange]) -> str:
+    """Return the label of a scene, given what differs from the shipped one of its name."""
+    keys = [change.key for change in changes if change.path[0] not in _NO_MOTION]
+    if not keys:
+        return name
+    more = f" and {len(keys) - _SHOWN_CHANGES} more" if len(keys) > _SHOWN_CHANGES else ""
+    return f"{name}, changed: {', '.join(keys[:_SHOWN_CHANGES])}{more}"
+
+
+def moves_as_shipped(changes: Iterable[SceneChange] | None) -> bool:
+    """Return whether a scene has the motion of the shipped one; `changes` as of it."""
+    return changes is not None and all(change.path[0] in _NO_MOTION for change in changes)
 
 
 def _shipped() -> dict[str, Path]:

@@ -19,7 +19,7 @@ from dataclasses import Field, dataclass, fields
 from itertools import pairwise
 from operator import attrgetter
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 from rotor_mbs.errors import InputError, PlausibilityWarning
 from rotor_mbs.scenario import keys
@@ -475,7 +475,7 @@ class Scene:
 
     def __repr__(self) -> str:
         """Show the keys of the scene with their units, long tables cut off, on one screen."""
-        lines = [f"{self.name}: {self.title}"]
+        lines = [f"{self.label}: {self.title}"]
         for key, unit, value in _short_keys(self):
             lines.append(f"  {key + (f', {unit}' if unit else ''):28} {value}".rstrip())
         return "\n".join(lines)
@@ -487,7 +487,14 @@ class Scene:
         for cells in _short_keys(self):
             key, unit, value = map(escape, cells)
             rows += f"<tr><th style='text-align:left'>{key}</th><td>{value}</td><td>{unit}</td></tr>"
-        return f"<table><caption>{escape(f'{self.name}: {self.title}')}</caption>{rows}</table>"
+        return f"<table><caption>{escape(f'{self.label}: {self.title}')}</caption>{rows}</table>"
+
+    @property
+    def label(self) -> str:
+        """Its name; of a shipped scene that was changed, "paper/fig11, changed: blade.mass"."""
+        from rotor_mbs.scenario.catalogue import scene_label  # late: it reads scenes
+
+        return scene_label(self)
 
     @property
     def phases(self) -> tuple[float, ...]:
@@ -811,6 +818,86 @@ def scene_keys(scene: Scene) -> list[tuple[KeyPath, Any]]:
 
     collect(scene_tables(scene), ())
     return found
+
+
+class SceneChange(NamedTuple):
+    """A key of which two scenes have different values, None where one of them has none.
+
+    Prints as "blade.mass 15000 -> 15010".
+    """
+
+    path: KeyPath
+    before: Any
+    after: Any
+
+    @property
+    def key(self) -> str:
+        """The key as it is written, "initial.angles[1]"."""
+        return shown_key(self.path)
+
+    def __str__(self) -> str:
+        return f"{self.key} {_exact_text(self.before)} -> {_exact_text(self.after)}"
+
+
+def scene_changes(before: Scene, after: Scene, ignored: Sequence[str] = ()) -> list[SceneChange]:
+    """Return what differs between two scenes, a change for each key or entry of a list.
+
+    Parameters
+    ----------
+    before, after : their titles, figures, methods and settings are not compared; the tip is where
+        both store its path.
+    ignored : keys that are not compared either.
+    """
+    are_unequal = any(len(set(scene.blades)) > 1 for scene in (before, after))
+    left_out = {field.metadata["key"] for field in scene_fields("label")} | {*ignored}
+    old, new = (_values_by_path(scene, each_blade=are_unequal) for scene in (before, after))
+    changes: list[SceneChange] = []
+    for path in dict.fromkeys((*old, *new)):
+        is_unused_tip = path[0] == "blade" and path[-1] == "tip"
+        is_unused_tip = is_unused_tip and not (before.wants("tip") and after.wants("tip"))
+        if path[0] not in left_out and not is_unused_tip:
+            changes += _entry_changes(path, old.get(path), new.get(path))
+    return changes
+
+
+def _values_by_path(scene: Scene, *, each_blade: bool) -> dict[KeyPath, Any]:
+    """Return the values of a scene's keys, loads that are constant as numbers.
+
+    Parameters
+    ----------
+    scene : Scene
+    each_blade : whether equal blades have a table each, as unequal ones have.
+    """
+    values: dict[KeyPath, Any] = {}
+    for path, value in scene_keys(scene):
+        paths = [path]
+        if each_blade and path[0] == "blade" and not isinstance(path[1], int):
+            paths = [("blade", i, *path[1:]) for i in range(len(scene.blades))]
+        for each in paths:
+            values[each] = without_times(value)
+    return values
+
+
+def _entry_changes(path: KeyPath, before: Any, after: Any) -> Iterator[SceneChange]:
+    """Yield the change of a value, of lists with as many entries those of their entries."""
+    are_lists = isinstance(before, list) and isinstance(after, list) and len(before) == len(after)
+    if are_lists and path != ("outputs",):
+        for i, (old, new) in enumerate(zip(before, after, strict=True)):
+            yield from _entry_changes((*path, i), old, new)
+    elif before != after:
+        yield SceneChange(path, before, after)
+
+
+def _exact_text(value: Any) -> str:
+    """Return a value with all its digits, a list of at most six entries."""
+    if value is None:
+        return "none"
+    if not isinstance(value, list):
+        return str(value).removesuffix(".0")
+    shown = [_exact_text(entry) for entry in value[:_SHOWN_ENTRIES]]
+    if len(value) > _SHOWN_ENTRIES:
+        shown.append(f"... {len(value) - _SHOWN_ENTRIES} more")
+    return f"[{', '.join(shown)}]"
 
 
 def without_times(value: Any) -> Any:

@@ -294,7 +294,7 @@ class Solution:
 
     def __repr__(self) -> str:
         rows = self._summary() | {"arrays": self._arrays()}
-        lines = [f"{self.scene.name}: {self.scene.title}"]
+        lines = [f"{self.scene.label}: {self.scene.title}"]
         for name, text in rows.items():
             lines += textwrap.wrap(f"{name}: {text}", 110, initial_indent="  ", subsequent_indent="    ")
         return "\n".join(lines)
@@ -302,7 +302,7 @@ class Solution:
     def _repr_html_(self) -> str:
         rows = self._summary() | {"arrays": self._arrays()}
         cells = "".join(f"<tr><th>{escape(k)}</th><td>{escape(v)}</td></tr>" for k, v in rows.items())
-        return f"<table><caption>{escape(f'{self.scene.name}: {self.scene.title}')}</caption>{cells}</table>"
+        return f"<table><caption>{escape(f'{self.scene.label}: {self.scene.title}')}</caption>{cells}</table>"
 
 
 def need_xarray() -> Any:

@@ -6,7 +6,7 @@ import itertools
 import math
 import tempfile
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
@@ -34,12 +34,16 @@ from rotor_mbs.runs.runner import OnProgress, ignore_progress
 from rotor_mbs.runs.sweeps import StoredSweep, parameter_name
 from rotor_mbs.runs.table import TableFile
 from rotor_mbs.scenario.accuracy_bounds import Bounds
-from rotor_mbs.scenario.catalogue import find_scenes
+from rotor_mbs.scenario.catalogue import find_scenes, natural_key
+from rotor_mbs.scenario.scene import Scene, scene_changes
 from rotor_mbs.studies.run import run_scenes
 from rotor_mbs.studies.stored_references import shipped_reference
 
+_DEFAULT_SCENES = ("paper", "check")
 _TIMEOUT_S = 60.0
 AGAINST = "against"  # the name of the checks that compare with an earlier file
+CHANGED = "scene"  # the name of those that compare the scenes of both
+_SHOWN_CHANGES = 10  # keys of a scene
 _OF_EVERY_RUN = "status"  # the name of a check that each run has one of
 # A value below a few units in the last place of a double is rounding: its change says nothing.
 _ROUNDING = 2.0**-50
@@ -78,7 +82,7 @@ def check_default_set(
     It is every scene of the paper by the default methods; the scenes made for checking by every method;
     or all by the `methods` that are named, where they can represent them.
     """
-    paper, own = find_scenes(["paper"]), find_scenes(["check"])
+    paper, own = (find_scenes([folder]) for folder in _DEFAULT_SCENES)
     corrected = [name for name in method_names(is_corrected=True) if find_method(name).is_installed]
     asked: dict[str, Sequence[str]] = {}
     for scene in (*paper, *own):
@@ -143,6 +147,40 @@ def runs_gone(path: Path, earlier: Path) -> Check:
     where = Where(str(old.attributes["base_scene"]), "*", "run: all")
     hint = f"{gone} of {len(before)} runs of the earlier file are missing in this one"
     return Check(AGAINST, where, float(gone), 0.0, hint, "runs")
+
+
+def scenes_checked(path: Path | None) -> dict[str, Scene]:
+    """Return the scenes of a file by name, of a sweep the one that is varied; without a file those of the default set.
+
+    Raises StoreError, and InputError where a stored scene is none.
+    """
+    if path is None:
+        return {scene.name: scene for scene in find_scenes(_DEFAULT_SCENES)}
+    if is_sweep(path):
+        base = StoredSweep(path, allow_damaged_runs=True).base_scene
+        return {base.name: base}
+    with open_results(path, verify=False) as results:
+        return {name: stored.scene for name, stored in results.scenes.items()}
+
+
+def changed_scenes(new: Mapping[str, Scene], old: Mapping[str, Scene], *, are_allowed: bool = False) -> list[Check]:
+    """Compare the scenes that have the same name: a check for each, of how many keys differ.
+
+    Parameters
+    ----------
+    new, old : scenes by name.
+    are_allowed : whether scenes may differ; what differs is told all the same.
+    """
+    checks = []
+    for name in new.keys() & old.keys():
+        changes = scene_changes(old[name], new[name])
+        told = [str(change) for change in changes[:_SHOWN_CHANGES]]
+        if len(changes) > _SHOWN_CHANGES:
+            told.append(f"{len(changes) - _SHOWN_CHANGES} more")
+        count = float(len(changes))
+        hint = f"{name}: {', '.join(told)}" if told else "as in the earlier file"
+        checks.append(Check(CHANGED, Where(name, "*", "keys"), count, count if are_allowed else 0.0, hint, "keys"))
+    return sorted(checks, key=lambda check: natural_key(check.where.scene))
 
 
 def judged_runs(checks: Iterable[Check]) -> Counter[str]:

@@ -146,6 +146,7 @@ def compute_modes(scene: Scene, speeds: Sequence[float] | Array = (), models: Se
         for tables in (scene.pitch_torque, scene.bearing_rest)
     )
     facts = scene.name, scene_hash(scene), scene.title, len(scene.blades), scene.gravity
+    label = scene.label
     scene = replace(scene, pitch_torque=torques, bearing_rest=rests)
     speeds = np.array(increasing_speeds(speeds))
     rest = _linear(scene, modal.REST, np.zeros(1), models, notes)
@@ -160,7 +161,7 @@ def compute_modes(scene: Scene, speeds: Sequence[float] | Array = (), models: Se
     reasons = tuple(dict.fromkeys(notes))  # rest and rotation may have the same
     if not (rest or rotation or (table is not None and (table.stable >= 0).any())):
         raise InputError("; ".join(reasons))
-    return modal.SceneModes(*facts, rest, rotation, table, reasons)
+    return modal.SceneModes(*facts, rest, rotation, table, reasons, label)
 
 
 def _linear(

@@ -162,7 +162,7 @@ def test_a_changed_scene_and_ones_own_have_figures_that_say_so(tmp_path: Path) -
     names = ["mine.pdf", "mine.txt", "paper-fig11.pdf", "paper-fig11.txt"]
     assert sorted(file.name for file in (tmp_path / "out").iterdir()) == names
     text = (tmp_path / "out" / "paper-fig11.txt").read_text(encoding="utf-8")
-    assert "changed: not the scene of the paper" in text
+    assert "(scene paper/fig11, changed: gravity)" in text
     assert "Figure 11" not in text
     assert "gravity 9 m/s^2" in text
     assert "changed" not in (tmp_path / "out" / "mine.txt").read_text(encoding="utf-8")

@@ -167,7 +167,7 @@ def test_a_changed_scene_of_the_paper_says_so_and_is_none_of_it(tmp_path: Path) 
     changed = FIG11.replace(gravity=9.0)
     runs = [Made(changed, REFERENCE, SWING), Made(changed, PRINTED, SWING), Made(changed, TAYLOR, SWING)]
     text = text_of(write_report(store(tmp_path / "r.h5", runs), tmp_path / "out").parent)
-    assert "changed: not the scene of this name that is shipped" in text
+    assert "paper/fig11, changed: gravity" in text
     assert "of the paper" not in words_of(text.partition("<main>")[2].partition("<details")[0])
     assert "printed" not in answer_of(text)
 

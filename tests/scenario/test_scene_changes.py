@@ -19,6 +19,7 @@ from rotor_mbs.scenario.scene import (
     load_scene,
     new_scene_text,
     parse_scene,
+    scene_changes,
     scene_hash,
     scene_toml,
 )
@@ -126,3 +127,35 @@ def test_the_template_is_a_scene_with_every_key(tmp_path: Path) -> None:
         here = tables
         for name in key["key"].split("."):
             here = here[name]
+
+
+FIG11 = find_scenes(["paper/fig11"])[0]
+
+
+@pytest.mark.parametrize(
+    ("changes", "told"),
+    [
+        ({"blade.mass": 12000.0}, ["blade.mass 17740 -> 12000"]),
+        ({"initial.angles[1]": 0.25}, ["initial.angles[1] 0.5 -> 0.25"]),
+        ({"blade[1].mass": 12000.0}, ["blade[1].mass 17740 -> 12000"]),
+        ({"torque.rotor": 3.0}, ["torque.rotor none -> 3"]),
+        ({"torque.rotor": [[0.0, 1.5], [2.0, 0.0]]}, ["torque.rotor none -> [[0, 1.5], [2, 0]]"]),
+        ({"outputs": ["angles"]}, ["outputs [angles, rates, tip, energy] -> [angles]"]),
+        ({"title": "Another", "settings": {"step": 1e-3}}, []),
+        ({}, []),
+    ],
+)
+def test_what_differs_between_two_scenes_is_told_by_key(changes: dict[str, Any], told: list[str]) -> None:
+    before = FIG11.replace(**{"blade.mass": 17740.0, "initial.angles[1]": 0.5})
+    assert [str(change) for change in scene_changes(before, before.replace(**changes))] == told
+
+
+def test_a_changed_scene_that_is_shipped_says_so_by_its_name() -> None:
+    assert FIG11.label == FIG11.replace(samples=11, outputs=["angles"], title="Another").label == "paper/fig11"
+    changed = FIG11.replace(gravity=9.81, **{"blade.mass": 12000.0})
+    assert changed.label == "paper/fig11, changed: gravity, blade.mass"
+    assert repr(changed).startswith(f"{changed.label}: ")
+    assert changed.label in changed._repr_html_()
+    assert replace(changed, name="mine").label == "mine"
+    many = FIG11.replace(gravity=9.81, duration=1.0, **{"blade.mass": 12000.0, "hub.inertia": 4.0})
+    assert many.label == "paper/fig11, changed: gravity, duration, blade.mass and 1 more"

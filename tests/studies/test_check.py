@@ -23,6 +23,7 @@ from support.scenes import paper
 from support.stored import Made, change_row, damage, drop, rotor, store
 from support.sweeps import THREE_RUNS, made_sweep
 
+import rotor_mbs as rm
 from rotor_mbs.cli import main
 from rotor_mbs.cli import verdicts as formats
 from rotor_mbs.methods.catalogue import REFERENCE, method_names
@@ -196,6 +197,46 @@ def test_a_sweep_is_checked_for_methods_and_for_runs_of_an_earlier_file(
     lines_of(capsys, old, "--require", METHOD, "--against", new, status=0)
     named(lines_of(capsys, old, "--require", "mine/lsoda", status=1), "FAIL required: paper/fig11", f"has {METHOD}")
     named(lines_of(capsys, new, "--against", old, status=1), "FAIL against", "1 of 3 runs of the earlier file")
+
+
+def test_a_scene_that_changed_since_the_earlier_file_fails_unless_it_may(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Both files pass for themselves: by their own scene every run is right."""
+    scene = shipped(SCENE).replace(duration=0.1, samples=11, outputs=["angles", "rates"])
+    files = []
+    for name, changes in (
+        ("old", {"blade[1].mass": 15.0, "torque.rotor": 20.0}),
+        ("new", {"blade[1].mass": 15.01, "initial.angles[1]": 0.25, "torque.rotor": 20.0}),
+    ):
+        runs = rm.run(scene.replace(**changes), [METHOD])
+        files.append(runs.save(tmp_path / f"{name}.h5"))
+    old, new = files
+    lines = lines_of(capsys, new, status=0)
+    start = f"{SCENE}, changed: duration, blade[1].mass, initial.angles[1] and 1 more"
+    assert start in lines
+    line = named(lines_of(capsys, new, "--against", old, status=1), f"FAIL scene: {SCENE} *")
+    angle = str(scene.initial_angles[1]).removesuffix(".0")
+    change = f"; {SCENE}: blade[1].mass 15 -> 15.01, initial.angles[1] {angle} -> 0.25"
+    assert line.endswith(change)
+    allowed = lines_of(capsys, new, "--against", old, "--allow-changed", status=0)
+    assert named(allowed, "pass scene").endswith(change)
+    assert not any("scene:" in line for line in lines_of(capsys, new, "--against", new, status=0))
+    assert main(["check", str(new), "--allow-changed"]) == 2
+
+
+def test_a_sweep_of_a_changed_scene_fails_against_an_earlier_one(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    scene = paper("fig11", samples=11, duration=0.1)
+    files = []
+    for name, mass in (("old", 15000.0), ("new", 15010.0)):
+        base = scene.replace(**{"blade.mass": mass})
+        path = tmp_path / f"{name}.h5"
+        rm.sweep(base, {"gravity": [9.7, 9.8]}, methods=[METHOD], output=path)
+        files.append(path)
+    line = named(lines_of(capsys, files[1], "--against", files[0], status=1), "FAIL scene")
+    assert line.endswith("; paper/fig11: blade.mass 15000 -> 15010")
 
 
 def test_a_reference_that_is_altered_or_not_there_fails(copy: Path, capsys: pytest.CaptureFixture[str]) -> None:

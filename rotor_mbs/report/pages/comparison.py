@@ -72,7 +72,7 @@ def comparison_page(record: Record) -> PageContent:
     if verdict.horizon_s is not None and verdict.horizon_s < verdict.compared_until:
         compared += f"; errors checked up to the horizon at {seconds(verdict.horizon_s)}"
     facts.append(Fact("Compared up to", _place(verdict.compared_until, verdict), compared))
-    title = f"{Path(verdict.source).name} against {verdict.scene}"
+    title = f"{Path(verdict.source).name} against {record.attributes.get('scene_label', verdict.scene)}"
     return PageContent(title, about, comparison_answer(record), facts, sections)
 
 

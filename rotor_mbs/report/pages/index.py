@@ -221,7 +221,7 @@ def scene_table(report: Report) -> PageTable:
     rows: list[Row] = []
     for name, scene in report.scenes.items():
         note = typeset_title(scene.title)
-        row: list[TableCell | str] = [TableCell(short_name(name), href=report.files[name], note=note)]
+        row: list[TableCell | str] = [TableCell(short_name(scene.label), href=report.files[name], note=note)]
         row += _departure_cells(scene)
         _, error = agreement(scene)
         failed = [run for run in scene.corrected_runs.values() if run.status not in GOOD]
@@ -376,7 +376,7 @@ def _own_index(report: Report) -> PageContent:
             text.format(
                 len(failed),
                 count,
-                ", ".join(scene.name for scene in failed[:5]),
+                ", ".join(scene.label for scene in failed[:5]),
                 in_words(good).capitalize(),
             )
         ]
@@ -425,7 +425,7 @@ def own_table(report: Report, scenes: Sequence[StoredScene]) -> PageTable:
     rows: list[Row] = []
     for scene in scenes:
         row: list[TableCell | str] = [
-            TableCell(scene.name, href=report.files[scene.name], note=typeset_title(scene.title))
+            TableCell(scene.label, href=report.files[scene.name], note=typeset_title(scene.title))
         ]
         run = scene.corrected or scene.printed
         name = "" if run is None else next((name for name in ("rates", "angles") if name in run), "")

@@ -140,7 +140,7 @@ def modes_page(modes: Sequence[SceneModes]) -> PageContent:
             facts = _facts(scene)
         sections += _scene_sections(scene, f"scene{place}", with_name=len(modes) > 1)
     title = typeset_title(modes[0].title) if len(modes) == 1 else f"Modes of {in_words(len(modes))} scenes"
-    about = ", ".join(scene.scene for scene in modes)
+    about = ", ".join(scene.label for scene in modes)
     return PageContent(title, f"Modes and Campbell diagram of {about}", answer, facts, sections)
 
 
@@ -157,7 +157,7 @@ def mode_answer(scene: SceneModes) -> list[Markup]:
         if not scene.agrees:
             how = Markup('<span class="bad">do not agree: they differ by {} of a frequency</span>')
             how = how.format(number(scene.disagreement))
-        sentences.append(Markup("{}: the modes of {} models {}.").format(scene.scene, in_words(models), how))
+        sentences.append(Markup("{}: the modes of {} models {}.").format(scene.label, in_words(models), how))
     rest = _first(scene.rest)
     if rest is not None:
         known = [value for value in rest.undamped_frequencies[0].tolist() if math.isfinite(value) and value > 0.0]
@@ -218,7 +218,7 @@ def _facts(scene: SceneModes) -> list[Fact]:
 
 def _scene_sections(scene: SceneModes, name: str, *, with_name: bool) -> list[Section]:
     """Return the sections of one scene; `name` begins their ids, the scene's own name their headings."""
-    before = f"{scene.scene}: " if with_name else ""
+    before = f"{scene.label}: " if with_name else ""
     sections = []
     rest, rotation = _first(scene.rest), _first(scene.rotation)
     if rotation is not None and len(rotation.speeds) > 1 and not np.isnan(rotation.growth_rates).all():

@@ -60,7 +60,6 @@ from rotor_mbs.report.pages import scene_plots as draw
 from rotor_mbs.report.pages.scene_plots import CORRECTED, PRINTED, Channel, Jumps
 from rotor_mbs.report.pages.viewer import viewer
 from rotor_mbs.runs.read import StoredRun, StoredScene
-from rotor_mbs.scenario.catalogue import shipped_scene
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.scenario.time_table import values_at
 from rotor_mbs.solution.status import GOOD
@@ -107,11 +106,9 @@ def short_name(scene: str) -> str:
 
 def described(scene: StoredScene) -> str:
     """Return what the scene is, for the line below the title."""
-    parts = [scene.name]
+    parts = [scene.label]
     if scene.figures:
         parts.append(f"Figure{'s' if ',' in scene.figures else ''} {scene.figures} of the paper")
-    elif not scene.is_shipped and shipped_scene(scene.name) is not None:
-        parts.append("changed: not the scene of this name that is shipped")
     blades = len(scene.scene.blades)
     parts.append(f"{blades} blade{'s' if blades != 1 else ''}")
     parts.append(f"{scene.scene.duration:g} s, {scene.scene.samples} samples")

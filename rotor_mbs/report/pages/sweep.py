@@ -40,7 +40,6 @@ from rotor_mbs.report.pages import words_of
 from rotor_mbs.report.pages.scene_plots import Jumps, blade_look, jumps_of
 from rotor_mbs.runs.sweeps import StoredSweep, parameter_name
 from rotor_mbs.runs.table import text_of
-from rotor_mbs.scenario.scene import parse_scene
 from rotor_mbs.solution.quantities import LOADS
 from rotor_mbs.solution.status import GOOD, STATUSES
 
@@ -447,7 +446,7 @@ def _jumps(sweep: _Sweep) -> Jumps:
         key.startswith(("torque", "bearing.rest", "duration")) for key in sweep.keys
     ):
         return Jumps([], [])
-    return jumps_of(parse_scene(str(attributes["scene_toml"]), str(attributes["base_scene"])))
+    return jumps_of(sweep.stored.base_scene)
 
 
 def chosen_runs(sweep: _Sweep, shown: NDArray[np.bool_], most: int) -> NDArray[np.int64]:
