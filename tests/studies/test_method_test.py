@@ -154,8 +154,13 @@ def test_the_engine_that_is_broken_below_passes() -> None:
     assert [check for check in examined(RK4) if not check.passed] == []
 
 
-@pytest.mark.full
-@pytest.mark.parametrize("fault", BROKEN)
+# Half a minute each: of the others every night.
+_IN_CI = ("Steiner's share missing", "no jump handling", "first order", "a step too few")
+
+
+@pytest.mark.parametrize(
+    "fault", [pytest.param(one, marks=pytest.mark.full if one in _IN_CI else pytest.mark.nightly) for one in BROKEN]
+)
 def test_a_broken_engine_fails_with_a_right_reason_or_none(fault: str) -> None:
     old, new, right = BROKEN[fault]
     assert RK4.count(old) >= 1
