@@ -29,7 +29,6 @@ from rotor_mbs.solution.trajectory import Array, Trajectory
 FLOOR_SAFETY = 3.0
 # s, the interval for which bounds are given: in n of them the errors of a method add up, each grown by at most G.
 _BOUND_INTERVAL = 0.01
-_UNIT_ROUNDOFF = 2.0**-53
 # rad, below any number that a defect can be told from.
 _SMALLEST_FLOOR = 1e-18
 # rad: a pitch that should stay zero has left it when it is past this: ten million times above round-off of a radian,
@@ -60,6 +59,7 @@ class Defects:
         the row's time makes of them.
     conditioning : (n - 1,) factor by which the nearly singular mass matrix magnifies rounding inside an interval.
     start : (m,) initial state of the scene in these coordinates.
+    precision : relative error of a step of the integration from row to row.
     """
 
     time: Array
@@ -75,6 +75,7 @@ class Defects:
     start: Array
     growth_units: Array
     own_loads: Trajectory
+    precision: float = 2.0**-52
 
     @functools.cached_property
     def transitions(self) -> Array:
@@ -256,13 +257,13 @@ class Defects:
 
     @functools.cached_property
     def _arithmetic(self) -> Array:
-        """(n - 1,) rad, rounding of the arithmetic within each interval: of the size of its largest number in every
-        step, independent from step to step. A step is taken to span about a radian of the fastest coordinate."""
+        """(n - 1,) rad, error of the arithmetic within each interval: of the size of its largest number in every step,
+        independent from step to step. A step is taken to span about a radian of the fastest coordinate."""
         sizes = (np.abs(self.states) / self._units).max(axis=1)
         fastest = np.abs(self.states[:, len(self.moving) :]).max(axis=1)
         largest, rate = (np.maximum(values[:-1], values[1:]) for values in (sizes, fastest))
         steps = np.maximum(rate * np.diff(self.time), 1.0)
-        return np.asarray(2.0 * _UNIT_ROUNDOFF * largest * self.conditioning * np.sqrt(steps))
+        return np.asarray(self.precision * largest * self.conditioning * np.sqrt(steps))
 
     @functools.cached_property
     def _errors_and_drift(self) -> tuple[Array, float]:

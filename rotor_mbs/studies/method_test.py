@@ -122,7 +122,7 @@ class _Examination:
         self._bound = defect_bound(self._bounds, method.name)
         self._made: list[Check] = []
         self._refused: set[str] = set()
-        # Of the first scene whose defects nothing else explains; None as long as there is none.
+        # Of the first scene that fails by its defects; None as long as there is none.
         self._has_faults_in_time: bool | None = None
 
     def checks(self) -> list[Check]:
@@ -227,6 +227,8 @@ class _Examination:
         try:
             judged = judged_defects(scene, defects, self._bound)
             alike = DefectSearch(judged).textbook_causes()
+            if alike and self._has_faults_in_time is None:
+                self._has_faults_in_time = False
             if len(alike) > 1:  # this motion does not tell which
                 return f"{NOT_FOUND}: explained alike by: {'; '.join(alike)}"
             if alike:

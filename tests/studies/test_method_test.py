@@ -124,7 +124,7 @@ BROKEN = {
     ),
     "a step too few": (
         "for i in range(count)", "for i in range(count - (stop.end == self.scene.duration))",
-        "times late|row repeated|row omitted|its step",
+        "times late|row repeated|row omitted|its step|continues from another state",
     ),
     "angles wrapped": (
         "return Trajectory(self.time[: len(self.states)], *np.split(np.array(self.states), 2, axis=1))",

@@ -33,6 +33,7 @@ _MAX_STEPS_DOP853 = 10_000
 # Such intervals decide the status, which more of them do not change: each halves what the next may take, down to this,
 # so that samples that are all far from a motion take little more than one interval's steps.
 _FEWEST_STEPS = 50
+_TAYLOR = 2.0**-52  # tolerance
 _DOP853 = (2.3e-14, 1e-16)  # tolerances, the tightest that SciPy takes
 _EVALUATIONS_PER_STEP = 12  # by it, whether a step is kept or tried again
 # Runge-Kutta steps of order 4 over a quarter of a radian leave a share of about 1e-5 of the transition matrices.
@@ -54,6 +55,9 @@ _UNIT_ROUNDOFF = 2.0**-53
 # Below this share of its inertia a rotor is singular, and nothing is known of the interval.
 _SMALLEST_SHARE = 1e-30
 _DIFFERENCE = 1e-7  # rad and rate units: rounding and curvature are a share of 1e-8 or so of a matrix's entries
+# Where errors grow so much that such a difference is no small one at the end of the interval, a smaller one is tried.
+_SMALL_DIFFERENCE = 1e-11
+_SMALL_AT_END = 0.1  # rad and rate units
 
 
 def interval_defects(
@@ -115,6 +119,7 @@ def interval_defects(
         start=start,
         growth_units=np.concatenate([np.ones(half), rate_units(scene)]),
         own_loads=Trajectory(time, angles, rates, **loads),
+        precision=_TAYLOR if is_available() else _DOP853[0],
     )
 
 
@@ -249,7 +254,7 @@ _Advance = Callable[[Segment, float, float, Array, int], tuple[Array, int]]
 
 def _advance_by_taylor(scene: Scene, count: int) -> _Advance:
     """Return the integration of (count,) variables by the code that is compiled for lagrange/taylor."""
-    propagation = Propagation(scene, tol=2.0**-52, compact_mode=is_compact(scene), high_accuracy=True)
+    propagation = Propagation(scene, tol=_TAYLOR, compact_mode=is_compact(scene), high_accuracy=True)
     integrator = propagation.integrator
     state = integrator.state
     entered: list[Segment] = []
@@ -312,16 +317,43 @@ def _transitions(scene: Scene, time: Array, states: Array, ends: Array) -> Array
             is_rough[rows[is_near]] = False
     # Explicit steps are too long there: differences of the ends that the integrator of the defects itself finds.
     rows = np.flatnonzero(is_rough)
-    if len(rows):
-        with np.errstate(all="ignore"):
-            for i in range(count):
-                moved = states[rows]
-                moved[:, i] += _DIFFERENCE * units[i]
-                change = moved[:, i] - states[rows, i]  # as it is rounded
-                moved_ends = interval_ends(scene, time[rows], time[rows + 1], moved)
-                transitions[rows, :, i] = (moved_ends - ends[rows]) / change[:, None]
+    for difference in (_DIFFERENCE, _SMALL_DIFFERENCE):
+        if len(rows):
+            matrices, is_linear = _difference_transitions(scene, time, states, ends, rows, difference * units)
+            transitions[rows[is_linear]] = matrices[is_linear]
+            rows = rows[~is_linear]
     transitions[~np.isfinite(transitions).all(axis=(1, 2))] = np.inf
     return transitions
+
+
+def _difference_transitions(
+    scene: Scene, time: Array, states: Array, ends: Array, rows: NDArray[np.int64], differences: Array
+) -> tuple[Array, NDArray[np.bool_]]:
+    """Find matrices of the intervals after `rows` from ends of moved states.
+
+    Parameters
+    ----------
+    differences : (m,) by how much each variable is moved.
+
+    Returns
+    -------
+    matrices, is_linear : (k, m, m), (k,)
+        And whether every moved end is next to the interval's own. Where errors have grown to the size of the motion
+        the matrix is none: it says that they grow no more.
+    """
+    count = states.shape[1]
+    units = differences / differences[0]
+    matrices = np.empty((len(rows), count, count))
+    is_linear = np.ones(len(rows), dtype=bool)
+    with np.errstate(all="ignore"):
+        for i in range(count):
+            moved = states[rows]
+            moved[:, i] += differences[i]
+            change = moved[:, i] - states[rows, i]  # as it is rounded
+            away = interval_ends(scene, time[rows], time[rows + 1], moved) - ends[rows]
+            matrices[:, :, i] = away / change[:, None]
+            is_linear &= ~(np.abs(away / units) > _SMALL_AT_END).any(axis=1)
+    return matrices, is_linear
 
 
 def _quick_transitions(
