@@ -234,13 +234,17 @@ def _assurance(first: Complex, second: Complex) -> Array:
 REST, ROTATION = "rest", "rotation"
 CLOSED_FORM = "lagrange"  # the source that others are compared with
 FLOQUET = f"{CLOSED_FORM}/floquet"  # name of a record
-# Sources agree where their frequencies and decay rates differ by no more than this share.
+# Sources agree where their eigenvalues differ by no more than this share of the largest one.
 AGREEMENT = 1e-8
+# Share to which the modes of a source satisfy its own equations: six digits are printed.
+PRINTED_PRECISION = 1e-6
 _NOTE_WIDTH = 130  # characters, of a summary's lines: as wide as its table
 _SHOWN_ROWS = 24  # of a summary: three states of eight modes
-# Frequencies below this share of the largest are not compared: they are roots of what is left when stiffnesses cancel,
-# and of a rotor that nothing holds that is rounding.
+# Eigenvalues below this share of the largest are not compared: they are roots of what is left when stiffnesses cancel,
+# and of a rotor that nothing holds that is rounding. Their residuals are, which no root magnifies.
 _SLOW = 1e-3
+# Share of the equations' terms below which a singular vector counts as a shape of an eigenvalue.
+_NO_FORCE = 1e-10
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -249,7 +253,8 @@ class LinearModes(ModeSet):
 
     names: "collective pitch" where symmetry tells the modes apart, else "mode 2". kind: REST or ROTATION. angles:
     (speeds, n) rad, steady values of the `coordinates` that move. stiffness, damping: (speeds, n, n), the mass matrix
-    divided out. messages: why there is nothing at a speed, or "".
+    divided out. weights: 1/s², moments of all weights about the shaft divided by the inertia, of which the stiffness of
+    a balanced rotor is rounding. messages: why there is nothing at a speed, or "".
     """
 
     source: str
@@ -261,7 +266,43 @@ class LinearModes(ModeSet):
     angles: Array
     stiffness: Array
     damping: Array
+    weights: float = 0.0
     messages: tuple[str, ...] = ()
+
+    @property
+    def residual(self) -> float:
+        """Largest residual of (λ² + λ damping + stiffness) φ = 0 over all modes, divided by the size of its terms.
+
+        The modes of equal blades are computed as if no blade differed, and those without gravity as if nothing
+        depended on the rotor's angle: matrices for which that is false have a residual.
+        """
+        largest = 0.0
+        for i in range(len(self.speeds)):
+            if not np.isfinite(self.stiffness[i]).all():
+                continue
+            for values, shape in zip(self.eigenvalues[i], self.shapes[i], strict=True):
+                # The shape is that of both where they are conjugate, else of one of them.
+                residuals = [self.residual_of(i, value, shape) for value in values.tolist()]
+                largest = max(largest, min(residuals))
+        return largest
+
+    def residual_of(self, i: int, value: complex, shape: Complex) -> float:
+        """Return the residual of one eigenvalue (1/s) with a shape (n,) at speed number i, see `residual`."""
+        stiffness, damping = self.stiffness[i], self.damping[i]
+        force = value * value * shape + value * (damping @ shape) + stiffness @ shape
+        return float(np.linalg.norm(force) / (np.linalg.norm(shape) * self._terms(i, value)))
+
+    def shapes_of(self, i: int, value: complex) -> Complex:
+        """Return all shapes of an eigenvalue (1/s) at speed number i, one in each row, from the whole matrices."""
+        n = len(self.coordinates)
+        _, sizes, vectors = np.linalg.svd(value * value * np.eye(n) + value * self.damping[i] + self.stiffness[i])
+        is_shape = sizes <= max(10.0 * sizes[-1], _NO_FORCE * self._terms(i, value))
+        return np.asarray(vectors[is_shape].conj())
+
+    def _terms(self, i: int, value: complex) -> float:
+        """Return the size of the equations' terms for an eigenvalue, 1/s²."""
+        stiffness, damping = (np.abs(matrix[i]).max(initial=0.0) for matrix in (self.stiffness, self.damping))
+        return float(max(abs(value) ** 2 + abs(value) * damping + stiffness, self.weights, 1e-300))
 
     @property
     def multiblade_shapes(self) -> Complex:
@@ -325,29 +366,65 @@ class SceneModes:
 
     @property
     def disagreement(self) -> float:
-        """Largest difference of a mode's frequency or decay rate between two models, relative to its frequency; 0 for
-        one model."""
+        """Largest difference of two models; 0 for one model.
+
+        That of a mode's larger eigenvalue in modulus, or of the mean real part, divided by the largest eigenvalue; of
+        eigenvalues below a thousandth of the largest one the residual of the closed form's mode in the other model's
+        equations, see `LinearModes.residual`.
+        """
         largest = 0.0
         for kind in (self.rest, self.rotation):
-            numbers = [  # (2, speeds, modes)
-                np.stack([np.abs(source.eigenvalues).max(axis=2), source.eigenvalues.real.mean(axis=2)])
-                for source in kind.values()
-            ]
-            for other in numbers[1:]:
-                sizes = numbers[0][0]
-                fast = sizes > _SLOW * np.nanmax(sizes, initial=0.0)
-                share = np.abs(other - numbers[0])[:, fast] / sizes[fast]
-                largest = max(largest, float(np.nanmax(share, initial=0.0)))
+            sources = list(kind.values())
+            for other in sources[1:]:
+                largest = max(largest, _difference(sources[0], other))
         return largest
 
     @property
+    def residuals(self) -> dict[str, float]:
+        """By model, the largest residual of its modes in its own equations."""
+        residuals: dict[str, float] = {}
+        for kind in (self.rest, self.rotation):
+            for model, source in kind.items():
+                residuals[model] = max(residuals.get(model, 0.0), source.residual)
+        return residuals
+
+    @property
     def agrees(self) -> bool:
-        return self.disagreement <= AGREEMENT
+        """Whether the models agree, and each one's modes satisfy its own equations."""
+        return self.disagreement <= AGREEMENT and not self.faults
+
+    @property
+    def faults(self) -> list[str]:
+        """A line for each model whose modes do not satisfy its own equations to the printed digits."""
+        lines = []
+        for model, residual in self.residuals.items():
+            if not residual <= PRINTED_PRECISION:
+                lines.append(f"{model}: its modes leave {residual:.1e} of its own linearized equations")
+        return lines
 
     @property
     def closed_form(self) -> list[LinearModes]:
         """Modes of the closed form at rest and over speed, as far as they were computed."""
         return [next(iter(kind.values())) for kind in (self.rest, self.rotation) if kind]
+
+
+def _difference(first: LinearModes, other: LinearModes) -> float:
+    """Return the difference of two sources of one state, see `SceneModes.disagreement`."""
+    sizes = np.abs(first.eigenvalues)  # (speeds, modes, 2)
+    top = float(np.nanmax(sizes, initial=0.0))
+    numbers = []
+    for source in (first, other):
+        numbers.append(np.stack([np.abs(source.eigenvalues).max(axis=2), source.eigenvalues.real.mean(axis=2)]))
+    is_fast = sizes.max(axis=2) > _SLOW * top
+    largest = float(np.nanmax(np.abs(numbers[1] - numbers[0])[:, is_fast], initial=0.0)) / top if top else 0.0
+    for i in range(len(first.speeds)):
+        if not (np.isfinite(first.stiffness[i]).all() and np.isfinite(other.stiffness[i]).all()):
+            continue
+        for value in first.eigenvalues[i].ravel().tolist():
+            if abs(value) <= _SLOW * top:
+                residuals = [other.residual_of(i, value, shape) for shape in first.shapes_of(i, value)]
+                largest = max(largest, *residuals)
+    return largest
 
 
 def mode_rows(modes: SceneModes) -> list[dict[str, object]]:
@@ -412,7 +489,9 @@ def mode_summary(modes: SceneModes) -> str:
     models = list(dict.fromkeys((*modes.rest, *modes.rotation)))
     if len(models) > 1:
         verdict = "agree" if modes.agrees else "DISAGREE"
-        lines.append(f"{', '.join(models)} {verdict}: modes differ by at most {modes.disagreement:.1e} (relative)")
+        differ = f"modes differ by at most {modes.disagreement:.1e} of the largest eigenvalue"
+        lines.append(f"{', '.join(models)} {verdict}: {differ}")
+    lines += modes.faults
     for note in modes.notes:
         lines += textwrap.wrap(note, _NOTE_WIDTH, subsequent_indent="  ")
     return "\n".join(lines)
@@ -505,6 +584,7 @@ def _linear_record(scene: str, linear: LinearModes, common: Mapping[str, Any]) -
         "coordinate_labels": list(linear.coordinates),
         "component_labels": ["rotor", *multiblade(linear.blades)[0]],
         "messages": list(linear.messages),
+        "weights": linear.weights,
     }
     return _record(scene, f"{linear.source}/{linear.kind}", attributes, _linear_datasets(linear))
 
@@ -573,6 +653,7 @@ def _modes_of(of_all: Sequence[Record]) -> dict[str, SceneModes]:
                     angles=arrays["steady_angle"],
                     stiffness=arrays["stiffness"],
                     damping=arrays["damping"],
+                    weights=float(facts.get("weights", 0.0)),
                     messages=tuple(map(str, facts["messages"])),
                 )
         facts = next(iter(records.values())).attributes
@@ -588,4 +669,5 @@ def _modes_of(of_all: Sequence[Record]) -> dict[str, SceneModes]:
             notes=tuple(str(facts["notes"]).splitlines()),
             label=str(facts.get("scene_label", scene)),
         )
+        assert isinstance(modes_by_scene[scene].agrees, bool)  # arrays that do not fit together raise here
     return modes_by_scene

@@ -77,8 +77,9 @@ class Modes(SceneModes):
     rest, rotation : modes by model, at rest under gravity, and over speed without gravity; the closed form first.
     floquet : Floquet multipliers under gravity; None if not computed.
     notes : results that could not be computed, with the reason.
-    agrees, disagreement : whether the modes of the models agree, and the largest difference of a frequency or a decay
-        rate, relative to the frequency.
+    agrees, disagreement : whether the modes of the models agree and satisfy their own equations, and the largest
+        difference of a frequency or a decay rate, relative to the largest eigenvalue.
+    residuals, faults : by model, what its modes leave of its own linearized equations; lines where that is too much.
     plot : `modes.plot()` draws the Campbell diagram; `.damping()`, `.multipliers()`.
     """
 
@@ -123,4 +124,4 @@ class Modes(SceneModes):
 
     def _repr_html_(self) -> str:
         drawn = self.plot()._repr_svg_() if self.rotation else ""
-        return f"<p>{escape(self.scene)}: {escape(self.title)}</p>{self.table()._repr_html_()}{drawn}"
+        return f"<p>{escape(self.label)}: {escape(self.title)}</p>{self.table()._repr_html_()}{drawn}"

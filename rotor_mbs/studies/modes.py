@@ -106,8 +106,8 @@ def modes_of_scenes(
                     computed.append(end.value)
                     status, message = "ok", ""
                     if not end.value.agrees:
-                        differ = f"relative difference of modes up to {end.value.disagreement:.1e}"
-                        status, message = "inaccurate", differ
+                        differ = f"models differ by up to {end.value.disagreement:.1e} of the largest eigenvalue"
+                        status, message = "inaccurate", "; ".join(end.value.faults) or differ
                     outcome = Outcome(label, "", status, message, share=share)
                 made.append(outcome)
                 on_progress(done, len(scenes), outcome)
@@ -243,6 +243,7 @@ def _linear(
             angles=over_speed([angles[columns] for _, angles, _, _ in steady]),
             stiffness=over_speed([linear.stiffness for linear in made]),
             damping=over_speed([linear.damping for linear in made]),
+            weights=max(weight_stiffnesses),
             messages=tuple(point if isinstance(point, str) else "" for point in points),
         )
     return modes_by_model

@@ -11,13 +11,14 @@ import pytest
 from support.scenes import general
 
 import rotor_mbs as rm
+from rotor_mbs.analysis import modes as modal
 from rotor_mbs.analysis.modes import read_modes, to_records
 from rotor_mbs.cli import main
 from rotor_mbs.errors import InputError, StoreError
 from rotor_mbs.methods.catalogue import find_method
 from rotor_mbs.runs.read import write_records
 from rotor_mbs.scenario.catalogue import find_scenes
-from rotor_mbs.scenario.scene import Scene
+from rotor_mbs.scenario.scene import Scene, scene_from_tables
 from rotor_mbs.solution.status import REFUSED
 from rotor_mbs.studies import modes as study
 
@@ -60,6 +61,87 @@ def test_a_model_of_another_rotor_is_found_out(part, off, monkeypatch):
     found = study.compute_modes(general(gravity=0.0, bearing_damping=(300.0, 500.0, 400.0)))
     assert not found.agrees
     assert found.disagreement == pytest.approx(off, rel=0.2)
+
+
+def break_matrices(monkeypatch, change):
+    """Hand over matrices of one model that `change` has changed."""
+    method = find_method("exudyn_tree/rk67")
+    right = method.linearize
+
+    def wrong(scene, *state):
+        linear = right(scene, *state)
+        stiffness = linear.stiffness.copy()
+        change(stiffness)
+        return replace(linear, stiffness=stiffness)
+
+    monkeypatch.setitem(method.__dict__, "linearize", wrong)
+
+
+def couple_pitches(stiffness):
+    """Leave what multiblade coordinates read of equal blades: their diagonal."""
+    size = 1e-4 * stiffness[1, 1]
+    for i, j in ((1, 2), (2, 3), (3, 1)):
+        stiffness[i, j] += size
+        stiffness[j, i] -= size
+
+
+def hold_rotor(stiffness):
+    """Let the pitches depend on the rotor's angle, which is left out of modes without gravity."""
+    stiffness[1:, 0] += 1e-4 * stiffness[1, 1]
+
+
+@pytest.mark.parametrize("change", [couple_pitches, hold_rotor])
+def test_a_linearization_that_its_modes_do_not_satisfy_is_found_out(change, monkeypatch, tmp_path):
+    """Modes of symmetric equations are computed from a part of the matrices, which is right here."""
+    break_matrices(monkeypatch, change)
+    found = study.compute_modes(replace(SOFT, gravity=0.0), [1.2])
+    assert not found.agrees
+    np.testing.assert_allclose(
+        found.rotation["exudyn_tree"].eigenvalues, found.rotation["lagrange"].eigenvalues, atol=1e-6
+    )
+    write_records(tmp_path / "modes.h5", to_records(found))
+    assert not read_modes(tmp_path / "modes.h5")["soft"].agrees
+    if change is couple_pitches:
+        assert found.residuals["exudyn_tree"] > 1e-6 > found.residuals["lagrange"]
+        assert "exudyn_tree: its modes leave" in found.faults[0]
+
+
+def test_a_slow_mode_that_is_wrong_is_found_out(monkeypatch):
+    """A pendulum on bearings over a thousand times faster, whose frequency is below what is compared."""
+    scene = replace(general(bearing_stiffness=(3e8,) * 3), bearing_damping=())
+    found = study.compute_modes(scene)
+    values = np.abs(found.rest["lagrange"].eigenvalues)
+    assert values.min() < 1e-3 * values.max()
+    assert found.agrees
+
+    def twice(stiffness):
+        stiffness[0, 0] *= 2.0
+
+    break_matrices(monkeypatch, twice)
+    assert not study.compute_modes(scene).agrees
+
+
+def test_models_that_agree_to_rounding_of_the_largest_eigenvalue_agree():
+    """A mode 600 times slower than the largest has 2e-8 of its own frequency from rounding of 2e-11 of that."""
+    blade = {
+        "mass": 5735.873229895609,
+        "centre_of_mass": [-0.12268342394039689, 0.14314354773890337, 12.592758364323915],
+        "inertia": [
+            85519.73186439436, 86726.09939908709, 1578.6863819026487, -295.9626892286708, -2578.226239776899,
+            1084.554916651137,
+        ],
+        "tip": [0.0, 0.0, 22.0],
+    }  # fmt: skip
+    angles = [2.1916749052073907, 0.489647641963062, -0.04283653238530771, -1.1838732991132703, 0.14028002379495041]
+    stiffness = [22807.77811834454, 54485.32665326917, 16882.012736492943, 16766.434760896558]
+    tables = {
+        "title": "r", "blades": 4, "gravity": 9.81, "duration": 1.0, "samples": 11, "blade": blade,
+        "hub": {"inertia": 83964.6944133776}, "initial": {"angles": angles, "rates": [0.0] * 5},
+        "bearing": {"stiffness": stiffness},
+    }  # fmt: skip
+    found = study.compute_modes(scene_from_tables(tables, "m3"), [0.0, 1.25, 2.5])
+    assert found.agrees
+    assert "agree" in modal.mode_summary(found)
 
 
 @pytest.mark.parametrize("share", [-1e-13, 1e-13])

@@ -153,10 +153,12 @@ def mode_answer(scene: SceneModes) -> list[Markup]:
     sentences = []
     models = max(len(scene.rest), len(scene.rotation))
     if models > 1:
-        how = Markup("agree within <b>{}</b> of a frequency").format(up_to(scene.disagreement))
+        how = Markup("agree within <b>{}</b> of the largest eigenvalue").format(up_to(scene.disagreement))
         if not scene.agrees:
-            how = Markup('<span class="bad">do not agree: they differ by {} of a frequency</span>')
+            how = Markup('<span class="bad">do not agree: they differ by {} of the largest eigenvalue</span>')
             how = how.format(number(scene.disagreement))
+            if scene.faults:
+                how = Markup('<span class="bad">are not those of their equations: {}</span>').format(scene.faults[0])
         sentences.append(Markup("{}: the modes of {} models {}.").format(scene.label, in_words(models), how))
     rest = _first(scene.rest)
     if rest is not None:
@@ -195,7 +197,7 @@ def _facts(scene: SceneModes) -> list[Fact]:
             Fact(
                 "Models",
                 text,
-                f"{models}; largest relative difference {number(scene.disagreement)}",
+                f"{models}; difference {number(scene.disagreement)} of the largest eigenvalue",
                 tone,
             )
         )
