@@ -3,6 +3,7 @@ the generated reference pages have everything."""
 
 from __future__ import annotations
 
+import importlib
 import re
 import shlex
 from collections.abc import Iterator
@@ -14,8 +15,10 @@ import pytest
 import rotor_mbs as rm
 from rotor_mbs.cli import main
 from rotor_mbs.cli.arguments import _parser, parse
+from rotor_mbs.cli.verdicts import line
 from rotor_mbs.methods.catalogue import method_names
 from rotor_mbs.scenario.scene import BLADE_KEYS, SCENE_KEYS, load_scene
+from rotor_mbs.studies.check import changed_scenes
 
 ROOT = Path(__file__).parents[1]
 DOCUMENTS = (ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md")))
@@ -139,3 +142,25 @@ def test_every_public_name_key_command_and_method_is_on_a_reference_page(monkeyp
     }
     for name, texts in expected.items():
         assert not [text for text in texts if text not in pages[name]], name
+
+
+def test_the_picture_of_defects_shows_a_run_below_and_one_above_what_is_allowed(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.syspath_prepend(ROOT / "docs/_ext")
+    drawing = importlib.import_module("draw_defects")
+    ends, allowed, faulty, good = drawing.curves()
+    is_late = ends > drawing.FAULT_TIME_S + 0.05
+    assert (good < allowed).all()
+    assert (faulty[~is_late][:-1] < allowed[~is_late][:-1]).all()
+    assert (faulty[is_late] > 3.0 * allowed[is_late]).all()
+    picture = drawing.PICTURE.read_text()
+    assert f"gravity {drawing.FAULT:.0e} too large from {drawing.FAULT_TIME_S:g} s on" in picture
+    assert "allowed" in picture
+
+
+def test_the_line_of_a_changed_scene_is_that_of_check() -> None:
+    scene = rm.scene("paper/fig11").replace(**{"blade.mass": 15000.0})
+    changed = scene.replace(**{"blade.mass": 15010.0})
+    (check,) = changed_scenes({scene.name: changed}, {scene.name: scene})
+    assert f"    {line(check)}\n" in TEXTS["check.md"]

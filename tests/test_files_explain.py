@@ -73,7 +73,7 @@ def fits(text: str) -> bool:
         "two": ("results", "paper/fig08, paper/fig11", METHOD),
         "sweep": ("sweep", "bearing.stiffness  N m/rad  0     10  2", "2 ok", METHOD),
         "modes": ("modes", "lagrange, exudyn_tree, exudyn_chain", "damped (Hz)", "modes differ by at most"),
-        "comparison": ("comparison", "data/trajectory  paper/fig08  26    0.5", "1e-06"),
+        "comparison": ("comparison", "data/trajectory  paper/fig08, changed: duration  26    0.5", "1e-06"),
     }.items(),
 )
 def test_show_tells_what_is_in_a_file_and_what_to_do_next(
