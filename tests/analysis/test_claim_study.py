@@ -73,7 +73,7 @@ def test_what_is_measured_exists(item: Published) -> None:
     ("names", "duration", "runs"),
     [
         (["fig03-rotor-constant", "fig03-pitch-grows"], 8.0, 2),
-        *(pytest.param([], duration, 3, marks=pytest.mark.full) for duration in DURATIONS),
+        *(pytest.param([], duration, 3, marks=pytest.mark.nightly) for duration in DURATIONS),
     ],
 )
 def test_the_first_runs_are_those_of_the_shipped_table(names: list[str], duration: float, runs: int) -> None:

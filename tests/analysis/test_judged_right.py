@@ -309,8 +309,12 @@ def examine(seed: int, methods: tuple[str, ...]) -> None:
             assert error > 1e-10, (seed, method, error, verdict.message)
 
 
+# Blades that spin hundreds of times take minutes: those are judged every night.
+_QUICK_SEEDS = [seed for seed in range(23) if seed not in (1, 8, 10)]
+
+
 @pytest.mark.full
-@pytest.mark.parametrize("seed", range(20))
+@pytest.mark.parametrize("seed", _QUICK_SEEDS)
 def test_random_rotors_are_judged_right(seed: int) -> None:
     examine(seed, (*EXACT, "exudyn_tree/rk67"))
 
