@@ -53,11 +53,12 @@ def bench(
 
     Examples
     --------
+    >>> import numpy as np
     >>> import rotor_mbs as rm
     >>> scene = rm.scene("paper/fig03").replace(duration=0.5, samples=51)
     >>> curves = rm.bench(scene, "exudyn_tree/rk44", repeats=1, budget=1.0)
     >>> curve = curves["paper/fig03/exudyn_tree/rk44"]
-    >>> bool(curve["angle_error_max"][curve["setting"].argmin()] < 1e-9)
+    >>> bool(np.nanmin(curve["angle_error_max"]) < 1e-9)
     True
     """
     from rotor_mbs.studies.bench import run_bench  # late: most users time nothing
