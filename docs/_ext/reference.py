@@ -387,6 +387,8 @@ _ATTRIBUTES = {
     "parameter_keys": "keys of the varied parameters",
     "notes": "results that could not be computed, with the reason",
     "label": "label of the model",
+    "scene_label": "name of the scene, with what was changed in a shipped one",
+    "weights": "1/s^2, moments of all weights about the shaft divided by the inertia: what residuals are relative to",
     "symmetric": "1 if the modes are named after multiblade coordinates",
     "mode_labels": "names of the modes",
     "coordinate_labels": "names of the coordinates",
