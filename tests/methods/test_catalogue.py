@@ -6,6 +6,7 @@ import sys
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import pytest
 from support.packages import install
@@ -74,12 +75,16 @@ def installed(names: Iterable[str]) -> list[str]:
     return able
 
 
+def _mark_of(name: str) -> Any:
+    """An hour of chaos takes a minute: it is judged every night."""
+    if name in _QUICK:
+        return ()
+    return pytest.mark.nightly if name == "extreme/hour-chaos" else pytest.mark.full
+
+
 @pytest.mark.parametrize(
     "name",
-    [
-        pytest.param(given.name, marks=() if given.name in _QUICK else pytest.mark.full)
-        for given in find_scenes(["stiff", "extreme"])
-    ],
+    [pytest.param(given.name, marks=_mark_of(given.name)) for given in find_scenes(["stiff", "extreme"])],
 )
 def test_what_the_rule_takes_holds(name: str) -> None:
     """Every method that claims to be right, at its default settings, against the frozen reference."""
