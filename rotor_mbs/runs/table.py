@@ -54,6 +54,9 @@ from rotor_mbs.runs.design import (
 )
 from rotor_mbs.runs.hdf5 import (
     CHARACTERS,
+    TEXT,
+    TEXT_IN_MEMORY,
+    TEXT_TYPE,
     WITHOUT_VALUES,
     Column,
     StoredGroup,
@@ -182,6 +185,15 @@ class Table:
             is_known = (status >= 0) & (status < len(STATUSES))
             statuses[start : start + step] = np.where(is_right & is_known, status, MISSING)
         return statuses
+
+    def clear(self) -> None:
+        """Write blank rows, which a reader of an unfinished file sees; their statuses stay as they are."""
+        with self.path.open("r+b") as file:
+            for name, blank in blank_rows(1, self.row_type).items():
+                if name != "status":
+                    file.seek(self.offsets[name])
+                    for _ in range(len(self.runs) if "run" in self.computed[name].dimensions else 1):
+                        file.write(blank.data)
 
     def place(self, row: int = 0) -> Place:
         """Where the rows from `row` on are. Their checksums begin with the run where that is a number, else the row."""
@@ -333,14 +345,6 @@ class Place:
         is_known = 0 <= row["status"][0] < len(STATUSES)
         return bool(is_known and checksums(self.first, row, self.row_type)[0] == row["crc32"][0])
 
-    def clear(self) -> None:
-        """Write a blank row, which a reader of an unfinished file sees; its status stays as it is."""
-        with self.path.open("r+b") as file:
-            for name, values in blank_rows(1, self.row_type).items():
-                if name != "status":
-                    file.seek(self.offsets[name])
-                    file.write(values.data)
-
     def mark_missing(self, rows: Collection[int]) -> None:
         """Take back the statuses of some rows, counted from the first, before they are computed again."""
         with store_errors(self.path), self.path.open("r+b") as file:
@@ -414,10 +418,10 @@ def row_of_run(run: Solution, place: Place, facts: Mapping[str, object]) -> Rows
 
 
 @contextmanager
-def laid_out(path: Path, tables: Sequence[Table], attributes: Mapping[str, object]) -> Iterator[Path]:
-    """Yield a new file with room for all rows, under a temporary name; after the block it is complete under its name,
-    or not there. Its space is reserved twice: HDF5 does not survive a disk that fills up under it, and truncates the
-    file it begins. Raises StoreError."""
+def laid_out(path: Path, tables: Sequence[Table], attributes: Mapping[str, object]) -> Iterator[list[Table]]:
+    """Yield the tables of a new file with room for all rows, under a temporary name; after the block it is complete
+    under its name, or not there. Its space is reserved twice: HDF5 does not survive a disk that fills up under it, and
+    truncates the file it begins. Raises StoreError."""
     with replacing(path) as temporary:
         rows = sum(len(table.runs) * (table.row_type.itemsize + 8 * (4 + len(table.known))) for table in tables)
         _reserve(temporary, _HEAD_BYTES + rows)
@@ -431,7 +435,14 @@ def laid_out(path: Path, tables: Sequence[Table], attributes: Mapping[str, objec
             laid.seek(0, os.SEEK_END)
             laid.write(trailer)
         _reserve(temporary, temporary.stat().st_size)
-        yield temporary
+        inode = temporary.stat().st_ino
+        laid_tables = []
+        for table in tables:
+            offsets = {name: offset for name, (offset, _) in rows_of[table.group].items()}
+            known = {name: (column, _as_stored(values)) for name, (column, values) in table.known.items()}
+            runs = _as_stored(table.runs)
+            laid_tables.append(replace(table, runs=runs, known=known, path=temporary, inode=inode, offsets=offsets))
+        yield laid_tables
 
 
 def _reserve(path: Path, size: int) -> None:
@@ -483,18 +494,21 @@ def new_group(parent: Any, name: str) -> Any:
 
 def put(group: Any, name: str, values: Any, column: Column) -> Any:
     """A dataset of numbers or texts. The scales of its dimensions must be there; a scale is its own dimension."""
+    return _described(group.create_dataset(name, data=_as_stored(values)), group, name, column)
+
+
+def _as_stored(values: Any) -> NDArray[Any]:
     is_text = len(values) > 0 and isinstance(values[0], str)
-    data = np.array(list(values), dtype=h5py.string_dtype()) if is_text else np.asarray(values)
-    return _described(group.create_dataset(name, data=data), group, column)
+    return np.array(list(values), dtype=TEXT) if is_text else np.asarray(values)
 
 
-def _described(dataset: Any, group: Any, column: Column) -> Any:
+def _described(dataset: Any, group: Any, name: str, column: Column) -> Any:
     put_attributes(dataset, {"units": column.units, "long_name": column.long_name, **column.attributes})
     for axis, dimension in enumerate(column.dimensions):
-        if group[dimension] == dataset:
+        if dimension == name:
             dataset.make_scale(dimension)
         else:
-            dataset.dims[axis].attach_scale(group[dimension])
+            h5py.h5ds.attach_scale(dataset.id, h5py.h5d.open(group.id, dimension.encode()), axis)
     return dataset
 
 
@@ -514,19 +528,24 @@ def put_empty(group: Any, name: str, shape: tuple[int, ...], kind: Any, column: 
     layout.set_fill_time(h5py.h5d.FILL_TIME_NEVER if fill is None else h5py.h5d.FILL_TIME_ALLOC)
     if fill is not None:
         layout.set_fill_value(np.array(fill, kind))
-    dataset = _described(group.create_dataset(name, shape, kind, dcpl=layout), group, column)
+    dataset = _described(group.create_dataset(name, shape, kind, dcpl=layout), group, name, column)
     if np.dtype(kind).kind == "S":
         dataset.attrs["_Encoding"] = "utf-8"
     return dataset
 
 
 def put_attributes(target: Any, values: Mapping[str, object]) -> None:
-    """Numbers as float64 or int64, truth as int8 (netCDF-4 has no booleans), lists of names as strings."""
+    """Write attributes that are not there: numbers as float64 or int64, truth as int8 (netCDF-4 has no booleans), lists
+    of names as strings."""
     for name, value in values.items():
-        if isinstance(value, bool):
+        if isinstance(value, str):
+            # Nearly all are single texts, which the general way writes three times slower.
+            stored = h5py.h5a.create(target.id, name.encode(), TEXT_TYPE, h5py.h5s.create(h5py.h5s.SCALAR))
+            stored.write(np.array(value, TEXT), mtype=TEXT_IN_MEMORY)
+        elif isinstance(value, bool):
             target.attrs[name] = np.int8(value)
         elif isinstance(value, (list, tuple)):
-            target.attrs.create(name, list(value), dtype=h5py.string_dtype())
+            target.attrs.create(name, list(value), dtype=TEXT)
         else:
             target.attrs[name] = value
 
@@ -548,15 +567,21 @@ def parsed(text: object, kind: type[T], place: object) -> T:
 class TableFile:
     """The tables of a file, by their groups; rows are read and written by their places.
 
-    only: groups of the tables that are read, by default all. Raises StoreError where the file cannot be read, or what
-    was laid out has changed since.
+    only: groups of the tables that are read, by default all. laid_tables: all tables of a file that was just laid out,
+    which is not read. Raises StoreError where the file cannot be read, or what was laid out has changed since.
     """
 
-    def __init__(self, path: Path, only: Collection[str] | None = None) -> None:
+    def __init__(
+        self, path: Path, only: Collection[str] | None = None, *, laid_tables: Sequence[Table] | None = None
+    ) -> None:
         self.path = path
         self.groups: list[str] = []
         self.tables: dict[str, Table] = {}
-        self.read(only)
+        if laid_tables is None:
+            self.read(only)
+        else:
+            self.tables = {table.group: table for table in laid_tables}
+            self.groups = list(self.tables)
 
     def read(self, only: Collection[str] | None = None) -> None:
         """Read further tables of the file, by default all that have not been read."""
@@ -630,7 +655,8 @@ class TableFile:
                     new_references.add(run.label)
             if is_missing:
                 missing.append((run, place, reference))
-                place.mark_missing([0])
+                if (row["status"][0], row[REPEATED["status"]][0]) != (MISSING, MISSING):
+                    place.mark_missing([0])
             else:
                 kept.append((run, status, text_of(row["message"][0])))
         return missing, kept
@@ -861,22 +887,16 @@ def _write_tables(path: Path, tables: Sequence[Table], rows: Sequence[tuple[str,
         summary += f"; tables {', '.join(others)}"
     described = {"title": "Rotor models compared", "summary": summary, "keywords": KEYWORDS}  # as ACDD asks for them
     attributes = {**described, **versions(), **machine(), "created": created, "date_created": created}
-    with laid_out(path, tables, attributes) as temporary:
-        file = TableFile(temporary)
-        given = {(group, run): values for group, run, values in rows}
-        for made in tables:
-            for run in made.runs if "crc32" in made.computed else ():
-                place = file.place(str(run), made.group)
-                values = given.get((made.group, str(run)))
-                if values is None:
-                    place.clear()
-                else:
-                    blank = blank_rows(1, place.row_type)
-                    place.write({name: values.get(name, blank[name]) for name in place.row_type.names or ()})
-    # It is the same file under its name now, and need not be read again.
-    file.path = path
-    file.tables = {group: replace(table, path=path) for group, table in file.tables.items()}
-    return file
+    with laid_out(path, tables, attributes) as laid_tables:
+        for table in laid_tables:
+            table.clear()
+        file = TableFile(path, laid_tables=laid_tables)
+        for group, run, values in rows:
+            place = file.place(run, group)
+            blank = blank_rows(1, place.row_type)
+            place.write({name: values.get(name, blank[name]) for name in place.row_type.names or ()})
+    # It is the same file under its name now.
+    return TableFile(path, laid_tables=[replace(table, path=path) for table in laid_tables])
 
 
 # Other HDF5 files

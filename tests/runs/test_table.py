@@ -157,6 +157,19 @@ def test_more_rows_keep_those_that_are_stored(tmp_path: Path) -> None:
     assert np.isnan(file.place(first).read()["constraint_error"]).all()  # a column that it does not have
 
 
+def test_the_tables_of_a_new_file_are_known_without_reading_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = tmp_path / "r.h5"
+    with monkeypatch.context() as patch:
+        patch.setattr("rotor_mbs.runs.table.read_content", None)
+        laid = extend_file(path, results_tables(_asked("reference", "lagrange/taylor")))
+    read = TableFile(path)
+    assert laid.groups == read.groups
+    for group, table in read.tables.items():
+        assert (laid.tables[group].offsets, laid.tables[group].inode) == (table.offsets, table.inode)
+        assert laid.tables[group].row_type == table.row_type
+        assert laid.tables[group].known_rows == table.known_rows
+
+
 def test_runs_of_other_numbers_are_not_dropped_without_being_computed_again(tmp_path: Path) -> None:
     path = tmp_path / "r.h5"
     _write(extend_file(path, results_tables(_asked("lagrange/taylor"))), "paper/fig08/lagrange/taylor", 1.0)
