@@ -205,7 +205,7 @@ def solve_judged(
     reference = None if shipped is None else shipped.trajectory
     own = own_settings(scene, method) | dict(settings or {})
     try:
-        run = solve(method, scene, own, _REPEATS, _REPEAT_BUDGET_S, time_limit_s)
+        run = solve(method, scene, own, time_limit_s=time_limit_s)
     except OutOfTimeError as exc:
         return without_samples(scene, method, own, "timed_out", str(exc)), reference
     if reference is None and compute_reference:

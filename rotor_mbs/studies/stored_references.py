@@ -90,16 +90,21 @@ def rebuilt_reference(scene: Scene, arrays: Mapping[str, NDArray[Any]]) -> Traje
 
 def frozen_solution(scene: Scene) -> Solution | None:
     """Return the shipped reference of a scene, with the settings and times of when it was computed; None where there is
-    none. Raises StoreError where it cannot be read."""
+    none. Its arrays are shared by all callers, and read-only. Raises StoreError where it cannot be read."""
     shipped = shipped_reference(scene_hash(scene))
-    if shipped is None:
-        return None
+    return None if shipped is None else _read_shipped(shipped, scene)
+
+
+@functools.lru_cache(maxsize=32)
+def _read_shipped(shipped: ShippedReference, scene: Scene) -> Solution:
     with open_results(shipped.path, only=[shipped.scene]) as results:
         stored = results.scenes[shipped.scene].reference
         assert stored is not None  # a file of references has one for each scene
         facts = stored.attributes
         arrays = {name: stored.array(name) for name in ("time", *FROZEN) if name in stored}
         trajectory = rebuilt_reference(scene, arrays)
+        for values in (trajectory.time, trajectory.angles, trajectory.rates, *trajectory.quantities.values()):
+            values.flags.writeable = False
         is_complete = len(trajectory.time) == scene.samples
         engine = Integration(
             is_complete,

@@ -210,13 +210,16 @@ def fitted_rates(scene: Scene, time: Array, angles: Array) -> Array:
     raise InputError("the rates cannot be computed from the angles: the rows are too far apart for this motion")
 
 
-def interval_ends(scene: Scene, begins: Array, ends: Array, states: Array) -> Array:
+def interval_ends(
+    scene: Scene, begins: Array, ends: Array, states: Array, integration: _Integration | None = None
+) -> Array:
     """Find where the closed form gets from each row of states.
 
     Parameters
     ----------
     begins, ends : (n,) s, of the rows, increasing, and until when.
     states : (n, m) angles, then rates, of the coordinates that move.
+    integration : of this scene, for several calls; else it is built here.
 
     Returns
     -------
@@ -224,10 +227,7 @@ def interval_ends(scene: Scene, begins: Array, ends: Array, states: Array) -> Ar
         NaN where it does not get there, or would take more steps than any motion of the rotor.
     """
     segments = scene.load_segments
-    if is_available():
-        advance, max_steps = _advance_by_taylor(scene, states.shape[1]), _MAX_STEPS_TAYLOR
-    else:
-        advance, max_steps = _advance_by_dop853(scene), _MAX_STEPS_DOP853
+    advance, max_steps = integration or _integration_of(scene, states.shape[1])
     reached_states = states.astype(float)
     place = 0
     for k, (state, begin, end) in enumerate(zip(states, begins.tolist(), ends.tolist(), strict=True)):
@@ -250,6 +250,14 @@ def interval_ends(scene: Scene, begins: Array, ends: Array, states: Array) -> Ar
 
 # (segment, start, end, state at the start, most steps) -> state at the end, NaN where it is not reached; steps taken
 _Advance = Callable[[Segment, float, float, Array, int], tuple[Array, int]]
+_Integration = tuple[_Advance, int]  # and the most steps that it may take in an interval
+
+
+def _integration_of(scene: Scene, count: int) -> _Integration:
+    """Return the integration of (count,) variables from sample to sample: by heyoka, or without it by DOP853."""
+    if is_available():
+        return _advance_by_taylor(scene, count), _MAX_STEPS_TAYLOR
+    return _advance_by_dop853(scene), _MAX_STEPS_DOP853
 
 
 def _advance_by_taylor(scene: Scene, count: int) -> _Advance:
@@ -344,13 +352,15 @@ def _difference_transitions(
     count = states.shape[1]
     units = differences / differences[0]
     matrices = np.empty((len(rows), count, count))
+    integration = _integration_of(scene, count)
     is_linear = np.ones(len(rows), dtype=bool)
     with np.errstate(all="ignore"):
         for i in range(count):
             moved = states[rows]
             moved[:, i] += differences[i]
             change = moved[:, i] - states[rows, i]  # as it is rounded
-            away = interval_ends(scene, time[rows], time[rows + 1], moved) - ends[rows]
+            moved_ends = interval_ends(scene, time[rows], time[rows + 1], moved, integration)
+            away = moved_ends - ends[rows]
             matrices[:, :, i] = away / change[:, None]
             is_linear &= ~(np.abs(away / units) > _SMALL_AT_END).any(axis=1)
     return matrices, is_linear

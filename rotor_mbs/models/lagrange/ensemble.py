@@ -204,10 +204,10 @@ class _Group:
             options = {"tol": tolerance, "compact_mode": taylor.is_compact(example), "high_accuracy": True}
             return heyoka().taylor_adaptive_batch(equations, state=np.zeros((len(equations), lanes())), **options)
 
-        self.integrator = taylor.compiled(("batch", tolerance, structure), integrator)
+        self.integrator = taylor.compiled(("batch", tolerance, structure), integrator, self)
         outputs = example.wants("tip"), example.wants("energy")
-        self.observables = taylor.compiled(("observables", *outputs, structure), lambda: _observables(example))
-        self.momenta = taylor.compiled(("momenta", structure), lambda: _momenta(example))
+        self.observables = taylor.compiled(("observables", *outputs, structure), lambda: _observables(example), self)
+        self.momenta = taylor.compiled(("momenta", structure), lambda: _momenta(example), self)
         self.moving = example.moving_coordinates
         fixed = [i for i in range(len(example.initial_angles)) if i not in self.moving]
         angles = np.array([scene.initial_angles for scene in scenes]).T

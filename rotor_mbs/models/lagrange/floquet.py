@@ -130,7 +130,7 @@ class _Variational:
             system.append((engine.make_vars("trace"), trace))
             return engine.taylor_adaptive(system, state=np.zeros(len(system)), compact_mode=True)
 
-        self._integrator = compiled(("turn", tuple(parameters.structure)), make)
+        self._integrator = compiled(("turn", tuple(parameters.structure)), make, self)
         self._values = array_of(parameters.values, quad=False)
         still = linearize(scene, scene.initial_angles, [0.0] * len(scene.initial_angles), 0.0)
         self._frequency = math.sqrt(np.abs(still.stiffness).max())

@@ -77,6 +77,17 @@ def rotor_form(
     convert : rounds each coefficient once, to the kind of number to compute with.
     phases : (blades,) cosines and sines of the mounting angles; those of `Scene.phases` where left out.
     """
+    if convert is float and phases is None:
+        return _form_in_doubles(scene)
+    return _form(scene, convert, phases)
+
+
+@functools.lru_cache(maxsize=16)  # a run is judged by many functions that need it
+def _form_in_doubles(scene: Scene) -> RotorForm:
+    return _form(scene, float, None)
+
+
+def _form(scene: Scene, convert: Convert, phases: Sequence[tuple[Fraction, Fraction]] | None) -> RotorForm:
     gravity = Fraction(scene.gravity)
     count = len(scene.blades)
     forms: list[BladeForm] = []

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import weakref
 from collections.abc import Callable
 from fractions import Fraction
 from importlib.util import find_spec
@@ -74,13 +75,23 @@ def equation_numbers(scene: Scene, parameters: Parameters) -> tuple[RotorForm, L
 
 
 _compiled: dict[tuple[object, ...], Any] = {}
+_idle: dict[tuple[object, ...], list[Any]] = {}  # copies of it whose owners are gone
 
 
-def compiled(key: tuple[object, ...], make: Callable[[], Any]) -> Any:
-    """Return compiled code of its own for the caller, since it holds a state; made once per process and structure."""
+def compiled(key: tuple[object, ...], make: Callable[[], Any], owner: object) -> Any:
+    """Return compiled code that no other owner uses meanwhile, since it holds a state.
+
+    It is made once per process and structure. When its owner is gone, the next one gets it as it was left: state, time
+    and parameters are to be set.
+    """
     if key not in _compiled:
-        _compiled[key] = make()
-    return copy.deepcopy(_compiled[key])
+        _compiled[key], _idle[key] = make(), []
+    try:
+        code = _idle[key].pop()
+    except IndexError:
+        code = copy.deepcopy(_compiled[key])
+    weakref.finalize(owner, _idle[key].append, code).atexit = False
+    return code
 
 
 def set_parameters(integrator: Any, values: Any) -> None:
@@ -144,7 +155,7 @@ class Propagation:
         if variational:
             equations, start = equations[:count], start[:count]
             equations = engine.var_ode_sys(equations, args=engine.var_args.vars, order=1)
-        self.integrator = compiled(key, lambda: engine.taylor_adaptive(equations, state=start, **options))
+        self.integrator = compiled(key, lambda: engine.taylor_adaptive(equations, state=start, **options), self)
         set_parameters(self.integrator, array_of(parameters.values, quad=quad))
         self._initial = np.concatenate([start, np.eye(count).ravel()]) if variational else start
         self._segments = scene.load_segments
