@@ -238,26 +238,34 @@ def datasets_of(group: Any) -> dict[str, Any]:
     return datasets
 
 
+def _dimension(dataset: Any, axis: int, name: str, scale_names: dict[int, str]) -> str:
+    """Return the name of the scale of an axis; a dataset without one is a scale, and its own dimension.
+
+    Parameters
+    ----------
+    dataset, axis, name : the array, the number of its axis, and its name.
+    scale_names : by the address of a scale in the file, of those that were met; the scale is added.
+    """
+    scales: list[Any] = []
+    if h5py.h5ds.get_num_scales(dataset.id, axis):
+        h5py.h5ds.iterate(dataset.id, axis, scales.append, 0)
+    if not scales:
+        return name
+    address = h5py.h5o.get_info(scales[0]).addr
+    if address not in scale_names:
+        # By its attribute: the library would look for its path through the whole file, and its own way to a name ends
+        # the process where that is damaged.
+        scale = str(attribute(h5py.Dataset(scales[0]), "NAME"))
+        scale_names[address] = CHARACTERS if scale.startswith(WITHOUT_VALUES) else scale
+    return scale_names[address]
+
+
 def columns_of(datasets: Mapping[str, Any]) -> dict[str, Column]:
     """Describe the datasets of a group, by name."""
     columns = {}
-    dimension_names: dict[int, str] = {}  # by the address of a scale in the file
+    scale_names: dict[int, str] = {}
     for name, dataset in datasets.items():
-        dimensions = []
-        for axis in range(dataset.ndim):
-            scales: list[Any] = []
-            if h5py.h5ds.get_num_scales(dataset.id, axis):
-                h5py.h5ds.iterate(dataset.id, axis, scales.append, 0)
-            if not scales:  # a scale is its own dimension
-                dimensions.append(name)
-                continue
-            address = h5py.h5o.get_info(scales[0]).addr
-            if address not in dimension_names:
-                # By its attribute: the library would look for its path through the whole file, and its own way to a
-                # name ends the process where that is damaged.
-                scale = str(attribute(h5py.Dataset(scales[0]), "NAME"))
-                dimension_names[address] = CHARACTERS if scale.startswith(WITHOUT_VALUES) else scale
-            dimensions.append(dimension_names[address])
+        dimensions = tuple(_dimension(dataset, axis, name, scale_names) for axis in range(dataset.ndim))
         attributes = attributes_of(dataset)
         attributes.pop("_Encoding", None)
         for key, value in attributes.items():
@@ -265,7 +273,7 @@ def columns_of(datasets: Mapping[str, Any]) -> dict[str, Column]:
             if isinstance(value, list) and not isinstance(value[0], str):
                 attributes[key] = dataset.attrs[key]
         units, long_name = str(attributes.pop("units")), str(attributes.pop("long_name"))
-        columns[name] = Column(tuple(dimensions), units, long_name, dataset.dtype.str, attributes)
+        columns[name] = Column(dimensions, units, long_name, dataset.dtype.str, attributes)
     return columns
 
 

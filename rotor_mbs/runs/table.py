@@ -418,10 +418,19 @@ def row_of_run(run: Solution, place: Place, facts: Mapping[str, object]) -> Rows
 
 
 @contextmanager
-def laid_out(path: Path, tables: Sequence[Table], attributes: Mapping[str, object]) -> Iterator[list[Table]]:
-    """Yield the tables of a new file with room for all rows, under a temporary name; after the block it is complete
-    under its name, or not there. Its space is reserved twice: HDF5 does not survive a disk that fills up under it, and
-    truncates the file it begins. Raises StoreError."""
+def laid_out(path: Path, tables: Sequence[Table], attributes: Mapping[str, object]) -> Iterator[TableFile]:
+    """Yield a new file with room for all rows, under a temporary name; after the block it is complete under its name,
+    or not there.
+
+    Its space is reserved twice: HDF5 does not survive a disk that fills up under it, and truncates the file it begins.
+    Raises StoreError.
+
+    Parameters
+    ----------
+    path : of the file.
+    tables : as they are to be laid out.
+    attributes : of the file.
+    """
     with replacing(path) as temporary:
         rows = sum(len(table.runs) * (table.row_type.itemsize + 8 * (4 + len(table.known))) for table in tables)
         _reserve(temporary, _HEAD_BYTES + rows)
@@ -435,6 +444,7 @@ def laid_out(path: Path, tables: Sequence[Table], attributes: Mapping[str, objec
             laid.seek(0, os.SEEK_END)
             laid.write(trailer)
         _reserve(temporary, temporary.stat().st_size)
+        # All that a reader would find is known here: reading it back would take longer than writing it.
         inode = temporary.stat().st_ino
         laid_tables = []
         for table in tables:
@@ -442,7 +452,7 @@ def laid_out(path: Path, tables: Sequence[Table], attributes: Mapping[str, objec
             known = {name: (column, _as_stored(values)) for name, (column, values) in table.known.items()}
             runs = _as_stored(table.runs)
             laid_tables.append(replace(table, runs=runs, known=known, path=temporary, inode=inode, offsets=offsets))
-        yield laid_tables
+        yield TableFile(temporary, laid_out_as=(attributes, laid_tables))
 
 
 def _reserve(path: Path, size: int) -> None:
@@ -498,6 +508,7 @@ def put(group: Any, name: str, values: Any, column: Column) -> Any:
 
 
 def _as_stored(values: Any) -> NDArray[Any]:
+    """Return numbers or texts as a reader of the file gets them."""
     is_text = len(values) > 0 and isinstance(values[0], str)
     return np.array(list(values), dtype=TEXT) if is_text else np.asarray(values)
 
@@ -567,20 +578,28 @@ def parsed(text: object, kind: type[T], place: object) -> T:
 class TableFile:
     """The tables of a file, by their groups; rows are read and written by their places.
 
-    only: groups of the tables that are read, by default all. laid_tables: all tables of a file that was just laid out,
-    which is not read. Raises StoreError where the file cannot be read, or what was laid out has changed since.
+    only: groups of the tables that are read, by default all. laid_out_as: attributes and all tables of a file that was
+    just laid out, which is not read. Raises StoreError where the file cannot be read, or what was laid out has changed
+    since.
     """
 
     def __init__(
-        self, path: Path, only: Collection[str] | None = None, *, laid_tables: Sequence[Table] | None = None
+        self,
+        path: Path,
+        only: Collection[str] | None = None,
+        *,
+        laid_out_as: tuple[Mapping[str, Any], Sequence[Table]] | None = None,
     ) -> None:
         self.path = path
+        self.attributes: dict[str, Any] = {}
         self.groups: list[str] = []
         self.tables: dict[str, Table] = {}
-        if laid_tables is None:
+        if laid_out_as is None:
             self.read(only)
         else:
-            self.tables = {table.group: table for table in laid_tables}
+            attributes, tables = laid_out_as
+            self.attributes = dict(attributes)
+            self.tables = {table.group: table for table in tables}
             self.groups = list(self.tables)
 
     def read(self, only: Collection[str] | None = None) -> None:
@@ -887,16 +906,15 @@ def _write_tables(path: Path, tables: Sequence[Table], rows: Sequence[tuple[str,
         summary += f"; tables {', '.join(others)}"
     described = {"title": "Rotor models compared", "summary": summary, "keywords": KEYWORDS}  # as ACDD asks for them
     attributes = {**described, **versions(), **machine(), "created": created, "date_created": created}
-    with laid_out(path, tables, attributes) as laid_tables:
-        for table in laid_tables:
+    with laid_out(path, tables, attributes) as file:
+        for table in file.tables.values():
             table.clear()
-        file = TableFile(path, laid_tables=laid_tables)
         for group, run, values in rows:
             place = file.place(run, group)
             blank = blank_rows(1, place.row_type)
             place.write({name: values.get(name, blank[name]) for name in place.row_type.names or ()})
     # It is the same file under its name now.
-    return TableFile(path, laid_tables=[replace(table, path=path) for table in laid_tables])
+    return TableFile(path, laid_out_as=(attributes, [replace(table, path=path) for table in file.tables.values()]))
 
 
 # Other HDF5 files
