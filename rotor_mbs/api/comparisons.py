@@ -13,7 +13,7 @@ from rotor_mbs.analysis.text_tables import TextTable
 from rotor_mbs.comparison.data import load_data
 from rotor_mbs.comparison.modes import compare_modes
 from rotor_mbs.comparison.trajectory import compare_with_reference
-from rotor_mbs.comparison.verdict import DEFAULT_TOLERANCE, DataVerdict, channel_table, verdict_of
+from rotor_mbs.comparison.verdict import DEFAULT_TOLERANCE, DataVerdict, channel_table, unused_lines, verdict_of
 from rotor_mbs.errors import StoreError
 from rotor_mbs.methods.time_limit import valid_seconds
 from rotor_mbs.runs.hdf5 import reading
@@ -175,8 +175,7 @@ class DataComparison:
             f"{verdict.source}: {verdict.rows} rows against {self.record.attributes.get('scene_label', verdict.scene)}",
             *map("  {}".format, verdict.read),
         ]
-        if verdict.unused:
-            lines.append(f"  not used: {', '.join(verdict.unused[:12])}{', ...' * (len(verdict.unused) > 12)}")
+        lines += [f"  {line}" for line in unused_lines(verdict)]
         lines += ["", str(self.table()), ""]
         if verdict.horizon_s is not None:
             lines.append(

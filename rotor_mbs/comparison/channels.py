@@ -10,8 +10,10 @@ import itertools
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
-from rotor_mbs.comparison.columns import BASE_UNITS
+from rotor_mbs.comparison.columns import split_bracketed_unit
+from rotor_mbs.comparison.units import BASE_UNITS, is_unit
 from rotor_mbs.errors import InputError
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.quantities import LOADS
@@ -35,6 +37,10 @@ VECTOR_NAMES = {
     "angle": ("angles", "angle", "q", "qpos", "coordinates", "positions"),
     "rate": ("rates", "rate", "qd", "dq", "qdot", "qvel", "coordinates_t", "velocities"),
 }
+_VECTORS = {
+    kind: tuple(name.replace("_", "") for name in names) for kind, names in VECTOR_NAMES.items()
+}
+_RATE_ARRAYS = _VECTORS["rate"]
 SPEED_NAMES = ("speed", "rotorspeed", "rotspeed", "omega")
 FREQUENCY_NAMES = {
     "frequency": (
@@ -56,6 +62,8 @@ _UNIT_ENDING = re.compile(
     r"_((?:rad|deg|turns|rev)(?:_per_s|/s|_s)?|rpm|hz|s|ms|us|min|(?-i:k?Nm?))$", re.IGNORECASE
 )
 _BEYOND_INDICES = 10**10
+_DERIVATIVE = re.compile(r"der\s*\((.*)\)", re.IGNORECASE)  # of Modelica and FMI
+_MODELICA = ((".phi", ""), (".w", " rate"))  # angle and rate of a joint
 
 
 def channel_key(name: str) -> str:
@@ -138,41 +146,180 @@ def mode_channels(scene: Scene) -> list[Channel]:
     return known
 
 
-def channel_from_name(name: str, vector: int, known: Sequence[Channel]) -> Channel | None:
+class Entry(NamedTuple):
+    """A numbered column as one of an array, `q[2,1]` or `pitch_2`.
+
+    Attributes
+    ----------
+    key : the name with a mark in place of the numbers: what all columns of the array have.
+    numbers : in the name.
+    start, end : of the numbers in the name without its unit.
+    """
+
+    key: str
+    numbers: tuple[int, ...]
+    start: int
+    end: int
+
+
+def entry_of(name: str) -> Entry | None:
+    """Return the numbers of a column, in brackets or the last ones in it; None without any."""
+    plain = split_unit(name)[0]
+    end = plain.rfind("]")
+    start = plain.rfind("[", 0, max(end, 0))
+    if 0 <= start < end:
+        content = plain[start + 1 : end]
+        if content and all(character in "0123456789, " for character in content):
+            numbers = tuple(_number(digits.strip()) for digits in content.split(","))
+            return Entry(f"{plain[:start]}[]{plain[end + 1 :]}", numbers, start, end + 1)
+    groups = list(re.finditer(r"\d+", plain))
+    if not groups:
+        return None
+    start, end = groups[-1].span()
+    return Entry(f"{plain[:start]}#{plain[end:]}", (_number(plain[start:end]),), start, end)
+
+
+class Place(NamedTuple):
+    """Where a column is in its array: how many columns that has; the column's indices from 0."""
+
+    columns: int
+    indices: tuple[int, ...]
+
+
+def places_of(names: Sequence[str]) -> dict[str, Place]:
+    """Return the places of numbered columns in their arrays.
+
+    Modelica and FMI count from 1, Python from 0: an array has the index 0 or it counts from 1. A
+    dimension of length 1, as in `q[1,1]` ... `q[4,1]`, is none.
+    """
+    arrays: dict[str, dict[str, tuple[int, ...]]] = {}
+    for name in names:
+        entry = entry_of(name)
+        if entry is not None:
+            arrays.setdefault(f"{entry.key} {len(entry.numbers)}", {})[name] = entry.numbers
+    places = {}
+    for columns in arrays.values():
+        dimensions = []
+        for numbers in zip(*columns.values(), strict=True):
+            is_counted = len(set(numbers)) > 1 or len(columns) == 1
+            dimensions.append((min(numbers) > 0, is_counted))
+        if not any(is_counted for _, is_counted in dimensions):
+            dimensions = [(is_from_1, True) for is_from_1, _ in dimensions]
+        for name, numbers in columns.items():
+            indices = []
+            for number, (is_from_1, is_counted) in zip(numbers, dimensions, strict=True):
+                if is_counted:
+                    indices.append(number - 1 if is_from_1 else number)
+            places[name] = Place(len(columns), tuple(indices))
+    return places
+
+
+def channel_from_name(
+    name: str, vector: int, known: Sequence[Channel], indices: Sequence[int] | None = None
+) -> Channel | None:
     """Return the channel that a column's name suggests, None where it suggests none.
 
     Parameters
     ----------
-    name : of the column, "rotor_deg", or of an array's column, "q[0]".
+    name : of the column, "rotor_deg", or of an array's column, "q[0]"; der(x) is the rate of x.
     vector : how many columns its array has, 0 where it is none: `q[0]` is the rotor where there is
         one per coordinate.
     known : `channels` or `mode_channels`.
+    indices : see `Place`; by default the numbers in the name, from 0 where they are in brackets.
     """
+    stripped = name.strip().strip("\"'").strip()
+    inner = _DERIVATIVE.fullmatch(split_unit(stripped)[0])
+    if inner:
+        return _rate_of(channel_from_name(inner[1], vector, known, indices), known)
+    channel = _channel_of_path(stripped, vector, known, indices)
+    folder, _, last = split_unit(stripped)[0].rpartition("/")
+    if channel is None and folder and last:
+        # What stands in "run/rates/rotor" is known by its last part, and the rate by another.
+        channel = _channel_of_path(last, vector, known, indices)
+        parts = {_array_name(part) for part in folder.split("/")}
+        if channel is not None and parts & set(_RATE_ARRAYS):
+            channel = _rate_of(channel, known) or channel
+    return channel
+
+
+def names_a_channel(name: str, known: Sequence[Channel]) -> bool:
+    """Whether a name is that of a channel, or of an array of channels."""
+    if channel_from_name(name, 0, known) is not None:
+        return True
+    array = _array_name(split_unit(name)[0].rpartition("/")[2])
+    for channel in known:
+        if array in _VECTORS.get(channel.kind, ()) or array in _load_arrays(channel):
+            return True
+    return False
+
+
+def _load_arrays(channel: Channel) -> tuple[str, ...]:
+    """Return the arrays of which a load may be a column: of all blades, of one; none of others."""
+    if not channel.is_load:
+        return ()
+    of_one = channel.name.rstrip("xyz ")
+    return _array_name(of_one.rstrip("0123456789 ")), _array_name(of_one)
+
+
+def _rate_of(channel: Channel | None, known: Sequence[Channel]) -> Channel | None:
+    """Return the rate of an angle; None of another channel."""
+    if channel is None or channel.kind != "angle":
+        return None
+    return _named(f"{channel.name} rate", known)
+
+
+def _array_name(name: str) -> str:
+    """Return the name of an array as it is compared: "Q_dot" is "qdot"."""
+    return re.sub(r"[\s_.]", "", name).lower()
+
+
+def _channel_of_path(
+    name: str, vector: int, known: Sequence[Channel], indices: Sequence[int] | None
+) -> Channel | None:
+    """Return the channel of a name of which nothing is left out; see `channel_from_name`."""
     plain = split_unit(name)[0].lower()
-    array, indices = _array_and_indices(name)
+    entry = entry_of(plain)
+    is_bracketed = entry is not None and plain[entry.start : entry.start + 1] == "["
     if known[0].name == SPEED:
-        return _mode_channel(plain, known, is_entry=bool(indices))
+        return _mode_channel(plain, known, is_entry=is_bracketed, indices=indices)
     openfast = _OPENFAST.fullmatch(plain)
     if openfast:
         return _openfast_load(openfast, known)
-    if indices:
-        return _array_channel(array, indices, vector, known)
+    if entry is not None:
+        if indices is None:
+            indices = entry.numbers
+            if not is_bracketed:
+                indices = [number - 1 for number in entry.numbers]
+        ends = plain[: entry.start].strip("_ .("), plain[entry.end :].strip("_ .)")
+        if is_bracketed or not ends[1]:
+            found = _array_channel(_array_name(ends[0] + ends[1]), indices, vector, known)
+            if found is not None:
+                return found
+        if len(indices) != 1:
+            return None
+        # From here on as the blade's number, which is counted from 1.
+        plain = f"{plain[: entry.start]} {indices[0] + 1} {plain[entry.end :]}"
     load = _named_load(plain, known)
     if load is not None:
         return load
-    letters, numbers = re.sub(r"[^a-z]", "", plain), re.findall(r"\d+", plain)
+    for ending, replacement in _MODELICA:
+        if plain.endswith(ending) and plain != ending:
+            plain = plain.removesuffix(ending) + replacement
+            break
+    letters, numbers = re.sub(r"[^a-z]", "", plain.removesuffix("(t)")), re.findall(r"\d+", plain)
     if letters in TIME_NAMES:
-        return known[0]
-    return _angle_or_rate(letters, numbers, known)
-
-
-def _array_and_indices(name: str) -> tuple[str, list[int]]:
-    """Return "q" and [0, 1] of "group/q[0,1]"; "" and [] where the name is no array's column."""
-    entry = re.fullmatch(r"(.*)\[([\d,]+)\]", name)
-    if entry is None:
-        return "", []
-    array = entry[1].rpartition("/")[2].strip().lower()
-    return array, [_number(digits) for digits in entry[2].split(",")]
+        return known[0] if not numbers else None
+    channel = _angle_or_rate(letters, numbers, known)
+    if channel is None or entry is None:
+        return channel
+    # Several rotors are the azimuths of blades; more pitches than blades may have the rotor first.
+    blades = sum(other.kind == "angle" for other in known) - 1
+    allowed = 1 if channel.name.startswith("rotor") else blades
+    return (
+        channel
+        if vector <= allowed or (not is_bracketed and channel.name.startswith("pitch"))
+        else None
+    )
 
 
 def _number(digits: str) -> int:
@@ -190,7 +337,9 @@ def _has_one_blade(known: Sequence[Channel]) -> bool:
     return _named("pitch 2", known) is None
 
 
-def _mode_channel(plain: str, known: Sequence[Channel], *, is_entry: bool) -> Channel | None:
+def _mode_channel(
+    plain: str, known: Sequence[Channel], *, is_entry: bool, indices: Sequence[int] | None
+) -> Channel | None:
     """Return the speed or a frequency; plain: the name without its unit."""
     letters, numbers = re.sub(r"[^a-z]", "", plain), re.findall(r"\d+", plain)
     if letters in SPEED_NAMES:
@@ -198,7 +347,9 @@ def _mode_channel(plain: str, known: Sequence[Channel], *, is_entry: bool) -> Ch
     number = 1
     if numbers:
         number = _number(numbers[-1])
-        if is_entry:
+        if indices is not None:
+            number = 1 + (indices[0] if len(indices) == 1 else _BEYOND_INDICES)
+        elif is_entry:
             number += 1  # indices begin with 0
     for kind, names in FREQUENCY_NAMES.items():
         if letters in names and plain != "mode":  # a column "mode" alone numbers them
@@ -221,13 +372,15 @@ def _array_channel(
     array: str, indices: Sequence[int], vector: int, known: Sequence[Channel]
 ) -> Channel | None:
     """Return the channel of an array's column, if the array has as many columns as channels."""
-    fitting = [channel for channel in known if array in VECTOR_NAMES.get(channel.kind, ())]
+    fitting = [channel for channel in known if array in _VECTORS.get(channel.kind, ())]
+    if fitting and len(indices) != 1:
+        return None
     if not fitting and array:
-        fitting = [channel for channel in known if channel.key.startswith(f"{array}_")]
+        fitting = [channel for channel in known if array in _load_arrays(channel)]
     place = indices[0]
     if len(indices) == 2:
         place = 3 * indices[0] + indices[1]  # blades and axes
-    if len(fitting) != vector or place >= vector:
+    if len(fitting) != vector or not 0 <= place < vector or max(indices) >= vector:
         return None
     return fitting[place]
 
@@ -278,10 +431,18 @@ def _angle_or_rate(
 def split_unit(name: str) -> tuple[str, str]:
     """Return name and unit of a column whose name ends in a unit.
 
-    >>> split_unit("pitch_1_rate_deg_s"), split_unit("rotor")
-    (('pitch_1_rate', 'deg/s'), ('rotor', ''))
+    >>> split_unit("pitch_1_rate_deg_s"), split_unit("rotor in rad"), split_unit("rotor")
+    (('pitch_1_rate', 'deg/s'), ('rotor', 'rad'), ('rotor', ''))
     """
-    match = _UNIT_ENDING.search(name)
+    stem, unit = split_bracketed_unit(name)
+    if unit:
+        return stem, unit
+    for divider in (" in ", ","):
+        stem, _, unit = name.rpartition(divider)
+        if stem.strip() and len(unit) < 40 and is_unit(unit):
+            return stem.strip(), unit.strip()
+    match = _UNIT_ENDING.search(name[-40:])
     if match is None:
         return name, ""
-    return name[: match.start()], re.sub("_(?:per_)?s$", "/s", match[1].lower())
+    stem = name[: len(name) - len(match[0])]
+    return stem, re.sub("_(?:per_)?s$", "/s", match[1].lower())

@@ -3,131 +3,181 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from decimal import Decimal
+from numbers import Real
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from rotor_mbs.comparison.units import is_unit, plain_unit, unit_of_attributes
 from rotor_mbs.errors import InputError
-
-# By dimension: factor to s, rad or rad/s.
-_ANGLES = {
-    **dict.fromkeys(("rad", "radian", "radians"), 1.0),
-    **dict.fromkeys(("deg", "degree", "degrees", "°"), math.pi / 180.0),
-    **dict.fromkeys(("turn", "turns", "rev", "revolutions"), 2.0 * math.pi),
-}
-_TIMES = {
-    **dict.fromkeys(("s", "sec", "second", "seconds"), 1.0),
-    "ms": 1e-3,
-    "us": 1e-6,
-    "µs": 1e-6,
-    "min": 60.0,
-}
-_PER_SECOND = ("/s", "/sec", " s-1")
-_RATES = {f"{unit}{per}": factor for unit, factor in _ANGLES.items() for per in _PER_SECOND}
-_RATES |= dict.fromkeys(("rpm", "rev/min", "r/min"), math.pi / 30.0) | {"hz": 2.0 * math.pi}
-_FORCES = {"n": 1.0, "kn": 1e3}
-_TIMES_METRE = (" m", "m", "-m", "*m", "·m", ".m")
-_MOMENTS = {f"{unit}{metre}": factor for unit, factor in _FORCES.items() for metre in _TIMES_METRE}
-UNITS = {
-    "time": _TIMES,
-    "angle": _ANGLES,
-    "rate": _RATES,
-    "frequency": _RATES,
-    "force": _FORCES,
-    "moment": _MOMENTS,
-}
-ALLOWED_UNITS = {
-    "time": "s, ms, us, min",
-    "angle": "rad, deg, turns",
-    "rate": "rad/s, deg/s, turns/s, rpm",
-    "frequency": "rad/s, Hz",
-    "force": "N, kN",
-    "moment": "N m, kN m",
-}
-BASE_UNITS = {
-    "time": "s",
-    "angle": "rad",
-    "rate": "rad/s",
-    "frequency": "rad/s",
-    "force": "N",
-    "moment": "N m",
-}
 
 MAX_COLUMNS = 100_000  # of a file: wide results of a finite-element program have some thousands
 MAX_NAME = 200  # characters: longer names are cut, so that messages and pages stay readable
 _MAX_SHOWN = 12  # names that a message lists
 _MAX_SHOWN_NAME = 60  # characters of each
+_MAX_SHOWN_VALUE = 40  # characters of what is no number
 
 
 class DataColumn(NamedTuple):
-    """A column: (n,) numbers, and the unit that the file states, "" where it states none."""
+    """A column of numbers.
+
+    Attributes
+    ----------
+    values : (n,) as they stand in the file, NaN where one is missing.
+    unit : that the file states, "" where it states none.
+    step : between numbers that are packed as integers, in the same unit; 0 where they are not.
+    """
 
     values: NDArray[np.float64]
     unit: str = ""
+    step: float = 0.0
+
+
+class LeftOut(NamedTuple):
+    """Why something in a file is no column of numbers.
+
+    Attributes
+    ----------
+    reason : in words, "row 3 has 'x', no number".
+    is_column : whether it is a column for all that, which may have been meant to be a channel.
+    """
+
+    reason: str
+    is_column: bool = False
 
 
 @dataclass(frozen=True)
 class DataTable:
-    """The columns of a file by name, in the order of the file; source: what messages call it."""
+    """The columns of a file.
+
+    Attributes
+    ----------
+    source : what messages call the file.
+    columns : by name, in the order of the file.
+    left_out : by name what else is in the file.
+    """
 
     source: str
     columns: Mapping[str, DataColumn]
+    left_out: Mapping[str, LeftOut] = field(default_factory=dict)
 
     def __getitem__(self, name: str) -> DataColumn:
         """Return a column. Raises InputError, with the columns that there are."""
+        if name in self.left_out:
+            raise self.refusal(name)
         if name not in self.columns:
             available = shown_names(list(self.columns))
             raise InputError(f"{self.source}: no column {name!r}; available: {available}")
         return self.columns[name]
 
+    def refusal(self, name: str) -> InputError:
+        """Return the error for a column that is needed and has no numbers."""
+        column = f"column {name!r}: {self.left_out[name].reason}"
+        return InputError(f"{self.source}: {column}; allowed: numbers, a row for every time")
+
+
+def arrays_of(data: Any) -> tuple[dict[str, Any], dict[str, str]]:
+    """Return arrays and their units by name from a mapping, a DataFrame or a Dataset.
+
+    Names of two levels are joined: a unit in the last level is the unit, other levels are parts of
+    a path. The index of a DataFrame is a column, unless it counts the rows; without a name, times
+    or numbers that are not whole are the time. Of a Dataset also the coordinates are arrays.
+    """
+    arrays: dict[str, Any] = {}
+    units: dict[str, str] = {}
+    index = getattr(data, "index", None)
+    if index is not None and hasattr(index, "names") and type(index).__name__ != "RangeIndex":
+        for level, name in enumerate(index.names):
+            values = np.asarray(index.get_level_values(level))
+            label = "time" if values.dtype.kind in "fm" and len(index.names) == 1 else "index"
+            arrays[label if name is None else str(name)] = values
+    # The time of an xarray.Dataset is a coordinate, which `items` leaves out.
+    for name, values in [*dict(getattr(data, "coords", {})).items(), *data.items()]:
+        label, unit = _joined(name)
+        if label in arrays:
+            label = f"{label} (column {len(arrays) + 1})"
+        arrays[label] = values
+        unit = unit_of_attributes(getattr(values, "attrs", {})) or unit
+        if unit:
+            units[label] = unit
+    return arrays, units
+
+
+def _joined(name: object) -> tuple[str, str]:
+    """Return name and unit of a column whose name may have several levels."""
+    if not isinstance(name, tuple):
+        return str(name), ""
+    levels = [str(level).strip() for level in name]
+    unit = ""
+    if len(levels) > 1 and (is_unit(levels[-1]) or not plain_unit(levels[-1])):
+        unit = levels.pop()
+    return "/".join(level for level in levels if level), unit
+
 
 def table_of(
-    source: str, arrays: Mapping[str, Any], units: Mapping[str, str] | None = None
+    source: str,
+    arrays: Mapping[str, Any],
+    units: Mapping[str, str] | None = None,
+    steps: Mapping[str, float] | None = None,
 ) -> DataTable:
     """Return arrays by name as columns.
 
     An array of two dimensions (n, k) becomes the columns `name[0]` ... `name[k-1]`, one of three
     (n, j, k) the columns `name[0,0]` ... `name[j-1,k-1]`. An array (k, n) beside others of length n
     is transposed, as MATLAB's arrays are where HDF5 stores them. What is no numbers, is a single
-    number, or has more dimensions is left out.
+    number, or has more dimensions is in `left_out`.
 
     Parameters
     ----------
     source : what messages call the data.
     arrays : arrays, or what NumPy makes arrays of; masked values become NaN.
     units : units by the name of the array; by default a unit in brackets behind the name.
+    steps : of packed arrays by name, see `DataColumn`.
 
     Raises
     ------
     InputError
         If there are no columns of numbers, or more than `MAX_COLUMNS`.
     """
-    try:
-        plain_arrays = {name: _unmasked(values) for name, values in arrays.items()}
-    except ValueError as exc:
-        allowed = "arrays (n,) and (n, columns)"
-        raise InputError(f"{source}: rows of different lengths; allowed: {allowed}") from exc
+    numeric: dict[str, NDArray[Any]] = {}
+    left_out: dict[str, LeftOut] = {}
+    stated = dict(units or {})
+    for name, values in arrays.items():
+        try:
+            numeric[name], unit = _numbers(values)
+        except _NotNumbersError as exc:
+            left_out[name] = exc.left_out
+            continue
+        if unit:
+            stated[name] = unit
     # A single row, of one speed, is a column of length 1; otherwise dimensions of length 1 are
     # MATLAB's.
-    is_single_row = any(values.shape == (1,) for values in plain_arrays.values())
-    numeric: dict[str, NDArray[Any]] = {}
-    for name, values in plain_arrays.items():
+    is_single_row = any(values.shape == (1,) for values in numeric.values())
+    for name, values in list(numeric.items()):
         squeezed = values if is_single_row and values.shape[:1] == (1,) else np.squeeze(values)
-        if squeezed.dtype.kind in "fiu" and 0 < squeezed.ndim < 4:
-            numeric[name] = squeezed
+        numeric[name] = squeezed
+        if squeezed.ndim == 0 or squeezed.ndim > 3 or not squeezed.size:
+            shape = " x ".join(map(str, values.shape))
+            reason = f"an array of {shape}" if squeezed.ndim or not squeezed.size else "one number"
+            left_out[name] = LeftOut(reason)
+            del numeric[name]
     rows = 0  # of the columns, as the arrays of one dimension have them
     for values in numeric.values():
         if values.ndim == 1:
             rows = max(rows, values.size)
     columns: dict[str, DataColumn] = {}
     for name, values in numeric.items():
-        plain_name, stated = split_bracketed_unit(name)
-        unit = (units or {}).get(name, stated)
+        plain_name, unit = split_bracketed_unit(name)
+        if plain_name in columns:  # "a [m]" beside "a [s]"
+            plain_name = name
+        unit = stated.get(name, unit)
+        step = (steps or {}).get(name, 0.0)
         if values.ndim == 1:
-            columns[plain_name] = DataColumn(values.astype(float), unit)
+            columns[plain_name] = DataColumn(values.astype(float), unit, step)
             continue
         is_transposed = values.shape[-1] == rows != values.shape[0]
         oriented = values.T if is_transposed else values
@@ -137,25 +187,84 @@ def table_of(
             raise InputError(f"{source}: {problem}; allowed: up to {MAX_COLUMNS} in all")
         for place in np.ndindex(oriented.shape[1:]):
             label = f"{plain_name}[{','.join(map(str, place))}]"
-            columns[label] = DataColumn(oriented[:, *place].astype(float), unit)
+            columns[label] = DataColumn(oriented[:, *place].astype(float), unit, step)
     if not columns:
         allowed = "a time and angles, as columns or arrays"
         raise InputError(f"{source}: no columns of numbers in it; allowed: {allowed}")
-    return DataTable(source, columns)
+    return DataTable(source, columns, left_out)
 
 
-def _unmasked(values: Any) -> NDArray[Any]:
-    """Return values as an array, NaN where they are masked."""
+class _NotNumbersError(Exception):
+    """Raised for values that are no numbers."""
+
+    def __init__(self, reason: str, *, is_column: bool) -> None:
+        super().__init__(reason)
+        self.left_out = LeftOut(reason, is_column)
+
+
+def _numbers(values: Any) -> tuple[NDArray[Any], str]:
+    """Return values as an array of numbers, NaN where one is missing, and the unit of durations.
+
+    Raises
+    ------
+    _NotNumbersError
+        With the row of the first value that is none.
+    """
     if np.ma.isMaskedArray(values):
-        return np.asarray(np.ma.filled(values.astype(float), np.nan))
-    return np.asarray(values)
+        values = np.ma.filled(values.astype(float), np.nan)
+    try:
+        array = np.asarray(values)
+    except (ValueError, TypeError) as exc:
+        raise _NotNumbersError("rows of different lengths", is_column=True) from exc
+    if array.dtype.kind in "fiu":
+        return array, ""
+    if array.dtype.kind == "m":
+        seconds = array / np.timedelta64(1, "s")
+        return seconds, "s"
+    if array.dtype.kind == "O":
+        return _numbers_of_objects(array), ""
+    names = {"M": "dates", "b": "true or false", "c": "complex numbers", "V": "records"}
+    if array.dtype.kind in names:
+        raise _NotNumbersError(f"{names[array.dtype.kind]}, no numbers", is_column=array.ndim > 0)
+    if array.ndim == 0 or not array.size:
+        raise _NotNumbersError("a text", is_column=False)
+    raise _NotNumbersError(_shown_value(1, array.flat[0]), is_column=True)
+
+
+def _numbers_of_objects(array: NDArray[Any]) -> NDArray[np.float64]:
+    """Return numbers from an array of objects, NaN for None. Raises _NotNumbersError."""
+    numbers = np.empty(array.size)
+    width = math.prod(array.shape[1:]) or 1
+    for i, value in enumerate(array.flat):
+        # pandas.NA and NaT are of types that NumPy does not know.
+        if value is None or type(value).__name__ in ("NAType", "NaTType"):
+            numbers[i] = np.nan
+            continue
+        is_number = isinstance(value, Real | Decimal) and not isinstance(value, bool | np.bool_)
+        if not is_number:
+            reason = _shown_value(i // width + 1, value)
+            if isinstance(value, list | tuple | np.ndarray):
+                reason = "rows of different lengths"
+            raise _NotNumbersError(reason, is_column=array.ndim > 0 and not isinstance(value, dict))
+        try:
+            numbers[i] = float(value)
+        except OverflowError:  # a whole number of more than 308 digits
+            numbers[i] = np.inf
+    return numbers.reshape(array.shape)
+
+
+def _shown_value(row: int, value: object) -> str:
+    """Return "row 3 has 'x', no number"."""
+    text = value.decode("latin-1") if isinstance(value, bytes) else str(value)
+    return f"row {row} has {text[:_MAX_SHOWN_VALUE]!a}, no number"
 
 
 def split_bracketed_unit(name: str) -> tuple[str, str]:
     """Return name and unit of "rotor [deg]", "rotor (deg)" or "rotor / deg"; "" for no unit.
 
-    A number in brackets is an index: "q[0]" has no unit. Linear in the length of the name, which
-    may be any.
+    Numbers in brackets are indices, and what stands in round brackets directly behind a word and is
+    no unit is what a function is of: "q[1,1]" and "der(phi)" have no unit. Linear in the length of
+    the name, which may be any.
 
     >>> split_bracketed_unit("rotor [deg]"), split_bracketed_unit("t / s")
     (('rotor', 'deg'), ('t', 's'))
@@ -168,9 +277,18 @@ def split_bracketed_unit(name: str) -> tuple[str, str]:
         return text, ""
     end, unit = min(units)
     stem = text[:end].strip()
-    if not stem or unit.isdigit():
+    if not stem or _is_argument(text, end, stem, unit):
         return text, ""
     return stem, unit
+
+
+def _is_argument(text: str, end: int, stem: str, unit: str) -> bool:
+    """Whether what stands in the brackets at `end` is an index or what a function is of."""
+    if unit and all(character.isdigit() or character in ", " for character in unit):
+        return True
+    if text[end] != "(" or text[end - 1].isspace():
+        return False
+    return stem.rpartition("/")[2].lower() == "der" or not is_unit(unit)
 
 
 def _bracketed(text: str) -> tuple[int, str] | None:
@@ -196,7 +314,7 @@ def _behind_stroke(text: str) -> tuple[int, str] | None:
     return None
 
 
-def shown_names(names: list[str]) -> str:
+def shown_names(names: Sequence[str]) -> str:
     """Return the first names as a message can list them."""
     shown = []
     for name in names[:_MAX_SHOWN]:

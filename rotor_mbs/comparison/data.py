@@ -9,16 +9,17 @@ from __future__ import annotations
 import math
 import os
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rotor_mbs.comparison.channels import SPEED, Channel
-from rotor_mbs.comparison.columns import UNITS, DataTable, table_of
+from rotor_mbs.comparison.columns import DataTable, arrays_of, table_of
 from rotor_mbs.comparison.files import read_table
 from rotor_mbs.comparison.mapping import ColumnMapping, DataMapping, find_channels, read_mapping
+from rotor_mbs.comparison.units import unit_factor
 from rotor_mbs.errors import InputError
 from rotor_mbs.scenario.scene import Scene
 
@@ -46,8 +47,9 @@ class ForeignData:
     channels : what the columns of `values` are.
     rounding, time_rounding : (n, channels), (n,) half a unit in the last digit of each number, as
         it was written.
-    read, unused : a line for each channel: column, unit, and what was assumed; names of the other
-        columns.
+    read, unused : a line for each channel: column, unit, and what was assumed; by name of every
+        other column, why it is not compared.
+    loads_left_out : names of the loads among these that are not omitted.
     wrapped : for each channel, whether whole turns are missing from it.
     precision : "4 decimals: rounding error 5e-05", or the like of digits; "" of numbers with hardly
         any rounding.
@@ -62,7 +64,8 @@ class ForeignData:
     rounding: Array
     time_rounding: Array
     read: tuple[str, ...] = ()
-    unused: tuple[str, ...] = ()
+    unused: Mapping[str, str] = field(default_factory=dict)
+    loads_left_out: tuple[str, ...] = ()
     wrapped: tuple[bool, ...] = ()
     precision: str = ""
     omitted: tuple[str, ...] = ()
@@ -129,9 +132,7 @@ def load_data(
     if isinstance(data, str | os.PathLike):
         table = read_table(data, mapping.group, scene.name)
     elif hasattr(data, "items"):
-        # The time of an xarray.Dataset is a coordinate, which `items` leaves out.
-        coordinates = getattr(data, "coords", {})
-        table = table_of("data", {**coordinates, **dict(data.items())})
+        table = table_of("data", *arrays_of(data))
     else:
         allowed = 'a file, or arrays by name, such as {"time": run.time, "angles": run.angles}'
         raise InputError(f"data: {type(data).__name__}; allowed: {allowed}")
@@ -156,11 +157,13 @@ def data_of_table(
         For columns that cannot be channels of one trajectory, or one table of modes.
     """
     mapping = mapping or DataMapping()
-    sources, lines = find_channels(table, scene, mapping)
+    found = find_channels(table, scene, mapping)
+    sources = found.sources
     _refuse_different_lengths(table, sources)
     columns = [table[source.column].values for source in sources.values()]
     arrays = [_si_values(table, channel, source) for channel, source in sources.items()]
-    rounding, precision = _rounding_of_columns(sources, columns)
+    steps = [table[source.column].step for source in sources.values()]
+    rounding, precision = _rounding_of_columns(sources, columns, steps)
     is_modes = next(iter(sources)).name == SPEED
     if is_modes:
         order = np.argsort(arrays[0], kind="stable")
@@ -178,7 +181,6 @@ def data_of_table(
         is_usual = np.abs(intervals - usual) <= _EQUAL * usual
         if is_usual.mean() >= _MOSTLY:
             rounding[0] = np.abs(arrays[0]) * 2.0**-53
-    used = {source.column for source in sources.values()}
     return ForeignData(
         source=table.source,
         time=arrays[0],
@@ -186,13 +188,19 @@ def data_of_table(
         channels=tuple(sources)[1:],
         rounding=np.stack(rounding[1:], axis=1),
         time_rounding=rounding[0],
-        read=lines,
-        unused=tuple(name for name in table.columns if name not in used),
+        read=found.lines,
+        unused=found.unused,
+        loads_left_out=found.loads_left_out,
         wrapped=tuple(source.wrapped for source in sources.values())[1:],
         precision=precision,
         omitted=mapping.omitted,
         is_modes=is_modes,
     )
+
+
+def _factor(channel: Channel, source: ColumnMapping) -> float:
+    """Return the factor of a column's unit, which is known to be one of its channel's."""
+    return unit_factor(source.unit, channel.kind) or 1.0
 
 
 def _refuse_different_lengths(table: DataTable, sources: Mapping[Channel, ColumnMapping]) -> None:
@@ -209,7 +217,7 @@ def _refuse_different_lengths(table: DataTable, sources: Mapping[Channel, Column
 def _si_values(table: DataTable, channel: Channel, source: ColumnMapping) -> Array:
     """Return a channel in SI units, (n,). Raises InputError where it is not finite."""
     values = table[source.column].values
-    factor = UNITS[channel.kind][source.unit.lower()]
+    factor = _factor(channel, source)
     si_values: Array = source.sign * (values + source.offset) * factor
     bad = np.flatnonzero(~np.isfinite(si_values))
     if len(bad):
@@ -240,7 +248,7 @@ def _refuse_wrong_times(source: str, time: Array) -> None:
 
 
 def _rounding_of_columns(
-    sources: Mapping[Channel, ColumnMapping], columns: Sequence[Array]
+    sources: Mapping[Channel, ColumnMapping], columns: Sequence[Array], steps: Sequence[float]
 ) -> tuple[list[Array], str]:
     """Find the rounding of all columns, the time or speed first.
 
@@ -248,6 +256,7 @@ def _rounding_of_columns(
     ----------
     sources : by channel, with its unit.
     columns : (n,) numbers of each, as they were written.
+    steps : between packed numbers of each, see `DataColumn`.
 
     Returns
     -------
@@ -258,7 +267,7 @@ def _rounding_of_columns(
     factors = []
     kinds = []
     for channel, source in sources.items():
-        factors.append(UNITS[channel.kind][source.unit.lower()])
+        factors.append(_factor(channel, source))
         kinds.append((channel.kind, source.unit))
     del kinds[0]  # of the time
     rounding = [rounding_of_printed(time)]
@@ -271,6 +280,7 @@ def _rounding_of_columns(
         # Frequencies are computed, not chosen: few of them say something of digits, too.
         min_distinct = 1 if kind[0] == "frequency" else _MIN_DISTINCT
         rounding.append(rounding_of_printed(values, [alike, numbers], min_distinct))
+    rounding = [np.maximum(last, 0.5 * step) for last, step in zip(rounding, steps, strict=True)]
     precision = _precision(numbers, rounding[1:])
     in_si_units = [each * abs(factor) for each, factor in zip(rounding, factors, strict=True)]
     return in_si_units, precision

@@ -1,5 +1,8 @@
 """Which library reads which format: the work of the process that `comparison.files` starts.
 
+pandas reads text and JSON, pymatreader and SciPy MAT files, SciPy netCDF-3, xarray decodes what the
+CF conventions say of arrays in netCDF and HDF5. Ours are the headers of OpenFAST and Exudyn.
+
 A file may be damaged, or made to harm: what it claims to hold is bounded before it is read, and the
 process has limits of memory and time for what no check foresees. No regular expression here takes
 longer than a constant times the length of its text.
@@ -8,13 +11,15 @@ longer than a constant times the length of its text.
 from __future__ import annotations
 
 import csv
+import io
+import itertools
 import json
 import math
 import re
 import struct
 import warnings
 import zipfile
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -24,12 +29,14 @@ from numpy.typing import NDArray
 from rotor_mbs.comparison.columns import (
     MAX_COLUMNS,
     MAX_NAME,
-    UNITS,
     DataColumn,
     DataTable,
+    LeftOut,
+    arrays_of,
     split_bracketed_unit,
     table_of,
 )
+from rotor_mbs.comparison.units import unit_factor, unit_of_attributes
 from rotor_mbs.errors import InputError, RotorError
 
 # Of a file, and of its arrays unpacked; a million rows of ten columns are 80 MB.
@@ -37,19 +44,38 @@ MAX_BYTES = 1 << 29
 _MAX_PROBLEM = 2000  # characters of a message, which may name groups of the file
 FORMATS = "text with a header, .json, .npz, .mat, HDF5, netCDF, OpenFAST .out and .outb"
 _HDF5, _NETCDF3 = b"\x89HDF\r\n\x1a\n", b"CDF"
-_ZIP, _MATLAB_5 = b"PK\x03\x04", b"MATLAB 5.0 MAT-file"
+_ZIP, _MATLAB_5, _MATLAB_73 = b"PK\x03\x04", b"MATLAB 5.0 MAT-file", b"MATLAB 7.3 MAT-file"
 _MATLAB_NUMBERS = {
     "double", "single", "logical", "int8", "int16", "int32", "int64", "uint8", "uint16", "uint32",
     "uint64",
 }  # fmt: skip
 _UTF_16 = (b"\xff\xfe", b"\xfe\xff")  # spreadsheets' "Unicode text"
+# What the netCDF library writes into rows that were never written, where a file states no other.
+_DEFAULT_FILL = {
+    "f4": 9.969209968386869e36,
+    "f8": 9.969209968386869e36,
+    "i1": -127,
+    "i2": -32767,
+    "i4": -2147483647,
+    "i8": -9223372036854775806,
+}
+_MAX_PARTS = 10_000  # arrays, cells and fields of a MAT or JSON file that are looked at
 
-# Text: comma-separated values, columns divided by blanks, Exudyn's sensor files, OpenFAST's `.out`.
+# Text: comma-separated values, columns divided by blanks, Exudyn's files, OpenFAST's `.out`.
 _COMMENT = ("#", "%", "//", "!")
 _DIVIDERS = (";", "\t", ",", None)  # None: blanks
 _EXUDYN = re.compile(r"OutputVariableType = (\w+)")
+# Exudyn's solution file: how many columns it has of each kind, behind the time.
+_EXUDYN_SOLUTION = re.compile(r"written coordinates \[[^\]]*\] = \[([\d, ]+)\]")
+_EXUDYN_KINDS = (
+    "coordinates", "coordinates_t", "accelerations", "ode1", "ode1_t", "algebraic", "data",
+)  # fmt: skip
 _DECIMAL_COMMA = re.compile(r"[+-]?\d*,\d+(?:[eE][+-]?\d+)?")
 _FORTRAN = re.compile(r"(?<=[\d.])[dD](?=[+-]?\d)")  # 1.5D-03
+_FORTRAN_3_DIGITS = re.compile(r"(?<=[\d.])(?=[+-]\d{3}$)")  # 0.123456-101: no room for the E
+# What programs write where they have no number; a row with it may be the first one.
+_MISSING = re.compile(r"\*+|-+|\?|#?n/?a!?|null|none|missing|nil", re.IGNORECASE)
+_MAX_SEARCHED = 200  # lines in which a header is looked for where some columns are texts
 
 Arrays = Mapping[str, Any]
 Units = Mapping[str, str]
@@ -76,9 +102,9 @@ def read_in_worker(arguments: tuple[Path, str, str]) -> DataTable:
         with warnings.catch_warnings(action="ignore"):
             table = read_columns(path, group, scene)
         columns = {}
-        for name, column in _short_names(table.columns).items():
-            columns[name] = DataColumn(column.values, column.unit[:MAX_NAME])
-        return DataTable(table.source, columns)
+        for label, column in _short_names(table.columns).items():
+            columns[label] = DataColumn(column.values, column.unit[:MAX_NAME], column.step)
+        return DataTable(table.source, columns, _short_names(table.left_out))
     except RotorError as exc:
         problems = [line[:_MAX_PROBLEM] for line in str(exc).splitlines()]
     except MemoryError:
@@ -96,12 +122,12 @@ def _line(exc: BaseException) -> str:
     return lines[0][:200] if lines else type(exc).__name__
 
 
-def _short_names(columns: Mapping[str, DataColumn]) -> dict[str, DataColumn]:
+def _short_names(by_name: Mapping[str, Any]) -> dict[str, Any]:
     """Cut names that are too long for messages and pages; they stay distinct."""
     short = {}
-    for number, (name, column) in enumerate(columns.items(), start=1):
+    for number, (name, value) in enumerate(by_name.items(), start=1):
         label = name if len(name) <= MAX_NAME else f"{name[:MAX_NAME]}... (column {number})"
-        short[label] = column
+        short[label] = value
     return short
 
 
@@ -123,15 +149,17 @@ def read_columns(path: Path, group: str, scene: str) -> DataTable:
     source = str(path)
     if head.startswith(_ZIP):
         return table_of(source, _numpy_archive(path))
-    if head.startswith(_MATLAB_5):
-        return table_of(source, _matlab_5(path))
+    # The version and the order of bytes stand at the end of MATLAB's text.
+    is_matlab_73 = head.startswith(_MATLAB_73) and head[124:128] in (b"\x00\x02IM", b"\x02\x00MI")
+    if head.startswith(_MATLAB_5) or _is_matlab_4(head) or is_matlab_73:
+        return table_of(source, _matlab(path, is_hdf5=is_matlab_73))
     if head.startswith(_NETCDF3):
-        return table_of(source, *_netcdf_3(path))
+        return _decoded(source, *_netcdf_3(path))
     if path.suffix.lower() == ".outb":
         return table_of(source, *_openfast(path))
     # MATLAB's v7.3 has 512 bytes of its own before.
     if head.startswith(_HDF5) or head[512:].startswith(_HDF5):
-        return table_of(source, *_hdf5(path, group, scene))
+        return _hdf5(path, group, scene)
     if b"\x00" in head and not head.startswith(_UTF_16):
         raise InputError(f"{path}: not a format that can be read; allowed: {FORMATS}")
     content = path.read_bytes()
@@ -140,9 +168,8 @@ def read_columns(path: Path, group: str, scene: str) -> DataTable:
     except UnicodeDecodeError:
         text = content.decode("latin-1")
     del content
-    if text.lstrip().startswith("{"):  # JSON: arrays by name
-        arrays = {name: np.asarray(values) for name, values in json.loads(text).items()}
-        return table_of(source, arrays)
+    if _is_json(text):
+        return table_of(source, *_json(text))
     return _read_text(source, text)
 
 
@@ -154,44 +181,142 @@ def _refuse_large(path: Path, size: float) -> None:
 
 
 def _numpy_archive(path: Path) -> Arrays:
-    """Read the arrays of an .npz file."""
+    """Read the arrays of an .npz file; those of objects are named by what they are."""
     # An entry is read to the size that the archive declares for it, and no further.
     with zipfile.ZipFile(path) as entries:
         _refuse_large(path, sum(entry.file_size for entry in entries.infolist()))
+    arrays: dict[str, Any] = {}
     with path.open("rb") as file, np.load(file, allow_pickle=False) as archive:
-        return {name: archive[name] for name in archive.files}
+        for name in archive.files:
+            try:
+                arrays[name] = archive[name]
+            except ValueError as exc:
+                if "allow_pickle" not in str(exc):
+                    raise
+                arrays[name] = ["objects of Python"] * 2  # pickles, which are programs
+    return arrays
 
 
-def _matlab_5(path: Path) -> Arrays:
-    """Read the arrays of numbers of a MAT file of version 5 to 7."""
-    from scipy.io import loadmat, whosmat  # late: 0.1 s
-
-    # The heads of the arrays alone are unpacked for this; structures and cells are not read at all.
-    numeric = {name: shape for name, shape, kind in whosmat(path) if kind in _MATLAB_NUMBERS}
-    _refuse_large(path, sum(8.0 * math.prod(shape) for shape in numeric.values()))
-    arrays = loadmat(path, variable_names=list(numeric)) if numeric else {}
-    return {name: values for name, values in arrays.items() if not name.startswith("__")}
+# MAT files
 
 
-def _netcdf_3(path: Path) -> tuple[Arrays, Units]:
-    """Read the variables of a netCDF-3 file and their units; path: the file."""
+def _is_matlab_4(head: bytes) -> bool:
+    """Whether a file begins with the head of an array as MATLAB 4 writes it.
+
+    Five whole numbers: machine, precision and kind as decimal digits; rows, columns, whether it is
+    complex, length of the name.
+    """
+    if len(head) < 20:
+        return False
+    for order in "<>":
+        kind, rows, columns, is_complex, length = struct.unpack(f"{order}5i", head[:20])
+        digits = kind // 1000, kind // 100 % 10, kind // 10 % 10, kind % 10
+        is_kind = digits[0] in (0, 1) and not digits[1] and digits[2] < 6 and digits[3] < 3
+        if is_kind and min(rows, columns) > 0 and is_complex in (0, 1) and 1 < length < 100:
+            return True
+    return False
+
+
+def _matlab(path: Path, *, is_hdf5: bool) -> Arrays:
+    """Read a MAT file of any version; fields of structures are named "structure/field".
+
+    Parameters
+    ----------
+    path : the file.
+    is_hdf5 : whether it is of version 7.3.
+    """
+    from pymatreader import read_mat  # late: 0.2 s
+    from scipy.io import whosmat
+
+    if is_hdf5:
+        from rotor_mbs.runs.table import refuse_claims
+
+        refuse_claims(path, MAX_BYTES)
+    else:
+        # The heads of the arrays alone are unpacked for this, not those of structures and cells.
+        shapes = [shape for _, shape, kind in whosmat(path) if kind in _MATLAB_NUMBERS]
+        _refuse_large(path, sum(8.0 * math.prod(shape) for shape in shapes))
+    content = read_mat(str(path))
+    names = [name for name in content if not (name.startswith("__") or name == "#refs#")]
+    return dict(_parts("", {name: content[name] for name in names}))
+
+
+def _parts(path: str, value: Any) -> Iterator[tuple[str, Any]]:
+    """Yield what is nested, by path: "out/q", "cells/1"; at most `_MAX_PARTS`."""
+    yield from itertools.islice(_all_parts(path, value), _MAX_PARTS)
+
+
+def _all_parts(path: str, value: Any) -> Iterator[tuple[str, Any]]:
+    """Yield the arrays of nested mappings and lists of anything but numbers."""
+    prefix = f"{path}/" if path else ""
+    if isinstance(value, Mapping):
+        fields = dict(value)
+        # Simulink's "structure with time": the values of a signal have the name of its label.
+        if "time" in fields and isinstance(fields.get("signals"), Mapping):
+            signals = fields.pop("signals")
+            yield from _signals(prefix, signals)
+        for name, field in fields.items():
+            yield from _all_parts(f"{prefix}{name}", field)
+        return
+    if isinstance(value, np.ndarray) and value.dtype.kind == "O":
+        value = list(value.flat)
+    if isinstance(value, list) and any(np.ndim(_sample(part)) for part in value[:_MAX_PARTS]):
+        if all(isinstance(part, list) for part in value):
+            yield path, value  # rows of numbers, as JSON has them
+            return
+        for number, part in enumerate(value, start=1):
+            yield from _all_parts(f"{prefix}{number}", part)
+        return
+    yield path, value
+
+
+def _sample(value: Any) -> Any:
+    """Return a list for what has parts, a number for what has none."""
+    return [0] if isinstance(value, list | dict | np.ndarray) and len(value) else 0
+
+
+def _signals(prefix: str, signals: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
+    """Yield the values of Simulink's signals by their labels."""
+    values, labels = signals.get("values"), signals.get("label", "")
+    if not isinstance(values, list):
+        values, labels = [values], [labels]
+    for number, part in enumerate(values):
+        label = labels[number] if isinstance(labels, list) and number < len(labels) else labels
+        name = label if isinstance(label, str) and label else f"signals/{number + 1}"
+        yield f"{prefix}{name}", part
+
+
+# netCDF and HDF5
+
+
+def _netcdf_3(path: Path) -> tuple[Arrays, Mapping[str, Mapping[str, Any]]]:
+    """Read the variables of a netCDF-3 file and their attributes; path: the file."""
     from scipy.io import netcdf_file
 
+    from rotor_mbs.runs.table import ARRAY_ATTRIBUTES
+
     arrays: dict[str, Any] = {}
-    units: dict[str, str] = {}
+    attributes: dict[str, dict[str, Any]] = {}
     # Variables are views of the file, until they are copied: several may be views of the same
     # bytes.
-    with netcdf_file(path, "r", mmap=True) as file:
+    with netcdf_file(path, "r", mmap=True, maskandscale=False) as file:
         sizes = [8.0 * math.prod(variable.shape) for variable in file.variables.values()]
         _refuse_large(path, sum(sizes))
-        for name in file.variables:
-            arrays[name] = np.array(file.variables[name][:])
-            if hasattr(file.variables[name], "units"):
-                units[name] = file.variables[name].units.decode()
-    return arrays, units
+        for name, variable in file.variables.items():
+            values = np.array(variable[:])
+            arrays[name] = values.astype(values.dtype.newbyteorder("="))
+            attributes[name] = {}
+            for key in ARRAY_ATTRIBUTES:
+                if hasattr(variable, key):
+                    attributes[name][key] = getattr(variable, key)
+            # Of the netCDF library, which fills rows that nobody writes.
+            fill = _DEFAULT_FILL.get(arrays[name].dtype.str[1:])
+            if fill is not None:
+                attributes[name].setdefault("_FillValue", fill)
+    return arrays, attributes
 
 
-def _hdf5(path: Path, group: str, scene: str) -> tuple[Arrays, Units]:
+def _hdf5(path: Path, group: str, scene: str) -> DataTable:
     """Read the arrays of a group of an HDF5 file, of this program's own or of any other."""
     from rotor_mbs.runs import table  # late: 0.2 s
     from rotor_mbs.runs.design import RUNS
@@ -199,8 +324,66 @@ def _hdf5(path: Path, group: str, scene: str) -> tuple[Arrays, Units]:
     from rotor_mbs.runs.trailer import is_of_this_program
 
     if is_of_this_program(path) and RUNS in table.TableFile(path, ()).groups:
-        return run_arrays(path, group, scene), {}
-    return table.read_arrays(path, group, scene, MAX_BYTES)
+        return table_of(str(path), run_arrays(path, group, scene))
+    arrays, attributes, others = table.read_arrays(path, group, scene, MAX_BYTES)
+    if "axis0" in {*arrays, *others} and "block0_values" in {*arrays, *others}:
+        allowed = "a table that other programs can read: to_csv, or to_xarray().to_netcdf"
+        raise InputError(f"{path}: pandas' own layout of HDF5 (to_hdf); allowed: {allowed}")
+    for name, values in arrays.items():
+        # Floating-point rows that netCDF's library never wrote; HDF5's own are 0.
+        fill = _DEFAULT_FILL.get(values.dtype.str[1:]) if values.dtype.kind == "f" else None
+        if fill is not None:
+            attributes[name].setdefault("_FillValue", fill)
+    decoded = _decoded(str(path), arrays, attributes)
+    left_out = dict(decoded.left_out)
+    for name, (reason, is_column) in others.items():
+        left_out[name] = LeftOut(reason, is_column)
+    return DataTable(decoded.source, decoded.columns, left_out)
+
+
+def _decoded(source: str, arrays: Arrays, attributes: Mapping[str, Mapping[str, Any]]) -> DataTable:
+    """Return arrays as columns, unpacked as the CF conventions say: scales, missing values.
+
+    Parameters
+    ----------
+    source : what messages call the file.
+    arrays : by name, as they are stored.
+    attributes : by name of the array.
+    """
+    import xarray as xr  # late: 0.4 s
+
+    variables = {}
+    units: dict[str, str] = {}
+    steps: dict[str, float] = {}
+    for number, (name, values) in enumerate(arrays.items()):
+        facts = dict(attributes.get(name, {}))
+        unit = unit_of_attributes(facts)
+        if unit:
+            units[name] = unit
+        for key in ("units", "unit"):
+            facts.pop(key, None)
+        for key in ("_FillValue", "missing_value"):
+            if key in facts:
+                facts[key] = np.asarray(facts[key]).ravel()[0]
+        scale = facts.get("scale_factor")
+        if scale is not None and values.dtype.kind in "iu":
+            steps[name] = abs(float(np.asarray(scale).ravel()[0]))
+        dimensions = [f"dimension_{number}_{axis}" for axis in range(values.ndim)]
+        variables[name] = (dimensions, values, facts)
+    dataset = xr.decode_cf(
+        xr.Dataset(variables), decode_times=False, decode_timedelta=False, decode_coords=False
+    )
+    unpacked = {name: dataset[name].values for name in arrays}
+    for name, values in unpacked.items():
+        is_single = arrays[name].dtype.kind in "iu" and values.dtype == np.float32
+        if is_single:
+            # xarray unpacks 16 bits in single precision, which would be rounding of its own.
+            facts = variables[name][2]
+            scale = float(facts.get("scale_factor", 1.0))
+            offset = float(facts.get("add_offset", 0.0))
+            exact = arrays[name].astype(float) * scale + offset
+            unpacked[name] = np.where(np.isnan(values), np.nan, exact)
+    return table_of(source, unpacked, units, steps)
 
 
 def _openfast(path: Path) -> tuple[Arrays, Units]:
@@ -224,19 +407,66 @@ def _openfast(path: Path) -> tuple[Arrays, Units]:
     return arrays, dict(zip(names, units, strict=True))
 
 
+# JSON
+
+
+def _is_json(text: str) -> bool:
+    """Whether a text begins as JSON: an object, or a list of objects or lists."""
+    begin = text[:1000].lstrip()
+    return begin.startswith("{") or (begin[:1] == "[" and begin[1:].lstrip()[:1] in "[{")
+
+
+def _json(text: str) -> tuple[Arrays, Units]:
+    """Read arrays by name, or a table in any of the forms that pandas writes.
+
+    Rows as objects, in one list or a line each; {"columns": ..., "data": ...}; a column, or a row,
+    as an object of its own.
+    """
+    import pandas as pd  # late: 0.3 s
+
+    try:
+        content = json.loads(text)
+    except json.JSONDecodeError:
+        lines = [line for line in text.splitlines() if line.strip()]
+        if len(lines) < 2 or not lines[1].lstrip().startswith("{"):
+            raise
+        content = [json.loads(line) for line in lines]
+    if isinstance(content, list):
+        rows = [row for row in content if isinstance(row, dict)]
+        if len(rows) != len(content):
+            raise ValueError("rows without names")
+        return arrays_of(pd.DataFrame(rows))
+    if isinstance(content.get("data"), list):
+        if isinstance(content.get("columns"), list):
+            columns = [tuple(c) if isinstance(c, list) else c for c in content["columns"]]
+            return arrays_of(pd.DataFrame(content["data"], columns=pd.Index(columns)))
+        if "schema" in content:
+            return arrays_of(pd.DataFrame(content["data"]))
+    parts = list(content.values())
+    if parts and all(isinstance(part, dict) for part in parts):
+        if all(name.isdigit() for name in content):
+            return arrays_of(pd.DataFrame(parts))
+        if all(name.isdigit() for part in parts for name in part):
+            by_row = pd.DataFrame(content)
+            return arrays_of(by_row.reset_index(drop=True))
+    return dict(_parts("", content)), {}
+
+
+# Text
+
+
 def _read_text(source: str, text: str) -> DataTable:
     """Read the columns of a text file.
 
     Parameters
     ----------
     source : what messages call the file.
-    text : comma-separated values, columns divided by blanks, Exudyn's sensor files, OpenFAST's
-        `.out`.
+    text : comma-separated values, columns divided by blanks, Exudyn's files, OpenFAST's `.out`.
 
     Raises
     ------
     InputError
-        With the line where something else than a number stands.
+        With the line that has another number of fields.
     """
     lines = []
     for number, line in enumerate(text.splitlines(), start=1):
@@ -245,35 +475,87 @@ def _read_text(source: str, text: str) -> DataTable:
             lines.append((number, line.strip(" ")))
     first, divider = _first_row(source, lines)
     head = [line for _, line in lines[:first]]  # comments among it
-    rows = []
-    for number, line in lines[first:]:
-        if not line.startswith(_COMMENT):
-            rows.append((number, _FORTRAN.sub("E", line)))
+    rows = [(number, line) for number, line in lines[first:] if not line.startswith(_COMMENT)]
     del lines
-    # Beside a point a comma may stand between thousands; without one it is decimal.
-    if divider != "," and not any("." in row for _, row in rows):
-        rows = [(i, row.replace(",", ".")) for i, row in rows]
-    values = _numbers(source, rows, divider)
+    columns = _columns_of_rows(source, rows, divider)
     comments = [line.lstrip("#%/! ") for line in head if line.startswith(_COMMENT)]
-    variable = _EXUDYN.search("\n".join(comments))
-    if variable is not None and "sensor output file" in comments[0]:
-        return table_of(source, {"time": values[:, 0], variable[1]: values[:, 1:]})
+    if comments and comments[0].startswith("Exudyn"):
+        exudyn = _exudyn(source, comments, columns)
+        if exudyn is not None:
+            return exudyn
     plain = [line for line in head if not line.startswith(_COMMENT)]
-    names = _names(source, plain or comments, values.shape[1], divider)
-    columns: dict[str, DataColumn] = {}
+    names = _names(source, plain or comments, len(columns), divider)
+    named: dict[str, DataColumn] = {}
+    left_out: dict[str, LeftOut] = {}
     repeats: dict[str, int] = {}
-    for (name, unit), column in zip(names, values.T, strict=True):
-        if not name and np.isnan(column).all():
+    for (name, unit), values in zip(names, columns, strict=True):
+        is_empty = isinstance(values, np.ndarray) and bool(np.isnan(values).all())
+        if not name and is_empty:
             continue  # a divider at the end of every line makes a column of nothing
         # Later columns of one name are kept, with marks before it.
         count = repeats.get(name, 0)
         label = name
-        while label in columns:
+        while label in named or label in left_out:
             label = f"{'_' * count}{name}" if count < 10 else f"_{count}_{name}"
             count += 1
         repeats[name] = count
-        columns[label] = DataColumn(column.copy(), unit)
-    return DataTable(source, columns)
+        if isinstance(values, LeftOut):
+            left_out[label] = values
+        else:
+            named[label] = DataColumn(values, unit)
+    return DataTable(source, named, left_out)
+
+
+def _exudyn(
+    source: str, comments: Sequence[str], columns: Sequence[NDArray[np.float64] | LeftOut]
+) -> DataTable | None:
+    """Read a sensor or solution file of Exudyn, whose columns have no names.
+
+    Parameters
+    ----------
+    source : what messages call the file.
+    comments : above the numbers.
+    columns : of numbers.
+
+    Returns
+    -------
+    DataTable or None
+        None for another file. Of several solves in one file the last one.
+
+    Raises
+    ------
+    InputError
+        For something else than numbers, or another number of columns than the head says.
+    """
+    head = "\n".join(comments)
+    variable, written = _EXUDYN.search(head), _EXUDYN_SOLUTION.search(head)
+    if variable is None and written is None:
+        return None
+    for number, column in enumerate(columns, start=1):
+        if isinstance(column, LeftOut):
+            raise InputError(f"{source}: column {number}: {column.reason}; allowed: numbers")
+    values = np.stack([column for column in columns if isinstance(column, np.ndarray)], axis=1)
+    left_out = {}
+    ends = np.flatnonzero(np.diff(values[:, 0]) < 0.0)
+    if len(ends):
+        begin = int(ends[-1]) + 1
+        left_out[f"rows 1 to {begin}"] = LeftOut("of an earlier solve")
+        values = values[begin:]
+    arrays: dict[str, Any] = {"time": values[:, 0]}
+    if written is None and variable is not None:
+        arrays[variable[1]] = values[:, 1:]
+    elif written is not None:
+        counts = [int(count) for count in written[1].split(",")[: len(_EXUDYN_KINDS)]]
+        if sum(counts) != values.shape[1] - 1:
+            problem = f"{values.shape[1] - 1} columns beside the time, {sum(counts)} in its head"
+            raise InputError(f"{source}: {problem}; allowed: as many")
+        begin = 1
+        for kind, count in zip(_EXUDYN_KINDS, counts, strict=False):
+            if count:
+                arrays[kind] = values[:, begin : begin + count]
+            begin += count
+    table = table_of(source, arrays)
+    return DataTable(source, table.columns, {**table.left_out, **left_out})
 
 
 def _first_row(source: str, lines: Lines) -> tuple[int, str | None]:
@@ -299,21 +581,55 @@ def _first_row(source: str, lines: Lines) -> tuple[int, str | None]:
         if line.startswith(_COMMENT):
             continue
         for divider in _DIVIDERS:
-            fields = _fields(_FORTRAN.sub("E", line), divider)
-            others = []
-            for field in fields:
-                if field and not _is_number(field, decimal_comma=divider != ","):
-                    others.append(field)
-            if len(fields) > 1 and any(fields) and not others:
+            fields = _fields(line, divider)
+            numbers, others = _kinds_of_fields(fields, divider)
+            if len(fields) > 1 and numbers and not others:
                 return place, divider
-            if others and len(fields) - len(others) > most_numbers:
-                most_numbers = len(fields) - len(others)
+            if others and numbers > most_numbers:
+                most_numbers = numbers
                 nearest = f"; line {number} has {others[0][:40]!a}"
+    with_texts = _first_row_with_texts(lines)
+    if with_texts is not None:
+        return with_texts
     if any(_is_number(line, decimal_comma=True) for _, line in lines):
         allowed = "a column of times, and others beside it"
         raise InputError(f"{source}: one column of numbers; allowed: {allowed}")
     allowed = "columns of numbers below a header line"
     raise InputError(f"{source}: no row of numbers in it{nearest}; allowed: {allowed}")
+
+
+def _first_row_with_texts(lines: Lines) -> tuple[int, str | None] | None:
+    """Find the first of two rows with numbers and texts below a line of as many texts."""
+    plain = []
+    for place, (_, line) in enumerate(lines[:_MAX_SEARCHED]):
+        if not line.startswith(_COMMENT):
+            plain.append((place, line))
+    for divider in _DIVIDERS:
+        for (_, above), (place, line), (_, below) in zip(plain, plain[1:], plain[2:], strict=False):
+            widths = [len(_fields(text, divider)) for text in (above, line, below)]
+            counts = []
+            for text in (above, line, below):
+                counts.append(_kinds_of_fields(_fields(text, divider), divider)[0])
+            is_below_head = counts[0] == 0 and min(counts[1:]) > 0
+            if is_below_head and widths[0] > 1 and len(set(widths)) == 1:
+                return place, divider
+    return None
+
+
+def _kinds_of_fields(fields: Sequence[str], divider: str | None) -> tuple[int, list[str]]:
+    """Return how many fields are numbers, and those that are neither numbers nor missing ones."""
+    numbers, others = 0, []
+    for field in fields:
+        if _is_number(_without_fortran(field), decimal_comma=divider != ","):
+            numbers += 1
+        elif field and not _MISSING.fullmatch(field):
+            others.append(field)
+    return numbers, others
+
+
+def _without_fortran(field: str) -> str:
+    """Return a number as other programs write it: 1.5D-3 and 0.15-101 have an E."""
+    return _FORTRAN_3_DIGITS.sub("E", _FORTRAN.sub("E", field))
 
 
 def _fields(line: str, divider: str | None) -> list[str]:
@@ -332,8 +648,10 @@ def _is_number(field: str, *, decimal_comma: bool) -> bool:
     return True
 
 
-def _numbers(source: str, rows: Lines, divider: str | None) -> NDArray[np.float64]:
-    """Read the numbers of all rows.
+def _columns_of_rows(
+    source: str, rows: Lines, divider: str | None
+) -> list[NDArray[np.float64] | LeftOut]:
+    """Read the columns of all rows.
 
     Parameters
     ----------
@@ -343,32 +661,84 @@ def _numbers(source: str, rows: Lines, divider: str | None) -> NDArray[np.float6
 
     Returns
     -------
-    ndarray
-        (n, columns), NaN where a field is empty.
+    list of ndarray or LeftOut
+        (n,) numbers of each column, NaN where a field is empty; or the first field that is none.
 
     Raises
     ------
     InputError
-        With the line that has another number of fields, or something else than a number.
+        With the line that has another number of fields.
     """
+    import pandas as pd  # late: 0.3 s
+
     width = len(_fields(rows[0][1], divider))
     if width > MAX_COLUMNS:
         raise InputError(f"{source}: {width} columns; allowed: up to {MAX_COLUMNS}")
-    values = np.empty((len(rows), width))
-    for i, (number, line) in enumerate(rows):
-        fields = _fields(line, divider)
-        if len(fields) != width:
-            problem = f"{len(fields)} fields, where the rows above have {width}"
+    # Beside a point a comma may stand between thousands; without one it is decimal.
+    is_comma = divider != "," and not any("." in row for _, row in rows)
+    body = io.StringIO("\n".join(row for _, row in rows))
+    try:
+        frame = pd.read_csv(
+            body,
+            sep=r"\s+" if divider is None else divider,
+            header=None,
+            names=list(range(width)),
+            index_col=False,
+            decimal="," if is_comma else ".",
+            skipinitialspace=True,
+            skip_blank_lines=False,
+            keep_default_na=False,
+            na_values=[""],
+            float_precision="round_trip",
+            low_memory=False,
+        )
+    except pd.errors.ParserError:
+        _refuse_ragged(source, rows, divider, width)
+        raise
+    # Rows that are too short have empty fields at their end; so may have whole rows.
+    if len(frame) != len(rows) or frame[width - 1].isna().any():
+        _refuse_ragged(source, rows, divider, width)
+    columns: list[NDArray[np.float64] | LeftOut] = []
+    for number in range(width):
+        column = frame[number]
+        if column.dtype.kind in "fiu":
+            columns.append(column.to_numpy(float))
+        else:
+            columns.append(_numbers_of_texts(column.to_numpy(object), rows, is_comma=is_comma))
+    return columns
+
+
+def _refuse_ragged(source: str, rows: Lines, divider: str | None, width: int) -> None:
+    """Raise InputError for the first line with another number of fields."""
+    for number, line in rows:
+        count = len(_fields(line, divider))
+        if count != width:
+            problem = f"{count} fields, where the rows above have {width}"
             raise InputError(f"{source}:{number}: {problem}")
+
+
+def _numbers_of_texts(
+    fields: NDArray[Any], rows: Lines, *, is_comma: bool
+) -> NDArray[np.float64] | LeftOut:
+    """Return a column that pandas has left as texts: Fortran's numbers, or the first that is none.
+
+    Parameters
+    ----------
+    fields : (n,) texts and numbers, NaN where a field is empty.
+    rows : their lines.
+    is_comma : whether numbers have decimal commas.
+    """
+    numbers = np.empty(len(fields))
+    for i, field in enumerate(fields):
+        text = str(field).strip()
+        if is_comma:
+            text = text.replace(",", ".")
         try:
-            values[i] = [float(field or "nan") for field in fields]
+            numbers[i] = float(_without_fortran(text))
         except ValueError:
-            for j, field in enumerate(fields):
-                if field and not _is_number(field, decimal_comma=False):
-                    problem = f"{field[:40]!a} in column {j + 1}; allowed: a number"
-                    raise InputError(f"{source}:{number}: {problem}") from None
-            raise
-    return values
+            reason = f"row {i + 1} (line {rows[i][0]}) has {str(field)[:40]!a}, no number"
+            return LeftOut(reason, is_column=True)
+    return numbers
 
 
 def _names(
@@ -389,7 +759,7 @@ def _names(
     last = _words(head[-1], divider, width)
     above = _words(head[-2], divider, width) if len(head) > 1 else []
     units = [word.strip("[]() ") for word in last]
-    is_line_of_units = not UNITS["time"].keys().isdisjoint(unit.lower() for unit in units)
+    is_line_of_units = any(unit_factor(unit, "time") is not None for unit in units)
     if len(above) == len(last) and is_line_of_units:
         names = list(zip(above, units, strict=True))
     else:

@@ -1,14 +1,12 @@
 """Which column is which channel, in which unit, sign and zero: from a mapping file, or by names.
 
-A channel is sign * (column + offset), the offset in the column's own unit. What a mapping leaves
-out is not compared; the time (or speed) alone is known by its name then. All are known by their
-names where a mapping has a group alone. See docs/compare.md.
+A channel is sign * (column + offset), the offset in the column's own unit. A mapping replaces
+single channels and adds to those that are known by the names of columns. See docs/compare.md.
 """
 
 from __future__ import annotations
 
 import os
-from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -23,15 +21,19 @@ from rotor_mbs.comparison.channels import (
     channel_from_name,
     channels,
     mode_channels,
+    names_a_channel,
+    places_of,
     split_unit,
 )
-from rotor_mbs.comparison.columns import ALLOWED_UNITS, UNITS, DataTable, shown_names
+from rotor_mbs.comparison.columns import DataTable, shown_names
+from rotor_mbs.comparison.units import ALLOWED_UNITS, plain_unit, unit_factor
 from rotor_mbs.errors import InputError
 from rotor_mbs.scenario import keys
 from rotor_mbs.scenario.keys import Kind, file_key
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.scenario.toml_file import TableError, read_toml
 
+_UNKNOWN = "no channel has this name"
 _SIGN = keys.restricted(keys.whole(-1, 1), bool, "1, -1")
 
 
@@ -59,14 +61,17 @@ class DataMapping:
 
     Attributes
     ----------
-    columns : by the key of a channel; empty where channels are known by the names of columns.
+    columns : by the key of a channel; the others are known by the names of columns.
     group : of an HDF5 file.
     omitted : names of channels that are neither compared nor missed.
+    only : names of the channels to which the comparison is restricted, beside the time or speed;
+        empty where it is not.
     """
 
     columns: Mapping[str, ColumnMapping] = field(default_factory=dict)
     group: str = ""
     omitted: tuple[str, ...] = ()
+    only: tuple[str, ...] = ()
 
 
 def _read_column_mapping(value: object) -> ColumnMapping:
@@ -107,6 +112,7 @@ def read_mapping(
     omit = keys.list_of(keys.choice(tuple(names)), f"a list of {', '.join(names)}")
     declared["group"] = file_key("group", _GROUP, default="").metadata
     declared["omit"] = file_key("omit", omit, default=()).metadata
+    declared["only"] = file_key("only", omit, default=()).metadata
     source = "columns"
     if isinstance(columns, Mapping):
         try:
@@ -119,16 +125,39 @@ def read_mapping(
             values = keys.read_keys(declared, file.tables)
     group = values.pop("group")
     omitted = tuple(names[key] for key in values.pop("omit"))
+    only = tuple(names[key] for key in values.pop("only"))
     mapped = {key: mapping for key, mapping in values.items() if mapping is not None}
-    if mapped.keys() in ({TIME}, {SPEED}) or not (mapped or group or omitted):
+    if not (mapped or group or omitted or only):
         allowed = ", ".join(declared)
-        raise InputError(f"{source}: no channel to compare; allowed: {allowed}")
-    return DataMapping(mapped, group, omitted)
+        raise InputError(f"{source}: says nothing; allowed: {allowed}")
+    for channel in known:
+        is_mapped = channel.key in mapped and channel.name not in (TIME, SPEED)
+        if only and is_mapped and not _is_one_of(channel, only):
+            allowed = f'"{channel.key}" in `only`, or no column for it'
+            raise InputError(f"{source}: {channel.key}: is not in `only`; allowed: {allowed}")
+    return DataMapping(mapped, group, omitted, only)
 
 
-def find_channels(
-    table: DataTable, scene: Scene, mapping: DataMapping
-) -> tuple[dict[Channel, ColumnMapping], tuple[str, ...]]:
+@dataclass(frozen=True)
+class FoundChannels:
+    """Where the channels of data come from, and what else the data have.
+
+    Attributes
+    ----------
+    sources : by channel, the time or speed first, with the unit.
+    lines : for each channel where it comes from.
+    unused : by name of every other column, why it is not compared.
+    loads_left_out : names of the loads that are known by their names and neither compared nor
+        omitted.
+    """
+
+    sources: Mapping[Channel, ColumnMapping]
+    lines: tuple[str, ...]
+    unused: Mapping[str, str]
+    loads_left_out: tuple[str, ...]
+
+
+def find_channels(table: DataTable, scene: Scene, mapping: DataMapping) -> FoundChannels:
     """Find where each channel comes from, with its unit.
 
     Parameters
@@ -138,32 +167,50 @@ def find_channels(
         speed and frequencies.
     mapping : what is said of the columns.
 
-    Returns
-    -------
-    dict, tuple of str
-        By channel, the time or speed first; a line for each that says so.
-
     Raises
     ------
     InputError
-        For a name that could be two channels, a wrong unit, or without a time and an angle or rate.
+        For a name that could be two channels, a wrong unit, a column without numbers that is named
+        as a channel, or without a time and an angle or rate.
     """
     known, by_name = _known_channels(table, scene, mapping)
-    sources = _sources(table, known, by_name, mapping)
+    sources, reasons, loads_left_out = _sources(table, known, by_name, mapping)
     chosen: dict[Channel, ColumnMapping] = {}
     lines = []
     for channel in sorted(sources, key=lambda channel: channel.column):
         source = sources[channel]
-        stated = table[source.column].unit or split_unit(source.column)[1]
-        unit = source.unit or stated
-        if unit and unit.lower() not in UNITS[channel.kind]:
-            column = f"column {source.column!r} for {channel.name} is in {unit!r}"
+        stated = plain_unit(source.unit or _stated_unit(table, source.column))
+        if stated and unit_factor(stated, channel.kind) is None:
+            column = f"column {source.column!r} for {channel.name} is in {stated!r}"
             allowed = ALLOWED_UNITS[channel.kind]
             raise InputError(f"{table.source}: {column}; allowed: {allowed}")
-        chosen[channel] = replace(source, unit=unit or channel.unit)
-        lines.append(_line(channel, chosen[channel], is_assumed=not unit))
+        chosen[channel] = replace(source, unit=stated or channel.unit)
+        lines.append(_line(channel, chosen[channel], is_assumed=not stated))
+    unused = {}
+    used = {source.column for source in chosen.values()}
+    for name in table.columns:
+        if name not in used:
+            unused[name] = reasons.get(name, _UNKNOWN)
+    for name, left_out in table.left_out.items():
+        meant = channel_from_name(name, 0, known)
+        is_chosen = any(meant is not None and meant.name == other.name for other in chosen)
+        is_wanted = meant is None or not _is_unwanted(meant, mapping)
+        if left_out.is_column and names_a_channel(name, known) and is_wanted and not is_chosen:
+            raise table.refusal(name)
+        unused[name] = left_out.reason
     _refuse_missing(table, known[0], chosen)
-    return chosen, tuple(lines)
+    return FoundChannels(chosen, tuple(lines), unused, loads_left_out)
+
+
+def _stated_unit(table: DataTable, name: str) -> str:
+    """Return the unit that a file states of a column, "" where it states none."""
+    stated = table[name].unit or split_unit(name)[1]
+    inner = name.strip()
+    if stated or not inner.lower().startswith("der("):
+        return stated
+    # The rate of "phi_deg" is in deg/s.
+    of_angle = split_unit(inner[4:].rstrip(")"))[1]
+    return f"{of_angle}/s" if of_angle else ""
 
 
 def _known_channels(
@@ -184,12 +231,15 @@ def _known_channels(
     """
     motion, modes = channels(scene), mode_channels(scene)
     motion_by_name, modes_by_name = _suggested(table, motion), _suggested(table, modes)
-    is_mapped = any(channel.key in mapping.columns for channel in modes)
-    if is_mapped:
+    motion_keys = {channel.key for channel in motion}
+    # A mapping of either decides.
+    if any(channel.key in mapping.columns for channel in modes):
         return modes, modes_by_name
+    if not motion_keys.isdisjoint(mapping.columns):
+        return motion, motion_by_name
     has_time = any(channel == motion[0] for channel, _ in motion_by_name)
     has_modes = {channel.kind for channel, _ in modes_by_name} == {"rate", "frequency"}
-    if has_modes and not has_time and not mapping.columns:
+    if has_modes and not has_time:
         return modes, modes_by_name
     return motion, motion_by_name
 
@@ -197,11 +247,14 @@ def _known_channels(
 def _suggested(table: DataTable, known: Sequence[Channel]) -> list[tuple[Channel, str]]:
     """Return the channels that names suggest, and the names."""
     # How many columns an array has says what it may be: angles are one per coordinate.
-    entries = [name for name in table.columns if name.endswith("]")]
-    widths = Counter(name.rpartition("[")[0] for name in entries)
+    places = places_of(list(table.columns))
     suggested = []
     for name in table.columns:
-        channel = channel_from_name(name, widths[name.rpartition("[")[0]], known)
+        place = places.get(name)
+        if place is None:
+            channel = channel_from_name(name, 0, known)
+        else:
+            channel = channel_from_name(name, place.columns, known, place.indices)
         if channel is not None:
             suggested.append((channel, name))
     return suggested
@@ -212,8 +265,8 @@ def _sources(
     known: Sequence[Channel],
     by_name: Sequence[tuple[Channel, str]],
     mapping: DataMapping,
-) -> dict[Channel, ColumnMapping]:
-    """Return where each channel comes from: what is mapped, and what names suggest.
+) -> tuple[dict[Channel, ColumnMapping], dict[str, str], tuple[str, ...]]:
+    """Return where each channel comes from: what is mapped, and beside it what names suggest.
 
     Parameters
     ----------
@@ -221,6 +274,12 @@ def _sources(
     known : the channels that there may be, the time or speed first.
     by_name : those that names of columns suggest, and the names.
     mapping : what is said of the columns.
+
+    Returns
+    -------
+    dict, dict, tuple of str
+        By channel where it comes from; by column that is known by its name and not compared, why;
+        the loads among these that are not omitted.
 
     Raises
     ------
@@ -232,10 +291,21 @@ def _sources(
         mapped = mapping.columns.get(channel.key)
         if mapped is not None:
             sources[channel.in_frame(mapped.frame) if mapped.frame else channel] = mapped
+    mapped_columns = {mapped.column for mapped in sources.values()}
+    reasons: dict[str, str] = {}
+    loads_left_out: list[str] = []
     for channel, name in by_name:
-        # Beside a mapping the time alone is known by its name.
-        is_left_out = mapping.columns and (channel != known[0] or channel in sources)
-        if is_left_out or _is_omitted(channel, mapping.omitted):
+        if name in mapped_columns:
+            continue
+        mapped = mapping.columns.get(_without_frame(channel).key)
+        if mapped is not None:
+            reasons[name] = f"{channel.name} is mapped to {mapped.column!r}"
+            continue
+        if channel != known[0] and _is_unwanted(channel, mapping):
+            is_omitted = _is_one_of(channel, mapping.omitted)
+            reasons[name] = f"{channel.name} is {'omitted' if is_omitted else 'not in `only`'}"
+            if channel.is_load and not is_omitted:
+                loads_left_out.append(channel.name)
             continue
         for other, source in sources.items():
             if other.name == channel.name:
@@ -243,7 +313,19 @@ def _sources(
                 allowed = f"`{channel.key}` in a mapping file says which"
                 raise InputError(f"{table.source}: {both}; allowed: {allowed}")
         sources[channel] = ColumnMapping(column=name, sign=channel.sign)
-    return sources
+    return sources, reasons, tuple(loads_left_out)
+
+
+def _without_frame(channel: Channel) -> Channel:
+    """Return a load in the frame of the scene's loads; any other channel as it is."""
+    return replace(channel, name=channel.name.partition(",")[0])
+
+
+def _is_unwanted(channel: Channel, mapping: DataMapping) -> bool:
+    """Whether a mapping omits a channel, or restricts the channels to others."""
+    if _is_one_of(channel, mapping.omitted):
+        return True
+    return bool(mapping.only) and not _is_one_of(channel, mapping.only)
 
 
 def _line(channel: Channel, source: ColumnMapping, *, is_assumed: bool) -> str:
@@ -277,11 +359,10 @@ def _refuse_missing(
         raise InputError(f"{table.source}: {problem}; allowed: a mapping file (--columns)")
 
 
-def _is_omitted(channel: Channel, omitted: Sequence[str]) -> bool:
-    """Whether a channel, or the load or the modes that it is one of, is omitted."""
+def _is_one_of(channel: Channel, names: Sequence[str]) -> bool:
+    """Whether a channel, or the load or the modes that it is one of, is one of `names`."""
     name = channel.name.partition(",")[0]
     is_one_of_many = channel.is_load or channel.kind == "frequency"
-    for other in omitted:
-        if name == other or (is_one_of_many and name.startswith(f"{other} ")):
-            return True
-    return False
+    if name in names:
+        return True
+    return is_one_of_many and any(name.startswith(f"{other} ") for other in names)

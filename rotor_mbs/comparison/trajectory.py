@@ -11,6 +11,8 @@ from numpy.typing import NDArray
 
 from rotor_mbs.analysis.judgement import OK_ERROR
 from rotor_mbs.comparison.causes import likely_causes
+from rotor_mbs.comparison.channels import channel_key
+from rotor_mbs.comparison.columns import shown_names
 from rotor_mbs.comparison.data import ForeignData
 from rotor_mbs.comparison.data_defects import (
     carried_errors,
@@ -193,6 +195,15 @@ def compare_with_reference(
                 status, message = "inaccurate", comparison.message
         expected = np.hstack([expected, expected_loads])
         compared = compared.beside(loads)
+
+    if data.loads_left_out:
+        problem = f"loads of the data that are not compared: {shown_names(data.loads_left_out)}"
+        notes.append(problem)
+        if status == "ok":
+            keys = ", ".join(
+                f'"{channel_key(name.partition(",")[0])}"' for name in data.loads_left_out
+            )
+            status, message = "unchecked", f"{problem}; allowed: omit = [{keys}] in a mapping file"
 
     verdict = DataVerdict(
         scene=scene.name,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -66,7 +66,8 @@ class DataVerdict:
         (s); None of modes.
     defect_time, predicted : s, end of the interval of the largest defect; rad, the error up to the
         horizon that the defects add up to; None where they are not known.
-    read, unused, notes : how columns were read; columns that were not; what else there is to know.
+    read, unused, notes : how columns were read; by name of every other column, why it is not
+        compared; what else there is to know.
     likely : what the difference looks like, of what was tried; empty where nothing fits, or nothing
         was tried.
     axis : "time", or "speed" of a table of modes, whose `compared_until` is in rad/s.
@@ -84,7 +85,7 @@ class DataVerdict:
     defect_time: float | None = None
     predicted: float | None = None
     read: tuple[str, ...] = ()
-    unused: tuple[str, ...] = ()
+    unused: Mapping[str, str] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
     likely: tuple[str, ...] = ()
     axis: str = "time"
@@ -201,7 +202,7 @@ def comparison_record(
         for ending, (unit, long_name, array) in by_ending.items():
             arrays[channel.key + ending] = array
             columns[channel.key + ending] = Column((axis,), unit, channel.name + long_name)
-    unused = verdict.unused[:_MAX_NAMES]
+    unused = list(verdict.unused.items())[:_MAX_NAMES]
     while len(json.dumps(unused)) > _MAX_NAME_BYTES:
         unused = unused[: len(unused) // 2]
     attributes = {
@@ -214,10 +215,30 @@ def comparison_record(
         "message": verdict.message,
         "tolerance": verdict.tolerance,
         "horizon_s": np.nan if verdict.horizon_s is None else verdict.horizon_s,
-        "verdict": json.dumps(as_dictionary(replace(verdict, unused=unused))),
+        "verdict": json.dumps(as_dictionary(replace(verdict, unused=dict(unused)))),
         **versions(),
     }
     return Record("comparison", scene.name, f"data/{content}", attributes, arrays, columns)
+
+
+def unused_lines(verdict: DataVerdict, most: int = 12) -> list[str]:
+    """Return the columns that are not compared, a line for each reason.
+
+    Parameters
+    ----------
+    verdict : has them, with the reasons.
+    most : names in a line.
+    """
+    names_by_reason: dict[str, list[str]] = {}
+    for name, reason in verdict.unused.items():
+        names_by_reason.setdefault(reason, []).append(name)
+    lines = []
+    for reason, names in names_by_reason.items():
+        shown = ", ".join(names[:most])
+        if len(names) > most:
+            shown = f"{shown}, ... ({len(names)} in all)"
+        lines.append(f"not used ({reason}): {shown}")
+    return lines
 
 
 def channel_table(verdict: DataVerdict) -> TextTable:

@@ -329,7 +329,7 @@ def run_arrays(path: Path, group: str = "", scene: str = "") -> dict[str, NDArra
     """The arrays of one run of a results file; group, scene: as for `read_arrays`, the run "scene/method"."""
     with open_results(path) as results:
         runs = {f"{name}/{run.method}": run for name, known in results.scenes.items() for run in known.runs.values()}
-        run = runs[chosen_group(path, list(runs), group.strip("/"), scene)]
+        run = runs[chosen_group(path, list(runs), group, scene)]
         return {name: run.array(name) for name in run.names if run.array(name).ndim <= 3}
 
 

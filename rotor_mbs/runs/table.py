@@ -19,6 +19,7 @@ from __future__ import annotations
 import errno
 import functools
 import io
+import itertools
 import json
 import math
 import os
@@ -30,7 +31,7 @@ from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import IO, Any, TypeVar
+from typing import IO, Any, NamedTuple, TypeVar
 
 import h5py
 import numpy as np
@@ -95,6 +96,10 @@ _HEAD_BYTES = 1 << 17  # of a file beside its rows, at most: descriptions and te
 _READ_BYTES = 1 << 25  # read at once when checksums are verified
 _LONGEST_LABEL = 1000  # characters; names of files are shorter
 _TEXT_LENGTH = 600  # characters of a message
+
+# What says how an array of another program is to be read.
+ARRAY_ATTRIBUTES = ("units", "unit", "scale_factor", "add_offset", "_FillValue", "missing_value", "_Unsigned")
+_MAX_MEMBERS = 1000  # of a group, that are listed with what they are
 
 T = TypeVar("T")
 # (rows, ...) arrays by the name of their dataset.
@@ -950,16 +955,29 @@ def _groups_with_arrays(group: Any, place: str = "") -> Iterator[str]:
             yield place
 
 
-def read_arrays(
-    path: Path, group: str = "", scene: str = "", max_bytes: float = math.inf
-) -> tuple[dict[str, NDArray[Any]], dict[str, str]]:
-    """Read arrays of numbers of up to three dimensions and their units, by name, from one group of any HDF5 file.
+class StoredArrays(NamedTuple):
+    """The arrays of one group of any HDF5 file.
+
+    Attributes
+    ----------
+    arrays : by name, of up to three dimensions, as they are stored.
+    attributes : by name of the array those of `ARRAY_ATTRIBUTES` that it has, numbers and texts.
+    others : by name what else is in the group, and what that is; whether it is a column of something else than numbers.
+    """
+
+    arrays: dict[str, NDArray[Any]]
+    attributes: dict[str, dict[str, Any]]
+    others: dict[str, tuple[str, bool]]
+
+
+def read_arrays(path: Path, group: str = "", scene: str = "", max_bytes: float = math.inf) -> StoredArrays:
+    """Read arrays of numbers of up to three dimensions and their attributes from one group of any HDF5 file.
 
     Parameters
     ----------
     path : the file; of another program, or of this one.
-    group : path of the group, or the end of it; may be left out where one group alone has arrays, or one alone but the
-        reference below `scene`.
+    group : path of the group, or the end of it, "/" for the root; may be left out where one group alone has arrays, or
+        one alone but the reference below `scene`.
     scene : name of a scene, whose groups are preferred.
     max_bytes : of all arrays as float64, by what the file claims of them, before any is read.
 
@@ -971,33 +989,91 @@ def read_arrays(
     try:
         with h5py.File(path, "r") as file:
             places = _array_places(file)
-            place = chosen_group(path, list(places), group.strip("/"), scene)
-            datasets = {name: file[place or "/"][name] for name in places[place]}
-            size = sum(8.0 * dataset.size for dataset in datasets.values())
-            if size > max_bytes:
-                allowed = f"up to {max_bytes / 2**30:g} GB: export fewer rows or arrays"
-                raise StoreError(f"{path}: its arrays claim {size / 2**30:.1f} GB; allowed: {allowed}")
-            for dataset in datasets.values():
-                if dataset.is_virtual or dataset.external:
-                    raise StoreError(f"{path}: {dataset.name} is stored in another file; allowed: arrays of this one")
+            place = chosen_group(path, list(places), group, scene)
+            chosen = file[place or "/"]
+            datasets = {name: chosen[name] for name in places[place]}
+            _refuse_claims(path, datasets.values(), max_bytes)
             arrays = {name: dataset[()] for name, dataset in datasets.items()}
-            units = {name: _unit_of(dataset) for name, dataset in datasets.items()}
+            attributes = {name: _attributes_of_array(dataset) for name, dataset in datasets.items()}
+            others = {}
+            for name in itertools.islice(chosen, _MAX_MEMBERS):
+                if name not in datasets:
+                    others[name] = _what_it_is(chosen, name)
+            for other in itertools.islice(places, _MAX_MEMBERS):
+                if other != place and other.rpartition("/")[0] != place:
+                    others[f"/{other}"] = ("another group", False)
     except (OSError, RuntimeError, KeyError, ValueError, TypeError) as exc:
         raise StoreError(f"{path}: not a readable HDF5 file ({reason_of(exc)})") from exc
-    return arrays, {name: unit for name, unit in units.items() if unit}
+    return StoredArrays(arrays, attributes, others)
 
 
-def _unit_of(dataset: Any) -> str:
-    """Return the attribute `units`, "" where there is none; many texts, which may take long to read, are no unit."""
-    if "units" not in dataset.attrs or dataset.attrs.get_id("units").get_space().get_simple_extent_npoints() != 1:
-        return ""
-    return str(attribute(dataset, "units", ""))
+def refuse_claims(path: Path, max_bytes: float) -> None:
+    """Raise StoreError if an HDF5 file claims more than `max_bytes`, or has arrays that other files store."""
+    datasets: list[Any] = []
+
+    def note(_: str, item: Any) -> None:
+        if isinstance(item, h5py.Dataset) and item.size:
+            datasets.append(item)
+
+    try:
+        with h5py.File(path, "r") as file:
+            file.visititems(note)
+            _refuse_claims(path, datasets, max_bytes)
+    except (OSError, RuntimeError, KeyError, ValueError, TypeError) as exc:
+        raise StoreError(f"{path}: not a readable HDF5 file ({reason_of(exc)})") from exc
+
+
+def _refuse_claims(path: Path, datasets: Iterable[Any], max_bytes: float) -> None:
+    """Raise StoreError if datasets are larger than `max_bytes` in all, or stored in other files."""
+    size = 0.0
+    for dataset in datasets:
+        size += 8.0 * dataset.size
+        if dataset.is_virtual or dataset.external:
+            raise StoreError(f"{path}: {dataset.name} is stored in another file; allowed: arrays of this one")
+    if size > max_bytes:
+        allowed = f"up to {max_bytes / 2**30:g} GB: export fewer rows or arrays"
+        raise StoreError(f"{path}: its arrays claim {size / 2**30:.1f} GB; allowed: {allowed}")
+
+
+def _what_it_is(group: Any, name: str) -> tuple[str, bool]:
+    """Return what a member of a group is that is no array of numbers, and whether it is a column for all that."""
+    if group.get(name, getlink=True).__class__ is not h5py.HardLink:
+        return "a link to another file or place", False
+    item = group[name]
+    if not isinstance(item, h5py.Dataset):
+        return "another group", False
+    if not item.size:
+        return "no values", False
+    if item.size == 1:
+        return "one value", False
+    if item.dtype.kind in "fiu":
+        return f"an array of {len(item.shape)} dimensions", False
+    return ("records, no numbers" if item.dtype.kind == "V" else "no numbers"), True
+
+
+def _attributes_of_array(dataset: Any) -> dict[str, Any]:
+    """Return those of `ARRAY_ATTRIBUTES` that an array has.
+
+    Many texts, which may take long to read, and what is neither a number nor a text are no unit.
+    """
+    found = {}
+    for name in ARRAY_ATTRIBUTES:
+        if name in dataset.attrs and dataset.attrs.get_id(name).get_space().get_simple_extent_npoints() == 1:
+            value = attribute(dataset, name)
+            # A number keeps the type with which it was written.
+            is_text = isinstance(value, str) or (isinstance(value, list) and isinstance(value[0], str))
+            found[name] = value if is_text else np.asarray(dataset.attrs[name]).ravel()[0]
+    return found
 
 
 def chosen_group(path: Path, places: Sequence[str], group: str, scene: str) -> str:
     """Return the one of `places` that is meant, see `read_arrays`. Raises StoreError."""
     inside = [place for place in places if place.startswith(f"{scene}/")] or list(places)
-    if group:
+    fitting: list[str]
+    is_root, group = group.strip() == "/", group.strip("/")
+    if is_root:
+        fitting = [place for place in places if not place]
+    elif group:
         fitting = [place for place in inside if place == group]
         fitting = fitting or [place for place in inside if f"/{place}".endswith(f"/{group}")]
     else:
@@ -1007,7 +1083,7 @@ def chosen_group(path: Path, places: Sequence[str], group: str, scene: str) -> s
     if not places:
         raise StoreError(f"{path}: no arrays of numbers in it; allowed: a time and angles")
     shown = ", ".join(place or "/" for place in inside[:12]) + (", ..." if len(inside) > 12 else "")
-    problem = f"no group {group!r}" if group else "arrays in several groups"
+    problem = f"no group {group or '/'!r}" if group or is_root else "arrays in several groups"
     raise StoreError(f"{path}: {problem}; allowed: a mapping file with group = one of {shown}")
 
 

@@ -174,7 +174,7 @@ def test_results_of_this_program_are_data_too(results: Path, tmp_path: Path) -> 
     with pytest.raises(RotorError, match=r"several groups; .*paper/fig08/exudyn_tree/rk67"):
         load_data(results, SCENE)
     stored = rm.open(results)["paper/fig08/exudyn_tree/rk67"]
-    for columns, count in (('rotor = "angles[0]"\n', 1), ("", 8)):  # a group alone: columns are guessed
+    for columns, count in (('only = ["rotor"]\n', 1), ('rotor = "angles[0]"\n', 8), ("", 8)):
         (tmp_path / "map.toml").write_text(f'group = "exudyn_tree/rk67"\n{columns}')
         data = load_data(results, SCENE, tmp_path / "map.toml")
         assert len(data.columns) == count
@@ -205,8 +205,14 @@ WRONG: dict[str, tuple[Callable[[Path], object], str]] = {
     "decreasing time": (_write(HEAD + "0,1\n2,2\n1,3\n"), "comes before"),
     "too few rows": (_write(HEAD + "0,1\n1,2\n"), "2 rows; allowed: 3 or more"),
     "before the start": (_write(HEAD + "-1,1\n0,2\n1,3\n"), "begins at t = -1 s"),
-    "a comma between thousands": (_write('time [ms],rotor\n0,1\n"1,000",2\n"2,000",3\n'), "'1,000' in column 1"),
-    "dates": (_write(HEAD + "12:00:01,1\n12:00:02,2\n12:00:03,3\n"), "line 2 has '12:00:01'"),
+    "a comma between thousands": (
+        _write('time [ms],rotor\n0,1\n"1,000",2\n"2,000",3\n'),
+        "column 'time': row 2 (line 3) has '1,000', no number",
+    ),
+    "dates": (
+        _write(HEAD + "12:00:01,1\n12:00:02,2\n12:00:03,3\n"),
+        "column 'time': row 1 (line 2) has '12:00:01', no number",
+    ),
     "two columns for one channel": (_write("time,rotor,azimuth\n0,1,1\n1,2,2\n2,3,3\n"), "could be rotor"),
     "a text that begins as JSON": (_write('{"time": [0, 1'), "allowed: text with a header"),
     "JSON of no arrays": (_write('{"time": {"a": 1}}'), "allowed: "),
@@ -251,7 +257,10 @@ def test_wrong_arrays_are_refused(arrays: Any, message: str) -> None:
         ('rotor = { column = "a", unit = "rpm" }', "'rpm'; allowed: rad, deg, turns"),
         ('rotor = { column = "a", sign = 2 }', "rotor.sign: 2 is out of range; allowed: 1, -1"),
         ("rotor = 3", "rotor: 3 is not a table; allowed: a column's name, or a table with `column`"),
-        ('time = "t"', "no channel to compare"),
+        ('time = "t"', "no column for an angle or a rate; available: t, a, b"),
+        ("", "says nothing; allowed: time, rotor, pitch_1"),
+        ('only = ["rotor"]\npitch_1 = "a"', 'pitch_1: is not in `only`; allowed: "pitch_1" in `only`, or no column'),
+        ('only = ["rotr"]', "only: 'rotr'; allowed: rotor"),
         ("rotor", "not TOML"),
     ],
 )

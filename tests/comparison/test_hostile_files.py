@@ -7,6 +7,7 @@ is not linear takes hours, beside the reading process's own limit, whose message
 from __future__ import annotations
 
 import io
+import json
 import struct
 import zipfile
 import zlib
@@ -61,7 +62,7 @@ def test_long_names_are_cut_and_stay_distinct(tmp_path: Path) -> None:
     (tmp_path / "data.csv").write_text(f"time,rotor,{long}1,{long}2\n0,1,5,6\n1,2,5,6\n2,3,5,6\n")
     data = load_data(tmp_path / "data.csv", SCENE)
     assert data.columns == [0]
-    assert data.unused == tuple(f"{long[:MAX_NAME]}... (column {number})" for number in (3, 4))
+    assert list(data.unused) == [f"{long[:MAX_NAME]}... (column {number})" for number in (3, 4)]
 
 
 @pytest.mark.full
@@ -78,10 +79,10 @@ def test_a_comparison_with_long_names_is_stored(tmp_path: Path) -> None:
     compared.save(tmp_path / "comparison.h5")
 
 
-def test_records_of_json_on_one_line_are_one_line(tmp_path: Path) -> None:
-    record = '{"time": 0.0, "rotor": 1.0}'
-    (tmp_path / "data.json").write_text(f"[{', '.join([record] * 10_000)}]")
-    assert "no row of numbers" in refusal_of(tmp_path / "data.json")
+def test_records_of_json_on_one_line_may_be_of_any_length(tmp_path: Path) -> None:
+    records = [{"time": float(number), "rotor": 1.0} for number in range(10_000)]
+    (tmp_path / "data.json").write_text(json.dumps(records))
+    assert len(load_data(tmp_path / "data.json", SCENE).time) == 10_000
 
 
 @pytest.mark.parametrize("text", ['{"a":' * 100_000, '{"a": ' + "[" * 100_000 + "]" * 100_000 + "}", '{"a": [[1, [2'])

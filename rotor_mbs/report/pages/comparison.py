@@ -11,7 +11,7 @@ import numpy as np
 from markupsafe import Markup
 
 from rotor_mbs.comparison.channels import channel_key
-from rotor_mbs.comparison.verdict import ChannelErrors, DataVerdict, axis_unit, channel_table, verdict_of
+from rotor_mbs.comparison.verdict import ChannelErrors, DataVerdict, axis_unit, channel_table, unused_lines, verdict_of
 from rotor_mbs.report import canvas, plots
 from rotor_mbs.report.canvas import Panels
 from rotor_mbs.report.elements import (
@@ -263,7 +263,9 @@ def _reading_section(verdict: DataVerdict) -> Section:
     read = Listing([(place, line) for place, line in enumerate_lines(verdict.read)])
     folds: list[Fold | Grid | Element] = [Fold("Columns", f"{len(verdict.read)} that were read", [read])]
     if verdict.unused:
-        folds.append(Fold("Columns not used", str(len(verdict.unused)), [Note(", ".join(verdict.unused))]))
+        folds.append(
+            Fold("Columns not used", str(len(verdict.unused)), [Note(line) for line in unused_lines(verdict, 1000)])
+        )
     others = [*(f"Probable cause: {cause}" for cause in verdict.likely[2:]), *verdict.notes]
     if others:
         folds.append(Fold("Notes", str(len(others)), [Note(text) for text in others], is_open=True))
