@@ -214,6 +214,9 @@ def _numbers(values: Any) -> tuple[NDArray[Any], str]:
         values = np.ma.filled(values.astype(float), np.nan)
     try:
         array = np.asarray(values)
+        if array.dtype.kind in "US" and isinstance(values, list | tuple):
+            # NumPy has made texts of the numbers beside a text.
+            array = np.asarray(values, object)
     except (ValueError, TypeError) as exc:
         raise _NotNumbersError("rows of different lengths", is_column=True) from exc
     if array.dtype.kind in "fiu":

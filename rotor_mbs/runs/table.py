@@ -62,6 +62,7 @@ from rotor_mbs.runs.hdf5 import (
     Column,
     StoredGroup,
     attribute,
+    is_dimension_only,
     is_group,
     place_of,
     read_content,
@@ -1042,7 +1043,7 @@ def _what_it_is(group: Any, name: str) -> tuple[str, bool]:
     item = group[name]
     if not isinstance(item, h5py.Dataset):
         return "another group", False
-    if not item.size:
+    if not item.size or is_dimension_only(item):
         return "no values", False
     if item.size == 1:
         return "one value", False
@@ -1097,6 +1098,7 @@ def _array_places(file: Any) -> dict[str, list[str]]:
             and item.dtype.kind in "fiu"
             and 0 < len(item.shape or ()) <= 3
             and item.size > 1
+            and not is_dimension_only(item)
         ):
             folder, _, name = path.rpartition("/")
             places.setdefault(folder, []).append(name)
