@@ -310,7 +310,7 @@ def need_xarray() -> Any:
     try:
         import xarray
     except ImportError as exc:
-        raise InputError('xarray is not installed; allowed: pip install "rotor_mbs[xarray]"') from exc
+        raise InputError("xarray is not installed; allowed: pip install xarray") from exc
     return xarray
 
 

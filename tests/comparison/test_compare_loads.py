@@ -216,7 +216,10 @@ def test_a_mapping_says_column_unit_sign_and_frame_of_a_load() -> None:
     states = {"time": "time", "rotor": "angles[0]", **{f"pitch_{i}": f"angles[{i}]" for i in (1, 2, 3)}}
     mapping = {"blade_root_force_2_x": {"column": "fx", "unit": "kN", "sign": -1, "frame": "rotor"}}
     found = rm.compare({**arrays, "fx": -turned[:, 1, 0] / 1e3}, short("paper/fig11"), columns=states | mapping)
-    assert (found.status, found.verdict.channels[-1].name) == ("ok", "blade root force 2 x, rotor frame")
+    compared = [channel.name for channel in found.verdict.channels]
+    assert found.status == "ok"
+    assert "blade root force 2 x, rotor frame" in compared
+    assert "blade root force 2 x" not in compared
     with pytest.raises(InputError, match="shaft_force_x: frame 'blade'; allowed: base, rotor"):
         rm.compare(arrays, short("paper/fig11"), columns={"shaft_force_x": {"column": "time", "frame": "blade"}})
     with pytest.raises(InputError, match="no column for an angle or a rate"):

@@ -258,9 +258,9 @@ def test_wrong_arrays_are_refused(arrays: Any, message: str) -> None:
         ('rotor = { column = "a", sign = 2 }', "rotor.sign: 2 is out of range; allowed: 1, -1"),
         ("rotor = 3", "rotor: 3 is not a table; allowed: a column's name, or a table with `column`"),
         ('time = "t"', "no column for an angle or a rate; available: t, a, b"),
-        ("", "says nothing; allowed: time, rotor, pitch_1"),
+        ("omit = []", "says nothing; allowed: time, rotor, pitch_1"),
         ('only = ["rotor"]\npitch_1 = "a"', 'pitch_1: is not in `only`; allowed: "pitch_1" in `only`, or no column'),
-        ('only = ["rotr"]', "only: 'rotr'; allowed: rotor"),
+        ('only = ["rotr"]', "is not one of them, perhaps rotor; allowed: a list of rotor"),
         ("rotor", "not TOML"),
     ],
 )
