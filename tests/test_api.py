@@ -59,7 +59,6 @@ def test_a_scene_of_ones_own_gets_a_computed_reference(tmp_path: Path) -> None:
 
 
 def test_labels_units_and_values_of_xarray(study: rm.Runs) -> None:
-    pytest.importorskip("xarray")
     data = study.to_xarray()
     run = study["exudyn_tree/rk67"]
     chosen = data.angles.sel(run="exudyn_tree/rk67", coordinate="pitch 1")
@@ -94,14 +93,7 @@ def test_a_solution_has_its_quantities_status_and_metrics() -> None:
         run["constraint_error"]
     with pytest.raises(AttributeError, match="nothing"):
         assert run.nothing is None
-    pytest.importorskip("xarray")
     np.testing.assert_array_equal(run.to_xarray().angles.sel(coordinate="pitch 2"), run.angles[:, 2])
-
-
-def test_without_xarray_the_extra_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(sys.modules, "xarray", None)
-    with pytest.raises(rm.InputError, match=r'pip install "rotor_mbs\[xarray\]"'):
-        rm.run(rm.scene("paper/fig03").replace(**SHORT), METHOD).to_xarray()
 
 
 def test_runs_are_saved_opened_and_rendered(study: rm.Runs, tmp_path: Path) -> None:

@@ -25,7 +25,6 @@ from rotor_mbs.runs.versions import machine, versions
 from rotor_mbs.scenario.catalogue import scene_of
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.scenario.toml_file import file_path
-from rotor_mbs.solution.trajectory import need_xarray
 from rotor_mbs.studies.modes import compute_modes, increasing_speeds
 
 if TYPE_CHECKING:
@@ -101,7 +100,9 @@ class Modes(SceneModes):
         states = {"rotation": self.rotation, "rest": self.rest}
         if state not in states:
             raise InputError(f"no state {shown_value(state)}; allowed: {', '.join(states)}")
-        return linear_dataset(states[state], need_xarray())
+        import xarray  # late: 0.4 s
+
+        return linear_dataset(states[state], xarray)
 
     def save(self, path: str | os.PathLike[str]) -> Path:
         """Save the modes in a file that `rotor-mbs report` reads.

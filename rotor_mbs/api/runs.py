@@ -48,7 +48,7 @@ from rotor_mbs.scenario.toml_file import file_path, plain_value
 from rotor_mbs.solution.defects import Defects
 from rotor_mbs.solution.quantities import known_quantities
 from rotor_mbs.solution.status import STATUSES
-from rotor_mbs.solution.trajectory import Integration, Solution, Trajectory, need_xarray
+from rotor_mbs.solution.trajectory import Integration, Solution, Trajectory
 from rotor_mbs.studies.run import run_scenes, solve_judged
 
 if TYPE_CHECKING:
@@ -526,7 +526,8 @@ class Runs(Mapping[Any, Any]):
         InputError
             If a sweep that is no grid is to be unstacked.
         """
-        xarray = need_xarray()
+        import xarray  # late: 0.4 s
+
         if not self._is_sweep and not self.scene:
             return xarray.open_datatree(self.path)
         if self._is_sweep:

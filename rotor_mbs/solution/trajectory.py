@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from rotor_mbs.errors import InputError, shown_value
+from rotor_mbs.errors import shown_value
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.quantities import (
     NAMES,
@@ -245,9 +245,9 @@ class Solution:
 
     def to_xarray(self) -> Any:
         """Return the samples as an xarray.Dataset with units, long names and labels:
-        `data.angles.sel(coordinate="pitch 1")`, `data.tip.sel(blade=1, axis="y")`. Raises InputError if xarray is not
-        installed."""
-        xarray = need_xarray()
+        `data.angles.sel(coordinate="pitch 1")`, `data.tip.sel(blade=1, axis="y")`."""
+        import xarray  # late: 0.4 s
+
         labels = {"coordinate": list(self.scene.coordinate_labels), "axis": ["x", "y", "z"]}
         scales: dict[str, Any] = {**scale_values(self.scene), "time": self.time}
         arrays = self.quantities
@@ -303,15 +303,6 @@ class Solution:
         rows = self._summary() | {"arrays": self._arrays()}
         cells = "".join(f"<tr><th>{escape(k)}</th><td>{escape(v)}</td></tr>" for k, v in rows.items())
         return f"<table><caption>{escape(f'{self.scene.label}: {self.scene.title}')}</caption>{cells}</table>"
-
-
-def need_xarray() -> Any:
-    """The module xarray. Raises InputError that says how to get it."""
-    try:
-        import xarray
-    except ImportError as exc:
-        raise InputError("xarray is not installed; allowed: pip install xarray") from exc
-    return xarray
 
 
 def _attributes(quantity: Quantity) -> dict[str, str]:

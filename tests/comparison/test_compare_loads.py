@@ -202,7 +202,6 @@ def test_only_columns_that_are_there_are_judged_and_omit_leaves_out(tmp_path: Pa
 
 
 def test_stored_loads_are_the_datas_and_the_closed_forms() -> None:
-    pytest.importorskip("xarray")
     arrays, _ = data_of("paper/fig11")
     found = rm.compare(arrays | {"shaft_force": 1.5 * arrays["shaft_force"]}, short("paper/fig11")).to_xarray()
     np.testing.assert_allclose(found.shaft_force_z_reference, arrays["shaft_force"][:, 2], rtol=1e-9)

@@ -8,7 +8,9 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import pandas
 import pytest
+import xarray
 from support import other_code, references
 from support.data_files import FORMATS
 
@@ -118,7 +120,6 @@ def test_the_command_prints_a_table_and_writes_a_page(tmp_path: Path, capsys: py
 
 def test_the_stored_comparison_has_data_reference_and_errors_in_si(run: rm.Run, tmp_path: Path) -> None:
     """Of a file in degrees with a channel left out; both readers of netCDF-4 take it, with scales and units."""
-    xarray = pytest.importorskip("xarray")
     late = run.time <= 9.0
     pitch = np.degrees(run.angles[late, 1]) + 1e-3
     found = rm.compare({"t_ms": 1e3 * run.time[late], "pitch_1_deg": pitch}, run.scene)
@@ -181,9 +182,9 @@ def test_rows_that_are_far_apart_are_judged() -> None:
 
 
 def test_tables_of_other_libraries_are_data(run: rm.Run) -> None:
-    assert rm.compare(pytest.importorskip("xarray") and run.to_xarray(), run.scene).agrees
+    assert rm.compare(run.to_xarray(), run.scene).agrees
     table = {"time": run.time, "rotor": run.angles[:, 0], "pitch 1": run.angles[:, 1]}
-    assert rm.compare(pytest.importorskip("pandas").DataFrame(table), run.scene).agrees
+    assert rm.compare(pandas.DataFrame(table), run.scene).agrees
 
 
 def test_numbers_without_sense_are_inaccurate(run: rm.Run) -> None:

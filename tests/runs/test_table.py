@@ -81,7 +81,8 @@ def _missing(path: Path) -> list[int]:
 
 @pytest.mark.parametrize("engine", ENGINES)
 def test_xarray_opens_it_at_every_moment(path: Path, engine: str) -> None:
-    xr = pytest.importorskip("xarray")
+    import xarray as xr
+
     for first in range(0, ROWS, 4):
         with xr.open_dataset(path, engine=engine) as data:
             assert (data.status.values != MISSING).sum() == first
@@ -199,7 +200,8 @@ def test_tables_of_other_studies_stay_beside_the_runs(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("engine", ENGINES)
 def test_a_results_file_opens_in_one_call_and_methods_are_told_by_label(results: Path, engine: str) -> None:
-    xr = pytest.importorskip("xarray")
+    import xarray as xr
+
     with xr.open_datatree(results, engine=engine) as tree:
         data = tree["paper/fig11"].ds
         off = abs(data.angles - data.angles.sel(run="reference"))

@@ -282,7 +282,8 @@ def test_a_turn_that_takes_years_has_no_multipliers_but_a_reason():
 
 @pytest.mark.full
 def test_the_command_writes_a_file_that_opens_in_xarray_and_a_page(tmp_path: Path, capsys):
-    xarray = pytest.importorskip("xarray")
+    import xarray
+
     pytest.importorskip("heyoka")
     output = tmp_path / "modes.h5"
     assert main(["modes", "stiff/nrel-5mw", "--speeds", "0:3:4", "-o", str(output), "-j", "1"]) == 0
@@ -358,7 +359,6 @@ def test_the_api_has_tables_figures_files(found, tmp_path):
     assert read_modes(found.save(tmp_path / "modes.h5"))["soft"].agrees
     with pytest.raises(InputError, match="no Floquet multipliers"):
         found.plot.multipliers()
-    pytest.importorskip("xarray")
     data = found.to_xarray()
     assert data.solver.long_name == "model"
     expected = found.rotation["lagrange"].undamped_frequencies[:, 2]
