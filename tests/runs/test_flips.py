@@ -15,11 +15,8 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from support.checking import results_file
 from support.commands import rotor_mbs
-from support.sweeps import THREE_RUNS, made_sweep
 
-import rotor_mbs as rm
 from rotor_mbs.errors import RotorError, StoreError
 from rotor_mbs.report.build import write_report
 from rotor_mbs.runs.read import open_results, read_records
@@ -27,7 +24,7 @@ from rotor_mbs.runs.sweeps import StoredSweep
 from rotor_mbs.runs.trailer import read_trailer
 
 SCENE = "check/held"
-KINDS = ("results", "sweep", "modes", "comparison")
+KINDS = ("results", "s", "modes", "comparison")
 FLIPS, CUTS = 2000, 300
 _SIGNATURES = (
     b"\x89HDF", b"GCOL", b"HEAP", b"TREE", b"SNOD", b"OHDR", b"OCHK", b"FRHP", b"FHDB", b"BTHD", b"BTLF",
@@ -35,31 +32,11 @@ _SIGNATURES = (
 LIMIT_S = 10.0  # in which a command ends
 
 
-def make_files(folder: Path) -> None:
-    results_file(folder / "results", [SCENE], ["lagrange/dop853"])
-    made_sweep(folder, THREE_RUNS).rename(folder / "sweep")
-    assert rotor_mbs("modes", SCENE, "--speeds", "0.5:1:2", "-j", "1", "-o", folder / "modes").status == 0
-    rm.export(SCENE, "csv", folder / "data.csv")
-    rm.compare(folder / "data.csv", SCENE).save(folder / "comparison")
-
-
 def metadata(content: bytes, path: Path) -> list[int]:
     """Offsets in HDF5's heaps and headers: within 512 bytes behind a signature of theirs; rows left out."""
     rows = [region for columns in read_trailer(path).groups.values() for region in columns.values()]
     near = set[int]()
-    for signature in (
-        b"GCOL",
-        b"HEAP",
-        b"TREE",
-        b"SNOD",
-        b"OHDR",
-        b"OCHK",
-        b"FRHP",
-        b"FHDB",
-        b"BTHD",
-        b"BTLF",
-        b"\x89HDF",
-    ):
+    for signature in _SIGNATURES:
         start = content.find(signature)
         while start >= 0:
             near.update(range(start, min(start + 512, len(content))))
@@ -70,8 +47,8 @@ def metadata(content: bytes, path: Path) -> list[int]:
 def damages(folder: Path, flips: int, cuts: int, seed: int) -> Iterator[tuple[str, str, bytes]]:
     """Kind, what was done, content: half of the flips in heaps and headers, half anywhere."""
     chance = random.Random(seed)
-    whole = {kind: (folder / kind).read_bytes() for kind in KINDS}
-    inner = {kind: metadata(whole[kind], folder / kind) for kind in KINDS}
+    whole = {kind: (folder / f"{kind}.h5").read_bytes() for kind in KINDS}
+    inner = {kind: metadata(whole[kind], folder / f"{kind}.h5") for kind in KINDS}
     for number in range(flips):
         kind = KINDS[number % len(KINDS)]
         content = bytearray(whole[kind])
@@ -96,7 +73,7 @@ def read_all(kind: str, path: Path) -> None:
             runs = [f"{scene.name}/{name}" for scene in results.scenes.values() for name in scene.runs]
         if runs != [f"{SCENE}/reference", f"{SCENE}/lagrange/dop853"]:
             raise StoreError(f"{path}: a run is missing")
-    elif kind == "sweep":
+    elif kind == "s":
         sweep = StoredSweep(path)
         if (sweep.column("status") < 0).any():
             raise StoreError(f"{path}: a run is missing")
@@ -124,34 +101,26 @@ def attempt(kind: str, content: bytes, folder: Path, command: str) -> str:
     return f"{command} {kind}: status {status}"
 
 
-def try_all(folder: Path, flips: int, cuts: int, seed: int) -> Counter[str]:
+def try_all(folder: Path, out: Path, flips: int, cuts: int, seed: int) -> Counter[str]:
     outcomes = Counter[str]()
-    (folder / "out").mkdir(exist_ok=True)
     for number, (kind, what, content) in enumerate(damages(folder, flips, cuts, seed)):
         try:
-            outcomes[attempt(kind, content, folder / "out", "check" if number // 8 % 4 else "report")] += 1
+            outcomes[attempt(kind, content, out, "check" if number // 8 % 4 else "report")] += 1
         except Exception as exc:
             raise AssertionError(f"{kind}: {what}: {type(exc).__name__}: {exc}") from exc
     return outcomes
 
 
-@pytest.fixture(scope="module")
-def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    made = tmp_path_factory.mktemp("flips")
-    make_files(made)
-    return made
-
-
-def test_a_flipped_bit_or_a_cut_is_found(folder: Path) -> None:
+def test_a_flipped_bit_or_a_cut_is_found(files: Path, tmp_path: Path) -> None:
     """The short form: the digest is compared before HDF5 sees the file, so that it cannot hang this process."""
-    outcomes = try_all(folder, 96, 16, seed=1)
+    outcomes = try_all(files, tmp_path, 96, 16, seed=1)
     assert sum(outcomes.values()) == 112
 
 
 @pytest.mark.nightly
-def test_two_thousand_flipped_bits_and_three_hundred_cuts_are_found(folder: Path) -> None:
+def test_two_thousand_flipped_bits_and_three_hundred_cuts_are_found(files: Path, tmp_path: Path) -> None:
     process = subprocess.run(
-        [sys.executable, __file__, str(folder)], capture_output=True, text=True, check=False,
+        [sys.executable, __file__, str(files), str(tmp_path)], capture_output=True, text=True, check=False,
         timeout=(FLIPS + CUTS) * LIMIT_S, env={**os.environ, "PYTHONPATH": str(Path(__file__).parents[1])},
     )  # fmt: skip
     assert process.returncode == 0, process.stderr
@@ -159,5 +128,5 @@ def test_two_thousand_flipped_bits_and_three_hundred_cuts_are_found(folder: Path
 
 
 if __name__ == "__main__":
-    for name, count in sorted(try_all(Path(sys.argv[1]), FLIPS, CUTS, seed=2).items()):
+    for name, count in sorted(try_all(*map(Path, sys.argv[1:]), FLIPS, CUTS, seed=2).items()):
         print(count, name)

@@ -15,7 +15,6 @@ from support.checking import results_file
 from support.commands import rotor_mbs
 from support.scenes import paper
 from support.stored import Made, rotor, store
-from support.sweeps import THREE_RUNS, made_sweep
 
 import rotor_mbs as rm
 from rotor_mbs.errors import RotorError
@@ -51,16 +50,13 @@ _QUICK = {"run", "sweep", "modes", "compare", "save of runs", "save of modes"}
 
 
 @pytest.fixture(scope="module")
-def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A file of every kind, by its name; `input` what commands read."""
+def folder(files: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A file of every kind, by its name."""
     made = tmp_path_factory.mktemp("kinds")
-    (made / "input").mkdir()
-    results_file(made / "input" / "results", [SCENE], [METHOD])
-    made_sweep(made / "input", THREE_RUNS)
-    shutil.copy(made / "input" / "s.h5", made / "sweep")
-    shutil.copy(made / "input" / "s.h5", made / "unfinished sweep")
+    shutil.copy(files / "s.h5", made / "sweep")
+    shutil.copy(files / "s.h5", made / "unfinished sweep")
     TableFile(made / "unfinished sweep").tables[""].place(1).mark_missing([0])
-    write_splits(made / "input" / "s.h5", made / "splits")
+    write_splits(files / "s.h5", made / "splits")
     shutil.move(made / "splits" / "train.h5", made / "split")
 
     short = paper("fig08", samples=11)
@@ -68,16 +64,11 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
         store(made / name, [Made(short, "reference", rotor(np.sin)), Made(short, METHOD, rotor(np.sin))])
     TableFile(made / "unfinished results").place(f"{OTHER}/{METHOD}").mark_missing([0])
     known = {"run": "one", "scene": OTHER, "method_name": METHOD, "step": 0.5, "tolerance": np.nan}
-    place = extend_file(made / "stability", [points_table("stability", [known])]).place("one", "stability")
-    place.write(place.rows_of({"status": "ok", "angle_error_max": 0.25}))
-    assert rotor_mbs("bench", OTHER, "-m", METHOD, "--budget", "0.01", "-o", made / "bench").status == 0
-
-    modes, data = made / "input" / "modes", made / "input" / "data.csv"
-    assert rotor_mbs("modes", SCENE, "-j", "1", "-o", modes).status == 0
-    rm.export(SCENE, "csv", data)
-    rm.compare(data, SCENE).save(made / "input" / "comparison")
+    for kind in ("bench", "stability"):
+        place = extend_file(made / kind, [points_table(kind, [known])]).place("one", kind)
+        place.write(place.rows_of({"status": "ok", "angle_error_max": 0.25}))
     for kind in ("modes", "comparison"):
-        records = read_records(made / "input" / kind, kind)
+        records = read_records(files / f"{kind}.h5", kind)
         write_records(made / kind, [replace(record, scene=OTHER) for record in records])
 
     content = (made / "results").read_bytes()
@@ -93,9 +84,9 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return made
 
 
-def answer(command: str, path: Path, given: Path, monkeypatch: pytest.MonkeyPatch) -> str:
+def answer(command: str, path: Path, files: Path, monkeypatch: pytest.MonkeyPatch) -> str:
     """ "" where a command has written to `path`, else its one line."""
-    sweep, data = given / "s.toml", given / "data.csv"
+    sweep, data = files / "s.toml", files / "data.csv"
     lines: dict[str, list[object]] = {
         "run": ["run", SCENE, "-m", METHOD, "-j", "1", "-o", path],
         "reference": ["reference", SCENE, "-j", "1", "-o", path],
@@ -107,11 +98,11 @@ def answer(command: str, path: Path, given: Path, monkeypatch: pytest.MonkeyPatc
     }
     calls: dict[str, Callable[[], object]] = {
         "reproduce": lambda: reproduce.reproduce(path, workers=0, timeout_s=60.0),
-        "save of runs": lambda: rm.open(given / "results").save(path),
-        "save of a sweep": lambda: rm.open(given / "s.h5").save(path),
+        "save of runs": lambda: rm.open(files / "results.h5").save(path),
+        "save of a sweep": lambda: rm.open(files / "s.h5").save(path),
         "save of modes": lambda: rm.modes(SCENE).save(path),
         "save of a comparison": lambda: rm.compare(data, SCENE).save(path),
-        "datasets of a sweep": lambda: write_splits(given / "s.h5", path.parent),
+        "datasets of a sweep": lambda: write_splits(files / "s.h5", path.parent),
     }
     if command in calls:
         if command == "reproduce":  # of one scene that takes no time
@@ -155,13 +146,13 @@ def stored(path: Path) -> dict[str, object]:
     "command", [pytest.param(name, marks=() if name in _QUICK else pytest.mark.full) for name in EXTENDS]
 )
 def test_a_command_extends_its_own_kind_and_leaves_every_other(
-    command: str, kind: str, folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    command: str, kind: str, folder: Path, files: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     names = {"compare": "comparison.h5", "datasets of a sweep": "train.h5"}
     path = tmp_path / names.get(command, "file.h5")
     before = (folder / kind).read_bytes()
     path.write_bytes(before)
-    line = answer(command, path, folder / "input", monkeypatch)
+    line = answer(command, path, files, monkeypatch)
     if kind in EXTENDS[command]:
         assert line == ""
         earlier, now = stored(folder / kind), stored(path)
@@ -198,19 +189,17 @@ def test_the_documentation_has_the_same_table() -> None:
 
 
 @pytest.mark.parametrize("command", ["run", "sweep", "modes", "compare", "save of runs"])
-def test_an_empty_file_is_a_new_one(
-    command: str, folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_an_empty_file_is_a_new_one(command: str, files: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path = tmp_path / ("comparison.h5" if command == "compare" else "file.h5")
     path.touch()
-    assert answer(command, path, folder / "input", monkeypatch) == ""
+    assert answer(command, path, files, monkeypatch) == ""
     assert h5py.is_hdf5(path)
 
 
-def test_a_copy_of_runs_replaces_one_with_the_same_runs(folder: Path, tmp_path: Path) -> None:
+def test_a_copy_of_runs_replaces_one_with_the_same_runs(files: Path, tmp_path: Path) -> None:
     """A script that is called again; runs that the copy does not have are not lost."""
     target = tmp_path / "copy.h5"
-    runs = rm.open(folder / "input" / "results")
+    runs = rm.open(files / "results.h5")
     for _ in range(2):
         assert runs.save(target).read_bytes() == runs.path.read_bytes()
     results_file(target, [SCENE], ["lagrange/ode45"])

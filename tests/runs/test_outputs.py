@@ -15,7 +15,7 @@ from support.checking import results_file
 from support.commands import refusal, rotor_mbs
 from support.scenes import paper
 from support.stored import Made, rotor, store
-from support.sweeps import THREE_RUNS, made_sweep, run_local
+from support.sweeps import made_sweep, run_local
 
 import rotor_mbs as rm
 from rotor_mbs.errors import InputError, StoreError
@@ -27,9 +27,9 @@ RUN = ["run", "check/held", "-m", "lagrange/dop853", "-j", "1", "-o"]
 
 
 @pytest.fixture(scope="module")
-def dataset(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def dataset(files: Path) -> Path:
     """Of a sweep, beside its file s.toml."""
-    return made_sweep(tmp_path_factory.mktemp("sweep"), THREE_RUNS)
+    return files / "s.h5"
 
 
 @pytest.mark.parametrize(

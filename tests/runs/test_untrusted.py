@@ -16,10 +16,8 @@ from pathlib import Path
 
 import h5py
 import pytest
-from support.checking import results_file
 from support.commands import rotor_mbs
 from support.forging import append_trailer
-from support.sweeps import THREE_RUNS, made_sweep
 
 import rotor_mbs as rm
 from rotor_mbs.errors import StoreError
@@ -31,17 +29,6 @@ from rotor_mbs.scenario.catalogue import REFERENCES
 SCENE = "check/held"
 KINDS = ("results", "s", "modes", "comparison")
 _SOON_S = 60.0  # on a busy machine
-
-
-@pytest.fixture(scope="module")
-def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    made = tmp_path_factory.mktemp("untrusted")
-    results_file(made / "results.h5", [SCENE], ["lagrange/dop853"])
-    made_sweep(made, THREE_RUNS)
-    assert rotor_mbs("modes", SCENE, "--speeds", "0.5:1:2", "-j", "1", "-o", made / "modes.h5").status == 0
-    rm.export(SCENE, "csv", made / "data.csv")
-    rm.compare(made / "data.csv", SCENE).save(made / "comparison.h5")
-    return made
 
 
 @pytest.fixture(autouse=True)
@@ -103,8 +90,8 @@ def forge(path: Path, change: Callable[[bytearray], None]) -> None:
 
 @pytest.mark.parametrize("forgery", [pytest.param("hangs", marks=pytest.mark.full), "dies", "takes memory"])
 @pytest.mark.parametrize("kind", [KINDS[0], *(pytest.param(kind, marks=pytest.mark.full) for kind in KINDS[1:])])
-def test_every_command_ends_with_a_line(forgery: str, kind: str, folder: Path, tmp_path: Path) -> None:
-    path = Path(shutil.copy(folder / f"{kind}.h5", tmp_path / "forged.h5"))
+def test_every_command_ends_with_a_line(forgery: str, kind: str, files: Path, tmp_path: Path) -> None:
+    path = Path(shutil.copy(files / f"{kind}.h5", tmp_path / "forged.h5"))
     forge(path, FORGERIES[forgery])
     before = path.read_bytes()
     commands: list[list[object]] = [["check", path], ["show", path], ["report", path, "-o", tmp_path / "pages"]]
@@ -112,7 +99,7 @@ def test_every_command_ends_with_a_line(forgery: str, kind: str, folder: Path, t
         commands += [["animate", SCENE, path, "-o", tmp_path / "a.webp"], ["figures", path, "-o", tmp_path]]
         commands += [["run", SCENE, "-m", "lagrange/dop853", "-j", "1", "-o", path]]
     elif kind == "s":
-        commands += [["sweep", folder / "s.toml", "-j", "1", "-o", path]]
+        commands += [["sweep", files / "s.toml", "-j", "1", "-o", path]]
     elif kind == "modes":
         commands += [["modes", SCENE, "--speeds", "0.5:1:2", "-j", "1", "-o", path]]
     for words in commands:
@@ -151,22 +138,22 @@ def _process(path: Path, argument: None) -> int:  # noqa: ARG001
     ("read", "argument"), [(_wait, 100.0), (_take, 1 << 31), (_die, signal.SIGSEGV)], ids=["time", "memory", "signal"]
 )
 def test_the_limits_of_the_worker(
-    read: Callable[[Path, object], object], argument: object, folder: Path, tmp_path: Path
+    read: Callable[[Path, object], object], argument: object, files: Path, tmp_path: Path
 ) -> None:
-    path = Path(shutil.copy(folder / "results.h5", tmp_path / "changed.h5"))
+    path = Path(shutil.copy(files / "results.h5", tmp_path / "changed.h5"))
     forge(path, lambda content: content.extend(bytes(8)))
     with pytest.raises(StoreError, match=r"damaged or forged: .* takes more than .* s or .* GB"):
         read_apart(path, read, argument)
     assert read_apart(path, _process, None) != os.getpid()  # a new process reads the next one
 
 
-def test_only_files_of_others_are_read_by_the_worker(folder: Path, tmp_path: Path) -> None:
-    assert read_apart(folder / "results.h5", _process, None) == os.getpid()
+def test_only_files_of_others_are_read_by_the_worker(files: Path, tmp_path: Path) -> None:
+    assert read_apart(files / "results.h5", _process, None) == os.getpid()
     assert read_apart(sorted(REFERENCES.glob("*.h5"))[0], _process, None) == os.getpid()
-    path = Path(shutil.copy(folder / "results.h5", tmp_path / "changed.h5"))
+    path = Path(shutil.copy(files / "results.h5", tmp_path / "changed.h5"))
     forge(path, lambda content: content.extend(bytes(8)))
     assert read_apart(path, _process, None) != os.getpid()
-    assert rm.open(path).statuses == rm.open(folder / "results.h5").statuses
+    assert rm.open(path).statuses == rm.open(files / "results.h5").statuses
 
 
 def test_the_worker_needs_no_more_than_it_reads_with() -> None:

@@ -5,9 +5,11 @@ from __future__ import annotations
 import contextlib
 import io
 import sys
-from typing import NamedTuple
+from typing import Any, NamedTuple
+from unittest import mock
 
 from rotor_mbs.cli import main
+from rotor_mbs.processes import pool
 
 PROGRAM = [sys.executable, "-m", "rotor_mbs"]
 
@@ -20,15 +22,28 @@ class Ended(NamedTuple):
     err: str
 
 
-def rotor_mbs(*words: object) -> Ended:
+def rotor_mbs(*words: object, processes: bool = False) -> Ended:
+    """Call a command in this process.
+
+    What `-j 1` would give to a worker process is done here, too, unless a test is about processes: to start one and
+    load the engines takes longer than most runs of tests.
+    """
     out, err = io.StringIO(), io.StringIO()
-    with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
+    workers = contextlib.nullcontext() if processes else mock.patch.object(pool, "WorkerPool", _pool_without_process)
+    with workers, contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
         try:
             status = main([str(word) for word in words])
         except SystemExit as exc:  # of the argument parser
             status = int(str(exc.code))
     assert "Traceback" not in err.getvalue()
     return Ended(status, out.getvalue(), err.getvalue())
+
+
+def _pool_without_process(workers: int, *arguments: Any) -> pool.TaskPool:
+    return pool.SerialPool() if workers == 1 else _WorkerPool(workers, *arguments)
+
+
+_WorkerPool = pool.WorkerPool
 
 
 def refusal(*words: object) -> str:
