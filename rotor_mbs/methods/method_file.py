@@ -22,7 +22,7 @@ from typing import TYPE_CHECKING, Any
 
 from rotor_mbs.errors import InputError, RotorError, one_line
 from rotor_mbs.methods.base import BuiltItem, Method, no_items, step_ladder, tolerance_ladder
-from rotor_mbs.processes.worker import TaskLostError, Worker
+from rotor_mbs.processes.worker import TaskLostError, Worker, memory_limit_text
 
 if TYPE_CHECKING:
     from rotor_mbs.scenario.scene import Scene
@@ -48,22 +48,26 @@ class MethodFile:
         return Path(self.path).stem
 
     def load(self, built_in: Iterable[Method]) -> dict[str, Method]:
-        """Return its methods by name: "mine/rk4", also where the file calls it "rk4". Raises InputError: a line with
-        file and line number for whatever the file raises."""
+        """Return its methods by name: "mine/rk4", also where the file calls it "rk4".
+
+        Parameters
+        ----------
+        built_in : methods that are none of the file's, also where it imports them.
+
+        Raises
+        ------
+        InputError
+            A line with file and line number for whatever the file raises, and where it has no
+            method or a name that is not allowed.
+        """
+        built_in = list(built_in)
         if not _NAME.fullmatch(self.model):
             raise InputError(f"{self.path}: allowed: a file's name of letters, digits, - and _")
         taken = next((known for known in built_in if known.model == self.model), None)
         if taken is not None:
             raise InputError(f"{self.path}: {taken.name} has this name; allowed: another file name")
-        module = ModuleType(f"rotor_mbs_method_file_{self.model}")
-        module.__file__ = self.path
-        sys.modules[module.__name__] = module  # dataclasses look there
-        with self.located(), _without_folder(self.path), _loading, quiet():
-            exec(compile(self.text, self.path, "exec", dont_inherit=True), vars(module))
         methods: dict[str, Method] = {}
-        values = (value if isinstance(value, list | tuple) else [value] for value in vars(module).values())
-        defined = dict.fromkeys(one for several in values for one in several if isinstance(one, Method))
-        for method in defined:
+        for method in self.defined(self.execute()):
             if any(method is known for known in built_in):  # imported
                 continue
             own = self._named(method)
@@ -74,9 +78,31 @@ class MethodFile:
             raise InputError(f"{self.path}: defines no Method; allowed: at least one (docs/your-engine.md)")
         return methods
 
+    def execute(self) -> ModuleType:
+        """Run the file's text and return its module. Raises InputError."""
+        module = ModuleType(f"rotor_mbs_method_file_{self.model}")
+        module.__file__ = self.path
+        sys.modules[module.__name__] = module  # dataclasses look there
+        with self.located(), _without_folder(self.path), _loading, quiet():
+            exec(compile(self.text, self.path, "exec", dont_inherit=True), vars(module))
+        return module
+
+    def defined(self, module: ModuleType) -> list[Method]:
+        """Return the methods that its module has, also in lists, each once."""
+        methods: dict[Method, None] = {}
+        for value in vars(module).values():
+            for item in value if isinstance(value, list | tuple) else [value]:
+                if isinstance(item, Method):
+                    methods[item] = None
+        return list(methods)
+
+    def name_of(self, method: Method) -> str:
+        """Return the name of a method under the file's name."""
+        return f"{self.model}/{method.name.rpartition('/')[2]}"
+
     def _named(self, method: Method) -> Method:
         """Return a method under the file's name, with a ladder if it has none and a step or a tolerance."""
-        name = f"{self.model}/{method.name.rpartition('/')[2]}"
+        name = self.name_of(method)
         ladders = method.ladders
         if not ladders:
             declared = method.settings.declared()
@@ -100,10 +126,10 @@ class MethodFile:
     def _items(self, method: Method, scene: Scene) -> list[BuiltItem]:
         """Where the method does not say what it builds, it is built: what it cannot represent it refuses there. In a
         process of its own: somebody's code may end or hang it."""
-        name = f"{self.model}/{method.name.rpartition('/')[2]}"
+        name = self.name_of(method)
         late = f"{name}: not built for {scene.name} within {_LOAD_S:g} s"
         ended = f"{name}: ended the process that built it for {scene.name}"
-        items: list[BuiltItem] = _ask(self, (name, scene), late, ended)
+        items: list[BuiltItem] = _ask(self, (method.name, scene), late, ended)
         return items
 
     def build_items(self, method: Method, scene: Scene) -> list[BuiltItem]:
@@ -135,22 +161,22 @@ def located(error: BaseException, paths: Iterable[str]) -> str:
 
 
 def read_file(path: str) -> MethodFile:
-    """Raises InputError for a file that cannot be read, and for one that ends or hangs the process that loads it."""
+    """Read a file and run it in a process of its own.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read, raises an error, or ends or hangs the process that loads it.
+    """
     try:
         file = MethodFile(path, Path(path).read_text(encoding="utf-8"))
     except (OSError, ValueError) as exc:
         raise InputError(f"{path}: {getattr(exc, 'strerror', None) or exc}; allowed: a Python file") from exc
-    _ask(
-        file,
-        None,
-        f"{path}: not loaded within {_LOAD_S:g} s",
-        f"{path}: ended the process that loaded it",
-    )
+    _ask(file, None, f"{path}: not loaded within {_LOAD_S:g} s", f"{path}: ended the process that loaded it")
     return file
 
 
 _loading = threading.Lock()  # where files are loaded by several threads, their output is restored in order
-_asking = threading.Lock()
 _worker = Worker(is_silent=True)  # that loads files; somebody's code may end or hang it
 atexit.register(_worker.close)
 
@@ -161,45 +187,46 @@ def _ask(file: MethodFile, built: tuple[str, Scene] | None, late: str, ended: st
     Parameters
     ----------
     file : the file to load.
-    built : a method of it, by its name, and the scene for which it is built; None to load alone.
+    built : a method of it, by the name that the file gives it, and the scene for which it is built;
+        None to load alone.
     late, ended : messages where it takes too long, and where it ends its process.
 
     Raises
     ------
     MethodRefusal, InputError
-        As the file's method does, and for a file that is late or ends the process.
+        As the file and its method do, and for a file that is late or ends the process.
     ResourceError
         If the process cannot be started.
     """
     try:
-        with _asking:
-            return _worker.run(_answer, (str(Path.cwd()), file, built), _LOAD_S)
+        try:
+            return _worker.run(_answer, (file, built), _LOAD_S)
+        except InputError:
+            if built is not None:
+                raise
+        # The process has the modules that the file imports, and the import path, as they were: a
+        # new one sees what was mended since.
+        _worker.end_process()
+        return _worker.run(_answer, (file, built), _LOAD_S)
     except TaskLostError as exc:
-        if exc.failure == "timed_out":
-            raise InputError(late) from None
+        if exc.exit_code is None:
+            raise InputError(f"{late}{memory_limit_text()}") from None
         raise InputError(f"{ended} (exit code {exc.exit_code})") from None
 
 
-_loaded: dict[MethodFile, dict[str, Method]] = {}  # in the other process
+_executed: dict[MethodFile, ModuleType] = {}  # in the other process
 
 
-def _answer(question: tuple[str, MethodFile, tuple[str, Scene] | None]) -> Any:
-    """Load a file once, and build what is asked, in the other process; see `_ask`.
-
-    What loading raises is raised again where it counts.
-    """
-    folder, file, built = question
-    os.chdir(folder)
-    if file not in _loaded:
-        _loaded[file] = {}
-        with suppress(InputError):
-            _loaded[file] = file.load(())
+def _answer(question: tuple[MethodFile, tuple[str, Scene] | None]) -> Any:
+    """Run a file, once unless it fails, and build what is asked, in the other process; see `_ask`."""
+    file, built = question
+    if file not in _executed:
+        _executed[file] = file.execute()
     if built is None:
         return None
     name, scene = built
-    items = _loaded[file][name].items
-    assert isinstance(items, partial)
-    return file.build_items(items.args[0], scene)
+    (method,) = (method for method in file.defined(_executed[file]) if method.name == name)
+    return file.build_items(method, scene)
 
 
 @contextmanager

@@ -6,11 +6,12 @@ import operator
 import signal
 import threading
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, CancelledError, Future, ThreadPoolExecutor, wait
 from contextlib import AbstractContextManager, contextmanager, nullcontext
 from dataclasses import dataclass, replace
 from queue import LifoQueue
+from types import MappingProxyType
 from typing import Any, Generic, Self, TypeAlias, TypeVar
 
 from rotor_mbs.errors import (
@@ -99,6 +100,7 @@ class WorkerPool(TaskPool):
     workers : how many processes.
     initializer : called first in every process; what it raises is the error of a task.
     core : to which the processes are bound, where the system allows it; None for any.
+    environment : environment variables of the processes where this one has none of the name.
 
     Examples
     --------
@@ -112,10 +114,11 @@ class WorkerPool(TaskPool):
         workers: int,
         initializer: Callable[[], object] | None = None,
         core: int | None = None,
+        environment: Mapping[str, str] = MappingProxyType({}),
     ) -> None:
         self.workers = workers
         self._threads = ThreadPoolExecutor(workers)
-        self._workers = [Worker(initializer, core=core) for _ in range(workers)]
+        self._workers = [Worker(initializer, core=core, environment=environment) for _ in range(workers)]
         # The last one that became free is taken first: with few tasks, few processes are started.
         self._free: LifoQueue[Worker] = LifoQueue()
         for worker in reversed(self._workers):
@@ -179,14 +182,25 @@ def check_workers(workers: int) -> None:
         raise InputError(f"workers: {shown_value(workers)}; allowed: {allowed}")
 
 
-def local_pool(workers: int, initializer: Callable[[], object] | None = None) -> TaskPool:
-    """Return a pool of so many worker processes of this machine.
+def local_pool(
+    workers: int,
+    initializer: Callable[[], object] | None = None,
+    environment: Mapping[str, str] = MappingProxyType({}),
+) -> TaskPool:
+    """Return a pool of worker processes of this machine.
 
-    With 0 workers, tasks run in this process, without a time limit. Raises InputError for a number
-    that is out of range.
+    Parameters
+    ----------
+    workers : how many; with 0, tasks run in this process, without a time limit.
+    initializer, environment : of the processes, as for `WorkerPool`.
+
+    Raises
+    ------
+    InputError
+        If the number of workers is out of range.
     """
     check_workers(workers)
-    return WorkerPool(workers, initializer) if workers else SerialPool()
+    return WorkerPool(workers, initializer, environment=environment) if workers else SerialPool()
 
 
 def pool_of(workers: Workers) -> AbstractContextManager[TaskPool]:

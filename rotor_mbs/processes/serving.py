@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gc
+import math
 import os
 import pickle
 import queue
@@ -86,9 +87,20 @@ def set_up(core: int | None, memory_limit: int | None, initializer: Callable[[],
     if core is not None and hasattr(os, "sched_setaffinity"):
         os.sched_setaffinity(0, {core})
     if memory_limit is not None:
+        _keep_below_limit_of_parent()
         limit_resources(memory_limit)
     if initializer is not None:
         initializer()
+
+
+def _keep_below_limit_of_parent() -> None:
+    """Make the parent's limit of address space one that this process cannot raise."""
+    with suppress(ImportError):  # Windows
+        import resource
+
+        soft, _ = resource.getrlimit(resource.RLIMIT_AS)
+        with suppress(ValueError, OSError):  # macOS has no limit of address space
+            resource.setrlimit(resource.RLIMIT_AS, (soft, soft))
 
 
 def limit_resources(memory: int, processor_s: int | None = None) -> None:
@@ -110,19 +122,34 @@ def limit_resources(memory: int, processor_s: int | None = None) -> None:
                 resource.setrlimit(kind, (limit, hard))
 
 
+def address_space() -> float:
+    """Return the limit of address space (bytes) of this process and of those that it starts; infinite without one."""
+    with suppress(ImportError):  # Windows
+        import resource
+
+        limit, _ = resource.getrlimit(resource.RLIMIT_AS)
+        if limit != resource.RLIM_INFINITY:
+            return float(limit)
+    return math.inf
+
+
 def is_worker() -> bool:
     """Return whether this is a worker process."""
     return _is_worker
 
 
 def _answer(request: bytes) -> bytes:
-    """Return the pickled (result, error) of a pickled (function, argument).
+    """Return the pickled (result, error) of a request: a folder, and a pickled function with its argument.
 
     What cannot be pickled, and an exit, is an error of the task.
     """
     try:
         with system_errors_apart():
-            work, task = pickle.loads(request)
+            folder, call = pickle.loads(request)
+            if folder:
+                with suppress(OSError):  # it is gone, and the parent has that, too
+                    os.chdir(folder)
+            work, task = pickle.loads(call)
             result = work(task)
         return pickle.dumps((result, None))
     except Exception as exc:

@@ -6,6 +6,7 @@ pass through two pipes as pickles, so that it does not need the script that its 
 
 from __future__ import annotations
 
+import math
 import os
 import pickle
 import signal
@@ -13,27 +14,32 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Callable
-from contextlib import suppress
+import weakref
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager, suppress
 from functools import cache, partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, BinaryIO, Self, TypeVar
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any, BinaryIO, Self, TypeVar, cast
 
 from rotor_mbs.errors import ResourceError, RotorError
-from rotor_mbs.processes.serving import send, set_up
+from rotor_mbs.processes.serving import address_space, send, set_up
 
 if TYPE_CHECKING:
-    from concurrent.futures import ThreadPoolExecutor
+    from concurrent.futures import Future, ThreadPoolExecutor
 
 T = TypeVar("T")
 R = TypeVar("R")
 
+SET_UP_LIMIT_S = 300.0  # large engines load in seconds, on a busy machine in minutes
 # The processes are the parallelism, and timings must not depend on a library's threads.
 _ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
 # Without -P, Python would import from the current folder.
 _PROGRAM = "import sys; sys.path[:] = sys.argv[1:]; from rotor_mbs.processes.serving import serve; serve()"
 _RETRY_START_S = 1.0  # after the system had no room for a process
 _END_S = 1.0  # until a process whose pipe is closed has ended
+# What a pipe raises whose other end is gone.
+_PIPE_ERRORS = (EOFError, ConnectionError, pickle.UnpicklingError)
 
 
 class TaskLostError(RotorError):
@@ -41,8 +47,10 @@ class TaskLostError(RotorError):
 
     Attributes
     ----------
-    failure : "timed_out" if it exceeded its time limit, "worker_died" if its process died.
-    exit_code : of its process; negative for the number of a signal.
+    failure : "timed_out" if it exceeded its time limit, "worker_died" if its process died, or was
+        ended at the time limit where it may have waited for memory.
+    exit_code : of a process that died by itself, negative for the number of a signal; None for one
+        that was ended at the time limit.
     """
 
     def __init__(self, message: str, failure: str, exit_code: int | None = None) -> None:
@@ -54,7 +62,9 @@ class TaskLostError(RotorError):
 class Worker:
     """A process that calls one function at a time, keeps its state, and is replaced if it dies.
 
-    It starts when it is first used, ignores Ctrl-C, and ends with its parent. A context manager.
+    It starts when it is first used, ignores Ctrl-C, and ends with its parent. Its functions run in
+    the parent's current folder. Threads that call it take turns; a process that is forked off the
+    parent has a worker process of its own. A context manager.
 
     Parameters
     ----------
@@ -62,6 +72,8 @@ class Worker:
     core : to which the process is bound, where the system allows it; None for any.
     memory_limit : bytes of address space, where the system can limit it; None for no limit.
     is_silent : whether what the process prints is dropped; otherwise it goes to standard error.
+    environment : environment variables of the process where this process has none of the name.
+    set_up_limit_s : time for the start of the process, its imports and its initializer, in s.
 
     Examples
     --------
@@ -77,16 +89,21 @@ class Worker:
         core: int | None = None,
         memory_limit: int | None = None,
         is_silent: bool = False,
+        environment: Mapping[str, str] = MappingProxyType({}),
+        set_up_limit_s: float = SET_UP_LIMIT_S,
     ) -> None:
         self._set_up = partial(set_up, core, memory_limit)
         self._initializer = initializer
+        self._default_environment = _ONE_THREAD | dict(environment)
         # Idle threads, too, take address space.
-        self._environment = _ONE_THREAD if memory_limit is not None else {}
+        self._fixed_environment = _ONE_THREAD if memory_limit is not None else {}
         self._stderr = subprocess.DEVNULL if is_silent else None
+        self._set_up_limit_s = set_up_limit_s
+        self._turn = threading.Lock()  # held while a function is called
         self._lock = threading.Lock()  # held while the process is started or replaced
         self._process: _Process | None = None
-        self._is_set_up = False
         self._is_closed = False
+        _workers.add(self)
 
     def start(self) -> _Process:
         """Start the process unless it works; it loads its code while the caller goes on.
@@ -103,18 +120,11 @@ class Worker:
             if self._is_closed:
                 raise ResourceError("a process could not be started: its pool is closed")
             if self._process is None:
-                self._is_set_up = False
-                try:
-                    self._process = _starter(os.getpid()).submit(self._begin).result()
-                except (OSError, RuntimeError) as exc:
-                    time.sleep(_RETRY_START_S)
-                    raise ResourceError(f"a process could not be started: {exc}{_memory_limit()}") from exc
-                with suppress(OSError):  # it has died, which its first use finds
-                    send(self._process.stdin, pickle.dumps((self._set_up, self._initializer)))
+                self._process = self._started()
             return self._process
 
     def run(self, work: Callable[[T], R], task: T, timeout_s: float) -> R:
-        """Call `work(task)` in the process, for one thread at a time.
+        """Call `work(task)` in the process, in the current folder of this one.
 
         The time limit counts from when the process, with its initializer done, begins.
 
@@ -126,33 +136,68 @@ class Worker:
             If no process could be started.
         Exception
             What `work` raised. If that cannot be pickled, a RuntimeError with its first line.
+            Also what this process raises while it waits, such as a signal's handler.
         """
+        folder = ""
+        with suppress(OSError):  # it is gone
+            folder = os.getcwd()  # noqa: PTH109  (a text)
         request = pickle.dumps((work, task))
-        process = None
-        try:
-            process = self.start()
-            if not self._is_set_up:
-                self._wait_until_set_up(process)
-            answer = process.exchange(request, timeout_s)
-        except BaseException:  # also an interrupt: a later answer would be taken for the next one
-            if process is not None:
-                process.end()
-            raise
+        with self._turn:
+            process = None
+            try:
+                process = self.start()
+                if not process.is_set_up:
+                    self._wait_until_set_up(process)
+                answer = process.exchange(pickle.dumps((folder, request)), timeout_s)
+            except BaseException:  # a later answer would be taken for the next one
+                if process is not None:
+                    process.end()
+                raise
         result: R = _result(answer)
         return result
+
+    def end_process(self) -> None:
+        """End the process at once, with what it does and its state; the next call starts another."""
+        with self._lock:
+            if self._process is not None:
+                self._process.end()
 
     def close(self) -> None:
         """End the process at once, with what it does, and start no other; from any thread."""
         self._is_closed = True
-        with self._lock:
-            if self._process is not None:
-                self._process.end()
+        self.end_process()
 
     def __enter__(self) -> Self:
         return self
 
     def __exit__(self, *_: object) -> None:
         self.close()
+
+    def _started(self) -> _Process:
+        """Start a process and ask it to set itself up. Raises ResourceError."""
+        from concurrent.futures import wait  # late: `rotor-mbs list` starts no process
+
+        beginning: Future[_Process] | None = None
+        try:
+            try:
+                beginning = _starter(os.getpid()).submit(self._begin)
+            except RuntimeError as exc:
+                raise _not_started(str(exc)) from exc
+            # Its error is asked for, not raised: what is raised here is this process's own.
+            done, _ = wait([beginning], self._set_up_limit_s)
+            if not done:
+                raise _not_started(f"the system did not start it in {self._set_up_limit_s:g} s")
+            error = beginning.exception()
+            if isinstance(error, OSError | RuntimeError):
+                time.sleep(_RETRY_START_S)
+                raise _not_started(str(error)) from error
+            process = beginning.result()
+            process.send(pickle.dumps(("", pickle.dumps((self._set_up, self._initializer)))))
+        except BaseException:
+            if beginning is not None:  # nobody waits for it any more
+                beginning.add_done_callback(_end_begun)
+            raise
+        return process
 
     def _begin(self) -> _Process:
         """Start a process. Raises OSError."""
@@ -163,56 +208,122 @@ class Worker:
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=self._stderr,
-            env=_ONE_THREAD | dict(os.environ) | self._environment,
+            env=self._default_environment | dict(os.environ) | self._fixed_environment,
         )
 
     def _wait_until_set_up(self, process: _Process) -> None:
-        """Wait for the initializer. Raises ResourceError if the process ends, and what it raises."""
+        """Wait for the initializer. Raises ResourceError if the process ends or is late, and what it raises."""
         try:
-            answer = pickle.load(process.stdout)
-        except Exception as exc:
-            reason = f"it ended at once with exit code {process.end(_END_S)}{_memory_limit()}"
-            raise ResourceError(f"a process could not be started: {reason}") from exc
+            answer = process.exchange(b"", self._set_up_limit_s)
+        except TaskLostError as exc:
+            reason = f"it ended at once with exit code {exc.exit_code}"
+            if exc.exit_code is None:
+                reason = f"it was not ready after {self._set_up_limit_s:g} s"
+            raise _not_started(reason) from exc
         _result(answer)
-        self._is_set_up = True
+        process.is_set_up = True
+
+    def _forget_after_fork(self) -> None:
+        """Leave the process to the parent, in a child that was forked off it with locks as they were."""
+        self._turn, self._lock = threading.Lock(), threading.Lock()
+        if self._process is not None:
+            self._process.forget()
+            self._process = None
+
+
+_workers: weakref.WeakSet[Worker] = weakref.WeakSet()
+
+
+def _forget_processes() -> None:
+    """Leave all worker processes to the parent, in a child that was forked off it."""
+    for worker in list(_workers):
+        worker._forget_after_fork()
+
+
+if hasattr(os, "register_at_fork"):
+    os.register_at_fork(after_in_child=_forget_processes)
 
 
 class _Process(subprocess.Popen[bytes]):
-    """A process with pipes to its standard input and from its standard output."""
+    """A process with pipes to its standard input and from its standard output.
+
+    Attributes
+    ----------
+    is_set_up : whether its initializer is known to have returned.
+    """
 
     stdin: BinaryIO
     stdout: BinaryIO
+    is_set_up = False
+
+    def send(self, message: bytes) -> None:
+        """Send a message; where the process has died, its answer shows that. Raises what is raised meanwhile."""
+        try:
+            send(self.stdin, message)
+        except Exception as exc:
+            if not self._ends(exc):
+                raise
 
     def exchange(self, request: bytes, timeout_s: float) -> bytes:
-        """Send a request and return its answer. Raises TaskLostError, ResourceError."""
-        is_late = threading.Event()
+        """Send a request, unless it is empty, and return the next answer.
 
-        def end_late() -> None:
-            is_late.set()
-            self.kill()
-
-        timer = threading.Timer(min(timeout_s, threading.TIMEOUT_MAX), end_late)
-        try:
-            timer.start()
-        except RuntimeError as exc:
-            raise ResourceError(f"not enough threads: {exc}") from exc
-        try:
-            send(self.stdin, request)
-            answer: bytes = pickle.load(self.stdout)
-        except Exception:  # none is the task's own: those come back as answers
-            answer = b""
-        finally:
-            timer.cancel()
-            timer.join()
+        Raises
+        ------
+        TaskLostError
+            If the process is late, and then ended, or has died.
+        ResourceError
+            If the system has no room for the thread that watches the time.
+        Exception
+            What is raised in this process while it waits.
+        """
+        answer = b""
+        with self._killed_after(timeout_s) as is_late:
+            try:
+                if request:
+                    send(self.stdin, request)
+                answer = pickle.load(self.stdout)
+            except Exception as exc:
+                # Most errors of a pipe are signs of an end. But a handler of a signal may raise
+                # any type, and memory may be lacking here: that is no word on the process.
+                if not is_late.is_set() and not self._ends(exc):
+                    raise
         if is_late.is_set():  # also in the moment of its answer
             # What lacks memory may wait for it without end: that says nothing of the task.
-            limit = _memory_limit()
+            limit = memory_limit_text()
             failure = "worker_died" if limit else "timed_out"
             raise TaskLostError(f"ended after {timeout_s:g} s{limit}", failure)
         if not answer:
             code = self.end(_END_S)
             raise TaskLostError(f"its process died (exit code {code})", "worker_died", code)
         return answer
+
+    def _ends(self, error: Exception) -> bool:
+        """Return whether the process has ended, within a moment after an error of its pipes."""
+        try:
+            self.wait(_END_S if isinstance(error, _PIPE_ERRORS) else 0.0)
+        except subprocess.TimeoutExpired:
+            return False
+        return True
+
+    @contextmanager
+    def _killed_after(self, limit_s: float) -> Iterator[threading.Event]:
+        """Kill the process if the block takes longer; yield the event that is set then. Raises ResourceError."""
+        is_late = threading.Event()
+
+        def end_late() -> None:
+            is_late.set()
+            self.kill()
+
+        timer = threading.Timer(min(limit_s, threading.TIMEOUT_MAX), end_late)
+        try:
+            timer.start()
+        except RuntimeError as exc:
+            raise ResourceError(f"not enough threads: {exc}") from exc
+        try:
+            yield is_late
+        finally:
+            timer.cancel()
+            timer.join()
 
     def end(self, patience_s: float = 0.0) -> int:
         """End the process, where it has not ended by itself within `patience_s`; return its exit code."""
@@ -225,6 +336,24 @@ class _Process(subprocess.Popen[bytes]):
             with suppress(OSError):  # what was not sent
                 stream.close()
         return code
+
+    def forget(self) -> None:
+        """Close the pipes in a child of the parent, without what the parent was sending, and wait for nothing."""
+        self.returncode = 0  # it is no child of this process
+        for stream in (self.stdin, self.stdout):
+            # The buffer's own lock may be held by a thread that there is not in this process.
+            cast(Any, stream).raw.close()
+
+
+def _end_begun(beginning: Future[_Process]) -> None:
+    """End a process that has begun after all."""
+    if not beginning.cancelled() and beginning.exception() is None:
+        beginning.result().end()
+
+
+def _not_started(reason: str) -> ResourceError:
+    """Return the error of a process that could not be started, with the limit of memory under which that was."""
+    return ResourceError(f"a process could not be started: {reason}{memory_limit_text()}")
 
 
 @cache
@@ -245,15 +374,12 @@ def _block_interrupts() -> None:
         signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
 
 
-def _memory_limit() -> str:
+def memory_limit_text() -> str:
     """Return the limit of this process's memory in words, "" if there is none."""
-    with suppress(ImportError):  # Windows
-        import resource
-
-        limit, _ = resource.getrlimit(resource.RLIMIT_AS)
-        if limit != resource.RLIM_INFINITY:
-            return f" under a memory limit (ulimit -v) of {limit >> 20} MiB"
-    return ""
+    limit = address_space()
+    if math.isinf(limit):
+        return ""
+    return f" under a memory limit (ulimit -v) of {int(limit) >> 20} MiB"
 
 
 def _result(answer: bytes) -> Any:

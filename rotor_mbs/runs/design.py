@@ -27,7 +27,8 @@ ONCE_A_SCENE = ("angle_uncertainty", "error_growth")  # stored once a scene, ove
 
 
 def flags(names: Sequence[str], first: int = 0) -> dict[str, Any]:
-    """The attributes of a column of codes, as CF has them: what each code from `first` on means."""
+    """Return the attributes of a column of codes, as CF has them: what each code from `first` on
+    means."""
     return {"flag_values": np.arange(first, first + len(names), dtype=np.int8), "flag_meanings": " ".join(names)}
 
 
@@ -176,7 +177,7 @@ class Asked:
 
     @property
     def label(self) -> str:
-        """Of its row: "paper/fig11/lagrange/taylor"."""
+        """Return the label of its row: "paper/fig11/lagrange/taylor"."""
         return f"{self.scene.name}/{self.method}"
 
     @property
@@ -185,7 +186,7 @@ class Asked:
 
     @property
     def known(self) -> dict[str, str]:
-        """The columns of /runs that follow from the design."""
+        """Return the columns of /runs that follow from the design."""
         method = find_method(self.method)
         settings = method.chosen(self.scene, self.settings).as_dict()
         return {

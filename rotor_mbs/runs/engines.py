@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import re
 import socket
 from collections.abc import Mapping
@@ -35,10 +34,7 @@ def open_task_pool(name: str, workers: int) -> TaskPool:
         For another name, and a cluster that cannot be used.
     """
     if name == "local":
-        if workers:
-            for variable, value in _KEEP_MEMORY.items():
-                os.environ.setdefault(variable, value)
-        return local_pool(workers, _load)
+        return local_pool(workers, _load, _KEEP_MEMORY)
     if not re.fullmatch(r"dask:tcp://[^\s/:]+:[0-9]{1,5}", name):
         raise InputError(f"engine {name}: no such engine; allowed: {ENGINE_FORMS}")
     from rotor_mbs.processes.cluster import open_cluster  # late: only for a cluster

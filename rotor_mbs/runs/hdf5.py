@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor_mbs.errors import RotorError, StoreError, one_line
-from rotor_mbs.runs.trailer import SPLIT_OF, Trailer, read_trailer
-from rotor_mbs.runs.untrusted import read_apart
+from rotor_mbs.runs.trailer import Trailer, read_trailer, refuse_split
+from rotor_mbs.runs.untrusted import read_in_worker
 
 CHARACTERS = "characters"  # the dimension of texts that are filled in later
 # The netCDF-4 library's name for the scale of a dimension without values.
@@ -28,7 +28,7 @@ _REFERENCE = np.dtype([("length", "<u4"), ("heap", "<u8"), ("index", "<u4")])
 TEXT = h5py.string_dtype()
 TEXT_IN_MEMORY = h5py.h5t.py_create(TEXT)
 TEXT_TYPE = h5py.h5t.py_create(TEXT, logical=True)
-_ATTEMPTS = 3  # to open a file that is being replaced
+ATTEMPTS = 3  # to open a file that is being replaced
 
 
 class Column(NamedTuple):
@@ -79,7 +79,7 @@ class Content(NamedTuple):
 
 
 def read_content(path: Path, kinds: Collection[str], only: Collection[str] | None = None) -> Content:
-    """Read a file of this program, apart unless it is trusted.
+    """Read a file of this program, in the worker process unless the file is trusted.
 
     Parameters
     ----------
@@ -92,7 +92,7 @@ def read_content(path: Path, kinds: Collection[str], only: Collection[str] | Non
     StoreError
         If it is missing, damaged or another program's, or cannot be read within limits.
     """
-    return read_apart(path, _read_content, (kinds, only))
+    return read_in_worker(path, _read_content, (kinds, only))
 
 
 def _read_content(path: Path, asked: tuple[Collection[str], Collection[str] | None]) -> Content:
@@ -120,22 +120,26 @@ def _read_group(group: Any, regions: Mapping[str, tuple[int, int]]) -> StoredGro
 
 @contextmanager
 def open_file(path: Path) -> Iterator[tuple[Any, Trailer]]:
-    """Open an existing file of this program, read only, and its trailer, which is checked before HDF5 sees the file.
-    Raises StoreError where it is missing, damaged or another program's."""
-    for _ in range(_ATTEMPTS):
+    """Open a file of this program for reading, after its trailer was checked. Raises StoreError
+    where it is missing, damaged or another program's."""
+    for _ in range(ATTEMPTS):
         trailer = read_trailer(path)
         try:
             file = h5py.File(path, "r")
+        except FileNotFoundError:  # removed since it was checked
+            continue
         except OSError as exc:
             raise StoreError(
                 f"{path}: not a readable HDF5 file ({reason_of(exc)}); allowed: a file that rotor-mbs wrote"
             ) from exc
         with file:
-            if path.stat().st_ino != trailer.inode:  # replaced since it was checked
+            try:
+                inode = path.stat().st_ino
+            except FileNotFoundError:  # removed since it was checked
                 continue
-            if trailer.kind.startswith(SPLIT_OF):
-                whole = trailer.kind.removeprefix(SPLIT_OF)
-                raise StoreError(f"{path}: a split for Hugging Face datasets; allowed: the sweep's own file, {whole}")
+            if inode != trailer.inode:  # replaced since it was checked
+                continue
+            refuse_split(path, trailer.kind)
             yield file, trailer
             return
     raise StoreError(f"{path}: is being replaced by another process")
@@ -143,11 +147,12 @@ def open_file(path: Path) -> Iterator[tuple[Any, Trailer]]:
 
 @contextmanager
 def reading(path: Path | str, what: str = "") -> Iterator[None]:
-    """Whatever goes wrong with what a file holds is a StoreError that names the place: HDF5 raises errors of many kinds
-    on damaged files, and so does code with what a forged one says, although its digest is right."""
+    """Raise whatever goes wrong in the block with what a file holds as a StoreError that names the
+    place. HDF5 raises errors of many kinds on damaged files, and so does code with what a forged
+    one says, although its digest is right."""
     try:
         yield
-    except (RotorError, ImportError, BrokenPipeError):
+    except (RotorError, ImportError, MemoryError, BrokenPipeError):
         raise
     except Exception as exc:
         place = f"{path}: {what}" if what else f"{path}"
@@ -155,14 +160,14 @@ def reading(path: Path | str, what: str = "") -> Iterator[None]:
 
 
 def group_at(file: Any, path: str) -> Any:
-    """A group by its path. Raises StoreError where there is none, or a link."""
+    """Return a group by its path. Raises StoreError where there is none, or a link."""
     for name in path.split("/") if path else ():
         file = member(file, name)
     return file
 
 
 def member(group: Any, name: str) -> Any:
-    """A member of a group. Raises StoreError where there is none, or a link."""
+    """Return a member of a group. Raises StoreError where there is none, or a link."""
     link = group.get(name, getlink=True)
     if not isinstance(link, h5py.HardLink):
         found = "is missing" if link is None else "is a link"
@@ -196,7 +201,7 @@ def values_of(dataset: Any) -> NDArray[Any]:
 
 
 def plain(value: Any) -> Any:
-    """An attribute as a plain Python value."""
+    """Return an attribute as a plain Python value."""
     if isinstance(value, np.ndarray):
         return [plain(item) for item in value]
     if isinstance(value, bytes):
@@ -205,12 +210,14 @@ def plain(value: Any) -> Any:
 
 
 def attributes_of(target: Any) -> dict[str, Any]:
-    """As plain Python values, without those that the library writes by itself."""
+    """Return the attributes of a group or dataset as plain Python values, without those that the
+    library writes by itself."""
     return {name: attribute(target, name) for name in target.attrs if name not in _NOT_ATTRIBUTES}
 
 
 def attribute(target: Any, name: str, default: Any = None) -> Any:
-    """As a plain Python value; the default where there is none. Raises ValueError for a type that no attribute has.
+    """Return an attribute as a plain Python value, or the default where there is none. Raises
+    ValueError for a type that no attribute has.
 
     In a damaged file a text may have become a list of any type: reading it ends the process.
     """
@@ -282,7 +289,8 @@ def is_group(item: Any) -> bool:
 
 
 def reason_of(error: Exception) -> str:
-    """What HDF5 says in brackets, "file signature not found", without the name of its function."""
+    """Return what HDF5 says in brackets, "file signature not found", without the name of its
+    function."""
     text = str(error).splitlines()[0]
     return text.partition("(")[2].rpartition(")")[0] or text
 
@@ -291,10 +299,10 @@ def reason_of(error: Exception) -> str:
 
 
 def place_of(dataset: Any) -> tuple[int, int]:
-    """Offset and length in bytes of the values of a contiguous dataset."""
+    """Return offset and length in bytes of the values of a contiguous dataset."""
     return dataset.id.get_offset() or 0, dataset.nbytes
 
 
 def is_dimension_only(dataset: Any) -> bool:
-    """Whether a dataset is a dimension without values."""
+    """Return whether a dataset is a dimension without values."""
     return str(attribute(dataset, "NAME", "")).startswith(WITHOUT_VALUES)

@@ -68,7 +68,7 @@ def locked(output: Path) -> Iterator[None]:
 
 
 def is_being_written(output: Path) -> bool:
-    """Whether another process writes it now, or was killed while it did."""
+    """Return whether another process writes a file now, or was killed while it did."""
     return _lock_of(_resolved(output)).exists()
 
 
@@ -77,7 +77,7 @@ def _lock_of(place: Path) -> Path:
 
 
 def _resolved(output: Path) -> Path:
-    """The file itself where the output is a symbolic link: both names are one output."""
+    """Return the file itself where the output is a symbolic link: both names are one output."""
     try:
         return output.resolve() if output.is_symlink() else Path(os.path.abspath(output))  # noqa: PTH100  (links stay)
     except (OSError, RuntimeError) as exc:  # links in a circle, a working folder that is gone
@@ -87,7 +87,7 @@ def _resolved(output: Path) -> Path:
 
 @contextmanager
 def store_errors(path: object) -> Iterator[None]:
-    """What the system refuses in the block is a StoreError about `path`."""
+    """Raise what the system refuses in the block as a StoreError about `path`."""
     try:
         yield
     except OSError as exc:
@@ -95,14 +95,14 @@ def store_errors(path: object) -> Iterator[None]:
 
 
 def replace_file(path: Path, content: Buffer, mark: bytes) -> None:
-    """As `write_file`, in the place of an earlier output of the same kind alone: see `refuse_foreign`. Raises
-    InputError, StoreError."""
+    """Write a file in the place of an earlier output of the same kind alone, see `write_file` and
+    `refuse_foreign`. Raises InputError, StoreError."""
     refuse_foreign(path, mark)
     write_file(path, content)
 
 
 def write_file(path: Path, content: Buffer) -> None:
-    """`content` under a temporary name beside `path`, forced to the disk, then renamed.
+    """Write `content` under a temporary name beside `path`, force it to the disk, then rename it.
 
     Of a symbolic link the file that it points to is replaced; a device or a pipe is written to. Raises StoreError where
     it cannot be written.
@@ -118,8 +118,8 @@ def write_file(path: Path, content: Buffer) -> None:
 
 
 def refuse_foreign(path: Path, mark: bytes) -> None:
-    """Raise InputError where `path` is a file that this program did not write as an output of the same kind, which is
-    no HDF5 file.
+    """Raise InputError where `path` is a file that is no output of this program of the same kind.
+    For outputs that are no HDF5 files.
 
     mark: a regular expression that is found in every output of the kind. An empty file may be replaced.
     """

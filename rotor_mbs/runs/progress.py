@@ -7,6 +7,7 @@ tqdm counts iterations, and needs ipywidgets in a notebook.
 from __future__ import annotations
 
 import importlib
+import io
 import os
 import re
 import shutil
@@ -30,7 +31,7 @@ _STATUS = re.compile(rf"\b({'|'.join((*STATUSES, 'no_reference'))})\b")
 
 
 def coloured(text: str, stream: TextIO) -> str:
-    """The statuses in a text each in its colour: on a terminal, unless the user asks for none
+    """Return a text with each status in its colour: on a terminal, unless the user asks for none
     (https://no-color.org)."""
     if not stream.isatty() or "NO_COLOR" in os.environ:
         return text
@@ -79,7 +80,8 @@ class ProgressLine:
         self._show(text if keep else self._estimate(outcome.share) + text, keep=keep)
 
     def stage(self, name: str, done: int, total: int, note: str = "") -> None:
-        """What has no outcomes of its own, such as drawing pages: called before the first and after each."""
+        """Show work that has no outcomes of its own, such as drawing pages: called before the first
+        and after each."""
         now = time.monotonic()
         if name != self._stage:
             self._stage, self._stage_start, self._share_before = name, now, done / total
@@ -89,20 +91,21 @@ class ProgressLine:
         self._show(f"{self._estimate(done / total)}{name} {done}/{total}{note}")
 
     def runs(self, done: int, total: int, statuses: Counter[str]) -> None:
-        """Runs of a sweep that have been computed, by status: called before the first and after each block of runs."""
+        """Show how many runs of a sweep have been computed, with which status: called before the
+        first and after each block of runs."""
         self._statuses.update(statuses)
         failed = [f", {count} {status}" for status, count in sorted(self._statuses.items()) if status not in GOOD]
         self.stage("runs", done, total, "".join(failed))
 
     def _estimate(self, share: float) -> str:
-        """ "40%, about 20 s left  ", where the line renews itself."""
+        """Return "40%, about 20 s left  ", or "" where the line does not renew itself."""
         if not self._is_live or not self._share_before < share < 1.0:
             return ""
         left = (self._last - self._stage_start) / (share - self._share_before) * (1.0 - share)
         return f"{share:4.0%}, about {span(left)} left  "
 
     def _show(self, text: str, *, keep: bool = False) -> None:
-        """keep: it stays on the terminal, whole."""
+        """Show a text; keep: it stays on the terminal, whole."""
         text = printable(text)
         if not self._is_live:
             self._print(text)
@@ -123,7 +126,7 @@ class ProgressLine:
         self._print("\r\x1b[K", end="")
 
     def _print(self, text: str, end: str = "\n") -> None:
-        """A progress that nobody can read any more must not end the work."""
+        """Print a line, and go on where nobody can read it any more."""
         with suppress(OSError, ValueError):
             print(text, end=end, file=getattr(self._stream, "unfiltered", self._stream), flush=True)
 
@@ -153,7 +156,11 @@ class NotebookLine(ProgressLine):
 
 
 class SilentProgress(ProgressLine):
-    """Shows nothing."""
+    """A progress that shows nothing, and needs no stream."""
+
+    def __init__(self) -> None:
+        with io.StringIO() as nowhere:
+            super().__init__(nowhere)
 
     def __enter__(self) -> Self:
         return self
@@ -178,6 +185,6 @@ def progress_of_call(progress: bool | None) -> ProgressLine:
     # A notebook's streams are no terminals: its kernel brings its own.
     if type(sys.stdout).__module__.startswith("ipykernel"):
         return NotebookLine()
-    if progress is None and not (sys.stderr is not None and sys.stderr.isatty()):
+    if sys.stderr is None or (progress is None and not sys.stderr.isatty()):
         return SilentProgress()
     return ProgressLine()

@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 from rotor_mbs.errors import StoreError
 from rotor_mbs.methods.catalogue import PRINTED, REFERENCE, is_built_in, is_corrected
 from rotor_mbs.runs.design import FROZEN, MISSING, NUMBERS, POINT_COLUMNS, REPEATED, RUNS
-from rotor_mbs.runs.hdf5 import Column, StoredGroup, read_content, reading
+from rotor_mbs.runs.hdf5 import ATTEMPTS, Column, StoredGroup, read_content, reading
 from rotor_mbs.runs.output_files import locked
 from rotor_mbs.runs.table import (
     Place,
@@ -52,7 +52,6 @@ from rotor_mbs.solution.status import STATUSES, code_of
 from rotor_mbs.solution.trajectory import Integration, Solution, Trajectory
 
 _TEXTS = ("message", "engine_message")
-_ATTEMPTS = 3  # to open a file that is being replaced
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,19 +72,19 @@ class StoredRun:
 
     @functools.cached_property
     def _stored(self) -> Rows:
-        """The columns of its row as they are in the file."""
+        """Return the columns of its row as they are in the file."""
         with reading(self._name):
             return self._place.read(file=self._file)
 
     @functools.cached_property
     def is_damaged(self) -> bool:
-        """Whether its row is not what was written."""
+        """Return whether its row is not what was written."""
         row = self._stored
         return bool((checksums(self._place.first, row, self._place.row_type) != row["crc32"]).any())
 
     @functools.cached_property
     def _row(self) -> Rows:
-        """Its columns. Raises StoreError where they are not what was written."""
+        """Return the columns of its row. Raises StoreError where they are not what was written."""
         if self._verify and self.is_damaged:
             raise StoreError(f"{self._name} changed after it was written")
         return {name: values[0] for name, values in self._stored.items()}
@@ -96,7 +95,8 @@ class StoredRun:
 
     @functools.cached_property
     def attributes(self) -> dict[str, Any]:
-        """Status, message, metrics, times ... as plain values; those that the run does not have are left out."""
+        """Return status, message, metrics, times ... as plain values; those that the run does not
+        have are left out."""
         facts: dict[str, Any] = {"status": self.status, "settings": self.known["settings"]}
         facts |= {name: text_of(self._row[name]) for name in _TEXTS}
         for name, value in self._row.items():
@@ -109,7 +109,7 @@ class StoredRun:
 
     @property
     def is_frozen(self) -> bool:
-        """Whether it is a reference that was read from a shipped file."""
+        """Return whether it is a reference that was read from a shipped file."""
         return "frozen_with" in parsed(self.known["versions"], dict, self._name)
 
     @property
@@ -123,7 +123,8 @@ class StoredRun:
 
     @property
     def labels(self) -> list[str]:
-        """Names of the coordinates: rotor, pitch 1, ...; none where neither angles nor rates are stored."""
+        """Return the names of the coordinates: rotor, pitch 1, ...; none where neither angles nor
+        rates are stored."""
         is_known = "angles" in self or "rates" in self
         return list(coordinate_labels(len(self.scales["coordinate"]) - 1)) if is_known else []
 
@@ -133,8 +134,8 @@ class StoredRun:
 
     @functools.cached_property
     def _arrays(self) -> dict[str, NDArray[Any]]:
-        """By name, scales included. One that its method or its scene's outputs do not have is NaN from the first sample
-        on, and left out."""
+        """Return its arrays by name, scales included. One that its method or its scene's outputs do
+        not have is NaN from the first sample on, and left out."""
         count = self.samples
         scales = {name: values[:count] if name == "time" else values for name, values in self.scales.items()}
         own = {name: values[:count] for name, values in self._row.items() if np.ndim(values) and name not in _TEXTS}
@@ -142,14 +143,15 @@ class StoredRun:
 
     @property
     def names(self) -> list[str]:
-        """The arrays that it has, scales included."""
+        """Return the names of its arrays, scales included."""
         return list(self._arrays)
 
     def __contains__(self, name: str) -> bool:
         return name in self._arrays
 
     def array(self, name: str) -> NDArray[Any]:
-        """(samples, ...) An array, or a scale. Raises StoreError where the run has none of that name."""
+        """Return an array or a scale, (samples, ...). Raises StoreError where the run has none of
+        that name."""
         if name not in self:
             raise StoreError(f"{self._name} has no {name}")
         return self._arrays[name]
@@ -187,7 +189,8 @@ class StoredRun:
         return faults
 
     def trajectory(self, scene: Scene) -> Trajectory | None:
-        """Its samples; None where its arrays cannot be used. Angles and rates that are not stored are NaN."""
+        """Return its samples; None where its arrays cannot be used. Angles and rates that are not
+        stored are NaN."""
         if self.faults(scene, complete=False):
             return None
         time = self.array("time")
@@ -197,7 +200,7 @@ class StoredRun:
         return Trajectory(**{"time": time, "angles": blank, "rates": blank, **arrays})
 
     def solution(self, scene: Scene) -> Solution | None:
-        """The run without its judgement; None where its arrays cannot be used."""
+        """Return the run without its judgement; None where its arrays cannot be used."""
         trajectory, facts = self.trajectory(scene), self.attributes
         if trajectory is None:
             return None
@@ -218,33 +221,35 @@ class StoredScene:
 
     @functools.cached_property
     def scene(self) -> Scene:
-        """Raises InputError where its text is no scene."""
+        """Return the scene that its text describes. Raises InputError where its text is no scene."""
         return parse_scene(str(self.attributes["scene_toml"]), self.name)
 
     @functools.cached_property
     def reference_trajectory(self) -> Trajectory | None:
-        """None where there is no reference, or its arrays cannot be used."""
+        """Return the samples of the reference; None where there is none, or its arrays cannot be
+        used."""
         return None if self.reference is None else self.reference.trajectory(self.scene)
 
     @functools.cached_property
     def changes(self) -> list[SceneChange] | None:
-        """What differs from this package's scene of its name; None where there is none."""
+        """Return what differs from this package's scene of its name; None where there is none."""
         known = shipped_scene(self.name)
         return None if known is None else scene_changes(known, self.scene)
 
     @property
     def label(self) -> str:
-        """Its name, with what was changed in a scene of this package."""
+        """Return its name, with what was changed in a scene of this package."""
         return label_with_changes(self.name, self.changes or ())
 
     @property
     def is_shipped(self) -> bool:
-        """Whether its motion is that of this package's scene of its name; samples and outputs may be others."""
+        """Return whether its motion is that of this package's scene of its name; samples and
+        outputs may be others."""
         return moves_as_shipped(self.changes)
 
     @property
     def figures(self) -> str:
-        """The paper's figures that show its motion, as "11, 13a"; "" where none does."""
+        """Return the paper's figures that show its motion, as "11, 13a"; "" where none does."""
         return str(self.attributes.get("figures", "")) if self.is_shipped else ""
 
     @property
@@ -257,29 +262,31 @@ class StoredScene:
 
     @property
     def methods(self) -> dict[str, StoredRun]:
-        """The runs but the reference, in the order of the file."""
+        """Return the runs but the reference, in the order of the file."""
         return {name: run for name, run in self.runs.items() if name != REFERENCE}
 
     @property
     def printed(self) -> StoredRun | None:
-        """The run of the printed equations with all their errata, where it has samples."""
+        """Return the run of the printed equations with all their errata, where it has samples."""
         run = self.runs.get(PRINTED)
         return run if run is not None and run.samples else None
 
     @property
     def corrected_runs(self) -> dict[str, StoredRun]:
-        """Runs of the corrected models but the reference; those without samples too."""
+        """Return the runs of the corrected models but the reference; those without samples too."""
         return {name: run for name, run in self.methods.items() if is_corrected(name)}
 
     @property
     def corrected(self) -> StoredRun | None:
-        """The reference, else the first run of a corrected model that has samples; None without either."""
+        """Return the reference, else the first run of a corrected model that has samples; None
+        without either."""
         candidates = [self.reference, *self.corrected_runs.values()]
         return next((run for run in candidates if run is not None and run.samples), None)
 
     @property
     def sides(self) -> dict[str, StoredRun]:
-        """The "printed" run and the one that stands for the "corrected" model, those that there are."""
+        """Return the "printed" run and the one that stands for the "corrected" model, those that
+        there are."""
         sides = {"printed": self.printed, "corrected": self.corrected}
         return {side: run for side, run in sides.items() if run is not None}
 
@@ -298,7 +305,7 @@ def open_results(path: Path, *, verify: bool = True, only: Collection[str] | Non
     """Open a results file; of a file that replaces it meanwhile nothing is seen. A run is compared with its checksum
     when it is read, but for verify=False; only: names of scenes, by default all. Raises StoreError, also for whatever
     goes wrong in the block with what the file holds."""
-    for _ in range(_ATTEMPTS):
+    for _ in range(ATTEMPTS):
         stored = opened_tables(path, None if only is None else {RUNS, *only})
         with path.open("rb") as file:
             inode = os.fstat(file.fileno()).st_ino
@@ -326,7 +333,8 @@ def run_names(path: Path) -> list[tuple[str, str]]:
 
 
 def run_arrays(path: Path, group: str = "", scene: str = "") -> dict[str, NDArray[Any]]:
-    """The arrays of one run of a results file; group, scene: as for `read_arrays`, the run "scene/method"."""
+    """Return the arrays of one run of a results file; group, scene: as for `read_arrays`, the run
+    "scene/method"."""
     with open_results(path) as results:
         runs = {f"{name}/{run.method}": run for name, known in results.scenes.items() for run in known.runs.values()}
         run = runs[chosen_group(path, list(runs), group, scene)]
@@ -334,7 +342,8 @@ def run_arrays(path: Path, group: str = "", scene: str = "") -> dict[str, NDArra
 
 
 def is_sweep(path: Path) -> bool:
-    """Whether a file of this program is the dataset of a sweep. Raises StoreError where it cannot be read."""
+    """Return whether a file of this program is the dataset of a sweep. Raises StoreError where it
+    cannot be read."""
     return read_trailer(path).kind == SWEEP
 
 
@@ -386,7 +395,7 @@ class Record:
 
     @property
     def messages(self) -> list[str]:
-        """One for each row."""
+        """Return a message for each row."""
         return [str(text) for text in self.attributes.get("messages", [""] * len(self.arrays["status"]))]
 
 
@@ -394,13 +403,14 @@ class Record:
 
 
 def points_table(group: str, points: Sequence[Mapping[str, object]]) -> Table:
-    """The table `group` of these points: of each the known columns by name."""
+    """Return the table `group` of these points, each with its known columns by name."""
     runs = [str(point["run"]) for point in points]
     return Table(group, runs, known_columns(points), POINT_COLUMNS[group], characters=_MESSAGE_LENGTH)
 
 
 def read_records(path: Path, kind: str) -> list[Record]:
-    """The records of a kind, in the order of the file; no curve of which a point is missing. Raises StoreError."""
+    """Read the records of a kind, in the order of the file; no curve of which a point is missing.
+    Raises StoreError."""
     if kind in POINT_COLUMNS:
         tables = TableFile(path, [kind]).tables.values()
         with reading(path):

@@ -47,7 +47,7 @@ OnProgress = Callable[[int, int, Outcome], None]
 
 
 def ignore_progress(_done: int, _total: int, _outcome: Outcome) -> None:
-    """For calls that report no progress."""
+    """Do nothing, in calls that report no progress."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -67,7 +67,7 @@ class Task(ABC):
 
     @property
     def first(self) -> int:
-        """Number of the first row, with which its checksum begins."""
+        """Return the number of the first row, with which its checksum begins."""
         return self.place.first
 
     @abstractmethod
@@ -75,15 +75,17 @@ class Task(ABC):
         """Compute its rows, in a worker process."""
 
     def split(self) -> Sequence[Self]:
-        """Its rows one by one; an empty sequence where it is one row, or cannot be split."""
+        """Return tasks of its rows one by one; an empty sequence where it is one row, or cannot be
+        split."""
         return ()
 
     def failed(self, status: str, message: str) -> Rows | None:  # noqa: ARG002
-        """The rows of a task that was ended or raised; None where nothing is stored, so that it is tried again."""
+        """Return the rows of a task that was ended or raised; None where nothing is stored, so that
+        it is tried again."""
         return None
 
     def outcome(self, rows: Rows) -> Outcome:
-        """What became of it, by what `compute` gives of its rows."""
+        """Return how it ended, from what `compute` gives of its rows."""
         return Outcome(self.label, self.method, "measured", f"{len(rows['status'])} points")
 
 
@@ -119,7 +121,8 @@ def compute(pool: TaskPool, tasks: Iterable[T]) -> Iterator[TaskEnd[T, Rows]]:
 
 
 def perform(task: Task, *, stores: bool) -> Rows:
-    """In a worker: the rows of a task; where it `stores` them, as it sees the file, what is reported of them."""
+    """Compute the rows of a task in a worker process, and return them; where it `stores` them, as
+    it sees the file, only what is reported of them."""
     rows = task.perform()
     if not stores:
         return rows

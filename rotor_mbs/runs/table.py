@@ -16,6 +16,7 @@ written by the HDF5 library after the layout.
 
 from __future__ import annotations
 
+import copy
 import errno
 import functools
 import io
@@ -27,7 +28,7 @@ import threading
 import time
 import zlib
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager, nullcontext
+from contextlib import contextmanager, nullcontext, suppress
 from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime
 from pathlib import Path
@@ -623,6 +624,12 @@ class TableFile:
                 self.tables[name] = _table(self.path, name, stored, content.inode)
             self._check_runs()
 
+    def copy(self) -> TableFile:
+        """Return a copy with the same tables, to which others can be added, or from which they can be removed."""
+        other = copy.copy(self)
+        other.tables = dict(self.tables)
+        return other
+
     def _check_runs(self) -> None:
         """Raises StoreError where a run has no arrays."""
         rows = self.tables[RUNS].known_rows if RUNS in self.tables else {}
@@ -687,7 +694,8 @@ class TableFile:
         return missing, kept
 
 
-_opened: dict[tuple[Path, tuple[int, ...]], TableFile] = {}
+_opened: dict[tuple[Path, Path, tuple[int, ...]], TableFile] = {}
+_opening = threading.Lock()  # held while `_opened` is used
 _MAX_OPENED = 4  # files whose tables are kept
 _SETTLED_NS = 100_000_000  # since the last write, which a clock's tick might hide
 
@@ -705,17 +713,23 @@ def opened_tables(path: Path, only: Collection[str] | None = None) -> TableFile:
         state = path.stat()
     except OSError:
         return TableFile(path, only)  # says what is wrong
-    stamp = (path.absolute(), (state.st_dev, state.st_ino, state.st_size, state.st_mtime_ns))
-    file = _opened.pop(stamp, None)
+    # The path as it is given, too: it stands in the tables' messages.
+    stamp = (path, path.absolute(), (state.st_dev, state.st_ino, state.st_size, state.st_mtime_ns))
+    with _opening:
+        file = _opened.pop(stamp, None)
     if file is None:
         file = TableFile(path, only)
     else:
         file.read(only)
-    if time.time_ns() - state.st_mtime_ns > _SETTLED_NS and path.stat().st_mtime_ns == state.st_mtime_ns:
-        _opened[stamp] = file
-        while len(_opened) > _MAX_OPENED:
-            del _opened[next(iter(_opened))]
-    return file
+    is_settled = time.time_ns() - state.st_mtime_ns > _SETTLED_NS
+    with suppress(OSError):  # removed meanwhile
+        is_settled = is_settled and path.stat().st_mtime_ns == state.st_mtime_ns
+        with _opening:
+            if is_settled:
+                _opened[stamp] = file
+            while len(_opened) > _MAX_OPENED:
+                del _opened[next(iter(_opened))]
+    return file.copy()
 
 
 def _table(path: Path, group: str, stored: StoredGroup, inode: int) -> Table:

@@ -130,6 +130,13 @@ def _checked(path: Path, file: IO[bytes]) -> Trailer:
     return Trailer(kind, groups, os.fstat(file.fileno()).st_ino, digest.digest())
 
 
+def refuse_split(path: Path, kind: str) -> None:
+    """Raise StoreError for a file that is a split of a sweep's dataset."""
+    if kind.startswith(SPLIT_OF):
+        whole = kind.removeprefix(SPLIT_OF)
+        raise StoreError(f"{path}: a split for Hugging Face datasets; allowed: the sweep's own file, {whole}")
+
+
 def may_extend(path: Path, kind: str) -> bool:
     """Decide what a command may write to: whether there is a file of the kind that it extends, and not nothing yet.
 

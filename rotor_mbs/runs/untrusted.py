@@ -10,18 +10,16 @@ from __future__ import annotations
 
 import atexit
 import math
-import os
-import threading
 import time
 from collections.abc import Callable
 from contextlib import suppress
 from importlib import import_module
 from pathlib import Path
-from typing import TypeVar
+from typing import TypeVar, cast
 
 from rotor_mbs.errors import ResourceError, StoreError
-from rotor_mbs.processes.serving import is_worker, limit_resources
-from rotor_mbs.processes.worker import TaskLostError, Worker
+from rotor_mbs.processes.serving import address_space, is_worker, limit_resources
+from rotor_mbs.processes.worker import TaskLostError, Worker, memory_limit_text
 from rotor_mbs.runs.trailer import read_trailer
 
 T = TypeVar("T")
@@ -34,6 +32,7 @@ TIME_OF_BYTE_S = 1e-5
 MEMORY = 1 << 30
 MEMORY_OF_BYTE = 16
 _WAIT_S = 300.0  # for what takes time without the processor; also the limit where the system has none
+_SET_UP_S = 60.0
 
 
 def _load() -> None:
@@ -41,8 +40,7 @@ def _load() -> None:
     import_module("rotor_mbs.runs.hdf5")  # by its name: it imports this module
 
 
-_worker = Worker(_load, memory_limit=MEMORY, is_silent=True)
-_asking = threading.Lock()
+_worker = Worker(_load, memory_limit=MEMORY, is_silent=True, set_up_limit_s=_SET_UP_S)
 _trusted: set[bytes] = set()
 atexit.register(_worker.close)
 
@@ -58,7 +56,7 @@ def trust(digest: bytes) -> None:
     _trusted.add(digest)
 
 
-def read_apart(path: Path, read: Callable[[Path, T], R], argument: T) -> R:
+def read_in_worker(path: Path, read: Callable[[Path, T], R], argument: T) -> R:
     """Return `read(path, argument)` of a file of this program, called in the worker process.
 
     In a worker process, and for a file that is trusted, it is called in this process.
@@ -68,7 +66,7 @@ def read_apart(path: Path, read: Callable[[Path, T], R], argument: T) -> R:
     StoreError
         If the file cannot be read within the limits, and what `read` raises.
     ResourceError
-        If the worker process cannot be started.
+        If the worker process cannot be started, or the system lacks memory to read the file.
     """
     from rotor_mbs.scenario.catalogue import REFERENCES  # late: the worker does without
 
@@ -79,23 +77,35 @@ def read_apart(path: Path, read: Callable[[Path, T], R], argument: T) -> R:
     size = path.stat().st_size - sum(length for _, length in regions)
     seconds = TIME_S + TIME_OF_BYTE_S * size
     memory = int(MEMORY + MEMORY_OF_BYTE * size)
-    folder = ""
-    with suppress(OSError):  # the working folder is gone
-        folder = os.getcwd()  # noqa: PTH109  (a text)
-    try:
-        with _asking:
-            return _worker.run(_read_limited, (folder, seconds, memory, read, path, argument), _WAIT_S + seconds)
-    except (TaskLostError, MemoryError):
-        pass
+    is_over_limit = True
+    with suppress(TaskLostError):
+        try:
+            value, is_over_limit = _worker.run(
+                _read_limited, (seconds, memory, read, path, argument), _WAIT_S + seconds
+            )
+            if not is_over_limit:
+                return cast(R, value)
+        except MemoryError:  # of this process, which receives what was read
+            is_over_limit = False
+    # Under a smaller limit of the caller's own, the end of the worker says nothing of the file.
+    if not is_over_limit or address_space() < memory:
+        raise ResourceError(f"{path}: not enough memory to read it{memory_limit_text()}")
     limits = f"{seconds:.3g} s or {memory / 2**30:.3g} GB"
     problem = f"damaged or forged: HDF5 ends the process that reads it, or takes more than {limits}"
     raise StoreError(f"{path}: {problem}; allowed: a file that rotor-mbs wrote")
 
 
-def _read_limited(arguments: tuple[str, float, int, Callable[[Path, T], R], Path, T]) -> R:
-    """Call `read(path, argument)` in the folder of the parent, within limits of this process."""
-    folder, seconds, memory, read, path, argument = arguments
-    if folder:
-        os.chdir(folder)
+def _read_limited(arguments: tuple[float, int, Callable[[Path, T], R], Path, T]) -> tuple[R | None, bool]:
+    """Call `read(path, argument)` within limits of this process.
+
+    Returns
+    -------
+    value : what was read; None where the memory did not suffice.
+    is_over_limit : whether the memory did not suffice.
+    """
+    seconds, memory, read, path, argument = arguments
     limit_resources(memory, math.ceil(time.process_time() + seconds))
-    return read(path, argument)
+    try:
+        return read(path, argument), False
+    except MemoryError:
+        return None, True

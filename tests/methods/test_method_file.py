@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import resource
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -241,3 +242,34 @@ def test_what_modes_and_bench_need_is_named() -> None:
     ended = rotor_mbs("bench", "one.toml", "-m", "mine.py")
     assert ended.status == 2
     assert "no ladder for method 'mine/lsoda' (a Method of a file needs a setting `step` or" in ended.err
+
+
+@pytest.mark.parametrize("mended", ["file", "module"])
+def test_a_file_that_failed_is_loaded_again(mended: str, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Where it was mended in the same session, or a module that it imports was."""
+    library = folder / "library"
+    library.mkdir()
+    monkeypatch.syspath_prepend(str(library))
+    broken, right = "missing = 0\n", "present = 0\n"
+    name = f"helper_of_{mended}"
+    (library / f"{name}.py").write_text(broken if mended == "module" else right)
+    importing = f"from {name} import present\n"
+    Path("mine.py").write_text(importing + ("1 / 0\n" if mended == "file" else "") + EXAMPLE)
+    for _ in range(2):
+        with pytest.raises(rm.InputError, match=r"mine\.py:[12]: (ZeroDivision|Import)Error"):
+            catalogue.check_names("mine.py")
+    (library / f"{name}.py").write_text(right + "# longer\n")
+    Path("mine.py").write_text(importing + EXAMPLE)
+    assert catalogue.check_names("mine.py") == ("mine/lsoda",)
+
+
+def test_a_file_that_is_late_under_a_memory_limit_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
+    limits = resource.getrlimit(resource.RLIMIT_AS)
+    monkeypatch.setattr(method_file, "_LOAD_S", 0.5)
+    Path("mine.py").write_text("while True: pass\n")
+    resource.setrlimit(resource.RLIMIT_AS, (1 << 46, limits[1]))
+    try:
+        with pytest.raises(rm.InputError, match=r"not loaded within 0\.5 s under a memory limit \(ulimit -v\)"):
+            catalogue.check_names("mine.py")
+    finally:
+        resource.setrlimit(resource.RLIMIT_AS, limits)

@@ -351,3 +351,92 @@ def test_a_process_that_ends_at_its_start_is_the_systems_fault_and_names_a_memor
         pytest.raises(ResourceError, match=reason),
     ):
         pool.submit(_pid, None, _LONG_S).result()
+
+
+@contextmanager
+def _interrupted(error: BaseException, after_s: float = 0.2) -> Iterator[None]:
+    """A handler of SIGALRM, as a user's own time limit has one, that raises an error in this process."""
+
+    def raise_error(*_: object) -> None:
+        raise error
+
+    before = signal.signal(signal.SIGALRM, raise_error)
+    signal.setitimer(signal.ITIMER_REAL, after_s)
+    try:
+        yield
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0.0)
+        signal.signal(signal.SIGALRM, before)
+
+
+@pytest.mark.skipif(not hasattr(signal, "SIGALRM"), reason="no alarms here")
+@pytest.mark.parametrize("error", [TimeoutError("mine"), MemoryError("mine"), ConnectionResetError("mine")])
+def test_what_the_caller_raises_while_it_waits_is_its_own(error: Exception) -> None:
+    with Worker() as worker:
+        pid = worker.run(_pid, None, _LONG_S)
+        with pytest.raises(type(error), match="mine"), _interrupted(error):
+            worker.run(time.sleep, _LONG_S, _LONG_S)
+        assert worker.run(_pid, None, _LONG_S) != pid
+        worker.end_process()
+        with (
+            pytest.raises(type(error), match="mine"),
+            Worker(partial(time.sleep, _LONG_S)) as slow,
+            _interrupted(error),
+        ):
+            slow.run(_pid, None, _LONG_S)
+
+
+def test_a_set_up_that_takes_too_long_is_told() -> None:
+    told = r"could not be started: it was not ready after 0\.2 s"
+    with (
+        Worker(partial(time.sleep, _LONG_S), set_up_limit_s=0.2) as worker,
+        pytest.raises(ResourceError, match=told),
+    ):
+        worker.run(_pid, None, _LONG_S)
+
+
+def test_threads_take_turns() -> None:
+    with Worker() as worker, ThreadPoolExecutor(4) as threads:
+        tasks = [threads.submit(worker.run, abs, -number, _LONG_S) for number in range(40)]
+        assert [task.result() for task in tasks] == [*range(40)]
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="no fork here")
+@pytest.mark.filterwarnings("ignore:This process:DeprecationWarning")
+def test_a_forked_process_has_a_worker_of_its_own(tmp_path: Path) -> None:
+    """Also where it is forked while another thread waits for an answer, with the locks held."""
+    with Worker() as worker, ThreadPoolExecutor(1) as thread:
+        pid = worker.run(_pid, None, _LONG_S)
+        waits = thread.submit(worker.run, time.sleep, 1.0, _LONG_S)
+        while not worker._turn.locked():
+            time.sleep(0.01)
+        child = os.fork()
+        if child == 0:
+            try:
+                (tmp_path / "pid").write_text(str(worker.run(_pid, None, _LONG_S)))
+            finally:
+                os._exit(0)
+        os.waitpid(child, 0)
+        waits.result()
+        assert worker.run(_pid, None, _LONG_S) == pid
+    assert (tmp_path / "pid").read_text() not in ("", str(pid))
+
+
+def _folder(_: object) -> str:
+    return str(Path.cwd())
+
+
+def test_a_function_runs_in_the_folder_of_its_caller(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    with Worker() as worker:
+        for name in ("first", "second"):
+            (tmp_path / name).mkdir()
+            monkeypatch.chdir(tmp_path / name)
+            assert worker.run(_folder, None, _LONG_S) == str(tmp_path / name)
+
+
+def test_variables_of_the_environment_are_defaults_of_the_process(monkeypatch: pytest.MonkeyPatch) -> None:
+    names = ("ROTOR_MBS_FIRST", "ROTOR_MBS_SECOND")
+    with Worker(environment=dict.fromkeys(names, "default")) as worker:
+        monkeypatch.setenv(names[1], "mine")
+        assert [worker.run(os.getenv, name, _LONG_S) for name in names] == ["default", "mine"]
+    assert names[0] not in os.environ

@@ -21,9 +21,9 @@ from support.forging import append_trailer
 
 import rotor_mbs as rm
 from rotor_mbs.errors import StoreError
-from rotor_mbs.runs import untrusted
+from rotor_mbs.runs import hdf5, untrusted
 from rotor_mbs.runs.trailer import read_trailer
-from rotor_mbs.runs.untrusted import read_apart
+from rotor_mbs.runs.untrusted import read_in_worker
 from rotor_mbs.scenario.catalogue import REFERENCES
 
 SCENE = "check/held"
@@ -143,16 +143,65 @@ def test_the_limits_of_the_worker(
     path = Path(shutil.copy(files / "results.h5", tmp_path / "changed.h5"))
     forge(path, lambda content: content.extend(bytes(8)))
     with pytest.raises(StoreError, match=r"damaged or forged: .* takes more than .* s or .* GB"):
-        read_apart(path, read, argument)
-    assert read_apart(path, _process, None) != os.getpid()  # a new process reads the next one
+        read_in_worker(path, read, argument)
+    assert read_in_worker(path, _process, None) != os.getpid()  # a new process reads the next one
+
+
+_UNDER_A_LIMIT = """
+import resource, sys
+from pathlib import Path
+from taking import take
+from rotor_mbs.errors import ResourceError
+from rotor_mbs.runs.untrusted import read_in_worker
+
+resource.setrlimit(resource.RLIMIT_AS, (900 << 20, resource.RLIM_INFINITY))
+try:
+    read_in_worker(Path(sys.argv[1]), take, 800 << 20)
+except ResourceError as exc:
+    print(exc)
+"""
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="no limit of address space")
+def test_what_the_callers_own_memory_limit_stops_is_no_forgery(files: Path, tmp_path: Path) -> None:
+    """800 MB are within what a file may take (1 GB), but not within the caller's limit."""
+    path = Path(shutil.copy(files / "results.h5", tmp_path / "changed.h5"))
+    forge(path, lambda content: content.extend(bytes(8)))
+    (tmp_path / "taking.py").write_text("def take(path, size):\n    return len(bytes(size))\n")
+    (tmp_path / "program.py").write_text(_UNDER_A_LIMIT)
+    program = [sys.executable, str(tmp_path / "program.py"), str(path)]
+    ended = subprocess.run(program, capture_output=True, text=True, timeout=_SOON_S)
+    told = f"{path}: not enough memory to read it under a memory limit (ulimit -v) of 900 MiB"
+    assert (ended.stdout.strip(), ended.stderr) == (told, "")
+
+
+def test_a_file_that_is_removed_while_it_is_opened_is_a_line(
+    files: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = Path(shutil.copy(files / "results.h5", tmp_path / "removed.h5"))
+
+    def opened(*arguments: object) -> h5py.File:
+        file = open_by_h5py(*arguments)
+        path.unlink()
+        return file
+
+    open_by_h5py = h5py.File
+    monkeypatch.setattr(h5py, "File", opened)
+    with pytest.raises(StoreError, match=r"removed\.h5: no such file"), hdf5.open_file(path):
+        pass
+
+
+def test_a_lack_of_memory_is_no_damage() -> None:
+    with pytest.raises(MemoryError), hdf5.reading("results.h5"):
+        raise MemoryError
 
 
 def test_only_files_of_others_are_read_by_the_worker(files: Path, tmp_path: Path) -> None:
-    assert read_apart(files / "results.h5", _process, None) == os.getpid()
-    assert read_apart(sorted(REFERENCES.glob("*.h5"))[0], _process, None) == os.getpid()
+    assert read_in_worker(files / "results.h5", _process, None) == os.getpid()
+    assert read_in_worker(sorted(REFERENCES.glob("*.h5"))[0], _process, None) == os.getpid()
     path = Path(shutil.copy(files / "results.h5", tmp_path / "changed.h5"))
     forge(path, lambda content: content.extend(bytes(8)))
-    assert read_apart(path, _process, None) != os.getpid()
+    assert read_in_worker(path, _process, None) != os.getpid()
     assert rm.open(path).statuses == rm.open(files / "results.h5").statuses
 
 
