@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import subprocess
 import sys
 from pathlib import Path
@@ -10,6 +11,8 @@ import numpy as np
 import pytest
 
 import rotor_mbs as rm
+from rotor_mbs.errors import ResourceError
+from rotor_mbs.runs.runner import Outcome
 
 METHOD = "lagrange/dop853"
 
@@ -62,6 +65,8 @@ def test_a_comparison_and_a_check_load_no_library_of_pictures_and_pages(tmp_path
     code = """
 import sys
 import rotor_mbs as rm
+from rotor_mbs.errors import ResourceError
+from rotor_mbs.runs.runner import Outcome
 assert "numpy" not in sys.modules
 scene = rm.scene("paper/fig03").replace(duration=0.5, samples=51)
 run = rm.run(scene, "lagrange/dop853")
@@ -74,3 +79,41 @@ print(sorted({"matplotlib", "jinja2", "pandas", "xarray"} & set(sys.modules)))
     words = [sys.executable, "-c", code, str(tmp_path / "runs.h5")]
     ended = subprocess.run(words, capture_output=True, text=True, check=False, cwd=tmp_path)
     assert ended.stdout == "[]\n", ended.stderr
+
+
+def test_curves_without_a_file_live_as_long_as_the_object(scene: rm.Scene, tmp_path: Path) -> None:
+    curves = rm.bench(scene, "exudyn_tree/rk44", repeats=1, budget=0.5, progress=False)
+    assert curves.path.is_file()
+    assert repr(curves).startswith("1 curve of error against run time\n")
+    assert str(curves.path) not in curves._repr_html_()
+    page = curves.to_html(tmp_path / "pages")
+    assert page.is_file()
+    folder = curves.path.parent
+    del curves
+    gc.collect()
+    assert not folder.exists()
+
+
+@pytest.mark.parametrize("repeats", [0, -3])
+def test_a_bench_repeats_at_least_once(scene: rm.Scene, repeats: int) -> None:
+    with pytest.raises(rm.InputError, match=f"repeats: {repeats}; allowed: a whole number from 1"):
+        rm.bench(scene, "exudyn_tree/rk44", repeats=repeats)
+    with pytest.raises(TypeError):
+        rm.bench(scene, "exudyn_tree/rk44", repeats="many")  # type: ignore[arg-type]
+
+
+def test_curves_that_were_lost_are_an_error(scene: rm.Scene, monkeypatch: pytest.MonkeyPatch) -> None:
+    def lose(*_: object, **__: object) -> tuple[list[Outcome], list[object]]:
+        lost = Outcome("paper/fig03 exudyn_tree/rk44", "exudyn_tree/rk44", "worker_died", "no room", is_stored=False)
+        return [lost], []
+
+    monkeypatch.setattr("rotor_mbs.studies.bench.run_bench", lose)
+    with pytest.raises(ResourceError, match="paper/fig03 exudyn_tree/rk44: no room"):
+        rm.bench(scene, "exudyn_tree/rk44")
+
+
+def test_a_results_file_is_opened_without_scipy(scene: rm.Scene, tmp_path: Path) -> None:
+    path = rm.run(scene, [METHOD]).save(tmp_path / "runs.h5")
+    code = "import sys, rotor_mbs as rm; rm.open(sys.argv[1]); print('scipy' in sys.modules)"
+    ended = subprocess.run([sys.executable, "-c", code, str(path)], capture_output=True, text=True, cwd=tmp_path)
+    assert (ended.stdout, ended.stderr) == ("False\n", "")

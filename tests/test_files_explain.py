@@ -18,9 +18,10 @@ from support.scenes import paper
 from support.stored import Made, rotor, store
 
 import rotor_mbs as rm
-from rotor_mbs.runs import progress, table
+from rotor_mbs.runs import progress, table, untrusted
 from rotor_mbs.runs.hdf5 import Content
 from rotor_mbs.runs.runner import Outcome
+from rotor_mbs.studies import check
 
 SHORT = {"duration": 0.5, "samples": 26}
 SCREEN = (140, 50)  # characters in a line, lines
@@ -155,6 +156,65 @@ def test_a_file_is_opened_once_and_a_run_reads_its_scene_alone(
     Path(shutil.copy(files["one"], tmp_path / "other.h5")).replace(path)
     with pytest.raises(rm.StoreError, match=f"has no {label} any more: another file has taken its place"):
         _ = runs[label]
+
+
+def test_tables_of_a_file_are_kept_by_the_path_as_it_is_given(
+    files: dict[str, Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A message has the path that was asked for, and what one caller adds or removes is not another's."""
+    path = Path(shutil.copy(files["one"], tmp_path / "one.h5"))
+    os.utime(path, (1e9, 1e9))  # long ago
+    first = table.opened_tables(path)
+    monkeypatch.chdir(tmp_path)
+    assert {stored.path for stored in table.opened_tables(Path("one.h5")).tables.values()} == {Path("one.h5")}
+    first.tables.clear()
+    assert {stored.path for stored in table.opened_tables(path).tables.values()} == {path}
+
+
+def test_a_sweep_has_no_scene_of_a_label(files: dict[str, Path]) -> None:
+    with pytest.raises(KeyError, match=r"'paper/fig08'; available: 0, 1"):
+        _ = rm.open(files["sweep"])["paper/fig08"]
+
+
+def test_the_short_table_of_a_scene_is_of_its_own_runs(files: dict[str, Path], monkeypatch: pytest.MonkeyPatch) -> None:
+    """Also where it has so many that it is one of methods."""
+    monkeypatch.setattr("rotor_mbs.api.runs.MOST_ROWS", 1)
+    runs = rm.open(files["many"])
+    assert f"{METHOD}  " in repr(runs)
+    assert "6 of 6 ok" in repr(runs)
+    assert "1 of 1 ok" in repr(runs["paper/fig11"])
+    assert "6 of 6" not in repr(runs["paper/fig11"])
+
+
+def test_each_command_that_reads_a_file_prepares_it(files: dict[str, Path], monkeypatch: pytest.MonkeyPatch) -> None:
+    """The process that reads is started before the command's own code is loaded; a scene needs none."""
+    prepared: list[str] = []
+    monkeypatch.setattr(untrusted, "prepare_reading", lambda: prepared.append("once"))
+    for words, count in ((["show", files["one"]], 1), (["check", files["one"]], 2), (["show", "paper/fig08"], 2)):
+        assert rotor_mbs(*words).status == 0
+        assert len(prepared) == count
+
+
+def test_check_reads_the_scenes_of_a_file_once(files: dict[str, Path], monkeypatch: pytest.MonkeyPatch) -> None:
+    read: list[Path | None] = []
+    scenes_checked = check.scenes_checked
+
+    def noted(path: Path | None) -> dict[str, rm.Scene]:
+        read.append(path)
+        return scenes_checked(path)
+
+    monkeypatch.setattr(check, "scenes_checked", noted)
+    path = files["one"]
+    assert rotor_mbs("check", path, "--against", path).status == 0
+    assert read == [path, path]
+
+
+def test_without_standard_error_a_progress_shows_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    """As under pythonw on Windows, also where it is asked for."""
+    monkeypatch.setattr(sys, "stderr", None)
+    for asked in (None, True, False):
+        with progress.progress_of_call(asked) as line:
+            line.stage("pages", 1, 2)
 
 
 def test_several_modes_and_comparisons_of_a_file_are_a_dict(tmp_path: Path) -> None:

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
+import operator
 import os
-import tempfile
 from collections.abc import Iterable, Iterator, Mapping
 from html import escape
 from pathlib import Path
 from typing import Any
 
 from rotor_mbs.analysis.text_tables import TextTable, bench_table
-from rotor_mbs.api.runs import texts
-from rotor_mbs.errors import MethodRefusal
+from rotor_mbs.api.runs import TemporaryFolder, refuse_losses, texts
+from rotor_mbs.errors import InputError, MethodRefusal, shown_value
 from rotor_mbs.methods.catalogue import check_names
 from rotor_mbs.processes import cores
 from rotor_mbs.runs.progress import progress_of_call
@@ -37,8 +37,9 @@ def bench(
     ----------
     scene : a Scene, the name of a shipped scene, or a TOML file.
     methods : names of methods, or paths of Python files; by default all that have a ladder.
-    output : file of the curves; what it has is not measured again. Default: none is kept.
-    repeats : number of timed runs of each point, at most.
+    output : file of the curves; what it has is not measured again. Default: a temporary file, which
+        is removed with the last object that refers to it.
+    repeats : number of timed runs of each point, at most; 1 or more.
     budget : time for all curves (s).
     progress : whether to show the progress. By default on a terminal and in a notebook.
 
@@ -50,6 +51,9 @@ def bench(
         If a method that is named cannot represent the scene.
     TypeError
         For an argument of a wrong type.
+    ResourceError
+        If the process that measured curves died or could not be started; the others are stored in
+        `output`.
 
     Examples
     --------
@@ -64,15 +68,22 @@ def bench(
     from rotor_mbs.studies.bench import run_bench  # late: most users time nothing
 
     scene, budget = scene_of(scene), positive("budget", as_float(budget))
+    if operator.index(repeats) < 1:
+        raise InputError(f"repeats: {shown_value(repeats)}; allowed: a whole number from 1")
     names = list(check_names(methods if isinstance(methods, str) else texts(methods))) if methods else []
-    with tempfile.TemporaryDirectory() as folder, progress_of_call(progress) as shown:
-        path = Path(folder) / "bench.h5" if output is None else file_path(output)
-        _, refused = run_bench(
+    folder = None
+    if output is None:
+        folder = TemporaryFolder()
+        output = folder.path / "bench.h5"
+    path = file_path(output)
+    with progress_of_call(progress) as shown:
+        outcomes, refused = run_bench(
             [scene], names, path, repeats=repeats, budget_s=budget, workers=cores(), on_progress=shown
         )
-        if refused and names:
-            raise MethodRefusal("\n".join(map(str, refused)))
-        return BenchCurves(path)
+    if refused and names:
+        raise MethodRefusal("\n".join(map(str, refused)))
+    refuse_losses([f"{curve.label}: {curve.message}" for curve in outcomes if not curve.is_stored])
+    return BenchCurves(path, _folder=folder)
 
 
 class BenchCurves(Mapping[str, Mapping[str, Any]]):
@@ -82,8 +93,9 @@ class BenchCurves(Mapping[str, Mapping[str, Any]]):
     in s or a tolerance.
     """
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, *, _folder: TemporaryFolder | None = None) -> None:
         self.path = path
+        self._folder = _folder
         self._records = {f"{record.scene}/{record.name}": record for record in read_records(path, "bench")}
 
     def __getitem__(self, label: str) -> Mapping[str, Any]:
@@ -106,7 +118,12 @@ class BenchCurves(Mapping[str, Mapping[str, Any]]):
         return write_report(self.path, file_path(folder))
 
     def __repr__(self) -> str:
-        return f"{self.path}: {counted(len(self), 'curve')} of error against run time\n{self.table()}"
+        return f"{self._headline()}\n{self.table()}"
 
     def _repr_html_(self) -> str:
-        return f"<p>{escape(str(self.path))}</p>{self.table()._repr_html_()}"
+        return f"<p>{escape(self._headline())}</p>{self.table()._repr_html_()}"
+
+    def _headline(self) -> str:
+        """Return what it holds, with the file where that is the user's."""
+        place = f"{self.path}: " if self._folder is None else ""
+        return f"{place}{counted(len(self), 'curve')} of error against run time"

@@ -5,10 +5,6 @@ from __future__ import annotations
 import os
 from typing import Any
 
-from rotor_mbs.api.benches import BenchCurves
-from rotor_mbs.api.comparisons import open_comparisons
-from rotor_mbs.api.modes import open_modes
-from rotor_mbs.api.runs import Runs
 from rotor_mbs.runs.design import RUNS
 from rotor_mbs.runs.table import TableFile
 from rotor_mbs.runs.trailer import COMPARISON, MODES, RESULTS, read_trailer
@@ -39,12 +35,21 @@ def open(path: str | os.PathLike[str]) -> Any:
     """
     file = file_path(path)
     kind = read_trailer(file).kind
+    # Each kind loads what it needs: modes need SciPy, and runs do not.
     if kind == MODES:
+        from rotor_mbs.api.modes import open_modes
+
         return open_modes(file)
     if kind == COMPARISON:
+        from rotor_mbs.api.comparisons import open_comparisons
+
         return open_comparisons(file)
     groups = TableFile(file, ()).groups
     if kind == RESULTS and RUNS not in groups and "bench" in groups:
+        from rotor_mbs.api.benches import BenchCurves
+
         return BenchCurves(file)
+    from rotor_mbs.api.runs import Runs
+
     runs = Runs(file)
     return Runs(file, runs.scenes[0]) if kind == RESULTS and len(runs.scenes) == 1 else runs

@@ -201,7 +201,7 @@ def run(
         raise InputError(asked)
     if not chosen[scene.name]:
         raise MethodRefusal("\n".join(map(str, refused)))
-    folder = _TemporaryFolder()
+    folder = TemporaryFolder()
     path = folder.path / "runs.h5"
     with progress_of_call(progress) as on_progress:
         report = run_scenes(
@@ -336,7 +336,7 @@ def sweep(
     names = list(check_names(methods if isinstance(methods, str) else texts(methods)))
     study = sweep_of(scene, plain_value({**parameters}), methods=names, **plain_value(options))
     if output is None:
-        folder = _TemporaryFolder()
+        folder = TemporaryFolder()
         path = folder.path / "sweep.h5"
     else:
         folder, path = None, file_path(output)
@@ -359,13 +359,14 @@ def texts(values: Iterable[str]) -> list[str]:
 
 
 def refuse_losses(lost: Sequence[str]) -> None:
-    """Raises ResourceError where runs were asked for and could not be computed; a line each, of the first ones."""
+    """Raise ResourceError where runs were asked for and could not be computed; a line each, of the
+    first ones."""
     if lost:
         more = [f"... ({len(lost)} in all)"] if len(lost) > _SHOWN else []
         raise ResourceError("\n".join([*lost[:_SHOWN], *more]))
 
 
-class _TemporaryFolder:
+class TemporaryFolder:
     """A folder that goes with the last object that refers to it."""
 
     def __init__(self) -> None:
@@ -393,7 +394,7 @@ class Runs(Mapping[Any, Any]):
     """
 
     def __init__(
-        self, path: str | os.PathLike[str], scene: str = "", *, _folder: _TemporaryFolder | None = None
+        self, path: str | os.PathLike[str], scene: str = "", *, _folder: TemporaryFolder | None = None
     ) -> None:
         self.path, self.scene, self._folder = file_path(path), os.fsdecode(scene), _folder
         self._is_sweep = is_sweep(self.path)
@@ -411,7 +412,7 @@ class Runs(Mapping[Any, Any]):
                     self._labels[method if self.scene else f"{name}/{method}"] = name, method
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """A copy, or what another process unpickles, has a file of its own in place of a temporary one."""
+        """Return how it is copied or unpickled: with a file of its own in place of a temporary one."""
         return _restored, (self.path, self.scene, self.path.read_bytes() if self._folder is not None else None)
 
     def __getitem__(self, label: Any) -> Any:
@@ -420,7 +421,7 @@ class Runs(Mapping[Any, Any]):
         if self.scene and isinstance(label, str):  # "paper/fig11/lagrange/taylor", as in a file of several scenes
             label = label.removeprefix(f"{self.scene}/")
         if label not in self._labels:
-            if label in self.scenes:
+            if not self._is_sweep and label in self.scenes:
                 return Runs(self.path, label, _folder=self._folder)
             available = ", ".join(map(str, islice(self._labels, 20)))
             raise KeyError(f"{shown_value(label)}; available: {available}")
@@ -456,7 +457,7 @@ class Runs(Mapping[Any, Any]):
 
     @functools.cached_property
     def _sweep(self) -> StoredSweep:
-        """Read whole once, to verify it."""
+        """Read a sweep whole once, to verify it."""
         return StoredSweep(self.path)
 
     def _runs(self) -> Iterator[StoredRun]:
@@ -604,11 +605,15 @@ class Runs(Mapping[Any, Any]):
 
     def _headline(self) -> str:
         counts = ", ".join(f"{count} {status}" for status, count in self.statuses.items())
-        return f"{self._scene_label or self.path}: {counted(len(self), 'run')}: {counts}"
+        place = self._scene_label or str(self.path)
+        if self._is_sweep and self._folder is not None:  # a temporary file's path says nothing
+            place = f"sweep of {self._sweep.base_scene.label}"
+        return f"{place}: {counted(len(self), 'run')}: {counts}"
 
     @functools.cached_property
     def _scene_label(self) -> str:
-        """The scene and what was changed in a shipped one; "" of several scenes, and of a sweep."""
+        """Return the scene and what was changed in a shipped one; "" of several scenes, and of a
+        sweep."""
         if self._is_sweep or not self.scene:
             return ""
         with open_results(self.path, only=[self.scene]) as results:
@@ -620,21 +625,21 @@ class Runs(Mapping[Any, Any]):
             return sweep_parameters(self._sweep)
         if len(self) <= MOST_ROWS:
             return self.table()
-        with open_results(self.path) as results:  # while the table is made, too
+        with open_results(self.path, only=[self.scene] if self.scene else None) as results:
             return method_table(run for scene in results.scenes.values() for run in scene.methods.values())
 
 
 def _restored(path: Path, scene: str, content: bytes | None) -> Runs:
     if content is None:
         return Runs(path, scene)
-    folder = _TemporaryFolder()
+    folder = TemporaryFolder()
     own = folder.path / path.name
     own.write_bytes(content)
     return Runs(own, scene, _folder=folder)
 
 
 def _labelled(data: Any) -> Any:
-    """A dataset whose coordinates and axes have their names in place of numbers."""
+    """Return a dataset whose coordinates and axes have their names in place of numbers."""
     labels = {}
     if "coordinate" in data.coords:
         labels["coordinate"] = list(np.atleast_1d(data.coordinate.attrs["labels"]))
@@ -644,7 +649,7 @@ def _labelled(data: Any) -> Any:
 
 
 def _loaded(scene: StoredScene, stored: StoredRun) -> Run:
-    """A run as it was stored."""
+    """Return a run as it was stored."""
     solution = stored.solution(scene.scene)
     if solution is None:
         raise StoreError(f"{scene.name}/{stored.method}: {'; '.join(stored.faults(scene.scene))}")

@@ -17,7 +17,8 @@ import threading
 import warnings
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager, redirect_stderr, redirect_stdout, suppress
-from typing import Any, NoReturn, TextIO
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NoReturn, TextIO
 
 from rotor_mbs.errors import (
     InputError,
@@ -28,6 +29,9 @@ from rotor_mbs.errors import (
     printable,
     system_errors_apart,
 )
+
+if TYPE_CHECKING:
+    import argparse
 
 EXIT_OK, EXIT_FAILED, EXIT_BAD_INPUT, EXIT_INTERRUPTED = 0, 1, 2, 130
 # Commands that only print: a reader who has seen enough (`rotor-mbs list | head`) has missed nothing.
@@ -76,11 +80,7 @@ def _run(words: list[str]) -> int:
 
                 arguments = parse(words)
                 load_methods(arguments)
-                read = getattr(arguments, "file", None)
-                if read is not None and read.suffix != ".toml" and read.is_file():
-                    from rotor_mbs.runs.untrusted import prepare_reading
-
-                    prepare_reading()  # beside the loading of the command's own code
+                _prepare_reading(arguments)
                 module, _, function = arguments.command.partition(":")
                 command = getattr(importlib.import_module(f"rotor_mbs.cli.{module}"), function)
                 status = int(command(arguments))
@@ -108,9 +108,24 @@ def _run(words: list[str]) -> int:
             return EXIT_BAD_INPUT if exc.filename else EXIT_FAILED
 
 
+def _prepare_reading(arguments: argparse.Namespace) -> None:
+    """Start the process that reads a file of this program, if one is named, while the command's code is loaded."""
+    name = getattr(arguments, "file", None) or getattr(arguments, "scene", None)
+    if not isinstance(name, str | os.PathLike):
+        return
+    from rotor_mbs.runs.trailer import is_of_this_program
+
+    with suppress(OSError):  # one that cannot be read is told by the command
+        if is_of_this_program(Path(name)):
+            from rotor_mbs.runs.untrusted import prepare_reading
+
+            prepare_reading()
+
+
 @contextmanager
 def _without_invalid_date() -> Iterator[None]:
-    """Ignore a SOURCE_DATE_EPOCH that is no number in the block: a part of NumPy would not load, and SciPy with it."""
+    """Ignore a SOURCE_DATE_EPOCH that is no number in the block: a part of NumPy would not load,
+    and SciPy with it."""
     date = os.environ.get("SOURCE_DATE_EPOCH")
     if date is None or date.isdecimal():
         yield
@@ -123,14 +138,15 @@ def _without_invalid_date() -> Iterator[None]:
 
 
 def _print_warning(message: Warning | str, category: type[Warning], *where: Any, **_: Any) -> None:
-    """Doubts about numbers of a file in a line, other warnings as Python shows them."""
+    """Print a warning: doubts about numbers of a file in a line, others as Python shows them."""
     is_doubt = issubclass(category, PlausibilityWarning)
     text = f"warning: {message}" if is_doubt else warnings.formatwarning(message, category, *where[:2])
     print_line(text.rstrip(), sys.stderr)
 
 
 def _is_interrupt(error: BaseException) -> bool:
-    """Inside compiled code of a library, or while it loads, an interrupt becomes another error, or its cause."""
+    """Return whether an error is an interrupt: inside compiled code, or while it loads, that
+    becomes another error, or its cause."""
     cause: BaseException | None = error
     while cause is not None:
         if isinstance(cause, KeyboardInterrupt):
@@ -141,7 +157,8 @@ def _is_interrupt(error: BaseException) -> bool:
 
 @contextmanager
 def _signals_as_interrupts() -> Iterator[None]:
-    """SIGTERM, as a cluster sends it before it kills, and SIGHUP, of a terminal that is closed, end as Ctrl-C does."""
+    """End the block as Ctrl-C does on SIGTERM, which a cluster sends before it kills, and on
+    SIGHUP, of a terminal that is closed."""
     if threading.current_thread() is not threading.main_thread():
         yield
         return
@@ -151,7 +168,8 @@ def _signals_as_interrupts() -> Iterator[None]:
         raise KeyboardInterrupt
 
     def interrupt_again(unraisable: sys.UnraisableHookArgs) -> None:
-        """One that came where Python ignores exceptions, as in a weak reference's callback, comes a moment later."""
+        """Repeat an interrupt that came where Python ignores exceptions, as in a weak reference's
+        callback, a moment later."""
         if isinstance(unraisable.exc_value, KeyboardInterrupt):
             threading.Timer(0.01, _thread.interrupt_main).start()
         else:

@@ -25,13 +25,15 @@ _MAX_NUMBER = 1e9  # of a count; of seconds: thirty years
 
 
 def default_results() -> Path:
-    """The results file that is read where none is named: `run`'s in this folder, else `reproduce`'s."""
+    """Return the results file that is read where none is named: `run`'s in this folder, else
+    `reproduce`'s."""
     results = Path("results.h5")
     return results if results.exists() else REPRODUCED / results
 
 
 def pages_beside(results: Path) -> Path:
-    """The folder for the pages of a file where none is named: `report` beside results.h5, x-report beside x.h5."""
+    """Return the folder for the pages of a file where none is named: `report` beside results.h5,
+    x-report beside x.h5."""
     return results.parent / ("report" if results.name == "results.h5" else f"{results.stem}-report")
 
 
@@ -40,7 +42,7 @@ def _not_allowed(text: str, allowed: str) -> argparse.ArgumentTypeError:
 
 
 def path(text: str) -> Path:
-    """The path of a file or folder, there or not."""
+    """Return the path of a file or folder, there or not."""
     try:
         return file_path(text)
     except InputError as error:
@@ -48,7 +50,7 @@ def path(text: str) -> Path:
 
 
 def file(text: str) -> Path:
-    """An output file: neither an empty name nor an existing folder."""
+    """Return the path of an output file: neither an empty name nor an existing folder."""
     output = path(text)
     if not output.name or output.name == ".." or output.is_dir():
         raise _not_allowed(text, "a file's name, not a folder")
@@ -56,7 +58,7 @@ def file(text: str) -> Path:
 
 
 def folder(text: str) -> Path:
-    """An output folder: one that exists, or that can be made."""
+    """Return the path of an output folder: one that exists, or that can be made."""
     output = path(text)
     existing = next((place for place in (output, *output.parents) if place.exists()), output)
     if not (existing.is_dir() and os.access(existing, os.W_OK)):
@@ -65,7 +67,7 @@ def folder(text: str) -> Path:
 
 
 def span(text: str) -> tuple[float, ...]:
-    """COUNT numbers from FROM to TO, both included, of "FROM:TO:COUNT"."""
+    """Return COUNT numbers from FROM to TO, both included, of "FROM:TO:COUNT"."""
     try:
         start, end, number = text.split(":")
         first, last, count = float(start), float(end), int(number)
@@ -83,7 +85,7 @@ def span(text: str) -> tuple[float, ...]:
 
 
 def part(text: str) -> tuple[int, int]:
-    """(K, N) of "K/N"."""
+    """Return (K, N) of "K/N"."""
     number, _, parts = text.partition("/")
     try:
         are_whole = number.isdecimal() and parts.isdecimal()
@@ -95,7 +97,7 @@ def part(text: str) -> tuple[int, int]:
 
 
 def setting(text: str) -> tuple[str, object]:
-    """(name, value) of "name=value": a number where it is one."""
+    """Return (name, value) of "name=value": a number where it is one."""
     name, equals, value = (piece.strip() for piece in text.partition("="))
     if not (name and equals and value):
         raise _not_allowed(text, "NAME=VALUE")
@@ -167,8 +169,8 @@ class _Parser(argparse.ArgumentParser):
 
 
 def parse(argv: Sequence[str]) -> argparse.Namespace:
-    """The arguments; `command` is the place of the function to call, "module:function". Ends with status 2 on bad
-    usage."""
+    """Return the arguments; `command` is the place of the function to call, "module:function". Ends
+    with status 2 on bad usage."""
     parser, commands = _parser()
     if argv and not argv[0].startswith("-") and argv[0] not in commands:
         hint = nearest(argv[0], commands)
@@ -180,7 +182,8 @@ def parse(argv: Sequence[str]) -> argparse.Namespace:
 
 
 def load_methods(arguments: argparse.Namespace) -> None:
-    """In place of a Python file the names of its methods. Raises InputError for methods that are unknown."""
+    """Replace Python files in the arguments by the names of their methods. Raises InputError for
+    methods that are unknown."""
     given = [name for name in ("method", "methods") if name in arguments]
     if given:
         from rotor_mbs.methods.catalogue import check_names  # late: other commands need not wait for it

@@ -151,7 +151,8 @@ _DISK_IS_FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 
 
 def bench(arguments: argparse.Namespace) -> int:
-    """Error and run time, and their pages. 0 also where points failed: they are what is measured."""
+    """Measure errors and run times, and write their pages; 0 also where points failed, which is
+    what is measured."""
     from rotor_mbs.analysis.text_tables import bench_table
     from rotor_mbs.runs.read import read_records
     from rotor_mbs.studies.bench import run_bench
@@ -176,8 +177,8 @@ def bench(arguments: argparse.Namespace) -> int:
 
 
 def stability(arguments: argparse.Namespace) -> int:
-    """Run the stiff and extreme suite, how many runs of each method are ok, its pages; 1 where a run was not
-    computed."""
+    """Run the stiff and extreme suite, print how many runs of each method are ok, write its pages;
+    1 where a run was not computed."""
     from rotor_mbs.studies.stability import SUITE, run_suite, suite_runs, suite_table
 
     start, scenes = time.monotonic(), find_scenes(arguments.scenes or SUITE)
@@ -227,7 +228,8 @@ def modes(arguments: argparse.Namespace) -> int:
 
 
 def compare(arguments: argparse.Namespace) -> int:
-    """Data of another program against a scene's reference: a table, its page, the numbers as a results file."""
+    """Compare data of another program with a scene's reference: print a table, write its page and
+    the numbers as a results file."""
     from rotor_mbs.api.comparisons import compare as compare_data
     from rotor_mbs.comparison.verdict import as_dictionary
     from rotor_mbs.runs.trailer import COMPARISON, may_extend
@@ -248,7 +250,7 @@ def compare(arguments: argparse.Namespace) -> int:
 
 
 def export(arguments: argparse.Namespace) -> int:
-    """A scene for another program; the paths that were written, a line each."""
+    """Write a scene for another program, and print the paths that were written, a line each."""
     from rotor_mbs.studies.export import FORMATS
     from rotor_mbs.studies.export import export as export_scene
 
@@ -259,7 +261,7 @@ def export(arguments: argparse.Namespace) -> int:
 
 
 def report(arguments: argparse.Namespace) -> int:
-    """Pages from `arguments.file` into `arguments.output`, or beside the file."""
+    """Write pages of `arguments.file` into `arguments.output`, or beside the file."""
     from rotor_mbs.report.build import write_report
 
     output = arguments.output or pages_beside(arguments.file)
@@ -273,7 +275,7 @@ def report(arguments: argparse.Namespace) -> int:
 
 
 def figures(arguments: argparse.Namespace) -> int:
-    """The paper's figures as files for a manuscript into `arguments.output`."""
+    """Write the paper's figures as files for a manuscript into `arguments.output`."""
     from rotor_mbs.report.figures import write_figures
 
     print(*write_figures(arguments.file, arguments.output, arguments.format, arguments.figure or ()), sep="\n")
@@ -281,7 +283,7 @@ def figures(arguments: argparse.Namespace) -> int:
 
 
 def animate(arguments: argparse.Namespace) -> int:
-    """`arguments.scene` of `arguments.file`, moving, into `arguments.output`."""
+    """Draw the motion of `arguments.scene` of `arguments.file` into `arguments.output`."""
     from rotor_mbs.report.animation import write_animation
 
     output = arguments.output or file_path(arguments.scene.rpartition("/")[2] + ".webp")

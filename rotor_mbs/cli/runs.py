@@ -68,7 +68,7 @@ def reproduce(arguments: argparse.Namespace) -> int:
 
 
 def _reproduce(arguments: argparse.Namespace, results: Path, pages: Path) -> tuple[int, str]:
-    """The exit status and the summary; one pool of processes does all."""
+    """Return the exit status and the summary; one pool of processes does all."""
     load_runs = partial(import_module, "rotor_mbs.studies.reproduce")
     with local_pool(arguments.jobs, load_runs) as pool, ProgressLine() as progress:
         report, refused = reproduce_paper(results, workers=pool, timeout_s=arguments.timeout, on_progress=progress)
@@ -79,7 +79,7 @@ def _reproduce(arguments: argparse.Namespace, results: Path, pages: Path) -> tup
 
 
 def reference(arguments: argparse.Namespace) -> int:
-    """References are recomputed, also those that are shipped."""
+    """Compute references, also those that are shipped."""
     scenes = find_scenes(arguments.scenes)
     with ProgressLine() as progress:
         report = run_scenes(

@@ -23,7 +23,8 @@ if TYPE_CHECKING:  # a sweep's workers load their code meanwhile
 
 
 def print_table(table: TextTable | str) -> None:
-    """On standard output, after an empty line, with its statuses coloured on a terminal; nothing without rows."""
+    """Print a table on standard output, after an empty line, with its statuses coloured on a
+    terminal; nothing without rows."""
     if isinstance(table, str) or table.rows:
         # Colours are control characters, which the stream would escape.
         write = getattr(sys.stdout, "write_unfiltered", sys.stdout.write)

@@ -30,7 +30,7 @@ JSON = rb'\A\[\]\Z|\A\[\n \{\n  "check": "'
 
 
 def check(arguments: argparse.Namespace) -> int:
-    """Prints every verdict that fails (with --verbose all), then a count; status 1 where one fails."""
+    """Print every verdict that fails (with --verbose all), then a count; return 1 where one fails."""
     _refuse_foreign(arguments)
     if arguments.allow_changed and arguments.against is None:
         raise InputError("--allow-changed: allowed: with --against OLD")
@@ -45,9 +45,10 @@ def check(arguments: argparse.Namespace) -> int:
     else:
         with ProgressLine() as progress:
             verdicts = study.check_default_set(bounds, arguments.jobs, progress, arguments.method)
+    scenes = study.scenes_checked(arguments.file)
     if verdicts and earlier is not None:
         verdicts += study.regressions(verdicts, earlier)
-        scenes, before = (study.scenes_checked(place) for place in (arguments.file, arguments.against))
+        before = study.scenes_checked(arguments.against)
         verdicts += study.changed_scenes(scenes, before, are_allowed=arguments.allow_changed)
         if arguments.file is not None and is_sweep(arguments.file):
             verdicts.append(study.runs_gone(arguments.file, arguments.against))
@@ -59,7 +60,7 @@ def check(arguments: argparse.Namespace) -> int:
     for text in report_lines(verdicts, annotated, verbose=arguments.verbose):
         print(text, file=stream)
     if arguments.file is not None:
-        for scene in study.scenes_checked(arguments.file).values():
+        for scene in scenes.values():
             if scene.label != scene.name:
                 print(escaped(scene.label), file=stream)
     runs = ", ".join(f"{count} {method}" for method, count in study.judged_runs(verdicts).items())
@@ -101,7 +102,8 @@ def worst_first(failures: Sequence[Check]) -> list[Check]:
 
 
 def test_method(arguments: argparse.Namespace) -> int:
-    """What holds of each method, and the most likely reason where something does not; 1 where something does not."""
+    """Examine methods, and print what holds of each and the most likely reason where something does
+    not; return 1 there."""
     from rotor_mbs.studies.method_test import examine  # late: `check` needs no models
 
     _refuse_foreign(arguments)
@@ -122,7 +124,8 @@ def test_method(arguments: argparse.Namespace) -> int:
 
 
 def _refuse_foreign(arguments: argparse.Namespace) -> None:
-    """Before anything is computed: files of --junit and --json that hold something else, or are the same."""
+    """Refuse files of --junit and --json that hold something else, or are the same, before anything
+    is computed."""
     if (
         arguments.junit is not None
         and arguments.json is not None
@@ -145,7 +148,8 @@ def _write_verdicts(arguments: argparse.Namespace, verdicts: Sequence[Check]) ->
 
 
 def line(check: Check) -> str:
-    """One line: outcome, what was checked where, the value, the bound, the margin; of a failure what to look at."""
+    """Return the line of a check: outcome, what was checked where, the value, the bound, the
+    margin; of a failure what to look at."""
     outcome = "pass" if check.passed else "FAIL"
     margin = "inf" if math.isinf(check.margin) else f"{check.margin:.3g}"
     unit = f" {check.unit}" if check.unit else ""
@@ -158,14 +162,15 @@ def line(check: Check) -> str:
 
 
 def github(check: Check) -> str:
-    """A workflow command that GitHub shows as an error annotation."""
+    """Return a workflow command that GitHub shows as an error annotation."""
     title = escaped(f"rotor-mbs {check.name} {check.where.scene} {check.where.method}").replace("%", "%25")
     title = title.replace(":", "%3A").replace(",", "%2C")
     return f"::error title={title}::{line(check).replace('%', '%25')}"  # neither has a line break
 
 
 def as_json(checks: Sequence[Check]) -> str:
-    """A list of objects; numbers that JSON cannot hold (NaN, infinity) become null."""
+    """Return checks as a JSON list of objects; numbers that JSON cannot hold (NaN, infinity) become
+    null."""
     rows = []
     for check in checks:
         numbers = {"value": check.value, "bound": check.bound, "margin": check.margin}
@@ -183,7 +188,8 @@ def as_json(checks: Sequence[Check]) -> str:
 
 
 def junit(checks: Sequence[Check]) -> bytes:
-    """JUnit XML as GitHub's and GitLab's viewers read it: a suite per scene, a case per check."""
+    """Return checks as JUnit XML, as GitHub's and GitLab's viewers read it: a suite per scene, a
+    case per check."""
     root = ElementTree.Element("testsuites", {"name": "rotor-mbs check", **_counts(checks)})
     for scene in dict.fromkeys(check.where.scene for check in checks):
         of_scene = [check for check in checks if check.where.scene == scene]
@@ -210,5 +216,6 @@ def _counts(checks: Sequence[Check]) -> dict[str, str]:
 
 
 def escaped(text: str) -> str:
-    """`text` with escapes for what controls a terminal or is not allowed in XML: control characters, surrogates."""
+    """Return `text` with escapes for what controls a terminal or is not allowed in XML: control
+    characters, surrogates."""
     return "".join(char if char.isprintable() else ascii(char)[1:-1] for char in text)
