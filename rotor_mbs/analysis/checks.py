@@ -12,10 +12,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from rotor_mbs.analysis.judgement import judge
+from rotor_mbs.analysis.judgement import Judgement, bounds_of, judge
 from rotor_mbs.analysis.published import claims
 from rotor_mbs.analysis.run_checks import Check as Check
-from rotor_mbs.analysis.run_checks import RunSamples, run_checks
+from rotor_mbs.analysis.run_checks import RunSamples, bounded, defect_allowed, defect_bound, run_checks
 from rotor_mbs.analysis.run_checks import Where as Where
 from rotor_mbs.errors import InputError, StoreError
 from rotor_mbs.methods.catalogue import PRINTED, REFERENCE, find_method_or_none, is_corrected, methods
@@ -24,7 +24,7 @@ from rotor_mbs.runs.hdf5 import reading
 from rotor_mbs.runs.read import OpenResults, StoredRun, StoredScene
 from rotor_mbs.scenario.accuracy_bounds import Bounds
 from rotor_mbs.solution.defects import DRIFT_ROWS, FLOOR_SAFETY
-from rotor_mbs.solution.metrics import HORIZON_GROWTH, Metrics, running_growth
+from rotor_mbs.solution.metrics import HORIZON_GROWTH, Metrics, interval_metrics, running_growth, worst_interval
 from rotor_mbs.solution.status import COMPLETE
 from rotor_mbs.solution.trajectory import Solution, Trajectory
 
@@ -35,13 +35,8 @@ _MOST_INTERVALS = 12  # in which a peak of the printed equations' rate is looked
 _OWN_GROWTH = 0.05
 
 
-def make_check(bounds: Bounds, name: str, where: Where, value: float, unit: str, hint: str) -> Check:
-    """A value against the bound of `name` for the method."""
-    return Check(name, where, float(value), bounds.of(name, where.method).value, hint, unit)
-
-
 def checks_of(results: OpenResults, frozen: Sequence[OpenResults], bounds: Bounds) -> list[Check]:
-    """Every check that an open file allows, in the order of its scenes.
+    """Return every check that an open file allows, in the order of its scenes.
 
     The file is opened with verify=False: a row that has changed is judged, too. frozen: the shipped references.
 
@@ -58,14 +53,14 @@ def checks_of(results: OpenResults, frozen: Sequence[OpenResults], bounds: Bound
             motion_ends = scene.reference is not None and scene.reference.status == "singular"
             for run in scene.runs.values():
                 hint = "its row changed after it was written" if run.is_damaged else "as written"
-                checks.append(_of(run, "integrity", "row", run.is_damaged, own, "rows", hint))
+                checks.append(bounded(own, "integrity", _where(run, "row"), run.is_damaged, "rows", hint))
                 try:
                     # Whatever goes wrong with a run that is known to be damaged is that damage.
                     with reading(str(scene.name), run.method) if run.is_damaged else nullcontext():
                         faults, solution = run.faults(scene.scene), run.solution(scene.scene)
                         checks += _of_run(run, own, solution, faults, scene.reference_trajectory, motion_ends)
                 except StoreError as exc:
-                    checks.append(_of(run, "complete", "all", math.nan, own, "faults", str(exc)))
+                    checks.append(bounded(own, "complete", _where(run, "all"), math.nan, "faults", str(exc)))
             checks += _of_reference(scene, shipped.get(scene.name) if own.scene else None, own)
         for claim in claims(results.scenes):  # the paper's numbers, in units of their last printed digit
             if claim.printed is not None:
@@ -73,12 +68,12 @@ def checks_of(results: OpenResults, frozen: Sequence[OpenResults], bounds: Bound
                 gives = f"the paper prints {claim.value}, the run gives {claim.printed:.6f}"
                 hint = f"{gives}: the printed entries, g, ode45"
                 where = Where(claim.scene, PRINTED, claim.id)
-                checks.append(make_check(bounds, "published", where, off, "last digits", hint))
+                checks.append(bounded(bounds, "published", where, off, "last digits", hint))
     return checks
 
 
-def _of(run: StoredRun, name: str, channel: str, value: float, bounds: Bounds, unit: str, hint: str) -> Check:
-    return make_check(bounds, name, Where(run.scene, run.method, channel), value, unit, hint)
+def _where(run: StoredRun, channel: str) -> Where:
+    return Where(run.scene, run.method, channel)
 
 
 def _of_run(
@@ -89,7 +84,8 @@ def _of_run(
     reference: Trajectory | None,
     motion_ends: bool,
 ) -> Iterator[Check]:
-    """A run that stops early and reports it is complete where the motion ends there."""
+    """Yield the checks of a run. One that stops early and reports it is complete where the motion
+    ends there."""
     reports_it = solution is not None and run.status not in COMPLETE
     if reports_it and (motion_ends or not is_corrected(run.method)):
         faults = []
@@ -97,7 +93,7 @@ def _of_run(
     if faults:
         message = run.attributes.get("message", "")
         hint = "; ".join([f"stored as {run.status}{': ' if message else ''}{message}", *faults])
-    yield _of(run, "complete", "all", float(len(faults)), bounds, "faults", hint)
+    yield bounded(bounds, "complete", _where(run, "all"), float(len(faults)), "faults", hint)
     if solution is None:
         return
     scene = solution.scene
@@ -109,12 +105,13 @@ def _of_run(
     hint = f"stored {run.status}, its samples give {judgement.status} {judgement.message}".rstrip()
     if judgement.false_success != claimed:
         hint += "; whether the engine's report of success is false differs from what is stored"
-    yield _of(run, "status", "status", float(wrong), bounds, "faults", hint)
-    channel, worst, hint = _changed_metric(run, judgement.metrics, solution)
-    yield _of(run, "metrics", channel, worst, bounds, "relative", hint)
+    yield bounded(bounds, "status", _where(run, "status"), float(wrong), "faults", hint)
+    metrics = judgement.metrics | _of_stored_interval(run, judgement)
+    channel, worst, hint = _changed_metric(run, metrics, solution)
+    yield bounded(bounds, "metrics", _where(run, channel), worst, "relative", hint)
     faults = settings_faults(run)
     hint = "; ".join(faults) or "the method's, each within its range"
-    yield _of(run, "settings", "settings", float(len(faults)), bounds, "faults", hint)
+    yield bounded(bounds, "settings", _where(run, "settings"), float(len(faults)), "faults", hint)
     if len(solution.trajectory.time):
         samples = RunSamples(scene, run.method, solution.trajectory, judgement.metrics, judgement.defects)
         yield from run_checks(samples, bounds, is_corrected=is_corrected(run.method))
@@ -124,28 +121,60 @@ def _of_run(
             known = np.isfinite(own_growth) & (own_growth < HORIZON_GROWTH)
             off = float(np.abs(np.log(growth[known] / own_growth[known])).max(initial=0.0))
             hint = "the stored horizon is not that computed from the samples"
-            yield Check("growth", Where(run.scene, run.method, "of the samples"), off, _OWN_GROWTH, hint, "log")
+            yield Check("growth", _where(run, "of the samples"), off, _OWN_GROWTH, hint, "log")
+
+
+def _of_stored_interval(run: StoredRun, judgement: Judgement) -> Metrics:
+    """Return the numbers of the interval that is stored as the worst, if it is as far beyond its bound as the worst.
+
+    Which one of several is the worst, the last bits of the samples decide, which other hardware rounds otherwise.
+    """
+    defects, metrics = judgement.defects, judgement.metrics
+    stored = run.attributes.get("defect_time", math.nan)
+    if defects is None or "defect_time" not in metrics or not math.isfinite(stored):
+        return {}
+    has_bound = "defect_judged" in metrics
+    interval = int(np.abs(defects.time[1:] - stored).argmin())
+    worst = worst_interval(defects, is_corrected=has_bound)
+    floor = _rounding(metrics)
+    is_as_far = not has_bound or defects.judged_sizes[interval] >= defects.judged_sizes[worst] - floor
+    if not metrics.get("defect_judged"):  # it is the one with the largest defect
+        is_as_far = is_as_far and defects.sizes[interval] >= defects.sizes[worst] - floor
+    if not is_as_far:
+        return {}
+    own = interval_metrics(defects, interval, is_corrected=has_bound)
+    if "defect_allowed" in metrics:
+        own["defect_allowed"] = defect_allowed(own, defect_bound(bounds_of(run.method), run.method))
+    return own
+
+
+def _rounding(metrics: Metrics) -> float:
+    """Return the largest part of a defect (rad) that rounding of the samples may decide."""
+    return FLOOR_SAFETY * metrics.get("defect_floor", float(np.finfo(float).eps))
 
 
 def _changed_metric(run: StoredRun, metrics: Metrics, solution: Solution) -> tuple[str, float, str]:
-    """Channel, value and hint of the stored number that is furthest from what the samples give."""
+    """Return channel, value and hint of the stored number that is furthest from what the samples
+    give."""
     trajectory = solution.trajectory
     worst, hint, channel = 0.0, "stored numbers equal those of the samples", "stored numbers"
     if not any(name in run.attributes for name in metrics):
         return channel, worst, hint  # a file of references keeps none, and a run without samples has none
-    floor = FLOOR_SAFETY * metrics.get("defect_floor", float(np.finfo(float).eps))
+    floor = _rounding(metrics)
     growth = min(float(running_growth(trajectory)[-1]), HORIZON_GROWTH)
     # What the last bits of the samples decide, which other hardware rounds otherwise.
     allowances = {
         "defect_max": floor,
         "defect_judged": floor,
         "defect_excess": floor,
-        "defect_allowed": math.inf,  # of another interval, where rounding decides which is furthest beyond its bound
         "defect_median": floor,
         "defect_mean": floor,
         "defect_drift": floor * DRIFT_ROWS * growth,
         "angle_error_predicted": floor * HORIZON_GROWTH,
     }
+    # Proportional to the growth of an error over an interval; without an excess there is no interval to speak of.
+    is_beyond = metrics.get("defect_excess", 0.0) > floor
+    allowances["defect_allowed"] = _OWN_GROWTH * metrics.get("defect_allowed", 0.0) if is_beyond else math.inf
     # Angles and rates that are not stored are NaN here.
     lacking = set() if solution.scene.wants("rates") else {"rotor_rate_max"}
     if not solution.scene.wants("angles"):
@@ -156,8 +185,6 @@ def _changed_metric(run: StoredRun, metrics: Metrics, solution: Solution) -> tup
         lacking |= {"rotor_angle_min", "rotor_angle_max", "rotor_rate_max"}
     for name, value in (metrics | own).items():
         if name in lacking:
-            continue
-        if name == "defect_time" and metrics["defect_max"] <= floor:
             continue
         stored = float(run.attributes.get(name, np.nan))
         allowance = allowances.get(name, 0.0)
@@ -170,7 +197,8 @@ def _changed_metric(run: StoredRun, metrics: Metrics, solution: Solution) -> tup
 
 
 def _own_extremes(solution: Solution) -> dict[str, float]:
-    """The extremes of the printed equations' run at ode45's own points, which lie between the samples, too.
+    """Return the extremes of the printed equations' run at ode45's own points, which lie between
+    the samples, too.
 
     The equations are integrated again from the samples beside the extremes, and from those where the rate bends most:
     where a blade passes its singular pitch, a peak is narrower than an interval. {} of a run that broke off, which may
@@ -202,7 +230,8 @@ def _own_extremes(solution: Solution) -> dict[str, float]:
 
 
 def settings_faults(run: StoredRun) -> list[str]:
-    """What is wrong with the stored settings: each of the method's must be there, none else, each within its range."""
+    """Return what is wrong with the stored settings: each of the method's must be there, none else,
+    each within its range."""
     method = find_method_or_none(run.method)
     if method is None:
         return []
@@ -216,12 +245,13 @@ def settings_faults(run: StoredRun) -> list[str]:
 
 
 def _of_reference(scene: StoredScene, shipped: StoredRun | None, bounds: Bounds) -> Iterator[Check]:
-    """The reference in the file against the shipped one of the same scene; a file without one cannot be judged."""
+    """Yield checks of the reference in the file against the shipped one of the same scene; a file
+    without one cannot be judged."""
     stored = scene.reference
     hint = "an altered reference, or a changed scene or closed form"
     if stored is None:
         hint = "the file has no reference to compare the runs with"
-        yield make_check(bounds, "reference", Where(scene.name, REFERENCE, "all"), math.nan, "rad", hint)
+        yield bounded(bounds, "reference", Where(scene.name, REFERENCE, "all"), math.nan, "rad", hint)
     elif shipped is not None:
         if stored.is_frozen:  # it says that it was read from the shipped file
             changed = []
@@ -231,13 +261,15 @@ def _of_reference(scene: StoredScene, shipped: StoredRun | None, bounds: Bounds)
                     if values.shape != others.shape or values.tobytes() != others.tobytes():
                         changed.append(name)
             channel = ", ".join(changed) or "all"
-            yield _of(stored, "frozen", channel, float(len(changed)), bounds, "arrays", "as in the shipped file")
+            yield bounded(
+                bounds, "frozen", _where(stored, channel), float(len(changed)), "arrays", "as in the shipped file"
+            )
         for name in ("angles", "rates"):
             if name in stored:
                 first, second, off = shipped.array(name), stored.array(name), math.nan
                 if first.shape == second.shape and second.dtype.kind == "f":
                     off = float((np.abs(first - second) / np.maximum(1.0, np.abs(first))).max(initial=0.0))
-                yield _of(stored, "reference", name, off, bounds, "rad, rad/s", hint)
+                yield bounded(bounds, "reference", _where(stored, name), off, "rad, rad/s", hint)
         for name, check_name in (("error_growth", "growth"), ("angle_uncertainty", "uncertainty")):
             if name in shipped:
                 first, off = shipped.array(name), math.nan
@@ -245,4 +277,4 @@ def _of_reference(scene: StoredScene, shipped: StoredRun | None, bounds: Bounds)
                 if first.shape == second.shape and second.dtype.kind == "f":
                     used = np.isfinite(first) & (first > 0.0)  # the ratio, as far as both are positive and finite
                     off = float(np.abs(np.log(second[used] / first[used])).max(initial=0.0))
-                yield _of(stored, check_name, name.replace("_", " "), off, bounds, "log", hint)
+                yield bounded(bounds, check_name, _where(stored, name.replace("_", " ")), off, "log", hint)

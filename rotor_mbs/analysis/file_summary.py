@@ -17,7 +17,7 @@ from rotor_mbs.runs.hdf5 import read_content, reading
 from rotor_mbs.runs.read import StoredScene, open_results, read_records
 from rotor_mbs.runs.sweeps import StoredSweep
 from rotor_mbs.runs.table import parsed
-from rotor_mbs.runs.trailer import COMPARISON, MODES, RESULTS, SWEEP, read_trailer
+from rotor_mbs.runs.trailer import COMPARISON, MODES, RESULTS, SWEEP, read_trailer, refuse_split
 from rotor_mbs.runs.versions import made_with
 from rotor_mbs.scenario.keys import counted
 from rotor_mbs.solution.status import GOOD, STATUSES
@@ -97,6 +97,7 @@ def shortened(names: Sequence[str]) -> str:
 def summary_of(path: Path) -> FileSummary:
     """Return what is in a file. Raises StoreError where it cannot be read or is not of this program."""
     kind = read_trailer(path).kind
+    refuse_split(path, kind)
     of_kind = {RESULTS: _results, SWEEP: _sweep, MODES: _modes, COMPARISON: _comparison}
     with reading(path):
         summary = of_kind[kind](path)

@@ -2,7 +2,7 @@
 
 ok: what a run has is right over the whole of what was asked. Times and start are the scene's, tips and energies those
 of its angles and rates, loads those of the closed form at its state; every interval's defect is within the method's
-bound, the balances of energy and momentum are kept, and the error of the angles up to the horizon is at most 0.01 rad
+bound, the energy balance is kept, and the error of the angles up to the horizon is at most 0.01 rad
 (from the reference, or predicted from the defects). An engine's report can only lower a status. The printed equations
 are "completed" where they reach the end: nothing is claimed of them.
 """
@@ -30,10 +30,10 @@ from rotor_mbs.models.lagrange.defects import interval_defects
 from rotor_mbs.models.lagrange.singularity import rotor_inertia_shares
 from rotor_mbs.scenario.accuracy_bounds import Bound, Bounds, shipped_bounds
 from rotor_mbs.scenario.scene import Scene
-from rotor_mbs.solution.defects import OK_ERROR as OK_ERROR
 from rotor_mbs.solution.defects import Defects
 from rotor_mbs.solution.metrics import ANGLE_LIMIT, Metrics, metrics_of
 from rotor_mbs.solution.quantities import Array
+from rotor_mbs.solution.status import OK_ERROR
 from rotor_mbs.solution.trajectory import Integration, Solution, Trajectory
 
 # A run is checked where one of these could be found.
@@ -104,7 +104,8 @@ def clearly_ok(
     angles: Array,
     own: tuple[Bound, ...] = (),
 ) -> NDArray[np.bool_]:
-    """(k,) whether `judge`, without a reference, is certain to call each of k runs of a method ok.
+    """Return whether `judge`, without a reference, is certain to call each of k runs of a method
+    ok: (k,).
 
     Parameters
     ----------
@@ -127,8 +128,8 @@ def clearly_ok(
 
 
 def _is_close(scene: Scene, status: str, metrics: Metrics) -> bool:
-    """Whether a claim of success may stand: an inaccurate run that resembles the motion is no false success; against an
-    unchecked run's claim nothing is known."""
+    """Return whether a claim of success may stand: an inaccurate run that resembles the motion is
+    no false success; against an unchecked run's claim nothing is known."""
     if status != "inaccurate":
         return status in ("ok", "unchecked", "completed")
     errors = [metrics[name] for name in ("energy_drift_max", "defect_max") if name in metrics]
@@ -196,7 +197,7 @@ def _status(
 
 def _too_far_apart(defects: Defects, count: int) -> str:
     """Return why a defect of more than 0.01 rad would not be seen in some intervals."""
-    unseen = np.where(~defects.is_judged | ~(defects.excess <= OK_ERROR), defects.growth, 0.0)
+    unseen = np.where(defects.is_judged, 0.0, defects.growth)
     worst = int(unseen.argmax())
     length = float(defects.time[worst + 1] - defects.time[worst])
     apart = f"rows {length:.3g} s apart, between which errors grow {defects.growth[worst]:.1e}-fold"
@@ -204,8 +205,9 @@ def _too_far_apart(defects: Defects, count: int) -> str:
 
 
 def smallest_rotor_inertia_share(scene: Scene, run: Trajectory) -> float:
-    """Smallest S / (rotor inertia) at the last sample and on the straight way on to the next one. S = J_hub + Σ (a -
-    b²/Jzz) is the rotor's inertia with every pitch free to give way: m (c² + d²) cos²θ for point masses."""
+    """Return the smallest S / (rotor inertia) at the last sample and on the straight way on to the
+    next one. S = J_hub + Σ (a - b²/Jzz) is the rotor's inertia with every pitch free to give way: m
+    (c² + d²) cos²θ for point masses."""
     if not len(run.time):
         angles = np.array([scene.initial_angles])
     else:

@@ -12,12 +12,14 @@ from rotor_mbs.solution.trajectory import Array
 
 
 def tip_paths(scene: Scene, angles: Array) -> Array:
-    """(n, blades, 3) m, base frame, of (n, 1 + blades) rad."""
+    """Return the paths of the tips in the base frame, (n, blades, 3) m, at angles (n, 1 + blades)
+    rad."""
     return np.stack([_rotated(_frames(scene, angles, i), blade.tip) for i, blade in enumerate(scene.blades)], axis=1)
 
 
 def kinetic_energy(scene: Scene, angles: Array, rates: Array) -> Array:
-    """(n,) J: ½ m v² + ½ ω·I ω of every blade, v = ω × r and ω = q̇2 e_y + θ̇ e_z(blade), and of the hub."""
+    """Return ½ m v² + ½ ω·I ω of every blade, v = ω × r and ω = q̇2 e_y + θ̇ e_z(blade), and of the
+    hub: (n,) J."""
     total = 0.5 * scene.hub_inertia * rates[:, 0] ** 2
     for i, blade in enumerate(scene.blades):
         frames = _frames(scene, angles, i)
@@ -31,7 +33,8 @@ def kinetic_energy(scene: Scene, angles: Array, rates: Array) -> Array:
 
 
 def potential_energy(scene: Scene, time: Array, angles: Array) -> Array:
-    """(n,) J: of weights, zero at the shaft's height, and of bearing springs (a pitch that cannot move has none).
+    """Return the energy of weights, zero at the shaft's height, and of bearing springs (a pitch
+    that cannot move has none): (n,) J.
 
     time (n,) s, for rest angles that move
     """
@@ -45,7 +48,8 @@ def potential_energy(scene: Scene, time: Array, angles: Array) -> Array:
 
 
 def work_of_constant_loads(scene: Scene, angles: Array) -> Array | None:
-    """(n,) J; None where a load changes or there is damping: there the work is no function of the angles."""
+    """Return the work of the loads, (n,) J; None where a load changes or there is damping: there
+    the work is no function of the angles."""
     if scene.has_damping or not scene.has_constant_loads:
         return None
     torques = [scene.torque_at(0.0), *(value_at(torque, 0.0) for torque, _ in scene.pitch_loads)]
@@ -53,7 +57,7 @@ def work_of_constant_loads(scene: Scene, angles: Array) -> Array | None:
 
 
 def _frames(scene: Scene, angles: Array, blade: int) -> Array:
-    """(n, 3, 3) Ry(q2 + phase) Rz(θ): columns are the blade's axes in the base frame."""
+    """Return Ry(q2 + phase) Rz(θ), (n, 3, 3): columns are the blade's axes in the base frame."""
     azimuth, pitch = angles[:, 0] + scene.phases[blade], angles[:, 1 + blade]
     s, c, sp, cp = np.sin(azimuth), np.cos(azimuth), np.sin(pitch), np.cos(pitch)
     zero = np.zeros_like(s)
@@ -62,13 +66,13 @@ def _frames(scene: Scene, angles: Array, blade: int) -> Array:
 
 
 def _rotated(frames: Array, point: tuple[float, float, float]) -> Array:
-    """(n, 3) m."""
+    """Return a vector of a blade in the base frame, (n, 3) m."""
     return np.asarray(frames @ np.array(point))
 
 
 def exact_rotor_angle(scene: Scene, time: Array) -> tuple[str, Array] | None:
-    """Return (name, (n,) rad) of the rotor's angle where every pitch stays at zero; None where no exact solution is
-    known.
+    """Return the name of an exact solution and the rotor's angle by it, (n,) rad, where every pitch
+    stays at zero; None where none is known.
 
     One blade let go at rest: a pendulum (elliptic functions; Abramowitz & Stegun 22.2). Equal blades in balance:
     gravity cancels, a constant torque gives q0 + Ω0 t + τ t² / (2 I).
@@ -96,7 +100,8 @@ def _inertia_at_zero_pitch(blade: Blade) -> float:
 
 
 def _pendulum(scene: Scene, time: Array) -> tuple[str, Array] | None:
-    """Return 'pendulum' and its angle by elliptic functions, (n,) rad; None for a rotor that is none, or is driven."""
+    """Return "pendulum" and its angle by elliptic functions, (n,) rad; None for a rotor that is
+    none, or is driven."""
     from scipy.special import ellipj, ellipk
 
     blade = scene.blades[0]

@@ -74,7 +74,8 @@ class ModeSet:
 
 
 def multiblade(blades: int) -> tuple[tuple[str, ...], Array]:
-    """Names of the multiblade (Coleman) coordinates, and the (blades, blades) matrix from them to the blades' pitches.
+    """Return the names of the multiblade (Coleman) coordinates, and the (blades, blades) matrix
+    from them to the blades' pitches.
 
     Pitch of blade i = collective + Σ_k (cosine_k cos k ψ_i + sine_k sin k ψ_i) [+ differential (-1)^(i-1)], with the
     blade's mounting angle ψ_i = 2π(i-1)/blades. Source: R. P. Coleman, A. M. Feingold, NACA Report 1351, 1958.
@@ -148,7 +149,8 @@ def modes_of(
 
 
 def isotropic_modes(stiffness: Array, damping: Array) -> ModeSet:
-    """Modes of a rotor of equal blades without gravity: rotor, then one for each multiblade coordinate, by name.
+    """Return the modes of a rotor of equal blades without gravity: rotor, then one for each
+    multiblade coordinate, by name.
 
     Multiblade coordinates split the equations exactly: rotor and collective pitch, and each of the others alone.
     """
@@ -170,7 +172,8 @@ def isotropic_modes(stiffness: Array, damping: Array) -> ModeSet:
 
 
 def track(sets: Sequence[ModeSet]) -> list[ModeSet]:
-    """Puts the same modes in the same places at every speed: each set is put in the order of the one before."""
+    """Put the same modes in the same places at every speed: each set is put in the order of the one
+    before."""
     out = list(sets[:1])
     for each in sets[1:]:
         out.append(in_order_of(out[-1], each))
@@ -178,7 +181,7 @@ def track(sets: Sequence[ModeSet]) -> list[ModeSet]:
 
 
 def in_order_of(first: ModeSet, other: ModeSet) -> ModeSet:
-    """The modes of `other` in the places of those of `first` that they are most like.
+    """Return the modes of `other` in the places of those of `first` that they are most like.
 
     Likeness of two modes: the modal assurance criterion |φ·ψ*|² / (|φ|² |ψ|²), less their relative distance.
     """
@@ -194,13 +197,15 @@ def in_order_of(first: ModeSet, other: ModeSet) -> ModeSet:
 
 
 def whirl_frequencies(frequency: Array, speed: Array, harmonic: Array | int = 1) -> tuple[Array, Array]:
-    """Backward and forward whirl in rad/s, as the base sees a cosine and sine mode of `frequency` in the rotor."""
+    """Return backward and forward whirl in rad/s, as the base sees a cosine and sine mode of
+    `frequency` in the rotor."""
     return np.abs(frequency - harmonic * speed), frequency + harmonic * speed
 
 
 def floquet(transition: Array, flow: Array, gradient: Array, speed: float) -> tuple[Complex, Complex]:
-    """Multipliers of a (2n, 2n) state transition matrix over a turn, the largest first: all of them, and the others
-    than those that are 1 for every such motion. It is stable where none of the latter is larger than 1, up to `GROWTH`.
+    """Return multipliers of a (2n, 2n) state transition matrix over a turn, the largest first: all
+    of them, and the others than those that are 1 for every such motion. It is stable where none of
+    the latter is larger than 1, up to `GROWTH`.
 
     flow: (2n,) time derivative of the state, an eigenvector for 1. gradient: (2n,) derivative of what the motion keeps,
     a left eigenvector for 1, or zeros.
@@ -225,7 +230,7 @@ def _normalized(shape: Complex | Array) -> Complex:
 
 
 def _assurance(first: Complex, second: Complex) -> Array:
-    """(n, m) modal assurance criterion between the rows of both."""
+    """Return the modal assurance criterion between the rows of both, (n, m)."""
     product = np.abs(first.conj() @ second.T) ** 2
     sizes = np.outer((np.abs(first) ** 2).sum(axis=1), (np.abs(second) ** 2).sum(axis=1))
     return np.asarray(product / np.maximum(sizes, 1e-300))
@@ -428,7 +433,8 @@ def _difference(first: LinearModes, other: LinearModes) -> float:
 
 
 def mode_rows(modes: SceneModes) -> list[dict[str, object]]:
-    """A row for each state, speed and mode of the closed form: speeds and frequencies in rad/s, growth in 1/s."""
+    """Return a row for each state, speed and mode of the closed form: speeds and frequencies in
+    rad/s, growth in 1/s."""
     rows: list[dict[str, object]] = []
     for linear in modes.closed_form:
         numbers = {
@@ -447,7 +453,7 @@ def mode_rows(modes: SceneModes) -> list[dict[str, object]]:
 
 
 def mode_table(rows: Sequence[Mapping[str, object]]) -> TextTable:
-    """Table of such rows, damped frequencies in Hz too."""
+    """Return a table of such rows, damped frequencies in Hz too."""
     head = (
         "state", "speed (rad/s)", "mode", "undamped (rad/s)", "damped (rad/s)", "damped (Hz)", "damping ratio",
         "growth (1/s)",
@@ -542,7 +548,7 @@ def _linear_datasets(linear: LinearModes) -> Datasets:
 
 
 def to_records(modes: SceneModes) -> list[Record]:
-    """The records of a file of modes."""
+    """Return the records of a file of modes."""
     common = {name: getattr(modes, name) for name in ("scene_hash", "title", "blades", "gravity")}
     common |= {"notes": "\n".join(modes.notes), "scene_label": modes.label}
     linear = [*modes.rest.values(), *modes.rotation.values()]
@@ -590,7 +596,8 @@ def _linear_record(scene: str, linear: LinearModes, common: Mapping[str, Any]) -
 
 
 def linear_dataset(sources: Mapping[str, LinearModes], xarray: Any) -> Any:
-    """All sources of one state as an xarray.Dataset with the dimension `solver`; `xarray` is the module."""
+    """Return all sources of one state as an xarray.Dataset with the dimension `solver`; `xarray` is
+    the module."""
     if not sources:
         raise InputError("no modes of this state; allowed: a state that was computed")
     sets = []
@@ -612,7 +619,8 @@ def linear_dataset(sources: Mapping[str, LinearModes], xarray: Any) -> Any:
 
 
 def read_modes(path: Path) -> dict[str, SceneModes]:
-    """By scene, all modes in a file. Raises StoreError where the file cannot be read or has none."""
+    """Read all modes in a file, by scene. Raises StoreError where the file cannot be read or has
+    none."""
     records = read_records(path, "modes")
     if not records:
         raise StoreError(f"{path}: no modes in it; allowed: a file that rotor-mbs modes has written")

@@ -83,7 +83,7 @@ class CheckedEntry(NamedTuple):
 
 
 def published() -> tuple[Published, ...]:
-    """All numbers and claims, in the order of the file."""
+    """Return all numbers and claims, in the order of the file."""
     items = []
     for table in _tables("published")["published"]:
         sides = [test[side] for test in table.get("tests", ()) for side in ("of", "than") if side in test]
@@ -93,12 +93,13 @@ def published() -> tuple[Published, ...]:
 
 
 def conditions() -> dict[str, str]:
-    """What had to be found out to reproduce the numbers: by subject (gravity, duration) or scene (fig05)."""
+    """Return what had to be found out to reproduce the numbers: by subject (gravity, duration) or
+    scene (fig05)."""
     return dict(_tables("published")["conditions"])
 
 
 def errata() -> tuple[Erratum, ...]:
-    """The errata, in the order of the file."""
+    """Return the errata, in the order of the file."""
     return tuple(Erratum(**table) for table in _tables("errata")["erratum"])
 
 
@@ -107,7 +108,8 @@ def _tables(name: str) -> dict[str, Any]:
 
 
 def checked_entries() -> list[CheckedEntry]:
-    """Every printed entry against derivatives of (3), in the order of the equations: reference/errata-check.csv.
+    """Return every printed entry against derivatives of (3), in the order of the equations:
+    reference/errata-check.csv.
 
     Tests compute every entry (`tests/support/printed_entries.py`) and compare the file with it.
     """
@@ -142,7 +144,7 @@ class ClaimStudy:
     shares: Mapping[str, Mapping[str, Sequence[tuple[float | None, int]]]]
 
     def count(self, method: str, verdict: str) -> int:
-        """How many claims have this verdict by the method."""
+        """Return how many claims have this verdict by the method."""
         return sum(verdicts[method] == verdict for verdicts in self.verdicts.values())
 
 
@@ -180,7 +182,7 @@ def claims(scenes: Mapping[str, StoredScene], items: Iterable[Published] | None 
 
 
 def rounds_to(value: float, item: Published) -> bool:
-    """Whether `value`, rounded as it would be printed, is the printed number."""
+    """Return whether `value`, rounded as it would be printed, is the printed number."""
     return f"{value:.{item.decimals}f}" == f"{item.value:.{item.decimals}f}"
 
 

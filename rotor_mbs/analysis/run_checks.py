@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -18,7 +18,7 @@ from rotor_mbs.models.lagrange.samples import load_conditioning, load_rounding
 from rotor_mbs.models.lagrange.singularity import least_inertia_shares
 from rotor_mbs.scenario.accuracy_bounds import Bounds
 from rotor_mbs.scenario.scene import Scene
-from rotor_mbs.solution.defects import FLOOR_SAFETY, LEFT_ZERO, OK_ERROR, Defects
+from rotor_mbs.solution.defects import FLOOR_SAFETY, LEFT_ZERO, Defects
 from rotor_mbs.solution.metrics import Metrics, energy_scale
 from rotor_mbs.solution.quantities import (
     Array,
@@ -29,6 +29,7 @@ from rotor_mbs.solution.quantities import (
     known_quantities,
     sizes,
 )
+from rotor_mbs.solution.status import OK_ERROR
 from rotor_mbs.solution.trajectory import Trajectory
 
 # Below this share of the rotor's inertia the last bit of a pitch decides it: (π/2 known to 1e-16)², a hundredfold.
@@ -44,7 +45,7 @@ _GROWN = 1e4
 
 
 class Where(NamedTuple):
-    """What a check is of; the method is "*" where it is of a whole scene."""
+    """The place of a check: scene, method and channel; the method is "*" for a whole scene."""
 
     scene: str
     method: str
@@ -102,12 +103,20 @@ class RunSamples:
     metrics: Metrics
     defects: Defects | None
 
-    def check(
-        self, bounds: Bounds, name: str, channel: str, value: float, unit: str, hint: str, fault: str = ""
-    ) -> Check:
-        """Return a value against the bound of `name` for the method."""
-        bound = bounds.of(name, self.method).value
-        return Check(name, Where(self.scene.name, self.method, channel), float(value), bound, hint, unit, fault)
+    def where(self, channel: str) -> Where:
+        """Return the place of a check of one of its channels."""
+        return Where(self.scene.name, self.method, channel)
+
+
+def bounded(bounds: Bounds, name: str, where: Where, value: float, unit: str, hint: str, fault: str = "") -> Check:
+    """Return a value against the bound of the check `name` for the method.
+
+    Parameters
+    ----------
+    bounds : bounds of the scene.
+    name, where, value, unit, hint, fault : as the fields of the check.
+    """
+    return Check(name, where, float(value), bounds.of(name, where.method).value, hint, unit, fault)
 
 
 def run_checks(run: RunSamples, bounds: Bounds, *, is_corrected: bool = True) -> Iterator[Check]:
@@ -131,7 +140,9 @@ def _checks_of_rows(run: RunSamples, bounds: Bounds) -> Iterator[Check]:
     scene, trajectory = run.scene, run.trajectory
     times = np.linspace(0.0, scene.duration, scene.samples)[: len(trajectory.time)]
     off = float(np.abs(trajectory.time - times).max()) / scene.duration
-    yield run.check(bounds, "times", "time", off, "of duration", "samples are equally spaced, both ends included")
+    yield bounded(
+        bounds, "times", run.where("time"), off, "of duration", "samples are equally spaced, both ends included"
+    )
     if not scene.wants("angles"):
         return
     # A pitch without inertia is fixed: its rate is zero, whatever the scene says.
@@ -141,7 +152,7 @@ def _checks_of_rows(run: RunSamples, bounds: Bounds) -> Iterator[Check]:
     if scene.wants("rates"):
         off = max(off, float(np.abs(trajectory.rates[0] - rates).max()))
     size = max(1.0, *map(abs, scene.initial_angles), *map(abs, rates.tolist()))
-    yield run.check(bounds, "start", "angles, rates", off / size, "rad, rad/s", "the initial state")
+    yield bounded(bounds, "start", run.where("angles, rates"), off / size, "rad, rad/s", "the initial state")
 
 
 def _checks_of_outputs(run: RunSamples, bounds: Bounds) -> Iterator[Check]:
@@ -154,21 +165,22 @@ def _checks_of_outputs(run: RunSamples, bounds: Bounds) -> Iterator[Check]:
         length = max(float(np.linalg.norm(blade.tip)) for blade in scene.blades) or 1.0
         hint = "the tip point, the azimuth or the rotation of a blade"
         fault = f"a tip is {away:.1e} m from where its angles put it, allowed {{bound}} m"
-        yield _with_fault(run.check(bounds, "tip", "tip", float(away) / length, "of length", hint), fault, length)
+        yield _with_fault(
+            bounded(bounds, "tip", run.where("tip"), float(away) / length, "of length", hint), fault, length
+        )
     if trajectory.energy_error is not None:
         own = energy_error(trajectory)
         off = math.nan if own is None else float(np.abs(trajectory.energy_error - own).max())
         hint = "differs from the balance of the stored energies"
         scale = energy_scale(scene, trajectory) or 1.0
-        yield run.check(bounds, "energies", "energy error", off / scale, "of scale", hint)
+        yield bounded(bounds, "energies", run.where("energy error"), off / scale, "of scale", hint)
     if scene.wants("rates") and trajectory.kinetic_energy is not None:
         yield from _checks_of_energies(run, bounds)
 
 
 def _with_fault(check: Check, fault: str, scale: float = 1.0) -> Check:
     """Return the check with a fault whose field {bound} is filled in, times `scale`."""
-    text = fault.format(bound=f"{check.bound * scale:.0e}")
-    return Check(check.name, check.where, check.value, check.bound, check.hint, check.unit, text)
+    return replace(check, fault=fault.format(bound=f"{check.bound * scale:.0e}"))
 
 
 def _checks_of_energies(run: RunSamples, bounds: Bounds) -> Iterator[Check]:
@@ -188,7 +200,7 @@ def _checks_of_energies(run: RunSamples, bounds: Bounds) -> Iterator[Check]:
     for name, (stored, own) in formulas.items():
         if stored is not None and own is not None:
             off = float(np.abs(stored - own).max()) / scale
-            yield run.check(bounds, "energies", name, off, "of scale", hint)
+            yield bounded(bounds, "energies", run.where(name), off, "of scale", hint)
 
 
 def _checks_of_motion(run: RunSamples, bounds: Bounds) -> Iterator[Check]:
@@ -198,7 +210,7 @@ def _checks_of_motion(run: RunSamples, bounds: Bounds) -> Iterator[Check]:
         drift = max(metrics["energy_drift_max"] - energy_slack(scene, trajectory), 0.0)
         hint = "a force without its potential, a wrong mass matrix, or too long a step"
         fault = f"energy drift {metrics['energy_drift_max']:.1e} of the energy scale, allowed {{bound}}"
-        yield _with_fault(run.check(bounds, "energy", "balance", drift, "of scale", hint), fault)
+        yield _with_fault(bounded(bounds, "energy", run.where("balance"), drift, "of scale", hint), fault)
     yield from _checks_of_quantities(run, bounds)
     if "defect_max" in metrics:
         yield from _checks_of_defects(run, bounds)
@@ -206,17 +218,17 @@ def _checks_of_motion(run: RunSamples, bounds: Bounds) -> Iterator[Check]:
         hint = f"up to the horizon at {metrics['horizon_s']:.2f} s: defects, amplified by the motion"
         error = max(metrics["angle_error_max"] - start_slack(scene), 0.0)
         fault = _error_fault(run, metrics["angle_error_max"], "angle error")
-        yield _with_fault(run.check(bounds, "error", "angles", error, "rad", hint), fault)
+        yield _with_fault(bounded(bounds, "error", run.where("angles"), error, "rad", hint), fault)
     elif "angle_error_predicted" in metrics:
         # Without a reference the defects say how large the error is; bounds of shipped scenes are for the true one.
-        error, where = metrics["angle_error_predicted"], Where(scene.name, run.method, "angles, predicted")
+        error, where = metrics["angle_error_predicted"], run.where("angles, predicted")
         value, fault = max(error - start_slack(scene), 0.0), _error_fault(run, error, "predicted angle error")
         yield Check("error", where, value, OK_ERROR, "defects, amplified by the motion", "rad", fault)
     exact = kinematics.exact_rotor_angle(scene, trajectory.time) if scene.wants("angles") else None
     if exact is not None:
         name, angle = exact
         off = max(float(np.abs(trajectory.angles[:, 0] - angle).max()) - start_slack(scene), 0.0)
-        yield run.check(bounds, "exact", "rotor angle", off, "rad", f"{name}, solved analytically")
+        yield bounded(bounds, "exact", run.where("rotor angle"), off, "rad", f"{name}, solved analytically")
 
 
 def _checks_of_defects(run: RunSamples, bounds: Bounds) -> Iterator[Check]:
@@ -224,12 +236,11 @@ def _checks_of_defects(run: RunSamples, bounds: Bounds) -> Iterator[Check]:
     metrics = run.metrics
     if bounds.find("defect median", run.method):
         fault = f"median of the defects {metrics['defect_median']:.1e} rad, allowed {{bound}}"
-        median = run.check(
-            bounds, "defect median", "median", metrics["defect_median"], "rad", "a term, a parameter, the step"
-        )
+        value, hint = metrics["defect_median"], "a term, a parameter, the step"
+        median = bounded(bounds, "defect median", run.where("median"), value, "rad", hint)
         yield _with_fault(median, fault)
     bound = defect_bound(bounds, run.method)
-    where = Where(run.scene.name, run.method, "largest")
+    where = run.where("largest")
     hint = f"up to t = {metrics['defect_time']:.6g} s: a term, a parameter, the step"
     allowed = defect_allowed(metrics, bound)
     fault = f"defect {metrics['defect_excess']:.1e} rad in the interval up to t = {metrics['defect_time']:.6g} s"
@@ -314,9 +325,9 @@ def _checks_of_quantities(run: RunSamples, bounds: Bounds) -> Iterator[Check]:
             assert exact is not None
             off = sizes(quantity, stored - exact) - sizes(quantity, rounding[quantity.name])
             error = max(float(off.max(initial=0.0)), 0.0) / rule.scale_of(scene, trajectory)
-            if not np.isfinite(off).all():
+            if not (off < math.inf).all():  # also NaN; minus infinity: rounding leaves everything open
                 error = math.inf
-        where = Where(scene.name, run.method, rule.channel or quantity.name)
+        where = run.where(rule.channel or quantity.name)
         hint, unit = rule.look_at or quantity.long_name, rule.unit or quantity.units
         what = rule.fault or f"{rule.metric} is {{value}} {rule.unit}".rstrip()
         fault = f"{what.format(value=f'{error:.1e}')}, allowed {bound:.0e}"

@@ -21,7 +21,7 @@ MOST_ROWS = 40  # of a table with a row for each run
 
 
 def run_row(run: StoredRun) -> tuple[str, ...]:
-    """Cells under RUN_HEAD."""
+    """Return the cells of a run under RUN_HEAD."""
     facts = run.attributes
     shown = comparison(facts, float(run.scales["time"][-1]))
     if run.method == REFERENCE:  # not compared with itself
@@ -32,7 +32,8 @@ def run_row(run: StoredRun) -> tuple[str, ...]:
 
 
 def table_of_runs(scenes: Mapping[str, StoredScene], wanted: Mapping[str, Iterable[str]]) -> TextTable:
-    """A row for each of the `wanted` runs and their references; of many runs, one for each method."""
+    """Return a row for each of the `wanted` runs and their references; of many runs, one for each
+    method."""
     runs = []
     rows: list[tuple[str, ...]] = []
     for name, methods in wanted.items():
@@ -68,8 +69,9 @@ def method_table(runs: Iterable[StoredRun]) -> TextTable:
 
 
 def bench_table(curves: Sequence[Record]) -> TextTable:
-    """A row for each curve: how many settings are ok, the smallest error, and the run time to reach given errors: empty
-    if it does not, "not measured" if it might with finer settings, which the budget left out."""
+    """Return a row for each curve: how many settings are ok, the smallest error, and the run time
+    to reach given errors: empty if it does not, "not measured" if it might with finer settings,
+    which the budget left out."""
     rows = []
     for curve in curves:
         errors, seconds = points(curve)

@@ -37,30 +37,34 @@ class Reach(NamedTuple):
 
 
 def succeeded(curve: Record, error: str = ANGLE_ERROR) -> NDArray[np.bool_]:
-    """(settings,) Which points stand on the curve: run to the end, and not useless. A coarse one need not be ok."""
+    """Return which points stand on the curve, (settings,): run to the end, and not useless. A
+    coarse one need not be ok."""
     is_complete = np.isin(curve.arrays["status"], [code_of(status) for status in COMPLETE])
     is_known = np.isfinite(curve.arrays[error]) & np.isfinite(curve.arrays["run_time_s"])
     return np.asarray(is_complete & is_known & (curve.arrays[ANGLE_ERROR] < USELESS_RAD))
 
 
 def failed(curve: Record) -> NDArray[np.bool_]:
-    """(settings,) Which points are failures: run, and neither on the curve nor left out by the budget."""
+    """Return which points are failures, (settings,): run, and neither on the curve nor left out by
+    the budget."""
     return np.asarray(~succeeded(curve) & (curve.arrays["status"] != code_of("left_out")))
 
 
 def left_out(curve: Record) -> int:
-    """How many rungs of its ladder, the finest ones, the budget left out: what it does not reach they might."""
+    """Return how many of the finest settings of its ladder the budget left out: what it does not
+    reach they might."""
     return curve.statuses.count("left_out")
 
 
 def points(curve: Record, error: str = ANGLE_ERROR) -> tuple[Array, Array]:
-    """(errors in rad, times in s) of the points on the curve."""
+    """Return (errors in rad, times in s) of the points on the curve."""
     chosen = succeeded(curve, error)
     return np.maximum(curve.arrays[error][chosen], SMALLEST_ERROR), curve.arrays["run_time_s"][chosen]
 
 
 def pareto(errors: Array, seconds: Array) -> NDArray[np.intp]:
-    """Indices of the points that no other beats in both, by rising time: errors fall strictly."""
+    """Return indices of the points that no other beats in both, by rising time: errors fall
+    strictly."""
     front: list[int] = []
     for i in np.lexsort((errors, seconds)):
         if not front or errors[i] < errors[front[-1]]:
@@ -69,7 +73,8 @@ def pareto(errors: Array, seconds: Array) -> NDArray[np.intp]:
 
 
 def time_to_reach(errors: Array, seconds: Array, target: float) -> float | None:
-    """s, on the front, straight in the logarithms between two points; None where no point is as accurate.
+    """Return the run time (s) to an error, on the front, straight in the logarithms between two
+    points; None where no point is as accurate.
 
     Where already the fastest point is more accurate than asked for, its time.
     """
@@ -81,14 +86,15 @@ def time_to_reach(errors: Array, seconds: Array, target: float) -> float | None:
 
 
 def fastest(curves: Sequence[Record], target: float) -> list[tuple[Record, Reach]]:
-    """Those that reach the target, the fastest first."""
+    """Return the curves that reach the target, the fastest first."""
     times = [(curve, time_to_reach(*points(curve), target)) for curve in curves]
     able = sorted(((curve, time) for curve, time in times if time is not None), key=lambda pair: pair[1])
     return [(curve, Reach(time, time / able[0][1])) for curve, time in able]
 
 
 def fitted_order(steps: Array, errors: Array) -> float | None:
-    """Slope of log error over log step on the finest points above the round-off floor; None with fewer than two.
+    """Return the slope of log error over log step on the finest points above the round-off floor;
+    None with fewer than two.
 
     steps: s, coarse to fine; errors: rad, > 0.
     """
@@ -106,7 +112,8 @@ def fitted_order(steps: Array, errors: Array) -> float | None:
 
 
 def step_for(target: float, steps: Array, errors: Array) -> float | None:
-    """s: where the error crosses `target` for good, by a straight line in logarithms; None where it does not."""
+    """Return the step (s) where the error crosses `target` for good, by a straight line in
+    logarithms; None where it does not."""
     below = errors <= target
     if not below.any() or not below[-1]:
         return None
@@ -118,12 +125,12 @@ def step_for(target: float, steps: Array, errors: Array) -> float | None:
 
 
 def values_of(curves: Iterable[Record], column: str) -> list[float]:
-    """The finite values of a column over the points on these curves."""
+    """Return the finite values of a column over the points on these curves."""
     values = [curve.arrays[column][succeeded(curve)] for curve in curves if column in curve.arrays]
     return [value for array in values for value in array.tolist() if math.isfinite(value)]
 
 
 def by_scene(curves: Sequence[Record]) -> Mapping[str, list[Record]]:
-    """The curves of each scene, in order."""
+    """Return the curves of each scene, in order."""
     names = dict.fromkeys(curve.scene for curve in curves)
     return {name: [curve for curve in curves if curve.scene == name] for name in names}

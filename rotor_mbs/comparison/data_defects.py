@@ -134,7 +134,7 @@ def judged_defects(scene: Scene, defects: Defects, tolerance: float) -> JudgedDe
     values = vectors / units
     # Where a number is next to nothing its rounding is no measure.
     floors = np.maximum(defects.floors, 0.3 * np.median(defects.floors, axis=0) + 1e-18)
-    is_judged = defects.is_judged & np.isfinite(vectors).all(axis=1)
+    is_judged = defects.is_resolved & np.isfinite(vectors).all(axis=1)
     sizes = np.abs(np.where(is_judged[:, None], values, 0.0))
     excess = np.maximum(sizes - AT_FLOOR * floors, 0.0).max(axis=1, initial=0.0)
     return JudgedDefects(scene, defects, tolerance, units, values, floors, is_judged, excess)

@@ -9,7 +9,6 @@ from time import monotonic
 import numpy as np
 from numpy.typing import NDArray
 
-from rotor_mbs.analysis.judgement import OK_ERROR
 from rotor_mbs.comparison.causes import likely_causes
 from rotor_mbs.comparison.channels import channel_key
 from rotor_mbs.comparison.columns import shown_names
@@ -44,6 +43,7 @@ from rotor_mbs.runs.read import Record
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.defects import FLOOR_SAFETY, Defects
 from rotor_mbs.solution.metrics import horizon, horizon_samples
+from rotor_mbs.solution.status import OK_ERROR
 from rotor_mbs.solution.trajectory import Array, Trajectory
 
 _TIME_ROUNDING = 1e-9  # of the duration: times that are sums of steps may end so far past it
@@ -348,14 +348,14 @@ def _channel_errors(scene: Scene, rows: ReferencedRows, error: Array) -> tuple[C
     for j, channel in enumerate(rows.compared.channels):
         defect = floor = None
         known = defects_of_channel(scene, rows.defects, channel)
-        if known is not None and rows.defects is not None and rows.defects.is_judged.any():
+        if known is not None and rows.defects is not None and rows.defects.is_resolved.any():
             sizes, floors = known
             # As of a run: what is allowed grows with the length of an interval and the error
             # growth over it.
             beyond_rounding = np.maximum(sizes - FLOOR_SAFETY * floors, 0.0)
             excess = rows.defects.in_bound_units(beyond_rounding)
-            defect = float(excess[rows.defects.is_judged].max())
-            floor = float(floors[rows.defects.is_judged].max())
+            defect = float(excess[rows.defects.is_resolved].max())
+            floor = float(floors[rows.defects.is_resolved].max())
         channels.append(
             ChannelErrors(
                 name=channel.name,
@@ -373,7 +373,7 @@ def _channel_errors(scene: Scene, rows: ReferencedRows, error: Array) -> tuple[C
 def _largest_interval(defects: Defects) -> int:
     """Return the number of the interval whose defect exceeds what is allowed most."""
     excess = defects.in_bound_units(defects.channel_excess).max(axis=1)
-    return int(np.where(defects.is_judged, excess, 0.0).argmax())
+    return int(np.where(defects.is_resolved, excess, 0.0).argmax())
 
 
 def _largest_drift(scene: Scene, defects: Defects | None) -> tuple[float, str]:
@@ -509,8 +509,8 @@ def _unchecked_parts(
     if defects is None and rows.note and until < len(rows.places):
         after = f"after the horizon at {rows.horizon_s:.6g} s nothing is checked"
         yield "unchecked", f"{after}; {rows.note}"
-    if defects is not None and not defects.is_judged[until - 1 :].all():
-        first = until - 1 + int(np.argmin(defects.is_judged[until - 1 :]))
+    if defects is not None and not defects.is_resolved[until - 1 :].all():
+        first = until - 1 + int(np.argmin(defects.is_resolved[until - 1 :]))
         since = f"the first after t = {defects.time[first]:.6g} s"
         reason = "the rows are too far apart, or have too few digits, to be checked"
         yield "unchecked", f"after the horizon {reason}, {since}"

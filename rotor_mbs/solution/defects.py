@@ -9,8 +9,8 @@ of an error over it:
 
     allowed = min(b, 0.01 rad) max(1, h / 0.01 s) max(1, G),    excess = size - 3 floor
 
-An excess above what is allowed is a fault. An interval in which an excess of more than 0.01 rad is allowed, or in which
-rounding alone may be as large, is not judged.
+An excess above what is allowed is a fault. An interval that shows no fault is not judged where its excess is more than
+0.01 rad, which is allowed only between rows that are far apart, or where rounding alone may be as large (`is_judged`).
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from rotor_mbs.solution.status import OK_ERROR as OK_ERROR
+from rotor_mbs.solution.status import OK_ERROR
 from rotor_mbs.solution.trajectory import Array, Trajectory
 
 # What the rounding of a run's own numbers makes of a defect, as it is estimated, may be this many times larger.
@@ -159,9 +159,17 @@ class Defects:
         return self.in_bound_units(self.excess)
 
     @property
-    def is_judged(self) -> NDArray[np.bool_]:
-        """Whether each interval is judged, (n - 1,): rounding explains less than 0.01 rad, or the defect has no end."""
+    def is_resolved(self) -> NDArray[np.bool_]:
+        """Whether rounding explains at most 0.01 rad in each interval, or its defect has no end: (n - 1,)."""
         return np.asarray((FLOOR_SAFETY * self.floor <= OK_ERROR) | ~np.isfinite(self.sizes))
+
+    @property
+    def is_judged(self) -> NDArray[np.bool_]:
+        """Whether a defect of more than 0.01 rad would be seen in each interval, (n - 1,).
+
+        It is resolved, and its own excess, where it passes its bound, is no larger.
+        """
+        return np.asarray(self.is_resolved & (self.excess <= OK_ERROR))
 
     @property
     def predicted(self) -> Array:

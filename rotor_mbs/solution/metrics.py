@@ -8,7 +8,7 @@ import numpy as np
 
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.scenario.time_table import value_at
-from rotor_mbs.solution.defects import LEFT_ZERO, OK_ERROR, Defects
+from rotor_mbs.solution.defects import LEFT_ZERO, Defects
 from rotor_mbs.solution.quantities import Array, array_of, deviation, energy_error, known_quantities, sizes
 from rotor_mbs.solution.trajectory import Trajectory
 
@@ -24,7 +24,7 @@ _LINEAR_FROM, _LINEAR_TO = 1e-12, 1e-2
 
 
 def running_growth(reference: Trajectory) -> Array:
-    """(n,) the largest error growth so far, at least 1."""
+    """Return the largest error growth so far, at least 1, at each sample: (n,)."""
     growth = reference.get("error_growth")
     if growth is None:
         return np.ones(len(reference.time))
@@ -32,24 +32,28 @@ def running_growth(reference: Trajectory) -> Array:
 
 
 def horizon_samples(reference: Trajectory) -> int:
-    """How many samples lie before the horizon (all where the growth stays below HORIZON_GROWTH)."""
+    """Return how many samples lie before the horizon (all where the growth stays below
+    HORIZON_GROWTH)."""
     beyond = running_growth(reference) >= HORIZON_GROWTH
     return int(np.argmax(beyond)) if beyond.any() else len(beyond)
 
 
 def horizon(reference: Trajectory) -> float:
-    """Time in s of the last sample before the error growth reaches HORIZON_GROWTH, or of the last sample."""
+    """Return the time in s of the last sample before the error growth reaches HORIZON_GROWTH, or of
+    the last sample."""
     return float(reference.time[max(horizon_samples(reference) - 1, 0)])
 
 
 def angle_error(run: Trajectory, reference: Trajectory) -> Array:
-    """(common samples,) rad: largest over the coordinates. Angles are unwrapped: a lost turn is an error of 2π."""
+    """Return the largest error of the angles over the coordinates, (common samples,) rad. Angles
+    are unwrapped: a lost turn is an error of 2π."""
     n = min(len(run.time), len(reference.time))
     return np.asarray(np.abs(run.angles[:n] - reference.angles[:n]).max(axis=1))
 
 
 def energy_scale(scene: Scene, run: Trajectory) -> float:
-    """J: Σ m g |r| + kinetic and spring energy at the start + largest |work|; zero only where nothing moves."""
+    """Return the energy (J) that errors are relative to: Σ m g |r| + kinetic and spring energy at
+    the start + largest |work|; zero only where nothing moves."""
     weights = sum(blade.mass * scene.gravity * float(np.linalg.norm(blade.centre_of_mass)) for blade in scene.blades)
     springs = sum(
         0.5 * stiffness * float(np.square(angle - value_at(scene.pitch_loads[i][1], 0.0)))
@@ -124,31 +128,39 @@ def defect_metrics(defects: Defects, horizon_s: float | None, *, is_corrected: b
     horizon_s : of the reference; None without a reference: that of the run itself.
     is_corrected : see `metrics_of`.
     """
-    largest = int(defects.sizes.argmax())
+    floor = defects.floor
     metrics = {
-        "defect_max": float(defects.sizes[largest]),
+        "defect_max": float(defects.sizes.max()),
         "defect_median": float(np.median(defects.sizes)),
-        "defect_time": float(defects.time[1 + largest]),
         "defect_mean": defects.mean,
-    }
+    } | interval_metrics(defects, worst_interval(defects, is_corrected=is_corrected), is_corrected=is_corrected)
     if is_corrected:
-        excess, judged, floor = defects.excess, defects.judged_sizes, defects.floor
-        if judged.any():  # the interval that is told is then the one that is furthest beyond what is allowed
-            largest = int(judged.argmax())
         if horizon_s is None:
             until = defects.horizon_samples(HORIZON_GROWTH)
             horizon_s = float(defects.time[max(until - 1, 0)])
         metrics |= {
-            "defect_time": float(defects.time[1 + largest]),
-            "defect_excess": float(excess[largest]),
-            "defect_judged": float(judged[largest]),
             "defect_floor": float(floor[np.isfinite(floor)].max(initial=0.0)),
-            "defects_not_judged": float((~defects.is_judged | ~(excess <= OK_ERROR)).sum()),
+            "defects_not_judged": float((~defects.is_judged).sum()),
             "defect_drift": defects.drift,
             "horizon_s": horizon_s,
             "angle_error_predicted": float(np.abs(defects.predicted[defects.time <= horizon_s]).max()),
         }
     return {name: value for name, value in metrics.items() if not np.isnan(value)}
+
+
+def worst_interval(defects: Defects, *, is_corrected: bool = True) -> int:
+    """Return the interval that is furthest beyond its bound, or has the largest defect if none exceeds rounding."""
+    judged = defects.judged_sizes if is_corrected else np.zeros(1)
+    return int(judged.argmax()) if judged.any() else int(defects.sizes.argmax())
+
+
+def interval_metrics(defects: Defects, interval: int, *, is_corrected: bool = True) -> Metrics:
+    """Return the numbers of one interval, of the worst one those that are stored: its end, and how far it is beyond."""
+    metrics = {"defect_time": float(defects.time[1 + interval])}
+    if is_corrected:
+        metrics["defect_excess"] = float(defects.excess[interval])
+        metrics["defect_judged"] = float(defects.judged_sizes[interval])
+    return metrics
 
 
 def _angle_errors(run: Trajectory, reference: Trajectory, until: int) -> Metrics:
@@ -179,7 +191,8 @@ def _angle_errors(run: Trajectory, reference: Trajectory, until: int) -> Metrics
 
 
 def largest(values: Array) -> Array:
-    """(k,) of (k, n): the largest size of each row; samples that are not finite do not count."""
+    """Return the largest size of each row of (k, n) values; samples that are not finite do not
+    count."""
     result: Array = np.abs(np.maximum(values.max(axis=1), -values.min(axis=1)))  # of zeros: not -0
     if not np.isfinite(result).all():
         magnitudes = np.abs(values)
@@ -188,8 +201,8 @@ def largest(values: Array) -> Array:
 
 
 def energy_drifts(scenes: Sequence[Scene], kinetic: Array, work: Array, errors: Array) -> Array:
-    """(k,) the largest energy error of each of k runs, of its scale (J where that is zero); from (k, n) J over the
-    samples, NaN samples not counted."""
+    """Return the largest energy error of each of k runs, relative to its scale (in J where that is
+    zero). From (k, n) J over the samples; NaN samples are not counted."""
     nothing = np.zeros((1, 1))
     still = Trajectory(nothing[0], nothing, nothing)
     at_rest = np.array([energy_scale(scene, still) for scene in scenes])

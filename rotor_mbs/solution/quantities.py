@@ -121,7 +121,8 @@ def sample_times(scene: Scene) -> Array:
 
 
 def scale_values(scene: Scene) -> dict[str, NDArray[np.float64] | NDArray[np.int64]]:
-    """The scales of a complete run: time in s, and the numbers of coordinates, blades and axes."""
+    """Return the scales of a complete run: time in s, and the numbers of coordinates, blades and
+    axes."""
     blades = len(scene.blades)
     return {
         "time": sample_times(scene),
@@ -132,7 +133,7 @@ def scale_values(scene: Scene) -> dict[str, NDArray[np.float64] | NDArray[np.int
 
 
 def row_shape(quantity: Quantity, scene: Scene) -> tuple[int, ...]:
-    """The shape of one sample of a quantity: () for a number, (1 + blades,) for angles."""
+    """Return the shape of one sample of a quantity: () for a number, (1 + blades,) for angles."""
     scales = scale_values(scene)
     return tuple(len(scales[dimension]) for dimension in quantity.dimensions[1:])
 
@@ -142,14 +143,15 @@ def row_shape(quantity: Quantity, scene: Scene) -> tuple[int, ...]:
 
 @np.errstate(over="ignore", invalid="ignore")  # of a runaway: the judgement sees what is not finite
 def energy_balance(kinetic: Array, potential: Array, work: Array) -> Array:
-    """(..., n) J: total energy less work, less its value at the start, of one run or of many."""
+    """Return total energy less work, less its value at the start, of one run or of many: (..., n)
+    J."""
     total = kinetic + potential - work
     error: Array = total - total[..., :1]  # of a run without a sample, too
     return error
 
 
 def energy_error(samples: Trajectory) -> Array | None:
-    """(n,) J: the energy balance of a run; None where energies were not asked for."""
+    """Return the energy balance of a run, (n,) J; None where energies were not asked for."""
     kinetic, potential, work = (samples.get(name) for name in ("kinetic_energy", "potential_energy", "work"))
     if kinetic is None or potential is None or work is None:
         return None
@@ -157,18 +159,20 @@ def energy_error(samples: Trajectory) -> Array | None:
 
 
 def longest_arm(scene: Scene) -> float:
-    """m: the largest distance of a blade's centre of mass from the hub's centre; 1 where all are there."""
+    """Return the largest distance (m) of a blade's centre of mass from the hub's centre; 1 where
+    all are there."""
     return max(math.hypot(*blade.centre_of_mass) for blade in scene.blades) or 1.0
 
 
 def _largest_root_force(_scene: Scene, run: Trajectory) -> float:
-    """N, over the blades and the samples; 1 where there is none."""
+    """Return the largest root force (N) over the blades and the samples; 1 where there is none."""
     forces = run.get("blade_root_force")
     return 1.0 if forces is None else float(np.linalg.norm(forces, axis=-1).max(initial=0.0)) or 1.0
 
 
 def _largest_root_force_at_arm(scene: Scene, run: Trajectory) -> float:
-    """N m, that force at the longest arm: a scale for moments, which may all be next to nothing."""
+    """Return the largest root force at the longest arm (N m): a scale for moments, which may all be
+    next to nothing."""
     return _largest_root_force(scene, run) * longest_arm(scene)
 
 
@@ -217,8 +221,9 @@ LOADS = (
 def named_loads(
     roots: Iterable[tuple[Array, Array]], shaft_force: Array, shaft_moment: Array, actuators: Array
 ) -> dict[str, Array]:
-    """The arrays of `LOADS` by name, from each blade's (n, 3) force (N) and moment (N m) at its root in its frame, the
-    shaft's in the base frame, and the (n, blades) moments of the actuators."""
+    """Return the arrays of `LOADS` by name, from each blade's (n, 3) force (N) and moment (N m) at
+    its root in its frame, the shaft's in the base frame, and the (n, blades) moments of the
+    actuators."""
     forces, moments = (np.stack(vectors, axis=1) for vectors in zip(*roots, strict=True))
     arrays = forces, moments, shaft_force, shaft_moment, actuators
     return {load.name: np.asarray(values, dtype=float) for load, values in zip(LOADS, arrays, strict=True)}
@@ -277,14 +282,14 @@ NAMES = frozenset(quantity.name for quantity in BUILT_IN)
 
 
 def known_quantities(outputs: Iterable[str] = ()) -> tuple[Quantity, ...]:
-    """The built-in quantities, and those that installed packages bring for `outputs`. Raises InputError where an output
-    is neither."""
+    """Return the built-in quantities, and those that installed packages bring for `outputs`. Raises
+    InputError where an output is neither."""
     return BUILT_IN + tuple(quantity for output in outputs if output not in _OUTPUTS for quantity in installed(output))
 
 
 def quantities(outputs: Iterable[str]) -> tuple[Quantity, ...]:
-    """Those that a scene's `outputs` ask for, and those that are stored whenever a model has them; raises
-    InputError."""
+    """Return the quantities that a scene's `outputs` ask for, and those that are stored whenever a
+    model has them. Raises InputError."""
     asked = {"", *outputs}
     return tuple(quantity for quantity in known_quantities(asked) if quantity.output in asked)
 
@@ -329,8 +334,9 @@ def installed(output: str) -> tuple[Quantity, ...]:
 
 
 def array_of(quantity: Quantity, scene: Scene, samples: Trajectory) -> Array | None:
-    """The run's array: the model's own, or what the quantity's producer makes of the samples; None where there is none.
-    Raises InputError where a producer gives an array of another shape."""
+    """Return a quantity of a run: the model's own array, or what the quantity's producer makes of
+    the samples; None where there is none. Raises InputError where a producer gives an array of
+    another shape."""
     values = samples.get(quantity.name)
     if values is not None or quantity.producer is None:
         return values
@@ -350,14 +356,16 @@ def arrays(scene: Scene, samples: Trajectory) -> dict[str, Array]:
 
 
 def sizes(quantity: Quantity, values: Array) -> Array:
-    """Magnitudes of an array of this quantity: with the last dimension `axis`, lengths of the vectors."""
+    """Return magnitudes of an array of this quantity: with the last dimension `axis`, lengths of
+    the vectors."""
     lengths: Array = np.linalg.norm(values, axis=-1) if quantity.dimensions[-1] == "axis" else np.abs(values)
     return lengths
 
 
 def deviation(quantity: Quantity, scene: Scene, run: Trajectory, reference: Trajectory | None) -> Array | None:
-    """(common samples,) size of a quantity, or of its difference from the reference, largest over the other axes; None
-    where it is not judged, or the run or the needed reference does not have it."""
+    """Return the size of a quantity, or of its difference from the reference, largest over the
+    other axes: (common samples,). None where it is not judged, or the run or the needed reference
+    does not have it."""
     rule = quantity.judgement
     if rule is None:
         return None

@@ -63,7 +63,8 @@ class Trajectory:
 
 
 def shape_fault(scene: Scene, run: Trajectory) -> str:
-    """The array that has not the shape of the scene and as many rows as there are times; "" where all have."""
+    """Return the name of the array that has not the shape of the scene, or not a row for each time;
+    "" where all have."""
     time = np.shape(run.time)
     if len(time) != 1:
         return f"time has the shape {time}; allowed: one dimension"
@@ -126,7 +127,8 @@ class RunBlock:
 
 
 def all_coordinates(scene: Scene, angles: Array, rates: Array) -> tuple[Array, Array]:
-    """(n, 1 + blades) rad and rad/s from those of `scene.moving_coordinates`; a pitch that is fixed keeps its angle."""
+    """Return (n, 1 + blades) rad and rad/s from those of `scene.moving_coordinates`; a pitch that
+    is fixed keeps its angle."""
     moving = scene.moving_coordinates
     all_angles = np.tile(np.array(scene.initial_angles, dtype=angles.dtype), (len(angles), 1))
     all_rates = np.zeros_like(all_angles)
@@ -140,14 +142,16 @@ def finite_rows(*tables: Array) -> int:
 
 
 def finite_samples(scene: Scene, arrays: Mapping[str, Array]) -> Trajectory:
-    """The samples of all `arrays` by name, (samples reached, ...), up to the first in which one is not finite."""
+    """Return the samples of all `arrays` by name, (samples reached, ...), up to the first in which
+    one is not finite."""
     n = finite_rows(*arrays.values())
     return Trajectory(sample_times(scene)[:n], **{name: values[:n] for name, values in arrays.items()})
 
 
 @dataclass(frozen=True)
 class Linearization:
-    """δq̈ + D δq̇ + K δq = 0 about a state of constant rates, the mass matrix divided out."""
+    """Equations δq̈ + D δq̇ + K δq = 0 about a state of constant rates, the mass matrix divided
+    out."""
 
     stiffness: Array  # (n, n) 1/s²: M⁻¹ times the derivative of the forces by the coordinates, sign turned
     damping: Array  # (n, n) 1/s: the same by the rates; it has gyroscopic terms, too
@@ -155,7 +159,8 @@ class Linearization:
 
 
 def scene_at(scene: Scene, angles: Sequence[float] | Array, speed: float, torque: float) -> Scene:
-    """`scene` at `angles` (1 + blades,) rad, its rotor turning at `speed` rad/s under `torque` N m."""
+    """Return `scene` at `angles` (1 + blades,) rad, its rotor turning at `speed` rad/s under
+    `torque` N m."""
     return replace(
         scene,
         initial_angles=tuple(float(angle) for angle in angles),
@@ -166,8 +171,9 @@ def scene_at(scene: Scene, angles: Sequence[float] | Array, speed: float, torque
 
 
 def limit_at_zero(quotients: Sequence[Array], ratio: float) -> Array:
-    """Difference quotients with the steps h, 2h, 4h, ... extrapolated to a step of 0 (Richardson); ratio: by which a
-    doubled step enlarges each further term of the error, 2 for one-sided quotients, 4 for central ones."""
+    """Extrapolate difference quotients with the steps h, 2h, 4h, ... to a step of 0 (Richardson).
+    ratio: by which a doubled step enlarges each further term of the error, 2 for one-sided
+    quotients, 4 for central ones."""
     values = list(quotients)
     for power in range(1, len(values)):
         values = [fine + (fine - coarse) / (ratio**power - 1.0) for fine, coarse in itertools.pairwise(values)]

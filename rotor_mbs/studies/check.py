@@ -15,7 +15,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rotor_mbs.analysis.checks import Check, Where, checks_of, make_check
+from rotor_mbs.analysis.checks import Check, Where, checks_of
+from rotor_mbs.analysis.run_checks import bounded
 from rotor_mbs.errors import InputError
 from rotor_mbs.methods.catalogue import (
     REFERENCE,
@@ -111,8 +112,8 @@ def judge_file(path: Path, bounds: Bounds) -> list[Check]:
         absent = f"{missing} runs missing; the sweep's own command computes them, or says why not{writer}"
         changed = f"{damaged} runs changed after they were written" if damaged else "every run as written"
         return [
-            make_check(bounds, "complete", where, missing, "runs", absent),
-            make_check(bounds, "integrity", where, damaged, "runs", changed),
+            bounded(bounds, "complete", where, missing, "runs", absent),
+            bounded(bounds, "integrity", where, damaged, "runs", changed),
         ]
     with ExitStack() as stack:
         results = stack.enter_context(open_results(path, verify=False))
@@ -127,7 +128,7 @@ def judge_file(path: Path, bounds: Bounds) -> list[Check]:
     missing = 0 if runs is None else int((runs.column("status") == MISSING).sum())
     if missing:
         absent = f"{missing} runs missing; the command that wrote the file computes them{writer}"
-        checks.append(make_check(bounds, "complete", Where("*", "*", "runs"), missing, "runs", absent))
+        checks.append(bounded(bounds, "complete", Where("*", "*", "runs"), missing, "runs", absent))
     return checks
 
 

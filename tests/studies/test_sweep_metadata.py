@@ -14,6 +14,7 @@ from typing import Any
 import h5py
 import numpy as np
 import pytest
+from support.commands import refusal
 
 from rotor_mbs.cli import main
 from rotor_mbs.errors import InputError, StoreError
@@ -89,6 +90,7 @@ def test_a_dataset_card_replaces_its_own_kind_only(dataset: Path, tmp_path: Path
     assert all(f"path: {file.name}" in text for file in files)
     with pytest.raises(StoreError, match=f"a split for .*; allowed: the sweep's own file, {dataset.name}"):
         StoredSweep(files[0])
+    assert "a split for Hugging Face datasets; allowed: the sweep's own file" in refusal("show", files[0])
     write_splits(dataset, tmp_path)
     card.write_text("of somebody else")
     with pytest.raises(InputError, match="is not an output of this command"):

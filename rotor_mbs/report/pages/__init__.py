@@ -8,7 +8,6 @@ from collections.abc import Collection, Iterable, Mapping, Sequence
 from functools import cached_property
 
 from rotor_mbs.analysis import published
-from rotor_mbs.analysis.judgement import OK_ERROR
 from rotor_mbs.analysis.published import ClaimStudy, Erratum, Published, claims
 from rotor_mbs.analysis.work_precision import by_scene
 from rotor_mbs.methods.catalogue import PRINTED, REFERENCE, errata_methods, find_method_or_none, is_corrected
@@ -18,7 +17,7 @@ from rotor_mbs.report.looks import label_of, with_capital
 from rotor_mbs.report.numbers import NOTHING, in_words, number, seconds, up_to, with_unit
 from rotor_mbs.runs.design import metric_columns
 from rotor_mbs.runs.read import OpenResults, Record, StoredRun, StoredScene, read_records
-from rotor_mbs.solution.status import GOOD
+from rotor_mbs.solution.status import GOOD, OK_ERROR
 from rotor_mbs.studies.stability import OUTCOMES, SUITE, SuiteRun, suite_runs
 
 

@@ -10,7 +10,6 @@ from dataclasses import replace
 import numpy as np
 from markupsafe import Markup
 
-from rotor_mbs.analysis.judgement import OK_ERROR
 from rotor_mbs.analysis.published import ENERGY_RISE, Published
 from rotor_mbs.methods.catalogue import REFERENCE, is_corrected
 from rotor_mbs.report.elements import (
@@ -62,7 +61,7 @@ from rotor_mbs.report.pages.viewer import viewer
 from rotor_mbs.runs.read import StoredRun, StoredScene
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.scenario.time_table import values_at
-from rotor_mbs.solution.status import GOOD
+from rotor_mbs.solution.status import GOOD, OK_ERROR
 
 HORIZON_NOTE = (
     "Horizon: the time until which an error of the initial state has grown by less than a factor "
