@@ -25,6 +25,8 @@ from rotor_mbs.solution.trajectory import Array
 _GRAVITIES = (9.8, 9.80665, 9.81, 9.82, 10.0, 0.0)
 # Zeros that people choose, by degrees.
 _QUARTERS = {90: math.pi / 2.0, 180: math.pi, 270: -math.pi / 2.0}
+# Directions of gravity in the base that have the same effect on the motion as those azimuths.
+_GRAVITY_AT_QUARTER = {90: "+x", 180: "+z", 270: "-x"}
 _SAME_START = 1e-3  # rad, rad/s: a scene that starts farther off cannot be the one
 _MAX_BLADES = 6  # that are tried one by one
 # Fields of a scene with an entry per blade, and their keys.
@@ -32,10 +34,12 @@ _BEARING_FIELDS = {
     "bearing_stiffness": "bearing.stiffness",
     "bearing_damping": "bearing.damping",
     "pitch_torque": "torque.pitch",
+    "bearing_rest": "bearing.rest",
 }
-# Fields of a scene that may be forgotten.
+# Fields of a scene that may be forgotten, or enter with another factor.
 _FORGOTTEN = {
     "rotor_torque": "the torque of the rotor",
+    "pitch_torque": "the pitch torques",
     "bearing_stiffness": "the springs",
     "bearing_damping": "the dampers of the bearings",
     "shaft_damping": "the damper of the shaft",
@@ -95,6 +99,8 @@ def rotor_hypotheses(scene: Scene) -> Iterator[Hypothesis[RotorModel]]:
         for text, factor in _FACTORS.items():
             scaled = _with_factor(factor, reduced) if factor else reduced
             yield Hypothesis(f"{text} the {terms}", RotorModel(scene, equations=scaled))
+    for text, other_equations in _OTHER_EQUATIONS.items():
+        yield Hypothesis(text, RotorModel(scene, equations=other_equations))
     text = "small-angle approximation: sin x = x, cos x = 1"
     yield Hypothesis(text, RotorModel(scene, equations=_small_angles))
     for names in _ERRATA:
@@ -142,6 +148,86 @@ def _with_factor(factor: float, reduced: Accelerations) -> Accelerations:
     return equations
 
 
+def _with_moments(moments: Callable[..., tuple[Any, Sequence[Any]]]) -> Accelerations:
+    """Return the closed form's equations with other generalized forces.
+
+    Parameters
+    ----------
+    moments : (angles, rates, form, loads) -> N m more on the rotor, and on each pitch that moves.
+    """
+
+    def equations(angles: Any, rates: Any, form: Any, loads: Any, *functions: Any) -> list[Any]:
+        rotor, on_pitches = moments(angles, rates, form, loads)
+        torques = loads.pitches or [0.0] * len(form.blades)
+        pitches = [torque + more for torque, more in zip(torques, on_pitches, strict=True)]
+        changed = replace(loads, rotor=loads.rotor + rotor, pitches=pitches)
+        return closed_form.accelerations(angles, rates, form, changed, *functions)
+
+    return equations
+
+
+def _reaction_of_torques(_angles: Any, _rates: Any, form: Any, loads: Any) -> Any:
+    """Return the pitch torques' reactions as if the pitch axes were along the shaft."""
+    return -sum(loads.pitches), [0.0] * len(form.blades)
+
+
+def _reaction_of_bearings(angles: Any, rates: Any, form: Any, loads: Any) -> Any:
+    """Return the reactions of the pitch torques, springs and dampers, likewise."""
+    total: Any = 0.0
+    for blade, theta, rate, torque, rest in closed_form.pitches(form, angles, rates, loads):
+        total = total + torque + blade.stiffness * (rest - theta) - blade.damping * rate
+    return -total, [0.0] * len(form.blades)
+
+
+def _gravity_on_pitches(angles: Any, _rates: Any, form: Any, _loads: Any) -> Any:
+    """Return what balances the moments of gravity about the pitch axes."""
+    moments = []
+    for blade, theta in zip(form.blades, angles[1:], strict=True):
+        sin_phi = np.sin(angles[0]) * blade.cos_phase + np.cos(angles[0]) * blade.sin_phase
+        arm = blade.weight_x * np.sin(theta) + blade.weight_y * np.cos(theta)
+        moments.append(arm * sin_phi)
+    return 0.0, moments
+
+
+def _weight_off_axis(angles: Any, rates: Any, form: Any, loads: Any) -> Any:
+    """Return what balances the moments of weights by their distances from the pitch axes."""
+    rotor: Any = 0.0
+    for blade, theta in zip(form.blades, angles[1:], strict=True):
+        cos_phi = np.cos(angles[0]) * blade.cos_phase - np.sin(angles[0]) * blade.sin_phase
+        arm = blade.weight_x * np.cos(theta) - blade.weight_y * np.sin(theta)
+        rotor = rotor - arm * cos_phi
+    return rotor, _gravity_on_pitches(angles, rates, form, loads)[1]
+
+
+def _gyroscopic_moments(angles: Any, rates: Any, form: Any, _loads: Any) -> Any:
+    """Return what balances the moments ω x J ω of the blades, on the shaft and the pitch axes."""
+    rotor: Any = 0.0
+    on_pitches = []
+    for blade, theta, rate in zip(form.blades, angles[1:], rates[1:], strict=True):
+        s, c = np.sin(theta), np.cos(theta)
+        x, y, z = rates[0] * s, rates[0] * c, rate
+        xy, xz, yz = 0.5 * blade.inertia_sc, blade.coupling_s, blade.coupling_c
+        momentum_x = blade.inertia_ss * x + xy * y + xz * z
+        momentum_y = xy * x + blade.inertia_cc * y + yz * z
+        momentum_z = xz * x + yz * y + blade.pitch_inertia * z
+        on_x, on_y = y * momentum_z - z * momentum_y, z * momentum_x - x * momentum_z
+        rotor = rotor + s * on_x + c * on_y
+        on_pitches.append(x * momentum_y - y * momentum_x)
+    return rotor, on_pitches
+
+
+# Equations with one mistake, of methods by Lagrange's equations or by Newton's and Euler's.
+_OTHER_EQUATIONS = {
+    "pitch torques with reactions on the rotor": _with_moments(_reaction_of_torques),
+    "moments of the pitch bearings with reactions on the rotor": _with_moments(
+        _reaction_of_bearings
+    ),
+    "without gravity in the equations of the pitches": _with_moments(_gravity_on_pitches),
+    "weight of the blades on the pitch axes": _with_moments(_weight_off_axis),
+    "without the gyroscopic moments ω x J ω of the blades": _with_moments(_gyroscopic_moments),
+}
+
+
 def _printed(
     scene: Scene, errata: Errata, angles: Any, rates: Any, _form: Any, loads: Any, *_: Any
 ) -> list[Any]:
@@ -172,17 +258,25 @@ def _printed(
 
 def _other_scenes(scene: Scene) -> Iterator[tuple[str, Scene]]:
     """Yield scenes in words, some of which may be the scene itself."""
-    for gravity in (*_GRAVITIES, -scene.gravity):
+    for gravity in _GRAVITIES:
         yield f"gravity of {gravity:g} m/s^2", replace(scene, gravity=gravity)
     yield from _other_blades(scene)
     yield from _exchanged_bearings(scene)
-    for field, text in _FORGOTTEN.items():
-        yield f"without {text}", _scaled_at(scene, [(field,)], -1.0)
+    for (field, text), (amount, factor) in itertools.product(_FORGOTTEN.items(), _FACTORS.items()):
+        # A negative stiffness, damping or inertia is not a scene's, and no motion lasts with it.
+        if factor >= 0.0 or field in ("rotor_torque", "pitch_torque"):
+            yield f"{amount} {text}", _scaled_at(scene, [(field,)], factor - 1.0)
     if any(scene.bearing_stiffness):
         unloaded = replace(scene, bearing_rest=())
         yield "rest angles of the springs ignored: taken as 0", unloaded
+        for text, factor in (
+            ("rad taken as degrees", math.pi / 180.0),
+            ("degrees taken as rad", 180.0 / math.pi),
+        ):
+            changed = _scaled_at(scene, [("bearing_rest",)], factor - 1.0)
+            yield f"rest angles of the springs in {text}", changed
     count = len(scene.blades)
-    if count > 1:
+    if count > 2:  # of two blades that is twice the hub's inertia
         hubs = replace(scene, hub_inertia=count * scene.hub_inertia)
         yield "the hub's inertia once for each blade", hubs
     if not scene.has_constant_loads:
@@ -221,6 +315,7 @@ def _single_blades(scene: Scene) -> range:
 def _other_blades(scene: Scene) -> Iterator[tuple[str, Scene]]:
     """Yield variants of a scene with other masses, centres of mass or inertias, in words."""
     changes: Mapping[str, Callable[[Blade], Blade]] = {
+        "products of inertia about the centre of mass ignored": _without_products,
         "blade mass on the pitch axis": _with_mass_on_axis,
         "blades without inertia, as point masses": _without_inertia,
         "products of inertia with opposite sign": _with_opposite_products,
@@ -255,14 +350,26 @@ def _exchanged(values: tuple[Any, ...], i: int, j: int) -> tuple[Any, ...]:
 
 
 def _exchanged_bearings(scene: Scene) -> Iterator[tuple[str, Scene]]:
-    """Yield scenes in which two blades have each other's springs, dampers or torques."""
+    """Yield scenes in which blades have springs, dampers, torques or rest angles of others."""
+    count, change = len(scene.blades), dict[str, Any]()
+    first = dict[str, Any]()
     for field, key in _BEARING_FIELDS.items():
         values = getattr(scene, field)
         if len(values) != len(scene.blades):
             continue
+        first[field] = (values[0],) * count
+        yield f"{key} of blade 1 at all blades", replace(scene, **{field: first[field]})
+        # Of two blades that is an exchange.
+        for step, which in ((1, "next"), (-1, "previous")) if count > 2 else ():
+            change = {field: (*values[step:], *values[:step])}
+            yield f"{key} of the {which} blade at each blade", replace(scene, **change)
         for i, j in itertools.combinations(_single_blades(scene), 2):
-            change: dict[str, Any] = {field: _exchanged(values, i, j)}
+            change = {field: _exchanged(values, i, j)}
             yield f"{key} of blades {i + 1} and {j + 1} exchanged", replace(scene, **change)
+    first.pop("pitch_torque", None)
+    first.pop("bearing_rest", None)
+    if len(first) == 2:
+        yield "stiffness and damping of bearing 1 at all blades", replace(scene, **first)
 
 
 def _with_mass_on_axis(blade: Blade) -> Blade:
@@ -272,6 +379,10 @@ def _with_mass_on_axis(blade: Blade) -> Blade:
 
 def _without_inertia(blade: Blade) -> Blade:
     return replace(blade, inertia=_inertia([0.0] * 6))
+
+
+def _without_products(blade: Blade) -> Blade:
+    return replace(blade, inertia=_inertia([*blade.inertia[:3], 0.0, 0.0, 0.0]))
 
 
 def _with_opposite_products(blade: Blade) -> Blade:
@@ -313,6 +424,8 @@ def _other_azimuths(scene: Scene) -> Iterator[tuple[str, tuple[float, ...]]]:
         yield "all blades at the azimuth of blade 1", (0.0,) * count
         in_degrees = tuple(math.degrees(phase) for phase in right)
         yield "azimuths of the blades in degrees taken as rad", in_degrees
+        in_radians = tuple(math.radians(phase) for phase in right)
+        yield "azimuths of the blades in rad taken as degrees", in_radians
         if count != 3:
             of_three = tuple(math.radians(120.0 * i) for i in range(count))
             yield "blades at multiples of 120 degrees", of_three
@@ -326,6 +439,8 @@ def _other_azimuths(scene: Scene) -> Iterator[tuple[str, tuple[float, ...]]]:
     zeros = {360.0 * i / count: phase for i, phase in enumerate(right) if i}
     for degrees, angle in (zeros | _QUARTERS).items():
         place = f"blade 1 at an azimuth of {degrees:g} degrees where it is 0"
+        if degrees in _GRAVITY_AT_QUARTER:
+            place += f", or gravity along {_GRAVITY_AT_QUARTER[int(degrees)]} of the base"
         turned = tuple(phase + angle for phase in right)
         yield f"rotor angle from another zero: {place}", turned
 

@@ -16,6 +16,7 @@ from support.commands import rotor_mbs
 from support.other_code import Mistakes
 
 from rotor_mbs.analysis.checks import Check
+from rotor_mbs.analysis.kinematics import tip_paths
 from rotor_mbs.comparison.data_defects import judged_defects
 from rotor_mbs.comparison.defect_search import DefectSearch
 from rotor_mbs.methods import catalogue
@@ -25,7 +26,15 @@ from rotor_mbs.models.lagrange.defects import interval_defects
 from rotor_mbs.scenario.catalogue import only_scene
 from rotor_mbs.scenario.scene import Blade, Scene
 from rotor_mbs.solution.trajectory import Integration, Solution, Trajectory, sample_times
-from rotor_mbs.studies.method_test import NOT_FOUND, examine, five_blades, protocol_fault, root_mean_square
+from rotor_mbs.studies.method_test import (
+    NOT_FOUND,
+    examine,
+    five_blades,
+    protocol_fault,
+    root_mean_square,
+    wrong_rows,
+    wrong_tip,
+)
 
 DOCUMENT = (Path(__file__).parents[2] / "docs" / "your-engine.md").read_text()
 (EXAMPLE,) = re.findall(r"```python\n(.*?)METHOD", DOCUMENT, re.DOTALL)
@@ -219,6 +228,80 @@ def test_what_is_wrong_with_the_form_of_a_run_is_said(change: dict[str, object],
     assert protocol_fault(Solution(scene, "a/b", run, Integration(success))) == fault
 
 
+def test_a_load_jumps_between_two_rows() -> None:
+    """An engine that ends its steps at rows alone has to fail."""
+    away = [np.abs(sample_times(FIVE) - kink).min() for kink in FIVE.kink_times]
+    assert max(away) > 1e-3
+
+
+# ---- Rows and outputs that are made wrongly of a right motion
+
+
+def right_run() -> Trajectory:
+    return Trajectory(sample_times(FIVE), *other_code.trajectory(FIVE, sample_times(FIVE)))
+
+
+def differenced(run: Trajectory) -> Trajectory:
+    rates = run.rates.copy()
+    rates[1:] = np.diff(run.angles, axis=0) / np.diff(run.time)[:, None]
+    return run.replace(rates=rates)
+
+
+def interpolated(run: Trajectory) -> Trajectory:
+    some, rows = run.time[::5], np.hstack([run.angles, run.rates])
+    columns = [np.interp(run.time, some, column) for column in rows[::5].T]
+    angles, rates = np.split(np.stack(columns, axis=1), 2, axis=1)
+    return run.replace(angles=angles, rates=rates)
+
+
+def reversed_blades(run: Trajectory) -> Trajectory:
+    order = [0, 5, 4, 3, 2, 1]
+    return run.replace(angles=run.angles[:, order], rates=run.rates[:, order])
+
+
+ROWS = {
+    "rates are in degrees per second": lambda run: run.replace(rates=np.degrees(run.rates)),
+    "rates have the opposite sign": lambda run: run.replace(rates=-run.rates),
+    "rates are backward differences": differenced,
+    "linear interpolation": interpolated,
+    "pitches are in the reverse order of the blades": reversed_blades,
+    "": lambda run: run.replace(rates=1.01 * run.rates),
+}
+
+
+def test_rows_that_are_made_wrongly_are_named() -> None:
+    run = right_run()
+    for expected, change in ROWS.items():
+        wrong = change(run)
+        defects = interval_defects(FIVE, wrong.time, wrong.angles, wrong.rates)
+        text = wrong_rows(FIVE, wrong, defects)
+        assert expected in text
+        assert bool(expected) == bool(text)
+
+
+def test_a_uniform_rotation_before_a_load_is_no_interpolation() -> None:
+    scene = only_scene("paper/fig03").replace(duration=1.0, samples=51)
+    time = sample_times(scene)
+    angles = np.zeros((51, 2))
+    angles[:, 0] = time + np.where(time > 0.6, (time - 0.6) ** 2, 0.0)
+    rates = np.gradient(angles, time, axis=0)
+    defects = interval_defects(scene, time, angles, rates)
+    assert "interpolation" not in wrong_rows(scene, Trajectory(time, angles, rates), defects)
+
+
+def test_tips_that_are_made_wrongly_are_named() -> None:
+    run = right_run()
+    own = tip_paths(FIVE, run.angles)
+    without_pitch = tip_paths(FIVE, run.angles * [1, 0, 0, 0, 0, 0])
+    for tip, expected in (
+        (without_pitch, "tips without the rotation by the pitch"),
+        (own[:, ::-1], "tips of the blades in reverse order"),
+        (np.roll(own, 1, axis=1), "the tip of the previous blade for each blade"),
+        (own + np.array([0.0, 0.1, 0.0]), ""),
+    ):
+        assert wrong_tip(FIVE, run.replace(tip=tip)) == expected
+
+
 # ---- Causes, on the states of a run by other equations
 
 
@@ -243,6 +326,37 @@ OTHERS: dict[str, tuple[Any, Mistakes, str]] = {
     "Steiner twice": ({"blades": changed_blades(FIVE, 2.0)}, other_code.NONE, "inertia about the root used"),
     "half": ({}, Mistakes(coriolis=0.5), "half of the Coriolis terms"),
     "azimuths": ({}, Mistakes(phases=tuple(np.arange(5) * 2.0 * np.pi / 3.0)), "blades at multiples of 120 degrees"),
+    "dampers twice": (
+        {"bearing_damping": tuple(2.0 * d for d in FIVE.bearing_damping)},
+        other_code.NONE,
+        "twice the dampers of the bearings",
+    ),
+    "rest in degrees": (
+        {"bearing_rest": tuple(tuple((t, np.radians(r)) for t, r in table) for table in FIVE.bearing_rest)},
+        other_code.NONE,
+        "rest angles of the springs in rad taken as degrees",
+    ),
+    "torques of other blades": (
+        {"pitch_torque": (*FIVE.pitch_torque[-1:], *FIVE.pitch_torque[:-1])},
+        other_code.NONE,
+        "torque.pitch of the previous blade at each blade",
+    ),
+    "one bearing": (
+        {"bearing_stiffness": (30.0,) * 5, "bearing_damping": (2.0,) * 5},
+        other_code.NONE,
+        "stiffness and damping of bearing 1 at all blades",
+    ),
+    "no products": (
+        {"blades": tuple(replace(b, inertia=(*b.inertia[:3], 0.0, 0.0, 0.0)) for b in FIVE.blades)},
+        other_code.NONE,
+        "products of inertia about the centre of mass ignored",
+    ),
+    "azimuths in degrees": (
+        {},
+        Mistakes(phases=tuple(np.radians(np.arange(5) * 0.4 * np.pi))),
+        "in rad taken as degrees",
+    ),
+    "gravity upwards": ({"gravity": -9.81}, other_code.NONE, "or gravity along +z of the base"),
     "damper": (
         {"bearing_damping": tuple(1.5 * d for d in FIVE.bearing_damping)},
         other_code.NONE,
