@@ -63,14 +63,20 @@ class ModeSet:
     def damping_ratios(self) -> Array:
         """(..., n) damping ratio, above 1 if overdamped; NaN where the undamped frequency is 0 or none."""
         frequencies = self.undamped_frequencies
-        rate = -0.5 * (self.eigenvalues[..., 0] + self.eigenvalues[..., 1]).real
+        rate = -0.5 * self._real_parts.sum(axis=-1)
         ratios = np.divide(rate, frequencies, out=np.full_like(rate, np.nan), where=frequencies > 0.0)
         return np.asarray(ratios + 0.0)  # no -0
 
     @property
     def growth_rates(self) -> Array:
         """(..., n) 1/s: the larger real part of each mode; above 0 it is unstable."""
-        return np.asarray(self.eigenvalues.real.max(axis=-1) + 0.0)
+        return np.asarray(self._real_parts.max(axis=-1) + 0.0)
+
+    @property
+    def _real_parts(self) -> Array:
+        """(..., n, 2) 1/s: 0 where they are below the precision of the eigenvalue, as -1e-100 beside 1 rad/s."""
+        is_rounding = np.abs(self.eigenvalues.real) <= np.finfo(float).eps * np.abs(self.eigenvalues)
+        return np.where(is_rounding, 0.0, self.eigenvalues.real)
 
 
 def multiblade(blades: int) -> tuple[tuple[str, ...], Array]:

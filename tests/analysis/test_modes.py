@@ -21,6 +21,14 @@ def test_damping_ratios_of_one_oscillator():
     assert over.damped_frequencies == [0.0]
 
 
+def test_a_damping_below_the_precision_of_the_eigenvalue_is_zero():
+    values = np.array([[2e-102 + 1j, 2e-102 - 1j], [-1e-12 + 1j, -1e-12 - 1j], [1e-30, -1e-30]], dtype=complex)
+    found = modes.ModeSet(values, np.eye(3, dtype=complex))
+    assert found.damping_ratios[:2].tolist() == [0.0, 1e-12]
+    # What is slow as a whole is no rounding.
+    assert found.growth_rates.tolist() == [0.0, -1e-12, 1e-30]
+
+
 def test_a_mode_that_grows_without_oscillating_has_no_undamped_frequency():
     found = modes.modes_of(np.array([[-9.0]]), np.array([[0.0]]), is_cyclic=False)
     assert np.isnan(found.undamped_frequencies[0])

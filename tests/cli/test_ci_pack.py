@@ -176,6 +176,22 @@ def reported(junit: Path) -> list[str]:
 
 
 @pytest.mark.full
+def test_action_and_job_may_allow_a_scene_that_was_changed(project: Path) -> None:
+    for duration, name in ((0.2, "main/results.h5"), (0.1, "results.h5")):
+        scene = rm.load(project / "my.toml").replace(duration=duration, samples=3)
+        (project / name).parent.mkdir(exist_ok=True)
+        rm.run(scene, ["lagrange/dop853"]).save(project / name)
+    given = {"file": "results.h5", "against": EARLIER, "package": ""}
+    job = {**JOB["variables"], "FILE": "results.h5", "AGAINST": EARLIER, "PACKAGE": ""}
+    for allowed in ("false", "true"):
+        done = _run_action(project, **given, allow_changed=allowed)[-1]
+        done_job = _bash("\n".join(JOB["script"]), project, **job | {"ALLOW_CHANGED": allowed})
+        for told in (done.stdout, done_job.stdout):
+            assert "duration 0.2 -> 0.1" in told
+        assert (done.returncode, done_job.returncode) == ((1, 1) if allowed == "false" else (0, 0)), done
+
+
+@pytest.mark.full
 def test_the_workflow_for_github_compares_with_the_file_of_the_main_branch(project: Path) -> None:
     steps = GITHUB["jobs"]["accuracy"]["steps"]
     caches = [step for step in steps if "actions/cache" in step.get("uses", "")]
