@@ -35,6 +35,7 @@ _NEARLY = 0.05
 _LEFT_OF_LOADS = 0.15  # of the defects: a load changes within an interval, and the rotor turns on
 _OF_COORDINATE = 0.1  # of a coordinate's defects are a load's on it, the rest of those on others
 _OF_USUAL = 10.0  # times a coordinate's own median: less says nothing of it
+_MIN_CLOCK = 3  # intervals that are late or early alike
 _MAX_DIRECTIONS = 20  # intervals of a fault at which loads are looked for
 _SMALL_TURN = 1e-6  # rad, by the load whose effect is computed: far above round-off, and yet linear
 
@@ -93,7 +94,7 @@ def _fault(judged: JudgedDefects, group: NDArray[np.int64]) -> str:
     """
     time = judged.defects.time
     start, end = float(time[group[0]]), float(time[group[-1] + 1])
-    text = _wrong_row(judged, group)
+    text = _wrong_row(judged, group) or _wrong_clock(judged, group)
     if text:
         return text
     # The coordinates on which loads make such defects.
@@ -156,6 +157,33 @@ def _wrong_row(judged: JudgedDefects, group: NDArray[np.int64]) -> str:
                 return f"a stuck row, or one at a wrong time: {row}"
             return f"a single wrong row: {row}"
     return ""
+
+
+def _wrong_clock(judged: JudgedDefects, group: NDArray[np.int64]) -> str:
+    """Describe intervals at whose ends the motion itself is late or early; "" where it is neither.
+
+    Parameters
+    ----------
+    judged : the defects.
+    group : (k,) intervals that stand out.
+    """
+    if len(group) < _MIN_CLOCK:
+        return ""
+    lags = []
+    for row in group:
+        rate = _state_rate(judged, int(row))
+        cosine = _cosine(judged.values[row], rate)
+        if abs(cosine) < _PARALLEL:
+            return ""
+        lags.append(float(judged.values[row] @ rate) / float(rate @ rate))
+    if min(lags) < 0.0 < max(lags):
+        return ""
+    clock = "late" if lags[0] > 0.0 else "early"
+    time = judged.defects.time
+    period = f"from t = {time[group[0]]:.6g} to {time[group[-1] + 1]:.6g} s"
+    lag = f"{abs(float(np.median(lags))):.2g} s"
+    intervals = f"each of {len(group)} intervals {period}"
+    return f"the motion is {clock} by {lag} more in {intervals}: steps, or times"
 
 
 def _change_of_state(judged: JudgedDefects, row: int) -> str:

@@ -228,7 +228,7 @@ def _loads_in_rows(
         change = np.abs(columns_of(loads_at(moved)) - expected)
         rounding += change * (defects.rounding[:, i] / step)[:, None]
 
-    judged = np.isfinite(expected).all(axis=1) & ~_is_at_jump(scene, time)
+    judged = np.isfinite(expected).all(axis=1) & ~is_at_jump(scene, time)
     judged_loads = JudgedLoads(
         scene=scene,
         channels=loads.channels,
@@ -244,7 +244,7 @@ def _loads_in_rows(
     return expected, judged_loads
 
 
-def _is_at_jump(scene: Scene, time: Array) -> NDArray[np.bool_]:
+def is_at_jump(scene: Scene, time: Array) -> NDArray[np.bool_]:
     """Whether each of (n,) times is one at which a prescribed load jumps."""
     at_jump = np.zeros(len(time), bool)
     for table in scene.load_tables:

@@ -90,10 +90,10 @@ class Parameter:
 
 def rotor_hypotheses(scene: Scene) -> Iterator[Hypothesis[RotorModel]]:
     """Yield other scenes and equations that people mistake a scene's for."""
-    for text, other in _other_scenes(scene):
+    for text, other in other_scenes(scene):
         if other != scene:
             yield Hypothesis(text, RotorModel(other))
-    for text, azimuths in _other_azimuths(scene):
+    for text, azimuths in other_azimuths(scene):
         yield Hypothesis(text, RotorModel(scene, azimuths))
     for terms, reduced in REDUCED_EQUATIONS.items():
         for text, factor in _FACTORS.items():
@@ -256,7 +256,7 @@ def _printed(
 # Other scenes
 
 
-def _other_scenes(scene: Scene) -> Iterator[tuple[str, Scene]]:
+def other_scenes(scene: Scene) -> Iterator[tuple[str, Scene]]:
     """Yield scenes in words, some of which may be the scene itself."""
     for gravity in _GRAVITIES:
         yield f"gravity of {gravity:g} m/s^2", replace(scene, gravity=gravity)
@@ -417,7 +417,7 @@ def _inertia(values: Sequence[float]) -> tuple[float, float, float, float, float
     return xx, yy, zz, xy, xz, yz
 
 
-def _other_azimuths(scene: Scene) -> Iterator[tuple[str, tuple[float, ...]]]:
+def other_azimuths(scene: Scene) -> Iterator[tuple[str, tuple[float, ...]]]:
     """Yield azimuths, rad, at which the blades of a scene should not be, in words."""
     right, count = tuple(scene.phases), len(scene.blades)
     if count > 1:

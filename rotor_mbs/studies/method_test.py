@@ -13,12 +13,13 @@ from dataclasses import replace
 import numpy as np
 
 from rotor_mbs.analysis.judgement import bounds_of, defects_of
-from rotor_mbs.analysis.kinematics import exact_rotor_angle, tip_paths
+from rotor_mbs.analysis.kinematics import exact_rotor_angle
 from rotor_mbs.analysis.run_checks import Check, RunSamples, Where, defect_bound, run_checks
 from rotor_mbs.analysis.work_precision import fitted_order
 from rotor_mbs.comparison.data_defects import judged_defects
 from rotor_mbs.comparison.defect_search import DefectSearch
 from rotor_mbs.comparison.faults import faults_in_time
+from rotor_mbs.comparison.wrong_outputs import root_mean_square, wrong_energy, wrong_loads, wrong_rows, wrong_tip
 from rotor_mbs.errors import MethodRefusal, ResourceError, RotorError
 from rotor_mbs.methods.base import STEP, Method
 from rotor_mbs.methods.catalogue import error_line, find_method, with_method_files
@@ -94,9 +95,7 @@ _COARSEST = 0.02  # s, of the steps whose order is looked for
 _LONG = 1000.0  # times the duration, of a run that is to be stopped
 _STOP_S, _LOAD_S = 0.5, 20.0
 _FIRST_S = 300.0  # of a first run, in which an engine may compile its code
-_LEFT = 1e-3  # of the defects, by a cause that is named
 _ACCURATE = 1e-6  # rad per interval: no such defect makes an energy balance fail
-_STRAIGHT = 0.3  # of the rows: more than this lie on straight lines where rows are interpolated
 NOT_FOUND = "cause not found"
 
 
@@ -203,11 +202,10 @@ class _Examination:
             checks = list(run_checks(samples, self._bounds))
         # Of several checks of a name the one furthest beyond its bound.
         worst = {check.name: check for check in sorted(checks, key=lambda check: -check.margin)}
-        reason = ""
-        if "defect" in worst and defects is not None:
-            size = worst["defect"].value
-            if not size <= allowance * self._bound:
-                reason = self._cause(scene, run, defects)
+        reason = rows = ""
+        if "defect" in worst and defects is not None and not worst["defect"].value <= allowance * self._bound:
+            rows = wrong_rows(scene, run, defects)
+            reason = rows or self._cause(scene, run, defects)
         for name, check in worst.items():
             if name == "error":  # what the defects add up to: of a motion that grows, they alone are the method's
                 continue
@@ -215,6 +213,8 @@ class _Examination:
             hint = check.hint
             if reason and name in ("defect", "defect median"):
                 hint = reason
+            elif rows:
+                hint = "the rows are wrong: see the defect"
             elif reason and name in ("energy", "loads"):
                 hint = "the motion is wrong: see the defect"
             elif name == "energy" and "defect" in worst and worst["defect"].value <= _ACCURATE * allowance:
@@ -222,25 +222,21 @@ class _Examination:
                 hint = "the motion is right: a stored energy is wrong"
                 if "energies" in worst and worst["energies"].passed:
                     hint = "the motion and the energies are right: the work of loads, commands or dampers is wrong"
-            elif name in ("energies", "loads"):
-                hint = f"{check.where.channel}: {hint}"
-            elif name == "tip":
-                hint = wrong_tip(scene, run) or hint
+            elif name in ("energies", "loads", "tip") and not check.value <= bound:
+                hint = _wrong_output(scene, run, check)
             self._add(name, scene.name, check.value, bound, hint, check.unit)
 
     def _cause(self, scene: Scene, run: Trajectory, defects: Defects) -> str:
         """Return why the defects of a run are too large.
 
-        It is asked for its step, for rates of other rows, and for other equations or numbers; what
-        none of these explains may be faults at a time, or a scheme of lower order.
+        It is asked for its step, and for other equations or numbers; what none of these explains
+        may be faults at a time, or a scheme of lower order.
         """
         left, order = self._with_half_step(scene, run, defects)
         claimed = self._method.order or 1.0
         if order >= claimed - _ORDER_BAND:
             step = self._method.defaults["step"]
             return f"step of {step:g} s too large: half the step gives {left:.1e} rad, order {order:.1f}"
-        if mistake := wrong_rows(scene, run, defects):
-            return mistake
         try:
             judged = judged_defects(scene, defects, self._bound)
             alike = DefectSearch(judged).textbook_causes()
@@ -339,111 +335,19 @@ class _Examination:
         self._add("time limit", scene.name, float(solution.status == "worker_died"), 0.0, hint)
 
 
-def root_mean_square(defects: Defects) -> float:
-    """Return the root mean square of the defects over the intervals, rad, above zero."""
-    return max(float(np.sqrt(np.mean(np.square(defects.sizes)))), float(np.finfo(float).tiny))
-
-
-def wrong_rows(scene: Scene, run: Trajectory, defects: Defects) -> str:
-    """Return how the rows of a run are made wrongly of a right motion; "" if no way explains its defects.
-
-    Parameters
-    ----------
-    scene : the rotor.
-    run : its samples.
-    defects : those of the run.
-    """
-    if text := _interpolated_rows(run, defects):
-        return text
-    time, angles, rates = run.time, run.angles, run.rates
-    if text := _differenced_rates(run):
-        return text
-    before, after = slice(None, -1), slice(1, None)
-    opposite = np.array([1.0, *[-1.0] * len(scene.blades)])
-    degree = np.pi / 180.0
-    trials = {
-        "rates are a row late": (time[before], angles[before], rates[after]),
-        "rates are a row early": (time[after], angles[after], rates[before]),
-        "rates are in degrees per second": (time, angles, degree * rates),
-        "rates are in revolutions per minute": (time, angles, np.pi / 30.0 * rates),
-        "rates are in revolutions per second": (time, angles, 2.0 * np.pi * rates),
-        "rates have the opposite sign": (time, angles, -rates),
-        "angles are in degrees": (time, degree * angles, rates),
-        "angles and rates are in degrees": (time, degree * angles, degree * rates),
-        "pitches have the opposite sign": (time, opposite * angles, opposite * rates),
-    }
-    if len(scene.blades) > 1:
-        order = [0, *range(len(scene.blades), 0, -1)]
-        trials["pitches are in the reverse order of the blades"] = (time, angles[:, order], rates[:, order])
-    for text, arrays in trials.items():
-        other = defects_of(scene, Trajectory(*arrays))
-        if other is not None and root_mean_square(other) <= _LEFT * root_mean_square(defects):
+def _wrong_output(scene: Scene, run: Trajectory, check: Check) -> str:
+    """Return what tips, energies or loads are in place of those at the run's own states."""
+    channel = check.where.channel
+    if check.name == "tip":
+        return wrong_tip(scene, run) or f"not where the angles put it; {NOT_FOUND}"
+    if check.name == "energies":
+        text = wrong_energy(scene, run, channel)
+    else:
+        # They have their names in the text.
+        if text := wrong_loads(scene, run):
             return text
-    return ""
-
-
-def _interpolated_rows(run: Trajectory, defects: Defects) -> str:
-    """Return whether many rows lie on straight lines between their neighbours; "" if not."""
-    angles = run.angles
-    if len(angles) < 3:
-        return ""
-    size = np.maximum(np.abs(angles).max(axis=0), 1.0)
-    bend = np.abs(angles[2:] - 2.0 * angles[1:-1] + angles[:-2])
-    is_straight = (bend <= 1e-12 * size).all(axis=1) & np.ptp(angles, axis=0).any()
-    share = float(is_straight.mean())
-    # A uniform rotation lies on one too: then without defects, and not between rows that bend, again and again.
-    changes = np.count_nonzero(np.diff(is_straight.astype(int)))
-    if share <= _STRAIGHT or changes < 4:
-        return ""
-    if np.median(defects.sizes[1:][is_straight]) <= _LEFT * defects.sizes.max():
-        return ""
-    return f"{100.0 * share:.0f} % of the rows lie on straight lines between others: linear interpolation"
-
-
-def _differenced_rates(run: Trajectory) -> str:
-    """Return whether rates are difference quotients of the angles of rows; "" if not."""
-    if len(run.time) < 4:
-        return ""
-    slopes = np.diff(run.angles, axis=0) / np.diff(run.time)[:, None]
-    quotients = {
-        "backward": (run.rates[1:], slopes),
-        "forward": (run.rates[:-1], slopes),
-        "central": (run.rates[1:-1], 0.5 * (slopes[1:] + slopes[:-1])),
-    }
-    size = max(float(np.abs(run.rates).max()), float(np.finfo(float).tiny))
-    is_uniform = np.ptp(run.rates, axis=0).max() <= 1e-9 * size
-    for text, (rates, quotient) in quotients.items():
-        if not is_uniform and np.abs(rates - quotient).max() <= 1e-9 * size:
-            return f"rates are {text} differences of the angles of rows"
-    return ""
-
-
-def wrong_tip(scene: Scene, run: Trajectory) -> str:
-    """Return what the tips of a run are in place of its own; "" if unknown."""
-    tip, angles = run.tip, run.angles
-    pitches = np.array([0.0, *[1.0] * len(scene.blades)])
-    own = tip_paths(scene, angles)
-    at_centre = replace(scene, blades=tuple(replace(blade, tip=blade.centre_of_mass) for blade in scene.blades))
-    x, y, z = np.moveaxis(own, 2, 0)
-    trials = {
-        "tips without the rotation by the pitch": tip_paths(scene, angles * (1.0 - pitches)),
-        "tips without the rotation of the rotor": tip_paths(scene, angles * pitches),
-        "tips with the pitch in the opposite sense": tip_paths(scene, angles * (1.0 - 2.0 * pitches)),
-        "tips with the rotor turned in the opposite sense": tip_paths(scene, angles * (2.0 * pitches - 1.0)),
-        "tips of the blades in reverse order": own[:, ::-1],
-        "the tip of blade 1 for all blades": np.repeat(own[:, :1], own.shape[1], axis=1),
-        "centres of mass in place of tips": tip_paths(at_centre, angles),
-        "y and z of the tips exchanged": np.stack([x, z, y], axis=2),
-        "x and z of the tips exchanged": np.stack([z, y, x], axis=2),
-        "tips in mm": 1e3 * own,
-    }
-    for step, which in ((1, "next"), (-1, "previous")):
-        trials[f"the tip of the {which} blade for each blade"] = np.roll(own, -step, axis=1)
-    right = []
-    for text, paths in trials.items():
-        if np.abs(tip - paths).max() <= _LEFT * np.abs(tip - own).max():
-            right.append(text)
-    return right[0] if len(right) == 1 else ""
+        channel = channel.replace("_", " ")
+    return f"{channel}: {text}" if text else f"{channel}: not that of its angles and rates; {NOT_FOUND}"
 
 
 def protocol_fault(solution: Solution) -> str:
@@ -465,7 +369,11 @@ def protocol_fault(solution: Solution) -> str:
     if n > scene.samples or np.abs(run.time - times).max() > 1e-9 * scene.duration:
         return "its times are not the scene's sample times"
     turned = np.diff(run.angles, axis=0) - 0.5 * (run.rates[1:] + run.rates[:-1]) * np.diff(times)[:, None]
-    jumps = np.argwhere((np.abs(turned) > np.pi) & (np.abs(np.abs(turned) - 2.0 * np.pi) < 0.5))
+    # Rates in another unit differ from the angles' by a turn somewhere, too, but not all at once.
+    beside = np.full((1, turned.shape[1]), 0.0)
+    before, after = np.vstack([beside, turned[:-1]]), np.vstack([turned[1:], beside])
+    is_single = np.maximum(np.abs(before), np.abs(after)) < 1.0
+    jumps = np.argwhere((np.abs(np.abs(turned) - 2.0 * np.pi) < 0.5) & is_single)
     if len(jumps):
         row, column = jumps[0]
         return f"{scene.coordinate_labels[column]} jumps by a turn at t = {times[row + 1]:.6g} s: angles are wrapped"

@@ -19,6 +19,7 @@ from rotor_mbs.analysis.checks import Check
 from rotor_mbs.analysis.kinematics import tip_paths
 from rotor_mbs.comparison.data_defects import judged_defects
 from rotor_mbs.comparison.defect_search import DefectSearch
+from rotor_mbs.comparison.wrong_outputs import root_mean_square, wrong_rows, wrong_tip
 from rotor_mbs.methods import catalogue
 from rotor_mbs.methods.catalogue import find_method, method_names
 from rotor_mbs.methods.solve import solve
@@ -26,15 +27,7 @@ from rotor_mbs.models.lagrange.defects import interval_defects
 from rotor_mbs.scenario.catalogue import only_scene
 from rotor_mbs.scenario.scene import Blade, Scene
 from rotor_mbs.solution.trajectory import Integration, Solution, Trajectory, sample_times
-from rotor_mbs.studies.method_test import (
-    NOT_FOUND,
-    examine,
-    five_blades,
-    protocol_fault,
-    root_mean_square,
-    wrong_rows,
-    wrong_tip,
-)
+from rotor_mbs.studies.method_test import NOT_FOUND, examine, five_blades, protocol_fault
 
 DOCUMENT = (Path(__file__).parents[2] / "docs" / "your-engine.md").read_text()
 (EXAMPLE,) = re.findall(r"```python\n(.*?)METHOD", DOCUMENT, re.DOTALL)

@@ -25,6 +25,7 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 from rotor_mbs.analysis.judgement import judge
 from rotor_mbs.methods.catalogue import find_method, supporting_methods
 from rotor_mbs.methods.solve import solve
+from rotor_mbs.methods.time_limit import OutOfTimeError
 from rotor_mbs.models.lagrange.heyoka_adapter import is_available
 from rotor_mbs.solution.defects import OK_ERROR
 from rotor_mbs.solution.status import COMPLETE
@@ -83,7 +84,11 @@ def verdicts(seed: int, methods: Sequence[str], limit_s: float = LIMIT_S, angles
         angles = independent_angles(seed)
     installed = [name for name in methods if find_method(name).is_installed]
     for method in supporting_methods(scene, installed)[0]:
-        run = solve(method, scene, {}, time_limit_s=limit_s)
+        try:
+            run = solve(method, scene, {}, time_limit_s=limit_s)
+        except OutOfTimeError as exc:
+            yield Verdict(seed, method, "timed_out", str(exc), np.nan, np.nan, scene.duration, "")
+            continue
         judgement = judge(scene, run, None)
         horizon = judgement.metrics.get("horizon_s", 0.0)
         before = np.flatnonzero(run.time <= horizon)
@@ -104,6 +109,8 @@ def _fault(method: str, status: str, message: str, error: float) -> str:
     """Return what is wrong with a verdict; "" where nothing is."""
     if status == "ok":
         return "" if error <= OK_ERROR else f"ok, but off by {error:.1e} rad"
+    if status == "timed_out":
+        return ""
     if method in EXACT and status != "unchecked":
         return f"exact to rounding, but {status}"
     if status == "unchecked":

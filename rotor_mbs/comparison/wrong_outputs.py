@@ -1,0 +1,387 @@
+"""Rows, tips, energies and loads that a program makes wrongly of a right motion.
+
+Each is compared with what other conventions or numbers make of the same states. One is named if it
+leaves at most a thousandth of the difference, and of the loads and tips only if it is alone.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotor_mbs.analysis import kinematics
+from rotor_mbs.analysis.judgement import defects_of
+from rotor_mbs.comparison.loads import is_at_jump, loads_by_frame
+from rotor_mbs.comparison.other_rotors import other_azimuths, other_scenes
+from rotor_mbs.scenario.scene import Scene
+from rotor_mbs.scenario.time_table import ROTOR_TORQUE, values_before
+from rotor_mbs.solution.defects import Defects
+from rotor_mbs.solution.quantities import LOADS
+from rotor_mbs.solution.trajectory import Array, Trajectory
+
+_LEFT = 1e-3  # of a difference, by what is named
+_STRAIGHT = 0.3  # of the rows: more than this lie on straight lines where rows are interpolated
+_MAX_ALIKE = 3  # explanations of an energy that are named
+
+
+# Rows
+
+
+def wrong_rows(scene: Scene, run: Trajectory, defects: Defects) -> str:
+    """Return how the rows of a run are made wrongly of a right motion.
+
+    Parameters
+    ----------
+    scene : the rotor.
+    run : its samples.
+    defects : those of the run.
+
+    Returns
+    -------
+    str
+        "" if no way explains its defects.
+    """
+    text = _interpolated_rows(run, defects) or _differenced_rates(run)
+    if text:
+        return text
+    time, angles, rates = run.time, run.angles, run.rates
+    before, after = slice(None, -1), slice(1, None)
+    opposite = np.array([1.0, *[-1.0] * len(scene.blades)])
+    degree = np.pi / 180.0
+    trials = {
+        "rates are a row late": (time[before], angles[before], rates[after]),
+        "rates are a row early": (time[after], angles[after], rates[before]),
+        "rates are in degrees per second": (time, angles, degree * rates),
+        "rates are in revolutions per minute": (time, angles, np.pi / 30.0 * rates),
+        "rates are in revolutions per second": (time, angles, 2.0 * np.pi * rates),
+        "rates have the opposite sign": (time, angles, -rates),
+        "angles are in degrees": (time, degree * angles, rates),
+        "angles and rates are in degrees": (time, degree * angles, degree * rates),
+        "pitches have the opposite sign": (time, opposite * angles, opposite * rates),
+    }
+    if len(scene.blades) > 1:
+        order = [0, *range(len(scene.blades), 0, -1)]
+        text = "pitches are in the reverse order of the blades"
+        trials[text] = (time, angles[:, order], rates[:, order])
+    for text, arrays in trials.items():
+        other = defects_of(scene, Trajectory(*arrays))
+        if other is not None and root_mean_square(other) <= _LEFT * root_mean_square(defects):
+            return text
+    return ""
+
+
+def root_mean_square(defects: Defects) -> float:
+    """Return the root mean square of the defects over the intervals, rad, above zero."""
+    mean = float(np.sqrt(np.mean(np.square(defects.sizes))))
+    return max(mean, float(np.finfo(float).tiny))
+
+
+def _interpolated_rows(run: Trajectory, defects: Defects) -> str:
+    """Return whether many rows lie on straight lines between their neighbours; "" if not."""
+    angles = run.angles
+    if len(angles) < 3:
+        return ""
+    size = np.maximum(np.abs(angles).max(axis=0), 1.0)
+    bend = np.abs(angles[2:] - 2.0 * angles[1:-1] + angles[:-2])
+    is_straight = (bend <= 1e-12 * size).all(axis=1) & np.ptp(angles, axis=0).any()
+    share = float(is_straight.mean())
+    # A uniform rotation lies on one too: then without defects, and not between rows that bend,
+    # again and again.
+    changes = np.count_nonzero(np.diff(is_straight.astype(int)))
+    if share <= _STRAIGHT or changes < 4:
+        return ""
+    if np.median(defects.sizes[1:][is_straight]) <= _LEFT * defects.sizes.max():
+        return ""
+    where = "lie on straight lines between others: linear interpolation"
+    return f"{100.0 * share:.0f} % of the rows {where}"
+
+
+def _differenced_rates(run: Trajectory) -> str:
+    """Return whether rates are difference quotients of the angles of rows; "" if not."""
+    if len(run.time) < 4:
+        return ""
+    slopes = np.diff(run.angles, axis=0) / np.diff(run.time)[:, None]
+    quotients = {
+        "backward": (run.rates[1:], slopes),
+        "forward": (run.rates[:-1], slopes),
+        "central": (run.rates[1:-1], 0.5 * (slopes[1:] + slopes[:-1])),
+    }
+    size = max(float(np.abs(run.rates).max()), float(np.finfo(float).tiny))
+    is_uniform = np.ptp(run.rates, axis=0).max() <= 1e-9 * size
+    for text, (rates, quotient) in quotients.items():
+        if not is_uniform and np.abs(rates - quotient).max() <= 1e-9 * size:
+            return f"rates are {text} differences of the angles of rows"
+    return ""
+
+
+# Tips
+
+
+def wrong_tip(scene: Scene, run: Trajectory) -> str:
+    """Return what the tips of a run are in place of its own; "" if unknown."""
+    assert run.tip is not None
+    own = kinematics.tip_paths(scene, run.angles)
+    named = _explaining(run.tip, own, dict(_other_tips(scene, run.angles, own)))
+    if len(named) == 1:
+        return named[0]
+    if named:
+        return ""
+    return _other_tip_point(scene, run.tip, run.angles, own)
+
+
+def _other_tips(scene: Scene, angles: Array, own: Array) -> Iterator[tuple[str, Array]]:
+    """Yield other paths, (n, blades, 3) m, in words.
+
+    Parameters
+    ----------
+    scene : the rotor.
+    angles : (n, 1 + blades) rad.
+    own : (n, blades, 3) m, the right paths.
+    """
+    pitches = np.array([0.0, *[1.0] * len(scene.blades)])
+    factors = {
+        "tips without the rotation by the pitch": 1.0 - pitches,
+        "tips without the rotation of the rotor": pitches,
+        "tips with the pitch in the opposite sense": 1.0 - 2.0 * pitches,
+        "tips with the rotor turned in the opposite sense": 2.0 * pitches - 1.0,
+    }
+    for text, factor in factors.items():
+        yield text, kinematics.tip_paths(scene, angles * factor)
+    for order, place in _exchanges(len(scene.blades)):
+        yield f"tips {place}", own[:, order]
+    yield (
+        "centres of mass in place of tips",
+        kinematics.tip_paths(_with_tips_at_centres(scene), angles),
+    )
+    x, y, z = np.moveaxis(own, 2, 0)
+    yield "y and z of the tips exchanged", np.stack([x, z, y], axis=2)
+    yield "x and z of the tips exchanged", np.stack([z, y, x], axis=2)
+    yield "tips in mm", 1e3 * own
+    for text, azimuths in other_azimuths(scene):
+        yield text, _turned_about_shaft(own, np.array(azimuths) - scene.phases)
+
+
+def _other_tip_point(scene: Scene, tip: Array, angles: Array, own: Array) -> str:
+    """Return at which point of its frame the tip of a blade is, if at one; "" if not.
+
+    Parameters
+    ----------
+    scene : the rotor.
+    tip, own : (n, blades, 3) m, of the run and the right ones.
+    angles : (n, 1 + blades) rad.
+    """
+    texts = []
+    columns = []
+    # Columns of the frames: the paths of three points, one on each axis.
+    for axis in np.eye(3):
+        point = (float(axis[0]), float(axis[1]), float(axis[2]))
+        blades = tuple(replace(blade, tip=point) for blade in scene.blades)
+        columns.append(kinematics.tip_paths(replace(scene, blades=blades), angles))
+    frames = np.stack(columns, axis=3)  # (n, blades, 3, 3)
+    points = np.einsum("nbij,nbi->nbj", frames, tip).mean(axis=0)
+    paths = np.einsum("nbij,bj->nbi", frames, points)
+    if np.abs(tip - paths).max() > _LEFT * np.abs(tip - own).max():
+        return ""
+    for i, blade in enumerate(scene.blades):
+        if np.abs(points[i] - blade.tip).max() > _LEFT * np.abs(tip - own).max():
+            there, right = (
+                ", ".join(f"{x:.6g}" for x in point) for point in (points[i], blade.tip)
+            )
+            texts.append(f"tip of blade {i + 1} at ({there}) m in place of ({right}) m")
+    return "; ".join(texts[:_MAX_ALIKE])
+
+
+# Energies
+
+
+def wrong_energy(scene: Scene, run: Trajectory, name: str) -> str:
+    """Return what an energy of a run is in place of its own.
+
+    Parameters
+    ----------
+    scene : the rotor.
+    run : its samples.
+    name : "kinetic energy" or "potential energy".
+
+    Returns
+    -------
+    str
+        All that explain it, at most three; "" if there are none, or more.
+    """
+    if name == "kinetic energy":
+        stored, own = run.kinetic_energy, kinematics.kinetic_energy(scene, run.angles, run.rates)
+        trials = dict(_other_kinetic_energies(scene, run, own))
+    elif name == "potential energy":
+        stored = run.potential_energy
+        own = kinematics.potential_energy(scene, run.time, run.angles)
+        trials = dict(_other_potential_energies(scene, run, own))
+    else:
+        return ""
+    assert stored is not None
+    named = _explaining(stored, own, trials)
+    return " or ".join(named) if len(named) <= _MAX_ALIKE else ""
+
+
+def _other_kinetic_energies(
+    scene: Scene, run: Trajectory, own: Array
+) -> Iterator[tuple[str, Array]]:
+    """Yield other kinetic energies, (n,) J, in words; own: the right one."""
+    yield from _scaled(own)
+    rotor = np.array([1.0, *[0.0] * len(scene.blades)])
+    for text, factor in (("rates of the pitches", rotor), ("rate of the rotor", 1.0 - rotor)):
+        rates = run.rates * factor
+        yield f"without the {text}", kinematics.kinetic_energy(scene, run.angles, rates)
+    for text, other in other_scenes(scene):
+        yield text, kinematics.kinetic_energy(other, run.angles, run.rates)
+
+
+def _other_potential_energies(
+    scene: Scene, run: Trajectory, own: Array
+) -> Iterator[tuple[str, Array]]:
+    """Yield other potential energies, (n,) J, in words; own: the right one."""
+    yield from _scaled(own)
+    yield "zero at another height", own + (run.potential_energy - own)[0]
+    of_weights = kinematics.potential_energy(_without_springs(scene), run.time, run.angles)
+    for text, factor in (("without the share", 0.0), ("opposite sign of the share", -1.0)):
+        yield f"{text} of the weights", own + (factor - 1.0) * of_weights
+        yield f"{text} of the springs", of_weights + factor * (own - of_weights)
+    paths = kinematics.tip_paths(_with_tips_at_centres(scene), run.angles)
+    weights = scene.gravity * np.array([blade.mass for blade in scene.blades])
+    for text, azimuths in other_azimuths(scene):
+        turned = _turned_about_shaft(paths, np.array(azimuths) - scene.phases)
+        yield text, own + (turned - paths)[:, :, 2] @ weights
+    for text, other in other_scenes(scene):
+        yield text, kinematics.potential_energy(other, run.time, run.angles)
+
+
+def _scaled(own: Array) -> Iterator[tuple[str, Array]]:
+    """Yield an energy times factors, in words."""
+    for text, factor in (("opposite sign", -1.0), ("half of it", 0.5), ("twice of it", 2.0)):
+        yield text, factor * own
+
+
+def _without_springs(scene: Scene) -> Scene:
+    return replace(scene, bearing_stiffness=())
+
+
+# Loads
+
+
+def wrong_loads(scene: Scene, run: Trajectory) -> str:
+    """Return what the loads of a run are in place of those at its own states.
+
+    Rows at a jump of a load count as little as in `compare`: not at all.
+
+    Returns
+    -------
+    str
+        For each load that is wrong and known; "" if there are none.
+    """
+    rows = ~is_at_jump(scene, run.time)
+    time, angles, rates = run.time[rows], run.angles[rows], run.rates[rows]
+    frames: dict[str, Mapping[str, Array]] = {}
+    for frame, matrix in loads_by_frame(scene, time, angles, rates).items():
+        frames[frame] = _by_load(scene, matrix)
+    torque = values_before(scene.load_segments, time)[ROTOR_TORQUE]
+    texts = []
+    for load in LOADS:
+        stored = run.get(load.name)
+        if stored is None:
+            continue
+        trials = dict(_other_loads(scene, load.name, frames, torque))
+        named = _explaining(stored[rows], frames[""][load.name], trials)
+        if len(named) == 1:
+            texts.append(f"{load.name.replace('_', ' ')}: {named[0]}")
+    return "; ".join(texts)
+
+
+def _other_loads(
+    scene: Scene, name: str, frames: Mapping[str, Mapping[str, Array]], torque: Array
+) -> Iterator[tuple[str, Array]]:
+    """Yield what a load may be taken for, in words.
+
+    Parameters
+    ----------
+    scene : the rotor.
+    name : of the load.
+    frames : by frame, "" its own, the loads by name.
+    torque : (n,) N m, of the rotor.
+    """
+    own = frames[""][name]
+    yield "sign reversed (action in place of reaction)", -own
+    yield "kN taken as N", 1e-3 * own
+    yield "N taken as kN", 1e3 * own
+    for frame in ("rotor", "base"):
+        yield f"in the {frame} frame", frames[frame][name]
+    if name.startswith(("blade", "pitch")):
+        for order, place in _exchanges(len(scene.blades)):
+            yield place, own[:, order]
+    if name == "blade_root_moment":
+        for point in ("centre_of_mass", "tip"):
+            arms = np.array([getattr(blade, point) for blade in scene.blades])
+            moved = own - np.cross(arms, frames[""]["blade_root_force"])
+            yield f"about the {point.replace('_', ' ')} in place of the root", moved
+    if name == "shaft_moment":
+        yield "with the torque on the rotor in it", own + torque[:, None] * [0.0, 1.0, 0.0]
+
+
+def _by_load(scene: Scene, matrix: Array) -> dict[str, Array]:
+    """Split the columns of `loads_by_frame` by the loads' names."""
+    arrays = {}
+    first = 0
+    for load in LOADS:
+        shape = []
+        if "blade" in load.dimensions:
+            shape.append(len(scene.blades))
+        if "axis" in load.dimensions:
+            shape.append(3)
+        count = int(np.prod(shape)) if shape else 1
+        arrays[load.name] = matrix[:, first : first + count].reshape(len(matrix), *shape)
+        first += count
+    return arrays
+
+
+# All of them
+
+
+def _explaining(stored: Array, own: Array, trials: Mapping[str, Array]) -> list[str]:
+    """Return the trials that leave at most a thousandth of the difference of an array."""
+    difference = float(np.abs(stored - own).max(initial=0.0))
+    named = []
+    for text, values in trials.items():
+        if np.abs(stored - values).max(initial=0.0) <= _LEFT * difference:
+            named.append(text)
+    return named if difference > 0.0 else []
+
+
+def _exchanges(count: int) -> Iterator[tuple[NDArray[np.intp], str]]:
+    """Yield blades in place of blades, and where theirs stand."""
+    blades = np.arange(count)
+    orders = {
+        "of the blades in reverse order": blades[::-1],
+        "of blade 1 for all blades": 0 * blades,
+        "of the next blade for each blade": np.roll(blades, -1),
+        "of the previous blade for each blade": np.roll(blades, 1),
+    }
+    # Of two blades the last three may be one.
+    seen = [blades.tolist()]
+    for text, order in orders.items():
+        if order.tolist() not in seen:
+            seen.append(order.tolist())
+            yield order, text
+
+
+def _with_tips_at_centres(scene: Scene) -> Scene:
+    """Return a scene whose tip paths are those of the centres of mass."""
+    blades = tuple(replace(blade, tip=blade.centre_of_mass) for blade in scene.blades)
+    return replace(scene, blades=blades)
+
+
+def _turned_about_shaft(paths: Array, angles: Array) -> Array:
+    """Turn (n, blades, 3) vectors in the base about the shaft, by (blades,) rad."""
+    x, y, z = np.moveaxis(paths, 2, 0)
+    s, c = np.sin(angles), np.cos(angles)
+    return np.stack([c * x + s * z, y, c * z - s * x], axis=2)
