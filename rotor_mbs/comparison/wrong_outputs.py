@@ -129,7 +129,7 @@ def wrong_tip(scene: Scene, run: Trajectory) -> str:
         return named[0]
     if named:
         return ""
-    return _other_tip_point(scene, run.tip, run.angles, own)
+    return _other_tip_points(scene, run.tip, run.angles, own)
 
 
 def _other_tips(scene: Scene, angles: Array, own: Array) -> Iterator[tuple[str, Array]]:
@@ -164,8 +164,8 @@ def _other_tips(scene: Scene, angles: Array, own: Array) -> Iterator[tuple[str, 
         yield text, _turned_about_shaft(own, np.array(azimuths) - scene.phases)
 
 
-def _other_tip_point(scene: Scene, tip: Array, angles: Array, own: Array) -> str:
-    """Return at which point of its frame the tip of a blade is, if at one; "" if not.
+def _other_tip_points(scene: Scene, tip: Array, angles: Array, own: Array) -> str:
+    """Return by how much the tips are off, if that is constant in some frame; "" if not.
 
     Parameters
     ----------
@@ -173,25 +173,37 @@ def _other_tip_point(scene: Scene, tip: Array, angles: Array, own: Array) -> str
     tip, own : (n, blades, 3) m, of the run and the right ones.
     angles : (n, 1 + blades) rad.
     """
-    texts = []
+    allowed = _LEFT * float(np.abs(tip - own).max())
+    without_pitches = angles * np.array([1.0, *[0.0] * len(scene.blades)])
+    frames = {
+        "of the blade's frame": _blade_frames(scene, angles),
+        "of a frame that turns with the rotor, z along the blade": _blade_frames(
+            scene, without_pitches
+        ),
+        "of the base": np.zeros((*own.shape, 3)) + np.eye(3),
+    }
+    for text, axes in frames.items():
+        offsets = np.einsum("nbij,nbi->nbj", axes, tip - own).mean(axis=0)
+        if np.abs(tip - own - np.einsum("nbij,bj->nbi", axes, offsets)).max() > allowed:
+            continue
+        offsets[np.abs(offsets) <= allowed] = 0.0  # rounding
+        shown = ["(" + ", ".join(f"{x:.4g}" for x in offset) + ")" for offset in offsets]
+        if len(set(shown)) == 1:
+            return f"tips off by {shown[0]} m {text}"
+        wrong = [i for i, offset in enumerate(offsets) if offset.any()]
+        texts = [f"tip of blade {i + 1} off by {shown[i]} m {text}" for i in wrong[:_MAX_ALIKE]]
+        return "; ".join(texts)
+    return ""
+
+
+def _blade_frames(scene: Scene, angles: Array) -> Array:
+    """Return the axes of the blades' frames in the base, (n, blades, 3, 3): columns."""
     columns = []
-    # Columns of the frames: the paths of three points, one on each axis.
     for axis in np.eye(3):
         point = (float(axis[0]), float(axis[1]), float(axis[2]))
         blades = tuple(replace(blade, tip=point) for blade in scene.blades)
         columns.append(kinematics.tip_paths(replace(scene, blades=blades), angles))
-    frames = np.stack(columns, axis=3)  # (n, blades, 3, 3)
-    points = np.einsum("nbij,nbi->nbj", frames, tip).mean(axis=0)
-    paths = np.einsum("nbij,bj->nbi", frames, points)
-    if np.abs(tip - paths).max() > _LEFT * np.abs(tip - own).max():
-        return ""
-    for i, blade in enumerate(scene.blades):
-        if np.abs(points[i] - blade.tip).max() > _LEFT * np.abs(tip - own).max():
-            there, right = (
-                ", ".join(f"{x:.6g}" for x in point) for point in (points[i], blade.tip)
-            )
-            texts.append(f"tip of blade {i + 1} at ({there}) m in place of ({right}) m")
-    return "; ".join(texts[:_MAX_ALIKE])
+    return np.stack(columns, axis=3)
 
 
 # Energies

@@ -217,11 +217,13 @@ class _Examination:
                 hint = "the rows are wrong: see the defect"
             elif reason and name in ("energy", "loads"):
                 hint = "the motion is wrong: see the defect"
-            elif name == "energy" and "defect" in worst and worst["defect"].value <= _ACCURATE * allowance:
+            elif name == "energy":
+                hint = f"energy minus work is not constant; {NOT_FOUND}"
                 # Neither forces, masses nor the step can be wrong where the motion is right.
-                hint = "the motion is right: a stored energy is wrong"
-                if "energies" in worst and worst["energies"].passed:
-                    hint = "the motion and the energies are right: the work of loads, commands or dampers is wrong"
+                if "defect" in worst and worst["defect"].value <= _ACCURATE * allowance:
+                    hint = "the motion is right: a stored energy is wrong"
+                    if "energies" in worst and worst["energies"].passed:
+                        hint = "the motion and the energies are right: the work of loads, commands or dampers is wrong"
             elif name in ("energies", "loads", "tip") and not check.value <= bound:
                 hint = _wrong_output(scene, run, check)
             self._add(name, scene.name, check.value, bound, hint, check.unit)
@@ -261,7 +263,7 @@ class _Examination:
         return (faults if self._has_faults_in_time else by_order) or NOT_FOUND
 
     def _with_half_step(self, scene: Scene, run: Trajectory, defects: Defects) -> tuple[float, float]:
-        """Return the largest defect with half the step, rad, and the order by which the defects shrink.
+        """Return the largest judged defect with half the step, rad, and the order by which the defects shrink.
 
         Both are zero for a method without a step.
         """
@@ -273,7 +275,7 @@ class _Examination:
         if half is None:
             return 0.0, 0.0
         ratio = root_mean_square(defects) / root_mean_square(half)
-        return float(half.sizes.max()), float(np.log2(ratio))
+        return float(half.judged_sizes.max()), float(np.log2(ratio))
 
     def _exact(self, scene: Scene) -> None:
         known = exact_rotor_angle(scene, sample_times(scene))
@@ -306,10 +308,14 @@ class _Examination:
         angles, image, others = (run.angles for run in runs)
         if len(others):
             others = np.hstack([others[:, :1] + turn, others[:, 2:], others[:, 1:2]])
+        hints = {
+            "mirror image": "the mirror image of the initial state does not give that of the motion",
+            "renumbered": "blades by other numbers give another motion",
+        }
         for check, there in (("mirror image", image * sign if len(image) else image), ("renumbered", others)):
             error = np.abs(angles - there).max() if angles.shape == there.shape and len(angles) else np.inf
-            hint = fault or "blades or signs are treated differently"
-            self._add(check, scene.name, error, 10.0 * scene.samples * self._bound, hint, "rad")
+            bound = 10.0 * scene.samples * self._bound
+            self._add(check, scene.name, error, bound, fault or hints[check], "rad")
 
     def _order(self, scene: Scene) -> None:
         ladder = next((one for one in self._method.ladders if one.kind == STEP), None)

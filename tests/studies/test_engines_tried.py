@@ -1,0 +1,110 @@
+"""Engines with one mistake each fail `test-method` with the right reason or none; right ones of any order pass."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from concurrent.futures import Future
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import pytest
+from support import broken_engines
+from support.broken_engines import BROKEN, NOT_FOUND, RIGHT, is_right, reasons
+
+from rotor_mbs.analysis.run_checks import Check
+from rotor_mbs.methods import catalogue
+from rotor_mbs.methods.catalogue import find_method
+from rotor_mbs.studies import method_test
+
+# Of which `test-method` tells that they are wrong, and not why.
+NOT_NAMED = {"p13_coupling_sign", "p14_pitch_sense_in_gravity", "p19_no_coupling_alpha", "p20_hub_radius"}
+
+
+@pytest.fixture(autouse=True)
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+    monkeypatch.chdir(tmp_path)
+    yield tmp_path
+    catalogue._files.clear()
+    catalogue._of_files.clear()
+
+
+class HerePool:
+    """A pool of no workers: what is submitted is computed at once."""
+
+    def submit(self, _work: Any, task: Any, _limit_s: float) -> Future[Any]:
+        done = Future[Any]()
+        done.set_result(method_test._run(task))
+        return done
+
+
+def method_of(name: str) -> str:
+    file = Path(f"{name}.py")
+    file.write_text(broken_engines.ENGINES[name].source())
+    (method,) = catalogue.check_names(str(file))
+    return method
+
+
+def first_scene(name: str) -> list[Check]:
+    """Return the checks on the five blades alone."""
+    examination = method_test._Examination(find_method(method_of(name)), HerePool(), 60.0)  # type: ignore[arg-type]
+    examination._scene(method_test.five_blades(), 1.0)
+    return examination._made
+
+
+def as_records(checks: list[Check]) -> list[dict[str, Any]]:
+    records = []
+    for check in checks:
+        record = asdict(check) | {"passed": check.passed, "check": check.name, "scene": check.where.scene}
+        records.append(record)
+    return records
+
+
+def judge_reasons(name: str, checks: list[Check]) -> None:
+    """A broken engine fails; nothing wrong is named, and what is wrong is where that can be."""
+    given = reasons(as_records(checks))
+    assert given, f"{name} passes"
+    verdicts = {reason: is_right(BROKEN[name], reason) for reason in given}
+    assert False not in verdicts.values(), verdicts
+    assert (True in verdicts.values()) == (name not in NOT_NAMED), verdicts
+
+
+QUICK = ("r04_tip_no_pitch", "r12_loads_of_blade_1", "r07_rates_in_degrees")
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        pytest.param(name, marks=() if name in QUICK else pytest.mark.full)
+        for name in (*QUICK, "r10_potential_sign", "r03_kinetic_without_hub", "n04_last_step_short", "n06_no_jumps")
+    ],
+)
+def test_a_mistake_is_named_by_the_first_scene(name: str) -> None:
+    judge_reasons(name, first_scene(name))
+
+
+@pytest.mark.full
+def test_a_right_engine_passes_the_first_scene() -> None:
+    assert [check for check in first_scene("rk4") if not check.passed] == []
+
+
+@pytest.mark.nightly
+@pytest.mark.parametrize("name", BROKEN)
+def test_a_broken_engine_fails_with_the_right_reason_or_none(name: str) -> None:
+    judge_reasons(name, method_test.examine(method_of(name)))
+
+
+@pytest.mark.nightly
+@pytest.mark.parametrize("name", RIGHT)
+def test_a_right_engine_passes_with_its_order(name: str) -> None:
+    checks = method_test.examine(method_of(name))
+    assert [check for check in checks if not check.passed] == []
+    # The one with a tolerance, and that of the document, have no step.
+    assert ("order" in {check.name for check in checks}) == (name not in ("dop_tol", "lagrange"))
+
+
+def test_no_reason_is_right_by_accident() -> None:
+    """What is expected of one engine is not said of another mistake."""
+    assert is_right(BROKEN["p01_gravity_axis"], f"{NOT_FOUND}; the run raised an error") is None
+    assert is_right(BROKEN["p01_gravity_axis"], "gravity of 9.8 m/s^2") is False
+    assert is_right(BROKEN["p16_gravity_9_8"], "gravity of 9.8 m/s^2") is True
