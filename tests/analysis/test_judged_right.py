@@ -7,12 +7,11 @@ from typing import Any
 
 import numpy as np
 import pytest
-from support import other_code
-from support.random_scenes import random_scene
+from support.random_verdicts import COARSE, EXACT, verdicts
 
 from rotor_mbs.analysis.judgement import Judgement, judge
 from rotor_mbs.analysis.run_checks import RunSamples, run_checks
-from rotor_mbs.methods.catalogue import find_method, supporting_methods
+from rotor_mbs.methods.catalogue import find_method
 from rotor_mbs.methods.solve import solve
 from rotor_mbs.models.lagrange.heyoka_adapter import is_available
 from rotor_mbs.models.lagrange.samples import load_conditioning
@@ -282,31 +281,11 @@ def test_another_number_of_twice_its_bound_is_seen(name: str, array: str, unit: 
 
 # ---- Random rotors against an integration that is not the package's
 
-EXACT = (TAYLOR, "lagrange/dop853")
-COARSE = ("exudyn_tree/rk67", "mujoco/rk4", "exudyn_chain/extrapolated", "exudyn_tree/generalized_alpha")
-LIMIT_S = 60.0
-
-
 def examine(seed: int, methods: tuple[str, ...]) -> None:
     """No run is ok that is off by more than 0.01 rad before its horizon, and no right run is refused."""
-    scene = random_scene(seed)
-    with np.errstate(all="ignore"):
-        angles, _ = other_code.trajectory(scene, np.linspace(0.0, scene.duration, scene.samples), atol=1e-13)
-    for method in supporting_methods(scene, [name for name in methods if find_method(name).is_installed])[0]:
-        run = solve(method, scene, {}, time_limit_s=LIMIT_S)
-        verdict = judge(scene, run, None)
-        if verdict.status in ("timed_out", "solver_failed"):
-            assert method not in EXACT, (seed, verdict.message)
-            continue
-        before = run.time <= verdict.metrics["horizon_s"]
-        error = float(np.abs(run.angles - angles)[before].max())
-        if verdict.status == "ok":
-            assert error <= OK_ERROR, (seed, method, error)
-        elif verdict.status == "unchecked":
-            assert "would not be seen; more samples" in verdict.message, (seed, method, verdict.message)
-        else:  # its own error, not rounding; of what is exact to rounding there is none
-            assert method not in EXACT, (seed, method, verdict.message)
-            assert error > 1e-10, (seed, method, error, verdict.message)
+    found = list(verdicts(seed, methods))
+    assert found
+    assert [verdict for verdict in found if verdict.fault] == []
 
 
 # Blades that spin hundreds of times take minutes: those are judged every night.

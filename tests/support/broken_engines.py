@@ -410,7 +410,7 @@ RIGHT = {
         "",
         [
             (_STEP, "        k1 = f(t, y, part)\n        return y + h / 2 * (k1 + f(t + h, y + h * k1, part))\n\n"),
-            ("number(1e-3", "number(2e-4"),
+            ("number(1e-3", "number(1e-4"),
             ("order=4", "order=2"),
         ],
     ),

@@ -141,7 +141,8 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("file", type=Path)
     parser.add_argument("--seeds", default="0:200", help="first:end")
-    parser.add_argument("--limit", type=float, default=LIMIT_S, help="s, of each integration")
+    parser.add_argument("--limit", type=float, default=LIMIT_S, help="s, of each run")
+    parser.add_argument("--cpu", type=float, default=600.0, help="s, of the independent integration")
     arguments = parser.parse_args()
     first, end = map(int, arguments.seeds.split(":"))
     names = [field.name for field in fields(Verdict)]
@@ -154,10 +155,10 @@ def main() -> None:
         if seed in done:
             continue
         try:
-            with _cpu_limit(arguments.limit):
+            with _cpu_limit(arguments.cpu):
                 angles = independent_angles(seed)
         except TimeoutError:
-            text = f"independent integration takes more than {arguments.limit:g} s"
+            text = f"independent integration takes more than {arguments.cpu:g} s"
             rows = [Verdict(seed, "", "not judged", text, np.nan, np.nan, np.nan, "")]
         else:
             methods = dict.fromkeys((*EXACT, *COARSE))
