@@ -281,6 +281,7 @@ def test_another_number_of_twice_its_bound_is_seen(name: str, array: str, unit: 
 
 # ---- Random rotors against an integration that is not the package's
 
+
 def examine(seed: int, methods: tuple[str, ...]) -> None:
     """No run is ok that is off by more than 0.01 rad before its horizon, and no right run is refused."""
     found = list(verdicts(seed, methods))
