@@ -224,7 +224,10 @@ def title_of(figure: PaperFigure, scenes: Mapping[str, StoredScene]) -> str:
 
 
 def caption_of(figure: PaperFigure, scenes: Mapping[str, StoredScene]) -> str:
-    """Return the caption: what is shown, the scenes, by which methods with which settings, and what of it is right."""
+    """Return the caption: what is shown, the scenes, by which methods with which settings, and which of it is right.
+
+    A model is called right where the status of each of its runs is ok.
+    """
     pictures = panel_runs(figure, scenes)
     what = {
         MOTION: "(a) Angles (rad) and (b) rates (rad/s) of the rotor and of the pitch of each blade over time (s).",
@@ -249,7 +252,7 @@ def caption_of(figure: PaperFigure, scenes: Mapping[str, StoredScene]) -> str:
         lines.append(f"{HEADINGS[PRINTED_SIDE]}: {what}. {_method_line(run)}")
     name = HEADINGS[CORRECTED] if PRINTED_SIDE in sides else REFERENCE_HEADING
     if CORRECTED in sides:
-        text = f"{name}: right. {_method_line(sides[CORRECTED][0])}"
+        text = f"{name}: {_verdict(sides[CORRECTED])}. {_method_line(sides[CORRECTED][0])}"
         bound = _uncertainty(sides[CORRECTED])
         if bound is not None:
             text += f" Its angles are uncertain by at most {up_to(bound)} rad."
@@ -268,8 +271,10 @@ def caption_of(figure: PaperFigure, scenes: Mapping[str, StoredScene]) -> str:
         if INDEPENDENT in sides:
             independent = sides[INDEPENDENT][0]
             text += f" {_method_line(independent)}"
+            text += f" It is {_verdict(sides[INDEPENDENT])}"
             if worst is not None:
-                text += f" It agrees within {up_to(worst)} rad in all angles."
+                text += f"; no angle differs by more than {up_to(worst)} rad"
+            text += "."
         lines.append(text)
     return "\n".join(lines) + "\n"
 
@@ -286,7 +291,16 @@ def _scene_line(label: str, scene: StoredScene) -> str:
     )
 
 
+def _verdict(runs: Sequence[StoredRun]) -> str:
+    """Return "right" for runs of which every one is ok, else their statuses."""
+    statuses = [run.status.replace("_", " ") for run in runs if run.status != "ok"]
+    if not statuses:
+        return "right"
+    return f"not verified ({len(statuses)} of {len(runs)} runs: {', '.join(dict.fromkeys(statuses))})"
+
+
 def _method_line(run: StoredRun) -> str:
+    """Return the method of a run, its name and its settings."""
     settings = ", ".join(f"{name} = {value}" for name, value in run.settings.items())
     name = f"{with_capital(label_of(run.method))} ({run.method})"
     return f"{name}: {settings}." if settings else f"{name}."

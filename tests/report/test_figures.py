@@ -125,9 +125,19 @@ def test_the_caption_has_scene_methods_settings_and_what_is_right(drawn: Path) -
         "Figure 11 of", "scene paper/fig11", "initial angles 0.523599, 0.785398, 0.523599, 1.5708 rad",
         "gravity 9.8 m/s^2; 10 s, 1001 samples", "with their 3 errors; wrong", "(printed/ode45)",
         "Corrected model: right", "(reference)", "of an independent computation from the corrected model",
-        "(exudyn_tree/rk67)", "It agrees within 0 rad",
+        "(exudyn_tree/rk67)", "It is right; no angle differs by more than 0 rad.",
     ):  # fmt: skip
         assert piece in text, piece
+
+
+def test_a_caption_calls_nothing_right_that_is_not_ok(tmp_path: Path) -> None:
+    scene = paper("fig11", samples=101)
+    facts = {"status": "inaccurate"}
+    runs = [Made(scene, name, rotor(np.sin), attributes=facts) for name in ("lagrange/taylor", "exudyn_tree/rk67")]
+    with open_results(store(tmp_path / "r.h5", runs)) as opened:
+        text = caption_of(all_figures(opened.scenes)["11"], opened.scenes)
+    assert "right" not in text
+    assert text.count("not verified (1 of 1 runs: inaccurate)") == 2
 
 
 def test_a_figure_shows_each_model_as_it_was_stored_and_how_far_the_others_are(tmp_path: Path) -> None:
