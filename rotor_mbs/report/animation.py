@@ -100,6 +100,7 @@ def frames(stored: StoredScene, magnified: float | None) -> Iterator[Image.Image
     clock = panels.figure.text(0.01, 0.93, "", color=GREY)
 
     def picture(frame: int) -> Image.Image:
+        """Draw a frame; a run that ended before stays where it ended."""
         for axes, name, corners, ended, paths, blades in moving:
             last = min(frame, ended - 1)
             axes.set_title(
@@ -118,9 +119,19 @@ def frames(stored: StoredScene, magnified: float | None) -> Iterator[Image.Image
 
 
 def wires(scene: Scene, time: Array, angles: Array, at: Array, magnified: float) -> Array:
-    """Compute corners of the blades at the times `at` (s); distances from the pitch axis are drawn `magnified` times.
+    """Return where three corners of each blade are in the picture.
 
-    Returns (times, blades, 3, 2) m, projected: the pitch axis' end, the tip, and the tip's offset at the hub.
+    Parameters
+    ----------
+    scene : of the run.
+    time, angles : (n,) s and (n, coordinates) rad, its samples.
+    at : (times,) s, of the pictures; between samples the angles are interpolated.
+    magnified : how many times the distances from the pitch axis are drawn.
+
+    Returns
+    -------
+    (times, blades, 3, 2) m
+        The end of the pitch axis, the tip, and a point at the hub as far from the pitch axis as the tip.
     """
     moved = np.stack([np.interp(at, time, column) for column in angles.T], axis=1)
     corners = []

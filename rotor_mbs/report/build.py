@@ -96,7 +96,11 @@ def make_pages(results: Path, numbers: Sequence[int]) -> dict[str, str]:
 
 @contextmanager
 def _without_warnings() -> Iterator[None]:
-    """A file may hold any number: what overflows in a plot is not told with a line of this program's source."""
+    """Suppress warnings in the block.
+
+    A file may hold any number; a user has no use for a warning with a line of this program's source where one
+    overflows in a plot.
+    """
     with warnings.catch_warnings(), np.errstate(all="ignore"):
         warnings.simplefilter("ignore")
         yield

@@ -87,7 +87,7 @@ class Panels:
         return artists
 
     def with_legend(self) -> Panels:
-        """Add a legend above the axes. Returns the same object."""
+        """Add a legend above the axes, and return the same object."""
         artists = self.labelled()
         with style():
             self.axes[0].legend(
@@ -111,7 +111,7 @@ class Panels:
 
 
 def panels(heights: tuple[float, ...], x_label: str) -> Panels:
-    """Panels one below the other; heights in inches, that of the top one first. x_label: of the last one."""
+    """Build panels one below the other: heights in inches, the top one first; the last one has the label of x."""
     figure = Figure(figsize=(WIDTH, sum(heights) + 0.6), facecolor="white")
     with style():
         axes = figure.subplots(len(heights), squeeze=False, sharex=True, height_ratios=heights)[:, 0].tolist()
@@ -136,7 +136,7 @@ def grid(rows: int, columns: int, height: float) -> Panels:
 
 
 def squares(count: int) -> Panels:
-    """Axes with equal scales and without a frame side by side, 420 pixels each, below room for two lines of text."""
+    """Build axes side by side with equal scales and no frame, 420 pixels each, below room for two lines of text."""
     with style():
         figure = Figure(figsize=(4.2 * count, 4.6), dpi=100, facecolor="white")
         axes = [figure.add_axes((i / count, 0.0, 1.0 / count, 4.2 / 4.6), aspect="equal") for i in range(count)]
@@ -146,14 +146,14 @@ def squares(count: int) -> Panels:
 
 
 def pixels(figure: Figure) -> NDArray[np.uint8]:
-    """(height, width, 3) The figure as it is now, in red, green and blue."""
+    """Return the figure as it is now as an image: (height, width, 3) red, green and blue."""
     canvas: Any = FigureCanvasAgg(figure)
     canvas.draw()
     return np.asarray(canvas.buffer_rgba())[..., :3]
 
 
 def style(*, for_print: bool = False) -> AbstractContextManager[None]:
-    """A context in which figures are drawn in the style of the pages, or in that of manuscripts."""
+    """Return a context in which figures are drawn in the style of the pages, or in that of manuscripts."""
     return matplotlib.rc_context(_PRINT_STYLE if for_print else _PAGE_STYLE)
 
 
@@ -285,14 +285,17 @@ def log_axis(axes: Any, lowest: float, highest: float) -> None:
 
 
 def ticks(axis: Any, labels: Mapping[float, str]) -> None:
-    """Labels at these places and no others; without the tick objects that `set_ticks` makes at once."""
+    """Label an axis at these places and no others.
+
+    `set_ticks` would make objects for all of them at once, which is slow.
+    """
     axis.set_major_locator(FixedLocator([*labels]))
     axis.set_major_formatter(FuncFormatter(lambda value, _: labels.get(value, "")))
     axis.set_minor_locator(NullLocator())
 
 
 def curve(axes: Any, x: Any, y: Any, look: Look, width: float = 1.2, **more: Any) -> None:
-    """A line with markers that are white inside, as far as the look has them; its label stands in the legend."""
+    """Draw a line, with markers that are white inside where the look has them; its label stands in the legend."""
     axes.plot(
         x, y, color=look.colour, linestyle=look.line, linewidth=width, marker=look.marker, label=look.label or "_",
         **{"markersize": 4.2, "markerfacecolor": PAPER} | more,

@@ -194,13 +194,9 @@ class Plot:
 
 @dataclass(frozen=True)
 class Legend:
-    """The curves of a section: (key, look) each. Buttons that switch them; without keys a mere list.
-
-    hidden : keys of the curves that are off at first.
-    """
+    """The curves of a section: (key, look) each. Buttons that switch them; without keys a mere list."""
 
     items: Sequence[tuple[str, Look]]
-    hidden: Sequence[str] = ()
     kind: str = field(default="legend", init=False)
 
 

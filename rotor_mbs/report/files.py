@@ -47,7 +47,7 @@ _SCRIPTS = {  # by file, what a page has that needs it
     "viewer": 'class="viewer"',
     "map": 'id="sweep"',
 }
-_MAX_NUMBERS = 150_000  # of a page's curves: 800 kB, so that a page has at most 1 MB
+MAX_NUMBERS = 150_000  # of a page's curves: 800 kB, so that a page has at most 1 MB
 _PLACE_OF_SCRIPTS = "<!-- scripts -->"
 Pairs = Sequence[tuple[str, str]]
 # Control characters but those of lines and tabs, and halves of surrogate pairs: names and messages come from any file.
@@ -110,8 +110,8 @@ def render(page: PageContent, made: Pairs = (), links: Pairs = (), here: str = "
     template, store = _environment().get_template("page.html.j2"), CurveStore()
     known = {"page": page, "links": shown, "versions": made}
     html = template.render(known, store=store, numbered=itertools.count(1).__next__)
-    if store.size > _MAX_NUMBERS:
-        store = CurveStore(every=-(-store.size // _MAX_NUMBERS))
+    if store.size > MAX_NUMBERS:
+        store = CurveStore(every=-(-store.size // MAX_NUMBERS))
         html = template.render(known, store=store, numbered=itertools.count(1).__next__)
     scripts = "".join(f"<script>{_script(name)}</script>\n" for name, sign in _SCRIPTS.items() if sign in html)
     return html.replace(_PLACE_OF_SCRIPTS, scripts, 1)
@@ -180,7 +180,7 @@ def _still(plot: Plot, number: int) -> Markup:
 
 
 def _breakable(text: str) -> Markup:
-    """A name such as exudyn_tree/rk67 may be broken after a slash or an underscore; a sentence is typeset."""
+    """Return a name that a browser may break after a slash or an underscore, or a sentence, typeset."""
     if " " in text:
         return escape(numbers.typeset(text))
     return Markup(re.sub("([/_])", r"\1<wbr>", str(escape(text))))

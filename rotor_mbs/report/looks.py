@@ -83,7 +83,7 @@ class Look:
 
     @property
     def css(self) -> str:
-        """Classes of the style sheet that draw it on a page: "blue dashed"."""
+        """The classes of the style sheet that draw it on a page: "blue dashed"."""
         name = _NAMES.get(self.colour, "grey")
         if name == "reference":
             return "reference"  # a wide band, on which other curves can be seen

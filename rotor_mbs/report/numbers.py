@@ -21,12 +21,15 @@ _SIGN = re.compile(r"(?<![\w)])-(?=\S)|(?<= )-(?= )")
 
 
 def power(exponent: int) -> str:
-    """10⁻¹⁰ for -10."""
+    """Return a power of ten: 10⁻¹⁰ for -10."""
     return "10" + str(exponent).translate(_SUPERSCRIPT)
 
 
 def number(value: float | None, digits: int = 2) -> str:
-    """`digits` significant digits: 0.31, 12, 1200, 1.2×10⁻¹⁰; a dash for None, "not finite" for NaN."""
+    """Return a number with so many significant digits: 0.31, 12, 1200, 1.2×10⁻¹⁰.
+
+    None gives a dash, NaN and infinities "not finite".
+    """
     if value is None:
         return NOTHING
     if not math.isfinite(value):
@@ -49,7 +52,7 @@ def typeset_title(title: str) -> str:
 
 
 def fixed(value: float | None, decimals: int) -> str:
-    """So many decimals, as a paper prints them; without the sign of a zero."""
+    """Return a number with so many decimals, as a paper prints it; a zero has no sign, None gives a dash."""
     if value is None:
         return NOTHING
     text = f"{value:.{decimals}f}"
@@ -57,7 +60,7 @@ def fixed(value: float | None, decimals: int) -> str:
 
 
 def with_unit(value: float | None, unit: str, digits: int = 2) -> str:
-    """A number with its unit, without a line break between them."""
+    """Return a number with its unit, without a line break between them."""
     return number(value, digits) if value is None else f"{number(value, digits)}{SPACE}{unit}"
 
 
@@ -130,7 +133,7 @@ def in_words(count: int) -> str:
 
 
 def typeset(text: str) -> str:
-    """A sentence with its numbers such as 8.1e+00 and 1e-06 as 8.1 and 10⁻⁶; names such as torque-1e9 stay."""
+    """Return a sentence in which 8.1e+00 is written 8.1 and 1e-06 10⁻⁶; names such as torque-1e9 stay."""
 
     def shortest(computed: re.Match[str]) -> str:
         mantissa, exponent = computed.groups()
@@ -148,7 +151,10 @@ def minus(text: str) -> str:
 
 
 def formula(text: str, *, in_prose: bool = False) -> Markup:
-    """The text with symbols in italics and their indices as subscripts."""
+    """Return the text with symbols in italics and their indices as subscripts.
+
+    in_prose: single letters are words, but for those that are symbols of the paper.
+    """
     symbol = _SYMBOL_IN_PROSE if in_prose else _SYMBOL
 
     def typeset(match: re.Match[str]) -> str:

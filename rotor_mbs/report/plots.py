@@ -40,7 +40,7 @@ class Series(NamedTuple):
 
 
 def motion(time: Array, angles: Array | None, rates: Array | None, horizon: float | None = None) -> Panels:
-    """Angles (rad), then rates (rad/s), both (n, coordinates); either may be missing."""
+    """Plot angles (rad) above rates (rad/s), both (n, coordinates); either may be None."""
     rows: list[tuple[str, Sequence[Series]]] = []
     for name, values in ((ANGLE_AXIS, angles), (RATE_AXIS, rates)):
         if values is not None:
@@ -51,12 +51,16 @@ def motion(time: Array, angles: Array | None, rates: Array | None, horizon: floa
 
 
 def coordinate_series(time: Array, values: Array) -> list[Series]:
-    """A curve per coordinate of `values` (n, coordinates)."""
+    """Return a curve for each coordinate of `values` (n, coordinates)."""
     return [Series(time, x, coordinate_look(i)) for i, x in enumerate(values.T)]
 
 
 def draw_lines(axes: Any, series: Sequence[Series], label: str) -> None:
-    """The curves over one vertical axis: of angles and rates in their range, of others in k or M of a unit."""
+    """Draw curves over one vertical axis.
+
+    label: with the unit in brackets; of other quantities than angles and rates it gets a prefix, k or M, where the
+    values are large.
+    """
     shortest = min(len(curve.values) for curve in series)
     values = np.stack([curve.values[:shortest] for curve in series], axis=1)
     scale, prefix = prefix_of(float(np.abs(values).max()) if "(" in label and "(rad" not in label else 1.0)
@@ -68,7 +72,7 @@ def draw_lines(axes: Any, series: Sequence[Series], label: str) -> None:
 
 
 def set_range(axes: Any, values: Array) -> None:
-    """The vertical range for `values` (n, curves): leaves out a divergence, does not magnify rounding errors."""
+    """Set the vertical range for `values` (n, curves), without a divergence and without magnifying rounding errors."""
     if is_cut(values):
         usual = float(np.quantile(np.abs(values).max(axis=1), 0.9))
         axes.set_ylim(-2.0 * usual, 2.0 * usual)
@@ -83,7 +87,14 @@ def lines(
     horizon: float | None = None,
     heights: Sequence[float] = (),
 ) -> Panels:
-    """Panels one above the other: (label with a unit, curves) each."""
+    """Plot panels one above the other over time.
+
+    Parameters
+    ----------
+    rows : of each panel the label, with a unit, and its curves.
+    horizon : s, which is marked.
+    heights : of the panels, in; equal ones where left out.
+    """
     panels = canvas.panels(tuple(heights) or (2.3,) * len(rows), TIME_AXIS)
     for axes, (label, series) in zip(panels.axes, rows, strict=True):
         draw_lines(axes, series, label)
@@ -138,14 +149,14 @@ def thin(time: Array, values: Array) -> tuple[Array, Array]:
 
 
 def is_cut(values: Array) -> bool:
-    """Whether the largest of these values (n, curves) are left out: of a divergence, not of a jolt that passes."""
+    """Return whether the largest of these values (n, curves) are a divergence, and not a jolt that passes."""
     largest = np.abs(values).max(axis=1)
     usual = float(np.quantile(largest, 0.9))
     return bool(min(largest.max(), _STILL * largest[-5:].max()) > _RUNAWAY * usual > 0.0)
 
 
 def mark_time(axes: Any, end: float, horizon: float | None) -> None:
-    """A vertical line where the horizon lies before the end (s) of what is drawn."""
+    """Draw a vertical line at the horizon, where that lies before the end (s) of what is drawn."""
     if horizon is not None and horizon < end:
         axes.axvline(
             horizon,
@@ -157,7 +168,7 @@ def mark_time(axes: Any, end: float, horizon: float | None) -> None:
 
 
 def paths(tip: Array) -> Panels:
-    """The paths of `tip` (n, blades, 3) m."""
+    """Plot the paths of `tip` (n, blades, 3) m."""
     panels = canvas.panels((4.1,), "")
     draw_paths(panels.axes[0], tip)
     return panels
@@ -206,7 +217,7 @@ def draw_paths(axes: Any, tip: Array) -> None:
 
 
 def projected(points: Array) -> Array:
-    """Points (n, 3) as seen from far away, from above and to the side: (n, 2), to the right and up, in m."""
+    """Project points (n, 3) to what is seen from far away, above and to the side: (n, 2), to the right and up, m."""
     right = np.array([-np.sin(_AZIMUTH), np.cos(_AZIMUTH), 0.0])
     level = np.array([np.cos(_AZIMUTH), np.sin(_AZIMUTH), 0.0])
     up = np.array([0.0, 0.0, np.cos(_ELEVATION)]) - np.sin(_ELEVATION) * level
@@ -317,7 +328,7 @@ def _some(time: Array) -> Array:
 
 
 def _quantity(run: Solution, name: str) -> Array:
-    """Raises InputError where the run does not have it, or its file does not."""
+    """Return a quantity of a run. Raises InputError where the run does not have it, or its file does not."""
     _some(run.time)
     try:
         values = run[name]

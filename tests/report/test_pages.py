@@ -12,6 +12,7 @@ import pytest
 from support.checking import results_file
 from support.report_pages import (
     answer_of,
+    facts_of,
     plots_of,
     rows_of,
     section_of,
@@ -181,9 +182,22 @@ def test_own_scenes_stand_in_a_table_those_that_failed_first(tmp_path: Path) -> 
     folder = write_report(store(tmp_path / "r.h5", runs), tmp_path / "out").parent
     text = text_of(folder)
     assert list(rows_of(section_of(text, "scenes"))) == ["b", "a", "c"]
-    assert answer_of(text).startswith("1 of 3 scenes are not ok: b.")
+    assert answer_of(text) == "1 of 3 scenes is not ok: b. Two of the three scenes are ok."
     assert rows_of(section_of(text, "scenes"))["b"][1] == "divergedlagrange/taylor: 10⁹ rad"
     assert sorted(path.name for path in folder.iterdir()) == ["a.html", "b.html", "c.html", "index.html"]
+
+
+def test_scenes_of_which_nothing_was_checked_are_not_ok(tmp_path: Path) -> None:
+    """One with the printed equations alone, one with a reference alone."""
+    scenes = [replace(PLAIN, name=name, figures=(), outputs=("angles", "rates")).replace() for name in "ab"]
+    runs = [Made(scenes[0], PRINTED, SWING, attributes={"status": "completed"}), Made(scenes[1], REFERENCE, SWING)]
+    text = text_of(write_report(store(tmp_path / "r.h5", runs), tmp_path / "out").parent)
+    assert answer_of(text).startswith("None of the two scenes is ok. Of two nothing was checked: they have no run of")
+    assert facts_of(text)["Scenes"] == "0 of 2 ok"
+    table = section_of(text, "scenes")
+    assert [cells[1] for cells in rows_of(table).values()] == ["completed", "reference only"]
+    assert "✓" not in table
+    assert 'class="good"' not in table
 
 
 def test_the_index_says_how_much_of_the_time_was_compared(tmp_path: Path) -> None:

@@ -13,11 +13,14 @@ from support.report_pages import answer_of, facts_of, rows_of, section_of, text_
 from support.scenes import paper
 from support.stored import Made, rotor, store
 
+from rotor_mbs.analysis.modes import SceneModes
 from rotor_mbs.api.comparisons import compare
+from rotor_mbs.errors import InputError
 from rotor_mbs.report.build import write_report
+from rotor_mbs.report.files import write_page
 from rotor_mbs.report.numbers import number
-from rotor_mbs.report.pages import computations
-from rotor_mbs.report.pages.comparison import onset_of
+from rotor_mbs.report.pages import agreement_of_scenes, computations
+from rotor_mbs.report.pages.comparison import comparison_page, error_panels, onset_of
 from rotor_mbs.report.pages.modes import modes_page
 from rotor_mbs.runs.read import open_results
 from rotor_mbs.scenario.scene import scene_toml
@@ -61,7 +64,7 @@ def test_the_sentence_of_a_scene_of_the_paper_has_its_numbers(results: Path, rep
     assert percent == pytest.approx(100.0 * gain / scale, rel=0.05)
     # The tree run is inaccurate: it stands first, in red, and is not counted among what agrees.
     assert text.startswith("Exudyn tree, RK67 is inaccurate")
-    assert "Closed form, Taylor of the corrected model agrees" in text
+    assert "Corrected, closed form, Taylor agrees with the reference within" in text
     facts = facts_of(text_of(report, "paper-fig11.html"))
     assert facts["Corrected model"] == "inaccurate | 1 of 2 methods ok, limit 0.01 rad"
     assert facts["Printed model leaves it after"].startswith(f"{number(left)} s | largest difference")
@@ -96,7 +99,9 @@ def test_the_index_says_what_was_found(results: Path, report: Path) -> None:
     assert text.startswith("The paper's printed equations contain three errors and create energy in 2 of 4 scenes.")
     with open_results(results) as opened:
         error = opened.scenes["paper/fig11"].runs[TAYLOR].attributes["angle_error_max"]
-    (within,) = found(r"Corrected, closed form, Taylor agrees within NUMBER rad in 1 of 4 scenes", text)
+    (within,) = found(
+        r"Corrected, closed form, Taylor agrees with the reference within NUMBER rad in 1 of 4 scenes", text
+    )
     assert error <= within < 2.0 * error
     assert "Of four numbers that the paper publishes three come out of the printed equations and none" in text
     facts = facts_of(text_of(report, "index.html"))
@@ -107,6 +112,21 @@ def test_the_index_says_what_was_found(results: Path, report: Path) -> None:
 def test_methods_are_counted_as_independent_by_their_models() -> None:
     assert computations([TAYLOR, TREE, "exudyn_chain/extrapolated"]) == "three independent computations"
     assert computations([TAYLOR, DOP853]) == "two methods of one model"
+
+
+def test_methods_are_said_to_agree_in_the_scenes_in_which_all_of_them_ran(tmp_path: Path) -> None:
+    """Two methods ran on fig11, one of them on fig05, and another one that nothing was compared with."""
+    scenes = paper("fig11", samples=101), paper("fig05", samples=101)
+    runs = [Made(scene, name, rotor(np.sin)) for scene in scenes for name in ("reference", TAYLOR)]
+    runs.append(Made(scenes[0], TREE, rotor(np.sin)))
+    path = store(tmp_path / "r.h5", runs)
+    with open_results(path) as opened:
+        methods, error, count = agreement_of_scenes(opened.scenes.values())
+        assert (methods, error, count) == ([TAYLOR], 0.0, 2)
+    text = text_of(write_report(path, tmp_path / "out").parent, "index.html")
+    assert "Corrected, closed form, Taylor agrees with the reference exactly in all 2 scenes." in answer_of(text)
+    assert "independent" not in answer_of(text)
+    assert "1 method" in section_of(text, "scenes")
 
 
 # A scene of one's own
@@ -229,6 +249,17 @@ def test_data_that_agree_are_said_to(tmp_path: Path) -> None:
     assert "✗" not in text
 
 
+def test_data_of_which_no_channel_was_compared_have_a_page_and_no_plot(monkeypatch: pytest.MonkeyPatch) -> None:
+    time = np.linspace(0.0, 1.0, 11)
+    data = {"time": time, "angles": np.zeros((11, 4))}
+    compared = compare(data, paper("fig11").replace(duration=1.0, samples=11))
+    verdict = replace(compared.verdict, channels=[])
+    monkeypatch.setattr("rotor_mbs.report.pages.comparison.verdict_of", lambda _: verdict)
+    assert [section.id for section in comparison_page(compared.record).sections if section.elements]
+    with pytest.raises(InputError, match="no channel was compared"):
+        error_panels(compared.record)
+
+
 # Modes
 
 
@@ -243,3 +274,25 @@ def test_the_sentence_of_modes_has_their_frequencies_and_stability() -> None:
     assert numbers[-1] == pytest.approx(known.max(), rel=1e-3)
     assert "agree within" in text
     assert ("stable at all" in text) == bool((modes.floquet is not None) and (modes.floquet.stable == 1).all())
+
+
+def test_modes_that_do_not_satisfy_their_equations_are_told_of_one_model_too(monkeypatch: pytest.MonkeyPatch) -> None:
+    modes = compute_modes(paper("fig11"), [0.5, 1.0])
+    fault = "lagrange: its modes leave 1.0e-02 of its own linearized equations"
+    monkeypatch.setattr(SceneModes, "faults", property(lambda _: [fault]))
+    for kind in (modes.rest, modes.rotation):
+        for model in list(kind)[1:]:
+            del kind[model]  # type: ignore[attr-defined]
+    page = modes_page([modes])
+    assert fault in str(page.answer[0])
+    assert (page.facts[0].value, page.facts[0].note) == ("✗ not their equations", fault)
+
+
+def test_axes_of_modes_are_named_by_their_scenes(tmp_path: Path) -> None:
+    modes = [compute_modes(paper(name), [0.5, 1.0]) for name in ("fig11", "fig12")]
+    for of_page, names in (
+        (modes[:1], ["rotor speed"]),
+        (modes, ["rotor speed of paper/fig11", "rotor speed of paper/fig12"]),
+    ):
+        text = text_of(write_page(tmp_path / str(len(names)), modes_page(of_page), {}).parent)
+        assert sorted(set(re.findall("&#34;name&#34;:&#34;(rotor speed.*?)&#34;", text))) == names

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from support.report_pages import answer_of, facts_of, plots_of, rows_of, section_of, sections_of, text_of
+from support.report_pages import answer_of, facts_of, plots_of, rows_of, section_of, sections_of, text_of, words_of
 from support.sweeps import made_sweep
 
 from rotor_mbs.processes.pool import SerialPool
@@ -115,6 +115,32 @@ def test_one_parameter_has_curves_over_it_and_no_map(tmp_path: Path) -> None:
     np.testing.assert_allclose(y, np.degrees(stored.column("pitch_max")[()]), rtol=1e-6)
 
 
+def test_runs_of_the_printed_equations_are_completed_and_not_ok(tmp_path: Path) -> None:
+    text = (
+        HEAD.replace("lagrange/dop853", "printed/ode45") + 'outputs = []\n[[axis]]\nkey = "gravity"\nvalues = [9, 10]\n'
+    )
+    page = text_of(write_report(made_sweep(tmp_path, text), tmp_path / "out").parent)
+    assert answer_of(page).startswith("All 2 runs are completed.")
+    assert facts_of(page)["Runs that are completed"] == "2 of 2 | nothing is claimed of the printed equations"
+    assert "✓" not in page
+    assert not re.search(r"\bok\b", words_of(section_of(page, "runs")))
+
+
+def test_runs_are_links_where_they_can_be_shown(grid: tuple[StoredSweep, str], tmp_path: Path) -> None:
+    text = HEAD + 'outputs = []\n[[axis]]\nkey = "gravity"\nvalues = [9, 10]\n'
+    page = text_of(write_report(made_sweep(tmp_path, text), tmp_path / "out").parent)
+    assert 'id="sweep"' not in page
+    assert "#run-" not in page
+    assert "#run-" in grid[1]
+
+
+def test_what_is_shown_of_one_method_alone_says_so(tmp_path: Path) -> None:
+    text = GRID.replace('["lagrange/dop853"]', '["lagrange/dop853", "lagrange/ode45"]')
+    page = text_of(write_report(made_sweep(tmp_path, text), tmp_path / "out").parent)
+    for section in ("map", "slices"):
+        assert "By lagrange/dop853 alone." in words_of(section_of(page, section))
+
+
 def test_random_draws_are_points_over_each_parameter(tmp_path: Path) -> None:
     path = made_sweep(
         tmp_path,
@@ -144,7 +170,7 @@ def test_the_map_of_a_part_of_a_grid_has_the_runs_that_are_there(
     maps = [part for section in page.sections for grid in section.elements for card in getattr(grid, "cards", ())
             for part in card if isinstance(part, HeatMap)]  # fmt: skip
     (shown,) = maps
-    assert "By lagrange/dop853." in shown.note or "By lagrange/ode45." in shown.note
+    assert "By lagrange/dop853 alone." in shown.note or "By lagrange/ode45 alone." in shown.note
     numbers = [cell[0] for line in shown.cells for cell in line if cell is not None]
     first = np.asarray(stored.column("method_code"))
     assert len(numbers) == len({*numbers}) == int((first == first[0]).sum())

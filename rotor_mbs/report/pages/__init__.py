@@ -7,11 +7,14 @@ import math
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from functools import cached_property
 
+import numpy as np
+from markupsafe import Markup
+
 from rotor_mbs.analysis import published
-from rotor_mbs.analysis.published import ClaimStudy, Erratum, Published, claims
+from rotor_mbs.analysis.published import ClaimStudy, Erratum, Published, claims, rounds_to
 from rotor_mbs.analysis.work_precision import by_scene
 from rotor_mbs.methods.catalogue import PRINTED, REFERENCE, errata_methods, find_method_or_none, is_corrected
-from rotor_mbs.report.elements import PageTable, Row, TableCell
+from rotor_mbs.report.elements import Array, PageTable, Row, TableCell
 from rotor_mbs.report.files import INDEX, page_names
 from rotor_mbs.report.looks import label_of, with_capital
 from rotor_mbs.report.numbers import NOTHING, in_words, number, seconds, up_to, with_unit
@@ -40,28 +43,28 @@ class Report(OpenResults):
 
     @cached_property
     def claims(self) -> Sequence[Published]:
-        """Of the paper, about these scenes."""
+        """The paper's published numbers and claims about these scenes."""
         return claims(self.scenes)
 
     @cached_property
     def conditions(self) -> Mapping[str, str]:
-        """What the paper does not print."""
+        """Conditions of the paper's runs that it does not print and that were found out, by scene."""
         return published.conditions() if self.claims else {}
 
     @cached_property
     def study(self) -> ClaimStudy | None:
-        """The claims on many runs."""
+        """Verdicts on the claims from many runs with moved starts; None without claims."""
         return published.claim_study() if self.claims else None
 
     @cached_property
     def errata(self) -> Sequence[Erratum]:
-        """Empty where no run is of equations that have them."""
+        """The errors in the printed equations; empty where no run is of equations that have them."""
         printed = {PRINTED, *errata_methods().values()}
         return published.errata() if any(printed & {*scene.runs} for scene in self.scenes.values()) else ()
 
     @cached_property
     def curves(self) -> Mapping[str, Sequence[Record]]:
-        """Error and run time, by scene."""
+        """The curves of error over run time that `rotor-mbs bench` stored, by scene."""
         return by_scene(read_records(self.path, "bench"))
 
     @cached_property
@@ -77,6 +80,7 @@ METRICS = (
 )  # fmt: skip
 # Against the reference, which has none itself.
 _ERRORS_OF_RUNS = ("angle_error_max", "angle_error_predicted", "angle_error_whole", "tip_error_max")
+_SPAN = 30.0  # between the smallest and the largest value, beyond which an axis is logarithmic
 _METHODS_IN_A_TABLE = 8  # side by side on a page of 1440 px
 
 
@@ -146,6 +150,12 @@ def compared_time(scenes: Iterable[StoredScene]) -> tuple[float, float]:
     return compared, whole
 
 
+def is_wide(values: Array) -> bool:
+    """Return whether values are positive and span so much that a logarithmic axis shows more."""
+    known = values[np.isfinite(values)]
+    return bool(len(known)) and bool(known.min() > 0.0) and bool(known.max() > _SPAN * known.min())
+
+
 def models_of(methods: Collection[str]) -> int:
     """Return how many models, which share no code, these methods belong to."""
     return len({method.partition("/")[0] for method in methods})
@@ -172,24 +182,83 @@ def computations(methods: Collection[str]) -> str:
 def agreement(scene: StoredScene) -> tuple[list[str], float | None]:
     """Return the corrected methods of a scene that are ok, and the largest of their angle errors up to the horizon.
 
-    None instead of the error (rad) where none was compared with a reference.
+    Methods that were not compared with a reference are left out; where none was, the error (rad) is None.
     """
-    good = {name: run for name, run in scene.corrected_runs.items() if run.status == "ok"}
-    errors = [error for run in good.values() if (error := metric(run, "angle_error_max")) is not None]
-    return list(good), max(errors) if errors else None
+    errors: dict[str, float] = {}
+    for name, run in scene.corrected_runs.items():
+        error = metric(run, "angle_error_max")
+        if run.status == "ok" and error is not None:
+            errors[name] = error
+    return list(errors), max(errors.values(), default=None)
 
 
-def agreement_text(scene: StoredScene) -> str:
+def agreement_of_scenes(scenes: Iterable[StoredScene]) -> tuple[list[str], float | None, int]:
+    """Return how the corrected methods agree over several scenes.
+
+    Returns
+    -------
+    methods : those that are ok in every scene that was compared at all; none, where the scenes have different ones.
+    error : rad, the largest angle error of any run that is ok; None where none was compared with a reference.
+    count : of the scenes that were compared.
+    """
+    common: list[str] = []
+    errors: list[float] = []
+    for scene in scenes:
+        methods, error = agreement(scene)
+        if error is not None:
+            common = [name for name in common if name in methods] if errors else methods
+            errors.append(error)
+    return common, max(errors, default=None), len(errors)
+
+
+def agree_within(methods: Sequence[str], error: float, digits: int = 1) -> Markup:
+    """Return the beginning of a sentence: "three independent computations agree within 2×10⁻⁶ rad".
+
+    Parameters
+    ----------
+    methods : that agree; of one it is said that it agrees with the reference, of none what they have in common.
+    error : rad, the largest.
+    digits : of the error, which is rounded up.
+    """
+    within = Markup("<b>exactly</b>") if error == 0.0 else Markup("within <b>{} rad</b>").format(up_to(error, digits))
+    subject = computations(methods) if methods else "all runs that are ok"
+    verb = "agrees with the reference" if len(methods) == 1 else "agree"
+    return Markup("{} {} {}").format(subject, verb, within)
+
+
+def reproduced(numbers: Iterable[Published]) -> tuple[int, int]:
+    """Return how many published numbers come out of the printed equations, and how many out of the corrected ones."""
+    printed = corrected = 0
+    for claim in numbers:
+        printed += claim.printed is not None and rounds_to(claim.printed, claim)
+        corrected += claim.corrected is not None and rounds_to(claim.corrected, claim)
+    return printed, corrected
+
+
+def numbers_sentence(claims: Iterable[Published]) -> Markup:
+    """Return which model gives the numbers that the paper publishes; "" without such numbers."""
+    numbers = [claim for claim in claims if claim.is_number]
+    if not numbers:
+        return Markup()
+    printed, corrected = reproduced(numbers)
+    if printed == len(numbers) and corrected == 0:
+        text = "All {} numbers that the paper publishes come out of the printed equations and none out of the "
+        text += "corrected ones: its curves show the errors, not the rotor."
+        return Markup(text).format(in_words(len(numbers)))
+    text = "Of {} numbers that the paper publishes <b>{}</b> come out of the printed equations and <b>{}</b> out of "
+    text += "the corrected ones."
+    words = [in_words(count) if count else "none" for count in (printed, corrected)]
+    return Markup(text).format(in_words(len(numbers)), *words)
+
+
+def agreement_text(scene: StoredScene) -> Markup:
     """Return a sentence about how near the scene's corrected methods are to each other; "" where nothing is known."""
     methods, error = agreement(scene)
     if error is None:
-        return ""
-    verb = "agrees" if len(methods) == 1 else "agree"
-    within = "exactly" if error == 0.0 else f"within {up_to(error, 1)} rad"
+        return Markup()
     compared, whole = compared_time([scene])
     until = "" if compared >= whole else f" up to {seconds(compared)}"
-    other = " with the reference" if len(methods) == 1 else ""
-    return f"{with_capital(computations(methods))} {verb}{other} {within}{until}."
+    return Markup("{}{}.").format(Markup(with_capital(agree_within(methods, error))), until)
 
 
 def agreement_table(scene: StoredScene, suite_runs: Sequence[SuiteRun] = ()) -> PageTable:

@@ -391,7 +391,7 @@ def engine_tables(results: OpenResults, scenes: Mapping[str, Sequence[Record]]) 
 
 
 def _worst_cell(own: Mapping[str, Sequence[Record]], column: str) -> TableCell | str:
-    """The smallest value on the scene where that is largest; on how many scenes no setting is useful."""
+    """Return the best value of a method on the scene where it does worst, and on how many scenes it has none."""
     values = {name: work_precision.values_of(curves, column) for name, curves in own.items()}
     known = {name: min(of_scene) for name, of_scene in values.items() if of_scene}
     if not known:
@@ -409,8 +409,13 @@ def _worst_cell(own: Mapping[str, Sequence[Record]], column: str) -> TableCell |
 def _reach_cell(
     scenes: Mapping[str, Sequence[Record]], own: Mapping[str, Sequence[Record]], target: float
 ) -> TableCell:
-    """Tell on how many scenes it reaches the target, the median of the ratios of its run times to the fastest, and
-    them."""
+    """Return on how many scenes a method reaches an error, and how much slower than the fastest one it is there.
+
+    Parameters
+    ----------
+    scenes, own : the curves of all methods, and those of this one, by scene.
+    target : the error, rad.
+    """
     reached: dict[str, work_precision.Reach] = {}
     cut = 0  # scenes on which it was not measured to there
     for name, curves in own.items():
@@ -432,7 +437,7 @@ def _reach_cell(
 
 
 def _order_cell(curves: Sequence[Record]) -> str:
-    """The median of the fitted orders of a method with a fixed step, and the order that it claims."""
+    """Return the order that was fitted to a method with a fixed step, and the order that it claims."""
     claimed = [curve.attributes["order_expected"] for curve in curves if "order_expected" in curve.attributes]
     seen = [curve.attributes["order"] for curve in curves if claimed and "order" in curve.attributes]
     if not claimed:
@@ -451,7 +456,7 @@ def _drift_cell(run: StoredRun | None) -> TableCell | str:
 
 
 def _zero_pitch_cell(own: Mapping[str, Sequence[Record]]) -> TableCell | str:
-    """Whether pitches that are zero in the reference are zero at every setting."""
+    """Return whether pitches that are zero in the reference are zero at every setting."""
     known = work_precision.values_of((curve for curves in own.values() for curve in curves), "zero_pitch_max")
     if not known:
         return NOTHING
@@ -459,8 +464,10 @@ def _zero_pitch_cell(own: Mapping[str, Sequence[Record]]) -> TableCell | str:
 
 
 def _false_success_cell(own: Mapping[str, Sequence[Record]], suite: Sequence[SuiteRun]) -> TableCell | str:
-    """Count false successes of the runs of the stability suite that are not ok, where the file has them; else of the
-    settings here."""
+    """Return how often an engine reported success for a wrong result.
+
+    Of the runs of the stability suite, where the file has them; else of the settings on this page.
+    """
     if suite:
         # What the time limit ended is neither right nor wrong.
         finished = [run for run in suite if run.status != "timed_out"]

@@ -12,6 +12,7 @@ from markupsafe import Markup
 
 from rotor_mbs.comparison.channels import channel_key
 from rotor_mbs.comparison.verdict import ChannelErrors, DataVerdict, axis_unit, channel_table, unused_lines, verdict_of
+from rotor_mbs.errors import InputError
 from rotor_mbs.report import canvas, plots
 from rotor_mbs.report.canvas import Panels
 from rotor_mbs.report.elements import (
@@ -47,12 +48,14 @@ def comparison_page(record: Record) -> PageContent:
     """Return the content of the page: the verdict and the onset of a fault, plots, channels, how the data were read."""
     verdict = verdict_of(record)
     is_time = verdict.axis == "time"
+    onset = onset_of(record, verdict)
+    marks = _marks(record, verdict, onset)
     sections = [
-        _channel_section(record, verdict),
-        _error_section(record, verdict),
+        _channel_section(record, verdict, marks),
+        _error_section(record, verdict, marks),
         _table_section(verdict),
+        _reading_section(verdict),
     ]
-    sections.append(_reading_section(verdict))
     about = f"{typeset_title(record.attributes['title'])} · {verdict.rows} rows"
     facts = [
         Fact(
@@ -61,7 +64,6 @@ def comparison_page(record: Record) -> PageContent:
             tone="good" if verdict.agrees else "bad",
         )
     ]
-    onset = onset_of(record, verdict)
     if onset is not None:
         name = "First outside the tolerance" if is_time else "First speed outside the tolerance"
         facts.append(Fact(name, _place(onset[0], verdict), onset[1]))
@@ -73,13 +75,14 @@ def comparison_page(record: Record) -> PageContent:
         compared += f"; errors checked up to the horizon at {seconds(verdict.horizon_s)}"
     facts.append(Fact("Compared up to", _place(verdict.compared_until, verdict), compared))
     title = f"{Path(verdict.source).name} against {record.attributes.get('scene_label', verdict.scene)}"
-    return PageContent(title, about, comparison_answer(record), facts, sections)
+    return PageContent(title, about, comparison_answer(verdict, onset), facts, sections)
 
 
-def comparison_answer(record: Record) -> list[Markup]:
-    """Return whether the data agree, from when on they do not, why, and what it looks like."""
-    verdict = verdict_of(record)
-    onset = onset_of(record, verdict)
+def comparison_answer(verdict: DataVerdict, onset: tuple[float, str] | None) -> list[Markup]:
+    """Return whether the data agree, from when on they do not, which channels do, and the probable causes.
+
+    onset: see `onset_of`.
+    """
     if verdict.agrees:
         defects = [channel.defect for channel in verdict.channels if channel.defect is not None]
         text = Markup("The data <b>agree</b> with {}").format(verdict.scene)
@@ -108,10 +111,11 @@ def comparison_answer(record: Record) -> list[Markup]:
 
 
 def _is_outside(channel: ChannelErrors, verdict: DataVerdict) -> bool:
-    """Whether a channel's defect is beyond the tolerance; one that cannot be judged is not.
+    """Return whether a channel is what is wrong with the data.
 
-    The defects of a coordinate are wrong, too, where another one's values are: what stays at the reference is not what
-    is wrong, as long as there is a channel that does not.
+    Its defect must be beyond the tolerance. A wrong value in one coordinate gives defects in the others, too, which
+    follow the reference: as long as some channel departs from the reference, those that do not are not outside.
+    A channel that cannot be judged is not outside.
     """
 
     def is_beyond(size: float | None) -> bool:
@@ -167,19 +171,18 @@ def _axis_of(record: Record, verdict: DataVerdict) -> Horizontal:
     return Horizontal("rotor speed", "rad/s", "speed", first, last)
 
 
-def _marks(record: Record, verdict: DataVerdict, *, with_horizon: bool = False) -> list[Mark]:
-    onset = onset_of(record, verdict)
+def _marks(record: Record, verdict: DataVerdict, onset: tuple[float, str] | None) -> list[Mark]:
+    """Return marks of the onset of a fault, where there is one, and of the horizon, where it lies within the data."""
     marks = [] if onset is None else [Mark("first outside", onset[0])]
     horizon, axis = verdict.horizon_s, _axis_of(record, verdict)
-    if with_horizon and horizon is not None and axis.first < horizon < axis.last:
+    if horizon is not None and axis.first < horizon < axis.last:
         marks.append(Mark("horizon", horizon))
     return marks
 
 
-def _channel_section(record: Record, verdict: DataVerdict) -> Section:
+def _channel_section(record: Record, verdict: DataVerdict, marks: Sequence[Mark]) -> Section:
     """Return every channel's data upon the reference, those outside the tolerance first."""
     rows, axis = record.arrays[verdict.axis], _axis_of(record, verdict)
-    marks = _marks(record, verdict)
     plots: list[Plot] = []
     channels = sorted(verdict.channels, key=lambda channel: not _is_outside(channel, verdict))
     for channel in channels:
@@ -208,11 +211,10 @@ def _channel_section(record: Record, verdict: DataVerdict) -> Section:
     return Section("channels", heading, elements if plots else [], say)
 
 
-def _error_section(record: Record, verdict: DataVerdict) -> Section:
+def _error_section(record: Record, verdict: DataVerdict, marks: Sequence[Mark]) -> Section:
     """Return the errors of the channels, and their interval defects with the tolerance."""
     rows, axis = record.arrays[verdict.axis], _axis_of(record, verdict)
     channels = _drawn(verdict)
-    marks = _marks(record, verdict, with_horizon=True)
     errors, defects = [], []
     for channel in channels:
         look = replace(_look(channel), label=channel.name)
@@ -282,8 +284,11 @@ def enumerate_lines(lines: Sequence[str]) -> list[tuple[str, str]]:
 
 
 def error_panels(record: Record) -> Panels:
-    """The error of each channel over time, on a logarithmic axis."""
-    verdict, channels = verdict_of(record), _drawn(verdict_of(record))
+    """Plot the error of each channel over time, on a logarithmic axis. Raises InputError without channels."""
+    verdict = verdict_of(record)
+    channels = _drawn(verdict)
+    if not channels:
+        raise InputError(f"{verdict.source}: no channel was compared; nothing to plot")
     rows = record.arrays[verdict.axis]
     series = [Series(rows, np.abs(_array(record, channel, "_error")), _look(channel)) for channel in channels]
     panels = plots.errors(series, f"error ({channels[0].unit})", verdict.horizon_s)
@@ -295,7 +300,7 @@ def error_panels(record: Record) -> Panels:
 
 
 def defect_panels(record: Record) -> Panels | None:
-    """The defects of each channel over time, with the tolerance; None without any."""
+    """Plot the defects of each channel over time, with the tolerance; None without any."""
     verdict = verdict_of(record)
     time = record.arrays[verdict.axis][1:]
     series = []
@@ -313,13 +318,15 @@ def _array(record: Record, channel: ChannelErrors, ending: str = "") -> Any:
 
 
 def _drawn(verdict: DataVerdict) -> Sequence[ChannelErrors]:
-    """The channels that are drawn: the angles, else the rates; of modes all."""
+    """Return the channels that are drawn: the angles, else those with the first one's unit; of none, none."""
     units = [channel.unit for channel in verdict.channels]
+    if not units:
+        return []
     unit = "rad" if "rad" in units else units[0]
     return [channel for channel in verdict.channels if channel.unit == unit]
 
 
 def _look(channel: ChannelErrors) -> Look:
-    """The look of the channel's coordinate: 0 the rotor, 1 the pitch of blade 1, ..."""
+    """Return the look of the channel's coordinate: 0 the rotor, 1 the pitch of blade 1, ..."""
     digits = "".join(filter(str.isdigit, channel.name))
     return coordinate_look(int(digits or 0))

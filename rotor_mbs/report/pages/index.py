@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 from markupsafe import Markup
 
-from rotor_mbs.analysis.published import ENERGY_RISE, Published, rounds_to
+from rotor_mbs.analysis.published import ENERGY_RISE, rounds_to
 from rotor_mbs.methods.catalogue import errata_methods, is_corrected
 from rotor_mbs.report.elements import (
     Element,
@@ -24,23 +24,29 @@ from rotor_mbs.report.elements import (
     TableCell,
 )
 from rotor_mbs.report.looks import coordinate_look, with_capital
-from rotor_mbs.report.numbers import NOTHING, formula, in_words, number, prefixed, typeset_title, up_to, with_unit
+from rotor_mbs.report.numbers import NOTHING, formula, in_words, number, prefixed, typeset_title, with_unit
 from rotor_mbs.report.pages import (
     Report,
+    agree_within,
     agreement,
+    agreement_of_scenes,
     compared_time,
-    computations,
     method_cell,
     metric,
     number_cell,
+    numbers_sentence,
     paper,
+    reproduced,
     status_text,
 )
 from rotor_mbs.report.pages import scene_plots as draw
 from rotor_mbs.report.pages.scene import HORIZON_NOTE, paper_plots, short_name
 from rotor_mbs.report.pages.scene_plots import CORRECTED, PRINTED
 from rotor_mbs.runs.read import StoredRun, StoredScene
+from rotor_mbs.scenario.keys import counted
 from rotor_mbs.solution.status import GOOD
+
+_NAMED = 5  # scenes in a sentence
 
 
 def index_page(report: Report) -> PageContent:
@@ -72,46 +78,13 @@ def paper_answer(report: Report) -> list[Markup]:
             "The paper's printed equations contain <b>{} errors</b> and create energy in <b>{} of {} scenes</b>."
         )
         sentences.append(text.format(in_words(len(report.errata)), len(rising), len(with_printed)))
-    methods, error, agreeing = _agreement(report)
+    methods, error, agreeing = agreement_of_scenes(scenes)
     if error is not None:
-        verb = "agrees" if len(methods) == 1 else "agree"
         where = f"all {len(scenes)}" if agreeing == len(scenes) else f"{agreeing} of {len(scenes)}"
-        text = Markup("Corrected, {} {} within <b>{} rad</b> in {} scenes.")
-        sentences.append(text.format(computations(methods), verb, up_to(error, 1), where))
-    numbers = [claim for claim in report.claims if claim.is_number]
-    printed, corrected = (_reproduced(numbers, side) for side in (PRINTED, CORRECTED))
-    if numbers and printed == len(numbers) and corrected == 0:
-        count = in_words(len(numbers))
-        text = Markup("All {} numbers that the paper publishes come out of the printed equations and none out of the ")
-        text += Markup("corrected ones: its curves show the errors, not the rotor.")
-        sentences.append(text.format(count))
-    elif numbers:
-        text = Markup("Of {} numbers that the paper publishes {} come out of the printed equations and {} out of the ")
-        text += Markup("corrected ones.")
-        sentences.append(
-            text.format(
-                in_words(len(numbers)), *(in_words(count) if count else "none" for count in (printed, corrected))
-            )
-        )
-    return sentences
-
-
-def _reproduced(numbers: Sequence[Published], side: str) -> int:
-    values = [(claim.printed if side == PRINTED else claim.corrected, claim) for claim in numbers]
-    return sum(value is not None and rounds_to(value, claim) for value, claim in values)
-
-
-def _agreement(report: Report) -> tuple[list[str], float | None, int]:
-    """Return the corrected methods that are ok in some scene, the largest error of such a run (rad), and how many
-    scenes have one."""
-    methods: dict[str, None] = {}
-    errors = []
-    for scene in report.scenes.values():
-        names, error = agreement(scene)
-        if error is not None:
-            methods |= dict.fromkeys(names)
-            errors.append(error)
-    return list(methods), max(errors, default=None), len(errors)
+        text = Markup("Corrected, {} in {} scenes.")
+        sentences.append(text.format(agree_within(methods, error), where))
+    sentences.append(numbers_sentence(report.claims))
+    return [sentence for sentence in sentences if sentence]
 
 
 def _paper_index(report: Report) -> PageContent:
@@ -151,7 +124,7 @@ def _paper_facts(report: Report) -> list[Fact]:
         note = f"up to {prefixed(max(known)[0], 'J', 2)} ({short_name(max(known)[1])})" if known else ""
         count = sum(gain is not None for gain in gains.values())
         facts.append(Fact("Scenes in which energy is created", f"{count} of {len(with_printed)}", note))
-    _, error, _ = _agreement(report)
+    _, error, _ = agreement_of_scenes(report.scenes.values())
     if error is not None:
         runs = [run for scene in report.scenes.values() for run in scene.corrected_runs.values()]
         good = sum(run.status == "ok" for run in runs)
@@ -173,8 +146,8 @@ def _paper_facts(report: Report) -> list[Fact]:
         if rounding:
             verb = "are" if rounding > 1 else "is"
             note += f"; {in_words(rounding)} of them {verb} amplified rounding error"
-        reproduced = _reproduced(numbers, PRINTED)
-        facts.append(Fact("Published numbers reproduced", f"{reproduced} of {len(numbers)}", note))
+        count, _ = reproduced(numbers)
+        facts.append(Fact("Published numbers reproduced", f"{count} of {len(numbers)}", note))
     return facts
 
 
@@ -219,13 +192,16 @@ def _hero_section(scene: StoredScene, report: Report) -> Section:
 def scene_table(report: Report) -> PageTable:
     """Return a row per scene of the paper: the angle that differs most, when and by how much energy; agreement."""
     rows: list[Row] = []
+    most = max((len(agreement(scene)[0]) for scene in report.scenes.values()), default=0)
     for name, scene in report.scenes.items():
         note = typeset_title(scene.title)
         row: list[TableCell | str] = [TableCell(short_name(scene.label), href=report.files[name], note=note)]
         row += _departure_cells(scene)
-        _, error = agreement(scene)
+        methods, error = agreement(scene)
         failed = [run for run in scene.corrected_runs.values() if run.status not in GOOD]
         notes = ", ".join(f"{run.method}: {status_text(run)}" for run in failed)
+        if len(methods) != most:
+            notes = "; ".join(filter(None, [counted(len(methods), "method"), notes]))
         if error is None:
             row.append(TableCell(NOTHING, note=notes))
         else:
@@ -234,11 +210,10 @@ def scene_table(report: Report) -> PageTable:
         compared, whole = compared_time([scene])
         row.append(TableCell(f"{compared:.3g} of {whole:g} s", order=compared) if whole else "")
         rows.append(row)
-    count = in_words(max((len(agreement(scene)[0]) for scene in report.scenes.values()), default=0))
     head = (
         "Scene", "The angle that differs most: corrected, as printed",
         f"Printed model is {draw.VISIBLE:g} rad off after", "Energy it creates",
-        f"Corrected: {count} methods agree within (rad)", "Compared",
+        "Corrected methods agree within (rad)", "Compared",
     )  # fmt: skip
     return PageTable("All scenes", head, rows, wide=(1, 5), sortable=True)
 
@@ -358,7 +333,7 @@ def _methods_section(report: Report) -> Section:
     )
     if report.curves:
         elements.append(Note(Markup('<a href="bench.html">Error against run time for all methods and steps</a>')))
-    return Section("methods", f"The {in_words(len(rows))} computations", elements)
+    return Section("methods", "Methods over all scenes", elements)
 
 
 # ---- A user's own scenes
@@ -368,29 +343,35 @@ def _own_index(report: Report) -> PageContent:
     """Return the index of a file with scenes of one's own."""
     scenes = list(report.scenes.values())
     failed = [scene for scene in scenes if _is_bad(scene)]
+    good = [scene for scene in scenes if scene.corrected_runs and scene not in failed]
+    unchecked = len(scenes) - len(failed) - len(good)
     count = len(scenes)
-    good = count - len(failed)
+    answer = []
     if failed:
-        text = Markup('<span class="bad">{} of {} scenes are not ok</span>: {}. {} are ok.')
-        answer = [
-            text.format(
-                len(failed),
-                count,
-                ", ".join(scene.label for scene in failed[:5]),
-                in_words(good).capitalize(),
-            )
-        ]
+        text = Markup('<span class="bad">{} of {} scenes {} not ok</span>: {}.')
+        names = ", ".join(scene.label for scene in failed[:_NAMED])
+        if len(failed) > _NAMED:
+            names += f" and {len(failed) - _NAMED} more"
+        answer.append(text.format(len(failed), count, _is_or_are(len(failed)), names))
+    if len(good) == count:
+        answer.append(Markup("All <b>{} scenes</b> are ok.").format(in_words(count)))
     else:
-        answer = [Markup("All <b>{} scenes</b> are ok.").format(in_words(count))]
-    methods, error, agreeing = _agreement(report)
+        text = Markup("{} of the {} scenes {} ok.")
+        subject = in_words(len(good)).capitalize() if good else "None"
+        answer.append(text.format(subject, in_words(count), _is_or_are(max(len(good), 1))))
+    if unchecked:
+        text = Markup("Of {} nothing was checked: {} no run of a corrected model beside the reference.")
+        answer.append(text.format(in_words(unchecked), "it has" if unchecked == 1 else "they have"))
+    methods, error, agreeing = agreement_of_scenes(scenes)
     if error is not None:
-        verb = "agrees with the reference" if len(methods) == 1 else "agree"
-        text = Markup("{} {} within <b>{} rad</b> in {} of {} scenes.")
-        answer.append(text.format(with_capital(computations(methods)), verb, up_to(error, 1), agreeing, count))
+        text = Markup("{} in {} of {} scenes.")
+        sentence = Markup(with_capital(agree_within(methods, error)))
+        answer.append(text.format(sentence, agreeing, count))
     say = "Those that are not ok first; click a heading to sort." if failed else "Click a heading to sort."
     table = own_table(report, [*failed, *(scene for scene in scenes if scene not in failed)])
     sections = [Section("scenes", f"{count} scenes", [table], say), _methods_section(report)]
-    facts = [Fact("Scenes", f"{good} of {count} ok", "", "bad" if failed else "good")]
+    tone = "bad" if failed else "good" if len(good) == count else ""
+    facts = [Fact("Scenes", f"{len(good)} of {count} ok", "", tone)]
     largest = _largest_moment(scenes)
     if largest is not None:
         facts.append(Fact("Largest blade root moment", prefixed(largest[0], "N m"), largest[1]))
@@ -406,7 +387,12 @@ def _own_index(report: Report) -> PageContent:
     return PageContent("Rotor scenes", report.path.name, answer, facts, sections)
 
 
+def _is_or_are(count: int) -> str:
+    return "is" if count == 1 else "are"
+
+
 def _is_bad(scene: StoredScene) -> bool:
+    """Return whether a run of a corrected model is not ok."""
     return any(run.status not in GOOD for run in scene.runs.values() if is_corrected(run.method))
 
 
@@ -418,6 +404,21 @@ def _largest_moment(scenes: Sequence[StoredScene]) -> tuple[float, str] | None:
         if value is not None:
             found.append((value, scene.name))
     return max(found) if found else None
+
+
+def _status_cell(scene: StoredScene) -> TableCell:
+    """Return how the runs of a scene ended: those that are not good with their messages, else how many are ok."""
+    bad = [run for run in scene.methods.values() if run.status not in GOOD]
+    if bad:
+        notes = "; ".join(f"{run.method}: {run.attributes.get('message', '')}" for run in bad)
+        statuses = ", ".join(dict.fromkeys(map(status_text, bad)))
+        return TableCell(statuses, "bad", note=notes, order=-len(bad))
+    good = len(scene.corrected_runs)
+    if good:
+        return TableCell(f"✓ {good} of {good}", "good", order=good)
+    # Of the printed equations, and of a reference alone, nothing was checked.
+    ended = ", ".join(dict.fromkeys(map(status_text, scene.methods.values())))
+    return TableCell(ended or "reference only", order=0)
 
 
 def own_table(report: Report, scenes: Sequence[StoredScene]) -> PageTable:
@@ -444,26 +445,7 @@ def own_table(report: Report, scenes: Sequence[StoredScene]) -> PageTable:
             )
         else:
             row.append("")
-        good = sum(run.status in GOOD for run in scene.methods.values())
-        bad = [run for run in scene.methods.values() if run.status not in GOOD]
-        if bad:
-            notes = "; ".join(f"{run.method}: {run.attributes.get('message', '')}" for run in bad)
-            row.append(
-                TableCell(
-                    ", ".join(dict.fromkeys(map(status_text, bad))),
-                    "bad",
-                    note=notes,
-                    order=-len(bad),
-                )
-            )
-        else:
-            row.append(
-                TableCell(
-                    f"✓ {good} of {len(scene.methods)}" if scene.methods else "reference only",
-                    "good",
-                    order=good,
-                )
-            )
+        row.append(_status_cell(scene))
         load = None if run is None else metric(run, "blade_root_moment_max")
         row.append("" if load is None else TableCell(prefixed(load, "N m"), order=load))
         _, error = agreement(scene)

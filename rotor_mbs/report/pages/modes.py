@@ -10,6 +10,7 @@ import numpy as np
 from markupsafe import Markup
 
 from rotor_mbs.analysis.modes import (
+    AGREEMENT,
     GROWTH,
     FloquetTable,
     LinearModes,
@@ -37,6 +38,7 @@ from rotor_mbs.report.elements import (
 )
 from rotor_mbs.report.looks import BLUE, GREY, VERMILLION, Look, coordinate_look
 from rotor_mbs.report.numbers import NOTHING, SPACE, in_words, number, typeset_title, up_to
+from rotor_mbs.report.pages import is_wide
 from rotor_mbs.scenario.keys import counted
 from rotor_mbs.solution.trajectory import Array
 
@@ -44,7 +46,6 @@ _MARKS = ("o", "s", "^", "D", "v", "P", "x")
 _TURN = 2.0 * math.pi
 _ZERO = 1e-6  # of the largest frequency: a smaller one is that of a rigid motion
 _NOTHING = 1e-9  # 1/s, or of a frequency: a smaller growth or damping is rounding error
-_SPAN = 30.0  # between the smallest and the largest value, beyond which an axis is logarithmic
 
 
 class ModePlots:
@@ -125,7 +126,10 @@ class ModePlots:
 
 
 def mode_look(index: int, name: str) -> Look:
-    """Line and marker of a mode: equal frequencies lie on each other, so that each mode has its own marker."""
+    """Return the line and the marker of a mode.
+
+    Each mode has a marker of its own, since curves of equal frequencies lie on each other.
+    """
     return replace(coordinate_look(index, name), marker=_MARKS[index % len(_MARKS)])
 
 
@@ -149,16 +153,16 @@ def _first(kind: Mapping[str, LinearModes]) -> LinearModes | None:
 
 
 def mode_answer(scene: SceneModes) -> list[Markup]:
-    """Return the lowest frequencies, whether the models agree, and whether the rotation is stable."""
+    """Return whether the modes satisfy their equations and the models agree, frequencies at rest, and stability."""
     sentences = []
     models = max(len(scene.rest), len(scene.rotation))
+    for fault in scene.faults:
+        sentences.append(Markup('<span class="bad">{}: {}</span>.').format(scene.label, fault))
     if models > 1:
         how = Markup("agree within <b>{}</b> of the largest eigenvalue").format(up_to(scene.disagreement))
-        if not scene.agrees:
+        if scene.disagreement > AGREEMENT:
             how = Markup('<span class="bad">do not agree: they differ by {} of the largest eigenvalue</span>')
             how = how.format(number(scene.disagreement))
-            if scene.faults:
-                how = Markup('<span class="bad">are not those of their equations: {}</span>').format(scene.faults[0])
         sentences.append(Markup("{}: the modes of {} models {}.").format(scene.label, in_words(models), how))
     rest = _first(scene.rest)
     if rest is not None:
@@ -190,17 +194,13 @@ def _facts(scene: SceneModes) -> list[Fact]:
     """Return the facts at the top of the page of modes."""
     facts = []
     models = max(len(scene.rest), len(scene.rotation))
-    if models > 1:
-        tone = "good" if scene.agrees else "bad"
-        text = "✓ agree" if scene.agrees else "✗ do not agree"
-        facts.append(
-            Fact(
-                "Models",
-                text,
-                f"{models}; difference {number(scene.disagreement)} of the largest eigenvalue",
-                tone,
-            )
-        )
+    note = f"{models}; difference {number(scene.disagreement)} of the largest eigenvalue"
+    if scene.faults:
+        facts.append(Fact("Models", "✗ not their equations", scene.faults[0], "bad"))
+    elif models > 1 and scene.agrees:
+        facts.append(Fact("Models", "✓ agree", note, "good"))
+    elif models > 1:
+        facts.append(Fact("Models", "✗ do not agree", note, "bad"))
     rotation = _first(scene.rotation)
     if rotation is not None and len(rotation.speeds) > 1:
         low, high = float(rotation.speeds[0]), float(rotation.speeds[-1])
@@ -221,19 +221,20 @@ def _facts(scene: SceneModes) -> list[Fact]:
 def _scene_sections(scene: SceneModes, name: str, *, with_name: bool) -> list[Section]:
     """Return the sections of one scene; `name` begins their ids, the scene's own name their headings."""
     before = f"{scene.label}: " if with_name else ""
+    axis_name = f"rotor speed of {scene.label}" if with_name else "rotor speed"
     sections = []
     rest, rotation = _first(scene.rest), _first(scene.rotation)
     if rotation is not None and len(rotation.speeds) > 1 and not np.isnan(rotation.growth_rates).all():
-        legend, cards = _campbell(rotation, name)
+        legend, cards = _campbell(rotation, name, axis_name)
         say = (
             "Horizontally: rotor speed (rad/s), in steady rotation without gravity; a torque "
             "keeps the speed. Frequencies are in the rotor's frame; 1P, 2P: multiples of the "
             "rotor speed."
         )
         sections.append(Section(f"{name}-rotation", f"{before}Campbell diagram", [legend, Grid(2, cards)], say))
-    turning = _turning(scene, name)
+    turning = _turning(scene, name, axis_name)
     if turning is not None:
-        sections.append(replace_heading(turning, before))
+        sections.append(replace(turning, heading=f"{before}{turning.heading}"))
     if rest is not None:
         sections.append(Section(f"{name}-rest", f"{before}At rest", [*_tables(rest, 0), Note(_AT_REST)]))
     folds: list[Grid | Fold | Element] = []
@@ -258,14 +259,17 @@ def _scene_sections(scene: SceneModes, name: str, *, with_name: bool) -> list[Se
     return sections
 
 
-def replace_heading(section: Section, before: str) -> Section:
-    return replace(section, heading=f"{before}{section.heading}")
+def _campbell(rotation: LinearModes, name: str, axis_name: str) -> tuple[Legend, list[list[Element]]]:
+    """Return the legend and the plots over speed: frequencies with multiples of the speed, their change, damping.
 
-
-def _campbell(rotation: LinearModes, name: str) -> tuple[Legend, list[list[Element]]]:
-    """Return the legend and the plots over speed: frequencies with multiples of the speed, their change, damping."""
+    Parameters
+    ----------
+    rotation : modes over speed.
+    name : begins the keys of the curves.
+    axis_name : of the horizontal axis, which is zoomed together with others of that name.
+    """
     speeds = rotation.speeds
-    axis = Horizontal(f"rotor speed of {name}", "rad/s", "speed", float(speeds[0]), float(speeds[-1]))
+    axis = Horizontal(axis_name, "rad/s", "speed", float(speeds[0]), float(speeds[-1]))
     looks = [mode_look(k, mode) for k, mode in enumerate(rotation.names)]
     frequencies = rotation.damped_frequencies
     top = float(np.nanmax(frequencies, initial=0.0)) * 1.08 or 1.0
@@ -298,19 +302,19 @@ def _campbell(rotation: LinearModes, name: str) -> tuple[Legend, list[list[Eleme
     return Legend(items), [[plot] for plot in plots]
 
 
-def _turning(scene: SceneModes, name: str) -> Section | None:
-    """Return the Floquet multipliers over speed; None without any."""
+def _turning(scene: SceneModes, name: str, axis_name: str) -> Section | None:
+    """Return the Floquet multipliers over speed; None without any. name, axis_name: as for `_campbell`."""
     table = scene.floquet
     if table is None or len(table.speeds) < 2 or not np.isfinite(table.largest).any():
         return None
     speeds = table.speeds
-    axis = Horizontal(f"rotor speed of {name}", "rad/s", "speed", float(speeds[0]), float(speeds[-1]))
+    axis = Horizontal(axis_name, "rad/s", "speed", float(speeds[0]), float(speeds[-1]))
     sizes = np.abs(table.multipliers)
     shown = np.where(sizes > 0.0, sizes, np.nan)
     each = [Curve(f"{name} each", Look(BLUE, "-", "", "each"), speeds, column, dots="only") for column in shown.T]
     largest = Curve(f"{name} largest", Look(VERMILLION, "-", "", "largest"), speeds, table.largest)
     known = shown[np.isfinite(shown)]
-    is_log = bool(len(known)) and bool(known.max() > _SPAN * known.min())
+    is_log = is_wide(known)
     mark = [Mark("1: above it the motion is unstable", y=1.0)]
     plot = Plot(
         "Modulus of the multipliers",

@@ -34,7 +34,7 @@ from rotor_mbs.report.elements import (
     TableCell,
 )
 from rotor_mbs.report.numbers import NOTHING, fixed, formula, in_words, number, up_to
-from rotor_mbs.report.pages import Report, metric, number_cell
+from rotor_mbs.report.pages import Report, metric, number_cell, numbers_sentence
 from rotor_mbs.runs.design import COLUMNS
 from rotor_mbs.runs.read import StoredScene
 
@@ -155,16 +155,8 @@ def claims_page(report: Report) -> PageContent:
     study, claims = report.study, report.claims
     answer = []
     numbers = [claim for claim in claims if claim.is_number]
-    printed = sum(claim.printed is not None and rounds_to(claim.printed, claim) for claim in numbers)
-    corrected = sum(claim.corrected is not None and rounds_to(claim.corrected, claim) for claim in numbers)
     if numbers:
-        text = Markup("Of {} published numbers <b>{}</b> come out of the printed equations and <b>{}</b> out of the ")
-        text += Markup("corrected ones.")
-        answer.append(
-            text.format(
-                in_words(len(numbers)), *(in_words(count) if count else "none" for count in (printed, corrected))
-            )
-        )
+        answer.append(numbers_sentence(numbers))
     sections = []
     if study is not None:
         holds = [study.count(method, HOLDS) for method in study.methods]

@@ -44,11 +44,11 @@ from rotor_mbs.report.looks import (
 from rotor_mbs.report.numbers import SPACE, fixed, number, prefixed, seconds, typeset_title, up_to, with_unit
 from rotor_mbs.report.pages import (
     Report,
+    agree_within,
     agreement,
     agreement_table,
     agreement_text,
     compared_time,
-    computations,
     horizon_of,
     metric,
     metrics_tables,
@@ -127,6 +127,7 @@ def _drawn_runs(scene: StoredScene) -> dict[str, StoredRun]:
 
 
 def _paper_page(scene: StoredScene, report: Report, claims: Sequence[Published]) -> PageContent:
+    """Return the page of a scene of the paper: the printed model beside the corrected one."""
     sections = [
         paper_motion(scene, claims),
         _agreement_section(scene, report),
@@ -149,9 +150,7 @@ def paper_answer(scene: StoredScene) -> list[Markup]:
     methods, error = agreement(scene)
     if error is not None:
         compared, whole = compared_time([scene])
-        verb = "agrees" if len(methods) == 1 else "agree"
-        text = Markup("{} of the corrected model {}").format(with_capital(computations(methods)), verb)
-        text += Markup(" <b>exactly</b>") if error == 0.0 else Markup(" within <b>{} rad</b>").format(up_to(error))
+        text = Markup("Corrected, {}").format(agree_within(methods, error, 2))
         if compared < whole:
             whole_errors = [metric(scene.runs[method], "angle_error_whole") for method in methods]
             at_end = max((value for value in whole_errors if value is not None), default=None)
@@ -339,7 +338,7 @@ def own_answer(scene: StoredScene, run: StoredRun | None) -> list[Markup]:
         size, blade, at = moment
         text = Markup("The largest blade root moment is <b>{}</b>, blade {} at {}.")
         sentences.append(text.format(prefixed(size, "N m"), blade, seconds(at)))
-    sentences.append(Markup("{}").format(agreement_text(scene)))
+    sentences.append(agreement_text(scene))
     return [sentence for sentence in sentences if sentence]
 
 
@@ -548,6 +547,7 @@ def _motion_section(
 
 
 def _energy_channel(run: StoredRun) -> Channel | None:
+    """Return kinetic and potential energy and the work of the loads; None where the run does not have them."""
     names = ("kinetic_energy", "potential_energy", "work")
     if not all(name in run for name in names):
         return None

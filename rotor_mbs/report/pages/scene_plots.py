@@ -207,6 +207,7 @@ class Channel(NamedTuple):
         marks: Sequence[Mark] = (),
         still: bool = False,
     ) -> Plot:
+        """Return the plot of the curves over time; height, marks and still are those of `Plot`."""
         curves = [Curve(key, look, time, values, self.breaks) for key, look, values in self.curves]
         return Plot(
             self.name,

@@ -34,18 +34,17 @@ from rotor_mbs.report.elements import (
     SourceText,
     TableCell,
 )
+from rotor_mbs.report.files import MAX_NUMBERS
 from rotor_mbs.report.looks import BLUE, Look, coordinate_look, step_look, with_capital
 from rotor_mbs.report.numbers import number, prefix_of, shortest, typeset_title
-from rotor_mbs.report.pages import words_of
+from rotor_mbs.report.pages import is_wide, words_of
 from rotor_mbs.report.pages.scene_plots import Jumps, blade_look, jumps_of
 from rotor_mbs.runs.sweeps import StoredSweep, parameter_name
 from rotor_mbs.runs.table import text_of
 from rotor_mbs.solution.quantities import LOADS
 from rotor_mbs.solution.status import GOOD, STATUSES
 
-_SPAN = 30.0  # between the smallest and the largest value, beyond which an axis is logarithmic
 _COUNTS = ("steps", "rhs_evaluations", "time_reached")  # columns that say nothing of the motion
-_MAX_NUMBERS = 150_000  # of curves on a page: 800 kB
 _MAX_ROWS = 500  # of the table of all runs
 _MAX_CELLS = 24  # of a map in each direction
 _DECIDES = 0.6  # share of the variance of a quantity that a parameter explains, when it is said to decide
@@ -93,6 +92,16 @@ class _Sweep:
         return np.isin(self.statuses, [code for code, status in enumerate(STATUSES) if status in GOOD])
 
     @cached_property
+    def good_words(self) -> str:
+        """What the runs are called that need no attention: ok; those of the printed equations completed."""
+        present = [STATUSES[code] for code in np.unique(self.statuses[self.is_good]).tolist()]
+        return " or ".join(present) or "ok"
+
+    def tone(self, run: int) -> str:
+        """Return the colour of a run's status; of a completed run nothing is claimed."""
+        return "good" if self.status_of(run) == "ok" else "" if self.is_good[run] else "bad"
+
+    @cached_property
     def varied(self) -> list[str]:
         """The parameters with more than one value."""
         return [key for key in self.keys if len(np.unique(self.parameters[key])) > 1]
@@ -131,7 +140,10 @@ def sweep_page(stored: StoredSweep) -> PageContent:
         say = ""
         if curves and (places < 0).any():
             count = int((places >= 0).sum())
-            say = f"Curves of {count} of {len(places)} runs: those that are not ok, the corners, and every few."
+            say = f"Curves of {count} of {len(places)} runs: those that are not {sweep.good_words}, the corners, "
+            say += "and every few."
+            if len(stored.methods) > 1:
+                say += f" By {stored.methods[int(sweep.codes[0])]} alone."
         sections.append(
             Section(
                 "map",
@@ -140,20 +152,20 @@ def sweep_page(stored: StoredSweep) -> PageContent:
                 say,
             )
         )
+    is_shown = map_element is not None or bool(curves)  # so that a run can be chosen
     sections.append(_over_parameters(sweep, quantities, first_method))
-    sections.append(_faults_section(sweep))
-    sections.append(_runs_section(sweep, quantities))
+    sections.append(_faults_section(sweep, with_links=is_shown))
+    sections.append(_runs_section(sweep, quantities, with_links=is_shown))
     sections.append(_details_section(sweep, quantities))
-    known = {"start": _start(sweep, quantities, places)} if map_element is not None or curves else {}
     data: dict[str, object] = {}
-    if known:
+    if is_shown:
         data = {
             "values": [[_json_number(value) for value in quantity.values.tolist()] for quantity in quantities],
             "labels": [sweep.described(run) for run in range(len(sweep.statuses))],
             "statuses": [sweep.status_of(run) for run in range(len(sweep.statuses))],
             "numbers": sweep.numbers.tolist(),
             "places": places.tolist(),
-            **known,
+            "start": _start(sweep, quantities, places),
         }
     title = typeset_title(str(stored.attributes["title"]))
     about = with_capital(str(stored.attributes["summary"]).rstrip("."))
@@ -244,12 +256,6 @@ def _over(statistic: object, values: Array, axis: int) -> Array:
     return np.where(known, statistic(filled, axis=axis), np.nan)
 
 
-def is_wide(values: Array) -> bool:
-    """Whether positive values span so much that a logarithmic axis shows more."""
-    known = values[np.isfinite(values)]
-    return bool(len(known)) and bool(known.min() > 0.0) and bool(known.max() > _SPAN * known.min())
-
-
 def explained(values: Array, parameter: Array) -> float:
     """Return the share of the variance of `values` that lies between the values of a parameter.
 
@@ -271,13 +277,13 @@ def explained(values: Array, parameter: Array) -> float:
 
 
 def sweep_answer(sweep: _Sweep, quantities: Sequence[RunQuantity]) -> list[Markup]:
-    """Return how many runs are ok, which are not, and what the parameters do to the first quantities."""
+    """Return how many runs are ok or completed, which are not, and what the parameters do to the first quantities."""
     count = len(sweep.statuses)
     good = int(sweep.is_good.sum())
     text = (
-        Markup("<b>{} of {} runs are ok</b>").format(good, count)
+        Markup("<b>{} of {} runs {} {}</b>").format(good, count, "is" if good == 1 else "are", sweep.good_words)
         if good < count
-        else Markup("<b>All {} runs are ok</b>").format(count)
+        else Markup("<b>All {} runs are {}</b>").format(count, sweep.good_words)
     )
     for code in np.unique(sweep.statuses[~sweep.is_good]):
         runs = np.flatnonzero(sweep.statuses == code)
@@ -321,7 +327,7 @@ def _deciding(sweep: _Sweep, values: Array) -> str:
 
 
 def common_values(sweep: _Sweep, runs: NDArray[np.int64]) -> str:
-    """Return the values of the parameters that all of these runs share and other runs do not; "" where none."""
+    """Return the values of the varied parameters that all of these runs share; "" where they share none."""
     parts = []
     for key in sweep.varied:
         own = np.unique(sweep.parameters[key][runs])
@@ -331,8 +337,12 @@ def common_values(sweep: _Sweep, runs: NDArray[np.int64]) -> str:
 
 
 def _facts(sweep: _Sweep, quantities: Sequence[RunQuantity]) -> list[Fact]:
+    """Return how many runs are ok, the ranges of two parameters, and those of the first quantities."""
     count, good = len(sweep.statuses), int(sweep.is_good.sum())
-    facts = [Fact("Runs that are ok", f"{good} of {count}", tone="good" if good == count else "bad")]
+    is_checked = sweep.good_words == "ok"
+    note = "" if is_checked else "nothing is claimed of the printed equations"
+    tone = "bad" if good < count else "good" if is_checked else ""
+    facts = [Fact(f"Runs that are {sweep.good_words}", f"{good} of {count}", note, tone)]
     for key in sweep.varied[:2]:
         values = sweep.parameters[key]
         low, high = brief(values.min()), brief(values.max())
@@ -376,7 +386,7 @@ def _map(sweep: _Sweep, quantities: Sequence[RunQuantity], shown: NDArray[np.boo
     if any(cell is not None and cell[1] == "failed" for line in cells for cell in line):
         note += " ✗: failed."
     if len(sweep.stored.methods) > 1:
-        note += f" By {sweep.stored.methods[int(sweep.codes[shown][0])]}."
+        note += f" By {sweep.stored.methods[int(sweep.codes[shown][0])]} alone."
     label = f"Runs by {field_name(rows_key)} and {field_name(columns_key)}; arrow keys move, the curves follow"
     names = [with_capital(quantity.title) for quantity in quantities]
     texts = ([brief(value) for value in values] for values in (columns, rows[::-1]))
@@ -412,9 +422,9 @@ def _curves(sweep: _Sweep, shown: NDArray[np.bool_]) -> tuple[list[Plot], NDArra
     if not wanted or len(time) < 2:
         return [], places
     columns = sum(len(curves) for _, _, curves in wanted)
-    every = max(1, math.ceil(len(time) * columns / (_MAX_NUMBERS // 4)))
+    every = max(1, math.ceil(len(time) * columns / (MAX_NUMBERS // 4)))
     samples = time[::every]
-    runs = chosen_runs(sweep, shown, max(4, _MAX_NUMBERS // (columns * len(samples))))
+    runs = chosen_runs(sweep, shown, max(4, MAX_NUMBERS // (columns * len(samples))))
     places[runs] = np.arange(len(runs))
     axis = Horizontal("time", "s", "t", float(time[0]), float(time[-1]))
     jumps = _jumps(sweep)
@@ -465,7 +475,11 @@ def chosen_runs(sweep: _Sweep, shown: NDArray[np.bool_], most: int) -> NDArray[n
 
 
 def _start(sweep: _Sweep, quantities: Sequence[RunQuantity], places: NDArray[np.int64]) -> int:
-    """Return the run that is shown first: of those that are ok and have curves, the one with the median quantity."""
+    """Return the run that is shown first.
+
+    Of those that need no attention and have curves it is the one nearest to the middle of the grid; of a sweep that is
+    no grid the one whose first quantity is nearest to the median.
+    """
     candidates = np.flatnonzero((places >= 0) & sweep.is_good)
     if not len(candidates):
         candidates = np.flatnonzero(places >= 0) if (places >= 0).any() else np.arange(len(places))
@@ -487,11 +501,16 @@ def _start(sweep: _Sweep, quantities: Sequence[RunQuantity], places: NDArray[np.
 
 
 def _over_parameters(sweep: _Sweep, quantities: Sequence[RunQuantity], shown: NDArray[np.bool_]) -> Section:
-    """Return quantities over each parameter: a curve per value of the other one of a grid, else a point per run."""
+    """Return quantities over each parameter: a curve per value of the other one of a grid, else a point per run.
+
+    shown: (runs,) which of them are drawn, those of the first method.
+    """
     chosen = quantities[:3]
     elements: list[Grid | Fold | Element] = []
     if not sweep.varied or not chosen:
         return Section("slices", "", [])
+    methods = sweep.stored.methods
+    method = f" By {methods[int(sweep.codes[shown][0])]} alone." if len(methods) > 1 else ""
     keys = sweep.grid_keys
     if len(keys) == 2:
         key, other = keys
@@ -506,7 +525,7 @@ def _over_parameters(sweep: _Sweep, quantities: Sequence[RunQuantity], shown: ND
                     _parameter_curve(f"step-{i}", items[i][1], sweep.parameters[key][mine], quantity.values[mine])
                 )
             cards.append([_parameter_plot(sweep, key, quantity, curves)])
-        say = f"Horizontally: {sweep.axis_name(key)}. A curve per {sweep.axis_name(other)}."
+        say = f"Horizontally: {sweep.axis_name(key)}. A curve per {sweep.axis_name(other)}.{method}"
         if _is_log(sweep.parameters[key]) and not sweep.parameters[key].all():
             say += " The axis is logarithmic: runs at 0 are in the map."
         return Section("slices", f"Over {field_name(key)}", [Legend(items), Grid(3, cards)], say)
@@ -518,7 +537,7 @@ def _over_parameters(sweep: _Sweep, quantities: Sequence[RunQuantity], shown: ND
             is_line = len(sweep.varied) == 1
             curve = Curve(curve.key, curve.look, curve.x, curve.y, dots="line" if is_line else "only")
             cards.append([_parameter_plot(sweep, key, quantity, [curve])])
-        elements += [Note(f"Horizontally: {sweep.axis_name(key)}."), Grid(3, cards)]
+        elements += [Note(f"Horizontally: {sweep.axis_name(key)}.{method}"), Grid(3, cards)]
     heading = f"Over {field_name(sweep.varied[0])}" if len(sweep.varied) == 1 else "Over each parameter"
     return Section("slices", heading, elements)
 
@@ -529,7 +548,7 @@ def _parameter_curve(key: str, look: Look, parameter: Array, values: Array) -> C
 
 
 def _is_log(parameter: Array) -> bool:
-    """Whether a parameter has a logarithmic axis: no value is negative, and the positive ones span decades."""
+    """Return whether a parameter has a logarithmic axis: no value is negative, and the positive ones span decades."""
     return bool((parameter >= 0.0).all()) and is_wide(parameter[parameter > 0.0])
 
 
@@ -563,8 +582,11 @@ def _parameter_plot(sweep: _Sweep, key: str, quantity: RunQuantity, curves: Sequ
 # ---- Tables
 
 
-def _faults_section(sweep: _Sweep) -> Section:
-    """Return the runs that are not ok, grouped by status and reason, with the ranges of their parameters."""
+def _faults_section(sweep: _Sweep, *, with_links: bool) -> Section:
+    """Return the runs that are not ok, grouped by status and reason, with the ranges of their parameters.
+
+    with_links: whether there is a map or a plot that shows the example of each group.
+    """
     groups: dict[tuple[int, str], list[int]] = {}
     messages = [text_of(characters) for characters in sweep.stored.column("message")]
     for run in np.flatnonzero(~sweep.is_good).tolist():
@@ -583,7 +605,7 @@ def _faults_section(sweep: _Sweep) -> Section:
         worst = runs[int(np.nan_to_num(sizes, nan=-1.0).argmax())]
         reason = messages[worst] or "no reason is stored"
         row.append(TableCell(reason, mark="across"))
-        row.append(TableCell(str(sweep.numbers[worst]), href=f"#run-{worst}"))
+        row.append(TableCell(str(sweep.numbers[worst]), href=f"#run-{worst}" if with_links else ""))
         rows.append(row)
     head = (
         "Status",
@@ -592,24 +614,26 @@ def _faults_section(sweep: _Sweep) -> Section:
         "Reason",
         "Example",
     )
-    return Section(
-        "faults",
-        "Runs that are not ok",
-        [PageTable("Runs that are not ok", head, rows)] if rows else [],
-    )
+    heading = f"Runs that are not {sweep.good_words}"
+    return Section("faults", heading, [PageTable(heading, head, rows)] if rows else [])
 
 
-def _runs_section(sweep: _Sweep, quantities: Sequence[RunQuantity]) -> Section:
-    """Return all runs in a table that is folded, those that are not ok first."""
+def _runs_section(sweep: _Sweep, quantities: Sequence[RunQuantity], *, with_links: bool) -> Section:
+    """Return all runs in a table that is folded, those that are not ok first.
+
+    with_links: whether there is a map or a plot that shows a run whose number is clicked.
+    """
     chosen = quantities[: max(1, 6 - len(sweep.varied))]
     order = [*np.flatnonzero(~sweep.is_good).tolist(), *np.flatnonzero(sweep.is_good).tolist()][:_MAX_ROWS]
     several = len(sweep.stored.methods) > 1
     rows: list[Row] = []
     for run in order:
-        tone = "good" if sweep.is_good[run] else "bad"
+        tone = sweep.tone(run)
         sign = "✓ " if tone == "good" else ""
         row: list[TableCell | str] = [
-            TableCell(str(sweep.numbers[run]), href=f"#run-{run}", order=float(sweep.numbers[run]))
+            TableCell(
+                str(sweep.numbers[run]), href=f"#run-{run}" if with_links else "", order=float(sweep.numbers[run])
+            )
         ]
         if several:
             row.append(sweep.stored.methods[int(sweep.codes[run])])
@@ -631,7 +655,7 @@ def _runs_section(sweep: _Sweep, quantities: Sequence[RunQuantity]) -> Section:
     hint = (
         "click a heading to sort"
         if count <= _MAX_ROWS
-        else f"the first {_MAX_ROWS}, those that are not ok before the others"
+        else f"the first {_MAX_ROWS}, those that are not {sweep.good_words} before the others"
     )
     return Section("runs", "All runs", [Fold(f"{count} runs", hint, [table])] if rows else [])
 
@@ -646,7 +670,7 @@ def _details_section(sweep: _Sweep, quantities: Sequence[RunQuantity]) -> Sectio
         if len(values) > 1:
             quantiles = [number(float(value), 3) for value in np.quantile(values, (0.0, 0.05, 0.5, 0.95, 1.0))]
             rows.append((with_capital(quantity.title), *quantiles))
-    head = ("Result of the ok runs", "Smallest", "5 %", "Median", "95 %", "Largest")
+    head = (f"Result of the {sweep.good_words} runs", "Smallest", "5 %", "Median", "95 %", "Largest")
     folds: list[Grid | Fold | Element] = [
         Fold(
             "Parameters",

@@ -64,14 +64,17 @@ def viewer(stored: StoredScene, runs: Mapping[str, StoredRun]) -> dict[str, Any]
 
 
 def angles_at(time: Array, angles: Array, step: float) -> Array:
-    """(frames, coordinates) rad at 0, step, 2 step ...: straight between samples."""
+    """Return the angles at 0, step, 2 step ..., interpolated between samples: (frames, coordinates) rad."""
     count = math.floor(float(time[-1]) / step + 1e-9) + 1
     at = np.minimum(np.arange(count) * step, time[-1])
     return np.stack([np.interp(at, time, column) for column in angles.T], axis=1)
 
 
 def magnification(scene: Scene) -> int | None:
-    """How many times a tip's distance from its pitch axis is drawn, so that it is a tenth of the blade; at least 1."""
+    """Return by how much the distance of the tips from their pitch axes is magnified in the picture.
+
+    It is drawn as a tenth of the longest blade, and at least as it is. None: the tips lie on the axes.
+    """
     offset = max(math.hypot(*blade.tip[:2]) for blade in scene.blades)
     if not offset:
         return None
