@@ -38,7 +38,7 @@ from rotor_mbs.runs.table import (
 from rotor_mbs.runs.trailer import SWEEP, may_extend
 from rotor_mbs.runs.versions import row_versions
 from rotor_mbs.scenario.scene import Scene, parse_scene
-from rotor_mbs.scenario.sweep import SPLITS, Sweep, split_rows
+from rotor_mbs.scenario.sweep import SPLITS, Sweep
 from rotor_mbs.solution import quantities
 from rotor_mbs.solution.status import code_of
 
@@ -86,9 +86,8 @@ def sweep_table(sweep: Sweep, methods: Sequence[str], numbers: range) -> Table:
     column = Column(("run",), "1", "code of the method", attributes=flags(methods))
     known["method_code"] = column, (runs // rows).astype(np.int8)
     if options.validation or options.test:
-        splits = split_rows(rows, options.validation, options.test, options.seed)
         column = Column(("run",), "1", "split of the dataset", attributes=flags(SPLITS))
-        known["split"] = column, splits[runs % rows]
+        known["split"] = column, options.splits()[runs % rows]
     kind = {"float64": "<f8", "float32": "<f4"}[options.precision]
     asked = [quantity for quantity in quantities.quantities(sweep.outputs) if quantity.output and quantity.required]
     trajectories = {

@@ -186,7 +186,7 @@ class Design:
     error_growth, defects : whether they are computed for every run.
     combine : "grid" or "zip".
     draws, seed : number of random values of each random axis; seed of the random numbers.
-    validation, test : shares of the runs.
+    validation, test : shares of the runs; in a grid with random axes of the draws, see `splits`.
     axes : what is varied.
     """
 
@@ -228,7 +228,9 @@ class Design:
     )
     draws: int = file_key("draws", _DRAWS, default=0)
     seed: int = file_key("seed", _SEED, default=0)
-    validation: float = file_key("validation", _SHARE, note=": fraction of the runs", default=0.0)
+    validation: float = file_key(
+        "validation", _SHARE, note=": fraction of the runs, of a grid with random axes of the draws", default=0.0
+    )
     test: float = file_key("test", _SHARE, note="; validation + test < 1", default=0.0)
     axes: tuple[Axis, ...] = file_key("axis", _AXES)
 
@@ -321,6 +323,19 @@ class Design:
             numbers = numbers // count
         return table
 
+    def splits(self) -> NDArray[np.int8]:
+        """Return which rows are for training, validation and test: places in `SPLITS`, (rows,).
+
+        Rows of the same draw are in the same split. Otherwise, in a grid of random and other axes, nearly every draw
+        would be in several, and a model would be tested on starts that it was trained with.
+        """
+        shape, drawn = self.shape, [axis.is_drawn for axis in self.axes]
+        numbers = np.arange(self.count)
+        if any(drawn) and self.combine == "grid":
+            place = next(place for place, digit in enumerate(self._digits) if drawn[digit[0]])
+            numbers = np.unravel_index(numbers, shape)[place]
+        return split_rows(int(numbers.max()) + 1, self.validation, self.test, self.seed)[numbers]
+
     @functools.cached_property
     def values(self) -> list[Array]:
         """Return the values of each axis, (values,)."""
@@ -356,12 +371,12 @@ DESIGN_KEYS = keys.declared_keys(Design)
 
 
 def split_rows(count: int, validation: float, test: float, seed: int) -> NDArray[np.int8]:
-    """Draw which rows of a sweep are for training, validation and test.
+    """Draw which rows, or draws, of a sweep are for training, validation and test.
 
     Parameters
     ----------
-    count : number of rows.
-    validation, test : shares of the rows, to the nearest row.
+    count : their number.
+    validation, test : shares of them, to the nearest whole number.
     seed : of the random numbers.
 
     Returns

@@ -52,8 +52,8 @@ def write_splits(path: Path | str, folder: Path) -> list[Path]:
     """Write the dataset at `path` as a folder that `datasets.load_dataset(folder)` of Hugging Face reads.
 
     That reader takes each variable of an HDF5 file for a column, and wants one number of rows in all of them: each
-    split is a file of its own, without the scales. Runs that are missing are left out; those that failed have their
-    status. A split is held in memory while it is written.
+    split is a file of its own, without the scales but the time, which is repeated in every row. Runs that are missing
+    are left out; those that failed have their status. A split is held in memory while it is written.
 
     Parameters
     ----------
@@ -87,7 +87,14 @@ def write_splits(path: Path | str, folder: Path) -> list[Path]:
                     values = np.ascontiguousarray(values).view(f"S{values.shape[1]}")[:, 0]
                 variable = file.create_dataset(name, data=values)
                 variable.attrs.update(units=column.units, long_name=column.long_name)
+            if "time" in stored.columns:
+                # The reader has no scales: each row has the times of its samples.
+                time = np.broadcast_to(stored.column("time"), (len(rows), len(stored.column("time"))))
+                variable = file.create_dataset("time", data=time)
+                variable.attrs.update(units="s", long_name="time, the same in all runs")
     card = folder / "README.md"
+    if "time" in stored.columns:
+        columns["time"] = Column(("run", "time"), "s", "time, the same in all runs")
     facts = {
         "splits": [file.stem for file in files],
         "time": stored.column("time") if "time" in stored.columns else (),

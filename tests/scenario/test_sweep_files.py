@@ -70,6 +70,21 @@ def test_the_shares_for_validation_and_test_are_exact_and_drawn() -> None:
     np.testing.assert_array_equal(codes == 1, split_rows(1000, 0.2, 0.0, 3) == 1)
 
 
+def test_no_draw_stands_in_two_splits() -> None:
+    """Forty random starts at three stiffnesses; without the other axis every row is a draw."""
+    random, other = "initial.angles[1]", "bearing.stiffness"
+    scene = find_scenes(["paper/fig11"])[0]
+    for order in ((random, other), (other, random)):
+        axes = {random: {"uniform": [0.0, 1.0]}, other: [0.0, 1e3, 1e4]}
+        design = sweep_of(scene, {key: axes[key] for key in order}, draws=40, validation=0.2, test=0.1).design
+        codes, starts = design.splits(), design.rows(0, design.count)[:, order.index(random)]
+        assert np.bincount(codes).tolist() == [84, 24, 12]
+        for start in np.unique(starts):
+            assert len(set(codes[starts == start].tolist())) == 1
+    alone = sweep_of(scene, {random: {"uniform": [0.0, 1.0]}}, draws=40, validation=0.2).design
+    np.testing.assert_array_equal(alone.splits(), split_rows(40, 0.2, 0.0, 0))
+
+
 def test_a_sweep_without_a_file_is_that_of_its_text(tmp_path: Path) -> None:
     scene = find_scenes(["paper/fig11"])[0]
     axes = {"gravity": [9.0, 10.0], "initial.angles[1]": {"linear": {"start": 0, "end": 1, "count": 3}}}

@@ -81,6 +81,8 @@ def test_a_split_has_its_runs_bit_for_bit(dataset: Path) -> None:
             assert file["tip"].attrs["units"] == "m"
             for name, values in columns.items():
                 assert file[name][()].tobytes() == values.tobytes()
+            with h5py.File(dataset) as whole:
+                assert (file["time"][()] == whole["time"][()]).all()
 
 
 def test_a_dataset_card_replaces_its_own_kind_only(dataset: Path, tmp_path: Path) -> None:
