@@ -11,9 +11,9 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from support.commands import rotor_mbs
 
 import rotor_mbs as rm
-from rotor_mbs.cli import main
 from rotor_mbs.cli.arguments import _parser, parse
 from rotor_mbs.cli.verdicts import line
 from rotor_mbs.methods.catalogue import method_names
@@ -96,9 +96,9 @@ def make_inputs(name: str) -> None:
         fewer = sweep.replace("draws = 100 ", "draws = 4 ").replace("error_growth = true", "error_growth = false")
         assert fewer != sweep
         Path("sweep.toml").write_text(fewer)
-        assert main(["sweep", "sweep.toml", "-o", "study.h5", "-j", "1"]) == 0
+        assert rotor_mbs("sweep", "sweep.toml", "-o", "study.h5", "-j", 1).status == 0
     elif name == "bench.md":
-        main(shlex.split("bench check/general -m lagrange/dop853 -o bench.h5 --budget 1 --repeats 1"))
+        rotor_mbs(*shlex.split("bench check/general -m lagrange/dop853 -o bench.h5 --budget 1 --repeats 1"))
 
 
 @pytest.mark.full

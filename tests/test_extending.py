@@ -37,6 +37,7 @@ PACKAGES = {
         {"momentum": "rotor_momentum:QUANTITY", "broken": "rotor_momentum:NOTHING", "number": "math:pi"},
     ),
 }
+METHODS = ("outside/rk4", "lagrange/dop853", "exudyn_tree/rk67")
 # What outside/rk4 can compute, with pitches at rest.
 SCENE = rm.scene("check/general").replace(
     duration=0.5, samples=51,
@@ -84,15 +85,24 @@ def test_list_show_and_a_wrong_name_know_the_method() -> None:
     assert "no springs" in command("run", "stiff/bearing-1e4", "-m", "outside/rk4", status=2)
 
 
-def test_a_run_is_stored_judged_and_checked() -> None:
-    command("run", "one.toml", "-m", "outside/rk4", "-m", "lagrange/dop853", "-o", "one.h5", "-j", "1")
-    stored = rm.open("one.h5")
-    run, other = stored["one/outside/rk4"], stored["one/lagrange/dop853"]
+@pytest.fixture(scope="module")
+def stored(folder: Path) -> Path:
+    """A file of runs of worker processes, which find the packages for themselves."""
+    path = folder / "two.h5"
+    words = [word for method in METHODS for word in ("-m", method)]
+    ended = rotor_mbs("run", folder / "two.toml", *words, "-o", path, "-j", 1, processes=True)
+    assert ended.status == 0, ended
+    return path
+
+
+def test_a_run_is_stored_judged_and_checked(stored: Path) -> None:
+    runs = rm.open(stored)
+    run, other = runs["two/outside/rk4"], runs["two/lagrange/dop853"]
     assert (run.status, run.settings) == ("ok", {"step": 2e-3})
     assert np.abs(run.angles - other.angles).max() < 1e-9  # order 4: 1e-11 at this step
     assert np.abs(run["tip"] - other["tip"]).max() < 1e-8
-    assert "shaft_momentum" not in other.quantities  # nobody asked for it
-    assert "defect: one outside/rk4" in command("check", "one.h5", "-v")
+    assert "shaft_momentum" not in rm.run("one.toml", "outside/rk4").quantities  # nobody asked for it
+    assert "defect: two outside/rk4" in command("check", str(stored), "-v")
 
 
 def test_a_sweep_takes_its_runs_side_by_side_and_judges_them_by_its_own_bounds() -> None:
@@ -117,22 +127,20 @@ def test_a_sweep_takes_its_runs_side_by_side_and_judges_them_by_its_own_bounds()
         assert np.array_equal(data.at("angles", 5)[0], alone.angles[5])
 
 
-def test_a_quantity_is_stored_judged_and_drawn_for_every_method() -> None:
-    methods = ("outside/rk4", "lagrange/dop853", "exudyn_tree/rk67")
-    command("run", "two.toml", *(word for method in methods for word in ("-m", method)), "-o", "two.h5", "-j", "1")
+def test_a_quantity_is_stored_judged_and_drawn_for_every_method(stored: Path) -> None:
     # At the start the pitches are at rest: twice the kinetic energy by the rotor's rate.
     (kinetic,), _ = energies(SCENE, np.array([[*SCENE.initial_angles, *SCENE.initial_rates]]))
-    stored = rm.open("two.h5")
-    for method in methods:
-        run = stored[f"two/{method}"]
+    runs = rm.open(stored)
+    for method in METHODS:
+        run = runs[f"two/{method}"]
         assert run["shaft_momentum"].shape == (51,)
         assert run["shaft_momentum"][0] == pytest.approx(2.0 * kinetic / 0.4, rel=1e-12)
         assert 0.0 <= run.metrics["shaft_momentum_error_max"] < 1.0
-    with h5py.File("two.h5") as file:
+    with h5py.File(stored) as file:
         column = file["two/shaft_momentum"]
-        assert (column.attrs["units"], column.shape) == ("N m s", (len(stored), 51))
-    assert "momentum" in command("check", "two.h5", "-v")
-    page = write_report(Path("two.h5"), Path("pages")).read_text()
+        assert (column.attrs["units"], column.shape) == ("N m s", (len(runs), 51))
+    assert "momentum" in command("check", str(stored), "-v")
+    page = write_report(stored, Path("pages")).read_text()
     assert "from outside, RK4" in page
     assert "Angular momentum about the shaft" in page
 

@@ -108,7 +108,7 @@ def with_late_fault(scene: Scene, share: float) -> Trajectory:
     return first.replace(angles=angles, rates=np.vstack([first.rates[:row], after.rates]))
 
 
-@pytest.mark.parametrize("samples", [81, 41])
+@pytest.mark.parametrize("samples", [pytest.param(81, marks=pytest.mark.full), 41])
 @pytest.mark.parametrize(
     "fault",
     [lambda s: with_jump(s, 0.05), lambda s: with_jump(s, 0.015), lambda s: with_late_fault(s, 0.003)],

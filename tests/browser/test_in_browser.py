@@ -103,10 +103,9 @@ def axe(tmp_path_factory: pytest.TempPathFactory) -> str:
 @pytest.mark.parametrize("width", SIZES)
 def test_no_error_no_request_no_sideways_scrolling(page: Page, pages: list[Path], width: int) -> None:
     for path in pages:
-        seconds = page.open(path, width)
+        page.open(path, width)
         assert page.faults == [], path.name
         assert page.run("document.documentElement.scrollWidth") <= width, path.name
-        assert seconds < 5.0, path.name  # a machine in use; alone it is a fraction of a second
 
 
 def test_pages_can_be_mailed(pages: list[Path]) -> None:

@@ -104,7 +104,7 @@ def test_all_angles_in_degrees_are_named_and_rest_angles_and_inertias_in_other_u
 
 def test_an_inaccurate_run_names_the_next_step_to_try_until_it_is_accurate() -> None:
     scene = rm.scene("check/general")
-    step, steps = 0.1, [0.1]
+    step, steps = 0.02, [0.02]
     while (run := rm.run(scene, "exudyn_tree/rk44", step=step)).status == "inaccurate":
         step = float(run.message.rpartition("next to try: step=")[2])
         steps.append(step)

@@ -10,10 +10,10 @@ from typing import Any
 
 import numpy as np
 import pytest
+from support.commands import rotor_mbs
 
 import rotor_mbs as rm
 from rotor_mbs.api.comparisons import DataComparison
-from rotor_mbs.cli import main
 from rotor_mbs.studies.modes import compute_modes
 
 Array = Any
@@ -83,27 +83,24 @@ def test_what_nothing_explains_has_no_cause() -> None:
         assert compare(UNEQUAL, wrong).likely == ()
 
 
-def test_the_command_reads_a_table_in_rpm_and_hz_and_few_digits(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_the_command_reads_a_table_in_rpm_and_hz_and_few_digits(tmp_path: Path) -> None:
     """Rows in any order; a mapping with omit."""
     damped, _ = tables(UNEQUAL)
     rows = np.column_stack([SPEEDS * 30.0 / math.pi, damped[:, 1:] / (2.0 * math.pi)])[::-1]
     page, data = tmp_path / "page" / "index.html", tmp_path / "modes.csv"
-    call = ["compare", str(data), "--scene", UNEQUAL, "-o", str(page.parent)]
+    call = ["compare", data, "--scene", UNEQUAL, "-o", page.parent]
     decimals = ["%.17g", "%.4f", "%.4f", "%.4f"]
     for digits, factor, status in ((decimals, 1.0, 0), ("%.17g", 1.001, 1)):
         head = "speed [rpm],f1 [Hz],f2 [Hz],freq_3_Hz"
         np.savetxt(data, rows * [1.0, factor, 1.0, 1.0], digits, ",", header=head, comments="")
-        assert main(call) == status
-        shown = capsys.readouterr().out
+        ended, shown, _ = rotor_mbs(*call)
+        assert ended == status
         assert "frequency 3 = 'freq_3_Hz' [hz]" in shown
         assert "horizon" not in shown
         assert ("rounding error" in shown) == (digits == decimals)
         assert ("inaccurate" in page.read_text()) == (status == 1)
     (tmp_path / "map.toml").write_text('omit = ["frequency_1"]\n')
-    assert main([*call, "--columns", str(tmp_path / "map.toml"), "--json"]) == 0
-    assert '"axis": "speed"' in capsys.readouterr().out
+    assert '"axis": "speed"' in rotor_mbs(*call, "--columns", tmp_path / "map.toml", "--json").out
 
 
 def test_the_programs_own_file_of_modes_is_data_too(tmp_path: Path) -> None:

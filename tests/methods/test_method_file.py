@@ -68,7 +68,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
 
 
 def run(*words: str) -> str:
-    ended = rotor_mbs("run", "one.toml", "-j", "1", *words)
+    ended = rotor_mbs("run", "one.toml", "-j", 1, *words)
     assert ended.status == 0, ended
     return ended.out
 
@@ -162,24 +162,13 @@ def test_a_file_that_cannot_be_used_is_one_line(
     assert not Path("o.h5").exists()
 
 
+@pytest.mark.full  # what each of them becomes in the program itself: test_pool.py, test_judgement.py
 def test_whatever_a_method_does_is_one_line_and_loses_nothing(
     capfd: pytest.CaptureFixture[str],
 ) -> None:
     Path("bad.py").write_text("import os; print('x' * 10**6); os.write(1, b'x' * 10**6)\n" + BAD)
-    ended = rotor_mbs(
-        "run",
-        "one.toml",
-        "-m",
-        "bad.py",
-        "-m",
-        "mine.py",
-        "-o",
-        "o.h5",
-        "-j",
-        "1",
-        "--timeout",
-        "2",
-    )
+    words = ("-m", "bad.py", "-m", "mine.py", "-o", "o.h5", "-j", 1, "--timeout", 2)
+    ended = rotor_mbs("run", "one.toml", *words, processes=True)
     printed = "".join(capfd.readouterr())
     assert ended.status == 1
     assert len(ended.out + ended.err + printed) < 3000
@@ -233,6 +222,9 @@ def test_a_sweep_and_python_take_a_file() -> None:
     Path("bad.py").write_text(BAD)
     with pytest.raises(rm.InputError, match="the file has bad/Raises, "):
         rm.run(scene, "bad.py")
+    run = rm.run(scene, "bad/Raises")
+    assert (run.status, run.message) == ("solver_failed", "bad.py:8: ZeroDivisionError: division by zero")
+    assert rm.run(scene, "bad/Shape").message == "bad/Shape: angles has the shape (6, 1); allowed: (6, 4)"
 
 
 def test_what_modes_and_bench_need_is_named() -> None:

@@ -25,8 +25,18 @@ SCENES = {
 }
 
 
-@pytest.mark.parametrize("method", ["exudyn_tree/rk67", "mujoco/rk4", "lagrange/taylor", "lagrange/dop853"])
-@pytest.mark.parametrize("name", SCENES)
+METHODS = ("exudyn_tree/rk67", "mujoco/rk4", "lagrange/taylor", "lagrange/dop853")
+_QUICK = {("fig11", method) for method in METHODS} | {("jumps", METHODS[0]), ("NREL", METHODS[3])}
+
+
+@pytest.mark.parametrize(
+    ("name", "method"),
+    [
+        pytest.param(name, method, marks=() if (name, method) in _QUICK else pytest.mark.full)
+        for name in SCENES
+        for method in METHODS
+    ],
+)
 def test_momentum_is_the_impulse_of_torque_weights_and_bearing(name: str, method: str) -> None:
     """About the shaft, and in space where no torque jumps. Seen: 3e-11 after jumps, else 1e-13; MuJoCo 1e-7."""
     if not find_method(method).is_installed:

@@ -25,7 +25,7 @@ STIFF = shipped("stiff/nrel-5mw-damped").replace(
 )
 
 
-@pytest.mark.parametrize("damping", [1e5, 1e6])
+@pytest.mark.parametrize("damping", [1e5, pytest.param(1e6, marks=pytest.mark.full)])
 def test_a_run_with_energies_has_the_defects_of_one_without(damping: float) -> None:
     """Round-off. With the work in J the engine accepts steps with errors of 5e-13 rad."""
     pytest.importorskip("heyoka")

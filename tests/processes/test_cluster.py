@@ -12,10 +12,9 @@ from functools import partial
 from pathlib import Path
 
 import pytest
-from support.commands import refusal
+from support.commands import refusal, rotor_mbs
 from support.sweeps import starts_file, stored_runs
 
-from rotor_mbs.cli import main
 from rotor_mbs.errors import InputError, StoreError
 from rotor_mbs.processes.cluster import Cluster, run_as_worker
 from rotor_mbs.processes.pool import SerialPool, run_in
@@ -68,7 +67,7 @@ def test_a_killed_worker_of_a_cluster_loses_nothing(
     output, errors, status = swept(tmp_path, address, worker, 60)
     assert status == 0, (output, errors)
     assert "60 runs: 60 ok" in output
-    assert main(["sweep", str(tmp_path / "s.toml"), "-o", str(tmp_path / "local.h5")]) == 0
+    assert rotor_mbs("sweep", tmp_path / "s.toml", "-o", tmp_path / "local.h5").status == 0
     assert (tmp_path / "dask.h5").read_bytes() == (tmp_path / "local.h5").read_bytes()
 
 

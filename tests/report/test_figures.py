@@ -14,7 +14,6 @@ from support.report_pages import plots_of, section_of, text_of
 from support.scenes import paper
 from support.stored import Made, rotor, store
 
-from rotor_mbs.cli import main
 from rotor_mbs.report.animation import wires
 from rotor_mbs.report.figures import FIGURES, all_figures, available, caption_of, composed, differences
 from rotor_mbs.report.pages.scene_plots import parting
@@ -82,11 +81,12 @@ def test_the_plots_of_a_figure_have_every_sample(results: Path, report: Path) ->
 # As files
 
 
-def test_every_figure_the_file_has_is_written(drawn: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["figures", str(drawn), "-o", str(tmp_path), "--format", "svg"]) == 0
+def test_every_figure_the_file_has_is_written(drawn: Path, tmp_path: Path) -> None:
+    ended = rotor_mbs("figures", drawn, "-o", tmp_path, "--format", "svg")
+    assert ended.status == 0
     names = [f"fig{number:02d}.{ending}" for number in (8, 9, 10, 11, 13, 15, 16) for ending in ("svg", "txt")]
     assert sorted(path.name for path in tmp_path.iterdir()) == sorted(names)
-    assert capsys.readouterr().out.split() == [str(tmp_path / name) for name in names]
+    assert ended.out.split() == [str(tmp_path / name) for name in names]
     head = (tmp_path / "fig11.svg").read_text(encoding="utf-8")[:2000]
     width = re.search(r'width="([\d.]+)pt"', head)
     assert width is not None
@@ -98,7 +98,7 @@ def test_formats_have_the_same_bytes_every_time_and_say_what_they_show(
     drawn: Path, tmp_path: Path, kind: str, start: bytes
 ) -> None:
     for folder in ("a", "b"):
-        assert main(["figures", str(drawn), "--format", kind, "--figure", "11", "-o", str(tmp_path / folder)]) == 0
+        assert rotor_mbs("figures", drawn, "--format", kind, "--figure", 11, "-o", tmp_path / folder).status == 0
     content = (tmp_path / "a" / f"fig11.{kind}").read_bytes()
     assert content.startswith(start)
     assert content == (tmp_path / "b" / f"fig11.{kind}").read_bytes()
@@ -168,7 +168,7 @@ def test_a_changed_scene_and_ones_own_have_figures_that_say_so(tmp_path: Path) -
     changed = paper("fig11", samples=11).replace(gravity=9.0)
     own = replace(changed, name="mine", title="Mine", figures=())
     path = store(tmp_path / "r.h5", [Made(changed, "reference", RIGHT), Made(own, "reference", RIGHT)])
-    assert main(["figures", str(path), "-o", str(tmp_path / "out")]) == 0
+    assert rotor_mbs("figures", path, "-o", tmp_path / "out").status == 0
     names = ["mine.pdf", "mine.txt", "paper-fig11.pdf", "paper-fig11.txt"]
     assert sorted(file.name for file in (tmp_path / "out").iterdir()) == names
     text = (tmp_path / "out" / "paper-fig11.txt").read_text(encoding="utf-8")
@@ -176,7 +176,7 @@ def test_a_changed_scene_and_ones_own_have_figures_that_say_so(tmp_path: Path) -
     assert "Figure 11" not in text
     assert "gravity 9 m/s^2" in text
     assert "changed" not in (tmp_path / "out" / "mine.txt").read_text(encoding="utf-8")
-    assert main(["figures", str(path), "--figure", "mine", "-o", str(tmp_path / "one")]) == 0
+    assert rotor_mbs("figures", path, "--figure", "mine", "-o", tmp_path / "one").status == 0
     assert len([*(tmp_path / "one").iterdir()]) == 2
 
 

@@ -314,7 +314,7 @@ def test_loads_have_a_plot_per_component_and_their_extremes(tmp_path: Path) -> N
 
 
 def test_a_driven_scene_shows_torque_power_pitch_and_command(tmp_path: Path) -> None:
-    path = results_file(tmp_path / "r.h5", ["turbine/pitch-step"], ["lagrange/dop853"])
+    path = results_file(tmp_path / "r.h5", ["turbine/pitch-step"], [])
     text = text_of(write_report(path, tmp_path / "out").parent)
     plots = plots_of(text)
     assert {"Torque on the rotor", "Power of the torque", "Power of the pitch actuators"} <= {*plots}
@@ -352,7 +352,7 @@ def test_a_torque_that_jumps_is_drawn_by_its_table_and_what_follows_is_interrupt
 
 
 def test_a_quantity_below_rounding_of_its_kind_is_zero(tmp_path: Path) -> None:
-    path = results_file(tmp_path / "r.h5", ["check/loads"], ["lagrange/dop853"])
+    path = results_file(tmp_path / "r.h5", ["check/loads"], [])
     text = text_of(write_report(path, tmp_path / "out").parent)
     for row in rows_of(section_of(text, "extremes")).values():
         for cell in row[1:]:

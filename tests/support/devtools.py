@@ -9,7 +9,6 @@ import select
 import shutil
 import subprocess
 import tempfile
-import time
 from pathlib import Path
 from typing import Any
 
@@ -58,16 +57,14 @@ class Page:
                 found: dict[str, Any] = answer["result"]
                 return found
 
-    def open(self, path: Path, width: int, height: int = 900, scheme: str = "light") -> float:
-        """Seconds until the page was loaded."""
+    def open(self, path: Path, width: int, height: int = 900, scheme: str = "light") -> None:
+        """Open a page, and wait until it is loaded."""
         self.call("Emulation.setDeviceMetricsOverride", width=width, height=height, deviceScaleFactor=1, mobile=False)
         self.call("Emulation.setEmulatedMedia", features=[{"name": "prefers-color-scheme", "value": scheme}])
         self.faults, self._loaded = [], False
-        start = time.monotonic()
         self.call("Page.navigate", url=path.absolute().as_uri())
         while not self._loaded:
             self._next()
-        return time.monotonic() - start
 
     def run(self, script: str) -> Any:
         """The value of an expression, or of what it promises."""
