@@ -222,9 +222,11 @@ def test_a_sweep_and_python_take_a_file() -> None:
     Path("bad.py").write_text(BAD)
     with pytest.raises(rm.InputError, match="the file has bad/Raises, "):
         rm.run(scene, "bad.py")
-    run = rm.run(scene, "bad/Raises")
-    assert (run.status, run.message) == ("solver_failed", "bad.py:8: ZeroDivisionError: division by zero")
-    assert rm.run(scene, "bad/Shape").message == "bad/Shape: angles has the shape (6, 1); allowed: (6, 4)"
+    bad = rm.run(scene, ["bad/Raises", "bad/Shape"], workers=0)
+    assert [(run.status, run.message) for run in bad.values()][1:] == [
+        ("solver_failed", "bad.py:8: ZeroDivisionError: division by zero"),
+        ("solver_failed", "bad/Shape: angles has the shape (6, 1); allowed: (6, 4)"),
+    ]
 
 
 def test_what_modes_and_bench_need_is_named() -> None:

@@ -408,7 +408,9 @@ def first_failure(kind: str, tests: tuple[str, ...]) -> str:
 
     with redirect_stdout(io.StringIO()), redirect_stderr(io.StringIO()), tempfile.TemporaryDirectory() as folder:
         for number, (scenes, method) in enumerate(RUNS[kind]):
-            for check in failed(judged(results_file(Path(folder) / f"{number}.h5", scenes.split(), [method]))):
+            # What does not end is ended by the fork's limit: on a busy machine a right run may take its minute.
+            path = results_file(Path(folder) / f"{number}.h5", scenes.split(), [method], timeout_s=1e4)
+            for check in failed(judged(path)):
                 return f"check {check.name}: {' '.join(check.where)}"
         first = _FirstFailure()
         paths = [str(ROOT / "tests" / test) for test in tests]
