@@ -61,7 +61,8 @@ def test_the_physics_of_a_scene_key_is_in_the_files_of_its_row() -> None:
     row = re.findall(r"^\| a scene key \| (.*) \|$", TEXT, re.M)[0]
     named = re.findall(r"`([\w/]+/(?:\w+\.py)?)`", row)
     assert "models/" in named
-    keys = "hub_inertia|bearing_(stiffness|damping|rest)|bearing|shaft_damping|pitch_torque|rotor_torque"
+    keys = "hub_(inertia|radius|mass)|shaft_(tilt|damping)|bearing_(stiffness|damping|rest)"
+    keys += "|bearing|(pitch|rotor)_torque"
     using = [file for file, code in CODE.items() if re.search(rf"\bscene\.({keys})\b", code)]
     assert [file for file in using if not file.startswith(("scenario/", *named))] == []
 

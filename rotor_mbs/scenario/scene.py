@@ -23,7 +23,7 @@ from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 from rotor_mbs.errors import InputError, PlausibilityWarning
 from rotor_mbs.scenario import keys
-from rotor_mbs.scenario.keys import Kind, counted, file_key, invalid, list_of, read_each, restricted
+from rotor_mbs.scenario.keys import Kind, counted, file_key, invalid, list_of, read_each, restricted, within
 from rotor_mbs.scenario.time_table import (
     LoadTable,
     Segment,
@@ -62,6 +62,7 @@ ENTRY_POINT_GROUP = "rotor_mbs.quantities"
 MAX_BLADES = 1000
 MAX_SAMPLES = 10_000_000
 MAX_SAMPLE_BYTES = 2 << 30
+MAX_CONE = 1.5  # rad
 _SHOWN_KEYS, _SHOWN_ENTRIES = 30, 6  # of a scene on a screen, and of a list
 # Principal moments may break the triangle inequality by this share of their sum: numbers typed
 # with ten digits do so for a flat body, whose inequality is an equality. It is far above the
@@ -250,6 +251,19 @@ _INERTIA = restricted(
     "six numbers xx yy zz xy xz yz{unit} that a rigid body can have",
     f"no rigid body has this inertia: {_NOT_RIGID}",
 )
+_TILT = within(
+    keys.SIZE,
+    at_least=-0.5 * math.pi,
+    at_most=0.5 * math.pi,
+    allowed="a number{unit} from -pi/2 to pi/2",
+)
+# At a right angle the pitch axis would be the shaft itself.
+_CONE = within(
+    keys.SIZE,
+    at_least=-MAX_CONE,
+    at_most=MAX_CONE,
+    allowed=f"a number{{unit}} from -{MAX_CONE:g} to {MAX_CONE:g}",
+)
 _LOAD = Kind(_read_load, "a number{unit}, or rows [t, number] with t >= 0 s", over_time=True)
 _ANGLES = Kind(
     _read_angles,
@@ -274,7 +288,9 @@ _SETTINGS = keys.dict_of(
 
 @dataclass(frozen=True, slots=True)
 class Blade:
-    """A rigid blade, in its own frame: origin on the shaft axis, z along the pitch axis.
+    """A rigid blade, in its own frame: origin at the apex, z along the pitch axis.
+
+    The apex is the point where all pitch axes meet the shaft.
 
     Attributes
     ----------
@@ -282,6 +298,8 @@ class Blade:
     centre_of_mass : (3,) m.
     inertia : xx yy zz xy xz yz of the tensor about the centre of mass (xy = -∫xy dm), kg m².
     tip : (3,) m, the point whose path is stored.
+    cone : rad, angle between the pitch axis and the plane normal to the shaft at the apex; above 0
+        the axis leans towards +y, the shaft's end that a tilt above 0 raises.
     """
 
     mass: float = file_key("mass", keys.POSITIVE, "kg")
@@ -303,6 +321,14 @@ class Blade:
         "m",
         ', needed for the output "tip"',
         optional=(),
+    )
+    cone: float = file_key(
+        "cone",
+        _CONE,
+        "rad",
+        ": the pitch axis leans towards +y",
+        default=0.0,
+        added=True,
     )
 
     @property
@@ -382,7 +408,9 @@ def _key(
 class Scene:
     """A rotor with its loads and initial state.
 
-    Blade i is mounted at 2π(i-1)/blades about the shaft (+y); z is up.
+    Blade i is mounted at 2π(i-1)/blades about the shaft, whose direction is +y without tilt; z is
+    up. The axes of blade i in the base frame are the columns of
+    Rx(tilt) Ry(q + 2π(i-1)/blades) Rx(-cone_i) Rz(θ_i), q the rotor's angle and θ_i the pitch.
 
     Attributes
     ----------
@@ -392,6 +420,10 @@ class Scene:
     outputs : what is stored of a run.
     blades : (blades,) `Blade`.
     hub_inertia, shaft_damping : kg m² about the shaft; N m s/rad.
+    hub_radius : m from the apex to each blade's root along its pitch axis: where root loads are
+        given.
+    hub_mass : kg, at the apex; it enters the shaft's loads alone.
+    shaft_tilt : rad, by which the shaft's +y end is raised, about x.
     initial_angles, initial_rates : (1 + blades,) rad, rad/s: rotor, then a pitch per blade.
     rotor_torque : a table over time (see time_table), N m.
     pitch_torque : (blades,) tables over time, N m, between hub and blade; positive in the direction
@@ -462,6 +494,30 @@ class Scene:
         "rad",
         ": pitch at which the spring is unloaded",
         default=(),
+        added=True,
+    )
+    hub_radius: float = _key(
+        "hub.radius",
+        keys.NOT_NEGATIVE,
+        "m",
+        ", from the apex to the blade roots: where root loads are given",
+        default=0.0,
+        added=True,
+    )
+    hub_mass: float = _key(
+        "hub.mass",
+        keys.NOT_NEGATIVE,
+        "kg",
+        ", at the apex: in the shaft's loads alone",
+        default=0.0,
+        added=True,
+    )
+    shaft_tilt: float = _key(
+        "shaft.tilt",
+        _TILT,
+        "rad",
+        ": the +y end of the shaft rises",
+        default=0.0,
         added=True,
     )
     methods: tuple[str, ...] = _key("methods", _METHODS, role="label", default=())
@@ -678,15 +734,23 @@ def scene_hash(scene: Scene) -> str:
     for field in scene_fields("run", "start", "rotor"):
         value = getattr(scene, field.name)
         if field.name == "blades":
-            names = [name for name in BLADE_KEYS if name != "tip" or scene.wants("tip")]
-            blades = []
-            for blade in value:
-                # A mass in a list, as the other numbers of a blade are: so it is in stored hashes.
-                blades.append([_exact(getattr(blade, name), listed=True) for name in names])
-            content["blades"] = blades
+            content["blades"] = [_blade_numbers(blade, scene.wants("tip")) for blade in value]
         elif not (field.metadata["added"] and value == field.default):
             content[field.name] = sorted(value) if field.name == "outputs" else _exact(value)
     return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
+
+
+def _blade_numbers(blade: Blade, with_tip: bool) -> list[object]:
+    """Return the numbers of a blade as they enter the hash of its scene."""
+    numbers = []
+    for name, declared in BLADE_KEYS.items():
+        value = getattr(blade, name)
+        is_default_of_added = declared.get("added", False) and value == declared["optional"]
+        if is_default_of_added or (name == "tip" and not with_tip):
+            continue
+        # A mass in a list, as the other numbers of a blade are: so it is in stored hashes.
+        numbers.append(_exact(value, listed=True))
+    return numbers
 
 
 def _exact(value: object, *, listed: bool = False) -> object:
@@ -797,6 +861,8 @@ def _blade_tables(scene: Scene) -> dict[str, Any] | list[dict[str, Any]]:
         # A tip that only repeats the centre of mass was not given.
         if blade.tip == blade.centre_of_mass and not scene.wants("tip"):
             del table["tip"]
+        if not blade.cone:
+            del table["cone"]
         written.append(table)
     return written[0] if are_equal else written
 
@@ -1167,6 +1233,7 @@ MAX_RATE = 100.0  # rad/s: a thousand revolutions per minute
 # m, from the shaft to the farthest point of a blade: the longest built have 130.
 MIN_DISTANCE, MAX_DISTANCE = 0.01, 300.0
 MIN_MASS, MAX_MASS = 0.01, 1e6  # kg
+MAX_LEAN = 0.5  # rad, of shaft and pitch axes: real rotors have 0.1
 USUAL_GRAVITY = (1.0, 30.0)  # m/s^2: the Moon, Jupiter
 
 
@@ -1181,7 +1248,26 @@ def implausible_values(scene: Scene) -> list[str]:
             lines += _implausible_blade(f"blade[{i}]", blade)
     if scene.gravity and not USUAL_GRAVITY[0] <= scene.gravity <= USUAL_GRAVITY[1]:
         lines.append(f"gravity: {scene.gravity:g} m/s^2; 9.81 is usual, 0 is none")
+    return lines + _implausible_hub(scene)
+
+
+def _implausible_hub(scene: Scene) -> list[str]:
+    """Return a line for each number of hub and shaft that looks like a slip."""
+    lines = []
+    if abs(scene.shaft_tilt) > MAX_LEAN:
+        lines.append(f"shaft.tilt: {_as_wide_angle(scene.shaft_tilt)}")
+    farthest = max(max(math.hypot(*blade.tip), blade.centre_of_mass[2]) for blade in scene.blades)
+    if scene.hub_radius >= farthest:
+        beyond = f"beyond the farthest point of a blade, {farthest:g} m"
+        lines.append(f"hub.radius: {scene.hub_radius:g} m is {beyond}; is it in m?")
+    if scene.hub_mass and not MIN_MASS <= scene.hub_mass <= MAX_MASS:
+        lines.append(f"hub.mass: {scene.hub_mass:g} kg; is it in kg?")
     return lines
+
+
+def _as_wide_angle(angle: float) -> str:
+    """Return the advice for a tilt or cone (rad) that is far above that of real rotors."""
+    return f'{angle:g} rad are {math.degrees(angle):.3g} degrees; degrees? write "deg({angle:g})"'
 
 
 def _implausible_motion(scene: Scene) -> list[str]:
@@ -1224,4 +1310,6 @@ def _implausible_blade(name: str, blade: Blade) -> list[str]:
     if gyration > 2.0 * math.hypot(*blade.tip):
         far = f"a radius of gyration of {gyration:.3g} m, far beyond the tip"
         lines.append(f"{name}.inertia: {far}; is it in kg m^2, mass in kg?")
+    if abs(blade.cone) > MAX_LEAN:
+        lines.append(f"{name}.cone: {_as_wide_angle(blade.cone)}")
     return lines

@@ -98,6 +98,9 @@ def test_all_angles_in_degrees_are_named_and_rest_angles_and_inertias_in_other_u
     assert line.startswith("bearing.rest[0]: 5 rad are 0.8 turns")
     (line,) = implausible_values(rm.scene("paper/fig11").replace(**{"blade.inertia": [9e7, 9e7, 1e3, 0, 0, 0]}))
     assert line.startswith("blade.inertia: a radius of gyration of 77.5 m")  # sqrt(9e7 / 15000)
+    wide = {"shaft.tilt": 0.6, "blade.cone": -1.2, "hub.radius": 90.0, "hub.mass": 56.78e6}
+    keys = [line.partition(":")[0] for line in implausible_values(rm.scene("paper/fig11").replace(**wide))]
+    assert sorted(keys) == ["blade.cone", "hub.mass", "hub.radius", "shaft.tilt"]
     for name, _ in list_scenes():
         assert not [line for line in implausible_values(rm.scene(name)) if "gyration" in line or "rest" in line], name
 

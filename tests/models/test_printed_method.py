@@ -108,6 +108,10 @@ def test_a_singularity_ends_the_run_with_what_was_reached():
         (replace(FIG11, bearing_stiffness=(0.0, 1.0, 0.0)), "bearing"),
         (replace(FIG11, bearing_damping=(0.0, 1.0, 0.0)), "bearing"),
         (replace(FIG11, shaft_damping=1.0), "shaft damping"),
+        (replace(FIG11, shaft_tilt=0.1), "shaft.tilt"),
+        (replace(FIG11, blades=(replace(FIG11.blades[0], cone=0.1),) * 3), "blade.cone"),
+        (replace(FIG11, hub_radius=1.0), "radius or a mass"),
+        (replace(FIG11, hub_mass=1.0), "radius or a mass"),
     ],
 )
 def test_refusals_are_one_sentence(given, word):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import tomllib
+from dataclasses import replace
 from fractions import Fraction
 from math import hypot, pi
 from pathlib import Path
@@ -22,7 +23,9 @@ from rotor_mbs.scenario.scene import (
     Scene,
     is_rigid_body_inertia,
     load_scene,
+    parse_scene,
     scene_hash,
+    scene_toml,
 )
 from rotor_mbs.scenario.toml_file import find_lines, line_of
 
@@ -121,6 +124,19 @@ def test_hash_ignores_how_the_scene_is_written(tmp_path: Path) -> None:
         .replace("[blade]", "[[blade]]\nmass = 2\ncentre_of_mass = [0.5, 0, 3]\n[[blade]]")
     )
     assert scene_hash(_load(tmp_path, rewritten)) == plain
+
+
+def test_tilt_cone_and_hub_are_numbers_of_the_scene_and_zeros_are_as_if_they_were_not_there(tmp_path: Path) -> None:
+    plain = _load(tmp_path, SCENE)
+    zeros = SCENE.replace("[blade]", "[blade]\ncone = 0") + "[shaft]\ntilt = 0.0\n[hub]\nmass = 0\nradius = 0\n"
+    assert scene_hash(_load(tmp_path, zeros)) == scene_hash(plain)
+    table = "[[blade]]\nmass = 2\ncentre_of_mass = [0.5, 0, 3]\ncone = 'deg({})'\n"
+    text = SCENE.replace("[blade]\nmass = 2\ncentre_of_mass = [0.5, 0, 3]\n", table.format(-2.5) + table.format(4))
+    scene = _load(tmp_path, text + "[shaft]\ntilt = 'deg(-5)'\n[hub]\nmass = 56780\nradius = 1.5\n")
+    assert [blade.cone for blade in scene.blades] == [-2.5 * pi / 180, 4 * pi / 180]
+    assert (scene.shaft_tilt, scene.hub_mass, scene.hub_radius) == (-5 * pi / 180, 56780.0, 1.5)
+    assert replace(parse_scene(scene_toml(scene), "scene"), text=scene.text) == scene
+    assert len({scene_hash(each) for each in (plain, scene, replace(scene, blades=scene.blades[::-1]))}) == 3
 
 
 @given(

@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from rotor_mbs.methods.base import BuiltItem
+from rotor_mbs.models import refuse_tilt_and_cone
 from rotor_mbs.scenario.scene import Blade, Scene
 from rotor_mbs.solution.trajectory import Array
 
@@ -127,6 +128,7 @@ def hub_body(scene: Scene) -> Body:
 
     The disc's other two moments, half of the axial one, are never felt: they make it a body that can exist.
     """
+    refuse_tilt_and_cone("exudyn", scene)
     half = 0.5 * scene.hub_inertia
     parts = [Body(0.0, np.zeros(3), np.diag([half, scene.hub_inertia, half]))]
     for index, blade in enumerate(scene.blades):

@@ -15,6 +15,7 @@ from typing import Any
 
 import numpy as np
 
+from rotor_mbs.models import refuse_tilt_and_cone
 from rotor_mbs.scenario.scene import Blade, Scene
 from rotor_mbs.scenario.time_table import is_constant
 from rotor_mbs.solution.trajectory import Array
@@ -88,6 +89,7 @@ def _form_in_doubles(scene: Scene) -> RotorForm:
 
 
 def _form(scene: Scene, convert: Convert, phases: Sequence[tuple[Fraction, Fraction]] | None) -> RotorForm:
+    refuse_tilt_and_cone("lagrange", scene)
     gravity = Fraction(scene.gravity)
     count = len(scene.blades)
     forms: list[BladeForm] = []

@@ -25,6 +25,7 @@ from xml.etree import ElementTree as ET
 import numpy as np
 
 from rotor_mbs.methods.base import BuiltItem
+from rotor_mbs.models import refuse_tilt_and_cone
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.scenario.time_table import (
     ROTOR_TORQUE,
@@ -94,6 +95,7 @@ def joint_name(coordinate: int) -> str:
 
 def model(scene: Scene, integrator: str, step: float) -> ET.Element:
     """Return the MJCF element tree of a scene; integrator: a key of `INTEGRATORS`; step: time step in s."""
+    refuse_tilt_and_cone("mujoco", scene)
     root = ET.Element("mujoco", model=scene.name or "rotor")
     ET.SubElement(root, "compiler", angle="radian")
     option = ET.SubElement(

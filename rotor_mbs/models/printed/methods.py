@@ -116,6 +116,11 @@ def point_mass_rotor(name: str, errata: Errata | None, scene: Scene) -> PointMas
             any(scene.bearing_stiffness) or any(scene.bearing_damping)
         ),
         f"{name} does not include shaft damping; it must be 0": scene.shaft_damping != 0.0,
+        f"{name} does not include a tilted shaft; shaft.tilt must be 0": scene.shaft_tilt != 0.0,
+        f"{name} does not include coned blades; blade.cone must be 0": blade.cone != 0.0,
+        f"{name} does not include a hub with a radius or a mass; both must be 0": (
+            scene.hub_radius != 0.0 or scene.hub_mass != 0.0
+        ),
     }
     for sentence, refused in refusals.items():
         if refused:
