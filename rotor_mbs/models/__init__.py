@@ -36,8 +36,6 @@ def refuse_tilt_and_cone(model: str, scene: Scene) -> None:
 
 def equation_items(scene: Scene, sources: tuple[str, str] = ("", "")) -> list[BuiltItem]:
     """Return the equations and terms of a scene; sources: where the rotor's and a pitch's come from."""
-    if not sources[0]:
-        refuse_tilt_and_cone("lagrange", scene)
     moving = scene.moving_coordinates
     of_rotor, of_pitch = sources
     built = []
@@ -50,6 +48,10 @@ def equation_items(scene: Scene, sources: tuple[str, str] = ("", "")) -> list[Bu
     optional = {
         "hub inertia": scene.hub_inertia != 0.0,
         "gravity": scene.gravity != 0.0,
+        "shaft tilt": scene.shaft_tilt != 0.0,
+        "blade cone": any(blade.cone for blade in scene.blades),
+        "hub radius": scene.wants("loads") and scene.hub_radius != 0.0,
+        "hub mass": scene.wants("loads") and scene.hub_mass != 0.0,
         "rotor torque": scene.has_torque,
         "pitch torque": any(scene.pitch_torque),
         "bearing stiffness": any(scene.bearing_stiffness),

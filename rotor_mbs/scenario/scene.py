@@ -558,6 +558,11 @@ class Scene:
         return tuple(2.0 * math.pi * i / len(self.blades) for i in range(len(self.blades)))
 
     @property
+    def has_tilt_or_cone(self) -> bool:
+        """Whether the shaft is tilted or a blade is coned."""
+        return self.shaft_tilt != 0.0 or any(blade.cone for blade in self.blades)
+
+    @property
     def has_torque(self) -> bool:
         """Whether a torque acts on the rotor at some time."""
         return any(torque != 0.0 for _, torque in self.rotor_torque)

@@ -21,8 +21,9 @@ from rotor_mbs.methods.solve import solve
 from rotor_mbs.models.lagrange import closed_form
 from rotor_mbs.models.lagrange import defects as defects_module
 from rotor_mbs.models.lagrange.defects import fitted_rates, interval_defects, interval_ends
+from rotor_mbs.models.lagrange.hamilton import resting_pitches
 from rotor_mbs.models.lagrange.heyoka_adapter import is_available
-from rotor_mbs.models.lagrange.parameters import rate_units, resting_pitches
+from rotor_mbs.models.lagrange.parameters import rate_units
 from rotor_mbs.models.lagrange.reference import _variational_matrices
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution import defects as solution_defects

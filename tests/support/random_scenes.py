@@ -3,6 +3,7 @@ far, half a second to a minute."""
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -54,6 +55,33 @@ def random_scene(seed: int) -> Scene:
         initial_angles=tuple(rng.uniform(-1.0, 1.0, 1 + count).tolist()),
         initial_rates=tuple((rng.uniform(-2.0, 2.0, 1 + count) / period).tolist()),
         **fields,
+    )
+
+
+def leaning_scene(seed: int, blades: int = 0) -> Scene:
+    """Return the rotor of a seed with a tilted shaft, a cone of each blade of its own, a hub with radius and mass.
+
+    blades: how many, 0 for those of the seed; all have a hub, so that a rotor of one blade is not singular.
+    """
+    scene = random_scene(seed)
+    rng = np.random.default_rng([41, seed])
+    size = scene.blades[0].centre_of_mass[2]
+    if blades:
+        scene = replace(
+            scene, blades=tuple(_blade(rng, size) for _ in range(blades)), bearing_stiffness=(), bearing_rest=(),
+            bearing_damping=(), pitch_torque=(),
+            initial_angles=tuple(rng.uniform(-1.0, 1.0, 1 + blades).tolist()),
+            initial_rates=tuple(rng.uniform(-1.0, 1.0, 1 + blades).tolist()),
+        )  # fmt: skip
+    cones = rng.uniform(-0.5, 0.5, len(scene.blades)).tolist()
+    return replace(
+        scene,
+        name=f"leaning {seed}",
+        blades=tuple(replace(blade, cone=cone) for blade, cone in zip(scene.blades, cones, strict=True)),
+        shaft_tilt=float(rng.uniform(-0.6, 0.6)),
+        hub_inertia=max(scene.hub_inertia, 0.1 * scene.blades[0].mass * size**2),
+        hub_mass=float(scene.blades[0].mass * rng.uniform(0.5, 2.0)),
+        hub_radius=float(0.1 * size),
     )
 
 

@@ -3,11 +3,18 @@
 Every function takes numbers of any kind that knows + - * / (floats, arrays, quad precision, symbolic expressions)
 together with a sine and a cosine for that kind, and contains no branch on a value.
 
-Symbols: φ = q2 + 2π(i-1)/N azimuth of blade i, θ its pitch, Ω = q̇2, s = sin θ, c = cos θ.
-T = ½ J_hub Ω² + ½ Σ ω·J ω with ω = (Ω s, Ω c, θ̇) and J the blade's inertia about the hub centre, so
-T = ½ (J_hub + Σ a) Ω² + Σ b Ω θ̇ + ½ Σ Jzz θ̇²,  a = Jxx s² + Jyy c² + 2 Jxy s c,  b = Jxz s + Jyz c,
-V = Σ m g (z cos φ - (x c - y s) sin φ) + ½ k (θ - r)², r the rest angle of the spring.
-The mass matrix is an arrowhead; eliminating the pitches leaves the Schur complement S = J_hub + Σ (a - b²/Jzz).
+Symbols: φ = q2 + 2π(i-1)/N azimuth of blade i, θ its pitch, Ω = q̇2, s = sin θ, c = cos θ; τ tilt, β cone.
+The blade's axes in the base frame are Rx(τ) Ry(φ) Rx(-β) Rz(θ), so that its angular velocity in its own axes is
+ω = (Ω cos β s, Ω cos β c, θ̇ + Ω sin β). With J the blade's inertia about the apex,
+a = Jxx s² + Jyy c² + 2 Jxy s c and b = Jxz s + Jyz c, T = ½ J_hub Ω² + ½ Σ ω·J ω is
+T = ½ (J_hub + Σ A) Ω² + Σ B Ω θ̇ + ½ Σ Jzz θ̇²,
+A = cos²β a + 2 sin β cos β b + sin²β Jzz,  B = cos β b + sin β Jzz,
+V = Σ m g h + ½ k (θ - r)², r the rest angle of the spring, and with u = x c - y s, v = x s + y c
+h = sin τ (v cos β + z sin β) + cos τ (-u sin φ + (z cos β - v sin β) cos φ).
+The mass matrix is an arrowhead; eliminating the pitches leaves the Schur complement
+S = J_hub + Σ (A - B²/Jzz) = J_hub + Σ cos²β (a - b²/Jzz).
+
+What is linear in s and c by tilt or cone is in `BladeForm.lean`, and costs an upright rotor nothing.
 """
 
 from __future__ import annotations
@@ -16,7 +23,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from rotor_mbs.models.lagrange.parameters import BladeForm, Number, RotorForm
+from rotor_mbs.models.lagrange.parameters import BladeForm, Lean, Number, RotorForm
 from rotor_mbs.scenario.time_table import ROTOR_TORQUE, rest_place, torque_place
 
 Function = Callable[[Any], Any]
@@ -79,25 +86,36 @@ def accelerations(
         sin_phi = sin_q * blade.cos_phase + cos_q * blade.sin_phase
         cos_phi = cos_q * blade.cos_phase - sin_q * blade.sin_phase
         s_turn, c_turn = s * (spin * spin), c * (spin * spin)
-        ratio = blade.ratio_s * s + blade.ratio_c * c  # b / Jzz
+        ratio = blade.ratio_s * s + blade.ratio_c * c  # B / Jzz, without tilt and cone
         resistance = blade.stiffness * (theta - rest) + blade.damping * rate - torque
-        # ½ ∂a/∂θ Ω² and gravity, both on the pitch: s·on_s + c·on_c
+        # ½ ∂A/∂θ Ω² and gravity, both on the pitch: s·on_s + c·on_c
         on_s = blade.half_slope_sc * c_turn - blade.half_slope_cs * s_turn - blade.weight_x * sin_phi
         on_c = blade.half_slope_cs * c_turn - blade.weight_y * sin_phi
-        pitched.append((s, c, on_s, on_c, resistance))
-        # The rotor's moment, pitch eliminated; ½ ∂a/∂θ times drag: Coriolis, and b / Jzz times what turns the pitch.
+        # ½ ∂A/∂θ times drag is in the rotor's moment, pitch eliminated: Coriolis, and B / Jzz times what turns the pitch.
         drag = 2.0 * (spin * rate) + (blade.ratio_s * s_turn + blade.ratio_c * c_turn)
+        lean = blade.lean
+        if lean:
+            up = lean.axial - lean.radial * cos_phi
+            on_s = on_s + lean.slope_s * (spin * spin) + lean.weight_y * up
+            on_c = on_c + lean.slope_c * (spin * spin) - lean.weight_x * up
+            ratio, drag = ratio + lean.ratio, drag + lean.ratio * (spin * spin)
+        pitched.append((s, c, on_s, on_c, resistance))
         lever = blade.lever_cc * c + blade.lever_sc * s
         rotor_c = blade.weight_x * cos_phi + sin_phi * lever - blade.coupling_s * (rate * rate)
         rotor_c = rotor_c - blade.half_slope_sc * (s * drag) - blade.half_slope_cs * (c * drag)
         rotor_s = blade.lever_ss * (s * sin_phi) - blade.weight_y * cos_phi + blade.coupling_c * (rate * rate)
         rotor_s = rotor_s + blade.half_slope_cs * (s * drag)
+        if lean:
+            rotor_c = rotor_c - lean.slope_c * drag + lean.weight_x * (ratio * up)
+            rotor_s = rotor_s - lean.slope_s * drag - lean.weight_y * (ratio * up)
         moment = moment + (c * rotor_c + s * rotor_s) + ratio * resistance
         schur = schur + (blade.schur_ss * (s * s) + blade.schur_cc * (c * c) + blade.schur_sc * (s * c))
     rotor = moment / schur
     result = [rotor]
     for blade, (s, c, on_s, on_c, resistance) in zip(form.blades, pitched, strict=True):
         driven = s * (on_s - blade.coupling_s * rotor) + c * (on_c - blade.coupling_c * rotor)
+        if blade.lean:
+            driven = driven - blade.lean.coupling * rotor
         result.append((driven - resistance) / blade.pitch_inertia)
     return result
 
@@ -134,7 +152,7 @@ def rest_energy(angles: Sequence[Number], form: RotorForm, rests: Sequence[Numbe
 def energies(
     angles: Sequence[Number], rates: Sequence[Number], form: RotorForm, loads: LoadValues, sin: Function, cos: Function
 ) -> tuple[Number, Number]:
-    """Return kinetic and potential energy (J), gravity's about the shaft's height, and that of bearing springs.
+    """Return kinetic and potential energy (J), gravity's about the apex's height, and that of bearing springs.
 
     Parameters are those of `accelerations`: angles, rates, form, loads, sin, cos.
     """
@@ -144,24 +162,44 @@ def energies(
     potential = 0.0 * sin_q
     for weight, cos_phase, sin_phase in form.fixed:
         potential = potential + weight * (cos_q * cos_phase - sin_q * sin_phase)
+    potential = potential + form.fixed_height
     for blade, theta, rate, _, rest in pitches(form, angles, rates, loads):
         s, c = sin(theta), cos(theta)
         inertia = blade.inertia_ss * (s * s) + blade.inertia_cc * (c * c) + blade.inertia_sc * (s * c)
         coupling = blade.coupling_s * s + blade.coupling_c * c
+        if blade.lean:
+            inertia = inertia + (blade.lean.inertia_s * s + blade.lean.inertia_c * c)
+            coupling = coupling + blade.lean.coupling
         of_blade = 0.5 * inertia * (spin * spin) + coupling * spin * rate + 0.5 * blade.pitch_inertia * (rate * rate)
         kinetic = kinetic + of_blade
         sin_phi = sin_q * blade.cos_phase + cos_q * blade.sin_phase
         cos_phi = cos_q * blade.cos_phase - sin_q * blade.sin_phase
         height = cos_phi * blade.weight_z - sin_phi * (blade.weight_x * c - blade.weight_y * s)
+        if blade.lean:
+            up = blade.lean.axial - blade.lean.radial * cos_phi
+            height = height + (blade.lean.weight_x * s + blade.lean.weight_y * c) * up + blade.lean.height
         potential = potential + height + 0.5 * blade.stiffness * ((theta - rest) * (theta - rest))
     return kinetic, potential
 
 
 def point_path(
-    azimuth: Number, pitch: Number, point: Sequence[float], sin: Function, cos: Function
+    azimuth: Number, pitch: Number, point: Sequence[float], sin: Function, cos: Function, lean: Lean | None = None
 ) -> tuple[Number, Number, Number]:
-    """Return a point of a blade in the base frame, (x, y, z) in m: Ry(azimuth)·Rz(pitch)·point."""
+    """Return a point of a blade in the base frame, (x, y, z) in m: Rx(tilt)·Ry(azimuth)·Rx(-cone)·Rz(pitch)·point.
+
+    Parameters
+    ----------
+    azimuth, pitch : rad.
+    point : (3,) m in the blade's frame.
+    sin, cos : for the kind of number.
+    lean : cosines and sines of cone and tilt; None where both are 0.
+    """
     x, y, z = point
     s, c = sin(pitch), cos(pitch)
     across, along = x * c - y * s, x * s + y * c
-    return cos(azimuth) * across + sin(azimuth) * z, along, cos(azimuth) * z - sin(azimuth) * across
+    if lean:
+        along, z = along * lean.cos_cone + z * lean.sin_cone, z * lean.cos_cone - along * lean.sin_cone
+    x, z = cos(azimuth) * across + sin(azimuth) * z, cos(azimuth) * z - sin(azimuth) * across
+    if lean:
+        along, z = along * lean.cos_tilt - z * lean.sin_tilt, along * lean.sin_tilt + z * lean.cos_tilt
+    return x, along, z

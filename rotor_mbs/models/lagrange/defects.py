@@ -14,9 +14,10 @@ from rotor_mbs.errors import InputError
 from rotor_mbs.methods.time_limit import raise_if_over
 from rotor_mbs.models.lagrange import closed_form
 from rotor_mbs.models.lagrange.closed_form import Accelerations, load_values
+from rotor_mbs.models.lagrange.hamilton import resting_pitches
 from rotor_mbs.models.lagrange.heyoka_adapter import is_available
 from rotor_mbs.models.lagrange.ode_solvers import OdeSolver, scipy_integrator
-from rotor_mbs.models.lagrange.parameters import rate_units, resting_pitches, rotor_form
+from rotor_mbs.models.lagrange.parameters import pitch_weight, rate_units, rotor_form
 from rotor_mbs.models.lagrange.samples import loads_at, sampled_loads
 from rotor_mbs.models.lagrange.singularity import least_inertia_shares
 from rotor_mbs.models.lagrange.taylor import Propagation, is_compact
@@ -386,7 +387,7 @@ def explicit_steps(scene: Scene, intervals: Array, states: Array, most: int) -> 
     half = states.shape[1] // 2
     fastest = float(np.max(np.where(np.isfinite(states[:, half:]), np.abs(states[:, half:]), 0.0)))
     for blade in rotor_form(scene).blades:
-        moment = blade.stiffness + math.hypot(blade.weight_x, blade.weight_y)
+        moment = blade.stiffness + pitch_weight(blade)
         fastest = max(fastest, math.sqrt(moment / blade.pitch_inertia), blade.damping / blade.pitch_inertia)
     steps = fastest * float(intervals.max()) / _RADIANS_PER_STEP
     return max(math.ceil(steps), 1) if steps <= most else None

@@ -16,6 +16,7 @@ from rotor_mbs.methods.solve import solve
 from rotor_mbs.models.lagrange import closed_form, hamilton, taylor
 from rotor_mbs.models.lagrange.heyoka_adapter import Parameters, array_of, failure, heyoka
 from rotor_mbs.models.lagrange.ode_solvers import work_unit
+from rotor_mbs.models.lagrange.parameters import Lean, leans
 from rotor_mbs.models.lagrange.samples import constant_work
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.trajectory import Array, Integration, RunBlock
@@ -102,11 +103,15 @@ def solve_many(scenes: Sequence[Scene], tolerance: float) -> RunBlock:
     return block
 
 
-def _tip_numbers(scene: Scene, parameters: Parameters) -> list[list[Any]]:
-    """Return the tips, (blades, 3) m, as numbers that come after those of the equations; [] without such an output."""
+def _tip_numbers(scene: Scene, parameters: Parameters) -> list[tuple[list[Any], Lean | None]]:
+    """Return tip (m), and cosines and sines of cone and tilt of each blade; [] without such an output.
+
+    These numbers come after those of the equations.
+    """
     if not scene.wants("tip"):
         return []
-    return [[parameters(Fraction(x)) for x in blade.tip] for blade in scene.blades]
+    tips = [[parameters(Fraction(x)) for x in blade.tip] for blade in scene.blades]
+    return list(zip(tips, leans(scene, parameters), strict=True))
 
 
 def _momenta(example: Scene) -> Any:
@@ -136,9 +141,9 @@ def _observables(example: Scene) -> Any:
         else:
             pitches.append(parameters.own(Fraction(0)))
     observables: list[Any] = [*rates]
-    for i, point in enumerate(points):
+    for i, (point, lean) in enumerate(points):
         azimuth = angles[0] + example.phases[i]
-        observables += closed_form.point_path(azimuth, pitches[i], point, engine.sin, engine.cos)
+        observables += closed_form.point_path(azimuth, pitches[i], point, engine.sin, engine.cos, lean)
     if example.wants("energy"):
         observables += closed_form.energies(angles, rates, form, loads, engine.sin, engine.cos)
     return _compiled_rows(example, observables, [*angles, *momenta])

@@ -114,6 +114,7 @@ class _Variational:
         engine = heyoka()
         parameters = Parameters()
         form = rotor_form(scene, parameters)
+        parameters.structure.append(int(scene.has_tilt_or_cone))
         self.coordinates = 1 + len(form.blades)
         pitch_loads = [parameters(Fraction(value_at(table, 0.0))) for table in scene.load_tables[1:]]
         torque = parameters.own(Fraction(0))

@@ -1,17 +1,21 @@
 """The closed form in Hamilton's variables, angles and momenta p = ∂T/∂q̇: for sweeps; fewer and cheaper steps.
 
 Symbols as in `closed_form`:
-p_0 = (J_hub + Σ a) Ω + Σ b θ̇,  p_i = b Ω + Jzz θ̇,
-ṗ_0 = τ - ∂V/∂q2,  ṗ_i = ½ ∂a/∂θ Ω² + ∂b/∂θ Ω θ̇ - ∂V/∂θ, and what dampers and torques do.
+p_0 = (J_hub + Σ A) Ω + Σ B θ̇,  p_i = B Ω + Jzz θ̇,
+ṗ_0 = torque - ∂V/∂q2,  ṗ_i = ½ ∂A/∂θ Ω² + ∂B/∂θ Ω θ̇ - ∂V/∂θ, and what dampers and torques do.
 """
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Sequence
+from dataclasses import replace
+from fractions import Fraction
 from typing import Any
 
 from rotor_mbs.models.lagrange.closed_form import Function, LoadValues, pitches
-from rotor_mbs.models.lagrange.parameters import RotorForm
+from rotor_mbs.models.lagrange.parameters import BladeForm, RotorForm, rotor_form
+from rotor_mbs.scenario.scene import Scene
 
 Numbers = Sequence[Any]
 
@@ -23,6 +27,9 @@ def momenta(angles: Numbers, rates: Numbers, form: RotorForm, sin: Function, cos
         s, c = sin(theta), cos(theta)
         b = blade.coupling_s * s + blade.coupling_c * c
         total = total + (blade.inertia_ss * (s * s) + blade.inertia_cc * (c * c) + blade.inertia_sc * (s * c)) * spin
+        if blade.lean:
+            b = b + blade.lean.coupling
+            total = total + (blade.lean.inertia_s * s + blade.lean.inertia_c * c) * spin
         total = total + b * rate
         of_pitches.append(b * spin + blade.pitch_inertia * rate)
     return [total, *of_pitches]
@@ -38,7 +45,8 @@ def rates(angles: Numbers, momenta: Numbers, form: RotorForm, sin: Function, cos
     for blade, theta, p in zip(form.blades, angles[1:], momenta[1:], strict=True):
         s, c = sin(theta), cos(theta)
         schur = schur + (blade.schur_ss * (s * s) + blade.schur_cc * (c * c) + blade.schur_sc * (s * c))
-        ratios.append(blade.ratio_s * s + blade.ratio_c * c)
+        ratio = blade.ratio_s * s + blade.ratio_c * c
+        ratios.append(ratio + blade.lean.ratio if blade.lean else ratio)
         rest = rest - ratios[-1] * p
     spin = rest / schur
     pitching = zip(form.blades, momenta[1:], ratios, strict=True)
@@ -65,5 +73,52 @@ def forces(
         half_slope = blade.half_slope_sc * (s * c) + blade.half_slope_cs * (c * c - s * s)
         force = spin * (half_slope * spin + (blade.coupling_s * c - blade.coupling_c * s) * rate)
         force = force - sin_phi * (blade.weight_x * s + blade.weight_y * c)
+        if lean := blade.lean:
+            force = force + spin * spin * (lean.slope_s * s + lean.slope_c * c)
+            force = force - (lean.axial - lean.radial * cos_phi) * (lean.weight_x * c - lean.weight_y * s)
+            moment = moment - lean.radial * (lean.weight_x * s + lean.weight_y * c) * sin_phi
         of_pitches.append(force - blade.stiffness * (theta - rest) - blade.damping * rate + torque)
     return [moment, *of_pitches]
+
+
+def resting_pitches(scene: Scene) -> tuple[int, ...]:
+    """Return the coordinates of the pitches that the equations leave at zero for ever.
+
+    They start there at rest, without a load, and nothing that the rotor does moves them.
+    """
+    form = rotor_form(scene, Fraction)
+    resting = []
+    for column, blade in zip(scene.moving_coordinates[1:], form.blades, strict=True):
+        torque, rest = scene.pitch_loads[column - 1]
+        loads = [value for _, value in torque]
+        if blade.stiffness:
+            loads += [value for _, value in rest]
+        start = scene.initial_angles[column], scene.initial_rates[column]
+        if not any([*start, *loads]) and _stays_at_zero(replace(blade, cos_phase=Fraction(1), sin_phase=Fraction(0))):
+            resting.append(column)
+    return tuple(resting)
+
+
+# Cosine and sine of an azimuth, and a rotor rate: with four, a force α Ω² + β sin φ + γ cos φ + δ that is zero at
+# all of them is zero everywhere.
+_ROTOR_STATES = ((1, 0, 1), (0, 1, 2), (-1, 0, 3), (0, -1, 5))
+
+
+@functools.lru_cache(maxsize=256)
+def _stays_at_zero(blade: BladeForm) -> bool:
+    """Return whether momentum and force of a pitch without a load vanish at zero, whatever the rotor does.
+
+    Parameters
+    ----------
+    blade : its coefficients as Fractions, which are computed with exactly.
+    """
+    form = RotorForm((blade,), (), Fraction(0), Fraction(0))
+    for cos_q, sin_q, spin in _ROTOR_STATES:
+        # The rotor's angle stands for itself, the pitch's is 0.
+        sines, cosines = {"rotor": Fraction(sin_q), 0: Fraction(0)}, {"rotor": Fraction(cos_q), 0: Fraction(1)}
+        state = ["rotor", 0], [Fraction(spin), Fraction(0)], form
+        of_pitch = momenta(*state, sines.__getitem__, cosines.__getitem__)[1]
+        force = forces(*state, LoadValues(Fraction(0)), sines.__getitem__, cosines.__getitem__)[1]
+        if of_pitch or force:
+            return False
+    return True

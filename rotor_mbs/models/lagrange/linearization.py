@@ -12,7 +12,7 @@ import numpy as np
 from rotor_mbs.errors import InputError
 from rotor_mbs.models.lagrange import closed_form, hamilton
 from rotor_mbs.models.lagrange.closed_form import Function, LoadValues
-from rotor_mbs.models.lagrange.parameters import RotorForm, rotor_form
+from rotor_mbs.models.lagrange.parameters import RotorForm, pitch_weight, rotor_form
 from rotor_mbs.models.lagrange.samples import loads_at_start
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.trajectory import Array, Linearization
@@ -182,9 +182,12 @@ def _refuse_large_torques(scene: Scene, form: RotorForm, speed: float, loads: Lo
     """Raise InputError where a pitch has no spring, and a torque above all that gravity and rotation can balance."""
     columns = scene.moving_coordinates[1:]
     for column, blade, torque in zip(columns, form.blades, loads.pitches, strict=True):
-        # The largest values over the pitch of x s + y c and of ½ ∂a/∂θ = ½ half_slope_sc sin 2θ + half_slope_cs cos 2θ
-        largest = math.hypot(blade.weight_x, blade.weight_y)
-        largest += speed * speed * math.hypot(0.5 * blade.half_slope_sc, blade.half_slope_cs)
+        # The largest values over the pitch of x s + y c and of ½ ∂A/∂θ = ½ half_slope_sc sin 2θ + half_slope_cs cos 2θ
+        largest = pitch_weight(blade)
+        slope = math.hypot(0.5 * blade.half_slope_sc, blade.half_slope_cs)
+        if blade.lean:
+            slope += math.hypot(blade.lean.slope_s, blade.lean.slope_c)
+        largest += speed * speed * slope
         if not blade.stiffness and abs(torque) > (1.0 + _ROUNDING) * largest:
             balance = "nothing balances it"
             if largest:
@@ -246,5 +249,6 @@ def _weights(form: RotorForm) -> float:
     """Return the sum of the moments of all weights, N m, as if each acted alone."""
     moments = [abs(float(weight)) for weight, _, _ in form.fixed]
     for blade in form.blades:
-        moments += [abs(blade.weight_x), abs(blade.weight_y), abs(blade.weight_z)]
+        weights = blade.lean or blade
+        moments += [abs(weights.weight_x), abs(weights.weight_y), abs(blade.weight_z)]
     return float(sum(moments))

@@ -9,13 +9,12 @@ from __future__ import annotations
 import functools
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from typing import Any
 
 import numpy as np
 
-from rotor_mbs.models import refuse_tilt_and_cone
 from rotor_mbs.scenario.scene import Blade, Scene
 from rotor_mbs.scenario.time_table import is_constant
 from rotor_mbs.solution.trajectory import Array
@@ -54,6 +53,34 @@ class BladeForm:
     inertia_ss: Number  # kg m², a = inertia_ss·s² + inertia_cc·c² + inertia_sc·s c
     inertia_cc: Number
     inertia_sc: Number
+    lean: LeanForm | None = None  # None where neither the shaft is tilted nor any blade coned
+
+
+@dataclass(frozen=True, slots=True)
+class LeanForm:
+    """What tilt τ and cone β of one blade add to `BladeForm`, whose coefficients have their cosines."""
+
+    ratio: Number  # sin β, added to b / Jzz
+    coupling: Number  # kg m², Jzz sin β, added to b
+    slope_s: Number  # kg m², ½ ∂A/∂θ has slope_s·s + slope_c·c beside its quadratic form
+    slope_c: Number
+    inertia_s: Number  # kg m², A has inertia_s·s + inertia_c·c beside its quadratic form
+    inertia_c: Number
+    weight_x: Number  # N m, m g (x, y) of the centre of mass, without the cosine of the tilt
+    weight_y: Number
+    axial: Number  # sin τ cos β; axial - radial·cos φ is the upward component of the coned y axis
+    radial: Number  # cos τ sin β
+    height: Number  # N m, potential energy m g z sin τ sin β
+
+
+@dataclass(frozen=True, slots=True)
+class Lean:
+    """Cosine and sine of a blade's cone and of the shaft's tilt."""
+
+    cos_cone: Number
+    sin_cone: Number
+    cos_tilt: Number
+    sin_tilt: Number
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,6 +92,7 @@ class RotorForm:
     fixed: tuple[tuple[Number, Number, Number], ...]
     inertia: Number  # kg m², hub and the blades that are fixed
     shaft_damping: Number  # N m s/rad
+    fixed_height: Number = 0.0  # N m, constant potential energy of the blades that are fixed
 
 
 def rotor_form(
@@ -89,23 +117,47 @@ def _form_in_doubles(scene: Scene) -> RotorForm:
 
 
 def _form(scene: Scene, convert: Convert, phases: Sequence[tuple[Fraction, Fraction]] | None) -> RotorForm:
-    refuse_tilt_and_cone("lagrange", scene)
     gravity = Fraction(scene.gravity)
     count = len(scene.blades)
     forms: list[BladeForm] = []
     fixed: list[tuple[Number, Number, Number]] = []
-    inertia = Fraction(scene.hub_inertia)
+    inertia, fixed_height = Fraction(scene.hub_inertia), Fraction(0)
     for i, blade in enumerate(scene.blades):
         phase = phases[i] if phases else phase_of(i, count)
         if blade.has_pitch_inertia:
             bearing = (Fraction(value) for value in scene.bearings[i])
-            values = [*phase, *_coefficients(blade, gravity), *bearing, *_rotor_inertia(blade)]
-            forms.append(BladeForm(*(convert(value) for value in values)))
+            values = [*phase, *_coefficients(blade, gravity, scene.shaft_tilt), *bearing, *_rotor_inertia(blade)]
+            form = BladeForm(*(convert(value) for value in values))
+            if scene.has_tilt_or_cone:
+                of_lean = _lean_coefficients(blade, gravity, scene.shaft_tilt)
+                form = replace(form, lean=LeanForm(*(convert(value) for value in of_lean)))
+            forms.append(form)
         else:
+            lean = _lean(blade.cone, scene.shaft_tilt)
             inertia += _rotor_inertia(blade)[1]
             weight = Fraction(blade.mass) * gravity * Fraction(blade.centre_of_mass[2])
+            fixed_height += weight * lean.sin_tilt * lean.sin_cone
+            weight *= lean.cos_tilt * lean.cos_cone
             fixed.append((convert(weight), convert(phase[0]), convert(phase[1])))
-    return RotorForm(tuple(forms), tuple(fixed), convert(inertia), convert(Fraction(scene.shaft_damping)))
+    damping = Fraction(scene.shaft_damping)
+    return RotorForm(tuple(forms), tuple(fixed), convert(inertia), convert(damping), convert(fixed_height))
+
+
+def leans(scene: Scene, convert: Convert = float) -> list[Lean | None]:
+    """Return cosines and sines of cone and tilt of each blade, rounded once; None for each where all are upright."""
+    if not scene.has_tilt_or_cone:
+        return [None] * len(scene.blades)
+    converted: list[Lean | None] = []
+    for blade in scene.blades:
+        lean = _lean(blade.cone, scene.shaft_tilt)
+        converted.append(Lean(*(convert(getattr(lean, name)) for name in Lean.__slots__)))
+    return converted
+
+
+@functools.lru_cache(maxsize=256)
+def _lean(cone: float, tilt: float) -> Lean:
+    """Return cosines and sines of two angles (rad), which are taken as exact, to 50 digits."""
+    return Lean(*(value for angle in (cone, tilt) for value in _cosine_and_sine(Fraction(angle))))
 
 
 def phase_of(blade: int, count: int) -> tuple[Fraction, Fraction]:
@@ -130,21 +182,55 @@ def _inertia_about_hub(blade: Blade) -> tuple[Fraction, Fraction, Fraction, Frac
 
 @functools.lru_cache(maxsize=256)
 def _rotor_inertia(blade: Blade) -> tuple[Fraction, Fraction, Fraction]:
-    """Return ss, cc, sc of the blade's inertia about the shaft, a(θ) = Jxx s² + Jyy c² + 2 Jxy s c."""
-    xx, yy, _, xy, _, _ = _inertia_about_hub(blade)
-    return xx, yy, 2 * xy
+    """Return ss, cc, sc of the blade's inertia about the shaft, A = inertia_ss s² + inertia_cc c² + inertia_sc s c."""
+    xx, yy, zz, xy, _, _ = _inertia_about_hub(blade)
+    lean = _lean(blade.cone, 0.0)
+    cone_cc, cone_ss = lean.cos_cone**2, lean.sin_cone**2
+    # What the pitch axis has about the shaft, Jzz sin²β, is split over s² + c² = 1.
+    return cone_cc * xx + cone_ss * zz, cone_cc * yy + cone_ss * zz, 2 * cone_cc * xy
 
 
 @functools.lru_cache(maxsize=256)  # the blades of a rotor are mostly equal, and so are the rotors of a sweep
-def _coefficients(blade: Blade, gravity: Fraction) -> list[Fraction]:
+def _coefficients(blade: Blade, gravity: Fraction, tilt: float) -> list[Fraction]:
     """Return schur_ss ... lever_sc of BladeForm, in its order."""
     xx, yy, zz, xy, xz, yz = _inertia_about_hub(blade)
     x, y, z = (Fraction(value) for value in blade.centre_of_mass)
-    weight = Fraction(blade.mass) * gravity
+    lean = _lean(blade.cone, tilt)
+    cos_cone, squared = lean.cos_cone, lean.cos_cone**2
+    weight = Fraction(blade.mass) * gravity * lean.cos_tilt
     schur = [xx - xz * xz / zz, yy - yz * yz / zz, 2 * (xy - xz * yz / zz)]
     lever = [weight * (z + xz * x / zz), weight * (z + yz * y / zz), weight * (xz * y + yz * x) / zz]
-    slope, coupling, weights = [xx - yy, xy], [xz, yz], [weight * x, weight * y, weight * z]
-    return [*schur, *slope, *coupling, xz / zz, yz / zz, zz, *weights, *lever]
+    return [
+        *(squared * value for value in (*schur, xx - yy, xy)),
+        *(cos_cone * value for value in (xz, yz, xz / zz, yz / zz)),
+        zz,
+        weight * x,
+        weight * y,
+        cos_cone * weight * z,
+        *(cos_cone * value for value in lever),
+    ]
+
+
+@functools.lru_cache(maxsize=256)
+def _lean_coefficients(blade: Blade, gravity: Fraction, tilt: float) -> list[Fraction]:
+    """Return the coefficients of LeanForm, in its order."""
+    _, _, zz, _, xz, yz = _inertia_about_hub(blade)
+    x, y, z = (Fraction(value) for value in blade.centre_of_mass)
+    weight, lean = Fraction(blade.mass) * gravity, _lean(blade.cone, tilt)
+    mixed = lean.sin_cone * lean.cos_cone
+    return [
+        lean.sin_cone,
+        lean.sin_cone * zz,
+        -mixed * yz,
+        mixed * xz,
+        2 * mixed * xz,
+        2 * mixed * yz,
+        weight * x,
+        weight * y,
+        lean.sin_tilt * lean.cos_cone,
+        lean.cos_tilt * lean.sin_cone,
+        weight * z * lean.sin_tilt * lean.sin_cone,
+    ]
 
 
 _FIXED_POINT = 10**60  # whole numbers stand for this many times a fraction
@@ -154,12 +240,26 @@ _FIXED_POINT = 10**60  # whole numbers stand for this many times a fraction
 def _cosine_of_turn(turn: Fraction) -> Fraction:
     """Return cos(2π·turn) to 50 digits: so that a third of a turn is -1/2 in double and in quad precision."""
     angle = 2 * PI * ((turn + Fraction(1, 2)) % 1 - Fraction(1, 2))
-    square = int(angle * angle * _FIXED_POINT)
+    return _power_series(angle * angle, 1)
+
+
+def _cosine_and_sine(angle: Fraction) -> tuple[Fraction, Fraction]:
+    """Return cosine and sine of an angle of at most a few rad to 50 digits."""
+    square = angle * angle
+    return _power_series(square, 1), angle * _power_series(square, 2)
+
+
+def _power_series(square: Fraction, first: int) -> Fraction:
+    """Return the sum of (-square)^n over the product of the first 2n numbers from `first` on, to 50 digits.
+
+    With first = 1 it is the cosine of the square's root, with 2 the sine divided by that root.
+    """
+    fixed = int(square * _FIXED_POINT)
     term = total = _FIXED_POINT
-    k, sign = 0, 1
+    k, sign = first - 1, 1
     while term:
         k, sign = k + 2, -sign
-        term = term * square // (k * (k - 1) * _FIXED_POINT)
+        term = term * fixed // (k * (k - 1) * _FIXED_POINT)
         total += sign * term
     return Fraction(total, _FIXED_POINT).limit_denominator(10**50)
 
@@ -175,27 +275,14 @@ def changing_rests(scene: Scene) -> tuple[bool, ...]:
     return tuple(not is_constant(rest) for rest in rests)
 
 
-def resting_pitches(scene: Scene) -> tuple[int, ...]:
-    """Return the coordinates of the pitches that the equations leave at zero for ever.
-
-    They start there at rest, without a load, and mass and inertia of the blade are symmetric about its x-z plane.
-    """
-    form = rotor_form(scene, Fraction)
-    resting = []
-    for column, blade in zip(scene.moving_coordinates[1:], form.blades, strict=True):
-        torque, rest = scene.pitch_loads[column - 1]
-        loads = [value for _, value in torque]
-        if blade.stiffness:
-            loads += [value for _, value in rest]
-        start = scene.initial_angles[column], scene.initial_rates[column]
-        asymmetry = blade.weight_y, blade.half_slope_cs, blade.coupling_c
-        if not any([*start, *loads, *asymmetry]):
-            resting.append(column)
-    return tuple(resting)
-
-
 # Up to this natural frequency, rad/s, a rate counts in rad/s as an angle counts in rad (the paper's blades: 10.7).
 _UNIT_FREQUENCY = 100.0
+
+
+def pitch_weight(blade: BladeForm) -> float:
+    """Return the largest moment (N m) that the blade's weight can have about its pitch axis."""
+    weights = blade.lean or blade
+    return math.hypot(weights.weight_x, weights.weight_y)
 
 
 def rate_units(scene: Scene) -> Array:
@@ -208,6 +295,6 @@ def rate_units(scene: Scene) -> Array:
     spin = abs(scene.initial_rates[0])
     frequencies = [0.0]
     for blade in form.blades:
-        moment = blade.stiffness + math.hypot(blade.weight_x, blade.weight_y)
+        moment = blade.stiffness + pitch_weight(blade)
         frequencies.append(max(math.sqrt(moment / blade.pitch_inertia), spin))
     return np.array([frequency if frequency > _UNIT_FREQUENCY else 1.0 for frequency in frequencies])

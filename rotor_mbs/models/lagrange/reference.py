@@ -17,9 +17,10 @@ from numpy.typing import NDArray
 
 from rotor_mbs.models.lagrange import closed_form
 from rotor_mbs.models.lagrange.closed_form import Accelerations
+from rotor_mbs.models.lagrange.hamilton import resting_pitches
 from rotor_mbs.models.lagrange.heyoka_adapter import is_available
 from rotor_mbs.models.lagrange.ode_solvers import OdeSolver, scipy_integrator
-from rotor_mbs.models.lagrange.parameters import Number, rate_units, resting_pitches, rotor_form
+from rotor_mbs.models.lagrange.parameters import Number, rate_units, rotor_form
 from rotor_mbs.models.lagrange.samples import quad_loads
 from rotor_mbs.models.lagrange.taylor import Propagation
 from rotor_mbs.scenario.scene import Scene

@@ -2,14 +2,16 @@
 
 Loads on roots, shaft bearing and actuators follow by Newton's and Euler's laws from the closed form's accelerations.
 
-Symbols, in the frame of a blade with azimuth φ and pitch θ: s = sin θ, c = cos θ; angular velocity
-ω = (Ω s, Ω c, θ̇) and acceleration α = dω/dt; centre of mass r, inertia I about it; up = the base frame's z.
-F = m (α × r + ω × (ω × r) + g up),  M = I α + ω × I ω + r × F: of the hub on the blade, about the hub centre.
+Symbols, in the frame of a blade with azimuth φ, pitch θ, cone β: s = sin θ, c = cos θ; angular velocity
+ω = (Ω cos β s, Ω cos β c, θ̇ + Ω sin β) and acceleration α = dω/dt; centre of mass r, inertia I about it; up = the base
+frame's z; root at e = (0, 0, hub radius).
+F = m (α × r + ω × (ω × r) + g up),  M = I α + ω × I ω + (r - e) × F: of the hub on the blade, about its root.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from fractions import Fraction
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -20,7 +22,9 @@ from rotor_mbs.models.lagrange.closed_form import Function, LoadValues, load_val
 from rotor_mbs.models.lagrange.heyoka_adapter import quad_arithmetic
 from rotor_mbs.models.lagrange.parameters import (
     Convert,
+    Lean,
     changing_rests,
+    leans,
     phase_of,
     rotor_form,
 )
@@ -117,9 +121,10 @@ def trajectory(scene: Scene, times: Array, states: Array) -> Trajectory:
     fields: dict[str, Array] = {}
     if scene.wants("tip"):
         paths = []
-        for i, (blade, phase) in enumerate(zip(scene.blades, scene.phases, strict=True)):
+        blades = zip(scene.blades, scene.phases, leans(scene), strict=True)
+        for i, (blade, phase, lean) in enumerate(blades):
             azimuth, pitch = angles[:, 0] + phase, angles[:, 1 + i]
-            path = closed_form.point_path(azimuth, pitch, blade.tip, np.sin, np.cos)
+            path = closed_form.point_path(azimuth, pitch, blade.tip, np.sin, np.cos, lean)
             paths.append(np.broadcast_arrays(*path))
         rows = np.array(paths)
         fields["tip"] = np.ascontiguousarray(rows.transpose(2, 0, 1))
@@ -261,7 +266,7 @@ def load_conditioning(scene: Scene, times: Array, angles: Array, rates: Array) -
             unit = np.zeros_like(rates)
             unit[:, coordinate] = 1.0
             roots, shaft_force, shaft_moment = _reactions(scene, angles, still, unit, 0.0, float, np.sin, np.cos)
-            shaft_moment[:, 1] += scene.hub_inertia * unit[:, 0]
+            _add_about_shaft(shaft_moment, scene.hub_inertia * unit[:, 0], scene, float)
             loads = named_loads(roots, shaft_force, shaft_moment, np.zeros_like(angles[:, 1:]))
             for name, values in loads.items():
                 part = (np.abs(values).T * lost[:, place]).T
@@ -273,11 +278,12 @@ def _inverse_mass_matrices(scene: Scene, angles: Array) -> Array:
     """Return the inverse of the mass matrix at (n, 1 + blades) rad: (n, moving, moving), by the Schur complement."""
     form, moving = rotor_form(scene), scene.moving_coordinates
     schur = np.full(len(angles), form.inertia)
-    levers = [np.full(len(angles), -1.0)]  # of each coordinate on the rotor: -1, then b / Jzz
+    levers = [np.full(len(angles), -1.0)]  # of each coordinate on the rotor: -1, then B / Jzz
     for blade, column in zip(form.blades, moving[1:], strict=True):
         s, c = np.sin(angles[:, column]), np.cos(angles[:, column])
         schur += blade.schur_ss * (s * s) + blade.schur_cc * (c * c) + blade.schur_sc * (s * c)
-        levers.append(blade.ratio_s * s + blade.ratio_c * c)
+        ratio = blade.ratio_s * s + blade.ratio_c * c
+        levers.append(ratio + blade.lean.ratio if blade.lean else ratio)
     lever = np.stack(levers, axis=1)
     inverse = lever[:, :, None] * lever[:, None, :] / schur[:, None, None]
     for i, blade in enumerate(form.blades, start=1):
@@ -317,8 +323,21 @@ def _loads(
         torque, rest = applied[torque_place(column)], applied[rest_place(column)]
         actuators[:, column - 1] = torque - stiffness * (angles[:, column] - rest) - damping * rates[:, column]
     roots, shaft_force, shaft_moment = _reactions(scene, angles, rates, accelerations, scene.gravity, convert, sin, cos)
-    shaft_moment[:, 1] += scene.hub_inertia * accelerations[:, 0] - applied[ROTOR_TORQUE]
+    about_shaft = scene.hub_inertia * accelerations[:, 0] - applied[ROTOR_TORQUE]
+    _add_about_shaft(shaft_moment, about_shaft, scene, convert)
+    if scene.hub_mass:
+        shaft_force[:, 2] += scene.hub_mass * scene.gravity
     return named_loads(roots, shaft_force, shaft_moment, actuators)
+
+
+def _add_about_shaft(moments: Numbers, sizes: Numbers, scene: Scene, convert: Convert) -> None:
+    """Add moments about the shaft, (n,) N m, to moments in the base frame, (n, 3) N m."""
+    lean = leans(scene, convert)[0]
+    if not lean:
+        moments[:, 1] += sizes
+        return
+    moments[:, 1] += sizes * lean.cos_tilt
+    moments[:, 2] += sizes * lean.sin_tilt
 
 
 def _reactions(
@@ -331,16 +350,22 @@ def _reactions(
     sin: Function,
     cos: Function,
 ) -> tuple[list[tuple[Numbers, Numbers]], Numbers, Numbers]:
-    """Return force and moment at each root, and the sums of both about the hub centre in the base frame."""
+    """Return force and moment at each root, and the sums of both about the apex in the base frame."""
     sin_q, cos_q = sin(angles[:, 0]), cos(angles[:, 0])
+    radius = convert(Fraction(scene.hub_radius)) if scene.hub_radius else 0.0
     roots, in_base = [], []
-    for i, blade in enumerate(scene.blades):
+    for i, (blade, lean) in enumerate(zip(scene.blades, leans(scene, convert), strict=True)):
         cos_phase, sin_phase = map(convert, phase_of(i, len(scene.blades)))
         azimuth = sin_q * cos_phase + cos_q * sin_phase, cos_q * cos_phase - sin_q * sin_phase
         pitch = sin(angles[:, 1 + i]), cos(angles[:, 1 + i])
         turning = rates[:, 0], rates[:, 1 + i], accelerations[:, 0], accelerations[:, 1 + i]
-        roots.append(root_load(blade, azimuth, pitch, turning, gravity))
-        in_base.append([_in_base_frame(vectors, azimuth, pitch) for vectors in roots[-1]])
+        force, moment = root_load(blade, azimuth, pitch, turning, gravity, lean)
+        about_apex = moment
+        if scene.hub_radius:
+            root = np.array([0.0, 0.0, 1.0]) * radius
+            moment = about_apex - np.cross(root, force)
+        roots.append((force, moment))
+        in_base.append([_in_base_frame(vectors, azimuth, pitch, lean) for vectors in (force, about_apex)])
     shaft_force, shaft_moment = (sum(vectors) for vectors in zip(*in_base, strict=True))
     return roots, shaft_force, shaft_moment
 
@@ -351,8 +376,9 @@ def root_load(
     pitch: tuple[Numbers, Numbers],
     turning: tuple[Numbers, Numbers, Numbers, Numbers],
     gravity: float,
+    lean: Lean | None,
 ) -> tuple[Numbers, Numbers]:
-    """Compute the load on a blade's root, (n, 3) force and moment in the blade's frame.
+    """Compute the load on a blade, (n, 3) force and moment about the apex in the blade's frame.
 
     Parameters
     ----------
@@ -360,19 +386,40 @@ def root_load(
     azimuth, pitch : sine and cosine, (n,) each.
     turning : Ω, θ̇, dΩ/dt and dθ̇/dt, (n,) each.
     gravity : m/s².
+    lean : cosines and sines of cone and tilt; None where both are 0.
     """
     (sin_phi, cos_phi), (s, c) = azimuth, pitch
     spin, rate, spin_rate, rate_rate = turning
-    omega = np.stack([spin * s, spin * c, rate], axis=1)
-    alpha = np.stack([spin_rate * s + spin * rate * c, spin_rate * c - spin * rate * s, rate_rate], axis=1)
-    up = np.stack([-sin_phi * c, sin_phi * s, cos_phi], axis=1)
+    if lean is None:
+        omega = np.stack([spin * s, spin * c, rate], axis=1)
+        alpha = np.stack([spin_rate * s + spin * rate * c, spin_rate * c - spin * rate * s, rate_rate], axis=1)
+        up = np.stack([-sin_phi * c, sin_phi * s, cos_phi], axis=1)
+    else:
+        # Components along the blade's y and z axes at zero pitch, which the cone turns.
+        spin_y, spin_z = spin * lean.cos_cone, spin * lean.sin_cone
+        spin_rate_y, spin_rate_z = spin_rate * lean.cos_cone, spin_rate * lean.sin_cone
+        up_x, up_radial = -sin_phi * lean.cos_tilt, cos_phi * lean.cos_tilt
+        up_y = lean.sin_tilt * lean.cos_cone - up_radial * lean.sin_cone
+        up_z = lean.sin_tilt * lean.sin_cone + up_radial * lean.cos_cone
+        omega = np.stack([spin_y * s, spin_y * c, rate + spin_z], axis=1)
+        alpha_x = spin_rate_y * s + spin_y * rate * c
+        alpha_y = spin_rate_y * c - spin_y * rate * s
+        alpha = np.stack([alpha_x, alpha_y, rate_rate + spin_rate_z], axis=1)
+        up = np.stack([up_x * c + up_y * s, up_y * c - up_x * s, up_z], axis=1)
     r, inertia = np.array(blade.centre_of_mass), blade.inertia_tensor
     force = blade.mass * (np.cross(alpha, r) + np.cross(omega, np.cross(omega, r)) + gravity * up)
     return force, alpha @ inertia + np.cross(omega, omega @ inertia) + np.cross(r, force)
 
 
-def _in_base_frame(vectors: Numbers, azimuth: tuple[Numbers, Numbers], pitch: tuple[Numbers, Numbers]) -> Numbers:
-    """Return (n, 3) vectors of a blade's frame in the base frame: Ry(φ)·Rz(θ)·vector."""
+def _in_base_frame(
+    vectors: Numbers, azimuth: tuple[Numbers, Numbers], pitch: tuple[Numbers, Numbers], lean: Lean | None
+) -> Numbers:
+    """Return (n, 3) vectors of a blade's frame in the base frame: Rx(τ)·Ry(φ)·Rx(-β)·Rz(θ)·vector."""
     (sin_phi, cos_phi), (s, c), (x, y, z) = azimuth, pitch, vectors.T
-    across = x * c - y * s
-    return np.stack([cos_phi * across + sin_phi * z, x * s + y * c, cos_phi * z - sin_phi * across], axis=1)
+    across, along = x * c - y * s, x * s + y * c
+    if lean:
+        along, z = along * lean.cos_cone + z * lean.sin_cone, z * lean.cos_cone - along * lean.sin_cone
+    x, z = cos_phi * across + sin_phi * z, cos_phi * z - sin_phi * across
+    if lean:
+        along, z = along * lean.cos_tilt - z * lean.sin_tilt, along * lean.sin_tilt + z * lean.cos_tilt
+    return np.stack([x, along, z], axis=1)

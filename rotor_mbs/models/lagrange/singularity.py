@@ -1,7 +1,7 @@
 """How near a rotor is to pitches at which its mass matrix is singular.
 
-S = J_hub + Σ (a - b²/Jzz) is the rotor's inertia with every pitch free to give way, the Schur complement of
-`closed_form`: m (c² + d²) cos²θ for point masses, which vanishes where all pitches are ±π/2.
+S = J_hub + Σ cos²β (a - b²/Jzz) is the rotor's inertia with every pitch free to give way, the Schur complement of
+`closed_form`: m (c² + d²) cos²β cos²θ for point masses, which vanishes where all pitches are ±π/2.
 """
 
 from __future__ import annotations
@@ -26,6 +26,8 @@ def rotor_inertia_shares(scene: Scene, angles: Array) -> Array:
         s, c = np.sin(angles[:, column]), np.cos(angles[:, column])
         remaining += blade.schur_ss * s * s + blade.schur_cc * c * c + blade.schur_sc * s * c
         whole += blade.inertia_ss * s * s + blade.inertia_cc * c * c + blade.inertia_sc * s * c
+        if blade.lean:
+            whole += blade.lean.inertia_s * s + blade.lean.inertia_c * c
     return np.asarray(remaining / whole)
 
 

@@ -63,6 +63,7 @@ def equation_numbers(scene: Scene, parameters: Parameters) -> tuple[RotorForm, L
     Takes the scene's numbers into `parameters`, in the order that integrators have them.
     """
     form = rotor_form(scene, parameters)
+    parameters.structure.append(int(scene.has_tilt_or_cone))
     # The engine's step control is relative to the largest variable. In J the work would be that by far, and set the
     # accuracy of all others.
     work_per_joule = parameters.own(1 / Fraction(work_unit(scene))) if scene.work_needs_path else 0.0
