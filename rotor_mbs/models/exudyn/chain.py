@@ -11,7 +11,7 @@ import numpy as np
 from rotor_mbs.methods.base import BuiltItem
 from rotor_mbs.models.exudyn import geometry
 from rotor_mbs.models.exudyn.geometry import Part, Ref, sensor
-from rotor_mbs.models.exudyn.loads import Loads, Moment, chain_sensors, is_driven, moment_on
+from rotor_mbs.models.exudyn.loads import Loads, Moment, along_shaft, chain_sensors, is_driven, moment_on
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.scenario.time_table import constant_value, is_constant
 from rotor_mbs.solution.trajectory import Array
@@ -23,14 +23,10 @@ class Placed:
 
     name: str
     body: geometry.Body
-    about_shaft: float  # rad, of its orientation
-    pitch: float
+    rotation: Array  # (3, 3) from its frame to the base frame
+    quaternion: Array  # (4,) Euler parameters of the same rotation
     axis: Array  # (3,) in the base frame, that it turns about in its bearing
     omega: Array  # (3,) rad/s in the base frame, angular velocity
-
-    @property
-    def rotation(self) -> Array:
-        return geometry.rotation_y(np.cos(self.about_shaft), np.sin(self.about_shaft)) @ geometry.rotation_z(self.pitch)
 
 
 def placed_bodies(scene: Scene) -> list[Placed]:
@@ -38,17 +34,28 @@ def placed_bodies(scene: Scene) -> list[Placed]:
 
     Positions and velocities fit the joints.
     """
-    rotor, rate = scene.initial_angles[0], scene.initial_rates[0]
-    shaft = np.array([0.0, 1.0, 0.0])
-    spin = rate * shaft
-    bodies = [Placed("hub", geometry.hub_body(scene), rotor, 0.0, shaft, spin)]
+    rotor, tilt = scene.initial_angles[0], scene.shaft_tilt
+    shaft = geometry.shaft_axis(scene)
+    spin = scene.initial_rates[0] * shaft
+    rotation, pose = _rotor_rotation(scene, rotor), geometry.quaternion(rotor, 0.0, tilt)
+    bodies = [Placed("hub", geometry.hub_body(scene), rotation, pose, shaft, spin)]
     for i in geometry.movable_blades(scene):
         pitch, pitch_rate = scene.initial_angles[1 + i], scene.initial_rates[1 + i]
-        about_shaft = rotor + scene.phases[i]
-        axis = np.array([np.sin(about_shaft), 0.0, np.cos(about_shaft)])
+        about_shaft, cone = rotor + scene.phases[i], scene.blades[i].cone
+        unpitched = _rotor_rotation(scene, about_shaft)
+        if cone:
+            unpitched = unpitched @ geometry.rotation_x(-cone)
+        axis = unpitched[:, 2].copy()
+        rotation, pose = unpitched @ geometry.rotation_z(pitch), geometry.quaternion(about_shaft, pitch, tilt, cone)
         body = geometry.blade_body(scene.blades[i])
-        bodies.append(Placed(f"blade {i + 1}", body, about_shaft, pitch, axis, spin + pitch_rate * axis))
+        bodies.append(Placed(f"blade {i + 1}", body, rotation, pose, axis, spin + pitch_rate * axis))
     return bodies
+
+
+def _rotor_rotation(scene: Scene, about_shaft: float) -> Array:
+    """Return the rotation from a frame of the rotor, turned by an angle (rad) about the shaft, to the base frame."""
+    turned = geometry.rotation_y(np.cos(about_shaft), np.sin(about_shaft))
+    return geometry.rotation_x(scene.shaft_tilt) @ turned if scene.shaft_tilt else turned
 
 
 def parts(scene: Scene, loads: Loads, node: str = "euler_parameters") -> list[Part]:
@@ -69,10 +76,10 @@ def parts(scene: Scene, loads: Loads, node: str = "euler_parameters") -> list[Pa
             mass = Part("marker", f"{placed.name} mass", "MarkerBodyMass", {"bodyNumber": Ref("object", placed.name)})
             weight = {"markerNumber": Ref("marker", mass.name), "loadVector": [0.0, 0.0, -scene.gravity]}
             built += [mass, Part("load", f"gravity on {placed.name}", "LoadMassProportional", weight)]
-    ground = _marker("ground", "at shaft", geometry.ALONG_SHAFT, np.zeros(3))
+    ground = _marker("ground", "at shaft", geometry.rotation_x(scene.shaft_tilt) @ geometry.ALONG_SHAFT, np.zeros(3))
     built += _bearing("shaft bearing", ground, _on_body(hub, "at shaft", geometry.ALONG_SHAFT))
     for i, blade in zip(geometry.movable_blades(scene), blades, strict=True):
-        seat = _on_body(hub, f"at bearing {i + 1}", geometry.mounting(i, len(scene.blades)))
+        seat = _on_body(hub, f"at bearing {i + 1}", geometry.mounting(scene, i))
         built += _bearing(f"pitch bearing {i + 1}", seat, _on_body(blade, "at bearing", np.eye(3)))
         built += _pitch_spring(scene, loads, i, seat.name, f"{blade.name} at bearing")
     if scene.shaft_damping:
@@ -80,10 +87,10 @@ def parts(scene: Scene, loads: Loads, node: str = "euler_parameters") -> list[Pa
     if scene.has_torque:
         load: dict[str, object] = {
             "markerNumber": Ref("marker", "hub at shaft"),
-            "loadVector": [0.0, scene.rotor_torque[0][1], 0.0],
+            "loadVector": along_shaft(scene, scene.rotor_torque[0][1]),
         }
         if not scene.has_constant_torque:
-            load["loadVectorUserFunction"] = moment_on(scene, loads, 0).about_y
+            load["loadVectorUserFunction"] = _torque_on_shaft(scene, moment_on(scene, loads, 0))
         detail = "constant" if scene.has_constant_torque else "over time"
         built.append(Part("load", "rotor torque", "LoadTorqueVector", load, detail))
     # From these the joint angles and rates are found, which are no coordinates of the chain.
@@ -116,7 +123,7 @@ def _body(placed: Placed, node: str) -> list[Part]:
     position = placed.rotation @ body.com
     with np.errstate(over="ignore", invalid="ignore"):  # of a rate that has no bound: the run says so
         velocity = np.cross(placed.omega, position)
-    p = geometry.quaternion(placed.about_shaft, placed.pitch)
+    p = placed.quaternion
     if node == "euler_parameters":
         type_, pose, motion = "NodeRigidBodyEP", p, geometry.quaternion_rate(p, placed.omega)
     else:
@@ -142,7 +149,7 @@ def _body(placed: Placed, node: str) -> list[Part]:
 
 
 def _on_body(placed: Placed, where: str, rotation: Array) -> Part:
-    """Return a marker at the hub centre, with a (3, 3) rotation, that is fixed on a body."""
+    """Return a marker at the apex, with a (3, 3) rotation, that is fixed on a body."""
     return _marker(placed.name, where, rotation, -placed.body.com)
 
 
@@ -188,6 +195,15 @@ def _pitch_spring(scene: Scene, loads: Loads, blade: int, seat: str, root: str) 
         detail = f"{spring.detail}, torque over time".removeprefix(", ")
         spring = replace(spring, parameters=parameters, detail=detail)
     return [*built, spring]
+
+
+def _torque_on_shaft(scene: Scene, moment: Moment) -> Callable[..., list[float]]:
+    """Return the rotor torque as the engine asks for it: a vector in the base frame, N m."""
+
+    def torque(_system: object, time: float, _load: object) -> list[float]:
+        return along_shaft(scene, moment.at(time))
+
+    return torque
 
 
 def _spring_torque(moment: Moment) -> Callable[..., float]:

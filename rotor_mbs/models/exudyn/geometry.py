@@ -1,5 +1,6 @@
-"""Rotations and rigid bodies of the rotor. Base frame: z up, the shaft along y. Blade i stands in the hub frame turned
-by its phase about y, and turns by its pitch about its own z: R_i = Ry(rotor + phase_i) Rz(pitch_i)."""
+"""Rotations and rigid bodies of the rotor. Base frame: z up; the shaft is y of the shaft frame, which is the base frame
+turned by the tilt about x. Blade i stands in the hub frame turned by its phase about y and by its cone about -x, and
+turns by its pitch about its own z: R_i = Rx(tilt) Ry(rotor + phase_i) Rx(-cone_i) Rz(pitch_i)."""
 
 from __future__ import annotations
 
@@ -10,7 +11,6 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from rotor_mbs.methods.base import BuiltItem
-from rotor_mbs.models import refuse_tilt_and_cone
 from rotor_mbs.scenario.scene import Blade, Scene
 from rotor_mbs.solution.trajectory import Array
 
@@ -20,7 +20,7 @@ ALONG_SHAFT = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]])
 
 @dataclass(frozen=True)
 class Body:
-    """A rigid body in its own frame, whose origin is the hub centre."""
+    """A rigid body in its own frame, whose origin is the apex."""
 
     mass: float  # kg
     com: Array  # (3,) m, centre of mass
@@ -41,9 +41,23 @@ def rotation_z(angle: float) -> Array:
     return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
 
 
-def mounting(index: int, count: int) -> Array:
-    """Return the rotation from the hub frame to the zero-pitch frame of blade `index` (from 0) of `count`, (3, 3)."""
-    return rotation_y(*_turn(index, count))
+def rotation_x(angle: float) -> Array:
+    """Return the turn about x by an angle in rad, (3, 3); exactly the identity for 0."""
+    if not angle:
+        return np.eye(3)
+    c, s = math.cos(angle), math.sin(angle)
+    return np.array([[1.0, 0.0, 0.0], [0.0, c, -s], [0.0, s, c]])
+
+
+def mounting(scene: Scene, index: int) -> Array:
+    """Return the rotation from the zero-pitch frame of blade `index` (from 0) to the hub frame, (3, 3)."""
+    mounted, cone = rotation_y(*_turn(index, len(scene.blades))), scene.blades[index].cone
+    return mounted @ rotation_x(-cone) if cone else mounted
+
+
+def shaft_axis(scene: Scene) -> Array:
+    """Return the direction of the shaft in the base frame, (3,)."""
+    return rotation_x(scene.shaft_tilt)[:, 1]
 
 
 def _turn(part: int, whole: int) -> tuple[float, float]:
@@ -61,11 +75,22 @@ def _turn(part: int, whole: int) -> tuple[float, float]:
     return [(cosine, sine), (-sine, cosine), (-cosine, -sine), (sine, -cosine)][quarter % 4]
 
 
-def quaternion(about_shaft: float, pitch: float) -> Array:
-    """Return the Euler parameters of Ry(about_shaft) Rz(pitch), (4,), scalar first."""
+def quaternion(about_shaft: float, pitch: float, tilt: float = 0.0, cone: float = 0.0) -> Array:
+    """Return the Euler parameters of Rx(tilt) Ry(about_shaft) Rx(-cone) Rz(pitch), (4,), scalar first."""
     c, s = math.cos(0.5 * about_shaft), math.sin(0.5 * about_shaft)
     cp, sp = math.cos(0.5 * pitch), math.sin(0.5 * pitch)
-    return np.array([c * cp, s * sp, s * cp, c * sp])
+    if not (tilt or cone):
+        return np.array([c * cp, s * sp, s * cp, c * sp])
+    about_x = [np.array([math.cos(0.5 * angle), math.sin(0.5 * angle), 0.0, 0.0]) for angle in (tilt, -cone)]
+    rotor = _quaternion_product(about_x[0], np.array([c, 0.0, s, 0.0]))
+    blade = _quaternion_product(about_x[1], np.array([cp, 0.0, 0.0, sp]))
+    return _quaternion_product(rotor, blade)
+
+
+def _quaternion_product(p: Array, q: Array) -> Array:
+    """Return the Euler parameters of the rotation `p` after the rotation `q`, (4,)."""
+    scalar = p[0] * q[0] - p[1:] @ q[1:]
+    return np.concatenate([[scalar], p[0] * q[1:] + q[0] * p[1:] + np.cross(p[1:], q[1:])])
 
 
 def quaternion_rate(p: Array, omega: Array) -> Array:
@@ -93,8 +118,8 @@ def movable_blades(scene: Scene) -> tuple[int, ...]:
 
 
 def fixed_blade_rotation(scene: Scene, index: int) -> Array:
-    """Return the rotation from the hub frame to the frame of a blade fixed at its initial pitch, (3, 3)."""
-    return mounting(index, len(scene.blades)) @ rotation_z(scene.initial_angles[1 + index])
+    """Return the rotation from the frame of a blade fixed at its initial pitch to the hub frame, (3, 3)."""
+    return mounting(scene, index) @ rotation_z(scene.initial_angles[1 + index])
 
 
 def body_of_point(scene: Scene, index: int, point: Sequence[float]) -> tuple[int, Array]:
@@ -126,11 +151,12 @@ def blade_body(blade: Blade) -> Body:
 def hub_body(scene: Scene) -> Body:
     """Return the hub as a thin disc about the shaft, with every blade that cannot pitch made part of it.
 
-    The disc's other two moments, half of the axial one, are never felt: they make it a body that can exist.
+    The disc's other two moments, half of the axial one, are never felt: they make it a body that can exist. Neither is
+    its mass, at the apex, but by the shaft bearing: it has one where loads are wanted.
     """
-    refuse_tilt_and_cone("exudyn", scene)
     half = 0.5 * scene.hub_inertia
-    parts = [Body(0.0, np.zeros(3), np.diag([half, scene.hub_inertia, half]))]
+    mass = scene.hub_mass if scene.wants("loads") else 0.0
+    parts = [Body(mass, np.zeros(3), np.diag([half, scene.hub_inertia, half]))]
     for index, blade in enumerate(scene.blades):
         if not blade.has_pitch_inertia:
             body, rotation = blade_body(blade), fixed_blade_rotation(scene, index)

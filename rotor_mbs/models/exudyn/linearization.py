@@ -14,7 +14,7 @@ import numpy as np
 from rotor_mbs.errors import MethodRefusal
 from rotor_mbs.models.exudyn import chain, tree
 from rotor_mbs.models.exudyn.adapter import Linearized, System
-from rotor_mbs.models.exudyn.geometry import quaternion
+from rotor_mbs.models.exudyn.geometry import movable_blades
 from rotor_mbs.models.exudyn.loads import Loads
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.trajectory import Array, Linearization, limit_at_zero, scene_at
@@ -77,7 +77,7 @@ def linearize_chain(scene: Scene, angles: Sequence[float] | Array, speed: float,
     rank = int(np.count_nonzero(singular_values > 1e-10 * singular_values[0]))
     N: Array = np.asarray(vectors[:, rank:])
     geometric = limit_at_zero([_geometric_stiffness(system, multipliers, N, step) for step in _STEPS], 2.0)
-    joint = _joint_rates(chain.placed_bodies(state)) @ N
+    joint = _joint_rates(state) @ N
     mass = N.T @ linear.M @ N
 
     def in_joint_angles(matrix: Array) -> Array:
@@ -88,17 +88,26 @@ def linearize_chain(scene: Scene, angles: Sequence[float] | Array, speed: float,
     return Linearization(stiffness, damping, joint @ np.linalg.solve(mass, N.T @ force))
 
 
-def _joint_rates(bodies: Sequence[chain.Placed]) -> Array:
+def _joint_rates(scene: Scene) -> Array:
     """Return the joints' rates as a linear function of the rates of all bodies' coordinates, (bodies, 7 bodies).
 
     Coordinates are positions and Euler parameters (e0, e); the angular velocity is 2 (e0 ė - ė0 e + e × ė).
     """
+    bodies = chain.placed_bodies(scene)
     rows = np.zeros((len(bodies), 7 * len(bodies)))
     for k, placed in enumerate(bodies):
-        p = quaternion(placed.about_shaft, placed.pitch)
-        spin = np.column_stack([-p[1:], p[0] * np.eye(3) + np.cross(p[1:], np.eye(3)).T])
-        rows[k, 7 * k + 3 : 7 * k + 7] = 2.0 * placed.axis @ spin
+        rows[k, 7 * k + 3 : 7 * k + 7] = placed.axis @ _spin(placed)
+    # Of the rotor's rate a coned blade has a part about its own axis; its pitch rate is the rest.
+    for k, i in enumerate(movable_blades(scene), start=1):
+        if scene.blades[i].cone:
+            rows[k, 3:7] -= bodies[k].axis @ _spin(bodies[0])
     return rows
+
+
+def _spin(placed: chain.Placed) -> Array:
+    """Return the matrix that makes an angular velocity of the rates of Euler parameters, (3, 4)."""
+    p = placed.quaternion
+    return 2.0 * np.column_stack([-p[1:], p[0] * np.eye(3) + np.cross(p[1:], np.eye(3)).T])
 
 
 def _extrapolated(linearized: Callable[[float], Linearized]) -> Linearized:

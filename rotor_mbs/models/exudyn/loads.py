@@ -6,6 +6,7 @@ part of the hub, from Newton's and Euler's laws on the engine's accelerations.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -21,7 +22,9 @@ from rotor_mbs.models.exudyn.geometry import (
     fixed_blade_rotation,
     mounting,
     movable_blades,
+    rotation_x,
     sensor,
+    shaft_axis,
 )
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.scenario.time_table import ROTOR_TORQUE, Segment, is_constant, rest_place, torque_place, values_before
@@ -94,9 +97,11 @@ class Moment:
         """Return the moment; the engine's load function of a load on a coordinate."""
         return self.at(time)
 
-    def about_y(self, _system: object, time: float, _load: object) -> list[float]:
-        """Return the moment as a vector; the engine's load function of a torque along the shaft."""
-        return [0.0, self.at(time), 0.0]
+
+def along_shaft(scene: Scene, size: float) -> list[float]:
+    """Return a vector along the shaft of a size, in the base frame."""
+    tilt = scene.shaft_tilt
+    return [0.0, size * math.cos(tilt), size * math.sin(tilt)] if tilt else [0.0, size, 0.0]
 
 
 def moment_on(scene: Scene, loads: Loads, coordinate: int) -> Moment:
@@ -139,7 +144,7 @@ def _newton_euler(scene: Scene, i: int, sampled: Sampled) -> tuple[Array, Array,
     Returns
     -------
     force, moment : ndarray, shape (n, 3)
-        N and N m, about the root, in the frame of the blade.
+        N and N m, about the apex, in the frame of the blade.
     frames : ndarray, shape (n, 3, 3)
         From that frame to the base frame.
     """
@@ -178,14 +183,32 @@ def tree_loads(scene: Scene, time: Array, sampled: Sampled) -> dict[str, Array]:
     shaft_force = sum(_in_base(frames, force) for force, _, frames in blades)
     shaft_moment = sum(_in_base(frames, moment) for _, moment, frames in blades)
     assert isinstance(shaft_moment, np.ndarray)
-    shaft_moment[:, 1] -= values_before(scene.load_segments, time)[ROTOR_TORQUE]
+    _add_along_shaft(scene, shaft_moment, -values_before(scene.load_segments, time)[ROTOR_TORQUE])
     if scene.hub_inertia:
-        shaft_moment[:, 1] += scene.hub_inertia * sampled("hub spin rate")[:, 1]
+        _add_along_shaft(scene, shaft_moment, scene.hub_inertia * sampled("hub spin rate")[:, 1])
+    shaft_force = np.asarray(shaft_force)
+    if scene.hub_mass:
+        shaft_force[:, 2] += scene.hub_mass * scene.gravity
     actuators = np.zeros((len(time), len(blades)))
     for i in movable_blades(scene):
         actuators[:, i] = blades[i][1][:, 2]
-    roots = ((force, moment) for force, moment, _ in blades)
-    return named_loads(roots, np.asarray(shaft_force), shaft_moment, actuators)
+    roots = (_at_root(scene, force, moment) for force, moment, _ in blades)
+    return named_loads(roots, shaft_force, shaft_moment, actuators)
+
+
+def _add_along_shaft(scene: Scene, moments: Array, sizes: Array) -> None:
+    """Add moments along the shaft, (n,) N m, to moments in the base frame, (n, 3) N m."""
+    if not scene.shaft_tilt:
+        moments[:, 1] += sizes
+    else:
+        moments += sizes[:, None] * shaft_axis(scene)
+
+
+def _at_root(scene: Scene, force: Array, moment: Array) -> tuple[Array, Array]:
+    """Return force and moment about the root of a blade, from those about the apex; (n, 3) in the blade's frame."""
+    if scene.hub_radius:
+        moment = moment - np.cross([0.0, 0.0, scene.hub_radius], force)
+    return force, moment
 
 
 def tree_sensors(scene: Scene, on_link: Callable[[str, str, int, Array], Part]) -> list[Part]:
@@ -240,20 +263,20 @@ def chain_loads(scene: Scene, sampled: Sampled) -> dict[str, Array]:
     roots, actuators = [], np.zeros((len(hub), len(scene.blades)))
     for i in range(len(scene.blades)):
         if i not in movable_blades(scene):
-            roots.append(_newton_euler(scene, i, sampled)[:2])
+            roots.append(_at_root(scene, *_newton_euler(scene, i, sampled)[:2]))
             continue
         frames = matrices(sampled(f"blade {i + 1} rotation"))
-        seat = hub @ mounting(i, len(scene.blades))
+        seat = hub @ mounting(scene, i)
         force, moment = _joint_reaction(f"pitch bearing {i + 1}", seat, frames, sampled)
         if is_driven(scene, i):
             actuators[:, i] = -sampled(f"pitch spring {i + 1} torque")[:, 0]
         # A joint has no moment about its own axis: there the connector acts.
         along = actuators[:, i, None] * [0.0, 0.0, 1.0]
-        roots.append((_in_frames(frames, force), _in_frames(frames, moment) + along))
-    ground = np.broadcast_to(ALONG_SHAFT, hub.shape)
+        roots.append(_at_root(scene, _in_frames(frames, force), _in_frames(frames, moment) + along))
+    ground = np.broadcast_to(rotation_x(scene.shaft_tilt) @ ALONG_SHAFT, hub.shape)
     force, moment = _joint_reaction("shaft bearing", ground, hub @ ALONG_SHAFT, sampled)
     if scene.shaft_damping:
-        moment[:, 1] -= sampled("shaft damper torque")[:, 0]
+        _add_along_shaft(scene, moment, -sampled("shaft damper torque")[:, 0])
     return named_loads(roots, force, moment, actuators)
 
 

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor_mbs.models.exudyn import chain, tree
-from rotor_mbs.models.exudyn.geometry import Body, mounting, movable_blades
+from rotor_mbs.models.exudyn.geometry import Body, mounting, movable_blades, rotation_x
 from rotor_mbs.models.exudyn.loads import chain_loads, matrices, prescribed_moments, tree_loads
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.scenario.time_table import ROTOR_TORQUE, Segment, is_constant, values_at
@@ -93,7 +93,7 @@ def chain_trajectory(scene: Scene, recorded: Callable[[str], Array], has_work: b
     read = _Reader(scene, recorded, state)
     angles, rates = _joint_motion(scene, read)
     fields = _fields(scene, read, angles, rates, bodies, has_work)
-    # Every body's own hub centre, which the joints keep together with the ground's and the hub's.
+    # Every body's own apex, which the joints keep together with the ground's and the hub's.
     centres = []
     for name, body in bodies:
         rotations = matrices(read.sampled(f"{name} rotation"))
@@ -110,6 +110,8 @@ def chain_trajectory(scene: Scene, recorded: Callable[[str], Array], has_work: b
 def _joint_motion(scene: Scene, read: _Reader) -> tuple[Array, Array]:
     """Return the chain's angles and rates in all rows, (rows, 1 + blades) rad and rad/s."""
     hub = matrices(read.all("hub rotation"))
+    if scene.shaft_tilt:  # in the shaft frame, in which blades too are seen
+        hub = rotation_x(-scene.shaft_tilt) @ hub
     rates = joint_rates(scene, read.all)
     # A turn about y has its sine and its cosine twice.
     twice_sine = hub[:, 0, 2] - hub[:, 2, 0]
@@ -118,9 +120,13 @@ def _joint_motion(scene: Scene, read: _Reader) -> tuple[Array, Array]:
     angles = [unwrap(read.time, wrapped, rates[:, 0], scene.initial_angles[0])]
     for column, i in enumerate(movable_blades(scene), start=1):
         # Axes of the blade, and of its seat on the hub at a pitch of zero.
-        x, y, _ = np.moveaxis(matrices(read.all(f"blade {i + 1} rotation")), 2, 0)
-        seat_x = hub @ mounting(i, len(scene.blades))[:, 0]
-        seat_y = hub[:, :, 1]
+        blade = matrices(read.all(f"blade {i + 1} rotation"))
+        if scene.shaft_tilt:
+            blade = rotation_x(-scene.shaft_tilt) @ blade
+        x, y, _ = np.moveaxis(blade, 2, 0)
+        seat = mounting(scene, i)
+        seat_x = hub @ seat[:, 0]
+        seat_y = hub @ seat[:, 1] if scene.blades[i].cone else hub[:, :, 1]
         twice_sine = _dot(seat_y, x) - _dot(seat_x, y)
         twice_cosine = _dot(seat_x, x) + _dot(seat_y, y)
         wrapped = np.arctan2(twice_sine, twice_cosine)

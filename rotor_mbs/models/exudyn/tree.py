@@ -15,6 +15,7 @@ from rotor_mbs.models.exudyn.geometry import (
     hub_body,
     mounting,
     movable_blades,
+    rotation_x,
     sensor,
 )
 from rotor_mbs.models.exudyn.loads import Loads, moment_on, tree_sensors
@@ -96,12 +97,12 @@ def link_name(link: int) -> str:
 def _tree(scene: Scene) -> Part:
     """Return the tree of a scene, with gravity, springs and dampers, which are parameters of it."""
     blades, links = movable_blades(scene), bodies(scene)
-    mountings = [mounting(i, len(scene.blades)) for i in blades]
+    mountings = [mounting(scene, i) for i in blades]
     parameters: dict[str, object] = {
         "nodeNumber": _NODE,
         "jointTypes": ["RevoluteY", *("RevoluteZ" for _ in blades)],
         "linkParents": [-1, *(0 for _ in blades)],
-        "jointTransformations": [np.eye(3), *mountings],
+        "jointTransformations": [rotation_x(scene.shaft_tilt), *mountings],
         "jointOffsets": [[0.0, 0.0, 0.0] for _ in links],
         "linkMasses": [link.mass for link in links],
         "linkCOMs": [list(link.com) for link in links],
