@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from rotor_mbs.errors import MethodRefusal
 from rotor_mbs.methods.base import BuiltItem
 from rotor_mbs.methods.settings import Settings, number
 
@@ -19,19 +18,6 @@ class Ode45Settings(Settings):
 
     relative_tolerance: float = number(1e-6, above=0.0, doc="relative tolerance of the local error")
     absolute_tolerance: float = number(1e-9, above=0.0, doc="absolute tolerance of the local error, rad and rad/s")
-
-
-def refuse_tilt_and_cone(model: str, scene: Scene) -> None:
-    """Raise MethodRefusal for a tilted shaft, coned blades, a hub with mass or a radius."""
-    present = {
-        "shaft.tilt": scene.shaft_tilt,
-        "blade.cone": any(blade.cone for blade in scene.blades),
-        "hub.radius": scene.hub_radius,
-        "hub.mass": scene.hub_mass,
-    }
-    for key, value in present.items():
-        if value:
-            raise MethodRefusal(f"{model} does not include {key}; it must be 0")
 
 
 def equation_items(scene: Scene, sources: tuple[str, str] = ("", "")) -> list[BuiltItem]:

@@ -91,7 +91,7 @@ def accelerations(
         # ½ ∂A/∂θ Ω² and gravity, both on the pitch: s·on_s + c·on_c
         on_s = blade.half_slope_sc * c_turn - blade.half_slope_cs * s_turn - blade.weight_x * sin_phi
         on_c = blade.half_slope_cs * c_turn - blade.weight_y * sin_phi
-        # ½ ∂A/∂θ times drag is in the rotor's moment, pitch eliminated: Coriolis, and B / Jzz times what turns the pitch.
+        # In the rotor's moment, pitch eliminated, ½ ∂A/∂θ times drag: Coriolis, and B / Jzz times what turns the pitch.
         drag = 2.0 * (spin * rate) + (blade.ratio_s * s_turn + blade.ratio_c * c_turn)
         lean = blade.lean
         if lean:

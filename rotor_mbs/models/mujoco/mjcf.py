@@ -1,7 +1,8 @@
 """The rotor as a model in MuJoCo's own format (MJCF), from raw scene data.
 
-World frame: z up, shaft along y. The hub turns about y by the hinge "rotor"; blade i is a child of the hub, mounted at
-its phase about y, and turns about its own z by the hinge "pitch i". Hinge angles are the scene's angles, unwrapped.
+World frame: z up. The hub's body is turned by the tilt of the shaft about x, and turns about its own y by the hinge
+"rotor"; blade i is a child of the hub, mounted at its phase about y and then its cone about -x, and turns about its own
+z by the hinge "pitch i". Hinge angles are the scene's angles, unwrapped. All origins are at the apex.
 A blade without inertia about its pitch axis has no hinge: it is welded to the hub at its initial pitch.
 
 Loads are actuators with the activation dynamics da/dt = u: the activation a is the torque in N m, the control u its
@@ -25,7 +26,6 @@ from xml.etree import ElementTree as ET
 import numpy as np
 
 from rotor_mbs.methods.base import BuiltItem
-from rotor_mbs.models import refuse_tilt_and_cone
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.scenario.time_table import (
     ROTOR_TORQUE,
@@ -95,7 +95,6 @@ def joint_name(coordinate: int) -> str:
 
 def model(scene: Scene, integrator: str, step: float) -> ET.Element:
     """Return the MJCF element tree of a scene; integrator: a key of `INTEGRATORS`; step: time step in s."""
-    refuse_tilt_and_cone("mujoco", scene)
     root = ET.Element("mujoco", model=scene.name or "rotor")
     ET.SubElement(root, "compiler", angle="radian")
     option = ET.SubElement(
@@ -109,9 +108,13 @@ def model(scene: Scene, integrator: str, step: float) -> ET.Element:
     ET.SubElement(option, "flag", constraint="disable", contact="disable", autoreset="disable")
     world = ET.SubElement(root, "worldbody")
     hub = ET.SubElement(world, "body", name="hub")
+    if scene.shaft_tilt:
+        hub.set("quat", numbers(math.cos(0.5 * scene.shaft_tilt), math.sin(0.5 * scene.shaft_tilt), 0.0, 0.0))
     _joint(hub, 0, "0 1 0", 0.0, scene.shaft_damping)
     half = 0.5 * scene.hub_inertia  # a thin disc about the shaft: the other two moments are never felt
-    _inertial(hub, 0.0, (0.0, 0.0, 0.0), (half, scene.hub_inertia, half, 0.0, 0.0, 0.0))
+    # Neither is its mass, but by the shaft's bearing.
+    hub_mass = scene.hub_mass if scene.wants("loads") else 0.0
+    _inertial(hub, hub_mass, (0.0, 0.0, 0.0), (half, scene.hub_inertia, half, 0.0, 0.0, 0.0))
     for number in range(1, len(scene.blades) + 1):
         _blade(hub, scene, number)
     loads = loads_of(scene)
@@ -152,10 +155,15 @@ def _blade(hub: ET.Element, scene: Scene, number: int) -> None:
     """Add a blade (1, 2, ...) to the hub: body, hinge, inertia and tip."""
     blade, phase = scene.blades[number - 1], scene.phases[number - 1]
     pitch = 0.0 if blade.has_pitch_inertia else scene.initial_angles[number]
-    # The quaternion of Ry(phase) Rz(pitch), scalar part first.
+    # The quaternion of Ry(phase) Rz(pitch), scalar part first; with a cone Rx(-cone) is between the two.
     c, s = math.cos(0.5 * phase), math.sin(0.5 * phase)
     cp, sp = math.cos(0.5 * pitch), math.sin(0.5 * pitch)
-    body = ET.SubElement(hub, "body", name=f"blade {number}", quat=numbers(c * cp, s * sp, s * cp, c * sp))
+    mounting = c * cp, s * sp, s * cp, c * sp
+    if blade.cone:
+        cc, sc = math.cos(0.5 * blade.cone), -math.sin(0.5 * blade.cone)
+        w, x, y, z = c * cc, c * sc, s * cc, -s * sc
+        mounting = w * cp - z * sp, x * cp + y * sp, y * cp - x * sp, z * cp + w * sp
+    body = ET.SubElement(hub, "body", name=f"blade {number}", quat=numbers(*mounting))
     if blade.has_pitch_inertia:
         stiffness, damping = scene.bearings[number - 1]
         _joint(body, number, "0 0 1", stiffness, damping, constant_value(scene.pitch_loads[number - 1][1]))

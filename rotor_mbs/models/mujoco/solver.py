@@ -258,7 +258,7 @@ class MujocoSolver:
             if scene.wants("energy"):
                 masses, moments = self.engine.masses, self.engine.moments
                 twice = masses[:, None] * poses.velocity**2 + moments * poses.spin**2
-                weights = scene.gravity * (poses.centre[:, :, 2] @ masses)  # zero at the height of the shaft
+                weights = scene.gravity * (poses.centre[:, :, 2] @ masses)  # zero at the height of the apex
                 springs, of_rests = _springs(scene, fields["angles"])
                 work = self._work(angles, rates, poses.acceleration, values)
                 fields["kinetic_energy"] = 0.5 * twice.sum(axis=(1, 2))[at]
@@ -278,9 +278,15 @@ class MujocoSolver:
         # In the frame of each body; the first is the hub.
         root_forces = np.einsum("nbij,nbi->bnj", poses.frame, force)[1:]
         root_moments = np.einsum("nbij,nbi->bnj", poses.frame, moment)[1:]
+        if self._scene.hub_radius:  # from the apex to the root
+            root_moments = root_moments - np.cross([0.0, 0.0, self._scene.hub_radius], root_forces)
         shaft_moment = moment[:, 0].copy()
         if self._scene.has_torque:
-            shaft_moment[:, 1] -= values[:, 0]  # the first of `mjcf.loads_of`
+            torque = values[:, 0]  # the first of `mjcf.loads_of`
+            if self._scene.shaft_tilt:
+                shaft_moment -= torque[:, None] * poses.frame[:, 0, :, 1]  # along the hub's own y axis
+            else:
+                shaft_moment[:, 1] -= torque
         has_hinge = np.isin(np.arange(1, 1 + len(self._scene.blades)), self._moving)
         actuators = np.where(has_hinge, root_moments[:, :, 2].T, 0.0)
         return named_loads(zip(root_forces, root_moments, strict=True), force[:, 0], shaft_moment, actuators)
