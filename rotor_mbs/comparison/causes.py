@@ -11,6 +11,7 @@ from rotor_mbs.comparison.data_defects import JudgedDefects
 from rotor_mbs.comparison.data_mistakes import (
     MIN_ROWS,
     TrajectorySearch,
+    clock_mistakes,
     column_mistakes,
     data_mistakes,
 )
@@ -51,19 +52,22 @@ def likely_causes(search: TrajectorySearch, judged: JudgedDefects | None) -> lis
     texts = data_mistakes(search)
     if texts:
         return texts
-    if judged is not None and is_elsewhere:
+    if judged is None:
+        texts = clock_mistakes(search)
+    elif is_elsewhere:
         texts = DefectSearch(judged).scenes()
-    elif judged is not None and has_defects:
-        texts = _other_models_or_faults(judged)
+    elif has_defects:
+        texts = _other_models_or_faults(search, judged)
     texts = texts or _scatter(search, first) or column_mistakes(search, with_factor=True)
     if not texts and judged is not None and has_defects and is_elsewhere:
-        texts = _other_models_or_faults(judged)
+        texts = _other_models_or_faults(search, judged)
     return texts
 
 
-def _other_models_or_faults(judged: JudgedDefects) -> list[str]:
-    """Search for another model or parameters, else for faults at a time."""
-    return DefectSearch(judged).explanations() or faults_in_time(judged)
+def _other_models_or_faults(search: TrajectorySearch, judged: JudgedDefects) -> list[str]:
+    """Search for another model, parameters or a clock, else for faults at a time."""
+    models = DefectSearch(judged).explanations()
+    return models + clock_mistakes(search) or faults_in_time(judged)
 
 
 def _scatter(search: TrajectorySearch, data: ForeignData) -> list[str]:

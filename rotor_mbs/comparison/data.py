@@ -6,6 +6,7 @@ increase.
 
 from __future__ import annotations
 
+import itertools
 import math
 import os
 from collections.abc import Mapping, Sequence
@@ -19,20 +20,19 @@ from rotor_mbs.comparison.channels import SPEED, Channel
 from rotor_mbs.comparison.columns import DataTable, arrays_of, table_of
 from rotor_mbs.comparison.files import read_table
 from rotor_mbs.comparison.mapping import ColumnMapping, DataMapping, find_channels, read_mapping
+from rotor_mbs.comparison.times import ordered_rows, rounding_of_steps
 from rotor_mbs.comparison.units import unit_factor
 from rotor_mbs.errors import InputError
 from rotor_mbs.scenario.scene import Scene
 
 Array = NDArray[np.float64]
 
-_FEW_DIGITS, _ALL_DIGITS = 9, 17
+_FEW_DIGITS, _SURE_DIGITS, _ALL_DIGITS = 9, 14, 17
+_ROUNDED_SINCE = 2.0 * 2.0**-52  # of a number
 _SINGLE_DIGITS = 8  # as many as single precision has
 _MAX_EXCEPTIONS = 0.05  # of the numbers
 _MIN_DISTINCT = 10  # values: fewer may have been chosen, and say nothing of digits
 _SAMPLE = 200  # numbers of a column, at least, where not all are needed
-_EQUAL = 1e-6  # of an interval between rows
-_MOSTLY = 0.9  # of the intervals
-_MIN_ROWS = 3  # fewer have no motion to be compared
 
 
 @dataclass(frozen=True)
@@ -53,6 +53,8 @@ class ForeignData:
     wrapped : for each channel, whether whole turns are missing from it.
     precision : "4 decimals: rounding error 5e-05", or the like of digits; "" of numbers with hardly
         any rounding.
+    time_precision : of the times likewise, "" where that of the numbers matters more.
+    notes : what was done to the rows.
     omitted : names of channels that are not to be missed.
     is_modes : whether it is a table of modes.
     """
@@ -68,6 +70,8 @@ class ForeignData:
     loads_left_out: tuple[str, ...] = ()
     wrapped: tuple[bool, ...] = ()
     precision: str = ""
+    time_precision: str = ""
+    notes: tuple[str, ...] = ()
     omitted: tuple[str, ...] = ()
     is_modes: bool = False
 
@@ -165,34 +169,43 @@ def data_of_table(
     steps = [table[source.column].step for source in sources.values()]
     rounding, precision = _rounding_of_columns(sources, columns, steps)
     is_modes = next(iter(sources)).name == SPEED
+    notes: tuple[str, ...] = ()
+    time_precision = ""
     if is_modes:
-        order = np.argsort(arrays[0], kind="stable")
-        arrays = [array[order] for array in arrays]
-        rounding = [array[order] for array in rounding]
-        if arrays[0][0] < 0.0 or (np.diff(arrays[0]) == 0.0).any():
+        places = np.argsort(arrays[0], kind="stable")
+        time = arrays[0][places]
+        if time[0] < 0.0 or (np.diff(time) == 0.0).any():
             problem = "a speed below 0, or one that repeats"
             raise InputError(f"{table.source}: {problem}; allowed: a row for each speed")
+        time_rounding = rounding[0][places]
     else:
-        _refuse_wrong_times(table.source, arrays[0])
-        intervals = np.diff(arrays[0])
-        # Equal intervals are meant as they are written, though the times have few digits; a few
-        # that differ are faults of the clock.
-        usual = float(np.median(intervals))
-        is_usual = np.abs(intervals - usual) <= _EQUAL * usual
-        if is_usual.mean() >= _MOSTLY:
-            rounding[0] = np.abs(arrays[0]) * 2.0**-53
+        is_load = np.array([channel.is_load for channel in list(sources)[1:]])
+        numbers = np.stack(arrays[1:], axis=1)
+        places, time, notes = ordered_rows(
+            table.source, arrays[0], numbers[:, ~is_load], numbers[:, is_load], _jump_times(scene)
+        )
+        of_steps = rounding_of_steps(time)
+        time_rounding = rounding[0][places] if of_steps is None else of_steps
+        time_precision = _time_precision(
+            columns[0], rounding[0], is_equidistant=of_steps is not None
+        )
+    values = []
+    for source, array in zip(list(sources.values())[1:], arrays[1:], strict=True):
+        values.append(np.unwrap(array[places]) if source.wrapped else array[places])
     return ForeignData(
         source=table.source,
-        time=arrays[0],
-        values=np.stack(arrays[1:], axis=1),
+        time=time,
+        values=np.stack(values, axis=1),
         channels=tuple(sources)[1:],
-        rounding=np.stack(rounding[1:], axis=1),
-        time_rounding=rounding[0],
+        rounding=np.stack(rounding[1:], axis=1)[places],
+        time_rounding=time_rounding,
         read=found.lines,
         unused=found.unused,
         loads_left_out=found.loads_left_out,
         wrapped=tuple(source.wrapped for source in sources.values())[1:],
         precision=precision,
+        time_precision=time_precision,
+        notes=notes,
         omitted=mapping.omitted,
         is_modes=is_modes,
     )
@@ -224,24 +237,17 @@ def _si_values(table: DataTable, channel: Channel, source: ColumnMapping) -> Arr
         place = f"in row {bad[0] + 1} of {len(values)}"
         problem = f"column {source.column!r} is {values[bad[0]]} {place}"
         raise InputError(f"{table.source}: {problem}; allowed: finite numbers")
-    return np.unwrap(si_values) if source.wrapped else si_values
+    return si_values
 
 
-def _refuse_wrong_times(source: str, time: Array) -> None:
-    """Raise InputError unless times, (n,) s, increase from 0 or later."""
-    if len(time) < _MIN_ROWS:
-        raise InputError(f"{source}: {len(time)} rows; allowed: {_MIN_ROWS} or more")
-    if time[0] < 0.0:
-        allowed = "times from 0, the scene's start (`offset` of the time)"
-        raise InputError(f"{source}: begins at t = {time[0]:g} s; allowed: {allowed}")
-    wrong = np.flatnonzero(np.diff(time) <= 0.0)
-    if len(wrong):
-        row = int(wrong[0])
-        problem = "repeats" if time[row + 1] == time[row] else "comes before"
-        raise InputError(
-            f"{source}: the time of row {row + 2}, {time[row + 1]:.9g} s, {problem} that of the "
-            f"row above, {time[row]:.9g} s; allowed: times that increase"
-        )
+def _jump_times(scene: Scene) -> list[float]:
+    """Return the times, s, at which a prescribed load of a scene jumps."""
+    times = []
+    for table in scene.load_tables:
+        for (before, _), (after, _) in itertools.pairwise(table):
+            if before == after:
+                times.append(after)
+    return times
 
 
 # Rounding: data are judged by the digits with which they were written
@@ -318,7 +324,7 @@ def rounding_of_printed(
     # the coarser.
     last = np.zeros(len(values))
     noise = 4.0 * 2.0**-52 * largest  # of the arithmetic
-    for decimals in range(_FEW_DIGITS + 1):
+    for decimals in range(_SURE_DIGITS + 1):
         unit = 10.0**-decimals
         # With less than a hundredth of a unit any number fits.
         if not 100.0 * noise < unit < largest:
@@ -328,7 +334,7 @@ def rounding_of_printed(
             last[:] = 0.5 * unit
             break
     digits = _significant_digits(judged)
-    if digits <= _FEW_DIGITS:
+    if digits < _ALL_DIGITS:
         exponents = np.floor(np.log10(np.where(sizes > 0.0, sizes, 1.0)))
         units = 0.5 * 10.0 ** (exponents + 1 - digits)
         last = np.maximum(last, np.where(sizes > 0.0, units, 0.0))
@@ -367,10 +373,28 @@ def _precision(columns: Sequence[Array], rounding: Sequence[Array]) -> str:
     return f"{digits} digits: relative rounding error {0.5 * 10.0 ** (1 - digits):.0e}"
 
 
+def _time_precision(time: Array, rounding: Array, *, is_equidistant: bool) -> str:
+    """Return `ForeignData.time_precision`.
+
+    Parameters
+    ----------
+    time, rounding : (n,) as they were written, in the unit of the file.
+    is_equidistant : whether the intervals are equal, which are meant as they are.
+    """
+    if is_equidistant:
+        return ""
+    text = _precision([time], [rounding])
+    if text or not (rounding > 2.0 * 2.0**-53 * np.abs(time)).any():
+        return text
+    return "single precision"
+
+
 def _significant_digits(values: Array) -> int:
-    """Find with how many significant digits the numbers may have been written."""
+    """Find with how many significant digits the numbers may have been written; 17 for any."""
     nonzero = values[values != 0.0]
-    for digits in range(1, _FEW_DIGITS + 1):
+    if not np.isfinite(nonzero).all():
+        return _ALL_DIGITS
+    for digits in range(1, _ALL_DIGITS):
         # Most numbers of digits are refuted by a few values.
         if _have_digits(nonzero[:_SAMPLE], digits) and _have_digits(nonzero, digits):
             return digits
@@ -378,8 +402,16 @@ def _significant_digits(values: Array) -> int:
 
 
 def _have_digits(values: Array, digits: int) -> bool:
-    """Whether all numbers, none of them 0, may have so many significant digits."""
-    with np.errstate(all="ignore"):  # the unit of a number near the smallest may be 0: none fit
-        unit = 10.0 ** (np.floor(np.log10(np.abs(values))) + 1 - digits)
-        rounded = np.round(values / unit) * unit
-    return np.allclose(values, rounded, rtol=1e-12, atol=0.0)
+    """Whether all finite numbers, none of them 0, may have so many significant digits."""
+    if digits <= _FEW_DIGITS:
+        with np.errstate(all="ignore"):  # the unit of the smallest numbers may be 0: none fit
+            unit = 10.0 ** (np.floor(np.log10(np.abs(values))) + 1 - digits)
+            rounded = np.round(values / unit) * unit
+        return np.allclose(values, rounded, rtol=1e-12, atol=0.0)
+    # The arithmetic above has no more digits. A number may have been multiplied by a unit since.
+    most = _ROUNDED_SINCE if digits <= _SURE_DIGITS else 0.0
+    for value in values.tolist():
+        written = float(f"{value:.{digits - 1}e}")
+        if abs(written - value) > most * abs(value):
+            return False
+    return True

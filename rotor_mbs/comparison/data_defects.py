@@ -14,6 +14,7 @@ from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.defects import Defects
 from rotor_mbs.solution.trajectory import Array, Trajectory
 
+STRETCHES = (10, 100)  # rows over which defects are added up, too
 AT_FLOOR = 3.0  # times the rounding, as it is estimated
 
 
@@ -72,23 +73,26 @@ def defects_of_data(
         return None, ""
     time, states, rounding = data.time[:rows], states[:rows], rounding[:rows]
     note = ""
+    time_rounding = data.time_rounding[:rows]
     if without_rates and not without_angles:
         try:
-            rates = fitted_rates(scene, time, states[:, :count])
+            fitted = fitted_rates(scene, time, states[:, :count])
         except InputError as exc:
             return None, f"no defects: {exc}"
         columns = [count + i for i in without_rates]
-        states[:, columns] = rates[:, without_rates]
-        # Of a slope through five rows.
-        step = float(np.median(np.diff(time)))
-        rounding[:, columns] = rounding[:, without_rates] / step
+        states[:, columns] = fitted.rates[:, without_rates]
+        moving = scene.moving_coordinates
+        at_times = time_rounding[:, None] * np.abs(fitted.rates)
+        of_angles = np.maximum(rounding[:, :count], 2.0**-53 * np.abs(states[:, :count]))
+        of_rates = np.zeros((rows, count))
+        of_rates[:, moving] = fitted.rounding((of_angles + at_times)[:, moving])
+        rounding[:, columns] = of_rates[:, without_rates]
         names = ", ".join(f"{scene.coordinate_labels[i]} rate" for i in without_rates)
         fitting = f"by fitting the equations of motion to {FIT_ROWS} rows"
         note = f"computed from the angles, {fitting}: {names}"
     if not np.isfinite(states).all():
         return None, ""
     angles, rates = states[:, :count], states[:, count:]
-    time_rounding = data.time_rounding[:rows]
     return interval_defects(scene, time, angles, rates, rounding, time_rounding), note
 
 
@@ -104,6 +108,7 @@ class JudgedDefects:
         and what rounding makes of them.
     is_judged : (n - 1,) intervals that count.
     excess : (n - 1,) rad, the largest of an interval beyond rounding.
+    has_fitted_rates : whether the rates are computed from the angles.
     """
 
     scene: Scene
@@ -114,6 +119,7 @@ class JudgedDefects:
     floors: Array
     is_judged: NDArray[np.bool_]
     excess: Array
+    has_fitted_rates: bool = False
 
     @property
     def largest(self) -> float:
@@ -126,8 +132,17 @@ class JudgedDefects:
         return not self.largest
 
 
-def judged_defects(scene: Scene, defects: Defects, tolerance: float) -> JudgedDefects:
-    """Find what of the defects of data is beyond rounding; tolerance: rad."""
+def judged_defects(
+    scene: Scene, defects: Defects, tolerance: float, *, has_fitted_rates: bool = False
+) -> JudgedDefects:
+    """Find what of the defects of data is beyond rounding.
+
+    Parameters
+    ----------
+    scene, defects : the scene, and the defects of the data.
+    tolerance : rad, of an interval's defect.
+    has_fitted_rates : whether the rates are computed from the angles.
+    """
     moving = list(defects.moving)
     vectors = np.hstack([defects.angles[:, moving], defects.rates[:, moving]])
     units = np.concatenate([np.ones(len(moving)), defects.rate_units[moving]])
@@ -137,4 +152,6 @@ def judged_defects(scene: Scene, defects: Defects, tolerance: float) -> JudgedDe
     is_judged = defects.is_resolved & np.isfinite(vectors).all(axis=1)
     sizes = np.abs(np.where(is_judged[:, None], values, 0.0))
     excess = np.maximum(sizes - AT_FLOOR * floors, 0.0).max(axis=1, initial=0.0)
-    return JudgedDefects(scene, defects, tolerance, units, values, floors, is_judged, excess)
+    return JudgedDefects(
+        scene, defects, tolerance, units, values, floors, is_judged, excess, has_fitted_rates
+    )

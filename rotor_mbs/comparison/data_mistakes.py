@@ -6,16 +6,19 @@ data where the data so corrected have no defects.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.interpolate import make_interp_spline
 from scipy.optimize import linear_sum_assignment
 
 from rotor_mbs.comparison.channels import channels
+from rotor_mbs.comparison.column_readings import LATE_OR_EARLY, ColumnReadings
 from rotor_mbs.comparison.data import ForeignData
 from rotor_mbs.comparison.data_defects import (
+    AT_FLOOR,
+    STRETCHES,
     carried_errors,
     defects_of_data,
     judged_defects,
@@ -25,6 +28,7 @@ from rotor_mbs.comparison.hypotheses import Hypothesis, explanations
 from rotor_mbs.models.lagrange.defects import interval_ends
 from rotor_mbs.models.lagrange.reference import TimedReference
 from rotor_mbs.scenario.scene import Scene
+from rotor_mbs.solution.defects import FLOOR_SAFETY
 from rotor_mbs.solution.metrics import horizon
 from rotor_mbs.solution.trajectory import Array, Trajectory
 
@@ -32,19 +36,6 @@ from rotor_mbs.solution.trajectory import Array, Trajectory
 # at most this.
 _LEFT, _MAX_LEFT = 1e-3, 1e-4
 MIN_ROWS = 5  # with fewer, something always fits
-_DEGREE, _TURN = math.pi / 180.0, 2.0 * math.pi
-_FACTORS = {
-    "angle": (
-        (_DEGREE, "degrees taken as rad"),
-        (1.0 / _DEGREE, "rad taken as degrees"),
-        (_TURN, "turns taken as rad"),
-    ),
-    "rate": (
-        (_DEGREE, "deg/s taken as rad/s"),
-        (_TURN / 60.0, "rpm taken as rad/s"),
-        (_TURN, "Hz taken as rad/s"),
-    ),
-}
 _TIME_FACTORS = (
     (1e-3, "time in ms taken as s"),
     (1e-6, "time in us taken as s"),
@@ -54,7 +45,13 @@ _MIN_LAG = 1e-4  # of an interval between rows: less is rounding
 _WHOLE_ROWS = 1e-3  # of a row: a lag so near a number of rows is that number
 _LAG_ROW = 50  # by which a lag is explanation
 _LAG_ROUNDS = 8
+_MAX_CLOCK, _MIN_CLOCK = 1.2, 1e-7  # factor of a clock; what differs less is rounding
 _TIME_ROUNDING = 1e-9  # of the duration
+_MIN_COVERED = 0.3  # of the duration: in a short part of a motion anything fits
+_MAX_PERIOD = 20  # rows from one that is computed to the next
+_MIN_KNOTS = 5  # fewer rows are on one polynomial, or nearly so
+_NOT_BY_CHANCE = 10.0  # times what is allowed of interpolated rows, the motion itself is off them
+_INTERPOLATED = 1e-9  # of the largest number: of the arithmetic of interpolation
 
 
 @dataclass(frozen=True)
@@ -66,6 +63,8 @@ class TrajectorySearch:
     scene, data, exact : the scene, the data, the reference.
     tolerance : rad, of an interval's defect.
     worst : the largest error per unit of error growth.
+    is_within_tolerance : whether the data agree, and are looked at because of a difference that is
+        smaller. A lag or a clock may be an integrator's own error then.
     """
 
     scene: Scene
@@ -73,6 +72,7 @@ class TrajectorySearch:
     exact: TimedReference
     tolerance: float
     worst: float
+    is_within_tolerance: bool = False
 
     def states_at(self, time: Array) -> Array:
         """Compute the motion at other times, from the reference's row before each.
@@ -115,11 +115,15 @@ class TrajectorySearch:
     def defect_left(self, correction: Correction) -> float:
         """Return the largest defect of corrected data beyond rounding; 0 where none is known.
 
+        What cannot be corrected has been compared with the reference.
+
         Parameters
         ----------
         correction : the data, whose times may begin before 0 and end after the scene.
         """
         data = correction.data
+        if data is None:
+            return 0.0
         end = self.scene.duration * (1.0 + _TIME_ROUNDING)
         data = data.rows((data.time >= 0.0) & (data.time <= end))
         inside = self.up_to_horizon(data)
@@ -133,23 +137,39 @@ class TrajectorySearch:
         defects, _ = defects_of_data(self.scene, data, reference, len(inside.time))
         if defects is None:
             return 0.0
-        return judged_defects(self.scene, defects, self.tolerance).largest
+        left = judged_defects(self.scene, defects, self.tolerance).largest
+        for stretch in STRETCHES:
+            sizes, floors = defects.over_rows(stretch)
+            left = max(left, float((sizes - AT_FLOOR * floors).max(initial=0.0)))
+        return left
 
 
 @dataclass(frozen=True)
 class Correction:
-    """Corrected data, and the mistakes that their columns had, in words."""
+    """Corrected data, None where no column can be corrected; the columns' mistakes in words."""
 
-    data: ForeignData
+    data: ForeignData | None
     mistakes: tuple[str, ...] = ()
 
 
 def data_mistakes(search: TrajectorySearch) -> list[str]:
-    """Search for mistakes in the columns, and for those in the times with any in the columns."""
-    texts = column_mistakes(search)
-    if texts:
-        return texts
-    for hypothesis in _time_hypotheses(search):
+    """Search for mistakes in the columns, and for those in the rows with any in the columns."""
+    return column_mistakes(search) or _row_mistakes(search, _row_hypotheses(search))
+
+
+def clock_mistakes(search: TrajectorySearch) -> list[str]:
+    """Search for a clock that is fast or slow, with any mistake in the columns.
+
+    Angles of a motion under gravity alone are as fast in another gravity: both are causes.
+    """
+    return _row_mistakes(search, _clocks(search))
+
+
+def _row_mistakes(
+    search: TrajectorySearch, hypotheses: Iterator[Hypothesis[ForeignData]]
+) -> list[str]:
+    """Return the first of some mistakes in the rows that explains the data, with the columns'."""
+    for hypothesis in hypotheses:
         texts = column_mistakes(search, hypothesis)
         if texts:
             return texts
@@ -189,21 +209,106 @@ def column_mistakes(
     return list(mistakes) if times is None else ["; and ".join([times.text, *mistakes])]
 
 
-# Times
+# Rows and times
 
 
-def _time_hypotheses(search: TrajectorySearch) -> Iterator[Hypothesis[ForeignData]]:
-    """Yield times in another unit, numbers of rows, a constant lag, and time reversed."""
+def _row_hypotheses(search: TrajectorySearch) -> Iterator[Hypothesis[ForeignData]]:
+    """Yield what may be wrong with rows and times, and the data without it."""
+    yield from _times_in_other_units(search)
+    yield from _rows_between(search)
+    if not search.is_within_tolerance:
+        yield from _lags(search)
     data = search.data
+    reversed_time = (data.time[0] + data.time[-1] - data.time)[::-1]
+    backward = replace(
+        data, time=reversed_time, values=data.values[::-1], rounding=data.rounding[::-1]
+    )
+    yield Hypothesis("rows from the end to the start, time reversed", backward)
+
+
+def _times_in_other_units(search: TrajectorySearch) -> Iterator[Hypothesis[ForeignData]]:
+    """Yield times in ms, us and minutes, numbers of rows, and sums in single precision."""
+    data = search.data
+    count = len(data.time)
     factors = list(_TIME_FACTORS)
-    if np.array_equal(np.diff(data.time), np.ones(len(data.time) - 1)):
-        step = search.scene.duration / (len(data.time) - 1)
-        factors.append((step, "row numbers taken as s"))
+    if np.array_equal(np.diff(data.time), np.ones(count - 1)):
+        factors.append((search.scene.duration / (count - 1), "row numbers taken as s"))
     for factor, text in factors:
         time, rounding = data.time * factor, data.time_rounding * factor
-        yield Hypothesis(text, replace(data, time=time, time_rounding=rounding))
+        if time[-1] >= _MIN_COVERED * search.scene.duration:
+            yield Hypothesis(text, replace(data, time=time, time_rounding=rounding))
+    # A clock that adds up a step in single precision is late or early by thousandths of a step.
+    single = data.time.astype(np.float32)
+    step = single[1] - single[0]
+    summed = np.cumsum(np.append(single[:1], np.full(count - 1, step)), dtype=np.float32)
+    if np.array_equal(summed, data.time.astype(float)):
+        chosen = float(f"{step:.6e}")
+        equal = np.asarray(float(single[0]) + chosen * np.arange(count))
+        text = f"times are sums of {chosen:g} s in single precision"
+        yield Hypothesis(text, replace(data, time=equal, time_rounding=2.0**-53 * equal))
+
+
+def _rows_between(search: TrajectorySearch) -> Iterator[Hypothesis[ForeignData]]:
+    """Yield rows that are held or interpolated between every few: the others alone are right."""
+    data = search.data
+    count = len(data.time)
+    changes = np.flatnonzero(np.diff(data.values, axis=0).any(axis=1)) + 1
+    period = int(np.gcd.reduce(changes)) if len(changes) else 1
+    if period > 1:
+        text = f"every row is held for {period} rows"
+        yield Hypothesis(text, data.rows(slice(0, None, period)))
+    inside = search.up_to_horizon(data)
+    right = search.states_at(inside.time)[:, data.columns]
+    largest = np.abs(data.values).max(axis=0)
+    allowed = AT_FLOOR * data.rounding + _INTERPOLATED * largest
+    for degree, text in ((1, "linearly"), (3, "by a cubic spline")):
+        # Rows between every fourth one are between every second one, too: the longest counts.
+        for period in range(min(_MAX_PERIOD, count // MIN_ROWS), 1, -1):
+            left = _left_between(data.time, data.values, period, degree)
+            if not (left <= allowed[: len(left)]).all():
+                continue
+            # A slow motion has hardly anything between its rows that is not on a spline.
+            of_right = _left_between(inside.time, right, period, degree)
+            if (of_right > _NOT_BY_CHANCE * allowed[: len(of_right)]).any():
+                text = f"interpolated {text} between every {period} rows"
+                yield Hypothesis(text, data.rows(slice(0, None, period)))
+            break
+
+
+def _left_between(time: Array, values: Array, period: int, degree: int) -> Array:
+    """Return by how much rows are off what is interpolated between every few of them.
+
+    Parameters
+    ----------
+    time, values : (n,) s, (n, columns).
+    period : rows from one that is kept to the next.
+    degree : of the polynomials.
+
+    Returns
+    -------
+    ndarray
+        (rows up to the last that is kept, columns), by the better of two conditions at the ends.
+    """
+    last = (len(time) - 1) // period * period + 1
+    knots = slice(0, last, period)
+    left = np.full((last, values.shape[1]), np.inf)
+    if len(time[knots]) < _MIN_KNOTS:
+        return left
+    for at_ends in (None, "natural") if degree > 1 else (None,):
+        spline = make_interp_spline(time[knots], values[knots], k=degree, bc_type=at_ends)
+        off = np.abs(spline(time[:last]) - values[:last])
+        if off.max() < left.max():
+            left = off
+    return left
+
+
+def _lags(search: TrajectorySearch) -> Iterator[Hypothesis[ForeignData]]:
+    """Yield a constant lag."""
+    data, end = search.data, horizon(search.exact.trajectory)
     step = float(np.median(np.diff(data.time)))
-    lag = _lag(search)
+    # Not the first row: at the start the motion may be slow, and the lag hardly seen.
+    row = min(_LAG_ROW, len(data.time) // 4)
+    lag = float(data.time[row]) - _time_of_row(search, row, 0.0, end)
     if abs(lag) > _MIN_LAG * step:
         rows = lag / step
         in_rows = ""
@@ -212,29 +317,43 @@ def _time_hypotheses(search: TrajectorySearch) -> Iterator[Hypothesis[ForeignDat
         side = "late" if lag > 0.0 else "early"
         text = f"a constant lag of {lag:.6g} s{in_rows} ({side}): `offset = {-lag:.6g}` of the time"
         yield Hypothesis(text, replace(data, time=data.time - lag))
-    reversed_time = (data.time[0] + data.time[-1] - data.time)[::-1]
-    backward = replace(
-        data, time=reversed_time, values=data.values[::-1], rounding=data.rounding[::-1]
-    )
-    yield Hypothesis("rows from the end to the start, time reversed", backward)
 
 
-def _lag(search: TrajectorySearch) -> float:
-    """Find by how much a row of the data is later than the reference is nearest to it, s.
+def _clocks(search: TrajectorySearch) -> Iterator[Hypothesis[ForeignData]]:
+    """Yield a clock that is fast or slow."""
+    data, end = search.data, horizon(search.exact.trajectory)
+    row = int(np.searchsorted(data.time, 0.5 * end))
+    if not 0 < row < len(data.time) or data.time[0] < 0.0:
+        return
+    written = float(data.time[row])
+    right = _time_of_row(search, row, written / _MAX_CLOCK, written * _MAX_CLOCK)
+    factor = written / right if right else 1.0
+    if abs(factor - 1.0) > _MIN_CLOCK:
+        side = "fast" if factor > 1.0 else "slow"
+        text = f"a clock that is {100.0 * abs(factor - 1.0):.4g} % {side}: times / {factor:.8g}"
+        time, rounding = data.time / factor, data.time_rounding / factor
+        yield Hypothesis(text, replace(data, time=time, time_rounding=rounding))
+
+
+def _time_of_row(search: TrajectorySearch, row: int, first: float, last: float) -> float:
+    """Find when the reference is nearest to a row of the data, s.
 
     From the nearest row of the reference on by Gauss and Newton's iteration over the time.
 
     Parameters
     ----------
     search : the data and the reference, which is carried on from its rows.
+    row : number of the row.
+    first, last : s, between which times it is looked for, up to the horizon.
     """
     data, run = search.data, search.exact.trajectory
-    # Not the first row: at the start the motion may be slow, and the lag hardly seen.
-    row = min(_LAG_ROW, len(data.time) // 4)
-    columns, end = data.columns, horizon(run)
-    states = states_of(run)[run.time <= end][:, columns]
+    columns, end = data.columns, min(horizon(run), last)
+    is_tried = (run.time >= first) & (run.time <= end)
+    if not is_tried.any():
+        return float(data.time[row])
+    states = states_of(run)[is_tried][:, columns]
     distances = np.abs(states - data.values[row]).max(axis=1)
-    time = float(run.time[int(distances.argmin())])
+    time = float(run.time[is_tried][int(distances.argmin())])
     step = 1e-6 * max(end, 1e-9)  # for the derivative
     for _ in range(_LAG_ROUNDS):
         here, ahead = search.states_at(np.array([time, time + step]))[:, columns]
@@ -242,7 +361,7 @@ def _lag(search: TrajectorySearch) -> float:
         size = float(slope @ slope)
         change = float((data.values[row] - here) @ slope) / size if size else 0.0
         time = min(max(time + change, 0.0), end - step)
-    return float(data.time[row]) - time
+    return time
 
 
 # Columns
@@ -261,11 +380,20 @@ def _column_hypotheses(
     """
     states, carried = search.states_at(inside.time), search.carried(inside.time)
     columns = data.columns
-    error = np.abs((inside.values - states[:, columns]) / carried[:, columns])
-    if float(error.max()) <= search.allowed:
+    error = np.abs(inside.values - states[:, columns]) - FLOOR_SAFETY * inside.rounding
+    if float((error / carried[:, columns]).max()) <= search.allowed:
         yield Hypothesis("", Correction(data), price=0)
         return
-    corrected = _corrected_channels(search, data, states, carried, with_factor=with_factor)
+    readings = ColumnReadings(
+        data,
+        states,
+        carried,
+        search.states_at,
+        search.allowed,
+        search.tolerance,
+        with_factor=with_factor,
+    )
+    corrected = _corrected_channels(readings)
     if corrected is not None:
         yield corrected
     # Columns that are those of other channels, rates taken as angles among them: each column is
@@ -280,94 +408,37 @@ def _column_hypotheses(
         yield _exchange(search.scene, data, list(chosen))
 
 
-def _corrected_channels(
-    search: TrajectorySearch,
-    data: ForeignData,
-    states: Array,
-    carried: Array,
-    *,
-    with_factor: bool,
-) -> Hypothesis[Correction] | None:
-    """Correct each channel by itself: unit, sign, zero, turns.
-
-    Parameters
-    ----------
-    search, data : what the data should be, and all rows.
-    states, carried : (n, 2 (1 + blades)) in the rows from t = 0 to the horizon, see
-        `TrajectorySearch`.
-    with_factor : whether any factor of a channel may be wrong.
-
-    Returns
-    -------
-    Hypothesis or None
-        None where a channel fits by no correction.
-    """
-    begin = int(np.searchsorted(data.time, 0.0))  # rows before it have no reference
-    rows = slice(begin, begin + len(states))
+def _corrected_channels(readings: ColumnReadings) -> Hypothesis[Correction] | None:
+    """Correct each channel by itself; None where a channel fits by no reading."""
+    data = readings.data
     names: dict[str, list[str]] = {}
-    values, roundings = [], []
+    kept, values, roundings = [], [], []
     for j, channel in enumerate(data.channels):
-        expected, scale = states[:, channel.column], carried[:, channel.column]
-        candidates = list(_corrections(channel.kind, data.values[:, j], begin, float(expected[0])))
-        if with_factor:
-            # By least squares.
-            factor = float(data.values[rows, j] @ expected / (expected @ expected))
-            if factor:
-                text = f"too large by a factor of {factor:.6g}"
-                candidates.append((text, 1.0 / factor, data.values[:, j] / factor))
-        left = []
-        for _, _, corrected in candidates:
-            left.append(float(np.abs((corrected[rows] - expected) / scale).max()))
-        least = max(min(left), 1e-3 * search.tolerance)
-        if not least <= search.allowed:
+        reading = readings.best(j)
+        if reading is None:
             return None
-        # The simplest of those that leave about as little as the best.
-        for (text, factor, corrected), size in zip(candidates, left, strict=True):
-            if size <= 10.0 * least:
-                names.setdefault(text, []).append(channel.name)
-                values.append(corrected)
-                roundings.append(data.rounding[:, j] * abs(factor))
-                break
-    mistakes = [f"{', '.join(which)}: {text}" for text, which in names.items() if text]
-    corrected_data = replace(
-        data, values=np.stack(values, axis=1), rounding=np.stack(roundings, axis=1)
+        names.setdefault(reading.text, []).append(channel.name)
+        if reading.corrected is not None:
+            kept.append(j)
+            values.append(reading.corrected)
+            roundings.append(reading.rounding)
+    # Rows late of every channel are late times, for which there is a hypothesis of its own.
+    if len(names) == 1 and len(data.channels) > 1 and next(iter(names)).endswith(LATE_OR_EARLY):
+        return None
+    mistakes = tuple(f"{', '.join(which)}: {text}" for text, which in names.items() if text)
+    if not values:
+        return Hypothesis("; and ".join(mistakes), Correction(None, mistakes), len(mistakes))
+    corrected = replace(
+        data,
+        channels=tuple(data.channels[j] for j in kept),
+        values=np.stack(values, axis=1),
+        rounding=np.stack(roundings, axis=1),
+        wrapped=tuple(data.wrapped[j] for j in kept if data.wrapped),
     )
-    correction = Correction(corrected_data, tuple(mistakes))
+    # Of a channel that is rows late the last ones are not there.
+    is_known = np.asarray(np.isfinite(corrected.values).all(axis=1))
+    correction = Correction(corrected.rows(is_known), mistakes)
     return Hypothesis("; and ".join(mistakes), correction, len(mistakes))
-
-
-def _corrections(
-    kind: str, values: Array, begin: int, start: float
-) -> Iterator[tuple[str, float, Array]]:
-    """Yield what may be wrong with a channel, the factor, and its values so corrected.
-
-    The simplest first: another unit, the other sign, another zero, turns that are missing.
-
-    Parameters
-    ----------
-    kind : "angle" or "rate".
-    values : (rows,) of the channel.
-    begin : the first row that is compared.
-    start : the right value there.
-    """
-    factors = [(1.0, ""), *_FACTORS[kind]]
-    signed = [(sign * factor, text) for sign in (1.0, -1.0) for factor, text in factors]
-    for has_other_zero in (False, True):
-        for factor, text in signed:
-            mistakes = [text] if text else []
-            if factor < 0.0:
-                mistakes.append("sign reversed")
-            zero = 0.0
-            if has_other_zero:
-                zero = factor * float(values[begin]) - start
-                mistakes.append(f"zero off by {zero:.6g}")
-            corrected = factor * values - zero
-            yield ", ".join(mistakes), factor, corrected
-            if kind == "angle" and np.abs(np.diff(corrected)).max() > 0.5 * _TURN:
-                unwrapped = np.unwrap(corrected)
-                unwrapped += _TURN * np.round((start - unwrapped[begin]) / _TURN)
-                text_of_turns = ", ".join([*mistakes, "wrapped, taken as unwrapped"])
-                yield text_of_turns, factor, unwrapped
 
 
 def _exchange(scene: Scene, data: ForeignData, chosen: Sequence[int]) -> Hypothesis[Correction]:

@@ -26,6 +26,7 @@ _MAX_STEPS = 512  # of Runge and Kutta in an interval
 _STANDS_OUT = 30.0  # times the median of the defects
 _FAINT = 0.02  # of the largest defect: fainter ones are not told beside it
 _EVERYWHERE = 0.6  # of the intervals
+_MOST, _OF_OTHERS = 0.9, 1e-3  # of the other intervals; of the largest defect, that they have
 _EDGE = 0.1  # of the faulty intervals' median: what is beside them is not faulty
 _GAP = 6  # intervals: faults that are nearer are one
 _AT_END = 3  # intervals
@@ -72,6 +73,10 @@ def faults_in_time(judged: JudgedDefects) -> list[str]:
         beside = float(np.median(excess[edges]))
         if beside > _EDGE * float(np.median(excess[wrong])):
             return []
+    # And with the faults all is explained: what is left of the others is next to nothing.
+    others = np.delete(excess, wrong)
+    if float(np.quantile(others, _MOST)) > max(judged.tolerance, _OF_OTHERS * judged.largest):
+        return []
     groups = np.split(wrong, np.flatnonzero(np.diff(wrong) > _GAP) + 1)
     # A filter, or differences in place of rates, are wrong in all rows, and most at the ends.
     if usual > _OF_ENDS * judged.largest:

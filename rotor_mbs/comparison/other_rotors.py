@@ -280,16 +280,17 @@ def other_scenes(scene: Scene) -> Iterator[tuple[str, Scene]]:
         hubs = replace(scene, hub_inertia=count * scene.hub_inertia)
         yield "the hub's inertia once for each blade", hubs
     if not scene.has_constant_loads:
-        yield "ramps of loads held at their value at the start", _with_held_ramps(scene)
+        # An engine that asks for the loads once for each segment gets those of all at the kinks of
+        # any.
+        times = [0.0, *scene.kink_times, scene.duration]
+        yield "ramps of loads held at their value at the start", with_held_loads(scene, times)
     for degrees, angle in _QUARTERS.items():
         turned = _pitch_turned(scene, range(len(scene.blades)), angle)
         yield f"pitch angles from another zero: {degrees} degrees where they are 0", turned
 
 
-def _with_held_ramps(scene: Scene) -> Scene:
-    """Return a scene whose loads keep, from each kink of any of them to the next, one value."""
-    # An engine that asks for the loads once for each segment gets those of all at the kinks of any.
-    times = [0.0, *scene.kink_times, scene.duration]
+def with_held_loads(scene: Scene, times: Sequence[float]) -> Scene:
+    """Return a scene whose loads keep, from each of some times (s) to the next, one value."""
     return replace(
         scene,
         rotor_torque=_held(scene.rotor_torque, times),

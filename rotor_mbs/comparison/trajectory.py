@@ -14,12 +14,13 @@ from rotor_mbs.comparison.channels import channel_key
 from rotor_mbs.comparison.columns import shown_names
 from rotor_mbs.comparison.data import ForeignData
 from rotor_mbs.comparison.data_defects import (
+    STRETCHES,
     carried_errors,
     defects_of_data,
     judged_defects,
     states_of,
 )
-from rotor_mbs.comparison.data_mistakes import TrajectorySearch
+from rotor_mbs.comparison.data_mistakes import TrajectorySearch, data_mistakes
 from rotor_mbs.comparison.defect_search import DefectSearch
 from rotor_mbs.comparison.loads import compare_loads
 from rotor_mbs.comparison.verdict import (
@@ -37,6 +38,7 @@ from rotor_mbs.methods.time_limit import (
     raise_if_over,
     time_limit,
 )
+from rotor_mbs.models.lagrange.defects import rates_of_change
 from rotor_mbs.models.lagrange.heyoka_adapter import is_available
 from rotor_mbs.models.lagrange.reference import TimedReference, reference_at
 from rotor_mbs.runs.read import Record
@@ -50,7 +52,7 @@ _TIME_ROUNDING = 1e-9  # of the duration: times that are sums of steps may end s
 _MIN_ROWS = 3
 _STAGES = 4  # reference, interval defects, search for causes, loads
 _SAME_START = 1e-3  # rad, rad/s: starts that differ by more are another start
-_STRETCHES = (10, 100)  # rows over which defects are added up, too
+_LEFT_OF_SMALL = 0.02  # of errors within the tolerance, by a cause that explains them
 _MAX_GAP = 1.5  # intervals that may be missing at the start or end of the motion
 
 
@@ -68,6 +70,8 @@ class ReferencedRows:
     expected : (rows, channels) what the channels of `compared` should be.
     until, horizon_s : rows up to the horizon of the scene, and that horizon, s.
     defects, note : interval defects of the data, None where unknown; what a reader must know.
+    rounding, of_times : (rows, channels) half a digit of each number, with what half a digit of its
+        time makes of it; and the share of the times alone.
     """
 
     data: ForeignData
@@ -80,6 +84,8 @@ class ReferencedRows:
     horizon_s: float
     defects: Defects | None
     note: str
+    rounding: Array
+    of_times: Array
 
 
 @dataclass(frozen=True)
@@ -95,6 +101,7 @@ class TrajectoryErrors:
     predicted, defect_time : see `DataVerdict`.
     drift, drifting : the largest sum of defects over a longer stretch, beyond rounding, rad, and of
         which channel over how many rows.
+    beyond_digits : the largest defect, or sum over a longer stretch, over its own rounding.
     missing : labels of coordinates without a column of angles.
     """
 
@@ -106,6 +113,7 @@ class TrajectoryErrors:
     defect_time: float | None
     drift: float
     drifting: str
+    beyond_digits: float
     missing: tuple[str, ...]
 
 
@@ -160,7 +168,7 @@ def compare_with_reference(
         problem = f"{missing_part} after {time_limit_s:g} s; allowed: a longer time limit"
         raise InputError(f"timeout: {problem}") from None
 
-    errors = _errors_of(data, scene, rows)
+    errors = _errors_of(data, scene, tolerance, rows)
     findings = _findings(data, scene, tolerance, rows, errors)
     status, message = next(findings, ("ok", ""))
     notes = _notes_on_rows(data, scene, rows, errors)
@@ -173,7 +181,11 @@ def compare_with_reference(
         notes.append("the search for causes was stopped at the time limit")
     if status != "ok" and not likely:
         notes += _note_on_start(data, rows)
-    if status == "ok" and likely:
+    if status == "ok" and errors.beyond_digits > FLOOR_SAFETY:
+        times = f"{errors.beyond_digits:.2g} times what the digits of the data explain"
+        cause = "" if likely else ": an integrator's own error, or a cause that was not found"
+        notes.append(f"within {tolerance:g} rad per interval, but {times}{cause}")
+    elif status == "ok" and likely:
         notes.append(f"within {tolerance:g} rad per interval, but correlated")
 
     channels, expected, compared = errors.channels, rows.expected, rows.compared
@@ -286,6 +298,12 @@ def _rows_with_reference(
     inside = replace(inside, values=values)
     compared = inside.rows(slice(len(places)))
     defects, note = defects_of_data(scene, compared, reference, until)
+    # A row is at its time to half a digit of that: by as much the motion goes on.
+    changes = np.zeros((len(places), 2 * len(scene.initial_angles)))
+    moving = scene.moving_coordinates
+    columns = [*moving, *(len(scene.initial_angles) + i for i in moving)]
+    changes[:, columns] = rates_of_change(scene, reference.time, states_of(reference)[:, columns])
+    of_times = (compared.time_rounding[:, None] * changes)[:, compared.columns]
     return ReferencedRows(
         data=inside,
         compared=compared,
@@ -297,16 +315,21 @@ def _rows_with_reference(
         horizon_s=horizon_s,
         defects=defects,
         note=note,
+        rounding=compared.rounding + of_times,
+        of_times=of_times,
     )
 
 
-def _errors_of(data: ForeignData, scene: Scene, rows: ReferencedRows) -> TrajectoryErrors:
+def _errors_of(
+    data: ForeignData, scene: Scene, tolerance: float, rows: ReferencedRows
+) -> TrajectoryErrors:
     """Measure the errors and defects of data against their reference.
 
     Parameters
     ----------
     data : angles and rates.
     scene : the scene.
+    tolerance : rad, of an interval's defect.
     rows : the data with their reference.
     """
     error = np.abs(rows.compared.values - rows.expected)
@@ -320,7 +343,7 @@ def _errors_of(data: ForeignData, scene: Scene, rows: ReferencedRows) -> Traject
     exact = rows.exact
     carried = carried_errors(exact.trajectory, exact.growth, exact.units)
     carried = carried[rows.places][:, data.columns]
-    excess = np.maximum(error - FLOOR_SAFETY * rows.compared.rounding, 0.0)
+    excess = np.maximum(error - FLOOR_SAFETY * rows.rounding, 0.0)
     missing = [label for i, label in enumerate(scene.coordinate_labels) if i not in data.columns]
     return TrajectoryErrors(
         channels=_channel_errors(scene, rows, error),
@@ -331,6 +354,7 @@ def _errors_of(data: ForeignData, scene: Scene, rows: ReferencedRows) -> Traject
         defect_time=defect_time,
         drift=drift,
         drifting=drifting,
+        beyond_digits=_beyond_digits(scene, tolerance, rows.defects),
         missing=tuple(missing),
     )
 
@@ -396,11 +420,33 @@ def _largest_drift(scene: Scene, defects: Defects | None) -> tuple[float, str]:
         return largest
     labels = [scene.coordinate_labels[i] for i in defects.moving]
     names = [*labels, *(f"{label} rate" for label in labels)]
-    for stretch in _STRETCHES:
+    for stretch in STRETCHES:
         sizes, floors = defects.over_rows(stretch)
         excess = (sizes - FLOOR_SAFETY * floors).max(axis=0, initial=0.0)
         worst = int(excess.argmax())
         largest = max(largest, (float(excess[worst]), f"{names[worst]}, over {stretch} rows"))
+    return largest
+
+
+def _beyond_digits(scene: Scene, tolerance: float, defects: Defects | None) -> float:
+    """Return how many times its own rounding the largest defect is, of an interval or a stretch.
+
+    Rounding alone makes no more than 3 of it: what is more is systematic, though it may be far
+    below the tolerance.
+
+    Parameters
+    ----------
+    scene, tolerance, defects : as above; 0 without defects.
+    """
+    if defects is None:
+        return 0.0
+    judged = judged_defects(scene, defects, tolerance)
+    ratios = np.abs(judged.values) / judged.floors
+    largest = float(ratios[judged.is_judged].max(initial=0.0))
+    for stretch in STRETCHES:
+        sizes, floors = defects.over_rows(stretch)
+        ratios = sizes / floors
+        largest = max(largest, float(ratios[np.isfinite(ratios)].max(initial=0.0)))
     return largest
 
 
@@ -430,7 +476,7 @@ def _wrong_first_row(
 ) -> Iterator[tuple[str, str]]:
     """Yield a first row that is not the scene's initial state."""
     compared = rows.compared
-    off = errors.error[0] - tolerance - FLOOR_SAFETY * compared.rounding[0]
+    off = errors.error[0] - tolerance - FLOOR_SAFETY * rows.rounding[0]
     worst = int(off.argmax())
     if off[worst] > 0.0:
         channel, value = errors.channels[worst], compared.values[0, worst]
@@ -476,7 +522,7 @@ def _wrong_errors(
     # Without defects the errors are all that there is.
     has_defects = any(channel.defect is not None for channel in errors.channels)
     bound = OK_ERROR if has_defects else tolerance
-    bound += FLOOR_SAFETY * float(rows.compared.rounding.max(initial=0.0))
+    bound += FLOOR_SAFETY * float(rows.rounding[: rows.until].max(initial=0.0))
     if not largest.error_max <= bound:
         size = f"error {largest.error_max:.1e} {largest.unit}"
         yield "inaccurate", f"{largest.name}: {size} up to the horizon, allowed {bound:.0e}"
@@ -512,7 +558,10 @@ def _unchecked_parts(
     if defects is not None and not defects.is_resolved[until - 1 :].all():
         first = until - 1 + int(np.argmin(defects.is_resolved[until - 1 :]))
         since = f"the first after t = {defects.time[first]:.6g} s"
-        reason = "the rows are too far apart, or have too few digits, to be checked"
+        digits = "have too few digits"
+        if data.time_precision:
+            digits = f"have times of too few digits ({data.time_precision.partition(':')[0]})"
+        reason = f"the rows are too far apart, or {digits}, to be checked"
         yield "unchecked", f"after the horizon {reason}, {since}"
     missed = [name for name in errors.missing if name not in data.omitted]
     if missed:
@@ -529,8 +578,14 @@ def _notes_on_rows(
     later = len(data.time) - len(rows.data.time)
     if later:
         notes.append(f"{later} rows after the scene's {scene.duration:g} s are not compared")
+    notes += data.notes
     if data.precision:
         notes.append(f"numbers of {data.precision}")
+    largest = float(rows.of_times[: rows.until].max(initial=0.0))
+    if data.time_precision and largest > float(data.rounding.max(initial=0.0)):
+        notes.append(
+            f"times of {data.time_precision}: they explain differences of up to {largest:.0e}"
+        )
     if errors.missing:
         notes.append(f"missing angles: {', '.join(errors.missing)}")
     return notes
@@ -573,12 +628,21 @@ def _likely_causes(
     """
     judged = None
     if rows.defects is not None and not errors.missing:
-        judged = judged_defects(scene, rows.defects, tolerance)
-    if is_ok:
-        return DefectSearch(judged).explanations() if judged is not None else []
+        rates = len(scene.initial_angles) + np.array(scene.moving_coordinates)
+        has_rates = bool(np.isin(rates, data.columns).any())
+        judged = judged_defects(scene, rows.defects, tolerance, has_fitted_rates=not has_rates)
     # The search has all rows, also those after the scene's duration.
     turned = rows.data.values[0] - data.values[0]  # the turns that wrapped channels have got
     whole = replace(data, values=data.values + turned)
     worst = float(errors.per_growth[: rows.until].max())
+    if is_ok:
+        if judged is None:
+            return []
+        texts: list[str] = []
+        if errors.beyond_digits > FLOOR_SAFETY:
+            smaller = min(tolerance, _LEFT_OF_SMALL * float(errors.excess_per_growth.max()))
+            search = TrajectorySearch(scene, whole, rows.exact, smaller, worst, True)
+            texts = data_mistakes(search)
+        return texts or DefectSearch(judged).explanations()
     search = TrajectorySearch(scene, whole, rows.exact, tolerance, worst)
     return likely_causes(search, judged)

@@ -328,11 +328,11 @@ def test_rates_are_found_from_the_angles(name: str, duration: float, samples: in
     """To the rounding of five angles."""
     scene = paper(name, duration=duration, samples=samples, outputs=("angles", "rates"))
     run = solve(DOP853, scene, {}).trajectory
-    np.testing.assert_allclose(fitted_rates(scene, run.time, run.angles), run.rates, rtol=0, atol=1e-10)
+    np.testing.assert_allclose(fitted_rates(scene, run.time, run.angles).rates, run.rates, rtol=0, atol=1e-10)
     if duration == 1.0:  # rows so near that a wrong one takes nothing from the others
         wrong = run.angles.copy()
         wrong[50, 0] += 0.1
-        rates = fitted_rates(scene, run.time, wrong)
+        rates = fitted_rates(scene, run.time, wrong).rates
         np.testing.assert_allclose(np.delete(rates - run.rates, np.s_[44:57], axis=0), 0.0, rtol=0, atol=1e-8)
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import functools
 import math
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -103,7 +103,7 @@ def interval_defects(
     if time_rounding is None:
         time_rounding = _UNIT_ROUNDOFF * np.abs(time)
     # A row is at its time to half a digit of that: by as much the state goes on.
-    last_digits = last_digits + time_rounding[:, None] * _rates_of_change(scene, time, states)
+    last_digits = last_digits + time_rounding[:, None] * rates_of_change(scene, time, states)
     shares = least_inertia_shares(scene, angles)
     start = np.concatenate([np.array(scene.initial_angles)[moving], np.array(scene.initial_rates)[moving]])
     return Defects(
@@ -124,7 +124,7 @@ def interval_defects(
     )
 
 
-def _rates_of_change(scene: Scene, time: Array, states: Array) -> Array:
+def rates_of_change(scene: Scene, time: Array, states: Array) -> Array:
     """Return the largest |dy/dt| at (n, m) states, (n, m) 1/s; at a jump of a load that of either side."""
     half = states.shape[1] // 2
     angles, rates = list(states[:, :half].T), states[:, half:].T
@@ -141,15 +141,37 @@ def _rates_of_change(scene: Scene, time: Array, states: Array) -> Array:
     return changes
 
 
-def fitted_rates(scene: Scene, time: Array, angles: Array) -> Array:
+@dataclass(frozen=True)
+class FittedRates:
+    """Rates that are computed from angles.
+
+    Attributes
+    ----------
+    rates : (n, 1 + blades) rad/s.
+    sensitivity : (n, half, FIT_ROWS half) 1/s, of the rate of each moving coordinate, by each angle of its window.
+    windows : (n,) first row of the window of each row.
+    """
+
+    rates: Array
+    sensitivity: Array
+    windows: NDArray[np.int64]
+
+    def rounding(self, rounding: Array) -> Array:
+        """Return what (n, half) rad of rounding in the angles make of the rates, (n, half) rad/s."""
+        of_window = np.hstack([rounding[self.windows + row] for row in range(FIT_ROWS)])
+        return np.asarray(np.einsum("kij,kj->ki", np.abs(self.sensitivity), of_window))
+
+
+def fitted_rates(scene: Scene, time: Array, angles: Array) -> FittedRates:
     """Compute rates of data that have angles alone, by the closed form through five rows around each.
 
     Least squares over the state at the first row of every window, carried through it by the transition matrices; from
     differences, until the rates stand still.
 
-    Returns
-    -------
-    (n, 1 + blades) rad/s
+    Parameters
+    ----------
+    scene : the scene.
+    time, angles : (n,) s and (n, 1 + blades) rad.
 
     Raises
     ------
@@ -191,7 +213,8 @@ def fitted_rates(scene: Scene, time: Array, angles: Array) -> Array:
         residual = np.concatenate([offset[:, :half] for offset in offsets], axis=1)
         if not (np.isfinite(design).all() and np.isfinite(residual).all()):
             raise InputError("the rates cannot be computed from the angles: errors grow without bound between the rows")
-        at_first = -np.einsum("kij,kj->ki", np.linalg.pinv(design), residual) * scale
+        inverse = np.linalg.pinv(design)
+        at_first = -np.einsum("kij,kj->ki", inverse, residual) * scale
         all_rows = np.stack(
             [np.einsum("kij,kj->ki", m, at_first) + offset for m, offset in zip(matrices, offsets, strict=True)]
         )
@@ -202,12 +225,13 @@ def fitted_rates(scene: Scene, time: Array, angles: Array) -> Array:
         if before == np.inf:  # the first round
             is_near = usual <= _NEAR
         if change <= _STANDS_STILL:
-            return rates
+            break
         if not change < before and (usual <= _STANDS_STILL or not is_near):
             break
         before = change
-    if is_near:
-        return rates
+    if is_near or change <= _STANDS_STILL:
+        at_rows = np.stack(matrices)[places, windows, half:] * scale
+        return FittedRates(rates, at_rows @ inverse[windows], windows)
     raise InputError("the rates cannot be computed from the angles: the rows are too far apart for this motion")
 
 

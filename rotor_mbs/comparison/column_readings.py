@@ -1,0 +1,305 @@
+"""What a column of a trajectory may be in place of the right numbers.
+
+Units, signs and zeros; rows late; differences in place of rates; means; numbers in coarse steps. A
+reading is held to the reference in the rows up to the horizon, and the simplest that fits is taken.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotor_mbs.comparison.data import ForeignData
+from rotor_mbs.solution.defects import FLOOR_SAFETY
+from rotor_mbs.solution.trajectory import Array
+
+_DEGREE, _TURN = math.pi / 180.0, 2.0 * math.pi
+_FACTORS = {
+    "angle": (
+        (_DEGREE, "degrees taken as rad"),
+        (1.0 / _DEGREE, "rad taken as degrees"),
+        (_TURN, "turns taken as rad"),
+    ),
+    "rate": (
+        (_DEGREE, "deg/s taken as rad/s"),
+        (_TURN / 60.0, "rpm taken as rad/s"),
+        (_TURN, "Hz taken as rad/s"),
+    ),
+}
+LATE_OR_EARLY = (" late", " early")
+_MAX_ROWS_LATE = 3
+_MEANS_OF_ROWS = range(2, 22)
+_FINE_ROWS = 100  # intervals in which means over an interval are computed
+_SAMPLES = 20  # of an interval, for such means
+_MEANS_OF_SAMPLES = (2, 4, 5, 10, 20)
+_FAR_LESS = 0.02  # of what is left by a column in which nothing is wrong
+_MIN_COMPARED = 10  # rows: with fewer, some mean always fits
+_MIN_STEPS = 10  # distinct numbers: fewer say nothing of a step between them
+_MAX_STEPS = 1 << 20  # in the range of a column: more are no coarse steps
+_WHOLE = 1e-3  # of a step: a number of steps so near a whole one is that
+_TRUNCATED = (("rounded", 0.5), ("cut off", 1.0))  # the error of a step, in steps
+
+
+@dataclass(frozen=True)
+class Reading:
+    """What a column may be.
+
+    Attributes
+    ----------
+    text : what is wrong with it, "" for nothing.
+    left : the largest error per unit of growth, beyond rounding.
+    corrected, rounding : (rows,) the right numbers, and half a digit of each; None where they
+        cannot be found from the column.
+    """
+
+    text: str
+    left: float
+    corrected: Array | None
+    rounding: Array
+
+
+class ColumnReadings:
+    """The readings of the columns of data.
+
+    Parameters
+    ----------
+    data : all rows.
+    states, carried : (n, 2 (1 + blades)) the reference, and what an error may become, in the rows
+        from t = 0 to the horizon.
+    states_at : gives the reference at other times.
+    allowed, tolerance : of an error per unit of growth, of a reading that fits; and the user's.
+    with_factor : whether any factor of a channel may be wrong.
+    """
+
+    def __init__(
+        self,
+        data: ForeignData,
+        states: Array,
+        carried: Array,
+        states_at: Callable[[Array], Array],
+        allowed: float,
+        tolerance: float,
+        *,
+        with_factor: bool,
+    ) -> None:
+        self.data = data
+        self._begin = int(np.searchsorted(data.time, 0.0))  # rows before it have no reference
+        self._rows = slice(self._begin, self._begin + len(states))
+        self._states, self._carried, self._states_at = states, carried, states_at
+        self._allowed, self._tolerance = allowed, tolerance
+        self._with_factor = with_factor
+        self._fine: Array | None = None
+
+    def best(self, j: int) -> Reading | None:
+        """Return the simplest reading of a column that fits about as well as the best of its kind.
+
+        One in which something is wrong has to leave far less than nothing wrong leaves.
+
+        Parameters
+        ----------
+        j : number of the column.
+        """
+        right = self._inverse(j, "", self.data.values[:, j])
+        if right.left <= self._tolerance:
+            return right
+        enough = min(self._allowed, _FAR_LESS * right.left)
+        for kind in (self._units, self._late_rows, self._steps, self._differences, self._means):
+            readings = list(kind(j))
+            least = min((reading.left for reading in readings), default=math.inf)
+            if least <= enough:
+                alike = min(10.0 * max(least, 1e-3 * self._tolerance), enough)
+                return next(reading for reading in readings if reading.left <= alike)
+        return right if right.left <= self._allowed else None
+
+    def _left(self, j: int, expected: Array, values: Array, rounding: Array | float) -> float:
+        """Return the largest error per unit of growth in the rows where both numbers are known."""
+        is_known = np.isfinite(expected) & np.isfinite(values)
+        if not is_known.any():
+            return math.inf
+        scale = self._carried[:, self.data.channels[j].column]
+        error = np.maximum(np.abs(values - expected) - rounding, 0.0) / scale
+        return float(error[is_known].max())
+
+    def _expected(self, j: int) -> Array:
+        return np.asarray(self._states[:, self.data.channels[j].column])
+
+    def _inverse(self, j: int, text: str, corrected: Array, factor: float = 1.0) -> Reading:
+        """Return a reading whose right numbers are known."""
+        rounding = self.data.rounding[:, j] * abs(factor)
+        left = self._left(
+            j, self._expected(j), corrected[self._rows], FLOOR_SAFETY * rounding[self._rows]
+        )
+        return Reading(text, left, corrected, rounding)
+
+    def _units(self, j: int) -> Iterator[Reading]:
+        """Yield another unit, the other sign, another zero, turns that are missing; a factor."""
+        values, kind = self.data.values[:, j], self.data.channels[j].kind
+        begin, start = self._begin, float(self._expected(j)[0])
+        factors = [(1.0, ""), *_FACTORS[kind]]
+        signed = [(sign * factor, text) for sign in (1.0, -1.0) for factor, text in factors]
+        for has_other_zero in (False, True):
+            for factor, text in signed:
+                mistakes = [text] if text else []
+                if factor < 0.0:
+                    mistakes.append("sign reversed")
+                zero = 0.0
+                if has_other_zero:
+                    zero = factor * float(values[begin]) - start
+                    mistakes.append(f"zero off by {zero:.6g}")
+                corrected = factor * values - zero
+                yield self._inverse(j, ", ".join(mistakes), corrected, factor)
+                if kind == "angle" and np.abs(np.diff(corrected)).max() > 0.5 * _TURN:
+                    unwrapped = np.unwrap(corrected)
+                    unwrapped += _TURN * np.round((start - unwrapped[begin]) / _TURN)
+                    text_of_turns = ", ".join([*mistakes, "wrapped, taken as unwrapped"])
+                    yield self._inverse(j, text_of_turns, unwrapped, factor)
+        expected = self._expected(j)
+        if self._with_factor:
+            # By least squares.
+            factor = float(values[self._rows] @ expected / (expected @ expected))
+            if factor:
+                text = f"too large by a factor of {factor:.6g}"
+                yield self._inverse(j, text, values / factor, 1.0 / factor)
+
+    def _late_rows(self, j: int) -> Iterator[Reading]:
+        """Yield a column that is some rows late or early."""
+        values = self.data.values[:, j]
+        for late in range(1, _MAX_ROWS_LATE + 1):
+            rows = "a row" if late == 1 else f"{late} rows"
+            unknown = np.full(min(late, len(values)), np.nan)
+            yield self._inverse(j, f"{rows} late", np.concatenate([values[late:], unknown]))
+            yield self._inverse(j, f"{rows} early", np.concatenate([unknown, values[:-late]]))
+
+    def _steps(self, j: int) -> Iterator[Reading]:
+        """Yield a column whose numbers are in coarse steps, or in half precision."""
+        values, expected = self.data.values[:, j], self._expected(j)
+        unit = self.data.channels[j].unit
+        with np.errstate(over="ignore"):
+            is_half = bool((values.astype(np.float16).astype(float) == values).all())
+        found: list[tuple[str, Array]] = []
+        if is_half:
+            found.append(("numbers of half precision (float16)", 2.0**-11 * np.abs(values)))
+        step = self._step(j)
+        if step is not None:
+            turns = _TURN / step
+            of_turn = ""
+            if unit == "rad" and abs(turns - round(turns)) < _WHOLE * turns and turns < _MAX_STEPS:
+                of_turn = f", {round(turns)} a turn"
+            for how, error in _TRUNCATED:
+                text = f"{how} to steps of {step:.6g} {unit}{of_turn}"
+                found.append((text, np.full(len(values), error * step)))
+        for text, rounding in found:
+            left = self._left(j, expected, values[self._rows], rounding[self._rows])
+            yield Reading(text, left, values, np.maximum(rounding, self.data.rounding[:, j]))
+
+    def _step(self, j: int) -> float | None:
+        """Return the step between the numbers of a column; of few numbers that of another one."""
+        channels = self.data.channels
+        for other in (j, *range(len(channels))):
+            if channels[other].kind == channels[j].kind:
+                step = _step_between(self.data.values[:, other])
+                if step is not None:
+                    numbers = (self.data.values[:, j] - self.data.values[0, other]) / step
+                    is_whole = np.abs(numbers - np.round(numbers)).max() <= _WHOLE
+                    return step if is_whole else None
+        return None
+
+    def _forward(self, j: int, text: str, expected: Array) -> Reading:
+        """Return a reading that says what the column should be, and not what is right instead."""
+        values, rounding = self.data.values[self._rows, j], self.data.rounding[:, j]
+        if np.count_nonzero(np.isfinite(expected)) < _MIN_COMPARED:
+            return Reading(text, math.inf, None, rounding)
+        left = self._left(j, expected, values, FLOOR_SAFETY * rounding[self._rows])
+        return Reading(text, left, None, rounding)
+
+    def _differences(self, j: int) -> Iterator[Reading]:
+        """Yield differences of angles in place of a rate."""
+        channel = self.data.channels[j]
+        if channel.kind != "rate":
+            return
+        angle = self._states[:, channel.column - self._states.shape[1] // 2]
+        time = self.data.time[self._rows]
+        slopes = np.diff(angle) / np.diff(time)
+        central = np.full(len(time), np.nan)
+        central[1:-1] = np.gradient(angle, time)[1:-1]
+        text = "differences of the angles"
+        yield self._forward(j, f"{text} over two intervals, around each row", central)
+        yield self._forward(
+            j, f"{text}, the mean over the interval before each row", np.append(np.nan, slopes)
+        )
+        yield self._forward(
+            j, f"{text}, the mean over the interval after each row", np.append(slopes, np.nan)
+        )
+
+    def _means(self, j: int) -> Iterator[Reading]:
+        """Yield means over rows, and over samples or the whole of an interval."""
+        expected = self._expected(j)
+        count = len(expected)
+        sums = np.concatenate([[0.0], np.cumsum(expected)])
+        for width in _MEANS_OF_ROWS:
+            if count < width + _MIN_COMPARED:
+                break
+            means = (sums[width:] - sums[:-width]) / width
+            ends = [("up to each row", width - 1)]
+            if width % 2:
+                ends.insert(0, ("around each row", width // 2))
+            for text, before in ends:
+                # Filters treat the rows at the ends each in its own way.
+                of_rows = np.full(count, np.nan)
+                of_rows[width - 1 : count - width + 1] = means[
+                    width - 1 - before : count - width + 1 - before
+                ]
+                yield self._forward(j, f"mean of {width} rows {text}", of_rows)
+        for text, means in self._means_of_samples(self.data.channels[j].column):
+            of_rows = np.full(count, np.nan)
+            of_rows[: len(means)] = means
+            yield self._forward(j, text, of_rows)
+
+    def _means_of_samples(self, column: int) -> Iterator[tuple[str, Array]]:
+        """Yield means over the interval before, after and around each row, for the first rows."""
+        time = self.data.time[self._rows][: _FINE_ROWS + 1]
+        if len(time) < _MIN_COMPARED:
+            return
+        if self._fine is None:
+            shares = np.arange(_SAMPLES) / _SAMPLES
+            fine = (time[:-1, None] + np.diff(time)[:, None] * shares).ravel()
+            self._fine = self._states_at(np.append(fine, time[-1]))
+        fine_values = self._fine[:, column]
+        rows = np.arange(len(time)) * _SAMPLES
+        weights = np.ones(_SAMPLES + 1)
+        weights[1:-1:2], weights[2:-1:2] = 4.0, 2.0  # Simpson's rule
+        whole = (np.arange(_SAMPLES + 1), weights / (3.0 * _SAMPLES))
+        for where, shift in (("before", -_SAMPLES), ("after", 0), ("around", -_SAMPLES // 2)):
+            kinds = [(f"mean over the interval {where} each row", *whole)]
+            for samples in _MEANS_OF_SAMPLES:
+                stride = _SAMPLES // samples
+                # Of the interval before a row its end is one of the samples.
+                offsets = stride * np.arange(samples) + (stride if where == "before" else 0)
+                text = f"mean of {samples} samples of the interval {where} each row"
+                kinds.append((text, offsets, np.full(samples, 1.0 / samples)))
+            for text, offsets, weight in kinds:
+                places: NDArray[np.int64] = rows[:, None] + offsets + shift
+                is_inside = (places >= 0).all(axis=1) & (places < len(fine_values)).all(axis=1)
+                means = np.full(len(time), np.nan)
+                means[is_inside] = fine_values[places[is_inside]] @ weight
+                yield text, means
+
+
+def _step_between(values: Array) -> float | None:
+    """Return the step of which all differences are whole multiples, None where there is none."""
+    distinct = np.unique(values)
+    if len(distinct) < _MIN_STEPS:
+        return None
+    differences = np.diff(distinct)
+    step = float(differences.min())
+    if not distinct[-1] - distinct[0] < _MAX_STEPS * step:
+        return None
+    counts = np.round(differences / step)
+    step = float(differences.sum() / counts.sum())
+    if np.abs(differences / step - counts).max() > _WHOLE:
+        return None
+    return step

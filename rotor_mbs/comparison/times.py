@@ -1,0 +1,154 @@
+"""The rows of a motion in the order of their times, and the rounding of the times.
+
+Programs write a row twice at an event, rows of an initialisation before t = 0, rows from the end to
+the start. What is said twice is dropped, what contradicts itself is refused.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotor_mbs.errors import InputError
+from rotor_mbs.scenario.time_table import ALIGNMENT
+
+Array = NDArray[np.float64]
+
+_NEAR_ZERO = 1e-9  # of an interval: a time that is nearer to 0 is 0
+_SAME_STATE = 1e-9  # rad, rad/s, or of a number: of the same state, computed twice
+_EQUAL = 1e-6  # of an interval between rows
+_MOSTLY = 0.9  # of the intervals
+_STEP_DIGITS = 12  # of a step that somebody has chosen
+_ROUNDOFF = 2.0**-53
+_MIN_ROWS = 3  # fewer have no motion to be compared
+
+
+class OrderedRows(NamedTuple):
+    """The rows that are compared.
+
+    Attributes
+    ----------
+    places : (n,) numbers of the rows in the data, in the order of their times.
+    time : (n,) s, increasing from 0 or later.
+    notes : what was done to them, a line each.
+    """
+
+    places: NDArray[np.int64]
+    time: Array
+    notes: tuple[str, ...]
+
+
+def ordered_rows(
+    source: str, time: Array, motion: Array, others: Array, jumps: Sequence[float]
+) -> OrderedRows:
+    """Order rows by their times, one row for each time, from t = 0 on.
+
+    Parameters
+    ----------
+    source : what messages call the data.
+    time : (n,) s, as it stands in the data.
+    motion, others : (n, channels) rad and rad/s of angles and rates; numbers of loads.
+    jumps : s, times at which a load of the scene jumps.
+
+    Raises
+    ------
+    InputError
+        For two different rows at one time, unless a load jumps there; for fewer than three rows.
+    """
+    notes = []
+    if len(time) < _MIN_ROWS:
+        raise InputError(f"{source}: {len(time)} rows; allowed: {_MIN_ROWS} or more")
+    steps = np.abs(np.diff(time))
+    usual = float(np.median(steps[steps > 0.0])) if (steps > 0.0).any() else 0.0
+    time = np.where(np.abs(time) <= _NEAR_ZERO * usual, 0.0, time)
+    places = np.arange(len(time))
+    if (np.diff(time) < 0.0).any():
+        is_descending = bool((np.diff(time) <= 0.0).all())
+        if is_descending:
+            # The rows of one time are in the order of the file after a stable sort, which would be
+            # from after a jump to before it.
+            places = places[::-1]
+        places = places[np.argsort(time[places], kind="stable")]
+        was = "from the end to the start" if is_descending else "not in the order of their times"
+        notes.append(f"the rows are {was}: sorted")
+    early = int(np.count_nonzero(time < 0.0))
+    if early == len(time):
+        allowed = "times from 0, the scene's start (`offset` of the time)"
+        raise InputError(f"{source}: ends at t = {time.max():g} s; allowed: {allowed}")
+    if early:
+        places = places[time[places] >= 0.0]
+        notes.append(f"{early} rows before t = 0 are not compared")
+    is_kept = np.ones(len(places), dtype=bool)
+    twice = at_jumps = 0
+    for row in np.flatnonzero(np.diff(time[places]) == 0.0):
+        first, second = places[row], places[row + 1]
+        is_kept[row] = False
+        if _are_same(motion[first], motion[second], 0.0) and _are_same(
+            others[first], others[second], 0.0
+        ):
+            twice += 1
+        elif _are_same(motion[first], motion[second], _SAME_STATE) and any(
+            abs(time[first] - jump) <= ALIGNMENT * usual for jump in jumps
+        ):
+            at_jumps += 1
+        else:
+            problem = f"the time of row {second + 1}, {time[second]:.9g} s, repeats that of row"
+            allowed = "one row for each time, or two with the same angles where a load jumps"
+            raise InputError(
+                f"{source}: {problem} {first + 1} with other numbers; allowed: {allowed}"
+            )
+    if twice:
+        notes.append(f"{twice} rows are there twice: one of each is compared")
+    if at_jumps:
+        notes.append(
+            f"{at_jumps} rows before a jump of a load are not compared, those after it are"
+        )
+    places = places[is_kept]
+    if len(places) < _MIN_ROWS:
+        problem = f"{len(places)} rows at different times from t = 0 on"
+        raise InputError(f"{source}: {problem}; allowed: {_MIN_ROWS} or more")
+    return OrderedRows(places, time[places], tuple(notes))
+
+
+def _are_same(first: Array, second: Array, tolerance: float) -> bool:
+    """Whether two rows have the same numbers, to a tolerance of 1 or of the larger ones."""
+    scale = np.maximum(np.maximum(np.abs(first), np.abs(second)), 1.0)
+    return bool((np.abs(first - second) <= tolerance * scale).all())
+
+
+def rounding_of_steps(time: Array) -> Array | None:
+    """Find the rounding of times whose intervals are equal; None of other times.
+
+    Equal intervals are meant as they are written, though the times have few digits; a few that
+    differ are faults of the clock. A clock that adds up its steps is off by what the additions have
+    rounded, which no single time shows.
+
+    Parameters
+    ----------
+    time : (n,) s, increasing.
+
+    Returns
+    -------
+    ndarray or None
+        (n,) s.
+    """
+    intervals = np.diff(time)
+    usual = float(np.median(intervals))
+    is_usual = np.abs(intervals - usual) <= _EQUAL * usual
+    if not is_usual.mean() >= _MOSTLY:
+        return None
+    rounding: Array = np.abs(time) * _ROUNDOFF
+    if not is_usual.all():
+        return rounding
+    mean = (time[-1] - time[0]) / (len(time) - 1)
+    rows = np.arange(len(time))
+    from_line = np.abs(time - (time[0] + mean * rows))
+    if from_line.max() <= 4.0 * _ROUNDOFF * np.abs(time).max():
+        return rounding
+    digits = _STEP_DIGITS - 1 - math.floor(math.log10(mean))
+    from_chosen = np.abs(time - (time[0] + round(mean, digits) * rows))
+    return np.asarray(rounding + np.minimum(from_chosen, rows * rounding))
