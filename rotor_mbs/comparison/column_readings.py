@@ -241,7 +241,7 @@ class ColumnReadings:
         count = len(expected)
         sums = np.concatenate([[0.0], np.cumsum(expected)])
         for width in _MEANS_OF_ROWS:
-            if count < width + _MIN_COMPARED:
+            if count < 2 * (width - 1) + _MIN_COMPARED:
                 break
             means = (sums[width:] - sums[:-width]) / width
             ends = [("up to each row", width - 1)]

@@ -677,6 +677,10 @@ def _columns_of_rows(
     # Beside a point a comma may stand between thousands; without one it is decimal.
     is_comma = divider != "," and not any("." in row for _, row in rows)
     body = io.StringIO("\n".join(row for _, row in rows))
+    # Numbers are read to their last bit: since 3.1 they always are, and to ask for it is deprecated.
+    options: dict[str, Any] = {}
+    if tuple(int(part) for part in pd.__version__.split(".")[:2]) < (3, 1):
+        options["float_precision"] = "round_trip"
     try:
         frame = pd.read_csv(
             body,
@@ -689,8 +693,8 @@ def _columns_of_rows(
             skip_blank_lines=False,
             keep_default_na=False,
             na_values=[""],
-            float_precision="round_trip",
             low_memory=False,
+            **options,
         )
     except pd.errors.ParserError:
         _refuse_ragged(source, rows, divider, width)

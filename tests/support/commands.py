@@ -39,8 +39,8 @@ def rotor_mbs(*words: object, processes: bool = False) -> Ended:
     return Ended(status, out.getvalue(), err.getvalue())
 
 
-def _pool_without_process(workers: int, *arguments: Any) -> pool.TaskPool:
-    return pool.SerialPool() if workers == 1 else _WorkerPool(workers, *arguments)
+def _pool_without_process(workers: int, *arguments: Any, **options: Any) -> pool.TaskPool:
+    return pool.SerialPool() if workers == 1 else _WorkerPool(workers, *arguments, **options)
 
 
 _WorkerPool = pool.WorkerPool
