@@ -65,8 +65,6 @@ def test_a_comparison_and_a_check_load_no_library_of_pictures_and_pages(tmp_path
     code = """
 import sys
 import rotor_mbs as rm
-from rotor_mbs.errors import ResourceError
-from rotor_mbs.runs.runner import Outcome
 assert "numpy" not in sys.modules
 scene = rm.scene("paper/fig03").replace(duration=0.5, samples=51)
 run = rm.run(scene, "lagrange/dop853")
