@@ -1,4 +1,5 @@
-"""docs/architecture.md against the code: layers, the places it names, what there is to touch to add something."""
+"""docs/architecture.md against the code: layers, the places it names, what there is to touch to add something; and the
+tests against the code: they use what is public."""
 
 from __future__ import annotations
 
@@ -79,3 +80,39 @@ def test_every_model_is_in_the_catalogue_and_in_the_contract_of_independence() -
     (independent,) = (contract["modules"] for contract in CONTRACTS if contract["type"] == "independence")
     assert {name.rpartition(".")[2] for name in independent} == models
     assert set(re.findall(r"'rotor_mbs\.models\.(\w+)", CODE["methods/catalogue.py"])) == models
+
+
+# Tests
+
+# Protocols of Python and of notebooks; and names that a test has no other way to, until they are public.
+PRIVATE = {"_repr_html_", "_replace", "_asdict", "_fields", "_exit", "_config"}
+PRIVATE |= {
+    "_files", "_of_files", "_own_extremes", "_changed_metric", "_of_reference", "_of_run", "_PATIENT_S",
+    "_LONGEST_RUN_S", "_LOAD_S", "_is_met", "_mbs", "_runs", "_in_doubles", "_transition_matrices",
+    "_matrices_by_quotients", "_Sweep", "_measure_scene", "_on_body",
+}  # fmt: skip
+
+
+def private_names(tree: ast.Module) -> set[str]:
+    """Return names with one underscore in front that are not the own ones: imported, of an object, or set by a text."""
+    names: set[str] = set()
+    for node in ast.walk(tree):
+        match node:
+            case ast.ImportFrom(names=imported):
+                names |= {alias.name for alias in imported}
+            case ast.Attribute(value=ast.Name(id="self" | "cls")):
+                pass
+            case ast.Attribute(attr=name):
+                names.add(name)
+            case ast.Call(
+                func=ast.Attribute(attr="setattr" | "object" | "setitem"), args=[_, ast.Constant(str(name)), *_]
+            ):
+                names.add(name)
+    return {name for name in names if name.startswith("_") and not name.startswith("__")}
+
+
+def test_tests_use_public_names() -> None:
+    """A private function is tested through the public one that calls it, so that it may be written anew."""
+    names = {path: private_names(ast.parse(path.read_text())) for path in (ROOT / "tests").rglob("*.py")}
+    assert {path.name: found - PRIVATE for path, found in names.items() if found - PRIVATE} == {}
+    assert set().union(*names.values()) >= PRIVATE  # none that is public now

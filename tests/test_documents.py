@@ -14,7 +14,7 @@ import pytest
 from support.commands import rotor_mbs
 
 import rotor_mbs as rm
-from rotor_mbs.cli.arguments import _parser, parse
+from rotor_mbs.cli.arguments import parse
 from rotor_mbs.cli.verdicts import line
 from rotor_mbs.methods.catalogue import method_names
 from rotor_mbs.scenario.scene import BLADE_KEYS, SCENE_KEYS, load_scene
@@ -134,8 +134,10 @@ def test_every_public_name_key_command_and_method_is_on_a_reference_page(monkeyp
     for name in (*rm.__all__, "assert_agrees", "Modes", "RunPlots"):
         assert f"api/{name}" in pages, name
         assert f"(api/{name}.md)" in pages["api"]
+    commands = re.findall(r"^    ([a-z-]+)\b", rotor_mbs("--help").out, re.M)
+    assert "reproduce" in commands
     expected = {
-        "command-line": [f"## {name}" for name in _parser()[1]],
+        "command-line": [f"## {name}" for name in commands],
         "scene-file": [f"`{key['key']}`" for key in SCENE_KEYS.values() if key["key"] != "blade"]
         + [f"`blade.{key['key']}`" for key in BLADE_KEYS.values()],
         "methods": [f"## {name}" for name in method_names()],

@@ -6,9 +6,9 @@ from importlib import util
 from pathlib import Path
 
 import pytest
+from support.packages import forget_method_files
 
 import rotor_mbs as rm
-from rotor_mbs.methods import catalogue
 from rotor_mbs.methods.catalogue import check_names
 
 FOLDER = Path(__file__).parents[1] / "examples" / "engines"
@@ -45,5 +45,4 @@ def test_an_engine_agrees_with_the_closed_form(name: str) -> None:
             with pytest.raises(rm.MethodRefusal, match="blades without inertia"):
                 rm.run("check/held", full)
     finally:
-        catalogue._files.clear()
-        catalogue._of_files.clear()
+        forget_method_files()

@@ -8,7 +8,6 @@ from __future__ import annotations
 import json
 import math
 import os
-import sys
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -16,7 +15,7 @@ import h5py
 import numpy as np
 import pytest
 from support.commands import rotor_mbs
-from support.packages import install
+from support.packages import forget_what_is_installed, install
 from support.rotors import energies
 
 import rotor_mbs as rm
@@ -44,14 +43,6 @@ SCENE = rm.scene("check/general").replace(
     **{"torque.rotor": 0, "bearing.stiffness": 0, "bearing.damping": 0, "shaft.damping": 0},
     **{"initial.angles": [0.5, 0.3, -0.2, 0.1], "initial.rates": [0.4, 0, 0, 0]},
 )  # fmt: skip
-
-
-def forget_what_is_installed() -> None:
-    """Empties the caches of rotor_mbs, of which some hold the methods and quantities that were found."""
-    for name, module in list(sys.modules.items()):
-        if name.startswith("rotor_mbs."):
-            for value in vars(module).values():
-                getattr(value, "cache_clear", lambda: None)()
 
 
 @pytest.fixture(scope="module", autouse=True)

@@ -4,13 +4,11 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-
-from rotor_mbs.methods import catalogue
+from support.packages import forget_method_files
 
 
 @pytest.fixture(autouse=True)
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     monkeypatch.chdir(tmp_path)
     yield tmp_path
-    catalogue._files.clear()
-    catalogue._of_files.clear()
+    forget_method_files()

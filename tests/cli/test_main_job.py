@@ -3,7 +3,6 @@ and run time: `.ci/wheel`."""
 
 from __future__ import annotations
 
-import argparse
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import NamedTuple
@@ -17,6 +16,7 @@ from rotor_mbs.runs.read import open_results
 from rotor_mbs.scenario.catalogue import find_scenes
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.studies import reproduce
+from rotor_mbs.studies.run import RunReport
 
 SCENES = [reproduce.BENCHED]
 PRINTED, RIGHT = "printed/ode45", ("lagrange/taylor", "exudyn_tree/rk67")
@@ -86,23 +86,28 @@ def again(folder: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., bool]:
     """Calls `reproduce`, with work that writes a results file and an index; returns whether the work was done."""
     done: list[Path] = []
 
-    def work(_arguments: argparse.Namespace, results: Path, pages: Path) -> tuple[int, str]:
+    def compute(results: Path, **_: object) -> tuple[RunReport, list[object]]:
         done.append(results)
-        pages.mkdir(parents=True, exist_ok=True)
-        (pages / "index.html").touch()
         if not results.exists():
             results.write_bytes(bytes(1000))
-        return int(Path("fails").exists()), "result as printed: what came out\n"
+        return RunReport([], 0), []
+
+    def write(_results: Path, pages: Path, *_: object) -> None:
+        pages.mkdir(parents=True, exist_ok=True)
+        (pages / "index.html").touch()
 
     def called(*options: str) -> bool:
         done.clear()
-        ended = rotor_mbs("reproduce", "-o", folder, *options)
+        ended = rotor_mbs("reproduce", "-j", 1, "-o", folder, *options)
         assert ended.status == int(bool(done) and Path("fails").exists())
         assert "result as printed: what came out" in ended.out
         assert ("nothing to do" in ended.out) == (not done)
         return bool(done)
 
-    monkeypatch.setattr(runs, "_reproduce", work)
+    monkeypatch.setattr(runs, "reproduce_paper", compute)
+    monkeypatch.setattr(runs, "print_summary", lambda *_: int(Path("fails").exists()))
+    monkeypatch.setattr(runs, "summary_of", lambda _: "result as printed: what came out\n")
+    monkeypatch.setattr("rotor_mbs.report.build.write_report", write)
     return called
 
 

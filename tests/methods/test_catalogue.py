@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from support.packages import install
+from support.packages import forget_what_is_installed, install
 from support.references import reference, scene
 from support.scenes import PAPER, paper
 
@@ -139,9 +139,9 @@ TAKEN = Method(name="lagrange/taylor", label="x", build=Solver, items=items)
 def site(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     """A folder on sys.path for packages that a test installs."""
     monkeypatch.syspath_prepend(tmp_path)
-    catalogue._plug_ins.cache_clear()
+    forget_what_is_installed()
     yield tmp_path
-    catalogue._plug_ins.cache_clear()
+    forget_what_is_installed()
     sys.modules.pop("made_up", None)
 
 

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from support.commands import rotor_mbs
+from support.packages import forget_method_files
 
 import rotor_mbs as rm
 from rotor_mbs.methods import catalogue, method_file
@@ -63,8 +64,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     Path("one.toml").write_text(SCENE)
     Path("mine.py").write_text(EXAMPLE)
     yield tmp_path
-    catalogue._files.clear()
-    catalogue._of_files.clear()
+    forget_method_files()
 
 
 def run(*words: str) -> str:

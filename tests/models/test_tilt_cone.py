@@ -183,8 +183,8 @@ def test_blades_without_pitch_inertia_lean_with_the_hub(method: str) -> None:
     skip_if_missing(method)
     rod = replace(AXIAL, inertia=(12.0, 12.0, 0.0, 0.0, 0.0, 0.0), cone=0.3)
     scene = make_scene(
-        [0.4, 0.5, 0.2], [1.0, 0.0, 0.3], (rod, replace(STOUT, cone=-0.2)), shaft_tilt=0.2, hub_radius=0.5, hub_mass=9.0,
-        duration=0.2, samples=11, outputs=("angles", "rates", "tip", "energy", "loads"),
+        [0.4, 0.5, 0.2], [1.0, 0.0, 0.3], (rod, replace(STOUT, cone=-0.2)), shaft_tilt=0.2, hub_radius=0.5,
+        hub_mass=9.0, duration=0.2, samples=11, outputs=("angles", "rates", "tip", "energy", "loads"),
     )  # fmt: skip
     run = solve(method, scene, {}).trajectory
     share = 1e-5 if method == CHAIN else 1e-12

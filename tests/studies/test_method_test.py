@@ -14,6 +14,7 @@ import pytest
 from support import other_code
 from support.commands import rotor_mbs
 from support.other_code import Mistakes
+from support.packages import forget_method_files
 
 from rotor_mbs.analysis.checks import Check
 from rotor_mbs.analysis.kinematics import kinetic_energy, potential_energy, tip_paths
@@ -123,8 +124,7 @@ BROKEN = {
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     monkeypatch.chdir(tmp_path)
     yield
-    catalogue._files.clear()
-    catalogue._of_files.clear()
+    forget_method_files()
 
 
 def examined(text: str) -> list[Check]:
