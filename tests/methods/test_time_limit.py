@@ -345,12 +345,17 @@ def alarmed(call: Callable[[], object], seconds: float, error: type[BaseExceptio
     assert signal.getsignal(signal.SIGALRM) is handler
 
 
+# An alarm between the opening of a file and what closes it: the collector does, and says so.
+A_FILE_MAY_STAY_OPEN = pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
+
+
 @pytest.mark.parametrize("error", [Late, pytest.param(TimeoutError, marks=pytest.mark.full),
                                    pytest.param(RuntimeError, marks=pytest.mark.full),
                                    pytest.param(ValueError, marks=pytest.mark.full),
                                    pytest.param(pytest.fail.Exception, marks=pytest.mark.full)])  # fmt: skip
 @pytest.mark.parametrize("timeout", [100.0, float("inf")])
 @pytest.mark.parametrize("method", METHODS)
+@A_FILE_MAY_STAY_OPEN
 def test_the_callers_alarm_passes_through_a_method(method: str, timeout: float, error: type[BaseException]) -> None:
     if not find_method(method).is_installed:
         pytest.skip(f"{method} is not installed")
@@ -372,6 +377,7 @@ CALLS: dict[str, Callable[[], object]] = {
 
 
 @pytest.mark.parametrize("name", CALLS)
+@A_FILE_MAY_STAY_OPEN
 def test_the_callers_alarm_passes_through_a_call(name: str) -> None:
     """What has been caught on the way is no result of a method, and no task that is tried again."""
     rm.run(SHORT, ["exudyn_tree/rk67", DOP853])  # loads what is needed
@@ -434,7 +440,7 @@ def _spoilt(seed: int, calls: int) -> list[tuple[int, float]]:
 
 
 def test_after_random_calls_with_random_limits_a_call_gives_the_same_bits() -> None:
-    assert not _spoilt(seed=1, calls=60)
+    assert not _spoilt(seed=1, calls=25)
 
 
 @pytest.mark.nightly
