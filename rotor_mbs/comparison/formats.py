@@ -383,7 +383,18 @@ def _decoded(source: str, arrays: Arrays, attributes: Mapping[str, Mapping[str, 
             offset = float(facts.get("add_offset", 0.0))
             exact = arrays[name].astype(float) * scale + offset
             unpacked[name] = np.where(np.isnan(values), np.nan, exact)
-    return table_of(source, unpacked, units, steps)
+    overflown = {}
+    for name in steps:
+        stored = arrays[name].ravel()
+        # A number that is too large for 32 or 64 bits becomes the least one of them.
+        is_least = (stored == np.iinfo(stored.dtype).min) & np.isfinite(unpacked[name].ravel())
+        if stored.dtype.kind == "i" and stored.itemsize > 2 and is_least.any():
+            row = int(is_least.argmax()) // math.prod(arrays[name].shape[1:]) + 1
+            reason = f"row {row} has {stored.min()}, packed from a number that did not fit"
+            overflown[name] = LeftOut(reason, is_column=True)
+            del unpacked[name]
+    table = table_of(source, unpacked, units, steps)
+    return DataTable(source, table.columns, {**table.left_out, **overflown})
 
 
 def _openfast(path: Path) -> tuple[Arrays, Units]:
@@ -677,7 +688,7 @@ def _columns_of_rows(
     # Beside a point a comma may stand between thousands; without one it is decimal.
     is_comma = divider != "," and not any("." in row for _, row in rows)
     body = io.StringIO("\n".join(row for _, row in rows))
-    # Numbers are read to their last bit: since 3.1 they always are, and to ask for it is deprecated.
+    # Numbers are read to their last bit; since 3.1 they always are, and asking is deprecated.
     options: dict[str, Any] = {}
     if tuple(int(part) for part in pd.__version__.split(".")[:2]) < (3, 1):
         options["float_precision"] = "round_trip"

@@ -15,7 +15,7 @@ from rotor_mbs.comparison.channels import Channel, channels
 from rotor_mbs.comparison.data import ForeignData
 from rotor_mbs.comparison.hypotheses import Explanation, Hypothesis, cheapest, explanations
 from rotor_mbs.comparison.verdict import ChannelErrors, agrees_until
-from rotor_mbs.models.lagrange.samples import sampled_loads
+from rotor_mbs.models.lagrange.samples import LoadParts, partial_loads
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.scenario.time_table import ALIGNMENT, ROTOR_TORQUE, values_before
 from rotor_mbs.solution.defects import FLOOR_SAFETY, Defects
@@ -30,6 +30,12 @@ _STATE_STEP = 1e-7  # of a state, for the derivative of the loads
 MIN_EXPLAINED = 5  # rows: with fewer, something always fits
 MAX_LEFT = 1e-4  # of the largest load, or of a frequency, by a mistake that is named,
 LEFT_SHARE = 1e-2  # and of the difference: another program's own error is no mistake
+WHOLE = LoadParts()
+_FORGOTTEN = {
+    "without the weight": LoadParts(weight=0.0),
+    "without the accelerations of rotor and pitches": LoadParts(accelerations=0.0),
+    "of the weight alone, without inertia forces": LoadParts(accelerations=0.0, rates=0.0),
+}
 _UNITS = {1.0: "", 1e-3: "kN taken as N", 1e3: "N taken as kN"}
 _FACTORS = [sign * factor for sign in (1.0, -1.0) for factor in _UNITS]
 # "" is the one that the scene's loads have: of a root the blade's, of the shaft the base.
@@ -56,11 +62,18 @@ class LoadComparison:
 
 @dataclass(frozen=True)
 class Component:
-    """What a column of loads may be: a factor times (n,) values; shown: of which component."""
+    """What a column of loads may be: a factor times (n,) values.
+
+    Attributes
+    ----------
+    shown : of which component.
+    is_shifted : whether the first and the last row are not known.
+    """
 
     factor: float
     values: Array
     shown: str = ""
+    is_shifted: bool = False
 
 
 @dataclass(frozen=True)
@@ -72,7 +85,9 @@ class JudgedLoads:
     scene, channels : the scene, and the channels of the data.
     known : all components of loads of the scene, as the columns of `by_frame`.
     by_frame : by frame the (n, components) loads of the closed form.
+    mistaken : by what is wrong, in words, the same otherwise computed.
     time : (n,) s.
+    is_inside : (n,) rows that are neither the first nor the last one.
     values, rounding, expected : (n, channels) N or N m.
     smallest_scale : (channels,) by which an error is judged at least.
     tolerance : of a component's largest.
@@ -82,6 +97,8 @@ class JudgedLoads:
     channels: tuple[Channel, ...]
     known: Sequence[Channel]
     by_frame: Mapping[str, Array]
+    mistaken: Mapping[str, Mapping[str, Array]]
+    is_inside: NDArray[np.bool_]
     time: Array
     values: Array
     rounding: Array
@@ -108,7 +125,8 @@ class JudgedLoads:
         factor, values = component.factor, component.values
         rounding = FLOOR_SAFETY * self.rounding[:, j] / min(abs(factor), 1)
         error = np.abs(self.values[:, j] / factor - values)
-        left = float((error - rounding).max())
+        rows = self.is_inside if component.is_shifted else slice(None)
+        left = float((error - rounding)[rows].max(initial=-np.inf))
         before = np.abs(self.values[:, j] - self.expected[:, j]).max(initial=0.0)
         share = min(self.tolerance, MAX_LEFT)
         allowed = min(share * self.scale(j, values), LEFT_SHARE * before)
@@ -117,7 +135,9 @@ class JudgedLoads:
         return float(left - allowed)
 
 
-def loads_by_frame(scene: Scene, time: Array, angles: Array, rates: Array) -> dict[str, Array]:
+def loads_by_frame(
+    scene: Scene, time: Array, angles: Array, rates: Array, parts: LoadParts = WHOLE
+) -> dict[str, Array]:
     """Return the loads of the closed form at given states, in every frame.
 
     Parameters
@@ -125,6 +145,7 @@ def loads_by_frame(scene: Scene, time: Array, angles: Array, rates: Array) -> di
     scene : the scene.
     time : (n,) s.
     angles, rates : (n, 1 + blades) rad and rad/s.
+    parts : what of them is forgotten.
 
     Returns
     -------
@@ -132,7 +153,7 @@ def loads_by_frame(scene: Scene, time: Array, angles: Array, rates: Array) -> di
         By frame, (n, components) N or N m in the order of `channels`. What has no components in a
         frame is as it is in its own.
     """
-    loads = sampled_loads(scene, time, angles, rates)
+    loads = partial_loads(scene, time, angles, rates, parts)
     in_rotor, in_base = dict[str, Array](), dict[str, Array]()
     azimuths = angles[:, :1] + np.array(scene.phases)
     for name, values in loads.items():
@@ -200,9 +221,9 @@ def _loads_in_rows(
     known = [channel for channel in channels(scene) if channel.is_load]
     places = [channel.column - known[0].column for channel in loads.channels]
 
-    def loads_at(states: Array) -> dict[str, Array]:
+    def loads_at(states: Array, parts: LoadParts = WHOLE) -> dict[str, Array]:
         angles, rates = all_coordinates(scene, states[:, :half], states[:, half:])
-        return loads_by_frame(scene, time, angles, rates)
+        return loads_by_frame(scene, time, angles, rates, parts)
 
     def columns_of(by_frame: Mapping[str, Array]) -> Array:
         columns = []
@@ -229,11 +250,23 @@ def _loads_in_rows(
         rounding += change * (defects.rounding[:, i] / step)[:, None]
 
     judged = np.isfinite(expected).all(axis=1) & ~is_at_jump(scene, time)
+    mistaken = {text: loads_at(states, parts) for text, parts in _FORGOTTEN.items()}
+    for text, late in (("a row late", 1), ("a row early", -1)):
+        mistaken[text] = {
+            frame: np.roll(matrix, late, axis=0) for frame, matrix in by_frame.items()
+        }
+    # Nobody knows of the first and last row what stands before and behind them.
+    is_inside = judged & (np.arange(len(time)) > 0) & (np.arange(len(time)) < len(time) - 1)
     judged_loads = JudgedLoads(
         scene=scene,
         channels=loads.channels,
         known=known,
         by_frame={frame: matrix[judged] for frame, matrix in by_frame.items()},
+        mistaken={
+            text: {frame: matrix[judged] for frame, matrix in matrices.items()}
+            for text, matrices in mistaken.items()
+        },
+        is_inside=is_inside[judged],
         time=time[judged],
         values=loads.values[: len(time)][judged],
         rounding=rounding[judged],
@@ -362,6 +395,14 @@ def _component_hypotheses(loads: JudgedLoads, j: int) -> Iterator[Hypothesis[Com
                     text = ", ".join(["with the torque on the rotor in it", *mistakes])
                     component = Component(factor, matrix[:, i] + torque, shown)
                     yield Hypothesis(text, component, price + 1)
+    own = channel.column - loads.known[0].column
+    for wrong, by_frame in loads.mistaken.items():
+        for factor in _FACTORS:
+            mistakes = [wrong, *_mistakes(factor)]
+            component = Component(
+                factor, by_frame[channel.frame][:, own], is_shifted=wrong.startswith("a row")
+            )
+            yield Hypothesis(", ".join(mistakes), component, len(mistakes))
 
 
 def _shared_texts(

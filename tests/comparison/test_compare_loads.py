@@ -89,6 +89,35 @@ def with_torque(scene: Scene, data: Arrays) -> Arrays:
     return {"shaft_moment": data["shaft_moment"] + torque[:, None] * [0.0, 1.0, 0.0]}
 
 
+def without(forgotten: str) -> Callable[[Scene, Arrays], Arrays]:
+    """Root forces m (a + g up) of which the weight, or what the coordinates' accelerations make of a, is forgotten."""
+
+    def change(scene: Scene, data: Arrays) -> Arrays:
+        force = data["blade_root_force"].copy()
+        for i, blade in enumerate(scene.blades):
+            spin, pitch_rate = data["rates"][:, 0], data["rates"][:, 1 + i]
+            azimuth, pitch = data["angles"][:, 0] + scene.phases[i], data["angles"][:, 1 + i]
+            up = other_code.about("z", -pitch).apply(other_code.about("y", -azimuth).apply([0.0, 0.0, 1.0]))
+            weight = blade.mass * scene.gravity * up
+            if forgotten == "weight":
+                force[:, i] -= weight
+                continue
+            s, c = np.sin(pitch), np.cos(pitch)
+            omega = np.stack([spin * s, spin * c, pitch_rate], axis=1)
+            coriolis = np.stack([spin * c * pitch_rate, -spin * s * pitch_rate, 0.0 * spin], axis=1)
+            r = np.array(blade.centre_of_mass)
+            turning = np.cross(coriolis, r) + np.cross(omega, np.cross(omega, r))
+            force[:, i] = weight + (blade.mass * turning if forgotten == "accelerations" else 0.0)
+        return {"blade_root_force": force}
+
+    return change
+
+
+def late(_: Scene, data: Arrays) -> Arrays:
+    force = data["blade_root_force"]
+    return {"blade_root_force": np.concatenate([force[:1], force[:-1]])}
+
+
 Change = Callable[[Scene, Arrays], Arrays]
 REVERSED = "sign reversed (action in place of reaction)"
 MISTAKES: dict[str, tuple[Change, list[str]]] = {
@@ -116,6 +145,10 @@ MISTAKES: dict[str, tuple[Change, list[str]]] = {
         lambda _, d: {"shaft_moment": d["shaft_moment"] - np.cross([0.0, -2.0, 0.0], d["shaft_force"])},
         ["about the point (0, -2, 0) m of the base frame in place of the hub centre"],
     ),
+    "a row late": (late, [": a row late"]),
+    "without weight": (without("weight"), [": without the weight"]),
+    "without accelerations": (without("accelerations"), [": without the accelerations of rotor and pitches"]),
+    "weight alone": (without("inertia"), [": of the weight alone, without inertia forces"]),
     "without pitch": (in_rotor, ["in the rotor frame"]),
     "in the base": (in_base, ["in the base frame"]),
     "turning with the shaft": (shaft_in_rotor, ["in the rotor frame"]),

@@ -11,6 +11,7 @@ F = m (α × r + ω × (ω × r) + g up),  M = I α + ω × I ω + (r - e) × F:
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any, NamedTuple
 
@@ -198,6 +199,28 @@ def sampled_loads(scene: Scene, times: Array, angles: Array, rates: Array) -> di
         return _loads(scene, times, angles, rates, float, np.sin, np.cos)
 
 
+@dataclass(frozen=True)
+class LoadParts:
+    """Factors of what loads are made of: 1 as they are, 0 where it is forgotten.
+
+    Attributes
+    ----------
+    weight : of gravity.
+    accelerations : of those of the coordinates.
+    rates : of the rates, of which the other inertia forces are.
+    """
+
+    weight: float = 1.0
+    accelerations: float = 1.0
+    rates: float = 1.0
+
+
+def partial_loads(scene: Scene, times: Array, angles: Array, rates: Array, parts: LoadParts) -> dict[str, Array]:
+    """Return the load quantities with some parts forgotten, as `sampled_loads` returns them whole."""
+    with np.errstate(all="ignore"):
+        return _loads(scene, times, angles, rates, float, np.sin, np.cos, parts)
+
+
 def load_rounding(scene: Scene, times: Array, angles: Array, rates: Array) -> dict[str, Array]:
     """Return how much of the load quantities the last digits of a state leave open, in the shape of each.
 
@@ -300,7 +323,14 @@ def quad_loads(scene: Scene, times: Array, states: Any) -> dict[str, Array]:
 
 
 def _loads(
-    scene: Scene, times: Array, angles: Numbers, rates: Numbers, convert: Convert, sin: Function, cos: Function
+    scene: Scene,
+    times: Array,
+    angles: Numbers,
+    rates: Numbers,
+    convert: Convert,
+    sin: Function,
+    cos: Function,
+    parts: LoadParts | None = None,
 ) -> dict[str, Array]:
     """Compute the load quantities, (n, ...), at a jump of a load before it.
 
@@ -310,6 +340,7 @@ def _loads(
     times : (n,) s.
     angles, rates : (n, 1 + blades) rad and rad/s.
     convert, sin, cos : for the kind of number.
+    parts : what of them is forgotten; nothing where left out.
     """
     moving, applied = scene.moving_coordinates, values_before(scene.load_segments, times)
     accelerations = np.zeros_like(angles)
@@ -322,11 +353,15 @@ def _loads(
         stiffness, damping = scene.bearings[column - 1]
         torque, rest = applied[torque_place(column)], applied[rest_place(column)]
         actuators[:, column - 1] = torque - stiffness * (angles[:, column] - rest) - damping * rates[:, column]
-    roots, shaft_force, shaft_moment = _reactions(scene, angles, rates, accelerations, scene.gravity, convert, sin, cos)
+    gravity = scene.gravity
+    if parts is not None:
+        gravity, rates = parts.weight * gravity, parts.rates * rates
+        accelerations = parts.accelerations * accelerations
+    roots, shaft_force, shaft_moment = _reactions(scene, angles, rates, accelerations, gravity, convert, sin, cos)
     about_shaft = scene.hub_inertia * accelerations[:, 0] - applied[ROTOR_TORQUE]
     _add_about_shaft(shaft_moment, about_shaft, scene, convert)
     if scene.hub_mass:
-        shaft_force[:, 2] += scene.hub_mass * scene.gravity
+        shaft_force[:, 2] += scene.hub_mass * gravity
     return named_loads(roots, shaft_force, shaft_moment, actuators)
 
 
