@@ -18,13 +18,16 @@ def tip_paths(scene: Scene, angles: Array) -> Array:
 
 
 def kinetic_energy(scene: Scene, angles: Array, rates: Array) -> Array:
-    """Return ½ m v² + ½ ω·I ω of every blade, v = ω × r and ω = q̇2 e_y + θ̇ e_z(blade), and of the
-    hub: (n,) J."""
+    """Return ½ m v² + ½ ω·I ω of every blade, v = ω × r and ω = q̇2 e_shaft + θ̇ e_z(blade), and of
+    the hub: (n,) J."""
     total = 0.5 * scene.hub_inertia * rates[:, 0] ** 2
     for i, blade in enumerate(scene.blades):
         frames = _frames(scene, angles, i)
         omega = rates[:, 1 + i, None] * frames[:, :, 2]
-        omega[:, 1] += rates[:, 0]
+        if scene.shaft_tilt:
+            omega += rates[:, :1] * np.array([0.0, math.cos(scene.shaft_tilt), math.sin(scene.shaft_tilt)])
+        else:
+            omega[:, 1] += rates[:, 0]
         velocity = np.cross(omega, _rotated(frames, blade.centre_of_mass))
         tensor = blade.inertia_tensor
         own = np.einsum("nij,ni->nj", frames, omega)  # ω in the blade's frame
@@ -33,7 +36,7 @@ def kinetic_energy(scene: Scene, angles: Array, rates: Array) -> Array:
 
 
 def potential_energy(scene: Scene, time: Array, angles: Array) -> Array:
-    """Return the energy of weights, zero at the shaft's height, and of bearing springs (a pitch
+    """Return the energy of weights, zero at the apex's height, and of bearing springs (a pitch
     that cannot move has none): (n,) J.
 
     time (n,) s, for rest angles that move
@@ -57,12 +60,24 @@ def work_of_constant_loads(scene: Scene, angles: Array) -> Array | None:
 
 
 def _frames(scene: Scene, angles: Array, blade: int) -> Array:
-    """Return Ry(q2 + phase) Rz(θ), (n, 3, 3): columns are the blade's axes in the base frame."""
+    """Return Rx(tilt) Ry(q2 + phase) Rx(-cone) Rz(θ), (n, 3, 3): columns are the blade's axes in
+    the base frame."""
     azimuth, pitch = angles[:, 0] + scene.phases[blade], angles[:, 1 + blade]
     s, c, sp, cp = np.sin(azimuth), np.cos(azimuth), np.sin(pitch), np.cos(pitch)
     zero = np.zeros_like(s)
+    if scene.has_tilt_or_cone:
+        about_shaft = np.array([[c, zero, s], [zero, zero + 1.0, zero], [-s, zero, c]])
+        about_pitch = np.array([[cp, -sp, zero], [sp, cp, zero], [zero, zero, zero + 1.0]])
+        tilt, cone = _about_x(scene.shaft_tilt), _about_x(-scene.blades[blade].cone)
+        return np.einsum("ij,jkn,kl,lmn->nim", tilt, about_shaft, cone, about_pitch)
     x_axis, y_axis, z_axis = (c * cp, sp, -s * cp), (-c * sp, cp, s * sp), (s, zero, c)
     return np.stack([np.stack(axis, axis=1) for axis in (x_axis, y_axis, z_axis)], axis=2)
+
+
+def _about_x(angle: float) -> Array:
+    """Return the right-handed rotation about x, (3, 3)."""
+    c, s = math.cos(angle), math.sin(angle)
+    return np.array([[1.0, 0.0, 0.0], [0.0, c, -s], [0.0, s, c]])
 
 
 def _rotated(frames: Array, point: tuple[float, float, float]) -> Array:
@@ -75,13 +90,17 @@ def exact_rotor_angle(scene: Scene, time: Array) -> tuple[str, Array] | None:
     stays at zero; None where none is known.
 
     One blade let go at rest: a pendulum (elliptic functions; Abramowitz & Stegun 22.2). Equal blades in balance:
-    gravity cancels, a constant torque gives q0 + Ω0 t + τ t² / (2 I).
+    gravity cancels, a constant torque gives q0 + Ω0 t + τ t² / (2 I). On a tilted shaft gravity turns the pitches of
+    blades whose centre of mass is off the pitch axis, and a cone those that have a moment of inertia about it.
     """
     # Zero pitch is invariant for blades that their own x-z plane mirrors; nothing may damp the rotor.
     mirrored = all(b.centre_of_mass[1] == 0.0 and b.inertia[3] == 0.0 and b.inertia[5] == 0.0 for b in scene.blades)
     at_zero = not any(scene.initial_angles[1:]) and not any(scene.initial_rates[1:])
     driven = any(table for tables in scene.pitch_loads for table in tables)
     if not mirrored or not at_zero or driven or scene.shaft_damping:
+        return None
+    weighs = scene.gravity != 0.0 and any(blade.centre_of_mass[0] for blade in scene.blades)
+    if (scene.shaft_tilt and weighs) or any(blade.cone and blade.has_pitch_inertia for blade in scene.blades):
         return None
     if len(scene.blades) == 1:
         return _pendulum(scene, time)
@@ -94,9 +113,9 @@ def exact_rotor_angle(scene: Scene, time: Array) -> tuple[str, Array] | None:
 
 
 def _inertia_at_zero_pitch(blade: Blade) -> float:
-    """Return a blade's inertia about the shaft, which is then its own y axis, kg m²."""
+    """Return a blade's inertia about the shaft, which is then its own y axis but for the cone of a fixed blade, kg m²."""
     yy: float = blade.inertia_about_apex()[1]
-    return yy
+    return yy * math.cos(blade.cone) ** 2 if blade.cone else yy
 
 
 def _pendulum(scene: Scene, time: Array) -> tuple[str, Array] | None:
@@ -107,6 +126,8 @@ def _pendulum(scene: Scene, time: Array) -> tuple[str, Array] | None:
     blade = scene.blades[0]
     x, _, z = blade.centre_of_mass
     arm, lead = math.hypot(x, z), math.atan2(x, z)
+    if scene.has_tilt_or_cone:  # gravity across the shaft, and the distance from it
+        arm *= math.cos(scene.shaft_tilt) * math.cos(blade.cone)
     if scene.has_torque or scene.initial_rates[0] or not scene.gravity or not arm:
         return None
     frequency = math.sqrt(blade.mass * scene.gravity * arm / (scene.hub_inertia + _inertia_at_zero_pitch(blade)))

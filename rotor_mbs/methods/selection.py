@@ -152,5 +152,6 @@ def _leaves_zero_pitch(scene: Scene) -> bool:
     """Return whether the pitch of the first blade moves, and no spring keeps it below ±π/2."""
     _, y, _ = scene.blades[0].centre_of_mass
     starts_at_zero = scene.initial_angles[1] == 0.0 and scene.initial_rates[1] == 0.0
-    stays = y == 0.0 and starts_at_zero and not scene.pitch_torque
+    leans = scene.blades[0].cone != 0.0 or (scene.shaft_tilt != 0.0 and scene.gravity != 0.0)
+    stays = y == 0.0 and starts_at_zero and not scene.pitch_torque and not leans
     return not stays and not any(scene.bearing_stiffness)

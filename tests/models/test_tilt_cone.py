@@ -11,11 +11,13 @@ from typing import Any
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
-from support.newton_euler import State, measure
+from support.newton_euler import State, measure, turn
 from support.random_scenes import leaning_scene
 from support.rotors import AXIAL, STOUT, make_scene, pendulum
 from support.scenes import general
 
+from rotor_mbs.analysis.judgement import judge
+from rotor_mbs.analysis.kinematics import exact_rotor_angle
 from rotor_mbs.methods.catalogue import find_method
 from rotor_mbs.methods.solve import solve
 from rotor_mbs.models.exudyn import linearization as exudyn_linearization
@@ -330,6 +332,9 @@ def test_a_blade_on_a_tilted_shaft_is_a_pendulum(method: str, tilt: float, cone:
     exact = pendulum(2.0, length, 0.0, 9.81 * math.cos(tilt), run.time)
     np.testing.assert_allclose(run.angles[:, 0], exact, rtol=0.0, atol=1e-9)
     assert np.abs(run.angles[:, 1]).max() <= 1e-12
+    name, known = exact_rotor_angle(scene, run.time)
+    assert name == "pendulum"
+    np.testing.assert_allclose(known, exact, rtol=0.0, atol=1e-13)
 
 
 # What rests by symmetry
@@ -360,6 +365,82 @@ def leaning(scene: Scene, tilt: float, cone: float, **changes: Any) -> Scene:
     }.values(),
 )  # fmt: skip
 def test_pitches_at_rest_by_symmetry_are_those_that_stay_exactly_zero(scene: Scene, rests: bool) -> None:
+    """And only of them an exact solution is known to `check`."""
+    assert (exact_rotor_angle(scene, np.zeros(1)) is not None) == rests
     assert resting_pitches(scene) == ((1, 2, 3) if rests else ())
     run = solve("lagrange/dop853", scene, {}).trajectory
     assert run.angles[:, 1:].any() == (not rests)
+
+
+# Planted faults, each in the motion or the loads of every model
+
+
+def about_pitch_axis(scene: Scene) -> Scene:
+    """Return the rotor whose blades were turned about their pitch axes in place of being coned."""
+    blades = []
+    for blade in scene.blades:
+        R = turn(2, blade.cone)
+        tensor = R @ blade.inertia_tensor @ R.T
+        elements = tensor[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]]
+        centre = R @ blade.centre_of_mass
+        blades.append(replace(blade, cone=0.0, centre_of_mass=tuple(centre), inertia=tuple(elements)))
+    return replace(scene, blades=tuple(blades))
+
+
+def with_cones(scene: Scene, factor: float) -> Scene:
+    return replace(scene, blades=tuple(replace(blade, cone=factor * blade.cone) for blade in scene.blades))
+
+
+WRONG = {
+    "tilt of the other sign": lambda scene: replace(scene, shaft_tilt=-scene.shaft_tilt),
+    "cone of the other sign": lambda scene: with_cones(scene, -1.0),
+    "cone about the pitch axis": about_pitch_axis,
+    "gravity along the rotor's plane": lambda scene: replace(scene, shaft_tilt=0.0),
+}
+MODELS = ("lagrange/dop853", "exudyn_tree/rk67", pytest.param(CHAIN, marks=pytest.mark.full), "mujoco/rk4")
+# As real rotors have them: 5 and 2.5 degrees.
+REAL = replace(
+    LEANING, shaft_tilt=math.radians(5.0), duration=0.2, samples=11,
+    blades=tuple(replace(blade, cone=math.radians(2.5)) for blade in LEANING.blades),
+)  # fmt: skip
+
+
+@pytest.mark.parametrize("method", MODELS)
+def test_a_fault_in_the_motion_is_seen_by_the_defects_of_every_model(method: str) -> None:
+    skip_if_missing(method)
+    scene = replace(REAL, outputs=("angles", "rates"))
+    assert judge(scene, solve(method, scene, {}), None).status == "ok"
+    for fault, wrong in WRONG.items():
+        verdict = judge(scene, solve(method, wrong(scene), {}), None)
+        assert (verdict.status, verdict.message[:6]) == ("inaccurate", "defect"), fault
+
+
+@pytest.mark.parametrize("method", MODELS)
+def test_a_fault_in_tips_energies_or_loads_is_seen_in_every_model(method: str) -> None:
+    """Of a right motion: loads without the cone, without the hub's weight, at the apex; tips and energies of a fault."""
+    skip_if_missing(method)
+    scene = replace(REAL, outputs=("angles", "rates", "tip", "energy", "loads"))
+    run = solve(method, scene, {})
+    right = dict(run.trajectory.quantities)
+    verdict = judge(scene, run, None)
+    assert verdict.status == "ok", verdict.message
+    faults = WRONG | {
+        "cone left out": lambda scene: with_cones(scene, 0.0),
+        "hub without weight": lambda scene: replace(scene, hub_mass=0.0),
+        "roots at the apex": lambda scene: replace(scene, hub_radius=0.0),
+    }
+    for fault, wrong in faults.items():
+        other = wrong(scene)
+        states = [measure(other, *state) for state in zip(run.trajectory.angles, run.trajectory.rates, strict=True)]
+        planted = {
+            "loads": {name: np.array([state.loads[name] for state in states]) for name in (*FORCES, *MOMENTS)},
+            "tip": {"tip": np.array([state.tips for state in states])},
+            "energies": {"potential_energy": np.array([state.potential for state in states])},
+        }
+        for output, arrays in planted.items():
+            if output != "loads" and fault in ("hub without weight", "roots at the apex"):
+                continue
+            run.trajectory.quantities = right | arrays
+            assert judge(scene, run, None).status == "inaccurate", (fault, output)
+    run.trajectory.quantities = right
+    assert judge(scene, run, None).status == "ok"
