@@ -69,7 +69,7 @@ def _frames(scene: Scene, angles: Array, blade: int) -> Array:
         about_shaft = np.array([[c, zero, s], [zero, zero + 1.0, zero], [-s, zero, c]])
         about_pitch = np.array([[cp, -sp, zero], [sp, cp, zero], [zero, zero, zero + 1.0]])
         tilt, cone = _about_x(scene.shaft_tilt), _about_x(-scene.blades[blade].cone)
-        return np.einsum("ij,jkn,kl,lmn->nim", tilt, about_shaft, cone, about_pitch)
+        return np.asarray(np.einsum("ij,jkn,kl,lmn->nim", tilt, about_shaft, cone, about_pitch))
     x_axis, y_axis, z_axis = (c * cp, sp, -s * cp), (-c * sp, cp, s * sp), (s, zero, c)
     return np.stack([np.stack(axis, axis=1) for axis in (x_axis, y_axis, z_axis)], axis=2)
 
@@ -113,7 +113,7 @@ def exact_rotor_angle(scene: Scene, time: Array) -> tuple[str, Array] | None:
 
 
 def _inertia_at_zero_pitch(blade: Blade) -> float:
-    """Return a blade's inertia about the shaft, which is then its own y axis but for the cone of a fixed blade, kg m²."""
+    """Return a blade's inertia about the shaft, kg m²: about its own y axis, or that of a rod leant by its cone."""
     yy: float = blade.inertia_about_apex()[1]
     return yy * math.cos(blade.cone) ** 2 if blade.cone else yy
 

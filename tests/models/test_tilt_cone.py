@@ -417,7 +417,7 @@ def test_a_fault_in_the_motion_is_seen_by_the_defects_of_every_model(method: str
 
 @pytest.mark.parametrize("method", MODELS)
 def test_a_fault_in_tips_energies_or_loads_is_seen_in_every_model(method: str) -> None:
-    """Of a right motion: loads without the cone, without the hub's weight, at the apex; tips and energies of a fault."""
+    """Of a right motion: tips, energies and loads of another geometry, loads of no hub."""
     skip_if_missing(method)
     scene = replace(REAL, outputs=("angles", "rates", "tip", "energy", "loads"))
     run = solve(method, scene, {})
