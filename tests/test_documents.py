@@ -6,6 +6,8 @@ from __future__ import annotations
 import importlib
 import re
 import shlex
+import shutil
+import subprocess
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -122,6 +124,118 @@ def test_the_tour_prints_what_it_says(capsys: pytest.CaptureFixture[str]) -> Non
     printed = capsys.readouterr().out
     assert printed
     assert set(printed.split("\n")) <= {line.removeprefix("    ") for line in TEXTS["tour.md"].split("\n")}
+
+
+@pytest.mark.full
+@pytest.mark.parametrize("name", ["data.md", "sweeps.md"])
+def test_the_matlab_code_of_documents_runs_in_octave(
+    folder: Path, name: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Without drawing, which needs a display; at the end it prints one angle of the last block."""
+    octave = shutil.which("octave-cli")
+    if octave is None:
+        pytest.skip("needs Octave")
+    if subprocess.run([octave, "-q", "--eval", "pkg load netcdf"], capture_output=True, check=False).returncode:
+        pytest.skip("needs the package netcdf of Octave")
+    blocks = re.findall(r"```matlab\n(.*?)```", TEXTS[name], re.DOTALL)
+    lines = [line for block in blocks for line in block.splitlines() if not line.startswith("plot(")]
+    if name == "data.md":
+        path = folder / "octave" / "rotor-mbs-out" / "results.h5"
+        rm.run("paper/fig11", ["exudyn_tree/rk67", "lagrange/dop853"]).save(path)
+        assert main(["show", str(path)]) == 0
+        (methods,) = re.findall(r"  methods +(.*)", capsys.readouterr().out)
+        expected = rm.open(path)[methods.split(", ")[0]].angles[-1, 0]
+        lines.append("printf('%.17g', q(1, end, 2))")
+    else:
+        make_inputs(name)  # 12 runs
+        path = folder / "study.h5"
+        expected = rm.open(path)[7].angles[3, 2]
+        lines = [line.replace("18", "8") for line in lines]
+        lines.append("printf('%.17g', q(4, 3))")
+    script = path.parent / "code.m"
+    script.write_text("\n".join(lines))
+    where = path.parents[1] if name == "data.md" else path.parent
+    done = subprocess.run([octave, "-q", str(script)], cwd=where, capture_output=True, text=True, check=True)
+    assert float(done.stdout) == expected
+
+
+# What a document's path needs that the document itself does not make: by document, commands before it.
+BEFORE = {
+    "bench.md": ["run stiff/bearing-1e6 -m lagrange/dop853 -o results.h5"],
+    "check.md": [
+        "run paper/fig08 -m lagrange/dop853 -m exudyn_tree/rk67 -o results.h5",
+        "run paper/fig08 -m lagrange/dop853 -m exudyn_tree/rk67 -o main/results.h5",
+    ],
+    "compare.md": [
+        "export paper/fig11 --to csv -o mine.csv",
+        "export my.toml --to csv -o OpenFAST.out",
+    ],
+}
+# Commands that would take minutes, with what makes them short; others of the documents are run as they stand.
+SHORTER = {
+    "reproduce": "run paper/fig08 -m lagrange/dop853 -o rotor-mbs-out/results.h5",
+    "bench paper/fig09": "bench paper/fig09 -m lagrange/dop853 -o bench-results.h5 --budget 1 --repeats 1",
+    "bench paper -o bench.h5": "bench check/general -m lagrange/dop853 -o bench.h5 --budget 1 --repeats 1",
+    "bench my.toml": "bench my.toml -m lagrange/dop853 --budget 1 --repeats 1",
+    "check": "check results.h5",
+    "check --junit check.xml --json check.json --github -v": "check results.h5 --junit check.xml --json check.json -v",
+    "modes stiff/nrel-5mw --speeds 0:3:31": "modes stiff/nrel-5mw --speeds 0:3:3",
+    "modes my.toml --speeds 0.1:3:30 -o modes.h5": "modes my.toml --speeds 0.1:3:3 -o modes.h5",
+    "sweep sweeps/fig11-spread": "sweep sweeps/fig11-spread --dry-run",
+    "sweep sweeps/pitch-stability": "sweep sweeps/pitch-stability --dry-run",
+    "sweep sweeps/learning": "sweep sweeps/learning --dry-run",
+}
+# Other programs' files, servers, engines of other packages, and commands of hours.
+NOT_HERE = (
+    "dask:",
+    "SLURM",
+    "examples/engines",
+    "engines.h5",
+    "-m mine.py",
+    "campbell.csv",
+    "stability",
+    "--repeats 50",
+)
+
+
+def path_of(name: str) -> list[str | list[str]]:
+    """A document's commands, as lists, and its Python, as text, in the order in which a reader meets them."""
+    steps: list[str | list[str]] = []
+    for part in re.split(r"(```python\n.*?```)", TEXTS[name], flags=re.DOTALL):
+        if part.startswith("```python"):
+            steps.append(part.removeprefix("```python\n").removesuffix("```"))
+        else:
+            steps += commands(re.sub(r"```.*?```", "", part, flags=re.DOTALL))
+    return steps
+
+
+@pytest.mark.nightly
+@pytest.mark.parametrize("name", [name for name, text in TEXTS.items() if commands(text) and name != "architecture.md"])
+def test_the_path_of_a_document_can_be_walked(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Every command and every piece of Python, one after the other in one folder, as a reader would."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "my.toml").write_text(OWN_SCENE)
+    (tmp_path / "main").mkdir()
+    if name == "compare.md":
+        (tmp_path / "map.toml").write_text('rotor = "q0"\n')
+    if name == "sweeps.md":
+        make_inputs(name)
+        (tmp_path / "SWEEP.toml").write_text((tmp_path / "sweep.toml").read_text())
+        (tmp_path / "study.h5").unlink()
+    if name == "your-engine.md":
+        (tmp_path / "mine.py").write_text(python_of(name)[0])
+    for command in BEFORE.get(name, []):
+        assert main(shlex.split(command)) == 0, command
+    names: dict[str, Any] = {}
+    for step in path_of(name):
+        if isinstance(step, str):
+            if "torch" not in step:
+                exec(step, names)
+            continue
+        text = shlex.join(step)
+        if not any(word in text for word in NOT_HERE):
+            # 1: a check failed, a run is inaccurate, as some documents show; 2 is a command that is not understood.
+            assert main(shlex.split(SHORTER.get(text, text))) in (0, 1), text
 
 
 def test_every_public_name_key_command_and_method_is_on_a_reference_page(monkeypatch: pytest.MonkeyPatch) -> None:
