@@ -23,8 +23,15 @@ from rotor_mbs.methods.solve import solve
 from rotor_mbs.runs.hdf5 import reading
 from rotor_mbs.runs.read import OpenResults, StoredRun, StoredScene
 from rotor_mbs.scenario.accuracy_bounds import Bounds
-from rotor_mbs.solution.defects import DRIFT_ROWS, FLOOR_SAFETY
-from rotor_mbs.solution.metrics import HORIZON_GROWTH, Metrics, interval_metrics, running_growth, worst_interval
+from rotor_mbs.solution.defects import FLOOR_SAFETY
+from rotor_mbs.solution.metrics import (
+    HORIZON_GROWTH,
+    METRICS,
+    Metrics,
+    interval_metrics,
+    running_growth,
+    worst_interval,
+)
 from rotor_mbs.solution.status import COMPLETE
 from rotor_mbs.solution.trajectory import Solution, Trajectory
 
@@ -163,15 +170,8 @@ def _changed_metric(run: StoredRun, metrics: Metrics, solution: Solution) -> tup
     floor = _rounding(metrics)
     growth = min(float(running_growth(trajectory)[-1]), HORIZON_GROWTH)
     # What the last bits of the samples decide, which other hardware rounds otherwise.
-    allowances = {
-        "defect_max": floor,
-        "defect_judged": floor,
-        "defect_excess": floor,
-        "defect_median": floor,
-        "defect_mean": floor,
-        "defect_drift": floor * DRIFT_ROWS * growth,
-        "angle_error_predicted": floor * HORIZON_GROWTH,
-    }
+    allowances = {name: floor * value.rounding for name, value in METRICS.items() if value.rounding}
+    allowances["defect_drift"] *= growth
     # Proportional to the growth of an error over an interval; without an excess there is no interval to speak of.
     is_beyond = metrics.get("defect_excess", 0.0) > floor
     allowances["defect_allowed"] = _OWN_GROWTH * metrics.get("defect_allowed", 0.0) if is_beyond else math.inf

@@ -39,13 +39,14 @@ from rotor_mbs.runs.design import COLUMNS, MISSING
 from rotor_mbs.runs.hdf5 import reading
 from rotor_mbs.runs.progress import progress_of_call
 from rotor_mbs.runs.read import StoredRun, StoredScene, is_sweep, open_results, run_names
-from rotor_mbs.runs.sweeps import ERROR_GROWTH, METRICS, StoredSweep, parameter_name
+from rotor_mbs.runs.sweeps import StoredSweep, parameter_name
 from rotor_mbs.runs.table import copy_file, text_of
 from rotor_mbs.scenario.catalogue import list_scenes, only_scene, scene_of
 from rotor_mbs.scenario.keys import counted
 from rotor_mbs.scenario.scene import Scene, load_scene
 from rotor_mbs.scenario.toml_file import file_path, plain_value
 from rotor_mbs.solution.defects import Defects
+from rotor_mbs.solution.metrics import METRICS
 from rotor_mbs.solution.quantities import known_quantities
 from rotor_mbs.solution.status import STATUSES
 from rotor_mbs.solution.trajectory import Integration, Solution, Trajectory
@@ -56,11 +57,6 @@ if TYPE_CHECKING:
 
 _NO_LIMIT_S = 1e9
 _SHOWN = 5  # lines of lost runs
-# Of a run on a screen; the others are in `Run.metrics`.
-_MAIN_METRICS = (
-    "energy_drift_max", "energy_gain_J", "horizon_s", "rotor_angle_min", "rotor_angle_max", "rotor_rate_max",
-    "pitch_max",
-)  # fmt: skip
 
 
 def scenes(folder: str = "") -> list[str]:
@@ -258,7 +254,7 @@ class Run(Solution):
 
     def __repr__(self) -> str:
         known = self._metrics_shown()
-        main = [f"{name} {known[name]}" for name in _MAIN_METRICS if name in known]
+        main = [f"{name} {known[name]}" for name, value in METRICS.items() if value.is_main and name in known]
         if not main:
             return super().__repr__()
         if len(known) > len(main):
@@ -574,7 +570,7 @@ class Runs(Mapping[Any, Any]):
         row = number - int(sweep.column("run")[0])
         values = {key: float(sweep.column(parameter_name(key))[row]) for key in sweep.keys}
         scene = sweep.base_scene.replace(**values, samples=len(sweep.column("time")))
-        facts = {name: sweep.column(name)[row] for name in METRICS | ERROR_GROWTH if name in sweep.columns}
+        facts = {name: sweep.column(name)[row] for name in COLUMNS if name in sweep.columns}
         arrays: dict[str, Any] = {}
         for quantity in known_quantities(scene.outputs):
             if quantity.name in sweep.columns and quantity.name not in facts:

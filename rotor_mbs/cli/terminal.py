@@ -64,7 +64,7 @@ def print_summary(report: RunReport, output: Path, refused: Sequence[Refusal] = 
     print(f"{output}: {text}")
     for line in report.stored_failures:
         print(f"stored: {line}", file=sys.stderr)
-    methods = [run.method for run in made] + [run.method for run, _, _ in report.kept]
+    methods = [run.method for run in made] + [run.method for run in report.kept]
     if not_run and all(method == REFERENCE for method in methods):
         return EXIT_BAD_INPUT
     return EXIT_FAILED if report.failures or is_incomplete or report.stored_failures else EXIT_OK

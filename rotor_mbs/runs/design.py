@@ -13,6 +13,7 @@ from rotor_mbs.methods.catalogue import REFERENCE, find_method
 from rotor_mbs.runs.hdf5 import CHARACTERS, Column
 from rotor_mbs.runs.versions import row_versions
 from rotor_mbs.scenario.scene import Scene, scene_hash
+from rotor_mbs.solution.metrics import METRICS, RowValue
 from rotor_mbs.solution.quantities import LOADS, quantities
 from rotor_mbs.solution.status import STATUSES
 
@@ -32,93 +33,67 @@ def flags(names: Sequence[str], first: int = 0) -> dict[str, Any]:
     return {"flag_values": np.arange(first, first + len(names), dtype=np.int8), "flag_meanings": " ".join(names)}
 
 
-_OWN_POINTS = "of printed/ode45 over ode45's own output points instead"
-# What a computed column with a value a row is, whichever table has it: units, long name, type where it is no double.
-COLUMNS = {
-    name: Column(("run", CHARACTERS) if CHARACTER in kind else ("run",), units, long_name, kind[0] if kind else "<f8")
-    for name, (units, long_name, *kind) in {
-        "status": ("1", "outcome of the run, see the status codes; -1: not computed yet", "i1"),
-        "message": ("1", "reason for a status other than ok and completed", CHARACTER),
-        "samples": ("1", "number of samples stored", "<i8"),
-        "time_reached": ("s", "time of the run's last sample; 0 also without any"),
-        "time_limit_s": ("s", "time limit that stopped the run; NaN if it was not stopped"),
-        "steps": ("1", "number of integration steps; -1: unknown", "<i8"),
-        "rhs_evaluations": ("1", "number of evaluations of the right-hand side; -1: unknown", "<i8"),
-        "setup_time_s": ("s", "time to build the model"),
-        "setup_again_time_s": ("s", "time to build the model a second time"),
-        "run_time_s": ("s", "median run time of the integration"),
-        "run_time_min_s": ("s", "shortest run time of the integration"),
-        "run_time_q1_s": ("s", "lower quartile of the run times"),
-        "run_time_q3_s": ("s", "upper quartile of the run times"),
-        "output_time_s": ("s", "time to compute the samples after the integration"),
-        "repeats": ("1", "number of timed runs", "<i8"),
-        "repeatable": ("1", "1 if the first and last run of every point of the curve are bitwise equal", "i1"),
-        "engine_success": ("1", "1: the engine reported success, 0: failure; -1: no report", "i1"),
-        "engine_message": ("1", "message of the engine", CHARACTER),
-        "false_success": ("1", "1 if the engine reported success although the samples are wrong", "i1"),
-        "energy_scale_J": ("J", "energy scale, to which energy errors are relative"),
-        "energy_drift_max": ("1", "largest energy error over the run, relative to the energy scale"),
-        "energy_gain_J": ("J", "largest increase of the total energy beyond the work"),
-        "angle_error_max": ("rad", "largest angle error up to the horizon"),
-        "angle_error_predicted": ("rad", "largest angle error up to the horizon, predicted from the defects"),
-        "defect_max": (
-            "rad",
-            "largest defect of a coordinate in an interval",
-        ),
-        "defect_median": ("rad", "median of the interval defects"),
-        "defect_time": ("s", "end of the interval that is furthest beyond its bound, or of the largest defect"),
-        "defect_judged": (
-            "rad",
-            "value compared with the bound: defect beyond rounding divided by (interval / 0.01 s), if above 1, and by "
-            "the error growth over the interval, if above 1; largest over the run",
-        ),
-        "defect_excess": ("rad", "defect beyond rounding in that interval"),
-        "defect_allowed": ("rad", "largest defect beyond rounding that is allowed in that interval"),
-        "defect_mean": ("rad", "largest signed mean of the defects of a coordinate"),
-        "defect_drift": (
-            "rad",
-            "largest sum of the defects of 100 consecutive intervals, each multiplied by the state transition matrix "
-            "from its interval to the last of the 100",
-        ),
-        "defect_floor": ("rad", "largest defect that rounding of the samples can cause"),
-        "defects_not_judged": (
-            "1",
-            "number of intervals with a defect of more than 0.01 rad, beyond rounding or because of it",
-        ),
-        "angle_error_whole": ("rad", "largest angle error over the whole run"),
-        "angle_error_end": ("rad", "angle error at the last sample of the scene"),
-        "tip_error_max": ("m", "largest distance of a tip from the reference up to the horizon"),
-        "error_growth": ("1", "largest factor by which a small error of the initial state has grown"),
-        "horizon_s": (
-            "s",
-            "time of the last sample before the error growth reaches 1e5",
-        ),
-        "uncertainty_rad": ("rad", "uncertainty of the reference up to the horizon"),
-        "zero_pitch_max": ("rad", "largest magnitude of the pitch angles that stay zero in the reference"),
-        "zero_pitch_left_s": ("s", "time at which a pitch angle that stays zero in the reference becomes nonzero"),
-        "zero_pitch_growth_per_s": ("1/s", "growth rate of a pitch angle that stays zero in the reference"),
-        "rotor_angle_min": ("rad", f"smallest rotor angle (signed) over the samples; {_OWN_POINTS}"),
-        "rotor_angle_max": ("rad", f"largest rotor angle (signed) over the samples; {_OWN_POINTS}"),
-        "rotor_rate_max": ("rad/s", f"largest magnitude of the rotor rate over the samples; {_OWN_POINTS}"),
-        "pitch_max": ("rad", "largest magnitude of a pitch angle"),
-        "left_out": ("1", "1 if the point was omitted because of the time budget", "i1"),
-        "load_before": ("1", "load average of the machine before the timing"),
-        "pinned_core": ("1", "number of the core used for timing; -1: any", "<i8"),
-        "order": ("1", "order of convergence of the curve, fitted above its round-off floor"),
-        "step_for_target_s": ("s", "largest step of the ladder with an error of at most 1e-6 rad"),
-        "code": (
-            "1",
-            "CRC-32 of the versions (package, code, libraries of the method) that computed the run",
-            "<u4",
-        ),
-        "crc32": (
-            "1",
-            "CRC-32 of the row over what is computed; not of what is known before",
-            "<u4",
-        ),
-    }.items()
+# What a row has beside metrics, whichever table it is in; in the order of the columns.
+_FACTS = {
+    "status": RowValue(
+        "1", "outcome of the run, see the status codes; -1: not computed yet", "runs bench stability sweep", "i1"
+    ),
+    "message": RowValue(
+        "1", "reason for a status other than ok and completed", "runs bench stability sweep", CHARACTER
+    ),
+    "samples": RowValue("1", "number of samples stored", "runs bench", "<i8"),
+    "time_reached": RowValue("s", "time of the run's last sample; 0 also without any", "runs sweep"),
+    "time_limit_s": RowValue("s", "time limit that stopped the run; NaN if it was not stopped", "runs sweep"),
+    "steps": RowValue("1", "number of integration steps; -1: unknown", "runs bench sweep", "<i8"),
+    "rhs_evaluations": RowValue("1", "number of evaluations of the right-hand side; -1: unknown", "runs sweep", "<i8"),
+    "setup_time_s": RowValue("s", "time to build the model", "runs bench"),
+    "setup_again_time_s": RowValue("s", "time to build the model a second time", "bench"),
+    "run_time_s": RowValue("s", "median run time of the integration", "runs bench"),
+    "run_time_min_s": RowValue("s", "shortest run time of the integration", "runs bench"),
+    "run_time_q1_s": RowValue("s", "lower quartile of the run times", "bench"),
+    "run_time_q3_s": RowValue("s", "upper quartile of the run times", "bench"),
+    "output_time_s": RowValue("s", "time to compute the samples after the integration", "runs bench"),
+    "repeats": RowValue("1", "number of timed runs", "runs bench", "<i8"),
+    "repeatable": RowValue(
+        "1", "1 if the first and last run of every point of the curve are bitwise equal", "bench", "i1"
+    ),
+    "engine_success": RowValue("1", "1: the engine reported success, 0: failure; -1: no report", kind="i1"),
+    "engine_message": RowValue("1", "message of the engine", kind=CHARACTER),
+    "false_success": RowValue(
+        "1", "1 if the engine reported success although the samples are wrong", "runs bench stability", "i1"
+    ),
+    "left_out": RowValue("1", "1 if the point was omitted because of the time budget", "bench", "i1"),
+    "load_before": RowValue("1", "load average of the machine before the timing", "bench"),
+    "pinned_core": RowValue("1", "number of the core used for timing; -1: any", "bench", "<i8"),
+    "order": RowValue("1", "order of convergence of the curve, fitted above its round-off floor", "bench"),
+    "step_for_target_s": RowValue("s", "largest step of the ladder with an error of at most 1e-6 rad", "stability"),
 }
+_LAST = {
+    "code": RowValue(
+        "1", "CRC-32 of the versions (package, code, libraries of the method) that computed the run", "sweep", "<u4"
+    ),
+    "crc32": RowValue(
+        "1", "CRC-32 of the row over what is computed; not of what is known before", "bench stability sweep", "<u4"
+    ),
+}
+_ROW_VALUES = _FACTS | METRICS | _LAST
+
+
+def _column(value: RowValue) -> Column:
+    dimensions = ("run", CHARACTERS) if value.kind == CHARACTER else ("run",)
+    return Column(dimensions, value.units, value.long_name, value.kind)
+
+
+# Every computed column with a value a row.
+COLUMNS = {name: _column(value) for name, value in _ROW_VALUES.items()}
 COLUMNS["status"] = COLUMNS["status"]._replace(attributes=flags(("missing", *STATUSES), MISSING))
+
+
+def columns_in(table: str) -> dict[str, Column]:
+    """Return the computed columns of a table with a value a row, by its name, see `RowValue`."""
+    return {name: COLUMNS[name] for name, value in _ROW_VALUES.items() if table in value.tables.split()}
+
+
 # What the design says of each row of a table, in this order: units, long name. What has no entry is no column.
 KNOWN = {
     "scene": ("1", "name of the scene"),
@@ -135,27 +110,8 @@ KNOWN = {
 }
 NUMBERS = ("step", "tolerance", "order_expected")  # those of them that are no texts
 
-_RUN_COLUMNS = (
-    "status", "message", "samples", "time_reached", "time_limit_s", "steps", "rhs_evaluations", "setup_time_s",
-    "run_time_s", "run_time_min_s", "output_time_s", "repeats", "engine_success", "engine_message", "false_success",
-    "energy_scale_J", "energy_drift_max", "energy_gain_J", "angle_error_max", "angle_error_predicted",
-    "angle_error_whole", "angle_error_end", "horizon_s", "defect_max", "defect_median", "defect_time",
-    "defect_judged", "defect_excess", "defect_allowed", "defect_mean", "defect_drift", "defect_floor",
-    "defects_not_judged",
-    "zero_pitch_max", "zero_pitch_left_s", "zero_pitch_growth_per_s", "rotor_angle_min", "rotor_angle_max",
-    "rotor_rate_max",
-)  # fmt: skip
 # The computed columns of each table of points.
-POINT_COLUMNS: Mapping[str, Mapping[str, Column]] = {
-    table: {name: COLUMNS[name] for name in names.split()}
-    for table, names in {
-        "bench": "status message angle_error_max angle_error_end tip_error_max energy_drift_max defect_max "
-        "defect_median zero_pitch_max run_time_s run_time_min_s run_time_q1_s run_time_q3_s setup_time_s "
-        "setup_again_time_s output_time_s repeats steps "
-        "false_success left_out horizon_s uncertainty_rad samples load_before pinned_core repeatable order crc32",
-        "stability": "status message angle_error_max energy_drift_max false_success step_for_target_s crc32",
-    }.items()
-}
+POINT_COLUMNS: Mapping[str, Mapping[str, Column]] = {table: columns_in(table) for table in ("bench", "stability")}
 
 
 @dataclass(frozen=True)
@@ -200,7 +156,7 @@ class Asked:
 
 def metric_columns(outputs: Iterable[str]) -> dict[str, Column]:
     """Return the computed columns of /runs for scenes that ask for these outputs."""
-    columns = {name: COLUMNS[name] for name in _RUN_COLUMNS}
+    columns = columns_in(RUNS)
     for quantity in quantities(outputs):
         name, long_name = quantity.name, quantity.long_name
         if quantity.judgement is not None:

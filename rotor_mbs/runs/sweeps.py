@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 
 from rotor_mbs.errors import InputError, StoreError, shown_value
 from rotor_mbs.methods.catalogue import find_method
-from rotor_mbs.runs.design import COLUMNS, MISSING, flags
+from rotor_mbs.runs.design import MISSING, columns_in, flags
 from rotor_mbs.runs.hdf5 import Column, reading
 from rotor_mbs.runs.output_files import locked
 from rotor_mbs.runs.table import (
@@ -44,19 +44,10 @@ from rotor_mbs.solution.status import code_of
 
 MESSAGE_LENGTH = 256  # bytes; the longest message seen has 242, of a singularity that ode45 does not pass
 
-METRICS = {
-    name: COLUMNS[name]
-    for name in (
-        "status", "steps", "rhs_evaluations", "time_reached", "energy_drift_max", "defect_max", "defect_median",
-        "defect_time", "angle_error_predicted", "rotor_angle_max", "rotor_rate_max", "pitch_max", "time_limit_s",
-        "message", "code", "crc32",
-    )
-} | {
+COLUMNS_OF_A_RUN = columns_in("sweep") | {
     "rotor_angle_max": Column(("run",), "rad", "largest magnitude of the rotor angle over the samples"),
     "rotor_rate_max": Column(("run",), "rad/s", "largest magnitude of the rotor rate over the samples"),
-}  # fmt: skip
-# Asked for by `error_growth = true`: the variational equations cost a hundred times the run itself.
-ERROR_GROWTH = {name: COLUMNS[name] for name in ("error_growth", "horizon_s")}
+}
 
 
 def parameter_name(key: str) -> str:
@@ -94,7 +85,9 @@ def sweep_table(sweep: Sweep, methods: Sequence[str], numbers: range) -> Table:
         quantity.name: Column(("run", *quantity.dimensions), quantity.units, quantity.long_name, kind)
         for quantity in asked
     }
-    computed = METRICS | (ERROR_GROWTH if options.error_growth else {}) | trajectories
+    computed = COLUMNS_OF_A_RUN | trajectories
+    if options.error_growth:  # the variational equations cost a hundred times the run itself
+        computed = COLUMNS_OF_A_RUN | columns_in("sweep_growth") | trajectories
     known = scene_scales(sweep.base, trajectories.values()) | known
     return Table("", runs, known, computed, characters=MESSAGE_LENGTH)
 
@@ -173,9 +166,8 @@ class StoredSweep:
                 raise StoreError(f"{place}: its attribute {name} is no list of texts; damaged")
         self.shape = parsed(self.attributes.get("shape"), list, place)  # of a grid, slowest first
         self.settings = parsed(self.attributes.get("settings"), dict, place)
-        missing = {*METRICS} - {*table.computed} | {*map(parameter_name, self.attributes["parameter_keys"])} - {
-            *table.known
-        }
+        parameters = map(parameter_name, self.attributes["parameter_keys"])
+        missing = {*COLUMNS_OF_A_RUN} - {*table.computed} | {*parameters} - {*table.known}
         if missing or "time" not in table.known or "method_code" not in table.known:
             raise StoreError(f"{place}: has no {', '.join(sorted(missing)) or 'time or method_code'}; damaged")
         runs, codes = table.column("run"), table.column("method_code")

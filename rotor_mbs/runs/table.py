@@ -659,40 +659,6 @@ class TableFile:
         own = [(name, place.row_type[name]) for name in place.row_type.names or ()]
         return replace(place, offsets={**place.offsets, **offsets}, row_type=np.dtype([*own, *kinds]))
 
-    def split_missing(
-        self, asked: Sequence[Asked], time_limit_s: float
-    ) -> tuple[list[tuple[Asked, Place, Place | None]], list[tuple[Asked, str, str]]]:
-        """Split `asked`, of each scene the reference first, into runs to compute and runs that stay as they are stored.
-
-        To be computed are those that the file lacks, that a shorter time limit ended, or whose reference is one of
-        these; their rows are marked as missing. They are returned with their place and that of the reference they are
-        judged by; those that stay, with status and message.
-        """
-        missing: list[tuple[Asked, Place, Place | None]] = []
-        references: dict[str, Place] = {}  # by label
-        new_references = set[str]()
-        kept: list[tuple[Asked, str, str]] = []
-        for run in asked:
-            place, reference = self.place(run.label), references.get(run.reference_label)
-            row = place.read()
-            status = STATUSES[row["status"][0]] if place.is_stored else ""
-            # A shipped reference may end early itself; it has a limit only where reading it was over one.
-            limit = row["time_limit_s"][0]
-            is_short = limit < time_limit_s if run.is_shipped else not limit >= time_limit_s
-            is_over = status == "timed_out" and is_short
-            is_missing = not status or is_over or run.reference_label in new_references
-            if run.method == REFERENCE:
-                references[run.label] = place
-                if is_missing:
-                    new_references.add(run.label)
-            if is_missing:
-                missing.append((run, place, reference))
-                if (row["status"][0], row[REPEATED["status"]][0]) != (MISSING, MISSING):
-                    place.mark_missing([0])
-            else:
-                kept.append((run, status, text_of(row["message"][0])))
-        return missing, kept
-
 
 _opened: dict[tuple[Path, Path, tuple[int, ...]], TableFile] = {}
 _opening = threading.Lock()  # held while `_opened` is used

@@ -1,20 +1,110 @@
-"""How far a run is from a reference, and from its own energy: one set of metrics for runs, reports and checks."""
+"""How far a run is from a reference, and from its own energy: one set of metrics for runs, reports and checks.
+
+`METRICS` declares each of them once: its unit, and which tables of a file have it.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.scenario.time_table import value_at
-from rotor_mbs.solution.defects import LEFT_ZERO, Defects
+from rotor_mbs.solution.defects import DRIFT_ROWS, LEFT_ZERO, Defects
 from rotor_mbs.solution.quantities import Array, array_of, deviation, energy_error, known_quantities, sizes
 from rotor_mbs.solution.trajectory import Trajectory
 
 HORIZON_GROWTH = 1e5  # a scene's horizon: when an error of the initial state may have grown this many times
 
 Metrics = dict[str, float]
+
+
+@dataclass(frozen=True)
+class RowValue:
+    """A number or text in the row of a run, or of a point, in a file.
+
+    Attributes
+    ----------
+    units, long_name : what it is.
+    tables : names of the tables that have it, separated by blanks: "runs", "bench", "stability",
+        "sweep", and "sweep_growth" for sweeps that ask for the error growth.
+    kind : its type in the file; "S1" for a text.
+    rounding : by how many times the `defect_floor` of a run it may differ on other hardware.
+    is_main : whether it is shown first of all.
+    """
+
+    units: str
+    long_name: str
+    tables: str = "runs"
+    kind: str = "<f8"
+    rounding: float = 0.0
+    is_main: bool = False
+
+
+_OWN_POINTS = "of printed/ode45 over ode45's own output points instead"
+_ALL, _BENCH = "runs bench stability", "runs bench"
+# Each metric, in the order of the columns. Those of quantities are declared with them, see `Quantity`.
+METRICS = {
+    "energy_scale_J": RowValue("J", "energy scale, to which energy errors are relative"),
+    "energy_drift_max": RowValue(
+        "1", "largest energy error over the run, relative to the energy scale", f"{_ALL} sweep", is_main=True
+    ),
+    "energy_gain_J": RowValue("J", "largest increase of the total energy beyond the work", is_main=True),
+    "angle_error_max": RowValue("rad", "largest angle error up to the horizon", _ALL),
+    "angle_error_predicted": RowValue(
+        "rad",
+        "largest angle error up to the horizon, predicted from the defects",
+        "runs sweep",
+        rounding=HORIZON_GROWTH,
+    ),
+    "angle_error_whole": RowValue("rad", "largest angle error over the whole run"),
+    "angle_error_end": RowValue("rad", "angle error at the last sample of the scene", _BENCH),
+    "tip_error_max": RowValue("m", "largest distance of a tip from the reference up to the horizon", "bench"),
+    "error_growth": RowValue(
+        "1", "largest factor by which a small error of the initial state has grown", "sweep_growth"
+    ),
+    "horizon_s": RowValue(
+        "s", "time of the last sample before the error growth reaches 1e5", f"{_BENCH} sweep_growth", is_main=True
+    ),
+    "uncertainty_rad": RowValue("rad", "uncertainty of the reference up to the horizon", "bench"),
+    "defect_max": RowValue("rad", "largest defect of a coordinate in an interval", f"{_BENCH} sweep", rounding=1.0),
+    "defect_median": RowValue("rad", "median of the interval defects", f"{_BENCH} sweep", rounding=1.0),
+    "defect_time": RowValue(
+        "s", "end of the interval that is furthest beyond its bound, or of the largest defect", "runs sweep"
+    ),
+    "defect_judged": RowValue(
+        "rad",
+        "value compared with the bound: defect beyond rounding divided by (interval / 0.01 s), if above 1, and by "
+        "the error growth over the interval, if above 1; largest over the run",
+        rounding=1.0,
+    ),
+    "defect_excess": RowValue("rad", "defect beyond rounding in that interval", rounding=1.0),
+    "defect_allowed": RowValue("rad", "largest defect beyond rounding that is allowed in that interval"),
+    "defect_mean": RowValue("rad", "largest signed mean of the defects of a coordinate", rounding=1.0),
+    "defect_drift": RowValue(
+        "rad",
+        "largest sum of the defects of 100 consecutive intervals, each multiplied by the state transition matrix "
+        "from its interval to the last of the 100",
+        rounding=DRIFT_ROWS,
+    ),
+    "defect_floor": RowValue("rad", "largest defect that rounding of the samples can cause"),
+    "defects_not_judged": RowValue(
+        "1", "number of intervals with a defect of more than 0.01 rad, beyond rounding or because of it"
+    ),
+    "zero_pitch_max": RowValue("rad", "largest magnitude of the pitch angles that stay zero in the reference", _BENCH),
+    "zero_pitch_left_s": RowValue("s", "time at which a pitch angle that stays zero in the reference becomes nonzero"),
+    "zero_pitch_growth_per_s": RowValue("1/s", "growth rate of a pitch angle that stays zero in the reference"),
+    "rotor_angle_min": RowValue("rad", f"smallest rotor angle (signed) over the samples; {_OWN_POINTS}", is_main=True),
+    "rotor_angle_max": RowValue(
+        "rad", f"largest rotor angle (signed) over the samples; {_OWN_POINTS}", "runs sweep", is_main=True
+    ),
+    "rotor_rate_max": RowValue(
+        "rad/s", f"largest magnitude of the rotor rate over the samples; {_OWN_POINTS}", "runs sweep", is_main=True
+    ),
+    "pitch_max": RowValue("rad", "largest magnitude of a pitch angle", "sweep", is_main=True),
+}
 
 # rad: beyond it a double's last digit is above 1e-10 rad, and neither its sine nor an error of 1e-9 rad means anything.
 ANGLE_LIMIT = 1e6

@@ -17,13 +17,13 @@ from rotor_mbs.methods.catalogue import REFERENCE, Refusal, default_methods, err
 from rotor_mbs.processes.pool import Workers, pool_of
 from rotor_mbs.runs.output_files import locked
 from rotor_mbs.runs.read import open_results
-from rotor_mbs.runs.runner import OnProgress, Task, compute_tasks, ignore_progress
+from rotor_mbs.runs.runner import OnProgress, compute_tasks, ignore_progress
 from rotor_mbs.runs.table import extend_file, results_tables
 from rotor_mbs.runs.versions import versions
 from rotor_mbs.scenario.catalogue import REFERENCES, SCENARIOS, find_scenes
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.studies.bench import Curve, curve_of, curve_tables, curve_tasks
-from rotor_mbs.studies.run import RunReport, asked_runs, run_tasks
+from rotor_mbs.studies.run import RunReport, asked_runs, missing_runs
 
 # The scene whose error and run time are measured by all methods: the paper's own crest, and a horizon of 6 s.
 BENCHED = "paper/fig11"
@@ -64,13 +64,12 @@ def reproduce(
     asked = asked_runs(scenes, methods, {})
     with locked(output), pool_of(workers) as pool:
         file = extend_file(output, [*results_tables(asked), *curve_tables(curves)], [curve.key for curve in curves])
-        missing, kept = file.split_missing(asked, timeout_s)
-        runs: list[Task] = [*run_tasks(missing, timeout_s)]
-        is_new = f"{benched.name}/{REFERENCE}" in [run.label for run, _, _ in missing]
+        runs, kept = missing_runs(file, asked, timeout_s)
+        labels = {task.label for task in runs}
+        is_new = f"{benched.name} {REFERENCE}" in labels
         unmeasured = [curve for curve in curves if is_new or not curve.is_stored(file)]
         of_curves = curve_tasks(file, unmeasured, 1.2 * timeout_s + 10.0, _LONGEST_S)
         made = compute_tasks([*runs, *of_curves], pool, on_progress)
-        labels = {task.label for task in runs}
         return RunReport([outcome for outcome in made if outcome.label in labels], kept), refused
 
 

@@ -25,10 +25,10 @@ from rotor_mbs.methods.catalogue import (
 from rotor_mbs.methods.solve import solve
 from rotor_mbs.methods.time_limit import OutOfTimeError, caller_signals, time_limit
 from rotor_mbs.processes.pool import Workers, pool_of
-from rotor_mbs.runs.design import Asked
+from rotor_mbs.runs.design import MISSING, REPEATED, Asked
 from rotor_mbs.runs.output_files import locked
 from rotor_mbs.runs.runner import OnProgress, Outcome, Task, compute_tasks, ignore_progress
-from rotor_mbs.runs.table import Place, Rows, extend_file, results_tables, row_of_run, text_of
+from rotor_mbs.runs.table import Place, Rows, TableFile, extend_file, results_tables, row_of_run, text_of
 from rotor_mbs.scenario.scene import Scene, scene_hash
 from rotor_mbs.solution.status import STATUSES
 from rotor_mbs.solution.trajectory import Integration, Solution, Trajectory
@@ -88,10 +88,10 @@ def work_of(scene: Scene, method: str) -> float:
 
 @dataclass(frozen=True)
 class RunReport:
-    """What became of a list of runs: of those that this call computed, and of those that were stored already."""
+    """The outcomes of a list of runs: of those that this call computed, and of those that were stored already."""
 
     made: list[Outcome]
-    kept: list[tuple[Asked, str, str]]  # with status and message
+    kept: list[Outcome]
 
     @property
     def failures(self) -> list[Outcome]:
@@ -102,9 +102,9 @@ class RunReport:
     def stored_failures(self) -> list[str]:
         """A line for each run that was stored already, should have succeeded and did not."""
         return [
-            f"{run.scene.name} {run.method} {status}: {message}"
-            for run, status, message in self.kept
-            if status != "ok" and is_corrected(run.method)
+            f"{run.label} {run.status}: {run.message}"
+            for run in self.kept
+            if run.status != "ok" and is_corrected(run.method)
         ]
 
     @property
@@ -143,8 +143,8 @@ def run_scenes(
     asked = asked_runs(scenes, methods, settings or {}, use_frozen=use_frozen)
     with locked(output), pool_of(workers) as pool:
         file = extend_file(output, results_tables(asked))
-        missing, kept = file.split_missing(asked, timeout_s)
-        return RunReport(compute_tasks(run_tasks(missing, timeout_s), pool, on_progress), kept)
+        tasks, kept = missing_runs(file, asked, timeout_s)
+        return RunReport(compute_tasks(tasks, pool, on_progress), kept)
 
 
 def asked_runs(
@@ -165,23 +165,60 @@ def asked_runs(
     return asked
 
 
-def run_tasks(missing: Sequence[tuple[Asked, Place, Place | None]], timeout_s: float) -> list[RunTask]:
-    """Return the tasks of runs, each given with its place and that of its reference."""
-    return [
-        RunTask(
-            label=f"{run.scene.name} {run.method}",
-            method=run.method,
-            place=place,
-            reference=reference,
-            # What ends itself at its time limit needs a while before, to load its engine and compile, and to write
-            # after.
-            kill_after_s=1.2 * timeout_s + 10.0,
-            work=work_of(run.scene, run.method),
-            asked=run,
-            time_limit_s=timeout_s,
+def missing_runs(file: TableFile, asked: Sequence[Asked], timeout_s: float) -> tuple[list[RunTask], list[Outcome]]:
+    """Decide which runs are computed, and mark their rows in the file as missing.
+
+    Parameters
+    ----------
+    file : has a row for each run.
+    asked : the runs, of each scene the reference first.
+    timeout_s : time limit of a run (s).
+
+    Returns
+    -------
+    tasks : of the runs that are not stored, that a shorter time limit ended, or whose reference is
+        computed.
+    stored : outcomes of the others, which stay as they are.
+    """
+    tasks: list[RunTask] = []
+    stored: list[Outcome] = []
+    references: dict[str, Place] = {}  # by label
+    new_references = set[str]()
+    for run in asked:
+        place = file.place(run.label)
+        row = place.read()
+        status = STATUSES[row["status"][0]] if place.is_stored else ""
+        # A shipped reference may end early itself; it has a limit only where reading it was over one.
+        limit = row["time_limit_s"][0]
+        is_short = limit < timeout_s if run.is_shipped else not limit >= timeout_s
+        is_over = status == "timed_out" and is_short
+        is_missing = not status or is_over or run.reference_label in new_references
+        reference = references.get(run.reference_label)
+        if run.method == REFERENCE:
+            references[run.label] = place
+            if is_missing:
+                new_references.add(run.label)
+        if not is_missing:
+            message = text_of(row["message"][0])
+            stored.append(Outcome(f"{run.scene.name} {run.method}", run.method, status, message))
+            continue
+        if (row["status"][0], row[REPEATED["status"]][0]) != (MISSING, MISSING):
+            place.mark_missing([0])
+        tasks.append(
+            RunTask(
+                label=f"{run.scene.name} {run.method}",
+                method=run.method,
+                place=place,
+                reference=reference,
+                # What ends itself at its time limit needs a while before, to load its engine and
+                # compile, and to write after.
+                kill_after_s=1.2 * timeout_s + 10.0,
+                work=work_of(run.scene, run.method),
+                asked=run,
+                time_limit_s=timeout_s,
+            )
         )
-        for run, place, reference in missing
-    ]
+    return tasks, stored
 
 
 @caller_signals()

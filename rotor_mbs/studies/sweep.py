@@ -27,9 +27,9 @@ from rotor_mbs.methods.solve import solve
 from rotor_mbs.methods.time_limit import OutOfTimeError, caller_signals, time_limit
 from rotor_mbs.models.lagrange.reference import error_growth
 from rotor_mbs.processes.pool import TaskPool
-from rotor_mbs.runs.design import MISSING
+from rotor_mbs.runs.design import COLUMNS, MISSING
 from rotor_mbs.runs.runner import Task, compute
-from rotor_mbs.runs.sweeps import ERROR_GROWTH, METRICS, code_of_method, open_sweep, sweep_table
+from rotor_mbs.runs.sweeps import code_of_method, open_sweep, sweep_table
 from rotor_mbs.runs.table import IDENTITY, KEYWORDS, Place, Rows, Table, blank_rows, row_of_run
 from rotor_mbs.runs.versions import machine, versions
 from rotor_mbs.scenario.scene import Scene, scene_hash
@@ -153,7 +153,7 @@ def _side_by_side(chunk: Chunk, scenes: Sequence[Scene]) -> Rows:
         of_runs.append({"energy_drift_max": float(drifts[i]), **of_defects})
     ok = clearly_ok(scenes, method.name, block.integrations, block.samples, of_runs, angles, method.bounds)
     row = chunk.place.row_type
-    metrics = np.dtype([(name, row[name]) for name in row.names or () if name in METRICS | ERROR_GROWTH])
+    metrics = np.dtype([(name, row[name]) for name in row.names or () if name in COLUMNS])
     rows = blank_rows(len(scenes), metrics)
     for name in row.names or ():
         if name not in rows:

@@ -12,8 +12,9 @@ import rotor_mbs as rm
 from rotor_mbs.analysis.judgement import judge
 from rotor_mbs.errors import InputError
 from rotor_mbs.methods.solve import solve
+from rotor_mbs.runs.design import columns_in, metric_columns
 from rotor_mbs.scenario.catalogue import find_scenes
-from rotor_mbs.solution.metrics import metrics_of
+from rotor_mbs.solution.metrics import METRICS, metrics_of
 from rotor_mbs.solution.quantities import LOADS
 from rotor_mbs.solution.trajectory import Array, Solution, Trajectory
 
@@ -27,6 +28,23 @@ def motion(rotor: Array, pitch: Array) -> Trajectory:
     rates = np.zeros_like(angles)
     rates[:, 0] = -2.0 * rotor
     return Trajectory(TIME, angles, rates)
+
+
+def test_a_metric_is_declared_where_it_is_computed_and_nowhere_else() -> None:
+    """Every number of a judged run is declared, for /runs or with its quantity."""
+    scene = paper("fig08", duration=0.2, samples=21)
+    reference = solve("lagrange/taylor", scene, {})
+    metrics = judge(scene, solve("lagrange/dop853", scene, {}), reference.trajectory).metrics
+    columns = metric_columns(scene.outputs)
+    assert {"angle_error_max", "defect_judged", "tip_error_max"} <= metrics.keys() <= columns.keys()
+    of_runs = [name for name, value in METRICS.items() if "runs" in value.tables.split()]
+    assert [name for name in columns if name in METRICS and name not in {"tip_error_max"}] == of_runs
+
+
+def test_a_declared_metric_is_a_column_of_its_tables() -> None:
+    for name, value in METRICS.items():
+        for table in ("runs", "bench", "stability", "sweep"):
+            assert (name in columns_in(table)) == (table in value.tables.split())
 
 
 def test_extremes_of_the_rotor_have_their_sign_and_the_rate_has_none() -> None:
