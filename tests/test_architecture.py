@@ -8,6 +8,8 @@ import re
 import tomllib
 from pathlib import Path
 
+import pytest
+
 from rotor_mbs.methods.catalogue import methods
 
 ROOT = Path(__file__).parents[1]
@@ -35,7 +37,9 @@ def code_of(text: str) -> str:
     return ast.unparse(tree)
 
 
-CODE = {file: code_of(text) for file, text in SOURCES.items()}
+@pytest.fixture(scope="module")
+def code() -> dict[str, str]:
+    return {file: code_of(text) for file, text in SOURCES.items()}
 
 
 def test_the_layers_are_those_of_the_import_contract() -> None:
@@ -58,28 +62,28 @@ def test_every_place_that_is_named_exists() -> None:
 # Files to change
 
 
-def test_the_physics_of_a_scene_key_is_in_the_files_of_its_row() -> None:
+def test_the_physics_of_a_scene_key_is_in_the_files_of_its_row(code: dict[str, str]) -> None:
     row = re.findall(r"^\| a scene key \| (.*) \|$", TEXT, re.M)[0]
     named = re.findall(r"`([\w/]+/(?:\w+\.py)?)`", row)
     assert "models/" in named
     keys = "hub_(inertia|radius|mass)|shaft_(tilt|damping)|bearing_(stiffness|damping|rest)"
     keys += "|bearing|(pitch|rotor)_torque"
-    using = [file for file, code in CODE.items() if re.search(rf"\bscene\.({keys})\b", code)]
+    using = [file for file, text in code.items() if re.search(rf"\bscene\.({keys})\b", text)]
     assert [file for file in using if not file.startswith(("scenario/", *named))] == []
 
 
-def test_an_integrator_is_one_object_in_its_models_folder() -> None:
+def test_an_integrator_is_one_object_in_its_models_folder(code: dict[str, str]) -> None:
     """A method's name stands nowhere but in its model's package, where no study chooses it by name."""
-    elsewhere = {file: code for file, code in CODE.items() if not file.startswith("models/")}
+    elsewhere = {file: text for file, text in code.items() if not file.startswith("models/")}
     for method in methods():
-        assert {file for file, code in elsewhere.items() if f"'{method.name}'" in code} <= CHOSEN, method.name
+        assert {file for file, text in elsewhere.items() if f"'{method.name}'" in text} <= CHOSEN, method.name
 
 
-def test_every_model_is_in_the_catalogue_and_in_the_contract_of_independence() -> None:
+def test_every_model_is_in_the_catalogue_and_in_the_contract_of_independence(code: dict[str, str]) -> None:
     models = {path.parent.name for path in PACKAGE.glob("models/*/methods.py")}
     (independent,) = (contract["modules"] for contract in CONTRACTS if contract["type"] == "independence")
     assert {name.rpartition(".")[2] for name in independent} == models
-    assert set(re.findall(r"'rotor_mbs\.models\.(\w+)", CODE["methods/catalogue.py"])) == models
+    assert set(re.findall(r"'rotor_mbs\.models\.(\w+)", code["methods/catalogue.py"])) == models
 
 
 # Tests

@@ -6,6 +6,7 @@ V = Σ m g z + Σ k (θ - rest)²/2.
 
 from __future__ import annotations
 
+import functools
 from math import hypot, pi
 
 import numpy as np
@@ -69,6 +70,7 @@ def about_hub(blade: Blade):
     return com + blade.mass * (r @ r * np.eye(3) - np.outer(r, r))
 
 
+@functools.cache
 def closed_form(scene: Scene, duration: float | None = None):
     """(n, 2 (1 + blades)) angles and rates at the samples up to `duration`, by `other_code`."""
     times = np.linspace(0.0, scene.duration, scene.samples)
