@@ -3,6 +3,7 @@
 This is the Python API. Modules are loaded on first use.
 
     scenes, scene, load      names of the shipped scenes; a shipped scene; a scene from a TOML file
+    scene_from_openfast      the scene of an OpenFAST model's rotor
     run                      simulate a scene with one method (`Run`) or several (`Runs`)
     sweep                    run a parameter study (`Runs`)
     compare                  compare data of another program with a scene (`DataComparison`)
@@ -49,6 +50,7 @@ if TYPE_CHECKING:
     from rotor_mbs.errors import RotorError as RotorError
     from rotor_mbs.errors import StoreError as StoreError
     from rotor_mbs.methods.base import Method as Method
+    from rotor_mbs.scenario.openfast_scene import scene_from_openfast as scene_from_openfast
     from rotor_mbs.scenario.scene import Blade as Blade
     from rotor_mbs.scenario.scene import Scene as Scene
     from rotor_mbs.studies.export import export as export
@@ -62,6 +64,7 @@ _MODULES = {
     "rotor_mbs.api.runs": "load run Run Runs scene scenes sweep",
     "rotor_mbs.errors": "InputError MethodRefusal RotorError StoreError",
     "rotor_mbs.methods.base": "Method",
+    "rotor_mbs.scenario.openfast_scene": "scene_from_openfast",
     "rotor_mbs.scenario.scene": "Blade Scene",
     "rotor_mbs.studies.export": "export",
 }

@@ -227,8 +227,13 @@ def _parser() -> tuple[_Parser, dict[str, _Parser]]:
     own.flag("--build", help="also list the items that each model builds")
     own.flag("--json", help="print JSON")
 
-    own = command("new", "write a commented scene file to start from", "commands:new", "my.toml")
+    own = command(
+        "new", "write a commented scene file to start from", "commands:new",
+        "my.toml", "mine.toml --from paper/fig11", "mine.toml --from MODEL.fst",
+    )  # fmt: skip
     own.add_argument("file", type=file, metavar="FILE", help="a TOML file that does not exist yet")
+    text = "a scene (paper/fig11) or a TOML file to copy, or an OpenFAST model (MODEL.fst) to make a scene of"
+    own.add_argument("--from", dest="source", metavar="SOURCE", help=text)
 
     own = command(
         "reproduce",

@@ -25,7 +25,14 @@ from rotor_mbs.methods.method_file import ENDING
 from rotor_mbs.processes import cores
 from rotor_mbs.runs.progress import ProgressLine
 from rotor_mbs.runs.trailer import is_of_this_program
-from rotor_mbs.scenario.catalogue import find_scenes, list_scenes, list_sweeps, only_scene
+from rotor_mbs.scenario.catalogue import (
+    MAPPING_ENDING,
+    check_scene_name,
+    find_scenes,
+    list_scenes,
+    list_sweeps,
+    only_scene,
+)
 from rotor_mbs.scenario.keys import counted
 from rotor_mbs.scenario.toml_file import file_path, shown_key
 from rotor_mbs.solution.status import REFUSED
@@ -52,20 +59,67 @@ def list_all(arguments: argparse.Namespace) -> int:
 
 
 def new(arguments: argparse.Namespace) -> int:
-    """Write a commented scene file; never in the place of another file."""
+    """Write a commented scene file, with a mapping for the results of an OpenFAST model; never over other files."""
     from rotor_mbs.scenario.scene import new_scene_text
 
-    if arguments.file.suffix != ".toml":
-        raise InputError(f"{arguments.file}: is not a TOML file's name; allowed: a name that ends in .toml")
-    try:
-        with arguments.file.open("x", encoding="utf-8") as file:
-            file.write(new_scene_text())
-    except OSError as exc:
-        raise InputError(
-            f"{arguments.file}: cannot be created: {exc.strerror}; allowed: a file that does not exist yet"
-        ) from exc
-    print(f"{arguments.file}: edit it, then: rotor-mbs run {arguments.file}")
+    path = arguments.file
+    source = None if arguments.source is None else file_path(arguments.source)
+    if path.suffix != ".toml":
+        raise InputError(f"{path}: is not a TOML file's name; allowed: a name that ends in .toml")
+    check_scene_name(path)
+    lines = [f"{path}: edit it, then: rotor-mbs run {path}"]
+    if source is None:
+        texts = {path: new_scene_text()}
+    elif source.suffix.lower() == ".fst":
+        texts, lines = _files_of_model(path, source)
+    elif source.is_file() and source.suffix != ".toml":
+        allowed = "a scene's name, a path that ends in .toml, or in .fst (an OpenFAST model)"
+        raise InputError(f"{source}: is neither a scene nor an OpenFAST model; allowed: {allowed}")
+    else:
+        texts = {path: only_scene(arguments.source).text}
+    for new_file in texts:
+        if new_file.exists() or new_file.is_symlink():
+            raise InputError(f"{new_file}: cannot be created: File exists; allowed: a file that does not exist yet")
+    for new_file, text in texts.items():
+        try:
+            with new_file.open("x", encoding="utf-8") as file:
+                file.write(text)
+        except OSError as exc:
+            raise InputError(
+                f"{new_file}: cannot be created: {exc.strerror}; allowed: a file that does not exist yet"
+            ) from exc
+    print(*lines, sep="\n")
     return 0
+
+
+def _files_of_model(path: Path, model: Path) -> tuple[dict[Path, str], list[str]]:
+    """Return the texts of the scene and the mapping of an OpenFAST model by path, and lines that tell of them.
+
+    Parameters
+    ----------
+    path : of the scene file.
+    model : the model's .fst file.
+    """
+    from rotor_mbs.scenario.openfast import read_rotor
+    from rotor_mbs.scenario.openfast_scene import mapping_text, scene_of_rotor
+
+    rotor = read_rotor(model)
+    scene = scene_of_rotor(rotor)
+    mapping = path.with_suffix(MAPPING_ENDING)
+    lines = []
+    for number, blade in enumerate(rotor.blades, 1):
+        line = f"blade {number}: {blade.mass:.3f} kg, cone {blade.cone:g} deg; {blade.source}"
+        lines.append(line)
+    if rotor.has_equal_blades:
+        lines = [f"{len(lines)} blades: {lines[0].partition(': ')[2]}"]
+    total = sum(rotor.hub_inertia)
+    lines.append(f"shaft: tilt {rotor.tilt:g} deg, {rotor.speed:g} rpm; hub and generator {total:.6g} kg m^2")
+    for note in rotor.left_out:
+        lines.append(f"not in the scene: {note.partition(': ')[0]}")
+    lines.append(f"{path}: edit it, then: rotor-mbs run {path}")
+    results = model.with_suffix(".out")
+    lines.append(f"{mapping}: for results, rotor-mbs compare {results} --scene {path} --columns {mapping}")
+    return {path: scene.text, mapping: mapping_text(rotor)}, lines
 
 
 def show(arguments: argparse.Namespace) -> int:

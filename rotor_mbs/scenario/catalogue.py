@@ -37,6 +37,8 @@ for _folder in (SCENARIOS, REFERENCES):
     if not _folder.is_dir():
         raise RotorError(f"{_folder}: the folder is missing; install rotor_mbs again")
 
+# Mappings of columns beside scene files: a folder's TOML files but for these are scenes.
+MAPPING_ENDING = ".columns.toml"
 _NO_MOTION = ("samples", "outputs")  # keys that change what is stored, not how the rotor moves
 _SHOWN_CHANGES = 3  # keys in the label of a changed scene
 
@@ -156,6 +158,13 @@ def _name_problem(
     return ""
 
 
+def check_scene_name(path: Path) -> None:
+    """Raise InputError if a scene cannot be named after the file `path`, whether there is one."""
+    problem = _name_problem(path, path.stem, {}, _shipped())
+    if problem:
+        raise InputError(f"{shown_path(path)}: {problem}")
+
+
 def only_scene(argument: str) -> Scene:
     """Return the one scene that an argument means.
 
@@ -255,7 +264,8 @@ def _files(argument: str) -> list[Path]:
     except (OSError, ValueError):  # a name too long for the file system, a NUL in it
         is_folder = exists = False
     if is_folder:
-        paths = sorted(path.glob("*.toml"), key=lambda path: natural_key(path.name))
+        files = sorted(path.glob("*.toml"), key=lambda path: natural_key(path.name))
+        paths = [file for file in files if not file.name.endswith(MAPPING_ENDING)]
         if not paths:
             what = "no TOML file in this folder; allowed: a folder of scene files"
             raise InputError(f"{shown_path(path)}: {what}")

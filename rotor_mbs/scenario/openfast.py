@@ -1,0 +1,652 @@
+"""The rotor of an OpenFAST model: geometry, masses, start, and what a scene cannot hold of it.
+
+Blades have the masses that OpenFAST computes with: ElastoDyn's sum over its nodes, or the integral
+over BeamDyn's stations. OpenFAST's axes x (downwind), y, z are the scene's y, -x, z.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from rotor_mbs.errors import InputError
+from rotor_mbs.scenario import keys
+from rotor_mbs.scenario.openfast_files import MAX_ROWS, InputFile, table_columns
+from rotor_mbs.scenario.toml_file import shown_path
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+MAX_NODES = 10_000
+_ANGLE = keys.within(keys.NUMBER, at_least=-360.0, at_most=360.0)
+_TILT = keys.within(keys.NUMBER, at_least=-90.0, at_most=90.0)
+_CONE = keys.within(keys.NUMBER, at_least=-85.0, at_most=85.0)
+_TABLE = "DISTRIBUTED"  # in the header of BeamDyn's stations
+# Of a matrix of BeamDyn: its six rows, for stiffness, then for mass.
+_MATRIX_ROWS = 6
+# A difference of the node sum from the integral above this is told to the user.
+_SHOWN_DIFFERENCE = 1e-3
+
+
+@dataclass(frozen=True)
+class BladeModel:
+    """Mass properties of a blade, about its root or its centre of mass, in the scene's axes.
+
+    Attributes
+    ----------
+    source : what they were computed from, in words.
+    mass : kg.
+    first_moment, second_moment : of the mass along the blade, about the root, kg m and kg m².
+    centre_of_mass : (3,) m, from the root.
+    inertia : xx yy zz xy xz yz about the centre of mass, kg m².
+    tip : (3,) m, from the root.
+    cone : degrees, the tip towards +y.
+    pitch : degrees, at the start, OpenFAST's sign: positive towards feather.
+    notes : what else is worth a comment.
+    """
+
+    source: str
+    mass: float
+    first_moment: float
+    second_moment: float
+    centre_of_mass: tuple[float, float, float]
+    inertia: tuple[float, float, float, float, float, float]
+    tip: tuple[float, float, float]
+    cone: float = 0.0
+    pitch: float = 0.0
+    notes: tuple[str, ...] = ()
+
+    @property
+    def body(self) -> tuple[object, ...]:
+        """What makes it a body at its place, without its pitch: equal for equal blades."""
+        return self.mass, self.centre_of_mass, self.inertia, self.tip, self.cone
+
+
+@dataclass(frozen=True)
+class OpenFastRotor:
+    """The rotor of an OpenFAST model.
+
+    Attributes
+    ----------
+    path, description : of the .fst file.
+    blades : (blades,) `BladeModel`.
+    hub_radius, hub_mass, hub_centre_of_mass : m, kg, m downwind of the apex.
+    hub_inertia : kg m² about the shaft, as a sum: the hub's, then the generator's.
+    hub_inertia_text : the same sum as arithmetic of the model's numbers.
+    tilt : degrees.
+    gravity : m/s².
+    azimuth, azimuth_up : degrees; initial one of blade 1, and that at which blade 1 points up.
+    speed : rpm, at the start.
+    gage : m, from the apex to the shaft's strain gages.
+    bearing : stiffness, damping, neutral pitch in degrees of each pitch bearing; () where the pitch
+        is prescribed.
+    duration : s, of the model's run.
+    left_out : what the model has and a scene has not, the most important first.
+    """
+
+    path: Path
+    description: str
+    blades: tuple[BladeModel, ...]
+    hub_radius: float
+    hub_mass: float
+    hub_centre_of_mass: float
+    hub_inertia: tuple[float, float]
+    hub_inertia_text: str
+    tilt: float
+    gravity: float
+    azimuth: float
+    azimuth_up: float
+    speed: float
+    gage: float
+    bearing: tuple[tuple[float, float, float], ...]
+    duration: float
+    left_out: tuple[str, ...]
+
+    @property
+    def has_equal_blades(self) -> bool:
+        """Whether all blades are one body, whatever their pitches are."""
+        return len({blade.body for blade in self.blades}) == 1
+
+    @property
+    def inertia(self) -> float:
+        """Rotor inertia about the shaft, kg m², as OpenFAST's summary prints it.
+
+        Blades are lines of mass on their pitch axes there; the generator is not in it.
+        """
+        total = self.hub_inertia[0]
+        for blade in self.blades:
+            about_apex = blade.second_moment + 2.0 * self.hub_radius * blade.first_moment
+            about_apex += self.hub_radius**2 * blade.mass
+            total += about_apex * math.cos(math.radians(blade.cone)) ** 2
+        return total
+
+
+def read_rotor(path: Path) -> OpenFastRotor:
+    """Read the rotor of an OpenFAST model.
+
+    Parameters
+    ----------
+    path : of the .fst file. Of the files that it names only those are read that the rotor needs.
+
+    Raises
+    ------
+    InputError
+        For a file or line that is missing, a number that is not allowed, and a model of which no
+        scene can be made.
+    """
+    main = InputFile(path, what="the main input file (.fst) of an OpenFAST model")
+    elastic = main.whole("CompElast", 1, 3)
+    if elastic == 3:
+        allowed = "1 (ElastoDyn) or 2 (BeamDyn)"
+        what = "3, Simplified ElastoDyn: the model has a rotor inertia and no blades"
+        raise main.problem("CompElast", what, allowed)
+    structure = main.file("EDFile", "an input file of ElastoDyn")
+    count = structure.whole("NumBl", 1, 3)
+    tip_radius = structure.number("TipRad", keys.POSITIVE)
+    hub_radius = structure.number("HubRad", keys.NOT_NEGATIVE)
+    if hub_radius >= tip_radius:
+        allowed = f"a number below TipRad, {tip_radius:g} m"
+        raise structure.problem("HubRad", f"{hub_radius:g} m leaves no blade", allowed)
+
+    blades = []
+    for number in range(1, count + 1):
+        read_blade = _beamdyn_blade if elastic == 2 else _elastodyn_blade
+        blades.append(read_blade(main, structure, number))
+
+    hub, hub_text = _hub_inertia(structure, count)
+    generator = structure.number("GenIner", keys.NOT_NEGATIVE)
+    ratio = structure.number("GBRatio")
+    gravity_file = main if "Gravity" in main else structure
+    return OpenFastRotor(
+        path=path,
+        description=main.description,
+        blades=tuple(blades),
+        hub_radius=hub_radius,
+        hub_mass=structure.number("HubMass", keys.NOT_NEGATIVE),
+        hub_centre_of_mass=structure.number("HubCM", keys.SIZE),
+        hub_inertia=(hub, generator * ratio**2),
+        hub_inertia_text=f"{hub_text} + {_text(generator)}*{_text(ratio)}**2",
+        tilt=structure.number("ShftTilt", _TILT),
+        gravity=gravity_file.number("Gravity", keys.NOT_NEGATIVE),
+        azimuth=structure.number("Azimuth", _ANGLE),
+        azimuth_up=structure.number("AzimB1Up", _ANGLE),
+        speed=structure.number("RotSpeed", keys.SIZE),
+        gage=structure.number("ShftGagL", keys.SIZE, 0.0),
+        bearing=_bearing(main, structure, blades),
+        duration=main.number("TMax", keys.NOT_NEGATIVE),
+        left_out=tuple(_left_out(main, structure, elastic, count)),
+    )
+
+
+def _text(number: float) -> str:
+    """Return a number as the scene file has it, without a superfluous ".0"."""
+    return repr(number).removesuffix(".0")
+
+
+# Hub and bearing
+
+
+def _hub_inertia(structure: InputFile, count: int) -> tuple[float, str]:
+    """Return the hub's inertia about the shaft, kg m², and it as arithmetic of the file's numbers.
+
+    Parameters
+    ----------
+    structure : ElastoDyn's primary file.
+    count : number of blades.
+    """
+    inertia = structure.number("HubIner", keys.NOT_NEGATIVE)
+    if count != 2 or "HubIner_Teeter" in structure:
+        return inertia, _text(inertia)
+    # Before OpenFAST 4.2 it is that about the teeter axis of a two-bladed rotor. The program takes
+    # it for that about the shaft, too, after moving it to the hub's centre of mass.
+    mass = structure.number("HubMass", keys.NOT_NEGATIVE)
+    undersling = structure.number("UndSling", keys.SIZE)
+    centre = structure.number("HubCM", keys.SIZE)
+    arm = undersling - centre
+    about_shaft = inertia - mass * arm**2
+    if about_shaft < 0.0:
+        least = mass * arm**2
+        what = f"{inertia:g} kg m² is below HubMass (UndSling - HubCM)²"
+        raise structure.problem("HubIner", what, f"at least {least:g} for two blades")
+    if not mass * arm:
+        return inertia, _text(inertia)
+    text = f"{_text(inertia)} - {_text(mass)}*({_text(undersling)} - {_text(centre)})**2"
+    return about_shaft, text.replace("- -", "+ ")
+
+
+def _bearing(
+    main: InputFile,
+    structure: InputFile,
+    blades: Sequence[BladeModel],
+) -> tuple[tuple[float, float, float], ...]:
+    """Return stiffness, damping and neutral pitch (degrees) of each pitch bearing.
+
+    They exist since OpenFAST 5, where ServoDyn has them; () for a prescribed pitch. Raises
+    InputError for a pitch that is free and has no inertia.
+    """
+    if not structure.flag("PitchDOF"):
+        return ()
+    for number, blade in enumerate(blades, 1):
+        if not blade.inertia[2] and not any(blade.centre_of_mass[:2]):
+            what = f"True, and blade {number} has no inertia about its pitch axis"
+            allowed = f"BlPIner({number}) above 0, or PitchDOF False"
+            raise structure.problem("PitchDOF", what, allowed)
+    if not main.whole("CompServo", 0, 100, 0):
+        return ((0.0, 0.0, 0.0),) * len(blades)
+    servo = main.file("ServoFile", "an input file of ServoDyn")
+    bearing = []
+    for number in range(1, len(blades) + 1):
+        stiffness = servo.number(f"PitSpr({number})", keys.NOT_NEGATIVE)
+        damping = servo.number(f"PitDamp({number})", keys.NOT_NEGATIVE)
+        bearing.append((stiffness, damping, servo.number(f"PitNeut({number})", _ANGLE)))
+    return tuple(bearing)
+
+
+# ElastoDyn's blades: mass on the pitch axis
+
+
+def _elastodyn_blade(main: InputFile, structure: InputFile, number: int) -> BladeModel:
+    """Return a blade as ElastoDyn sums it up over its nodes.
+
+    Parameters
+    ----------
+    main, structure : the .fst file and ElastoDyn's primary file.
+    number : of the blade, from 1.
+    """
+    tip_radius, hub_radius = structure.number("TipRad"), structure.number("HubRad")
+    length = tip_radius - hub_radius
+    file = structure.file(f"BldFile({number})", "an input file of an ElastoDyn blade")
+    density = _mass_density(file)
+
+    centres, widths, which = _nodes(main, structure, file, length)
+    tip_mass = structure.number(f"TipMass({number})", keys.NOT_NEGATIVE)
+    mass = tip_mass
+    first = tip_mass * length
+    second = tip_mass * length**2
+    for centre, width in zip(centres, widths, strict=True):
+        element = density(centre / length) * width
+        mass += element
+        first += element * centre
+        second += element * centre**2
+    if not mass >= keys.SMALLEST:
+        raise file.problem("BMassDen", f"the blade's mass is {mass:g} kg", "a mass above 0")
+
+    # Only a free pitch has an inertia: where it is prescribed, OpenFAST uses none.
+    pitch_inertia = 0.0
+    if structure.flag("PitchDOF"):
+        for name in ("PBrIner", "BlPIner"):
+            pitch_inertia += structure.number(f"{name}({number})", keys.NOT_NEGATIVE, 0.0)
+    across = second - first**2 / mass
+    if across < 0.0:  # by rounding, of a single node
+        across = 0.0
+    return BladeModel(
+        source=f"ElastoDyn's sum over {which}",
+        mass=mass,
+        first_moment=first,
+        second_moment=second,
+        centre_of_mass=(0.0, 0.0, first / mass),
+        inertia=(across, across, pitch_inertia, 0.0, 0.0, 0.0),
+        tip=(0.0, 0.0, length),
+        cone=structure.number(f"PreCone({number})", _CONE),
+        pitch=structure.number(f"BlPitch({number})", _ANGLE),
+        notes=_integral_note(file, length, tip_mass, mass, second),
+    )
+
+
+def _blade_table(file: InputFile) -> tuple[list[float], list[float]]:
+    """Return fractions of the length and masses per length of a blade file's stations.
+
+    Columns differ between generations of files, and are found by their names.
+    """
+    count = file.whole("NBlInpSt", 2, MAX_ROWS)
+    header = file.line_with("BlFract", "BMassDen")
+    if header < 0:
+        what = "no table with the columns BlFract and BMassDen"
+        raise InputError(f"{shown_path(file.path)}: {what}; allowed: a blade file of ElastoDyn")
+    at_fraction, at_density = table_columns(file, header, ("BlFract", "BMassDen"))
+    rows = file.rows(header + 2, count, "station", max(at_fraction, at_density) + 1)
+    fractions = [row[at_fraction] for row in rows]
+    factor = file.number("AdjBlMs", keys.NOT_NEGATIVE)
+    densities = [factor * row[at_density] for row in rows]
+    for index, row in enumerate(rows):
+        is_rising = index == 0 or fractions[index] > fractions[index - 1]
+        if not is_rising or not 0.0 <= fractions[index] <= 1.0 or row[at_density] < 0.0:
+            place = f"{shown_path(file.path)}:{header + 3 + index}"
+            what = f"BlFract {fractions[index]:g}, BMassDen {row[at_density]:g}"
+            allowed = "BlFract that rises from 0 to 1, BMassDen of at least 0"
+            raise InputError(f"{place}: {what}; allowed: {allowed}")
+    return fractions, densities
+
+
+def _mass_density(file: InputFile) -> Callable[[float], float]:
+    """Return a function of the fraction of the length: mass per length, kg/m, linear between."""
+    fractions, densities = _blade_table(file)
+
+    def density(fraction: float) -> float:
+        for left in range(len(fractions) - 1):
+            if fraction <= fractions[left + 1] or left == len(fractions) - 2:
+                width = fractions[left + 1] - fractions[left]
+                share = min(max((fraction - fractions[left]) / width, 0.0), 1.0)
+                return densities[left] + share * (densities[left + 1] - densities[left])
+        return densities[-1]
+
+    return density
+
+
+def _nodes(
+    main: InputFile,
+    structure: InputFile,
+    blade: InputFile,
+    length: float,
+) -> tuple[list[float], list[float], str]:
+    """Return distances from the root and widths of a blade's nodes, m, and what they are.
+
+    Parameters
+    ----------
+    main, structure, blade : the .fst file, ElastoDyn's primary file, a blade file.
+    length : of the blade, m.
+    """
+    # 1 is AeroDyn 14, with whose nodes ElastoDyn computes; or since OpenFAST 4, whose blade files
+    # have no column PitchAxis, AeroDisk.
+    is_old = blade.line_with("BlFract", "PitchAxis") >= 0
+    if is_old and main.whole("CompAero", 0, 100, 0) == 1:
+        aero = main.file("AeroFile", "an input file of AeroDyn 14")
+        if aero.line_with("RNodes", "DRNodes") < 0:
+            what = "no table with the columns RNodes and DRNodes"
+            raise InputError(f"{shown_path(aero.path)}: {what}; allowed: a file of AeroDyn 14")
+        return _aerodyn14_nodes(structure, aero, length)
+    count = structure.whole("BldNodes", 1, MAX_NODES)
+    width = length / count
+    centres = [(index + 0.5) * width for index in range(count)]
+    return centres, [width] * count, f"its {count} equal nodes"
+
+
+def _aerodyn14_nodes(structure: InputFile, aero: InputFile, length: float) -> tuple[list[float], list[float], str]:
+    """Return distances from the root and widths of AeroDyn 14's nodes, m, and what they are."""
+    count = aero.whole("BldNodes", 1, MAX_NODES)
+    header = aero.line_with("RNodes", "DRNodes")
+    (at_radius,) = table_columns(aero, header, ("RNodes",))
+    hub_radius = structure.number("HubRad")
+    centres = []
+    for row in aero.rows(header + 1, count, "node", at_radius + 1):
+        centres.append(row[at_radius] - hub_radius)
+    widths = [2.0 * centres[0]]
+    for before, centre in pairwise(centres):
+        widths.append(2.0 * (centre - before) - widths[-1])
+    for index, (centre, width) in enumerate(zip(centres, widths, strict=True)):
+        if not 0.0 < centre <= length or width <= 0.0:
+            place = f"{shown_path(aero.path)}:{header + 2 + index}"
+            what = f"RNodes {centre + hub_radius:g} m makes an element {width:.4g} m wide"
+            allowed = "nodes in the middle of elements between HubRad and TipRad"
+            raise InputError(f"{place}: {what}; allowed: {allowed}")
+    return centres, widths, f"the {count} nodes of AeroDyn 14"
+
+
+def _integral_note(
+    file: InputFile,
+    length: float,
+    tip_mass: float,
+    mass: float,
+    second: float,
+) -> tuple[str, ...]:
+    """Return how far the integral of the piecewise linear density is from the node sum.
+
+    Parameters
+    ----------
+    file : of the blade.
+    length : of the blade, m.
+    tip_mass : kg.
+    mass, second : mass and second moment of the node sum, kg and kg m².
+    """
+    fractions, densities = _blade_table(file)
+    total, moment = tip_mass, tip_mass * length**2
+    for left in range(len(fractions) - 1):
+        a, b = fractions[left] * length, fractions[left + 1] * length
+        mean = 0.5 * (densities[left] + densities[left + 1])
+        at_middle = 0.25 * (a + b) ** 2 * mean
+        total += (b - a) * mean
+        # Simpson's rule is exact for the product of a linear density and a square.
+        ends = a**2 * densities[left] + b**2 * densities[left + 1]
+        moment += (b - a) * (ends + 4.0 * at_middle) / 6.0
+    by_mass, by_moment = total / mass - 1.0, moment / second - 1.0 if second else 0.0
+    if max(abs(by_mass), abs(by_moment)) <= _SHOWN_DIFFERENCE:
+        return ()
+    differences = f"{100.0 * by_mass:+.2g} % in mass, {100.0 * by_moment:+.2g} % in second moment"
+    return (f"The integral of the density table, which OpenFAST does not use: {differences}.",)
+
+
+# BeamDyn's blades: sections along a curved axis
+
+
+def _beamdyn_blade(main: InputFile, structure: InputFile, number: int) -> BladeModel:
+    """Return a blade as the integral over BeamDyn's stations, with the inertia of its sections.
+
+    Parameters
+    ----------
+    main, structure : the .fst file and ElastoDyn's primary file.
+    number : of the blade, from 1.
+    """
+    import numpy as np  # late: a scene is read without it
+
+    file = main.file(f"BDBldFile({number})", "an input file of BeamDyn")
+    sections = file.file("BldFile", "an input file of a BeamDyn blade")
+    axis, twist = _reference_axis(file)
+    fractions, matrices = _stations(sections)
+
+    mass, moment, about_root = 0.0, np.zeros(3), np.zeros((3, 3))
+    pieces = np.diff(axis, axis=0)
+    lengths = np.sqrt((pieces**2).sum(axis=1))
+    if lengths.sum() <= 0.0:
+        raise file.problem("kp_total", "all key points are one", "key points along the blade")
+    at_key_points = np.concatenate([[0.0], np.cumsum(lengths)]) / lengths.sum()
+    # Between two of these points mass and axis are linear; three points of Gauss's rule are exact
+    # for their product with the square of a distance.
+    bounds = np.unique(np.concatenate([at_key_points, fractions]))
+    bounds = bounds[(bounds >= fractions[0]) & (bounds <= fractions[-1])]
+    points, weights = np.polynomial.legendre.leggauss(3)
+    for left, right in pairwise(bounds):
+        piece = min(int(np.searchsorted(at_key_points, 0.5 * (left + right))) - 1, len(lengths) - 1)
+        tangent = pieces[piece] / lengths[piece]
+        for point, weight in zip(points, weights, strict=True):
+            eta = 0.5 * (left + right) + 0.5 * (right - left) * point
+            ds = 0.5 * (right - left) * weight * lengths.sum()
+            share = (eta - at_key_points[piece]) * lengths.sum() / lengths[piece]
+            position = axis[piece] + share * pieces[piece]
+            angle = twist[piece] + share * (twist[piece + 1] - twist[piece])
+            turned = _section_axes(tangent, math.radians(angle))
+            per_length, offset, inertia = _section(matrices, fractions, eta)
+            # The tensor is about the section's origin: to its centre of mass, and to the root.
+            centre = position + turned @ offset
+            own = turned @ (inertia - per_length * _steiner(offset)) @ turned.T
+            mass += per_length * ds
+            moment += per_length * ds * centre
+            about_root += ds * (own + per_length * _steiner(centre))
+    if not mass >= keys.SMALLEST:
+        raise sections.problem("station_total", "the blade has no mass", "a mass above 0")
+
+    centre = moment / mass
+    to_scene = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
+    about_centre = to_scene @ (about_root - mass * _steiner(centre)) @ to_scene.T
+    if structure.flag("PitchDOF"):
+        about_centre[2, 2] += structure.number(f"PBrIner({number})", keys.NOT_NEGATIVE, 0.0)
+    x, y, z = (float(coordinate) for coordinate in to_scene @ centre)
+    xx, yy, zz = (float(about_centre[i, i]) for i in range(3))
+    xy, xz, yz = float(about_centre[0, 1]), float(about_centre[0, 2]), float(about_centre[1, 2])
+    tip_x, tip_y, tip_z = (float(coordinate) for coordinate in to_scene @ axis[-1])
+    return BladeModel(
+        source=f"integral over BeamDyn's {len(fractions)} stations",
+        mass=float(mass),
+        first_moment=float(moment[2]),
+        second_moment=float(0.5 * (about_root[0, 0] + about_root[1, 1] - about_root[2, 2])),
+        centre_of_mass=(x, y, z),
+        inertia=(xx, yy, zz, xy, xz, yz),
+        tip=(tip_x, tip_y, tip_z),
+        cone=structure.number(f"PreCone({number})", _CONE),
+        pitch=structure.number(f"BlPitch({number})", _ANGLE),
+    )
+
+
+def _steiner(point: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the inertia of a unit mass at a point about the origin, (3, 3) m²."""
+    import numpy as np  # late, as above
+
+    squared: NDArray[np.float64] = point @ point * np.eye(3) - np.outer(point, point)
+    return squared
+
+
+def _reference_axis(file: InputFile) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return key points, (n, 3) m from the root in OpenFAST's axes, and twists, (n,) degrees."""
+    import numpy as np  # late, as above
+
+    count = file.whole("kp_total", 2, MAX_ROWS)
+    header = file.line_with("kp_xr", "kp_yr", "kp_zr", "initial_twist")
+    if header < 0:
+        what = "no table with the columns kp_xr, kp_yr, kp_zr and initial_twist"
+        raise InputError(f"{shown_path(file.path)}: {what}; allowed: an input file of BeamDyn")
+    rows = file.rows(header + 2, count, "key point", 4)
+    table = np.array([row[:4] for row in rows])
+    # The last point of a member is the first of the next one.
+    is_new = np.concatenate([[True], (np.diff(table[:, :3], axis=0) != 0.0).any(axis=1)])
+    return table[is_new, :3], table[is_new, 3]
+
+
+def _stations(file: InputFile) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return fractions of the axis's length, (n,), and mass matrices, (n, 6, 6), of stations."""
+    import numpy as np  # late, as above
+
+    count = file.whole("station_total", 2, MAX_ROWS)
+    # Blocks of damping stand before the stations, and have rows of numbers, too.
+    start = next((i for i, line in enumerate(file.lines) if _TABLE in line.upper()), -1)
+    if start < 0:
+        what = "no line with DISTRIBUTED PROPERTIES"
+        raise InputError(f"{shown_path(file.path)}: {what}; allowed: a blade file of BeamDyn")
+    filled = file.lines_of_numbers(start + 1)
+    rows_each = 1 + 2 * _MATRIX_ROWS
+    fractions, matrices = np.zeros(count), np.zeros((count, _MATRIX_ROWS, _MATRIX_ROWS))
+    for station in range(count):
+        lines = filled[station * rows_each : (station + 1) * rows_each]
+        if len(lines) < rows_each:
+            what = f"{station} stations and a part of one, station_total is {count}"
+            raise file.problem("station_total", what, "as many as there are")
+        fractions[station] = file.rows(lines[0], 1, "fraction of station", 1)[0][0]
+        for row, index in enumerate(lines[1 + _MATRIX_ROWS :]):
+            name = f"row {row + 1} of the mass matrix, row"
+            matrices[station, row] = file.rows(index, 1, name, _MATRIX_ROWS)[0][:_MATRIX_ROWS]
+        is_rising = station == 0 or fractions[station] > fractions[station - 1]
+        if not is_rising or matrices[station, 0, 0] < 0.0:
+            place = f"{shown_path(file.path)}:{lines[0] + 1}"
+            what = f"station {station + 1} at {fractions[station]:g}"
+            allowed = "fractions that rise, masses of at least 0"
+            raise InputError(f"{place}: {what}; allowed: {allowed}")
+    return fractions, matrices
+
+
+def _section(
+    matrices: NDArray[np.float64],
+    fractions: NDArray[np.float64],
+    eta: float,
+) -> tuple[float, NDArray[np.float64], NDArray[np.float64]]:
+    """Return mass per length, centre of mass (3,) m and inertia (3, 3) about the section's origin.
+
+    Parameters
+    ----------
+    matrices : (n, 6, 6), of mass at the stations, linear between.
+    fractions : (n,) of the stations.
+    eta : fraction of the length at which the section is.
+    """
+    import numpy as np  # late, as above
+
+    right = min(max(int(np.searchsorted(fractions, eta)), 1), len(fractions) - 1)
+    share = (eta - fractions[right - 1]) / (fractions[right] - fractions[right - 1])
+    matrix = (1.0 - share) * matrices[right - 1] + share * matrices[right]
+    mass = float(matrix[0, 0])
+    centre = np.array([matrix[1, 5], -matrix[0, 5], 0.0])
+    centre = centre / mass if mass else np.zeros(3)
+    return mass, centre, matrix[3:, 3:]
+
+
+def _section_axes(tangent: NDArray[np.float64], twist: float) -> NDArray[np.float64]:
+    """Return the axes of a section as columns, (3, 3), in OpenFAST's axes of the blade root.
+
+    Parameters
+    ----------
+    tangent : (3,) of the reference axis: the section's z.
+    twist : rad, about -z: the section's x, seen along the blade, is at this angle.
+    """
+    import numpy as np  # late, as above
+
+    x = np.array([math.cos(twist), -math.sin(twist), 0.0])
+    x -= (x @ tangent) * tangent
+    x /= math.sqrt(x @ x)
+    return np.column_stack([x, np.cross(tangent, x), tangent])
+
+
+# What a scene has no place for
+
+
+def _left_out(main: InputFile, structure: InputFile, elastic: int, count: int) -> list[str]:
+    """Return what the model has and a scene has not, a text each, the most important first.
+
+    Parameters
+    ----------
+    main, structure : the .fst file and ElastoDyn's primary file.
+    elastic : CompElast.
+    count : number of blades.
+    """
+    notes = []
+    makes_motion = []
+    if main.whole("CompAero", 0, 100, 0):
+        makes_motion.append("aerodynamics")
+    if main.whole("CompServo", 0, 100, 0):
+        makes_motion.append("generator and controller torque")
+    if makes_motion:
+        rows = "rows [t, RtAeroMxh - GenTq*GBRatio] as torque.rotor stand for them"
+        notes.append(f"{', '.join(makes_motion)}: they make the motion; {rows}")
+    if not structure.flag("PitchDOF"):
+        notes.append("commands of the pitch: it is prescribed; rows [t, -pitch] are bearing.rest")
+    if not structure.flag("GenDOF", default=True):
+        notes.append("a prescribed speed (GenDOF False): a rotor in balance keeps its speed by itself")
+    if elastic == 2:
+        notes.append("flexible blades (BeamDyn)")
+    bending = ("FlapDOF1", "FlapDOF2", "EdgeDOF")
+    is_flexible = elastic == 1 and any(map(structure.flag, bending))
+    if is_flexible:
+        notes.append(f"flexible blades ({_listed(structure, bending)})")
+    if structure.flag("DrTrDOF"):
+        notes.append("drive-train torsion (DrTrDOF): hub and generator are one body here")
+    if count == 2 and structure.flag("TeetDOF"):
+        notes.append("teeter (TeetDOF): the hub is rigid here")
+    moving = (
+        "YawDOF", "TwFADOF1", "TwFADOF2", "TwSSDOF1", "TwSSDOF2", "PtfmSgDOF", "PtfmSwDOF",
+        "PtfmHvDOF", "PtfmRDOF", "PtfmPDOF", "PtfmYDOF",
+    )  # fmt: skip
+    if any(map(structure.flag, moving)):
+        names = _listed(structure, moving)
+        notes.append(f"motion of nacelle, tower or platform ({names}): the shaft's bearing rests here")
+    for name, effect in (("PtfmPitch", "tilt less it"), ("PtfmRoll", ""), ("TTDspFA", "")):
+        value = structure.number(name, default=0.0)
+        if value:
+            advice = f": the shaft's own angle is {effect}" if effect else ""
+            notes.append(f"an initial {name} of {value:g}{advice}")
+    efficiency = structure.number("GBoxEff", default=100.0)
+    if efficiency != 100.0:
+        notes.append(f"gearbox efficiency {efficiency:g} %, which is friction: see shaft.damping")
+    if structure.flag("Furling"):
+        notes.append("furling")
+    if main.whole("MHK", 0, 2, 0):
+        notes.append("water (MHK): buoyancy and added mass")
+    if main.whole("NRotors", 1, 100, 1) > 1:
+        notes.append("more rotors (NRotors): this is the first one")
+    if main.flag("MirrorRotor"):
+        notes.append("MirrorRotor: the motion here is the mirror image, x reversed")
+    return notes
+
+
+def _listed(structure: InputFile, names: Sequence[str]) -> str:
+    """Return those of some flags that are True, joined by commas."""
+    return ", ".join(name for name in names if structure.flag(name))
