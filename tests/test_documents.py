@@ -128,9 +128,7 @@ def test_the_tour_prints_what_it_says(capsys: pytest.CaptureFixture[str]) -> Non
 
 @pytest.mark.full
 @pytest.mark.parametrize("name", ["data.md", "sweeps.md"])
-def test_the_matlab_code_of_documents_runs_in_octave(
-    folder: Path, name: str, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_the_matlab_code_of_documents_runs_in_octave(folder: Path, name: str) -> None:
     """Without drawing, which needs a display; at the end it prints one angle of the last block."""
     octave = shutil.which("octave-cli")
     if octave is None:
@@ -142,8 +140,9 @@ def test_the_matlab_code_of_documents_runs_in_octave(
     if name == "data.md":
         path = folder / "octave" / "rotor-mbs-out" / "results.h5"
         rm.run("paper/fig11", ["exudyn_tree/rk67", "lagrange/dop853"]).save(path)
-        assert main(["show", str(path)]) == 0
-        (methods,) = re.findall(r"  methods +(.*)", capsys.readouterr().out)
+        shown = rotor_mbs("show", path)
+        assert shown.status == 0
+        (methods,) = re.findall(r"  methods +(.*)", shown.out)
         expected = rm.open(path)[methods.split(", ")[0]].angles[-1, 0]
         lines.append("printf('%.17g', q(1, end, 2))")
     else:
@@ -225,7 +224,7 @@ def test_the_path_of_a_document_can_be_walked(name: str, tmp_path: Path, monkeyp
     if name == "your-engine.md":
         (tmp_path / "mine.py").write_text(python_of(name)[0])
     for command in BEFORE.get(name, []):
-        assert main(shlex.split(command)) == 0, command
+        assert rotor_mbs(*shlex.split(command)).status == 0, command
     names: dict[str, Any] = {}
     for step in path_of(name):
         if isinstance(step, str):
@@ -235,7 +234,7 @@ def test_the_path_of_a_document_can_be_walked(name: str, tmp_path: Path, monkeyp
         text = shlex.join(step)
         if not any(word in text for word in NOT_HERE):
             # 1: a check failed, a run is inaccurate, as some documents show; 2 is a command that is not understood.
-            assert main(shlex.split(SHORTER.get(text, text))) in (0, 1), text
+            assert rotor_mbs(*shlex.split(SHORTER.get(text, text))).status in (0, 1), text
 
 
 def test_every_public_name_key_command_and_method_is_on_a_reference_page(monkeypatch: pytest.MonkeyPatch) -> None:
