@@ -16,8 +16,9 @@ from dataclasses import replace
 from pathlib import Path
 
 import rotor_mbs as rm
-from rotor_mbs.runs.design import Asked
-from rotor_mbs.runs.table import TableFile, extend_file, results_tables
+from rotor_mbs.runs.design import RunRequest, results_tables
+from rotor_mbs.runs.merge import fit_file_to_request
+from rotor_mbs.runs.table import TableFile
 
 REPEATS = 5
 
@@ -38,13 +39,13 @@ def measure_file(scenes: int) -> None:
     asked = []
     for i in range(scenes):
         scene = replace(base, name=f"own/s{i}")
-        asked += [Asked(scene, "reference"), Asked(scene, "lagrange/taylor")]
+        asked += [RunRequest(scene, "reference"), RunRequest(scene, "lagrange/taylor")]
     tables = results_tables(asked)
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "runs.h5"
         calls: dict[str, Callable[[], object]] = {
-            "layout": lambda: extend_file(path, tables),
-            "nothing to do": lambda: extend_file(path, tables),
+            "layout": lambda: fit_file_to_request(path, tables),
+            "nothing to do": lambda: fit_file_to_request(path, tables),
             "open": lambda: TableFile(path),
         }
         for name, call in calls.items():

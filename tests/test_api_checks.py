@@ -12,7 +12,7 @@ import pytest
 
 import rotor_mbs as rm
 from rotor_mbs.errors import ResourceError
-from rotor_mbs.runs.runner import Outcome
+from rotor_mbs.runs.runner import RunOutcome
 
 METHOD = "lagrange/dop853"
 
@@ -101,8 +101,8 @@ def test_a_bench_repeats_at_least_once(scene: rm.Scene, repeats: int) -> None:
 
 
 def test_curves_that_were_lost_are_an_error(scene: rm.Scene, monkeypatch: pytest.MonkeyPatch) -> None:
-    def lose(*_: object, **__: object) -> tuple[list[Outcome], list[object]]:
-        lost = Outcome("paper/fig03 exudyn_tree/rk44", "exudyn_tree/rk44", "worker_died", "no room", is_stored=False)
+    def lose(*_: object, **__: object) -> tuple[list[RunOutcome], list[object]]:
+        lost = RunOutcome("paper/fig03 exudyn_tree/rk44", "exudyn_tree/rk44", "worker_died", "no room", is_stored=False)
         return [lost], []
 
     monkeypatch.setattr("rotor_mbs.studies.bench.run_bench", lose)

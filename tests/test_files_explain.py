@@ -20,7 +20,7 @@ from support.stored import Made, rotor, store
 import rotor_mbs as rm
 from rotor_mbs.runs import progress, table, untrusted
 from rotor_mbs.runs.hdf5 import Content
-from rotor_mbs.runs.runner import Outcome
+from rotor_mbs.runs.runner import RunOutcome
 from rotor_mbs.studies import check
 
 SHORT = {"duration": 0.5, "samples": 26}
@@ -314,8 +314,8 @@ def test_a_notebook_shows_a_line_that_is_renewed(monkeypatch: pytest.MonkeyPatch
     stream = type("OutStream", (io.StringIO,), {"__module__": "ipykernel.iostream"})()
     monkeypatch.setattr(sys, "stdout", stream)
     with progress.progress_of_call(None) as line:
-        line(1, 4, Outcome("paper/fig05 a/b", "a/b", "ok", share=0.25))
-        line(2, 4, Outcome("paper/fig05 a/c", "a/c", "diverged", "not finite", share=0.5))
+        line(1, 4, RunOutcome("paper/fig05 a/b", "a/b", "ok", share=0.25))
+        line(2, 4, RunOutcome("paper/fig05 a/c", "a/c", "diverged", "not finite", share=0.5))
         line.stage("pages", 1, 2)
     assert shown[0].startswith("starting")
     assert " 25%, about " in shown[1]

@@ -37,10 +37,11 @@ from rotor_mbs.methods.time_limit import valid_seconds
 from rotor_mbs.processes.pool import check_workers
 from rotor_mbs.runs.design import COLUMNS, MISSING
 from rotor_mbs.runs.hdf5 import reading
+from rotor_mbs.runs.merge import copy_file
 from rotor_mbs.runs.progress import progress_of_call
 from rotor_mbs.runs.read import StoredRun, StoredScene, is_sweep, open_results, run_names
+from rotor_mbs.runs.rows import text_of
 from rotor_mbs.runs.sweeps import StoredSweep, parameter_name
-from rotor_mbs.runs.table import copy_file, text_of
 from rotor_mbs.scenario.catalogue import list_scenes, only_scene, scene_of
 from rotor_mbs.scenario.keys import counted
 from rotor_mbs.scenario.scene import Scene, load_scene

@@ -18,8 +18,8 @@ from rotor_mbs.solution.status import REFUSED
 
 if TYPE_CHECKING:  # a sweep's workers load their code meanwhile
     from rotor_mbs.analysis.text_tables import TextTable
-    from rotor_mbs.runs.runner import Outcome
-    from rotor_mbs.studies.run import RunReport
+    from rotor_mbs.runs.runner import RunOutcome
+    from rotor_mbs.studies.run import BatchReport
 
 
 def print_table(table: TextTable | str) -> None:
@@ -38,7 +38,7 @@ def print_json(data: object, *, indent: int | None = None) -> None:
     print(json.dumps(data, ensure_ascii=not is_unicode, indent=indent))
 
 
-def print_summary(report: RunReport, output: Path, refused: Sequence[Refusal] = ()) -> int:
+def print_summary(report: BatchReport, output: Path, refused: Sequence[Refusal] = ()) -> int:
     """Print the runs of a call in a few lines.
 
     Parameters
@@ -52,25 +52,25 @@ def print_summary(report: RunReport, output: Path, refused: Sequence[Refusal] = 
     int
         The exit status: 1 if a run that should succeed did not, or was not computed; 2 if the methods refused all runs.
     """
-    is_incomplete = print_not_computed(report.made, refused)
-    made = [run for run in report.made if run.status != REFUSED]
+    is_incomplete = print_not_computed(report.computed, refused)
+    made = [run for run in report.computed if run.status != REFUSED]
     counts = Counter(run.status if run.is_stored else "not computed" for run in made)
     parts = [f"{count} {status}" for status, count in counts.most_common()]
     text = f"{counted(len(made), 'run')} computed ({', '.join(parts)})" if made else "nothing to do"
-    text += f", {len(report.kept)} already stored"
-    not_run = len(refused) + len(report.made) - len(made)
+    text += f", {len(report.stored)} already stored"
+    not_run = len(refused) + len(report.computed) - len(made)
     if not_run:
         text += f", {not_run} not run"
     print(f"{output}: {text}")
     for line in report.stored_failures:
         print(f"stored: {line}", file=sys.stderr)
-    methods = [run.method for run in made] + [run.method for run in report.kept]
+    methods = [run.method for run in made] + [run.method for run in report.stored]
     if not_run and all(method == REFERENCE for method in methods):
         return EXIT_BAD_INPUT
     return EXIT_FAILED if report.failures or is_incomplete or report.stored_failures else EXIT_OK
 
 
-def print_not_computed(made: Sequence[Outcome], refused: Sequence[Refusal] = ()) -> bool:
+def print_not_computed(made: Sequence[RunOutcome], refused: Sequence[Refusal] = ()) -> bool:
     """Print a line for each run that was not computed.
 
     Parameters

@@ -26,7 +26,7 @@ def read_table(path: str | os.PathLike[str], group: str = "", scene: str = "") -
     Parameters
     ----------
     path : the file; what it is is decided by its first bytes.
-    group, scene : of an HDF5 file, see `runs.table.read_arrays`.
+    group, scene : of an HDF5 file, see `runs.arrays.read_arrays`.
 
     Raises
     ------

@@ -137,7 +137,7 @@ def read_columns(path: Path, group: str, scene: str) -> DataTable:
     Parameters
     ----------
     path : the file; what it is is decided by its first bytes.
-    group, scene : of an HDF5 file, see `runs.table.read_arrays`.
+    group, scene : of an HDF5 file, see `runs.arrays.read_arrays`.
 
     Raises
     ------
@@ -229,7 +229,7 @@ def _matlab(path: Path, *, is_hdf5: bool) -> Arrays:
     from scipy.io import whosmat
 
     if is_hdf5:
-        from rotor_mbs.runs.table import refuse_claims
+        from rotor_mbs.runs.arrays import refuse_claims
 
         refuse_claims(path, MAX_BYTES)
     else:
@@ -293,7 +293,7 @@ def _netcdf_3(path: Path) -> tuple[Arrays, Mapping[str, Mapping[str, Any]]]:
     """Read the variables of a netCDF-3 file and their attributes; path: the file."""
     from scipy.io import netcdf_file
 
-    from rotor_mbs.runs.table import ARRAY_ATTRIBUTES
+    from rotor_mbs.runs.arrays import ARRAY_ATTRIBUTES
 
     arrays: dict[str, Any] = {}
     attributes: dict[str, dict[str, Any]] = {}
@@ -318,14 +318,15 @@ def _netcdf_3(path: Path) -> tuple[Arrays, Mapping[str, Mapping[str, Any]]]:
 
 def _hdf5(path: Path, group: str, scene: str) -> DataTable:
     """Read the arrays of a group of an HDF5 file, of this program's own or of any other."""
-    from rotor_mbs.runs import table  # late: 0.2 s
+    from rotor_mbs.runs import arrays as hdf5_arrays  # late: 0.2 s
     from rotor_mbs.runs.design import RUNS
     from rotor_mbs.runs.read import run_arrays
+    from rotor_mbs.runs.table import TableFile
     from rotor_mbs.runs.trailer import is_of_this_program
 
-    if is_of_this_program(path) and RUNS in table.TableFile(path, ()).groups:
+    if is_of_this_program(path) and RUNS in TableFile(path, ()).groups:
         return table_of(str(path), run_arrays(path, group, scene))
-    arrays, attributes, others = table.read_arrays(path, group, scene, MAX_BYTES)
+    arrays, attributes, others = hdf5_arrays.read_arrays(path, group, scene, MAX_BYTES)
     if "axis0" in {*arrays, *others} and "block0_values" in {*arrays, *others}:
         allowed = "a table that other programs can read: to_csv, or to_xarray().to_netcdf"
         raise InputError(f"{path}: pandas' own layout of HDF5 (to_hdf); allowed: {allowed}")

@@ -1,29 +1,32 @@
-"""The design of a results file: the runs that are asked for, and the columns that a table of runs or points has."""
+"""The design of a results file: the runs that are asked for, the tables of the file, and their columns."""
 
 from __future__ import annotations
 
+import functools
 import json
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from rotor_mbs.methods.catalogue import REFERENCE, find_method
+from rotor_mbs.methods.catalogue import REFERENCE, find_method, method_names
 from rotor_mbs.runs.hdf5 import CHARACTERS, Column
 from rotor_mbs.runs.versions import row_versions
+from rotor_mbs.scenario.catalogue import natural_key
 from rotor_mbs.scenario.scene import Scene, scene_hash
 from rotor_mbs.solution.metrics import METRICS, RowValue
-from rotor_mbs.solution.quantities import LOADS, quantities
+from rotor_mbs.solution.quantities import LOADS, SCALES, quantities, scale_values
 from rotor_mbs.solution.status import STATUSES
 
 MISSING = -1  # status of a row that is not stored
 # What the table of a scene's arrays repeats of the run's row in another table; in a row it has this name.
-REPEATED = {"status": "status_repeated", "samples": "samples_repeated"}
+STATUS_COPIES = {"status": "status_repeated", "samples": "samples_repeated"}
 CHARACTER = "S1"  # kind of a column of texts that are computed: (run, characters), UTF-8, then zeros
 RUNS = "runs"
 # What a frozen reference stores: it cannot be computed again from angles and rates as precisely.
-FROZEN = ("angles", "rates", "work", *(load.name for load in LOADS), "angle_uncertainty", "error_growth")
+REFERENCE_ARRAYS = ("angles", "rates", "work", *(load.name for load in LOADS), "angle_uncertainty", "error_growth")
 ONCE_A_SCENE = ("angle_uncertainty", "error_growth")  # stored once a scene, over time
 
 
@@ -95,7 +98,7 @@ def columns_in(table: str) -> dict[str, Column]:
 
 
 # What the design says of each row of a table, in this order: units, long name. What has no entry is no column.
-KNOWN = {
+DESIGN_COLUMNS = {
     "scene": ("1", "name of the scene"),
     "method_name": ("1", "name of the method: model/integrator"),
     "curve": ("1", "method, and the settings that are constant along it"),
@@ -110,12 +113,13 @@ KNOWN = {
 }
 NUMBERS = ("step", "tolerance", "order_expected")  # those of them that are no texts
 
+_TEXT_LENGTH = 600  # characters of a message
 # The computed columns of each table of points.
 POINT_COLUMNS: Mapping[str, Mapping[str, Column]] = {table: columns_in(table) for table in ("bench", "stability")}
 
 
 @dataclass(frozen=True)
-class Asked:
+class RunRequest:
     """A run as it is asked for: a row of the design.
 
     versions: of what computes it, by default those of this installation; of a reference that is read from a shipped
@@ -172,7 +176,7 @@ def metric_columns(outputs: Iterable[str]) -> dict[str, Column]:
     return columns | {"crc32": COLUMNS["crc32"]}
 
 
-def arrays_of(run: Asked) -> dict[str, Column]:
+def arrays_of(run: RunRequest) -> dict[str, Column]:
     """Return the arrays over time that a run stores, by their name in the file."""
     method = find_method(run.method)
     # A reference is read back by its angles and rates, whatever the scene asks for.
@@ -187,3 +191,127 @@ def arrays_of(run: Asked) -> dict[str, Column]:
         dimensions = quantity.dimensions if is_once else ("run", *quantity.dimensions)
         columns[quantity.name] = Column(dimensions, quantity.units, quantity.long_name)
     return columns
+
+
+@dataclass(frozen=True)
+class TableSpec:
+    """A table as it is to be laid out.
+
+    Attributes
+    ----------
+    group : where it stands in the file; "" for the root.
+    runs : (rows,) the scale `run`: texts that tell the rows apart, or their numbers.
+    known : by name, column and values of the other dimensions' scales, and of what the design says of each row.
+    computed : columns that are computed, in the order in which the checksum of a row covers them. One without the
+        dimension `run` belongs to the reference.
+    attributes : of the group.
+    characters : of each computed text.
+    """
+
+    group: str
+    runs: Sequence[str] | NDArray[Any]
+    known: Mapping[str, tuple[Column, Any]]
+    computed: Mapping[str, Column]
+    attributes: Mapping[str, Any] = field(default_factory=dict)
+    characters: int = 0
+
+    @functools.cached_property
+    def row_type(self) -> np.dtype[np.void]:
+        """The computed columns of one row, in the order in which its checksum covers them."""
+        lengths = {name: len(values) for name, (_, values) in self.known.items()} | {CHARACTERS: self.characters}
+        shapes = {
+            name: tuple(lengths[dimension] for dimension in column.dimensions if dimension != "run")
+            for name, column in self.computed.items()
+        }
+        return np.dtype([(name, column.kind, shapes[name]) for name, column in self.computed.items()])
+
+    def shape(self, name: str) -> tuple[int, ...]:
+        """Of a computed column."""
+        rows = (len(self.runs),) if "run" in self.computed[name].dimensions else ()
+        return (*rows, *self.row_type[name].shape)
+
+    @functools.cached_property
+    def known_rows(self) -> Mapping[str, Mapping[str, Any]]:
+        """By run, what the design says of it."""
+        columns = {name: list(values) for name, (_, values) in self.known.items()}
+        return {str(run): {name: values[i] for name, values in columns.items()} for i, run in enumerate(self.runs)}
+
+    @functools.cached_property
+    def row_of(self) -> Mapping[str, int]:
+        """By run, the number of its row."""
+        return {str(run): row for row, run in enumerate(self.runs)}
+
+
+def known_columns(rows: Sequence[Mapping[str, object]]) -> dict[str, tuple[Column, Any]]:
+    """`known` of a table with these rows, texts and numbers by name, all with the same names."""
+    columns: dict[str, tuple[Column, Any]] = {}
+    for name, (units, long_name) in DESIGN_COLUMNS.items():
+        if rows and name in rows[0]:
+            values: Any = [row[name] for row in rows]
+            is_text = isinstance(values[0], str)
+            columns[name] = Column(("run",), units, long_name), values if is_text else np.array(values, float)
+    return columns
+
+
+def scene_scales(scene: Scene, columns: Iterable[Column]) -> dict[str, tuple[Column, Any]]:
+    """The scales of a table with these columns over a scene's samples, as part of `known`."""
+    used = {"time"}.union(*(column.dimensions for column in columns))
+    values = scale_values(scene)
+    attributes: dict[str, Any] = {
+        "time": {"standard_name": "time"},
+        "coordinate": {"labels": scene.coordinate_labels},
+    }
+    return {
+        name: (Column((name,), scale.units, scale.long_name, attributes=attributes.get(name, {})), values[name])
+        for name, scale in SCALES.items()
+        if name in used
+    }
+
+
+def runs_table(asked: Sequence[RunRequest]) -> TableSpec:
+    """The table /runs of a file with these runs."""
+    outputs = dict.fromkeys(output for run in asked for output in run.scene.outputs)
+    known = known_columns([run.known for run in asked])
+    return TableSpec(RUNS, [run.label for run in asked], known, metric_columns(outputs), characters=_TEXT_LENGTH)
+
+
+def scene_table(runs: Sequence[RunRequest], arrays: Collection[str] | None = None) -> TableSpec:
+    """Return the table of the arrays of one scene's runs. arrays: names of those that are stored, by default all."""
+    scene = runs[0].scene
+    computed = {
+        name: column for run in runs for name, column in arrays_of(run).items() if arrays is None or name in arrays
+    }
+    attributes = {
+        "title": scene.title,
+        "figures": ", ".join(scene.figures),
+        "blades": len(scene.blades),
+        "scene_toml": scene.text,
+        "scene_hash": scene_hash(scene),
+        "NX_class": "NXdata",
+        "signal": "angles",
+        "axes": ["run", "time", "coordinate"],
+    }
+    scales = scene_scales(scene, computed.values())
+    repeated = {name: COLUMNS[name] for name in STATUS_COPIES}
+    return TableSpec(scene.name, [run.method for run in runs], scales, repeated | computed, attributes)
+
+
+def results_tables(asked: Sequence[RunRequest]) -> list[TableSpec]:
+    """All tables of a file with these runs: /runs, then the arrays of each scene."""
+    asked = sorted(asked, key=lambda run: row_order(run.label))
+    by_scene: dict[str, list[RunRequest]] = {}
+    for run in asked:
+        by_scene.setdefault(run.scene.name, []).append(run)
+    return [
+        runs_table(asked),
+        *(scene_table(runs) for runs in by_scene.values()),
+    ]
+
+
+def row_order(run: str) -> tuple[Any, ...]:
+    """Scenes in natural order; of each the reference, then methods in the order of the catalogue."""
+    scene, method = (run.removesuffix(f"/{REFERENCE}"), REFERENCE) if run.endswith(f"/{REFERENCE}") else (
+        "/".join(run.split("/")[:-2]), "/".join(run.split("/")[-2:])
+    )  # fmt: skip
+    names = [REFERENCE, *method_names()]
+    return natural_key(scene), names.index(method) if method in names else len(names), method

@@ -21,7 +21,7 @@ from rotor_mbs.errors import printable
 from rotor_mbs.solution.status import GOOD, STATUSES
 
 if TYPE_CHECKING:  # a sweep's workers load their code meanwhile
-    from rotor_mbs.runs.runner import Outcome
+    from rotor_mbs.runs.runner import RunOutcome
 
 # How a status is coloured on a terminal: well; open to doubt; anything else went wrong.
 _COLOURS = {"ok": "32", "inaccurate": "33", "unchecked": "33"}
@@ -67,7 +67,7 @@ class ProgressLine:
         if self._is_live:
             self._clear()
 
-    def __call__(self, done: int, total: int, outcome: Outcome) -> None:
+    def __call__(self, done: int, total: int, outcome: RunOutcome) -> None:
         if done == 1:
             self._stage_start, self._share_before = self._last, 0.0
         self._last = time.monotonic()

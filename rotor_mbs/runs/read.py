@@ -24,25 +24,22 @@ from numpy.typing import NDArray
 
 from rotor_mbs.errors import StoreError
 from rotor_mbs.methods.catalogue import PRINTED, REFERENCE, is_built_in, is_corrected
-from rotor_mbs.runs.design import FROZEN, MISSING, NUMBERS, POINT_COLUMNS, REPEATED, RUNS
-from rotor_mbs.runs.hdf5 import ATTEMPTS, Column, StoredGroup, read_content, reading
-from rotor_mbs.runs.output_files import locked
-from rotor_mbs.runs.table import (
-    Place,
-    Rows,
-    Table,
-    TableFile,
-    checksums,
-    chosen_group,
+from rotor_mbs.runs.arrays import chosen_group
+from rotor_mbs.runs.design import (
+    MISSING,
+    NUMBERS,
+    POINT_COLUMNS,
+    REFERENCE_ARRAYS,
+    RUNS,
+    STATUS_COPIES,
+    TableSpec,
     known_columns,
-    new_file,
-    new_group,
-    opened_tables,
-    parsed,
-    put,
-    put_attributes,
-    text_of,
 )
+from rotor_mbs.runs.hdf5 import ATTEMPTS, Column, StoredGroup, read_content, reading
+from rotor_mbs.runs.layout import new_file, new_group, put, put_attributes
+from rotor_mbs.runs.output_files import locked
+from rotor_mbs.runs.rows import RowLocation, Rows, checksums, text_of
+from rotor_mbs.runs.table import StoredTable, TableFile, opened_tables, parsed
 from rotor_mbs.runs.trailer import MODES, SWEEP, may_extend, read_trailer
 from rotor_mbs.runs.versions import machine, versions
 from rotor_mbs.scenario.catalogue import label_with_changes, moves_as_shipped, natural_order, shipped_scene
@@ -66,7 +63,7 @@ class StoredRun:
     method: str
     known: Mapping[str, Any]
     scales: Mapping[str, NDArray[Any]]
-    _place: Place
+    _place: RowLocation
     _file: IO[bytes]
     _verify: bool = True
 
@@ -100,7 +97,7 @@ class StoredRun:
         facts: dict[str, Any] = {"status": self.status, "settings": self.known["settings"]}
         facts |= {name: text_of(self._row[name]) for name in _TEXTS}
         for name, value in self._row.items():
-            if name in ("status", "crc32", *REPEATED.values(), *_TEXTS) or np.ndim(value):
+            if name in ("status", "crc32", *STATUS_COPIES.values(), *_TEXTS) or np.ndim(value):
                 continue
             number = value.item()
             if (isinstance(number, int) and number >= 0) or (isinstance(number, float) and number == number):
@@ -167,7 +164,7 @@ class StoredRun:
         rows = len(self.array("time")) if "time" in self else scene.samples
         if complete and rows != scene.samples:
             faults.append(f"{rows} of {scene.samples} samples" if rows else "no samples")
-        always_there = FROZEN if self.is_frozen else ("angles", "rates")
+        always_there = REFERENCE_ARRAYS if self.is_frozen else ("angles", "rates")
         may_omit_others = self.is_frozen or not is_built_in(self.method)
         expected: dict[str, tuple[int, ...]] = {"time": (rows,)}
         for quantity in quantities(scene.outputs):
@@ -402,10 +399,10 @@ class Record:
 # Tables of points
 
 
-def points_table(group: str, points: Sequence[Mapping[str, object]]) -> Table:
+def points_table(group: str, points: Sequence[Mapping[str, object]]) -> TableSpec:
     """Return the table `group` of these points, each with its known columns by name."""
     runs = [str(point["run"]) for point in points]
-    return Table(group, runs, known_columns(points), POINT_COLUMNS[group], characters=_MESSAGE_LENGTH)
+    return TableSpec(group, runs, known_columns(points), POINT_COLUMNS[group], characters=_MESSAGE_LENGTH)
 
 
 def read_records(path: Path, kind: str) -> list[Record]:
@@ -419,7 +416,7 @@ def read_records(path: Path, kind: str) -> list[Record]:
         return [_record(name, group) for name, group in read_content(path, [kind]).groups.items()]
 
 
-def _point_records(stored: Table) -> Iterator[Record]:
+def _point_records(stored: StoredTable) -> Iterator[Record]:
     """Yield the rows of a table that belong to one curve or one ladder."""
     kind, statuses, rows = stored.group, stored.statuses(), list(stored.known_rows.values())
     columns = stored.place().read(len(stored.runs)) | {

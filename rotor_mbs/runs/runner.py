@@ -1,7 +1,7 @@
 """The one loop that computes rows of a table: tasks to worker processes, their rows to the file.
 
-A run passes through `compute_tasks`, `compute`, `pool.run_in` and `TaskPool.submit` here, and in the worker process
-through `perform` and `RunTask.perform`.
+A run passes through `run_tasks_references_first`, `run_tasks`, `pool.run_in` and `TaskPool.submit` here, and in the
+worker process through `run_in_worker` and `RunTask.perform`.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ import numpy as np
 from rotor_mbs.errors import InputError, MethodRefusal, StoreError
 from rotor_mbs.methods.catalogue import with_method_files
 from rotor_mbs.processes.pool import TaskEnd, TaskPool, run_in
-from rotor_mbs.runs.table import Place, Rows
+from rotor_mbs.runs.rows import RowLocation, Rows
 from rotor_mbs.solution.status import REFUSED
 
 # Columns that a worker returns of rows that it has written.
@@ -25,7 +25,7 @@ _REPORTED = ("status", "message", "run_time_s")
 
 
 @dataclass(frozen=True)
-class Outcome:
+class RunOutcome:
     """A run, or other rows of a study, that this call computed or tried to.
 
     status: of a run; "measured" for other rows; REFUSED where the method refused the scene. seconds: run time; NaN
@@ -43,10 +43,10 @@ class Outcome:
     share: float = 0.0
 
 
-OnProgress = Callable[[int, int, Outcome], None]
+OnProgress = Callable[[int, int, RunOutcome], None]
 
 
-def ignore_progress(_done: int, _total: int, _outcome: Outcome) -> None:
+def ignore_progress(_done: int, _total: int, _outcome: RunOutcome) -> None:
     """Do nothing, in calls that report no progress."""
 
 
@@ -60,8 +60,8 @@ class Task(ABC):
 
     label: str
     method: str
-    place: Place
-    reference: Place | None = None
+    place: RowLocation
+    reference: RowLocation | None = None
     kill_after_s: float = float("inf")
     work: float = 1.0
 
@@ -84,15 +84,15 @@ class Task(ABC):
         it is tried again."""
         return None
 
-    def outcome(self, rows: Rows) -> Outcome:
-        """Return how it ended, from what `compute` gives of its rows."""
-        return Outcome(self.label, self.method, "measured", f"{len(rows['status'])} points")
+    def outcome(self, rows: Rows) -> RunOutcome:
+        """Return how it ended, from what `run_tasks` gives of its rows."""
+        return RunOutcome(self.label, self.method, "measured", f"{len(rows['status'])} points")
 
 
 T = TypeVar("T", bound=Task)
 
 
-def compute(pool: TaskPool, tasks: Iterable[T]) -> Iterator[TaskEnd[T, Rows]]:
+def run_tasks(pool: TaskPool, tasks: Iterable[T]) -> Iterator[TaskEnd[T, Rows]]:
     """Compute tasks in a pool that is open, and store their rows: by the worker where it sees the file.
 
     However the loop ends, the rows of what has ended are in the file. The `value` of a finished task has at least the
@@ -100,7 +100,7 @@ def compute(pool: TaskPool, tasks: Iterable[T]) -> Iterator[TaskEnd[T, Rows]]:
     None where nothing is stored, and its failure and message say why: REFUSED where the method refused the scene.
     Raises what a task raised of InputError and StoreError.
     """
-    work = with_method_files(partial(perform, stores=pool.shares_disk))
+    work = with_method_files(partial(run_in_worker, stores=pool.shares_disk))
     for end in run_in(pool, work, tasks, lambda task: task.kill_after_s, lambda task: task.split()):
         task = end.task
         if isinstance(end.error, InputError | StoreError):
@@ -120,7 +120,7 @@ def compute(pool: TaskPool, tasks: Iterable[T]) -> Iterator[TaskEnd[T, Rows]]:
         yield TaskEnd(task, rows, end.failure, end.message)
 
 
-def perform(task: Task, *, stores: bool) -> Rows:
+def run_in_worker(task: Task, *, stores: bool) -> Rows:
     """Compute the rows of a task in a worker process, and return them; where it `stores` them, as
     it sees the file, only what is reported of them."""
     rows = task.perform()
@@ -130,26 +130,28 @@ def perform(task: Task, *, stores: bool) -> Rows:
     return {name: np.asarray(rows[name]) for name in _REPORTED if name in rows}
 
 
-def compute_tasks(tasks: Sequence[Task], pool: TaskPool, on_progress: OnProgress = ignore_progress) -> list[Outcome]:
-    """Compute tasks as `compute` does, references first; then the other rows whose reference is stored, slow and fast
+def run_tasks_references_first(
+    tasks: Sequence[Task], pool: TaskPool, on_progress: OnProgress = ignore_progress
+) -> list[RunOutcome]:
+    """Compute tasks as `run_tasks` does, references first; then the other rows whose reference is stored, slow and fast
     ones in turn.
 
     Returns what became of each task, in the order in which they ended.
     """
-    made: list[Outcome] = []
+    made: list[RunOutcome] = []
     total, done = sum(task.work for task in tasks), 0.0
 
     def note(end: TaskEnd[Task, Rows]) -> None:
         nonlocal done
         done += end.task.work
         if end.value is None:
-            outcome = Outcome(end.task.label, end.task.method, end.failure, end.message, is_stored=False)
+            outcome = RunOutcome(end.task.label, end.task.method, end.failure, end.message, is_stored=False)
         else:
             outcome = end.task.outcome(end.value)
         made.append(replace(outcome, share=done / total))
         on_progress(len(made), len(tasks), made[-1])
 
-    for end in compute(pool, [task for task in tasks if task.reference is None]):
+    for end in run_tasks(pool, [task for task in tasks if task.reference is None]):
         note(end)
     waiting = [task for task in tasks if task.reference is not None]
     ready = [task for task in waiting if task.reference is not None and task.reference.is_stored]
@@ -158,7 +160,7 @@ def compute_tasks(tasks: Sequence[Task], pool: TaskPool, on_progress: OnProgress
     ready.sort(key=lambda task: -task.work)
     quarter, count = len(ready) // 4, len(ready)
     turns = [task for pair in zip(ready[:quarter], ready[count - quarter :], strict=True) for task in pair]
-    for end in compute(pool, [*turns, *ready[quarter : count - quarter]]):
+    for end in run_tasks(pool, [*turns, *ready[quarter : count - quarter]]):
         note(end)
     for task in waiting:
         if task not in ready:

@@ -23,18 +23,11 @@ from numpy.typing import NDArray
 
 from rotor_mbs.errors import InputError, StoreError, shown_value
 from rotor_mbs.methods.catalogue import find_method
-from rotor_mbs.runs.design import MISSING, columns_in, flags
+from rotor_mbs.runs.design import MISSING, TableSpec, columns_in, flags, scene_scales
 from rotor_mbs.runs.hdf5 import Column, reading
+from rotor_mbs.runs.layout import create_file
 from rotor_mbs.runs.output_files import locked
-from rotor_mbs.runs.table import (
-    IDENTITY,
-    Table,
-    TableFile,
-    laid_out,
-    parsed,
-    require_texts,
-    scene_scales,
-)
+from rotor_mbs.runs.table import IDENTITY, StoredTable, TableFile, parsed, require_texts
 from rotor_mbs.runs.trailer import SWEEP, may_extend
 from rotor_mbs.runs.versions import row_versions
 from rotor_mbs.scenario.scene import Scene, parse_scene
@@ -64,7 +57,7 @@ def code_of_method(method: str) -> int:
     return zlib.crc32(json.dumps(row_versions(find_method(method)), sort_keys=True).encode())
 
 
-def sweep_table(sweep: Sweep, methods: Sequence[str], numbers: range) -> Table:
+def sweep_table(sweep: Sweep, methods: Sequence[str], numbers: range) -> TableSpec:
     """Return the table of the runs `numbers` of a sweep; run r is row r mod rows of the design, by method r div
     rows."""
     runs, rows, options = np.arange(numbers.start, numbers.stop), sweep.design.count, sweep.design
@@ -89,13 +82,13 @@ def sweep_table(sweep: Sweep, methods: Sequence[str], numbers: range) -> Table:
     if options.error_growth:  # the variational equations cost a hundred times the run itself
         computed = COLUMNS_OF_A_RUN | columns_in("sweep_growth") | trajectories
     known = scene_scales(sweep.base, trajectories.values()) | known
-    return Table("", runs, known, computed, characters=MESSAGE_LENGTH)
+    return TableSpec("", runs, known, computed, characters=MESSAGE_LENGTH)
 
 
 @contextmanager
 def open_sweep(
-    output: Path, table: Table, attributes: Mapping[str, object], time_limit_s: float = 0.0, *, fresh: bool = False
-) -> Iterator[tuple[Table, NDArray[np.int8]]]:
+    output: Path, table: TableSpec, attributes: Mapping[str, object], time_limit_s: float = 0.0, *, fresh: bool = False
+) -> Iterator[tuple[StoredTable, NDArray[np.int8]]]:
     """Open the file `output`, laid out where it is not there, which no other process writes in the block: its table,
     and (runs,) their statuses, MISSING where they are to be computed.
 
@@ -107,7 +100,7 @@ def open_sweep(
         path = output.resolve() if output.is_symlink() else output  # a link stays one
         is_new = not may_extend(path, SWEEP)
         if is_new:
-            with laid_out(path, [table], attributes):
+            with create_file(path, [table], attributes):
                 pass
         file = TableFile(path, [""])
         if file.attributes.get(IDENTITY) != attributes[IDENTITY]:

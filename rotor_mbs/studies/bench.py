@@ -28,11 +28,13 @@ from rotor_mbs.methods.base import STEP, TOLERANCE, Ladder, Method
 from rotor_mbs.methods.time_limit import OutOfTimeError, caller_signals, time_limit
 from rotor_mbs.processes import last_core
 from rotor_mbs.processes.pool import WorkerPool, run_in
-from rotor_mbs.runs.design import Asked
+from rotor_mbs.runs.design import RunRequest, TableSpec
+from rotor_mbs.runs.merge import fit_file_to_request
 from rotor_mbs.runs.output_files import locked
 from rotor_mbs.runs.read import Record, points_table
-from rotor_mbs.runs.runner import OnProgress, Outcome, Task, ignore_progress
-from rotor_mbs.runs.table import Place, Rows, Table, TableFile, extend_file
+from rotor_mbs.runs.rows import RowLocation, Rows
+from rotor_mbs.runs.runner import OnProgress, RunOutcome, Task, ignore_progress
+from rotor_mbs.runs.table import TableFile
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.metrics import horizon, horizon_samples
 from rotor_mbs.solution.status import COMPLETE, code_of
@@ -99,7 +101,7 @@ class Curve:
         """By which its rows are found: table, scene, curve."""
         return self.table, self.scene.name, self.name
 
-    def places(self, file: TableFile) -> list[Place]:
+    def places(self, file: TableFile) -> list[RowLocation]:
         """Where its rows are."""
         return [file.place(str(point.known["run"]), self.table) for point in self.points]
 
@@ -110,7 +112,7 @@ class Curve:
 def curve_of(scene: Scene, method: Method, ladder: Ladder, options: Mapping[str, object]) -> Curve:
     """Return the curve of a method's ladder. options: of the study, stored with each point, with facts of the method
     that a page may want."""
-    name, (short, _) = method.name + ladder.variant, thinned(scene)
+    name, (short, _) = method.name + ladder.variant, coarsened(scene)
     facts = {
         **options,
         "duration_s": scene.duration,
@@ -126,7 +128,7 @@ def curve_of(scene: Scene, method: Method, ladder: Ladder, options: Mapping[str,
     points = []
     for setting, chosen in ladder.settings_by_value(short.duration / (short.samples - 1)).items():
         try:
-            known = Asked(scene, method.name, chosen).known | of_all
+            known = RunRequest(scene, method.name, chosen).known | of_all
         except InputError:  # a step that is too small for the scene's duration; all finer ones are
             break
         known |= {kind: setting if kind == ladder.kind else math.nan for kind in (STEP, TOLERANCE)}
@@ -244,7 +246,9 @@ def statistics(times: Sequence[float]) -> dict[str, float]:
     }
 
 
-def conduct(ladders: Sequence[Sequence[PointTimer]], budget_s: float, repeats: int, clock: Callable[[], float]) -> None:
+def time_in_rounds(
+    ladders: Sequence[Sequence[PointTimer]], budget_s: float, repeats: int, clock: Callable[[], float]
+) -> None:
     """Warm up every point, the cheapest next rung of any ladder first, then time them in rounds.
 
     Parameters
@@ -257,7 +261,7 @@ def conduct(ladders: Sequence[Sequence[PointTimer]], budget_s: float, repeats: i
     _warm_all(ladders, budget_s, clock)
     points = [point for ladder in ladders for point in ladder if point.is_repeatable]
     wanted = [repeats if point.warm_s <= LONG_RUN_S else min(repeats, LONG_REPEATS) for point in points]
-    allowed = allot([max(point.warm_s, 1e-9) for point in points], wanted, budget_s - (clock() - start))
+    allowed = allocate_repeats([max(point.warm_s, 1e-9) for point in points], wanted, budget_s - (clock() - start))
     for round_ in range(max(allowed, default=0)):
         for point, count in zip(points, allowed, strict=True):
             if round_ and clock() - start > budget_s:  # the machine has become slower
@@ -288,7 +292,7 @@ def _warm_all(ladders: Sequence[Sequence[PointTimer]], budget_s: float, clock: C
             heapq.heappush(waiting, (last * min(max(growth, 2.0), 10.0), rung + 1, number))
 
 
-def allot(seconds: Sequence[float], wanted: Sequence[int], budget_s: float) -> list[int]:
+def allocate_repeats(seconds: Sequence[float], wanted: Sequence[int], budget_s: float) -> list[int]:
     """Repeats of each point: all it wants or what an equal share of time allows, and one in any case.
 
     What points that want less than their share leave is shared by the others.
@@ -310,30 +314,30 @@ def measure(
     For a process that does nothing else: engines are loaded beforehand, which is part of no run's time, and the garbage
     collector is off.
 
-    scene, reference : as they are benched (`prepared`).
+    scene, reference : as they are benched (`bench_inputs`).
     repeats, budget_s : timed runs of a point at most, and s for all of them.
     """
     for method in dict.fromkeys(curve.method for curve in curves):
         catalogue.find_method(method).import_engine()
     gc.disable()
     timers = [[PointTimer(point, scene, reference, _RUN_LIMIT_S) for point in curve.points] for curve in curves]
-    conduct(timers, budget_s, repeats, time.perf_counter)
+    time_in_rounds(timers, budget_s, repeats, time.perf_counter)
     return [[timer.row() for timer in own] for own in timers]
 
 
-def prepared(scene: Scene, place: Place) -> tuple[Scene, Trajectory]:
+def bench_inputs(scene: Scene, place: RowLocation) -> tuple[Scene, Trajectory]:
     """The scene as it is benched, without loads, and its reference, which is at `place`, at the same samples. Raises
     InputError where there is none."""
     reference = read_reference(place, scene)
     if reference is None or len(reference.time) < scene.samples:
         raise InputError(f"{scene.name}: no usable reference (it does not reach the end); a bench needs one")
-    short, k = thinned(scene)
+    short, k = coarsened(scene)
     short = replace(short, outputs=tuple(name for name in short.outputs if name != "loads"))
     arrays = {name: values[::k] for name, values in reference.quantities.items()}
     return short, Trajectory(reference.time[::k], reference.angles[::k], reference.rates[::k], **arrays)
 
 
-def thinned(scene: Scene) -> tuple[Scene, int]:
+def coarsened(scene: Scene) -> tuple[Scene, int]:
     """The scene with every k-th sample, and k: the finest thinning with at most 100 intervals, or none."""
     intervals = scene.samples - 1
     k = next((k for k in range(1, intervals + 1) if intervals % k == 0 and intervals // k <= _MOST_INTERVALS), 1)
@@ -345,7 +349,7 @@ def thinned(scene: Scene) -> tuple[Scene, int]:
 # Curves in a results file
 
 
-def curve_tables(curves: Sequence[Curve]) -> list[Table]:
+def curve_tables(curves: Sequence[Curve]) -> list[TableSpec]:
     """The table of the points of these curves, which are all of one; [] of none."""
     return [points_table(curves[0].table, [p.known for curve in curves for p in curve.points])] if curves else []
 
@@ -369,7 +373,7 @@ class CurveTask(Task):
         scene, reference = curve.scene, None
         if curve.table == BENCH:
             assert self.reference is not None  # every curve of a bench has one
-            scene, reference = prepared(scene, self.reference)
+            scene, reference = bench_inputs(scene, self.reference)
             facts = facts_of(scene, reference)
         elif self.reference is not None:
             reference = read_reference(self.reference, scene)
@@ -420,7 +424,7 @@ def run_bench(
     budget_s: float,
     workers: int,
     on_progress: OnProgress = ignore_progress,
-) -> tuple[list[Outcome], list[catalogue.Refusal]]:
+) -> tuple[list[RunOutcome], list[catalogue.Refusal]]:
     """Measure the curves of every scene into the results file `output`; what it has already is kept.
 
     Parameters
@@ -432,7 +436,7 @@ def run_bench(
 
     Returns
     -------
-    list of Outcome
+    list of RunOutcome
         The curves measured by this call.
     list of Refusal
         What was left out: methods that cannot represent a scene, and scenes without a usable reference.
@@ -449,7 +453,7 @@ def run_bench(
         none: Mapping[str, Sequence[str]] = {scene.name: () for scene in scenes}
         report = run_scenes(scenes, none, output, workers=workers, timeout_s=_REFERENCE_LIMIT_S)
         failed = {run.label.partition(" ")[0]: run for run in (*report.failures, *report.not_computed)}
-        changed = {run.label.partition(" ")[0] for run in report.made}  # whose reference is another one now
+        changed = {run.label.partition(" ")[0] for run in report.computed}  # whose reference is another one now
         ready: dict[str, tuple[Scene, Trajectory]] = {}
         curves: list[Curve] = []
         refused: list[catalogue.Refusal] = []
@@ -463,7 +467,7 @@ def run_bench(
                 continue
             place = TableFile(output).place(f"{scene.name}/{catalogue.REFERENCE}")
             try:
-                ready[scene.name] = prepared(scene, place)
+                ready[scene.name] = bench_inputs(scene, place)
             except InputError as exc:
                 reason = str(exc).removeprefix(f"{scene.name}: ")
                 refused.append(catalogue.Refusal(scene.name, "", reason))
@@ -473,9 +477,9 @@ def run_bench(
             refused += others
         if not curves:
             raise InputError(map(str, refused))
-        file = extend_file(output, curve_tables(curves), [curve.key for curve in curves])
+        file = fit_file_to_request(output, curve_tables(curves), [curve.key for curve in curves])
         missing = [curve for curve in curves if curve.scene.name in changed or not curve.is_stored(file)]
-        made: list[Outcome] = []
+        made: list[RunOutcome] = []
         for scene in scenes:
             own = [curve for curve in missing if curve.scene.name == scene.name]
             for outcome in _measure_scene(file, own, *ready[scene.name], repeats, budget_s) if own else ():
@@ -486,7 +490,7 @@ def run_bench(
 
 def _measure_scene(
     file: TableFile, curves: Sequence[Curve], short: Scene, reference: Trajectory, repeats: int, budget_s: float
-) -> Iterator[Outcome]:
+) -> Iterator[RunOutcome]:
     """Time, judge and store every point of the curves of one scene."""
     core = last_core()
     facts = facts_of(short, reference) | {"pinned_core": -1 if core is None else core}
@@ -500,7 +504,7 @@ def _measure_scene(
         for end in run_in(pool, catalogue.with_method_files(work), [curves], limit_s, split):
             for i, curve in enumerate(end.task):
                 if end.value is None:
-                    yield Outcome(curve.label, curve.method, end.failure, end.message, is_stored=False)
+                    yield RunOutcome(curve.label, curve.method, end.failure, end.message, is_stored=False)
                     continue
                 place, rows = curve.places(file)[0], end.value[i]
                 place.write(rows_of_curve(place, curve, rows, facts))
@@ -508,16 +512,18 @@ def _measure_scene(
                 ok, inaccurate, left_out = (statuses.count(status) for status in ("ok", "inaccurate", "left_out"))
                 failed = len(statuses) - ok - inaccurate - left_out
                 counts = f"{ok} ok, {inaccurate} inaccurate, {failed} failed, {left_out} omitted"
-                yield Outcome(curve.label, curve.method, "measured", f"{len(statuses)} points: {counts}")
+                yield RunOutcome(curve.label, curve.method, "measured", f"{len(statuses)} points: {counts}")
 
 
-def rows_of_curve(place: Place, curve: Curve, points: Sequence[Mapping[str, Any]], facts: Mapping[str, object]) -> Rows:
+def rows_of_curve(
+    place: RowLocation, curve: Curve, points: Sequence[Mapping[str, Any]], facts: Mapping[str, object]
+) -> Rows:
     """Return the rows of a curve, with its order of convergence, or the step for its target.
 
     facts: columns that all its points have in common.
     """
     facts = {**facts, "repeatable": int(all(point.get("same", True) for point in points))}
-    each = [place.rows_of({**point, **facts, "left_out": int(point["status"] == "left_out")}) for point in points]
+    each = [place.encode({**point, **facts, "left_out": int(point["status"] == "left_out")}) for point in points]
     rows = {name: np.concatenate([row[name] for row in each]) for name in each[0]}
     measured = Record(curve.table, curve.scene.name, curve.name, arrays=rows)
     if curve.target:

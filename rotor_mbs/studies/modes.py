@@ -23,7 +23,7 @@ from rotor_mbs.methods.time_limit import caller_signals
 from rotor_mbs.processes.pool import local_pool, run_in
 from rotor_mbs.runs.output_files import locked
 from rotor_mbs.runs.read import write_records
-from rotor_mbs.runs.runner import OnProgress, Outcome, ignore_progress
+from rotor_mbs.runs.runner import OnProgress, RunOutcome, ignore_progress
 from rotor_mbs.runs.trailer import MODES, may_extend
 from rotor_mbs.scenario.keys import LARGEST, SMALLEST
 from rotor_mbs.scenario.scene import Scene, scene_hash
@@ -53,7 +53,7 @@ def modes_of_scenes(
     workers: int,
     timeout_s: float,
     on_progress: OnProgress = ignore_progress,
-) -> list[Outcome]:
+) -> list[RunOutcome]:
     """Compute the modes of every scene into the file `output`; those that it has of other scenes are kept.
 
     Parameters
@@ -74,7 +74,7 @@ def modes_of_scenes(
 
     Returns
     -------
-    list of Outcome
+    list of RunOutcome
         One per scene, in the order in which they ended.
 
     Raises
@@ -88,7 +88,7 @@ def modes_of_scenes(
         if not any(method.linearize for method in methods() if method.model == model):
             raise InputError(f"{name}: its model has no linearization; allowed: a model with `linearize`")
     speeds = increasing_speeds(speeds)
-    made: list[Outcome] = []
+    made: list[RunOutcome] = []
     computed: list[modal.SceneModes] = []
     with locked(output):
         may_extend(output, MODES)  # before anything is computed
@@ -98,17 +98,17 @@ def modes_of_scenes(
                 label, share = f"{end.task.name} modes", done / len(scenes)
                 if isinstance(end.error, RotorError):
                     reason = str(end.error).removeprefix(f"{end.task.name}: ")
-                    made.append(Outcome(label, "", REFUSED, reason, is_stored=False, share=share))
+                    made.append(RunOutcome(label, "", REFUSED, reason, is_stored=False, share=share))
                     continue  # the reason is told once, at the end
                 if end.value is None:
-                    outcome = Outcome(label, "", end.failure, end.message, is_stored=False, share=share)
+                    outcome = RunOutcome(label, "", end.failure, end.message, is_stored=False, share=share)
                 else:
                     computed.append(end.value)
                     status, message = "ok", ""
                     if not end.value.agrees:
                         differ = f"models differ by up to {end.value.disagreement:.1e} of the largest eigenvalue"
                         status, message = "inaccurate", "; ".join(end.value.faults) or differ
-                    outcome = Outcome(label, "", status, message, share=share)
+                    outcome = RunOutcome(label, "", status, message, share=share)
                 made.append(outcome)
                 on_progress(done, len(scenes), outcome)
         if computed:

@@ -15,15 +15,16 @@ from rotor_mbs.analysis.published import claims, finding
 from rotor_mbs.analysis.text_tables import TextTable, method_table
 from rotor_mbs.methods.catalogue import REFERENCE, Refusal, default_methods, errata_methods, ladders, supporting_methods
 from rotor_mbs.processes.pool import Workers, pool_of
+from rotor_mbs.runs.design import results_tables
+from rotor_mbs.runs.merge import fit_file_to_request
 from rotor_mbs.runs.output_files import locked
 from rotor_mbs.runs.read import open_results
-from rotor_mbs.runs.runner import OnProgress, compute_tasks, ignore_progress
-from rotor_mbs.runs.table import extend_file, results_tables
+from rotor_mbs.runs.runner import OnProgress, ignore_progress, run_tasks_references_first
 from rotor_mbs.runs.versions import versions
 from rotor_mbs.scenario.catalogue import REFERENCES, SCENARIOS, find_scenes
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.studies.bench import Curve, curve_of, curve_tables, curve_tasks
-from rotor_mbs.studies.run import RunReport, asked_runs, missing_runs
+from rotor_mbs.studies.run import BatchReport, asked_runs, missing_runs
 
 # The scene whose error and run time are measured by all methods: the paper's own crest, and a horizon of 6 s.
 BENCHED = "paper/fig11"
@@ -32,7 +33,7 @@ _LONGEST_S = 0.25  # a run longer than this is the last of its curve: the next o
 
 def reproduce(
     output: Path, *, workers: Workers, timeout_s: float, on_progress: OnProgress = ignore_progress
-) -> tuple[RunReport, list[Refusal]]:
+) -> tuple[BatchReport, list[Refusal]]:
     """Compute the default set of runs and the curves into a results file; what it has already is kept.
 
     Parameters
@@ -44,7 +45,7 @@ def reproduce(
 
     Returns
     -------
-    RunReport
+    BatchReport
         The runs of this call, and those that were stored.
     list of Refusal
         Runs that were left out.
@@ -63,14 +64,16 @@ def reproduce(
     curves = short_curves(benched)
     asked = asked_runs(scenes, methods, {})
     with locked(output), pool_of(workers) as pool:
-        file = extend_file(output, [*results_tables(asked), *curve_tables(curves)], [curve.key for curve in curves])
-        runs, kept = missing_runs(file, asked, timeout_s)
+        file = fit_file_to_request(
+            output, [*results_tables(asked), *curve_tables(curves)], [curve.key for curve in curves]
+        )
+        runs, stored = missing_runs(file, asked, timeout_s)
         labels = {task.label for task in runs}
         is_new = f"{benched.name} {REFERENCE}" in labels
         unmeasured = [curve for curve in curves if is_new or not curve.is_stored(file)]
         of_curves = curve_tasks(file, unmeasured, 1.2 * timeout_s + 10.0, _LONGEST_S)
-        made = compute_tasks([*runs, *of_curves], pool, on_progress)
-        return RunReport([outcome for outcome in made if outcome.label in labels], kept), refused
+        made = run_tasks_references_first([*runs, *of_curves], pool, on_progress)
+        return BatchReport([outcome for outcome in made if outcome.label in labels], stored), refused
 
 
 def made_from(results: Path, timeout_s: float) -> str:

@@ -25,10 +25,12 @@ from rotor_mbs.methods.catalogue import (
 from rotor_mbs.methods.solve import solve
 from rotor_mbs.methods.time_limit import OutOfTimeError, caller_signals, time_limit
 from rotor_mbs.processes.pool import Workers, pool_of
-from rotor_mbs.runs.design import MISSING, REPEATED, Asked
+from rotor_mbs.runs.design import MISSING, STATUS_COPIES, RunRequest, results_tables
+from rotor_mbs.runs.merge import fit_file_to_request
 from rotor_mbs.runs.output_files import locked
-from rotor_mbs.runs.runner import OnProgress, Outcome, Task, compute_tasks, ignore_progress
-from rotor_mbs.runs.table import Place, Rows, TableFile, extend_file, results_tables, row_of_run, text_of
+from rotor_mbs.runs.rows import RowLocation, Rows, row_of_run, text_of
+from rotor_mbs.runs.runner import OnProgress, RunOutcome, Task, ignore_progress, run_tasks_references_first
+from rotor_mbs.runs.table import TableFile
 from rotor_mbs.scenario.scene import Scene, scene_hash
 from rotor_mbs.solution.status import STATUSES
 from rotor_mbs.solution.trajectory import Integration, Solution, Trajectory
@@ -45,7 +47,7 @@ _FIXED_WORK = 3.0  # building, judging, storing
 class RunTask(Task):
     """A run on its way to a worker process, which ends itself after `time_limit_s`."""
 
-    asked: Asked
+    asked: RunRequest
     time_limit_s: float
 
     def failed(self, status: str, message: str) -> Rows:
@@ -75,10 +77,10 @@ class RunTask(Task):
         limit = self.time_limit_s if run.status == "timed_out" and shipped is None else np.nan
         return row_of_run(run, self.place, {"false_success": int(false_success), "time_limit_s": limit})
 
-    def outcome(self, rows: Rows) -> Outcome:
+    def outcome(self, rows: Rows) -> RunOutcome:
         seconds = float("nan") if self.asked.is_shipped else float(rows["run_time_s"][0])
         status, message = STATUSES[int(rows["status"][0])], text_of(rows["message"][0])
-        return Outcome(self.label, self.method, status, message, seconds=seconds, is_shipped=self.asked.is_shipped)
+        return RunOutcome(self.label, self.method, status, message, seconds=seconds, is_shipped=self.asked.is_shipped)
 
 
 def work_of(scene: Scene, method: str) -> float:
@@ -87,30 +89,30 @@ def work_of(scene: Scene, method: str) -> float:
 
 
 @dataclass(frozen=True)
-class RunReport:
+class BatchReport:
     """The outcomes of a list of runs: of those that this call computed, and of those that were stored already."""
 
-    made: list[Outcome]
-    kept: list[Outcome]
+    computed: list[RunOutcome]
+    stored: list[RunOutcome]
 
     @property
-    def failures(self) -> list[Outcome]:
+    def failures(self) -> list[RunOutcome]:
         """Runs that should have succeeded and did not. How far the printed equations get is data, not a failure."""
-        return [run for run in self.made if run.is_stored and run.status != "ok" and is_corrected(run.method)]
+        return [run for run in self.computed if run.is_stored and run.status != "ok" and is_corrected(run.method)]
 
     @property
     def stored_failures(self) -> list[str]:
         """A line for each run that was stored already, should have succeeded and did not."""
         return [
             f"{run.label} {run.status}: {run.message}"
-            for run in self.kept
+            for run in self.stored
             if run.status != "ok" and is_corrected(run.method)
         ]
 
     @property
-    def not_computed(self) -> list[Outcome]:
+    def not_computed(self) -> list[RunOutcome]:
         """Runs whose process died or could not start; nothing is stored, the same call tries them again."""
-        return [run for run in self.made if not run.is_stored]
+        return [run for run in self.computed if not run.is_stored]
 
 
 @caller_signals()
@@ -124,7 +126,7 @@ def run_scenes(
     settings: Mapping[str, object] | None = None,
     use_frozen: bool = True,
     on_progress: OnProgress = ignore_progress,
-) -> RunReport:
+) -> BatchReport:
     """Compute every scene's reference and runs into the results file `output`; what it has already is kept.
 
     Parameters
@@ -142,9 +144,9 @@ def run_scenes(
     """
     asked = asked_runs(scenes, methods, settings or {}, use_frozen=use_frozen)
     with locked(output), pool_of(workers) as pool:
-        file = extend_file(output, results_tables(asked))
-        tasks, kept = missing_runs(file, asked, timeout_s)
-        return RunReport(compute_tasks(tasks, pool, on_progress), kept)
+        file = fit_file_to_request(output, results_tables(asked))
+        tasks, stored = missing_runs(file, asked, timeout_s)
+        return BatchReport(run_tasks_references_first(tasks, pool, on_progress), stored)
 
 
 def asked_runs(
@@ -153,19 +155,21 @@ def asked_runs(
     settings: Mapping[str, object],
     *,
     use_frozen: bool = True,
-) -> list[Asked]:
+) -> list[RunRequest]:
     """Return the rows of these scenes by their `methods`, the reference of each scene first: the shipped one, where
     there is one and it may be used, or one to be computed. Raises InputError."""
     of_call = settings_for(list(dict.fromkeys(name for scene in scenes for name in methods[scene.name])), settings)
-    asked: list[Asked] = []
+    asked: list[RunRequest] = []
     for scene in scenes:
-        runs = [Asked(scene, name, own_settings(scene, name) | of_call[name]) for name in methods[scene.name]]
+        runs = [RunRequest(scene, name, own_settings(scene, name) | of_call[name]) for name in methods[scene.name]]
         digest = scene_hash(scene)
-        asked += [Asked(scene, REFERENCE, versions=shipped_versions(digest) if use_frozen else None), *runs]
+        asked += [RunRequest(scene, REFERENCE, versions=shipped_versions(digest) if use_frozen else None), *runs]
     return asked
 
 
-def missing_runs(file: TableFile, asked: Sequence[Asked], timeout_s: float) -> tuple[list[RunTask], list[Outcome]]:
+def missing_runs(
+    file: TableFile, asked: Sequence[RunRequest], timeout_s: float
+) -> tuple[list[RunTask], list[RunOutcome]]:
     """Decide which runs are computed, and mark their rows in the file as missing.
 
     Parameters
@@ -181,8 +185,8 @@ def missing_runs(file: TableFile, asked: Sequence[Asked], timeout_s: float) -> t
     stored : outcomes of the others, which stay as they are.
     """
     tasks: list[RunTask] = []
-    stored: list[Outcome] = []
-    references: dict[str, Place] = {}  # by label
+    stored: list[RunOutcome] = []
+    references: dict[str, RowLocation] = {}  # by label
     new_references = set[str]()
     for run in asked:
         place = file.place(run.label)
@@ -200,9 +204,9 @@ def missing_runs(file: TableFile, asked: Sequence[Asked], timeout_s: float) -> t
                 new_references.add(run.label)
         if not is_missing:
             message = text_of(row["message"][0])
-            stored.append(Outcome(f"{run.scene.name} {run.method}", run.method, status, message))
+            stored.append(RunOutcome(f"{run.scene.name} {run.method}", run.method, status, message))
             continue
-        if (row["status"][0], row[REPEATED["status"]][0]) != (MISSING, MISSING):
+        if (row["status"][0], row[STATUS_COPIES["status"]][0]) != (MISSING, MISSING):
             place.mark_missing([0])
         tasks.append(
             RunTask(

@@ -21,11 +21,11 @@ from rotor_mbs.methods.catalogue import (
 )
 from rotor_mbs.methods.time_limit import caller_signals
 from rotor_mbs.processes.pool import Workers, pool_of
-from rotor_mbs.runs.design import Asked
+from rotor_mbs.runs.design import RunRequest
+from rotor_mbs.runs.merge import fit_file_to_request
 from rotor_mbs.runs.output_files import locked
 from rotor_mbs.runs.read import open_results, read_records
-from rotor_mbs.runs.runner import OnProgress, Outcome, compute_tasks, ignore_progress
-from rotor_mbs.runs.table import extend_file
+from rotor_mbs.runs.runner import OnProgress, RunOutcome, ignore_progress, run_tasks_references_first
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.studies.bench import Curve, Point, curve_tables, curve_tasks
 from rotor_mbs.studies.run import run_scenes
@@ -144,7 +144,7 @@ def run_suite(
     methods: Sequence[str] = (),
     settings: Mapping[str, object] | None = None,
     on_progress: OnProgress = ignore_progress,
-) -> tuple[list[Outcome], list[Refusal]]:
+) -> tuple[list[RunOutcome], list[Refusal]]:
     """Compute the suite on some scenes into a results file.
 
     What the file has already is kept; records of these scenes that are no longer wanted are dropped.
@@ -161,7 +161,7 @@ def run_suite(
 
     Returns
     -------
-    list of Outcome
+    list of RunOutcome
         What this call computed, or tried to.
     list of Refusal
         Runs that were left out.
@@ -183,14 +183,14 @@ def run_suite(
         raise InputError(map(str, refused))
     scenes = [scene for scene in scenes if asked[scene.name]]
     patient = {name: [method for method in able if method == _PATIENT_METHOD] for name, able in asked.items()}
-    made: list[Outcome] = []
+    made: list[RunOutcome] = []
     with pool_of(workers) as pool:
         for chosen, limit_s in ((patient, max(timeout_s, _PATIENT_S)), (asked, timeout_s)):
             own = settings_of_any([name for able in chosen.values() for name in able], settings or {})
             report = run_scenes(
                 scenes, chosen, output, workers=pool, timeout_s=limit_s, settings=own, on_progress=on_progress
             )
-            made += report.made
+            made += report.computed
         return made + complete_ladders(scenes, asked, output, pool, on_progress), refused
 
 
@@ -200,7 +200,7 @@ def complete_ladders(
     output: Path,
     workers: Workers,
     on_progress: OnProgress = ignore_progress,
-) -> list[Outcome]:
+) -> list[RunOutcome]:
     """Complete the ladders of steps of these scenes, where the runs in `output` call for them."""
     by_name = {scene.name: scene for scene in scenes}
     # Where a fixed step may matter: the stiff and light scenes, and runs that failed at the default step.
@@ -216,10 +216,10 @@ def complete_ladders(
     with locked(output), pool_of(workers) as pool:
         # Ladders of these scenes and methods that the runs no longer call for go.
         replaced = [(STEPS, scene, method) for scene, able in methods.items() for method in able]
-        file = extend_file(output, curve_tables(curves), replaced)
+        file = fit_file_to_request(output, curve_tables(curves), replaced)
         missing = [curve for curve in curves if not curve.is_stored(file)]
         tasks = curve_tasks(file, missing, _TASK_LIMIT_S, _LONGEST_RUN_S / _FACTOR, 2.0 * _LONGEST_RUN_S)
-        return compute_tasks(tasks, pool, on_progress)
+        return run_tasks_references_first(tasks, pool, on_progress)
 
 
 def ladder_curve(scene: Scene, method: str) -> Curve:
@@ -229,6 +229,6 @@ def ladder_curve(scene: Scene, method: str) -> Curve:
         steps.append(steps[-1] / _FACTOR)
     points = []
     for step in steps:
-        known = Asked(scene, method, {STEP: step}).known | {"run": f"{scene.name}/{method} step={step:.6g}"}
+        known = RunRequest(scene, method, {STEP: step}).known | {"run": f"{scene.name}/{method} step={step:.6g}"}
         points.append(Point(method, step, {STEP: step}, known | {STEP: step}))
     return Curve(scene, method, STEP, points, STEPS, TARGET)

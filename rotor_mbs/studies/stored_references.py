@@ -13,9 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor_mbs.methods.catalogue import REFERENCE, find_method
-from rotor_mbs.runs.design import FROZEN, MISSING, RUNS
+from rotor_mbs.runs.design import MISSING, REFERENCE_ARRAYS, RUNS
 from rotor_mbs.runs.read import open_results
-from rotor_mbs.runs.table import Place, TableFile
+from rotor_mbs.runs.rows import RowLocation
+from rotor_mbs.runs.table import TableFile
 from rotor_mbs.runs.versions import row_versions
 from rotor_mbs.scenario.catalogue import REFERENCES
 from rotor_mbs.scenario.scene import Scene, scene_hash
@@ -65,26 +66,26 @@ def _digest(path: Path) -> str:
     return hashlib.sha256(path.read_bytes()).hexdigest()
 
 
-def read_reference(place: Place, scene: Scene) -> Trajectory | None:
+def read_reference(place: RowLocation, scene: Scene) -> Trajectory | None:
     """The reference of `scene` at a place of a results file; None where it is missing or empty."""
     row = place.read()
     samples = int(row["samples"][0])
     if int(row["status"][0]) == MISSING or samples <= 0:
         return None
-    arrays = {name: row[name][0][:samples] for name in FROZEN if name in row}
+    arrays = {name: row[name][0][:samples] for name in REFERENCE_ARRAYS if name in row}
     return rebuilt_reference(scene, {"time": sample_times(scene)[:samples], **arrays})
 
 
 def rebuilt_reference(scene: Scene, arrays: Mapping[str, NDArray[Any]]) -> Trajectory:
     """A stored reference with what its scene asks for, computed from its angles and rates by its own closed form.
-    arrays: time and `FROZEN`, by name, as far as they are stored."""
+    arrays: time and `REFERENCE_ARRAYS`, by name, as far as they are stored."""
     from rotor_mbs.models.lagrange import samples
 
     known = {name: values for name, values in arrays.items() if not np.isnan(values[:1]).all()}
     moving = scene.moving_coordinates
     states = np.hstack([known["angles"][:, moving], known["rates"][:, moving]])
     reference = samples.trajectory(scene, known["time"], states)
-    reference.quantities |= {name: known[name] for name in FROZEN[2:] if name in known}
+    reference.quantities |= {name: known[name] for name in REFERENCE_ARRAYS[2:] if name in known}
     return reference
 
 
@@ -101,7 +102,7 @@ def _read_shipped(shipped: ShippedReference, scene: Scene) -> Solution:
         stored = results.scenes[shipped.scene].reference
         assert stored is not None  # a file of references has one for each scene
         facts = stored.attributes
-        arrays = {name: stored.array(name) for name in ("time", *FROZEN) if name in stored}
+        arrays = {name: stored.array(name) for name in ("time", *REFERENCE_ARRAYS) if name in stored}
         trajectory = rebuilt_reference(scene, arrays)
         for values in (trajectory.time, trajectory.angles, trajectory.rates, *trajectory.quantities.values()):
             values.flags.writeable = False

@@ -27,10 +27,12 @@ from rotor_mbs.methods.solve import solve
 from rotor_mbs.methods.time_limit import OutOfTimeError, caller_signals, time_limit
 from rotor_mbs.models.lagrange.reference import error_growth
 from rotor_mbs.processes.pool import TaskPool
-from rotor_mbs.runs.design import COLUMNS, MISSING
-from rotor_mbs.runs.runner import Task, compute
+from rotor_mbs.runs.design import COLUMNS, MISSING, TableSpec
+from rotor_mbs.runs.layout import KEYWORDS
+from rotor_mbs.runs.rows import RowLocation, Rows, blank_rows, row_of_run
+from rotor_mbs.runs.runner import Task, run_tasks
 from rotor_mbs.runs.sweeps import code_of_method, open_sweep, sweep_table
-from rotor_mbs.runs.table import IDENTITY, KEYWORDS, Place, Rows, Table, blank_rows, row_of_run
+from rotor_mbs.runs.table import IDENTITY
 from rotor_mbs.runs.versions import machine, versions
 from rotor_mbs.scenario.scene import Scene, scene_hash
 from rotor_mbs.scenario.sweep import Sweep, Variants
@@ -108,7 +110,7 @@ class Chunk(Task):
     def failed(self, status: str, message: str) -> Rows:
         limit = self.time_limit_s if status == "timed_out" else np.nan
         values = {"status": status, "message": message, "time_reached": 0.0, "code": self.code, "time_limit_s": limit}
-        return self.place.rows_of(values, len(self.values))
+        return self.place.encode(values, len(self.values))
 
 
 def limit_of(runs: int, time_limit_s: float) -> float:
@@ -178,7 +180,7 @@ def _side_by_side(chunk: Chunk, scenes: Sequence[Scene]) -> Rows:
         try:
             judged = _judged_row(chunk, run)
         except OutOfTimeError as exc:
-            judged = chunk.place.rows_of({"status": "timed_out", "message": f"{exc}, while its samples were assessed"})
+            judged = chunk.place.encode({"status": "timed_out", "message": f"{exc}, while its samples were assessed"})
             judged |= {name: rows[name][i : i + 1] for name in ("energy_drift_max", *_OF_DEFECTS)}
         for name in ("status", "message", "energy_drift_max", *_OF_DEFECTS):
             rows[name][i] = judged[name][0]
@@ -217,10 +219,10 @@ class SweepPlan:
     def rows(self) -> int:
         return self.sweep.design.count
 
-    def table(self) -> Table:
+    def table(self) -> TableSpec:
         return sweep_table(self.sweep, self.methods, range(self.first, self.last))
 
-    def chunks(self, place: Place, gaps: Sequence[tuple[int, int]], workers: int = 1) -> Iterator[Chunk]:
+    def chunks(self, place: RowLocation, gaps: Sequence[tuple[int, int]], workers: int = 1) -> Iterator[Chunk]:
         """Cut the runs of `gaps` into what one of `workers` does at once, by one method."""
         variants, design = self.sweep.variants(), self.sweep.design
         for first, _ in gaps[:1]:
@@ -367,7 +369,7 @@ def run_sweep(
         # First and last of every span of missing runs.
         edges = plan.first + np.flatnonzero(np.diff(statuses == MISSING, prepend=False, append=False))
         gaps = [(int(first), int(last)) for first, last in edges.reshape(-1, 2)]
-        for end in compute(pool, plan.chunks(place, gaps, pool.workers)):
+        for end in run_tasks(pool, plan.chunks(place, gaps, pool.workers)):
             chunk = end.task
             assert isinstance(chunk, Chunk)
             if end.value is None:  # nothing is known of these runs: they stay missing

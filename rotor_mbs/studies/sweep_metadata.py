@@ -17,9 +17,9 @@ import numpy as np
 
 from rotor_mbs.runs.design import MISSING
 from rotor_mbs.runs.hdf5 import Column
+from rotor_mbs.runs.layout import KEYWORDS, new_file
 from rotor_mbs.runs.output_files import replace_file
 from rotor_mbs.runs.sweeps import StoredSweep
-from rotor_mbs.runs.table import KEYWORDS, new_file
 from rotor_mbs.runs.trailer import SPLIT_OF, may_extend
 from rotor_mbs.scenario.sweep import SPLITS
 from rotor_mbs.solution.status import STATUSES

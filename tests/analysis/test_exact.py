@@ -16,7 +16,7 @@ from rotor_mbs.scenario.scene import Scene
 RIGID = replace(paper("fig03").blades[0], inertia=(3e5, 4e5, 2e5, 0.0, 0.0, 0.0))
 ONE, THREE = (paper(name, hub_inertia=1e6, blades=(RIGID,) * n) for name, n in (("fig03", 1), ("fig05", 3)))
 TURNING: dict[str, Any] = {"initial_rates": (0.5, 0.0, 0.0, 0.0)}
-KNOWN = {
+DESIGN_COLUMNS = {
     "pendulum": ONE,
     "rest": THREE,
     "uniform rotation": replace(THREE, **TURNING),
@@ -24,14 +24,14 @@ KNOWN = {
 }
 
 
-@pytest.mark.parametrize("name", KNOWN)
+@pytest.mark.parametrize("name", DESIGN_COLUMNS)
 def test_exact_solutions_are_those_of_the_equations(name: str) -> None:
     time = np.linspace(0.0, 5.0, 51)
-    found = exact_rotor_angle(KNOWN[name], time)
+    found = exact_rotor_angle(DESIGN_COLUMNS[name], time)
     assert found is not None
     assert found[0] == name
     # DOP853 at a relative tolerance of 1e-11 over some hundred steps.
-    assert found[1] == pytest.approx(other_code.trajectory(KNOWN[name], time)[0][:, 0], abs=1e-8)
+    assert found[1] == pytest.approx(other_code.trajectory(DESIGN_COLUMNS[name], time)[0][:, 0], abs=1e-8)
 
 
 def test_a_spring_has_its_energy_from_its_rest_angle() -> None:

@@ -188,7 +188,7 @@ NOTHING = Trajectory(np.empty(0), np.empty((0, 4)), np.empty((0, 4)))
 NEAR, FAR = (moving(math.acos(math.sqrt(share))) for share in (0.8e-3, 1.2e-3))  # of the rotor's inertia left
 PAST = moving(growth=2e5)  # the horizon is sample 3
 AT_ONCE = PAST.replace(error_growth=np.where(np.arange(11) < 1, 1.0, 2e5))  # the start alone is before its horizon
-KNOWN = {
+DESIGN_COLUMNS = {
     "complete": (moving(), DONE, None, "ok", False),
     "nothing to judge it by": (without_energies(moving()), DONE, None, "unchecked", False),
     "judged by its angles alone": (without_energies(moving()), DONE, moving(), "ok", False),
@@ -218,9 +218,9 @@ KNOWN = {
 }
 
 
-@pytest.mark.parametrize("name", KNOWN)
+@pytest.mark.parametrize("name", DESIGN_COLUMNS)
 def test_a_known_run_is_called_what_it_is(name: str) -> None:
-    run, engine, reference, *expected = KNOWN[name]
+    run, engine, reference, *expected = DESIGN_COLUMNS[name]
     assert status(run, engine, reference) == tuple(expected)
 
 

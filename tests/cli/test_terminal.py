@@ -24,7 +24,7 @@ from rotor_mbs.analysis.text_tables import table_of_runs
 from rotor_mbs.errors import MethodRefusal
 from rotor_mbs.runs.progress import ProgressLine
 from rotor_mbs.runs.read import open_results
-from rotor_mbs.runs.runner import Outcome
+from rotor_mbs.runs.runner import RunOutcome
 from rotor_mbs.runs.sweeps import StoredSweep
 
 
@@ -33,8 +33,8 @@ class Terminal(io.StringIO):
         return True
 
 
-def outcome(method: str = "lagrange/dop853", share: float = 0.5, **result: object) -> Outcome:
-    return Outcome(f"paper/fig05 {method}", method, **{"status": "ok", **result}, share=share)  # type: ignore[arg-type]
+def outcome(method: str = "lagrange/dop853", share: float = 0.5, **result: object) -> RunOutcome:
+    return RunOutcome(f"paper/fig05 {method}", method, **{"status": "ok", **result}, share=share)  # type: ignore[arg-type]
 
 
 def test_a_log_has_a_plain_line_for_each_case() -> None:

@@ -13,8 +13,8 @@ from support.scenes import general, paper
 from rotor_mbs.analysis.judgement import clearly_ok, judge
 from rotor_mbs.methods.solve import solve
 from rotor_mbs.models.lagrange.ensemble import lanes, solve_many
+from rotor_mbs.runs.rows import RowLocation
 from rotor_mbs.runs.sweeps import sweep_table
-from rotor_mbs.runs.table import Place
 from rotor_mbs.scenario.scene import Scene, scene_tables
 from rotor_mbs.scenario.sweep import Variants, sweep_of
 from rotor_mbs.solution.metrics import energy_drifts
@@ -117,7 +117,7 @@ def test_any_chunks_give_the_same_bytes(scene: Scene, keys: list[str], values: l
     sweep = sweep_of(variants.scene(values[0]), {"gravity": [9.8]}, outputs=["angles", "rates", "tip", "energy"])
     row = sweep_table(sweep, ["lagrange/taylor"], range(len(values))).row_type
     whole = Chunk(
-        label="", method="lagrange/taylor", place=Place(Path(), 0, 0, {}, row), values=np.array(values),
+        label="", method="lagrange/taylor", place=RowLocation(Path(), 0, 0, {}, row), values=np.array(values),
         variants=variants, settings={}, time_limit_s=60.0, code=0,
     )  # fmt: skip
     expected = whole.perform()

@@ -18,7 +18,8 @@ from support.forging import append_trailer, forged
 import rotor_mbs as rm
 from rotor_mbs.errors import RotorError, StoreError
 from rotor_mbs.report.build import write_report
-from rotor_mbs.runs.table import TableFile, checksums
+from rotor_mbs.runs.rows import checksums
+from rotor_mbs.runs.table import TableFile
 from rotor_mbs.runs.trailer import read_trailer
 
 SCENE = "check/held"

@@ -26,8 +26,9 @@ from rotor_mbs.errors import StoreError
 from rotor_mbs.runs import hdf5, trailer
 from rotor_mbs.runs.output_files import locked
 from rotor_mbs.runs.read import open_results
+from rotor_mbs.runs.rows import Rows
 from rotor_mbs.runs.sweeps import StoredSweep
-from rotor_mbs.runs.table import Rows, TableFile
+from rotor_mbs.runs.table import TableFile
 from rotor_mbs.runs.trailer import read_trailer
 
 METHOD = "lagrange/dop853"

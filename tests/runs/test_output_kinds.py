@@ -18,8 +18,9 @@ from support.stored import Made, rotor, store
 
 import rotor_mbs as rm
 from rotor_mbs.errors import RotorError
+from rotor_mbs.runs.merge import fit_file_to_request
 from rotor_mbs.runs.read import points_table, read_records, write_records
-from rotor_mbs.runs.table import TableFile, extend_file
+from rotor_mbs.runs.table import TableFile
 from rotor_mbs.scenario.catalogue import find_scenes
 from rotor_mbs.studies import reproduce
 from rotor_mbs.studies.sweep_metadata import write_splits
@@ -65,8 +66,8 @@ def folder(files: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     TableFile(made / "unfinished results").place(f"{OTHER}/{METHOD}").mark_missing([0])
     known = {"run": "one", "scene": OTHER, "method_name": METHOD, "step": 0.5, "tolerance": np.nan}
     for kind in ("bench", "stability"):
-        place = extend_file(made / kind, [points_table(kind, [known])]).place("one", kind)
-        place.write(place.rows_of({"status": "ok", "angle_error_max": 0.25}))
+        place = fit_file_to_request(made / kind, [points_table(kind, [known])]).place("one", kind)
+        place.write(place.encode({"status": "ok", "angle_error_max": 0.25}))
     for kind in ("modes", "comparison"):
         records = read_records(files / f"{kind}.h5", kind)
         write_records(made / kind, [replace(record, scene=OTHER) for record in records])

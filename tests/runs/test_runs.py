@@ -20,11 +20,12 @@ from rotor_mbs.errors import StoreError
 from rotor_mbs.methods.catalogue import find_method
 from rotor_mbs.processes.pool import SerialPool
 from rotor_mbs.runs.read import open_results
-from rotor_mbs.runs.runner import Outcome
-from rotor_mbs.runs.table import Rows, TableFile
+from rotor_mbs.runs.rows import Rows
+from rotor_mbs.runs.runner import RunOutcome
+from rotor_mbs.runs.table import TableFile
 from rotor_mbs.runs.versions import code_digest, row_versions
 from rotor_mbs.scenario.catalogue import find_scenes
-from rotor_mbs.studies.run import RunReport, RunTask, run_scenes
+from rotor_mbs.studies.run import BatchReport, RunTask, run_scenes
 
 SCENE = paper("fig08")
 METHODS = ("lagrange/dop853", "exudyn_tree/rk67", "lagrange/ode45")
@@ -36,14 +37,14 @@ def blank(task: RunTask) -> Rows:
     return task.failed("ok", task.asked.method)
 
 
-def run(path: Path, methods: Sequence[str] = METHODS, **options: object) -> RunReport:
+def run(path: Path, methods: Sequence[str] = METHODS, **options: object) -> BatchReport:
     given = {"workers": 0, "timeout_s": 60.0, "perform": blank, **options}
     with patch.object(RunTask, "perform", given.pop("perform")):
         return run_scenes([SCENE], {SCENE.name: methods}, path, **given)  # type: ignore[arg-type]
 
 
-def made(report: RunReport) -> list[str]:
-    return [outcome.method for outcome in report.made if outcome.is_stored]
+def made(report: BatchReport) -> list[str]:
+    return [outcome.method for outcome in report.computed if outcome.is_stored]
 
 
 def stored(path: Path) -> list[str]:
@@ -106,11 +107,11 @@ def test_references_come_first_and_what_is_stored_is_skipped(tmp_path: Path) -> 
     first = run(path, METHODS[:2])
     assert made(first)[0] == "reference"
     assert sorted(made(first)) == sorted(["reference", *METHODS[:2]])
-    assert first.made[-1].share == 1.0
+    assert first.computed[-1].share == 1.0
     assert made(run(path)) == [METHODS[2]]
     before = path.read_bytes()
     again = run(path)
-    assert (again.made, len(again.kept)) == ([], 4)
+    assert (again.computed, len(again.stored)) == ([], 4)
     assert path.read_bytes() == before
     assert [entry.name for entry in tmp_path.iterdir()] == ["r.h5"]
 
@@ -129,7 +130,7 @@ def test_runs_whose_reference_was_not_computed_are_not_computed(tmp_path: Path) 
 
 
 def test_an_interrupted_call_goes_on_where_it_stopped(tmp_path: Path) -> None:
-    def interrupt(done: int, total: int, _outcome: Outcome) -> None:
+    def interrupt(done: int, total: int, _outcome: RunOutcome) -> None:
         assert total == 4
         if done == 2:
             raise KeyboardInterrupt

@@ -12,29 +12,21 @@ import pytest
 from support.scenes import paper
 
 from rotor_mbs.errors import InputError, StoreError
-from rotor_mbs.runs.design import CHARACTER, COLUMNS, MISSING, Asked
+from rotor_mbs.runs.design import CHARACTER, COLUMNS, MISSING, RunRequest, TableSpec, results_tables
 from rotor_mbs.runs.hdf5 import CHARACTERS, Column
+from rotor_mbs.runs.layout import create_file
+from rotor_mbs.runs.merge import fit_file_to_request
 from rotor_mbs.runs.output_files import locked
 from rotor_mbs.runs.read import points_table
-from rotor_mbs.runs.table import (
-    Place,
-    Rows,
-    Table,
-    TableFile,
-    blank_rows,
-    characters,
-    extend_file,
-    laid_out,
-    results_tables,
-    text_of,
-)
+from rotor_mbs.runs.rows import RowLocation, Rows, blank_rows, characters, text_of
+from rotor_mbs.runs.table import TableFile
 from rotor_mbs.solution.status import STATUSES
 
 ROWS, SAMPLES = 23, 5
 ENGINES = ("h5netcdf", "netcdf4")
 
 
-def _table() -> Table:
+def _table() -> TableSpec:
     time = Column(("time",), "s", "time", attributes={"standard_name": "time"}), np.linspace(0.0, 1.0, SAMPLES)
     computed = {
         "status": COLUMNS["status"],
@@ -44,14 +36,14 @@ def _table() -> Table:
         "crc32": Column(("run",), "1", "checksum", "<u4"),
     }
     known = {"time": time, "stiffness": (Column(("run",), "N m/rad", "stiffness"), np.arange(ROWS, dtype=float))}
-    return Table("", np.arange(ROWS), known, computed, characters=40)
+    return TableSpec("", np.arange(ROWS), known, computed, characters=40)
 
 
-def _stored(path: Path) -> Table:
+def _stored(path: Path) -> TableSpec:
     return TableFile(path).tables[""]
 
 
-def _rows(place: Place, first: int, count: int) -> Rows:
+def _rows(place: RowLocation, first: int, count: int) -> Rows:
     rows = blank_rows(count, place.row_type)
     rows["status"][:], rows["steps"][:] = 0, 7
     rows["angles"][:] = np.arange(first, first + count)[:, None]
@@ -62,7 +54,7 @@ def _rows(place: Place, first: int, count: int) -> Rows:
 @pytest.fixture
 def path(tmp_path: Path) -> Path:
     made = tmp_path / "t.h5"
-    with laid_out(made, [_table()], {"title": "t"}):
+    with create_file(made, [_table()], {"title": "t"}):
         pass
     return made
 
@@ -113,7 +105,7 @@ def test_rows_of_another_number_do_not_count(path: Path) -> None:
 def test_a_worker_of_an_earlier_file_does_not_write_to_its_successor(path: Path) -> None:
     place = _stored(path).place()
     path.rename(path.with_name("kept.h5"))  # keeps its inode from being used again
-    with laid_out(path, [_table()], {"title": "t"}):
+    with create_file(path, [_table()], {"title": "t"}):
         pass
     before = path.read_bytes()
     with pytest.raises(StoreError, match="has been replaced by another file"):
@@ -129,9 +121,9 @@ def test_texts_are_cut_at_whole_characters() -> None:
 # Making a file fit what is asked
 
 
-def _asked(*methods: str, **changes: object) -> list[Asked]:
+def _asked(*methods: str, **changes: object) -> list[RunRequest]:
     scene = paper("fig08").replace(duration=1.0, samples=11, **changes)
-    return [Asked(scene, method) for method in methods]
+    return [RunRequest(scene, method) for method in methods]
 
 
 def _write(file: TableFile, run: str, value: float) -> None:
@@ -148,8 +140,8 @@ def _runs(path: Path) -> list[str]:
 
 def test_more_rows_keep_those_that_are_stored(tmp_path: Path) -> None:
     path, first = tmp_path / "r.h5", "paper/fig08/lagrange/taylor"
-    _write(extend_file(path, results_tables(_asked("reference", "lagrange/taylor"))), first, 1.0)
-    file = extend_file(path, results_tables(_asked("exudyn_chain/generalized_alpha", "lagrange/taylor")))
+    _write(fit_file_to_request(path, results_tables(_asked("reference", "lagrange/taylor"))), first, 1.0)
+    file = fit_file_to_request(path, results_tables(_asked("exudyn_chain/generalized_alpha", "lagrange/taylor")))
     assert _runs(path) == [first]
     assert (file.place(first).read()["angles"] == 1.0).all()
     assert file.tables["paper/fig08"].runs.tolist() == [
@@ -162,7 +154,7 @@ def test_the_tables_of_a_new_file_are_known_without_reading_it(tmp_path: Path, m
     path = tmp_path / "r.h5"
     with monkeypatch.context() as patch:
         patch.setattr("rotor_mbs.runs.table.read_content", None)
-        laid = extend_file(path, results_tables(_asked("reference", "lagrange/taylor")))
+        laid = fit_file_to_request(path, results_tables(_asked("reference", "lagrange/taylor")))
     read = TableFile(path)
     assert laid.groups == read.groups
     for group, table in read.tables.items():
@@ -173,28 +165,28 @@ def test_the_tables_of_a_new_file_are_known_without_reading_it(tmp_path: Path, m
 
 def test_runs_of_other_numbers_are_not_dropped_without_being_computed_again(tmp_path: Path) -> None:
     path = tmp_path / "r.h5"
-    _write(extend_file(path, results_tables(_asked("lagrange/taylor"))), "paper/fig08/lagrange/taylor", 1.0)
+    _write(fit_file_to_request(path, results_tables(_asked("lagrange/taylor"))), "paper/fig08/lagrange/taylor", 1.0)
     with pytest.raises(InputError, match="has lagrange/taylor of a scene of that name with other numbers"):
-        extend_file(path, results_tables(_asked("exudyn_tree/rk67", gravity=9.81)))
+        fit_file_to_request(path, results_tables(_asked("exudyn_tree/rk67", gravity=9.81)))
     assert _runs(path) == ["paper/fig08/lagrange/taylor"]
-    extend_file(path, results_tables(_asked("lagrange/taylor", gravity=9.81)))
+    fit_file_to_request(path, results_tables(_asked("lagrange/taylor", gravity=9.81)))
     assert _runs(path) == []
 
 
 def test_tables_of_other_studies_stay_beside_the_runs(tmp_path: Path) -> None:
     path = tmp_path / "r.h5"
-    extend_file(path, results_tables(_asked("lagrange/taylor")))
+    fit_file_to_request(path, results_tables(_asked("lagrange/taylor")))
     point = {"run": "a", "scene": "paper/fig08", "method_name": "lagrange/taylor", "step": 0.5, "tolerance": np.nan}
-    file = extend_file(path, [points_table("stability", [point])])
+    file = fit_file_to_request(path, [points_table("stability", [point])])
     place = file.place("a", "stability")
-    place.write(place.rows_of({"status": "ok", "angle_error_max": 0.25}))
-    file = extend_file(path, results_tables(_asked("lagrange/taylor", "exudyn_tree/rk67")))
+    place.write(place.encode({"status": "ok", "angle_error_max": 0.25}))
+    file = fit_file_to_request(path, results_tables(_asked("lagrange/taylor", "exudyn_tree/rk67")))
     assert file.place("a", "stability").is_stored
     assert file.place("a", "stability").read()["angle_error_max"].tolist() == [0.25]
-    assert extend_file(path, [points_table("stability", [point])]).place("a", "stability").is_stored
-    changed = extend_file(path, [points_table("stability", [point | {"step": 0.25}])])
+    assert fit_file_to_request(path, [points_table("stability", [point])]).place("a", "stability").is_stored
+    changed = fit_file_to_request(path, [points_table("stability", [point | {"step": 0.25}])])
     assert not changed.place("a", "stability").is_stored
-    file = extend_file(path, [], replaced=[("stability", "paper/fig08", "lagrange/taylor")])
+    file = fit_file_to_request(path, [], replaced=[("stability", "paper/fig08", "lagrange/taylor")])
     assert "stability" not in file.groups
 
 

@@ -8,16 +8,16 @@ import pytest
 
 from rotor_mbs.solution.status import comparison
 
-KNOWN = {"defect_max": 3e-9, "defect_excess": 2e-9, "defect_allowed": 5e-9, "horizon_s": 3.03}
+DESIGN_COLUMNS = {"defect_max": 3e-9, "defect_excess": 2e-9, "defect_allowed": 5e-9, "horizon_s": 3.03}
 
 
 @pytest.mark.parametrize(
     ("metrics", "expected"),
     [
         ({}, ("", "", "", "")),
-        (KNOWN | {"angle_error_max": 1e-4}, ("2.0e-09", "5.0e-09", "1.0e-04", "3.03 of 10 s")),
-        (KNOWN | {"angle_error_predicted": 1e-4}, ("2.0e-09", "5.0e-09", "1.0e-04 predicted", "3.03 of 10 s")),
-        (KNOWN | {"defect_excess": 0.0}, ("3.0e-09", "rounding", "", "")),
+        (DESIGN_COLUMNS | {"angle_error_max": 1e-4}, ("2.0e-09", "5.0e-09", "1.0e-04", "3.03 of 10 s")),
+        (DESIGN_COLUMNS | {"angle_error_predicted": 1e-4}, ("2.0e-09", "5.0e-09", "1.0e-04 predicted", "3.03 of 10 s")),
+        (DESIGN_COLUMNS | {"defect_excess": 0.0}, ("3.0e-09", "rounding", "", "")),
         ({"defect_max": 0.5}, ("5.0e-01", "", "", "")),  # of the printed equations nothing is allowed or forbidden
     ],
 )

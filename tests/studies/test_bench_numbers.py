@@ -24,8 +24,9 @@ from rotor_mbs.report.build import write_report
 from rotor_mbs.report.looks import look_of
 from rotor_mbs.report.pages.bench import bench_answer, diagram, engine_tables, point_table
 from rotor_mbs.runs.design import POINT_COLUMNS
+from rotor_mbs.runs.merge import fit_file_to_request
 from rotor_mbs.runs.read import Record, open_results, points_table, read_records
-from rotor_mbs.runs.table import TableFile, extend_file
+from rotor_mbs.runs.table import TableFile
 from rotor_mbs.solution.status import STATUSES
 
 
@@ -173,14 +174,14 @@ def test_the_sentence_names_the_fastest_and_how_much_slower_another_model_is() -
 def stored(path: Path, *curves: Record) -> Path:
     """The curves in a file, as `bench` stores them."""
     points = [point for curve in curves for point in known_points(curve)]
-    file = extend_file(path, [points_table("bench", points)])
+    file = fit_file_to_request(path, [points_table("bench", points)])
     for curve in curves:
         facts = {name: value for name, value in curve.attributes.items() if name in POINT_COLUMNS["bench"]}
         for i, point in enumerate(known_points(curve)):
             place = file.place(str(point["run"]), "bench")
             values = {name: array[i] for name, array in curve.arrays.items() if name not in ("setting", "status")}
             values |= {"status": curve.statuses[i], "message": curve.messages[i]}
-            place.write(place.rows_of(facts | values))
+            place.write(place.encode(facts | values))
     return path
 
 

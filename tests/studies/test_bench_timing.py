@@ -18,13 +18,13 @@ from support.scenes import paper
 from rotor_mbs.analysis import judgement
 from rotor_mbs.methods.base import BuiltItem, Settings
 from rotor_mbs.methods.catalogue import ladders
+from rotor_mbs.runs.merge import fit_file_to_request
 from rotor_mbs.runs.read import Record, read_records
-from rotor_mbs.runs.table import extend_file
 from rotor_mbs.scenario.accuracy_bounds import Bound
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.trajectory import Integration, Trajectory
 from rotor_mbs.studies import bench
-from rotor_mbs.studies.bench import Curve, Point, PointTimer, allot, conduct, measure
+from rotor_mbs.studies.bench import Curve, Point, PointTimer, allocate_repeats, measure, time_in_rounds
 
 SCENE = paper("fig05", duration=1.0, samples=11, initial_angles=(0.0,) * 4)
 
@@ -148,7 +148,9 @@ def run_conduct(
     order: list[Point] = []
     timers = [FakeTimer(one, taken, order, clock, one == hanging) for one, taken in seconds.items()]
     names = dict.fromkeys(one.method for one in seconds)
-    conduct([[timer for timer in timers if timer.point.method == name] for name in names], budget, repeats, clock)
+    time_in_rounds(
+        [[timer for timer in timers if timer.point.method == name] for name in names], budget, repeats, clock
+    )
     return timers, order
 
 
@@ -163,9 +165,9 @@ def test_rounds_go_over_all_points_in_turn_and_over_long_runs_five_times() -> No
 
 def test_what_cheap_points_leave_of_the_budget_goes_to_dear_ones() -> None:
     """Of 10 s, the cheap one wants 20 · 0.1 = 2; the two dear ones share 8: four runs of 1 s each."""
-    assert allot([1.0, 0.1, 1.0], [20, 20, 20], 10.0) == [4, 20, 4]
-    assert allot([1.0, 1.0], [5, 5], 0.0) == [1, 1]
-    assert allot([1.0], [5], 100.0) == [5]
+    assert allocate_repeats([1.0, 0.1, 1.0], [20, 20, 20], 10.0) == [4, 20, 4]
+    assert allocate_repeats([1.0, 1.0], [5, 5], 0.0) == [1, 1]
+    assert allocate_repeats([1.0], [5], 100.0) == [5]
 
 
 def test_a_rung_that_does_not_fit_the_budget_is_told_those_after_it_too_and_no_cheap_ladder_is_cut() -> None:
@@ -188,7 +190,7 @@ def test_a_point_that_never_came_back_is_not_repeated() -> None:
 def test_samples_are_thinned_to_a_divisor() -> None:
     cases = {1001: (101, 10), 101: (101, 1), 1084: (58, 19), 998: (998, 1), 401: (101, 4)}
     for samples, (left, every) in cases.items():
-        short, k = bench.thinned(replace(SCENE, samples=samples))
+        short, k = bench.coarsened(replace(SCENE, samples=samples))
         assert (short.samples, k) == (left, every)
 
 
@@ -242,7 +244,7 @@ def test_curves_are_tried_alone_where_their_process_dies(tmp_path: Path, monkeyp
     short = replace(ladder, values=(1e-3,))
     variants = [replace(short, variant=f" {name}") for name in ("first", "deadly", "last")]
     curves = [bench.curve_of(SCENE, method, ladder, {}) for ladder in variants]
-    file = extend_file(tmp_path / "b.h5", [*bench.curve_tables(curves)])
+    file = fit_file_to_request(tmp_path / "b.h5", [*bench.curve_tables(curves)])
     ended = {
         outcome.label.split()[-2]: outcome for outcome in bench._measure_scene(file, curves, SCENE, still(), 2, 5.0)
     }

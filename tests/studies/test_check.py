@@ -27,7 +27,8 @@ import rotor_mbs as rm
 from rotor_mbs.cli import verdicts as formats
 from rotor_mbs.methods.catalogue import REFERENCE, method_names
 from rotor_mbs.methods.solve import solve
-from rotor_mbs.runs.table import Rows, extend_file
+from rotor_mbs.runs.merge import fit_file_to_request
+from rotor_mbs.runs.rows import Rows
 from rotor_mbs.scenario.accuracy_bounds import Bound, shipped_bounds
 from rotor_mbs.scenario.catalogue import REFERENCES
 from rotor_mbs.solution.metrics import horizon_samples, running_growth
@@ -77,7 +78,7 @@ def test_what_is_shipped_passes_in_short(good: Path) -> None:
 
 
 def test_where_there_is_nothing_to_judge_the_command_says_so(tmp_path: Path) -> None:
-    extend_file(tmp_path / "empty.h5", [])
+    fit_file_to_request(tmp_path / "empty.h5", [])
     for path in (results_file(tmp_path / "reference.h5", [SCENE], []), tmp_path / "empty.h5"):
         assert refusal("check", path, "--require", METHOD) == f"{path}: nothing to check: no run of a method"
 

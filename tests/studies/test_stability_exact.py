@@ -13,8 +13,8 @@ from support.references import reference, run, scene
 
 from rotor_mbs.analysis.judgement import judge
 from rotor_mbs.analysis.work_precision import step_for
-from rotor_mbs.runs.design import Asked
-from rotor_mbs.runs.table import extend_file, results_tables
+from rotor_mbs.runs.design import RunRequest, results_tables
+from rotor_mbs.runs.merge import fit_file_to_request
 from rotor_mbs.solution.metrics import metrics_of
 from rotor_mbs.solution.status import STATUSES
 from rotor_mbs.studies.bench import curve_tables, curve_tasks
@@ -128,7 +128,9 @@ def test_a_step_for_a_target_is_read_off_a_ladder() -> None:
 def test_a_ladder_of_runs_that_fail_at_once_ends(tmp_path: Path) -> None:
     light, method = scene("extreme/light-1e-8"), "exudyn_chain/generalized_alpha"
     curve = ladder_curve(light, method)
-    file = extend_file(tmp_path / "s.h5", [*results_tables([Asked(light, "reference")]), *curve_tables([curve])])
+    file = fit_file_to_request(
+        tmp_path / "s.h5", [*results_tables([RunRequest(light, "reference")]), *curve_tables([curve])]
+    )
     (task,) = curve_tasks(file, [curve], 60.0, 0.5, 3.0)
     rows = task.perform()
     statuses = [STATUSES[code] for code in rows["status"]]

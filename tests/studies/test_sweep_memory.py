@@ -14,7 +14,7 @@ import pytest
 from support.sweeps import starts_file
 
 from rotor_mbs.runs.engines import open_task_pool
-from rotor_mbs.runs.table import Place
+from rotor_mbs.runs.rows import RowLocation
 from rotor_mbs.scenario.sweep import load_sweep
 from rotor_mbs.studies.sweep import Chunk, plan_sweep
 
@@ -36,7 +36,7 @@ def _resident(_: object) -> float:
 def test_a_worker_does_not_grow(tmp_path: Path, method: str, samples: int, duration: float) -> None:
     """10,000 runs after the first thousand: at most 20 MB."""
     plan = plan_sweep(load_sweep(starts_file(tmp_path, 11_000, samples, duration, method)))
-    nowhere = Place(Path(), 0, 0, {}, plan.table().row_type)
+    nowhere = RowLocation(Path(), 0, 0, {}, plan.table().row_type)
     with open_task_pool("local", 1) as pool:
         before = 0.0
         for chunk in plan.chunks(nowhere, [(0, 11_000)]):

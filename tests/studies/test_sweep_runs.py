@@ -18,8 +18,9 @@ import rotor_mbs as rm
 from rotor_mbs.methods.catalogue import find_method
 from rotor_mbs.processes.pool import SerialPool
 from rotor_mbs.runs.design import MISSING
+from rotor_mbs.runs.rows import Rows, text_of
 from rotor_mbs.runs.sweeps import StoredSweep
-from rotor_mbs.runs.table import Rows, TableFile, text_of
+from rotor_mbs.runs.table import TableFile
 from rotor_mbs.runs.versions import code_digest
 from rotor_mbs.scenario.catalogue import find_scenes
 from rotor_mbs.scenario.sweep import load_sweep

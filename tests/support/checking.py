@@ -14,8 +14,9 @@ from rotor_mbs.analysis.judgement import judge
 from rotor_mbs.methods.catalogue import REFERENCE
 from rotor_mbs.methods.solve import solve
 from rotor_mbs.models.exudyn import chain
-from rotor_mbs.runs.design import Asked
-from rotor_mbs.runs.table import extend_file, results_tables, row_of_run
+from rotor_mbs.runs.design import RunRequest, results_tables
+from rotor_mbs.runs.merge import fit_file_to_request
+from rotor_mbs.runs.rows import row_of_run
 from rotor_mbs.scenario.accuracy_bounds import Bounds, shipped_bounds
 from rotor_mbs.scenario.catalogue import find_scenes
 from rotor_mbs.scenario.scene import Scene
@@ -34,8 +35,8 @@ def results_file(path: Path, scenes: Sequence[str], methods: Sequence[str], time
 
 def add_run(path: Path, scene: Scene, run: Solution) -> None:
     """A run into a file that has its scene's reference, judged as a batch judges it."""
-    asked = Asked(scene, run.method, run.settings)
-    file = extend_file(path, results_tables([asked]))
+    asked = RunRequest(scene, run.method, run.settings)
+    file = fit_file_to_request(path, results_tables([asked]))
     judgement = judge(scene, run, read_reference(file.place(f"{scene.name}/{REFERENCE}"), scene))
     run = replace(run, scene=scene, status=judgement.status, message=judgement.message, metrics=judgement.metrics)
     place = file.place(asked.label)

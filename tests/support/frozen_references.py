@@ -15,31 +15,33 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor_mbs.methods.catalogue import REFERENCE
-from rotor_mbs.runs.design import FROZEN, Asked
+from rotor_mbs.runs.design import REFERENCE_ARRAYS, RunRequest, runs_table, scene_table
+from rotor_mbs.runs.merge import fit_file_to_request
 from rotor_mbs.runs.read import open_results
-from rotor_mbs.runs.table import extend_file, runs_table, scene_table
 
 _FACTS = ("steps", "time_reached", "setup_time_s", "run_time_s", "output_time_s")
 
 
 def freeze(source: Path, target: Path) -> None:
-    """The arrays of a results file's references that are `FROZEN` into the file `target`, their digests beside it."""
+    """Write the `REFERENCE_ARRAYS` of a results file's references into the file `target`, their digests beside it."""
     target.unlink(missing_ok=True)
     with open_results(source) as results:
         versions = {"frozen_with": f"heyoka {results.attributes['heyoka']}, {datetime.now(UTC).date().isoformat()}"}
         references = [
-            (Asked(stored.scene, REFERENCE, versions=versions), stored.reference)
+            (RunRequest(stored.scene, REFERENCE, versions=versions), stored.reference)
             for stored in results.scenes.values()
             if stored.reference is not None
         ]
-        tables = [scene_table([asked], arrays=[name for name in FROZEN if name in run]) for asked, run in references]
-        file = extend_file(target, [runs_table([asked for asked, _ in references]), *tables])
+        tables = [
+            scene_table([asked], arrays=[name for name in REFERENCE_ARRAYS if name in run]) for asked, run in references
+        ]
+        file = fit_file_to_request(target, [runs_table([asked for asked, _ in references]), *tables])
         for asked, run in references:
             place = file.place(asked.label)
             values: dict[str, object] = {"status": run.status, "samples": run.samples}
             values |= {name: run.attributes[name] for name in _FACTS}
-            values |= {name: run.array(name) for name in FROZEN if name in run}
-            place.write(place.rows_of(values))
+            values |= {name: run.array(name) for name in REFERENCE_ARRAYS if name in run}
+            place.write(place.encode(values))
     target.with_suffix(".sha256").write_text(digests(target))
 
 

@@ -10,8 +10,10 @@ from typing import Any
 import numpy as np
 
 from rotor_mbs.errors import StoreError
-from rotor_mbs.runs.design import RUNS, Asked
-from rotor_mbs.runs.table import Place, Rows, TableFile, extend_file, results_tables, row_of_run
+from rotor_mbs.runs.design import RUNS, RunRequest, results_tables
+from rotor_mbs.runs.merge import fit_file_to_request
+from rotor_mbs.runs.rows import RowLocation, Rows, row_of_run
+from rotor_mbs.runs.table import TableFile
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.metrics import metrics_of
 from rotor_mbs.solution.trajectory import Integration, Solution, Trajectory
@@ -57,7 +59,9 @@ class Made:
 def store(path: Path, runs: Sequence[Made]) -> Path:
     """The runs in one file, each compared with its scene's reference where there is one."""
     references = {made.scene.name: made.run().trajectory for made in runs if made.method == "reference"}
-    file = extend_file(path, results_tables([Asked(made.scene, made.method, versions=made.versions) for made in runs]))
+    file = fit_file_to_request(
+        path, results_tables([RunRequest(made.scene, made.method, versions=made.versions) for made in runs])
+    )
     for made in runs:
         run = made.run()
         metrics = metrics_of(made.scene, run.trajectory, references.get(made.scene.name)) if made.until else {}
@@ -100,7 +104,7 @@ def damage(path: Path, run: str, column: str, at: int = 0, bit: int = 0) -> None
     change_byte(TableFile(path).place(run), column, at, bit)
 
 
-def change_byte(place: Place, column: str, at: int = 0, bit: int = 0) -> None:
+def change_byte(place: RowLocation, column: str, at: int = 0, bit: int = 0) -> None:
     with place.path.open("r+b") as file:
         file.seek(place.offsets[column] + place.row_type[column].itemsize - 1 - at)
         byte = file.read(1)[0]
@@ -118,4 +122,4 @@ def change_row(path: Path, run: str, change: Callable[[Rows], None]) -> None:
 
 def drop(path: Path, scene: str, method: str) -> None:
     """Take a run out of a file."""
-    extend_file(path, [], replaced=[(RUNS, scene, method)])
+    fit_file_to_request(path, [], replaced=[(RUNS, scene, method)])

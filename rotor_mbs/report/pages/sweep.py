@@ -39,8 +39,8 @@ from rotor_mbs.report.looks import BLUE, Look, coordinate_look, step_look, with_
 from rotor_mbs.report.numbers import number, prefix_of, shortest, typeset_title
 from rotor_mbs.report.pages import is_wide, words_of
 from rotor_mbs.report.pages.scene_plots import Jumps, blade_look, jumps_of
+from rotor_mbs.runs.rows import text_of
 from rotor_mbs.runs.sweeps import StoredSweep, parameter_name
-from rotor_mbs.runs.table import text_of
 from rotor_mbs.solution.quantities import LOADS
 from rotor_mbs.solution.status import GOOD, STATUSES
 

@@ -1,0 +1,175 @@
+"""Arrays in any HDF5 file, of this program or of another."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import h5py
+import numpy as np
+from numpy.typing import NDArray
+
+from rotor_mbs.errors import StoreError
+from rotor_mbs.runs.hdf5 import (
+    attribute,
+    is_dimension_only,
+    reason_of,
+)
+
+# What says how an array of another program is to be read.
+ARRAY_ATTRIBUTES = ("units", "unit", "scale_factor", "add_offset", "_FillValue", "missing_value", "_Unsigned")
+_MAX_MEMBERS = 1000  # of a group, that are listed with what they are
+
+
+class StoredArrays(NamedTuple):
+    """The arrays of one group of any HDF5 file.
+
+    Attributes
+    ----------
+    arrays : by name, of up to three dimensions, as they are stored.
+    attributes : by name of the array those of `ARRAY_ATTRIBUTES` that it has, numbers and texts.
+    others : by name what else is in the group, and what that is; whether it is a column of something else than numbers.
+    """
+
+    arrays: dict[str, NDArray[Any]]
+    attributes: dict[str, dict[str, Any]]
+    others: dict[str, tuple[str, bool]]
+
+
+def read_arrays(path: Path, group: str = "", scene: str = "", max_bytes: float = math.inf) -> StoredArrays:
+    """Read arrays of numbers of up to three dimensions and their attributes from one group of any HDF5 file.
+
+    Parameters
+    ----------
+    path : the file; of another program, or of this one.
+    group : path of the group, or the end of it, "/" for the root; may be left out where one group alone has arrays, or
+        one alone but the reference below `scene`.
+    scene : name of a scene, whose groups are preferred.
+    max_bytes : of all arrays as float64, by what the file claims of them, before any is read.
+
+    Raises
+    ------
+    StoreError
+        If the file cannot be read or claims more, or with the groups that there are.
+    """
+    try:
+        with h5py.File(path, "r") as file:
+            places = _array_places(file)
+            place = chosen_group(path, list(places), group, scene)
+            chosen = file[place or "/"]
+            datasets = {name: chosen[name] for name in places[place]}
+            _refuse_claims(path, datasets.values(), max_bytes)
+            arrays = {name: dataset[()] for name, dataset in datasets.items()}
+            attributes = {name: _attributes_of_array(dataset) for name, dataset in datasets.items()}
+            others = {}
+            for name in itertools.islice(chosen, _MAX_MEMBERS):
+                if name not in datasets:
+                    others[name] = _what_it_is(chosen, name)
+            for other in itertools.islice(places, _MAX_MEMBERS):
+                if other != place and other.rpartition("/")[0] != place:
+                    others[f"/{other}"] = ("another group", False)
+    except (OSError, RuntimeError, KeyError, ValueError, TypeError) as exc:
+        raise StoreError(f"{path}: not a readable HDF5 file ({reason_of(exc)})") from exc
+    return StoredArrays(arrays, attributes, others)
+
+
+def refuse_claims(path: Path, max_bytes: float) -> None:
+    """Raise StoreError if an HDF5 file claims more than `max_bytes`, or has arrays that other files store."""
+    datasets: list[Any] = []
+
+    def note(_: str, item: Any) -> None:
+        if isinstance(item, h5py.Dataset) and item.size:
+            datasets.append(item)
+
+    try:
+        with h5py.File(path, "r") as file:
+            file.visititems(note)
+            _refuse_claims(path, datasets, max_bytes)
+    except (OSError, RuntimeError, KeyError, ValueError, TypeError) as exc:
+        raise StoreError(f"{path}: not a readable HDF5 file ({reason_of(exc)})") from exc
+
+
+def _refuse_claims(path: Path, datasets: Iterable[Any], max_bytes: float) -> None:
+    """Raise StoreError if datasets are larger than `max_bytes` in all, or stored in other files."""
+    size = 0.0
+    for dataset in datasets:
+        size += 8.0 * dataset.size
+        if dataset.is_virtual or dataset.external:
+            raise StoreError(f"{path}: {dataset.name} is stored in another file; allowed: arrays of this one")
+    if size > max_bytes:
+        allowed = f"up to {max_bytes / 2**30:g} GB: export fewer rows or arrays"
+        raise StoreError(f"{path}: its arrays claim {size / 2**30:.1f} GB; allowed: {allowed}")
+
+
+def _what_it_is(group: Any, name: str) -> tuple[str, bool]:
+    """Return what a member of a group is that is no array of numbers, and whether it is a column for all that."""
+    if group.get(name, getlink=True).__class__ is not h5py.HardLink:
+        return "a link to another file or place", False
+    item = group[name]
+    if not isinstance(item, h5py.Dataset):
+        return "another group", False
+    if not item.size or is_dimension_only(item):
+        return "no values", False
+    if item.size == 1:
+        return "one value", False
+    if item.dtype.kind in "fiu":
+        return f"an array of {len(item.shape)} dimensions", False
+    return ("records, no numbers" if item.dtype.kind == "V" else "no numbers"), True
+
+
+def _attributes_of_array(dataset: Any) -> dict[str, Any]:
+    """Return those of `ARRAY_ATTRIBUTES` that an array has.
+
+    Many texts, which may take long to read, and what is neither a number nor a text are no unit.
+    """
+    found = {}
+    for name in ARRAY_ATTRIBUTES:
+        if name in dataset.attrs and dataset.attrs.get_id(name).get_space().get_simple_extent_npoints() == 1:
+            value = attribute(dataset, name)
+            # A number keeps the type with which it was written.
+            is_text = isinstance(value, str) or (isinstance(value, list) and isinstance(value[0], str))
+            found[name] = value if is_text else np.asarray(dataset.attrs[name]).ravel()[0]
+    return found
+
+
+def chosen_group(path: Path, places: Sequence[str], group: str, scene: str) -> str:
+    """Return the one of `places` that is meant, see `read_arrays`. Raises StoreError."""
+    inside = [place for place in places if place.startswith(f"{scene}/")] or list(places)
+    fitting: list[str]
+    is_root, group = group.strip() == "/", group.strip("/")
+    if is_root:
+        fitting = [place for place in places if not place]
+    elif group:
+        fitting = [place for place in inside if place == group]
+        fitting = fitting or [place for place in inside if f"/{place}".endswith(f"/{group}")]
+    else:
+        fitting = [place for place in inside if not place.endswith("/reference")]
+    if len(fitting) == 1:
+        return fitting[0]
+    if not places:
+        raise StoreError(f"{path}: no arrays of numbers in it; allowed: a time and angles")
+    shown = ", ".join(place or "/" for place in inside[:12]) + (", ..." if len(inside) > 12 else "")
+    problem = f"no group {group or '/'!r}" if group or is_root else "arrays in several groups"
+    raise StoreError(f"{path}: {problem}; allowed: a mapping file with group = one of {shown}")
+
+
+def _array_places(file: Any) -> dict[str, list[str]]:
+    """Return the names of the arrays of numbers by their group; groups without any are left out."""
+    places: dict[str, list[str]] = {}
+
+    def note(path: str, item: Any) -> None:
+        if (
+            isinstance(item, h5py.Dataset)
+            and item.dtype.kind in "fiu"
+            and 0 < len(item.shape or ()) <= 3
+            and item.size > 1
+            and not is_dimension_only(item)
+        ):
+            folder, _, name = path.rpartition("/")
+            places.setdefault(folder, []).append(name)
+
+    file.visititems(note)
+    return places

@@ -1,0 +1,233 @@
+"""New HDF5 files: with room for all rows of their tables, or with groups of arrays."""
+
+from __future__ import annotations
+
+import errno
+import io
+import os
+import threading
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+from numpy.typing import NDArray
+
+from rotor_mbs.runs.design import (
+    MISSING,
+    TableSpec,
+)
+from rotor_mbs.runs.hdf5 import (
+    CHARACTERS,
+    TEXT,
+    TEXT_IN_MEMORY,
+    TEXT_TYPE,
+    WITHOUT_VALUES,
+    Column,
+    is_group,
+    place_of,
+)
+from rotor_mbs.runs.output_files import replacing, write_file
+from rotor_mbs.runs.table import StoredTable, TableFile
+from rotor_mbs.runs.trailer import (
+    FORMAT_VERSION,
+    INTEGRITY,
+    RESULTS,
+    SWEEP,
+    digest_of,
+    trailer_of,
+)
+from rotor_mbs.runs.untrusted import trust
+
+FORMAT = "rotor_mbs"
+CONVENTIONS = "CF-1.11, ACDD-1.3"
+# What every file is about: the attribute `keywords` of the ACDD conventions.
+KEYWORDS = "multibody dynamics, wind turbine rotor, Euler-Lagrange equations, model verification"
+_HEAD_BYTES = 1 << 17  # of a file beside its rows, at most: descriptions and texts
+
+
+@contextmanager
+def create_file(path: Path, tables: Sequence[TableSpec], attributes: Mapping[str, object]) -> Iterator[TableFile]:
+    """Yield a new file with room for all rows, under a temporary name; after the block it is complete under its name,
+    or not there.
+
+    Its space is reserved twice: HDF5 does not survive a disk that fills up under it, and truncates the file it begins.
+    Raises StoreError.
+
+    Parameters
+    ----------
+    path : of the file.
+    tables : as they are to be laid out.
+    attributes : of the file.
+    """
+    with replacing(path) as temporary:
+        rows = sum(len(table.runs) * (table.row_type.itemsize + 8 * (4 + len(table.known))) for table in tables)
+        _reserve(temporary, _HEAD_BYTES + rows)
+        with begin_file(temporary) as file:
+            put_attributes(file, attributes)
+            rows_of = {table.group: _put_table(file, table) for table in tables}
+        kind = SWEEP if "" in rows_of else RESULTS
+        with temporary.open("r+b") as laid:
+            trailer = trailer_of(laid, kind, rows_of)
+            trust(digest_of(trailer))
+            laid.seek(0, os.SEEK_END)
+            laid.write(trailer)
+        _reserve(temporary, temporary.stat().st_size)
+        # All that a reader would find is known here: reading it back would take longer than writing it.
+        inode = temporary.stat().st_ino
+        laid_tables = []
+        for table in tables:
+            offsets = {name: offset for name, (offset, _) in rows_of[table.group].items()}
+            known = {name: (column, _as_stored(values)) for name, (column, values) in table.known.items()}
+            laid_tables.append(
+                StoredTable(
+                    group=table.group,
+                    runs=_as_stored(table.runs),
+                    known=known,
+                    computed=table.computed,
+                    attributes=table.attributes,
+                    characters=table.characters,
+                    path=temporary,
+                    inode=inode,
+                    offsets=offsets,
+                )
+            )
+        yield TableFile(temporary, laid_out_as=(attributes, laid_tables))
+
+
+def _reserve(path: Path, size: int) -> None:
+    """Takes the space on the disk, where the system and the file system can: not on macOS and Windows, where a disk
+    that fills up is reported by the row that finds it full. Raises OSError."""
+    with path.open("ab") as file:
+        try:
+            if hasattr(os, "posix_fallocate"):
+                os.posix_fallocate(file.fileno(), 0, size)
+        except OSError as exc:
+            if exc.errno not in (errno.EOPNOTSUPP, errno.EINVAL, errno.ENOSYS):
+                raise OSError(exc.errno, f"{exc.strerror} ({size:.2g} bytes for all runs)") from exc
+        os.fsync(file.fileno())
+
+
+def _put_table(file: Any, table: TableSpec) -> dict[str, tuple[int, int]]:
+    """Offset and length in bytes of its computed columns."""
+    group = new_group(file, table.group) if table.group else file
+    put_attributes(group, table.attributes)
+    put(group, "run", table.runs, Column(("run",), "1", "name or number of the run"))
+    if table.characters:
+        put_dimension(group, CHARACTERS, table.characters)
+    for name, (column, values) in table.known.items():
+        put(group, name, values, column)
+    rows = {}
+    for name, column in table.computed.items():
+        kind, shape = table.row_type[name].base, table.shape(name)
+        dataset = put_empty(group, name, shape, kind, column, MISSING if name == "status" else None)
+        rows[name] = place_of(dataset)
+    return rows
+
+
+def begin_file(place: Path | str, **driver: object) -> Any:
+    """A new HDF5 file with the attributes of the format; on the disk, where it must not fill up, without a `driver`."""
+    file = h5py.File(place, "w", libver=("earliest", "v108"), track_order=True, **driver)
+    file.attrs["Conventions"] = CONVENTIONS
+    file.attrs["format"] = FORMAT
+    file.attrs["format_version"] = FORMAT_VERSION
+    file.attrs["integrity"] = INTEGRITY
+    return file
+
+
+def new_group(parent: Any, name: str) -> Any:
+    """A group, and those above it, that list their members in the order of writing."""
+    for part in name.split("/"):
+        parent = parent[part] if part in parent else parent.create_group(part, track_order=True)
+    return parent
+
+
+def put(group: Any, name: str, values: Any, column: Column) -> Any:
+    """A dataset of numbers or texts. The scales of its dimensions must be there; a scale is its own dimension."""
+    return _described(group.create_dataset(name, data=_as_stored(values)), group, name, column)
+
+
+def _as_stored(values: Any) -> NDArray[Any]:
+    """Return numbers or texts as a reader of the file gets them."""
+    is_text = len(values) > 0 and isinstance(values[0], str)
+    return np.array(list(values), dtype=TEXT) if is_text else np.asarray(values)
+
+
+def _described(dataset: Any, group: Any, name: str, column: Column) -> Any:
+    put_attributes(dataset, {"units": column.units, "long_name": column.long_name, **column.attributes})
+    for axis, dimension in enumerate(column.dimensions):
+        if dimension == name:
+            dataset.make_scale(dimension)
+        else:
+            h5py.h5ds.attach_scale(dataset.id, h5py.h5d.open(group.id, dimension.encode()), axis)
+    return dataset
+
+
+def put_dimension(group: Any, name: str, length: int) -> None:
+    """A dimension without values, as the netCDF-4 library has them."""
+    scale = group.create_dataset(name, (length,), ">f4")
+    scale.make_scale(f"{WITHOUT_VALUES}{length:10d}")
+
+
+def put_empty(group: Any, name: str, shape: tuple[int, ...], kind: Any, column: Column, fill: int | None = None) -> Any:
+    """A contiguous dataset that has its place in the file now and is written by others; fill: its first value, by
+    default what the file system makes of a new file, zeros."""
+    layout = h5py.h5p.create(h5py.h5p.DATASET_CREATE)
+    layout.set_layout(h5py.h5d.CONTIGUOUS)
+    layout.set_obj_track_times(False)  # the same call gives the same bytes
+    layout.set_alloc_time(h5py.h5d.ALLOC_TIME_EARLY)
+    layout.set_fill_time(h5py.h5d.FILL_TIME_NEVER if fill is None else h5py.h5d.FILL_TIME_ALLOC)
+    if fill is not None:
+        layout.set_fill_value(np.array(fill, kind))
+    dataset = _described(group.create_dataset(name, shape, kind, dcpl=layout), group, name, column)
+    if np.dtype(kind).kind == "S":
+        dataset.attrs["_Encoding"] = "utf-8"
+    return dataset
+
+
+def put_attributes(target: Any, values: Mapping[str, object]) -> None:
+    """Write attributes that are not there: numbers as float64 or int64, truth as int8 (netCDF-4 has no booleans), lists
+    of names as strings."""
+    for name, value in values.items():
+        if isinstance(value, str):
+            # Nearly all are single texts, which the general way writes three times slower.
+            stored = h5py.h5a.create(target.id, name.encode(), TEXT_TYPE, h5py.h5s.create(h5py.h5s.SCALAR))
+            stored.write(np.array(value, TEXT), mtype=TEXT_IN_MEMORY)
+        elif isinstance(value, bool):
+            target.attrs[name] = np.int8(value)
+        elif isinstance(value, (list, tuple)):
+            target.attrs.create(name, list(value), dtype=TEXT)
+        else:
+            target.attrs[name] = value
+
+
+@contextmanager
+def new_file(path: Path, kind: str) -> Iterator[Any]:
+    """Create an HDF5 file of a kind, put in the place of `path` when all of it is written and on the disk.
+
+    It is made in memory: HDF5 does not survive a disk that fills up under it, a plain write does. Raises StoreError
+    where the file cannot be written; what stood there before then still stands. Whether it may be replaced is decided
+    before, by `may_extend`.
+    """
+    memory = {"driver": "core", "backing_store": False, "block_size": 1 << 20}
+    with begin_file(f"{path.name}.{threading.get_ident()}", **memory) as file:
+        yield file
+        groups: dict[str, Mapping[str, tuple[int, int]]] = {place: {} for place in _groups_with_arrays(file)}
+        file.flush()
+        image = io.BytesIO(file.id.get_file_image())
+    trailer = trailer_of(image, kind, groups)
+    trust(digest_of(trailer))
+    image.seek(0, io.SEEK_END)
+    image.write(trailer)
+    write_file(path, image.getbuffer())
+
+
+def _groups_with_arrays(group: Any, place: str = "") -> Iterator[str]:
+    """Yield the path of the group of each array below a group, in the order in which they were written."""
+    for name, item in group.items():
+        if is_group(item):
+            yield from _groups_with_arrays(item, f"{place}/{name}" if place else name)
+        else:
+            yield place

@@ -1,0 +1,174 @@
+"""Rows of a table as bytes: where they lie in a file, how they are written and read, their checksums.
+
+The bytes of a row are written to their offsets, its status after a sync: a row is stored where its status is not -1 and
+its checksum is right.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+import zlib
+from collections.abc import Collection, Mapping
+from contextlib import nullcontext
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import IO, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotor_mbs.errors import StoreError
+from rotor_mbs.methods.catalogue import REFERENCE
+from rotor_mbs.runs.design import (
+    CHARACTER,
+    MISSING,
+    STATUS_COPIES,
+)
+from rotor_mbs.runs.output_files import store_errors
+from rotor_mbs.solution.status import STATUSES, code_of
+from rotor_mbs.solution.trajectory import Solution
+
+# (rows, ...) arrays by the name of their dataset.
+Rows = dict[str, NDArray[Any]]
+
+
+@dataclass(frozen=True)
+class RowLocation:
+    """Where consecutive rows lie in a file. Worker processes that see the file write them by it.
+
+    inode: of the file; another file of that name is not written to. first: number of the first row; its checksum begins
+    with it. offsets: bytes from the beginning of the file to the first row, by column. row_type: its columns
+    are in the order in which the checksum covers them.
+    """
+
+    path: Path
+    inode: int
+    first: int
+    offsets: Mapping[str, int]
+    row_type: np.dtype[np.void]
+
+    def encode(self, values: Mapping[str, object], count: int = 1) -> Rows:
+        """Return rows with these values, the same in each, by the name of their column: numbers, a text, the name of a
+        status, the first samples of an array. The other columns are blank; what is no column here is left out."""
+        rows = blank_rows(count, self.row_type)
+        for name, value in values.items():
+            if name == "status":
+                rows[name][:] = code_of(str(value))
+            elif name in rows and isinstance(value, str):
+                rows[name][:] = characters(value, rows[name].shape[1])
+            elif name in rows and isinstance(value, np.ndarray):
+                rows[name][:, : len(value)] = value
+            elif name in rows:
+                rows[name][:] = value
+        for name, repeated in STATUS_COPIES.items():
+            if repeated in rows:
+                rows[repeated][:] = rows[name]
+        return rows
+
+    def at(self, row: int) -> RowLocation:
+        """The place of a later row, counted from the first."""
+        offsets = {name: offset + row * self.row_type[name].itemsize for name, offset in self.offsets.items()}
+        return replace(self, first=self.first + row, offsets=offsets)
+
+    def write(self, rows: Rows) -> None:
+        """Store consecutive rows, their statuses last; meanwhile they are missing. Raises StoreError."""
+        columns = rows | {"crc32": checksums(self.first, rows, self.row_type)}
+        statuses = {name: columns.pop(name) for name in (STATUS_COPIES["status"], "status") if name in columns}
+        with store_errors(self.path), self.path.open("r+b") as file:
+            if os.fstat(file.fileno()).st_ino != self.inode:
+                raise StoreError(f"{self.path}: has been replaced by another file")
+            for name, status in statuses.items():
+                file.seek(self.offsets[name])
+                file.write(np.full(len(status), MISSING, np.int8).data)
+            for name, values in columns.items():
+                file.seek(self.offsets[name])
+                file.write(np.ascontiguousarray(values).data)
+            file.flush()
+            os.fsync(file.fileno())
+            for name, status in statuses.items():
+                file.seek(self.offsets[name])
+                file.write(np.ascontiguousarray(status, np.int8).data)
+
+    def read(self, count: int = 1, file: IO[bytes] | None = None) -> Rows:
+        """(count, ...) The columns of so many rows; file: one that is open. Raises OSError, ValueError."""
+        with nullcontext(file) if file is not None else self.path.open("rb") as source:
+            rows = {}
+            for name in self.row_type.names or ():
+                kind = self.row_type[name]
+                source.seek(self.offsets[name])
+                content = source.read(count * kind.itemsize)
+                rows[name] = np.frombuffer(content, kind.base).reshape(count, *kind.shape)
+        return rows
+
+    @property
+    def is_stored(self) -> bool:
+        """Whether the first row is there as it was written."""
+        row = self.read()
+        is_known = 0 <= row["status"][0] < len(STATUSES)
+        return bool(is_known and checksums(self.first, row, self.row_type)[0] == row["crc32"][0])
+
+    def mark_missing(self, rows: Collection[int]) -> None:
+        """Take back the statuses of some rows, counted from the first, before they are computed again."""
+        with store_errors(self.path), self.path.open("r+b") as file:
+            for row in rows:
+                for name in ("status", STATUS_COPIES["status"]):
+                    if name in self.offsets:
+                        file.seek(self.offsets[name] + row)
+                        file.write(np.int8(MISSING).tobytes())
+            file.flush()
+            os.fsync(file.fileno())
+
+
+def checksums(first: int, rows: Rows, row: np.dtype[np.void]) -> NDArray[np.uint32]:
+    """(rows,) CRC-32 of each row, over its number and its columns."""
+    sums = [first + i & 0xFFFFFFFF for i in range(len(rows["status"]))]
+    for name in (name for name in row.names or () if name != "crc32"):
+        contents: Any = np.ascontiguousarray(rows[name], row[name].base).reshape(len(sums), -1)
+        sums = [zlib.crc32(content, so_far) for content, so_far in zip(contents, sums, strict=True)]
+    return np.array(sums, np.uint32)
+
+
+def blank_rows(count: int, row: np.dtype[np.void]) -> Rows:
+    """Rows of which nothing is known: NaN, -1, no text."""
+    blanks = {"f": np.nan, "i": -1, "u": 0, "S": b""}
+    kinds = {name: row[name] for name in row.names or ()}
+    return {name: np.full((count, *kind.shape), blanks[kind.base.kind], kind.base) for name, kind in kinds.items()}
+
+
+def characters(text: str, length: int) -> NDArray[np.bytes_]:
+    """(length,) The text as UTF-8 characters, cut or filled up with zeros."""
+    return np.frombuffer(text.encode()[:length].ljust(length, b"\0"), CHARACTER)
+
+
+def text_of(values: NDArray[np.bytes_]) -> str:
+    """The text in an array of `characters`."""
+    return values.tobytes().rstrip(b"\0").decode(errors="ignore")
+
+
+def row_of_run(run: Solution, place: RowLocation, facts: Mapping[str, object]) -> Rows:
+    """Return the row of a run: status, metrics, times, arrays. facts: further columns by name."""
+    integration, run_times_s = run.integration, run.run_times_s or [math.nan]
+    # A reference is read back by its angles and rates, whatever the scene asks for.
+    own = {"angles": run.angles, "rates": run.rates} if run.method == REFERENCE else {}
+    return place.encode(
+        {
+            "status": run.status,
+            "message": run.message,
+            "engine_message": integration.message,
+            "samples": len(run.time),
+            "time_reached": float(run.time[-1]) if len(run.time) else 0.0,
+            "steps": -1 if integration.steps is None else integration.steps,
+            "rhs_evaluations": -1 if integration.rhs_evaluations is None else integration.rhs_evaluations,
+            "engine_success": int(integration.success),
+            "setup_time_s": run.setup_time_s,
+            "run_time_s": float(np.median(run_times_s)),
+            "run_time_min_s": min(run_times_s),
+            "output_time_s": run.output_time_s,
+            "repeats": len(run.run_times_s),
+            **run.metrics,
+            **facts,
+            **run.quantities,
+            **own,
+        }
+    )
