@@ -193,8 +193,8 @@ def _load(name: str, dimensions: tuple[str, ...], long_name: str, title: str, lo
     return Quantity(name, ("time", *dimensions), units, long_name, "loads", judgement=rule, plot=plot, has_peak=True)
 
 
-# The root of a blade is on its pitch axis, at the hub's radius from the apex. Where a torque jumps, the value is the one
-# before it.
+# The root of a blade is on its pitch axis, at the hub's radius from the apex. Where a torque jumps,
+# the value is the one before it.
 LOADS = (
     _load(
         "blade_root_force", ("blade", "axis"), "force of the hub on each blade at its root, in the blade's frame",
