@@ -21,6 +21,7 @@ from rotor_mbs.models.lagrange.parameters import rotor_form
 from rotor_mbs.scenario.time_table import torque_place
 from rotor_mbs.solution.trajectory import Array
 
+UNKNOWN_FAULT = "a fault"  # of which a text says where it is, and not what
 _MAX_NAMED = 6
 _MAX_STEPS = 512  # of Runge and Kutta in an interval
 _STANDS_OUT = 30.0  # times the median of the defects
@@ -82,15 +83,39 @@ def faults_in_time(judged: JudgedDefects) -> list[str]:
     if usual > _OF_ENDS * judged.largest:
         last = len(excess) - _AT_END
         groups = [group for group in groups if group[-1] >= _AT_END and group[0] < last]
-    texts = [_fault(judged, group) for group in groups[:_MAX_NAMED]]
+    texts = []
+    for group in groups[:_MAX_NAMED]:
+        texts += _faults_of(judged, group)
     if len(groups) > _MAX_NAMED:
         end = float(judged.defects.time[groups[-1][-1] + 1])
         texts.append(f"and {len(groups) - _MAX_NAMED} more faults until t = {end:.6g} s")
     return texts
 
 
+def _faults_of(judged: JudgedDefects, group: NDArray[np.int64]) -> list[str]:
+    """Describe the fault of a group of intervals, or those of its parts where it is more than one.
+
+    Parameters
+    ----------
+    judged : the defects.
+    group : (k,) intervals that stand out and are near each other.
+    """
+    text = _fault(judged, group)
+    if text:
+        return [text]
+    parts = np.split(group, np.flatnonzero(np.diff(group) > 1) + 1)
+    texts = [_fault(judged, part) for part in parts] if len(parts) > 1 else []
+    if texts and all(texts):
+        return texts
+    start, end = (float(judged.defects.time[row]) for row in (group[0], group[-1] + 1))
+    half = len(judged.defects.moving)
+    largest = int(np.abs(judged.values[group]).max(axis=0).argmax()) % half
+    label = _label(judged, largest)
+    return [f"{UNKNOWN_FAULT} from t = {start:.6g} to {end:.6g} s, largest in the {label}"]
+
+
 def _fault(judged: JudgedDefects, group: NDArray[np.int64]) -> str:
-    """Describe the fault of a group of intervals.
+    """Describe the fault of a group of intervals by its pattern; "" where it has none.
 
     Parameters
     ----------
@@ -118,10 +143,7 @@ def _fault(judged: JudgedDefects, group: NDArray[np.int64]) -> str:
             amounts.append(f"{loads[:, place].mean():+.3g} N m on the {_label(judged, place)}")
         period = f"from t = {start:.6g} to {end:.6g} s"
         return f"a load that is wrong or missing {period}: on average {' and '.join(amounts)}"
-    half = len(judged.defects.moving)
-    largest = int(np.abs(judged.values[group]).max(axis=0).argmax()) % half
-    label = _label(judged, largest)
-    return f"a fault from t = {start:.6g} to {end:.6g} s, largest in the {label}"
+    return ""
 
 
 def _label(judged: JudgedDefects, place: int) -> str:

@@ -18,7 +18,7 @@ from rotor_mbs.analysis.run_checks import Check, RunSamples, Where, defect_bound
 from rotor_mbs.analysis.work_precision import fitted_order
 from rotor_mbs.comparison.data_defects import judged_defects
 from rotor_mbs.comparison.defect_search import DefectSearch
-from rotor_mbs.comparison.faults import faults_in_time
+from rotor_mbs.comparison.faults import UNKNOWN_FAULT, faults_in_time
 from rotor_mbs.comparison.wrong_outputs import root_mean_square, wrong_energy, wrong_loads, wrong_rows, wrong_tip
 from rotor_mbs.errors import MethodRefusal, ResourceError, RotorError
 from rotor_mbs.methods.base import STEP, Method
@@ -249,6 +249,8 @@ class _Examination:
             if alike:
                 return alike[0]
             faults = " and ".join(faults_in_time(judged))
+            if faults.startswith(UNKNOWN_FAULT):  # where, but not what
+                faults = f"{NOT_FOUND}: {faults}"
         except RotorError:
             faults = ""
         # Wrong equations leave the same at any step: what shrinks is the scheme's.

@@ -7,20 +7,19 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from support.references import reference
+from support.references import reference, referenced
 from support.references import scene as scene_of
 
 from rotor_mbs.methods.catalogue import method_names
 from rotor_mbs.models.lagrange.defects import interval_defects
 from rotor_mbs.scenario.accuracy_bounds import shipped_bounds
-from rotor_mbs.scenario.catalogue import REFERENCES, list_scenes
+from rotor_mbs.scenario.catalogue import REFERENCES
 from rotor_mbs.solution.defects import FLOOR_SAFETY, OK_ERROR, Defects
 from rotor_mbs.solution.trajectory import Array
 
 OWN = "own/engine"  # without a bound of its own
 ROWS = 3  # of each scene, from its second to its last
 GROUPS = [path.stem for path in sorted(REFERENCES.glob("*.h5"))]
-SCENES = [name for name, _ in list_scenes() if name.partition("/")[0] in GROUPS]
 
 
 def bounds_by_value() -> dict[float, list[str]]:
@@ -84,9 +83,7 @@ def test_a_fault_of_twice_the_smallest_is_seen(name: str) -> None:
 @pytest.mark.parametrize("group", GROUPS)
 def test_a_fault_of_twice_the_smallest_is_seen_in_every_scene(group: str) -> None:
     judged = []
-    for name in SCENES:
-        if not name.startswith(f"{group}/"):
-            continue
+    for name in referenced(group):
         planted = sum(judge_faults(name, row) for row in rows_of(name, ROWS))
         judged.append(planted > 0)
     # In a scene whose motion ends at once, or is not known from row to row, nothing is judged.

@@ -330,7 +330,8 @@ ROWS = {
                 "        return Trajectory(time, angles[:, order], rates[:, order], **kept)",
             )
         ],
-        "pitches are in the reverse order",
+        # Where the pitches move alike, their moments tell the order.
+        "pitches are in the reverse order|pitch actuator moment: of the blades in reverse order",
     ),
 }  # fmt: skip
 

@@ -27,6 +27,11 @@ def _arrays(group: str) -> dict[str, dict[str, Array]]:
         return {name: {array: run.array(array) for array in run.names} for name, run in runs.items() if run}
 
 
+def referenced(group: str) -> list[str]:
+    """Return the scenes of a group that have a reference."""
+    return list(_arrays(group))
+
+
 @functools.cache
 def reference(name: str) -> Trajectory:
     return rebuilt_reference(scene(name), _arrays(name.split("/")[0])[name])
