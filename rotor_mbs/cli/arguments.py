@@ -168,6 +168,18 @@ class _Parser(argparse.ArgumentParser):
         self.add_argument("--timeout", type=SECONDS, default=seconds, metavar="SECONDS", help=text)
 
 
+class _Names(argparse.Action):
+    """Print the names of columns that `compare` understands, and end, as --help does."""
+
+    def __call__(self, parser: argparse.ArgumentParser, *_: object) -> None:
+        from rotor_mbs.analysis.text_tables import TextTable  # late: other commands need not wait for it
+        from rotor_mbs.comparison.channels import known_names
+
+        names = "known by (case, blanks and underscores do not matter)"
+        print(TextTable(("channel", names), known_names()))
+        parser.exit()
+
+
 def parse(argv: Sequence[str]) -> argparse.Namespace:
     """Return the arguments; `command` is the place of the function to call, "module:function". Ends
     with status 2 on bad usage."""
@@ -264,9 +276,7 @@ def _parser() -> tuple[_Parser, dict[str, _Parser]]:
     text = "text with a header, .json, .npz, .mat, HDF5, netCDF, an Exudyn sensor file, OpenFAST .out or .outb"
     own.add_argument("data", type=path, metavar="DATA", help=text)
     own.add_argument("--scene", required=True, metavar="SCENE", help="a name (paper/fig05) or a TOML file")
-    text = (
-        "mapping file: column, unit, sign and offset of each channel (default: identified by name, see docs/compare.md)"
-    )
+    text = "mapping file: column, unit, sign and offset of channels that are not known by name (see docs/compare.md)"
     own.add_argument("--columns", type=path, metavar="MAP.toml", help=text)
     text = (
         "bound (rad) on interval defects (the equations of motion integrated from each row to the next, minus the "
@@ -278,6 +288,7 @@ def _parser() -> tuple[_Parser, dict[str, _Parser]]:
     own.add_argument("--timeout", type=SECONDS, default=600.0, metavar="SECONDS", help=text)
     own.output(folder, "DIR", Path("comparison"), "output folder (default: %(default)s)")
     own.flag("--json", help="print the verdict as JSON")
+    own.add_argument("--names", action=_Names, nargs=0, help="print the names that columns may have, and end")
 
     own = command(
         "bench", "measure error and run time of each method at several tolerances or steps", "commands:bench",

@@ -13,13 +13,13 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 from rotor_mbs.comparison.columns import split_bracketed_unit
-from rotor_mbs.comparison.units import BASE_UNITS, is_unit
+from rotor_mbs.comparison.units import ALLOWED_UNITS, BASE_UNITS
 from rotor_mbs.errors import InputError
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.quantities import LOADS
 
 TIME, SPEED = "time", "speed"
-# Names without digits, blanks and marks, as listed in docs/compare.md; a name of a rate is one of
+# Names without digits, blanks and marks, as `known_names` lists them; a name of a rate is one of
 # an angle with a word of RATE_WORDS behind it, or d before it.
 TIME_NAMES = ("time", "t", "times", "zeit")
 ROTOR_NAMES = (
@@ -144,6 +144,32 @@ def mode_channels(scene: Scene) -> list[Channel]:
         for i in range(len(scene.coordinate_labels)):
             known.append(Channel(f"{kind} {i + 1}", "frequency", len(known) - 1))
     return known
+
+
+def known_names() -> list[tuple[str, ...]]:
+    """Return what columns may be, and the names by which they are known, with the units."""
+    affixes = f"the suffix {', '.join(RATE_WORDS[:-1])} or {RATE_WORDS[-1]}, or the prefix d"
+    rows: list[tuple[str, ...]] = [
+        ("time", ", ".join(TIME_NAMES)),
+        ("rotor", ", ".join(ROTOR_NAMES)),
+        ("pitch of a blade, with its number", ", ".join(PITCH_NAMES)),
+        ("rotor rate", f"a name of the rotor with {affixes}; {', '.join(ROTOR_RATE_NAMES)}"),
+        ("pitch rate", f"a name of a pitch with {affixes}"),
+        ("rate of x", "der(x)"),
+        ("angle and rate of a joint", "rotor.phi, rotor.w, pitch[1].phi, pitch[1].w"),
+        ("array of angles, rotor first", ", ".join(VECTOR_NAMES["angle"])),
+        ("array of rates, rotor first", ", ".join(VECTOR_NAMES["rate"])),
+        ("column of an array", "q[0], q[1], q(1), q[1,1], q_1: from 0, or from 1 without a 0"),
+        ("load, with blade and axis, or an array", ", ".join(load.name for load in LOADS)),
+        ("root load of OpenFAST", "RootFxb1, RootMyc2, ..."),
+        ("modes: rotor speed, without a time", ", ".join(SPEED_NAMES)),
+    ]
+    for kind, names in FREQUENCY_NAMES.items():
+        of_kind = "damped frequency" if kind == "frequency" else kind
+        rows.append((f"modes: {of_kind}, with its number, or an array", ", ".join(names)))
+    rows.append(("units", "; ".join(dict.fromkeys(ALLOWED_UNITS.values()))))
+    rows.append(("ways to write a unit", "rotor [deg], rotor (deg), rotor in deg, rotor_deg"))
+    return rows
 
 
 class Entry(NamedTuple):
@@ -437,10 +463,6 @@ def split_unit(name: str) -> tuple[str, str]:
     stem, unit = split_bracketed_unit(name)
     if unit:
         return stem, unit
-    for divider in (" in ", ","):
-        stem, _, unit = name.rpartition(divider)
-        if stem.strip() and len(unit) < 40 and is_unit(unit):
-            return stem.strip(), unit.strip()
     match = _UNIT_ENDING.search(name[-40:])
     if match is None:
         return name, ""

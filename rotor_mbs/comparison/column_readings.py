@@ -241,18 +241,17 @@ class ColumnReadings:
         count = len(expected)
         sums = np.concatenate([[0.0], np.cumsum(expected)])
         for width in _MEANS_OF_ROWS:
-            if count < 2 * (width - 1) + _MIN_COMPARED:
+            if count < 2 * width + _MIN_COMPARED:
                 break
             means = (sums[width:] - sums[:-width]) / width
             ends = [("up to each row", width - 1)]
             if width % 2:
                 ends.insert(0, ("around each row", width // 2))
             for text, before in ends:
-                # Filters treat the rows at the ends each in its own way.
                 of_rows = np.full(count, np.nan)
-                of_rows[width - 1 : count - width + 1] = means[
-                    width - 1 - before : count - width + 1 - before
-                ]
+                of_rows[before : before + len(means)] = means
+                # Filters treat the rows at the ends each in its own way.
+                of_rows[: width - 1] = of_rows[count - width + 1 :] = np.nan
                 yield self._forward(j, f"mean of {width} rows {text}", of_rows)
         for text, means in self._means_of_samples(self.data.channels[j].column):
             of_rows = np.full(count, np.nan)

@@ -263,7 +263,7 @@ def _shown_value(row: int, value: object) -> str:
 
 
 def split_bracketed_unit(name: str) -> tuple[str, str]:
-    """Return name and unit of "rotor [deg]", "rotor (deg)" or "rotor / deg"; "" for no unit.
+    """Return name and unit of "rotor [deg]", "rotor / deg" or "rotor in deg"; "" for no unit.
 
     Numbers in brackets are indices, and what stands in round brackets directly behind a word and is
     no unit is what a function is of: "q[1,1]" and "der(phi)" have no unit. Linear in the length of
@@ -277,6 +277,10 @@ def split_bracketed_unit(name: str) -> tuple[str, str]:
     text = name.strip()
     units = [place for place in (_bracketed(text), _behind_stroke(text)) if place is not None]
     if not units:
+        for divider in (" in ", ","):
+            stem, _, unit = text.rpartition(divider)
+            if stem.strip() and is_unit(unit):
+                return stem.strip(), unit.strip()
         return text, ""
     end, unit = min(units)
     stem = text[:end].strip()
