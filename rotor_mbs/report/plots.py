@@ -167,24 +167,34 @@ def mark_time(axes: Any, end: float, horizon: float | None) -> None:
         )
 
 
-def paths(tip: Array) -> Panels:
-    """Plot the paths of `tip` (n, blades, 3) m."""
+def paths(tip: Array, tilt: float = 0.0) -> Panels:
+    """Plot the paths of `tip` (n, blades, 3) m; tilt: of the shaft, rad."""
     panels = canvas.panels((4.1,), "")
-    draw_paths(panels.axes[0], tip)
+    draw_paths(panels.axes[0], tip, tilt)
     return panels
 
 
-def draw_paths(axes: Any, tip: Array) -> None:
-    """Draw the paths of `tip` (n, blades, 3) m, the blades at the start (dashed) and at the end (solid), shaft and
-    scale."""
+def draw_paths(axes: Any, tip: Array, tilt: float = 0.0) -> None:
+    """Draw paths of tips, the blades at the start (dashed) and at the end (solid), shaft and scale.
+
+    Parameters
+    ----------
+    axes : of Matplotlib.
+    tip : (n, blades, 3) m, base frame.
+    tilt : of the shaft, rad.
+    """
     reach = 1.04 * float(np.linalg.norm(tip, axis=2).max())
     axes.set(xlim=(-0.95 * reach, 0.95 * reach), ylim=(-1.02 * reach, 1.02 * reach), aspect="equal")
     axes.set_axis_off()
     angle = np.linspace(0.0, 2.0 * np.pi, 37)
     ring = reach * np.stack([np.sin(angle), 0.0 * angle, np.cos(angle)], axis=1)
+    shaft = np.array([[0.0, 0.0, 0.0], [0.0, -0.3 * reach, 0.0]])
+    if tilt:
+        turn = np.array([[1.0, 0.0, 0.0], [0.0, np.cos(tilt), -np.sin(tilt)], [0.0, np.sin(tilt), np.cos(tilt)]])
+        ring, shaft = ring @ turn.T, shaft @ turn.T
     axes.plot(*projected(ring).T, color=RING, linewidth=0.7)
     axes.plot(
-        *projected(np.array([[0.0, 0.0, 0.0], [0.0, -0.3 * reach, 0.0]])).T,
+        *projected(shaft).T,
         color=GREY,
         linewidth=3.0,
     )
@@ -318,7 +328,7 @@ class RunPlots(ComparisonPlots):
     def tips(self) -> Panels:
         """Plot the paths of the blade tips (m). Raises InputError if the run does not have them."""
         _some(self._run.time)
-        return paths(_quantity(self._run, "tip")).with_legend()
+        return paths(_quantity(self._run, "tip"), self._run.scene.shaft_tilt).with_legend()
 
 
 def _some(time: Array) -> Array:

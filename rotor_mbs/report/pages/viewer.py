@@ -42,9 +42,10 @@ def viewer(stored: StoredScene, runs: Mapping[str, StoredRun]) -> dict[str, Any]
     frames = {name: angles_at(*move, step) for name, move in moves.items()}
     data = {
         "step": step,
+        "tilt": scene.shaft_tilt,
         "colours": [name_of_colour(coordinate_look(i + 1).colour) for i in range(len(scene.blades))],
         "blades": [
-            {"phase": phase, "tip": blade.tip, "mass": blade.centre_of_mass}
+            {"phase": phase, "cone": blade.cone, "tip": blade.tip, "mass": blade.centre_of_mass}
             for phase, blade in zip(scene.phases, scene.blades, strict=True)
         ],
         "models": [{"name": name, "frames": angles.round(_DECIMALS).tolist()} for name, angles in frames.items()],

@@ -19,11 +19,17 @@
     return ways.map((way) => Math.max(1, Math.ceil(way / arc)));
   };
 
-  // Ry(rotor + phase) Rz(pitch) of a point of the blade, its distance from the pitch axis magnified.
-  const placed = (point, phase, rotor, pitch, magnified) => {
+  const aboutX = (angle, [x, y, z]) => {
+    const c = Math.cos(angle), s = Math.sin(angle);
+    return angle ? [x, c * y - s * z, s * y + c * z] : [x, y, z];
+  };
+
+  // Rx(tilt) Ry(rotor + phase) Rx(-cone) Rz(pitch) of a point of the blade, its distance from the pitch axis magnified.
+  const placed = (point, blade, tilt, rotor, pitch, magnified) => {
     const c = Math.cos(pitch), s = Math.sin(pitch), x = point[0] * magnified, y = point[1] * magnified;
-    const a = Math.cos(rotor + phase), b = Math.sin(rotor + phase), u = c * x - s * y, z = point[2];
-    return [a * u + b * z, s * x + c * y, -b * u + a * z];
+    const a = Math.cos(rotor + blade.phase), b = Math.sin(rotor + blade.phase);
+    const [u, v, w] = aboutX(-blade.cone, [c * x - s * y, s * x + c * y, point[2]]);
+    return aboutX(tilt, [a * u + b * w, v, -b * u + a * w]);
   };
 
   const start = (box) => {
@@ -43,7 +49,7 @@
         const points = [], times = [];
         const add = (place) => {
           const angles = between(frames, place);
-          points.push(placed(blade.tip, blade.phase, angles[0], angles[i + 1], magnified()));
+          points.push(placed(blade.tip, blade, data.tilt, angles[0], angles[i + 1], magnified()));
           times.push(place * data.step);
         };
         add(0);
@@ -73,8 +79,9 @@
 
     const room = (see) => {
       const ring = Array.from({ length: RING + 1 }, (_, i) => (2 * Math.PI * i) / RING);
-      line(see, ring.map((w) => [reach * Math.sin(w), 0, reach * Math.cos(w)]), shade("ring"), 1);
-      line(see, [[0, 0, 0], [0, -0.3 * reach, 0]], shade("grey"), 6);
+      const tilted = (points) => points.map((point) => aboutX(data.tilt, point));
+      line(see, tilted(ring.map((w) => [reach * Math.sin(w), 0, reach * Math.cos(w)])), shade("ring"), 1);
+      line(see, tilted([[0, 0, 0], [0, -0.3 * reach, 0]]), shade("grey"), 6);
     };
 
     const paths = (see, index, plain) => {
@@ -93,7 +100,7 @@
       const angles = between(models[index].frames, now / data.step), m = magnified();
       canvas.dataset[`angles${index}`] = angles.join(" ");
       const drawn = data.blades.map((blade, i) => {
-        const put = (point) => placed(point, blade.phase, angles[0], angles[i + 1], m);
+        const put = (point) => placed(point, blade, data.tilt, angles[0], angles[i + 1], m);
         const tip = put(blade.tip), root = put([blade.tip[0], blade.tip[1], 0.06 * reach]);
         return { i, tip, root, axis: put([0, 0, blade.tip[2]]), mass: put(blade.mass), depth: see.depth(tip) };
       });
