@@ -52,8 +52,11 @@ FREQUENCY_NAMES = {
 }  # fmt: skip
 LOAD_NAMES = tuple(load.name.replace("_", " ") for load in LOADS)
 # By the frame in which a scene's loads have them, the other frames in which data may have them.
-FRAMES = {"blade": ("rotor", "base"), "base": ("rotor",)}
-_FRAME_ENDINGS = (["blade", "frame"], ["rotor", "frame"], ["base", "frame"])
+# blade pitches, coned is the blade's at zero pitch, rotor turns with y along the shaft and z across
+# it (of a blade: at its azimuth), shaft is the base turned by the tilt.
+FRAMES = {"blade": ("coned", "rotor", "shaft", "base"), "base": ("shaft", "rotor")}
+LOAD_FRAMES = ("blade", *FRAMES["blade"])
+_FRAME_ENDINGS = [[frame, "frame"] for frame in LOAD_FRAMES]
 # OpenFAST's root loads, of the blade on the hub: x along the shaft, z along the blade, y against
 # the rotor's sense; the axes b turn with the pitch, the axes c do not.
 _OPENFAST = re.compile(r"root([fm])([xyz])([bc])(\d+)", re.IGNORECASE)
@@ -391,7 +394,7 @@ def _openfast_load(match: re.Match[str], known: Sequence[Channel]) -> Channel | 
     load = _named(f"blade root {kind} {blade} {axis}", known)
     if load is None:
         return None
-    return replace(load.in_frame("rotor" if frame == "c" else "blade"), sign=sign)
+    return replace(load.in_frame("coned" if frame == "c" else "blade"), sign=sign)
 
 
 def _array_channel(

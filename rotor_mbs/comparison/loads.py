@@ -6,7 +6,7 @@ import functools
 import itertools
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -39,7 +39,7 @@ _FORGOTTEN = {
 _UNITS = {1.0: "", 1e-3: "kN taken as N", 1e3: "N taken as kN"}
 _FACTORS = [sign * factor for sign in (1.0, -1.0) for factor in _UNITS]
 # "" is the one that the scene's loads have: of a root the blade's, of the shaft the base.
-_FRAMES = ("", "rotor", "base")
+_FRAMES = ("", "coned", "rotor", "shaft", "base")
 
 
 @dataclass(frozen=True)
@@ -86,6 +86,7 @@ class JudgedLoads:
     known : all components of loads of the scene, as the columns of `by_frame`.
     by_frame : by frame the (n, components) loads of the closed form.
     mistaken : by what is wrong, in words, the same otherwise computed.
+    hub_weight : what the hub's weight is of them.
     time : (n,) s.
     is_inside : (n,) rows that are neither the first nor the last one.
     values, rounding, expected : (n, channels) N or N m.
@@ -99,12 +100,18 @@ class JudgedLoads:
     by_frame: Mapping[str, Array]
     mistaken: Mapping[str, Mapping[str, Array]]
     is_inside: NDArray[np.bool_]
+    hub_weight: Mapping[str, Array]
     time: Array
     values: Array
     rounding: Array
     expected: Array
     smallest_scale: Array
     tolerance: float
+
+    @property
+    def frames(self) -> tuple[str, ...]:
+        """The frames that differ from one another in the scene."""
+        return tuple(frame for frame in _FRAMES if _plain_frame(self.scene, frame) == frame)
 
     def scale(self, j: int, component: Array) -> float:
         """Return the size by which errors of channel j are judged, if it is this component."""
@@ -154,24 +161,43 @@ def loads_by_frame(
         frame is as it is in its own.
     """
     loads = partial_loads(scene, time, angles, rates, parts)
-    in_rotor, in_base = dict[str, Array](), dict[str, Array]()
+    by_frame = {frame: dict(loads) for frame in _FRAMES}
     azimuths = angles[:, :1] + np.array(scene.phases)
+    cones = np.array([blade.cone for blade in scene.blades])
     for name, values in loads.items():
-        in_rotor[name] = in_base[name] = values
         if name.startswith("shaft"):
-            in_rotor[name] = _turned(values, -angles[:, 0], axis=1)
+            in_shaft = _turned(values, -scene.shaft_tilt, axis=0)
+            by_frame["shaft"][name] = in_shaft
+            by_frame["rotor"][name] = _turned(in_shaft, -angles[:, 0], axis=1)
         elif name.startswith("blade"):
-            in_rotor[name] = _turned(values, angles[:, 1:], axis=2)
-            in_base[name] = _turned(in_rotor[name], azimuths, axis=1)
+            coned = _turned(values, angles[:, 1:], axis=2)
+            in_rotor = _turned(coned, -cones, axis=0)
+            in_shaft = _turned(in_rotor, azimuths, axis=1)
+            by_frame["coned"][name] = coned
+            by_frame["rotor"][name] = in_rotor
+            by_frame["shaft"][name] = in_shaft
+            by_frame["base"][name] = _turned(in_shaft, scene.shaft_tilt, axis=0)
     matrices = {}
-    for frame, arrays in zip(_FRAMES, (loads, in_rotor, in_base), strict=True):
+    for frame, arrays in by_frame.items():
         columns = [arrays[load.name].reshape(len(time), -1) for load in LOADS]
         matrices[frame] = np.hstack(columns)
     return matrices
 
 
-def _turned(vectors: Array, angle: Array, axis: int) -> Array:
-    """Turn (..., 3) vectors about y (axis 1) or z (axis 2) by (...) rad."""
+def _plain_frame(scene: Scene, frame: str, of_shaft: bool = False) -> str:
+    """Return the frame that is the same as another one in a scene without tilt or cone.
+
+    of_shaft: whether it is that of a shaft load, which has its components in the base frame.
+    """
+    if frame == "coned" and not any(blade.cone for blade in scene.blades):
+        return "rotor"
+    if frame == "shaft" and not scene.shaft_tilt:
+        return "" if of_shaft else "base"
+    return frame
+
+
+def _turned(vectors: Array, angle: Array | float, axis: int) -> Array:
+    """Turn (..., 3) vectors about x (axis 0), y or z by (...) rad."""
     first, second = (axis + 1) % 3, (axis + 2) % 3
     turned = vectors.copy()
     turned[..., first] = np.cos(angle) * vectors[..., first] - np.sin(angle) * vectors[..., second]
@@ -221,7 +247,7 @@ def _loads_in_rows(
     known = [channel for channel in channels(scene) if channel.is_load]
     places = [channel.column - known[0].column for channel in loads.channels]
 
-    def loads_at(states: Array, parts: LoadParts = WHOLE) -> dict[str, Array]:
+    def loads_at(states: Array, parts: LoadParts = WHOLE, scene: Scene = scene) -> dict[str, Array]:
         angles, rates = all_coordinates(scene, states[:, :half], states[:, half:])
         return loads_by_frame(scene, time, angles, rates, parts)
 
@@ -249,6 +275,11 @@ def _loads_in_rows(
         change = np.abs(columns_of(loads_at(moved)) - expected)
         rounding += change * (defects.rounding[:, i] / step)[:, None]
 
+    hub_weight = {frame: np.zeros_like(matrix) for frame, matrix in by_frame.items()}
+    if scene.hub_mass:
+        without = loads_at(states, scene=replace(scene, hub_mass=0.0))
+        for frame, matrix in without.items():
+            hub_weight[frame] = by_frame[frame] - matrix
     judged = np.isfinite(expected).all(axis=1) & ~is_at_jump(scene, time)
     mistaken = {text: loads_at(states, parts) for text, parts in _FORGOTTEN.items()}
     for text, late in (("a row late", 1), ("a row early", -1)):
@@ -267,6 +298,7 @@ def _loads_in_rows(
             for text, matrices in mistaken.items()
         },
         is_inside=is_inside[judged],
+        hub_weight={frame: matrix[judged] for frame, matrix in hub_weight.items()},
         time=time[judged],
         values=loads.values[: len(time)][judged],
         rounding=rounding[judged],
@@ -378,7 +410,9 @@ def _component_hypotheses(loads: JudgedLoads, j: int) -> Iterator[Hypothesis[Com
     channel = loads.channels[j]
     name = channel.name.partition(",")[0]
     torque = values_before(loads.scene.load_segments, loads.time)[ROTOR_TORQUE]
-    for frame, matrix in loads.by_frame.items():
+    own_frame = _plain_frame(loads.scene, channel.frame, name.startswith("shaft"))
+    for frame in loads.frames:
+        matrix = loads.by_frame[frame]
         for i, other in enumerate(loads.known):
             if other.kind != channel.kind:
                 continue
@@ -386,11 +420,17 @@ def _component_hypotheses(loads: JudgedLoads, j: int) -> Iterator[Hypothesis[Com
             exchanges = int(_load(other) != _load(channel)) + int(other.name != name)
             for factor in _FACTORS:
                 mistakes = _mistakes(factor)
-                if frame != channel.frame:
+                if frame != own_frame:
                     mistakes.insert(0, f"in the {_frame_name(other, frame)} frame")
                 price = exchanges + len(mistakes)
                 component = Component(factor, matrix[:, i], shown)
                 yield Hypothesis(", ".join(mistakes), component, price)
+                if np.any(loads.hub_weight[frame][:, i]):
+                    text = ", ".join(["without the hub's weight", *mistakes])
+                    component = Component(
+                        factor, matrix[:, i] - loads.hub_weight[frame][:, i], shown
+                    )
+                    yield Hypothesis(text, component, price + 1)
                 if other.name == "shaft moment y":
                     text = ", ".join(["with the torque on the rotor in it", *mistakes])
                     component = Component(factor, matrix[:, i] + torque, shown)
@@ -466,11 +506,15 @@ def _other_point(loads: JudgedLoads, load: str, frame: str, group: Sequence[int]
         text = ", ".join([f"about {name} in place of {origin}", *_mistakes(factor)])
         points.append(Hypothesis(text, (factor, point)))
 
+    root = np.array([0.0, 0.0, loads.scene.hub_radius])
+    if is_root and loads.scene.hub_radius and frame in ("", "coned"):
+        for factor in _FACTORS:
+            add("the apex", -root, factor)
     if is_root and not frame:
         blade = loads.scene.blades[int(load.split()[-1]) - 1]
         for name, place in (("the centre of mass", blade.centre_of_mass), ("the tip", blade.tip)):
             for factor in _FACTORS:
-                add(name, np.array(place), factor)
+                add(name, np.array(place) - root, factor)
     # Any point: by least squares over the wrong components.
     frame_name = _frame_name(loads.channels[group[0]], frame)
     for factor in _FACTORS:

@@ -14,6 +14,7 @@ from typing import Any
 
 from rotor_mbs.comparison.channels import (
     FREQUENCY_NAMES,
+    LOAD_FRAMES,
     LOAD_NAMES,
     SPEED,
     TIME,
@@ -52,7 +53,7 @@ class ColumnMapping:
     sign: int = file_key("sign", _SIGN, default=1)
     offset: float = file_key("offset", keys.NUMBER, note=", in the column's unit", default=0.0)
     wrapped: bool = file_key("wrapped", keys.FLAG, default=False)
-    frame: str = file_key("frame", keys.choice(("blade", "rotor", "base")), default="")
+    frame: str = file_key("frame", keys.choice(LOAD_FRAMES), default="")
 
 
 @dataclass(frozen=True)

@@ -44,7 +44,11 @@ _FORGOTTEN = {
     "bearing_damping": "the dampers of the bearings",
     "shaft_damping": "the damper of the shaft",
     "hub_inertia": "the hub's inertia",
+    "shaft_tilt": "the tilt of the shaft",
 }
+# Fields that no motion depends on, and those that are changed by an angle, not by a share.
+_IN_LOADS_ALONE = ("hub_radius", "hub_mass")
+_LEANING_FIELDS = ("shaft_tilt", "cone")
 # Factors of terms in the equations of motion that are easily wrong.
 _FACTORS = {"without": 0.0, "half of": 0.5, "twice": 2.0, "opposite sign of": -1.0}
 # E3 is the power of a term that is zero without E2.
@@ -261,6 +265,7 @@ def other_scenes(scene: Scene) -> Iterator[tuple[str, Scene]]:
     for gravity in _GRAVITIES:
         yield f"gravity of {gravity:g} m/s^2", replace(scene, gravity=gravity)
     yield from _other_blades(scene)
+    yield "tilt of the shaft with opposite sign", replace(scene, shaft_tilt=-scene.shaft_tilt)
     yield from _exchanged_bearings(scene)
     for (field, text), (amount, factor) in itertools.product(_FORGOTTEN.items(), _FACTORS.items()):
         # A negative stiffness, damping or inertia is not a scene's, and no motion lasts with it.
@@ -321,6 +326,8 @@ def _other_blades(scene: Scene) -> Iterator[tuple[str, Scene]]:
         "blades without inertia, as point masses": _without_inertia,
         "products of inertia with opposite sign": _with_opposite_products,
         "products of inertia about the root with opposite sign": _with_opposite_root_products,
+        "cone of the blades with opposite sign": lambda blade: replace(blade, cone=-blade.cone),
+        "without the cone of the blades": lambda blade: replace(blade, cone=0.0),
         "tip used as centre of mass": lambda blade: replace(blade, centre_of_mass=blade.tip),
         "inertia about the root used as inertia about the centre of mass": _with_steiner,
         "inertia about the centre of mass used as inertia about the root: "
@@ -456,9 +463,12 @@ def parameters(scene: Scene) -> Iterator[Parameter]:
     """
     for item in scene_fields("rotor"):
         value = getattr(scene, item.name)
+        if item.name in ("blades", *_IN_LOADS_ALONE, *_LEANING_FIELDS):
+            continue
         # A zero, or no number, is not changed by a share.
-        if item.name != "blades" and _scaled(value, 1.0) != value:
+        if _scaled(value, 1.0) != value:
             yield Parameter(item.metadata["key"], "", _share_of([(item.name,)]))
+    yield Parameter("shaft.tilt", "rad", _tilt_moved)
     blades = list(range(len(scene.blades)))
     yield from _blade_parameters(scene, blades, "")
     if 1 < len(blades) <= _MAX_BLADES:
@@ -476,8 +486,8 @@ def _blade_parameters(scene: Scene, chosen: list[int], number: str) -> Iterator[
     number : of a single blade among several, as in its key; else "".
     """
     for field in fields(Blade):
-        if field.name == "tip":
-            continue  # which is in no equation
+        if field.name in ("tip", *_LEANING_FIELDS):  # the tip is in no equation
+            continue
         value = getattr(scene.blades[chosen[0]], field.name)
         if isinstance(value, tuple):
             entries: list[tuple[int, ...]] = [(i,) for i, entry in enumerate(value) if entry]
@@ -501,6 +511,7 @@ def _blade_parameters(scene: Scene, chosen: list[int], number: str) -> Iterator[
     if any(scene.bearing_damping) and not number:
         text = "share of the rotor's rate that the bearings' dampers see"
         yield Parameter(text, "of it", _damped_by_rotor)
+    yield Parameter(f"blade{number}.cone", "rad", functools.partial(_cone_moved, chosen))
     which = f"blade {chosen[0] + 1}" if len(chosen) == 1 else "all blades"
     azimuth = functools.partial(_azimuth_moved, chosen)
     yield Parameter(f"azimuth of {which}", "rad", azimuth)
@@ -515,6 +526,19 @@ def _share_of(paths: Sequence[Path]) -> Callable[[RotorModel, float], RotorModel
         return replace(model, scene=_scaled_at(model.scene, paths, change))
 
     return apply
+
+
+def _tilt_moved(model: RotorModel, change: float) -> RotorModel:
+    """Tilt the shaft by a change in rad."""
+    return replace(model, scene=replace(model.scene, shaft_tilt=model.scene.shaft_tilt + change))
+
+
+def _cone_moved(chosen: Sequence[int], model: RotorModel, change: float) -> RotorModel:
+    """Lean some blades by a change in rad."""
+    blades = list(model.scene.blades)
+    for i in chosen:
+        blades[i] = replace(blades[i], cone=blades[i].cone + change)
+    return replace(model, scene=replace(model.scene, blades=tuple(blades)))
 
 
 def _azimuth_moved(chosen: Sequence[int], model: RotorModel, change: float) -> RotorModel:

@@ -227,10 +227,10 @@ def test_only_columns_that_are_there_are_judged_and_omit_leaves_out(tmp_path: Pa
     wrong = rotor_mbs("compare", tmp_path / "d.csv", "--scene", tmp_path / "own.toml", "-o", tmp_path / "page")
     assert wrong.status == 1
     assert "blade root force 1 y = -'RootFxb1' [kN]" in wrong.out
-    assert "blade root moment 2 x, rotor frame = 'RootMyc2' [kN-m]" in wrong.out
+    assert "blade root moment 2 x, coned frame = 'RootMyc2' [kN-m]" in wrong.out
     assert f"shaft moment y: {REVERSED}" in wrong.out
     page = (tmp_path / "page" / "index.html").read_text()
-    assert all(text in page for text in ("blade root moment 2 x, rotor frame", "of the largest", "shaft moment y"))
+    assert all(text in page for text in ("blade root moment 2 x, coned frame", "of the largest", "shaft moment y"))
 
 
 def test_stored_loads_are_the_datas_and_the_closed_forms() -> None:
@@ -251,7 +251,7 @@ def test_a_mapping_says_column_unit_sign_and_frame_of_a_load() -> None:
     assert found.status == "ok"
     assert "blade root force 2 x, rotor frame" in compared
     assert "blade root force 2 x" not in compared
-    with pytest.raises(InputError, match="shaft_force_x: frame 'blade'; allowed: base, rotor"):
+    with pytest.raises(InputError, match="shaft_force_x: frame 'blade'; allowed: base, shaft, rotor"):
         rm.compare(arrays, short("paper/fig11"), columns={"shaft_force_x": {"column": "time", "frame": "blade"}})
     with pytest.raises(InputError, match="no column for an angle or a rate"):
         rm.compare({"time": arrays["time"], "shaft_force": arrays["shaft_force"]}, short("paper/fig11"))
