@@ -165,10 +165,7 @@ BEFORE = {
         "run paper/fig08 -m lagrange/dop853 -m exudyn_tree/rk67 -o results.h5",
         "run paper/fig08 -m lagrange/dop853 -m exudyn_tree/rk67 -o main/results.h5",
     ],
-    "compare.md": [
-        "export paper/fig11 --to csv -o mine.csv",
-        "export my.toml --to csv -o OpenFAST.out",
-    ],
+    "compare.md": ["export paper/fig11 --to csv -o mine.csv"],
 }
 # Commands that would take minutes, with what makes them short; others of the documents are run as they stand.
 SHORTER = {
@@ -215,8 +212,6 @@ def test_the_path_of_a_document_can_be_walked(name: str, tmp_path: Path, monkeyp
     monkeypatch.chdir(tmp_path)
     (tmp_path / "my.toml").write_text(OWN_SCENE)
     (tmp_path / "main").mkdir()
-    if name == "compare.md":
-        (tmp_path / "map.toml").write_text('rotor = "q0"\n')
     if name == "sweeps.md":
         make_inputs(name)
         (tmp_path / "SWEEP.toml").write_text((tmp_path / "sweep.toml").read_text())

@@ -8,5 +8,5 @@ pages      one module per page: stored data to the content of the page
 canvas     matplotlib: still pictures, figures for a manuscript (figures), notebooks (plots), animations (animation)
 templates  the pages' HTML, style and scripts
 
-Interval defects that a file does not have are computed when a page shows them, which needs SciPy.
+Nothing is integrated: a page shows what its file has, also where no engine and no SciPy can be imported.
 """

@@ -15,7 +15,7 @@ from rotor_mbs.report.canvas import TIME_AXIS, Panels
 from rotor_mbs.report.looks import BLUE, GREY, INK, RING, VERMILLION, Look, coordinate_look, look_of
 from rotor_mbs.report.numbers import prefix_of, with_unit
 from rotor_mbs.solution.metrics import angle_error, energy_scale, horizon
-from rotor_mbs.solution.quantities import LOADS, Plot, Quantity
+from rotor_mbs.solution.quantities import DEFECT, LOADS, Plot, Quantity
 from rotor_mbs.solution.trajectory import Array, Solution, Trajectory
 
 ANGLE_AXIS, RATE_AXIS = "angle (rad)", "rate (rad/s)"
@@ -255,15 +255,22 @@ class ComparisonPlots:
         return errors(series, "largest angle error (rad)", horizon(self._reference)).with_legend()
 
     def defects(self) -> Panels:
-        """Plot the interval defects (rad) of each run over time. Raises InputError for fewer than two samples."""
-        from rotor_mbs.models.lagrange.defects import interval_defects  # late: SciPy, and an engine
+        """Plot the interval defects (rad) of each run over time. Raises InputError for fewer than two samples.
 
+        Those of a run of a sweep, which are not stored, are computed.
+        """
         series = []
         for run in self._runs:
             if len(run.time) < 2:
                 raise InputError("the run has fewer than two samples; no interval to plot")
-            angles, rates = _quantity(run, "angles"), _quantity(run, "rates")
-            sizes = interval_defects(run.scene, run.time, angles, rates).sizes
+            stored = run.trajectory.get(DEFECT)
+            if stored is not None:
+                sizes = stored[1:]
+            else:
+                from rotor_mbs.models.lagrange.defects import interval_defects  # late: SciPy, and an engine
+
+                angles, rates = _quantity(run, "angles"), _quantity(run, "rates")
+                sizes = interval_defects(run.scene, run.time, angles, rates).sizes
             series.append(Series(run.time[1:], sizes, look_of(run.method)))
         return errors(series, "defect (rad)").with_legend()
 

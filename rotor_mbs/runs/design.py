@@ -17,7 +17,7 @@ from rotor_mbs.runs.versions import row_versions
 from rotor_mbs.scenario.catalogue import natural_key
 from rotor_mbs.scenario.scene import Scene, scene_hash
 from rotor_mbs.solution.metrics import METRICS, RowValue
-from rotor_mbs.solution.quantities import LOADS, SCALES, quantities, scale_values
+from rotor_mbs.solution.quantities import DEFECT, LOADS, SCALES, quantities, scale_values
 from rotor_mbs.solution.status import STATUSES
 
 MISSING = -1  # status of a row that is not stored
@@ -183,7 +183,10 @@ def arrays_of(run: RunRequest) -> dict[str, Column]:
     outputs = (*run.scene.outputs, "angles", "rates") if run.method == REFERENCE else run.scene.outputs
     columns = {}
     for quantity in quantities(outputs):
-        if not (quantity.required or quantity.name in method.arrays):
+        is_computed = quantity.required or quantity.name in method.arrays
+        if quantity.name == DEFECT:
+            is_computed = {"angles", "rates"} <= {*outputs}
+        if not is_computed:
             continue
         is_once = quantity.name in ONCE_A_SCENE
         if is_once and run.method != REFERENCE:

@@ -242,6 +242,9 @@ _JOINT_GAP = QuantityMetric(
     look_at="a joint of the chain that is not constrained, or its marker",
 )
 
+# Found by the judgement of a run, and not by its model.
+DEFECT = "defect"
+
 BUILT_IN = (
     Quantity("angles", ("time", "coordinate"), "rad", "rotor angle and pitch angles, unwrapped", "angles"),
     Quantity("rates", ("time", "coordinate"), "rad/s", "rotor rate and pitch rates", "rates"),
@@ -264,6 +267,11 @@ BUILT_IN = (
         plot=Plot("Largest gap in a joint", "gap (m)", logarithmic=True),
     ),
     *LOADS,
+    Quantity(
+        DEFECT, ("time",), "rad",
+        "size of the defect of the interval up to each sample, the largest over angles and rates; NaN in the first",
+        required=False,
+    ),
     Quantity(
         "angle_uncertainty", ("time",), "rad",
         "estimate of the error of the angles, before rounding to double precision (half a unit in the last place)",

@@ -32,6 +32,8 @@ from rotor_mbs.runs.rows import RowLocation, Rows, row_of_run, text_of
 from rotor_mbs.runs.runner import OnProgress, RunOutcome, Task, ignore_progress, run_tasks_references_first
 from rotor_mbs.runs.table import TableFile
 from rotor_mbs.scenario.scene import Scene, scene_hash
+from rotor_mbs.solution.defects import Defects
+from rotor_mbs.solution.quantities import DEFECT
 from rotor_mbs.solution.status import STATUSES
 from rotor_mbs.solution.trajectory import Integration, Solution, Trajectory
 from rotor_mbs.studies.stored_references import frozen_solution, read_reference, shipped_versions
@@ -273,8 +275,19 @@ def _judged(run: Solution, reference: Trajectory | None, end: float) -> tuple[So
         return replace(run, status="timed_out", message=f"{exc}, while its samples were assessed"), False
     advice = judgement.advice or next_to_try(run.scene, run.method, run.settings, judgement.status)
     message = judgement.message + advice
-    judged = replace(run, status=judgement.status, message=message, metrics=judgement.metrics)
+    trajectory = run.trajectory
+    if judgement.defects is not None:
+        trajectory = _with_defects(trajectory, judgement.defects)
+    judged = replace(run, trajectory=trajectory, status=judgement.status, message=message, metrics=judgement.metrics)
     return judged, judgement.false_success
+
+
+def _with_defects(samples: Trajectory, defects: Defects) -> Trajectory:
+    """Return the samples with the size of each interval's defect at its end; NaN where it is not known."""
+    sizes = np.concatenate([[np.nan], defects.sizes])
+    known = samples.replace(**{DEFECT: np.where(np.isfinite(sizes), sizes, np.nan)})
+    known.refined = samples.refined
+    return known
 
 
 def next_to_try(scene: Scene, method: str, settings: Mapping[str, object], status: str) -> str:

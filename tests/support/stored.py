@@ -52,6 +52,8 @@ class Made:
             fields["potential_energy"] = fields["work"] = np.zeros(len(time))
         if self.method == "reference":
             fields |= {"angle_uncertainty": np.full(len(time), 1e-30), "error_growth": np.ones(len(time))}
+        if len(time) and scene.wants("angles") and scene.wants("rates"):
+            fields["defect"] = np.concatenate([[np.nan], np.full(len(time) - 1, 1e-12)])
         trajectory = Trajectory(time, angles, rates, **fields)
         return Solution(scene, self.method, trajectory, Integration(True), {}, 0.01, [0.002], 0.001)
 

@@ -699,7 +699,7 @@ def _details_section(scene: StoredScene) -> Section:
     folds: list[Grid | Fold | Element] = []
     axis = draw.whole_time(list(runs.values()))
     if axis is not None:
-        curves = draw.error_curves(runs, draw.interval_errors(scene.scene, runs), first=1)
+        curves = draw.error_curves(runs, draw.interval_errors(runs), first=1)
         if curves:
             plot = draw.error_plot("Interval defect", "rad", curves, axis)
             legend = Legend([(f"{curve.key} ", curve.look) for curve in curves])

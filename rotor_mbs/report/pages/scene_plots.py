@@ -17,7 +17,7 @@ from rotor_mbs.report.numbers import prefix_of, prefixed, shortest
 from rotor_mbs.runs.read import StoredRun, StoredScene
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.scenario.time_table import kink_times, values_at
-from rotor_mbs.solution.quantities import LOADS, Quantity, known_quantities
+from rotor_mbs.solution.quantities import DEFECT, LOADS, Quantity, known_quantities
 
 Runs = Mapping[str, StoredRun]
 VISIBLE = 0.05  # rad: what one can see in a figure of the paper's size
@@ -346,22 +346,13 @@ def energy_errors(runs: Runs) -> dict[str, Array]:
     return errors
 
 
-def interval_errors(scene: Scene, runs: Runs) -> dict[str, Array]:
-    """Return the size of the defect of every interval of each run, from its second sample on: (n - 1,) rad.
+def interval_errors(runs: Runs) -> dict[str, Array]:
+    """Return the size of the defect of every interval of each run that has them, from its second sample on.
 
-    They are read where the file has them, else computed, which needs SciPy.
+    They are those of the file, (n - 1,) rad: pages integrate nothing.
     """
     sizes = {}
     for method, run in runs.items():
-        if "angles" not in run or "rates" not in run or run.samples < 2:
-            continue
-        if "defect" in run:
-            sizes[method] = np.asarray(run.array("defect")[1:], dtype=float)
-            continue
-        from rotor_mbs.models.lagrange.defects import (
-            interval_defects,
-        )  # late: SciPy, and an engine where there is one
-
-        time, angles, rates = (run.array(name) for name in ("time", "angles", "rates"))
-        sizes[method] = interval_defects(scene, time, angles, rates).sizes
+        if DEFECT in run and run.samples > 1:
+            sizes[method] = np.asarray(run.array(DEFECT)[1:], dtype=float)
     return sizes
