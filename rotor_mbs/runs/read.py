@@ -132,11 +132,11 @@ class StoredRun:
     @functools.cached_property
     def _arrays(self) -> dict[str, NDArray[Any]]:
         """Return its arrays by name, scales included. One that its method or its scene's outputs do
-        not have is NaN from the first sample on, and left out."""
+        not have is NaN in all samples, and left out."""
         count = self.samples
         scales = {name: values[:count] if name == "time" else values for name, values in self.scales.items()}
         own = {name: values[:count] for name, values in self._row.items() if np.ndim(values) and name not in _TEXTS}
-        return scales | {name: values for name, values in own.items() if count == 0 or not np.isnan(values[0]).all()}
+        return scales | {name: values for name, values in own.items() if count == 0 or not np.isnan(values).all()}
 
     @property
     def names(self) -> list[str]:

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import json
 import re
+import subprocess
+import sys
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 from support.checking import results_file
+from support.commands import rotor_mbs
 from support.report_pages import (
     answer_of,
     facts_of,
@@ -22,6 +25,7 @@ from support.report_pages import (
 )
 from support.scenes import paper
 from support.stored import Made, rotor, store
+from support.sweeps import THREE_RUNS, made_sweep
 
 from rotor_mbs.analysis.published import CheckedEntry, claim_study, published
 from rotor_mbs.errors import StoreError
@@ -497,3 +501,20 @@ def test_the_same_file_gives_the_same_bytes_in_any_number_of_processes(tmp_path:
     first, second = ({page.name: page.read_bytes() for page in folder.iterdir()} for folder in folders)
     assert sorted(first) == ["index.html", "one.html", "two.html"]
     assert first == second
+
+
+@pytest.mark.full
+def test_a_report_needs_no_engine_and_no_scipy(results: Path, tmp_path: Path) -> None:
+    """In a process in which none of them can be imported, whatever asks for it."""
+    modes, sweep = tmp_path / "modes.h5", made_sweep(tmp_path, THREE_RUNS)
+    assert rotor_mbs("modes", "paper/fig11", "--speeds", "0.5:1:2", "-o", modes).status == 0
+    code = (
+        "import sys\n"
+        "for name in ('exudyn', 'mujoco', 'heyoka', 'scipy'): sys.modules[name] = None\n"
+        "from pathlib import Path\n"
+        "from rotor_mbs.report.build import write_report\n"
+        "for path in map(Path, sys.argv[1:]): write_report(path, Path(path.stem))\n"
+    )
+    subprocess.run([sys.executable, "-c", code, results, modes, sweep], cwd=tmp_path, check=True)
+    assert len(list((tmp_path / results.stem).glob("*.html"))) > 4
+    assert "Interval defect" in text_of(tmp_path / results.stem, "paper-fig11.html")

@@ -15,9 +15,11 @@ from support.commands import rotor_mbs
 from support.scenes import paper
 from support.stored import Made, damage, rotor, store
 
+import rotor_mbs as rm
 from rotor_mbs.analysis.text_tables import run_row
 from rotor_mbs.errors import StoreError
 from rotor_mbs.methods.catalogue import find_method
+from rotor_mbs.models.lagrange.defects import interval_defects
 from rotor_mbs.processes.pool import SerialPool
 from rotor_mbs.runs.read import open_results
 from rotor_mbs.runs.rows import Rows
@@ -260,3 +262,19 @@ def test_a_full_disk_is_one_line_and_what_was_stored_stays(tmp_path: Path) -> No
     assert ended.err.count("\n") == 1
     assert path.read_bytes() == before
     assert [entry.name for entry in tmp_path.iterdir()] == ["r.h5"]
+
+
+def test_the_defect_of_every_interval_is_stored_with_its_run(results: Path) -> None:
+    """At the end of the interval, and as a quantity of a `Run`; the largest is the metric of that name."""
+    with open_results(results) as opened:
+        for scene in opened.scenes.values():
+            for stored in scene.runs.values():
+                sizes = stored.array("defect")
+                samples = (stored.array(name) for name in ("time", "angles", "rates"))
+                assert np.isnan(sizes[0])
+                assert sizes[1:].tobytes() == interval_defects(scene.scene, *samples).sizes.tobytes()
+    short = SCENE.replace(duration=0.1, samples=11)
+    computed = rm.run(short, "lagrange/dop853")
+    assert computed.defect[1:].max() == computed.metrics["defect_max"]
+    assert computed.to_xarray().defect.attrs["units"] == "rad"
+    assert "defect" not in rm.run(short.replace(outputs=["angles"]), "lagrange/dop853").quantities
