@@ -15,8 +15,8 @@ import h5py
 import numpy as np
 import pytest
 from support.commands import rotor_mbs
+from support.other_code import energies
 from support.packages import forget_what_is_installed, install
-from support.rotors import energies
 
 import rotor_mbs as rm
 from rotor_mbs.analysis.judgement import judge

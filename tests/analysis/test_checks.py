@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 import pytest
 from support.defects import made_defects
-from support.references import reference, scene
-from support.scenes import general, paper
+from support.references import reference
+from support.scenes import general, paper, shipped
 from support.stored import Arrays, Made, rotor, store
 
 from rotor_mbs.analysis import checks
@@ -36,7 +36,7 @@ from rotor_mbs.solution.quantities import energy_error
 from rotor_mbs.solution.trajectory import Solution, Trajectory
 
 METHOD, PRINTED, BOUNDS = "lagrange/dop853", "printed/ode45", shipped_bounds()
-LOADED = scene("check/loads")
+LOADED = shipped("check/loads")
 FIG11 = paper("fig11", samples=101)
 ANGLES, RATE = {"rotor_angle_min", "rotor_angle_max"}, {"rotor_rate_max"}
 

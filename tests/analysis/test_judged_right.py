@@ -1,4 +1,4 @@
-"""Runs that were called wrong words: what is right is ok, what is wrong is not, however far apart the rows are."""
+"""Verdicts on runs that are hard to judge: what is right is ok, what is wrong is not, at any distance of the rows."""
 
 from __future__ import annotations
 

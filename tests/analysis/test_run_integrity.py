@@ -1,4 +1,4 @@
-"""Settings of constructed runs."""
+"""Stored settings: what is missing, unknown or out of its range is a fault of the run."""
 
 from __future__ import annotations
 

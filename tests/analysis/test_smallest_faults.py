@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from support.references import reference, referenced
-from support.references import scene as scene_of
+from support.scenes import shipped
 
 from rotor_mbs.methods.catalogue import method_names
 from rotor_mbs.models.lagrange.defects import interval_defects
@@ -33,7 +33,7 @@ def bounds_by_value() -> dict[float, list[str]]:
 
 def interval(name: str, row: int, angles: Array, rates: Array) -> Defects:
     """Return the defects of the interval that ends in a row, (2, 1 + blades) rad and rad/s."""
-    return interval_defects(scene_of(name), reference(name).time[row - 1 : row + 1], angles, rates)
+    return interval_defects(shipped(name), reference(name).time[row - 1 : row + 1], angles, rates)
 
 
 def judge_faults(name: str, row: int) -> int:

@@ -10,8 +10,8 @@ from typing import Any
 
 import pytest
 from support.packages import forget_what_is_installed, install
-from support.references import reference, scene
-from support.scenes import PAPER, paper
+from support.references import reference
+from support.scenes import PAPER_SCENES, paper, shipped
 
 from rotor_mbs.analysis.judgement import judge
 from rotor_mbs.errors import InputError, MethodRefusal
@@ -30,7 +30,7 @@ DEFAULT_METHODS = tuple(method.name for method in methods() if method.is_default
 
 
 def test_scenes_of_the_paper_keep_the_default_set() -> None:
-    for name in PAPER:
+    for name in PAPER_SCENES:
         methods, reason = recommend(paper(name), DEFAULT_METHODS)
         assert methods[0] == "lagrange/taylor"  # not the printed model, which comes first in the paper's comparison
         assert set(methods) == set(DEFAULT_METHODS), name
@@ -57,7 +57,7 @@ CHOOSE_THEIR_STEP, IMPLICIT = ("lagrange/taylor", "exudyn_tree/dopri5"), ("lagra
     ],
 )
 def test_stiff_scenes_get_methods_that_stay_within_their_bounds(name: str, expected: tuple[str, ...]) -> None:
-    methods, reason = recommend(scene(f"stiff/{name}"), DEFAULT_METHODS)
+    methods, reason = recommend(shipped(f"stiff/{name}"), DEFAULT_METHODS)
     assert methods == expected
     assert "\n" not in reason
 
@@ -88,7 +88,7 @@ def _mark_of(name: str) -> Any:
 )
 def test_what_the_rule_takes_holds(name: str) -> None:
     """Every method that claims to be right, at its default settings, against the frozen reference."""
-    chosen = scene(name)
+    chosen = shipped(name)
     if singular_reason(chosen) or name in _NOTHING_HOLDS:
         pytest.skip("refused, or beyond every method")
     is_chaos = name == "extreme/hour-chaos"  # for an hour, in samples of 10 s: only the energy is known
@@ -104,7 +104,7 @@ def test_what_the_rule_takes_holds(name: str) -> None:
     "changes", [{"hub_inertia": 1e-6}, {"bearing_stiffness": (1e6,)}], ids=["with a hub", "held by a spring"]
 )
 def test_one_blade_is_taken_where_it_does_not_end(changes: dict[str, object]) -> None:
-    assert recommend(replace(scene("extreme/singular-one-blade"), **changes), DEFAULT_METHODS)[0]
+    assert recommend(replace(shipped("extreme/singular-one-blade"), **changes), DEFAULT_METHODS)[0]
 
 
 @pytest.mark.parametrize(("inertia", "hub", "refused"), [(0.0, 0.0, True), (4.0, 0.0, False), (0.0, 4.0, False)])

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from support import references
-from support.scenes import PAPER, paper
+from support.scenes import PAPER_SCENES, paper
 
 from rotor_mbs.analysis.judgement import defects_of, judge
 from rotor_mbs.methods.catalogue import find_method
@@ -24,7 +24,7 @@ BOUND = {"lagrange/taylor": (1e-10, 1e-12), "exudyn_tree/rk67": (1e-9, 1e-12), "
 SETTINGS: dict[str, dict[str, float]] = {"mujoco/rk4": {"step": 1e-3}}
 # One of each kind: a pendulum, rest, an invariant set, chaos, a driven rotor. The others take longer than they add.
 _QUICK = ("fig03", "fig05", "fig08", "fig11", "fig12", "fig15-100kNm")
-SCENES = [name if name in _QUICK else pytest.param(name, marks=pytest.mark.full) for name in PAPER]
+SCENES = [name if name in _QUICK else pytest.param(name, marks=pytest.mark.full) for name in PAPER_SCENES]
 
 
 def reference(name: str) -> Trajectory:
@@ -81,7 +81,7 @@ def test_up_to_the_horizon(name: str, method: str) -> None:
     [
         pytest.param(case, name, marks=() if (case, name) in _QUICK_CHAINS else pytest.mark.full)
         for case in CHAINS
-        for name in PAPER
+        for name in PAPER_SCENES
     ],
 )
 def test_the_chain_while_errors_grow_little(case: str, name: str) -> None:

@@ -12,8 +12,7 @@ import numpy as np
 import pytest
 from support.defects import made_defects
 from support.references import reference
-from support.references import scene as shipped
-from support.scenes import PAPER, paper
+from support.scenes import PAPER_SCENES, paper, shipped
 
 from rotor_mbs.analysis.judgement import judge
 from rotor_mbs.methods.catalogue import find_method
@@ -160,7 +159,7 @@ def test_the_transition_matrices_are_those_of_the_variational_equations(name: st
     assert (off <= 1e-4 * np.abs(exact[1:]).max(axis=(1, 2))).all()
 
 
-@pytest.mark.parametrize("name", PAPER)
+@pytest.mark.parametrize("name", PAPER_SCENES)
 def test_pitches_at_rest_by_symmetry_are_those_that_stay_exactly_zero(name: str) -> None:
     scene, exact = paper(name), reference(f"paper/{name}")
     zero = [i for i in scene.moving_coordinates[1:] if not exact.angles[:, i].any() and not exact.rates[:, i].any()]

@@ -7,20 +7,9 @@ from math import hypot, pi
 
 import numpy as np
 import pytest
-from support.rotors import (
-    AXIAL,
-    MIXED,
-    PAPER,
-    STOUT,
-    C,
-    D,
-    blade_points,
-    closed_form,
-    energies,
-    make_scene,
-    pendulum,
-)
+from support.other_code import blade_points, closed_form, energies, pendulum
 from support.runs import energy_error, run
+from support.scenes import ARM, AXIAL, MIXED, OFFSET, PAPER_BLADE, STOUT, make_scene
 
 from rotor_mbs.analysis import kinematics
 from rotor_mbs.methods.catalogue import REFERENCE, find_method
@@ -34,7 +23,7 @@ EXPLICIT = ["exudyn_tree/rk44", "exudyn_tree/rk67", "exudyn_tree/dopri5"]
 FINE = ["lagrange/taylor", "lagrange/dop853", "mujoco/rk4", *EXPLICIT]
 NAMES = [*FINE, *(name for name in EXUDYN if name not in FINE)]
 BOUND = {name: 1e-10 if name in FINE else 2e-7 for name in NAMES}
-INERTIA = 3 * 15000 * (C**2 + D**2)  # of the paper's rotor at zero pitch, kg m²
+INERTIA = 3 * 15000 * (OFFSET**2 + ARM**2)  # of the paper's rotor at zero pitch, kg m²
 
 every_method = pytest.mark.parametrize("name", NAMES)
 
@@ -53,7 +42,7 @@ def ramp_motion(t):
 
 # Of each scene the rotor's angle and the pitch at times t; None: pitches stay where they were.
 # At zero pitch a point mass lies in the plane of rotation, turned from the blade's axis by atan(c / d).
-POLE = replace(PAPER, centre_of_mass=(0.0, 0.0, D))
+POLE = replace(PAPER_BLADE, centre_of_mass=(0.0, 0.0, ARM))
 K_PITCH, D_PITCH, J_PITCH = 40.0, 3.0, 7.0  # with AXIAL, of which rotor and pitch do not feel each other
 
 
@@ -81,11 +70,11 @@ CONSTANT_LOADS = {
 CASES = {
     "pendulum": (
         make_scene([11 * pi / 12, 0], [0, 0], duration=2.5, samples=251),
-        lambda t: pendulum(11 * pi / 12, hypot(C, D), np.arctan2(C, D), 9.8, t), None,
+        lambda t: pendulum(11 * pi / 12, hypot(OFFSET, ARM), np.arctan2(OFFSET, ARM), 9.8, t), None,
     ),
     "pendulum of a pitch without inertia": (
         make_scene([11 * pi / 12, 0.25], [0, 0.0], (POLE,), duration=2.0),
-        lambda t: pendulum(11 * pi / 12, D, 0.0, 9.8, t), None,
+        lambda t: pendulum(11 * pi / 12, ARM, 0.0, 9.8, t), None,
     ),
     "three equal blades turn": (
         make_scene([pi / 6, 0, 0, 0], [pi / 10, 0, 0, 0]), lambda t: pi / 6 + pi / 10 * t, None

@@ -6,8 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from support.references import reference, scene
-from support.rotors import FIG11, closed_form
+from support.other_code import closed_form
+from support.references import reference
+from support.scenes import paper, shipped
 
 from rotor_mbs.methods.catalogue import find_method
 from rotor_mbs.methods.solve import solve
@@ -15,11 +16,11 @@ from rotor_mbs.models.exudyn.solvers import ExtrapolatedSolver
 from rotor_mbs.scenario.scene import Scene
 
 METHOD = "exudyn_chain/extrapolated"
-SHORT = replace(FIG11, duration=1.0, samples=101)
+SHORT = replace(paper("fig11"), duration=1.0, samples=101)
 
 
 def beginning(name: str, samples: int) -> Scene:
-    return replace(scene(name), duration=float(reference(name).time[samples - 1]), samples=samples)
+    return replace(shipped(name), duration=float(reference(name).time[samples - 1]), samples=samples)
 
 
 def exact_angles(given: Scene) -> np.ndarray:
@@ -47,7 +48,7 @@ def test_with_every_column_the_order_rises_by_two(columns: int, coarse: int, mon
     found = []
     for intervals in (coarse, 2 * coarse):
         accepted = [0]
-        given = replace(FIG11, duration=0.4, samples=1 + intervals)
+        given = replace(paper("fig11"), duration=0.4, samples=1 + intervals)
         solver = integrated(given, tolerance=1e-12)
         assert set(solver.columns) == {columns}
         found.append(np.abs(solver.observe().angles - exact_angles(given)).max())
@@ -89,7 +90,7 @@ def test_loads_at_every_sample_from_the_first_on() -> None:
     """The first multipliers are exact but for rounding; later ones keep what Newton's method leaves: a tenth of the
     tolerance, of forces, over the smallest substep."""
     name = "check/loads"
-    result, exact = solve(METHOD, scene(name), {}), reference(name)
+    result, exact = solve(METHOD, shipped(name), {}), reference(name)
     for load in ("blade_root_force", "blade_root_moment", "shaft_force", "shaft_moment", "pitch_actuator_moment"):
         off = np.abs(result[load] - exact.get(load)) / np.abs(exact.get(load)).max()
         assert off[0].max() < 1e-12
@@ -100,7 +101,7 @@ def test_loads_at_every_sample_from_the_first_on() -> None:
 def test_the_work_of_loads_and_dampers_along_the_substeps(method: str) -> None:
     """Springs that swing by 3.8 rad between samples: the energy keeps to 1e-6 of the largest kinetic one, where a power
     interpolated through the samples loses 2e-3 and more."""
-    given = replace(scene("turbine/pitch-step"), duration=1.2, samples=61, outputs=("angles", "energy"))
+    given = replace(shipped("turbine/pitch-step"), duration=1.2, samples=61, outputs=("angles", "energy"))
     result = solve(method, given, {})
     total = result["kinetic_energy"] + result["potential_energy"] - result["work"]
     assert np.abs(total - total[0]).max() < 1e-6 * result["kinetic_energy"].max()

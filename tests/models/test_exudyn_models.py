@@ -6,14 +6,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from support.rotors import FIG11, SLIM, STOUT, closed_form, make_scene
+from support.other_code import closed_form
 from support.runs import run
-from support.scenes import paper
+from support.scenes import SLIM, STOUT, make_scene, paper
 
 from rotor_mbs.analysis.kinematics import exact_rotor_angle
 from rotor_mbs.models.exudyn.adapter import linear_solver
 
-SHORT = replace(FIG11, duration=1.0, samples=101)
+SHORT = replace(paper("fig11"), duration=1.0, samples=101)
 
 
 @pytest.fixture(scope="module")

@@ -9,14 +9,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from support.rotors import FIG08, FIG11, MIXED, PAPER, make_scene
+from support.scenes import MIXED, PAPER_BLADE, make_scene, paper
 
 from rotor_mbs.errors import InputError, MethodRefusal
 from rotor_mbs.methods.solve import solve
 from rotor_mbs.models.exudyn import methods, sensor_samples
 
-POLE = replace(PAPER, centre_of_mass=(0.0, 0.0, 15.42))
-BARE = replace(FIG08, gravity=0.0, outputs=("angles", "rates"))
+POLE = replace(PAPER_BLADE, centre_of_mass=(0.0, 0.0, 15.42))
+BARE = replace(paper("fig08"), gravity=0.0, outputs=("angles", "rates"))
 SCENES = {
     "bare": BARE,
     "gravity": replace(BARE, gravity=9.8),
@@ -85,7 +85,7 @@ def test_work_is_integrated_along_the_path_where_it_is_asked_for_and_not_known(
     outputs, damping, along_the_path
 ) -> None:
     """The tree keeps rows between samples for it, and the extrapolated chain the work itself."""
-    scene = replace(FIG11, duration=0.2, samples=21, outputs=outputs, shaft_damping=damping)
+    scene = replace(paper("fig11"), duration=0.2, samples=21, outputs=outputs, shaft_damping=damping)
     tree, extrapolated = (
         METHODS[name].build(scene, METHODS[name].settings()) for name in (TREE, "exudyn_chain/extrapolated")
     )
@@ -105,11 +105,11 @@ def test_a_pitch_without_inertia_is_left_out() -> None:
 
 def test_samples_the_engine_cannot_tell_apart_are_refused() -> None:
     settings = METHODS[TREE].settings()
-    METHODS[TREE].build(replace(FIG08, duration=1.0001e-5), settings)  # 1000 intervals
+    METHODS[TREE].build(replace(paper("fig08"), duration=1.0001e-5), settings)  # 1000 intervals
     with pytest.raises(MethodRefusal, match="1e-08 s apart"):
-        METHODS[TREE].build(replace(FIG08, duration=0.9999e-5), settings)
+        METHODS[TREE].build(replace(paper("fig08"), duration=0.9999e-5), settings)
     with pytest.raises(InputError, match="steps"):
-        METHODS[TREE].chosen(FIG08, {"step": 1e-12})
+        METHODS[TREE].chosen(paper("fig08"), {"step": 1e-12})
 
 
 # One blade runs into θ = π/2, where nothing holds the rotor: the rates go to infinity at about 0.06 s.
@@ -142,7 +142,7 @@ def test_a_solve_that_fails_is_counted_to_the_last_step_that_it_took(name) -> No
 
 
 def test_counts_of_steps_and_evaluations() -> None:
-    scene = replace(FIG11, duration=0.1, samples=11)
+    scene = replace(paper("fig11"), duration=0.1, samples=11)
     rk44 = solve("exudyn_tree/rk44", scene, {"step": 3e-3}).integration
     assert (rk44.steps, rk44.rhs_evaluations) == (40, 160)  # four steps of at most 3 ms in each 10 ms
     rk67 = solve("exudyn_tree/rk67", scene, {"step": 3e-3}).integration
@@ -170,7 +170,7 @@ def test_loads_and_rotation_vectors_are_refused_together_alone() -> None:
 
 
 def test_ctrl_c_inside_a_solve_is_an_interrupt() -> None:
-    scene = replace(FIG11, duration=2.0, samples=201)
+    scene = replace(paper("fig11"), duration=2.0, samples=201)
     with pytest.raises(KeyboardInterrupt), subprocess.Popen(["sh", "-c", f"sleep 0.5; kill -INT {os.getpid()}"]):
         solve(CHAIN, scene, {"step": 1e-4})
 
@@ -186,7 +186,7 @@ TORQUE = ((0.0, 0.0), (4.0, 4.0), (4.0, 10.0), (8.0, 10.0))
 )
 def test_work_of_a_torque_that_jumps(rows: int, at_jump: float) -> None:
     """The row at the jump belongs to both segments, on whichever side of the jump its time was rounded to."""
-    scene = make_scene([0.0, 0.0], [1.0, 0.0], (PAPER,), duration=8.0, samples=81, rotor_torque=TORQUE)
+    scene = make_scene([0.0, 0.0], [1.0, 0.0], (PAPER_BLADE,), duration=8.0, samples=81, rotor_torque=TORQUE)
     time = np.linspace(0.0, 8.0, 81)
     time[40] = at_jump
     time = time[:rows]

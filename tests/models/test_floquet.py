@@ -9,8 +9,8 @@ from itertools import pairwise
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
-from support.rotors import acceleration, make_scene
-from support.scenes import general
+from support.other_code import acceleration
+from support.scenes import general, make_scene
 
 from rotor_mbs.analysis.modes import floquet
 from rotor_mbs.models.lagrange.floquet import Turn, periodic_turn

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from support.rotors import acceleration
+from support.other_code import acceleration
 from support.runs import run
 from support.scenes import general, paper
 

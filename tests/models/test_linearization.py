@@ -7,9 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from support.references import scene as shipped
-from support.rotors import AXIAL, acceleration, make_scene
-from support.scenes import general
+from support.other_code import acceleration
+from support.scenes import AXIAL, general, make_scene, shipped
 
 from rotor_mbs.analysis.modes import modes_of
 from rotor_mbs.methods.catalogue import find_method

@@ -9,10 +9,8 @@ import numpy as np
 import pytest
 from support import other_code
 from support.other_code import about
-from support.references import scene as shipped
-from support.rotors import make_scene
 from support.runs import run
-from support.scenes import general, paper
+from support.scenes import general, make_scene, paper, shipped
 
 from rotor_mbs.methods.solve import solve
 from rotor_mbs.scenario.scene import Blade, Scene

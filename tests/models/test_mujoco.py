@@ -9,9 +9,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 from support import references
-from support.rotors import MIXED, STOUT, closed_form, make_scene
+from support.other_code import closed_form
 from support.runs import run
-from support.scenes import paper
+from support.scenes import MIXED, STOUT, make_scene, paper, shipped
 
 from rotor_mbs.analysis.judgement import judge
 from rotor_mbs.errors import InputError
@@ -44,7 +44,7 @@ def test_order_of_convergence(method: str, order: int, steps: list[float]) -> No
 
 def test_the_work_of_loads_and_dampers_is_of_fourth_order() -> None:
     """Energy balance at two steps; without the dampers' part of the slopes it is of second order."""
-    scene = replace(references.scene("check/general"), outputs=("angles", "energy"))
+    scene = replace(shipped("check/general"), outputs=("angles", "energy"))
     drifts = []
     for step in (1e-3, 5e-4):
         result = run("mujoco/rk4", scene, step=step)
@@ -59,7 +59,7 @@ def test_point_masses_have_no_inertia_that_the_scene_does_not_give() -> None:
     solver = MujocoSolver(paper("fig11"), "rk4", RK4_STEP)
     assert not solver.engine.moments.any()
     assert solver.engine.masses.tolist() == [0.0, 15000.0, 15000.0, 15000.0]
-    scene = references.scene("extreme/toy")
+    scene = shipped("extreme/toy")
     coarse, fine = (
         interval_defects(scene, result.time, result.angles, result.rates).sizes.max()
         for result in (run("mujoco/rk4", scene, step=1e-4), run("mujoco/rk4", scene, step=5e-5))
@@ -84,7 +84,7 @@ def test_an_inertia_at_the_limit_of_the_triangle_inequality() -> None:
     "method", ["mujoco/rk4", *(pytest.param(f"mujoco/implicit{name}", marks=pytest.mark.full) for name in ("", "fast"))]
 )
 def test_runs_are_within_their_bounds_and_an_impossible_step_is_refused(method: str) -> None:
-    scene = references.scene("check/held")
+    scene = shipped("check/held")
     assert judge(scene, solve(method, scene, {}), references.reference(scene.name)).status == "ok"
     with pytest.raises(InputError, match="steps"):
         find_method(method).chosen(paper("fig03"), {"step": 1e-12})

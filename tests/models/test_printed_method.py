@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from support.rotors import pendulum
+from support.other_code import pendulum
 from support.scenes import paper
 
 from rotor_mbs.errors import MethodRefusal

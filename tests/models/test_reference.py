@@ -10,9 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 from support.references import reference as frozen_reference
-from support.references import scene as shipped_scene
-from support.rotors import AXIAL, make_scene
-from support.scenes import PAPER, paper
+from support.scenes import AXIAL, PAPER_SCENES, make_scene, paper, shipped
 
 from rotor_mbs.methods.solve import solve
 from rotor_mbs.models.lagrange import reference as reference_module
@@ -28,7 +26,7 @@ from rotor_mbs.solution.trajectory import Integration
 
 def _propagated(name: str, tolerance: float) -> Any:
     """(samples, coordinates that move) rad, quad precision."""
-    scene = shipped_scene(name)
+    scene = shipped(name)
     run = Propagation(scene, quad=True, tol=tolerance, compact_mode=True)
     run.integrate()
     return run.states[:, : len(scene.moving_coordinates)]
@@ -74,17 +72,17 @@ def _numbers(values: Any) -> Any:
 
 # Of each kind: rest, a pendulum, uniform rotation, constant torque, coordinates at exact zero, general rigid blades.
 _OF_EACH_KIND = ("paper/fig05", "paper/fig04b", "paper/fig06", "paper/fig15-100kNm", "paper/fig08", "check/general")
-_OTHERS = [f"paper/{name}" for name in PAPER if f"paper/{name}" not in _OF_EACH_KIND]
+_OTHERS = [f"paper/{name}" for name in PAPER_SCENES if f"paper/{name}" not in _OF_EACH_KIND]
 
 
 @pytest.mark.parametrize("name", [*_OF_EACH_KIND, *(pytest.param(name, marks=pytest.mark.full) for name in _OTHERS)])
 def test_uncertainty_bounds_the_true_error_at_every_sample(name: str) -> None:
     """Of the quad run; of the doubles that are stored, together with half a unit in the last place."""
     pytest.importorskip("heyoka")
-    exact, frozen = moving_angles(shipped_scene(name)), frozen_reference(name)
+    exact, frozen = moving_angles(shipped(name)), frozen_reference(name)
     rows = min(len(exact), len(frozen.time))
     assert rows == len(frozen.time)
-    stored = frozen.angles[:, shipped_scene(name).moving_coordinates]
+    stored = frozen.angles[:, shipped(name).moving_coordinates]
     uncertainty, rounding = frozen.angle_uncertainty, 0.5 * np.spacing(np.abs(stored)).max(axis=1)
     assert (distance(_propagated(name, 1e-33)[:rows], exact[:rows]) <= uncertainty).all()
     assert (distance(stored, exact[:rows]) <= uncertainty + rounding).all()

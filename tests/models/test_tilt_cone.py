@@ -12,9 +12,9 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 from support.newton_euler import State, measure, turn
+from support.other_code import pendulum
 from support.random_scenes import leaning_scene
-from support.rotors import AXIAL, STOUT, make_scene, pendulum
-from support.scenes import general
+from support.scenes import AXIAL, STOUT, general, make_scene
 
 from rotor_mbs.analysis.judgement import judge
 from rotor_mbs.analysis.kinematics import exact_rotor_angle

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from support.references import scene as shipped
+from support.scenes import shipped
 
 from rotor_mbs.analysis.judgement import defects_of
 from rotor_mbs.methods.solve import solve

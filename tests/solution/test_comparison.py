@@ -1,4 +1,4 @@
-"""What a status follows from, as it is told beside it."""
+"""What a status was found by, and to which time, as it is told beside it."""
 
 from __future__ import annotations
 

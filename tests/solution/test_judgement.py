@@ -8,8 +8,8 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from support.references import reference, scene
-from support.scenes import paper
+from support.references import reference
+from support.scenes import paper, shipped
 
 from rotor_mbs.analysis import judgement as judgement_module
 from rotor_mbs.analysis.judgement import Judgement, judge
@@ -36,13 +36,13 @@ def caught(chosen: Scene, result: Solution, exact: Trajectory | None = None) -> 
 
 RK44, ALPHA = "exudyn_tree/rk44", "exudyn_tree/generalized_alpha"
 CLAIMS = {
-    "a bearing of 1e12": (scene("stiff/bearing-1e12"), RK44, {}),
+    "a bearing of 1e12": (shipped("stiff/bearing-1e12"), RK44, {}),
     "an angle that is no number": (replace(paper("fig05"), initial_angles=(np.nan, 0.0, 0.0, 0.0)), RK44, {}),
-    "the singular pitch": (scene("extreme/singular-one-blade"), RK44, {}),
+    "the singular pitch": (shipped("extreme/singular-one-blade"), RK44, {}),
     "an implicit step of ten seconds": (paper("fig11", samples=2), ALPHA, {"step": 10.0}),
     # Its error scale, absolute + relative · rate, vanishes at -1: whatever the step makes of the motion is accepted.
     "dopri5 with equal tolerances at rates of minus one": (
-        replace(scene("extreme/rates-minus-one"), samples=4), "exudyn_tree/dopri5",
+        replace(shipped("extreme/rates-minus-one"), samples=4), "exudyn_tree/dopri5",
         {"absolute_tolerance": 1e-10, "relative_tolerance": 1e-10},
     ),
 }  # fmt: skip
@@ -123,7 +123,7 @@ def test_a_body_that_falls_free_of_its_joints() -> None:
 def test_nobody_gets_through_a_singularity_or_an_overflow(name: str, whose: str, limit_s: float) -> None:
     """One blade without hub inertia, or rates whose squares overflow: whatever a method makes of it, it is not ok; the
     implicit ones step over it. Nothing is written to the terminal: warnings are errors here."""
-    chosen = scene(name)
+    chosen = shipped(name)
     exact = reference(name) if "singular" in name else None
     assert exact is None or len(exact.time) < chosen.samples
     methods = [method for method in method_names(is_corrected=True) if method.startswith(whose)]
@@ -135,7 +135,7 @@ def test_nobody_gets_through_a_singularity_or_an_overflow(name: str, whose: str,
 
 def test_a_run_that_hangs_is_ended_with_what_it_reached() -> None:
     """DOPRI5 at the singular pitch repeats its smallest step for ever, if nobody counts."""
-    chosen = scene("extreme/singular-one-blade")
+    chosen = shipped("extreme/singular-one-blade")
     result = solve("exudyn_tree/dopri5", chosen, {"trial_steps": 10**9}, time_limit_s=1.0)
     assert result.integration.out_of_time
     verdict = judge(chosen, result, reference(chosen.name))
@@ -149,7 +149,7 @@ def test_a_run_that_hangs_is_ended_with_what_it_reached() -> None:
 def test_a_long_run_keeps_its_samples_when_ended(method: str) -> None:
     if not find_method(method).is_installed:
         pytest.skip(f"{method} is not installed")
-    chosen, built = replace(scene("extreme/pendulum-million"), duration=5e5, samples=200_001), find_method(method)
+    chosen, built = replace(shipped("extreme/pendulum-million"), duration=5e5, samples=200_001), find_method(method)
     solver = built.build(chosen, built.settings())
     with time_limit(0.3):
         integration = solver.integrate()
@@ -170,7 +170,7 @@ def test_a_run_that_was_ended_is_not_repeated() -> None:
     ended = Integration(False, "ended", out_of_time=True)
     solver = SimpleNamespace(integrate=lambda: ended, observe=lambda: reference("paper/fig05"))
     method = replace(find_method("lagrange/taylor"), build=lambda *_: solver)
-    result = solve(method, scene("paper/fig05"), {}, repeats=5)
+    result = solve(method, shipped("paper/fig05"), {}, repeats=5)
     assert result.integration.out_of_time
     assert len(result.run_times_s) == 1
 

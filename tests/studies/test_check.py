@@ -18,8 +18,7 @@ import pytest
 from support.checking import EVERY_SECOND_SAMPLE, WRONG, add_run, failed, faulty_run, judged, results_file
 from support.commands import PROGRAM, refusal, rotor_mbs
 from support.frozen_references import digests, freeze
-from support.references import scene as shipped
-from support.scenes import paper
+from support.scenes import paper, shipped
 from support.stored import Made, change_row, damage, drop, rotor, store
 from support.sweeps import THREE_RUNS, made_sweep
 

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from support import references
 from support.commands import refusal, rotor_mbs
+from support.scenes import shipped
 
 import rotor_mbs as rm
 from rotor_mbs.methods.solve import solve
@@ -53,7 +54,7 @@ def plain_python(*arguments: object) -> subprocess.CompletedProcess[str]:
 def test_the_mujoco_file_in_plain_mujoco(name: str, tmp_path: Path) -> None:
     """As this package's own model, to rounding; whose motions are within their bounds."""
     pytest.importorskip("mujoco")
-    scene = references.scene(name)
+    scene = shipped(name)
     (path,) = export(scene, "mjcf", tmp_path / "scene.xml")
     steps = round(scene.duration / (scene.samples - 1) / 2.5e-4)
     samples = min(200, scene.samples)
@@ -67,7 +68,7 @@ def test_the_mujoco_file_in_plain_mujoco(name: str, tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("name", [*SCENES, "check/pitch-loads"])
 def test_the_exudyn_script_in_plain_python(name: str, tmp_path: Path) -> None:
-    scene, exact = references.scene(name), references.reference(name)
+    scene, exact = shipped(name), references.reference(name)
     (path,) = export(scene, "exudyn", tmp_path / "scene.py")
     text = path.read_text(encoding="utf-8")
     assert "rotor_mbs" not in text
@@ -89,7 +90,7 @@ def test_the_exudyn_script_in_plain_python(name: str, tmp_path: Path) -> None:
 
 
 def test_the_csv_has_the_reference_bit_for_bit_with_units(tmp_path: Path) -> None:
-    scene, exact = references.scene("check/held"), references.reference("check/held")
+    scene, exact = shipped("check/held"), references.reference("check/held")
     (path,) = rm.export(scene, "csv", tmp_path / "held.csv")
     with path.open(encoding="utf-8", newline="") as file:
         header, *rows = csv.reader(file)

@@ -17,7 +17,7 @@ from pathlib import Path
 import pytest
 from support.checking import add_run, failed, judged, results_file
 from support.mutation import TARGETS, all_mutants, parsed, scopes
-from support.references import scene as shipped
+from support.scenes import shipped
 
 from rotor_mbs.errors import InputError
 from rotor_mbs.methods.solve import solve

@@ -9,10 +9,12 @@ from typing import Any
 import mpmath
 import numpy as np
 import pytest
-from support.references import reference, run, scene
+from support.references import reference
+from support.scenes import shipped
 
 from rotor_mbs.analysis.judgement import judge
 from rotor_mbs.analysis.work_precision import step_for
+from rotor_mbs.methods.solve import solve
 from rotor_mbs.runs.design import RunRequest, results_tables
 from rotor_mbs.runs.merge import fit_file_to_request
 from rotor_mbs.solution.metrics import metrics_of
@@ -20,6 +22,9 @@ from rotor_mbs.solution.status import STATUSES
 from rotor_mbs.studies.bench import curve_tables, curve_tasks
 from rotor_mbs.studies.stability import ladder_curve
 
+pytest.importorskip("heyoka")
+
+TAYLOR = "lagrange/taylor"
 mp = mpmath.mp.clone()
 mp.dps = 30
 
@@ -78,8 +83,8 @@ class Passage:
 )
 def test_through_the_singular_pitch(hub: str) -> None:
     """Time and rotor angle at every tenth pitch that the run passes, against 30-digit integrals over the pitch."""
-    one = scene(f"extreme/passage-{hub}")
-    found = run(one).trajectory
+    one = shipped(f"extreme/passage-{hub}")
+    found = solve(TAYLOR, one, {}).trajectory
     x, _, z = one.blades[0].centre_of_mass
     exact = Passage(one.blades[0].mass, x, z, one.hub_inertia, one.initial_angles[1])
     assert found.angles[0, 1] < np.pi / 2 < found.angles[-1, 1]
@@ -97,23 +102,23 @@ def test_an_hour_of_a_regular_motion() -> None:
     A rate off by δ turns the rotor by δ t: growth t / s. Pitch errors swing with at most the highest pitch frequency.
     The tree makes 720 000 steps of order 6 at ωh = 0.07: (ωh)^7/7! a step, a few 1e-12 of the pitch, 1e-8 at most.
     """
-    one = scene("extreme/hour-small")
+    one = shipped("extreme/hour-small")
     exact = reference(one.name)
     assert exact.error_growth is not None
     x, _, _ = one.blades[0].centre_of_mass
     fastest = np.sqrt((one.bearing_stiffness[0] / one.blades[0].mass + one.gravity * x) / x**2)
     assert (exact.error_growth <= exact.time + 2.0 * fastest).all()
-    verdict = judge(one, run(one), exact)
+    verdict = judge(one, solve(TAYLOR, one, {}), exact)
     assert verdict.status == "ok", verdict.message
     assert verdict.metrics["angle_error_end"] <= 1e-11  # of a pitch of 8e-3 rad, after 5000 swings
-    tree = run(one, "exudyn_tree/rk67", step=5e-3).trajectory
+    tree = solve("exudyn_tree/rk67", one, {"step": 5e-3}).trajectory
     assert np.abs(tree.angles[-1] - exact.angles[-1]).max() <= 1e-8
 
 
 def test_generalized_alpha_has_no_limit() -> None:
     """ωh = 1000 on a linear swing: what it draws is wrong, but does not grow. (The chain's Newton fails.)"""
-    one = replace(scene("stiff/bearing-1e12"), duration=5.0, samples=51, outputs=("angles", "rates"))
-    found = run(one, "exudyn_tree/generalized_alpha", step=0.01).trajectory
+    one = replace(shipped("stiff/bearing-1e12"), duration=5.0, samples=51, outputs=("angles", "rates"))
+    found = solve("exudyn_tree/generalized_alpha", one, {"step": 0.01}).trajectory
     assert len(found.time) == one.samples
     assert np.abs(found.angles[:, 1:]).max() <= 2e-3
 
@@ -126,7 +131,7 @@ def test_a_step_for_a_target_is_read_off_a_ladder() -> None:
 
 
 def test_a_ladder_of_runs_that_fail_at_once_ends(tmp_path: Path) -> None:
-    light, method = scene("extreme/light-1e-8"), "exudyn_chain/generalized_alpha"
+    light, method = shipped("extreme/light-1e-8"), "exudyn_chain/generalized_alpha"
     curve = ladder_curve(light, method)
     file = fit_file_to_request(
         tmp_path / "s.h5", [*results_tables([RunRequest(light, "reference")]), *curve_tables([curve])]
@@ -147,8 +152,8 @@ def test_a_million_periods_of_the_pendulum() -> None:
     """
     from scipy.special import ellipj, ellipk
 
-    one = scene("extreme/pendulum-million")
-    found = run(one)
+    one = shipped("extreme/pendulum-million")
+    found = solve(TAYLOR, one, {})
     drift = metrics_of(one, found.trajectory, None)["energy_drift_max"]
     assert found.integration.steps is not None
     assert drift <= 2e-14 * np.sqrt(found.integration.steps)

@@ -5,6 +5,7 @@ From positions in the base frame; nothing of the package but a scene's numbers. 
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import pairwise
@@ -13,8 +14,9 @@ from typing import Any
 import numpy as np
 from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
+from scipy.special import ellipj
 
-from rotor_mbs.scenario.scene import Scene
+from rotor_mbs.scenario.scene import Blade, Scene
 
 Array = Any
 
@@ -155,3 +157,62 @@ def _dot(first: list[Array], second: list[Array]) -> Array:
 def _sum(*terms: Any) -> list[Array]:
     """The weighted sum of vectors, given as vector, weight, vector, weight, ..."""
     return [sum(vector[i] * weight for vector, weight in zip(terms[::2], terms[1::2], strict=True)) for i in range(3)]
+
+
+# Motion and energies
+
+
+def about_hub(blade: Blade):
+    """(3, 3) kg m² about the hub centre."""
+    xx, yy, zz, xy, xz, yz = blade.inertia
+    r = np.array(blade.centre_of_mass)
+    com = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+    return com + blade.mass * (r @ r * np.eye(3) - np.outer(r, r))
+
+
+@functools.cache
+def closed_form(scene: Scene, duration: float | None = None):
+    """(n, 2 (1 + blades)) angles and rates at the samples up to `duration`, by `other_code`."""
+    times = np.linspace(0.0, scene.duration, scene.samples)
+    times = times[times <= (duration or scene.duration) + 1e-12]
+    return np.hstack(trajectory(scene, times, rtol=1e-13, atol=1e-14))
+
+
+def energies(scene: Scene, y):
+    """Kinetic and potential energy (n,) J of rows of angles and rates.
+
+    T = J_hub q'²/2 + Σ ω·J ω/2 with ω = (q' sin θ, q' cos θ, θ') in the blade frame and J about the hub centre;
+    V = Σ m g z + Σ k (θ - rest)²/2.
+    """
+    n = 1 + len(scene.blades)
+    kinetic = 0.5 * scene.hub_inertia * y[:, n] ** 2
+    potential = np.zeros(len(y))
+    for i, blade in enumerate(scene.blades):
+        theta, w, v = y[:, 1 + i], y[:, n], y[:, n + 1 + i]
+        omega = np.stack([w * np.sin(theta), w * np.cos(theta), v], axis=1)
+        kinetic += 0.5 * np.einsum("ni,ij,nj->n", omega, about_hub(blade), omega)
+        potential += blade.mass * scene.gravity * (blade_points(scene, y, i, blade.centre_of_mass)[:, 2])
+        if scene.bearing_stiffness:
+            times = np.linspace(0.0, scene.duration, scene.samples)[: len(y)]
+            rest = value_at(scene.bearing_rest[i] if scene.bearing_rest else (), times)
+            potential += 0.5 * scene.bearing_stiffness[i] * (theta - rest) ** 2
+    return kinetic, potential
+
+
+def blade_points(scene: Scene, y, index: int, point):
+    """(n, 3) m: Ry(q + phase) Rz(θ) point."""
+    psi, theta = y[:, 0] + scene.phases[index], y[:, 1 + index]
+    x = np.cos(theta) * point[0] - np.sin(theta) * point[1]
+    across = np.sin(theta) * point[0] + np.cos(theta) * point[1]
+    z = np.full_like(x, point[2])
+    return np.stack([np.cos(psi) * x + np.sin(psi) * z, across, -np.sin(psi) * x + np.cos(psi) * z], axis=1)
+
+
+def pendulum(start: float, length: float, lean: float, gravity: float, t):
+    """Angle of a pendulum released from rest at `start` from the top, its mass `lean` ahead of the angle told.
+
+    φ = angle + lean - π swings as φ = 2 asin(k cd(t sqrt(g/l), k²)), k = sin(φ(0)/2).
+    """
+    k = np.sin(0.5 * (start + lean - np.pi))
+    _, cn, dn, _ = ellipj(t * np.sqrt(gravity / length), k * k)
+    return np.pi - lean + 2.0 * np.arcsin(k * cn / dn)

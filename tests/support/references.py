@@ -1,22 +1,14 @@
-"""Shipped scenes, their frozen references, and runs of them; each read once."""
+"""Frozen references of shipped scenes, each file read once."""
 
 from __future__ import annotations
 
 import functools
 
-import pytest
-
-from rotor_mbs.methods.solve import solve
 from rotor_mbs.runs.read import open_results
-from rotor_mbs.scenario.catalogue import REFERENCES, only_scene
-from rotor_mbs.scenario.scene import Scene
-from rotor_mbs.solution.trajectory import Array, Solution, Trajectory
+from rotor_mbs.scenario.catalogue import REFERENCES
+from rotor_mbs.solution.trajectory import Array, Trajectory
 from rotor_mbs.studies.stored_references import rebuilt_reference
-
-TAYLOR = "lagrange/taylor"
-
-
-scene = functools.cache(only_scene)
+from support.scenes import shipped
 
 
 @functools.cache
@@ -34,10 +26,4 @@ def referenced(group: str) -> list[str]:
 
 @functools.cache
 def reference(name: str) -> Trajectory:
-    return rebuilt_reference(scene(name), _arrays(name.split("/")[0])[name])
-
-
-def run(one: Scene, method: str = TAYLOR, **settings: object) -> Solution:
-    if method == TAYLOR:
-        pytest.importorskip("heyoka")
-    return solve(method, one, settings)
+    return rebuilt_reference(shipped(name), _arrays(name.split("/")[0])[name])
