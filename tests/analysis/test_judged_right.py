@@ -293,7 +293,7 @@ def examine(seed: int, methods: tuple[str, ...]) -> None:
 
 
 # Blades that spin hundreds of times take minutes: those are judged every night.
-_QUICK_SEEDS = [seed for seed in range(23) if seed not in (1, 8, 10)]
+_QUICK_SEEDS = [seed for seed in range(10) if seed not in (1, 8)]
 
 
 @pytest.mark.full

@@ -219,7 +219,7 @@ def test_the_workflow_for_github_compares_with_the_file_of_the_main_branch(proje
     assert len(told) == len(set(told)) <= len(failures)  # each failure once
 
 
-@pytest.mark.full
+@pytest.mark.nightly
 def test_the_pipeline_for_gitlab_compares_with_the_file_of_the_main_branch(project: Path) -> None:
     assert GITLAB["accuracy"]["extends"] == ".rotor-mbs-check"
     job = {**JOB, **GITLAB["accuracy"], "variables": {**JOB["variables"], **GITLAB["accuracy"]["variables"]}}

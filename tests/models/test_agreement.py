@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -76,13 +77,16 @@ def test_up_to_the_horizon(name: str, method: str) -> None:
     assert np.abs(solution.energy_error[:rows]).max() <= energy * metrics["energy_scale_J"]
 
 
+def _mark_of(case: str, name: str) -> Any:
+    """The default is what results are read by; the others repeat in every scene what a few show."""
+    if (case, name) in _QUICK_CHAINS:
+        return ()
+    return pytest.mark.full if case == "default" or name in _QUICK else pytest.mark.nightly
+
+
 @pytest.mark.parametrize(
     ("case", "name"),
-    [
-        pytest.param(case, name, marks=() if (case, name) in _QUICK_CHAINS else pytest.mark.full)
-        for case in CHAINS
-        for name in PAPER_SCENES
-    ],
+    [pytest.param(case, name, marks=_mark_of(case, name)) for case in CHAINS for name in PAPER_SCENES],
 )
 def test_the_chain_while_errors_grow_little(case: str, name: str) -> None:
     method, settings, growth, bound = CHAINS[case]

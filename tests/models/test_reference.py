@@ -75,7 +75,7 @@ _OF_EACH_KIND = ("paper/fig05", "paper/fig04b", "paper/fig06", "paper/fig15-100k
 _OTHERS = [f"paper/{name}" for name in PAPER_SCENES if f"paper/{name}" not in _OF_EACH_KIND]
 
 
-@pytest.mark.parametrize("name", [*_OF_EACH_KIND, *(pytest.param(name, marks=pytest.mark.full) for name in _OTHERS)])
+@pytest.mark.parametrize("name", [*_OF_EACH_KIND, *(pytest.param(name, marks=pytest.mark.nightly) for name in _OTHERS)])
 def test_uncertainty_bounds_the_true_error_at_every_sample(name: str) -> None:
     """Of the quad run; of the doubles that are stored, together with half a unit in the last place."""
     pytest.importorskip("heyoka")

@@ -82,7 +82,7 @@ def test_where_there_is_nothing_to_judge_the_command_says_so(tmp_path: Path) -> 
         assert refusal("check", path, "--require", METHOD) == f"{path}: nothing to check: no run of a method"
 
 
-@pytest.mark.full
+@pytest.mark.nightly  # .ci/wheel runs and checks the scenes of the paper by these methods
 def test_the_default_set_passes(tmp_path: Path) -> None:
     lines_of("--json", tmp_path / "check.json", status=0)
     assert all(row["passed"] for row in json.loads((tmp_path / "check.json").read_text()))

@@ -123,9 +123,9 @@ def test_what_is_changed_and_explained_is_in_the_source() -> None:
 @pytest.mark.full
 def test_a_sample_of_mutants_is_noticed() -> None:
     """Of modules whose checks take a second; the others take part in the whole run."""
-    modules = r"^rotor_mbs\S*(closed_form|parameters|printed|geometry|chain|mujoco|judgement|ode45)"
+    modules = r"^rotor_mbs\S*(closed_form|parameters|printed|chain|judgement)"
     tried, unnoticed = survivors(modules, "--every", 80)
-    assert tried >= 14
+    assert tried >= 8
     assert unexplained(unnoticed) == []
 
 
@@ -171,13 +171,13 @@ def wrong_scenes(scene: Scene, keys: tuple[str, ...], share: float) -> Iterator[
 @pytest.mark.parametrize(
     ("scene", "keys", "count", "method", "share"),
     [
-        (*_GENERAL, "lagrange/dop853", 1e-6),
         (*_GENERAL, "exudyn_tree/rk67", 1e-6),
+        pytest.param(*_GENERAL, "lagrange/dop853", 1e-6, marks=pytest.mark.nightly),
         pytest.param(*_GENERAL, "mujoco/rk4", 1e-3, marks=pytest.mark.nightly),
         # Of second order: a product of inertia of 25 beside 4000 kg m² shows from 3 % on.
         pytest.param(*_GENERAL, "exudyn_chain/generalized_alpha", 5e-2, marks=pytest.mark.nightly),
         (*_PITCH_LOADS, "lagrange/dop853", 1e-4),  # times of jumps and kinks, too
-        (*_PITCH_LOADS, "exudyn_tree/rk67", 1e-4),
+        pytest.param(*_PITCH_LOADS, "exudyn_tree/rk67", 1e-4, marks=pytest.mark.nightly),
     ],
 )
 def test_every_number_of_a_scene_counts(

@@ -144,7 +144,7 @@ def test_a_ladder_of_runs_that_fail_at_once_ends(tmp_path: Path) -> None:
     assert np.isnan(rows["step_for_target_s"]).all()
 
 
-@pytest.mark.full
+@pytest.mark.nightly
 def test_a_million_periods_of_the_pendulum() -> None:
     """Against sn of Jacobi; energy within a random walk of round-off, 2e-14·√steps at most, all along.
 

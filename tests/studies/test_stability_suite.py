@@ -29,7 +29,7 @@ SCENES = ("stiff/bearing-1e8-damping-100", "extreme/light-1e-8", "extreme/rate-1
 @pytest.mark.full
 def test_no_run_of_ours_claims_success_and_the_pages_have_every_outcome(tmp_path: Path) -> None:
     pytest.importorskip("heyoka")
-    ended = rotor_mbs("stability", *SCENES, "-o", tmp_path / "stability.h5", "--timeout", "3")
+    ended = rotor_mbs("stability", *SCENES, "-o", tmp_path / "stability.h5", "--timeout", "1")
     assert ended.status == 0, ended.err
     found = suite_runs(tmp_path / "stability.h5")
     assert {cell.scene for cell in found} == set(SCENES)
@@ -50,7 +50,7 @@ def test_no_run_of_ours_claims_success_and_the_pages_have_every_outcome(tmp_path
     assert [row[0] for row in suite_table(found).rows] == list(dict.fromkeys(cell.method for cell in found))
 
 
-@pytest.mark.full
+@pytest.mark.nightly
 def test_a_run_of_which_only_the_energy_is_known_is_unchecked(tmp_path: Path) -> None:
     """A needle sampled at its two ends, 100 s apart: between them errors grow until nothing is known of the motion."""
     pytest.importorskip("heyoka")
