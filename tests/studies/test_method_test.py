@@ -401,7 +401,7 @@ OTHERS: dict[str, tuple[Any, Mistakes, str]] = {
 }
 
 
-_QUICK = ("right", "Steiner", "half")
+_QUICK = ("right", "Steiner")
 
 
 @pytest.mark.parametrize("name", [pytest.param(one, marks=() if one in _QUICK else pytest.mark.full) for one in OTHERS])
