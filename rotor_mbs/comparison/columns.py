@@ -59,11 +59,13 @@ class DataTable:
     source : what messages call the file.
     columns : by name, in the order of the file.
     left_out : by name what else is in the file.
+    program : that wrote the file, as its head says: "openfast", or "".
     """
 
     source: str
     columns: Mapping[str, DataColumn]
     left_out: Mapping[str, LeftOut] = field(default_factory=dict)
+    program: str = ""
 
     def __getitem__(self, name: str) -> DataColumn:
         """Return a column. Raises InputError, with the columns that there are."""

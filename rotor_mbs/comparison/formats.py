@@ -20,6 +20,7 @@ import struct
 import warnings
 import zipfile
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -64,6 +65,7 @@ _MAX_PARTS = 10_000  # arrays, cells and fields of a MAT or JSON file that are l
 # Text: comma-separated values, columns divided by blanks, Exudyn's files, OpenFAST's `.out`.
 _COMMENT = ("#", "%", "//", "!")
 _DIVIDERS = (";", "\t", ",", None)  # None: blanks
+_OPENFAST_HEAD = re.compile(r"^Predictions were generated .{0,80}\b(?:Open)?FAST\b")
 _EXUDYN = re.compile(r"OutputVariableType = (\w+)")
 # Exudyn's solution file: how many columns it has of each kind, behind the time.
 _EXUDYN_SOLUTION = re.compile(r"written coordinates \[[^\]]*\] = \[([\d, ]+)\]")
@@ -104,7 +106,7 @@ def read_in_worker(arguments: tuple[Path, str, str]) -> DataTable:
         columns = {}
         for label, column in _short_names(table.columns).items():
             columns[label] = DataColumn(column.values, column.unit[:MAX_NAME], column.step)
-        return DataTable(table.source, columns, _short_names(table.left_out))
+        return DataTable(table.source, columns, _short_names(table.left_out), table.program)
     except RotorError as exc:
         problems = [line[:_MAX_PROBLEM] for line in str(exc).splitlines()]
     except MemoryError:
@@ -156,7 +158,7 @@ def read_columns(path: Path, group: str, scene: str) -> DataTable:
     if head.startswith(_NETCDF3):
         return _decoded(source, *_netcdf_3(path))
     if path.suffix.lower() == ".outb":
-        return table_of(source, *_openfast(path))
+        return replace(table_of(source, *_openfast(path)), program="openfast")
     # MATLAB's v7.3 has 512 bytes of its own before.
     if head.startswith(_HDF5) or head[512:].startswith(_HDF5):
         return _hdf5(path, group, scene)
@@ -515,7 +517,8 @@ def _read_text(source: str, text: str) -> DataTable:
             left_out[label] = values
         else:
             named[label] = DataColumn(values, unit)
-    return DataTable(source, named, left_out)
+    is_openfast = any(map(_OPENFAST_HEAD.search, head))
+    return DataTable(source, named, left_out, "openfast" if is_openfast else "")
 
 
 def _exudyn(

@@ -12,6 +12,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
+from rotor_mbs.comparison import openfast
 from rotor_mbs.comparison.channels import (
     FREQUENCY_NAMES,
     LOAD_FRAMES,
@@ -27,6 +28,7 @@ from rotor_mbs.comparison.channels import (
     split_unit,
 )
 from rotor_mbs.comparison.columns import DataTable, shown_names
+from rotor_mbs.comparison.openfast import OpenFastSettings
 from rotor_mbs.comparison.units import ALLOWED_UNITS, plain_unit, unit_factor
 from rotor_mbs.errors import InputError
 from rotor_mbs.scenario import keys
@@ -67,12 +69,16 @@ class DataMapping:
     omitted : names of channels that are neither compared nor missed.
     only : names of the channels to which the comparison is restricted, beside the time or speed;
         empty where it is not.
+    program : whose names, units, signs and frames the columns have: "openfast", or "".
+    openfast : numbers of the model, for OpenFAST's output.
     """
 
     columns: Mapping[str, ColumnMapping] = field(default_factory=dict)
     group: str = ""
     omitted: tuple[str, ...] = ()
     only: tuple[str, ...] = ()
+    program: str = ""
+    openfast: OpenFastSettings = field(default_factory=OpenFastSettings)
 
 
 def _read_column_mapping(value: object) -> ColumnMapping:
@@ -83,6 +89,8 @@ def _read_column_mapping(value: object) -> ColumnMapping:
 
 
 _COLUMN_MAPPING = Kind(_read_column_mapping, "a column's name, or a table with `column`")
+_PROGRAM = keys.choice((openfast.PROGRAM,))
+_OPENFAST = keys.table_of(OpenFastSettings, "a table with AzimB1Up, HubCM, UndSling of the model")
 _GROUP = Kind(keys.read_text, "the path of a group in the file")
 
 
@@ -114,6 +122,8 @@ def read_mapping(
     declared["group"] = file_key("group", _GROUP, default="").metadata
     declared["omit"] = file_key("omit", omit, default=()).metadata
     declared["only"] = file_key("only", omit, default=()).metadata
+    declared["program"] = file_key("program", _PROGRAM, default="").metadata
+    declared["openfast"] = file_key("openfast", _OPENFAST, default=None).metadata
     source = "columns"
     if isinstance(columns, Mapping):
         try:
@@ -127,8 +137,10 @@ def read_mapping(
     group = values.pop("group")
     omitted = tuple(names[key] for key in values.pop("omit"))
     only = tuple(names[key] for key in values.pop("only"))
+    program = values.pop("program")
+    settings = values.pop("openfast")
     mapped = {key: mapping for key, mapping in values.items() if mapping is not None}
-    if not (mapped or group or omitted or only):
+    if not (mapped or group or omitted or only or program or settings):
         allowed = ", ".join(declared)
         raise InputError(f"{source}: says nothing; allowed: {allowed}")
     for channel in known:
@@ -136,7 +148,8 @@ def read_mapping(
         if only and is_mapped and not _is_one_of(channel, only):
             allowed = f'"{channel.key}" in `only`, or no column for it'
             raise InputError(f"{source}: {channel.key}: is not in `only`; allowed: {allowed}")
-    return DataMapping(mapped, group, omitted, only)
+    settings = settings or OpenFastSettings()
+    return DataMapping(mapped, group, omitted, only, program, settings)
 
 
 @dataclass(frozen=True)
@@ -174,10 +187,19 @@ def find_channels(table: DataTable, scene: Scene, mapping: DataMapping) -> Found
         For a name that could be two channels, a wrong unit, a column without numbers that is named
         as a channel, or without a time and an angle or rate.
     """
-    known, by_name = _known_channels(table, scene, mapping)
+    lines: list[str] = []
+    reasons_of_program: dict[str, str] = {}
+    if openfast.PROGRAM in (mapping.program, table.program):
+        known = channels(scene)
+        suggestions, reasons_of_program = openfast.suggested(table, known, scene, mapping.openfast)
+        by_name = [_of_suggestion(suggestion) for suggestion in suggestions]
+        lines.append(openfast.describe(mapping.openfast, is_guessed=not mapping.program))
+    else:
+        known, names = _known_channels(table, scene, mapping)
+        by_name = [(channel, ColumnMapping(name, sign=channel.sign)) for channel, name in names]
     sources, reasons, loads_left_out = _sources(table, known, by_name, mapping)
+    reasons = {**reasons_of_program, **reasons}
     chosen: dict[Channel, ColumnMapping] = {}
-    lines = []
     for channel in sorted(sources, key=lambda channel: channel.column):
         source = sources[channel]
         stated = plain_unit(source.unit or _stated_unit(table, source.column))
@@ -201,6 +223,18 @@ def find_channels(table: DataTable, scene: Scene, mapping: DataMapping) -> Found
         unused[name] = left_out.reason
     _refuse_missing(table, known[0], chosen)
     return FoundChannels(chosen, tuple(lines), unused, loads_left_out)
+
+
+def _of_suggestion(suggestion: openfast.Suggestion) -> tuple[Channel, ColumnMapping]:
+    """Return a channel of OpenFAST's output and where it comes from."""
+    source = ColumnMapping(
+        column=suggestion.column,
+        unit=suggestion.unit,
+        sign=suggestion.sign,
+        offset=suggestion.offset,
+        wrapped=suggestion.wrapped,
+    )
+    return suggestion.channel, source
 
 
 def _stated_unit(table: DataTable, name: str) -> str:
@@ -264,7 +298,7 @@ def _suggested(table: DataTable, known: Sequence[Channel]) -> list[tuple[Channel
 def _sources(
     table: DataTable,
     known: Sequence[Channel],
-    by_name: Sequence[tuple[Channel, str]],
+    by_name: Sequence[tuple[Channel, ColumnMapping]],
     mapping: DataMapping,
 ) -> tuple[dict[Channel, ColumnMapping], dict[str, str], tuple[str, ...]]:
     """Return where each channel comes from: what is mapped, and beside it what names suggest.
@@ -273,7 +307,7 @@ def _sources(
     ----------
     table : the columns.
     known : the channels that there may be, the time or speed first.
-    by_name : those that names of columns suggest, and the names.
+    by_name : those that names of columns suggest, and where they come from.
     mapping : what is said of the columns.
 
     Returns
@@ -295,7 +329,8 @@ def _sources(
     mapped_columns = {mapped.column for mapped in sources.values()}
     reasons: dict[str, str] = {}
     loads_left_out: list[str] = []
-    for channel, name in by_name:
+    for channel, suggested in by_name:
+        name = suggested.column
         if name in mapped_columns:
             continue
         mapped = mapping.columns.get(_without_frame(channel).key)
@@ -313,7 +348,7 @@ def _sources(
                 both = f"both {source.column!r} and {name!r} could be {channel.name}"
                 allowed = f"`{channel.key}` in a mapping file says which"
                 raise InputError(f"{table.source}: {both}; allowed: {allowed}")
-        sources[channel] = ColumnMapping(column=name, sign=channel.sign)
+        sources[channel] = suggested
     return sources, reasons, tuple(loads_left_out)
 
 

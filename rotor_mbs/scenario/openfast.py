@@ -82,7 +82,7 @@ class OpenFastRotor:
     gravity : m/s².
     azimuth, azimuth_up : degrees; initial one of blade 1, and that at which blade 1 points up.
     speed : rpm, at the start.
-    gage : m, from the apex to the shaft's strain gages.
+    undersling : m, from the teeter pin to the apex; 0 for three blades.
     bearing : stiffness, damping, neutral pitch in degrees of each pitch bearing; () where the pitch
         is prescribed.
     duration : s, of the model's run.
@@ -102,7 +102,7 @@ class OpenFastRotor:
     azimuth: float
     azimuth_up: float
     speed: float
-    gage: float
+    undersling: float
     bearing: tuple[tuple[float, float, float], ...]
     duration: float
     left_out: tuple[str, ...]
@@ -140,6 +140,9 @@ def read_rotor(path: Path) -> OpenFastRotor:
         scene can be made.
     """
     main = InputFile(path, what="the main input file (.fst) of an OpenFAST model")
+    if "CompElast" not in main and "NumBl" in main:
+        what = "a model of FAST v7, which is one file"
+        raise InputError(f"{shown_path(path)}: {what}; allowed: a model of FAST v8 or OpenFAST")
     elastic = main.whole("CompElast", 1, 3)
     if elastic == 3:
         allowed = "1 (ElastoDyn) or 2 (BeamDyn)"
@@ -176,7 +179,7 @@ def read_rotor(path: Path) -> OpenFastRotor:
         azimuth=structure.number("Azimuth", _ANGLE),
         azimuth_up=structure.number("AzimB1Up", _ANGLE),
         speed=structure.number("RotSpeed", keys.SIZE),
-        gage=structure.number("ShftGagL", keys.SIZE, 0.0),
+        undersling=structure.number("UndSling", keys.SIZE) if count == 2 else 0.0,
         bearing=_bearing(main, structure, blades),
         duration=main.number("TMax", keys.NOT_NEGATIVE),
         left_out=tuple(_left_out(main, structure, elastic, count)),

@@ -202,14 +202,18 @@ def _pitch_inertia(blade: BladeModel) -> float:
 
 def mapping_text(rotor: OpenFastRotor) -> str:
     """Return a mapping file for the output of the model, for `rotor-mbs compare --columns`."""
-    return "\n".join(
-        [
-            *_comment(f"Columns of the output of {rotor.path.name} (.out or .outb), for:"),
-            "#   rotor-mbs compare OUTPUT --scene SCENE --columns THIS",
-            'program = "openfast"   # signs, units, frames and points of its channels',
-            "",
-        ]
-    )
+    lines = [
+        *_comment(f"Columns of the output of {rotor.path.name} (.out or .outb), for:"),
+        "#   rotor-mbs compare OUTPUT --scene SCENE --columns THIS",
+        'program = "openfast"   # names, units, signs, frames and points of its channels',
+        "",
+        "[openfast]",
+        _entry("AzimB1Up", rotor.azimuth_up, "deg"),
+        _entry("HubCM", rotor.hub_centre_of_mass, "m"),
+    ]
+    if rotor.undersling:
+        lines.append(_entry("UndSling", rotor.undersling, "m"))
+    return "\n".join([*lines, ""])
 
 
 # Text
