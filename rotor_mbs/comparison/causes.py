@@ -15,7 +15,7 @@ from rotor_mbs.comparison.data_mistakes import (
     column_mistakes,
     data_mistakes,
 )
-from rotor_mbs.comparison.defect_search import DefectSearch
+from rotor_mbs.comparison.defect_search import QUICK_SEARCH, DefectSearch
 from rotor_mbs.comparison.faults import faults_in_time
 
 _SAME_START = 1e-3  # rad, rad/s: data that start farther off are no run of the scene as they are
@@ -55,7 +55,7 @@ def likely_causes(search: TrajectorySearch, judged: JudgedDefects | None) -> lis
     if judged is None:
         texts = clock_mistakes(search)
     elif is_elsewhere:
-        texts = DefectSearch(judged).scenes()
+        texts = DefectSearch(judged, QUICK_SEARCH).scenes()
     elif has_defects:
         texts = _other_models_or_faults(search, judged)
     texts = texts or _scatter(search, first) or column_mistakes(search, with_factor=True)
@@ -66,7 +66,7 @@ def likely_causes(search: TrajectorySearch, judged: JudgedDefects | None) -> lis
 
 def _other_models_or_faults(search: TrajectorySearch, judged: JudgedDefects) -> list[str]:
     """Search for another model, parameters or a clock, else for faults at a time."""
-    models = DefectSearch(judged).explanations()
+    models = DefectSearch(judged, QUICK_SEARCH).explanations()
     return models + clock_mistakes(search) or faults_in_time(judged)
 
 

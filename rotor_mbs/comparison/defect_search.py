@@ -36,7 +36,9 @@ _LEFT_OF_FITTED = {1: 0.02, 2: 2e-3, 3: 2e-3}  # of the largest defect, by numbe
 _ALIKE = 3.0  # times what the best explanation leaves
 _ALIKE_IN_ROUNDING = 1.05
 _QUICK = 3e-5  # share to which a change of the model is known
-_FINE = 8  # times the steps, with which that holds also where the mass matrix is nearly singular
+# Times the steps, with which that holds also where the mass matrix is nearly singular. Of many
+# steps fewer times are enough for a search that may not take minutes.
+_MOST_FINE, _FINE_STEPS = 8, 32
 _PERHAPS = 0.2  # of the defects left by steps that are not so fine
 _LEFT_OF_SETS = 0.1  # by the projections on several parameters, before they are iterated
 _FAR_BETTER = 0.1  # times what a cheaper explanation leaves
@@ -48,7 +50,10 @@ _MAX_PARAMETERS = 3  # at once
 _MAX_INTERVALS = 120  # that a hypothesis is tried on
 _MAX_WINDOWS = 60  # of rows, likewise, where the rates are computed from the angles
 _SMALLEST_FLOOR = 1e-18  # rad
-_MAX_STEPS = 512  # of Runge and Kutta in each of them
+# Of Runge and Kutta in each of them, at most: any; so many that a search takes some seconds; and of
+# data that agree.
+_MAX_STEPS, QUICK_SEARCH, BRIEF_SEARCH = 512, 32, 8
+_MAX_FITTED_BRIEF = 2
 _DIFFERENCE = 1e-4  # share or rad, for the derivative by a parameter
 _ROUNDS = 8
 _INDEPENDENT = 1e-6  # determinant of the cosines between the signatures of a set
@@ -61,13 +66,15 @@ class DefectSearch:
     Parameters
     ----------
     judged : the defects.
+    max_steps : of Runge and Kutta in an interval: where more are needed nothing is looked for. At
+        most `BRIEF_SEARCH` no more than single causes are.
 
     Attributes
     ----------
     rows : (k,) intervals that hypotheses are tried on.
     """
 
-    def __init__(self, judged: JudgedDefects) -> None:
+    def __init__(self, judged: JudgedDefects, max_steps: int = _MAX_STEPS) -> None:
         defects, scene = judged.defects, judged.scene
         self._judged, self._scene = judged, scene
         self._moving = list(defects.moving)
@@ -85,10 +92,13 @@ class DefectSearch:
         self._states = defects.states[rows].T
         # By the rounding of each number, but none so small that its channel alone counts.
         self._weights = 1.0 / np.maximum(self._floors, 1e-4 * largest)
-        self._steps = None
+        self._is_brief = max_steps <= BRIEF_SEARCH
+        self._steps, self._fine = None, _MOST_FINE
         if len(rows):
             lengths = self._ends - self._begins
-            self._steps = explicit_steps(scene, lengths, defects.states[rows], _MAX_STEPS)
+            self._steps = explicit_steps(scene, lengths, defects.states[rows], max_steps)
+        if self._steps is not None and max_steps < _MAX_STEPS:
+            self._fine = max(min(_MOST_FINE, _FINE_STEPS // self._steps), 1)
         self._ends_of_scene: dict[int, Array] = {}  # by the factor of the steps
         # For how many of these rows a column has one number, and with it one rounding error, on
         # average.
@@ -141,7 +151,7 @@ class DefectSearch:
             return []
 
         def left(model: RotorModel) -> float:
-            return self._share(self._residual(model, _FINE))
+            return self._share(self._residual(model, self._fine))
 
         # What leaves more than allowed is no explanation, but may be alike to one.
         hypotheses = rotor_hypotheses(self._scene)
@@ -160,7 +170,7 @@ class DefectSearch:
             return []
 
         def left(model: RotorModel) -> float:
-            return self._largest_left(self._residual(model, _FINE))
+            return self._largest_left(self._residual(model, self._fine))
 
         allowed = max(self._judged.tolerance, self._allowed)
         hypotheses = scenes_with_start(self._scene, self._first_row())
@@ -244,7 +254,7 @@ class DefectSearch:
 
     def _left_at_most(self, model: RotorModel, allowed: float) -> float:
         """Return the share that a model leaves; infinite if a defect stays above `allowed`."""
-        residual = self._residual(model, _FINE)
+        residual = self._residual(model, self._fine)
         if not self._is_rounding and not self._largest_left(residual) <= allowed:
             return math.inf
         return self._share(residual)
@@ -264,7 +274,8 @@ class DefectSearch:
         before = (self._values * self._weights).ravel()
         projections, total = signatures @ before, float(before @ before)
         best: list[Explanation[RotorModel]] = []
-        max_count = 1 if self._is_rounding else _MAX_PARAMETERS
+        max_count = 1 if self._is_rounding or self._is_brief else _MAX_PARAMETERS
+        max_fitted = _MAX_FITTED_BRIEF if self._is_brief else _MAX_FITTED
         for count in range(1, max_count + 1):
             sets = np.array(list(itertools.combinations(range(len(candidates)), count)))
             if not len(sets):
@@ -281,7 +292,7 @@ class DefectSearch:
                 is_enough = squares > (1.0 - _LEFT_OF_SETS**2) * total
                 sets, squares = sets[is_enough], squares[is_enough]
             fitted = []
-            for places in sets[np.argsort(-squares)[:_MAX_FITTED]]:
+            for places in sets[np.argsort(-squares)[:max_fitted]]:
                 hypothesis = self._fit([candidates[i] for i in places])
                 if hypothesis is not None:
                     fitted.append(hypothesis)
@@ -326,7 +337,7 @@ class DefectSearch:
         """
         change = np.zeros(len(chosen))
         for _ in range(1 if self._is_rounding else _ROUNDS):
-            residual = self._residual(_changed(self._scene, chosen, change), _FINE)
+            residual = self._residual(_changed(self._scene, chosen, change), self._fine)
             weighted = (residual * self._weights).ravel()
             columns = [self._slope(chosen, change, i).ravel() for i in range(len(chosen))]
             slopes = np.stack(columns, axis=1)
@@ -339,7 +350,7 @@ class DefectSearch:
             if (np.abs(correction) <= 1e-9 + 1e-6 * np.abs(change)).all():
                 break
         model = _changed(self._scene, chosen, change)
-        weighted = self._residual(model, _FINE) * self._weights
+        weighted = self._residual(model, self._fine) * self._weights
         if not np.isfinite(weighted).all():
             return None
         deviation = self._deviations(weighted, slopes)

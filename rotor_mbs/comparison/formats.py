@@ -487,8 +487,14 @@ def _read_text(source: str, text: str) -> DataTable:
         # Lines of nothing but dividers are what spreadsheets write for empty rows.
         if line.strip(" \t,;"):
             lines.append((number, line.strip(" ")))
+    lines = _with_vectors_as_columns(lines)
     first, divider = _first_row(source, lines)
     head = [line for _, line in lines[:first]]  # comments among it
+    closing = {}
+    width = len(_fields(lines[first][1], divider))
+    while len(lines) > first + 1 and _is_closing(lines[-1][1], divider, width):
+        number, line = lines.pop()
+        closing[f"line {number}"] = LeftOut(f"text below the numbers: {line[:40]!a}")
     rows = [(number, line) for number, line in lines[first:] if not line.startswith(_COMMENT)]
     del lines
     columns = _columns_of_rows(source, rows, divider)
@@ -500,7 +506,7 @@ def _read_text(source: str, text: str) -> DataTable:
     plain = [line for line in head if not line.startswith(_COMMENT)]
     names = _names(source, plain or comments, len(columns), divider)
     named: dict[str, DataColumn] = {}
-    left_out: dict[str, LeftOut] = {}
+    left_out: dict[str, LeftOut] = dict(closing)
     repeats: dict[str, int] = {}
     for (name, unit), values in zip(names, columns, strict=True):
         is_empty = isinstance(values, np.ndarray) and bool(np.isnan(values).all())
@@ -519,6 +525,45 @@ def _read_text(source: str, text: str) -> DataTable:
             named[label] = DataColumn(values, unit)
     is_openfast = any(map(_OPENFAST_HEAD.search, head))
     return DataTable(source, named, left_out, "openfast" if is_openfast else "")
+
+
+def _is_closing(line: str, divider: str | None, width: int) -> bool:
+    """Whether a last line is text and no row: "This output file was closed on 19-Oct-2018."."""
+    fields = _fields(line, divider)
+    numbers, others = _kinds_of_fields(fields, divider)
+    return not line.startswith(_COMMENT) and not numbers and bool(others) and len(fields) != width
+
+
+def _with_vectors_as_columns(lines: list[tuple[int, str]]) -> list[tuple[int, str]]:
+    """Return lines in which vectors in fields are columns: "time,y" above "0,1 2 3" of FMI 3.
+
+    Lines of other files are returned as they are.
+    """
+    for (_, above), (_, row) in itertools.pairwise(lines[:_MAX_SEARCHED]):
+        for divider in (",", ";"):
+            if divider not in row or row.startswith(_COMMENT):
+                continue
+            names, fields = _fields(above, divider), _fields(row, divider)
+            counts = [len(field.split()) for field in fields]
+            is_vector = len(names) == len(fields) and max(counts) > 1 and min(counts) > 0
+            words_of_names, words = " ".join(names).split(), " ".join(fields).split()
+            is_head = not any(_is_number(word, decimal_comma=False) for word in words_of_names)
+            is_row = all(_is_number(word, decimal_comma=False) for word in words)
+            if not (is_vector and is_head and is_row):
+                continue
+            labels = []
+            for name, count in zip(names, counts, strict=True):
+                plain, unit = split_bracketed_unit(name)
+                for i in range(count):
+                    label = plain if count == 1 else f"{plain}[{i}]"
+                    labels.append(f"{label} [{unit}]" if unit else label)
+            quoted = divider.join(f'"{label}"' for label in labels)
+            expanded = []
+            for number, line in lines:
+                text = quoted if line == above else divider.join(line.replace(divider, " ").split())
+                expanded.append((number, text))
+            return expanded
+    return lines
 
 
 def _exudyn(
@@ -775,6 +820,11 @@ def _names(
     if not head:
         allowed = "a line such as: time [s],rotor [rad]"
         raise InputError(f"{source}: no header line above the numbers; allowed: {allowed}")
+    # Below the names there may be another comment.
+    while len(head) > 1 and len(_words(head[-1], divider, width)) not in (width, width - 1):
+        if len(_words(head[-2], divider, width)) != width:
+            break
+        head = head[:-1]
     last = _words(head[-1], divider, width)
     above = _words(head[-2], divider, width) if len(head) > 1 else []
     units = [word.strip("[]() ") for word in last]

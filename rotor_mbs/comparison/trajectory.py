@@ -21,7 +21,7 @@ from rotor_mbs.comparison.data_defects import (
     states_of,
 )
 from rotor_mbs.comparison.data_mistakes import TrajectorySearch, data_mistakes
-from rotor_mbs.comparison.defect_search import DefectSearch
+from rotor_mbs.comparison.defect_search import BRIEF_SEARCH, DefectSearch
 from rotor_mbs.comparison.loads import compare_loads
 from rotor_mbs.comparison.verdict import (
     DEFAULT_TOLERANCE,
@@ -643,6 +643,6 @@ def _likely_causes(
             smaller = min(tolerance, _LEFT_OF_SMALL * float(errors.excess_per_growth.max()))
             search = TrajectorySearch(scene, whole, rows.exact, smaller, worst, True)
             texts = data_mistakes(search)
-        return texts or DefectSearch(judged).explanations()
+        return texts or DefectSearch(judged, BRIEF_SEARCH).explanations()
     search = TrajectorySearch(scene, whole, rows.exact, tolerance, worst)
     return likely_causes(search, judged)

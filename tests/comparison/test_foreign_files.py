@@ -67,6 +67,10 @@ REAL_LIFE = {
     "Fortran's exponents": _table(" ", ("time", "rotor_deg", "pitch_1_deg"), form="{:.9E}").replace("E", "D"),
     "empty rows at the end": _table(",") + ",,\n,,\n",
     "a column without a name": "\n".join(f"{i},{row}" for i, row in enumerate(_table(",").split("\n"), -1) if row)[2:],
+    "vectors in a field": "time,q [deg]\n" + "\n".join(f"{t!r},{a!r} {b!r} 0.0 0.0" for t, a, b in _ROWS),
+    "text below the numbers": _table(",") + "\nThis file was closed on 19-Oct-2018 at 10:15:16.\n",
+    "names in a comment above another": "# "
+    + _table(" ", ("time", "rotor_deg", "pitch_1_deg")).replace("\n", "\n# run\n", 1),
     "columns of one name that are not used": "\n".join(f"{row},0,0" for row in _table(",").splitlines()),
 }
 
@@ -76,9 +80,9 @@ def test_text_as_other_programs_write_it(tmp_path: Path, name: str) -> None:
     encoding = "utf-16" if name.startswith("Unicode") else "utf-8"
     (tmp_path / "data.csv").write_bytes(REAL_LIFE[name].encode(encoding))
     data = load_data(tmp_path / "data.csv", SCENE)
-    assert data.columns == [0, 1]
+    assert data.columns[:2] == [0, 1]
     np.testing.assert_allclose(data.time, [row[0] for row in _ROWS], rtol=1e-15)
-    np.testing.assert_allclose(np.degrees(data.values), [row[1:] for row in _ROWS], rtol=1e-14)
+    np.testing.assert_allclose(np.degrees(data.values[:, :2]), [row[1:] for row in _ROWS], rtol=1e-14)
 
 
 @pytest.mark.parametrize(
@@ -199,9 +203,12 @@ WRONG: dict[str, tuple[Callable[[Path], object], str]] = {
     "wrong unit": (_write("time [s],rotor [kg]\n0,1\n1,2\n2,3\n"), "'kg'; allowed: rad, deg, turns"),
     "NaN": (_write(HEAD + "0,1\n1,nan\n2,3\n"), "is nan in row 2 of 3"),
     "repeated time": (_write(HEAD + "0,1\n1,2\n1,3\n"), "the time of row 3, 1 s, repeats"),
-    "decreasing time": (_write(HEAD + "0,1\n2,2\n1,3\n"), "comes before"),
+    "two rows at one time": (
+        _write(HEAD + "0,1\n2,2\n1,3\n2,4\n"),
+        "the time of row 4, 2 s, repeats that of row 2 with other numbers",
+    ),
     "too few rows": (_write(HEAD + "0,1\n1,2\n"), "2 rows; allowed: 3 or more"),
-    "before the start": (_write(HEAD + "-1,1\n0,2\n1,3\n"), "begins at t = -1 s"),
+    "before the start": (_write(HEAD + "-4,1\n-3,2\n-1,3\n"), "ends at t = -1 s; allowed: times from 0"),
     "a comma between thousands": (
         _write('time [ms],rotor\n0,1\n"1,000",2\n"2,000",3\n'),
         "column 'time': row 2 (line 3) has '1,000', no number",

@@ -29,6 +29,7 @@ from support.random_tables import FILES, write_table
 Array = Any
 PRECISIONS = ("float64", "float32", "6 digits")
 WRONG_GRAVITY = 1.01  # a factor, which 6 digits of two seconds show
+UNMOVED, DRIFT = 1e-9, 1e-3  # rad
 
 
 def in_precision(values: Array, precision: str) -> Array:
@@ -49,7 +50,12 @@ def motions(name: str, seconds: float) -> Iterator[tuple[str, Scene, Array, Arra
     scene = shipped.replace(duration=float(exact.time[rows][-1]), samples=int(rows.sum()))
     yield "right", scene, exact.time[rows], exact.angles[rows], exact.rates[rows]
     run = rm.run(scene.replace(gravity=WRONG_GRAVITY * scene.gravity), "lagrange/dop853")
-    yield "wrong", scene, run.time, run.angles, run.rates
+    time, angles, rates = run.time, run.angles.copy(), run.rates.copy()
+    if np.abs(angles - exact.angles[rows]).max() < UNMOVED:
+        # Of a balanced rotor without pitch gravity moves nothing: there the rotor drifts off.
+        angles[:, 0] += DRIFT * (1.0 - np.cos(time))
+        rates[:, 0] += DRIFT * np.sin(time)
+    yield "wrong", scene, time, angles, rates
 
 
 def rows_of(name: str, seconds: float) -> Iterator[tuple[str, ...]]:
@@ -73,7 +79,10 @@ def rows_of(name: str, seconds: float) -> Iterator[tuple[str, ...]]:
                     continue
                 expected = load_data(arrays, scene)
                 for kind in FILES:
-                    path = write_table(folder, kind, arrays)
+                    # Text of a number in single precision is another number: it has the digits that tell it apart.
+                    of_text = {name: values.astype(float) for name, values in arrays.items()}
+                    is_text = kind in ("csv", "txt", "jsonl")
+                    path = write_table(folder, kind, of_text if is_text else arrays)
                     read = data_of_table(read_in_worker((path, "", scene.name)), scene)
                     are_equal = read.columns == expected.columns and np.array_equal(read.values, expected.values)
                     if not (are_equal and np.array_equal(read.rounding, expected.rounding)):
@@ -84,7 +93,7 @@ def rows_of(name: str, seconds: float) -> Iterator[tuple[str, ...]]:
 
 def main() -> None:
     seconds = float(sys.argv[1]) if len(sys.argv) > 1 else np.inf
-    print("| scene | numbers | columns | right data | gravity 1 % larger | formats with other numbers |")
+    print("| scene | numbers | columns | right data | wrong data | formats with other numbers |")
     print("|---|---|---|---|---|---|")
     names = sys.argv[2:] or [name for name, _ in list_scenes() if name.startswith("paper/")]
     for name in names:
