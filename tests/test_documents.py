@@ -14,6 +14,7 @@ from typing import Any
 
 import pytest
 from support.commands import rotor_mbs
+from support.openfast_models import write_model
 
 import rotor_mbs as rm
 from rotor_mbs.cli.arguments import parse
@@ -93,6 +94,8 @@ def make_inputs(name: str) -> None:
     """The files that a document's Python reads."""
     if name == "compare.md":
         rm.export("paper/fig11", "csv", "mine.csv")
+    elif name == "your-turbine.md":
+        write_model(Path.cwd()).rename("MODEL.fst")
     elif name == "sweeps.md":
         (sweep,) = re.findall(r"```toml\n(title.*?)```", TEXTS[name], re.DOTALL)
         fewer = sweep.replace("draws = 100 ", "draws = 4 ").replace("error_growth = true", "error_growth = false")
