@@ -162,6 +162,11 @@ def test_a_sweep_gives_labelled_runs_of_each_parameter_value(tmp_path: Path) -> 
         _ = data.plot
     assert data[1].status == "ok"
     assert data[1].metrics["defect_max"] == data.column("defect_max")[1]
+    assert data[1].integration.steps == data.column("steps")[1] > 0
+    assert data[1].integration.success
+    short = rm.sweep(scene, {"gravity": [9.8]}, methods=METHOD, samples=11, precision="float32")[0]
+    assert short.angles.dtype == float
+    assert len(short.time) == 11
     assert "run time" not in repr(data[1])
     np.testing.assert_array_equal(data[1].angles, data.column("angles")[1])
     by_stiffness = data.to_xarray(unstack=True).angles.sel(bearing_stiffness=1e3)

@@ -39,8 +39,7 @@ from rotor_mbs.runs.design import COLUMNS, MISSING
 from rotor_mbs.runs.hdf5 import reading
 from rotor_mbs.runs.merge import copy_file
 from rotor_mbs.runs.progress import progress_of_call
-from rotor_mbs.runs.read import StoredRun, StoredScene, is_sweep, open_results, run_names
-from rotor_mbs.runs.rows import text_of
+from rotor_mbs.runs.read import StoredRun, is_sweep, open_results, run_names
 from rotor_mbs.runs.sweeps import StoredSweep, parameter_name
 from rotor_mbs.scenario.catalogue import list_scenes, only_scene, scene_of
 from rotor_mbs.scenario.keys import counted
@@ -48,9 +47,8 @@ from rotor_mbs.scenario.scene import Scene, load_scene
 from rotor_mbs.scenario.toml_file import file_path, plain_value
 from rotor_mbs.solution.defects import Defects
 from rotor_mbs.solution.metrics import METRICS
-from rotor_mbs.solution.quantities import known_quantities
 from rotor_mbs.solution.status import STATUSES
-from rotor_mbs.solution.trajectory import Integration, Solution, Trajectory
+from rotor_mbs.solution.trajectory import Solution, Trajectory
 from rotor_mbs.studies.run import run_scenes, solve_judged
 
 if TYPE_CHECKING:
@@ -424,13 +422,14 @@ class Runs(Mapping[Any, Any]):
             raise KeyError(f"{shown_value(label)}; available: {available}")
         if self._is_sweep:
             with reading(self.path):
-                return self._run_of_sweep(int(label))
+                return _loaded(self._sweep.scene_of(int(label)), self._sweep.run(int(label)), None)
         name, method = self._labels[label]
         with open_results(self.path, only=[name]) as results:
             if name not in results.scenes or method not in results.scenes[name].runs:
                 raise StoreError(f"{self.path}: has no {name}/{method} any more: another file has taken its place")
             scene = results.scenes[name]
-            return _loaded(scene, scene.runs[method])
+            reference = None if method == REFERENCE else scene.reference_trajectory
+            return _loaded(scene.scene, scene.runs[method], reference)
 
     def __iter__(self) -> Iterator[Any]:
         return iter(self._labels)
@@ -565,32 +564,6 @@ class Runs(Mapping[Any, Any]):
 
         return write_report(self.path, file_path(folder))
 
-    def _run_of_sweep(self, number: int) -> Run:
-        """Return one run of a sweep, read from its row."""
-        sweep = self._sweep
-        row = number - int(sweep.column("run")[0])
-        values = {key: float(sweep.column(parameter_name(key))[row]) for key in sweep.keys}
-        scene = sweep.base_scene.replace(**values, samples=len(sweep.column("time")))
-        facts = {name: sweep.column(name)[row] for name in COLUMNS if name in sweep.columns}
-        arrays: dict[str, Any] = {}
-        for quantity in known_quantities(scene.outputs):
-            if quantity.name in sweep.columns and quantity.name not in facts:
-                arrays[quantity.name] = np.array(sweep.column(quantity.name)[row], float)
-        known = [~np.isnan(array.reshape(len(array), -1)).any(axis=1) for array in arrays.values()]
-        samples = int(np.all(known, axis=0).sum()) if known else 0
-        blank = np.full((samples, 1 + len(scene.blades)), np.nan)
-        arrays = {"angles": blank, "rates": blank, **{name: array[:samples] for name, array in arrays.items()}}
-        trajectory = Trajectory(np.array(sweep.column("time")[:samples]), **arrays)
-        status, message = STATUSES[int(facts["status"])], text_of(facts["message"])
-        steps, evaluations = (int(facts[name]) if facts[name] >= 0 else None for name in ("steps", "rhs_evaluations"))
-        integration = Integration(status == "ok", message, float(facts["time_reached"]), steps, evaluations)
-        method = sweep.methods[int(sweep.column("method_code")[row])]
-        metrics = {name: value.item() for name, value in facts.items() if value.dtype == float and value == value}
-        return Run(
-            scene, method, trajectory, integration, sweep.settings, run_times_s=[], status=status,
-            message=message, metrics=metrics,
-        )  # fmt: skip
-
     def __repr__(self) -> str:
         return f"{self._headline()}\n{self._short_table()}"
 
@@ -645,15 +618,9 @@ def _labelled(data: Any) -> Any:
     return data.assign_coords(labels)
 
 
-def _loaded(scene: StoredScene, stored: StoredRun) -> Run:
-    """Return a run as it was stored."""
-    solution = stored.solution(scene.scene)
+def _loaded(scene: Scene, stored: StoredRun, reference: Trajectory | None) -> Run:
+    """Return a run as it was stored. Raises StoreError."""
+    solution = stored.solution(scene)
     if solution is None:
-        raise StoreError(f"{scene.name}/{stored.method}: {'; '.join(stored.faults(scene.scene))}")
-    facts = stored.attributes
-    run = Run(**vars(solution), reference=None if stored.method == REFERENCE else scene.reference_trajectory)
-    run.status, run.message = stored.status, str(facts.get("message", ""))
-    run.metrics = {name: value for name, value in facts.items() if isinstance(value, float)}
-    run.run_times_s = [facts["run_time_s"]] if "run_time_s" in facts else []
-    run.setup_time_s, run.output_time_s = (facts.get(name, math.nan) for name in ("setup_time_s", "output_time_s"))
-    return run
+        raise StoreError(f"{stored.scene}/{stored.method}: {'; '.join(stored.faults(scene))}")
+    return Run(**vars(solution), reference=reference)

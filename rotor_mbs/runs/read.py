@@ -12,6 +12,7 @@ What studies store beside runs are records: tables of points, and groups of arra
 from __future__ import annotations
 
 import functools
+import math
 import os
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -53,10 +54,14 @@ _TEXTS = ("message", "engine_message")
 
 @dataclass(frozen=True, eq=False)
 class StoredRun:
-    """A run (or the reference) in an open file; its row is read, and verified, when something of it is asked for.
+    """A run, or the reference, or a run of a sweep, in a file; its row is read, and verified, when something of it is
+    asked for.
 
-    known: what the design says of it: settings, versions, ... scales: time, coordinate, blade, axis, as far as there
-    are.
+    Attributes
+    ----------
+    scene, method : names.
+    known : what the design says of it: settings, versions, ...
+    scales : time, coordinate, blade, axis, as far as there are.
     """
 
     scene: str
@@ -64,7 +69,7 @@ class StoredRun:
     known: Mapping[str, Any]
     scales: Mapping[str, NDArray[Any]]
     _place: RowLocation
-    _file: IO[bytes]
+    _file: IO[bytes] | None = None
     _verify: bool = True
 
     @functools.cached_property
@@ -95,7 +100,7 @@ class StoredRun:
         """Return status, message, metrics, times ... as plain values; those that the run does not
         have are left out."""
         facts: dict[str, Any] = {"status": self.status, "settings": self.known["settings"]}
-        facts |= {name: text_of(self._row[name]) for name in _TEXTS}
+        facts |= {name: text_of(self._row[name]) for name in _TEXTS if name in self._row}
         for name, value in self._row.items():
             if name in ("status", "crc32", *STATUS_COPIES.values(), *_TEXTS) or np.ndim(value):
                 continue
@@ -107,7 +112,7 @@ class StoredRun:
     @property
     def is_frozen(self) -> bool:
         """Return whether it is a reference that was read from a shipped file."""
-        return "frozen_with" in parsed(self.known["versions"], dict, self._name)
+        return "frozen_with" in parsed(self.known.get("versions", "{}"), dict, self._name)
 
     @property
     def status(self) -> str:
@@ -125,9 +130,20 @@ class StoredRun:
         is_known = "angles" in self or "rates" in self
         return list(coordinate_labels(len(self.scales["coordinate"]) - 1)) if is_known else []
 
-    @property
+    @functools.cached_property
     def samples(self) -> int:
-        return int(self._row["samples"])
+        """Return the number of samples up to which the run came."""
+        if "samples" in self._row:
+            return int(self._row["samples"])
+        # A sweep does not count them: its arrays are NaN after a run broke off.
+        arrays = [values for values in self._own_arrays.values() if len(values) == len(self.scales["time"])]
+        is_there = [np.isfinite(values.reshape(len(values), -1)).all(axis=1) for values in arrays]
+        return int(np.all(is_there, axis=0).sum()) if is_there else 0
+
+    @property
+    def _own_arrays(self) -> dict[str, NDArray[Any]]:
+        """Return its arrays by name, with the rows after its end."""
+        return {name: values for name, values in self._row.items() if np.ndim(values) and name not in _TEXTS}
 
     @functools.cached_property
     def _arrays(self) -> dict[str, NDArray[Any]]:
@@ -135,7 +151,7 @@ class StoredRun:
         not have is NaN in all samples, and left out."""
         count = self.samples
         scales = {name: values[:count] if name == "time" else values for name, values in self.scales.items()}
-        own = {name: values[:count] for name, values in self._row.items() if np.ndim(values) and name not in _TEXTS}
+        own = {name: values[:count] for name, values in self._own_arrays.items()}
         return scales | {name: values for name, values in own.items() if count == 0 or not np.isnan(values).all()}
 
     @property
@@ -193,18 +209,39 @@ class StoredRun:
         time = self.array("time")
         blank = np.full((len(time), 1 + len(scene.blades)), np.nan)
         names = {quantity.name for quantity in known_quantities(scene.outputs)}
-        arrays = {name: self.array(name) for name in names if name in self}
+        arrays = {name: np.asarray(self.array(name), float) for name in names if name in self}
         return Trajectory(**{"time": time, "angles": blank, "rates": blank, **arrays})
 
     def solution(self, scene: Scene) -> Solution | None:
-        """Return the run without its judgement; None where its arrays cannot be used."""
+        """Return the run with what was stored of it; None where its arrays cannot be used."""
         trajectory, facts = self.trajectory(scene), self.attributes
         if trajectory is None:
             return None
-        success = bool(facts.get("engine_success", self.is_frozen))  # a frozen reference has no report of its engine
-        out_of_time = self.status == "timed_out" and not success
-        engine = Integration(success, str(facts.get("engine_message", "")), out_of_time=out_of_time)
-        return Solution(scene, self.method, trajectory, engine, self.settings)
+        # A frozen reference has no report of its engine, and of a sweep's runs none is stored.
+        is_reported = "engine_success" in self._row
+        success = self.is_frozen if is_reported else self.status == "ok"
+        success = bool(facts.get("engine_success", success))
+        integration = Integration(
+            success,
+            str(facts.get("engine_message" if is_reported else "message", "")),
+            facts.get("time_reached", 0.0),
+            facts.get("steps"),
+            facts.get("rhs_evaluations"),
+            out_of_time=self.status == "timed_out" and not success,
+        )
+        return Solution(
+            scene,
+            self.method,
+            trajectory,
+            integration,
+            self.settings,
+            setup_time_s=facts.get("setup_time_s", math.nan),
+            run_times_s=[facts["run_time_s"]] if "run_time_s" in facts else [],
+            output_time_s=facts.get("output_time_s", math.nan),
+            status=self.status,
+            message=str(facts.get("message", "")),
+            metrics={name: value for name, value in facts.items() if isinstance(value, float)},
+        )
 
 
 @dataclass(frozen=True)

@@ -27,12 +27,14 @@ from rotor_mbs.runs.design import MISSING, TableSpec, columns_in, flags, scene_s
 from rotor_mbs.runs.hdf5 import Column, reading
 from rotor_mbs.runs.layout import create_file
 from rotor_mbs.runs.output_files import locked
+from rotor_mbs.runs.read import StoredRun
 from rotor_mbs.runs.table import IDENTITY, StoredTable, TableFile, parsed, require_texts
 from rotor_mbs.runs.trailer import SWEEP, may_extend
 from rotor_mbs.runs.versions import row_versions
 from rotor_mbs.scenario.scene import Scene, parse_scene
 from rotor_mbs.scenario.sweep import SPLITS, Sweep
 from rotor_mbs.solution import quantities
+from rotor_mbs.solution.quantities import SCALES
 from rotor_mbs.solution.status import code_of
 
 MESSAGE_LENGTH = 256  # bytes; the longest message seen has 242, of a singularity that ode45 does not pass
@@ -185,3 +187,20 @@ class StoredSweep:
             what = f"has no {shown_value(name)}"
             raise StoreError(f"{self._path}: {what}; allowed: a sweep whose outputs have it")
         return self._table.column(name)
+
+    def scene_of(self, number: int) -> Scene:
+        """Return the scene of one of its runs, at the samples that are stored."""
+        row = self._row_of(number)
+        values = {key: float(self.column(parameter_name(key))[row]) for key in self.keys}
+        return self.base_scene.replace(**values, samples=len(self.column("time")))
+
+    def run(self, number: int) -> StoredRun:
+        """Return one of its runs."""
+        row = self._row_of(number)
+        scales = {name: values for name, (_, values) in self._table.known.items() if name in SCALES}
+        method = self.methods[int(self.column("method_code")[row])]
+        known = {"settings": self.attributes["settings"]}
+        return StoredRun(str(self.attributes["base_scene"]), method, known, scales, self._table.place(row))
+
+    def _row_of(self, number: int) -> int:
+        return number - int(self.column("run")[0])
