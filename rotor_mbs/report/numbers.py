@@ -99,6 +99,22 @@ def up_to(value: float | None, digits: int = 2) -> str:
     return number(math.ceil(value / step * (1.0 - 1e-12)) * step, digits)
 
 
+def span(low: float, high: float, digits: int = 3, unit: str = "") -> str:
+    """Return a range, both ends to the digits of the larger one, so that what is next to zero is zero.
+
+    unit: directly behind both numbers, such as °.
+
+    >>> span(-0.00189, 1.75), span(-11.46, 11.2, unit="°")
+    ('0 to 1.75', '−11.5° to 11.2°')
+    """
+    largest = max(abs(low), abs(high))
+    ends = [low, high]
+    if largest > 0.0 and math.isfinite(largest):
+        step = 10.0 ** (math.floor(math.log10(largest)) - digits + 1)
+        ends = [round(value / step) * step for value in ends]
+    return " to ".join(f"{number(value, digits)}{unit}" for value in ends)
+
+
 def shortest(value: float) -> str:
     """Return a number that somebody chose as briefly as it can be written: 0, 300, 10⁵, 3.2×10⁴, 9.81.
 

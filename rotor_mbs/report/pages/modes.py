@@ -278,7 +278,8 @@ def _campbell(rotation: LinearModes, name: str, axis_name: str) -> tuple[Legend,
         return [Curve(f"{name} {k}", look, speeds, values[:, k]) for k, look in enumerate(looks)]
 
     harmonics = []
-    for k in sorted({1, 2, rotation.blades, 2 * rotation.blades}):
+    multiples = sorted({1, 2, rotation.blades, 2 * rotation.blades})
+    for k in multiples:
         line = np.where(k * speeds <= top, k * speeds, np.nan)
         harmonics.append(Curve(f"{name} harmonics", Look(GREY, ":", "", f"{k}P"), speeds, line))
     first = np.array([column[np.flatnonzero(np.isfinite(column))[:1]].sum() for column in frequencies.T])
@@ -298,7 +299,7 @@ def _campbell(rotation: LinearModes, name: str, axis_name: str) -> tuple[Legend,
         plots.append(Plot("Damping ratio", "", axis, curves(damping), 200, least=_NOTHING))
         plots.append(Plot("Growth rate", "1/s", axis, curves(growth), 200, least=_NOTHING))
     items = [(f"{name} {k}", look) for k, look in enumerate(looks)]
-    items.append((f"{name} harmonics", Look(GREY, ":", "", "multiples of the speed")))
+    items.append((f"{name} harmonics", Look(GREY, ":", "", f"{', '.join(f'{k}P' for k in multiples)} from below")))
     return Legend(items), [[plot] for plot in plots]
 
 

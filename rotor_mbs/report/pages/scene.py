@@ -41,7 +41,7 @@ from rotor_mbs.report.looks import (
     look_of,
     with_capital,
 )
-from rotor_mbs.report.numbers import SPACE, fixed, number, prefixed, seconds, typeset_title, up_to, with_unit
+from rotor_mbs.report.numbers import SPACE, fixed, number, prefixed, seconds, span, typeset_title, up_to, with_unit
 from rotor_mbs.report.pages import (
     Report,
     agree_within,
@@ -323,8 +323,7 @@ def own_answer(scene: StoredScene, run: StoredRun | None) -> list[Markup]:
             text = Markup("In {} the rotor moves between <b>{}° and {}°</b>").format(whole, low, high)
         if "rates" in run:
             speed = run.array("rates")[:, 0]
-            slowest, fastest = (number(float(value), 3) for value in (speed.min(), speed.max()))
-            text += Markup(", at {} to {} rad/s").format(slowest, fastest)
+            text += Markup(", at {} rad/s").format(span(float(speed.min()), float(speed.max())))
         sentences.append(text + ".")
         if angles.shape[1] > 1:
             pitch = np.degrees(angles[:, 1:])
@@ -374,8 +373,8 @@ def _own_facts(scene: StoredScene, run: StoredRun) -> list[Fact]:
     facts = []
     if "rates" in run:
         low, high = (float(value) for value in (run.array("rates")[:, 0].min(), run.array("rates")[:, 0].max()))
-        turns = f"{number(low * _RPM, 3)} to {number(high * _RPM, 3)} rev/min"
-        facts.append(Fact("Rotor speed", f"{number(low, 3)} to {number(high, 3)} rad/s", turns))
+        turns = f"{span(low * _RPM, high * _RPM)} rev/min"
+        facts.append(Fact("Rotor speed", f"{span(low, high)} rad/s", turns))
     for name, title in (
         ("blade_root_moment", "root moment"),
         ("pitch_actuator_moment", "actuator moment"),
@@ -392,9 +391,9 @@ def _own_facts(scene: StoredScene, run: StoredRun) -> list[Fact]:
             )
     if "angles" in run and run.array("angles").shape[1] > 1:
         pitch = run.array("angles")[:, 1:]
-        ends = [number(float(value), 3) for value in np.degrees([pitch.min(), pitch.max()])]
+        low, high = np.degrees([pitch.min(), pitch.max()]).tolist()
         blades = f"of {pitch.shape[1]} blade{'s' if pitch.shape[1] > 1 else ''}"
-        facts.append(Fact("Pitch", f"{ends[0]}° to {ends[1]}°", blades))
+        facts.append(Fact("Pitch", span(low, high, unit="°"), blades))
     compared, whole = compared_time([scene])
     if compared:
         note = "the reference's horizon" if compared < whole else "the whole run"
