@@ -104,7 +104,10 @@ def test_the_published_crest_comes_out_of_what_is_taken():
     assert run.metrics["rotor_angle_max"] == pytest.approx(CREST, abs=5.1e-5)
 
 
-@pytest.mark.parametrize("slip", READINGS, ids=" ".join)
+@pytest.mark.parametrize(
+    "slip",
+    [pytest.param(slip, marks=() if slip[0] == "(52)" else pytest.mark.full, id=" ".join(slip)) for slip in READINGS],
+)
 def test_the_published_crest_does_not_come_out_of_a_slip(slip, monkeypatch):
     """The motion is chaotic, so that any other equations miss it by far more than the 5e-5 rad of its last digit."""
     monkeypatch.setattr(literal, *READINGS[slip])
