@@ -152,7 +152,10 @@ class ColumnReadings:
                     mistakes.append(f"zero off by {zero:.6g}")
                 corrected = factor * values - zero
                 yield self._inverse(j, ", ".join(mistakes), corrected, factor)
-                if kind == "angle" and np.abs(np.diff(corrected)).max() > 0.5 * _TURN:
+                # Numbers that are not known to a turn say nothing of the turns between them.
+                is_known = FLOOR_SAFETY * abs(factor) * self.data.rounding[:, j].max() < 0.5 * _TURN
+                has_jumps = np.abs(np.diff(corrected)).max() > 0.5 * _TURN
+                if kind == "angle" and is_known and has_jumps:
                     unwrapped = np.unwrap(corrected)
                     unwrapped += _TURN * np.round((start - unwrapped[begin]) / _TURN)
                     text_of_turns = ", ".join([*mistakes, "wrapped, taken as unwrapped"])

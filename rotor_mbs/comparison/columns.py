@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor_mbs.comparison.units import is_unit, plain_unit, unit_of_attributes
-from rotor_mbs.errors import InputError
+from rotor_mbs.errors import InputError, shown_value
 
 MAX_COLUMNS = 100_000  # of a file: wide results of a finite-element program have some thousands
 MAX_NAME = 200  # characters: longer names are cut, so that messages and pages stay readable
@@ -73,7 +73,7 @@ class DataTable:
             raise self.refusal(name)
         if name not in self.columns:
             available = shown_names(list(self.columns))
-            raise InputError(f"{self.source}: no column {name!r}; available: {available}")
+            raise InputError(f"{self.source}: no column {shown_value(name)}; available: {available}")
         return self.columns[name]
 
     def refusal(self, name: str) -> InputError:

@@ -93,7 +93,7 @@ def test_right_data_are_ok_with_loads_in_every_frame() -> None:
         mapping[f"{load}{blade}_{'xyz'[index[-1]]}"] = {"column": column, "frame": frame}
     found = rm.compare(motion(SCENE) | columns, SCENE, columns=names | mapping, tolerance=1e-9)
     assert found.status == "ok", found.message
-    assert len(found.verdict.channels) == COUNT + len(columns)
+    assert len(found.verdict.channels) == 2 * COUNT + len(columns)
 
 
 MOTIONS: dict[str, tuple[Callable[[Scene], Scene], str]] = {
