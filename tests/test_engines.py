@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from importlib import util
 from pathlib import Path
 
@@ -36,6 +37,8 @@ def test_an_engine_agrees_with_the_closed_form(name: str) -> None:
     if util.find_spec(package) is None:
         pytest.skip(f"{package} is not installed")
     scene = rm.scene("check/pitch-loads").replace(duration=0.7, samples=71, outputs=["angles", "rates"])
+    blades = tuple(replace(blade, cone=0.3 - 0.2 * i) for i, blade in enumerate(scene.blades))
+    scene = replace(scene, shaft_tilt=-0.2, blades=blades)
     try:
         assert set(check_names(str(FOLDER / f"{name}.py"))) == {f"{name}/{method}" for method in bounds}
         for method, bound in bounds.items():

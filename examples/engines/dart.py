@@ -28,6 +28,12 @@ class Step(Settings):
     step: float = step(1e-4)
 
 
+def turned(about_y, about_x):
+    place = dart.math.Isometry3()
+    place.set_rotation(dart.math.eulerYXZToMatrix([about_y, about_x, 0.0]))
+    return place
+
+
 class Solver:
     def __init__(self, scene, settings):
         if not all(blade.has_pitch_inertia for blade in scene.blades):
@@ -35,13 +41,12 @@ class Solver:
         self.scene, self.settings, self.rotor = scene, settings, dart.dynamics.Skeleton("rotor")
         shaft, hub = self.rotor.createRevoluteJointAndBodyNodePair()
         shaft.setAxis([0.0, 1.0, 0.0])
+        shaft.setTransformFromParentBodyNode(turned(0.0, scene.shaft_tilt))
         hub.setInertia(dart.dynamics.Inertia(1.0, np.zeros(3), scene.hub_inertia * np.eye(3)))
         for phase, blade in zip(scene.phases, scene.blades, strict=True):
             hinge, body = self.rotor.createRevoluteJointAndBodyNodePair(hub)
             hinge.setAxis([0.0, 0.0, 1.0])
-            place = dart.math.Isometry3()
-            place.set_rotation(dart.math.eulerXYZToMatrix([0.0, phase, 0.0]))
-            hinge.setTransformFromParentBodyNode(place)
+            hinge.setTransformFromParentBodyNode(turned(phase, -blade.cone))
             body.setInertia(dart.dynamics.Inertia(blade.mass, np.array(blade.centre_of_mass), blade.inertia_tensor))
         self.world = dart.simulation.World()
         self.world.setGravity([0.0, 0.0, -scene.gravity])

@@ -54,14 +54,16 @@ class Solver:
         self.plant = plant = builder.AddSystem(MultibodyPlant(period))
         plant.mutable_gravity_field().set_gravity_vector([0.0, 0.0, -scene.gravity])
         hub = plant.AddRigidBody("hub", SpatialInertia.Zero())
-        shaft = RevoluteJoint("shaft", plant.world_frame(), hub.body_frame(), [0.0, 1.0, 0.0], scene.shaft_damping)
+        turn = RigidTransform(RotationMatrix.MakeXRotation(scene.shaft_tilt))
+        tilt = plant.AddFrame(FixedOffsetFrame("tilt", plant.world_frame(), turn))
+        shaft = RevoluteJoint("shaft", tilt, hub.body_frame(), [0.0, 1.0, 0.0], scene.shaft_damping)
         motor = plant.AddJointActuator("motor", plant.AddJoint(shaft))
         motor.set_default_rotor_inertia(scene.hub_inertia)
         motor.set_default_gear_ratio(1.0)
         for i, (phase, blade) in enumerate(zip(scene.phases, scene.blades, strict=True)):
             centre, inertia = np.array(blade.centre_of_mass), RotationalInertia(*blade.inertia)
             body = plant.AddRigidBody(str(i), SpatialInertia.MakeFromCentralInertia(blade.mass, centre, inertia))
-            root = RigidTransform(RotationMatrix.MakeYRotation(phase))
+            root = RigidTransform(RotationMatrix.MakeYRotation(phase) @ RotationMatrix.MakeXRotation(-blade.cone))
             place, (stiffness, damping) = FixedOffsetFrame(f"root {i}", hub.body_frame(), root), scene.bearings[i]
             joint = RevoluteJoint(f"pitch {i}", plant.AddFrame(place), body.body_frame(), [0.0, 0.0, 1.0], damping)
             plant.AddForceElement(RevoluteSpring(plant.AddJoint(joint), 0.0, stiffness))

@@ -29,13 +29,15 @@ class Tolerance(Settings):
 
 @functools.cache
 def of_a_blade():
-    """(numbers, phase, g, q, p, u, v) -> 2 x 2 mass matrix and forces of the rotor and one pitch, without loads."""
+    """(numbers, place, g, q, p, u, v) -> 2 x 2 mass matrix and forces of the rotor and one pitch, without loads."""
     q, p, u, v = me.dynamicsymbols("q p u v")
-    g, phase, m, x, y, z, *inertia = sm.symbols("g phase m x y z xx yy zz xy xz yz")
-    base, hub, root, blade = (me.ReferenceFrame(name) for name in ("N", "H", "R", "B"))
-    hub.orient_axis(base, base.y, q)
-    hub.set_ang_vel(base, u * base.y)
-    root.orient_axis(hub, hub.y, phase)
+    g, tilt, phase, cone, m, x, y, z, *inertia = sm.symbols("g tilt phase cone m x y z xx yy zz xy xz yz")
+    base, shaft, hub, azimuth, root, blade = (me.ReferenceFrame(name) for name in ("N", "S", "H", "A", "R", "B"))
+    shaft.orient_axis(base, base.x, tilt)
+    hub.orient_axis(shaft, shaft.y, q)
+    hub.set_ang_vel(shaft, u * shaft.y)
+    azimuth.orient_axis(hub, hub.y, phase)
+    root.orient_axis(azimuth, azimuth.x, -cone)
     blade.orient_axis(root, root.z, p)
     blade.set_ang_vel(root, v * root.z)
     origin = me.Point("O")
@@ -46,7 +48,7 @@ def of_a_blade():
     body = me.RigidBody("blade", centre, blade, m, (me.inertia(blade, xx, yy, zz, xy, yz, xz), centre))
     kane = me.KanesMethod(base, q_ind=[q, p], u_ind=[u, v], kd_eqs=[q.diff() - u, p.diff() - v])
     kane.kanes_equations([body], [(centre, -m * g * base.z)])
-    numbers = ((m, x, y, z, *inertia), phase, g, q, p, u, v)
+    numbers = ((m, x, y, z, *inertia), (tilt, phase, cone), g, q, p, u, v)
     return sm.lambdify(numbers, [kane.mass_matrix, kane.forcing], cse=True)
 
 
@@ -56,6 +58,8 @@ class Solver:
             raise MethodRefusal("kane: blades without inertia about the pitch axis are not supported")
         self.scene, self.tolerance, self.of_a_blade = scene, settings.relative_tolerance, of_a_blade()
         self.numbers = [(blade.mass, *blade.centre_of_mass, *blade.inertia) for blade in scene.blades]
+        cones = [blade.cone for blade in scene.blades]
+        self.places = [(scene.shaft_tilt, phase, cone) for phase, cone in zip(scene.phases, cones, strict=True)]
         self.stiffness = np.array([stiffness for stiffness, _ in scene.bearings])
         self.damping = np.array(scene.dampings)
 
@@ -66,8 +70,8 @@ class Solver:
         forces -= self.damping * state[len(forces) :]
         mass = np.zeros((len(forces), len(forces)))
         mass[0, 0] = self.scene.hub_inertia
-        for i, (numbers, phase) in enumerate(zip(self.numbers, self.scene.phases, strict=True)):
-            matrix, force = self.of_a_blade(numbers, phase, self.scene.gravity, q, pitches[i], u, rates[i])
+        for i, (numbers, place) in enumerate(zip(self.numbers, self.places, strict=True)):
+            matrix, force = self.of_a_blade(numbers, place, self.scene.gravity, q, pitches[i], u, rates[i])
             both = np.array([0, 1 + i])
             mass[np.ix_(both, both)] += matrix
             forces[both] += np.ravel(force)

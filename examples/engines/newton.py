@@ -23,6 +23,10 @@ class Step(Settings):
     step: float = step(1e-3)
 
 
+def turn(axis, angle):
+    return warp.quat_from_axis_angle(warp.vec3(*axis), angle)
+
+
 class Solver:
     def __init__(self, scene, settings):
         if not all(blade.has_pitch_inertia for blade in scene.blades):
@@ -31,11 +35,13 @@ class Solver:
         builder = newton.ModelBuilder(gravity=(0.0, 0.0, -scene.gravity))
         # A body needs a mass, which on the shaft has no effect.
         hub = builder.add_link(mass=1.0, inertia=warp.mat33(scene.hub_inertia * np.eye(3)), lock_inertia=True)
-        joints = [builder.add_joint_revolute(-1, hub, axis=(0.0, 1.0, 0.0), armature=0.0)]
+        tilt = warp.transform((0.0, 0.0, 0.0), turn((1.0, 0.0, 0.0), scene.shaft_tilt))
+        joints = [builder.add_joint_revolute(-1, hub, parent_xform=tilt, axis=(0.0, 1.0, 0.0), armature=0.0)]
         for phase, blade in zip(scene.phases, scene.blades, strict=True):
             inertia = warp.mat33(blade.inertia_tensor)
             body = builder.add_link(com=blade.centre_of_mass, inertia=inertia, mass=blade.mass, lock_inertia=True)
-            place = warp.transform((0.0, 0.0, 0.0), warp.quat_from_axis_angle(warp.vec3(0.0, 1.0, 0.0), phase))
+            turned = turn((0.0, 1.0, 0.0), phase) * turn((1.0, 0.0, 0.0), -blade.cone)
+            place = warp.transform((0.0, 0.0, 0.0), turned)
             joints.append(builder.add_joint_revolute(hub, body, parent_xform=place, axis=(0.0, 0.0, 1.0), armature=0.0))
         builder.add_articulation(joints)
         self.model = builder.finalize(device="cpu")

@@ -37,11 +37,12 @@ class Solver:
         self.scene, self.settings = scene, settings
         self.model = model = pin.Model()
         model.gravity.linear = np.array([0.0, 0.0, -scene.gravity])
-        shaft = model.addJoint(0, pin.JointModelRY(), pin.SE3.Identity(), "shaft")
+        tilt = pin.SE3(pin.utils.rotate("x", scene.shaft_tilt), np.zeros(3))
+        shaft = model.addJoint(0, pin.JointModelRY(), tilt, "shaft")
         hub = pin.Inertia(0.0, np.zeros(3), np.diag([0.0, scene.hub_inertia, 0.0]))
         model.appendBodyToJoint(shaft, hub, pin.SE3.Identity())
         for phase, blade in zip(scene.phases, scene.blades, strict=True):
-            place = pin.SE3(pin.utils.rotate("y", phase), np.zeros(3))
+            place = pin.SE3(pin.utils.rotate("y", phase) @ pin.utils.rotate("x", -blade.cone), np.zeros(3))
             hinge = model.addJoint(shaft, pin.JointModelRZ(), place, f"blade at {phase}")
             body = pin.Inertia(blade.mass, np.array(blade.centre_of_mass), blade.inertia_tensor)
             model.appendBodyToJoint(hinge, body, pin.SE3.Identity())

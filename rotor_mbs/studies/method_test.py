@@ -80,6 +80,21 @@ def five_blades() -> Scene:
     )
 
 
+def leaning_blades() -> Scene:
+    """Return the same rotor with a tilted shaft, a cone of each blade of its own, and a hub that loads feel."""
+    scene = five_blades()
+    blades = tuple(replace(blade, cone=0.3 - 0.15 * i) for i, blade in enumerate(scene.blades))
+    return replace(
+        scene,
+        name="tilt and cone",
+        title=f"{scene.title}, tilted and coned",
+        blades=blades,
+        shaft_tilt=-0.2,
+        hub_radius=0.3,
+        hub_mass=20.0,
+    )
+
+
 # Shipped scenes beside it, with durations in s that show each at work, samples, and how many times its bounds, which
 # are for slow motions, a method may need: stiff bearings take more of a fixed step.
 SCENES = {
@@ -134,7 +149,7 @@ class _Examination:
 
     def checks(self) -> list[Check]:
         self._ask(replace(only_scene(_SMOOTH), duration=0.02, samples=2, outputs=("angles", "rates")), limit=_FIRST_S)
-        scenes = [(five_blades(), 1.0)]
+        scenes = [(five_blades(), 1.0), (leaning_blades(), 1.0)]
         for name, (duration, samples, allowance) in SCENES.items():
             scenes.append((replace(only_scene(name), duration=duration, samples=samples, outputs=OUTPUTS), allowance))
         for scene, allowance in scenes:

@@ -80,8 +80,8 @@ def solve_many(scenes, settings):
 
 def items(scene):
     pitches = all(b.has_pitch_inertia for b in scene.blades)
-    if scene.has_damping or scene.has_torque or any(scene.bearing_stiffness) or not pitches:
-        raise MethodRefusal("outside/rk4 has no springs, no dampers, no torque, no pitch without inertia")
+    if scene.has_tilt_or_cone or scene.has_damping or scene.has_torque or any(scene.bearing_stiffness) or not pitches:
+        raise MethodRefusal("outside/rk4 has no springs, dampers, torque, tilt, cone, or pitch without inertia")
     return [BuiltItem("equation", label) for label in scene.coordinate_labels]
 
 
