@@ -48,10 +48,8 @@ def test_every_command_is_one() -> None:
     assert len(calls) > 15
     for arguments in calls:
         replaced = ["3/16" if word.startswith("$SLURM_ARRAY_TASK_ID") else word for word in arguments]
-        try:
+        if "--names" not in arguments:  # which prints and ends
             parse(replaced)  # ends with status 2 where it is none
-        except SystemExit as ended:  # of what only prints
-            assert ended.code == 0, arguments
 
 
 @pytest.mark.parametrize("path", DOCUMENTS, ids=lambda path: path.name)

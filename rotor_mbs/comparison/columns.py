@@ -73,7 +73,8 @@ class DataTable:
             raise self.refusal(name)
         if name not in self.columns:
             available = shown_names(list(self.columns))
-            raise InputError(f"{self.source}: no column {shown_value(name)}; available: {available}")
+            problem = f"no column {shown_value(name)}; available: {available}"
+            raise InputError(f"{self.source}: {problem}")
         return self.columns[name]
 
     def refusal(self, name: str) -> InputError:
