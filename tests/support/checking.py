@@ -6,6 +6,7 @@ import contextlib
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 from unittest import mock
 
 from rotor_mbs.analysis import kinematics
@@ -14,6 +15,7 @@ from rotor_mbs.analysis.judgement import judge
 from rotor_mbs.methods.catalogue import REFERENCE
 from rotor_mbs.methods.solve import solve
 from rotor_mbs.models.exudyn import chain
+from rotor_mbs.models.exudyn.geometry import Part
 from rotor_mbs.runs.design import RunRequest, results_tables
 from rotor_mbs.runs.merge import fit_file_to_request
 from rotor_mbs.runs.rows import row_of_run
@@ -108,15 +110,16 @@ def _wrong_seat(share: float) -> Iterator[None]:
 
     They are put there once the bodies' places are known: what is off is where the joint holds, not where the body is.
     """
-    right = chain._on_body
+    right = chain.parts
 
-    def wrong(placed: chain.Placed, where: str, rotation: chain.Array) -> chain.Part:
-        part = right(placed, where, rotation)
-        if placed.name == "hub":
-            return part
-        turned, position = part.parameters["localHT"]
-        moved = turned, position * (1.0 + share)
-        return replace(part, parameters={**part.parameters, "localHT": moved})
+    def wrong(*arguments: Any) -> list[Part]:
+        built = right(*arguments)
+        for number, part in enumerate(built):
+            if part.kind == "marker" and part.name.endswith(" at bearing"):
+                turned, position = part.parameters["localHT"]
+                moved = {**part.parameters, "localHT": (turned, position * (1.0 + share))}
+                built[number] = replace(part, parameters=moved)
+        return built
 
-    with mock.patch.object(chain, "_on_body", wrong):
+    with mock.patch.object(chain, "parts", wrong):
         yield
