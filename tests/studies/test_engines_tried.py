@@ -3,18 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from concurrent.futures import Future
-from dataclasses import asdict
 from pathlib import Path
-from typing import Any
 
 import pytest
 from support import broken_engines
-from support.broken_engines import BROKEN, NOT_FOUND, RIGHT, is_right, reasons
+from support.broken_engines import BROKEN, NOT_FOUND, RIGHT, as_records, checks_of_first_scene, is_right, reasons
 
 from rotor_mbs.analysis.run_checks import Check
 from rotor_mbs.methods import catalogue
-from rotor_mbs.methods.catalogue import find_method
 from rotor_mbs.studies import method_test
 
 # Of which `test-method` tells that they are wrong, and not why.
@@ -29,35 +25,11 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     catalogue._of_files.clear()
 
 
-class HerePool:
-    """A pool of no workers: what is submitted is computed at once."""
-
-    def submit(self, _work: Any, task: Any, _limit_s: float) -> Future[Any]:
-        done = Future[Any]()
-        done.set_result(method_test._run(task))
-        return done
-
-
 def method_of(name: str) -> str:
     file = Path(f"{name}.py")
     file.write_text(broken_engines.ENGINES[name].source())
     (method,) = catalogue.check_names(str(file))
     return method
-
-
-def first_scene(name: str) -> list[Check]:
-    """Return the checks on the five blades alone."""
-    examination = method_test._Examination(find_method(method_of(name)), HerePool(), 60.0)  # type: ignore[arg-type]
-    examination._scene(method_test.five_blades(), 1.0)
-    return examination._made
-
-
-def as_records(checks: list[Check]) -> list[dict[str, Any]]:
-    records = []
-    for check in checks:
-        record = asdict(check) | {"passed": check.passed, "check": check.name, "scene": check.where.scene}
-        records.append(record)
-    return records
 
 
 def judge_reasons(name: str, checks: list[Check]) -> None:
@@ -80,12 +52,12 @@ QUICK = ("r04_tip_no_pitch", "r12_loads_of_blade_1", "r07_rates_in_degrees")
     ],
 )
 def test_a_mistake_is_named_by_the_first_scene(name: str) -> None:
-    judge_reasons(name, first_scene(name))
+    judge_reasons(name, checks_of_first_scene(name, Path()))
 
 
 @pytest.mark.full
 def test_a_right_engine_passes_the_first_scene() -> None:
-    assert [check for check in first_scene("rk4") if not check.passed] == []
+    assert [check for check in checks_of_first_scene("rk4", Path()) if not check.passed] == []
 
 
 @pytest.mark.nightly

@@ -3,7 +3,8 @@
     python tests/support/broken_engines.py FOLDER [-o docs/engines-tried.md] [--engines NAME,NAME]
 
 examines each with `rotor-mbs test-method`, keeps its checks in FOLDER/NAME.json (what is there already is not run
-again), and writes the table of the document.
+again), and writes the table of the document. With `--first` it examines them in this process by the first scene alone,
+which takes seconds, and keeps that in FOLDER/NAME.first.json; the document says which have been examined by no more.
 """
 
 from __future__ import annotations
@@ -14,9 +15,15 @@ import re
 import subprocess
 import sys
 from collections.abc import Mapping, Sequence
+from concurrent.futures import Future
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
+
+from rotor_mbs.analysis.run_checks import Check
+from rotor_mbs.methods import catalogue
+from rotor_mbs.methods.catalogue import find_method
+from rotor_mbs.studies import method_test
 
 ROOT = Path(__file__).parents[2]
 NEWTON = (ROOT / "tests/studies/engines/right.py").read_text()
@@ -478,19 +485,50 @@ def examined(name: str, folder: Path) -> list[dict[str, Any]]:
     return checks
 
 
+class _HerePool:
+    """A pool of no workers: what is submitted is computed at once."""
+
+    def submit(self, _work: Any, task: Any, _limit_s: float) -> Future[Any]:
+        done = Future[Any]()
+        done.set_result(method_test._run(task))
+        return done
+
+
+def checks_of_first_scene(name: str, folder: Path) -> list[Check]:
+    """Return the checks of an engine on the five blades alone; its file is written into the folder."""
+    file = folder / f"{name}.py"
+    file.write_text(ENGINES[name].source())
+    (method,) = catalogue.check_names(str(file))
+    examination = method_test._Examination(find_method(method), _HerePool(), 60.0)  # type: ignore[arg-type]
+    examination._scene(method_test.five_blades(), 1.0)
+    return examination._made
+
+
+def as_records(checks: Sequence[Check]) -> list[dict[str, Any]]:
+    """Return checks as `test-method --json` writes them."""
+    records = []
+    for check in checks:
+        record = {"check": check.name, "scene": check.where.scene, "value": check.value, "bound": check.bound}
+        records.append(record | {"passed": check.passed, "hint": check.hint})
+    return records
+
+
 def table(folder: Path) -> str:
     """Return the document's tables, of the engines that have been examined."""
     broken, right = [], []
     named = wrong = 0
     for name, engine in ENGINES.items():
-        if not (folder / f"{name}.json").exists():
+        places = [folder / f"{name}.json", folder / f"{name}.first.json"]
+        place = next((place for place in places if place.exists()), None)
+        if place is None:
             continue
-        checks = examined(name, folder)
+        checks = json.loads(place.read_text())
+        scenes = "first" if place == places[1] else "all"
         given = reasons(checks)
         if name in RIGHT:
             order = next((check["value"] for check in checks if check["check"] == "order"), None)
             shown = "" if order is None else f"at most {order:.2g} below what it claims"
-            right.append(f"| {name} | {'passes' if not given else 'FAILS'} | {shown} |")
+            right.append(f"| {name} | {scenes} | {'passes' if not given else 'FAILS'} | {shown} |")
             continue
         verdicts = {reason: is_right(engine, reason) for reason in given}
         causes = [reason for reason, verdict in verdicts.items() if verdict] or [
@@ -502,19 +540,19 @@ def table(folder: Path) -> str:
         cause = "; ".join(causes[:1]).replace("|", "/") or NOT_FOUND
         verdict = f"fails ({', '.join(sorted({where.split(',')[0] for where in given.values()}))})"
         verdict = verdict if given else "PASSES"
-        broken.append(f"| {name} | {engine.mistake} | {verdict} | {cause} | {word} |")
+        broken.append(f"| {name} | {engine.mistake} | {scenes} | {verdict} | {cause} | {word} |")
     lines = [
         f"{len(broken)} broken engines: {sum('PASSES' in line for line in broken)} pass, {named} have the right cause,",
         f"{wrong} a wrong one, {len(broken) - named - wrong} none.",
         "",
-        "| engine | mistake | verdict | cause named | right? |",
-        "|---|---|---|---|---|",
+        "| engine | mistake | scenes | verdict | cause named | right? |",
+        "|---|---|---|---|---|---|",
         *broken,
         "",
         f"{len(right)} right engines:",
         "",
-        "| engine | verdict | measured order |",
-        "|---|---|---|",
+        "| engine | scenes | verdict | measured order |",
+        "|---|---|---|---|",
         *right,
     ]
     return "\n".join(lines) + "\n"
@@ -524,6 +562,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("folder", type=Path)
     parser.add_argument("-o", "--output", type=Path, help="the document, whose tables are replaced")
+    parser.add_argument("--first", action="store_true", help="by the first scene alone, in this process")
     parser.add_argument("--engines", default=",".join(ENGINES), help="names, separated by commas; '' for none")
     arguments = parser.parse_args()
     arguments.folder.mkdir(exist_ok=True)
