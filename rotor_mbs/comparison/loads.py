@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import itertools
+import math
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -111,7 +112,7 @@ class JudgedLoads:
     @property
     def frames(self) -> tuple[str, ...]:
         """The frames that differ from one another in the scene."""
-        return tuple(frame for frame in _FRAMES if _plain_frame(self.scene, frame) == frame)
+        return distinct_frames(self.scene)
 
     def scale(self, j: int, component: Array) -> float:
         """Return the size by which errors of channel j are judged, if it is this component."""
@@ -182,6 +183,17 @@ def loads_by_frame(
         columns = [arrays[load.name].reshape(len(time), -1) for load in LOADS]
         matrices[frame] = np.hstack(columns)
     return matrices
+
+
+def distinct_frames(scene: Scene) -> tuple[str, ...]:
+    """Return the frames that differ from one another in a scene, "" for that of its own loads."""
+    return tuple(frame for frame in _FRAMES if _plain_frame(scene, frame) == frame)
+
+
+def shaft_direction(scene: Scene, frame: str) -> Array:
+    """Return the direction of the shaft in the frame of a shaft load, (3,)."""
+    tilt = 0.0 if frame in ("shaft", "rotor") else scene.shaft_tilt
+    return np.array([0.0, math.cos(tilt), math.sin(tilt)])
 
 
 def _plain_frame(scene: Scene, frame: str, of_shaft: bool = False) -> str:
@@ -431,9 +443,12 @@ def _component_hypotheses(loads: JudgedLoads, j: int) -> Iterator[Hypothesis[Com
                         factor, matrix[:, i] - loads.hub_weight[frame][:, i], shown
                     )
                     yield Hypothesis(text, component, price + 1)
-                if other.name == "shaft moment y":
+                share = 0.0
+                if _load(other) == "shaft moment":
+                    share = float(shaft_direction(loads.scene, frame)["xyz".index(other.name[-1])])
+                if share:
                     text = ", ".join(["with the torque on the rotor in it", *mistakes])
-                    component = Component(factor, matrix[:, i] + torque, shown)
+                    component = Component(factor, matrix[:, i] + share * torque, shown)
                     yield Hypothesis(text, component, price + 1)
     own = channel.column - loads.known[0].column
     for wrong, by_frame in loads.mistaken.items():

@@ -14,7 +14,12 @@ from numpy.typing import NDArray
 
 from rotor_mbs.analysis import kinematics
 from rotor_mbs.analysis.judgement import defects_of
-from rotor_mbs.comparison.loads import is_at_jump, loads_by_frame
+from rotor_mbs.comparison.loads import (
+    distinct_frames,
+    is_at_jump,
+    loads_by_frame,
+    shaft_direction,
+)
 from rotor_mbs.comparison.other_rotors import other_azimuths, other_scenes
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.scenario.time_table import ROTOR_TORQUE, values_before
@@ -161,7 +166,17 @@ def _other_tips(scene: Scene, angles: Array, own: Array) -> Iterator[tuple[str, 
     yield "x and z of the tips exchanged", np.stack([z, y, x], axis=2)
     yield "tips in mm", 1e3 * own
     for text, azimuths in other_azimuths(scene):
-        yield text, _turned_about_shaft(own, np.array(azimuths) - scene.phases)
+        yield text, _turned_about_shaft(scene, own, np.array(azimuths) - scene.phases)
+    for text, other in _leaning_otherwise(scene):
+        yield text, kinematics.tip_paths(other, angles)
+
+
+def _leaning_otherwise(scene: Scene) -> Iterator[tuple[str, Scene]]:
+    """Yield scenes of other tilt or cone that people mistake a scene for, in words."""
+    cones = [blade.cone for blade in scene.blades]
+    for text, other in other_scenes(scene):
+        if other.shaft_tilt != scene.shaft_tilt or [blade.cone for blade in other.blades] != cones:
+            yield text, other
 
 
 def _other_tip_points(scene: Scene, tip: Array, angles: Array, own: Array) -> str:
@@ -263,7 +278,7 @@ def _other_potential_energies(
     paths = kinematics.tip_paths(_with_tips_at_centres(scene), run.angles)
     weights = scene.gravity * np.array([blade.mass for blade in scene.blades])
     for text, azimuths in other_azimuths(scene):
-        turned = _turned_about_shaft(paths, np.array(azimuths) - scene.phases)
+        turned = _turned_about_shaft(scene, paths, np.array(azimuths) - scene.phases)
         yield text, own + (turned - paths)[:, :, 2] @ weights
     for text, other in other_scenes(scene):
         yield text, kinematics.potential_energy(other, run.time, run.angles)
@@ -297,6 +312,13 @@ def wrong_loads(scene: Scene, run: Trajectory) -> str:
     frames: dict[str, Mapping[str, Array]] = {}
     for frame, matrix in loads_by_frame(scene, time, angles, rates).items():
         frames[frame] = _by_load(scene, matrix)
+    others: dict[str, Mapping[str, Array]] = {}
+    for text, other in _leaning_otherwise(scene):
+        others[text] = _by_load(scene, loads_by_frame(other, time, angles, rates)[""])
+    if scene.hub_mass:
+        bare = replace(scene, hub_mass=0.0)
+        matrix = loads_by_frame(bare, time, angles, rates)[""]
+        others["without the hub's weight"] = _by_load(scene, matrix)
     torque = values_before(scene.load_segments, time)[ROTOR_TORQUE]
     texts = []
     for load in LOADS:
@@ -304,6 +326,7 @@ def wrong_loads(scene: Scene, run: Trajectory) -> str:
         if stored is None:
             continue
         trials = dict(_other_loads(scene, load.name, frames, torque))
+        trials |= {text: arrays[load.name] for text, arrays in others.items()}
         named = _explaining(stored[rows], frames[""][load.name], trials)
         if len(named) == 1:
             texts.append(f"{load.name.replace('_', ' ')}: {named[0]}")
@@ -326,18 +349,25 @@ def _other_loads(
     yield "sign reversed (action in place of reaction)", -own
     yield "kN taken as N", 1e-3 * own
     yield "N taken as kN", 1e3 * own
-    for frame in ("rotor", "base"):
+    for frame in distinct_frames(scene)[1:]:
         yield f"in the {frame} frame", frames[frame][name]
     if name.startswith(("blade", "pitch")):
         for order, place in _exchanges(len(scene.blades)):
             yield place, own[:, order]
     if name == "blade_root_moment":
-        for point in ("centre_of_mass", "tip"):
-            arms = np.array([getattr(blade, point) for blade in scene.blades])
+        points = {
+            "centre of mass": [blade.centre_of_mass for blade in scene.blades],
+            "tip": [blade.tip for blade in scene.blades],
+        }
+        if scene.hub_radius:
+            points["apex"] = [(0.0, 0.0, 0.0)] * len(scene.blades)
+        for point, places in points.items():
+            arms = np.array(places) - [0.0, 0.0, scene.hub_radius]
             moved = own - np.cross(arms, frames[""]["blade_root_force"])
-            yield f"about the {point.replace('_', ' ')} in place of the root", moved
+            yield f"about the {point} in place of the root", moved
     if name == "shaft_moment":
-        yield "with the torque on the rotor in it", own + torque[:, None] * [0.0, 1.0, 0.0]
+        along_shaft = torque[:, None] * shaft_direction(scene, "")
+        yield "with the torque on the rotor in it", own + along_shaft
 
 
 def _by_load(scene: Scene, matrix: Array) -> dict[str, Array]:
@@ -392,8 +422,10 @@ def _with_tips_at_centres(scene: Scene) -> Scene:
     return replace(scene, blades=blades)
 
 
-def _turned_about_shaft(paths: Array, angles: Array) -> Array:
+def _turned_about_shaft(scene: Scene, paths: Array, angles: Array) -> Array:
     """Turn (n, blades, 3) vectors in the base about the shaft, by (blades,) rad."""
-    x, y, z = np.moveaxis(paths, 2, 0)
-    s, c = np.sin(angles), np.cos(angles)
-    return np.stack([c * x + s * z, y, c * z - s * x], axis=2)
+    s, c = np.sin(angles)[:, None], np.cos(angles)[:, None]
+    axis = shaft_direction(scene, "")
+    # Rodrigues' formula.
+    along = (paths @ axis)[..., None] * axis
+    return along + c * (paths - along) + s * np.cross(axis, paths)
