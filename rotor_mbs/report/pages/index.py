@@ -81,8 +81,10 @@ def paper_answer(report: Report) -> list[Markup]:
     methods, error, agreeing = agreement_of_scenes(scenes)
     if error is not None:
         where = f"all {len(scenes)}" if agreeing == len(scenes) else f"{agreeing} of {len(scenes)}"
-        text = Markup("Corrected, {} in {} scenes.")
-        sentences.append(text.format(agree_within(methods, error), where))
+        compared, whole = compared_time(scenes)
+        over = f", over {compared:.0f} of {whole:.0f} s" if compared < whole else ""
+        text = Markup("Corrected, {} in {} scenes{}.")
+        sentences.append(text.format(agree_within(methods, error), where, over))
     sentences.append(numbers_sentence(report.claims))
     return [sentence for sentence in sentences if sentence]
 
