@@ -129,7 +129,7 @@ def change_by_start(scene: Scene, step: float) -> Array:
         angles[moving] += changed[: len(moving)]
         rates[moving] += changed[len(moving) :]
         moved = replace(scene, initial_angles=tuple(angles.tolist()), initial_rates=tuple(rates.tolist()))
-        run = solve(TAYLOR, moved, {}).trajectory
+        run = solve(TAYLOR if is_available() else DOP853, moved, {}).trajectory
         return np.hstack([run.angles[:, moving], run.rates[:, moving]])
 
     steps = step * np.eye(2 * len(moving))

@@ -183,6 +183,7 @@ def test_a_pitch_that_is_fixed_has_no_growth_and_no_unit(monkeypatch: pytest.Mon
 
 def test_error_growth_of_a_stiff_oscillation_is_one() -> None:
     """An undamped spring of 1000 rad/s turns (angle, rate/ω) in a circle: no error of it grows, in either channel."""
+    pytest.importorskip("heyoka", reason="quotients of differences have four digits")
     scene = make_scene([0, 0.01], [0, 0], (AXIAL,), gravity=0.0, duration=0.1, samples=6, bearing_stiffness=(7e6,))
     result = reference_at(scene, np.linspace(0.0, 0.1, 6))
     np.testing.assert_allclose(result.units, [1.0, 1.0, 1.0, 1000.0])
