@@ -93,7 +93,7 @@ PRIVATE = {"_repr_html_", "_replace", "_asdict", "_fields", "_exit", "_config"}
 PRIVATE |= {
     "_files", "_of_files", "_own_extremes", "_changed_metric", "_of_reference", "_of_run", "_PATIENT_S",
     "_LONGEST_RUN_S", "_LOAD_S", "_is_met", "_mbs", "_runs", "_in_doubles", "_transition_matrices",
-    "_matrices_by_quotients", "_Sweep", "_measure_scene",
+    "_matrices_by_quotients", "_Sweep",
     "_turn", "_Examination", "_scene", "_made", "_run", "_of_stored_interval",
 }  # fmt: skip
 

@@ -74,6 +74,10 @@ class Task(ABC):
     def perform(self) -> Rows:
         """Compute its rows, in a worker process."""
 
+    def store(self, rows: Rows) -> None:
+        """Write its rows into the file. Raises StoreError."""
+        self.place.write(rows)
+
     def split(self) -> Sequence[Self]:
         """Return tasks of its rows one by one; an empty sequence where it is one row, or cannot be
         split."""
@@ -110,13 +114,13 @@ def run_tasks(pool: TaskPool, tasks: Iterable[T]) -> Iterator[TaskEnd[T, Rows]]:
             continue
         if end.value is not None:
             if not pool.shares_disk:
-                task.place.write(end.value)
+                task.store(end.value)
             yield end
             continue
         status = "solver_failed" if end.failure == "error" else end.failure
         rows = None if end.failure == "worker_died" else task.failed(status, end.message)
         if rows is not None:
-            task.place.write(rows)
+            task.store(rows)
         yield TaskEnd(task, rows, end.failure, end.message)
 
 
@@ -126,7 +130,7 @@ def run_in_worker(task: Task, *, stores: bool) -> Rows:
     rows = task.perform()
     if not stores:
         return rows
-    task.place.write(rows)
+    task.store(rows)
     return {name: np.asarray(rows[name]) for name in _REPORTED if name in rows}
 
 

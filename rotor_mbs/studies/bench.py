@@ -13,7 +13,6 @@ import os
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -27,13 +26,13 @@ from rotor_mbs.methods import catalogue
 from rotor_mbs.methods.base import STEP, TOLERANCE, Ladder, Method
 from rotor_mbs.methods.time_limit import OutOfTimeError, caller_signals, time_limit
 from rotor_mbs.processes import last_core
-from rotor_mbs.processes.pool import WorkerPool, run_in
+from rotor_mbs.processes.pool import WorkerPool
 from rotor_mbs.runs.design import RunRequest, TableSpec
 from rotor_mbs.runs.merge import fit_file_to_request
 from rotor_mbs.runs.output_files import locked
 from rotor_mbs.runs.read import Record, points_table
 from rotor_mbs.runs.rows import RowLocation, Rows
-from rotor_mbs.runs.runner import OnProgress, RunOutcome, Task, ignore_progress
+from rotor_mbs.runs.runner import OnProgress, RunOutcome, Task, ignore_progress, run_tasks
 from rotor_mbs.runs.table import TableFile
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.metrics import horizon, horizon_samples
@@ -454,7 +453,6 @@ def run_bench(
         report = run_scenes(scenes, none, output, workers=workers, timeout_s=_REFERENCE_LIMIT_S)
         failed = {run.label.partition(" ")[0]: run for run in (*report.failures, *report.not_computed)}
         changed = {run.label.partition(" ")[0] for run in report.computed}  # whose reference is another one now
-        ready: dict[str, tuple[Scene, Trajectory]] = {}
         curves: list[Curve] = []
         refused: list[catalogue.Refusal] = []
         options = {"repeats": repeats, "budget_s": budget_s}
@@ -467,7 +465,7 @@ def run_bench(
                 continue
             place = TableFile(output).place(f"{scene.name}/{catalogue.REFERENCE}")
             try:
-                ready[scene.name] = bench_inputs(scene, place)
+                bench_inputs(scene, place)
             except InputError as exc:
                 reason = str(exc).removeprefix(f"{scene.name}: ")
                 refused.append(catalogue.Refusal(scene.name, "", reason))
@@ -482,37 +480,89 @@ def run_bench(
         made: list[RunOutcome] = []
         for scene in scenes:
             own = [curve for curve in missing if curve.scene.name == scene.name]
-            for outcome in _measure_scene(file, own, *ready[scene.name], repeats, budget_s) if own else ():
+            for outcome in measured(bench_task(file, own, repeats, budget_s)) if own else ():
                 made.append(replace(outcome, share=(len(made) + 1) / len(missing)))
                 on_progress(len(made), len(missing), made[-1])
         return made, refused
 
 
-def _measure_scene(
-    file: TableFile, curves: Sequence[Curve], short: Scene, reference: Trajectory, repeats: int, budget_s: float
-) -> Iterator[RunOutcome]:
-    """Time, judge and store every point of the curves of one scene."""
-    core = last_core()
-    facts = facts_of(short, reference) | {"pinned_core": -1 if core is None else core}
-    work = partial(measure, scene=short, reference=reference, repeats=repeats, budget_s=budget_s)
+@dataclass(frozen=True, kw_only=True)
+class BenchTask(Task):
+    """Curves of one scene on their way to a worker process, which times them together.
 
-    def split(together: Sequence[Curve]) -> list[list[Curve]]:
-        return [[curve] for curve in together] if len(together) > 1 else []
+    Attributes
+    ----------
+    curves, places : the curves, and where the rows of each begin.
+    repeats, budget_s : timed runs of a point at most, and time for all of them in s.
+    """
 
-    with WorkerPool(1, core=core) as pool:
-        limit_s = _HANGING * budget_s + _LOADING_S
-        for end in run_in(pool, catalogue.with_method_files(work), [curves], limit_s, split):
-            for i, curve in enumerate(end.task):
-                if end.value is None:
+    curves: Sequence[Curve]
+    places: Sequence[RowLocation]
+    repeats: int
+    budget_s: float
+
+    def perform(self) -> Rows:
+        assert self.reference is not None
+        scene, reference = bench_inputs(self.curves[0].scene, self.reference)
+        core = last_core()  # to which this process is bound, see `measured`
+        facts = facts_of(scene, reference) | {"pinned_core": -1 if core is None else core}
+        points = measure(self.curves, scene, reference, self.repeats, self.budget_s)
+        parts = []
+        for curve, place, points_of_curve in zip(self.curves, self.places, points, strict=True):
+            parts.append(rows_of_curve(place, curve, points_of_curve, facts))
+        return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
+
+    def store(self, rows: Rows) -> None:
+        for part, place in zip(self.parts(rows), self.places, strict=True):
+            place.write(part)
+
+    def split(self) -> list[BenchTask]:
+        if len(self.curves) == 1:
+            return []
+        pairs = zip(self.curves, self.places, strict=True)
+        return [replace(self, curves=[curve], places=[place], place=place) for curve, place in pairs]
+
+    def parts(self, rows: Rows) -> list[Rows]:
+        """Return the rows of each curve."""
+        parts, first = [], 0
+        for curve in self.curves:
+            last = first + len(curve.points)
+            parts.append({name: values[first:last] for name, values in rows.items()})
+            first = last
+        return parts
+
+
+def bench_task(file: TableFile, curves: Sequence[Curve], repeats: int, budget_s: float) -> BenchTask:
+    """Return the task that measures curves of one scene, see `BenchTask`."""
+    scene = curves[0].scene.name
+    places = [curve.places(file)[0] for curve in curves]
+    return BenchTask(
+        label=scene,
+        method="",
+        place=places[0],
+        reference=file.place(f"{scene}/{catalogue.REFERENCE}"),
+        kill_after_s=_HANGING * budget_s + _LOADING_S,
+        curves=curves,
+        places=places,
+        repeats=repeats,
+        budget_s=budget_s,
+    )
+
+
+def measured(task: BenchTask) -> Iterator[RunOutcome]:
+    """Perform a task in a process on one core; yield the outcome of each of its curves."""
+    with WorkerPool(1, core=last_core()) as pool:
+        for end in run_tasks(pool, [task]):
+            if end.value is None:
+                for curve in end.task.curves:
                     yield RunOutcome(curve.label, curve.method, end.failure, end.message, is_stored=False)
-                    continue
-                place, rows = curve.places(file)[0], end.value[i]
-                place.write(rows_of_curve(place, curve, rows, facts))
-                statuses = [row["status"] for row in rows]
-                ok, inaccurate, left_out = (statuses.count(status) for status in ("ok", "inaccurate", "left_out"))
-                failed = len(statuses) - ok - inaccurate - left_out
+                continue
+            for curve, rows in zip(end.task.curves, end.task.parts(end.value), strict=True):
+                codes = rows["status"].tolist()
+                ok, inaccurate, left_out = (codes.count(code_of(status)) for status in ("ok", "inaccurate", "left_out"))
+                failed = len(codes) - ok - inaccurate - left_out
                 counts = f"{ok} ok, {inaccurate} inaccurate, {failed} failed, {left_out} omitted"
-                yield RunOutcome(curve.label, curve.method, "measured", f"{len(statuses)} points: {counts}")
+                yield RunOutcome(curve.label, curve.method, "measured", f"{len(codes)} points: {counts}")
 
 
 def rows_of_curve(

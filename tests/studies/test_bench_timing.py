@@ -7,7 +7,6 @@ import signal
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
 import h5py
 import numpy as np
@@ -20,11 +19,13 @@ from rotor_mbs.methods.base import BuiltItem, Settings
 from rotor_mbs.methods.catalogue import ladders
 from rotor_mbs.runs.merge import fit_file_to_request
 from rotor_mbs.runs.read import Record, read_records
+from rotor_mbs.runs.rows import Rows
 from rotor_mbs.scenario.accuracy_bounds import Bound
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.trajectory import Integration, Trajectory
 from rotor_mbs.studies import bench
-from rotor_mbs.studies.bench import Curve, Point, PointTimer, allocate_repeats, measure, time_in_rounds
+from rotor_mbs.studies.bench import Point, PointTimer, allocate_repeats, time_in_rounds
+from rotor_mbs.studies.run import run_scenes
 
 SCENE = paper("fig05", duration=1.0, samples=11, initial_angles=(0.0,) * 4)
 
@@ -230,24 +231,25 @@ def test_the_stored_points_keep_the_contract_and_a_bench_goes_on_where_it_was(tm
     assert sorted(entry.name for entry in tmp_path.iterdir()) == ["b-report", "b.h5"]
 
 
-def measure_dying(curves: list[Curve], **options: Any) -> Any:
-    """As the timing worker, which one curve kills."""
-    if any(curve.name.endswith("deadly") for curve in curves):
-        os.kill(os.getpid(), signal.SIGKILL)
-    return measure(curves, **options)
+class DyingTask(bench.BenchTask):
+    """Curves one of which kills the process that times it."""
+
+    def perform(self) -> Rows:
+        if any(curve.name.endswith("deadly") for curve in self.curves):
+            os.kill(os.getpid(), signal.SIGKILL)
+        return super().perform()
 
 
 @pytest.mark.full
 def test_curves_are_tried_alone_where_their_process_dies(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(bench, "measure", measure_dying)
+    monkeypatch.setattr(bench, "BenchTask", DyingTask)
     ((method, ladder),) = ladders(["lagrange/ode45"]).values()
     short = replace(ladder, values=(1e-3,))
     variants = [replace(short, variant=f" {name}") for name in ("first", "deadly", "last")]
     curves = [bench.curve_of(SCENE, method, ladder, {}) for ladder in variants]
+    run_scenes([SCENE], {SCENE.name: ()}, tmp_path / "b.h5", workers=0, timeout_s=60.0)
     file = fit_file_to_request(tmp_path / "b.h5", [*bench.curve_tables(curves)])
-    ended = {
-        outcome.label.split()[-2]: outcome for outcome in bench._measure_scene(file, curves, SCENE, still(), 2, 5.0)
-    }
+    ended = {outcome.label.split()[-2]: outcome for outcome in bench.measured(bench.bench_task(file, curves, 2, 5.0))}
     assert [curve.is_stored(file) for curve in curves] == [True, False, True]
     assert (ended["deadly"].status, ended["deadly"].is_stored) == ("worker_died", False)
     assert ended["deadly"].message.endswith("also when it was retried alone")
