@@ -38,6 +38,11 @@ def interval(name: str, row: int, angles: Array, rates: Array) -> Defects:
 
 def judge_faults(name: str, row: int) -> int:
     """Plant faults in the end of an interval; return how many."""
+    with np.errstate(all="ignore"):  # in extreme scenes numbers overflow
+        return _judge_faults(name, row)
+
+
+def _judge_faults(name: str, row: int) -> int:
     motion = reference(name)
     angles, rates = motion.angles[row - 1 : row + 1], motion.rates[row - 1 : row + 1]
     clean = interval(name, row, angles, rates)
