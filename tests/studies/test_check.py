@@ -231,7 +231,7 @@ def test_a_reference_that_is_altered_or_not_there_fails(copy: Path) -> None:
 
 def test_references_of_a_results_file_are_frozen_bit_for_bit(good: Path, tmp_path: Path) -> None:
     """Those of `good` were read from the shipped file."""
-    freeze(good, tmp_path / "again.h5")
+    freeze(good, target=tmp_path / "again.h5")
     lines = (tmp_path / "again.sha256").read_text().splitlines()
     assert lines
     assert {*lines} <= {*(REFERENCES / "check.sha256").read_text().splitlines()}

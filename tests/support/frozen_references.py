@@ -1,12 +1,19 @@
-"""Freezes references: of the file that `rotor-mbs reference` writes the arrays that are shipped, and their digests.
+"""Freezes references: of files that `rotor-mbs reference` writes the arrays that are shipped, and their digests.
 
 python tests/support/frozen_references.py references.h5 reference/paper.h5
+
+Of several files before the last one each adds the scenes that the ones before it have not: new scenes are added to a
+frozen file, whose arrays stay, by
+
+python tests/support/frozen_references.py reference/paper.h5 references.h5 new.h5
 """
 
 from __future__ import annotations
 
 import hashlib
+import json
 import sys
+from contextlib import ExitStack
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
@@ -17,21 +24,26 @@ from numpy.typing import NDArray
 from rotor_mbs.methods.catalogue import REFERENCE
 from rotor_mbs.runs.design import REFERENCE_ARRAYS, RunRequest, runs_table, scene_table
 from rotor_mbs.runs.merge import fit_file_to_request
-from rotor_mbs.runs.read import open_results
+from rotor_mbs.runs.read import StoredRun, open_results
+from rotor_mbs.scenario.catalogue import natural_order
 
 _FACTS = ("steps", "time_reached", "setup_time_s", "run_time_s", "output_time_s")
 
 
-def freeze(source: Path, target: Path) -> None:
-    """Write the `REFERENCE_ARRAYS` of a results file's references into the file `target`, their digests beside it."""
+def freeze(*sources: Path, target: Path) -> None:
+    """Write the `REFERENCE_ARRAYS` of results files' references into the file `target`, their digests beside it."""
     target.unlink(missing_ok=True)
-    with open_results(source) as results:
-        versions = {"frozen_with": f"heyoka {results.attributes['heyoka']}, {datetime.now(UTC).date().isoformat()}"}
-        references = [
-            (RunRequest(stored.scene, REFERENCE, versions=versions), stored.reference)
-            for stored in results.scenes.values()
-            if stored.reference is not None
-        ]
+    with ExitStack() as stack:
+        chosen: dict[str, tuple[RunRequest, StoredRun]] = {}
+        for source in sources:
+            results = stack.enter_context(open_results(source))
+            today = f"heyoka {results.attributes.get('heyoka', '')}, {datetime.now(UTC).date().isoformat()}"
+            for name, stored in results.scenes.items():
+                if stored.reference is not None and name not in chosen:
+                    known = json.loads(stored.reference.known["versions"])
+                    versions = {"frozen_with": known.get("frozen_with", today)}
+                    chosen[name] = RunRequest(stored.scene, REFERENCE, versions=versions), stored.reference
+        references = [chosen[name] for name in natural_order(chosen)]
         tables = [
             scene_table([asked], arrays=[name for name in REFERENCE_ARRAYS if name in run]) for asked, run in references
         ]
@@ -62,4 +74,5 @@ def array_digest(values: NDArray[Any]) -> str:
 
 
 if __name__ == "__main__":
-    freeze(*map(Path, sys.argv[1:]))
+    *sources, target = map(Path, sys.argv[1:])
+    freeze(*sources, target=target)
