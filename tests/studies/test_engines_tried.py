@@ -72,7 +72,7 @@ def test_a_right_engine_passes_with_its_order(name: str) -> None:
     checks = method_test.examine(method_of(name))
     assert [check for check in checks if not check.passed] == []
     # The one with a tolerance, and that of the document, have no step.
-    assert ("order" in {check.name for check in checks}) == (name not in ("dop_tol", "lagrange"))
+    assert ("order" in {check.name for check in checks}) == (name not in ("dop_tol", "document"))
 
 
 def test_no_reason_is_right_by_accident() -> None:
