@@ -4,6 +4,7 @@ value. The long form (1,000 files, 10,000 scenes): `pytest -m nightly tests/fuzz
 from __future__ import annotations
 
 import csv
+import json
 import random
 import re
 import warnings
@@ -111,6 +112,10 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     run = rm.run(scene, METHOD)
     for name in FOREIGN:
         FORMATS[name](folder / name, scene, run.time, run.angles, run.rates)
+    rows = [{"time": t, "q": q.tolist()} for t, q in zip(run.time.tolist(), run.angles, strict=True)]
+    write(folder / "rows.jsonl", "\n".join(map(json.dumps, rows)))
+    vectors = [f"{row['time']},{' '.join(map(repr, row['q']))}" for row in rows]
+    write(folder / "vectors.csv", "\n".join(["time,q", *vectors, "This file was closed on 19-Oct-2018."]))
     return folder
 
 
@@ -153,7 +158,9 @@ def test_a_damaged_file_of_another_program_is_data_or_one_line(name: str, count:
 
 
 @pytest.mark.parametrize("count", [150, pytest.param(10_000, marks=pytest.mark.nightly)])
-@pytest.mark.parametrize("name", ["data.csv", "data.txt", "sensor.txt", "data.out", "data.json"])
+@pytest.mark.parametrize(
+    "name", ["data.csv", "data.txt", "sensor.txt", "data.out", "data.json", "rows.jsonl", "vectors.csv"]
+)
 def test_edited_text_of_another_program_is_data_or_refused(name: str, count: int, folder: Path) -> None:
     """Read in this process: what is raised there is one line of the reading process (tests/comparison)."""
     scene, broken = paper("fig11"), folder / f"edited-{name}"
