@@ -19,6 +19,7 @@ from support.scenes import AXIAL, STOUT, general, make_scene
 from rotor_mbs.analysis.judgement import judge
 from rotor_mbs.analysis.kinematics import exact_rotor_angle
 from rotor_mbs.methods.catalogue import find_method
+from rotor_mbs.methods.selection import singular_reason
 from rotor_mbs.methods.solve import solve
 from rotor_mbs.models.exudyn import linearization as exudyn_linearization
 from rotor_mbs.models.lagrange import closed_form, hamilton, linearization, samples
@@ -444,3 +445,13 @@ def test_a_fault_in_tips_energies_or_loads_is_seen_in_every_model(method: str) -
             assert judge(scene, run, None).status == "inaccurate", (fault, output)
     run.trajectory.quantities = right
     assert judge(scene, run, None).status == "ok"
+
+
+def test_the_selection_rule_knows_that_tilt_and_cone_turn_a_pitch_to_where_the_rotor_is_singular() -> None:
+    """One point-mass blade on a hub without inertia stays at a pitch of zero on an upright rotor alone."""
+    one = make_scene([2.0, 0.0], [0.0, 0.0], duration=0.5, samples=11)
+    assert singular_reason(one) == ""
+    for scene in (leaning(one, 0.1, 0.0), leaning(one, 0.0, 0.1)):
+        assert "the mass matrix is singular at a pitch of ±π/2" in singular_reason(scene)
+        assert solve("lagrange/dop853", scene, {}).trajectory.angles[1:, 1].all()
+    assert singular_reason(leaning(replace(one, gravity=0.0), 0.1, 0.0)) == ""

@@ -19,6 +19,7 @@ from rotor_mbs.methods.solve import solve
 from rotor_mbs.solution.metrics import metrics_of
 from rotor_mbs.solution.trajectory import Trajectory
 from rotor_mbs.studies.export import export
+from rotor_mbs.studies.method_test import leaning_blades
 
 # Springs, dampers, full inertia, torque with a jump between samples; blades that cannot pitch; point masses, chaotic.
 SCENES = ("check/general", "check/held", pytest.param("paper/fig11", marks=pytest.mark.full))
@@ -87,6 +88,24 @@ def test_the_exudyn_script_in_plain_python(name: str, tmp_path: Path) -> None:
     assert np.abs(found.rates[:until] - exact.rates[:until]).max() < 1e-10
     if name == "check/pitch-loads":  # as it is, `compare` reads it
         assert rm.compare(tmp_path / "out.csv", scene).status == "ok"
+
+
+@pytest.mark.full
+def test_tilt_and_cone_are_in_both_files(tmp_path: Path) -> None:
+    """Five coned blades on a tilted shaft, against the closed form."""
+    pytest.importorskip("mujoco")
+    scene = replace(leaning_blades(), outputs=("angles", "rates"), duration=0.2, samples=21)
+    exact = solve("lagrange/dop853", scene, {}).trajectory
+    (path,) = export(scene, "exudyn", tmp_path / "scene.py")
+    done = plain_python(path, tmp_path / "out.csv")
+    assert done.returncode == 0, done.stderr
+    table = np.loadtxt(tmp_path / "out.csv", delimiter=",", skiprows=1)
+    assert np.abs(table[:, 1:7] - exact.angles).max() < 1e-11
+    (path,) = export(scene, "mjcf", tmp_path / "scene.xml")
+    (tmp_path / "program.py").write_text(PLAIN_MUJOCO, encoding="utf-8")
+    done = plain_python(tmp_path / "program.py", path, scene.samples, 40, tmp_path / "out.npy")
+    assert done.returncode == 0, done.stderr
+    assert np.abs(np.load(tmp_path / "out.npy") - exact.angles).max() < 1e-9
 
 
 def test_the_csv_has_the_reference_bit_for_bit_with_units(tmp_path: Path) -> None:
