@@ -332,7 +332,9 @@ def test_a_blade_on_a_tilted_shaft_is_a_pendulum(method: str, tilt: float, cone:
     length = inertia / (blade.mass * 3.0 * math.cos(cone))
     exact = pendulum(2.0, length, 0.0, 9.81 * math.cos(tilt), run.time)
     np.testing.assert_allclose(run.angles[:, 0], exact, rtol=0.0, atol=1e-9)
-    assert np.abs(run.angles[:, 1]).max() <= 1e-12
+    # The chain controls the error of an interval to its tolerance; out of the plane it is not zero.
+    allowed = find_method(CHAIN).defaults["tolerance"] if method == CHAIN else 1e-12
+    assert np.abs(run.angles[:, 1]).max() <= allowed
     name, known = exact_rotor_angle(scene, run.time)
     assert name == "pendulum"
     np.testing.assert_allclose(known, exact, rtol=0.0, atol=1e-13)

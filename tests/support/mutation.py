@@ -90,6 +90,11 @@ _ALL_LOADS = "models/test_exact_solutions.py::test_every_load_at_once_follows_th
 _EXACT = "models/test_exact_solutions.py::test_every_model_has_the_exact_motion"
 _CONSTANT = "constant torques and angle of rest"
 _PRINTED = ("models/test_printed.py", "analysis/test_errata.py")
+_NEWTON = "models/test_tilt_cone.py::test_a_motion_has_the_angles_energies_tips_and_loads_of_newtons_and_eulers_laws"
+_LEANING = (
+    "models/test_tilt_cone.py::test_the_closed_form_obeys_newtons_and_eulers_laws[3]",
+    f"{_NEWTON}[lagrange/dop853]",
+)
 _DEFAULTS = "analysis/test_run_integrity.py"
 _SENSORS = (
     *_PARTS,
@@ -113,9 +118,12 @@ _CHECK = "studies/test_check.py::test_"
 _TIME_TABLE = ("scenario/test_time_table.py",)
 _SAMPLES = ("models/test_segments.py", f"{_ALL_LOADS}[lagrange/dop853]", f"{_EXACT}[lagrange/dop853-{_CONSTANT}]")
 _TARGETS = (
-    Target(f"{_L}.closed_form", "accelerations power rest_energy energies point_path", "lagrange", _PRINTED),
-    Target(f"{_L}.parameters", "rotor_form _inertia_about_hub _rotor_inertia _coefficients _cosine_of_turn",
-           "lagrange", _PRINTED),
+    Target(f"{_L}.closed_form", "accelerations power rest_energy energies point_path", "lagrange",
+           (*_PRINTED, *_LEANING)),
+    Target(f"{_L}.parameters",
+           "rotor_form _form _inertia_about_hub _rotor_inertia _coefficients _cosine_of_turn "
+           "_lean_coefficients _lean leans",
+           "lagrange", (*_PRINTED, *_LEANING)),
     # What all but the printed equations share.
     Target("rotor_mbs.scenario.time_table",
            "value_at values_at constant_value kink_times torque_place rest_place values at segments values_before",
