@@ -167,6 +167,9 @@ def test_a_sweep_gives_labelled_runs_of_each_parameter_value(tmp_path: Path) -> 
     short = rm.sweep(scene, {"gravity": [9.8]}, methods=METHOD, samples=11, precision="float32")[0]
     assert short.angles.dtype == float
     assert len(short.time) == 11
+    alone = rm.sweep(scene, {"gravity": [9.8]}, methods=METHOD, samples=11, outputs=["angles"])[0]
+    np.testing.assert_allclose(alone.angles, short.angles, rtol=1e-6)
+    assert np.isnan(alone.rates).all()
     assert "run time" not in repr(data[1])
     np.testing.assert_array_equal(data[1].angles, data.column("angles")[1])
     by_stiffness = data.to_xarray(unstack=True).angles.sel(bearing_stiffness=1e3)

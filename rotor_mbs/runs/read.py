@@ -133,12 +133,17 @@ class StoredRun:
     @functools.cached_property
     def samples(self) -> int:
         """Return the number of samples up to which the run came."""
-        if "samples" in self._row:
+        if not self._is_of_sweep:
             return int(self._row["samples"])
-        # A sweep does not count them: its arrays are NaN after a run broke off.
+        # Its arrays are NaN after a run broke off.
         arrays = [values for values in self._own_arrays.values() if len(values) == len(self.scales["time"])]
         is_there = [np.isfinite(values.reshape(len(values), -1)).all(axis=1) for values in arrays]
         return int(np.all(is_there, axis=0).sum()) if is_there else 0
+
+    @property
+    def _is_of_sweep(self) -> bool:
+        """Return whether it is a run of a sweep, in which samples are not counted."""
+        return "samples" not in self._row
 
     @property
     def _own_arrays(self) -> dict[str, NDArray[Any]]:
@@ -184,6 +189,8 @@ class StoredRun:
         may_omit_others = self.is_frozen or not is_built_in(self.method)
         expected: dict[str, tuple[int, ...]] = {"time": (rows,)}
         for quantity in quantities(scene.outputs):
+            if self._is_of_sweep and quantity.name not in self._row:  # which has outputs of its own
+                continue
             if may_omit_others and quantity.name not in (*always_there, *self.names):
                 continue
             if quantity.required or (quantity.name == "angle_uncertainty" and self.method == REFERENCE):
