@@ -43,6 +43,8 @@ LIMIT_S = 60.0
 # rad: more than rounding and the independent integration leave. A coarse method whose error is
 # less than this breaks no claim.
 ROUNDING = 1e-10
+RIGHT = 1e-5  # rad: more than a right run of these methods is off
+OF_MOTION = ("defect", "median", "angle error", "predicted", "pitch")  # beginnings of messages
 
 
 @dataclass(frozen=True)
@@ -115,6 +117,9 @@ def _fault(method: str, status: str, message: str, error: float) -> str:
         return f"exact to rounding, but {status}"
     if status == "unchecked":
         return "" if "would not be seen; more samples" in message else "unchecked without a reason"
+    # Of a right motion tips, energies and loads are right, too.
+    if status in COMPLETE and error <= RIGHT and not message.startswith(OF_MOTION):
+        return f"right to {error:.1e} rad, but {message}"
     # What stopped before its end is not a motion that could be right.
     if status in COMPLETE and error <= ROUNDING:
         return f"right to {error:.1e} rad, but {status}"
