@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -54,12 +54,14 @@ class Reading:
     left : the largest error per unit of growth, beyond rounding.
     corrected, rounding : (rows,) the right numbers, and half a digit of each; None where they
         cannot be found from the column.
+    is_processed : whether it is more than another unit, sign or zero.
     """
 
     text: str
     left: float
     corrected: Array | None
     rounding: Array
+    is_processed: bool = False
 
 
 class ColumnReadings:
@@ -90,7 +92,7 @@ class ColumnReadings:
         self._begin = int(np.searchsorted(data.time, 0.0))  # rows before it have no reference
         self._rows = slice(self._begin, self._begin + len(states))
         self._states, self._carried, self._states_at = states, carried, states_at
-        self._allowed, self._tolerance = allowed, tolerance
+        self.allowed, self._tolerance = allowed, tolerance
         self._with_factor = with_factor
         self._fine: Array | None = None
 
@@ -106,14 +108,15 @@ class ColumnReadings:
         right = self._inverse(j, "", self.data.values[:, j])
         if right.left <= self._tolerance:
             return right
-        enough = min(self._allowed, _FAR_LESS * right.left)
+        enough = min(self.allowed, _FAR_LESS * right.left)
         for kind in (self._units, self._late_rows, self._steps, self._differences, self._means):
             readings = list(kind(j))
             least = min((reading.left for reading in readings), default=math.inf)
             if least <= enough:
                 alike = min(10.0 * max(least, 1e-3 * self._tolerance), enough)
-                return next(reading for reading in readings if reading.left <= alike)
-        return right if right.left <= self._allowed else None
+                simplest = next(reading for reading in readings if reading.left <= alike)
+                return replace(simplest, is_processed=kind != self._units)
+        return right if right.left <= self.allowed else None
 
     def _left(self, j: int, expected: Array, values: Array, rounding: Array | float) -> float:
         """Return the largest error per unit of growth in the rows where both numbers are known."""

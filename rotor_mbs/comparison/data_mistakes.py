@@ -45,10 +45,12 @@ _MIN_LAG = 1e-4  # of an interval between rows: less is rounding
 _WHOLE_ROWS = 1e-3  # of a row: a lag so near a number of rows is that number
 _LAG_ROW = 50  # by which a lag is explanation
 _LAG_ROUNDS = 8
+_MAX_OFF = 30.0  # times the usual distance from the reference, of a column that says when a row is
 _MAX_CLOCK, _MIN_CLOCK = 1.2, 1e-7  # factor of a clock; what differs less is rounding
 _TIME_ROUNDING = 1e-9  # of the duration
 _MIN_COVERED = 0.3  # of the duration: in a short part of a motion anything fits
 _MAX_PERIOD = 20  # rows from one that is computed to the next
+_FIRST_ROWS, _NEARLY_BETWEEN = 401, 1e-6
 _MIN_KNOTS = 5  # fewer rows are on one polynomial, or nearly so
 _NOT_BY_CHANCE = 10.0  # times what is allowed of interpolated rows, the motion itself is off them
 _INTERPOLATED = 1e-9  # of the largest number: of the arithmetic of interpolation
@@ -206,6 +208,9 @@ def column_mistakes(
     if explanation is None:
         return []
     mistakes = explanation.hypothesis.change.mistakes
+    # With a mistake in the times one more is a pair, and more explain anything.
+    if times is not None and len(mistakes) > 1:
+        return []
     return list(mistakes) if times is None else ["; and ".join([times.text, *mistakes])]
 
 
@@ -264,6 +269,13 @@ def _rows_between(search: TrajectorySearch) -> Iterator[Hypothesis[ForeignData]]
     for degree, text in ((1, "linearly"), (3, "by a cubic spline")):
         # Rows between every fourth one are between every second one, too: the longest counts.
         for period in range(min(_MAX_PERIOD, count // MIN_ROWS), 1, -1):
+            # Most periods are refuted by the first rows; what a spline does where these end decays.
+            first = _left_between(
+                data.time[:_FIRST_ROWS], data.values[:_FIRST_ROWS], period, degree
+            )
+            first = first[: len(first) // 4]
+            if not (first <= allowed[: len(first)] + _NEARLY_BETWEEN * largest).all():
+                continue
             left = _left_between(data.time, data.values, period, degree)
             if not (left <= allowed[: len(left)]).all():
                 continue
@@ -352,14 +364,22 @@ def _time_of_row(search: TrajectorySearch, row: int, first: float, last: float) 
     if not is_tried.any():
         return float(data.time[row])
     states = states_of(run)[is_tried][:, columns]
-    distances = np.abs(states - data.values[row]).max(axis=1)
-    time = float(run.time[is_tried][int(distances.argmin())])
+    distances = np.abs(states - data.values[row])
+    # By the nearer half of the columns that move: the others may have a mistake of their own.
+    is_moving = np.ptp(states, axis=0) > 0.0
+    if not is_moving.any():
+        return float(data.time[row])
+    usual = np.median(distances[:, is_moving], axis=1)
+    nearest = int(usual.argmin())
+    time = float(run.time[is_tried][nearest])
+    is_right = is_moving & (distances[nearest] <= _MAX_OFF * usual[nearest])
+    columns = [column for column, right in zip(columns, is_right, strict=True) if right]
     step = 1e-6 * max(end, 1e-9)  # for the derivative
     for _ in range(_LAG_ROUNDS):
         here, ahead = search.states_at(np.array([time, time + step]))[:, columns]
         slope = (ahead - here) / step
         size = float(slope @ slope)
-        change = float((data.values[row] - here) @ slope) / size if size else 0.0
+        change = float((data.values[row, is_right] - here) @ slope) / size if size else 0.0
         time = min(max(time + change, 0.0), end - step)
     return time
 
@@ -413,17 +433,24 @@ def _corrected_channels(readings: ColumnReadings) -> Hypothesis[Correction] | No
     data = readings.data
     names: dict[str, list[str]] = {}
     kept, values, roundings = [], [], []
+    processed = set()
+    has_right_motion = False  # a column that moves, and in which nothing is wrong
     for j, channel in enumerate(data.channels):
         reading = readings.best(j)
         if reading is None:
             return None
         names.setdefault(reading.text, []).append(channel.name)
+        if reading.is_processed:
+            processed.add(reading.text)
+        elif not reading.text and float(np.ptp(data.values[:, j])) > readings.allowed:
+            has_right_motion = True
         if reading.corrected is not None:
             kept.append(j)
             values.append(reading.corrected)
             roundings.append(reading.rounding)
-    # Rows late of every channel are late times, for which there is a hypothesis of its own.
-    if len(names) == 1 and len(data.channels) > 1 and next(iter(names)).endswith(LATE_OR_EARLY):
+    # Each column has its own only by chance; and if all are late, so are the times.
+    is_late = any(text.endswith(LATE_OR_EARLY) for text in processed)
+    if len(processed) > 1 or (is_late and not has_right_motion and len(data.channels) > 1):
         return None
     mistakes = tuple(f"{', '.join(which)}: {text}" for text, which in names.items() if text)
     if not values:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from time import monotonic
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -337,7 +338,8 @@ def _errors_of(
     if rows.defects is not None:
         defect_time = float(rows.defects.time[1 + _largest_interval(rows.defects)])
         predicted = float(np.abs(rows.defects.predicted[: rows.until]).max())
-    drift, drifting = _largest_drift(scene, rows.defects)
+    sums = _largest_sums(scene, rows.defects)
+    beyond_digits = _beyond_digits(scene, tolerance, rows.defects)
     # Per unit of error growth: in a motion whose errors do not grow, faults below any interval's
     # tolerance add up.
     exact = rows.exact
@@ -352,9 +354,9 @@ def _errors_of(
         excess_per_growth=(excess / carried)[: rows.until].max(axis=0),
         predicted=predicted,
         defect_time=defect_time,
-        drift=drift,
-        drifting=drifting,
-        beyond_digits=_beyond_digits(scene, tolerance, rows.defects),
+        drift=sums.drift,
+        drifting=sums.drifting,
+        beyond_digits=max(beyond_digits, sums.beyond_digits),
         missing=tuple(missing),
     )
 
@@ -400,22 +402,29 @@ def _largest_interval(defects: Defects) -> int:
     return int(np.where(defects.is_resolved, excess, 0.0).argmax())
 
 
-def _largest_drift(scene: Scene, defects: Defects | None) -> tuple[float, str]:
-    """Find the largest sum of defects over a stretch of rows, beyond rounding.
+class LargestSums(NamedTuple):
+    """Sums of defects over longer stretches of rows.
 
-    A drift may be hidden by the rounding of every single interval.
+    Attributes
+    ----------
+    drift, drifting : see `TrajectoryErrors`.
+    beyond_digits : the largest sum over its own rounding.
+    """
+
+    drift: float = 0.0
+    drifting: str = ""
+    beyond_digits: float = 0.0
+
+
+def _largest_sums(scene: Scene, defects: Defects | None) -> LargestSums:
+    """Find the largest sums of defects over stretches of rows: a drift hides in single intervals.
 
     Parameters
     ----------
     scene : names the coordinates.
     defects : of the data, None where they are not known.
-
-    Returns
-    -------
-    float, str
-        The sum, rad, and the channel and number of rows; 0 and "" without defects.
     """
-    largest = 0.0, ""
+    largest = LargestSums()
     if defects is None:
         return largest
     labels = [scene.coordinate_labels[i] for i in defects.moving]
@@ -424,12 +433,17 @@ def _largest_drift(scene: Scene, defects: Defects | None) -> tuple[float, str]:
         sizes, floors = defects.over_rows(stretch)
         excess = (sizes - FLOOR_SAFETY * floors).max(axis=0, initial=0.0)
         worst = int(excess.argmax())
-        largest = max(largest, (float(excess[worst]), f"{names[worst]}, over {stretch} rows"))
+        drift, drifting = largest.drift, largest.drifting
+        if excess[worst] > drift:
+            drift, drifting = float(excess[worst]), f"{names[worst]}, over {stretch} rows"
+        ratios = sizes / floors
+        ratio = float(ratios[np.isfinite(ratios)].max(initial=0.0))
+        largest = LargestSums(drift, drifting, max(largest.beyond_digits, ratio))
     return largest
 
 
 def _beyond_digits(scene: Scene, tolerance: float, defects: Defects | None) -> float:
-    """Return how many times its own rounding the largest defect is, of an interval or a stretch.
+    """Return how many times its own rounding the largest defect of an interval is.
 
     Rounding alone makes no more than 3 of it: what is more is systematic, though it may be far
     below the tolerance.
@@ -442,12 +456,7 @@ def _beyond_digits(scene: Scene, tolerance: float, defects: Defects | None) -> f
         return 0.0
     judged = judged_defects(scene, defects, tolerance)
     ratios = np.abs(judged.values) / judged.floors
-    largest = float(ratios[judged.is_judged].max(initial=0.0))
-    for stretch in STRETCHES:
-        sizes, floors = defects.over_rows(stretch)
-        ratios = sizes / floors
-        largest = max(largest, float(ratios[np.isfinite(ratios)].max(initial=0.0)))
-    return largest
+    return float(ratios[judged.is_judged].max(initial=0.0))
 
 
 def _findings(

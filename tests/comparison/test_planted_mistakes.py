@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.interpolate import make_interp_spline
 from support import other_code
 from support.checking import with_wrong_number
 from support.other_code import Mistakes
@@ -36,10 +37,13 @@ def steps(*rows: tuple[float, float]) -> tuple[tuple[float, float], ...]:
 @functools.cache
 def short(name: str) -> Scene:
     """A shipped scene; "driven": fig. 11 with a torque that jumps; "sprung": that with three different bearings."""
-    shipped = {"driven": "paper/fig11", "sprung": "paper/fig11"}.get(name, name)
+    shipped = {"driven": "paper/fig11", "sprung": "paper/fig11", "ramped": "paper/fig11"}.get(name, name)
     scene = replace(rm.scene(shipped), duration=DURATION, samples=ROWS)
     if name in ("driven", "sprung"):
         scene = replace(scene, rotor_torque=steps((0.5, JUMP)))
+    if name == "ramped":
+        scene = replace(rm.scene("paper/fig11"), duration=DURATION, samples=ROWS)
+        return replace(scene, rotor_torque=((0.0, 0.0), (DURATION, JUMP)))
     if name == "sprung":
         scene = replace(scene, bearing_stiffness=(6e3, 5e3, 8e3), bearing_damping=(300.0, 500.0, 400.0))
     return scene
@@ -142,6 +146,53 @@ def kicked(time: Array, q: Array, w: Array) -> tuple[Array, Array, Array]:
 
 def driven(*table: tuple[float, float]) -> Callable[[Scene], Scene]:
     return lambda scene: replace(scene, rotor_torque=steps(*table))
+
+
+# What programs make of right rows
+
+
+def late(values: Array, *columns: int) -> Array:
+    """Some columns a row late."""
+    shifted = values.copy()
+    shifted[1:, columns] = values[:-1, columns]
+    return shifted
+
+
+def between(degree: int) -> Callable[[Array, Array, Array], tuple[Array, Array, Array]]:
+    """Every fifth row, and what interpolation puts between."""
+
+    def spoilt(time: Array, q: Array, w: Array) -> tuple[Array, Array, Array]:
+        knots = slice(0, None, 5)
+        return (time, *(make_interp_spline(time[knots], values[knots], degree)(time) for values in (q, w)))
+
+    return spoilt
+
+
+def interval_means(time: Array, *_: Array) -> tuple[Array, Array, Array]:
+    """Of ten samples of the interval before each row."""
+    fine = other_code.trajectory(short("paper/fig11"), np.linspace(0.0, DURATION, 10 * (ROWS - 1) + 1))
+    means = [np.vstack([values[:1], values[1:].reshape(ROWS - 1, 10, 4).mean(axis=1)]) for values in fine]
+    return time, means[0], means[1]
+
+
+def in_steps(values: Array, step: float = 2.0 * np.pi / 4096) -> Array:
+    return np.round(values / step) * step
+
+
+def half(values: Array) -> Array:
+    return values.astype(np.float16).astype(float)
+
+
+def single_clock(time: Array, q: Array, w: Array) -> tuple[Array, Array, Array]:
+    steps = np.append(np.float32(0.0), np.full(len(time) - 1, np.float32(0.01)))
+    return np.cumsum(steps, dtype=np.float32).astype(float), q, w
+
+
+def held_ramp(scene: Scene) -> Scene:
+    """The torque of every row until the next one, as a controller gives it."""
+    rows = np.linspace(0.0, DURATION, ROWS)
+    values = np.interp(rows, *np.array(scene.rotor_torque).T)
+    return replace(scene, rotor_torque=steps(*zip(rows.tolist(), values.tolist(), strict=True)))
 
 
 THIRD = 2.0 * np.pi / 3.0
@@ -252,12 +303,35 @@ PLANTS = {
         "bearing.rest off by -0.1 rad (uncertainty ", "sprung",
         changed=lambda scene: replace(scene, bearing_rest=(((0.0, -0.1),),) * 3),
     ),
+    "central differences": Plant(
+        "pitch 3 rate: differences of the angles over two intervals, around each row",
+        spoilt=lambda t, q, _: (t, q, np.gradient(q, t, axis=0)),
+    ),
+    "backward differences": Plant(
+        "the mean over the interval before each row",
+        spoilt=lambda t, q, w: (t, q, np.vstack([w[:1], np.diff(q, axis=0) / np.diff(t)[:, None]])),
+    ),
+    "rates a row late": Plant("pitch 3 rate: a row late", spoilt=lambda t, q, w: (t, q, late(w, 0, 1, 2, 3))),
+    "rotor a row late": Plant("rotor: a row late", spoilt=lambda t, q, w: (t, late(q, 0), w)),
+    "rows held": Plant(
+        "every row is held for 5 rows",
+        spoilt=lambda t, q, w: (t, q[np.arange(ROWS) // 5 * 5], w[np.arange(ROWS) // 5 * 5]),
+    ),
+    "interpolated": Plant("interpolated linearly between every 5 rows", spoilt=between(1)),
+    "a spline": Plant("interpolated by a cubic spline between every 5 rows", spoilt=between(3)),
+    "moving average": Plant("mean of 5 rows around each row", spoilt=lambda *arrays: averaged(*arrays)),
+    "averaged and decimated": Plant("mean of 10 samples of the interval before each row", spoilt=interval_means),
+    "encoder": Plant("rounded to steps of 0.00153398 rad, 4096 a turn", spoilt=lambda t, q, w: (t, in_steps(q), w)),
+    "half precision": Plant("numbers of half precision", spoilt=lambda t, q, w: (t, half(q), half(w))),
+    "a fast clock": Plant("a clock that is 0.1 % fast", spoilt=lambda t, q, w: (1.001 * t, q, w)),
+    "a clock of single precision": Plant("times are sums of 0.01 s in single precision", spoilt=single_clock),
+    "loads held": Plant("loads held from each row to the next", "ramped", changed=held_ramp),
     "gravity and c": Plant(
         "gravity off by -1 % (uncertainty", changed=lambda scene: off("offset", 0.01)(off("gravity", -0.01)(scene))
     ),
 }  # fmt: skip
 # One of each kind: in the columns, in time, in the scene, at a time. The others carry the mark full.
-FAST = {"degrees", "blade order", "truncated", "one sample late", "gravity", "missing"}
+FAST = {"rotor a row late", "rows held", "degrees", "blade order", "truncated", "one sample late", "gravity", "missing"}
 
 
 @pytest.mark.parametrize(
