@@ -193,6 +193,7 @@ NOT_HERE = (
     "engines.h5",
     "-m mine.py",
     "campbell.csv",
+    "MODEL.out",
     "stability",
     "--repeats 50",
 )
@@ -220,6 +221,9 @@ def test_the_path_of_a_document_can_be_walked(name: str, tmp_path: Path, monkeyp
         make_inputs(name)
         (tmp_path / "SWEEP.toml").write_text((tmp_path / "sweep.toml").read_text())
         (tmp_path / "study.h5").unlink()
+    if name == "your-turbine.md":
+        make_inputs(name)
+        (tmp_path / "my.toml").unlink()
     if name == "your-engine.md":
         (tmp_path / "mine.py").write_text(python_of(name)[0])
     for command in BEFORE.get(name, []):
