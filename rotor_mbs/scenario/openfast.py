@@ -163,7 +163,7 @@ def read_rotor(path: Path) -> OpenFastRotor:
 
     hub, hub_text = _hub_inertia(structure, count)
     generator = structure.number("GenIner", keys.NOT_NEGATIVE)
-    ratio = structure.number("GBRatio")
+    ratio = structure.number("GBRatio", keys.SIZE)
     gravity_file = main if "Gravity" in main else structure
     return OpenFastRotor(
         path=path,

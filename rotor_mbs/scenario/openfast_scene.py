@@ -7,7 +7,7 @@ import re
 import textwrap
 from collections.abc import Sequence
 
-from rotor_mbs.errors import InputError, printable
+from rotor_mbs.errors import InputError
 from rotor_mbs.scenario.keys import MAX_TEXT
 from rotor_mbs.scenario.openfast import BladeModel, OpenFastRotor, read_rotor
 from rotor_mbs.scenario.scene import Scene, parse_scene
@@ -69,7 +69,7 @@ def scene_of_rotor(rotor: OpenFastRotor) -> Scene:
 def scene_text(rotor: OpenFastRotor) -> str:
     """Return a commented scene file of a rotor."""
     duration = min(rotor.duration, MAX_DURATION) or 10.0
-    title = " ".join(f"{rotor.path.stem}: {rotor.description}".split())
+    title = _on_one_line(f"{rotor.path.stem}: {rotor.description}")[:MAX_TEXT].rstrip(": ")
     lines = [
         *_comment(f"The rotor of the OpenFAST model {rotor.path.name}."),
         *_comment(
@@ -78,7 +78,7 @@ def scene_text(rotor: OpenFastRotor) -> str:
         ),
         *_left_out_comments(rotor),
         "",
-        f"title = {toml_value(_printable_text(title))}",
+        f"title = {toml_value(title)}",
         f"blades = {len(rotor.blades)}",
         _entry("gravity", rotor.gravity, "m/s^2"),
         _entry("duration", duration, f"s; TMax of the model: {rotor.duration:g}"),
@@ -219,15 +219,15 @@ def mapping_text(rotor: OpenFastRotor) -> str:
 # Text
 
 
-def _printable_text(text: str) -> str:
-    """Return a text of at most so many characters as a title has, without control characters."""
-    return printable(text)[:MAX_TEXT].rstrip(": ")
+def _on_one_line(text: str) -> str:
+    """Return a text without control characters, each run of blanks as one."""
+    return " ".join("".join(c if c.isprintable() else " " for c in text).split())
 
 
 def _comment(text: str, indent: str = "") -> list[str]:
     """Return a text as comment lines; lines but the first begin with `indent`."""
     return textwrap.wrap(
-        " ".join(printable(text).split()),
+        _on_one_line(text),
         _WIDTH,
         initial_indent="# ",
         subsequent_indent=f"# {indent}",

@@ -230,6 +230,15 @@ def test_what_the_model_has_and_a_scene_has_not_is_said_most_important_first(tmp
     assert places == sorted(places)
 
 
+def test_a_description_is_any_text(tmp_path: Path) -> None:
+    """It is the title: of control characters, marks of direction and 300 words what a title may have."""
+    path = write_model(tmp_path)
+    lines = path.read_bytes().split(b"\r\n")
+    lines[1] = 'a\x07b \u202e\u2028 \u00ad\x85 c"\\ '.encode() + b"word " * 300
+    path.write_bytes(b"\r\n".join(lines))
+    assert rm.scene_from_openfast(path).title.startswith('model: a b c"\\ word word')
+
+
 # What is refused
 
 
@@ -247,6 +256,7 @@ WRONG = [
     ("OpenFAST 4.2", {"EDFile": '"nowhere.dat"'}, "model.fst", "EDFile", "no such file; allowed: "),
     ("OpenFAST 4.2", {"CompElast": "3"}, "model.fst", "CompElast", "3, Simplified ElastoDyn: "),
     ("OpenFAST 4.2", {"GenDOF": "maybe"}, "ElastoDyn.dat", "GenDOF", "'maybe' is not a flag; allowed: True or False"),
+    ("OpenFAST 4.2", {"GBRatio": "1e300"}, "ElastoDyn.dat", "GBRatio", "1e+300 is out of range; allowed: 0, or sizes"),
     ("OpenFAST 4.2", {"TipRad": "1e14"}, "model.fst", "", "of the scene made of it: "),
     ("OpenFAST 5", V5, "ElastoDyn.dat", "PitchDOF", "True, and blade 1 has no inertia about its pitch axis; "),
     ("OpenFAST 5", {"PitSpr(2)": ""}, "ServoDyn.dat", "", "no line named PitSpr(2); allowed: "),
