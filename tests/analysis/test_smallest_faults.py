@@ -18,6 +18,7 @@ from rotor_mbs.solution.defects import FLOOR_SAFETY, OK_ERROR, Defects
 from rotor_mbs.solution.trajectory import Array
 
 OWN = "own/engine"  # without a bound of its own
+_ILL_CONDITIONED = 1e3
 ROWS = 3  # of each scene, from its second to its last
 GROUPS = [path.stem for path in sorted(REFERENCES.glob("*.h5"))]
 
@@ -66,8 +67,8 @@ def _judge_faults(name: str, row: int) -> int:
                 # Moved to a singular pitch, where nothing is known, a run is not ok either.
                 assert seen > bound or not defects.is_judged[0], (name, row, coordinate, methods, seen)
                 planted += 1
-        # And what is well below is no fault.
-        if largest <= 0.1 * allowed:
+        # And what is well below is no fault; beside a singular pitch all of it may be.
+        if largest <= 0.1 * allowed and clean.conditioning[0] < _ILL_CONDITIONED:
             moved_angles = angles.copy()
             moved_angles[1, moving[0]] += 0.4 * allowed
             assert interval(name, row, moved_angles, rates).judged_sizes[0] <= bound, (name, row, methods)
