@@ -53,7 +53,7 @@ _SMALLEST_FLOOR = 1e-18  # rad
 # Of Runge and Kutta in each of them, at most: any; so many that a search takes some seconds; and of
 # data that agree.
 _MAX_STEPS, QUICK_SEARCH, BRIEF_SEARCH = 512, 32, 8
-_MAX_FITTED_BRIEF = 2
+_MAX_FITTED_BRIEF = 4
 _DIFFERENCE = 1e-4  # share or rad, for the derivative by a parameter
 _ROUNDS = 8
 _INDEPENDENT = 1e-6  # determinant of the cosines between the signatures of a set
