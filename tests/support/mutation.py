@@ -90,11 +90,6 @@ _ALL_LOADS = "models/test_exact_solutions.py::test_every_load_at_once_follows_th
 _EXACT = "models/test_exact_solutions.py::test_every_model_has_the_exact_motion"
 _CONSTANT = "constant torques and angle of rest"
 _PRINTED = ("models/test_printed.py", "analysis/test_errata.py")
-_NEWTON = "models/test_tilt_cone.py::test_a_motion_has_the_angles_energies_tips_and_loads_of_newtons_and_eulers_laws"
-_LEANING = (
-    "models/test_tilt_cone.py::test_the_closed_form_obeys_newtons_and_eulers_laws[3]",
-    f"{_NEWTON}[lagrange/dop853]",
-)
 _DEFAULTS = "analysis/test_run_integrity.py"
 _SENSORS = (
     *_PARTS,
@@ -115,15 +110,18 @@ _DEFECTS = ("models/test_defects.py",)
 _JUDGED_RIGHT = ("analysis/test_judged_right.py",)
 _SWEEP = ("models/test_sweep_ensemble.py",)
 _CHECK = "studies/test_check.py::test_"
+_LEANING = "models/test_tilt_cone.py::test_"
+_LEANING_MOTION = f"{_LEANING}a_motion_has_the_angles_energies_tips_and_loads_of_newtons_and_eulers_laws"
 _TIME_TABLE = ("scenario/test_time_table.py",)
 _SAMPLES = ("models/test_segments.py", f"{_ALL_LOADS}[lagrange/dop853]", f"{_EXACT}[lagrange/dop853-{_CONSTANT}]")
 _TARGETS = (
     Target(f"{_L}.closed_form", "accelerations power rest_energy energies point_path", "lagrange",
-           (*_PRINTED, *_LEANING)),
+           (*_PRINTED, f"{_LEANING}the_closed_form_obeys_newtons_and_eulers_laws")),
     Target(f"{_L}.parameters",
-           "rotor_form _form _inertia_about_hub _rotor_inertia _coefficients _cosine_of_turn "
-           "_lean_coefficients _lean leans",
-           "lagrange", (*_PRINTED, *_LEANING)),
+           "rotor_form _form _inertia_about_hub _rotor_inertia _coefficients _lean_coefficients leans _lean "
+           "_cosine_of_turn "
+           "_cosine_and_sine _power_series",
+           "lagrange", (*_PRINTED, f"{_LEANING}the_closed_form_obeys_newtons_and_eulers_laws")),
     # What all but the printed equations share.
     Target("rotor_mbs.scenario.time_table",
            "value_at values_at constant_value kink_times torque_place rest_place values at segments values_before",
@@ -136,23 +134,28 @@ _TARGETS = (
     Target(f"{_P}.derivation", "*", "printed", _PRINTED),
     Target(f"{_P}.observables", "tip_path kinetic_energy potential_energy _sines", "printed", ()),
     Target(f"{_M}.geometry",
-           "rotation_y rotation_z mounting _turn blade_body hub_body fixed_blade_rotation body_of_point",
-           "tree", _PARTS),
+           "rotation_x rotation_y rotation_z mounting shaft_axis _turn blade_body hub_body fixed_blade_rotation "
+           "body_of_point",
+           "tree", (*_PARTS, f"{_LEANING_MOTION}[exudyn_tree/rk67]")),
     # About the common centre of mass, which a change moves to second order alone.
     Target(f"{_M}.geometry", "_joined", "tree", _PARTS, 0.001),
     Target(f"{_M}.tree", "_tree", "tree", _PARTS),
     Target(f"{_M}.sensor_samples", "springs work cumulative_integral _fields", "tree", _SENSORS),
     Target(f"{_M}.loads", "at prescribed_moments moment_on", "tree", ()),
-    Target(f"{_M}.geometry", "quaternion quaternion_rate", "chain", _PARTS, 0.01),
-    Target(f"{_M}.chain", "rotation placed_bodies _body _marker _on_body _pitch_spring _spring_torque", "chain",
-           (*_PARTS, f"{_EXACT}[exudyn_chain/generalized_alpha-a growing torque and a constant angle of rest]"),
+    Target(f"{_M}.geometry", "quaternion _quaternion_product quaternion_rate", "chain",
+           (*_PARTS, f"{_LEANING_MOTION}[exudyn_chain/extrapolated]"), 0.01),
+    Target(f"{_M}.chain",
+           "placed_bodies _rotor_rotation _body _marker _on_body _torque_on_shaft _pitch_spring _spring_torque",
+           "chain",
+           (*_PARTS, f"{_LEANING_MOTION}[exudyn_chain/extrapolated]",
+            f"{_EXACT}[exudyn_chain/generalized_alpha-a growing torque and a constant angle of rest]"),
            0.01),
     Target(f"{_M}.sensor_samples", "_joint_motion _dot unwrap", "chain", _SENSORS, 0.01),
     # Of fourth order: this model is bound to 1e-8.
     Target(f"{_J}.mjcf", "loads_of model _blade _joint _inertial _possible", "mujoco",
            (f"{_MUJOCO}point_masses_have_no_inertia_that_the_scene_does_not_give",
             f"{_MUJOCO}an_inertia_at_the_limit_of_the_triangle_inequality",
-            f"{_ALL_LOADS}[mujoco/rk4]"), 0.001),
+            f"{_ALL_LOADS}[mujoco/rk4]", f"{_LEANING_MOTION}[mujoco/rk4]"), 0.001),
     Target(f"{_J}.solver", "_advance observe _work _springs", "mujoco",
            (f"{_MUJOCO}steps_and_evaluations_are_counted", f"{_MUJOCO}the_work_of_loads_and_dampers_is_of_fourth_order",
             f"{_ALL_LOADS}[mujoco/rk4]"), 0.001),
