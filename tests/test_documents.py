@@ -78,6 +78,7 @@ def test_the_readmes_own_scene_is_one() -> None:
 
 def test_the_readmes_python_runs(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """First the API, then what reads a results file."""
+    pytest.importorskip("heyoka")
     rm.run("paper/fig11", ["lagrange/taylor", "exudyn_tree/rk67"]).save(folder / "rotor-mbs-out" / "results.h5")
     (first,), reading = python_of("README.md"), python_of("data.md")
     shorter = first.replace("duration=5.0, samples=501", "duration=0.5, samples=51")  # the references of 5 s take 6 s

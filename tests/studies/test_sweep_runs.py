@@ -38,6 +38,7 @@ def _file(folder: Path, draws: int = 4) -> Path:
 
 
 def test_side_by_side_or_not_the_runs_are_the_same(tmp_path: Path) -> None:
+    pytest.importorskip("heyoka")
     sweep = load_sweep(_file(tmp_path))
     run_local(sweep, tmp_path / "o.h5", 0, ["lagrange/taylor", "lagrange/dop853"])
     with h5py.File(tmp_path / "o.h5") as file:
@@ -186,6 +187,7 @@ values = [0, 9.8]
 
 def test_the_error_growth_is_that_of_the_frozen_reference(tmp_path: Path) -> None:
     """Both from double precision variational equations, whose own rounding is far below a thousandth."""
+    pytest.importorskip("heyoka")
     (scene,) = find_scenes(["paper/fig11"])
     assert scene.gravity == 9.8
     frozen = frozen_solution(scene).trajectory
