@@ -42,7 +42,7 @@ def calls(tmp_path_factory: pytest.TempPathFactory) -> Calls:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(reproduce, "find_scenes", only_some)
         patch.setattr(reproduce, "short_curves", lambda scene: curves(scene)[:2])
-        first, second = (rotor_mbs("reproduce", "-j", 1, "-o", folder) for _ in range(2))
+        first, second = (rotor_mbs("reproduce", "-j", 1, "--timeout", 600, "-o", folder) for _ in range(2))
     return Calls(folder, first, second)
 
 
