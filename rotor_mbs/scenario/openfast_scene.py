@@ -13,8 +13,9 @@ from rotor_mbs.scenario.openfast import BladeModel, OpenFastRotor, read_rotor
 from rotor_mbs.scenario.scene import Scene, parse_scene
 from rotor_mbs.scenario.toml_file import file_path, shown_path, toml_value
 
-# A model may run for 10 minutes or more; of most scenes the first minute says enough.
-MAX_DURATION = 60.0
+# A model may run for 10 minutes or more; of a rigid rotor the first turns say enough, and every
+# method runs them within seconds.
+MAX_DURATION = 20.0  # s
 SAMPLE_STEP = 0.05  # s
 # A pitch that the model prescribes is kept by a spring where it is a coordinate of the scene. The
 # spring is this fast, so that the weight of a blade moves the pitch by about 1 mrad.
