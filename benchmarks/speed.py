@@ -2,8 +2,9 @@
 
     python benchmarks/speed.py [SCENES]
 
-SCENES: in the results file that is laid out, by default 40. Times are the least of several repetitions, since other
-processes make them longer and never shorter; compare two versions by turns.
+SCENES: in the results file that is laid out, by default 40. Times are the least of several
+repetitions, since other processes make them longer and never shorter; compare two versions by
+turns.
 """
 
 from __future__ import annotations

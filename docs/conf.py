@@ -10,7 +10,14 @@ sys.path.insert(0, str(Path(__file__).parent / "_ext"))
 project = "rotor_mbs"
 author = copyright = "The rotor_mbs developers"
 release = version = rotor_mbs.__version__
-extensions = ["sphinx.ext.autodoc", "sphinx.ext.mathjax", "myst_nb", "docstrings", "reference", "root_pages"]
+extensions = [
+    "sphinx.ext.autodoc",
+    "sphinx.ext.mathjax",
+    "myst_nb",
+    "docstrings",
+    "reference",
+    "root_pages",
+]
 exclude_patterns = ["_ext"]
 
 html_theme = "furo"

@@ -1,4 +1,5 @@
-"""Simulation of wind-turbine rotors with independent models, compared with a reference and a published paper.
+"""Simulation of wind-turbine rotors with independent models, compared with a reference and a
+published paper.
 
 This is the Python API. Modules are loaded on first use.
 
@@ -23,7 +24,8 @@ Examples
 ('ok', (101, 4))
 """
 
-TYPE_CHECKING = False  # what type checkers take for true; importing `typing` would cost as much as all else here
+# what type checkers take for true; importing `typing` would cost as much as all else here
+TYPE_CHECKING = False
 
 __version__ = "0.1.0"
 

@@ -13,18 +13,22 @@ class RotorError(Exception):
 
 
 class InputError(RotorError):
-    """Raised for invalid input. One line per error: file, line, key, what is wrong, what is allowed.
+    """Raised for invalid input. One line per error: file, line, key, what is wrong, what is
+    allowed.
 
     The command line prints the lines and ends with exit status 2.
     """
 
     def __init__(self, problems: str | Iterable[str]) -> None:
-        self.problems: tuple[str, ...] = (problems,) if isinstance(problems, str) else tuple(problems)
+        self.problems: tuple[str, ...] = (
+            (problems,) if isinstance(problems, str) else tuple(problems)
+        )
         super().__init__("\n".join(self.problems))
 
 
 class MethodRefusal(RotorError):
-    """Raised if a method cannot represent a scene or is not installed. The message says what is allowed."""
+    """Raised if a method cannot represent a scene or is not installed. The message says what is
+    allowed."""
 
 
 class ResourceError(RotorError):
@@ -36,7 +40,8 @@ SYSTEM_ERRORS = (MemoryError, OSError, ImportError, ResourceError)
 
 
 class StoreError(RotorError):
-    """Raised if a results file cannot be read or written. The message has the file and the reason."""
+    """Raised if a results file cannot be read or written. The message has the file and the
+    reason."""
 
 
 class PlausibilityWarning(UserWarning):
@@ -45,14 +50,17 @@ class PlausibilityWarning(UserWarning):
 
 @contextmanager
 def system_errors_apart(*others: type[Exception]) -> Iterator[None]:
-    """Raise one of SYSTEM_ERRORS in the block for every error that the system causes, whatever its type.
+    """Raise one of SYSTEM_ERRORS in the block for every error that the system causes, whatever its
+    type.
 
-    A library that cannot be loaded may raise any error (NumPy a ValueError for an invalid SOURCE_DATE_EPOCH), and an
-    engine may replace an error of the system by one of its own. Neither says anything of the run.
+    A library that cannot be loaded may raise any error (NumPy a ValueError for an invalid
+    SOURCE_DATE_EPOCH), and an engine may replace an error of the system by one of its own. Neither
+    says anything of the run.
 
     Parameters
     ----------
-    *others : types of errors that may be raised at any point, also during an import, and pass as they are.
+    *others : types of errors that may be raised at any point, also during an import, and pass as
+    they are.
 
     Raises
     ------
@@ -78,7 +86,9 @@ def _was_importing(error: BaseException) -> bool:
     """Return whether an error passed through the code of a module that was being imported."""
     for frame, _ in traceback.walk_tb(error.__traceback__):
         # Code that `exec` runs has this name, too, but not the module's file.
-        if frame.f_code.co_name == "<module>" and frame.f_code.co_filename == frame.f_globals.get("__file__"):
+        if frame.f_code.co_name == "<module>" and frame.f_code.co_filename == frame.f_globals.get(
+            "__file__"
+        ):
             return True
     return False
 
@@ -93,7 +103,13 @@ def shown_value(value: object) -> str:
 
 
 # C0 but for tab and line feed, DEL, C1, and the marks that change the direction of writing.
-_CONTROLS = (*range(0x20), *range(0x7F, 0xA0), *range(0x200E, 0x2010), *range(0x202A, 0x202F), *range(0x2066, 0x206A))
+_CONTROLS = (
+    *range(0x20),
+    *range(0x7F, 0xA0),
+    *range(0x200E, 0x2010),
+    *range(0x202A, 0x202F),
+    *range(0x2066, 0x206A),
+)
 _ESCAPES = {code: ascii(chr(code))[1:-1] for code in _CONTROLS if chr(code) not in "\t\n"}
 
 
@@ -113,12 +129,15 @@ def one_line(error: BaseException) -> str:
 
 
 def nearest(name: str, known: Iterable[str]) -> str:
-    """ ", perhaps NAME" with the one of `known` that a misspelt `name` may mean, or "" where none is near.
+    """ ", perhaps NAME" with the one of `known` that a misspelt `name` may mean, or "" where none
+    is near.
 
-    >>> nearest("tailor", ["lagrange/taylor", "lagrange/radau"]), nearest("euler", ["lagrange/taylor"])
+    >>> names = ["lagrange/taylor", "lagrange/radau"]
+    >>> nearest("tailor", names), nearest("euler", names[:1])
     (', perhaps lagrange/taylor', '')
     """
     by_text = {one: one for one in known}
-    by_text |= {one.rpartition("/")[2]: one for one in reversed(by_text)}  # "rk67" may mean "exudyn_tree/rk67"
+    # "rk67" may mean "exudyn_tree/rk67"
+    by_text |= {one.rpartition("/")[2]: one for one in reversed(by_text)}
     near = difflib.get_close_matches(name[:80], by_text, n=1)
     return f", perhaps {by_text[near[0]]}" if near else ""

@@ -1,4 +1,5 @@
-"""For the tests of other projects: a trajectory of theirs must agree with the reference of a scene."""
+"""For the tests of other projects: a trajectory of theirs must agree with the reference of a
+scene."""
 
 from __future__ import annotations
 
@@ -12,9 +13,15 @@ from rotor_mbs.scenario.scene import Scene
 
 
 def assert_agrees(
-    time: Any, angles: Any, *, scene: Scene | str | os.PathLike[str], rates: Any = None, tolerance: float = 1e-6
+    time: Any,
+    angles: Any,
+    *,
+    scene: Scene | str | os.PathLike[str],
+    rates: Any = None,
+    tolerance: float = 1e-6,
 ) -> DataComparison:
-    """Raise AssertionError, with the table of the comparison, if a trajectory does not agree with a scene.
+    """Raise AssertionError, with the table of the comparison, if a trajectory does not agree with a
+    scene.
 
     Parameters
     ----------
@@ -31,7 +38,8 @@ def assert_agrees(
     Raises
     ------
     InputError
-        For arrays that cannot be compared: other shapes, times that do not increase, numbers that are not finite.
+        For arrays that cannot be compared: other shapes, times that do not increase, numbers that
+        are not finite.
     TypeError
         If `scene` is neither a scene nor text nor a path, or the tolerance no number.
 

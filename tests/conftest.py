@@ -1,4 +1,5 @@
-"""For all tests: signals arrive, compiled code stays out of the user's cache; a results file to read."""
+"""For all tests: signals arrive, compiled code stays out of the user's cache; a results file to
+read."""
 
 from __future__ import annotations
 
@@ -8,20 +9,22 @@ from pathlib import Path
 
 import pytest
 
-# A CI runner or `nohup ... &` may have them ignored, which processes inherit: a test of signals would wait in vain.
+# A CI runner or `nohup ... &` may have them ignored, which processes inherit: a test of signals
+# would wait in vain.
 for name, default in {"SIGINT": signal.default_int_handler, "SIGHUP": signal.SIG_DFL}.items():
     number = getattr(signal, name, None)  # SIGHUP: not on Windows
     if number is not None and signal.getsignal(number) is signal.SIG_IGN:
         signal.signal(number, default)
 
-# The mutants alone leave hundreds of integrators, and every process that compiles reads through all that is there:
-# 0.08 s with 240 MB. heyoka looks for its cache here when it is first imported.
+# The mutants alone leave hundreds of integrators, and every process that compiles reads through all
+# that is there: 0.08 s with 240 MB. heyoka looks for its cache here when it is first imported.
 os.environ["XDG_CACHE_HOME"] = str(Path(__file__).parents[1] / ".pytest_cache" / "compiled")
 
 
 @pytest.fixture(scope="session")
 def results(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A results file of two scenes of the paper by two methods and their references, made once; for reading only."""
+    """A results file of two scenes of the paper by two methods and their references, made once; for
+    reading only."""
     from support.checking import results_file  # late: it loads the engines
 
     scenes, methods = ("paper/fig08", "paper/fig11"), ("lagrange/dop853", "exudyn_tree/rk67")

@@ -1,4 +1,5 @@
-"""The Python API as a user has it: scenes in, runs and comparisons out, labelled, in files, in a notebook."""
+"""The Python API as a user has it: scenes in, runs and comparisons out, labelled, in files, in a
+notebook."""
 
 from __future__ import annotations
 
@@ -28,8 +29,13 @@ def test_every_public_name_is_there_and_documented() -> None:
 
 
 def test_importing_the_package_imports_nothing_else() -> None:
-    code = "import sys; before = set(sys.modules); import rotor_mbs; print(*sorted(set(sys.modules) - before))"
-    loaded = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.split()
+    code = (
+        "import sys; before = set(sys.modules); import rotor_mbs; "
+        "print(*sorted(set(sys.modules) - before))"
+    )
+    loaded = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True
+    ).stdout.split()
     assert loaded == ["rotor_mbs"]
 
 
@@ -65,7 +71,9 @@ def test_labels_units_and_values_of_xarray(study: rm.Runs) -> None:
     run = study["exudyn_tree/rk67"]
     chosen = data.angles.sel(run="exudyn_tree/rk67", coordinate="pitch 1")
     np.testing.assert_array_equal(chosen, run.angles[:, 1])
-    np.testing.assert_array_equal(data.tip.sel(run="exudyn_tree/rk67", blade=2, axis="y"), run["tip"][:, 1, 1])
+    np.testing.assert_array_equal(
+        data.tip.sel(run="exudyn_tree/rk67", blade=2, axis="y"), run["tip"][:, 1, 1]
+    )
     assert data.angles.attrs["units"] == "rad"
     assert data.time.attrs["units"] == "s"
     assert "method" not in data.dims
@@ -95,7 +103,9 @@ def test_a_solution_has_its_quantities_status_and_metrics() -> None:
         run["constraint_error"]
     with pytest.raises(AttributeError, match="nothing"):
         assert run.nothing is None
-    np.testing.assert_array_equal(run.to_xarray().angles.sel(coordinate="pitch 2"), run.angles[:, 2])
+    np.testing.assert_array_equal(
+        run.to_xarray().angles.sel(coordinate="pitch 2"), run.angles[:, 2]
+    )
 
 
 def test_runs_are_saved_opened_and_rendered(study: rm.Runs, tmp_path: Path) -> None:
@@ -104,7 +114,11 @@ def test_runs_are_saved_opened_and_rendered(study: rm.Runs, tmp_path: Path) -> N
     for name, run in study.items():
         for again in (file[f"{study.scene}/{name}"], file[study.scene][name]):
             assert again.angles.tobytes() == run.angles.tobytes()
-            assert (again.status, again.settings, again.metrics) == (run.status, run.settings, run.metrics)
+            assert (again.status, again.settings, again.metrics) == (
+                run.status,
+                run.settings,
+                run.metrics,
+            )
     with pytest.raises(KeyError, match="rk67"):
         file[f"{study.scene}/lagrange/radau"]
     with pytest.raises(rm.StoreError, match=r"^\.: is a folder; allowed: the name of a file$"):
@@ -131,13 +145,20 @@ def test_what_was_not_asked_for_is_refused_by_name(tmp_path: Path) -> None:
     run.plot().save(tmp_path / "motion.png")
     assert (tmp_path / "motion.png").read_bytes().startswith(b"\x89PNG")
     alone = rm.run(scene.replace(outputs=["angles"]), METHOD)
-    assert alone.message.endswith("without energies it needs both angles and rates, or angles and a reference")
+    assert alone.message.endswith(
+        "without energies it needs both angles and rates, or angles and a reference"
+    )
     # Read from a file that does not have them: NaN, and no plot of them.
     scene = scene.replace(outputs=["energy"])
-    stored, of_sweep = rm.run(scene, [METHOD])[METHOD], rm.sweep(scene, {"gravity": [9.8]}, methods=METHOD)[0]
+    stored, of_sweep = (
+        rm.run(scene, [METHOD])[METHOD],
+        rm.sweep(scene, {"gravity": [9.8]}, methods=METHOD)[0],
+    )
     assert np.isnan([stored.angles, stored.rates, of_sweep.angles, of_sweep.rates]).all()
     for draw in (stored.plot, stored.plot.error, stored.plot.defects, of_sweep.plot.rotor):
-        with pytest.raises(rm.InputError, match="angles are not stored; allowed: angles in `outputs`"):
+        with pytest.raises(
+            rm.InputError, match=("angles are not stored; allowed: angles in `outputs`")
+        ):
             draw()
     assert "<svg" not in stored._repr_html_() + rm.run(scene, [METHOD])._repr_html_()
 
@@ -146,18 +167,31 @@ def test_a_sweep_gives_labelled_runs_of_each_parameter_value(tmp_path: Path) -> 
     scene = rm.scene("paper/fig08").replace(**SHORT)
     values = [0.0, 1e3, 1e4]
     data = rm.sweep(
-        scene, {"bearing.stiffness": values}, methods="lagrange/dop853", samples=11, output=tmp_path / "stiffness.h5"
+        scene,
+        {"bearing.stiffness": values},
+        methods="lagrange/dop853",
+        samples=11,
+        output=tmp_path / "stiffness.h5",
     )
     table = data.to_xarray()
     assert table.bearing_stiffness.values.tolist() == values
     assert table.bearing_stiffness.attrs["units"] == "N m/rad"
     for i, stiffness in enumerate(values):
-        single = rm.run(scene.replace(samples=11, **{"bearing.stiffness": stiffness}), "lagrange/dop853")
+        single = rm.run(
+            scene.replace(samples=11, **{"bearing.stiffness": stiffness}), "lagrange/dop853"
+        )
         np.testing.assert_array_equal(data.column("angles")[i], single.angles)
     np.testing.assert_array_equal(data.at("angles", 7), data.column("angles")[:, 7])
     assert repr(rm.open(tmp_path / "stiffness.h5")) == repr(data)
     assert repr(data).splitlines()[0] == f"{tmp_path / 'stiffness.h5'}: 3 runs: 3 ok"
-    assert repr(data).splitlines()[-1].split() == ["bearing.stiffness", "N", "m/rad", "0", "10000", "3"]
+    assert repr(data).splitlines()[-1].split() == [
+        "bearing.stiffness",
+        "N",
+        "m/rad",
+        "0",
+        "10000",
+        "3",
+    ]
     with pytest.raises(rm.InputError, match=r"of a sweep only that of a run, runs\[0\]\.plot\(\)"):
         _ = data.plot
     assert data[1].status == "ok"
@@ -175,12 +209,26 @@ def test_a_sweep_gives_labelled_runs_of_each_parameter_value(tmp_path: Path) -> 
     by_stiffness = data.to_xarray(unstack=True).angles.sel(bearing_stiffness=1e3)
     np.testing.assert_array_equal(by_stiffness, data.column("angles")[1])
     for name, sample in (("angles", 11), ("status", 0)):
-        with pytest.raises(rm.StoreError, match=rf"^{name}, sample {sample}: allowed: .*, samples 0 to 10$"):
+        with pytest.raises(
+            rm.StoreError,
+            match=(
+                rf"^{name}, sample {sample}: allowed: .*, "
+                r"samples 0 to 10$"
+            ),
+        ):
             data.at(name, sample)
     for options in ({"gravity": [9.8, 9.8, 9.8]}, {"gravity": [9.0, 9.5, 9.8], "combine": "zip"}):
         gravity = {"gravity": options.pop("gravity")}
-        other = rm.sweep(scene, {"bearing.stiffness": values, **gravity}, methods=METHOD, samples=3, **options)
-        with pytest.raises(rm.InputError, match=r"not every combination of bearing_stiffness, gravity, once each; al"):
+        other = rm.sweep(
+            scene, {"bearing.stiffness": values, **gravity}, methods=METHOD, samples=3, **options
+        )
+        with pytest.raises(
+            rm.InputError,
+            match=(
+                r"not every combination of bearing_stiffness, "
+                r"gravity, once each; al"
+            ),
+        ):
             other.to_xarray(unstack=True)
     with pytest.raises(rm.InputError, match=r"bearing\.stifness"):
         rm.sweep(scene, {"bearing.stifness": values})

@@ -1,4 +1,5 @@
-"""Wrong arguments of every public function: a wrong value is a line, a wrong type a TypeError of the call itself."""
+"""Wrong arguments of every public function: a wrong value is a line, a wrong type a TypeError of
+the call itself."""
 
 from __future__ import annotations
 
@@ -74,7 +75,8 @@ def world() -> World:
 
 
 class Call(NamedTuple):
-    """A call with one argument: names of the VALUES with which it returns; whether it looks something up by a key."""
+    """A call with one argument: names of the VALUES with which it returns; whether it looks
+    something up by a key."""
 
     function: Callable[[World, Any], object]
     valid: set[str] = set()  # noqa: RUF012  (never changed)
@@ -94,7 +96,9 @@ CALLS: dict[str, Call] = {
     "Runs scene": Call(lambda w, v: rm.Runs(w.runs.path, v)),
     "run scene": Call(lambda _, v: rm.run(v, METHOD)),
     "run method": Call(lambda w, v: rm.run(w.scene, v), {"list", "dict", "empty"}),
-    "run method file": Call(lambda w, v: rm.run(w.scene, [f"{v}.py"] if isinstance(v, str) else [v])),
+    "run method file": Call(
+        lambda w, v: rm.run(w.scene, [f"{v}.py"] if isinstance(v, str) else [v])
+    ),
     "run methods": Call(lambda w, v: rm.run(w.scene, [v])),
     "run timeout": Call(lambda w, v: rm.run(w.scene, METHOD, timeout=v), {*NUMBERS, "inf"}),
     "run workers": Call(lambda w, v: rm.run(w.scene, METHOD, workers=v), {"3", "True"}),
@@ -104,17 +108,27 @@ CALLS: dict[str, Call] = {
     "sweep parameters": Call(lambda w, v: rm.sweep(w.scene, v)),
     "sweep key": Call(lambda w, v: rm.sweep(w.scene, {v: [1.0]})),
     "sweep values": Call(lambda w, v: rm.sweep(w.scene, {"gravity": v})),
-    "sweep value": Call(lambda w, v: rm.sweep(w.scene, {"gravity": [v]}, samples=2, outputs=[]), {"3", "3.5"}),
+    "sweep value": Call(
+        lambda w, v: rm.sweep(w.scene, {"gravity": [v]}, samples=2, outputs=[]), {"3", "3.5"}
+    ),
     "sweep range": Call(lambda w, v: rm.sweep(w.scene, {"gravity": {"linear": v}})),
     "sweep methods": Call(lambda w, v: rm.sweep(w.scene, {"gravity": [9.8]}, methods=v)),
-    "sweep output": Call(lambda w, v: rm.sweep(w.scene, {"gravity": [9.8]}, samples=2, output=v), {"None", "text"}),
+    "sweep output": Call(
+        lambda w, v: rm.sweep(w.scene, {"gravity": [9.8]}, samples=2, output=v), {"None", "text"}
+    ),
     # With parameters that are refused later: no worker is started.
     "sweep workers": Call(lambda w, v: rm.sweep(w.scene, {"gravity": ["a"]}, workers=v)),
     "sweep timeout": Call(lambda w, v: rm.sweep(w.scene, {"gravity": ["a"]}, timeout=v)),
     "sweep samples": Call(lambda w, v: rm.sweep(w.scene, {"gravity": [9.8]}, samples=v), {"3"}),
-    "sweep outputs": Call(lambda w, v: rm.sweep(w.scene, {"gravity": [9.8]}, samples=2, outputs=v), {"list", "empty"}),
-    "sweep seed": Call(lambda w, v: rm.sweep(w.scene, {"gravity": [9.8]}, samples=2, seed=v), {"3"}),
-    "sweep settings": Call(lambda w, v: rm.sweep(w.scene, {"gravity": [9.8]}, samples=2, settings=v), {"dict"}),
+    "sweep outputs": Call(
+        lambda w, v: rm.sweep(w.scene, {"gravity": [9.8]}, samples=2, outputs=v), {"list", "empty"}
+    ),
+    "sweep seed": Call(
+        lambda w, v: rm.sweep(w.scene, {"gravity": [9.8]}, samples=2, seed=v), {"3"}
+    ),
+    "sweep settings": Call(
+        lambda w, v: rm.sweep(w.scene, {"gravity": [9.8]}, samples=2, settings=v), {"dict"}
+    ),
     "sweep unknown option": Call(lambda w, v: rm.sweep(w.scene, {"gravity": [9.8]}, speed=v)),
     "compare data": Call(lambda w, v: rm.compare(v, w.scene)),
     "compare time": Call(lambda w, v: compared(w, time=v)),
@@ -123,7 +137,9 @@ CALLS: dict[str, Call] = {
     "compare columns": Call(lambda w, v: rm.compare(w.arrays, w.scene, columns=v), {"None"}),
     "compare column": Call(lambda w, v: rm.compare(w.arrays, w.scene, columns={"time": v})),
     "compare tolerance": Call(lambda w, v: rm.compare(w.arrays, w.scene, tolerance=v), NUMBERS),
-    "compare timeout": Call(lambda w, v: rm.compare(w.arrays, w.scene, timeout=v), {*NUMBERS, "inf"}),
+    "compare timeout": Call(
+        lambda w, v: rm.compare(w.arrays, w.scene, timeout=v), {*NUMBERS, "inf"}
+    ),
     "modes scene": Call(lambda _, v: rm.modes(v)),
     # Bytes are whole numbers, a dictionary is gone through by its keys.
     "modes speeds": Call(lambda w, v: rm.modes(w.scene, v), {"bytes", "list", "dict", "empty"}),
@@ -140,7 +156,9 @@ CALLS: dict[str, Call] = {
     "Run item": Call(lambda w, v: w.run[v], is_lookup=True),
     "Run loads": Call(lambda w, v: w.run.plot.loads(v)),
     "plot save": Call(lambda w, v: w.panels.save(v)),
-    "plot save ending": Call(lambda w, v: w.panels.save(f"{v}.png" if isinstance(v, str) else v), {"text"}),
+    "plot save ending": Call(
+        lambda w, v: w.panels.save(f"{v}.png" if isinstance(v, str) else v), {"text"}
+    ),
     "Runs item": Call(lambda w, v: w.runs[v], is_lookup=True),
     "Runs item of a sweep": Call(lambda w, v: w.sweep[v], {"True"}, is_lookup=True),
     "Runs column": Call(lambda w, v: w.sweep.column(v)),
@@ -154,7 +172,9 @@ CALLS: dict[str, Call] = {
     "Modes to_html": Call(lambda w, v: w.modes.to_html(v), {"text"}),
     "DataComparison save": Call(lambda w, v: w.comparison.save(v), {"text"}),
     "DataComparison to_html": Call(lambda w, v: w.comparison.to_html(v), {"text"}),
-    "Scene torque_at": Call(lambda w, v: w.scene.torque_at(v), {*NUMBERS, "nan", "inf", "-1", "10**400", "10**5000"}),
+    "Scene torque_at": Call(
+        lambda w, v: w.scene.torque_at(v), {*NUMBERS, "nan", "inf", "-1", "10**400", "10**5000"}
+    ),
     "replace gravity": Call(lambda w, v: w.scene.replace(gravity=v), {"3", "3.5"}),
     "replace title": Call(lambda w, v: w.scene.replace(title=v), {"text"}),
     "replace figures": Call(lambda w, v: w.scene.replace(figures=v), {"list", "empty"}),
@@ -162,25 +182,36 @@ CALLS: dict[str, Call] = {
     "replace samples": Call(lambda w, v: w.scene.replace(samples=v), {"3"}),
     "replace blade": Call(lambda w, v: w.scene.replace(blade=v)),
     "replace angles": Call(lambda w, v: w.scene.replace(**{"initial.angles": v})),
-    "replace angle": Call(lambda w, v: w.scene.replace(**{"initial.angles[1]": v}), {"3", "3.5", "-1"}),
-    "replace torque": Call(lambda w, v: w.scene.replace(**{"torque.rotor": v}), {"3", "3.5", "-1", "matrix"}),
+    "replace angle": Call(
+        lambda w, v: w.scene.replace(**{"initial.angles[1]": v}), {"3", "3.5", "-1"}
+    ),
+    "replace torque": Call(
+        lambda w, v: w.scene.replace(**{"torque.rotor": v}), {"3", "3.5", "-1", "matrix"}
+    ),
     "replace settings": Call(lambda w, v: w.scene.replace(settings=v), {"dict"}),
     "replace unknown key": Call(lambda w, v: w.scene.replace(speed=v)),
-}  # fmt: skip
+}
 
 
 def frames(error: BaseException) -> list[str]:
-    """Names of the functions of this package on the way to an error; a comprehension, and a recursion, are none."""
+    """Names of the functions of this package on the way to an error; a comprehension, and a
+    recursion, are none."""
     package = str(Path(rm.__file__).parent)
     found = traceback.extract_tb(error.__traceback__)
-    names = [frame.name for frame in found if frame.filename.startswith(package) and not frame.name.startswith("<")]
+    names = [
+        frame.name
+        for frame in found
+        if frame.filename.startswith(package) and not frame.name.startswith("<")
+    ]
     return list(dict.fromkeys(names))
 
 
 SLOW = ("Runs to_html", "run method")  # draws a report; computes references
 
 
-@pytest.mark.parametrize("name", [pytest.param(name, marks=pytest.mark.full if name in SLOW else ()) for name in CALLS])
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=pytest.mark.full if name in SLOW else ()) for name in CALLS]
+)
 def test_a_wrong_argument_is_a_line_or_a_type_error_of_the_call(
     name: str, world: World, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -199,6 +230,9 @@ def test_a_wrong_argument_is_a_line_or_a_type_error_of_the_call(
                 problems.append(f"{kind}: {' > '.join(frames(error))}: {error}")
         except Exception as error:
             if not (call.is_lookup and type(error) is KeyError):
-                problems.append(f"{kind}: {' > '.join(frames(error))}: {type(error).__name__} {str(error)[:200]}")
+                problems.append(
+                    f"{kind}: {' > '.join(frames(error))}: {type(error).__name__} "
+                    f"{str(error)[:200]}"
+                )
     assert not problems, "\n".join(problems)
     assert returned == call.valid

@@ -1,4 +1,5 @@
-"""`rm.check`, `rm.bench`, `rm.test_method`: what the commands find, in Python; and what a comparison does not load."""
+"""`rm.check`, `rm.bench`, `rm.test_method`: what the commands find, in Python; and what a
+comparison does not load."""
 
 from __future__ import annotations
 
@@ -22,7 +23,9 @@ def scene() -> rm.Scene:
     return rm.scene("paper/fig03").replace(duration=0.5, samples=51)
 
 
-def test_checks_of_a_file_are_a_sequence_that_says_what_failed(scene: rm.Scene, tmp_path: Path) -> None:
+def test_checks_of_a_file_are_a_sequence_that_says_what_failed(
+    scene: rm.Scene, tmp_path: Path
+) -> None:
     path = rm.run(scene, [METHOD]).save(tmp_path / "runs.h5")
     checks = rm.check(path)
     assert checks.passed
@@ -38,7 +41,9 @@ def test_checks_of_a_file_are_a_sequence_that_says_what_failed(scene: rm.Scene, 
 def test_bounds_of_ones_own_count(scene: rm.Scene, tmp_path: Path) -> None:
     path = rm.run(scene, [METHOD]).save(tmp_path / "runs.h5")
     bounds = tmp_path / "bounds.toml"
-    bounds.write_text('[[bound]]\ncheck = "energy"\nmethod = "*"\nvalue = 1e-30\nreason = "for the test"\n')
+    bounds.write_text(
+        '[[bound]]\ncheck = "energy"\nmethod = "*"\nvalue = 1e-30\nreason = "for the test"\n'
+    )
     assert "energy" in {check.name for check in rm.check(path, bounds=bounds).failures}
 
 
@@ -49,7 +54,9 @@ def test_a_bench_measures_a_ladder_and_keeps_it(scene: rm.Scene, tmp_path: Path)
     curve = curves["paper/fig03/exudyn_tree/rk44"]
     assert np.nanmin(curve["angle_error_max"]) < 1e-9
     again = rm.bench(scene, "exudyn_tree/rk44", output=path, repeats=1, budget=0.5, progress=False)
-    np.testing.assert_array_equal(again["paper/fig03/exudyn_tree/rk44"]["run_time_s"], curve["run_time_s"])
+    np.testing.assert_array_equal(
+        again["paper/fig03/exudyn_tree/rk44"]["run_time_s"], curve["run_time_s"]
+    )
     with pytest.raises(rm.InputError, match="unknown method"):
         rm.bench(scene, "mujoco/nothing")
 
@@ -100,9 +107,17 @@ def test_a_bench_repeats_at_least_once(scene: rm.Scene, repeats: int) -> None:
         rm.bench(scene, "exudyn_tree/rk44", repeats="many")  # type: ignore[arg-type]
 
 
-def test_curves_that_were_lost_are_an_error(scene: rm.Scene, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_curves_that_were_lost_are_an_error(
+    scene: rm.Scene, monkeypatch: pytest.MonkeyPatch
+) -> None:
     def lose(*_: object, **__: object) -> tuple[list[RunOutcome], list[object]]:
-        lost = RunOutcome("paper/fig03 exudyn_tree/rk44", "exudyn_tree/rk44", "worker_died", "no room", is_stored=False)
+        lost = RunOutcome(
+            "paper/fig03 exudyn_tree/rk44",
+            "exudyn_tree/rk44",
+            "worker_died",
+            "no room",
+            is_stored=False,
+        )
         return [lost], []
 
     monkeypatch.setattr("rotor_mbs.studies.bench.run_bench", lose)
@@ -113,5 +128,7 @@ def test_curves_that_were_lost_are_an_error(scene: rm.Scene, monkeypatch: pytest
 def test_a_results_file_is_opened_without_scipy(scene: rm.Scene, tmp_path: Path) -> None:
     path = rm.run(scene, [METHOD]).save(tmp_path / "runs.h5")
     code = "import sys, rotor_mbs as rm; rm.open(sys.argv[1]); print('scipy' in sys.modules)"
-    ended = subprocess.run([sys.executable, "-c", code, str(path)], capture_output=True, text=True, cwd=tmp_path)
+    ended = subprocess.run(
+        [sys.executable, "-c", code, str(path)], capture_output=True, text=True, cwd=tmp_path
+    )
     assert (ended.stdout, ended.stderr) == ("False\n", "")

@@ -1,4 +1,5 @@
-"""The API under load: wrong limits, generators, daemonic processes, threads, lost workers, copies."""
+"""The API under load: wrong limits, generators, daemonic processes, threads, lost workers,
+copies."""
 
 from __future__ import annotations
 
@@ -29,7 +30,9 @@ def _scene() -> Scene:
 
 
 def _sweep(**options: Any) -> rm.Runs:
-    return rm.sweep(_scene(), **{"parameters": {"gravity": [9.0, 9.8]}, "methods": [METHOD], **options})
+    return rm.sweep(
+        _scene(), **{"parameters": {"gravity": [9.0, 9.8]}, "methods": [METHOD], **options}
+    )
 
 
 SECONDS, COUNT = "allowed: seconds, more than 0$", "allowed: a whole number from 0 to 1024$"
@@ -58,15 +61,29 @@ def test_a_time_limit_beyond_any_run_is_none(timeout: float) -> None:
 
 
 @pytest.mark.parametrize(
-    "values", [range(1, 4), (float(x) for x in (1, 2, 3)), np.array([1, 2, 3]), {"values": np.array([1.0, 2.0, 3.0])}]
+    "values",
+    [
+        range(1, 4),
+        (float(x) for x in (1, 2, 3)),
+        np.array([1, 2, 3]),
+        {"values": np.array([1.0, 2.0, 3.0])},
+    ],
 )
 def test_values_of_a_sweep_may_be_anything_that_is_gone_through_once(values: Any) -> None:
-    runs = rm.sweep(_scene(), {"gravity": values}, methods=(m for m in [METHOD]), outputs=iter(["angles"]), samples=3)
+    runs = rm.sweep(
+        _scene(),
+        {"gravity": values},
+        methods=(m for m in [METHOD]),
+        outputs=iter(["angles"]),
+        samples=3,
+    )
     assert runs.column("gravity").tolist() == [1.0, 2.0, 3.0]
     assert runs.statuses == {"ok": 3}
 
 
-@pytest.mark.parametrize("parameters", [{}, {"gravity": 1.0}, {"gravity": "12"}, {"gravity": []}, {3: [1.0]}])
+@pytest.mark.parametrize(
+    "parameters", [{}, {"gravity": 1.0}, {"gravity": "12"}, {"gravity": []}, {3: [1.0]}]
+)
 def test_wrong_parameters_are_a_line(parameters: Any) -> None:
     with pytest.raises(InputError, match="allowed: "):
         _sweep(parameters=parameters)
@@ -88,7 +105,12 @@ print(rm.sweep(scene, {"gravity": [9.0, 9.8]}, methods=["lagrange/dop853"], work
 @pytest.mark.full
 def test_a_script_from_standard_input_needs_no_guard() -> None:
     ended = subprocess.run(
-        [sys.executable, "-"], input=SCRIPT, capture_output=True, text=True, timeout=100, check=False
+        [sys.executable, "-"],
+        input=SCRIPT,
+        capture_output=True,
+        text=True,
+        timeout=100,
+        check=False,
     )
     assert (ended.returncode, ended.stdout, ended.stderr) == (0, "{'ok': 2}\n", "")
 
@@ -116,7 +138,9 @@ def _here(call: Callable[[], Any]) -> Any:
 @pytest.mark.full
 @pytest.mark.parametrize("called", [_here, _in_thread])
 @pytest.mark.parametrize("kind", ["damper", "fast", "shaft"])
-def test_a_time_limit_bounds_reference_and_judging(kind: str, called: Callable[..., rm.Run]) -> None:
+def test_a_time_limit_bounds_reference_and_judging(
+    kind: str, called: Callable[..., rm.Run]
+) -> None:
     """Without a limit each of them takes minutes."""
     run = called(lambda: rm.run(_stiff(kind), "lagrange/radau", reference=True, timeout=2.0))
     assert run.status in ("timed_out", "ok", "inaccurate")
@@ -171,7 +195,13 @@ def test_finite_samples_that_are_no_motion_are_inaccurate_without_heyoka(
 def test_a_misspelt_setting_is_told_before_a_scene_is_refused() -> None:
     """Whether the method cannot represent it or is not installed."""
     scene = _scene().replace(hub={"inertia": 3.0})
-    with pytest.raises(InputError, match=r"no setting 'relative_tolerence', perhaps relative_tolerance"):
+    with pytest.raises(
+        InputError,
+        match=(
+            r"no setting 'relative_tolerence', perhaps "
+            r"relative_tolerance"
+        ),
+    ):
         rm.run(scene, ["printed/ode45"], relative_tolerence=1e-9)
     with pytest.raises(InputError, match="hub"):
         rm.run(scene, ["printed/ode45"], relative_tolerance=1e-9)
@@ -199,7 +229,9 @@ def test_limits_of_threads_do_not_end_each_other() -> None:
     [copy.copy, copy.deepcopy, lambda runs: pickle.loads(pickle.dumps(runs))],
     ids=["copy", "deepcopy", "pickle"],
 )
-def test_a_copy_outlives_its_original(make: Callable[[], rm.Runs], copied: Callable[[rm.Runs], rm.Runs]) -> None:
+def test_a_copy_outlives_its_original(
+    make: Callable[[], rm.Runs], copied: Callable[[rm.Runs], rm.Runs]
+) -> None:
     runs = make()
     twin, label, before = copied(runs), list(runs)[-1], runs[list(runs)[-1]].angles
     del runs

@@ -1,5 +1,5 @@
-"""What the README and `docs/` tell a reader to type is understood, what they link to is there, their Python runs;
-the generated reference pages have everything."""
+"""What the README and `docs/` tell a reader to type is understood, what they link to is there,
+their Python runs; the generated reference pages have everything."""
 
 from __future__ import annotations
 
@@ -32,13 +32,18 @@ TEXTS = {path.name: path.read_text() for path in DOCUMENTS}
 def commands(text: str) -> list[list[str]]:
     """Every call of rotor-mbs in an indented line, without what the shell does around it."""
     lines = [line.split("#")[0] for line in text.splitlines() if line.startswith("    ")]
-    parts = [part.strip() for line in lines for part in re.split(r"&&|\|\|", line.replace("exec ", ""))]
+    parts = [
+        part.strip() for line in lines for part in re.split(r"&&|\|\|", line.replace("exec ", ""))
+    ]
     calls = [part for part in parts if re.match(r"(\.venv/bin/|- run: )?rotor-mbs ", part)]
-    return [shlex.split(re.sub(r"\$\(.*?\)", "0001", call.partition("rotor-mbs ")[2])) for call in calls]
+    return [
+        shlex.split(re.sub(r"\$\(.*?\)", "0001", call.partition("rotor-mbs ")[2])) for call in calls
+    ]
 
 
 def python_of(name: str) -> list[str]:
-    """The Python of a document, but for the loader that needs PyTorch: tests/studies/test_sweep_metadata.py runs it."""
+    """The Python of a document, but for the loader that needs PyTorch:
+    tests/studies/test_sweep_metadata.py runs it."""
     blocks = re.findall(r"```python\n(.*?)```", TEXTS[name], re.DOTALL)
     return [block for block in blocks if "torch" not in block]
 
@@ -47,7 +52,9 @@ def test_every_command_is_one() -> None:
     calls = [call for text in TEXTS.values() for call in commands(text)]
     assert len(calls) > 15
     for arguments in calls:
-        replaced = ["3/16" if word.startswith("$SLURM_ARRAY_TASK_ID") else word for word in arguments]
+        replaced = [
+            "3/16" if word.startswith("$SLURM_ARRAY_TASK_ID") else word for word in arguments
+        ]
         if "--names" not in arguments:  # which prints and ends
             parse(replaced)  # ends with status 2 where it is none
 
@@ -79,9 +86,12 @@ def test_the_readmes_own_scene_is_one() -> None:
 def test_the_readmes_python_runs(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """First the API, then what reads a results file."""
     pytest.importorskip("heyoka")
-    rm.run("paper/fig11", ["lagrange/taylor", "exudyn_tree/rk67"]).save(folder / "rotor-mbs-out" / "results.h5")
+    rm.run("paper/fig11", ["lagrange/taylor", "exudyn_tree/rk67"]).save(
+        folder / "rotor-mbs-out" / "results.h5"
+    )
     (first,), reading = python_of("README.md"), python_of("data.md")
-    shorter = first.replace("duration=5.0, samples=501", "duration=0.5, samples=51")  # the references of 5 s take 6 s
+    # the references of 5 s take 6 s
+    shorter = first.replace("duration=5.0, samples=501", "duration=0.5, samples=51")
     assert shorter != first
     names: dict[str, Any] = {}
     for code in (shorter, *reading):
@@ -100,17 +110,24 @@ def make_inputs(name: str) -> None:
         write_model(Path.cwd()).rename("MODEL.fst")
     elif name == "sweeps.md":
         (sweep,) = re.findall(r"```toml\n(title.*?)```", TEXTS[name], re.DOTALL)
-        fewer = sweep.replace("draws = 100 ", "draws = 4 ").replace("error_growth = true", "error_growth = false")
+        fewer = sweep.replace("draws = 100 ", "draws = 4 ").replace(
+            "error_growth = true", "error_growth = false"
+        )
         assert fewer != sweep
         Path("sweep.toml").write_text(fewer)
         assert rotor_mbs("sweep", "sweep.toml", "-o", "study.h5", "-j", 1).status == 0
     elif name == "bench.md":
-        rotor_mbs(*shlex.split("bench check/general -m lagrange/dop853 -o bench.h5 --budget 1 --repeats 1"))
+        rotor_mbs(
+            *shlex.split(
+                "bench check/general -m lagrange/dop853 -o bench.h5 --budget 1 --repeats 1"
+            )
+        )
 
 
 @pytest.mark.full
 @pytest.mark.parametrize(
-    "name", [name for name in TEXTS if python_of(name) and name not in ("README.md", "data.md", "tour.md")]
+    "name",
+    [name for name in TEXTS if python_of(name) and name not in ("README.md", "data.md", "tour.md")],
 )
 def test_the_python_of_documents_runs(name: str) -> None:
     make_inputs(name)
@@ -128,7 +145,9 @@ def test_the_tour_prints_what_it_says(capsys: pytest.CaptureFixture[str]) -> Non
     exec(code, {})
     printed = capsys.readouterr().out
     assert printed
-    assert set(printed.split("\n")) <= {line.removeprefix("    ") for line in TEXTS["tour.md"].split("\n")}
+    assert set(printed.split("\n")) <= {
+        line.removeprefix("    ") for line in TEXTS["tour.md"].split("\n")
+    }
 
 
 @pytest.mark.full
@@ -138,10 +157,14 @@ def test_the_matlab_code_of_documents_runs_in_octave(folder: Path, name: str) ->
     octave = shutil.which("octave-cli")
     if octave is None:
         pytest.skip("needs Octave")
-    if subprocess.run([octave, "-q", "--eval", "pkg load netcdf"], capture_output=True, check=False).returncode:
+    if subprocess.run(
+        [octave, "-q", "--eval", "pkg load netcdf"], capture_output=True, check=False
+    ).returncode:
         pytest.skip("needs the package netcdf of Octave")
     blocks = re.findall(r"```matlab\n(.*?)```", TEXTS[name], re.DOTALL)
-    lines = [line for block in blocks for line in block.splitlines() if not line.startswith("plot(")]
+    lines = [
+        line for block in blocks for line in block.splitlines() if not line.startswith("plot(")
+    ]
     if name == "data.md":
         path = folder / "octave" / "rotor-mbs-out" / "results.h5"
         rm.run("paper/fig11", ["exudyn_tree/rk67", "lagrange/dop853"]).save(path)
@@ -159,11 +182,14 @@ def test_the_matlab_code_of_documents_runs_in_octave(folder: Path, name: str) ->
     script = path.parent / "code.m"
     script.write_text("\n".join(lines))
     where = path.parents[1] if name == "data.md" else path.parent
-    done = subprocess.run([octave, "-q", str(script)], cwd=where, capture_output=True, text=True, check=True)
+    done = subprocess.run(
+        [octave, "-q", str(script)], cwd=where, capture_output=True, text=True, check=True
+    )
     assert float(done.stdout) == expected
 
 
-# What a document's path needs that the document itself does not make: by document, commands before it.
+# What a document's path needs that the document itself does not make: by document, commands before
+# it.
 BEFORE = {
     "bench.md": ["run stiff/bearing-1e6 -m lagrange/dop853 -o results.h5"],
     "check.md": [
@@ -172,14 +198,21 @@ BEFORE = {
     ],
     "compare.md": ["export paper/fig11 --to csv -o mine.csv"],
 }
-# Commands that would take minutes, with what makes them short; others of the documents are run as they stand.
+# Commands that would take minutes, with what makes them short; others of the documents are run as
+# they stand.
 SHORTER = {
     "reproduce": "run paper/fig08 -m lagrange/dop853 -o rotor-mbs-out/results.h5",
-    "bench paper/fig09": "bench paper/fig09 -m lagrange/dop853 -o bench-results.h5 --budget 1 --repeats 1",
-    "bench paper -o bench.h5": "bench check/general -m lagrange/dop853 -o bench.h5 --budget 1 --repeats 1",
+    "bench paper/fig09": (
+        "bench paper/fig09 -m lagrange/dop853 -o bench-results.h5 --budget 1 --repeats 1"
+    ),
+    "bench paper -o bench.h5": (
+        "bench check/general -m lagrange/dop853 -o bench.h5 --budget 1 --repeats 1"
+    ),
     "bench my.toml": "bench my.toml -m lagrange/dop853 --budget 1 --repeats 1",
     "check": "check results.h5",
-    "check --junit check.xml --json check.json --github -v": "check results.h5 --junit check.xml --json check.json -v",
+    "check --junit check.xml --json check.json --github -v": (
+        "check results.h5 --junit check.xml --json check.json -v"
+    ),
     "modes stiff/nrel-5mw --speeds 0:3:31": "modes stiff/nrel-5mw --speeds 0:3:3",
     "modes my.toml --speeds 0.1:3:30 -o modes.h5": "modes my.toml --speeds 0.1:3:3 -o modes.h5",
     "sweep sweeps/fig11-spread": "sweep sweeps/fig11-spread --dry-run",
@@ -201,7 +234,8 @@ NOT_HERE = (
 
 
 def path_of(name: str) -> list[str | list[str]]:
-    """A document's commands, as lists, and its Python, as text, in the order in which a reader meets them."""
+    """A document's commands, as lists, and its Python, as text, in the order in which a reader
+    meets them."""
     steps: list[str | list[str]] = []
     for part in re.split(r"(```python\n.*?```)", TEXTS[name], flags=re.DOTALL):
         if part.startswith("```python"):
@@ -212,9 +246,14 @@ def path_of(name: str) -> list[str | list[str]]:
 
 
 @pytest.mark.nightly
-@pytest.mark.parametrize("name", [name for name, text in TEXTS.items() if commands(text) and name != "architecture.md"])
-def test_the_path_of_a_document_can_be_walked(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Every command and every piece of Python, one after the other in one folder, as a reader would."""
+@pytest.mark.parametrize(
+    "name", [name for name, text in TEXTS.items() if commands(text) and name != "architecture.md"]
+)
+def test_the_path_of_a_document_can_be_walked(
+    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Every command and every piece of Python, one after the other in one folder, as a reader
+    would."""
     monkeypatch.chdir(tmp_path)
     (tmp_path / "my.toml").write_text(OWN_SCENE)
     (tmp_path / "main").mkdir()
@@ -237,12 +276,16 @@ def test_the_path_of_a_document_can_be_walked(name: str, tmp_path: Path, monkeyp
             continue
         text = shlex.join(step)
         if not any(word in text for word in NOT_HERE):
-            # 1: a check failed, a run is inaccurate, as some documents show; 2 is a command that is not understood.
+            # 1: a check failed, a run is inaccurate, as some documents show; 2 is a command that is
+            # not understood.
             assert rotor_mbs(*shlex.split(SHORTER.get(text, text))).status in (0, 1), text
 
 
-def test_every_public_name_key_command_and_method_is_on_a_reference_page(monkeypatch: pytest.MonkeyPatch) -> None:
-    """`sphinx-build` itself fails where a built-in array is missing from the page of the file format."""
+def test_every_public_name_key_command_and_method_is_on_a_reference_page(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """`sphinx-build` itself fails where a built-in array is missing from the page of the file
+    format."""
     pytest.importorskip("sphinx", reason="extra docs")
     monkeypatch.syspath_prepend(str(ROOT / "docs" / "_ext"))
     from reference import declared_pages

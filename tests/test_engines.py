@@ -1,4 +1,5 @@
-"""The engines of examples/engines: each where its package is installed, on a scene with every term, by its defects."""
+"""The engines of examples/engines: each where its package is installed, on a scene with every term,
+by its defects."""
 
 from __future__ import annotations
 
@@ -13,7 +14,8 @@ import rotor_mbs as rm
 from rotor_mbs.methods.catalogue import check_names
 
 FOLDER = Path(__file__).parents[1] / "examples" / "engines"
-# Of each file its package, and per method what defects it may have, rad: round-off, or of the default step.
+# Of each file its package, and per method what defects it may have, rad: round-off, or of the
+# default step.
 ENGINES = {
     "pinocchio": ("pinocchio", {"dop853": 1e-12, "euler": 1e-3}),
     "drake": ("pydrake", {"rk5": 1e-12, "rk3": 1e-6, "radau3": 1e-5, "discrete": 1e-3}),
@@ -36,15 +38,23 @@ def test_an_engine_agrees_with_the_closed_form(name: str) -> None:
     package, bounds = ENGINES[name]
     if util.find_spec(package) is None:
         pytest.skip(f"{package} is not installed")
-    scene = rm.scene("check/pitch-loads").replace(duration=0.7, samples=71, outputs=["angles", "rates"])
+    scene = rm.scene("check/pitch-loads").replace(
+        duration=0.7, samples=71, outputs=["angles", "rates"]
+    )
     blades = tuple(replace(blade, cone=0.3 - 0.2 * i) for i, blade in enumerate(scene.blades))
     scene = replace(scene, shaft_tilt=-0.2, blades=blades)
     try:
-        assert set(check_names(str(FOLDER / f"{name}.py"))) == {f"{name}/{method}" for method in bounds}
+        assert set(check_names(str(FOLDER / f"{name}.py"))) == {
+            f"{name}/{method}" for method in bounds
+        }
         for method, bound in bounds.items():
             full = f"{name}/{method}"
             run = rm.run(scene, full, **TIGHT.get(full, {}))
-            assert (run.status, run.metrics["defect_max"] <= bound) == ("ok", True), (full, run.message, run.metrics)
+            assert (run.status, run.metrics["defect_max"] <= bound) == ("ok", True), (
+                full,
+                run.message,
+                run.metrics,
+            )
             with pytest.raises(rm.MethodRefusal, match="blades without inertia"):
                 rm.run("check/held", full)
     finally:

@@ -1,4 +1,5 @@
-"""Packages from outside: tests/extension/rotor_rk4.py adds a method, rotor_momentum.py an output quantity.
+"""Packages from outside: tests/extension/rotor_rk4.py adds a method, rotor_momentum.py an output
+quantity.
 
 Each is one module, found by its entry point; no file of rotor_mbs knows them.
 """
@@ -33,7 +34,11 @@ PACKAGES = {
     "rotor_rk4": ("rotor_mbs.methods", {"rk4": "rotor_rk4:METHOD"}),
     "rotor_momentum": (
         "rotor_mbs.quantities",
-        {"momentum": "rotor_momentum:QUANTITY", "broken": "rotor_momentum:NOTHING", "number": "math:pi"},
+        {
+            "momentum": "rotor_momentum:QUANTITY",
+            "broken": "rotor_momentum:NOTHING",
+            "number": "math:pi",
+        },
     ),
 }
 METHODS = ("outside/rk4", "lagrange/dop853", "exudyn_tree/rk67")
@@ -47,7 +52,8 @@ SCENE = rm.scene("check/general").replace(
 
 @pytest.fixture(scope="module", autouse=True)
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
-    """A folder on the path with the packages as an installer leaves them, and two scenes; commands run there."""
+    """A folder on the path with the packages as an installer leaves them, and two scenes; commands
+    run there."""
     folder = tmp_path_factory.mktemp("site")
     for module, (group, entry_points) in PACKAGES.items():
         install(folder, module, (SOURCES / f"{module}.py").read_text(), group, entry_points)
@@ -56,7 +62,10 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
     with pytest.MonkeyPatch.context() as patch:
         patch.chdir(folder)
         patch.syspath_prepend(folder)
-        patch.setenv("PYTHONPATH", os.pathsep.join([str(folder), *filter(None, [os.environ.get("PYTHONPATH")])]))
+        patch.setenv(
+            "PYTHONPATH",
+            os.pathsep.join([str(folder), *filter(None, [os.environ.get("PYTHONPATH")])]),
+        )
         forget_what_is_installed()
         yield folder
     forget_what_is_installed()
@@ -70,7 +79,9 @@ def command(*words: str, status: int = 0) -> str:
 
 def test_list_show_and_a_wrong_name_know_the_method() -> None:
     assert "  outside/rk4  " in command("list")
-    assert json.loads(command("show", "one.toml", "--json"))["models"]["outside"]["methods"] == ["outside/rk4"]
+    assert json.loads(command("show", "one.toml", "--json"))["models"]["outside"]["methods"] == [
+        "outside/rk4"
+    ]
     assert "step" in command("show", "outside/rk4")
     assert "outside/rk4" in command("run", "one.toml", "-m", "outside/rk5", status=2)
     assert "no springs" in command("run", "stiff/bearing-1e4", "-m", "outside/rk4", status=2)
@@ -92,12 +103,14 @@ def test_a_run_is_stored_judged_and_checked(stored: Path) -> None:
     assert (run.status, run.settings) == ("ok", {"step": 2e-3})
     assert np.abs(run.angles - other.angles).max() < 1e-9  # order 4: 1e-11 at this step
     assert np.abs(run["tip"] - other["tip"]).max() < 1e-8
-    assert "shaft_momentum" not in rm.run("one.toml", "outside/rk4").quantities  # nobody asked for it
+    # nobody asked for it
+    assert "shaft_momentum" not in rm.run("one.toml", "outside/rk4").quantities
     assert "defect: two outside/rk4" in command("check", str(stored), "-v")
 
 
 def test_a_sweep_takes_its_runs_side_by_side_and_judges_them_by_its_own_bounds() -> None:
-    """Nine runs, each once; at a step of 0.1 s, 0.8 rad of a fast pitch, they are over the package's own bound."""
+    """Nine runs, each once; at a step of 0.1 s, 0.8 rad of a fast pitch, they are over the
+    package's own bound."""
     method, blocks = find_method("outside/rk4"), []
     solve_many = method.solve_many
 
@@ -141,10 +154,16 @@ def moved(scene: Scene, pitch: float) -> Trajectory:
     return Trajectory(time, np.full((scene.samples, 4), pitch), np.zeros((scene.samples, 4)))
 
 
-@pytest.mark.parametrize(("error", "status"), [(0.9, "ok"), (1.1, "inaccurate"), (math.nan, "inaccurate")])
-def test_it_is_judged_against_the_same_producer_applied_to_the_reference(error: float, status: str) -> None:
+@pytest.mark.parametrize(
+    ("error", "status"), [(0.9, "ok"), (1.1, "inaccurate"), (math.nan, "inaccurate")]
+)
+def test_it_is_judged_against_the_same_producer_applied_to_the_reference(
+    error: float, status: str
+) -> None:
     """At rest there is no momentum, in N m s."""
-    asked = rm.scene("paper/fig08").replace(duration=0.5, samples=11, outputs=["angles", "momentum"])
+    asked = rm.scene("paper/fig08").replace(
+        duration=0.5, samples=11, outputs=["angles", "momentum"]
+    )
     asked = asked.replace(**{"initial.angles": [1.0] * 4})
     exact, run = moved(asked, 1.0), moved(asked, 1.0)
     run.quantities["shaft_momentum"] = np.full(asked.samples, error)
@@ -169,7 +188,9 @@ def test_a_producer_of_another_shape_is_refused() -> None:
 
 @pytest.mark.parametrize("method", ["lagrange/taylor", "lagrange/dop853"])
 def test_a_sweep_stores_a_quantity(method: str) -> None:
-    scene = rm.scene("paper/fig11").replace(duration=0.2, samples=5, outputs=["angles", "rates", "momentum"])
+    scene = rm.scene("paper/fig11").replace(
+        duration=0.2, samples=5, outputs=["angles", "rates", "momentum"]
+    )
     data = rm.sweep(scene, {"gravity": [9.0, 10.0]}, methods=[method], outputs=[*scene.outputs])
     for i, gravity in enumerate((9.0, 10.0)):
         alone = rm.run(scene.replace(gravity=gravity), method)["shaft_momentum"]
@@ -178,7 +199,18 @@ def test_a_sweep_stores_a_quantity(method: str) -> None:
 
 @pytest.mark.full
 def test_bench_measures_its_ladder_and_its_order() -> None:
-    command("bench", "one.toml", "-m", "outside/rk4", "-o", "bench.h5", "--repeats", "2", "--budget", "30")
+    command(
+        "bench",
+        "one.toml",
+        "-m",
+        "outside/rk4",
+        "-o",
+        "bench.h5",
+        "--repeats",
+        "2",
+        "--budget",
+        "30",
+    )
     (curve,) = read_records(Path("bench.h5"), "bench")
     assert (curve.name, curve.attributes["order_expected"]) == ("outside/rk4", 4)
     assert abs(curve.attributes["order"] - 4.0) < 0.3

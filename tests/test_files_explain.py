@@ -1,4 +1,5 @@
-"""What files, scenes, runs and long calls tell of themselves: `show FILE`, `rotor_mbs.open`, reprs, progress."""
+"""What files, scenes, runs and long calls tell of themselves: `show FILE`, `rotor_mbs.open`, reprs,
+progress."""
 
 from __future__ import annotations
 
@@ -40,15 +41,25 @@ def files(scene: rm.Scene, tmp_path_factory: pytest.TempPathFactory) -> dict[str
     data = {"time": np.linspace(0.0, 0.5, 26), "rotor": np.zeros(26)}
     curve = rotor(np.sin, np.cos, np.sin, np.cos)
     two = [
-        Made(paper(name, samples=51), method, curve) for name in ("fig08", "fig11") for method in ("reference", METHOD)
+        Made(paper(name, samples=51), method, curve)
+        for name in ("fig08", "fig11")
+        for method in ("reference", METHOD)
     ]
     many = []
     for name in (f"fig{number}" for number in ("08", "09", "11", "12", "13b", "14a")):
         many += [Made(paper(name, samples=3), method, curve) for method in ("reference", *SEVEN)]
     rm.run(scene, [METHOD]).save(folder / "one.h5")
-    rm.sweep(scene, {"bearing.stiffness": [0.0, 10.0]}, methods=METHOD, samples=5, output=folder / "sweep.h5")
+    rm.sweep(
+        scene,
+        {"bearing.stiffness": [0.0, 10.0]},
+        methods=METHOD,
+        samples=5,
+        output=folder / "sweep.h5",
+    )
     rm.modes(scene, [0.0, 1.0]).save(folder / "modes.h5")
-    rm.compare(data, scene, columns={"omit": ["pitch_1", "pitch_2", "pitch_3"]}).save(folder / "comparison.h5")
+    rm.compare(data, scene, columns={"omit": ["pitch_1", "pitch_2", "pitch_3"]}).save(
+        folder / "comparison.h5"
+    )
     return {
         **{path.stem: path for path in folder.iterdir() if path.suffix == ".h5"},
         "two": store(folder / "two.h5", two),
@@ -57,9 +68,14 @@ def files(scene: rm.Scene, tmp_path_factory: pytest.TempPathFactory) -> dict[str
 
 
 SEVEN = (
-    "printed/ode45", "printed_e1/ode45", "lagrange/taylor", "lagrange/ode45", METHOD, "exudyn_tree/rk67",
+    "printed/ode45",
+    "printed_e1/ode45",
+    "lagrange/taylor",
+    "lagrange/ode45",
+    METHOD,
+    "exudyn_tree/rk67",
     "exudyn_chain/extrapolated",
-)  # fmt: skip
+)
 
 
 def fits(text: str) -> bool:
@@ -70,11 +86,28 @@ def fits(text: str) -> bool:
 @pytest.mark.parametrize(
     ("name", "parts"),
     {
-        "one": ("results", "paper/fig08", METHOD, "angles, rates, tip, energy", "1 ok", "rotor-mbs check", "0.5"),
+        "one": (
+            "results",
+            "paper/fig08",
+            METHOD,
+            "angles, rates, tip, energy",
+            "1 ok",
+            "rotor-mbs check",
+            "0.5",
+        ),
         "two": ("results", "paper/fig08, paper/fig11", METHOD),
         "sweep": ("sweep", "bearing.stiffness  N m/rad  0     10  2", "2 ok", METHOD),
-        "modes": ("modes", "lagrange, exudyn_tree, exudyn_chain", "damped (Hz)", "modes differ by at most"),
-        "comparison": ("comparison", "data/trajectory  paper/fig08, changed: duration  26    0.5", "1e-06"),
+        "modes": (
+            "modes",
+            "lagrange, exudyn_tree, exudyn_chain",
+            "damped (Hz)",
+            "modes differ by at most",
+        ),
+        "comparison": (
+            "comparison",
+            "data/trajectory  paper/fig08, changed: duration  26    0.5",
+            "1e-06",
+        ),
     }.items(),
 )
 def test_show_tells_what_is_in_a_file_and_what_to_do_next(
@@ -82,7 +115,12 @@ def test_show_tells_what_is_in_a_file_and_what_to_do_next(
 ) -> None:
     shown = rotor_mbs("show", files[name])
     assert (shown.status, shown.err) == (0, "")
-    for part in (*parts, f"rotor_mbs {rm.__version__}", f"rotor-mbs report {files[name]}", "rm.open("):
+    for part in (
+        *parts,
+        f"rotor_mbs {rm.__version__}",
+        f"rotor-mbs report {files[name]}",
+        "rm.open(",
+    ):
         assert part in shown.out, part
     assert fits(shown.out)
     facts = json.loads(rotor_mbs("show", files[name], "--json").out)
@@ -93,7 +131,14 @@ def test_show_tells_what_is_in_a_file_and_what_to_do_next(
 
 def test_show_of_runs_that_are_not_ok_has_their_reasons(tmp_path: Path) -> None:
     failed = {"status": "solver_failed", "message": "the step became too small"}
-    made = [Made(paper("fig08", samples=11), METHOD, rotor(np.sin, np.cos, np.sin, np.cos), attributes=failed)]
+    made = [
+        Made(
+            paper("fig08", samples=11),
+            METHOD,
+            rotor(np.sin, np.cos, np.sin, np.cos),
+            attributes=failed,
+        )
+    ]
     out = rotor_mbs("show", store(tmp_path / "r.h5", made)).out
     assert f"paper/fig08 {METHOD} solver_failed: the step became too small" in out
 
@@ -104,7 +149,9 @@ def test_show_of_a_file_that_is_none(tmp_path: Path) -> None:
     assert "not an HDF5 file" in refusal("show", tmp_path / "other.h5")
 
 
-def test_show_of_a_method_file_lists_its_settings(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_show_of_a_method_file_lists_its_settings(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.chdir(tmp_path)
     Path("mine.py").write_text((Path(__file__).parent / "extension" / "rotor_rk4.py").read_text())
     out = rotor_mbs("show", "mine.py").out
@@ -114,14 +161,20 @@ def test_show_of_a_method_file_lists_its_settings(tmp_path: Path, monkeypatch: p
 def test_what_was_saved_is_opened(scene: rm.Scene, files: dict[str, Path]) -> None:
     runs = rm.open(files["one"])
     assert list(runs) == ["reference", METHOD]
-    assert runs[f"paper/fig08/{METHOD}"].status == runs["paper/fig08"][METHOD].status == runs[METHOD].status == "ok"
+    assert (
+        runs[f"paper/fig08/{METHOD}"].status
+        == runs["paper/fig08"][METHOD].status
+        == runs[METHOD].status
+        == "ok"
+    )
     assert list(rm.open(files["two"])) == [
         f"paper/{name}/{m}" for name in ("fig08", "fig11") for m in ("reference", METHOD)
     ]
     modes = rm.open(files["modes"])
     assert modes.agrees
     np.testing.assert_array_equal(
-        modes.rotation["lagrange"].eigenvalues, rm.modes(scene, [0.0, 1.0]).rotation["lagrange"].eigenvalues
+        modes.rotation["lagrange"].eigenvalues,
+        rm.modes(scene, [0.0, 1.0]).rotation["lagrange"].eigenvalues,
     )
     comparison = rm.open(files["comparison"])
     assert comparison.verdict.rows == 26
@@ -154,19 +207,24 @@ def test_a_file_is_opened_once_and_a_run_reads_its_scene_alone(
     assert [groups for groups in opened if groups] == [["paper/fig11"]]
     # Another file in its place is seen.
     Path(shutil.copy(files["one"], tmp_path / "other.h5")).replace(path)
-    with pytest.raises(rm.StoreError, match=f"has no {label} any more: another file has taken its place"):
+    with pytest.raises(
+        rm.StoreError, match=(f"has no {label} any more: another file has taken its place")
+    ):
         _ = runs[label]
 
 
 def test_tables_of_a_file_are_kept_by_the_path_as_it_is_given(
     files: dict[str, Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A message has the path that was asked for, and what one caller adds or removes is not another's."""
+    """A message has the path that was asked for, and what one caller adds or removes is not
+    another's."""
     path = Path(shutil.copy(files["one"], tmp_path / "one.h5"))
     os.utime(path, (1e9, 1e9))  # long ago
     first = table.opened_tables(path)
     monkeypatch.chdir(tmp_path)
-    assert {stored.path for stored in table.opened_tables(Path("one.h5")).tables.values()} == {Path("one.h5")}
+    assert {stored.path for stored in table.opened_tables(Path("one.h5")).tables.values()} == {
+        Path("one.h5")
+    }
     first.tables.clear()
     assert {stored.path for stored in table.opened_tables(path).tables.values()} == {path}
 
@@ -176,7 +234,9 @@ def test_a_sweep_has_no_scene_of_a_label(files: dict[str, Path]) -> None:
         _ = rm.open(files["sweep"])["paper/fig08"]
 
 
-def test_the_short_table_of_a_scene_is_of_its_own_runs(files: dict[str, Path], monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_short_table_of_a_scene_is_of_its_own_runs(
+    files: dict[str, Path], monkeypatch: pytest.MonkeyPatch
+) -> None:
     """Also where it has so many that it is one of methods."""
     monkeypatch.setattr("rotor_mbs.api.runs.MOST_ROWS", 1)
     runs = rm.open(files["many"])
@@ -186,16 +246,25 @@ def test_the_short_table_of_a_scene_is_of_its_own_runs(files: dict[str, Path], m
     assert "6 of 6" not in repr(runs["paper/fig11"])
 
 
-def test_each_command_that_reads_a_file_prepares_it(files: dict[str, Path], monkeypatch: pytest.MonkeyPatch) -> None:
-    """The process that reads is started before the command's own code is loaded; a scene needs none."""
+def test_each_command_that_reads_a_file_prepares_it(
+    files: dict[str, Path], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The process that reads is started before the command's own code is loaded; a scene needs
+    none."""
     prepared: list[str] = []
     monkeypatch.setattr(untrusted, "prepare_reading", lambda: prepared.append("once"))
-    for words, count in ((["show", files["one"]], 1), (["check", files["one"]], 2), (["show", "paper/fig08"], 2)):
+    for words, count in (
+        (["show", files["one"]], 1),
+        (["check", files["one"]], 2),
+        (["show", "paper/fig08"], 2),
+    ):
         assert rotor_mbs(*words).status == 0
         assert len(prepared) == count
 
 
-def test_check_reads_the_scenes_of_a_file_once(files: dict[str, Path], monkeypatch: pytest.MonkeyPatch) -> None:
+def test_check_reads_the_scenes_of_a_file_once(
+    files: dict[str, Path], monkeypatch: pytest.MonkeyPatch
+) -> None:
     read: list[Path | None] = []
     scenes_checked = check.scenes_checked
 
@@ -225,7 +294,10 @@ def test_several_modes_and_comparisons_of_a_file_are_a_dict(tmp_path: Path) -> N
 
 
 def test_reprs_fit_a_screen_and_have_units(scene: rm.Scene, files: dict[str, Path]) -> None:
-    blades = [{"mass": 10.0 + i, "centre_of_mass": [0.1, 0.0, 5.0], "tip": [0.0, 0.0, 9.0]} for i in range(9)]
+    blades = [
+        {"mass": 10.0 + i, "centre_of_mass": [0.1, 0.0, 5.0], "tip": [0.0, 0.0, 9.0]}
+        for i in range(9)
+    ]
     large = rm.scene("paper/fig08").replace(
         blades=9, blade=blades, torque={"rotor": [[float(i), i + 0.5] for i in range(500)]},
         initial={"angles": [0.0] * 10, "rates": [0.0] * 10},
@@ -237,7 +309,9 @@ def test_reprs_fit_a_screen_and_have_units(scene: rm.Scene, files: dict[str, Pat
     assert "... 494 more]" in repr(large)
     run = rm.open(files["one"])[METHOD]
     assert fits(repr(run))
-    assert "angles (26, 4) rad, rates (26, 4) rad/s, tip (26, 3, 3) m" in " ".join(repr(run).split())
+    assert "angles (26, 4) rad, rates (26, 4) rad/s, tip (26, 3, 3) m" in " ".join(
+        repr(run).split()
+    )
     assert "rotor_angle_max 0 rad" in repr(run)
     assert "largest magnitude of a pitch angle" not in repr(run)
     assert " rad</td>" in run._repr_html_()
@@ -252,11 +326,17 @@ def test_plots_in_a_notebook_have_legends(files: dict[str, Path]) -> None:
     runs, modes, comparison = (rm.open(files[name]) for name in ("one", "modes", "comparison"))
     run = runs[METHOD]
     plots: list[tuple[Callable[[], rm.report.canvas.Panels], str]] = [
-        (run.plot, "pitch 3"), (run.plot.energy, "kinetic"), (run.plot.tips, "blade 1"),
-        (run.plot.error, "closed form"), (runs.plot, "closed form"), (runs.plot.rotor, "closed form"),
-        (modes.plot, "collective pitch"), (modes.plot.damping, "sine pitch"), (modes.plot.multipliers, "largest"),
+        (run.plot, "pitch 3"),
+        (run.plot.energy, "kinetic"),
+        (run.plot.tips, "blade 1"),
+        (run.plot.error, "closed form"),
+        (runs.plot, "closed form"),
+        (runs.plot.rotor, "closed form"),
+        (modes.plot, "collective pitch"),
+        (modes.plot.damping, "sine pitch"),
+        (modes.plot.multipliers, "largest"),
         (comparison.plot, "rotor"),
-    ]  # fmt: skip
+    ]
     for plot, label in plots:
         legend = plot().axes[0].get_legend()
         assert any(label in text.get_text() for text in legend.get_texts()), (plot, label)
@@ -272,11 +352,21 @@ class Screen(io.StringIO):
 
 CALLS: dict[str, Callable[[rm.Scene, bool | None], object]] = {
     "run": lambda scene, shown: rm.run(scene, [METHOD], progress=shown),
-    "sweep": lambda scene, shown: rm.sweep(scene, {"gravity": [9.7, 9.8]}, methods=METHOD, samples=3, progress=shown),
-    "compare": lambda scene, shown: rm.compare({"time": [0.0, 0.1, 0.2], "rotor": np.zeros(3)}, scene,
-                                               columns={"omit": ["pitch_1", "pitch_2", "pitch_3"]}, progress=shown),
-}  # fmt: skip
-SEEN = {"run": f"[2/2] paper/fig08 {METHOD} ok", "sweep": "runs 2/2", "compare": "interval defects 1/4"}
+    "sweep": lambda scene, shown: rm.sweep(
+        scene, {"gravity": [9.7, 9.8]}, methods=METHOD, samples=3, progress=shown
+    ),
+    "compare": lambda scene, shown: rm.compare(
+        {"time": [0.0, 0.1, 0.2], "rotor": np.zeros(3)},
+        scene,
+        columns={"omit": ["pitch_1", "pitch_2", "pitch_3"]},
+        progress=shown,
+    ),
+}
+SEEN = {
+    "run": f"[2/2] paper/fig08 {METHOD} ok",
+    "sweep": "runs 2/2",
+    "compare": "interval defects 1/4",
+}
 
 
 @pytest.mark.parametrize("name", CALLS)
@@ -328,7 +418,8 @@ def test_a_notebook_shows_a_line_that_is_renewed(monkeypatch: pytest.MonkeyPatch
 
 
 def test_a_changed_scene_says_so_wherever_its_name_stands(tmp_path: Path) -> None:
-    """In `show FILE`, in the tables of runs, in a sweep, in modes, in a comparison; each as it was stored."""
+    """In `show FILE`, in the tables of runs, in a sweep, in modes, in a comparison; each as it was
+    stored."""
     label = "paper/fig08, changed: gravity"
     scene = rm.scene("paper/fig08").replace(gravity=9.0, samples=11)
     curve = rotor(np.sin, np.cos, np.sin, np.cos)
@@ -339,7 +430,13 @@ def test_a_changed_scene_says_so_wherever_its_name_stands(tmp_path: Path) -> Non
     assert repr(one[METHOD]).startswith(f"{label}: ")
     assert label in str(two.table())
     sweep = tmp_path / "sweep.h5"
-    rm.sweep(scene.replace(duration=0.1), {"bearing.stiffness": [0.0, 10.0]}, methods=METHOD, samples=5, output=sweep)
+    rm.sweep(
+        scene.replace(duration=0.1),
+        {"bearing.stiffness": [0.0, 10.0]},
+        methods=METHOD,
+        samples=5,
+        output=sweep,
+    )
     modes = rm.modes(scene)
     modes.save(tmp_path / "modes.h5")
     assert repr(modes) == repr(rm.open(tmp_path / "modes.h5"))

@@ -1,4 +1,5 @@
-"""The package without heyoka, as on macOS and Windows; skipped where it is installed (.ci/without-heyoka hides it)."""
+"""The package without heyoka, as on macOS and Windows; skipped where it is installed
+(.ci/without-heyoka hides it)."""
 
 from __future__ import annotations
 
@@ -30,7 +31,8 @@ def test_dop853_is_chosen_in_place_of_taylor() -> None:
 def test_a_run_and_a_computed_reference_are_ok() -> None:
     run = rm.run(short_scene(), DOP853, reference=True)
     assert run.status == "ok"
-    assert run.metrics["angle_error_max"] < 1e-9  # both by DOP853, the reference at a tolerance of 1e-14
+    # both by DOP853, the reference at a tolerance of 1e-14
+    assert run.metrics["angle_error_max"] < 1e-9
 
 
 def test_samples_that_are_no_motion_are_judged_and_end() -> None:

@@ -1,4 +1,5 @@
-"""Draw docs/defects.svg: what is allowed and what is found, of a good run and of one with a small fault from 5 s on.
+"""Draw docs/defects.svg: what is allowed and what is found, of a good run and of one with a small
+fault from 5 s on.
 
 Run: python docs/_ext/draw_defects.py
 """
@@ -24,11 +25,15 @@ PICTURE = Path(__file__).parents[1] / "defects.svg"
 
 
 def curves() -> tuple[Array, Array, Array, Array]:
-    """Return ends of intervals (s), what is allowed, and the defects of the faulty and of the good run (rad)."""
+    """Return ends of intervals (s), what is allowed, and the defects of the faulty and of the good
+    run (rad)."""
     scene = rm.scene("paper/fig11")
     good = rm.run(scene, METHOD)
     first = int(np.searchsorted(good.time, FAULT_TIME_S))
-    start = {"initial.angles": good.angles[first].tolist(), "initial.rates": good.rates[first].tolist()}
+    start = {
+        "initial.angles": good.angles[first].tolist(),
+        "initial.rates": good.rates[first].tolist(),
+    }
     rest = scene.replace(
         gravity=scene.gravity * (1.0 + FAULT),
         duration=scene.duration - FAULT_TIME_S,
@@ -53,7 +58,9 @@ def main() -> None:
     ends, *sizes = curves()
     looks = (
         Look("#333333", "--", "", "allowed"),
-        Look("#d55e00", "-", "", f"found: gravity {FAULT:.0e} too large from {FAULT_TIME_S:g} s on"),
+        Look(
+            "#d55e00", "-", "", (f"found: gravity {FAULT:.0e} too large from {FAULT_TIME_S:g} s on")
+        ),
         Look("#0072b2", "-", "", "found: good run"),
     )
     series = [Series(ends, values, look) for values, look in zip(sizes, looks, strict=True)]

@@ -21,7 +21,8 @@ TREE = "exudyn_tree/rk67"
 
 
 def draw(results: Path) -> None:
-    """Draw the rotor angle of Fig. 11 as printed, corrected and by Exudyn, and the differences from the reference."""
+    """Draw the rotor angle of Fig. 11 as printed, corrected and by Exudyn, and the differences from
+    the reference."""
     with open_results(results) as opened:
         scene = opened.scenes["paper/fig11"]
         runs = {name: scene.runs[name] for name in ("reference", "printed/ode45", TREE)}
@@ -46,8 +47,13 @@ def draw(results: Path) -> None:
         shown += gap[np.isfinite(gap)].tolist()
     canvas.log_axis(below, min(shown), max(shown))
     below.set_ylabel("difference (rad)")
-    title = "Rotor angle in Fig. 11: the printed equations depart; corrected ones and Exudyn coincide"
-    description = "Above: rotor angle over time. Below: largest difference of an angle from the corrected equations."
+    title = (
+        "Rotor angle in Fig. 11: the printed equations depart; corrected ones and Exudyn coincide"
+    )
+    description = (
+        "Above: rotor angle over time. Below: largest difference of an angle from the "
+        "corrected equations."
+    )
     TARGET.write_bytes(canvas.encoded(panels.figure, "svg", title=title, description=description))
 
 

@@ -1,7 +1,8 @@
 """The reference pages, generated from the program itself before Sphinx reads the sources.
 
-`docs/reference/` is made anew by every build: docstrings, the scene's and the sweep's keys, the parser of the command
-line, the catalogue of methods, the bounds, and the arrays of files that are written for this purpose.
+`docs/reference/` is made anew by every build: docstrings, the scene's and the sweep's keys, the
+parser of the command line, the catalogue of methods, the bounds, and the arrays of files that are
+written for this purpose.
 """
 
 from __future__ import annotations
@@ -73,16 +74,22 @@ def _pages_of_api() -> dict[str, str]:
         "`rotor_mbs.testing`": {
             name: f"rotor_mbs.testing.{name}"
             for name, item in vars(rotor_mbs.testing).items()
-            if inspect.isfunction(item) and item.__module__ == "rotor_mbs.testing" and not name.startswith("_")
+            if inspect.isfunction(item)
+            and item.__module__ == "rotor_mbs.testing"
+            and not name.startswith("_")
         },
     }
     known = {id(_object(place)) for names in groups.values() for place in names.values()}
     groups["Returned objects"] = {
-        item.__name__: f"{item.__module__}.{item.__name__}" for item in _returned(known) if id(item) not in known
+        item.__name__: f"{item.__module__}.{item.__name__}"
+        for item in _returned(known)
+        if id(item) not in known
     }
     known |= {id(_object(place)) for place in groups["Returned objects"].values()}
     groups["For methods and quantities of other packages"] = {
-        name: place for name, place in _imports_of_extensions().items() if id(_object(place)) not in known
+        name: place
+        for name, place in _imports_of_extensions().items()
+        if id(_object(place)) not in known
     }
     pages, parts = {}, []
     for heading, names in groups.items():
@@ -90,10 +97,17 @@ def _pages_of_api() -> dict[str, str]:
         for name, place in sorted(names.items()):
             item = _object(place)
             first = " ".join((inspect.getdoc(item) or "").split("\n\n")[0].split())
-            rows.append([f"[`{name}`](api/{name}.md)", first.split(". ")[0].rstrip(".:").replace("*", r"\*")])
+            rows.append(
+                [
+                    f"[`{name}`](api/{name}.md)",
+                    first.split(". ")[0].rstrip(".:").replace("*", r"\*"),
+                ]
+            )
             if inspect.isclass(item):
                 own = any(base.__module__.startswith("rotor_mbs.") for base in item.__bases__)
-                directive = f".. autoclass:: {place}\n   :members:" + "\n   :show-inheritance:" * own
+                directive = (
+                    f".. autoclass:: {place}\n   :members:" + "\n   :show-inheritance:" * own
+                )
             else:
                 directive = f".. autofunction:: {place}"
             pages[f"api/{name}"] = page(f"{name}", fenced(directive, "{eval-rst}"))
@@ -109,7 +123,8 @@ def _object(place: str) -> Any:
 
 
 def _returned(public: set[int]) -> list[type]:
-    """Classes of this package that public functions and properties return, and their base classes."""
+    """Classes of this package that public functions and properties return, and their base
+    classes."""
     found: dict[type, None] = {}
     todo = [_object(f"rotor_mbs.{name}") for name in rotor_mbs.__all__]
     for item in todo:
@@ -118,7 +133,9 @@ def _returned(public: set[int]) -> list[type]:
             members = [member for name, member in vars(item).items() if not name.startswith("_")]
             bases = [base for base in item.__bases__ if base.__module__.startswith("rotor_mbs.")]
         for member in members:
-            function = member.fget if isinstance(member, property) else getattr(member, "func", member)
+            function = (
+                member.fget if isinstance(member, property) else getattr(member, "func", member)
+            )
             for kind in [*_classes(function), *bases]:
                 if kind not in found and id(kind) not in public:
                     found[kind] = None
@@ -131,17 +148,24 @@ def _classes(function: Any) -> list[type]:
     module = inspect.getmodule(function)
     names = {**vars(module), **_type_checking_imports(module)} if module else {}
     kinds = [names.get(word) for word in re.findall(r"\w+", text)]
-    return [kind for kind in kinds if inspect.isclass(kind) and kind.__module__.startswith("rotor_mbs.")]
+    return [
+        kind for kind in kinds if inspect.isclass(kind) and kind.__module__.startswith("rotor_mbs.")
+    ]
 
 
 def _type_checking_imports(module: Any) -> dict[str, Any]:
-    """What a module imports, also within functions and for type checkers alone, from this package."""
+    """What a module imports, also within functions and for type checkers alone, from this
+    package."""
     nodes = ast.walk(ast.parse(inspect.getsource(module)))
     imports = [
-        node for node in nodes if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("rotor_mbs")
+        node
+        for node in nodes
+        if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("rotor_mbs")
     ]
     return {
-        alias.asname or alias.name: getattr(importlib.import_module(node.module or ""), alias.name, None)
+        alias.asname or alias.name: getattr(
+            importlib.import_module(node.module or ""), alias.name, None
+        )
         for node in imports
         for alias in node.names
     }
@@ -170,7 +194,9 @@ def _command_line() -> str:
                 continue
             names = ", ".join(code(option) for option in action.option_strings)
             value = (
-                "" if action.nargs == 0 else str(action.metavar or "{" + ",".join(map(str, action.choices or ())) + "}")
+                ""
+                if action.nargs == 0
+                else str(action.metavar or "{" + ",".join(map(str, action.choices or ())) + "}")
             )
             text = (action.help or "") % {**vars(action), "prog": own.prog}
             if action.dest == "jobs":  # the number of cores of the machine that builds the pages
@@ -183,7 +209,9 @@ def _command_line() -> str:
             fenced(usage),
             table(["argument", "value", "meaning"], rows),
         ]
-        parts.append(fenced((own.epilog or "").partition("\n")[2].replace("  rotor-mbs", "rotor-mbs"), "sh"))
+        parts.append(
+            fenced((own.epilog or "").partition("\n")[2].replace("  rotor-mbs", "rotor-mbs"), "sh")
+        )
     return page("Command line", *parts)
 
 
@@ -197,7 +225,9 @@ def _keys(declared: Mapping[str, Mapping[str, Any]], prefix: str = "") -> str:
         if "optional" in key:
             value = key["optional"]
             empty = value is None or (isinstance(value, tuple | dict | list) and not value)
-            default = "none" if empty else code(value if not isinstance(value, tuple) else list(value))
+            default = (
+                "none" if empty else code(value if not isinstance(value, tuple) else list(value))
+            )
         rows.append([code(prefix + key["key"]), key["allowed"], default])
     return table(["key", "allowed values, meaning", "default"], rows)
 
@@ -207,7 +237,8 @@ def _scene_file() -> str:
     return page(
         "Scene file",
         "A TOML file. `a.b` is the key `b` of the table `[a]`. "
-        f"A number may be arithmetic in quotes: {expressions.ALLOWED}; it is parsed, not executed as code.",
+        f"A number may be arithmetic in quotes: {expressions.ALLOWED}; it is parsed, not "
+        "executed as code.",
         "## Keys",
         _keys(top),
         "## Blades",
@@ -222,7 +253,10 @@ def _scene_file() -> str:
 def _sweep_file() -> str:
     return page(
         "Sweep file",
-        "A TOML file with numbers as in a [scene file](scene-file.md); see [parameter studies](../sweeps.md).",
+        (
+            "A TOML file with numbers as in a [scene file](scene-file.md); see [parameter "
+            "studies](../sweeps.md)."
+        ),
         "## Keys",
         _keys(DESIGN_KEYS),
         "## `[[axis]]`",
@@ -261,31 +295,47 @@ def _methods() -> str:
             [code(name), setting["allowed"], setting["doc"], code(defaults[name])]
             for name, setting in method.settings.declared().items()
         ]
-        parts += [f"## {method.name}", _sentence(method.label), _sentence("; ".join(filter(None, facts)))]
+        parts += [
+            f"## {method.name}",
+            _sentence(method.label),
+            _sentence("; ".join(filter(None, facts))),
+        ]
         parts += [table(["setting", "allowed", "meaning", "default"], rows)] if rows else []
     return page("Methods and their settings", *parts)
 
 
-_BOUND_HEADS = {"value": "bound", "fault": "value with the known fault", "known_fault": "known fault"}
+_BOUND_HEADS = {
+    "value": "bound",
+    "fault": "value with the known fault",
+    "known_fault": "known fault",
+}
 
 
 def _bounds() -> str:
-    entries = tomllib.loads((ROOT / "reference" / "accuracy.toml").read_text(encoding="utf-8"))["bound"]
+    entries = tomllib.loads((ROOT / "reference" / "accuracy.toml").read_text(encoding="utf-8"))[
+        "bound"
+    ]
     names = list(dict.fromkeys(name for entry in entries for name in entry))
     by_check: dict[str, list[dict[str, Any]]] = {}
     for entry in entries:
         by_check.setdefault(entry["check"], []).append(entry)
     parts = [
-        "From `reference/accuracy.toml`. Of the entries that match check, method and scene the first one applies; `*` "
-        "matches any text, `|` separates patterns, and an entry without scenes applies to any scene. Bounds of "
+        "From `reference/accuracy.toml`. Of the entries that match check, method and scene the "
+        "first one applies; `*` "
+        "matches any text, `|` separates patterns, and an entry without scenes applies to any "
+        "scene. Bounds of "
         "`defect`, "
-        "`defect median`, `error` and `exact` are in rad; the others are relative, or counts. What is compared: "
+        "`defect median`, `error` and `exact` are in rad; the others are relative, or counts. "
+        "What is compared: "
         "[check](../check.md)."
     ]
     for check, own in by_check.items():
         shown = [name for name in names if name != "check" and any(name in entry for entry in own)]
         rows = [
-            [code(entry.get(name, "")) if name in ("method", "scenes") else entry.get(name, "") for name in shown]
+            [
+                code(entry.get(name, "")) if name in ("method", "scenes") else entry.get(name, "")
+                for name in shown
+            ]
             for entry in own
         ]
         parts += [f"## {check}", table([_BOUND_HEADS.get(name, name) for name in shown], rows)]
@@ -311,8 +361,14 @@ _MEANINGS = {
     "missing": "not computed yet",
     "ok": "defects, energy balance and error up to the horizon within the bounds",
     "inaccurate": "end reached, but one of these bounds is exceeded",
-    "diverged": "values that are not finite, although the engine reports success; `samples` ends before them",
-    "singular": "the mass matrix is singular at the start or becomes singular; what follows is not determined",
+    "diverged": (
+        "values that are not finite, although the engine reports success; `samples` ends "
+        "before them"
+    ),
+    "singular": (
+        "the mass matrix is singular at the start or becomes singular; what follows is "
+        "not determined"
+    ),
     "solver_failed": "end not reached: the engine reports a failure",
     "timed_out": "end not reached: time limit",
     "left_out": "point of a benchmark that was not computed because of the time budget",
@@ -322,31 +378,40 @@ _MEANINGS = {
 }
 _EXAMPLES = {
     "Results": (
-        "`run`, `reproduce` and `reference` write one row per run into `/runs`, and the arrays over time into a group "
-        "that has the name of the scene. Both have the same runs: the label in `/runs` is `SCENE/METHOD`, that in the "
+        "`run`, `reproduce` and `reference` write one row per run into `/runs`, and the arrays "
+        "over time into a group "
+        "that has the name of the scene. Both have the same runs: the label in `/runs` is "
+        "`SCENE/METHOD`, that in the "
         "scene's group `METHOD`.",
         "run scene.toml -m lagrange/dop853 -m exudyn_chain/extrapolated -o results.h5 -j 1",
     ),
     "Benchmarks": (
-        "`bench` writes a row per point (a method with one setting on a scene) into `/bench`, and the references into "
+        "`bench` writes a row per point (a method with one setting on a scene) into `/bench`, and "
+        "the references into "
         "`/runs` and the groups of the scenes.",
         "bench scene.toml -m lagrange/dop853 --budget 1 --repeats 1 -o bench.h5",
     ),
     "Sweeps": (
-        "`sweep` writes one flat table at the root. `run` is a number; each varied parameter is a variable. Compared "
-        "with a results file there is no reference and no error relative to one, there are no run times, "
-        "`error_growth` and `horizon_s` only with `error_growth = true`, and scene, methods and versions are "
-        "attributes instead of columns. `code` distinguishes rows of other versions. `rotor_angle_max` is the largest "
+        "`sweep` writes one flat table at the root. `run` is a number; each varied parameter is a "
+        "variable. Compared "
+        "with a results file there is no reference and no error relative to one, there are no "
+        "run times, "
+        "`error_growth` and `horizon_s` only with `error_growth = true`, and scene, methods and "
+        "versions are "
+        "attributes instead of columns. `code` distinguishes rows of other versions. "
+        "`rotor_angle_max` is the largest "
         "magnitude; in a results file it is the largest value, beside `rotor_angle_min`.",
         "sweep study.toml -o sweep.h5 -j 1",
     ),
     "Modes": (
-        "`modes` writes a group per scene, model and state (`rest`, `rotation`); Floquet multipliers are "
+        "`modes` writes a group per scene, model and state (`rest`, `rotation`); Floquet "
+        "multipliers are "
         "in a group of `lagrange`. All models have the same variables.",
         "modes scene.toml --speeds 0.5:1:2 -o modes.h5 -j 1",
     ),
     "Comparisons": (
-        "`compare` writes the data, the reference and their differences at the times of the data. Shown are the "
+        "`compare` writes the data, the reference and their differences at the times of the data. "
+        "Shown are the "
         "variables of one channel of each kind.",
         "compare data.csv --scene scene.toml -o .",
     ),
@@ -388,7 +453,10 @@ _ATTRIBUTES = {
     "notes": "results that could not be computed, with the reason",
     "label": "label of the model",
     "scene_label": "name of the scene, with what was changed in a shipped one",
-    "weights": "1/s^2, moments of all weights about the shaft divided by the inertia: what residuals are relative to",
+    "weights": (
+        "1/s^2, moments of all weights about the shaft divided by the inertia: what "
+        "residuals are relative to"
+    ),
     "symmetric": "1 if the modes are named after multiblade coordinates",
     "mode_labels": "names of the modes",
     "coordinate_labels": "names of the coordinates",
@@ -410,43 +478,75 @@ def _statuses() -> list[list[object]]:
 
 def _file_format() -> str:
     parts = [
-        "All files are HDF5 and readable as netCDF-4, without links or compression. Numbers are little-endian. Every "
-        "dataset has the attributes `units` and `long_name`, and every dimension has a dataset of the same name with "
-        "its values (a dimension scale), except `characters`, whose dataset has the length alone. The tables list the "
-        "content of files that were written when these pages were built; signs, frames and units are explained in "
+        "All files are HDF5 and readable as netCDF-4, without links or compression. Numbers are "
+        "little-endian. Every "
+        "dataset has the attributes `units` and `long_name`, and every dimension has a dataset of "
+        "the same name with "
+        "its values (a dimension scale), except `characters`, whose dataset has the length alone. "
+        "The tables list the "
+        "content of files that were written when these pages were built; signs, frames and units "
+        "are explained in "
         "[Reading results](../data.md).",
-        "**Rows.** A row is complete if its `status` is not -1 and its `crc32` is correct; a file is complete if all "
-        "rows are. Of a missing row only the columns that are known in advance (`run`, `scene`, `method_name`, "
-        "`settings`, `versions`, `scene_hash`, varied parameters, `split`) are valid; its other values are undefined. "
-        "In a complete row a value that does not exist or was not computed is NaN, -1 (integers) or an empty text.",
-        "**Arrays over time** have one entry per sample. A run that ended early has `samples` of them, and the rest is "
-        "NaN; in a sweep, which has no such column, the entries that are not NaN are those of the run. An array that "
+        "**Rows.** A row is complete if its `status` is not -1 and its `crc32` is correct; a file "
+        "is complete if all "
+        "rows are. Of a missing row only the columns that are known in advance (`run`, `scene`, "
+        "`method_name`, "
+        "`settings`, `versions`, `scene_hash`, varied parameters, `split`) are valid; its other "
+        "values are undefined. "
+        "In a complete row a value that does not exist or was not computed is NaN, -1 (integers) "
+        "or an empty text.",
+        "**Arrays over time** have one entry per sample. A run that ended early has `samples` of "
+        "them, and the rest is "
+        "NaN; in a sweep, which has no such column, the entries that are not NaN are those of the "
+        "run. An array that "
         "the method does not compute is NaN as a whole.",
-        "**Text** that is known when the file is created is a string of variable length, UTF-8. Computed text, such as "
-        "`message`, is an array of single characters (run, characters), UTF-8, padded with zeros; xarray reads it as "
+        "**Text** that is known when the file is created is a string of variable length, UTF-8. "
+        "Computed text, such as "
+        "`message`, is an array of single characters (run, characters), UTF-8, padded with zeros; "
+        "xarray reads it as "
         "text, h5py and MATLAB as [described here](../data.md).",
-        "**Versions.** The column `versions` is a JSON text with the versions of this package, Python, the libraries "
-        "and the code that computed the row. A sweep has the column `code` instead, the CRC-32 of that text: among "
-        "rows of one method those of other versions can be told apart, but the versions themselves are not stored. "
-        f"The attributes {', '.join(map(code, VERSIONED))} of `/` are of the process that created the file. Rows of "
-        "other versions are recomputed by the next `run`, `reproduce`, `bench` or `stability`; a sweep keeps them.",
-        "**Layout.** Datasets are contiguous, so that a row lies at a fixed offset and is written there when it is "
-        "computed. The datasets that are filled in this way are called *computed* here, the others *known in advance*. "
+        "**Versions.** The column `versions` is a JSON text with the versions of this package, "
+        "Python, the libraries "
+        "and the code that computed the row. A sweep has the column `code` instead, the CRC-32 of "
+        "that text: among "
+        "rows of one method those of other versions can be told apart, but the versions "
+        "themselves are not stored. "
+        f"The attributes {', '.join(map(code, VERSIONED))} of `/` are of the process that created "
+        "the file. Rows of "
+        "other versions are recomputed by the next `run`, `reproduce`, `bench` or `stability`; a "
+        "sweep keeps them.",
+        "**Layout.** Datasets are contiguous, so that a row lies at a fixed offset and is written "
+        "there when it is "
+        "computed. The datasets that are filled in this way are called *computed* here, the "
+        "others *known in advance*. "
         "The trailer of the file lists them.",
-        "**Checksum.** `crc32` of row r is the CRC-32 of zlib (`zlib.crc32`), with r, counted from 0, as its starting "
-        "value, over the bytes of the row in each computed dataset of `/runs` except `crc32`, in the order in which "
-        "they were created (h5py lists them so), then of the method's row in each computed dataset of its scene's "
-        "group that has the dimension `run`. For a reference the computed datasets without the dimension `run` follow "
-        "as a whole. In `/bench` and `/stability` only the table's own datasets are covered, in a sweep those of `/`, "
-        "where the starting value is the number `run`. Datasets known in advance are not covered, but by the digest. "
+        "**Checksum.** `crc32` of row r is the CRC-32 of zlib (`zlib.crc32`), with r, counted "
+        "from 0, as its starting "
+        "value, over the bytes of the row in each computed dataset of `/runs` except `crc32`, in "
+        "the order in which "
+        "they were created (h5py lists them so), then of the method's row in each computed "
+        "dataset of its scene's "
+        "group that has the dimension `run`. For a reference the computed datasets without the "
+        "dimension `run` follow "
+        "as a whole. In `/bench` and `/stability` only the table's own datasets are covered, in a "
+        "sweep those of `/`, "
+        "where the starting value is the number `run`. Datasets known in advance are not covered, "
+        "but by the digest. "
         "[Reading results](../data.md) has a program for results files.",
-        "**Trailer.** Behind the end of HDF5, which does not see it: a JSON text, its length (8 bytes, little-endian), "
-        "a SHA-256 (32 bytes) and the text `rmbs-end`. The JSON object has `format_version`, `kind` (`results`, "
-        "`sweep`, `modes`, `comparison` or `split of FILE`) and `groups`: by group, by name of each computed dataset "
-        "in the order of the checksum, offset and length of its values in bytes. The SHA-256 covers every byte before "
+        "**Trailer.** Behind the end of HDF5, which does not see it: a JSON text, its length (8 "
+        "bytes, little-endian), "
+        "a SHA-256 (32 bytes) and the text `rmbs-end`. The JSON object has `format_version`, "
+        "`kind` (`results`, "
+        "`sweep`, `modes`, `comparison` or `split of FILE`) and `groups`: by group, by name of "
+        "each computed dataset "
+        "in the order of the checksum, offset and length of its values in bytes. The SHA-256 "
+        "covers every byte before "
         "it except these values. `rotor-mbs` verifies it before it opens a file.",
         "## Status codes",
-        "The attributes `flag_values` and `flag_meanings` of every dataset `status` list the codes and their names.",
+        (
+            "The attributes `flag_values` and `flag_meanings` of every dataset `status` list the "
+            "codes and their names."
+        ),
         table(["code", "status", "meaning"], [[-1, "missing", _MEANINGS["missing"]], *_statuses()]),
     ]
     shown: dict[str, list[str]] = {}
@@ -483,21 +583,30 @@ def _call(command: str) -> None:
 
 
 def _contents(path: Path, shown: dict[str, list[str]], attributes: set[str]) -> list[str]:
-    """The groups of a file. shown: rows of the tables of the page, by their place, which are not repeated; attributes:
-    receives the names of all attributes."""
+    """The groups of a file. shown: rows of the tables of the page, by their place, which are not
+    repeated; attributes: receives the names of all attributes."""
     parts = []
     with h5py.File(path) as file:
         groups = ["/"]
-        file.visititems(lambda name, item: groups.append(f"/{name}") if isinstance(item, h5py.Group) else None)
+        file.visititems(
+            lambda name, item: groups.append(f"/{name}") if isinstance(item, h5py.Group) else None
+        )
         for name in groups:
             group = file[name]
-            datasets = [item for item in group.values() if isinstance(item, h5py.Dataset) and _is_shown(item)]
+            datasets = [
+                item
+                for item in group.values()
+                if isinstance(item, h5py.Dataset) and _is_shown(item)
+            ]
             if not datasets and name != "/":
                 continue
             rows = [
                 [
                     code(Path(item.name).name),
-                    ", ".join(Path(dimension[0].name).name for dimension in item.dims if len(dimension)) or _own(item),
+                    ", ".join(
+                        Path(dimension[0].name).name for dimension in item.dims if len(dimension)
+                    )
+                    or _own(item),
                     _kind(item),
                     _text(item.attrs.get("units", "")),
                     _text(item.attrs.get("long_name", "")) + _flags(item),
@@ -505,9 +614,15 @@ def _contents(path: Path, shown: dict[str, list[str]], attributes: set[str]) -> 
                 for item in datasets
             ]
             attributes |= set(group.attrs)
-            content = table(["dataset", "dimensions", "type", "unit", "description"], rows) if rows else ""
+            content = (
+                table(["dataset", "dimensions", "type", "unit", "description"], rows)
+                if rows
+                else ""
+            )
             lines = content.splitlines()
-            if known := next((place for place in shown if rows and set(lines) <= set(shown[place])), ""):
+            if known := next(
+                (place for place in shown if rows and set(lines) <= set(shown[place])), ""
+            ):
                 if name.startswith("/modes/"):  # another model
                     continue
                 fewer = [line.split("|")[1].strip() for line in shown[known] if line not in lines]
@@ -521,7 +636,8 @@ def _contents(path: Path, shown: dict[str, list[str]], attributes: set[str]) -> 
 
 
 def _is_shown(item: Any) -> bool:
-    """Whether a dataset is listed: of the channels of a comparison the first one of each kind, no dimension alone."""
+    """Whether a dataset is listed: of the channels of a comparison the first one of each kind, no
+    dimension alone."""
     name = Path(item.name).name
     is_channel = item.name.startswith("/comparison/")
     return name != "characters" and not (is_channel and re.search(r"_[2-9](_|$)|_[yz](_|$)", name))
@@ -531,8 +647,12 @@ def _attributes(used: set[str]) -> str:
     """The meaning of every attribute; raises RuntimeError where one has none, or none has it."""
     names = used - VERSIONED
     if names != set(_ATTRIBUTES):
-        raise RuntimeError(f"attributes without a meaning, or without a file: {names ^ set(_ATTRIBUTES)}")
-    return table(["attribute", "meaning"], ([code(name), meaning] for name, meaning in _ATTRIBUTES.items()))
+        raise RuntimeError(
+            f"attributes without a meaning, or without a file: {names ^ set(_ATTRIBUTES)}"
+        )
+    return table(
+        ["attribute", "meaning"], ([code(name), meaning] for name, meaning in _ATTRIBUTES.items())
+    )
 
 
 def _own(item: Any) -> str:
@@ -554,9 +674,14 @@ def _text(value: Any) -> str:
 def _flags(item: Any) -> str:
     flags = []
     if "flag_meanings" in item.attrs and Path(item.name).name != "status":
-        flags.append(f"codes {', '.join(map(str, item.attrs['flag_values']))}: {_text(item.attrs['flag_meanings'])}")
+        flags.append(
+            f"codes {', '.join(map(str, item.attrs['flag_values']))}: "
+            f"{_text(item.attrs['flag_meanings'])}"
+        )
     if "labels" in item.attrs:
-        flags.append(f"names in the attribute `labels`: {', '.join(map(_text, item.attrs['labels']))}")
+        flags.append(
+            f"names in the attribute `labels`: {', '.join(map(_text, item.attrs['labels']))}"
+        )
     return "".join(f"; {flag}" for flag in flags)
 
 

@@ -1,7 +1,8 @@
-"""README, CONTRIBUTING and CHANGELOG as pages, and links that work both in the repository and in the pages.
+"""README, CONTRIBUTING and CHANGELOG as pages, and links that work both in the repository and in
+the pages.
 
-A page `{include}`s a file of the repository's root; links to these files lead to its page, links to `reports/` to a
-copy of that folder.
+A page `{include}`s a file of the repository's root; links to these files lead to its page, links to
+`reports/` to a copy of that folder.
 """
 
 from __future__ import annotations
@@ -14,7 +15,11 @@ from pathlib import Path
 from sphinx.application import Sphinx
 
 ROOT = Path(__file__).parents[2]
-PAGES = {"README.md": "index.md", "CONTRIBUTING.md": "contributing.md", "CHANGELOG.md": "changelog.md"}
+PAGES = {
+    "README.md": "index.md",
+    "CONTRIBUTING.md": "contributing.md",
+    "CHANGELOG.md": "changelog.md",
+}
 REPORTS = "reports"
 
 

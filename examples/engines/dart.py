@@ -1,4 +1,5 @@
-"""The rotor in DART: its forward dynamics by SciPy's DOP853, or as its World steps, by semi-implicit Euler.
+"""The rotor in DART: its forward dynamics by SciPy's DOP853, or as its World steps, by
+semi-implicit Euler.
 
 pip install dartpy scipy       # tried with dartpy 6.20.0, whose wheel has no variational integrator
 rotor-mbs run paper/fig11 -m ./dart.py
@@ -37,7 +38,9 @@ def turned(about_y, about_x):
 class Solver:
     def __init__(self, scene, settings):
         if not all(blade.has_pitch_inertia for blade in scene.blades):
-            raise MethodRefusal("dart: blades without inertia about the pitch axis are not supported")
+            raise MethodRefusal(
+                "dart: blades without inertia about the pitch axis are not supported"
+            )
         self.scene, self.settings, self.rotor = scene, settings, dart.dynamics.Skeleton("rotor")
         shaft, hub = self.rotor.createRevoluteJointAndBodyNodePair()
         shaft.setAxis([0.0, 1.0, 0.0])
@@ -47,7 +50,11 @@ class Solver:
             hinge, body = self.rotor.createRevoluteJointAndBodyNodePair(hub)
             hinge.setAxis([0.0, 0.0, 1.0])
             hinge.setTransformFromParentBodyNode(turned(phase, -blade.cone))
-            body.setInertia(dart.dynamics.Inertia(blade.mass, np.array(blade.centre_of_mass), blade.inertia_tensor))
+            body.setInertia(
+                dart.dynamics.Inertia(
+                    blade.mass, np.array(blade.centre_of_mass), blade.inertia_tensor
+                )
+            )
         self.world = dart.simulation.World()
         self.world.setGravity([0.0, 0.0, -scene.gravity])
         self.world.addSkeleton(self.rotor)
@@ -55,7 +62,8 @@ class Solver:
         self.damping = np.array(scene.dampings)
 
     def put(self, t, q, v, part):
-        loads = np.array(part.loads_at(t))  # the rotor's torque, then torque and rest angle of each pitch
+        # the rotor's torque, then torque and rest angle of each pitch
+        loads = np.array(part.loads_at(t))
         torque, rest = np.append(loads[0], loads[1::2]), np.append(0.0, loads[2::2])
         self.rotor.setPositions(q)
         self.rotor.setVelocities(v)
@@ -68,7 +76,15 @@ class Solver:
 
     def advance(self, y, stop):
         span, tolerance = (stop.start, stop.end), self.settings.relative_tolerance
-        run = solve_ivp(self.derivative, span, y, "DOP853", args=(stop.segment,), rtol=tolerance, atol=0.01 * tolerance)
+        run = solve_ivp(
+            self.derivative,
+            span,
+            y,
+            "DOP853",
+            args=(stop.segment,),
+            rtol=tolerance,
+            atol=0.01 * tolerance,
+        )
         return run.y[:, -1] if run.success else np.nan * y
 
     def integrate(self):
@@ -81,7 +97,10 @@ class Solver:
         return Integration(bool(np.isfinite(y).all()), "", scene.duration)
 
     def observe(self):
-        return Trajectory(sample_times(self.scene)[: len(self.states)], *np.split(np.array(self.states), 2, axis=1))
+        return Trajectory(
+            sample_times(self.scene)[: len(self.states)],
+            *np.split(np.array(self.states), 2, axis=1),
+        )
 
 
 class World(Solver):
@@ -97,8 +116,22 @@ class World(Solver):
 
 
 METHODS = [
-    Method(name="dop853", label="DART, DOP853", build=Solver, settings=Tolerance, distributions=("dartpy",),
-           bounds=(Bound("defect", "dop853", 1e-12, "round-off"),)),
-    Method(name="world", label="DART, World", build=World, settings=Step, order=1, fixed_step=True,
-           distributions=("dartpy",), bounds=(Bound("defect", "world", 1e-3, "order 1"),)),
-]  # fmt: skip
+    Method(
+        name="dop853",
+        label="DART, DOP853",
+        build=Solver,
+        settings=Tolerance,
+        distributions=("dartpy",),
+        bounds=(Bound("defect", "dop853", 1e-12, "round-off"),),
+    ),
+    Method(
+        name="world",
+        label="DART, World",
+        build=World,
+        settings=Step,
+        order=1,
+        fixed_step=True,
+        distributions=("dartpy",),
+        bounds=(Bound("defect", "world", 1e-3, "order 1"),),
+    ),
+]

@@ -1,9 +1,11 @@
-"""The rotor in Pinocchio: its articulated-body algorithm, over time by SciPy's DOP853 or by its own `integrate`.
+"""The rotor in Pinocchio: its articulated-body algorithm, over time by SciPy's DOP853 or by its own
+`integrate`.
 
     pip install pin scipy          # tried with pin 4.1.0
     rotor-mbs run paper/fig11 -m ./pinocchio.py
 
-`pinocchio/dop853` restarts at every sample and leaves round-off; `pinocchio/euler`, semi-implicit, is of order 1.
+`pinocchio/dop853` restarts at every sample and leaves round-off; `pinocchio/euler`, semi-implicit,
+is of order 1.
 """
 
 from dataclasses import dataclass
@@ -33,7 +35,9 @@ class Step(Settings):
 class Solver:
     def __init__(self, scene, settings):
         if not all(blade.has_pitch_inertia for blade in scene.blades):
-            raise MethodRefusal("pinocchio: blades without inertia about the pitch axis are not supported")
+            raise MethodRefusal(
+                "pinocchio: blades without inertia about the pitch axis are not supported"
+            )
         self.scene, self.settings = scene, settings
         self.model = model = pin.Model()
         model.gravity.linear = np.array([0.0, 0.0, -scene.gravity])
@@ -42,7 +46,9 @@ class Solver:
         hub = pin.Inertia(0.0, np.zeros(3), np.diag([0.0, scene.hub_inertia, 0.0]))
         model.appendBodyToJoint(shaft, hub, pin.SE3.Identity())
         for phase, blade in zip(scene.phases, scene.blades, strict=True):
-            place = pin.SE3(pin.utils.rotate("y", phase) @ pin.utils.rotate("x", -blade.cone), np.zeros(3))
+            place = pin.SE3(
+                pin.utils.rotate("y", phase) @ pin.utils.rotate("x", -blade.cone), np.zeros(3)
+            )
             hinge = model.addJoint(shaft, pin.JointModelRZ(), place, f"blade at {phase}")
             body = pin.Inertia(blade.mass, np.array(blade.centre_of_mass), blade.inertia_tensor)
             model.appendBodyToJoint(hinge, body, pin.SE3.Identity())
@@ -51,7 +57,8 @@ class Solver:
         self.damping = np.array(scene.dampings)
 
     def acceleration(self, t, q, v, part):
-        loads = np.array(part.loads_at(t))  # the rotor's torque, then torque and rest angle of each pitch
+        # the rotor's torque, then torque and rest angle of each pitch
+        loads = np.array(part.loads_at(t))
         torque, rest = np.append(loads[0], loads[1::2]), np.append(0.0, loads[2::2])
         torque += self.stiffness * (rest - q) - self.damping * v
         return pin.aba(self.model, self.data, q, v, torque)
@@ -62,7 +69,11 @@ class Solver:
         def derivative(t, y):
             return np.append(y[len(q) :], self.acceleration(t, *np.split(y, 2), stop.segment))
 
-        y, span, tolerance = np.append(q, v), (stop.start, stop.end), self.settings.relative_tolerance
+        y, span, tolerance = (
+            np.append(q, v),
+            (stop.start, stop.end),
+            self.settings.relative_tolerance,
+        )
         run = solve_ivp(derivative, span, y, "DOP853", rtol=tolerance, atol=0.01 * tolerance)
         return *np.split(run.y[:, -1], 2), "" if run.success else run.message
 
@@ -79,7 +90,9 @@ class Solver:
         return Integration(True, "", self.scene.duration)
 
     def observe(self):
-        return Trajectory(sample_times(self.scene)[: len(self.states)], *np.array(self.states).transpose(1, 0, 2))
+        return Trajectory(
+            sample_times(self.scene)[: len(self.states)], *np.array(self.states).transpose(1, 0, 2)
+        )
 
 
 class Euler(Solver):
@@ -93,8 +106,22 @@ class Euler(Solver):
 
 
 METHODS = [
-    Method(name="dop853", label="Pinocchio, DOP853", build=Solver, settings=Tolerance, distributions=("pin",),
-           bounds=(Bound("defect", "dop853", 1e-11, "round-off at its tolerance"),)),
-    Method(name="euler", label="Pinocchio, semi-implicit Euler", build=Euler, settings=Step, order=1, fixed_step=True,
-           distributions=("pin",), bounds=(Bound("defect", "euler", 1e-3, "order 1 at its default step"),)),
-]  # fmt: skip
+    Method(
+        name="dop853",
+        label="Pinocchio, DOP853",
+        build=Solver,
+        settings=Tolerance,
+        distributions=("pin",),
+        bounds=(Bound("defect", "dop853", 1e-11, "round-off at its tolerance"),),
+    ),
+    Method(
+        name="euler",
+        label="Pinocchio, semi-implicit Euler",
+        build=Euler,
+        settings=Step,
+        order=1,
+        fixed_step=True,
+        distributions=("pin",),
+        bounds=(Bound("defect", "euler", 1e-3, "order 1 at its default step"),),
+    ),
+]

@@ -1,6 +1,8 @@
-"""What `rotor-mbs check` finds in a results file: numbers against bounds, each with what to look at where it fails.
+"""What `rotor-mbs check` finds in a results file: numbers against bounds, each with what to look at
+where it fails.
 
-Every number is computed again from the stored samples; a stored metric or status is checked, never used.
+Every number is computed again from the stored samples; a stored metric or status is checked, never
+used.
 """
 
 from __future__ import annotations
@@ -15,10 +17,22 @@ import numpy as np
 from rotor_mbs.analysis.judgement import Judgement, bounds_of, judge
 from rotor_mbs.analysis.published import claims
 from rotor_mbs.analysis.run_checks import Check as Check
-from rotor_mbs.analysis.run_checks import RunSamples, bounded, defect_allowed, defect_bound, run_checks
+from rotor_mbs.analysis.run_checks import (
+    RunSamples,
+    bounded,
+    defect_allowed,
+    defect_bound,
+    run_checks,
+)
 from rotor_mbs.analysis.run_checks import Where as Where
 from rotor_mbs.errors import InputError, StoreError
-from rotor_mbs.methods.catalogue import PRINTED, REFERENCE, find_method_or_none, is_corrected, methods
+from rotor_mbs.methods.catalogue import (
+    PRINTED,
+    REFERENCE,
+    find_method_or_none,
+    is_corrected,
+    methods,
+)
 from rotor_mbs.methods.solve import solve
 from rotor_mbs.runs.hdf5 import reading
 from rotor_mbs.runs.read import OpenResults, StoredRun, StoredScene
@@ -35,7 +49,8 @@ from rotor_mbs.solution.metrics import (
 from rotor_mbs.solution.status import COMPLETE
 from rotor_mbs.solution.trajectory import Solution, Trajectory
 
-# Extremes at ode45's own points, which are others when it starts between: its relative tolerance, of rad or rad/s.
+# Extremes at ode45's own points, which are others when it starts between: its relative tolerance,
+# of rad or rad/s.
 _READ_OFF = 1e-3
 _MOST_INTERVALS = 12  # in which a peak of the printed equations' rate is looked for
 # |ln| of the ratio: the transition matrices of a run's intervals are good to 1e-5 each.
@@ -45,7 +60,8 @@ _OWN_GROWTH = 0.05
 def checks_of(results: OpenResults, frozen: Sequence[OpenResults], bounds: Bounds) -> list[Check]:
     """Return every check that an open file allows, in the order of its scenes.
 
-    The file is opened with verify=False: a row that has changed is judged, too. frozen: the shipped references.
+    The file is opened with verify=False: a row that has changed is judged, too. frozen: the shipped
+    references.
 
     Raises InputError where a stored scene is none.
     """
@@ -55,21 +71,30 @@ def checks_of(results: OpenResults, frozen: Sequence[OpenResults], bounds: Bound
     with np.errstate(all="ignore"):  # a hostile file may hold any number; what overflows fails
         for scene in results.scenes.values():
             # The bounds of a shipped scene are for its numbers, its samples too.
-            own = replace(bounds, scene="" if scene.changes is None or scene.changes else scene.name)
+            own = replace(
+                bounds, scene="" if scene.changes is None or scene.changes else scene.name
+            )
             # Whether the reference itself stops early: the motion does not exist beyond.
             motion_ends = scene.reference is not None and scene.reference.status == "singular"
             for run in scene.runs.values():
                 hint = "its row changed after it was written" if run.is_damaged else "as written"
-                checks.append(bounded(own, "integrity", _where(run, "row"), run.is_damaged, "rows", hint))
+                checks.append(
+                    bounded(own, "integrity", _where(run, "row"), run.is_damaged, "rows", hint)
+                )
                 try:
                     # Whatever goes wrong with a run that is known to be damaged is that damage.
                     with reading(str(scene.name), run.method) if run.is_damaged else nullcontext():
                         faults, solution = run.faults(scene.scene), run.solution(scene.scene)
-                        checks += _of_run(run, own, solution, faults, scene.reference_trajectory, motion_ends)
+                        checks += _of_run(
+                            run, own, solution, faults, scene.reference_trajectory, motion_ends
+                        )
                 except StoreError as exc:
-                    checks.append(bounded(own, "complete", _where(run, "all"), math.nan, "faults", str(exc)))
+                    checks.append(
+                        bounded(own, "complete", _where(run, "all"), math.nan, "faults", str(exc))
+                    )
             checks += _of_reference(scene, shipped.get(scene.name) if own.scene else None, own)
-        for claim in claims(results.scenes):  # the paper's numbers, in units of their last printed digit
+        # the paper's numbers, in units of their last printed digit
+        for claim in claims(results.scenes):
             if claim.printed is not None:
                 off = abs(round(claim.printed, claim.decimals) - claim.value) * 10**claim.decimals
                 gives = f"the paper prints {claim.value}, the run gives {claim.printed:.6f}"
@@ -108,7 +133,9 @@ def _of_run(
     claimed = bool(run.attributes.get("false_success", 0))
     # Whether a motion ended in a singularity, its angles and rates alone say.
     is_unknown = run.status == "singular" and not (scene.wants("angles") and scene.wants("rates"))
-    wrong = (judgement.status != run.status and not is_unknown) + (judgement.false_success != claimed)
+    wrong = (judgement.status != run.status and not is_unknown) + (
+        judgement.false_success != claimed
+    )
     hint = f"stored {run.status}, its samples give {judgement.status} {judgement.message}".rstrip()
     if judgement.false_success != claimed:
         hint += "; whether the engine's report of success is false differs from what is stored"
@@ -120,10 +147,16 @@ def _of_run(
     hint = "; ".join(faults) or "the method's, each within its range"
     yield bounded(bounds, "settings", _where(run, "settings"), float(len(faults)), "faults", hint)
     if len(solution.trajectory.time):
-        samples = RunSamples(scene, run.method, solution.trajectory, judgement.metrics, judgement.defects)
+        samples = RunSamples(
+            scene, run.method, solution.trajectory, judgement.metrics, judgement.defects
+        )
         yield from run_checks(samples, bounds, is_corrected=is_corrected(run.method))
         own_growth = judgement.defects.error_growth if judgement.defects is not None else None
-        if run.method == REFERENCE and own_growth is not None and "error_growth" in solution.trajectory.quantities:
+        if (
+            run.method == REFERENCE
+            and own_growth is not None
+            and "error_growth" in solution.trajectory.quantities
+        ):
             growth = solution.trajectory.error_growth
             known = np.isfinite(own_growth) & (own_growth < HORIZON_GROWTH)
             off = float(np.abs(np.log(growth[known] / own_growth[known])).max(initial=0.0))
@@ -132,9 +165,11 @@ def _of_run(
 
 
 def _of_stored_interval(run: StoredRun, judgement: Judgement) -> Metrics:
-    """Return the numbers of the interval that is stored as the worst, if it is as far beyond its bound as the worst.
+    """Return the numbers of the interval that is stored as the worst, if it is as far beyond its
+    bound as the worst.
 
-    Which one of several is the worst, the last bits of the samples decide, which other hardware rounds otherwise.
+    Which one of several is the worst, the last bits of the samples decide, which other hardware
+    rounds otherwise.
     """
     defects, metrics = judgement.defects, judgement.metrics
     stored = run.attributes.get("defect_time", math.nan)
@@ -144,7 +179,9 @@ def _of_stored_interval(run: StoredRun, judgement: Judgement) -> Metrics:
     interval = int(np.abs(defects.time[1:] - stored).argmin())
     worst = worst_interval(defects, is_corrected=has_bound)
     floor = _rounding(metrics)
-    is_as_far = not has_bound or defects.judged_sizes[interval] >= defects.judged_sizes[worst] - floor
+    is_as_far = (
+        not has_bound or defects.judged_sizes[interval] >= defects.judged_sizes[worst] - floor
+    )
     if not metrics.get("defect_judged"):  # it is the one with the largest defect
         is_as_far = is_as_far and defects.sizes[interval] >= defects.sizes[worst] - floor
     if not is_as_far:
@@ -166,15 +203,19 @@ def _changed_metric(run: StoredRun, metrics: Metrics, solution: Solution) -> tup
     trajectory = solution.trajectory
     worst, hint, channel = 0.0, "stored numbers equal those of the samples", "stored numbers"
     if not any(name in run.attributes for name in metrics):
-        return channel, worst, hint  # a file of references keeps none, and a run without samples has none
+        # a file of references keeps none, and a run without samples has none
+        return channel, worst, hint
     floor = _rounding(metrics)
     growth = min(float(running_growth(trajectory)[-1]), HORIZON_GROWTH)
     # What the last bits of the samples decide, which other hardware rounds otherwise.
     allowances = {name: floor * value.rounding for name, value in METRICS.items() if value.rounding}
     allowances["defect_drift"] *= growth
-    # Proportional to the growth of an error over an interval; without an excess there is no interval to speak of.
+    # Proportional to the growth of an error over an interval; without an excess there is no
+    # interval to speak of.
     is_beyond = metrics.get("defect_excess", 0.0) > floor
-    allowances["defect_allowed"] = _OWN_GROWTH * metrics.get("defect_allowed", 0.0) if is_beyond else math.inf
+    allowances["defect_allowed"] = (
+        _OWN_GROWTH * metrics.get("defect_allowed", 0.0) if is_beyond else math.inf
+    )
     # Angles and rates that are not stored are NaN here.
     lacking = set() if solution.scene.wants("rates") else {"rotor_rate_max"}
     if not solution.scene.wants("angles"):
@@ -192,7 +233,11 @@ def _changed_metric(run: StoredRun, metrics: Metrics, solution: Solution) -> tup
         if not (off <= allowance or stored == value):
             share = off / max(abs(value), abs(stored)) if math.isfinite(off) else math.nan
             if not share <= worst:
-                worst, channel, hint = share, name, f"stored {stored:.6g}, its samples give {value:.6g}"
+                worst, channel, hint = (
+                    share,
+                    name,
+                    (f"stored {stored:.6g}, its samples give {value:.6g}"),
+                )
     return channel, worst, hint
 
 
@@ -200,9 +245,10 @@ def _own_extremes(solution: Solution) -> dict[str, float]:
     """Return the extremes of the printed equations' run at ode45's own points, which lie between
     the samples, too.
 
-    The equations are integrated again from the samples beside the extremes, and from those where the rate bends most:
-    where a blade passes its singular pitch, a peak is narrower than an interval. {} of a run that broke off, which may
-    have been singular after its last sample, and where loads change over time.
+    The equations are integrated again from the samples beside the extremes, and from those where
+    the rate bends most: where a blade passes its singular pitch, a peak is narrower than an
+    interval. {} of a run that broke off, which may have been singular after its last sample, and
+    where loads change over time.
     """
     scene, trajectory = solution.scene, solution.trajectory
     angles, speeds = trajectory.angles[:, 0], np.abs(trajectory.rates[:, 0])
@@ -212,7 +258,11 @@ def _own_extremes(solution: Solution) -> dict[str, float]:
     intervals = {*np.argsort(-np.maximum(bends[:-1], bends[1:]))[:_MOST_INTERVALS].tolist()}
     for row in (int(angles.argmin()), int(angles.argmax()), int(speeds.argmax())):
         intervals |= {row - 1, row} & {*range(len(angles) - 1)}
-    extremes = {"rotor_angle_min": angles.min(), "rotor_angle_max": angles.max(), "rotor_rate_max": speeds.max()}
+    extremes = {
+        "rotor_angle_min": angles.min(),
+        "rotor_angle_max": angles.max(),
+        "rotor_rate_max": speeds.max(),
+    }
     for k in intervals:
         part = replace(
             scene,
@@ -251,7 +301,9 @@ def _of_reference(scene: StoredScene, shipped: StoredRun | None, bounds: Bounds)
     hint = "an altered reference, or a changed scene or closed form"
     if stored is None:
         hint = "the file has no reference to compare the runs with"
-        yield bounded(bounds, "reference", Where(scene.name, REFERENCE, "all"), math.nan, "rad", hint)
+        yield bounded(
+            bounds, "reference", Where(scene.name, REFERENCE, "all"), math.nan, "rad", hint
+        )
     elif shipped is not None:
         if stored.is_frozen:  # it says that it was read from the shipped file
             changed = []
@@ -262,19 +314,29 @@ def _of_reference(scene: StoredScene, shipped: StoredRun | None, bounds: Bounds)
                         changed.append(name)
             channel = ", ".join(changed) or "all"
             yield bounded(
-                bounds, "frozen", _where(stored, channel), float(len(changed)), "arrays", "as in the shipped file"
+                bounds,
+                "frozen",
+                _where(stored, channel),
+                float(len(changed)),
+                "arrays",
+                "as in the shipped file",
             )
         for name in ("angles", "rates"):
             if name in stored:
                 first, second, off = shipped.array(name), stored.array(name), math.nan
                 if first.shape == second.shape and second.dtype.kind == "f":
-                    off = float((np.abs(first - second) / np.maximum(1.0, np.abs(first))).max(initial=0.0))
+                    off = float(
+                        (np.abs(first - second) / np.maximum(1.0, np.abs(first))).max(initial=0.0)
+                    )
                 yield bounded(bounds, "reference", _where(stored, name), off, "rad, rad/s", hint)
         for name, check_name in (("error_growth", "growth"), ("angle_uncertainty", "uncertainty")):
             if name in shipped:
                 first, off = shipped.array(name), math.nan
                 second = stored.array(name) if name in stored else np.empty(0)
                 if first.shape == second.shape and second.dtype.kind == "f":
-                    used = np.isfinite(first) & (first > 0.0)  # the ratio, as far as both are positive and finite
+                    # the ratio, as far as both are positive and finite
+                    used = np.isfinite(first) & (first > 0.0)
                     off = float(np.abs(np.log(second[used] / first[used])).max(initial=0.0))
-                yield bounded(bounds, check_name, _where(stored, name.replace("_", " ")), off, "log", hint)
+                yield bounded(
+                    bounds, check_name, _where(stored, name.replace("_", " ")), off, "log", hint
+                )

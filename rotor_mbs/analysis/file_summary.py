@@ -56,10 +56,16 @@ class FileSummary:
     def as_dictionary(self) -> dict[str, Any]:
         """Return it as JSON can hold it."""
         return {
-            "file": str(self.path), "kind": self.kind, "bytes": self.path.stat().st_size, "scenes": self.scenes,
-            "methods": self.methods, "outputs": self.outputs, "statuses": self.statuses,
-            "made_with": dict(made_with(self.attributes)), "next": [command for command, _ in self.next],
-        }  # fmt: skip
+            "file": str(self.path),
+            "kind": self.kind,
+            "bytes": self.path.stat().st_size,
+            "scenes": self.scenes,
+            "methods": self.methods,
+            "outputs": self.outputs,
+            "statuses": self.statuses,
+            "made_with": dict(made_with(self.attributes)),
+            "next": [command for command, _ in self.next],
+        }
 
     def __str__(self) -> str:
         """Write the summary as a screen of text."""
@@ -74,7 +80,9 @@ class FileSummary:
         }
         for name, text in facts.items():
             if text:
-                parts += textwrap.wrap(text, _WIDTH, initial_indent=f"  {name:9}", subsequent_indent=11 * " ")
+                parts += textwrap.wrap(
+                    text, _WIDTH, initial_indent=f"  {name:9}", subsequent_indent=11 * " "
+                )
         parts += [f"  {line}".rstrip() for line in self.lines]
         for table in self.tables:
             parts += ["", str(table)]
@@ -95,13 +103,17 @@ def shortened(names: Sequence[str]) -> str:
 
 
 def summary_of(path: Path) -> FileSummary:
-    """Return what is in a file. Raises StoreError where it cannot be read or is not of this program."""
+    """Return what is in a file. Raises StoreError where it cannot be read or is not of this
+    program."""
     kind = read_trailer(path).kind
     refuse_split(path, kind)
     of_kind = {RESULTS: _results, SWEEP: _sweep, MODES: _modes, COMPARISON: _comparison}
     with reading(path):
         summary = of_kind[kind](path)
-    summary.next = [(f"rotor-mbs report {path}", "pages: figures, tables, what was found"), *summary.next]
+    summary.next = [
+        (f"rotor-mbs report {path}", "pages: figures, tables, what was found"),
+        *summary.next,
+    ]
     summary.next.append((f'rm.open("{path}")', "in Python, after `import rotor_mbs as rm`"))
     return summary
 
@@ -113,8 +125,12 @@ def _results(path: Path) -> FileSummary:
         summary = FileSummary(path, RESULTS, results.attributes, list(results.scenes))
         summary.labels = {name: scene.label for name, scene in results.scenes.items()}
         runs = [run for scene in results.scenes.values() for run in scene.methods.values()]
-        summary.methods = list(dict.fromkeys([run.method for run in runs] + [curve.method for curve in curves]))
-        summary.outputs = _unique(output for scene in results.scenes.values() for output in scene.scene.outputs)
+        summary.methods = list(
+            dict.fromkeys([run.method for run in runs] + [curve.method for curve in curves])
+        )
+        summary.outputs = _unique(
+            output for scene in results.scenes.values() for output in scene.scene.outputs
+        )
         summary.statuses = dict(Counter(run.status for run in runs))
         failed = [run for run in runs if run.status not in GOOD and is_corrected(run.method)]
         for run in failed[:_MOST_FAILED]:
@@ -125,7 +141,9 @@ def _results(path: Path) -> FileSummary:
             summary.lines.append(f"... {len(failed) - _MOST_FAILED} more runs that are not ok")
         if results.scenes:
             summary.tables = [_scene_table(results.scenes.values()), method_table(runs)]
-            summary.next = [(f"rotor-mbs check {path}", "accuracy verdicts; exit status 1 where one fails")]
+            summary.next = [
+                (f"rotor-mbs check {path}", ("accuracy verdicts; exit status 1 where one fails"))
+            ]
     if curves:
         summary.scenes = _unique([*summary.scenes, *(curve.scene for curve in curves)])
         summary.lines.append(f"bench: {counted(len(curves), 'curve')} of error against run time")
@@ -147,7 +165,16 @@ def _scene_table(scenes: Iterable[StoredScene]) -> TextTable:
         statuses = counts(Counter(run.status for run in stored.methods.values()))
         reference = stored.reference
         origin = "none" if reference is None else "shipped" if reference.is_frozen else "computed"
-        rows.append((stored.label, str(len(scene.blades)), f"{scene.duration:g}", str(scene.samples), origin, statuses))
+        rows.append(
+            (
+                stored.label,
+                str(len(scene.blades)),
+                f"{scene.duration:g}",
+                str(scene.samples),
+                origin,
+                statuses,
+            )
+        )
     return TextTable(("scene", "blades", "duration (s)", "samples", REFERENCE, "runs"), rows)
 
 
@@ -155,18 +182,28 @@ def _sweep(path: Path) -> FileSummary:
     """Return what is in a sweep: its parameters, how many runs have which status."""
     sweep = StoredSweep(path, allow_damaged_runs=True)
     codes = sweep.column("status")
-    summary = FileSummary(path, SWEEP, sweep.attributes, [sweep.base_scene.name], list(sweep.methods))
+    summary = FileSummary(
+        path, SWEEP, sweep.attributes, [sweep.base_scene.name], list(sweep.methods)
+    )
     summary.labels = {sweep.base_scene.name: sweep.base_scene.label}
     summary.statuses = dict(Counter(STATUSES[code] for code in codes.tolist() if code != MISSING))
     missing = int((codes == MISSING).sum())
     if missing:
         summary.statuses["not computed"] = missing
-        summary.next = [("rotor-mbs sweep ...", "the command that made it computes what is missing")]
+        summary.next = [
+            ("rotor-mbs sweep ...", ("the command that made it computes what is missing"))
+        ]
     if len(sweep.damaged_runs):
         summary.statuses["damaged"] = len(sweep.damaged_runs)
-    summary.outputs = [name for name, column in sweep.columns.items() if "time" in column.dimensions and name != "time"]
+    summary.outputs = [
+        name
+        for name, column in sweep.columns.items()
+        if "time" in column.dimensions and name != "time"
+    ]
     summary.tables = [sweep_parameters(sweep)]
-    summary.next.append((f"rotor-mbs check {path}", "accuracy verdicts; exit status 1 where one fails"))
+    summary.next.append(
+        (f"rotor-mbs check {path}", ("accuracy verdicts; exit status 1 where one fails"))
+    )
     return summary
 
 
@@ -174,8 +211,12 @@ def _modes(path: Path) -> FileSummary:
     found = read_modes(path)
     summary = FileSummary(path, MODES, read_content(path, ()).attributes, list(found))
     summary.labels = {name: modes.label for name, modes in found.items()}
-    summary.methods = _unique(model for modes in found.values() for model in (*modes.rest, *modes.rotation))
-    summary.lines = [line for modes in found.values() for line in ("", *mode_summary(modes).splitlines())]
+    summary.methods = _unique(
+        model for modes in found.values() for model in (*modes.rest, *modes.rotation)
+    )
+    summary.lines = [
+        line for modes in found.values() for line in ("", *mode_summary(modes).splitlines())
+    ]
     return summary
 
 
@@ -183,7 +224,10 @@ def _comparison(path: Path) -> FileSummary:
     """Return what is in a file of comparisons: a row for each, and why they do not agree."""
     records = read_records(path, COMPARISON)
     summary = FileSummary(
-        path, COMPARISON, read_content(path, ()).attributes, _unique(record.scene for record in records)
+        path,
+        COMPARISON,
+        read_content(path, ()).attributes,
+        _unique(record.scene for record in records),
     )
     summary.statuses = dict(Counter(str(record.attributes["status"]) for record in records))
     rows: list[tuple[str, ...]] = []
@@ -194,7 +238,11 @@ def _comparison(path: Path) -> FileSummary:
         rows.append((record.name, summary.labels[record.scene], *numbers, str(verdict["status"])))
         reasons = [verdict["message"], *(f"probable cause: {cause}" for cause in verdict["likely"])]
         for reason in filter(None, reasons):
-            summary.lines += textwrap.wrap(f"{record.name}: {reason}", _WIDTH, subsequent_indent="  ")
-    summary.tables = [TextTable(("data", "scene", "rows", "compared up to (s)", "tolerance", "status"), rows)]
+            summary.lines += textwrap.wrap(
+                f"{record.name}: {reason}", _WIDTH, subsequent_indent="  "
+            )
+    summary.tables = [
+        TextTable(("data", "scene", "rows", "compared up to (s)", "tolerance", "status"), rows)
+    ]
     summary.next = [("rotor-mbs compare DATA --scene SCENE", "the same for other data")]
     return summary

@@ -1,10 +1,11 @@
 """The one judgement of a run, from its samples, by the checks and bounds that `check` reads, too.
 
-ok: what a run has is right over the whole of what was asked. Times and start are the scene's, tips and energies those
-of its angles and rates, loads those of the closed form at its state; every interval's defect is within the method's
-bound, the energy balance is kept, and the error of the angles up to the horizon is at most 0.01 rad
-(from the reference, or predicted from the defects). An engine's report can only lower a status. The printed equations
-are "completed" where they reach the end: nothing is claimed of them.
+ok: what a run has is right over the whole of what was asked. Times and start are the scene's, tips
+and energies those of its angles and rates, loads those of the closed form at its state; every
+interval's defect is within the method's bound, the energy balance is kept, and the error of the
+angles up to the horizon is at most 0.01 rad (from the reference, or predicted from the defects). An
+engine's report can only lower a status. The printed equations are "completed" where they reach the
+end: nothing is claimed of them.
 """
 
 from __future__ import annotations
@@ -39,8 +40,9 @@ from rotor_mbs.solution.trajectory import Integration, Solution, Trajectory
 # A run is checked where one of these could be found.
 _CHECKS = ("energy_drift_max", "defect_max", "angle_error_max")
 
-# A claim of success is not false while a run resembles the motion: a hundredth, of the energy scale, of a radian for
-# an interval's defect, of what a quantity is relative to; and a radian for the angles up to the horizon.
+# A claim of success is not false while a run resembles the motion: a hundredth, of the energy
+# scale, of a radian for an interval's defect, of what a quantity is relative to; and a radian for
+# the angles up to the horizon.
 _RESEMBLES = 1e-2
 _RESEMBLING_ANGLE = 1.0
 
@@ -69,7 +71,8 @@ class Judgement:
 
 
 def defects_of(scene: Scene, run: Trajectory) -> Defects | None:
-    """Return the defects of a run's intervals; None without angles and rates, or with fewer than two samples."""
+    """Return the defects of a run's intervals; None without angles and rates, or with fewer than
+    two samples."""
     if len(run.time) < 2 or not (scene.wants("angles") and scene.wants("rates")):
         return None
     return interval_defects(scene, run.time, run.angles, run.rates)
@@ -81,12 +84,16 @@ def bounds_of(method: str) -> Bounds:
     return shipped_bounds().with_entries(known.bounds if known else ())
 
 
-@np.errstate(over="ignore", invalid="ignore", divide="ignore")  # of a runaway: what is not finite is judged
+# of a runaway: what is not finite is judged
+@np.errstate(over="ignore", invalid="ignore", divide="ignore")
 def judge(scene: Scene, run: Solution, reference: Trajectory | None) -> Judgement:
-    """Return the status of a run, its numbers, and whether its engine claims a success that it is not."""
+    """Return the status of a run, its numbers, and whether its engine claims a success that it is
+    not."""
     bounds = bounds_of(run.method)
     defects = defects_of(scene, run.trajectory)
-    metrics = metrics_of(scene, run.trajectory, reference, defects, is_corrected=is_corrected(run.method))
+    metrics = metrics_of(
+        scene, run.trajectory, reference, defects, is_corrected=is_corrected(run.method)
+    )
     if "defect_judged" in metrics and is_corrected(run.method):
         metrics["defect_allowed"] = defect_allowed(metrics, defect_bound(bounds, run.method))
     samples = RunSamples(scene, run.method, run.trajectory, metrics, defects)
@@ -114,7 +121,12 @@ def clearly_ok(
     """
     bounds = shipped_bounds().with_entries(own)
     energy, defect = bounds.of("energy", method).value, defect_bound(bounds, method)
-    complete = np.array([run.success and n == scenes[0].samples for run, n in zip(integrations, samples, strict=True)])
+    complete = np.array(
+        [
+            run.success and n == scenes[0].samples
+            for run, n in zip(integrations, samples, strict=True)
+        ]
+    )
     complete &= angles <= ANGLE_LIMIT
     shares = [rotor_inertia_shares(scene, np.array([scene.initial_angles]))[0] for scene in scenes]
     within = [
@@ -133,30 +145,51 @@ def _is_close(scene: Scene, status: str, metrics: Metrics) -> bool:
     if status != "inaccurate":
         return status in ("ok", "unchecked", "completed")
     errors = [metrics[name] for name in ("energy_drift_max", "defect_max") if name in metrics]
-    errors += [error for _, rule, error in quantity_errors(scene, metrics) if rule.relative_to or rule.check == "loads"]
-    return all(error <= _RESEMBLES for error in errors) and largest_angle_error(metrics) <= _RESEMBLING_ANGLE
+    errors += [
+        error
+        for _, rule, error in quantity_errors(scene, metrics)
+        if rule.relative_to or rule.check == "loads"
+    ]
+    return (
+        all(error <= _RESEMBLES for error in errors)
+        and largest_angle_error(metrics) <= _RESEMBLING_ANGLE
+    )
 
 
 def largest_angle_error(metrics: Metrics) -> float:
-    """Return the angle error (rad) up to the horizon, from the reference or predicted; 0 where neither is known."""
+    """Return the angle error (rad) up to the horizon, from the reference or predicted; 0 where
+    neither is known."""
     return metrics.get("angle_error_max", metrics.get("angle_error_predicted", 0.0))
 
 
 def _status(
     run: RunSamples, integration: Integration, reference: Trajectory | None, bounds: Bounds
 ) -> tuple[str, str, str]:
-    """Return status, message and advice: of whether the end was reached, of a singularity, then of the first check
-    that fails."""
+    """Return status, message and advice: of whether the end was reached, of a singularity, then of
+    the first check that fails."""
     scene, trajectory, metrics = run.scene, run.trajectory, run.metrics
     # Runs that did not reach the end, or that their engine calls failed.
     samples = len(trajectory.time)
     if samples != scene.samples or not integration.success:
-        reached = f"at t = {trajectory.time[-1]:.6g} s of {scene.duration:g} s" if samples else "at the start"
+        reached = (
+            f"at t = {trajectory.time[-1]:.6g} s of {scene.duration:g} s"
+            if samples
+            else "at the start"
+        )
         if integration.out_of_time:
             return "timed_out", f"{integration.message}, {reached}", ""
-        reported = integration.message or ("the engine reported success" if integration.success else "no reason given")
+        reported = integration.message or (
+            "the engine reported success" if integration.success else "no reason given"
+        )
         if smallest_rotor_inertia_share(scene, trajectory) < SINGULAR_SHARE:
-            return "singular", f"with all pitches at ±π/2 the mass matrix is nearly singular, {reached}; {reported}", ""
+            return (
+                "singular",
+                (
+                    "with all pitches at ±π/2 the mass matrix is nearly singular, "
+                    f"{reached}; {reported}"
+                ),
+                "",
+            )
         if integration.success:
             end = f" after {reached.removeprefix('at ')}" if samples else ""
             return "diverged", f"no finite sample{end}; {reported}", ""
@@ -164,7 +197,8 @@ def _status(
     if not is_corrected(run.method):
         return "completed", "", ""
 
-    # Complete runs of scenes without a solution: from a singular state, or past the time where the solution ends.
+    # Complete runs of scenes without a solution: from a singular state, or past the time where the
+    # solution ends.
     if rotor_inertia_shares(scene, trajectory.angles[:1])[0] < NO_INERTIA:
         return "singular", "with all pitches at ±π/2 the initial mass matrix is singular", ""
     if (
@@ -173,13 +207,21 @@ def _status(
         and smallest_rotor_inertia_share(scene, reference) < SINGULAR_SHARE
     ):
         end = reference.time[-1]
-        return "singular", f"the motion ends in a singularity after t = {end:.6g} s; the run continued", ""
+        return (
+            "singular",
+            (f"the motion ends in a singularity after t = {end:.6g} s; the run continued"),
+            "",
+        )
 
     # The table that `check` reads; of several that fail the first names the reason.
     for check in run_checks(run, bounds):
         if not check.passed:
             lost = check.name == "error" and symmetry_loss(run) is not None
-            advice = "; next to try: a method that keeps zeros, lagrange/* or exudyn_tree/*" if lost else ""
+            advice = (
+                "; next to try: a method that keeps zeros, lagrange/* or exudyn_tree/*"
+                if lost
+                else ""
+            )
             return "inaccurate", check.message, advice
 
     # Complete runs of which not everything could be judged.
@@ -201,7 +243,10 @@ def _too_far_apart(defects: Defects, count: int) -> str:
     worst = int(unseen.argmax())
     length = float(defects.time[worst + 1] - defects.time[worst])
     apart = f"rows {length:.3g} s apart, between which errors grow {defects.growth[worst]:.1e}-fold"
-    return f"{apart}: in {count} intervals a defect of {OK_ERROR:g} rad would not be seen; more samples"
+    return (
+        f"{apart}: in {count} intervals a defect of {OK_ERROR:g} rad would not be seen; "
+        "more samples"
+    )
 
 
 def smallest_rotor_inertia_share(scene: Scene, run: Trajectory) -> float:

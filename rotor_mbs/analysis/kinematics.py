@@ -1,4 +1,5 @@
-"""What is known of a scene without any model: tip paths and energies by plain rotation of bodies, exact solutions."""
+"""What is known of a scene without any model: tip paths and energies by plain rotation of bodies,
+exact solutions."""
 
 from __future__ import annotations
 
@@ -14,7 +15,10 @@ from rotor_mbs.solution.trajectory import Array
 def tip_paths(scene: Scene, angles: Array) -> Array:
     """Return the paths of the tips in the base frame, (n, blades, 3) m, at angles (n, 1 + blades)
     rad."""
-    return np.stack([_rotated(_frames(scene, angles, i), blade.tip) for i, blade in enumerate(scene.blades)], axis=1)
+    return np.stack(
+        [_rotated(_frames(scene, angles, i), blade.tip) for i, blade in enumerate(scene.blades)],
+        axis=1,
+    )
 
 
 def kinetic_energy(scene: Scene, angles: Array, rates: Array) -> Array:
@@ -25,13 +29,19 @@ def kinetic_energy(scene: Scene, angles: Array, rates: Array) -> Array:
         frames = _frames(scene, angles, i)
         omega = rates[:, 1 + i, None] * frames[:, :, 2]
         if scene.shaft_tilt:
-            omega += rates[:, :1] * np.array([0.0, math.cos(scene.shaft_tilt), math.sin(scene.shaft_tilt)])
+            omega += rates[:, :1] * np.array(
+                [0.0, math.cos(scene.shaft_tilt), math.sin(scene.shaft_tilt)]
+            )
         else:
             omega[:, 1] += rates[:, 0]
         velocity = np.cross(omega, _rotated(frames, blade.centre_of_mass))
         tensor = blade.inertia_tensor
         own = np.einsum("nij,ni->nj", frames, omega)  # ω in the blade's frame
-        total = total + 0.5 * blade.mass * (velocity**2).sum(axis=1) + 0.5 * np.einsum("ni,ij,nj->n", own, tensor, own)
+        total = (
+            total
+            + 0.5 * blade.mass * (velocity**2).sum(axis=1)
+            + 0.5 * np.einsum("ni,ij,nj->n", own, tensor, own)
+        )
     return total
 
 
@@ -43,7 +53,11 @@ def potential_energy(scene: Scene, time: Array, angles: Array) -> Array:
     """
     total = np.zeros(len(angles))
     for i, blade in enumerate(scene.blades):
-        total += blade.mass * scene.gravity * _rotated(_frames(scene, angles, i), blade.centre_of_mass)[:, 2]
+        total += (
+            blade.mass
+            * scene.gravity
+            * _rotated(_frames(scene, angles, i), blade.centre_of_mass)[:, 2]
+        )
         if scene.bearing_stiffness and blade.has_pitch_inertia:
             rest = values_at(scene.pitch_loads[i][1], time)
             total += 0.5 * scene.bearing_stiffness[i] * (angles[:, 1 + i] - rest) ** 2
@@ -89,18 +103,25 @@ def exact_rotor_angle(scene: Scene, time: Array) -> tuple[str, Array] | None:
     """Return the name of an exact solution and the rotor's angle by it, (n,) rad, where every pitch
     stays at zero; None where none is known.
 
-    One blade let go at rest: a pendulum (elliptic functions; Abramowitz & Stegun 22.2). Equal blades in balance:
-    gravity cancels, a constant torque gives q0 + Ω0 t + τ t² / (2 I). On a tilted shaft gravity turns the pitches of
-    blades whose centre of mass is off the pitch axis, and a cone those that have a moment of inertia about it.
+    One blade let go at rest: a pendulum (elliptic functions; Abramowitz & Stegun 22.2). Equal
+    blades in balance: gravity cancels, a constant torque gives q0 + Ω0 t + τ t² / (2 I). On a
+    tilted shaft gravity turns the pitches of blades whose centre of mass is off the pitch axis, and
+    a cone those that have a moment of inertia about it.
     """
-    # Zero pitch is invariant for blades that their own x-z plane mirrors; nothing may damp the rotor.
-    mirrored = all(b.centre_of_mass[1] == 0.0 and b.inertia[3] == 0.0 and b.inertia[5] == 0.0 for b in scene.blades)
+    # Zero pitch is invariant for blades that their own x-z plane mirrors; nothing may damp the
+    # rotor.
+    mirrored = all(
+        b.centre_of_mass[1] == 0.0 and b.inertia[3] == 0.0 and b.inertia[5] == 0.0
+        for b in scene.blades
+    )
     at_zero = not any(scene.initial_angles[1:]) and not any(scene.initial_rates[1:])
     driven = any(table for tables in scene.pitch_loads for table in tables)
     if not mirrored or not at_zero or driven or scene.shaft_damping:
         return None
     weighs = scene.gravity != 0.0 and any(blade.centre_of_mass[0] for blade in scene.blades)
-    if (scene.shaft_tilt and weighs) or any(blade.cone and blade.has_pitch_inertia for blade in scene.blades):
+    if (scene.shaft_tilt and weighs) or any(
+        blade.cone and blade.has_pitch_inertia for blade in scene.blades
+    ):
         return None
     if len(scene.blades) == 1:
         return _pendulum(scene, time)
@@ -108,12 +129,17 @@ def exact_rotor_angle(scene: Scene, time: Array) -> tuple[str, Array] | None:
         return None
     inertia = scene.hub_inertia + sum(_inertia_at_zero_pitch(blade) for blade in scene.blades)
     torque = scene.torque_at(0.0)
-    angle = scene.initial_angles[0] + scene.initial_rates[0] * time + torque * time**2 / (2.0 * inertia)
-    return ("constant torque" if torque else "uniform rotation" if scene.initial_rates[0] else "rest"), angle
+    angle = (
+        scene.initial_angles[0] + scene.initial_rates[0] * time + torque * time**2 / (2.0 * inertia)
+    )
+    return (
+        "constant torque" if torque else "uniform rotation" if scene.initial_rates[0] else "rest"
+    ), angle
 
 
 def _inertia_at_zero_pitch(blade: Blade) -> float:
-    """Return a blade's inertia about the shaft, kg m²: about its own y axis, or that of a rod leant by its cone."""
+    """Return a blade's inertia about the shaft, kg m²: about its own y axis, or that of a rod leant
+    by its cone."""
     yy: float = blade.inertia_about_apex()[1]
     return yy * math.cos(blade.cone) ** 2 if blade.cone else yy
 
@@ -130,7 +156,9 @@ def _pendulum(scene: Scene, time: Array) -> tuple[str, Array] | None:
         arm *= math.cos(scene.shaft_tilt) * math.cos(blade.cone)
     if scene.has_torque or scene.initial_rates[0] or not scene.gravity or not arm:
         return None
-    frequency = math.sqrt(blade.mass * scene.gravity * arm / (scene.hub_inertia + _inertia_at_zero_pitch(blade)))
+    frequency = math.sqrt(
+        blade.mass * scene.gravity * arm / (scene.hub_inertia + _inertia_at_zero_pitch(blade))
+    )
     amplitude = math.pi - (scene.initial_angles[0] + lead)  # from straight down
     if not -math.pi < amplitude < math.pi:
         return None

@@ -1,7 +1,9 @@
-"""Modes of linearized equations: frequencies, damping ratios, shapes in multiblade coordinates, Floquet multipliers; of
-a scene over rotor speed, as arrays, as lines for readers, and as records of a results file.
+"""Modes of linearized equations: frequencies, damping ratios, shapes in multiblade coordinates,
+Floquet multipliers; of a scene over rotor speed, as arrays, as lines for readers, and as records of
+a results file.
 
-Symbols: λ eigenvalue (1/s) of d/dt (δq, δq̇); ω0 = |λ| undamped and ωd = |Im λ| damped frequency (rad/s),
+Symbols: λ eigenvalue (1/s) of d/dt (δq, δq̇); ω0 = |λ| undamped and ωd = |Im λ| damped frequency
+(rad/s),
 ζ = -Re λ / ω0 damping ratio; μ Floquet multiplier.
 
 /modes/<scene>/<model>/rest        equilibrium under gravity, one row of `speed`
@@ -30,8 +32,8 @@ from rotor_mbs.solution.trajectory import Array
 
 Complex = NDArray[np.complex128]
 
-# A multiplier this much above 1 counts as growth: those of equal blades coincide, and rounding splits a double
-# eigenvalue by the root of 1e-16 and more.
+# A multiplier this much above 1 counts as growth: those of equal blades coincide, and rounding
+# splits a double eigenvalue by the root of 1e-16 and more.
 GROWTH = 1e-5
 
 
@@ -50,7 +52,8 @@ class ModeSet:
 
     @property
     def undamped_frequencies(self) -> Array:
-        """(..., n) rad/s: root of the product of both eigenvalues; NaN where one of them grows without oscillating."""
+        """(..., n) rad/s: root of the product of both eigenvalues; NaN where one of them grows
+        without oscillating."""
         product = (self.eigenvalues[..., 0] * self.eigenvalues[..., 1]).real
         return np.sqrt(np.where(product >= 0.0, np.abs(product), np.nan))
 
@@ -61,10 +64,13 @@ class ModeSet:
 
     @property
     def damping_ratios(self) -> Array:
-        """(..., n) damping ratio, above 1 if overdamped; NaN where the undamped frequency is 0 or none."""
+        """(..., n) damping ratio, above 1 if overdamped; NaN where the undamped frequency is 0 or
+        none."""
         frequencies = self.undamped_frequencies
         rate = -0.5 * self._real_parts.sum(axis=-1)
-        ratios = np.divide(rate, frequencies, out=np.full_like(rate, np.nan), where=frequencies > 0.0)
+        ratios = np.divide(
+            rate, frequencies, out=np.full_like(rate, np.nan), where=frequencies > 0.0
+        )
         return np.asarray(ratios + 0.0)  # no -0
 
     @property
@@ -74,8 +80,11 @@ class ModeSet:
 
     @property
     def _real_parts(self) -> Array:
-        """(..., n, 2) 1/s: 0 where they are below the precision of the eigenvalue, as -1e-100 beside 1 rad/s."""
-        is_rounding = np.abs(self.eigenvalues.real) <= np.finfo(float).eps * np.abs(self.eigenvalues)
+        """(..., n, 2) 1/s: 0 where they are below the precision of the eigenvalue, as -1e-100
+        beside 1 rad/s."""
+        is_rounding = np.abs(self.eigenvalues.real) <= np.finfo(float).eps * np.abs(
+            self.eigenvalues
+        )
         return np.where(is_rounding, 0.0, self.eigenvalues.real)
 
 
@@ -83,8 +92,9 @@ def multiblade(blades: int) -> tuple[tuple[str, ...], Array]:
     """Return the names of the multiblade (Coleman) coordinates, and the (blades, blades) matrix
     from them to the blades' pitches.
 
-    Pitch of blade i = collective + Σ_k (cosine_k cos k ψ_i + sine_k sin k ψ_i) [+ differential (-1)^(i-1)], with the
-    blade's mounting angle ψ_i = 2π(i-1)/blades. Source: R. P. Coleman, A. M. Feingold, NACA Report 1351, 1958.
+    Pitch of blade i = collective + Σ_k (cosine_k cos k ψ_i + sine_k sin k ψ_i) [+ differential
+    (-1)^(i-1)], with the blade's mounting angle ψ_i = 2π(i-1)/blades. Source: R. P. Coleman, A. M.
+    Feingold, NACA Report 1351, 1958.
     """
     psi = 2.0 * np.pi * np.arange(blades) / blades
     names, columns = ["collective"], [np.ones(blades)]
@@ -99,7 +109,8 @@ def multiblade(blades: int) -> tuple[tuple[str, ...], Array]:
 
 
 def multiblade_shapes(shapes: Complex) -> Complex:
-    """(..., 1 + blades) amplitudes of rotor and multiblade coordinates, from those of rotor and pitches."""
+    """(..., 1 + blades) amplitudes of rotor and multiblade coordinates, from those of rotor and
+    pitches."""
     _, matrix = multiblade(shapes.shape[-1] - 1)
     pitches = np.einsum("cb,...b->...c", np.linalg.inv(matrix), shapes[..., 1:])
     return np.concatenate([shapes[..., :1], pitches], axis=-1)
@@ -119,10 +130,11 @@ def modes_of(
     stiffness, damping : ndarray
         (n, n), 1/s² and 1/s, rotor first among the coordinates.
     is_cyclic : bool
-        Whether nothing depends on the rotor's angle (no gravity): it is left out, and its mode has an eigenvalue of
-        exactly 0.
+        Whether nothing depends on the rotor's angle (no gravity): it is left out, and its mode has
+        an eigenvalue of exactly 0.
     rounding : float
-        1/s², a stiffness that is rounding of larger numbers: an eigenvalue that follows from it is 0.
+        1/s², a stiffness that is rounding of larger numbers: an eigenvalue that follows from it is
+        0.
     """
     n = len(stiffness)
     matrix = np.block([[np.zeros((n, n)), np.eye(n)], [-stiffness, -damping]])
@@ -130,26 +142,39 @@ def modes_of(
     values, vectors = np.linalg.eig(matrix[first:, first:])
     rounding = max(rounding, 4e-16 * n * np.abs(stiffness).max(initial=0.0))
     values = np.where(np.abs(values) ** 2 <= rounding, 0.0, values).astype(complex)
-    values.real[np.abs(values.real) < 1e-14 * np.abs(values).max(initial=0.0)] = 0.0  # rounding of undamped modes
+    # rounding of undamped modes
+    values.real[np.abs(values.real) < 1e-14 * np.abs(values).max(initial=0.0)] = 0.0
     shapes = []
     for vector in vectors.T:
         positions, rates = vector[: n - first], vector[n - first :]
         slow = np.linalg.norm(rates) <= 1e-7 * np.linalg.norm(positions)
         shapes.append(_normalized(np.concatenate([np.zeros(first), positions]) if slow else rates))
     # Both eigenvalues of each mode, and its shape.
-    pairs = [((value, value.conjugate()), shapes[k]) for k, value in enumerate(values) if value.imag > 0.0]
-    single = sorted((k for k, value in enumerate(values) if value.imag == 0.0), key=lambda k: abs(values[k]))
+    pairs = [
+        ((value, value.conjugate()), shapes[k])
+        for k, value in enumerate(values)
+        if value.imag > 0.0
+    ]
+    single = sorted(
+        (k for k, value in enumerate(values) if value.imag == 0.0), key=lambda k: abs(values[k])
+    )
     if is_cyclic:
         slowest = single.pop(0)
         pairs.append(((values[slowest], 0j), shapes[slowest]))
     while single:
         last = single.pop()
-        partner = max(single, key=lambda k: float(_assurance(shapes[last][None], shapes[k][None])[0, 0]))
+        partner = max(
+            single, key=lambda k: float(_assurance(shapes[last][None], shapes[k][None])[0, 0])
+        )
         single.remove(partner)
-        # The growing one first, in every model: modes are recognized by their first eigenvalue, too.
+        # The growing one first, in every model: modes are recognized by their first eigenvalue,
+        # too.
         growing, decaying = sorted((values[last], values[partner]), key=lambda value: -value.real)
         pairs.append(((growing, decaying), shapes[partner]))
-    modes = ModeSet(np.array([pair for pair, _ in pairs], dtype=complex), np.array([shape for _, shape in pairs]))
+    modes = ModeSet(
+        np.array([pair for pair, _ in pairs], dtype=complex),
+        np.array([shape for _, shape in pairs]),
+    )
     order = np.argsort(np.nan_to_num(modes.undamped_frequencies), kind="stable")
     return ModeSet(modes.eigenvalues[order], modes.shapes[order])
 
@@ -158,23 +183,33 @@ def isotropic_modes(stiffness: Array, damping: Array) -> ModeSet:
     """Return the modes of a rotor of equal blades without gravity: rotor, then one for each
     multiblade coordinate, by name.
 
-    Multiblade coordinates split the equations exactly: rotor and collective pitch, and each of the others alone.
+    Multiblade coordinates split the equations exactly: rotor and collective pitch, and each of the
+    others alone.
     """
     names, matrix = multiblade(len(stiffness) - 1)
     n = len(stiffness)
     T = np.eye(n)
     T[1:, 1:] = matrix
-    K, D = (np.asarray(np.linalg.inv(T) @ matrix @ T, dtype=np.float64) for matrix in (stiffness, damping))
+    K, D = (
+        np.asarray(np.linalg.inv(T) @ matrix @ T, dtype=np.float64)
+        for matrix in (stiffness, damping)
+    )
     together = modes_of(K[:2, :2], D[:2, :2], is_cyclic=True)
-    values, shapes = list(together.eigenvalues), [np.append(shape, np.zeros(n - 2)) for shape in together.shapes]
-    if abs(shapes[0][0]) < abs(shapes[1][0]) and abs(shapes[0][1]) > 0.0:  # pitch slower than the rotor's decay
+    values, shapes = (
+        list(together.eigenvalues),
+        [np.append(shape, np.zeros(n - 2)) for shape in together.shapes],
+    )
+    # pitch slower than the rotor's decay
+    if abs(shapes[0][0]) < abs(shapes[1][0]) and abs(shapes[0][1]) > 0.0:
         values.reverse()
         shapes.reverse()
     for i in range(2, n):
         root = np.sqrt(complex((0.5 * D[i, i]) ** 2 - K[i, i]))
         values.append(np.array([-0.5 * D[i, i] + root, -0.5 * D[i, i] - root]))
         shapes.append(np.eye(n, dtype=complex)[i])
-    return ModeSet(np.array(values), np.array([_normalized(T @ shape) for shape in shapes]), ("rotor", *names))
+    return ModeSet(
+        np.array(values), np.array([_normalized(T @ shape) for shape in shapes]), ("rotor", *names)
+    )
 
 
 def track(sets: Sequence[ModeSet]) -> list[ModeSet]:
@@ -189,7 +224,8 @@ def track(sets: Sequence[ModeSet]) -> list[ModeSet]:
 def in_order_of(first: ModeSet, other: ModeSet) -> ModeSet:
     """Return the modes of `other` in the places of those of `first` that they are most like.
 
-    Likeness of two modes: the modal assurance criterion |φ·ψ*|² / (|φ|² |ψ|²), less their relative distance.
+    Likeness of two modes: the modal assurance criterion |φ·ψ*|² / (|φ|² |ψ|²), less their relative
+    distance.
     """
     from scipy.optimize import linear_sum_assignment
 
@@ -202,19 +238,23 @@ def in_order_of(first: ModeSet, other: ModeSet) -> ModeSet:
     return ModeSet(other.eigenvalues[order], other.shapes[order])
 
 
-def whirl_frequencies(frequency: Array, speed: Array, harmonic: Array | int = 1) -> tuple[Array, Array]:
+def whirl_frequencies(
+    frequency: Array, speed: Array, harmonic: Array | int = 1
+) -> tuple[Array, Array]:
     """Return backward and forward whirl in rad/s, as the base sees a cosine and sine mode of
     `frequency` in the rotor."""
     return np.abs(frequency - harmonic * speed), frequency + harmonic * speed
 
 
-def floquet(transition: Array, flow: Array, gradient: Array, speed: float) -> tuple[Complex, Complex]:
+def floquet(
+    transition: Array, flow: Array, gradient: Array, speed: float
+) -> tuple[Complex, Complex]:
     """Return multipliers of a (2n, 2n) state transition matrix over a turn, the largest first: all
     of them, and the others than those that are 1 for every such motion. It is stable where none of
     the latter is larger than 1, up to `GROWTH`.
 
-    flow: (2n,) time derivative of the state, an eigenvector for 1. gradient: (2n,) derivative of what the motion keeps,
-    a left eigenvector for 1, or zeros.
+    flow: (2n,) time derivative of the state, an eigenvector for 1. gradient: (2n,) derivative of
+    what the motion keeps, a left eigenvector for 1, or zeros.
     """
     if not np.isfinite(transition).all():
         nothing = np.full(len(transition), complex(np.nan, np.nan))
@@ -251,8 +291,9 @@ AGREEMENT = 1e-8
 PRINTED_PRECISION = 1e-6
 _NOTE_WIDTH = 130  # characters, of a summary's lines: as wide as its table
 _SHOWN_ROWS = 24  # of a summary: three states of eight modes
-# Eigenvalues below this share of the largest are not compared: they are roots of what is left when stiffnesses cancel,
-# and of a rotor that nothing holds that is rounding. Their residuals are, which no root magnifies.
+# Eigenvalues below this share of the largest are not compared: they are roots of what is left when
+# stiffnesses cancel, and of a rotor that nothing holds that is rounding. Their residuals are, which
+# no root magnifies.
 _SLOW = 1e-3
 # Share of the equations' terms below which a singular vector counts as a shape of an eigenvalue.
 _NO_FORCE = 1e-10
@@ -262,10 +303,11 @@ _NO_FORCE = 1e-10
 class LinearModes(ModeSet):
     """The modes of one source over speed, the same mode in the same place at every speed.
 
-    names: "collective pitch" where symmetry tells the modes apart, else "mode 2". kind: REST or ROTATION. angles:
-    (speeds, n) rad, steady values of the `coordinates` that move. stiffness, damping: (speeds, n, n), the mass matrix
-    divided out. weights: 1/s², moments of all weights about the shaft divided by the inertia, of which the stiffness of
-    a balanced rotor is rounding. messages: why there is nothing at a speed, or "".
+    names: "collective pitch" where symmetry tells the modes apart, else "mode 2". kind: REST or
+    ROTATION. angles: (speeds, n) rad, steady values of the `coordinates` that move. stiffness,
+    damping: (speeds, n, n), the mass matrix divided out. weights: 1/s², moments of all weights
+    about the shaft divided by the inertia, of which the stiffness of a balanced rotor is rounding.
+    messages: why there is nothing at a speed, or "".
     """
 
     source: str
@@ -282,10 +324,11 @@ class LinearModes(ModeSet):
 
     @property
     def residual(self) -> float:
-        """Largest residual of (λ² + λ damping + stiffness) φ = 0 over all modes, divided by the size of its terms.
+        """Largest residual of (λ² + λ damping + stiffness) φ = 0 over all modes, divided by the
+        size of its terms.
 
-        The modes of equal blades are computed as if no blade differed, and those without gravity as if nothing
-        depended on the rotor's angle: matrices for which that is false have a residual.
+        The modes of equal blades are computed as if no blade differed, and those without gravity as
+        if nothing depended on the rotor's angle: matrices for which that is false have a residual.
         """
         largest = 0.0
         for i in range(len(self.speeds)):
@@ -298,28 +341,36 @@ class LinearModes(ModeSet):
         return largest
 
     def residual_of(self, i: int, value: complex, shape: Complex) -> float:
-        """Return the residual of one eigenvalue (1/s) with a shape (n,) at speed number i, see `residual`."""
+        """Return the residual of one eigenvalue (1/s) with a shape (n,) at speed number i, see
+        `residual`."""
         stiffness, damping = self.stiffness[i], self.damping[i]
         force = value * value * shape + value * (damping @ shape) + stiffness @ shape
         return float(np.linalg.norm(force) / (np.linalg.norm(shape) * self._terms(i, value)))
 
     def shapes_of(self, i: int, value: complex) -> Complex:
-        """Return all shapes of an eigenvalue (1/s) at speed number i, one in each row, from the whole matrices."""
+        """Return all shapes of an eigenvalue (1/s) at speed number i, one in each row, from the
+        whole matrices."""
         n = len(self.coordinates)
-        _, sizes, vectors = np.linalg.svd(value * value * np.eye(n) + value * self.damping[i] + self.stiffness[i])
+        _, sizes, vectors = np.linalg.svd(
+            value * value * np.eye(n) + value * self.damping[i] + self.stiffness[i]
+        )
         is_shape = sizes <= max(10.0 * sizes[-1], _NO_FORCE * self._terms(i, value))
         return np.asarray(vectors[is_shape].conj())
 
     def _terms(self, i: int, value: complex) -> float:
         """Return the size of the equations' terms for an eigenvalue, 1/s²."""
-        stiffness, damping = (np.abs(matrix[i]).max(initial=0.0) for matrix in (self.stiffness, self.damping))
+        stiffness, damping = (
+            np.abs(matrix[i]).max(initial=0.0) for matrix in (self.stiffness, self.damping)
+        )
         return float(max(abs(value) ** 2 + abs(value) * damping + stiffness, self.weights, 1e-300))
 
     @property
     def multiblade_shapes(self) -> Complex:
         """(speeds, n, 1 + blades): by speed, mode, and rotor or multiblade coordinate."""
         whole = np.zeros((len(self.speeds), len(self.coordinates), 1 + self.blades), dtype=complex)
-        columns = [0 if name == "rotor" else int(name.rpartition(" ")[2]) for name in self.coordinates]
+        columns = [
+            0 if name == "rotor" else int(name.rpartition(" ")[2]) for name in self.coordinates
+        ]
         whole[:, :, columns] = self.shapes
         return multiblade_shapes(whole)
 
@@ -335,10 +386,12 @@ class LinearModes(ModeSet):
 
 @dataclass(frozen=True)
 class FloquetTable:
-    """Multipliers (speeds, 2n) of a turn under gravity over speed; largest: modulus of those that are not always 1.
+    """Multipliers (speeds, 2n) of a turn under gravity over speed; largest: modulus of those that
+    are not always 1.
 
-    stable: 1, 0, or -1 where no periodic motion was found. product_error: logarithm of their product less the
-    integrated trace; NaN where rounding hides it. torque: N m on the rotor; mismatch: rad that a turn misses.
+    stable: 1, 0, or -1 where no periodic motion was found. product_error: logarithm of their
+    product less the integrated trace; NaN where rounding hides it. torque: N m on the rotor;
+    mismatch: rad that a turn misses.
     """
 
     speeds: Array
@@ -359,7 +412,8 @@ class FloquetTable:
 
 @dataclass(frozen=True)
 class SceneModes:
-    """The modes of a scene by model, the closed form first; `notes` has the reason for missing results.
+    """The modes of a scene by model, the closed form first; `notes` has the reason for missing
+    results.
 
     label: the scene's name, with what was changed in a shipped one.
     """
@@ -379,9 +433,9 @@ class SceneModes:
     def disagreement(self) -> float:
         """Largest difference of two models; 0 for one model.
 
-        That of a mode's larger eigenvalue in modulus, or of the mean real part, divided by the largest eigenvalue; of
-        eigenvalues below a thousandth of the largest one the residual of the closed form's mode in the other model's
-        equations, see `LinearModes.residual`.
+        That of a mode's larger eigenvalue in modulus, or of the mean real part, divided by the
+        largest eigenvalue; of eigenvalues below a thousandth of the largest one the residual of the
+        closed form's mode in the other model's equations, see `LinearModes.residual`.
         """
         largest = 0.0
         for kind in (self.rest, self.rotation):
@@ -406,11 +460,14 @@ class SceneModes:
 
     @property
     def faults(self) -> list[str]:
-        """A line for each model whose modes do not satisfy its own equations to the printed digits."""
+        """A line for each model whose modes do not satisfy its own equations to the printed
+        digits."""
         lines = []
         for model, residual in self.residuals.items():
             if not residual <= PRINTED_PRECISION:
-                lines.append(f"{model}: its modes leave {residual:.1e} of its own linearized equations")
+                lines.append(
+                    f"{model}: its modes leave {residual:.1e} of its own linearized equations"
+                )
         return lines
 
     @property
@@ -425,15 +482,23 @@ def _difference(first: LinearModes, other: LinearModes) -> float:
     top = float(np.nanmax(sizes, initial=0.0))
     numbers = []
     for source in (first, other):
-        numbers.append(np.stack([np.abs(source.eigenvalues).max(axis=2), source.eigenvalues.real.mean(axis=2)]))
+        numbers.append(
+            np.stack([np.abs(source.eigenvalues).max(axis=2), source.eigenvalues.real.mean(axis=2)])
+        )
     is_fast = sizes.max(axis=2) > _SLOW * top
-    largest = float(np.nanmax(np.abs(numbers[1] - numbers[0])[:, is_fast], initial=0.0)) / top if top else 0.0
+    largest = (
+        float(np.nanmax(np.abs(numbers[1] - numbers[0])[:, is_fast], initial=0.0)) / top
+        if top
+        else 0.0
+    )
     for i in range(len(first.speeds)):
         if not (np.isfinite(first.stiffness[i]).all() and np.isfinite(other.stiffness[i]).all()):
             continue
         for value in first.eigenvalues[i].ravel().tolist():
             if abs(value) <= _SLOW * top:
-                residuals = [other.residual_of(i, value, shape) for shape in first.shapes_of(i, value)]
+                residuals = [
+                    other.residual_of(i, value, shape) for shape in first.shapes_of(i, value)
+                ]
                 largest = max(largest, *residuals)
     return largest
 
@@ -453,7 +518,10 @@ def mode_rows(modes: SceneModes) -> list[dict[str, object]]:
         for i, speed in enumerate(linear.speeds.tolist()):
             for k, name in enumerate(linear.names):
                 # None for what JSON has no number for.
-                shown = {key: float(a[i, k]) if math.isfinite(a[i, k]) else None for key, a in numbers.items()}
+                shown = {
+                    key: float(a[i, k]) if math.isfinite(a[i, k]) else None
+                    for key, a in numbers.items()
+                }
                 rows.append({"state": state, "speed": speed, "mode": name, **shown})
     return rows
 
@@ -461,9 +529,15 @@ def mode_rows(modes: SceneModes) -> list[dict[str, object]]:
 def mode_table(rows: Sequence[Mapping[str, object]]) -> TextTable:
     """Return a table of such rows, damped frequencies in Hz too."""
     head = (
-        "state", "speed (rad/s)", "mode", "undamped (rad/s)", "damped (rad/s)", "damped (Hz)", "damping ratio",
+        "state",
+        "speed (rad/s)",
+        "mode",
+        "undamped (rad/s)",
+        "damped (rad/s)",
+        "damped (Hz)",
+        "damping ratio",
         "growth (1/s)",
-    )  # fmt: skip
+    )
 
     def cell(value: object) -> str:
         return f"{value:.6g}" if isinstance(value, float) else "" if value is None else str(value)
@@ -472,7 +546,8 @@ def mode_table(rows: Sequence[Mapping[str, object]]) -> TextTable:
     for row in rows:
         damped = row["damped_frequency"]
         hertz = damped / math.tau if isinstance(damped, float) else None
-        state = "at rest" if row["state"] == "at rest" else "rotating, no gravity"  # a table as wide as a screen
+        # a table as wide as a screen
+        state = "at rest" if row["state"] == "at rest" else "rotating, no gravity"
         shown = state, row["speed"], row["mode"], row["undamped_frequency"], damped, hertz
         cells.append(tuple(map(cell, (*shown, row["damping_ratio"], row["growth_rate"]))))
     return TextTable(head, cells)
@@ -480,9 +555,12 @@ def mode_table(rows: Sequence[Mapping[str, object]]) -> TextTable:
 
 @np.errstate(all="ignore")
 def mode_summary(modes: SceneModes) -> str:
-    """Return modes at rest and at the lowest and highest speed, stability, and whether models agree, as text."""
+    """Return modes at rest and at the lowest and highest speed, stability, and whether models
+    agree, as text."""
     rows = mode_rows(modes)
-    ends = {linear.speeds[place] for linear in list(modes.rotation.values())[:1] for place in (0, -1)}
+    ends = {
+        linear.speeds[place] for linear in list(modes.rotation.values())[:1] for place in (0, -1)
+    }
     shown = [row for row in rows if row["state"] == "at rest" or row["speed"] in ends]
     lines = [f"{modes.label}: {modes.title}"]
     if shown:
@@ -520,20 +598,46 @@ def _linear_datasets(linear: LinearModes) -> Datasets:
     mode, shape = partial(Column, ("speed", "mode")), linear.multiblade_shapes
     component = Column(("component",), "1", "rotor and multiblade coordinates")
     n, (backward, forward) = np.arange(len(linear.coordinates)), linear.whirl
-    entry, part = partial(Column, ("speed", "equation", "coordinate")), partial(Column, ("speed", "mode", "component"))
-    root, place = partial(Column, ("speed", "mode", "root")), partial(Column, ("speed", "mode", "coordinate"))
+    entry, part = (
+        partial(Column, ("speed", "equation", "coordinate")),
+        partial(Column, ("speed", "mode", "component")),
+    )
+    root, place = (
+        partial(Column, ("speed", "mode", "root")),
+        partial(Column, ("speed", "mode", "coordinate")),
+    )
     return {
         "speed": (linear.speeds, _SPEED),
         "mode": (n, Column(("mode",), "1", "number of the mode")),
         "coordinate": (n, Column(("coordinate",), "1", "coordinate with inertia")),
         "component": (np.arange(shape.shape[2]), component),
-        "equation": (n, Column(("equation",), "1", "equation of motion, of the coordinate with the same number")),
-        "root": (np.arange(2), Column(("root",), "1", "number of the eigenvalue of a mode, 0 or 1")),
-        "steady_angle": (linear.angles, Column(("speed", "coordinate"), "rad", "angle at the steady state")),
-        "undamped_frequency": (linear.undamped_frequencies, mode("rad/s", "undamped frequency, in the rotor's frame")),
-        "damped_frequency": (linear.damped_frequencies, mode("rad/s", "damped frequency, in the rotor's frame")),
+        "equation": (
+            n,
+            Column(
+                ("equation",), "1", ("equation of motion, of the coordinate with the same number")
+            ),
+        ),
+        "root": (
+            np.arange(2),
+            Column(("root",), "1", "number of the eigenvalue of a mode, 0 or 1"),
+        ),
+        "steady_angle": (
+            linear.angles,
+            Column(("speed", "coordinate"), "rad", "angle at the steady state"),
+        ),
+        "undamped_frequency": (
+            linear.undamped_frequencies,
+            mode("rad/s", ("undamped frequency, in the rotor's frame")),
+        ),
+        "damped_frequency": (
+            linear.damped_frequencies,
+            mode("rad/s", ("damped frequency, in the rotor's frame")),
+        ),
         "damping_ratio": (linear.damping_ratios, mode("1", "damping ratio")),
-        "growth_rate": (linear.growth_rates, mode("1/s", "largest real part of the mode's eigenvalues")),
+        "growth_rate": (
+            linear.growth_rates,
+            mode("1/s", ("largest real part of the mode's eigenvalues")),
+        ),
         "backward_whirl_frequency": (
             backward,
             mode("rad/s", "damped frequency minus k times rotor speed, of cosine_k, sine_k"),
@@ -548,8 +652,14 @@ def _linear_datasets(linear: LinearModes) -> Datasets:
         "shape_imag": (linear.shapes.imag, place("1", "mode shape, imaginary part")),
         "multiblade_shape_real": (shape.real, part("1", "multiblade mode shape, real part")),
         "multiblade_shape_imag": (shape.imag, part("1", "multiblade mode shape, imaginary part")),
-        "stiffness": (linear.stiffness, entry("1/s^2", "inverse mass matrix times stiffness matrix")),
-        "damping": (linear.damping, entry("1/s", "inverse mass matrix times damping and gyroscopic matrix")),
+        "stiffness": (
+            linear.stiffness,
+            entry("1/s^2", "inverse mass matrix times stiffness matrix"),
+        ),
+        "damping": (
+            linear.damping,
+            entry("1/s", ("inverse mass matrix times damping and gyroscopic matrix")),
+        ),
     }
 
 
@@ -567,16 +677,32 @@ def to_records(modes: SceneModes) -> list[Record]:
             "speed": (table.speeds, _SPEED),
             "multiplier": (np.arange(table.multipliers.shape[1]), count),
             "multiplier_real": (table.multipliers.real, each("1", "Floquet multiplier, real part")),
-            "multiplier_imag": (table.multipliers.imag, each("1", "Floquet multiplier, imaginary part")),
-            "largest_multiplier": (table.largest, at("1", "largest modulus, without multipliers that are always 1")),
-            "growth_rate": (table.growth_rates, at("1/s", "growth rate that follows from the largest multiplier")),
-            "stable": (table.stable, at("1", "1: no multiplier above 1, 0: a multiplier above 1, -1: unknown")),
-            "product_error": (
-                table.product_error, at("1", "logarithm of the product of the multipliers minus the integrated trace")
+            "multiplier_imag": (
+                table.multipliers.imag,
+                each("1", ("Floquet multiplier, imaginary part")),
             ),
-            "torque": (table.torque, at("N m", "torque on the rotor that maintains its mean speed")),
+            "largest_multiplier": (
+                table.largest,
+                at("1", ("largest modulus, without multipliers that are always 1")),
+            ),
+            "growth_rate": (
+                table.growth_rates,
+                at("1/s", ("growth rate that follows from the largest multiplier")),
+            ),
+            "stable": (
+                table.stable,
+                at("1", ("1: no multiplier above 1, 0: a multiplier above 1, -1: unknown")),
+            ),
+            "product_error": (
+                table.product_error,
+                at("1", ("logarithm of the product of the multipliers minus the integrated trace")),
+            ),
+            "torque": (
+                table.torque,
+                at("N m", "torque on the rotor that maintains its mean speed"),
+            ),
             "mismatch": (table.mismatch, at("rad", "error of periodicity after a revolution")),
-        }  # fmt: skip
+        }
         facts = {**common, "messages": list(table.messages)}
         records.append(_record(modes.scene, FLOQUET, facts, floquet))
     return records
@@ -584,7 +710,14 @@ def to_records(modes: SceneModes) -> list[Record]:
 
 def _record(scene: str, name: str, attributes: Mapping[str, Any], datasets: Datasets) -> Record:
     arrays = {dataset: values for dataset, (values, _) in datasets.items()}
-    return Record("modes", scene, name, attributes, arrays, {dataset: what for dataset, (_, what) in datasets.items()})
+    return Record(
+        "modes",
+        scene,
+        name,
+        attributes,
+        arrays,
+        {dataset: what for dataset, (_, what) in datasets.items()},
+    )
 
 
 def _linear_record(scene: str, linear: LinearModes, common: Mapping[str, Any]) -> Record:
@@ -629,7 +762,9 @@ def read_modes(path: Path) -> dict[str, SceneModes]:
     none."""
     records = read_records(path, "modes")
     if not records:
-        raise StoreError(f"{path}: no modes in it; allowed: a file that rotor-mbs modes has written")
+        raise StoreError(
+            f"{path}: no modes in it; allowed: a file that rotor-mbs modes has written"
+        )
     with reading(path), np.errstate(all="ignore"):  # a file may hold any number
         return _modes_of(records)
 
@@ -648,14 +783,21 @@ def _modes_of(of_all: Sequence[Record]) -> dict[str, SceneModes]:
             if name == FLOQUET:
                 floquet = FloquetTable(
                     speeds=arrays["speed"],
-                    multipliers=np.asarray(arrays["multiplier_real"] + 1j * arrays["multiplier_imag"]),
+                    multipliers=np.asarray(
+                        arrays["multiplier_real"] + 1j * arrays["multiplier_imag"]
+                    ),
                     largest=arrays["largest_multiplier"],
                     messages=tuple(map(str, facts["messages"])),
-                    **{column: arrays[column] for column in ("stable", "product_error", "torque", "mismatch")},
+                    **{
+                        column: arrays[column]
+                        for column in ("stable", "product_error", "torque", "mismatch")
+                    },
                 )
             elif kind in states:
                 states[kind][source] = LinearModes(
-                    eigenvalues=np.asarray(arrays["eigenvalue_real"] + 1j * arrays["eigenvalue_imag"]),
+                    eigenvalues=np.asarray(
+                        arrays["eigenvalue_real"] + 1j * arrays["eigenvalue_imag"]
+                    ),
                     shapes=np.asarray(arrays["shape_real"] + 1j * arrays["shape_imag"]),
                     names=tuple(map(str, facts["mode_labels"])),
                     source=source,
@@ -683,5 +825,6 @@ def _modes_of(of_all: Sequence[Record]) -> dict[str, SceneModes]:
             notes=tuple(str(facts["notes"]).splitlines()),
             label=str(facts.get("scene_label", scene)),
         )
-        assert isinstance(modes_by_scene[scene].agrees, bool)  # arrays that do not fit together raise here
+        # arrays that do not fit together raise here
+        assert isinstance(modes_by_scene[scene].agrees, bool)
     return modes_by_scene

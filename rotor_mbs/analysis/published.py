@@ -1,8 +1,9 @@
-"""What the paper says, read from the shipped files under `reference/`: numbers, claims, errata, its entries checked;
-the same numbers read off stored runs, and how much of the paper is reproduced.
+"""What the paper says, read from the shipped files under `reference/`: numbers, claims, errata, its
+entries checked; the same numbers read off stored runs, and how much of the paper is reproduced.
 
-The paper's runs are chaotic: a claim may hold for one rounding and fail for the next. So its verdict is that of runs
-from many starts moved by rounding, for several durations, as reference/claims.json has it.
+The paper's runs are chaotic: a claim may hold for one rounding and fail for the next. So its
+verdict is that of runs from many starts moved by rounding, for several durations, as
+reference/claims.json has it.
 """
 
 from __future__ import annotations
@@ -25,10 +26,13 @@ class Published:
     """A number or claim of the paper, as in reference/published.toml.
 
     statement, tests : of a claim.
-    scene, metric, value, decimals : of a number: it is this metric of a run of the scene, rad or rad/s.
-    rounding : of a number, whether it is amplified rounding error, which depends on how the equations are written.
+    scene, metric, value, decimals : of a number: it is this metric of a run of the scene, rad or
+        rad/s.
+    rounding : of a number, whether it is amplified rounding error, which depends on how the
+        equations are written.
     scenes : whose runs decide it.
-    printed, corrected : of a number, what a file's runs of the printed and the corrected model give (`claims`).
+    printed, corrected : of a number, what a file's runs of the printed and the corrected model give
+        (`claims`).
     """
 
     id: str
@@ -68,9 +72,10 @@ class Erratum:
 class CheckedEntry(NamedTuple):
     """One printed entry against its derivative, as formulas.
 
-    difference: the largest of |printed - right| / max(1, |printed|, |right|) over random states. explained_by: the
-    fewest errata with which the paper's derivation gives what is printed, as "E1, E2"; "" where it agrees, or where
-    nothing explains it.
+    difference: the largest of |printed - right| / max(1, |printed|, |right|) over random states.
+    explained_by: the
+    fewest errata with which the paper's derivation gives what is printed, as "E1, E2"; "" where it
+    agrees, or where nothing explains it.
     """
 
     equation: str
@@ -86,7 +91,9 @@ def published() -> tuple[Published, ...]:
     """Return all numbers and claims, in the order of the file."""
     items = []
     for table in _tables("published")["published"]:
-        sides = [test[side] for test in table.get("tests", ()) for side in ("of", "than") if side in test]
+        sides = [
+            test[side] for test in table.get("tests", ()) for side in ("of", "than") if side in test
+        ]
         scenes = frozenset(scene for scene, *_ in sides) or frozenset({table["scene"]})
         items.append(Published(**table, scenes=scenes))
     return tuple(items)
@@ -128,10 +135,12 @@ class ClaimStudy:
     """The claims in words tested on many runs.
 
     rule : of the verdicts, in words.
-    runs, durations, spread : of each scene for each duration in s; rad, by which their starts were moved at most.
+    runs, durations, spread : of each scene for each duration in s; rad, by which their starts were
+        moved at most.
     methods : the printed and the corrected equations.
     verdicts : "holds", "fails" or "undecided" of each claim by method.
-    shares : of each claim by method, for each duration: the share of the deciding runs in which it holds (None where
+    shares : of each claim by method, for each duration: the share of the deciding runs in which it
+        holds (None where
         none decides), and how many decide.
     """
 
@@ -159,14 +168,16 @@ def claim_study() -> ClaimStudy:
     return ClaimStudy(**{field.name: stored[field.name] for field in fields(ClaimStudy)})
 
 
-# Share of a scene's energy scale. The drift of ode45 itself at the paper's tolerances is below a thousandth of that
-# (3e-7 of the scale at most, on the corrected equations).
+# Share of a scene's energy scale. The drift of ode45 itself at the paper's tolerances is below a
+# thousandth of that (3e-7 of the scale at most, on the corrected equations).
 ENERGY_RISE = 1e-3
 
 
-def claims(scenes: Mapping[str, StoredScene], items: Iterable[Published] | None = None) -> list[Published]:
-    """Return the numbers that runs of the paper's scenes have, and the claims about those that are all there; of
-    `items`, or of all. A scene that was changed under its name is not the paper's."""
+def claims(
+    scenes: Mapping[str, StoredScene], items: Iterable[Published] | None = None
+) -> list[Published]:
+    """Return the numbers that runs of the paper's scenes have, and the claims about those that are
+    all there; of `items`, or of all. A scene that was changed under its name is not the paper's."""
     results = []
     for item in published() if items is None else items:
         if not all(name in scenes and scenes[name].is_shipped for name in item.scenes):
@@ -175,7 +186,9 @@ def claims(scenes: Mapping[str, StoredScene], items: Iterable[Published] | None 
             results.append(item)
             continue
         runs = scenes[item.scene].printed, scenes[item.scene].corrected
-        printed, corrected = (None if run is None else run.attributes.get(item.metric) for run in runs)
+        printed, corrected = (
+            None if run is None else run.attributes.get(item.metric) for run in runs
+        )
         if printed is not None or corrected is not None:
             results.append(replace(item, printed=printed, corrected=corrected))
     return results
@@ -186,10 +199,14 @@ def rounds_to(value: float, item: Published) -> bool:
     return f"{value:.{item.decimals}f}" == f"{item.value:.{item.decimals}f}"
 
 
-def finding(scenes: Mapping[str, StoredScene], claims: Iterable[Published]) -> list[tuple[str, str, str]]:
-    """Tell how much of the paper is reproduced, and the energy that its equations gain; empty for other scenes.
+def finding(
+    scenes: Mapping[str, StoredScene], claims: Iterable[Published]
+) -> list[tuple[str, str, str]]:
+    """Tell how much of the paper is reproduced, and the energy that its equations gain; empty for
+    other scenes.
 
-    A row has a result, and what the equations as printed and the corrected model give; "" where nothing is known.
+    A row has a result, and what the equations as printed and the corrected model give; "" where
+    nothing is known.
     """
     claims = list(claims)
     numbers = [claim for claim in claims if claim.is_number]
@@ -201,15 +218,25 @@ def finding(scenes: Mapping[str, StoredScene], claims: Iterable[Published]) -> l
     rows = [("Published numbers reproduced", counts[0], counts[1])]
     if claims:
         study = claim_study()
-        printed, corrected = (f"{study.count(name, HOLDS)} of {len(study.verdicts)}" for name in study.methods)
+        printed, corrected = (
+            f"{study.count(name, HOLDS)} of {len(study.verdicts)}" for name in study.methods
+        )
         rows.append(("Published claims that hold", printed, corrected))
     runs = [run for scene in scenes.values() if (run := scene.printed) is not None]
     runs = [run for run in runs if "energy_gain_J" in run.attributes]
-    rising = [run for run in runs if run.attributes["energy_gain_J"] > ENERGY_RISE * run.attributes["energy_scale_J"]]
+    rising = [
+        run
+        for run in runs
+        if run.attributes["energy_gain_J"] > ENERGY_RISE * run.attributes["energy_scale_J"]
+    ]
     if runs:
-        result = f"Scenes with a spurious energy gain of more than {ENERGY_RISE:g} of the energy scale"
+        result = (
+            f"Scenes with a spurious energy gain of more than {ENERGY_RISE:g} of the energy scale"
+        )
         rows.append((result, f"{len(rising)} of {len(runs)}", ""))
     gains = [run.attributes["energy_gain_J"] for run in rising if run.status in GOOD]
     if gains:
-        rows.append(("Largest spurious energy gain of a complete run", f"{1e-6 * max(gains):.3g} MJ", ""))
+        rows.append(
+            ("Largest spurious energy gain of a complete run", f"{1e-6 * max(gains):.3g} MJ", "")
+        )
     return [row for row in rows if any(row[1:])]

@@ -1,7 +1,8 @@
 """The checks of a run's samples, in one table: its status, `check` and `test-method` read the same.
 
-Each check is a number against a bound. What samples say of each other (times, start, tips, energies) is asked of every
-run; defects, balances, loads and exact solutions only of a run that claims the corrected equations.
+Each check is a number against a bound. What samples say of each other (times, start, tips,
+energies) is asked of every run; defects, balances, loads and exact solutions only of a run that
+claims the corrected equations.
 """
 
 from __future__ import annotations
@@ -33,15 +34,20 @@ from rotor_mbs.solution.quantities import (
 from rotor_mbs.solution.status import OK_ERROR
 from rotor_mbs.solution.trajectory import Trajectory
 
-# Below this share of the rotor's inertia the last bit of a pitch decides it: (π/2 known to 1e-16)², a hundredfold.
+# Below this share of the rotor's inertia the last bit of a pitch decides it: (π/2 known to 1e-16)²,
+# a hundredfold.
 NO_INERTIA = 1e-30
-# Share of the rotor's inertia that is left once every pitch is free: below this a run that broke off broke off there.
+# Share of the rotor's inertia that is left once every pitch is free: below this a run that broke
+# off broke off there.
 SINGULAR_SHARE = 1e-3
-# Round-off of a run's state, what it becomes over some hundred steps; magnified it may add to the energy error.
+# Round-off of a run's state, what it becomes over some hundred steps; magnified it may add to the
+# energy error.
 _ROUND_OFF = 1e-14
-# Ten units in the last place of an angle that starts turns away from zero are no error of the method.
+# Ten units in the last place of an angle that starts turns away from zero are no error of the
+# method.
 _START_ROUND_OFF = 10.0 * float(np.finfo(float).eps)
-# Steps of a run: an error that is this many times the largest defect has not only been added up, but has grown.
+# Steps of a run: an error that is this many times the largest defect has not only been added up,
+# but has grown.
 _GROWN = 1e4
 
 
@@ -109,7 +115,9 @@ class RunSamples:
         return Where(self.scene.name, self.method, channel)
 
 
-def bounded(bounds: Bounds, name: str, where: Where, value: float, unit: str, hint: str, fault: str = "") -> Check:
+def bounded(
+    bounds: Bounds, name: str, where: Where, value: float, unit: str, hint: str, fault: str = ""
+) -> Check:
     """Return a value against the bound of the check `name` for the method.
 
     Parameters
@@ -123,12 +131,13 @@ def bounded(bounds: Bounds, name: str, where: Where, value: float, unit: str, hi
 def run_checks(run: RunSamples, bounds: Bounds, *, is_corrected: bool = True) -> Iterator[Check]:
     """Yield every check of a run that has samples.
 
-    The order is that in which they name the reason of a status: where a motion is wrong, so is much of what follows
-    from it.
+    The order is that in which they name the reason of a status: where a motion is wrong, so is much
+    of what follows from it.
 
     Parameters
     ----------
-    is_corrected : whether the run claims the corrected equations; the motion of others is not checked.
+    is_corrected : whether the run claims the corrected equations; the motion of others is not
+        checked.
     """
     yield from _checks_of_rows(run, bounds)
     if is_corrected:
@@ -142,7 +151,12 @@ def _checks_of_rows(run: RunSamples, bounds: Bounds) -> Iterator[Check]:
     times = np.linspace(0.0, scene.duration, scene.samples)[: len(trajectory.time)]
     off = float(np.abs(trajectory.time - times).max()) / scene.duration
     yield bounded(
-        bounds, "times", run.where("time"), off, "of duration", "samples are equally spaced, both ends included"
+        bounds,
+        "times",
+        run.where("time"),
+        off,
+        "of duration",
+        ("samples are equally spaced, both ends included"),
     )
     if not scene.wants("angles"):
         return
@@ -153,7 +167,9 @@ def _checks_of_rows(run: RunSamples, bounds: Bounds) -> Iterator[Check]:
     if scene.wants("rates"):
         off = max(off, float(np.abs(trajectory.rates[0] - rates).max()))
     size = max(1.0, *map(abs, scene.initial_angles), *map(abs, rates.tolist()))
-    yield bounded(bounds, "start", run.where("angles, rates"), off / size, "rad, rad/s", "the initial state")
+    yield bounded(
+        bounds, "start", run.where("angles, rates"), off / size, "rad, rad/s", "the initial state"
+    )
 
 
 def _checks_of_outputs(run: RunSamples, bounds: Bounds) -> Iterator[Check]:
@@ -162,12 +178,16 @@ def _checks_of_outputs(run: RunSamples, bounds: Bounds) -> Iterator[Check]:
     if not scene.wants("angles"):
         return
     if trajectory.tip is not None:
-        away = np.linalg.norm(trajectory.tip - kinematics.tip_paths(scene, trajectory.angles), axis=2).max()
+        away = np.linalg.norm(
+            trajectory.tip - kinematics.tip_paths(scene, trajectory.angles), axis=2
+        ).max()
         length = max(float(np.linalg.norm(blade.tip)) for blade in scene.blades) or 1.0
         hint = "the tip point, the azimuth or the rotation of a blade"
         fault = f"a tip is {away:.1e} m from where its angles put it, allowed {{bound}} m"
         yield _with_fault(
-            bounded(bounds, "tip", run.where("tip"), float(away) / length, "of length", hint), fault, length
+            bounded(bounds, "tip", run.where("tip"), float(away) / length, "of length", hint),
+            fault,
+            length,
         )
     if trajectory.energy_error is not None:
         own = energy_error(trajectory)
@@ -205,36 +225,53 @@ def _checks_of_energies(run: RunSamples, bounds: Bounds) -> Iterator[Check]:
             if name == "work" and not is_built_in(run.method):
                 # Not a function of the state alone where it is integrated with the motion: then it
                 # is as accurate as the balance of energy.
-                check = replace(check, bound=max(check.bound, bounds.of("energy", run.method).value))
+                check = replace(
+                    check, bound=max(check.bound, bounds.of("energy", run.method).value)
+                )
             yield check
 
 
 def _checks_of_motion(run: RunSamples, bounds: Bounds) -> Iterator[Check]:
-    """Yield what is asked of the corrected equations: energy balance, loads, defects, error, exact motion."""
+    """Yield what is asked of the corrected equations: energy balance, loads, defects, error, exact
+    motion."""
     scene, trajectory, metrics = run.scene, run.trajectory, run.metrics
     if "energy_drift_max" in metrics:
         drift = max(metrics["energy_drift_max"] - energy_slack(scene, trajectory), 0.0)
         hint = "a force without its potential, a wrong mass matrix, or too long a step"
-        fault = f"energy drift {metrics['energy_drift_max']:.1e} of the energy scale, allowed {{bound}}"
-        yield _with_fault(bounded(bounds, "energy", run.where("balance"), drift, "of scale", hint), fault)
+        fault = (
+            f"energy drift {metrics['energy_drift_max']:.1e} of the energy scale, allowed {{bound}}"
+        )
+        yield _with_fault(
+            bounded(bounds, "energy", run.where("balance"), drift, "of scale", hint), fault
+        )
     yield from _checks_of_quantities(run, bounds)
     if "defect_max" in metrics:
         yield from _checks_of_defects(run, bounds)
     if "angle_error_max" in metrics:
-        hint = f"up to the horizon at {metrics['horizon_s']:.2f} s: defects, amplified by the motion"
+        hint = (
+            f"up to the horizon at {metrics['horizon_s']:.2f} s: defects, amplified by the motion"
+        )
         error = max(metrics["angle_error_max"] - start_slack(scene), 0.0)
         fault = _error_fault(run, metrics["angle_error_max"], "angle error")
         yield _with_fault(bounded(bounds, "error", run.where("angles"), error, "rad", hint), fault)
     elif "angle_error_predicted" in metrics:
-        # Without a reference the defects say how large the error is; bounds of shipped scenes are for the true one.
+        # Without a reference the defects say how large the error is; bounds of shipped scenes are
+        # for the true one.
         error, where = metrics["angle_error_predicted"], run.where("angles, predicted")
-        value, fault = max(error - start_slack(scene), 0.0), _error_fault(run, error, "predicted angle error")
-        yield Check("error", where, value, OK_ERROR, "defects, amplified by the motion", "rad", fault)
+        value, fault = (
+            max(error - start_slack(scene), 0.0),
+            _error_fault(run, error, "predicted angle error"),
+        )
+        yield Check(
+            "error", where, value, OK_ERROR, "defects, amplified by the motion", "rad", fault
+        )
     exact = kinematics.exact_rotor_angle(scene, trajectory.time) if scene.wants("angles") else None
     if exact is not None:
         name, angle = exact
         off = max(float(np.abs(trajectory.angles[:, 0] - angle).max()) - start_slack(scene), 0.0)
-        yield bounded(bounds, "exact", run.where("rotor angle"), off, "rad", f"{name}, solved analytically")
+        yield bounded(
+            bounds, "exact", run.where("rotor angle"), off, "rad", f"{name}, solved analytically"
+        )
 
 
 def _checks_of_defects(run: RunSamples, bounds: Bounds) -> Iterator[Check]:
@@ -249,7 +286,10 @@ def _checks_of_defects(run: RunSamples, bounds: Bounds) -> Iterator[Check]:
     where = run.where("largest")
     hint = f"up to t = {metrics['defect_time']:.6g} s: a term, a parameter, the step"
     allowed = defect_allowed(metrics, bound)
-    fault = f"defect {metrics['defect_excess']:.1e} rad in the interval up to t = {metrics['defect_time']:.6g} s"
+    fault = (
+        f"defect {metrics['defect_excess']:.1e} rad in the interval up to t = "
+        f"{metrics['defect_time']:.6g} s"
+    )
     fault += f", allowed {allowed:.1e}"
     if allowed > 1.05 * bound:
         fault += f" ({bound:.0e} rad per 0.01 s, times length and error growth)"
@@ -265,12 +305,16 @@ def _checks_of_defects(run: RunSamples, bounds: Bounds) -> Iterator[Check]:
 def _error_fault(run: RunSamples, error: float, what: str) -> str:
     """Return what an angle error that is too large is called, and why it has become so."""
     metrics, scene = run.metrics, run.scene
-    text = f"{what} {error:.1e} rad up to the horizon at {metrics['horizon_s']:.3g} s of {scene.duration:g} s"
+    text = (
+        f"{what} {error:.1e} rad up to the horizon at {metrics['horizon_s']:.3g} s of "
+        f"{scene.duration:g} s"
+    )
     left = symmetry_loss(run)
     if left is not None:
         pitch, time = left
         return (
-            f"pitch {pitch} leaves zero at t = {time:.3g} s, where symmetry keeps it: rounding, which this unstable "
+            f"pitch {pitch} leaves zero at t = {time:.3g} s, where symmetry keeps it: rounding, "
+            "which this unstable "
             f"motion amplifies; {text}"
         )
     if error > _GROWN * metrics.get("defect_max", error):
@@ -279,8 +323,8 @@ def _error_fault(run: RunSamples, error: float, what: str) -> str:
 
 
 def symmetry_loss(run: RunSamples) -> tuple[int, float] | None:
-    """Return the first pitch, from 1, that leaves zero before the horizon although symmetry keeps it there, and the
-    time (s) at which it does."""
+    """Return the first pitch, from 1, that leaves zero before the horizon although symmetry keeps
+    it there, and the time (s) at which it does."""
     if run.defects is None or not run.defects.resting:
         return None
     away = np.abs(run.trajectory.angles[:, list(run.defects.resting)]) > LEFT_ZERO
@@ -308,16 +352,24 @@ def quantity_bound(rule: QuantityMetric, bounds: Bounds, method: str) -> float |
     return entry.value if entry else rule.bound
 
 
-def quantity_errors(scene: Scene, metrics: Metrics) -> Iterator[tuple[Quantity, QuantityMetric, float]]:
-    """Yield each judged quantity, its rule, and its error relative to what the rule says; only those in `metrics`."""
+def quantity_errors(
+    scene: Scene, metrics: Metrics
+) -> Iterator[tuple[Quantity, QuantityMetric, float]]:
+    """Yield each judged quantity, its rule, and its error relative to what the rule says; only
+    those in `metrics`."""
     for quantity in known_quantities(scene.outputs):
         rule = quantity.judgement
         if rule is not None and rule.metric in metrics:
-            yield quantity, rule, metrics[rule.metric] / (rule.relative_to(scene) if rule.relative_to else 1.0)
+            yield (
+                quantity,
+                rule,
+                metrics[rule.metric] / (rule.relative_to(scene) if rule.relative_to else 1.0),
+            )
 
 
 def _checks_of_quantities(run: RunSamples, bounds: Bounds) -> Iterator[Check]:
-    """Yield the quantities that have a rule and a bound: gaps of joints, loads, those of plug-ins."""
+    """Yield the quantities that have a rule and a bound: gaps of joints, loads, those of
+    plug-ins."""
     scene, trajectory = run.scene, run.trajectory
     rounding = _load_floors(run, bounds) if scene.wants("loads") and run.defects is not None else {}
     for quantity, rule, error in quantity_errors(scene, run.metrics):
@@ -326,12 +378,15 @@ def _checks_of_quantities(run: RunSamples, bounds: Bounds) -> Iterator[Check]:
             continue
         own_state = None if run.defects is None else run.defects.own_loads
         if quantity.name in rounding and own_state is not None and rule.scale_of is not None:
-            stored, exact = (array_of(quantity, scene, samples) for samples in (trajectory, own_state))
+            stored, exact = (
+                array_of(quantity, scene, samples) for samples in (trajectory, own_state)
+            )
             assert stored is not None
             assert exact is not None
             off = sizes(quantity, stored - exact) - sizes(quantity, rounding[quantity.name])
             error = max(float(off.max(initial=0.0)), 0.0) / rule.scale_of(scene, trajectory)
-            if not (off < math.inf).all():  # also NaN; minus infinity: rounding leaves everything open
+            # also NaN; minus infinity: rounding leaves everything open
+            if not (off < math.inf).all():
                 error = math.inf
         where = run.where(rule.channel or quantity.name)
         hint, unit = rule.look_at or quantity.long_name, rule.unit or quantity.units
@@ -341,8 +396,8 @@ def _checks_of_quantities(run: RunSamples, bounds: Bounds) -> Iterator[Check]:
 
 
 def _load_floors(run: RunSamples, bounds: Bounds) -> dict[str, Array]:
-    """Return what rounding leaves open of each load: that of the state, and of any engine's arithmetic unless the
-    method has a bound of its own."""
+    """Return what rounding leaves open of each load: that of the state, and of any engine's
+    arithmetic unless the method has a bound of its own."""
     samples = run.trajectory.time, run.trajectory.angles, run.trajectory.rates
     floors = load_rounding(run.scene, *samples)
     if bounds.of("loads", run.method).method == "*":
@@ -352,12 +407,16 @@ def _load_floors(run: RunSamples, bounds: Bounds) -> dict[str, Array]:
 
 
 def start_slack(scene: Scene) -> float:
-    """Return what the digits of an angle that starts turns away from zero leave open (rad); 0 within a turn."""
-    return _START_ROUND_OFF * max(0.0, *(abs(angle) - 2.0 * np.pi for angle in scene.initial_angles))
+    """Return what the digits of an angle that starts turns away from zero leave open (rad); 0
+    within a turn."""
+    return _START_ROUND_OFF * max(
+        0.0, *(abs(angle) - 2.0 * np.pi for angle in scene.initial_angles)
+    )
 
 
 def energy_slack(scene: Scene, run: Trajectory) -> float:
-    """Return the share of the energy scale that magnified round-off may add to a method's own energy error."""
+    """Return the share of the energy scale that magnified round-off may add to a method's own
+    energy error."""
     return _ROUND_OFF * (energy_conditioning(scene, run) - 1.0) + start_slack(scene)
 
 

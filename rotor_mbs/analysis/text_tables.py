@@ -1,4 +1,5 @@
-"""Small tables for a terminal or a notebook: of runs, of methods over many runs, of bench curves."""
+"""Small tables for a terminal or a notebook: of runs, of methods over many runs, of bench
+curves."""
 
 from __future__ import annotations
 
@@ -15,8 +16,15 @@ from rotor_mbs.runs.sweeps import StoredSweep, parameter_name
 from rotor_mbs.solution.status import GOOD, comparison, short_number
 
 RUN_HEAD = (
-    "method", "status", "defect (rad)", "allowed", "error (rad), limit 0.01", "compared", "energy drift", "time (s)",
-)  # fmt: skip
+    "method",
+    "status",
+    "defect (rad)",
+    "allowed",
+    "error (rad), limit 0.01",
+    "compared",
+    "energy drift",
+    "time (s)",
+)
 MOST_ROWS = 40  # of a table with a row for each run
 
 
@@ -31,7 +39,9 @@ def run_row(run: StoredRun) -> tuple[str, ...]:
     return run.method, run.status, *shown, short_number(facts.get("energy_drift_max")), time
 
 
-def table_of_runs(scenes: Mapping[str, StoredScene], wanted: Mapping[str, Iterable[str]]) -> TextTable:
+def table_of_runs(
+    scenes: Mapping[str, StoredScene], wanted: Mapping[str, Iterable[str]]
+) -> TextTable:
     """Return a row for each of the `wanted` runs and their references; of many runs, one for each
     method."""
     runs = []
@@ -50,8 +60,16 @@ def table_of_runs(scenes: Mapping[str, StoredScene], wanted: Mapping[str, Iterab
 
 
 def method_table(runs: Iterable[StoredRun]) -> TextTable:
-    """Return a row for each method: how many of its runs ended well, and the largest numbers among those."""
-    head = ("method", "runs", "largest defect (rad)", "largest error (rad)", "energy drift", "longest run time (s)")
+    """Return a row for each method: how many of its runs ended well, and the largest numbers among
+    those."""
+    head = (
+        "method",
+        "runs",
+        "largest defect (rad)",
+        "largest error (rad)",
+        "energy drift",
+        "longest run time (s)",
+    )
     by_method: dict[str, list[StoredRun]] = {}
     for run in runs:
         by_method.setdefault(run.method, []).append(run)
@@ -79,9 +97,24 @@ def bench_table(curves: Sequence[Record]) -> TextTable:
         count = f"{curve.statuses.count('ok')} of {len(curve.statuses)}"
         best = short_number(float(errors.min())) if len(errors) else ""
         missing = "not measured" if left_out(curve) else ""
-        rows.append((curve.scene, curve.name, count, best, *(missing if t is None else f"{t:.2e}" for t in times)))
+        rows.append(
+            (
+                curve.scene,
+                curve.name,
+                count,
+                best,
+                *(missing if t is None else f"{t:.2e}" for t in times),
+            )
+        )
     return TextTable(
-        ("scene", "method", "ok", "best error (rad)", *(f"s to {target:.0e} rad" for target in TARGETS_RAD)), rows
+        (
+            "scene",
+            "method",
+            "ok",
+            "best error (rad)",
+            *(f"s to {target:.0e} rad" for target in TARGETS_RAD),
+        ),
+        rows,
     )
 
 
@@ -92,7 +125,9 @@ def sweep_parameters(sweep: StoredSweep) -> TextTable:
         name = parameter_name(key)
         values = np.asarray(sweep.column(name), float)
         unit = sweep.columns[name].units
-        ends = (f"{value:.6g}" for value in (values.min(initial=np.inf), values.max(initial=-np.inf)))
+        ends = (
+            f"{value:.6g}" for value in (values.min(initial=np.inf), values.max(initial=-np.inf))
+        )
         rows.append((key, "" if unit == "1" else unit, *ends, str(len(np.unique(values)))))
     return TextTable(("varied", "unit", "from", "to", "values"), rows)
 
@@ -107,12 +142,17 @@ class TextTable:
     def __str__(self) -> str:
         rows = [self.head, *self.rows]
         widths = [max(len(cell) for cell in column) for column in zip(*rows, strict=True)]
-        lines = ["  ".join(f"{cell:{width}}" for cell, width in zip(row, widths, strict=True)) for row in rows]
+        lines = [
+            "  ".join(f"{cell:{width}}" for cell, width in zip(row, widths, strict=True))
+            for row in rows
+        ]
         return "\n".join(line.rstrip() for line in lines)
 
     __repr__ = __str__
 
     def _repr_html_(self) -> str:
         head = "".join(f"<th>{escape(cell)}</th>" for cell in self.head)
-        rows = "".join(f"<tr>{''.join(f'<td>{escape(cell)}</td>' for cell in row)}</tr>" for row in self.rows)
+        rows = "".join(
+            f"<tr>{''.join(f'<td>{escape(cell)}</td>' for cell in row)}</tr>" for row in self.rows
+        )
         return f"<table><tr>{head}</tr>{rows}</table>"

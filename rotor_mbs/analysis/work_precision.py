@@ -20,9 +20,11 @@ ANGLE_ERROR = "angle_error_max"  # up to the horizon, rad
 # An error as large as the motion itself: such a run is a failure, not a point on the curve.
 USELESS_RAD = 1.0
 
-# Below this many roundings of a double of order one an error of exactly zero is drawn and interpolated.
+# Below this many roundings of a double of order one an error of exactly zero is drawn and
+# interpolated.
 SMALLEST_ERROR = 1e-17
-# A curve turns into its round-off floor gradually: errors within this factor of the floor carry no order.
+# A curve turns into its round-off floor gradually: errors within this factor of the floor carry no
+# order.
 _ABOVE_FLOOR = 20.0
 # Above this error a step is too coarse for its order to show.
 _ASYMPTOTIC_RAD = 0.05
@@ -59,7 +61,9 @@ def left_out(curve: Record) -> int:
 def points(curve: Record, error: str = ANGLE_ERROR) -> tuple[Array, Array]:
     """Return (errors in rad, times in s) of the points on the curve."""
     chosen = succeeded(curve, error)
-    return np.maximum(curve.arrays[error][chosen], SMALLEST_ERROR), curve.arrays["run_time_s"][chosen]
+    return np.maximum(curve.arrays[error][chosen], SMALLEST_ERROR), curve.arrays["run_time_s"][
+        chosen
+    ]
 
 
 def pareto(errors: Array, seconds: Array) -> NDArray[np.intp]:
@@ -88,7 +92,9 @@ def time_to_reach(errors: Array, seconds: Array, target: float) -> float | None:
 def fastest(curves: Sequence[Record], target: float) -> list[tuple[Record, Reach]]:
     """Return the curves that reach the target, the fastest first."""
     times = [(curve, time_to_reach(*points(curve), target)) for curve in curves]
-    able = sorted(((curve, time) for curve, time in times if time is not None), key=lambda pair: pair[1])
+    able = sorted(
+        ((curve, time) for curve, time in times if time is not None), key=lambda pair: pair[1]
+    )
     return [(curve, Reach(time, time / able[0][1])) for curve, time in able]
 
 
@@ -102,7 +108,8 @@ def fitted_order(steps: Array, errors: Array) -> float | None:
     h, e = steps[usable], errors[usable]
     if len(e) < 2:
         return None
-    # Whether the errors stop falling: an earlier one is the smallest, or the last slope is clearly below the usual.
+    # Whether the errors stop falling: an earlier one is the smallest, or the last slope is clearly
+    # below the usual.
     slopes = np.diff(np.log(e)) / np.diff(np.log(h))
     if int(np.argmin(e)) < len(e) - 1 or bool(slopes[-1] < 0.75 * np.median(slopes)):
         above = e > _ABOVE_FLOOR * e.min()

@@ -31,7 +31,8 @@ def bench(
     budget: float = 28.0,
     progress: bool | None = None,
 ) -> BenchCurves:
-    """Measure the error of methods against their run time, each over its ladder of steps or tolerances.
+    """Measure the error of methods against their run time, each over its ladder of steps or
+    tolerances.
 
     Parameters
     ----------
@@ -70,7 +71,11 @@ def bench(
     scene, budget = scene_of(scene), positive("budget", as_float(budget))
     if operator.index(repeats) < 1:
         raise InputError(f"repeats: {shown_value(repeats)}; allowed: a whole number from 1")
-    names = list(check_names(methods if isinstance(methods, str) else texts(methods))) if methods else []
+    names = (
+        list(check_names(methods if isinstance(methods, str) else texts(methods)))
+        if methods
+        else []
+    )
     folder = None
     if output is None:
         folder = TemporaryFolder()
@@ -78,7 +83,13 @@ def bench(
     path = file_path(output)
     with progress_of_call(progress) as shown:
         outcomes, refused = run_bench(
-            [scene], names, path, repeats=repeats, budget_s=budget, workers=cores(), on_progress=shown
+            [scene],
+            names,
+            path,
+            repeats=repeats,
+            budget_s=budget,
+            workers=cores(),
+            on_progress=shown,
         )
     if refused and names:
         raise MethodRefusal("\n".join(map(str, refused)))
@@ -87,16 +98,19 @@ def bench(
 
 
 class BenchCurves(Mapping[str, Mapping[str, Any]]):
-    """Curves of error against run time in a file of `rotor-mbs bench`: arrays by "scene/curve", a value per setting.
+    """Curves of error against run time in a file of `rotor-mbs bench`: arrays by "scene/curve", a
+    value per setting.
 
-    `curves["paper/fig11/exudyn_tree/rk67"]["angle_error_max"]` (rad), `["run_time_s"]` (s), `["setting"]`: a time step
-    in s or a tolerance.
+    `curves["paper/fig11/exudyn_tree/rk67"]["angle_error_max"]` (rad), `["run_time_s"]` (s),
+    `["setting"]`: a time step in s or a tolerance.
     """
 
     def __init__(self, path: Path, *, _folder: TemporaryFolder | None = None) -> None:
         self.path = path
         self._folder = _folder
-        self._records = {f"{record.scene}/{record.name}": record for record in read_records(path, "bench")}
+        self._records = {
+            f"{record.scene}/{record.name}": record for record in read_records(path, "bench")
+        }
 
     def __getitem__(self, label: str) -> Mapping[str, Any]:
         return self._records[label].arrays
@@ -108,7 +122,8 @@ class BenchCurves(Mapping[str, Mapping[str, Any]]):
         return len(self._records)
 
     def table(self) -> TextTable:
-        """Table with a row per curve: the smallest error (rad), and the run time (s) at which errors are reached."""
+        """Table with a row per curve: the smallest error (rad), and the run time (s) at which
+        errors are reached."""
         return bench_table(list(self._records.values()))
 
     def to_html(self, folder: str | os.PathLike[str]) -> Path:

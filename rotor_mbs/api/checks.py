@@ -48,11 +48,15 @@ class Checks(Sequence[Check]):
         return len(self._checks)
 
     def table(self) -> TextTable:
-        """Table with a row per check: what was checked where, the value, what is allowed, and what to look at."""
+        """Table with a row per check: what was checked where, the value, what is allowed, and what
+        to look at."""
         return _table(self._checks)
 
     def __repr__(self) -> str:
-        text = f"{counted(len(self) - len(self.failures), 'check')} passed, {len(self.failures)} failed"
+        text = (
+            f"{counted(len(self) - len(self.failures), 'check')} passed, "
+            f"{len(self.failures)} failed"
+        )
         return f"{_table(self.failures)}\n{text}" if self.failures else text
 
     def _repr_html_(self) -> str:
@@ -64,7 +68,9 @@ def _table(checks: Iterable[Check]) -> TextTable:
     for check in checks:
         numbers = (f"{check.value:.1e}", f"{check.bound:.1e}", check.unit)
         rows.append((check.name, *check.where, *numbers, "" if check.passed else check.hint))
-    return TextTable(("check", "scene", "method", "channel", "value", "allowed", "unit", "reason"), rows)
+    return TextTable(
+        ("check", "scene", "method", "channel", "value", "allowed", "unit", "reason"), rows
+    )
 
 
 def check(
@@ -103,7 +109,11 @@ def check(
     known = shipped_bounds()
     if bounds is not None:
         known = known.with_entries(read_bounds(file_path(bounds)))
-    return Checks(check_file(file_path(path), known, [require] if isinstance(require, str) else texts(require)))
+    return Checks(
+        check_file(
+            file_path(path), known, [require] if isinstance(require, str) else texts(require)
+        )
+    )
 
 
 def test_method(name: str | os.PathLike[str], *, timeout: float = 60.0) -> Checks:  # noqa: PT028  (no test)
@@ -130,7 +140,9 @@ def test_method(name: str | os.PathLike[str], *, timeout: float = 60.0) -> Check
     from rotor_mbs.studies.method_test import examine  # late: models
 
     seconds = valid_seconds(timeout)
-    return Checks(made for method in check_names(os.fspath(name)) for made in examine(method, seconds))
+    return Checks(
+        made for method in check_names(os.fspath(name)) for made in examine(method, seconds)
+    )
 
 
 test_method.__test__ = False  # type: ignore[attr-defined]  # of pytest, where it is imported

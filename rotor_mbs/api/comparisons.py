@@ -13,7 +13,13 @@ from rotor_mbs.analysis.text_tables import TextTable
 from rotor_mbs.comparison.data import load_data
 from rotor_mbs.comparison.modes import compare_modes
 from rotor_mbs.comparison.trajectory import compare_with_reference
-from rotor_mbs.comparison.verdict import DEFAULT_TOLERANCE, DataVerdict, channel_table, unused_lines, verdict_of
+from rotor_mbs.comparison.verdict import (
+    DEFAULT_TOLERANCE,
+    DataVerdict,
+    channel_table,
+    unused_lines,
+    verdict_of,
+)
 from rotor_mbs.errors import StoreError
 from rotor_mbs.methods.time_limit import valid_seconds
 from rotor_mbs.runs.hdf5 import reading
@@ -41,30 +47,34 @@ def compare(
 ) -> DataComparison:
     """Compare a trajectory, loads or modes of another program with a scene.
 
-    A trajectory is compared with the reference at the times of the data, loads with those of the closed form at the
-    states of the data, and a table of modes with the frequencies of the closed form.
+    A trajectory is compared with the reference at the times of the data, loads with those of the
+    closed form at the states of the data, and a table of modes with the frequencies of the closed
+    form.
 
     Parameters
     ----------
-    data : a file, or arrays by name: `time` (n,) s, `angles` and `rates` (n, 1 + blades) rad and rad/s, or single
-        columns such as `rotor`, `pitch_1_deg`; angles or rates may be missing. Loads by name (N, N m), see
-        docs/compare.md. For modes: `speed` (m,) rad/s, `frequencies` (m, modes) rad/s. Also an `xarray.Dataset` or a
-        `pandas.DataFrame` with these names.
+    data : a file, or arrays by name: `time` (n,) s, `angles` and `rates` (n, 1 + blades) rad and
+        rad/s, or single
+        columns such as `rotor`, `pitch_1_deg`; angles or rates may be missing. Loads by name (N, N
+        m), see docs/compare.md. For modes: `speed` (m,) rad/s, `frequencies` (m, modes) rad/s. Also
+        an `xarray.Dataset` or a `pandas.DataFrame` with these names.
     scene : a Scene, the name of a shipped scene, or a TOML file.
-    columns : a mapping file, or a mapping with the same keys: column, unit, sign, offset of each channel, and whether
+    columns : a mapping file, or a mapping with the same keys: column, unit, sign, offset of each
+        channel, and whether
         it is wrapped. By default columns are identified by name, see `verdict.read`.
-    tolerance : bound on interval defects beyond rounding of the data (rad); relative bound on loads and frequencies.
+    tolerance : bound on interval defects beyond rounding of the data (rad); relative bound on loads
+        and frequencies.
     timeout : time limit for the reference, the defects and the search for causes (s).
     progress : whether to show the progress. By default on a terminal and in a notebook.
 
     Raises
     ------
     InputError
-        For data that cannot be read or compared, in one line with file, column or row, and what is allowed; or if the
-        reference takes longer than the time limit.
+        For data that cannot be read or compared, in one line with file, column or row, and what is
+        allowed; or if the reference takes longer than the time limit.
     TypeError
-        If `data` or `columns` is neither a mapping nor text nor a path, `scene` neither a scene nor text nor a path, or
-        a limit or a tolerance no number.
+        If `data` or `columns` is neither a mapping nor text nor a path, `scene` neither a scene nor
+        text nor a path, or a limit or a tolerance no number.
 
     Examples
     --------
@@ -89,7 +99,9 @@ def compare(
         foreign = load_data(data, scene, columns)
         if foreign.is_modes:
             return DataComparison(*compare_modes(foreign, scene, tolerance))
-        return DataComparison(*compare_with_reference(foreign, scene, tolerance, timeout, shown.stage))
+        return DataComparison(
+            *compare_with_reference(foreign, scene, tolerance, timeout, shown.stage)
+        )
 
 
 def open_comparisons(path: Path) -> DataComparison | dict[str, DataComparison]:
@@ -99,7 +111,9 @@ def open_comparisons(path: Path) -> DataComparison | dict[str, DataComparison]:
         with reading(path):
             found[f"{record.scene}/{record.name}"] = DataComparison(verdict_of(record), record)
     if not found:
-        raise StoreError(f"{path}: no comparison in it; allowed: a file that rotor-mbs compare has written")
+        raise StoreError(
+            f"{path}: no comparison in it; allowed: a file that rotor-mbs compare has written"
+        )
     return found if len(found) > 1 else next(iter(found.values()))
 
 
@@ -127,16 +141,18 @@ class DataComparison:
         return channel_table(self.verdict)
 
     def plot(self) -> Panels:
-        """Plot the defects of each coordinate over time and the tolerance; without defects, the errors."""
-        from rotor_mbs.report.pages.comparison import defect_panels, error_panels  # late: matplotlib
+        """Plot the defects of each coordinate over time and the tolerance; without defects, the
+        errors."""
+        # late: matplotlib
+        from rotor_mbs.report.pages.comparison import defect_panels, error_panels
 
         return (defect_panels(self.record) or error_panels(self.record)).with_legend()
 
     def to_xarray(self) -> Any:
         """Return data, reference, errors and defects as an xarray.Dataset over time.
 
-        Variables by channel, with units: data `pitch_1`, then `pitch_1_reference`, `pitch_1_error`, and
-        `pitch_1_defect` of the interval before each row (rad).
+        Variables by channel, with units: data `pitch_1`, then `pitch_1_reference`, `pitch_1_error`,
+        and `pitch_1_defect` of the interval before each row (rad).
         """
         import xarray  # late: 0.4 s
 
@@ -149,7 +165,9 @@ class DataComparison:
             )
             for name, column in record.columns.items()
         }
-        facts = {name: record.attributes[name] for name in ("source", "status", "message", "tolerance")}
+        facts = {
+            name: record.attributes[name] for name in ("source", "status", "message", "tolerance")
+        }
         return xarray.Dataset(variables, attrs={"scene": record.scene} | facts)
 
     def to_html(self, folder: str | os.PathLike[str]) -> Path:
@@ -162,8 +180,8 @@ class DataComparison:
     def save(self, path: str | os.PathLike[str]) -> Path:
         """Save data, reference, errors and verdict as a results file.
 
-        An earlier comparison is replaced. Raises InputError for other files, StoreError if it cannot be written,
-        TypeError if `path` is neither text nor a path.
+        An earlier comparison is replaced. Raises InputError for other files, StoreError if it
+        cannot be written, TypeError if `path` is neither text nor a path.
         """
         target = file_path(path)
         write_records(target, [self.record])
@@ -173,14 +191,18 @@ class DataComparison:
         """Say how columns were read, numbers by channel, and the verdict."""
         verdict = self.verdict
         lines = [
-            f"{verdict.source}: {verdict.rows} rows against {self.record.attributes.get('scene_label', verdict.scene)}",
+            (
+                f"{verdict.source}: {verdict.rows} rows against "
+                f"{self.record.attributes.get('scene_label', verdict.scene)}"
+            ),
             *map("  {}".format, verdict.read),
         ]
         lines += [f"  {line}" for line in unused_lines(verdict)]
         lines += ["", str(self.table()), ""]
         if verdict.horizon_s is not None:
             lines.append(
-                f"compared up to {verdict.compared_until:g} s; errors up to the horizon at {verdict.horizon_s:g} s"
+                f"compared up to {verdict.compared_until:g} s; errors up to the horizon at "
+                f"{verdict.horizon_s:g} s"
             )
         lines += verdict.notes
         lines.append(f"{verdict.status}{': ' * bool(verdict.message)}{verdict.message}")
@@ -189,5 +211,6 @@ class DataComparison:
 
     def _repr_html_(self) -> str:
         return (
-            f"<p>{escape(self.status)} {escape(self.message)}</p>{self.table()._repr_html_()}{self.plot()._repr_svg_()}"
+            f"<p>{escape(self.status)} "
+            f"{escape(self.message)}</p>{self.table()._repr_html_()}{self.plot()._repr_svg_()}"
         )

@@ -21,7 +21,8 @@ def open(path: str | os.PathLike[str]) -> Any:
     Runs
         Of a results file or a sweep. The labels of a file with one scene are method names.
     Modes, DataComparison
-        Of a file of modes, or of comparisons; if it has several, a dict by scene, or by scene and name.
+        Of a file of modes, or of comparisons; if it has several, a dict by scene, or by scene and
+        name.
     BenchCurves
         Of a results file that has no runs but the curves of `rotor-mbs bench`.
 

@@ -32,10 +32,12 @@ if TYPE_CHECKING:
 
 
 def modes(scene: Scene | str | os.PathLike[str], speeds: Sequence[float] = ()) -> Modes:
-    """Compute natural frequencies, damping ratios and mode shapes of a scene with every model that can be linearized.
+    """Compute natural frequencies, damping ratios and mode shapes of a scene with every model that
+    can be linearized.
 
-    Modes at rest under gravity, and over `speeds` in steady rotation without gravity (Campbell diagram); Floquet
-    multipliers in rotation under gravity. The scene's torque is not included: a drive torque maintains the speed.
+    Modes at rest under gravity, and over `speeds` in steady rotation without gravity (Campbell
+    diagram); Floquet multipliers in rotation under gravity. The scene's torque is not included: a
+    drive torque maintains the speed.
 
     Parameters
     ----------
@@ -73,12 +75,15 @@ class Modes(SceneModes):
 
     Attributes
     ----------
-    rest, rotation : modes by model, at rest under gravity, and over speed without gravity; the closed form first.
+    rest, rotation : modes by model, at rest under gravity, and over speed without gravity; the
+        closed form first.
     floquet : Floquet multipliers under gravity; None if not computed.
     notes : results that could not be computed, with the reason.
-    agrees, disagreement : whether the modes of the models agree and satisfy their own equations, and the largest
+    agrees, disagreement : whether the modes of the models agree and satisfy their own equations,
+        and the largest
         difference of a frequency or a decay rate, relative to the largest eigenvalue.
-    residuals, faults : by model, what its modes leave of its own linearized equations; lines where that is too much.
+    residuals, faults : by model, what its modes leave of its own linearized equations; lines where
+        that is too much.
     plot : `modes.plot()` draws the Campbell diagram; `.damping()`, `.multipliers()`.
     """
 
@@ -89,11 +94,13 @@ class Modes(SceneModes):
         return ModePlots(self)
 
     def table(self) -> TextTable:
-        """Table with a row per state, speed and mode of the closed form: rad/s, damping ratio, 1/s."""
+        """Table with a row per state, speed and mode of the closed form: rad/s, damping ratio,
+        1/s."""
         return mode_table(mode_rows(self))
 
     def to_xarray(self, state: str = "rotation") -> Any:
-        """Return the modes of one state, "rotation" or "rest", as an xarray.Dataset; dimension `solver`: the models.
+        """Return the modes of one state, "rotation" or "rest", as an xarray.Dataset; dimension
+        `solver`: the models.
 
         Raises InputError for another state, and one that was not computed.
         """
@@ -107,7 +114,8 @@ class Modes(SceneModes):
     def save(self, path: str | os.PathLike[str]) -> Path:
         """Save the modes in a file that `rotor-mbs report` reads.
 
-        A file of modes is replaced. Raises InputError for other files, TypeError if `path` is neither text nor a path.
+        A file of modes is replaced. Raises InputError for other files, TypeError if `path` is
+        neither text nor a path.
         """
         target = file_path(path)
         write_records(target, to_records(self))
@@ -125,4 +133,6 @@ class Modes(SceneModes):
 
     def _repr_html_(self) -> str:
         drawn = self.plot()._repr_svg_() if self.rotation else ""
-        return f"<p>{escape(self.label)}: {escape(self.title)}</p>{self.table()._repr_html_()}{drawn}"
+        return (
+            f"<p>{escape(self.label)}: {escape(self.title)}</p>{self.table()._repr_html_()}{drawn}"
+        )

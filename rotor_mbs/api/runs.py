@@ -59,7 +59,8 @@ _SHOWN = 5  # lines of lost runs
 
 
 def scenes(folder: str = "") -> list[str]:
-    """List the names of the shipped scenes, or of those in one folder. Raises InputError if there is no such folder.
+    """List the names of the shipped scenes, or of those in one folder. Raises InputError if there
+    is no such folder.
 
     Examples
     --------
@@ -78,7 +79,8 @@ def scenes(folder: str = "") -> list[str]:
 def scene(name: str) -> Scene:
     """Return a shipped scene, or that of a TOML file.
 
-    Raises InputError, with the most similar name, if there is none of that name, and TypeError if it is no text.
+    Raises InputError, with the most similar name, if there is none of that name, and TypeError if
+    it is no text.
 
     Examples
     --------
@@ -95,24 +97,36 @@ def scene(name: str) -> Scene:
 def load(path: str | os.PathLike[str]) -> Scene:
     """Read a scene from a TOML file. Its name is that of the file.
 
-    Implausible numbers, such as 30 rad, cause a PlausibilityWarning. Raises InputError with one line per error in
-    the file, TypeError if `path` is neither text nor a path.
+    Implausible numbers, such as 30 rad, cause a PlausibilityWarning. Raises InputError with one
+    line per error in the file, TypeError if `path` is neither text nor a path.
     """
     return load_scene(file_path(path), check=problems_of_scene, stacklevel=3)
 
 
 @overload
 def run(  # type: ignore[overload-overlap]
-    scene: Scene | str | os.PathLike[str], method: str = ..., *, timeout: float = ..., reference: bool = ...,
-    workers: int = ..., progress: bool | None = ..., **settings: object,
-) -> Run: ...  # fmt: skip
+    scene: Scene | str | os.PathLike[str],
+    method: str = ...,
+    *,
+    timeout: float = ...,
+    reference: bool = ...,
+    workers: int = ...,
+    progress: bool | None = ...,
+    **settings: object,
+) -> Run: ...
 
 
 @overload
 def run(
-    scene: Scene | str | os.PathLike[str], method: Sequence[str], *, timeout: float = ..., reference: bool = ...,
-    workers: int = ..., progress: bool | None = ..., **settings: object,
-) -> Runs: ...  # fmt: skip
+    scene: Scene | str | os.PathLike[str],
+    method: Sequence[str],
+    *,
+    timeout: float = ...,
+    reference: bool = ...,
+    workers: int = ...,
+    progress: bool | None = ...,
+    **settings: object,
+) -> Runs: ...
 
 
 def run(
@@ -132,14 +146,17 @@ def run(
     scene : Scene or str
         A Scene, the name of a shipped scene, or a TOML file.
     method : str or sequence of str
-        "model/integrator", as listed by `rotor-mbs list`, or a Python file that defines methods ("mine.py"), see
-        docs/your-engine.md. For an empty list, methods are selected by the same rule as in `rotor-mbs run`.
+        "model/integrator", as listed by `rotor-mbs list`, or a Python file that defines methods
+        ("mine.py"), see docs/your-engine.md. For an empty list, methods are selected by the same
+        rule as in `rotor-mbs run`.
     timeout : float
-        Time limit in s for run, reference and assessment of a method. A run that exceeds it has the status "timed_out"
-        and the samples computed so far. Loading and compilation, and up to 1 s of assessment, are not included.
+        Time limit in s for run, reference and assessment of a method. A run that exceeds it has the
+        status "timed_out" and the samples computed so far. Loading and compilation, and up to 1 s
+        of assessment, are not included.
     reference : bool
-        Whether to compute the quad-precision reference (up to some seconds) if none is shipped. With several methods
-        it is always computed. Without a reference the status follows from the samples and the energy balance.
+        Whether to compute the quad-precision reference (up to some seconds) if none is shipped.
+        With several methods it is always computed. Without a reference the status follows from the
+        samples and the energy balance.
     workers : int
         Number of worker processes for several methods; 0: everything runs in this process.
     progress : bool, optional
@@ -155,8 +172,8 @@ def run(
     Raises
     ------
     InputError
-        For an unknown method, an unknown setting, or one that is not allowed, a limit or a number of workers out of
-        range, or if one of several methods cannot represent the scene.
+        For an unknown method, an unknown setting, or one that is not allowed, a limit or a number
+        of workers out of range, or if one of several methods cannot represent the scene.
     TypeError
         For any other argument of a wrong type, such as a text in place of a number.
     MethodRefusal
@@ -170,7 +187,7 @@ def run(
     >>> run = rm.run(rm.scene("paper/fig08"), "lagrange/dop853", relative_tolerance=5e-14)
     >>> run.status
     'ok'
-    >>> run.metrics["angle_error_max"] < 1e-9   # rad, against the reference, up to the scene's horizon
+    >>> run.metrics["angle_error_max"] < 1e-9   # rad, to the scene's horizon
     True
     >>> scene = rm.scene("paper/fig08").replace(duration=1.0, samples=101)
     >>> runs = rm.run(scene, ["lagrange/dop853", "exudyn_tree/rk67"])
@@ -187,9 +204,12 @@ def run(
             method, *others = check_names(method)
             if others:
                 raise InputError(
-                    f"method: the file has {', '.join([method, *others])}; allowed: a list, [FILE], for all"
+                    f"method: the file has {', '.join([method, *others])}; allowed: a list, "
+                    "[FILE], for all"
                 )
-        solution, exact = solve_judged(scene, method, settings, compute_reference=reference, time_limit_s=timeout)
+        solution, exact = solve_judged(
+            scene, method, settings, compute_reference=reference, time_limit_s=timeout
+        )
         return Run(**vars(solution), reference=exact)
     chosen, _, refused = selected_methods([scene], check_names(texts(method)), settings)
     if asked := [str(refusal) for refusal in refused if refusal.is_asked]:
@@ -200,9 +220,14 @@ def run(
     path = folder.path / "runs.h5"
     with progress_of_call(progress) as on_progress:
         report = run_scenes(
-            [scene], chosen, path, workers=workers, timeout_s=min(timeout, _NO_LIMIT_S), settings=settings,
+            [scene],
+            chosen,
+            path,
+            workers=workers,
+            timeout_s=min(timeout, _NO_LIMIT_S),
+            settings=settings,
             on_progress=on_progress,
-        )  # fmt: skip
+        )
     refuse_losses([f"{run.label}: {run.message}" for run in report.not_computed])
     return Runs(path, scene.name, _folder=folder)
 
@@ -211,20 +236,22 @@ def run(
 class Run(Solution):
     """A run: a scene simulated with one method.
 
-    In addition to the members of `Solution` (`time`, `angles`, `rates`, `run["tip"]`, `status`, `message`, `metrics`,
-    `settings`, `to_xarray()`):
+    In addition to the members of `Solution` (`time`, `angles`, `rates`, `run["tip"]`, `status`,
+    `message`, `metrics`, `settings`, `to_xarray()`):
 
     Attributes
     ----------
     reference : the reference trajectory; None without a reference.
-    plot : `run.plot()` draws the motion; `run.plot.energy()`, `.error()`, `.tips()`, `.loads("shaft_force")`.
+    plot : `run.plot()` draws the motion; `run.plot.energy()`, `.error()`, `.tips()`,
+        `.loads("shaft_force")`.
     """
 
     reference: Trajectory | None = None
 
     @property
     def defects(self) -> Defects | None:
-        """Interval defects: the closed form integrated from each sample to the next, minus the run's next sample.
+        """Interval defects: the closed form integrated from each sample to the next, minus the
+        run's next sample.
 
         None for fewer than two samples, or without angles and rates.
 
@@ -253,12 +280,18 @@ class Run(Solution):
 
     def __repr__(self) -> str:
         known = self._metrics_shown()
-        main = [f"{name} {known[name]}" for name, value in METRICS.items() if value.is_main and name in known]
+        main = [
+            f"{name} {known[name]}"
+            for name, value in METRICS.items()
+            if value.is_main and name in known
+        ]
         if not main:
             return super().__repr__()
         if len(known) > len(main):
             main.append(f"... {len(known) - len(main)} more in run.metrics")
-        lines = textwrap.wrap(f"metrics: {', '.join(main)}", 110, initial_indent="  ", subsequent_indent="    ")
+        lines = textwrap.wrap(
+            f"metrics: {', '.join(main)}", 110, initial_indent="  ", subsequent_indent="    "
+        )
         return "\n".join([super().__repr__(), *lines])
 
     def _repr_html_(self) -> str:
@@ -268,8 +301,12 @@ class Run(Solution):
         cells = ""
         for name, text in self._metrics_shown().items():
             about = escape(COLUMNS[name].long_name) if name in COLUMNS else ""
-            cells += f"<tr><th>{escape(name)}</th><td>{escape(text)}</td><td style='text-align:left'>{about}</td></tr>"
-        folded = f"<details><summary>{counted(len(self.metrics), 'metric')}</summary><table>{cells}</table></details>"
+            cells += (
+                f"<tr><th>{escape(name)}</th><td>{escape(text)}</td><td "
+                f"style='text-align:left'>{about}</td></tr>"
+            )
+        summary = f"<summary>{counted(len(self.metrics), 'metric')}</summary>"
+        folded = f"<details>{summary}<table>{cells}</table></details>"
         return super()._repr_html_() + (folded if cells else "") + drawn
 
 
@@ -285,28 +322,35 @@ def sweep(
     progress: bool | None = None,
     **options: object,
 ) -> Runs:
-    """Run a parameter study: simulate a scene for all combinations of parameter values, into one dataset.
+    """Run a parameter study: simulate a scene for all combinations of parameter values, into one
+    dataset.
 
     Parameters
     ----------
     scene : a Scene, the name of a shipped scene, or a TOML file.
-    parameters : for each key of a number in a scene file, such as "bearing.stiffness" or "initial.angles[1]", a list
+    parameters : for each key of a number in a scene file, such as "bearing.stiffness" or
+        "initial.angles[1]", a list
         of values or a table as in an [[axis]] of a sweep file, such as `{"uniform": [0.0, 1.0]}`.
-    output : file of the dataset. A repeated call continues it after an interruption. Default: a temporary file.
+    output : file of the dataset. A repeated call continues it after an interruption. Default: a
+        temporary file.
     workers : number of worker processes; 0: everything runs in this process.
     timeout : time limit of each run (s).
-    fresh : whether stored runs are recomputed. By default they are kept, including those of other versions.
+    fresh : whether stored runs are recomputed. By default they are kept, including those of other
+        versions.
     progress : whether to show the progress. By default on a terminal and in a notebook.
-    **options : other keys of a sweep file: samples, outputs, draws, seed, combine, validation, settings, ...
+    **options : other keys of a sweep file: samples, outputs, draws, seed, combine, validation,
+    settings, ...
 
     Raises
     ------
     InputError
         For an invalid key, value or option, or if `output` is not the file of this sweep.
     MethodRefusal
-        If a method cannot represent the scene, or some of its variants; the other runs are stored in `output`.
+        If a method cannot represent the scene, or some of its variants; the other runs are stored
+        in `output`.
     TypeError
-        For an argument of a wrong type, and a value or option that no sweep file can have, such as None.
+        For an argument of a wrong type, and a value or option that no sweep file can have, such as
+        None.
     ResourceError
         If worker processes died or could not be started; the other runs are stored in `output`.
 
@@ -314,7 +358,8 @@ def sweep(
     --------
     >>> import rotor_mbs as rm
     >>> scene = rm.scene("paper/fig08").replace(duration=1.0, samples=101)
-    >>> runs = rm.sweep(scene, {"bearing.stiffness": [0.0, 1e3, 1e4]}, methods=["lagrange/dop853"], samples=11)
+    >>> axes = {"bearing.stiffness": [0.0, 1e3, 1e4]}
+    >>> runs = rm.sweep(scene, axes, methods=["lagrange/dop853"], samples=11)
     >>> runs.statuses
     {'ok': 3}
     >>> runs.to_xarray().angles.dims
@@ -347,7 +392,8 @@ def sweep(
 
 
 def texts(values: Iterable[str]) -> list[str]:
-    """Return the texts of a list, or of anything that can be gone through once. Raises TypeError for anything else."""
+    """Return the texts of a list, or of anything that can be gone through once. Raises TypeError
+    for anything else."""
     listed = list(values)
     "".join(listed)  # refuses an entry that is no text
     return listed
@@ -372,8 +418,9 @@ class TemporaryFolder:
 class Runs(Mapping[Any, Any]):
     """Runs of a file: a mapping from label to `Run`. A run is read on access.
 
-    Labels are method names (and "reference") for one scene, "paper/fig11/lagrange/taylor" for a file with several
-    scenes, and run numbers for a sweep. `runs["paper/fig11"]` returns the runs of one scene of a file.
+    Labels are method names (and "reference") for one scene, "paper/fig11/lagrange/taylor" for a
+    file with several scenes, and run numbers for a sweep. `runs["paper/fig11"]` returns the runs of
+    one scene of a file.
 
     Parameters
     ----------
@@ -389,7 +436,11 @@ class Runs(Mapping[Any, Any]):
     """
 
     def __init__(
-        self, path: str | os.PathLike[str], scene: str = "", *, _folder: TemporaryFolder | None = None
+        self,
+        path: str | os.PathLike[str],
+        scene: str = "",
+        *,
+        _folder: TemporaryFolder | None = None,
     ) -> None:
         self.path, self.scene, self._folder = file_path(path), os.fsdecode(scene), _folder
         self._is_sweep = is_sweep(self.path)
@@ -401,19 +452,27 @@ class Runs(Mapping[Any, Any]):
             names = run_names(self.path)
             if self.scene and self.scene not in dict(names):
                 allowed = ", ".join(dict(names))
-                raise StoreError(f"{self.path}: has no scene {shown_value(self.scene)}; allowed: {allowed}")
+                raise StoreError(
+                    f"{self.path}: has no scene {shown_value(self.scene)}; allowed: {allowed}"
+                )
             for name, method in names:
                 if self.scene in ("", name):
                     self._labels[method if self.scene else f"{name}/{method}"] = name, method
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Return how it is copied or unpickled: with a file of its own in place of a temporary one."""
-        return _restored, (self.path, self.scene, self.path.read_bytes() if self._folder is not None else None)
+        """Return how it is copied or unpickled: with a file of its own in place of a temporary
+        one."""
+        return _restored, (
+            self.path,
+            self.scene,
+            self.path.read_bytes() if self._folder is not None else None,
+        )
 
     def __getitem__(self, label: Any) -> Any:
-        """Return runs or a run by label. Raises KeyError for what the file does not have, StoreError for samples that
-        cannot be read."""
-        if self.scene and isinstance(label, str):  # "paper/fig11/lagrange/taylor", as in a file of several scenes
+        """Return runs or a run by label. Raises KeyError for what the file does not have,
+        StoreError for samples that cannot be read."""
+        # "paper/fig11/lagrange/taylor", as in a file of several scenes
+        if self.scene and isinstance(label, str):
             label = label.removeprefix(f"{self.scene}/")
         if label not in self._labels:
             if not self._is_sweep and label in self.scenes:
@@ -426,7 +485,10 @@ class Runs(Mapping[Any, Any]):
         name, method = self._labels[label]
         with open_results(self.path, only=[name]) as results:
             if name not in results.scenes or method not in results.scenes[name].runs:
-                raise StoreError(f"{self.path}: has no {name}/{method} any more: another file has taken its place")
+                raise StoreError(
+                    f"{self.path}: has no {name}/{method} any more: another file has "
+                    "taken its place"
+                )
             scene = results.scenes[name]
             reference = None if method == REFERENCE else scene.reference_trajectory
             return _loaded(scene.scene, scene.runs[method], reference)
@@ -462,9 +524,12 @@ class Runs(Mapping[Any, Any]):
                 yield from scene.runs.values()
 
     def table(self) -> TextTable:
-        """Table with a row per run: status, error (rad), energy drift (relative to the energy scale), run time (s)."""
+        """Table with a row per run: status, error (rad), energy drift (relative to the energy
+        scale), run time (s)."""
         if self._is_sweep:
-            counts: list[tuple[str, ...]] = [(status, str(count)) for status, count in self.statuses.items()]
+            counts: list[tuple[str, ...]] = [
+                (status, str(count)) for status, count in self.statuses.items()
+            ]
             return TextTable(("status", "runs"), counts)
         rows = []
         with open_results(self.path, only=[self.scene] if self.scene else None) as results:
@@ -478,14 +543,19 @@ class Runs(Mapping[Any, Any]):
         from rotor_mbs.report.plots import ComparisonPlots  # late: matplotlib
 
         if self._is_sweep:
-            raise InputError("plot: of a sweep only that of a run, runs[0].plot(), or the pages, to_html(FOLDER)")
+            raise InputError(
+                "plot: of a sweep only that of a run, runs[0].plot(), or the pages, to_html(FOLDER)"
+            )
         if not self.scene:
-            raise InputError(f"plot: only of the runs of one scene, such as runs[{self.scenes[0]!r}]")
+            raise InputError(
+                f"plot: only of the runs of one scene, such as runs[{self.scenes[0]!r}]"
+            )
         reference = self[REFERENCE].trajectory if REFERENCE in self else None
         return ComparisonPlots({name: self[name] for name in self if name != REFERENCE}, reference)
 
     def column(self, name: str) -> Any:
-        """Return an array of a sweep, (runs, ...), such as "status", "pitch_max" or "angles". Raises StoreError."""
+        """Return an array of a sweep, (runs, ...), such as "status", "pitch_max" or "angles".
+        Raises StoreError."""
         return np.array(self._sweep.column(name))
 
     def at(self, name: str, sample: int) -> Any:
@@ -512,7 +582,8 @@ class Runs(Mapping[Any, Any]):
         -------
         xarray.Dataset
             For one scene or a sweep (opened lazily), with the dimension `run`. Select by label:
-            `data.angles.sel(run="lagrange/taylor", coordinate="pitch 1")`, `data.tip.sel(blade=1, axis="y")`.
+            `data.angles.sel(run="lagrange/taylor", coordinate="pitch 1")`, `data.tip.sel(blade=1,
+            axis="y")`.
         xarray.DataTree
             For a file with several scenes, opened lazily.
 
@@ -538,8 +609,15 @@ class Runs(Mapping[Any, Any]):
                     return data.swap_dims(run=keys[0]).drop_vars("run")
                 values = [data[key].values.tolist() for key in keys]
                 combinations = len(set(zip(*values, strict=True)))
-                if not combinations == len(data.run) == math.prod(len(set(of_key)) for of_key in values):
-                    what = f"the {len(data.run)} runs are not every combination of {', '.join(keys)}, once each"
+                if (
+                    not combinations
+                    == len(data.run)
+                    == math.prod(len(set(of_key)) for of_key in values)
+                ):
+                    what = (
+                        f"the {len(data.run)} runs are not every combination of "
+                        f"{', '.join(keys)}, once each"
+                    )
                     raise InputError(f"unstack: {what}; allowed: the sweep of a grid")
                 data = data.set_index(run=keys).unstack("run")
             return data
@@ -550,9 +628,9 @@ class Runs(Mapping[Any, Any]):
     def save(self, path: str | os.PathLike[str]) -> Path:
         """Save a copy of the file, which `rotor-mbs report` and `rotor_mbs.open` read.
 
-        An earlier copy is replaced if no run in it is lost. Raises InputError for files with other runs or of another
-        kind, StoreError for files that are damaged or not of this program, TypeError if `path` is neither text nor a
-        path.
+        An earlier copy is replaced if no run in it is lost. Raises InputError for files with other
+        runs or of another kind, StoreError for files that are damaged or not of this program,
+        TypeError if `path` is neither text nor a path.
         """
         target = file_path(path)
         copy_file(self.path, target)
@@ -596,7 +674,9 @@ class Runs(Mapping[Any, Any]):
         if len(self) <= MOST_ROWS:
             return self.table()
         with open_results(self.path, only=[self.scene] if self.scene else None) as results:
-            return method_table(run for scene in results.scenes.values() for run in scene.methods.values())
+            return method_table(
+                run for scene in results.scenes.values() for run in scene.methods.values()
+            )
 
 
 def _restored(path: Path, scene: str, content: bytes | None) -> Runs:

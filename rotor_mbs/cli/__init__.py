@@ -1,7 +1,7 @@
 """The command line: runs a command, and turns errors and interrupts into its exit status.
 
-Standard output and standard error are plain: a title or a message that comes from a file may have escape sequences, and
-a closed standard error must not end a batch.
+Standard output and standard error are plain: a title or a message that comes from a file may have
+escape sequences, and a closed standard error must not end a batch.
 """
 
 from __future__ import annotations
@@ -34,7 +34,8 @@ if TYPE_CHECKING:
     import argparse
 
 EXIT_OK, EXIT_FAILED, EXIT_BAD_INPUT, EXIT_INTERRUPTED = 0, 1, 2, 130
-# Commands that only print: a reader who has seen enough (`rotor-mbs list | head`) has missed nothing.
+# Commands that only print: a reader who has seen enough (`rotor-mbs list | head`) has missed
+# nothing.
 _ONLY_PRINT = ("list", "show")
 
 _received_signals: list[int] = []  # that this call was to end by
@@ -43,7 +44,8 @@ _received_signals: list[int] = []  # that this call was to end by
 def main(argv: Sequence[str] | None = None) -> int:
     """Run a command: the words after `rotor-mbs`, by default those of this process.
 
-    Returns 0 done and all well; 1 done, but a check failed or a run did not succeed; 2 bad input; 130 interrupted.
+    Returns 0 done and all well; 1 done, but a check failed or a run did not succeed; 2 bad input;
+    130 interrupted.
     """
     if argv is not None:
         return _run(list(argv))
@@ -90,11 +92,17 @@ def _run(words: list[str]) -> int:
             return status
         except (KeyboardInterrupt, RotorError, SystemError, ImportError) as exc:
             if _is_interrupt(exc):
-                print_line("interrupted; finished runs are stored, the same command continues", sys.stderr)
+                print_line(
+                    "interrupted; finished runs are stored, the same command continues", sys.stderr
+                )
                 return EXIT_INTERRUPTED
             if isinstance(exc, RotorError):
                 print_line(str(exc), sys.stderr)
-                return EXIT_BAD_INPUT if isinstance(exc, InputError | MethodRefusal | StoreError) else EXIT_FAILED
+                return (
+                    EXIT_BAD_INPUT
+                    if isinstance(exc, InputError | MethodRefusal | StoreError)
+                    else EXIT_FAILED
+                )
             # Without memory for a library, its loading raises either.
             print_line(f"code cannot be loaded: {type(exc).__name__}: {exc}", sys.stderr)
             return EXIT_FAILED
@@ -109,7 +117,8 @@ def _run(words: list[str]) -> int:
 
 
 def _prepare_reading(arguments: argparse.Namespace) -> None:
-    """Start the process that reads a file of this program, if one is named, while the command's code is loaded."""
+    """Start the process that reads a file of this program, if one is named, while the command's
+    code is loaded."""
     name = getattr(arguments, "file", None) or getattr(arguments, "scene", None)
     if not isinstance(name, str | os.PathLike):
         return
@@ -140,7 +149,9 @@ def _without_invalid_date() -> Iterator[None]:
 def _print_warning(message: Warning | str, category: type[Warning], *where: Any, **_: Any) -> None:
     """Print a warning: doubts about numbers of a file in a line, others as Python shows them."""
     is_doubt = issubclass(category, PlausibilityWarning)
-    text = f"warning: {message}" if is_doubt else warnings.formatwarning(message, category, *where[:2])
+    text = (
+        f"warning: {message}" if is_doubt else warnings.formatwarning(message, category, *where[:2])
+    )
     print_line(text.rstrip(), sys.stderr)
 
 
@@ -181,7 +192,10 @@ def _signals_as_interrupts() -> Iterator[None]:
     for name in ("SIGINT", "SIGTERM", "SIGHUP"):
         number = getattr(signal, name, None)  # SIGHUP: not on Windows
         # A signal that is ignored (nohup) stays so.
-        if number is not None and signal.getsignal(number) in (signal.SIG_DFL, signal.default_int_handler):
+        if number is not None and signal.getsignal(number) in (
+            signal.SIG_DFL,
+            signal.default_int_handler,
+        ):
             handlers[number] = signal.signal(number, interrupt)
     try:
         yield
@@ -192,12 +206,14 @@ def _signals_as_interrupts() -> Iterator[None]:
 
 
 class PlainStream:
-    """A text stream that writes control characters as their escapes, and goes on where nobody reads it any more.
+    """A text stream that writes control characters as their escapes, and goes on where nobody reads
+    it any more.
 
     Attributes
     ----------
     unfiltered : the stream itself.
-    failure : the first error in writing, such as BrokenPipeError; what follows is dropped, so that a command does all
+    failure : the first error in writing, such as BrokenPipeError; what follows is dropped, so that
+        a command does all
         its work, and ends with this error.
     """
 
@@ -231,7 +247,8 @@ class PlainStream:
 
 @contextmanager
 def plain_streams() -> Iterator[None]:
-    """Make standard output and standard error plain in the block; in place of a closed one stands the null device.
+    """Make standard output and standard error plain in the block; in place of a closed one stands
+    the null device.
 
     What their encoding cannot express, such as ° in ASCII, is written as its escape.
     """
@@ -245,12 +262,14 @@ def plain_streams() -> Iterator[None]:
 
 
 def print_line(text: str, stream: TextIO) -> None:
-    """Print a line that may be lost: where nobody reads it any more, or the disk is full, it is dropped."""
+    """Print a line that may be lost: where nobody reads it any more, or the disk is full, it is
+    dropped."""
     with suppress(OSError, ValueError):
         print(text, file=stream, flush=True)
 
 
 def discard_output(stream: TextIO) -> None:
-    """Drop what is in a stream's buffer after a failed write: it must not fail again when the interpreter ends."""
+    """Drop what is in a stream's buffer after a failed write: it must not fail again when the
+    interpreter ends."""
     with suppress(OSError, ValueError):
         os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())

@@ -73,7 +73,8 @@ def span(text: str) -> tuple[float, ...]:
         first, last, count = float(start), float(end), int(number)
         if 0.0 <= first < last <= _MAX_SPEED and 2 <= count <= _MAX_SPAN:
             numbers = tuple(first + (last - first) * i / (count - 1) for i in range(count))
-            # A difference of a few units of rounding has fewer numbers than COUNT; 1e-320 has an infinite inverse.
+            # A difference of a few units of rounding has fewer numbers than COUNT; 1e-320 has an
+            # infinite inverse.
             slowest = min(number for number in numbers if number)
             if len(set(numbers)) == count and slowest >= _MIN_SPEED:
                 return numbers
@@ -109,7 +110,9 @@ def setting(text: str) -> tuple[str, object]:
     return name, value
 
 
-def _positive(kind: type[int] | type[float], allowed: str, largest: float = _MAX_NUMBER) -> Callable[[str], float]:
+def _positive(
+    kind: type[int] | type[float], allowed: str, largest: float = _MAX_NUMBER
+) -> Callable[[str], float]:
     def read(text: str) -> float:
         try:
             value = kind(text)
@@ -143,11 +146,18 @@ class _Parser(argparse.ArgumentParser):
         text = "a name (paper/fig05), a folder (paper) or a TOML file"
         self.add_argument("scenes", metavar="SCENE", **{"nargs": "+", "help": text} | options)
 
-    def method(self, help: str = "method (see rotor-mbs list), or a Python file that defines methods") -> None:
-        self.add_argument("-m", "--method", action="append", metavar="METHOD", help=f"{help}; may be repeated")
+    def method(
+        self, help: str = ("method (see rotor-mbs list), or a Python file that defines methods")
+    ) -> None:
+        self.add_argument(
+            "-m", "--method", action="append", metavar="METHOD", help=f"{help}; may be repeated"
+        )
 
     def settings(self) -> None:
-        text = "method setting, ignored by methods without it; may be repeated (see rotor-mbs show METHOD)"
+        text = (
+            "method setting, ignored by methods without it; may be repeated (see rotor-mbs "
+            "show METHOD)"
+        )
         self.add_argument("--set", action="append", type=setting, metavar="NAME=VALUE", help=text)
 
     def output(self, kind: Any, metavar: str, default: Path | None = None, help: str = "") -> None:
@@ -155,8 +165,13 @@ class _Parser(argparse.ArgumentParser):
         self.add_argument("-o", "--output", type=kind, default=default, metavar=metavar, help=help)
 
     def results(self) -> None:
-        text = "file written by rotor-mbs (default: results.h5 if it exists, else rotor-mbs-out/results.h5)"
-        self.add_argument("file", nargs="?", type=path, default=default_results(), metavar="FILE", help=text)
+        text = (
+            "file written by rotor-mbs (default: results.h5 if it exists, else "
+            "rotor-mbs-out/results.h5)"
+        )
+        self.add_argument(
+            "file", nargs="?", type=path, default=default_results(), metavar="FILE", help=text
+        )
 
     def jobs(self) -> None:
         text = "parallel processes (default: number of cores, here %(default)s)"
@@ -172,7 +187,8 @@ class _Names(argparse.Action):
     """Print the names of columns that `compare` understands, and end, as --help does."""
 
     def __call__(self, parser: argparse.ArgumentParser, *_: object) -> None:
-        from rotor_mbs.analysis.text_tables import TextTable  # late: other commands need not wait for it
+        # late: other commands need not wait for it
+        from rotor_mbs.analysis.text_tables import TextTable
         from rotor_mbs.comparison.channels import known_names
 
         names = "known by (case, blanks and underscores do not matter)"
@@ -186,7 +202,9 @@ def parse(argv: Sequence[str]) -> argparse.Namespace:
     parser, commands = _parser()
     if argv and not argv[0].startswith("-") and argv[0] not in commands:
         hint = nearest(argv[0], commands)
-        parser.error(f"unknown command {shown_value(argv[0])}{hint}; allowed: {', '.join(commands)}")
+        parser.error(
+            f"unknown command {shown_value(argv[0])}{hint}; allowed: {', '.join(commands)}"
+        )
     arguments, unknown = parser.parse_known_args(argv or ["--help"])
     if unknown:
         commands.get(argv[0], parser).error(f"unrecognized arguments: {' '.join(unknown)}")
@@ -198,7 +216,8 @@ def load_methods(arguments: argparse.Namespace) -> None:
     methods that are unknown."""
     given = [name for name in ("method", "methods") if name in arguments]
     if given:
-        from rotor_mbs.methods.catalogue import check_names  # late: other commands need not wait for it
+        # late: other commands need not wait for it
+        from rotor_mbs.methods.catalogue import check_names
 
         for name in given:
             setattr(arguments, name, check_names(getattr(arguments, name) or ()))
@@ -209,10 +228,15 @@ def _parser() -> tuple[_Parser, dict[str, _Parser]]:
     formatter = argparse.RawDescriptionHelpFormatter
     parser = _Parser(
         prog="rotor-mbs",
-        description="Simulate wind-turbine rotors with independent models, and compare these with each other.",
-        epilog="start with:\n  rotor-mbs list\n  rotor-mbs show paper/fig11\n  rotor-mbs run paper/fig11\n"
+        description=(
+            "Simulate wind-turbine rotors with independent models, and compare these with "
+            "each other."
+        ),
+        epilog="start with:\n  rotor-mbs list\n  rotor-mbs show paper/fig11\n  rotor-mbs run "
+        "paper/fig11\n"
         "rotor-mbs COMMAND --help shows the options of a command and an example.\n"
-        "exit status: 0 success; 1 a check failed or a run did not succeed; 2 bad input; 130 interrupted",
+        "exit status: 0 success; 1 a check failed or a run did not succeed; 2 bad input; 130 "
+        "interrupted",
         formatter_class=formatter,
     )
     parser.add_argument("--version", action="version", version=f"rotor-mbs {rotor_mbs.__version__}")
@@ -231,10 +255,17 @@ def _parser() -> tuple[_Parser, dict[str, _Parser]]:
     own.flag("--json", help="print JSON")
 
     own = command(
-        "show", "show a scene and its methods, the settings of a method, or what is in a file", "commands:show",
-        "paper/fig11", "paper/fig11 --build", "results.h5",
-    )  # fmt: skip
-    what = "a scene (paper/fig05), a TOML file, a method (lagrange/taylor, mine.py), or a file of results (results.h5)"
+        "show",
+        "show a scene and its methods, the settings of a method, or what is in a file",
+        "commands:show",
+        "paper/fig11",
+        "paper/fig11 --build",
+        "results.h5",
+    )
+    what = (
+        "a scene (paper/fig05), a TOML file, a method (lagrange/taylor, mine.py), or a file of "
+        "results (results.h5)"
+    )
     own.add_argument("scene", metavar="NAME", help=what)
     own.flag("--build", help="also list the items that each model builds")
     own.flag("--json", help="print JSON")
@@ -244,12 +275,19 @@ def _parser() -> tuple[_Parser, dict[str, _Parser]]:
         "my.toml", "mine.toml --from paper/fig11", "mine.toml --from MODEL.fst",
     )  # fmt: skip
     own.add_argument("file", type=file, metavar="FILE", help="a TOML file that does not exist yet")
-    text = "a scene (paper/fig11) or a TOML file to copy, or an OpenFAST model (MODEL.fst) to make a scene of"
+    text = (
+        "a scene (paper/fig11) or a TOML file to copy, or an OpenFAST model (MODEL.fst) to "
+        "make a scene of"
+    )
     own.add_argument("--from", dest="source", metavar="SOURCE", help=text)
 
     own = command(
         "reproduce",
-        "run every scene of the paper with the default methods and with each erratum alone, and write the report",
+        (
+            "run every scene of the paper with the default methods and with each erratum "
+            "alone, and "
+            "write the report"
+        ),
         "runs:reproduce",
         "",
         "-o out -j 4",
@@ -263,24 +301,43 @@ def _parser() -> tuple[_Parser, dict[str, _Parser]]:
         "my.toml -o my.h5", "paper/fig11 -m lagrange/taylor -m exudyn_tree/rk67 --set step=1e-3",
     )  # fmt: skip
     own.scenes()
-    own.method("method (see rotor-mbs list), or a Python file that defines methods (default: selected for each scene)")
+    own.method(
+        "method (see rotor-mbs list), or a Python file that defines methods (default: "
+        "selected for each scene)"
+    )
     own.settings()
     own.output(file, "FILE", Path("results.h5"))
     own.jobs()
     own.timeout()
 
     own = command(
-        "compare", "compare another program's trajectory, loads or modes with a scene; exit status 1 if they differ",
-        "commands:compare", "mine.csv --scene paper/fig11", "OpenFAST.out --scene my.toml --columns map.toml",
-    )  # fmt: skip
-    text = "text with a header, .json, .npz, .mat, HDF5, netCDF, an Exudyn sensor file, OpenFAST .out or .outb"
+        "compare",
+        (
+            "compare another program's trajectory, loads or modes with a scene; exit "
+            "status 1 if they differ"
+        ),
+        "commands:compare",
+        "mine.csv --scene paper/fig11",
+        ("OpenFAST.out --scene my.toml --columns map.toml"),
+    )
+    text = (
+        "text with a header, .json, .npz, .mat, HDF5, netCDF, an Exudyn sensor file, OpenFAST "
+        ".out or .outb"
+    )
     own.add_argument("data", type=path, metavar="DATA", help=text)
-    own.add_argument("--scene", required=True, metavar="SCENE", help="a name (paper/fig05) or a TOML file")
-    text = "mapping file: column, unit, sign and offset of channels that are not known by name (see docs/compare.md)"
+    own.add_argument(
+        "--scene", required=True, metavar="SCENE", help=("a name (paper/fig05) or a TOML file")
+    )
+    text = (
+        "mapping file: column, unit, sign and offset of channels that are not known by name "
+        "(see docs/compare.md)"
+    )
     own.add_argument("--columns", type=path, metavar="MAP.toml", help=text)
     text = (
-        "bound (rad) on interval defects (the equations of motion integrated from each row to the next, minus the "
-        "next row) and on errors divided by the error growth; for loads and frequencies a relative bound "
+        "bound (rad) on interval defects (the equations of motion integrated from each row to the "
+        "next, minus the "
+        "next row) and on errors divided by the error growth; for loads and frequencies a "
+        "relative bound "
         "(default: %(default)g)"
     )
     own.add_argument("--tolerance", type=POSITIVE, default=1e-6, metavar="X", help=text)
@@ -288,12 +345,17 @@ def _parser() -> tuple[_Parser, dict[str, _Parser]]:
     own.add_argument("--timeout", type=SECONDS, default=600.0, metavar="SECONDS", help=text)
     own.output(folder, "DIR", Path("comparison"), "output folder (default: %(default)s)")
     own.flag("--json", help="print the verdict as JSON")
-    own.add_argument("--names", action=_Names, nargs=0, help="print the names that columns may have, and end")
+    own.add_argument(
+        "--names", action=_Names, nargs=0, help=("print the names that columns may have, and end")
+    )
 
     own = command(
-        "bench", "measure error and run time of each method at several tolerances or steps", "commands:bench",
-        "paper/fig11", "paper/fig11 my.toml -m lagrange/taylor -m exudyn_tree/rk67 -o bench.h5",
-    )  # fmt: skip
+        "bench",
+        "measure error and run time of each method at several tolerances or steps",
+        "commands:bench",
+        "paper/fig11",
+        "paper/fig11 my.toml -m lagrange/taylor -m exudyn_tree/rk67 -o bench.h5",
+    )
     own.scenes()
     own.method("method (see rotor-mbs list), or a Python file that defines methods (default: all)")
     own.output(file, "FILE", Path("bench.h5"))
@@ -303,58 +365,113 @@ def _parser() -> tuple[_Parser, dict[str, _Parser]]:
     text = "time budget per scene in s (default: %(default)g)"
     own.add_argument("--budget", type=SECONDS, default=28.0, metavar="SECONDS", help=text)
 
-    own = command("reference", "recompute quad-precision references", "runs:reference", "paper/fig08 -o reference.h5")
+    own = command(
+        "reference",
+        "recompute quad-precision references",
+        "runs:reference",
+        "paper/fig08 -o reference.h5",
+    )
     own.scenes()
     own.add_argument("-o", "--output", type=file, required=True, metavar="FILE", help="output file")
     own.jobs()
     own.timeout()
 
     own = command(
-        "check", "check the accuracy of stored runs; exit status 1 if a check fails", "verdicts:check",
-        "", "rotor-mbs-out/results.h5 --junit check.xml",
-    )  # fmt: skip
+        "check",
+        "check the accuracy of stored runs; exit status 1 if a check fails",
+        "verdicts:check",
+        "",
+        "rotor-mbs-out/results.h5 --junit check.xml",
+    )
     own.add_argument(
-        "file", nargs="?", type=path, metavar="FILE", help="file to check (default: compute a set of runs)"
+        "file",
+        nargs="?",
+        type=path,
+        metavar="FILE",
+        help=("file to check (default: compute a set of runs)"),
     )
     own.method("method to compute if no FILE is given, or a Python file that defines methods")
     own.add_argument(
-        "--bounds", type=path, metavar="TOML", help="bounds that take precedence over reference/accuracy.toml"
+        "--bounds",
+        type=path,
+        metavar="TOML",
+        help=("bounds that take precedence over reference/accuracy.toml"),
     )
     text = "fail if a scene of FILE has no run with this method; may be repeated"
     own.add_argument("--require", action="append", metavar="METHOD", help=text)
     text = (
-        "also fail if, compared with this earlier file, a margin has shrunk more than tenfold, a run is missing or a "
+        "also fail if, compared with this earlier file, a margin has shrunk more than tenfold, a "
+        "run is missing or a "
         "scene was changed"
     )
     own.add_argument("--against", type=path, metavar="OLD", help=text)
-    own.flag("--allow-changed", help="tell what changed in scenes since OLD, and do not fail for it")
+    own.flag(
+        "--allow-changed", help=("tell what changed in scenes since OLD, and do not fail for it")
+    )
     own.add_argument("--junit", type=file, metavar="XML", help="write the verdicts as JUnit XML")
-    own.add_argument("--json", type=file, metavar="FILE", help="write the verdicts as JSON; - for standard output")
+    own.add_argument(
+        "--json",
+        type=file,
+        metavar="FILE",
+        help=("write the verdicts as JSON; - for standard output"),
+    )
     own.flag("--github", help="print the ten worst failures as annotations")
     own.flag("-v", "--verbose", help="print verdicts that pass, too")
     own.jobs()
 
     own = command(
-        "test-method", "test a method, your own or a built-in one, and report faults with their most likely causes",
-        "verdicts:test_method", "./mine.py", "lagrange/dop853 --json -",
-    )  # fmt: skip
-    own.add_argument("methods", nargs="+", metavar="METHOD", help="a method (see rotor-mbs list), or a Python file")
+        "test-method",
+        (
+            "test a method, your own or a built-in one, and report faults with their "
+            "most likely causes"
+        ),
+        "verdicts:test_method",
+        "./mine.py",
+        "lagrange/dop853 --json -",
+    )
+    own.add_argument(
+        "methods",
+        nargs="+",
+        metavar="METHOD",
+        help=("a method (see rotor-mbs list), or a Python file"),
+    )
     own.add_argument("--junit", type=file, metavar="XML", help="write the checks as JUnit XML")
-    own.add_argument("--json", type=file, metavar="FILE", help="write the checks as JSON; - for standard output")
+    own.add_argument(
+        "--json",
+        type=file,
+        metavar="FILE",
+        help=("write the checks as JSON; - for standard output"),
+    )
     own.timeout()
 
     own = command(
         "sweep", "run a parameter study and store it in one dataset", "commands:sweep",
         "sweeps/fig11-spread -o spread.h5", "my-sweep.toml --dry-run",
     )  # fmt: skip
-    own.add_argument("file", type=path, metavar="SWEEP.toml", help="a file, or a shipped sweep (sweeps/fig11-spread)")
+    own.add_argument(
+        "file",
+        type=path,
+        metavar="SWEEP.toml",
+        help=("a file, or a shipped sweep (sweeps/fig11-spread)"),
+    )
     own.method("method to use instead of those in the file")
     own.output(file, "FILE", help="output file (default: name of the sweep with .h5)")
     own.flag("--metadata", help="also write Croissant metadata beside FILE, as JSON")
     text = "also write a folder for Hugging Face datasets: a file per split and a dataset card"
     own.add_argument("--datasets", type=path, metavar="DIR", help=text)
-    own.add_argument("--engine", default="local", metavar="ENGINE", help="local (default), or dask:tcp://HOST:PORT")
-    own.add_argument("--part", type=part, default=(1, 1), metavar="K/N", help="compute part K of N, for a job array")
+    own.add_argument(
+        "--engine",
+        default="local",
+        metavar="ENGINE",
+        help=("local (default), or dask:tcp://HOST:PORT"),
+    )
+    own.add_argument(
+        "--part",
+        type=part,
+        default=(1, 1),
+        metavar="K/N",
+        help=("compute part K of N, for a job array"),
+    )
     own.flag("--fresh", help="recompute all stored runs")
     own.flag("--dry-run", help="only print number of runs and disk space")
     own.flag("--json", help="print the summary or the estimate as JSON")
@@ -362,9 +479,12 @@ def _parser() -> tuple[_Parser, dict[str, _Parser]]:
     own.timeout()
 
     own = command(
-        "stability", "run stiff and extreme scenes with every method and report which are stable and accurate",
-        "commands:stability", "", "stiff/bearing-1e8 -o stiff.h5",
-    )  # fmt: skip
+        "stability",
+        ("run stiff and extreme scenes with every method and report which are stable and accurate"),
+        "commands:stability",
+        "",
+        "stiff/bearing-1e8 -o stiff.h5",
+    )
     own.scenes(nargs="*", help="names of scenes, folders or TOML files (default: stiff extreme)")
     own.method("method (see rotor-mbs list), or a Python file that defines methods (default: all)")
     own.settings()
@@ -375,35 +495,56 @@ def _parser() -> tuple[_Parser, dict[str, _Parser]]:
     )  # many runs of the suite would reach any limit: with a short one it ends in minutes
 
     own = command(
-        "modes", "compute natural frequencies at rest and over rotor speed, and Floquet multipliers under gravity",
-        "commands:modes", "stiff/nrel-5mw --speeds 0:3:31",
-    )  # fmt: skip
+        "modes",
+        (
+            "compute natural frequencies at rest and over rotor speed, and Floquet "
+            "multipliers under gravity"
+        ),
+        "commands:modes",
+        "stiff/nrel-5mw --speeds 0:3:31",
+    )
     own.scenes()
-    own.method("method, or a Python file, whose model is compared with the closed form (default: all)")
+    own.method(
+        "method, or a Python file, whose model is compared with the closed form (default: all)"
+    )
     text = "rotor speeds in rad/s, equally spaced, such as 0:3:31 (default: only at rest)"
     own.add_argument("--speeds", type=span, default=(), metavar="FROM:TO:COUNT", help=text)
     own.output(file, "FILE", Path("modes.h5"))
     own.flag("--json", help="print the table as JSON")
     own.jobs()
-    own.timeout(600.0, text="time limit per scene in s; the modes of a scene that takes longer are not stored")
+    own.timeout(
+        600.0,
+        text=("time limit per scene in s; the modes of a scene that takes longer are not stored"),
+    )
 
     own = command(
-        "report", "write HTML pages from a results, bench, sweep, modes or comparison file", "commands:report",
+        "report",
+        "write HTML pages from a results, bench, sweep, modes or comparison file",
+        "commands:report",
         "my.h5 --open",
-    )  # fmt: skip
+    )
     own.results()
     text = "folder for the pages (default: NAME-report beside NAME.h5; report beside results.h5)"
     own.output(folder, "DIR", help=text)
     own.flag("--open", help="open the index in a browser")
 
     own = command(
-        "figures", "draw the paper's figures for a manuscript, from a results file", "commands:figures",
+        "figures",
+        "draw the paper's figures for a manuscript, from a results file",
+        "commands:figures",
         "--format svg --figure 11",
-    )  # fmt: skip
+    )
     own.results()
     own.output(folder, "DIR", Path("figures"))
-    own.add_argument("--format", choices=("pdf", "svg", "png"), default="pdf", help="format (default: %(default)s)")
-    own.add_argument("--figure", action="append", metavar="N", help="only this figure; may be repeated")
+    own.add_argument(
+        "--format",
+        choices=("pdf", "svg", "png"),
+        default="pdf",
+        help="format (default: %(default)s)",
+    )
+    own.add_argument(
+        "--figure", action="append", metavar="N", help=("only this figure; may be repeated")
+    )
 
     own = command(
         "animate", "animate a scene from a results file", "commands:animate",
@@ -413,7 +554,10 @@ def _parser() -> tuple[_Parser, dict[str, _Parser]]:
     own.results()
     text = "FILE.gif or FILE.webp (default: name of the scene with .webp)"
     own.output(file, "FILE", help=text)
-    text = "magnification of the tip's distance from its pitch axis (default: scaled to 10 %% of blade length)"
+    text = (
+        "magnification of the tip's distance from its pitch axis (default: scaled to 10 %% of "
+        "blade length)"
+    )
     own.add_argument("--offset", type=POSITIVE, metavar="TIMES", help=text)
 
     own = command(
@@ -423,6 +567,10 @@ def _parser() -> tuple[_Parser, dict[str, _Parser]]:
     own.add_argument("scene", metavar="SCENE", help="a name (paper/fig05) or a TOML file")
     text = "mjcf: MuJoCo model; exudyn: stand-alone Exudyn script; csv: reference trajectory"
     own.add_argument("--to", required=True, choices=EXPORT_FORMATS, metavar="FORMAT", help=text)
-    own.output(file, "FILE", help="output file (default: name of the scene with .xml, -exudyn.py or .csv)")
+    own.output(
+        file,
+        "FILE",
+        help=("output file (default: name of the scene with .xml, -exudyn.py or .csv)"),
+    )
 
     return parser, dict(commands.choices)

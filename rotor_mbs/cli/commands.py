@@ -1,6 +1,8 @@
-"""The commands but for `run`, `reproduce`, `reference`, `check` and `test-method`: what is available, studies, pages.
+"""The commands but for `run`, `reproduce`, `reference`, `check` and `test-method`: what is
+available, studies, pages.
 
-Each loads what it needs, and not what the others need: `list` reads no scene, and pages load no model.
+Each loads what it needs, and not what the others need: `list` reads no scene, and pages load no
+model.
 """
 
 from __future__ import annotations
@@ -20,7 +22,13 @@ from rotor_mbs.cli.arguments import pages_beside
 from rotor_mbs.cli.terminal import print_json, print_not_computed, print_table
 from rotor_mbs.errors import InputError, MethodRefusal, StoreError
 from rotor_mbs.methods.base import Method
-from rotor_mbs.methods.catalogue import check_names, find_method, find_method_or_none, methods, problems_of_methods
+from rotor_mbs.methods.catalogue import (
+    check_names,
+    find_method,
+    find_method_or_none,
+    methods,
+    problems_of_methods,
+)
 from rotor_mbs.methods.method_file import ENDING
 from rotor_mbs.processes import cores
 from rotor_mbs.runs.progress import ProgressLine
@@ -44,7 +52,11 @@ def list_all(arguments: argparse.Namespace) -> int:
     labels = [(method.name, method.label) for method in methods()]
     if arguments.json:
         kinds = {"scene": scenes, "sweep": sweeps, "method": labels}
-        rows = [{"name": name, "title": title, "kind": kind} for kind in kinds for name, title in kinds[kind]]
+        rows = [
+            {"name": name, "title": title, "kind": kind}
+            for kind in kinds
+            for name, title in kinds[kind]
+        ]
         print_json(rows)
         return 0
     headings: dict[str, list[tuple[str, str]]] = {}
@@ -54,12 +66,16 @@ def list_all(arguments: argparse.Namespace) -> int:
     width = max(len(name) for entries in headings.values() for name, _ in entries)
     for heading, entries in headings.items():
         print(heading, *(f"  {name:{width}}  {title}" for name, title in entries), "", sep="\n")
-    print("next: rotor-mbs show NAME; rotor-mbs run SCENE [-m METHOD]; rotor-mbs sweep SWEEP; rotor-mbs new FILE.toml")
+    print(
+        "next: rotor-mbs show NAME; rotor-mbs run SCENE [-m METHOD]; rotor-mbs sweep SWEEP; "
+        "rotor-mbs new FILE.toml"
+    )
     return 0
 
 
 def new(arguments: argparse.Namespace) -> int:
-    """Write a commented scene file, with a mapping for the results of an OpenFAST model; never over other files."""
+    """Write a commented scene file, with a mapping for the results of an OpenFAST model; never over
+    other files."""
     from rotor_mbs.scenario.scene import new_scene_text
 
     path = arguments.file
@@ -79,21 +95,26 @@ def new(arguments: argparse.Namespace) -> int:
         texts = {path: only_scene(arguments.source).text}
     for new_file in texts:
         if new_file.exists() or new_file.is_symlink():
-            raise InputError(f"{new_file}: cannot be created: File exists; allowed: a file that does not exist yet")
+            raise InputError(
+                f"{new_file}: cannot be created: File exists; allowed: a file that "
+                "does not exist yet"
+            )
     for new_file, text in texts.items():
         try:
             with new_file.open("x", encoding="utf-8") as file:
                 file.write(text)
         except OSError as exc:
             raise InputError(
-                f"{new_file}: cannot be created: {exc.strerror}; allowed: a file that does not exist yet"
+                f"{new_file}: cannot be created: {exc.strerror}; allowed: a file that does not "
+                "exist yet"
             ) from exc
     print(*lines, sep="\n")
     return 0
 
 
 def _files_of_model(path: Path, model: Path) -> tuple[dict[Path, str], list[str]]:
-    """Return the texts of the scene and the mapping of an OpenFAST model by path, and lines that tell of them.
+    """Return the texts of the scene and the mapping of an OpenFAST model by path, and lines that
+    tell of them.
 
     Parameters
     ----------
@@ -113,17 +134,22 @@ def _files_of_model(path: Path, model: Path) -> tuple[dict[Path, str], list[str]
     if rotor.has_equal_blades:
         lines = [f"{len(lines)} blades: {lines[0].partition(': ')[2]}"]
     total = sum(rotor.hub_inertia)
-    lines.append(f"shaft: tilt {rotor.tilt:g} deg, {rotor.speed:g} rpm; hub and generator {total:.6g} kg m^2")
+    lines.append(
+        f"shaft: tilt {rotor.tilt:g} deg, {rotor.speed:g} rpm; hub and generator {total:.6g} kg m^2"
+    )
     for note in rotor.left_out:
         lines.append(f"not in the scene: {note.partition(': ')[0]}")
     lines.append(f"{path}: edit it, then: rotor-mbs run {path}")
     results = model.with_suffix(".out")
-    lines.append(f"{mapping}: for results, rotor-mbs compare {results} --scene {path} --columns {mapping}")
+    lines.append(
+        f"{mapping}: for results, rotor-mbs compare {results} --scene {path} --columns {mapping}"
+    )
     return {path: scene.text, mapping: mapping_text(rotor)}, lines
 
 
 def show(arguments: argparse.Namespace) -> int:
-    """Show a scene's data and methods, with --build its items; the settings of a method; or what is in a file."""
+    """Show a scene's data and methods, with --build its items; the settings of a method; or what is
+    in a file."""
     if arguments.scene.endswith(ENDING):
         for name in check_names(arguments.scene):
             _show_method(find_method(name), as_json=arguments.json)
@@ -159,18 +185,27 @@ def _show_method(method: Method, *, as_json: bool) -> None:
         rule = f"{setting['allowed']}; {setting['doc']}".rstrip("; ")
         print(f"  {name:26} {defaults[name]!s:>16}  {rule}")
     print(
-        f"\nto change a setting: rotor-mbs run SCENE -m {method.name} --set NAME=VALUE" if declared else "no settings"
+        f"\nto change a setting: rotor-mbs run SCENE -m {method.name} --set NAME=VALUE"
+        if declared
+        else "no settings"
     )
 
 
 def _show_scene(arguments: argparse.Namespace) -> None:
-    """Print a scene's data, the methods that can run it, and with --build what each model builds."""
+    """Print a scene's data, the methods that can run it, and with --build what each model
+    builds."""
     from rotor_mbs.scenario.scene import scene_keys, scene_tables, unit_of, without_times
 
     scene = only_scene(arguments.scene)
     models: dict[str, dict[str, Any]] = {}
     for method in methods():
-        facts = {"name": method.model, "methods": [], "items": [], "refused": "", "is_linearized": False}
+        facts = {
+            "name": method.model,
+            "methods": [],
+            "items": [],
+            "refused": "",
+            "is_linearized": False,
+        }
         model = models.setdefault(method.model, facts)
         model["methods"].append(method.name)
         model["is_linearized"] |= method.linearize is not None
@@ -190,7 +225,8 @@ def _show_scene(arguments: argparse.Namespace) -> None:
     print("\nmethods" + (", and the items that each model builds" if arguments.build else ""))
     for name, model in models.items():
         first, *others = model["methods"]
-        line = ", ".join([first, *(other.removeprefix(name) for other in others)])  # "lagrange/taylor, /ode45, ..."
+        # "lagrange/taylor, /ode45, ..."
+        line = ", ".join([first, *(other.removeprefix(name) for other in others)])
         if model["refused"]:
             line += f"  (not available: {model['refused']})"
         elif model["is_linearized"]:
@@ -214,14 +250,21 @@ def bench(arguments: argparse.Namespace) -> int:
     scenes, output = find_scenes(arguments.scenes), arguments.output
     with ProgressLine() as progress:
         made, refused = run_bench(
-            scenes, arguments.method, output, repeats=arguments.repeats, budget_s=arguments.budget, workers=cores(),
+            scenes,
+            arguments.method,
+            output,
+            repeats=arguments.repeats,
+            budget_s=arguments.budget,
+            workers=cores(),
             on_progress=progress,
-        )  # fmt: skip
+        )
     measured = len({outcome.label.partition(" ")[0] for outcome in made})
     is_incomplete = print_not_computed(made, refused)
     not_run = {refusal.scene for refusal in refused if not refusal.method}
     names = {scene.name for scene in scenes} - not_run
-    print_table(bench_table([curve for curve in read_records(output, "bench") if curve.scene in names]))
+    print_table(
+        bench_table([curve for curve in read_records(output, "bench") if curve.scene in names])
+    )
     text = f"{counted(measured, 'scene')} measured, {len(names) - measured} already stored"
     if refused:
         text += f", {counted(len(refused), 'curve')} not run"
@@ -253,23 +296,31 @@ def stability(arguments: argparse.Namespace) -> int:
 
 
 def modes(arguments: argparse.Namespace) -> int:
-    """Print the modes of every scene; 1 where two models disagree on a frequency or a scene could not be computed."""
+    """Print the modes of every scene; 1 where two models disagree on a frequency or a scene could
+    not be computed."""
     from rotor_mbs.analysis.modes import mode_rows, mode_summary, read_modes
     from rotor_mbs.studies.modes import modes_of_scenes
 
     scenes = find_scenes(arguments.scenes)
     with ProgressLine() as progress:
         made = modes_of_scenes(
-            scenes, arguments.output, speeds=arguments.speeds, names=arguments.method, workers=arguments.jobs,
-            timeout_s=arguments.timeout, on_progress=progress,
-        )  # fmt: skip
+            scenes,
+            arguments.output,
+            speeds=arguments.speeds,
+            names=arguments.method,
+            workers=arguments.jobs,
+            timeout_s=arguments.timeout,
+            on_progress=progress,
+        )
     is_incomplete = print_not_computed(made)
     if all(outcome.status == REFUSED for outcome in made):
         return EXIT_BAD_INPUT
     lost = {outcome.label.partition(" ")[0] for outcome in made if not outcome.is_stored}
     found = read_modes(arguments.output) if len(lost) < len(scenes) else {}
     # The file may have modes of an earlier call for a scene of which none were computed now.
-    chosen = [found[scene.name] for scene in scenes if scene.name in found and scene.name not in lost]
+    chosen = [
+        found[scene.name] for scene in scenes if scene.name in found and scene.name not in lost
+    ]
     if arguments.json:
         for modes in chosen:
             print(*modes.notes, sep="\n", end="\n" if modes.notes else "", file=sys.stderr)
@@ -291,9 +342,12 @@ def compare(arguments: argparse.Namespace) -> int:
     stored = arguments.output / "comparison.h5"
     may_extend(stored, COMPARISON)  # before anything is computed
     found = compare_data(
-        arguments.data, only_scene(arguments.scene), columns=arguments.columns, tolerance=arguments.tolerance,
+        arguments.data,
+        only_scene(arguments.scene),
+        columns=arguments.columns,
+        tolerance=arguments.tolerance,
         timeout=arguments.timeout,
-    )  # fmt: skip
+    )
     page = found.to_html(arguments.output)
     found.save(stored)
     if arguments.json:
@@ -332,7 +386,10 @@ def figures(arguments: argparse.Namespace) -> int:
     """Write the paper's figures as files for a manuscript into `arguments.output`."""
     from rotor_mbs.report.figures import write_figures
 
-    print(*write_figures(arguments.file, arguments.output, arguments.format, arguments.figure or ()), sep="\n")
+    print(
+        *write_figures(arguments.file, arguments.output, arguments.format, arguments.figure or ()),
+        sep="\n",
+    )
     return 0
 
 
@@ -346,10 +403,12 @@ def animate(arguments: argparse.Namespace) -> int:
 
 
 def sweep(arguments: argparse.Namespace) -> int:
-    """Run a parameter study into one dataset; 1 where a run did not succeed, or the disk is full."""
+    """Run a parameter study into one dataset; 1 where a run did not succeed, or the disk is
+    full."""
     from rotor_mbs.runs.engines import open_task_pool
 
-    with open_task_pool(arguments.engine, arguments.jobs) as pool:  # its workers load their code meanwhile
+    # its workers load their code meanwhile
+    with open_task_pool(arguments.engine, arguments.jobs) as pool:
         from rotor_mbs.scenario.sweep import load_sweep
         from rotor_mbs.studies.sweep import plan_sweep, run_sweep
 
@@ -368,7 +427,18 @@ def sweep(arguments: argparse.Namespace) -> int:
         stream = sys.stderr if arguments.json else sys.stdout  # standard output is the JSON's alone
         if not plan.runs:  # as in a job array with more parts than runs
             if arguments.json:
-                print(json.dumps({"event": "end", "runs": 0, "made": 0, "statuses": {}, "files": [], "seconds": 0.0}))
+                print(
+                    json.dumps(
+                        {
+                            "event": "end",
+                            "runs": 0,
+                            "made": 0,
+                            "statuses": {},
+                            "files": [],
+                            "seconds": 0.0,
+                        }
+                    )
+                )
             print("no runs in this part", file=stream)
             return 0
         output = arguments.output or Path(f"{plan.sweep.name}.h5")
@@ -387,16 +457,26 @@ def sweep(arguments: argparse.Namespace) -> int:
             # What is stored stays, the same command continues; else nothing was begun.
             return EXIT_FAILED if is_full or made else EXIT_BAD_INPUT
         if arguments.json:
-            facts = {"runs": result.runs, "made": result.made, "statuses": result.statuses, "files": [str(result.path)]}
+            facts = {
+                "runs": result.runs,
+                "made": result.made,
+                "statuses": result.statuses,
+                "files": [str(result.path)],
+            }
             print(json.dumps({"event": "end", **facts, "seconds": round(result.seconds, 3)}))
         else:
-            by_status = ", ".join(f"{count} {status}" for status, count in Counter(result.statuses).most_common())
+            by_status = ", ".join(
+                f"{count} {status}" for status, count in Counter(result.statuses).most_common()
+            )
             by_status = by_status or "none stored"
             rate = f", {result.made / result.seconds:.4g} per s" if result.made else ""
             computed = f"{result.made} computed in {result.seconds:.1f} s{rate}"
             print(f"{result.path}: {counted(result.runs, 'run')}: {by_status}; {computed}")
         if result.older:
-            print_line(f"{result.older} stored runs are from other versions; --fresh recomputes them", sys.stderr)
+            print_line(
+                (f"{result.older} stored runs are from other versions; --fresh recomputes them"),
+                sys.stderr,
+            )
         for line in result.lost:
             print_line(f"{line}; not computed; repeat the command to try again", sys.stderr)
         for line in result.refused:

@@ -24,7 +24,8 @@ from rotor_mbs.studies.run import run_scenes
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Run scenes with the methods named with -m, or by a scene's file; without, a rule selects them."""
+    """Run scenes with the methods named with -m, or by a scene's file; without, a rule selects
+    them."""
     scenes, settings = find_scenes(arguments.scenes, problems_of_scene), dict(arguments.set or ())
     methods, reasons, refused = selected_methods(scenes, arguments.method, settings)
     for reason in reasons:
@@ -46,22 +47,29 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def reproduce(arguments: argparse.Namespace) -> int:
-    """Compute every scene of the paper, and the report; nothing where the last call ended well with all that decides it
-    equal.
+    """Compute every scene of the paper, and the report; nothing where the last call ended well with
+    all that decides it equal.
 
-    That is every bit of the results file, too: a changed one is found as by the checksums inside the file.
+    That is every bit of the results file, too: a changed one is found as by the checksums inside
+    the file.
     """
     start, status = time.monotonic(), 0
     results, pages = arguments.output / "results.h5", arguments.output / "report"
     index, summary, stamp = (pages / name for name in ("index.html", "summary.txt", ".made-from"))
     there = results.is_file() and index.is_file() and summary.is_file() and stamp.is_file()
-    if there and stamp.read_text() == made_from(results, arguments.timeout) and not is_being_written(results):
+    if (
+        there
+        and stamp.read_text() == made_from(results, arguments.timeout)
+        and not is_being_written(results)
+    ):
         print(f"{results}: nothing to do, every run is already stored")
     else:
         status, text = _reproduce(arguments, results, pages)
         replace_file(summary, text.encode(), rb"\A\s*(result|method) ")
         if status == 0:
-            replace_file(stamp, made_from(results, arguments.timeout).encode(), rb"\A[0-9a-f]{64}\Z")
+            replace_file(
+                stamp, made_from(results, arguments.timeout).encode(), rb"\A[0-9a-f]{64}\Z"
+            )
     print_table(summary.read_text(encoding="utf-8"))
     print(f"report: {index}\n{time.monotonic() - start:.1f} s")
     return status
@@ -71,7 +79,9 @@ def _reproduce(arguments: argparse.Namespace, results: Path, pages: Path) -> tup
     """Return the exit status and the summary; one pool of processes does all."""
     load_runs = partial(import_module, "rotor_mbs.studies.reproduce")
     with local_pool(arguments.jobs, load_runs) as pool, ProgressLine() as progress:
-        report, refused = reproduce_paper(results, workers=pool, timeout_s=arguments.timeout, on_progress=progress)
+        report, refused = reproduce_paper(
+            results, workers=pool, timeout_s=arguments.timeout, on_progress=progress
+        )
         from rotor_mbs.report.build import write_report  # late: matplotlib
 
         write_report(results, pages, pool, partial(progress.stage, "pages and figures"))

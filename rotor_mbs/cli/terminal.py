@@ -32,7 +32,8 @@ def print_table(table: TextTable | str) -> None:
 
 
 def print_json(data: object, *, indent: int | None = None) -> None:
-    """Print data as JSON on standard output, in ASCII where the stream's encoding may lack a character."""
+    """Print data as JSON on standard output, in ASCII where the stream's encoding may lack a
+    character."""
     encoding = sys.stdout.encoding or "utf-8"
     is_unicode = encoding.lower().startswith("utf")
     print(json.dumps(data, ensure_ascii=not is_unicode, indent=indent))
@@ -50,7 +51,8 @@ def print_summary(report: BatchReport, output: Path, refused: Sequence[Refusal] 
     Returns
     -------
     int
-        The exit status: 1 if a run that should succeed did not, or was not computed; 2 if the methods refused all runs.
+        The exit status: 1 if a run that should succeed did not, or was not computed; 2 if the
+        methods refused all runs.
     """
     is_incomplete = print_not_computed(report.computed, refused)
     made = [run for run in report.computed if run.status != REFUSED]
@@ -75,23 +77,30 @@ def print_not_computed(made: Sequence[RunOutcome], refused: Sequence[Refusal] = 
 
     Parameters
     ----------
-    made : what a call computed or tried to. Not computed are runs that their method refused when it was built, and
+    made : what a call computed or tried to. Not computed are runs that their method refused when it
+        was built, and
         runs whose process died or could not start.
     refused : runs that were left out before.
 
     Returns
     -------
     bool
-        Whether one of the runs was asked for by name, or should be tried again: the exit status is not 0.
+        Whether one of the runs was asked for by name, or should be tried again: the exit status is
+        not 0.
     """
     not_stored = [outcome for outcome in made if not outcome.is_stored]
     lost = [outcome for outcome in not_stored if outcome.status != REFUSED]
     refusals = list(refused)
     for outcome in not_stored:
         if outcome.status == REFUSED:
-            refusals.append(Refusal(outcome.label.partition(" ")[0], outcome.method, outcome.message))
+            refusals.append(
+                Refusal(outcome.label.partition(" ")[0], outcome.method, outcome.message)
+            )
     for refusal in refusals:
         print(refusal, file=sys.stderr)
     for outcome in lost:
-        print(f"{outcome.label}: not computed ({outcome.message}); repeat the command to try again", file=sys.stderr)
+        print(
+            f"{outcome.label}: not computed ({outcome.message}); repeat the command to try again",
+            file=sys.stderr,
+        )
     return bool(lost) or any(refusal.is_asked for refusal in refusals)

@@ -20,7 +20,8 @@ from rotor_mbs.runs.read import is_sweep
 from rotor_mbs.scenario.accuracy_bounds import read_bounds, shipped_bounds
 from rotor_mbs.studies import check as study
 
-# Annotations: GitHub shows as many of a step and drops the others silently. Also lines about shrunken margins.
+# Annotations: GitHub shows as many of a step and drops the others silently. Also lines about
+# shrunken margins.
 WORST = 10
 
 
@@ -30,16 +31,25 @@ JSON = rb'\A\[\]\Z|\A\[\n \{\n  "check": "'
 
 
 def check(arguments: argparse.Namespace) -> int:
-    """Print every verdict that fails (with --verbose all), then a count; return 1 where one fails."""
+    """Print every verdict that fails (with --verbose all), then a count; return 1 where one
+    fails."""
     _refuse_foreign(arguments)
     if arguments.allow_changed and arguments.against is None:
         raise InputError("--allow-changed: allowed: with --against OLD")
     if arguments.require and arguments.file is None:
         raise InputError("--require: allowed: with a FILE that is to have the runs")
-    bounds = shipped_bounds().with_entries(read_bounds(arguments.bounds) if arguments.bounds else ())
+    bounds = shipped_bounds().with_entries(
+        read_bounds(arguments.bounds) if arguments.bounds else ()
+    )
     earlier = None if arguments.against is None else study.check_file(arguments.against, bounds)
-    if earlier is not None and arguments.file is not None and is_sweep(arguments.against) != is_sweep(arguments.file):
-        raise InputError(f"--against {arguments.against}: a file of another kind than {arguments.file}")
+    if (
+        earlier is not None
+        and arguments.file is not None
+        and is_sweep(arguments.against) != is_sweep(arguments.file)
+    ):
+        raise InputError(
+            f"--against {arguments.against}: a file of another kind than {arguments.file}"
+        )
     if arguments.file is not None:
         verdicts = study.check_file(arguments.file, bounds, arguments.require or ())
     else:
@@ -54,7 +64,8 @@ def check(arguments: argparse.Namespace) -> int:
             verdicts.append(study.runs_gone(arguments.file, arguments.against))
 
     _write_verdicts(arguments, verdicts)
-    stream = sys.stderr if arguments.json == Path("-") else sys.stdout  # standard output is the JSON's alone
+    # standard output is the JSON's alone
+    stream = sys.stderr if arguments.json == Path("-") else sys.stdout
     failures = [verdict for verdict in verdicts if not verdict.passed]
     annotated = worst_first(failures)[:WORST] if arguments.github else []
     for text in report_lines(verdicts, annotated, verbose=arguments.verbose):
@@ -69,7 +80,9 @@ def check(arguments: argparse.Namespace) -> int:
     return 1 if failures else 0
 
 
-def report_lines(verdicts: Sequence[Check], annotated: Sequence[Check] = (), *, verbose: bool = False) -> list[str]:
+def report_lines(
+    verdicts: Sequence[Check], annotated: Sequence[Check] = (), *, verbose: bool = False
+) -> list[str]:
     """Return the lines that report checks, each failure once.
 
     Parameters
@@ -84,11 +97,15 @@ def report_lines(verdicts: Sequence[Check], annotated: Sequence[Check] = (), *, 
         A line per failure, or per check; of failures `against` an earlier file only the ten worst,
         as one changed default setting shrinks hundreds of margins; then the annotations.
     """
-    shrunk = worst_first([verdict for verdict in verdicts if verdict.name == study.AGAINST and not verdict.passed])
+    shrunk = worst_first(
+        [verdict for verdict in verdicts if verdict.name == study.AGAINST and not verdict.passed]
+    )
     left_out = [] if verbose else shrunk[WORST:]
     lines = []
     for verdict in verdicts:
-        is_wanted = verbose or not verdict.passed or (verdict.name == study.CHANGED and verdict.value > 0.0)
+        is_wanted = (
+            verbose or not verdict.passed or (verdict.name == study.CHANGED and verdict.value > 0.0)
+        )
         if is_wanted and verdict not in annotated and verdict not in left_out:
             lines.append(line(verdict))
     if left_out:
@@ -107,7 +124,9 @@ def test_method(arguments: argparse.Namespace) -> int:
     from rotor_mbs.studies.method_test import examine  # late: `check` needs no models
 
     _refuse_foreign(arguments)
-    verdicts = [verdict for name in arguments.methods for verdict in examine(name, arguments.timeout)]
+    verdicts = [
+        verdict for name in arguments.methods for verdict in examine(name, arguments.timeout)
+    ]
     _write_verdicts(arguments, verdicts)
     if arguments.json != Path("-"):
         rows: list[tuple[str, ...]] = []
@@ -115,7 +134,18 @@ def test_method(arguments: argparse.Namespace) -> int:
             note = "" if one.passed and one.name != "refusal" else one.hint
             number, bound = (f"{one.value:.1e}", f"{one.bound:.1e}") if one.unit else ("", "")
             outcome = "pass" if one.passed else "FAIL"
-            rows.append((one.where.method, one.name, one.where.scene, number, bound, one.unit, outcome, note))
+            rows.append(
+                (
+                    one.where.method,
+                    one.name,
+                    one.where.scene,
+                    number,
+                    bound,
+                    one.unit,
+                    outcome,
+                    note,
+                )
+            )
         heads = ("method", "check", "scene", "value", "allowed", "unit", "result", "reason")
         print_table(TextTable(heads, rows))
         failed = sum(not verdict.passed for verdict in verdicts)
@@ -153,7 +183,8 @@ def line(check: Check) -> str:
     outcome = "pass" if check.passed else "FAIL"
     margin = "inf" if math.isinf(check.margin) else f"{check.margin:.3g}"
     unit = f" {check.unit}" if check.unit else ""
-    is_told = not check.passed or (check.name == study.CHANGED and check.value > 0.0)  # an allowed change, too
+    # an allowed change, too
+    is_told = not check.passed or (check.name == study.CHANGED and check.value > 0.0)
     hint = f"; {check.hint}" if is_told else ""
     return escaped(
         f"{outcome} {check.name}: {' '.join(check.where)}: {check.value:.2e}, "
@@ -163,7 +194,9 @@ def line(check: Check) -> str:
 
 def github(check: Check) -> str:
     """Return a workflow command that GitHub shows as an error annotation."""
-    title = escaped(f"rotor-mbs {check.name} {check.where.scene} {check.where.method}").replace("%", "%25")
+    title = escaped(f"rotor-mbs {check.name} {check.where.scene} {check.where.method}").replace(
+        "%", "%25"
+    )
     title = title.replace(":", "%3A").replace(",", "%2C")
     return f"::error title={title}::{line(check).replace('%', '%25')}"  # neither has a line break
 
@@ -178,7 +211,9 @@ def as_json(checks: Sequence[Check]) -> str:
             {
                 "check": check.name,
                 **check.where._asdict(),
-                **{name: value if math.isfinite(value) else None for name, value in numbers.items()},
+                **{
+                    name: value if math.isfinite(value) else None for name, value in numbers.items()
+                },
                 "unit": check.unit,
                 "passed": check.passed,
                 "hint": check.hint,
@@ -193,7 +228,9 @@ def junit(checks: Sequence[Check]) -> bytes:
     root = ElementTree.Element("testsuites", {"name": "rotor-mbs check", **_counts(checks)})
     for scene in dict.fromkeys(check.where.scene for check in checks):
         of_scene = [check for check in checks if check.where.scene == scene]
-        suite = ElementTree.SubElement(root, "testsuite", {"name": escaped(scene), **_counts(of_scene)})
+        suite = ElementTree.SubElement(
+            root, "testsuite", {"name": escaped(scene), **_counts(of_scene)}
+        )
         for check in of_scene:
             name = escaped(f"{check.name} {check.where.method} {check.where.channel}")
             case = ElementTree.SubElement(
@@ -201,9 +238,13 @@ def junit(checks: Sequence[Check]) -> bytes:
             )
             properties = ElementTree.SubElement(case, "properties")
             for key in ("value", "bound", "margin", "unit"):
-                ElementTree.SubElement(properties, "property", name=key, value=escaped(str(getattr(check, key))))
+                ElementTree.SubElement(
+                    properties, "property", name=key, value=escaped(str(getattr(check, key)))
+                )
             if not check.passed:
-                failure = ElementTree.SubElement(case, "failure", message=line(check), type=check.name)
+                failure = ElementTree.SubElement(
+                    case, "failure", message=line(check), type=check.name
+                )
                 failure.text = line(check)
     ElementTree.indent(root)
     text: bytes = ElementTree.tostring(root, encoding="utf-8", xml_declaration=True)

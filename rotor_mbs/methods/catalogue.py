@@ -255,7 +255,9 @@ def with_method_files(work: Callable[..., R]) -> Callable[..., R]:
     return partial(_with_files_of, os.getpid(), tuple(_files.values()), work)
 
 
-def _with_files_of(process_id: int, files: Sequence[MethodFile], work: Callable[..., R], *arguments: object) -> R:
+def _with_files_of(
+    process_id: int, files: Sequence[MethodFile], work: Callable[..., R], *arguments: object
+) -> R:
     """Call a function where the methods of files are known."""
     for file in files:
         _add(file)

@@ -1,7 +1,7 @@
 """Methods that a Python file defines, named by its path: `-m ./mine.py` has `mine/...`.
 
-The file's text is read once and goes with every task to its worker process, which needs no file and computes what this
-process has read.
+The file's text is read once and goes with every task to its worker process, which needs no file and
+computes what this process has read.
 """
 
 from __future__ import annotations
@@ -72,10 +72,15 @@ class MethodFile:
                 continue
             own = self._named(method)
             if own.name in methods or not _NAME.fullmatch(own.name.rpartition("/")[2]):
-                raise InputError(f"{self.path}: method {own.name!r}; allowed: names of letters and digits, each once")
+                raise InputError(
+                    f"{self.path}: method {own.name!r}; allowed: names of letters "
+                    "and digits, each once"
+                )
             methods[own.name] = own
         if not methods:
-            raise InputError(f"{self.path}: defines no Method; allowed: at least one (docs/your-engine.md)")
+            raise InputError(
+                f"{self.path}: defines no Method; allowed: at least one (docs/your-engine.md)"
+            )
         return methods
 
     def execute(self) -> ModuleType:
@@ -101,7 +106,8 @@ class MethodFile:
         return f"{self.model}/{method.name.rpartition('/')[2]}"
 
     def _named(self, method: Method) -> Method:
-        """Return a method under the file's name, with a ladder if it has none and a step or a tolerance."""
+        """Return a method under the file's name, with a ladder if it has none and a step or a
+        tolerance."""
         name = self.name_of(method)
         ladders = method.ladders
         if not ladders:
@@ -124,8 +130,8 @@ class MethodFile:
         )
 
     def _items(self, method: Method, scene: Scene) -> list[BuiltItem]:
-        """Where the method does not say what it builds, it is built: what it cannot represent it refuses there. In a
-        process of its own: somebody's code may end or hang it."""
+        """Where the method does not say what it builds, it is built: what it cannot represent it
+        refuses there. In a process of its own: somebody's code may end or hang it."""
         name = self.name_of(method)
         late = f"{name}: not built for {scene.name} within {_LOAD_S:g} s"
         ended = f"{name}: ended the process that built it for {scene.name}"
@@ -142,7 +148,8 @@ class MethodFile:
 
     @contextmanager
     def located(self) -> Iterator[None]:
-        """What is raised in the block, but by this package on purpose, is an InputError with file and line number."""
+        """What is raised in the block, but by this package on purpose, is an InputError with file
+        and line number."""
         try:
             yield
         except RotorError:
@@ -156,8 +163,14 @@ def located(error: BaseException, paths: Iterable[str]) -> str:
     paths = list(paths)
     if isinstance(error, SyntaxError) and error.filename in paths:
         return f"{error.filename}:{error.lineno}: {type(error).__name__}: {error.msg}"
-    frames = [frame for frame in traceback.extract_tb(error.__traceback__) if frame.filename in paths]
-    return f"{frames[-1].filename}:{frames[-1].lineno}: {one_line(error)}" if frames else one_line(error)
+    frames = [
+        frame for frame in traceback.extract_tb(error.__traceback__) if frame.filename in paths
+    ]
+    return (
+        f"{frames[-1].filename}:{frames[-1].lineno}: {one_line(error)}"
+        if frames
+        else one_line(error)
+    )
 
 
 def read_file(path: str) -> MethodFile:
@@ -171,12 +184,20 @@ def read_file(path: str) -> MethodFile:
     try:
         file = MethodFile(path, Path(path).read_text(encoding="utf-8"))
     except (OSError, ValueError) as exc:
-        raise InputError(f"{path}: {getattr(exc, 'strerror', None) or exc}; allowed: a Python file") from exc
-    _ask(file, None, f"{path}: not loaded within {_LOAD_S:g} s", f"{path}: ended the process that loaded it")
+        raise InputError(
+            f"{path}: {getattr(exc, 'strerror', None) or exc}; allowed: a Python file"
+        ) from exc
+    _ask(
+        file,
+        None,
+        f"{path}: not loaded within {_LOAD_S:g} s",
+        (f"{path}: ended the process that loaded it"),
+    )
     return file
 
 
-_loading = threading.Lock()  # where files are loaded by several threads, their output is restored in order
+# where files are loaded by several threads, their output is restored in order
+_loading = threading.Lock()
 _worker = Worker(is_silent=True)  # that loads files; somebody's code may end or hang it
 atexit.register(_worker.close)
 
@@ -218,7 +239,8 @@ _executed: dict[MethodFile, ModuleType] = {}  # in the other process
 
 
 def _answer(question: tuple[MethodFile, tuple[str, Scene] | None]) -> Any:
-    """Run a file, once unless it fails, and build what is asked, in the other process; see `_ask`."""
+    """Run a file, once unless it fails, and build what is asked, in the other process; see
+    `_ask`."""
     file, built = question
     if file not in _executed:
         _executed[file] = file.execute()
@@ -242,7 +264,8 @@ def _without_folder(path: str) -> Iterator[None]:
 
 @contextmanager
 def quiet() -> Iterator[None]:
-    """Drop what is printed in the block, also what compiled code prints. For one thread at a time."""
+    """Drop what is printed in the block, also what compiled code prints. For one thread at a
+    time."""
     with (
         Path(os.devnull).open("w", encoding="utf-8") as nowhere,
         redirect_stdout(nowhere),

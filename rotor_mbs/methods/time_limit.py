@@ -1,15 +1,17 @@
 """Time limits of runs, and the signal handlers of the caller while methods run.
 
-A limit ends a block by OutOfTimeError, or, inside `samples_kept_at_limit`, lets the code ask `is_over` between steps,
-where an exception would lose samples. In the main thread the exception comes from SIGALRM, so that it also ends code
-that never asks; in other threads, and on Windows, the code must ask.
+A limit ends a block by OutOfTimeError, or, inside `samples_kept_at_limit`, lets the code ask
+`is_over` between steps, where an exception would lose samples. In the main thread the exception
+comes from SIGALRM, so that it also ends code that never asks; in other threads, and on Windows, the
+code must ask.
 
-Python has one handler for SIGALRM and one timer, ITIMER_REAL, and the caller may use both (pytest-timeout does). While
-a block is active, they are shared: the timer is set to whatever is due next, ours or the caller's, and the caller's
-handler is called when its own time has come. After the block, handler and timer are the caller's again.
+Python has one handler for SIGALRM and one timer, ITIMER_REAL, and the caller may use both
+(pytest-timeout does). While a block is active, they are shared: the timer is set to whatever is due
+next, ours or the caller's, and the caller's handler is called when its own time has come. After the
+block, handler and timer are the caller's again.
 
-What a handler of the caller raises must reach the caller, although engines and our own code catch exceptions of
-methods, to store them as results: see `caller_signals`.
+What a handler of the caller raises must reach the caller, although engines and our own code catch
+exceptions of methods, to store them as results: see `caller_signals`.
 """
 
 from __future__ import annotations
@@ -30,7 +32,8 @@ MESSAGE = "stopped at the time limit"  # of a run that was
 _MAX_LIMIT_S = 1e9  # the system's timers take no more than the seconds of its clock
 _SHORTEST_S = 1e-6  # 0 would switch the timer off
 _SOON_S = 1e-4  # until an alarm that came at a wrong moment comes again
-_EARLY_S = 1e-3  # an alarm is for what is due until then: clock and timer need not agree to the last digit
+# an alarm is for what is due until then: clock and timer need not agree to the last digit
+_EARLY_S = 1e-3
 
 
 class OutOfTimeError(Exception):
@@ -38,7 +41,8 @@ class OutOfTimeError(Exception):
 
 
 def valid_seconds(timeout: float) -> float:
-    """Return a valid time limit in s; inf: none. Raises InputError unless it is above 0, TypeError for no number."""
+    """Return a valid time limit in s; inf: none. Raises InputError unless it is above 0, TypeError
+    for no number."""
     try:
         seconds = math.fsum([timeout])  # as float(timeout), but not of text
     except OverflowError:  # a whole number above 1e308
@@ -49,7 +53,8 @@ def valid_seconds(timeout: float) -> float:
 
 
 def time_limit(seconds: float) -> AbstractContextManager[object]:
-    """Raise OutOfTimeError in the block after `seconds` (inf: never), except inside `samples_kept_at_limit`.
+    """Raise OutOfTimeError in the block after `seconds` (inf: never), except inside
+    `samples_kept_at_limit`.
 
     Limits may be nested: one that ends while an inner one is active ends the inner block, too.
     """
@@ -58,7 +63,8 @@ def time_limit(seconds: float) -> AbstractContextManager[object]:
 
 @contextmanager
 def samples_kept_at_limit() -> Iterator[None]:
-    """Raise nothing in the block at the limit: the code asks `is_over` itself and keeps its samples."""
+    """Raise nothing in the block at the limit: the code asks `is_over` itself and keeps its
+    samples."""
     stack = _limits.stack
     if not stack:
         yield
@@ -72,7 +78,8 @@ def samples_kept_at_limit() -> Iterator[None]:
 
 
 def is_over() -> bool:
-    """Return whether a limit is reached; once that is known, a late signal does not interrupt the innermost block."""
+    """Return whether a limit is reached; once that is known, a late signal does not interrupt the
+    innermost block."""
     stack = _limits.stack
     if not stack:
         return False
@@ -82,7 +89,8 @@ def is_over() -> bool:
 
 
 def raise_if_over() -> None:
-    """Raise OutOfTimeError where a limit is reached: between parts of long work, for threads without the signal."""
+    """Raise OutOfTimeError where a limit is reached: between parts of long work, for threads
+    without the signal."""
     if is_over():
         raise OutOfTimeError(MESSAGE)
 
@@ -90,8 +98,8 @@ def raise_if_over() -> None:
 def step_callback() -> Callable[[object], bool] | None:
     """Return what an engine calls after every step, with anything, to know whether to go on.
 
-    None where no alarm can come, neither of a limit nor of the caller: the call takes time, and it is in the call that
-    Python handles signals. For use inside `samples_kept_at_limit`.
+    None where no alarm can come, neither of a limit nor of the caller: the call takes time, and it
+    is in the call that Python handles signals. For use inside `samples_kept_at_limit`.
     """
     has_alarm = bool(_limits.stack)
     if not has_alarm and _handles_signals() and hasattr(signal, "getitimer"):
@@ -100,7 +108,8 @@ def step_callback() -> Callable[[object], bool] | None:
 
 
 def must_ask() -> bool:
-    """Return whether a limit is active that does not end code by itself: in a thread, or without SIGALRM."""
+    """Return whether a limit is active that does not end code by itself: in a thread, or without
+    SIGALRM."""
     return bool(_limits.stack) and not (_handles_signals() and _signals.has_alarm)
 
 
@@ -112,7 +121,8 @@ def _handles_signals() -> bool:
 
 
 class _Limits(threading.local):
-    """The limits of each thread, the innermost last: that of one thread must not end, or lift, that of another."""
+    """The limits of each thread, the innermost last: that of one thread must not end, or lift, that
+    of another."""
 
     def __init__(self) -> None:
         self.stack: list[_Limit] = []
@@ -121,13 +131,15 @@ class _Limits(threading.local):
 class _Limit:
     """The context of `time_limit`.
 
-    A class, because its methods are known to the handler of the alarm, which lets them finish: an exception inside a
-    `contextmanager`'s own code, before or after the block, would leave the limit behind.
+    A class, because its methods are known to the handler of the alarm, which lets them finish: an
+    exception inside a `contextmanager`'s own code, before or after the block, would leave the limit
+    behind.
     """
 
     def __init__(self, seconds: float) -> None:
         self._seconds = seconds
-        self.end = self.until = math.inf  # on the monotonic clock; `until`: of the limits around it, too
+        # on the monotonic clock; `until`: of the limits around it, too
+        self.end = self.until = math.inf
         self.is_polled = False
         self.is_known = False  # to the code in the block, which is not interrupted any more
         self.has_fired = False
@@ -166,7 +178,8 @@ _limits = _Limits()
 
 
 class _HandlerError(BaseException):
-    """Carries an exception of a caller's handler past every `except Exception`, to the end of `caller_signals`."""
+    """Carries an exception of a caller's handler past every `except Exception`, to the end of
+    `caller_signals`."""
 
     def __init__(self, error: BaseException) -> None:
         super().__init__(error)
@@ -176,10 +189,11 @@ class _HandlerError(BaseException):
 class caller_signals(ContextDecorator):  # noqa: N801  (a context manager, as `contextlib.suppress`)
     """Let exceptions of the caller's signal handlers through, whatever catches them in the block.
 
-    Exudyn turns an exception that a handler raises during its run into one of its own, and our own code stores what a
-    method raises as its result. So handlers are wrapped: what they raise is noted, passes every `except Exception`, and
-    is raised at the end of the block where something has caught it nevertheless. In the main thread; in others, where
-    Python runs no handlers, nothing is done.
+    Exudyn turns an exception that a handler raises during its run into one of its own, and our own
+    code stores what a method raises as its result. So handlers are wrapped: what they raise is
+    noted, passes every `except Exception`, and is raised at the end of the block where something
+    has caught it nevertheless. In the main thread; in others, where Python runs no handlers,
+    nothing is done.
     """
 
     def __enter__(self) -> None:
@@ -192,7 +206,8 @@ class caller_signals(ContextDecorator):  # noqa: N801  (a context manager, as `c
 
 
 class _Signals:
-    """The handlers and the timer of the caller, while ours stand in their place; used by the main thread alone."""
+    """The handlers and the timer of the caller, while ours stand in their place; used by the main
+    thread alone."""
 
     def __init__(self) -> None:
         self._depth = 0  # of blocks, while there are handlers
@@ -200,10 +215,13 @@ class _Signals:
         self._raised: BaseException | None = None  # by one of them, since the outermost block began
         self._shares_timer = False  # whether it is set by `arm`; else it is the caller's
         self._is_giving_back = False
-        self._due, self._interval = math.inf, 0.0  # of the caller's timer, on the monotonic clock; s, where it repeats
+        # of the caller's timer, on the monotonic clock; s, where it repeats
+        self._due, self._interval = math.inf, 0.0
         self._is_missed = False  # whether an alarm of the caller came where it had to wait
-        self._is_lost = False  # whether Python ignored what was raised, so that it is raised once more
-        self._hook: Callable[[sys.UnraisableHookArgs], object] = sys.__unraisablehook__  # the caller's
+        # whether Python ignored what was raised, so that it is raised once more
+        self._is_lost = False
+        # the caller's
+        self._hook: Callable[[sys.UnraisableHookArgs], object] = sys.__unraisablehook__
 
     def enter(self) -> None:
         """Begin a block; in the outermost one ours take the place of the caller's handlers."""
@@ -216,7 +234,8 @@ class _Signals:
                 self._hook, sys.unraisablehook = sys.unraisablehook, _on_unraisable
             for number in signal.valid_signals():
                 handler = signal.getsignal(number)
-                if number == _ALARM and handler is not None:  # one that is not Python's could not be set again
+                # one that is not Python's could not be set again
+                if number == _ALARM and handler is not None:
                     self._handlers[number] = handler
                     signal.signal(number, _on_alarm)
                 elif callable(handler):
@@ -270,7 +289,8 @@ class _Signals:
             return
         if not self._shares_timer:
             remaining, self._interval = signal.getitimer(signal.ITIMER_REAL)
-            signal.signal(_ALARM, _on_alarm)  # inside, an alarm that was on its way is handled, as the caller's
+            # inside, an alarm that was on its way is handled, as the caller's
+            signal.signal(_ALARM, _on_alarm)
             self._shares_timer = True
             now = time.monotonic()
             self._due = now + remaining if remaining else math.inf
@@ -287,10 +307,13 @@ class _Signals:
         if self._is_lost:
             times.append(now + _SOON_S)
         seconds = min(times) - now
-        signal.setitimer(signal.ITIMER_REAL, 0.0 if math.isinf(seconds) else max(seconds, _SHORTEST_S))
+        signal.setitimer(
+            signal.ITIMER_REAL, 0.0 if math.isinf(seconds) else max(seconds, _SHORTEST_S)
+        )
 
     def give_timer_back(self, handler: Any = None) -> None:
-        """Set the timer to what is left of the caller's time; an alarm that came due meanwhile comes at once.
+        """Set the timer to what is left of the caller's time; an alarm that came due meanwhile
+        comes at once.
 
         handler : in place of ours, before the timer is set.
         """
@@ -333,7 +356,10 @@ class _Signals:
         for place, limit in enumerate(stack):
             if limit.end > now or limit.has_fired:
                 continue
-            asking = next((inner for inner in reversed(stack[place:]) if inner.is_polled or inner.is_known), None)
+            asking = next(
+                (inner for inner in reversed(stack[place:]) if inner.is_polled or inner.is_known),
+                None,
+            )
             if asking is None and _is_in(frame, limit.frame, _must_finish):
                 signal.setitimer(signal.ITIMER_REAL, _SOON_S)
                 return
@@ -345,7 +371,8 @@ class _Signals:
         self.arm()
 
     def _call_alarm_handler(self, frame: FrameType | None) -> None:
-        """Call the caller's handler of the alarm as if ours were not there: it may set timer and handler."""
+        """Call the caller's handler of the alarm as if ours were not there: it may set timer and
+        handler."""
         handler, shared = self._handlers[_ALARM], self._shares_timer
         if handler == signal.SIG_IGN:
             return
@@ -376,7 +403,8 @@ class _Signals:
             raise _passing(error) from None
 
     def on_unraisable(self, unraisable: sys.UnraisableHookArgs) -> None:
-        """Raise an exception of ours again that came where Python ignores it, as in a weak reference's callback."""
+        """Raise an exception of ours again that came where Python ignores it, as in a weak
+        reference's callback."""
         error = unraisable.exc_value
         if isinstance(error, _HandlerError):
             error = error.error
@@ -392,7 +420,8 @@ class _Signals:
 
 
 def _passing(error: BaseException) -> BaseException:
-    """Return the exception itself, or what carries it where `except Exception` or our own code would catch it."""
+    """Return the exception itself, or what carries it where `except Exception` or our own code
+    would catch it."""
     return _HandlerError(error) if isinstance(error, Exception | SystemExit) else error
 
 
@@ -426,8 +455,11 @@ _OURS = {
 }
 
 
-def _is_in(frame: FrameType | None, outer: FrameType | None, is_sought: Callable[[CodeType], bool]) -> bool:
-    """Return whether one of the functions that were interrupted, from the innermost to `outer`, is sought."""
+def _is_in(
+    frame: FrameType | None, outer: FrameType | None, is_sought: Callable[[CodeType], bool]
+) -> bool:
+    """Return whether one of the functions that were interrupted, from the innermost to `outer`, is
+    sought."""
     while frame is not None and frame is not outer:
         if is_sought(frame.f_code):
             return True
@@ -436,14 +468,17 @@ def _is_in(frame: FrameType | None, outer: FrameType | None, is_sought: Callable
 
 
 def _is_ours(code: CodeType) -> bool:
-    """Return whether it is a function that begins or ends a block, or handles a signal: it must not be left half."""
+    """Return whether it is a function that begins or ends a block, or handles a signal: it must not
+    be left half."""
     return code in _OURS
 
 
 def _must_finish(code: CodeType) -> bool:
     """Return whether a limit waits for a function: what it would leave half stays in the process.
 
-    A compiled module whose import was broken off cannot be imported again, and a context that is not left, as that of
-    NumPy's floating-point errors, stays for what comes after.
+    A compiled module whose import was broken off cannot be imported again, and a context that is
+    not left, as that of NumPy's floating-point errors, stays for what comes after.
     """
-    return code.co_name in ("__enter__", "__exit__", "__del__") or code.co_filename.startswith("<frozen importlib")
+    return code.co_name in ("__enter__", "__exit__", "__del__") or code.co_filename.startswith(
+        "<frozen importlib"
+    )

@@ -1,4 +1,5 @@
-"""What the models that are equations share: the items of a scene, and the settings of ode45. Needs no NumPy."""
+"""What the models that are equations share: the items of a scene, and the settings of ode45. Needs
+no NumPy."""
 
 from __future__ import annotations
 
@@ -17,11 +18,14 @@ class Ode45Settings(Settings):
     """MATLAB's ode45."""
 
     relative_tolerance: float = number(1e-6, above=0.0, doc="relative tolerance of the local error")
-    absolute_tolerance: float = number(1e-9, above=0.0, doc="absolute tolerance of the local error, rad and rad/s")
+    absolute_tolerance: float = number(
+        1e-9, above=0.0, doc=("absolute tolerance of the local error, rad and rad/s")
+    )
 
 
 def equation_items(scene: Scene, sources: tuple[str, str] = ("", "")) -> list[BuiltItem]:
-    """Return the equations and terms of a scene; sources: where the rotor's and a pitch's come from."""
+    """Return the equations and terms of a scene; sources: where the rotor's and a pitch's come
+    from."""
     moving = scene.moving_coordinates
     of_rotor, of_pitch = sources
     built = []

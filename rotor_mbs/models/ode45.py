@@ -2,9 +2,11 @@
 
 On a chaotic problem the step control decides the digits, so it is followed to the letter; sources:
 
-[DP]  J. R. Dormand, P. J. Prince: A family of embedded Runge-Kutta formulae. J. Comput. Appl. Math. 6 (1980), 19-26.
-[SR]  L. F. Shampine, M. W. Reichelt: The MATLAB ODE Suite. SIAM J. Sci. Comput. 18 (1997), 1-22.
-[JSS] J. C. Jimenez, A. Sotolongo, J. M. Sanchez-Bornot: Locally Linearized Runge Kutta method of Dormand and
+[DP]  J. R. Dormand, P. J. Prince: A family of embedded Runge-Kutta formulae. J. Comput. Appl. Math.
+6 (1980), 19-26. [SR]  L. F. Shampine, M. W. Reichelt: The MATLAB ODE Suite. SIAM J. Sci. Comput. 18
+(1997), 1-22.
+[JSS] J. C. Jimenez, A. Sotolongo, J. M. Sanchez-Bornot: Locally Linearized Runge Kutta method of
+Dormand and
       Prince. Appl. Math. Comput. 247 (2014), 589-606; its Table 2 lists the interpolant of ode45.
 """
 
@@ -61,7 +63,8 @@ _INTERPOLANT: Array = np.array([[float(weight) for weight in row] for row in INT
 
 @dataclass(frozen=True, slots=True)
 class Ode45Result:
-    """Every accepted step with its stages, so that the solution can be read off at any time it reached.
+    """Every accepted step with its stages, so that the solution can be read off at any time it
+    reached.
 
     Attributes
     ----------
@@ -96,13 +99,17 @@ class Ode45Result:
         h = self.time[step + 1] - self.time[step]
         s = (times - self.time[step]) / h
         weights = s[:, None] ** np.arange(1, 5) @ _INTERPOLANT.T  # (len(times), 7)
-        value: Array = self.state[step] + h[:, None] * np.einsum("ts,tsn->tn", weights, self.stages[step])
-        at_end = s == 1.0  # the last step's end: the state itself, free of the interpolant's rounding
+        value: Array = self.state[step] + h[:, None] * np.einsum(
+            "ts,tsn->tn", weights, self.stages[step]
+        )
+        # the last step's end: the state itself, free of the interpolant's rounding
+        at_end = s == 1.0
         value[at_end] = self.state[step[at_end] + 1]
         return value
 
     def refined(self) -> tuple[Array, Array]:
-        """Return (time, state) as ode45 does by default: four per step, of which the last is the step's end."""
+        """Return (time, state) as ode45 does by default: four per step, of which the last is the
+        step's end."""
         fractions = np.arange(4) / 4
         inner = self.time[:-1, None] + np.diff(self.time)[:, None] * fractions
         time = np.append(inner.ravel(), self.time[-1])
@@ -112,7 +119,11 @@ class Ode45Result:
 
 
 def ode45(
-    f: RightHandSide, t_end: float, initial_state: Sequence[float], rel_tol: float = 1e-3, abs_tol: float = 1e-6
+    f: RightHandSide,
+    t_end: float,
+    initial_state: Sequence[float],
+    rel_tol: float = 1e-3,
+    abs_tol: float = 1e-6,
 ) -> Ode45Result:
     """Solve y' = f(t, y) in plain floats.
 
@@ -121,14 +132,15 @@ def ode45(
     f : returns NaN where it is not defined.
     t_end : above 0; the start is at 0.
     initial_state : (n,).
-    rel_tol, abs_tol : of the local error; the error of a component is relative to the larger of its magnitude and
+    rel_tol, abs_tol : of the local error; the error of a component is relative to the larger of its
+        magnitude and
         abs_tol / rel_tol.
 
     Returns
     -------
     Ode45Result
-        With success False, and what was reached, where a step would have to be shorter than 16 units in the last place
-        of t.
+        With success False, and what was reached, where a step would have to be shorter than 16
+        units in the last place of t.
     """
     threshold = abs_tol / rel_tol
     t, y = 0.0, [float(value) for value in initial_state]
@@ -142,7 +154,8 @@ def ode45(
         h_min = smallest_step(t)
         h = min(h_max, max(h_min, h))
         if done := 1.1 * h >= t_end - t:
-            h = t_end - t  # the last step is stretched, or cut, to the end; exact, for t is past half of it
+            # the last step is stretched, or cut, to the end; exact, for t is past half of it
+            h = t_end - t
         failed_here = False
         while True:
             y_new, k, error = _attempt(f, t, y, k1, h, threshold)
@@ -151,7 +164,8 @@ def ode45(
                 break
             if h <= h_min:
                 message = (
-                    f"Failure at t={t:e}. Unable to meet integration tolerances without reducing the step size "
+                    f"Failure at t={t:e}. Unable to meet integration tolerances without reducing "
+                    "the step size "
                     f"below the smallest value allowed ({h_min:e}) at time t."
                 )
                 break
@@ -174,21 +188,26 @@ def smallest_step(t: float) -> float:
     return 16.0 * math.ulp(t)
 
 
-def first_step(y: Sequence[float], k1: Sequence[float], h_max: float, rel_tol: float, threshold: float) -> float:
-    """Return the first step that ode45 tries: h_max, or less where the slope at the start is steep."""
+def first_step(
+    y: Sequence[float], k1: Sequence[float], h_max: float, rel_tol: float, threshold: float
+) -> float:
+    """Return the first step that ode45 tries: h_max, or less where the slope at the start is
+    steep."""
     slope = max(abs(rate) / max(abs(value), threshold) for value, rate in zip(y, k1, strict=True))
     rate_of_change = 1.25 * slope / rel_tol**_POWER
     return 1.0 / rate_of_change if h_max * rate_of_change > 1.0 else h_max
 
 
 def _after_success(h: float, error: float, rel_tol: float) -> float:
-    """Return the step after one of h with an error that is small enough: by the error, at most five times as long."""
+    """Return the step after one of h with an error that is small enough: by the error, at most five
+    times as long."""
     shrink = 1.25 * (error / rel_tol) ** _POWER
     return h / shrink if shrink > 0.2 else 5.0 * h
 
 
 def after_failure(h: float, error: float, rel_tol: float, failed_before: bool) -> float:
-    """Return the step tried after one of h with too large an error, at the same time: the first time by the error."""
+    """Return the step tried after one of h with too large an error, at the same time: the first
+    time by the error."""
     return 0.5 * h if failed_before else h * max(0.1, 0.8 * (rel_tol / error) ** _POWER)
 
 
@@ -218,10 +237,19 @@ def _attempt(
     """
     k2 = f(t + _C2 * h, [a + h * (_A21 * p) for a, p in zip(y, k1, strict=True)])
     k3 = f(t + _C3 * h, [a + h * (_A31 * p + _A32 * q) for a, p, q in zip(y, k1, k2, strict=True)])
-    k4 = f(t + _C4 * h, [a + h * (_A41 * p + _A42 * q + _A43 * r) for a, p, q, r in zip(y, k1, k2, k3, strict=True)])
+    k4 = f(
+        t + _C4 * h,
+        [
+            a + h * (_A41 * p + _A42 * q + _A43 * r)
+            for a, p, q, r in zip(y, k1, k2, k3, strict=True)
+        ],
+    )
     k5 = f(
         t + _C5 * h,
-        [a + h * (_A51 * p + _A52 * q + _A53 * r + _A54 * u) for a, p, q, r, u in zip(y, k1, k2, k3, k4, strict=True)],
+        [
+            a + h * (_A51 * p + _A52 * q + _A53 * r + _A54 * u)
+            for a, p, q, r, u in zip(y, k1, k2, k3, k4, strict=True)
+        ],
     )
     k6 = f(
         t + h,
@@ -236,7 +264,8 @@ def _attempt(
     ]
     k7 = f(t + h, y_new)
     ratios = [
-        abs(_E1 * p + _E3 * r + _E4 * u + _E5 * v + _E6 * w + _E7 * x) / max(abs(a), abs(b), threshold)
+        abs(_E1 * p + _E3 * r + _E4 * u + _E5 * v + _E6 * w + _E7 * x)
+        / max(abs(a), abs(b), threshold)
         for a, b, p, r, u, v, w, x in zip(y, y_new, k1, k3, k4, k5, k6, k7, strict=True)
     ]
     # The sum is finite only if every ratio is; max alone can lose a NaN.

@@ -123,13 +123,17 @@ class Cluster(TaskPool):
             with suppress(Exception):
                 if self._client.nthreads():
                     without_since = time.monotonic()
-        error = StoreError(f"engine dask: no workers for {self._patience_s:g} s; stored runs are kept")
+        error = StoreError(
+            f"engine dask: no workers for {self._patience_s:g} s; stored runs are kept"
+        )
         for future in list(self._waiting):
             with suppress(Exception):  # one that has just ended
                 future.set_exception(error)
 
 
-def run_as_worker(work: Callable[[T], R], task: T, timeout_s: float, check: Callable[[], object]) -> R:
+def run_as_worker(
+    work: Callable[[T], R], task: T, timeout_s: float, check: Callable[[], object]
+) -> R:
     """Call `work(task)` in a worker of a cluster, which ends where the task takes too long.
 
     Dask has no time limits; the worker's nanny starts a new one. It is ended by a watchdog outside

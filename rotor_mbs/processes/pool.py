@@ -29,7 +29,9 @@ from rotor_mbs.processes.worker import TaskLostError, Worker
 T = TypeVar("T")
 R = TypeVar("R")
 
-_SIGNALS_OF_END = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)]
+_SIGNALS_OF_END = [
+    getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)
+]
 _PER_WORKER = 2  # tasks submitted per worker: one to work on, one waiting
 _MAX_LACKS = 10  # in a row, before all is given up
 
@@ -118,7 +120,9 @@ class WorkerPool(TaskPool):
     ) -> None:
         self.workers = workers
         self._threads = ThreadPoolExecutor(workers)
-        self._workers = [Worker(initializer, core=core, environment=environment) for _ in range(workers)]
+        self._workers = [
+            Worker(initializer, core=core, environment=environment) for _ in range(workers)
+        ]
         # The last one that became free is taken first: with few tasks, few processes are started.
         self._free: LifoQueue[Worker] = LifoQueue()
         for worker in reversed(self._workers):
@@ -157,7 +161,8 @@ class WorkerPool(TaskPool):
 
 
 class SerialPool(TaskPool):
-    """A pool in this process, one task after the other, without time limits: where scripts must not start processes.
+    """A pool in this process, one task after the other, without time limits: where scripts must not
+    start processes.
 
     >>> SerialPool().submit(abs, -3, timeout_s=10.0).result()
     3
@@ -171,12 +176,15 @@ class SerialPool(TaskPool):
             with system_errors_apart():
                 future.set_result(work(task))
         except (Exception, SystemExit) as exc:  # also of another package's method
-            future.set_exception(RuntimeError(one_line(exc)) if isinstance(exc, SystemExit) else exc)
+            future.set_exception(
+                RuntimeError(one_line(exc)) if isinstance(exc, SystemExit) else exc
+            )
         return future
 
 
 def check_workers(workers: int) -> None:
-    """Raise InputError for a wrong number of worker processes, TypeError for what is no whole number."""
+    """Raise InputError for a wrong number of worker processes, TypeError for what is no whole
+    number."""
     if not 0 <= operator.index(workers) <= MAX_WORKERS:
         allowed = f"a whole number from 0 to {MAX_WORKERS}"
         raise InputError(f"workers: {shown_value(workers)}; allowed: {allowed}")
@@ -293,7 +301,8 @@ def _end_of(task: T, future: Future[R], pool: TaskPool) -> TaskEnd[T, R]:
 
 @contextmanager
 def delayed_interrupts() -> Iterator[None]:
-    """Delay Ctrl-C, SIGTERM and SIGHUP to the end of the block, which ends all processes or none."""
+    """Delay Ctrl-C, SIGTERM and SIGHUP to the end of the block, which ends all processes or
+    none."""
     if threading.current_thread() is not threading.main_thread():
         yield
         return

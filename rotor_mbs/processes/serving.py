@@ -64,7 +64,8 @@ def _private_pipes() -> tuple[BinaryIO, BinaryIO]:
     requests, answers = os.fdopen(pipes[0], "rb"), os.fdopen(pipes[1], "wb")
 
     def close_in_fork() -> None:
-        """Close the pipes in what a method forks, which may outlive this process, and hide its end."""
+        """Close the pipes in what a method forks, which may outlive this process, and hide its
+        end."""
         while pipes:
             os.close(pipes.pop())
 
@@ -82,7 +83,9 @@ def _receive(requests: BinaryIO, received: queue.SimpleQueue[bytes]) -> None:
         os._exit(1)
 
 
-def set_up(core: int | None, memory_limit: int | None, initializer: Callable[[], object] | None) -> None:
+def set_up(
+    core: int | None, memory_limit: int | None, initializer: Callable[[], object] | None
+) -> None:
     """Set the core and the limit of memory of this process, and call its initializer."""
     if core is not None and hasattr(os, "sched_setaffinity"):
         os.sched_setaffinity(0, {core})
@@ -123,7 +126,8 @@ def limit_resources(memory: int, processor_s: int | None = None) -> None:
 
 
 def address_space() -> float:
-    """Return the limit of address space (bytes) of this process and of those that it starts; infinite without one."""
+    """Return the limit of address space (bytes) of this process and of those that it starts;
+    infinite without one."""
     with suppress(ImportError):  # Windows
         import resource
 
@@ -139,7 +143,8 @@ def is_worker() -> bool:
 
 
 def _answer(request: bytes) -> bytes:
-    """Return the pickled (result, error) of a request: a folder, and a pickled function with its argument.
+    """Return the pickled (result, error) of a request: a folder, and a pickled function with its
+    argument.
 
     What cannot be pickled, and an exit, is an error of the task.
     """

@@ -35,7 +35,9 @@ SET_UP_LIMIT_S = 300.0  # large engines load in seconds, on a busy machine in mi
 # The processes are the parallelism, and timings must not depend on a library's threads.
 _ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
 # Without -P, Python would import from the current folder.
-_PROGRAM = "import sys; sys.path[:] = sys.argv[1:]; from rotor_mbs.processes.serving import serve; serve()"
+_PROGRAM = (
+    "import sys; sys.path[:] = sys.argv[1:]; from rotor_mbs.processes.serving import serve; serve()"
+)
 _RETRY_START_S = 1.0  # after the system had no room for a process
 _END_S = 1.0  # until a process whose pipe is closed has ended
 # What a pipe raises whose other end is gone.
@@ -157,7 +159,8 @@ class Worker:
         return result
 
     def end_process(self) -> None:
-        """End the process at once, with what it does and its state; the next call starts another."""
+        """End the process at once, with what it does and its state; the next call starts
+        another."""
         with self._lock:
             if self._process is not None:
                 self._process.end()
@@ -212,7 +215,8 @@ class Worker:
         )
 
     def _wait_until_set_up(self, process: _Process) -> None:
-        """Wait for the initializer. Raises ResourceError if the process ends or is late, and what it raises."""
+        """Wait for the initializer. Raises ResourceError if the process ends or is late, and what
+        it raises."""
         try:
             answer = process.exchange(b"", self._set_up_limit_s)
         except TaskLostError as exc:
@@ -224,7 +228,8 @@ class Worker:
         process.is_set_up = True
 
     def _forget_after_fork(self) -> None:
-        """Leave the process to the parent, in a child that was forked off it with locks as they were."""
+        """Leave the process to the parent, in a child that was forked off it with locks as they
+        were."""
         self._turn, self._lock = threading.Lock(), threading.Lock()
         if self._process is not None:
             self._process.forget()
@@ -257,7 +262,8 @@ class _Process(subprocess.Popen[bytes]):
     is_set_up = False
 
     def send(self, message: bytes) -> None:
-        """Send a message; where the process has died, its answer shows that. Raises what is raised meanwhile."""
+        """Send a message; where the process has died, its answer shows that. Raises what is raised
+        meanwhile."""
         try:
             send(self.stdin, message)
         except Exception as exc:
@@ -307,7 +313,8 @@ class _Process(subprocess.Popen[bytes]):
 
     @contextmanager
     def _killed_after(self, limit_s: float) -> Iterator[threading.Event]:
-        """Kill the process if the block takes longer; yield the event that is set then. Raises ResourceError."""
+        """Kill the process if the block takes longer; yield the event that is set then. Raises
+        ResourceError."""
         is_late = threading.Event()
 
         def end_late() -> None:
@@ -326,7 +333,8 @@ class _Process(subprocess.Popen[bytes]):
             timer.join()
 
     def end(self, patience_s: float = 0.0) -> int:
-        """End the process, where it has not ended by itself within `patience_s`; return its exit code."""
+        """End the process, where it has not ended by itself within `patience_s`; return its exit
+        code."""
         try:
             code = self.wait(patience_s)
         except subprocess.TimeoutExpired:
@@ -338,7 +346,8 @@ class _Process(subprocess.Popen[bytes]):
         return code
 
     def forget(self) -> None:
-        """Close the pipes in a child of the parent, without what the parent was sending, and wait for nothing."""
+        """Close the pipes in a child of the parent, without what the parent was sending, and wait
+        for nothing."""
         self.returncode = 0  # it is no child of this process
         for stream in (self.stdin, self.stdout):
             # The buffer's own lock may be held by a thread that there is not in this process.
@@ -352,7 +361,8 @@ def _end_begun(beginning: Future[_Process]) -> None:
 
 
 def _not_started(reason: str) -> ResourceError:
-    """Return the error of a process that could not be started, with the limit of memory under which that was."""
+    """Return the error of a process that could not be started, with the limit of memory under which
+    that was."""
     return ResourceError(f"a process could not be started: {reason}{memory_limit_text()}")
 
 

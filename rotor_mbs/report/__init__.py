@@ -5,8 +5,10 @@ curves     the numbers of a page's plots
 files      pages as HTML by the template, and their writing
 looks      colours and lines; numbers: numbers as text
 pages      one module per page: stored data to the content of the page
-canvas     matplotlib: still pictures, figures for a manuscript (figures), notebooks (plots), animations (animation)
+canvas     matplotlib: still pictures, figures for a manuscript (figures), notebooks (plots),
+           animations (animation)
 templates  the pages' HTML, style and scripts
 
-Nothing is integrated: a page shows what its file has, also where no engine and no SciPy can be imported.
+Nothing is integrated: a page shows what its file has, also where no engine and no SciPy can be
+imported.
 """

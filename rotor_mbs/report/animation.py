@@ -35,7 +35,8 @@ def write_animation(results: Path, name: str, output: Path, magnified: float | N
     ----------
     results, name : the file, and the name of the scene in it.
     output : the animation; its suffix gives the format.
-    magnified : how many times the tip's distance from the pitch axis is drawn; None: so many that it is visible.
+    magnified : how many times the tip's distance from the pitch axis is drawn; None: so many that
+        it is visible.
 
     Raises
     ------
@@ -46,14 +47,23 @@ def write_animation(results: Path, name: str, output: Path, magnified: float | N
     """
     kind = output.suffix.lower()
     if kind not in SUFFIXES:
-        raise InputError(f"{output}: unknown format {kind or '(none)'}; allowed: {', '.join(SUFFIXES)}")
+        raise InputError(
+            f"{output}: unknown format {kind or '(none)'}; allowed: {', '.join(SUFFIXES)}"
+        )
     refuse_foreign(output, _MARK)  # before anything is drawn
-    name = Path(name).stem if name.endswith(".toml") else name  # a scene of one's own is stored by the stem of its file
+    # a scene of one's own is stored by the stem of its file
+    name = Path(name).stem if name.endswith(".toml") else name
     with open_results(results) as opened:
         if name not in opened.scenes:
-            raise InputError(f"{results}: {name!r}: no such scene in it; allowed: {', '.join(opened.scenes) or 'none'}")
+            raise InputError(
+                f"{results}: {name!r}: no such scene in it; allowed: "
+                f"{', '.join(opened.scenes) or 'none'}"
+            )
         pictures = frames(opened.scenes[name], magnified)
-        webp, other = {"quality": 50, "method": 0, "xmp": _MARK}, {"optimize": False, "comment": _MARK}
+        webp, other = (
+            {"quality": 50, "method": 0, "xmp": _MARK},
+            {"optimize": False, "comment": _MARK},
+        )
         options = webp if kind == ".webp" else other
         stream = io.BytesIO()
         first, suffix = next(pictures), kind.removeprefix(".")
@@ -71,8 +81,8 @@ def write_animation(results: Path, name: str, output: Path, magnified: float | N
 
 
 def frames(stored: StoredScene, magnified: float | None) -> Iterator[Image.Image]:
-    """Draw the runs side by side: paths up to the frame, then the blades. Raises InputError where nothing can be
-    drawn."""
+    """Draw the runs side by side: paths up to the frame, then the blades. Raises InputError where
+    nothing can be drawn."""
     scene = stored.scene
     runs = {label_of(run.method): run for run in stored.sides.values() if "angles" in run}
     if not runs:
@@ -94,7 +104,8 @@ def frames(stored: StoredScene, magnified: float | None) -> Iterator[Image.Image
             colour = coordinate_look(blade + 1).colour
             paths += axes.plot([], [], color=colour, linewidth=0.8)
             blades += axes.fill([0.0], [0.0], facecolor="#dddddd", edgecolor=colour, linewidth=2.2)
-        ended = int(np.searchsorted(at, run.array("time")[-1], side="right"))  # after the last sample it stands still
+        # after the last sample it stands still
+        ended = int(np.searchsorted(at, run.array("time")[-1], side="right"))
         moving.append((axes, name, corners, ended, paths, blades))
     offset = f", offset drawn ×{factor:g}" if factor != 1.0 else ""
     clock = panels.figure.text(0.01, 0.93, "", color=GREY)
@@ -131,7 +142,8 @@ def wires(scene: Scene, time: Array, angles: Array, at: Array, magnified: float)
     Returns
     -------
     (times, blades, 3, 2) m
-        The end of the pitch axis, the tip, and a point at the hub as far from the pitch axis as the tip.
+        The end of the pitch axis, the tip, and a point at the hub as far from the pitch axis as the
+        tip.
     """
     moved = np.stack([np.interp(at, time, column) for column in angles.T], axis=1)
     corners = []

@@ -1,4 +1,5 @@
-"""The report of a file, whatever it has: all pages are made, those of scenes in a process pool, then written."""
+"""The report of a file, whatever it has: all pages are made, those of scenes in a process pool,
+then written."""
 
 from __future__ import annotations
 
@@ -35,15 +36,19 @@ OnPage = Callable[[int, int], None]  # with how many are drawn, of how many
 
 
 class Page(NamedTuple):
-    """A page before it is made: its file, label in the navigation ("": it is not there), and content."""
+    """A page before it is made: its file, label in the navigation ("": it is not there), and
+    content."""
 
     file: str
     label: str
     content: Callable[[], PageContent]
 
 
-def write_report(results: Path, output: Path, jobs: Workers = 1, on_page: OnPage = lambda *_: None) -> Path:
-    """Write the pages about any file that this program writes into a folder, all or none; returns the index.
+def write_report(
+    results: Path, output: Path, jobs: Workers = 1, on_page: OnPage = lambda *_: None
+) -> Path:
+    """Write the pages about any file that this program writes into a folder, all or none; returns
+    the index.
 
     Parameters
     ----------
@@ -74,7 +79,9 @@ def write_report(results: Path, output: Path, jobs: Workers = 1, on_page: OnPage
         numbers = [range(count)[start::groups] for start in range(groups)]
         for finished in run_in(pool, partial(make_pages, results), numbers, _TIMEOUT_S):
             if finished.value is None:
-                raise finished.error or StoreError(f"{results}: a page was not made: {finished.message}")
+                raise finished.error or StoreError(
+                    f"{results}: a page was not made: {finished.message}"
+                )
             made |= finished.value
             on_page(len(made), count)
     files.write_pages(output, made)
@@ -98,8 +105,8 @@ def make_pages(results: Path, numbers: Sequence[int]) -> dict[str, str]:
 def _without_warnings() -> Iterator[None]:
     """Suppress warnings in the block.
 
-    A file may hold any number; a user has no use for a warning with a line of this program's source where one
-    overflows in a plot.
+    A file may hold any number; a user has no use for a warning with a line of this program's source
+    where one overflows in a plot.
     """
     with warnings.catch_warnings(), np.errstate(all="ignore"):
         warnings.simplefilter("ignore")
@@ -107,15 +114,22 @@ def _without_warnings() -> Iterator[None]:
 
 
 def pages_of(report: Report) -> list[Page]:
-    """Return the pages for what the file has. The first one is the index; of a file of one scene it is that scene."""
-    modes, bench, compared = (read_records(report.path, kind) for kind in ("modes", "bench", "comparison"))
-    has_runs = any(scene.methods for scene in report.scenes.values()) or not (modes or bench or compared)
+    """Return the pages for what the file has. The first one is the index; of a file of one scene it
+    is that scene."""
+    modes, bench, compared = (
+        read_records(report.path, kind) for kind in ("modes", "bench", "comparison")
+    )
+    has_runs = any(scene.methods for scene in report.scenes.values()) or not (
+        modes or bench or compared
+    )
     if has_runs and not report.scenes:
         raise StoreError(f"{report.path}: no scene in it, nothing to report")
     pages: list[Page] = []
     scenes: list[Page] = []
     if has_runs:
-        scenes = [Page(file, "", partial(scene_page, name, report)) for name, file in report.files.items()]
+        scenes = [
+            Page(file, "", partial(scene_page, name, report)) for name, file in report.files.items()
+        ]
     if has_runs and report.is_suite:
         pages.append(Page("stability.html", "Stability suite", partial(stability_page, report)))
     elif has_runs and len(scenes) == 1:
@@ -136,7 +150,9 @@ def pages_of(report: Report) -> list[Page]:
         from rotor_mbs.analysis.modes import read_modes  # late: workers load what most files need
         from rotor_mbs.report.pages.modes import modes_page
 
-        pages.append(Page("modes.html", "Modes", partial(modes_page, list(read_modes(report.path).values()))))
+        pages.append(
+            Page("modes.html", "Modes", partial(modes_page, list(read_modes(report.path).values())))
+        )
     for number, record in enumerate(compared, 1):
         from rotor_mbs.report.pages.comparison import comparison_page
 

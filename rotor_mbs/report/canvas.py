@@ -1,4 +1,5 @@
-"""The only module that imports matplotlib: panels, the styles of pages and manuscripts, reproducible output."""
+"""The only module that imports matplotlib: panels, the styles of pages and manuscripts,
+reproducible output."""
 
 from __future__ import annotations
 
@@ -32,8 +33,8 @@ from rotor_mbs.scenario.toml_file import file_path
 def _unaffected_by_environment() -> Iterator[None]:
     """Import matplotlib in the block whatever the environment says of backends and folders.
 
-    No backend is needed here, and an unknown one in MPLBACKEND would be an error. A home that cannot be written is told
-    once in every process, though a temporary folder serves as well.
+    No backend is needed here, and an unknown one in MPLBACKEND would be an error. A home that
+    cannot be written is told once in every process, though a temporary folder serves as well.
     """
     backend = os.environ.pop("MPLBACKEND", None)
     logger = logging.getLogger("matplotlib")
@@ -63,7 +64,9 @@ PRINT_WIDTH = 174.0 / 25.4  # in; two columns of a journal
 MARK = b"rotor_mbs pictures"  # in the metadata of every picture that is a file
 KINDS = ("pdf", "svg", "png")
 _PAGE_STYLE, _PRINT_STYLE = (  # without matplotlib's defaults
-    matplotlib.rc_params_from_file(Path(__file__).with_name(f"{name}.mplstyle"), use_default_template=False)
+    matplotlib.rc_params_from_file(
+        Path(__file__).with_name(f"{name}.mplstyle"), use_default_template=False
+    )
     for name in ("page", "print")
 )
 
@@ -91,16 +94,22 @@ class Panels:
         artists = self.labelled()
         with style():
             self.axes[0].legend(
-                artists.values(), artists, loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2, frameon=False,
+                artists.values(),
+                artists,
+                loc="lower left",
+                bbox_to_anchor=(0.0, 1.0),
+                ncols=2,
+                frameon=False,
                 fontsize=8.0,
-            )  # fmt: skip
+            )
         self.figure.subplots_adjust(top=0.95 - 0.07 * math.ceil(len(artists) / 2))
         return self
 
     def save(self, path: str | PathLike[str]) -> None:
         """Save as PDF, SVG or PNG, by the ending of `path`.
 
-        Raises InputError for another one, StoreError, and TypeError if `path` is neither text nor a path.
+        Raises InputError for another one, StoreError, and TypeError if `path` is neither text nor a
+        path.
         """
         target = file_path(path)
         kind = target.suffix.removeprefix(".")
@@ -111,14 +120,19 @@ class Panels:
 
 
 def panels(heights: tuple[float, ...], x_label: str) -> Panels:
-    """Build panels one below the other: heights in inches, the top one first; the last one has the label of x."""
+    """Build panels one below the other: heights in inches, the top one first; the last one has the
+    label of x."""
     figure = Figure(figsize=(WIDTH, sum(heights) + 0.6), facecolor="white")
     with style():
-        axes = figure.subplots(len(heights), squeeze=False, sharex=True, height_ratios=heights)[:, 0].tolist()
+        axes = figure.subplots(len(heights), squeeze=False, sharex=True, height_ratios=heights)[
+            :, 0
+        ].tolist()
         axes[-1].set_xlabel(x_label)
     # Fixed margins: the layout does not depend on the fonts.
     height = float(figure.get_figheight())
-    figure.subplots_adjust(left=0.16, right=0.965, bottom=0.45 / height, top=1.0 - 0.15 / height, hspace=0.09)
+    figure.subplots_adjust(
+        left=0.16, right=0.965, bottom=0.45 / height, top=1.0 - 0.15 / height, hspace=0.09
+    )
     return Panels(figure, axes)
 
 
@@ -136,10 +150,14 @@ def grid(rows: int, columns: int, height: float) -> Panels:
 
 
 def squares(count: int) -> Panels:
-    """Build axes side by side with equal scales and no frame, 420 pixels each, below room for two lines of text."""
+    """Build axes side by side with equal scales and no frame, 420 pixels each, below room for two
+    lines of text."""
     with style():
         figure = Figure(figsize=(4.2 * count, 4.6), dpi=100, facecolor="white")
-        axes = [figure.add_axes((i / count, 0.0, 1.0 / count, 4.2 / 4.6), aspect="equal") for i in range(count)]
+        axes = [
+            figure.add_axes((i / count, 0.0, 1.0 / count, 4.2 / 4.6), aspect="equal")
+            for i in range(count)
+        ]
     for square in axes:
         square.set_axis_off()
     return Panels(figure, [*axes])
@@ -153,12 +171,16 @@ def pixels(figure: Figure) -> NDArray[np.uint8]:
 
 
 def style(*, for_print: bool = False) -> AbstractContextManager[None]:
-    """Return a context in which figures are drawn in the style of the pages, or in that of manuscripts."""
+    """Return a context in which figures are drawn in the style of the pages, or in that of
+    manuscripts."""
     return matplotlib.rc_context(_PRINT_STYLE if for_print else _PAGE_STYLE)
 
 
-def encoded(figure: Figure, kind: str, *, for_print: bool = True, title: str = "", description: str = "") -> bytes:
-    """Return the figure as a file of one of KINDS, with a title and a description; the same bytes every time."""
+def encoded(
+    figure: Figure, kind: str, *, for_print: bool = True, title: str = "", description: str = ""
+) -> bytes:
+    """Return the figure as a file of one of KINDS, with a title and a description; the same bytes
+    every time."""
     metadata: dict[str, Any] = {
         "pdf": {"CreationDate": None},
         "svg": {"Date": None},
@@ -179,24 +201,30 @@ def encoded(figure: Figure, kind: str, *, for_print: bool = True, title: str = "
     return stream.getvalue()
 
 
-# What an SVG file has and a part of a page does not need: metadata, comments, names of groups, spaces between elements.
+# What an SVG file has and a part of a page does not need: metadata, comments, names of groups,
+# spaces between elements.
 _SUPERFLUOUS = re.compile(
     r"<metadata>.*?</metadata>|<defs>\s*<style.*?</style>\s*</defs>|<!--.*?-->|(?<=>)\s+(?=<)"
-    r'| id="[a-zA-Z0-9.]+_\d+"| transform="rotate\(-0 [^"]*"|font-size: \d+px; |font-family: [^;"]*(; )?',
+    r'| id="[a-zA-Z0-9.]+_\d+"| transform="rotate\(-0 [^"]*"|font-size: \d+px; |font-family: '
+    r'[^;"]*(; )?',
     re.DOTALL,
 )
-_NAME = re.compile(r'(id="|="#|\(#)(?=[a-zA-Z]+[0-9a-f]{10})')  # of a marker or an area that is referred to
+# of a marker or an area that is referred to
+_NAME = re.compile(r'(id="|="#|\(#)(?=[a-zA-Z]+[0-9a-f]{10})')
 _COLOUR = re.compile(r"#[0-9a-f]{6}\b")
 _STILL_WIDTH = 3.4  # in, of 100 px: 12 px are 12 px on a telephone's page
 _STILL_POINTS = 300  # of a curve: about one a pixel
 
 
 def still(plot: Plot, name: str) -> Markup:
-    """Return a picture of a plot for a page without scripts, an `svg` element; names in it begin with `name`."""
+    """Return a picture of a plot for a page without scripts, an `svg` element; names in it begin
+    with `name`."""
     height = plot.height
     with style():
         figure = Figure(figsize=(_STILL_WIDTH, height / 100.0), dpi=100, facecolor="none")
-        axes: Any = figure.add_axes((0.15, 24.0 / height, 0.82, 1.0 - 32.0 / height), facecolor="none")
+        axes: Any = figure.add_axes(
+            (0.15, 24.0 / height, 0.82, 1.0 - 32.0 / height), facecolor="none"
+        )
         axes.tick_params(labelsize=9.0, colors=GREY)
         has_values = False
         for drawn in plot.curves:
@@ -248,7 +276,8 @@ def path_picture(panels: Panels, name: str, caption: str) -> Markup:
 
 
 def inside_of(file: bytes, name: str) -> str:
-    """Return what is inside the `svg` element of a file, for a page: names of its own, variables for the palette."""
+    """Return what is inside the `svg` element of a file, for a page: names of its own, variables
+    for the palette."""
     _, _, text = file.decode().partition("<svg")
     _, _, text = text.partition(">")
     text = _SUPERFLUOUS.sub("", text.rpartition("</svg>")[0]).replace("\n", "")
@@ -262,7 +291,8 @@ def inside_of(file: bytes, name: str) -> str:
 
 
 def extremes(values: Any, most: int) -> NDArray[np.int64]:
-    """Return which samples to draw: the ends, and the smallest and largest of equal intervals, about `most` in all."""
+    """Return which samples to draw: the ends, and the smallest and largest of equal intervals,
+    about `most` in all."""
     count = len(values)
     if count <= most:
         return np.arange(count)
@@ -275,7 +305,8 @@ def extremes(values: Any, most: int) -> NDArray[np.int64]:
 
 
 def log_axis(axes: Any, lowest: float, highest: float) -> None:
-    """Make the vertical axis logarithmic over whole decades, labelled 10⁻¹²; at most eight labels."""
+    """Make the vertical axis logarithmic over whole decades, labelled 10⁻¹²; at most eight
+    labels."""
     low, high = math.floor(math.log10(lowest)), math.ceil(math.log10(highest))
     high = max(high, low + 1)
     # The limits first: a range found by the axes themselves may overflow.
@@ -295,8 +326,15 @@ def ticks(axis: Any, labels: Mapping[float, str]) -> None:
 
 
 def curve(axes: Any, x: Any, y: Any, look: Look, width: float = 1.2, **more: Any) -> None:
-    """Draw a line, with markers that are white inside where the look has them; its label stands in the legend."""
+    """Draw a line, with markers that are white inside where the look has them; its label stands in
+    the legend."""
     axes.plot(
-        x, y, color=look.colour, linestyle=look.line, linewidth=width, marker=look.marker, label=look.label or "_",
+        x,
+        y,
+        color=look.colour,
+        linestyle=look.line,
+        linewidth=width,
+        marker=look.marker,
+        label=look.label or "_",
         **{"markersize": 4.2, "markerfacecolor": PAPER} | more,
-    )  # fmt: skip
+    )

@@ -1,4 +1,5 @@
-"""The numbers of a page's plots: columns as single precision, each once, in base64, with where each of them lies."""
+"""The numbers of a page's plots: columns as single precision, each once, in base64, with where each
+of them lies."""
 
 from __future__ import annotations
 
@@ -10,8 +11,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-# Where values are so many times their range, as a rotor angle after an hour, single precision would show steps: what is
-# stored is the difference from the first value.
+# Where values are so many times their range, as a rotor angle after an hour, single precision would
+# show steps: what is stored is the difference from the first value.
 _FAR_FROM_ZERO = 1000.0
 _LONG = 2000  # samples, two a pixel of a page
 # Single precision has no larger number.
@@ -21,10 +22,12 @@ _LARGEST = 3.0e38
 class CurveStore:
     """Columns of numbers for the script of a page.
 
-    A column is described by where it lies: {"at": [first, count]} in numbers from the beginning, in a table of several
-    runs [first, count, stride], with the stride from a run to the next; "from": a number to be added to each.
+    A column is described by where it lies: {"at": [first, count]} in numbers from the beginning, in
+    a table of several runs [first, count, stride], with the stride from a run to the next; "from":
+    a number to be added to each.
 
-    every : of columns that are long only so many-th samples are stored, so that a page does not become too large.
+    every : of columns that are long only so many-th samples are stored, so that a page does not
+        become too large.
     """
 
     def __init__(self, every: int = 1) -> None:
@@ -38,7 +41,8 @@ class CurveStore:
 
         Parameters
         ----------
-        values : (n,) the column; or (runs, n), of which the page shows one row at a time. NaN is a gap.
+        values : (n,) the column; or (runs, n), of which the page shows one row at a time. NaN is a
+            gap.
         """
         table = np.asarray(values, dtype=np.float64)[..., :: self.step(values)]
         count = int(table.shape[-1])

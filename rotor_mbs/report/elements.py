@@ -1,4 +1,5 @@
-"""What pages are made of: sentences, facts, plots, tables, sections. Plain data; templates turn them into HTML."""
+"""What pages are made of: sentences, facts, plots, tables, sections. Plain data; templates turn
+them into HTML."""
 
 from __future__ import annotations
 
@@ -48,7 +49,8 @@ Row = Sequence[TableCell | str]
 
 @dataclass(frozen=True)
 class PageTable:
-    """A table. The first cell of a row is its heading; a column in which no row has anything is left out.
+    """A table. The first cell of a row is its heading; a column in which no row has anything is
+    left out.
 
     caption : for a screen reader.
     wide : places of the columns that a narrow page does not show.
@@ -63,7 +65,8 @@ class PageTable:
     kind: str = field(default="table", init=False)
 
     def columns(self) -> list[tuple[int, TableCell | str, str]]:
-        """Return place, heading and classes ("n": numbers, on the right) of each column that is shown."""
+        """Return place, heading and classes ("n": numbers, on the right) of each column that is
+        shown."""
         shown = []
         for place, heading in enumerate(self.head):
             texts = []
@@ -194,7 +197,8 @@ class Plot:
 
 @dataclass(frozen=True)
 class Legend:
-    """The curves of a section: (key, look) each. Buttons that switch them; without keys a mere list."""
+    """The curves of a section: (key, look) each. Buttons that switch them; without keys a mere
+    list."""
 
     items: Sequence[tuple[str, Look]]
     kind: str = field(default="legend", init=False)
@@ -235,7 +239,8 @@ class Listing:
 
 @dataclass(frozen=True)
 class Matrix:
-    """A matrix of formulas, with a text above: entries as printed, and the correct one where that is faulty."""
+    """A matrix of formulas, with a text above: entries as printed, and the correct one where that
+    is faulty."""
 
     text: str
     rows: Sequence[Sequence[tuple[Markup, Markup | None]]]
@@ -244,8 +249,8 @@ class Matrix:
 
 @dataclass(frozen=True)
 class HeatMap:
-    """A map of runs over two parameters: a cell of equal size for each pair of values, in which the script writes a
-    quantity of the run.
+    """A map of runs over two parameters: a cell of equal size for each pair of values, in which the
+    script writes a quantity of the run.
 
     quantities : names of what may be shown.
     columns, rows : values of the parameters as text, from left to right, from top to bottom.
@@ -269,12 +274,25 @@ class RunChoice:
     kind: str = field(default="choice", init=False)
 
 
-Element = PageTable | Plot | Legend | Note | Viewer | SourceText | Listing | Matrix | HeatMap | RunChoice | Markup
+Element = (
+    PageTable
+    | Plot
+    | Legend
+    | Note
+    | Viewer
+    | SourceText
+    | Listing
+    | Matrix
+    | HeatMap
+    | RunChoice
+    | Markup
+)
 
 
 @dataclass(frozen=True)
 class Grid:
-    """Cards side by side, `columns` in a row on a wide page; what is in a card stands one below the other."""
+    """Cards side by side, `columns` in a row on a wide page; what is in a card stands one below the
+    other."""
 
     columns: int
     cards: Sequence[Sequence[Element]]
@@ -307,7 +325,8 @@ class Section:
 
 @dataclass(frozen=True)
 class Fact:
-    """One of the numbers at the top of a page: what it is, the number, and what else is to know of it."""
+    """One of the numbers at the top of a page: what it is, the number, and what else is to know of
+    it."""
 
     name: str
     value: str

@@ -1,6 +1,7 @@
-"""The paper's figures as files for a manuscript: the printed model, the corrected one, and how far the printed one and
-an independent computation are from it; each with a title, a description, and a caption in a file beside it. Scenes that
-are not the paper's, or were changed, have a figure of the same layout."""
+"""The paper's figures as files for a manuscript: the printed model, the corrected one, and how far
+the printed one and an independent computation are from it; each with a title, a description, and a
+caption in a file beside it. Scenes that are not the paper's, or were changed, have a figure of the
+same layout."""
 
 from __future__ import annotations
 
@@ -22,7 +23,8 @@ from rotor_mbs.scenario.scene import scene_tables
 from rotor_mbs.solution.trajectory import Array
 
 MOTION, PATHS, TORQUES = "motion", "paths", "torques"
-# The models that are compared, by key, in order from left to right; the last one is drawn by its difference.
+# The models that are compared, by key, in order from left to right; the last one is drawn by its
+# difference.
 HEADINGS = {"printed": "As printed", "corrected": "Corrected model"}
 DIFFERENCE = "Difference"  # from the corrected model; the caption says so
 REFERENCE_HEADING = "Motion"  # of a scene without a printed model, in which nothing was corrected
@@ -37,7 +39,8 @@ class PaperFigure(NamedTuple):
 
     number: str
     kind: str
-    panels: tuple[tuple[str, str], ...]  # the letter ("" where it has none; a torque) and the scene of each
+    # the letter ("" where it has none; a torque) and the scene of each
+    panels: tuple[tuple[str, str], ...]
 
 
 FIGURES = (
@@ -53,23 +56,29 @@ FIGURES = (
     PaperFigure("12", MOTION, (("", "paper/fig12"),)),
     PaperFigure("13", PATHS, (("a", "paper/fig11"), ("b", "paper/fig13b"))),
     PaperFigure("14", PATHS, (("a", "paper/fig14a"), ("b", "paper/fig14b"), ("c", "paper/fig14c"))),
-    PaperFigure("15", TORQUES, tuple((f"{n} kN m", f"paper/fig15-{n}kNm") for n in (1, 10, 50, 100))),
+    PaperFigure(
+        "15", TORQUES, tuple((f"{n} kN m", f"paper/fig15-{n}kNm") for n in (1, 10, 50, 100))
+    ),
     PaperFigure("16", PATHS, (("a", "paper/fig15-1kNm"), ("b", "paper/fig15-100kNm"))),
 )
 
 
 def available(scenes: Mapping[str, StoredScene]) -> tuple[PaperFigure, ...]:
-    """Return the figures of which `scenes` has a panel, with these panels; none of a changed scene."""
+    """Return the figures of which `scenes` has a panel, with these panels; none of a changed
+    scene."""
     figures = []
     for figure in FIGURES:
-        panels = tuple(panel for panel in figure.panels if panel[1] in scenes and scenes[panel[1]].is_shipped)
+        panels = tuple(
+            panel for panel in figure.panels if panel[1] in scenes and scenes[panel[1]].is_shipped
+        )
         if panels:
             figures.append(figure._replace(panels=panels))
     return tuple(figures)
 
 
 def all_figures(scenes: Mapping[str, StoredScene]) -> dict[str, PaperFigure]:
-    """Return the paper's figures by number, and one by name for each scene that is in none of them."""
+    """Return the paper's figures by number, and one by name for each scene that is in none of
+    them."""
     figures = {figure.number: figure for figure in available(scenes)}
     shown = {name for figure in figures.values() for _, name in figure.panels}
     for name in scenes:
@@ -79,8 +88,8 @@ def all_figures(scenes: Mapping[str, StoredScene]) -> dict[str, PaperFigure]:
 
 
 def compared_runs(scene: StoredScene) -> dict[str, StoredRun]:
-    """Return the scene's runs with angles and rates: "printed", "corrected", and "independent", by another model than
-    the corrected one's."""
+    """Return the scene's runs with angles and rates: "printed", "corrected", and "independent", by
+    another model than the corrected one's."""
     candidates = scene.sides
     for name, run in scene.corrected_runs.items():
         method = find_method_or_none(name)
@@ -91,7 +100,9 @@ def compared_runs(scene: StoredScene) -> dict[str, StoredRun]:
     return {key: run for key, run in candidates.items() if "angles" in run and "rates" in run}
 
 
-def panel_runs(figure: PaperFigure, scenes: Mapping[str, StoredScene]) -> dict[str, dict[str, dict[str, StoredRun]]]:
+def panel_runs(
+    figure: PaperFigure, scenes: Mapping[str, StoredScene]
+) -> dict[str, dict[str, dict[str, StoredRun]]]:
     """Return the runs of each picture by label: by letter of the row, then by model."""
     rows: dict[str, dict[str, dict[str, StoredRun]]] = {}
     for label, name in figure.panels:
@@ -111,7 +122,11 @@ def draw(figure: PaperFigure, axes: Sequence[Any], runs: Mapping[str, StoredRun]
         plots.draw_paths(axes[0], next(iter(runs.values())).array("tip"))
         return
     is_rotor = figure.kind == TORQUES
-    labels = ("rotor angle (rad)", "rotor rate (rad/s)") if is_rotor else (plots.ANGLE_AXIS, plots.RATE_AXIS)
+    labels = (
+        ("rotor angle (rad)", "rotor rate (rad/s)")
+        if is_rotor
+        else (plots.ANGLE_AXIS, plots.RATE_AXIS)
+    )
     for panel, name, label in zip(axes, ("angles", "rates"), labels, strict=True):
         series = []
         for place, (torque, run) in enumerate(runs.items()):
@@ -126,8 +141,11 @@ def draw(figure: PaperFigure, axes: Sequence[Any], runs: Mapping[str, StoredRun]
     axes[1].set_xlabel(canvas.TIME_AXIS)
 
 
-def draw_differences(figure: PaperFigure, axes: Sequence[Any], runs: Mapping[str, Mapping[str, StoredRun]]) -> None:
-    """Draw how far the printed model and an independent computation are from the corrected model, over time."""
+def draw_differences(
+    figure: PaperFigure, axes: Sequence[Any], runs: Mapping[str, Mapping[str, StoredRun]]
+) -> None:
+    """Draw how far the printed model and an independent computation are from the corrected model,
+    over time."""
     names = ("tip",) if figure.kind == PATHS else ("angles", "rates")
     units = {"tip": "tip distance (m)", "angles": "angle (rad)", "rates": "rate (rad/s)"}
     for panel, name in zip(axes, names, strict=True):
@@ -161,7 +179,8 @@ def draw_differences(figure: PaperFigure, axes: Sequence[Any], runs: Mapping[str
 
 
 def differences(name: str, run: StoredRun, other: StoredRun) -> Array:
-    """Return the largest difference over the coordinates, or distance of a tip, at the samples that both have: (n,)."""
+    """Return the largest difference over the coordinates, or distance of a tip, at the samples that
+    both have: (n,)."""
     n = min(run.samples, other.samples)
     gap = run.array(name)[:n] - other.array(name)[:n]
     sizes = np.linalg.norm(gap, axis=2) if name == "tip" else np.abs(gap)
@@ -170,8 +189,8 @@ def differences(name: str, run: StoredRun, other: StoredRun) -> Array:
 
 
 def composed(figure: PaperFigure, scenes: Mapping[str, StoredScene]) -> canvas.Panels:
-    """Return the whole figure: a column per model and one for the differences; position above velocity, or a row per
-    panel where paths are shown."""
+    """Return the whole figure: a column per model and one for the differences; position above
+    velocity, or a row per panel where paths are shown."""
     pictures = panel_runs(figure, scenes)
     keys = [key for key in HEADINGS if any(key in row for row in pictures.values())]
     has_differences = any(len(row) > 1 and CORRECTED in row for row in pictures.values())
@@ -208,7 +227,9 @@ def composed(figure: PaperFigure, scenes: Mapping[str, StoredScene]) -> canvas.P
         if len(labelled) > count:  # room for a second line of the legend
             figure_height = float(panels.figure.get_figheight())
             panels.figure.subplots_adjust(bottom=_LEGEND_HEIGHT / figure_height)
-        panels.figure.legend(labelled.values(), labelled, loc="lower center", ncols=count, handlelength=2.6)
+        panels.figure.legend(
+            labelled.values(), labelled, loc="lower center", ncols=count, handlelength=2.6
+        )
     return panels
 
 
@@ -224,15 +245,25 @@ def title_of(figure: PaperFigure, scenes: Mapping[str, StoredScene]) -> str:
 
 
 def caption_of(figure: PaperFigure, scenes: Mapping[str, StoredScene]) -> str:
-    """Return the caption: what is shown, the scenes, by which methods with which settings, and which of it is right.
+    """Return the caption: what is shown, the scenes, by which methods with which settings, and
+    which of it is right.
 
     A model is called right where the status of each of its runs is ok.
     """
     pictures = panel_runs(figure, scenes)
     what = {
-        MOTION: "(a) Angles (rad) and (b) rates (rad/s) of the rotor and of the pitch of each blade over time (s).",
-        PATHS: "Paths of the blade tips in space; blades at the start (dashed) and at the end (solid); equal scales.",
-        TORQUES: "(a) Rotor angle (rad) and (b) rotor rate (rad/s) over time (s) for each torque on the rotor.",
+        MOTION: (
+            "(a) Angles (rad) and (b) rates (rad/s) of the rotor and of the pitch of each "
+            "blade over time (s)."
+        ),
+        PATHS: (
+            "Paths of the blade tips in space; blades at the start (dashed) and at the end "
+            "(solid); equal scales."
+        ),
+        TORQUES: (
+            "(a) Rotor angle (rad) and (b) rotor rate (rad/s) over time (s) for each torque "
+            "on the rotor."
+        ),
     }[figure.kind]
     lines = [f"{title_of(figure, scenes)}.", what]
     for label, name in figure.panels:
@@ -264,9 +295,16 @@ def caption_of(figure: PaperFigure, scenes: Mapping[str, StoredScene]) -> str:
         dotted = " (dotted)" if figure.kind == TORQUES else ""
         others.append(f"of an independent computation{dotted}")
     if CORRECTED in sides and others:
-        what = "the largest distance of a tip (m)" if figure.kind == PATHS else "the largest over all coordinates"
+        what = (
+            "the largest distance of a tip (m)"
+            if figure.kind == PATHS
+            else ("the largest over all coordinates")
+        )
         other = "the corrected model" if PRINTED_SIDE in sides else "the reference"
-        text = f"{DIFFERENCE}: {what}, on a logarithmic axis over time (s), {' and '.join(others)} from {other}."
+        text = (
+            f"{DIFFERENCE}: {what}, on a logarithmic axis over time (s), "
+            f"{' and '.join(others)} from {other}."
+        )
         worst = _largest_difference(pictures)
         if INDEPENDENT in sides:
             independent = sides[INDEPENDENT][0]
@@ -280,14 +318,18 @@ def caption_of(figure: PaperFigure, scenes: Mapping[str, StoredScene]) -> str:
 
 
 def _scene_line(label: str, scene: StoredScene) -> str:
-    """Return what a scene is: its start, gravity, duration and samples, and whether it is the paper's."""
+    """Return what a scene is: its start, gravity, duration and samples, and whether it is the
+    paper's."""
     initial = scene_tables(scene.scene)["initial"]
-    angles, rates = (", ".join(f"{value:.6g}" for value in initial[key]) for key in ("angles", "rates"))
+    angles, rates = (
+        ", ".join(f"{value:.6g}" for value in initial[key]) for key in ("angles", "rates")
+    )
     before = f"({label}) " if label else ""
     return (
         f"{before}{scene.title} (scene {scene.label}): "
         f"initial angles {angles} rad and rates {rates} rad/s, rotor first; "
-        f"gravity {scene.scene.gravity:g} m/s^2; {scene.scene.duration:g} s, {scene.scene.samples} samples."
+        f"gravity {scene.scene.gravity:g} m/s^2; {scene.scene.duration:g} s, "
+        f"{scene.scene.samples} samples."
     )
 
 
@@ -296,7 +338,9 @@ def _verdict(runs: Sequence[StoredRun]) -> str:
     statuses = [run.status.replace("_", " ") for run in runs if run.status != "ok"]
     if not statuses:
         return "right"
-    return f"not verified ({len(statuses)} of {len(runs)} runs: {', '.join(dict.fromkeys(statuses))})"
+    return (
+        f"not verified ({len(statuses)} of {len(runs)} runs: {', '.join(dict.fromkeys(statuses))})"
+    )
 
 
 def _method_line(run: StoredRun) -> str:
@@ -307,9 +351,17 @@ def _method_line(run: StoredRun) -> str:
 
 
 def _uncertainty(runs: Iterable[StoredRun]) -> float | None:
-    known = [float(run.array("angle_uncertainty").max()) for run in runs if "angle_uncertainty" in run and run.samples]
+    known = [
+        float(run.array("angle_uncertainty").max())
+        for run in runs
+        if "angle_uncertainty" in run and run.samples
+    ]
     # Stored in double precision: half a unit in the last place of an angle is its own.
-    angles = [float(np.abs(run.array("angles")).max()) for run in runs if "angle_uncertainty" in run and run.samples]
+    angles = [
+        float(np.abs(run.array("angles")).max())
+        for run in runs
+        if "angle_uncertainty" in run and run.samples
+    ]
     if not known:
         return None
     return max(max(known), 0.5 * float(np.spacing(max(angles))))
@@ -318,7 +370,8 @@ def _uncertainty(runs: Iterable[StoredRun]) -> float | None:
 def _largest_difference(
     pictures: Mapping[str, Mapping[str, Mapping[str, StoredRun]]],
 ) -> float | None:
-    """Return the largest angle difference of the independent computations from the corrected model: rad."""
+    """Return the largest angle difference of the independent computations from the corrected model:
+    rad."""
     largest = []
     for row in pictures.values():
         for label, run in row.get(INDEPENDENT, {}).items():
@@ -331,14 +384,17 @@ def _largest_difference(
 # ---- Files
 
 
-def write_figures(results: Path, folder: Path, kind: str, numbers: Iterable[str] = ()) -> list[Path]:
+def write_figures(
+    results: Path, folder: Path, kind: str, numbers: Iterable[str] = ()
+) -> list[Path]:
     """Write figures for a manuscript with their captions, and return their files.
 
     Parameters
     ----------
     results, folder : the results file; where figNN.pdf and figNN.txt, and so on, are written.
     kind : "pdf", "svg" or "png".
-    numbers : of the paper's figures, such as "11", or names of other scenes; all that the file has where none is given.
+    numbers : of the paper's figures, such as "11", or names of other scenes; all that the file has
+        where none is given.
 
     Raises
     ------
@@ -353,10 +409,19 @@ def write_figures(results: Path, folder: Path, kind: str, numbers: Iterable[str]
         asked = list(dict.fromkeys(numbers)) or list(have)
         unknown = [name for name in asked if name not in have]
         if not have:
-            raise InputError(f"{results}: no run with angles and rates in the file; allowed: a file that has one")
+            raise InputError(
+                f"{results}: no run with angles and rates in the file; allowed: a file that has one"
+            )
         if unknown:
-            raise InputError(f"{results}: figure {', '.join(unknown)}: not in the file; allowed: {', '.join(have)}")
-        software = ", ".join(f"{name} {version}" for name, version in made_with(opened.attributes) if name != "created")
+            raise InputError(
+                f"{results}: figure {', '.join(unknown)}: not in the file; allowed: "
+                f"{', '.join(have)}"
+            )
+        software = ", ".join(
+            f"{name} {version}"
+            for name, version in made_with(opened.attributes)
+            if name != "created"
+        )
         made: dict[str, bytes] = {}
         # Numbers of a runaway overflow in a caption or a difference; they are drawn as they are.
         with np.errstate(over="ignore", invalid="ignore"):
@@ -366,7 +431,9 @@ def write_figures(results: Path, folder: Path, kind: str, numbers: Iterable[str]
                 caption += f"{canvas.MARK.decode()}, from {results.name}: {software}\n"
                 stem = f"fig{int(name):02d}" if figure.number else name.replace("/", "-")
                 panels = composed(figure, opened.scenes)
-                made[f"{stem}.{kind}"] = canvas.encoded(panels.figure, kind, title=title, description=caption)
+                made[f"{stem}.{kind}"] = canvas.encoded(
+                    panels.figure, kind, title=title, description=caption
+                )
                 made[f"{stem}.txt"] = caption.encode()
     for name, content in made.items():
         replace_file(folder / name, content, canvas.MARK)

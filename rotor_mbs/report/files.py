@@ -50,13 +50,14 @@ _SCRIPTS = {  # by file, what a page has that needs it
 MAX_NUMBERS = 150_000  # of a page's curves: 800 kB, so that a page has at most 1 MB
 _PLACE_OF_SCRIPTS = "<!-- scripts -->"
 Pairs = Sequence[tuple[str, str]]
-# Control characters but those of lines and tabs, and halves of surrogate pairs: names and messages come from any file.
+# Control characters but those of lines and tabs, and halves of surrogate pairs: names and messages
+# come from any file.
 _UNPRINTABLE = re.compile(r"[\x00-\x08\x0b\x0c\x0e-\x1f\x7f-\x9f\ud800-\udfff]")
 
 
 def page_names(scenes: Iterable[str]) -> dict[str, str]:
-    """Choose a file name for each scene: "paper-fig05.html" for "paper/fig05"; all different, also where case is
-    ignored.
+    """Choose a file name for each scene: "paper-fig05.html" for "paper/fig05"; all different, also
+    where case is ignored.
 
     Raises StoreError for a name with a part ".." or ".": no file of this program has one.
     """
@@ -64,7 +65,9 @@ def page_names(scenes: Iterable[str]) -> dict[str, str]:
     taken = {f"{name}.html" for name in MAIN_PAGES}
     for scene in scenes:
         if {"..", "."} & set(re.split(r"[/\\]", scene)):
-            raise StoreError(f"scene name {scene!r} cannot be made a file name; allowed: no part .. or .")
+            raise StoreError(
+                f"scene name {scene!r} cannot be made a file name; allowed: no part .. or ."
+            )
         stem = re.sub(r"[^A-Za-z0-9._-]+", "-", scene)[:_LONGEST].strip(".-") or "scene"
         stem = f"scene-{stem}" if stem.lower().startswith(_OTHERS) else stem
         name, number = f"{stem}.html", 2
@@ -76,9 +79,11 @@ def page_names(scenes: Iterable[str]) -> dict[str, str]:
 
 
 def write_pages(folder: Path, pages: Mapping[str, str]) -> None:
-    """Write each page whole or not at all; then remove pages of an earlier report that are no longer made.
+    """Write each page whole or not at all; then remove pages of an earlier report that are no
+    longer made.
 
-    Raises StoreError where the folder cannot be written, InputError where it has other pages of these names.
+    Raises StoreError where the folder cannot be written, InputError where it has other pages of
+    these names.
     """
     try:
         folder.mkdir(parents=True, exist_ok=True)
@@ -88,7 +93,11 @@ def write_pages(folder: Path, pages: Mapping[str, str]) -> None:
             content = _UNPRINTABLE.sub("\N{REPLACEMENT CHARACTER}", text).encode("utf-8")
             replace_file(folder / name, content, _MARK)
         for old in folder.glob("*.html"):
-            if old.name not in pages and old.is_file() and re.search(_MARK, old.read_bytes()[:2000]):
+            if (
+                old.name not in pages
+                and old.is_file()
+                and re.search(_MARK, old.read_bytes()[:2000])
+            ):
                 old.unlink()
     except OSError as exc:
         raise StoreError(f"{folder}: the report cannot be written: {exc.strerror or exc}") from exc
@@ -113,11 +122,15 @@ def render(page: PageContent, made: Pairs = (), links: Pairs = (), here: str = "
     if store.size > MAX_NUMBERS:
         store = CurveStore(every=-(-store.size // MAX_NUMBERS))
         html = template.render(known, store=store, numbered=itertools.count(1).__next__)
-    scripts = "".join(f"<script>{_script(name)}</script>\n" for name, sign in _SCRIPTS.items() if sign in html)
+    scripts = "".join(
+        f"<script>{_script(name)}</script>\n" for name, sign in _SCRIPTS.items() if sign in html
+    )
     return html.replace(_PLACE_OF_SCRIPTS, scripts, 1)
 
 
-def write_page(folder: str | PathLike[str], page: PageContent, attributes: Mapping[str, object]) -> Path:
+def write_page(
+    folder: str | PathLike[str], page: PageContent, attributes: Mapping[str, object]
+) -> Path:
     """Write one page as the index of a folder, and return its path.
 
     attributes: of what it shows, with what made it. Raises StoreError where it cannot be written.
@@ -137,7 +150,10 @@ def script_json(data: object) -> Markup:
 @cache
 def _script(name: str) -> str:
     """Return a script without indentation and without lines that are comments."""
-    lines = (line.strip() for line in (_TEMPLATES / f"{name}.js").read_text(encoding="utf-8").splitlines())
+    lines = (
+        line.strip()
+        for line in (_TEMPLATES / f"{name}.js").read_text(encoding="utf-8").splitlines()
+    )
     return "\n".join(line for line in lines if line and not line.startswith("//"))
 
 
@@ -180,7 +196,8 @@ def _still(plot: Plot, number: int) -> Markup:
 
 
 def _breakable(text: str) -> Markup:
-    """Return a name that a browser may break after a slash or an underscore, or a sentence, typeset."""
+    """Return a name that a browser may break after a slash or an underscore, or a sentence,
+    typeset."""
     if " " in text:
         return escape(numbers.typeset(text))
     return Markup(re.sub("([/_])", r"\1<wbr>", str(escape(text))))

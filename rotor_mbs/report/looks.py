@@ -1,4 +1,5 @@
-"""How methods and coordinates are drawn, the same in every figure, and the colours of light and dark pages."""
+"""How methods and coordinates are drawn, the same in every figure, and the colours of light and
+dark pages."""
 
 from __future__ import annotations
 
@@ -17,8 +18,8 @@ from rotor_mbs.methods.catalogue import (
 )
 from rotor_mbs.methods.catalogue import label_of as label_of
 
-# Colours by their name in the style sheet, on a light and on a dark page. Curves have a contrast of at least 3 to the
-# card that they are drawn on, texts one of at least 4.5 (a test computes them).
+# Colours by their name in the style sheet, on a light and on a dark page. Curves have a contrast of
+# at least 3 to the card that they are drawn on, texts one of at least 4.5 (a test computes them).
 PALETTE = {
     "ink": ("#1b1f24", "#e6e9ed"),
     "card": ("#ffffff", "#1c2025"),
@@ -26,7 +27,8 @@ PALETTE = {
     "grid": ("#e4e4e4", "#2a3037"),
     "ring": ("#c8ccd1", "#4d5560"),
     "heat": ("#0b5a8f", "#4fa8e0"),
-    # Models: after Okabe and Ito, distinguishable with colour blindness, darkened where white asks for it.
+    # Models: after Okabe and Ito, distinguishable with colour blindness, darkened where white asks
+    # for it.
     "reference": ("#5793c1", "#477ca6"),
     "blue": ("#0072b2", "#5cb3ec"),
     "navy": ("#1f3f8f", "#9db4ff"),
@@ -59,9 +61,13 @@ STEPS = 9
 INK, PAPER, GREY, RING, BLUE, VERMILLION = (
     PALETTE[name][0] for name in ("ink", "card", "grey", "ring", "blue", "vermillion")
 )
-COORDINATES = tuple(PALETTE[name][0] for name in PALETTE if name == "rotor" or name.startswith("blade-"))
-_NAMES = {light: name for name, (light, _) in PALETTE.items()} | {"#000000": "ink"}  # matplotlib's own black
-# Of the models in the order of the catalogue, for their methods in turn; those of other packages are grey.
+COORDINATES = tuple(
+    PALETTE[name][0] for name in PALETTE if name == "rotor" or name.startswith("blade-")
+)
+# matplotlib's own black
+_NAMES = {light: name for name, (light, _) in PALETTE.items()} | {"#000000": "ink"}
+# Of the models in the order of the catalogue, for their methods in turn; those of other packages
+# are grey.
 _MODEL_COLOURS = (("blue", "navy"), ("brown", "vermillion"), ("green",), ("purple",))
 _ERRATA = (("error-1", "^"), ("error-2", "P"), ("error-3", "h"))  # colour and marker
 # matplotlib's line styles, and what the style sheet calls them.
@@ -71,7 +77,8 @@ _MARKERS = ("o", "s", "^", "D", "v", "P", "X", "h", "p", "<", ">")
 
 @dataclass(frozen=True)
 class Look:
-    """How a curve is drawn, in matplotlib's notation: colour ("#0072b2"), line ("-", "--", "-.", ":") and marker.
+    """How a curve is drawn, in matplotlib's notation: colour ("#0072b2"), line ("-", "--", "-.",
+    ":") and marker.
 
     label: what it is called in a legend; "" where it stands in none.
     """
@@ -96,8 +103,8 @@ class Look:
 def _catalogue_looks() -> dict[str, Look]:
     """Return the looks of all methods, and of all curves of the bench, by name.
 
-    A model has its colours, and a line and a marker for each method. Of the corrected models the first method's line
-    is solid, that of the printed equations is dashed.
+    A model has its colours, and a line and a marker for each method. Of the corrected models the
+    first method's line is solid, that of the printed equations is dashed.
     """
     looks = {REFERENCE: Look(PALETTE["reference"][0], "-", "*"), PRINTED: Look(INK, "--", "o")}
     for (colour, marker), method in zip(_ERRATA, errata_methods().values(), strict=False):
@@ -122,7 +129,8 @@ def _catalogue_looks() -> dict[str, Look]:
 
 
 def look_of(curve: str) -> Look:
-    """Return how a method, or a curve of the bench, is drawn; one that is not in the catalogue in grey."""
+    """Return how a method, or a curve of the bench, is drawn; one that is not in the catalogue in
+    grey."""
     look = _catalogue_looks().get(curve)
     if look is None:
         code = zlib.crc32(curve.encode("utf-8", "replace"))
@@ -139,21 +147,29 @@ def coordinate_look(index: int, label: str = "") -> Look:
 
 
 def step_look(place: int, count: int, label: str) -> Look:
-    """Return the look of the curve `place` of `count` values of a varied parameter, in ascending order."""
+    """Return the look of the curve `place` of `count` values of a varied parameter, in ascending
+    order."""
     step = round(place * (STEPS - 1) / max(count - 1, 1)) if count > 1 else 0
     return Look(PALETTE[f"step-{step}"][0], ("-", "--", "-.", ":")[place // STEPS % 4], "", label)
 
 
 def name_of_colour(colour: str) -> str:
-    """Return the name in the style sheet of a colour of the light palette, "blade-1"; "" for another colour."""
+    """Return the name in the style sheet of a colour of the light palette, "blade-1"; "" for
+    another colour."""
     return _NAMES.get(colour, "")
 
 
 def palette_css() -> str:
-    """Return the palette as a style sheet: a variable for each colour, light and dark, and a class that draws in it."""
-    light, dark = (";".join(f"--{name}:{pair[shade]}" for name, pair in PALETTE.items()) for shade in (0, 1))
+    """Return the palette as a style sheet: a variable for each colour, light and dark, and a class
+    that draws in it."""
+    light, dark = (
+        ";".join(f"--{name}:{pair[shade]}" for name, pair in PALETTE.items()) for shade in (0, 1)
+    )
     classes = "".join(f".{name}{{--c:var(--{name})}}" for name in PALETTE)
-    return f":root{{{light}}}\n@media screen and (prefers-color-scheme:dark){{:root{{{dark}}}}}\n{classes}\n"
+    return (
+        f":root{{{light}}}\n@media screen and "
+        f"(prefers-color-scheme:dark){{:root{{{dark}}}}}\n{classes}\n"
+    )
 
 
 def with_capital(text: str) -> str:

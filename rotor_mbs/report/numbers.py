@@ -13,9 +13,13 @@ _SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 _PREFIXES = ((1e9, "G"), (1e6, "M"), (1e3, "k"), (1.0, ""))
 SPACE = "\N{NO-BREAK SPACE}"
 _COMPUTED = re.compile(r"(?<![\w./-])(-?\d+(?:\.\d+)?)e([+-]?\d+)\b")
-# A symbol with its index: c, q̇2, U33,3. In prose "a" may be a word, E1 is an erratum, and "kg m²" is a unit.
+# A symbol with its index: c, q̇2, U33,3. In prose "a" may be a word, E1 is an erratum, and "kg m²"
+# is a unit.
 _SYMBOL = re.compile(r"(?<![A-Za-z&#])(q̇|[A-Za-zα-ω])(\d+(?:,\d)?)?(?![A-Za-z])")
-_SYMBOL_IN_PROSE = re.compile(r"(?<![A-Za-z&#])(?<!kg )(?<!N )(q̇|[cdmqsUα-ω])(\d+(?:,\d)?)?(?![A-Za-z'])")
+_SYMBOL_IN_PROSE = re.compile(
+    r"(?<![A-Za-z&#])(?<!kg )(?<!N "
+    r")(q̇|[cdmqsUα-ω])(\d+(?:,\d)?)?(?![A-Za-z'])"
+)
 _ALONE_IN_PROSE = "cdm"  # symbols there without an index
 _SIGN = re.compile(r"(?<![\w)])-(?=\S)|(?<= )-(?= )")
 
@@ -52,7 +56,8 @@ def typeset_title(title: str) -> str:
 
 
 def fixed(value: float | None, decimals: int) -> str:
-    """Return a number with so many decimals, as a paper prints it; a zero has no sign, None gives a dash."""
+    """Return a number with so many decimals, as a paper prints it; a zero has no sign, None gives a
+    dash."""
     if value is None:
         return NOTHING
     text = f"{value:.{decimals}f}"
@@ -65,7 +70,8 @@ def with_unit(value: float | None, unit: str, digits: int = 2) -> str:
 
 
 def prefix_of(largest: float) -> tuple[float, str]:
-    """Return the number by which a channel up to `largest` is divided, and the prefix of its unit: k, M, G or none.
+    """Return the number by which a channel up to `largest` is divided, and the prefix of its unit:
+    k, M, G or none.
 
     >>> prefix_of(4.2e4)
     (1000.0, 'k')
@@ -77,7 +83,8 @@ def prefix_of(largest: float) -> tuple[float, str]:
 
 
 def prefixed(value: float | None, unit: str, digits: int = 3) -> str:
-    """Return a number with a prefix of its unit where it is large: "1.12 MJ", "687 J", "0.0041 J"."""
+    """Return a number with a prefix of its unit where it is large: "1.12 MJ", "687 J", "0.0041
+    J"."""
     if value is None or not math.isfinite(value) or value == 0.0:
         return with_unit(value, unit, digits)
     # 999.9 with three digits is 1.00 k.
@@ -95,12 +102,14 @@ def up_to(value: float | None, digits: int = 2) -> str:
     if value is None or not math.isfinite(value) or value == 0.0:
         return number(value, digits)
     step = 10.0 ** (math.floor(math.log10(value)) - digits + 1)
-    # The quotient of a number that has these digits may lie above a whole number by its rounding alone.
+    # The quotient of a number that has these digits may lie above a whole number by its rounding
+    # alone.
     return number(math.ceil(value / step * (1.0 - 1e-12)) * step, digits)
 
 
 def span(low: float, high: float, digits: int = 3, unit: str = "") -> str:
-    """Return a range, both ends to the digits of the larger one, so that what is next to zero is zero.
+    """Return a range, both ends to the digits of the larger one, so that what is next to zero is
+    zero.
 
     unit: directly behind both numbers, such as °.
 
@@ -116,7 +125,8 @@ def span(low: float, high: float, digits: int = 3, unit: str = "") -> str:
 
 
 def shortest(value: float) -> str:
-    """Return a number that somebody chose as briefly as it can be written: 0, 300, 10⁵, 3.2×10⁴, 9.81.
+    """Return a number that somebody chose as briefly as it can be written: 0, 300, 10⁵, 3.2×10⁴,
+    9.81.
 
     >>> shortest(1e5), shortest(300.0), shortest(-3.2e4), shortest(1e-3)
     ('10⁵', '300', '−3.2×10⁴', '0.001')
@@ -149,7 +159,8 @@ def in_words(count: int) -> str:
 
 
 def typeset(text: str) -> str:
-    """Return a sentence in which 8.1e+00 is written 8.1 and 1e-06 10⁻⁶; names such as torque-1e9 stay."""
+    """Return a sentence in which 8.1e+00 is written 8.1 and 1e-06 10⁻⁶; names such as torque-1e9
+    stay."""
 
     def shortest(computed: re.Match[str]) -> str:
         mantissa, exponent = computed.groups()

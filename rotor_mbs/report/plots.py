@@ -1,5 +1,5 @@
-"""What several pages draw from plain arrays: motion, energies and errors over time, paths of the blade tips; and the
-same of runs that are in memory, for notebooks and scripts."""
+"""What several pages draw from plain arrays: motion, energies and errors over time, paths of the
+blade tips; and the same of runs that are in memory, for notebooks and scripts."""
 
 from __future__ import annotations
 
@@ -19,7 +19,8 @@ from rotor_mbs.solution.quantities import DEFECT, LOADS, Plot, Quantity
 from rotor_mbs.solution.trajectory import Array, Solution, Trajectory
 
 ANGLE_AXIS, RATE_AXIS = "angle (rad)", "rate (rad/s)"
-# Smallest value that is drawn on a logarithmic axis: a hundredth of the rounding error of a double of order one.
+# Smallest value that is drawn on a logarithmic axis: a hundredth of the rounding error of a double
+# of order one.
 LOWEST = 1e-18
 HIGHEST = 1e15  # rad, or J: beyond it is a divergence alone
 # Values larger than this many times the 90 % quantile are cut off.
@@ -27,7 +28,8 @@ _RUNAWAY = 8.0
 _STILL = 10.0  # times what it is in the last samples, at most, where it has not passed
 # A range (rad, rad/s) that is rounding error.
 _ROUNDING = 1e-9
-_MAX_POINTS = 4000  # of a curve that is drawn; of more the smallest and the largest of equal intervals
+# of a curve that is drawn; of more the smallest and the largest of equal intervals
+_MAX_POINTS = 4000
 _AZIMUTH, _ELEVATION = np.radians((-62.0, 14.0))  # of the direction from which paths are seen
 
 
@@ -39,7 +41,9 @@ class Series(NamedTuple):
     look: Look
 
 
-def motion(time: Array, angles: Array | None, rates: Array | None, horizon: float | None = None) -> Panels:
+def motion(
+    time: Array, angles: Array | None, rates: Array | None, horizon: float | None = None
+) -> Panels:
     """Plot angles (rad) above rates (rad/s), both (n, coordinates); either may be None."""
     rows: list[tuple[str, Sequence[Series]]] = []
     for name, values in ((ANGLE_AXIS, angles), (RATE_AXIS, rates)):
@@ -58,12 +62,14 @@ def coordinate_series(time: Array, values: Array) -> list[Series]:
 def draw_lines(axes: Any, series: Sequence[Series], label: str) -> None:
     """Draw curves over one vertical axis.
 
-    label: with the unit in brackets; of other quantities than angles and rates it gets a prefix, k or M, where the
-    values are large.
+    label: with the unit in brackets; of other quantities than angles and rates it gets a prefix, k
+    or M, where the values are large.
     """
     shortest = min(len(curve.values) for curve in series)
     values = np.stack([curve.values[:shortest] for curve in series], axis=1)
-    scale, prefix = prefix_of(float(np.abs(values).max()) if "(" in label and "(rad" not in label else 1.0)
+    scale, prefix = prefix_of(
+        float(np.abs(values).max()) if "(" in label and "(rad" not in label else 1.0
+    )
     for curve in series:
         canvas.curve(axes, *thin(curve.time, curve.values / scale), curve.look)
     if "(rad" in label:
@@ -72,13 +78,15 @@ def draw_lines(axes: Any, series: Sequence[Series], label: str) -> None:
 
 
 def set_range(axes: Any, values: Array) -> None:
-    """Set the vertical range for `values` (n, curves), without a divergence and without magnifying rounding errors."""
+    """Set the vertical range for `values` (n, curves), without a divergence and without magnifying
+    rounding errors."""
     if is_cut(values):
         usual = float(np.quantile(np.abs(values).max(axis=1), 0.9))
         axes.set_ylim(-2.0 * usual, 2.0 * usual)
     elif values.max() - values.min() < _ROUNDING:
         middle = 0.5 * float(values.max() + values.min())
-        margin = 0.1 if middle + 0.1 > middle else 0.05 * abs(middle)  # to 1e16 a tenth adds nothing
+        # to 1e16 a tenth adds nothing
+        margin = 0.1 if middle + 0.1 > middle else 0.05 * abs(middle)
         axes.set_ylim(middle - margin, middle + margin)
 
 
@@ -143,13 +151,15 @@ def errors(series: Sequence[Series], label: str, horizon: float | None = None) -
 
 
 def thin(time: Array, values: Array) -> tuple[Array, Array]:
-    """Return the ends, and the smallest and the largest sample of equal intervals: no peak is lost."""
+    """Return the ends, and the smallest and the largest sample of equal intervals: no peak is
+    lost."""
     index = canvas.extremes(values, _MAX_POINTS)
     return time[index], values[index]
 
 
 def is_cut(values: Array) -> bool:
-    """Return whether the largest of these values (n, curves) are a divergence, and not a jolt that passes."""
+    """Return whether the largest of these values (n, curves) are a divergence, and not a jolt that
+    passes."""
     largest = np.abs(values).max(axis=1)
     usual = float(np.quantile(largest, 0.9))
     return bool(min(largest.max(), _STILL * largest[-5:].max()) > _RUNAWAY * usual > 0.0)
@@ -190,7 +200,9 @@ def draw_paths(axes: Any, tip: Array, tilt: float = 0.0) -> None:
     ring = reach * np.stack([np.sin(angle), 0.0 * angle, np.cos(angle)], axis=1)
     shaft = np.array([[0.0, 0.0, 0.0], [0.0, -0.3 * reach, 0.0]])
     if tilt:
-        turn = np.array([[1.0, 0.0, 0.0], [0.0, np.cos(tilt), -np.sin(tilt)], [0.0, np.sin(tilt), np.cos(tilt)]])
+        turn = np.array(
+            [[1.0, 0.0, 0.0], [0.0, np.cos(tilt), -np.sin(tilt)], [0.0, np.sin(tilt), np.cos(tilt)]]
+        )
         ring, shaft = ring @ turn.T, shaft @ turn.T
     axes.plot(*projected(ring).T, color=RING, linewidth=0.7)
     axes.plot(
@@ -203,7 +215,9 @@ def draw_paths(axes: Any, tip: Array, tilt: float = 0.0) -> None:
     corner = np.array([-0.88, -0.86]) * reach
     for end, name in zip(projected(length * np.eye(3)), "xyz", strict=True):
         axes.plot(*np.stack([corner, corner + end]).T, color=GREY, linewidth=0.8)
-        axes.text(*(corner + 1.2 * end), name, color=GREY, ha="center", va="center", fontsize="small")
+        axes.text(
+            *(corner + 1.2 * end), name, color=GREY, ha="center", va="center", fontsize="small"
+        )
     axes.text(
         *(corner - [0.0, 0.12 * reach]),
         f"{length:g} m",
@@ -227,7 +241,8 @@ def draw_paths(axes: Any, tip: Array, tilt: float = 0.0) -> None:
 
 
 def projected(points: Array) -> Array:
-    """Project points (n, 3) to what is seen from far away, above and to the side: (n, 2), to the right and up, m."""
+    """Project points (n, 3) to what is seen from far away, above and to the side: (n, 2), to the
+    right and up, m."""
     right = np.array([-np.sin(_AZIMUTH), np.cos(_AZIMUTH), 0.0])
     level = np.array([np.cos(_AZIMUTH), np.sin(_AZIMUTH), 0.0])
     up = np.array([0.0, 0.0, np.cos(_ELEVATION)]) - np.sin(_ELEVATION) * level
@@ -246,16 +261,20 @@ class ComparisonPlots:
         return self.error()
 
     def error(self) -> Panels:
-        """Plot the largest angle error (rad) of each run over time. Raises InputError without angles or reference."""
+        """Plot the largest angle error (rad) of each run over time. Raises InputError without
+        angles or reference."""
         if self._reference is None:
-            raise InputError("no reference to compare with; allowed: run(..., reference=True) computes one")
+            raise InputError(
+                "no reference to compare with; allowed: run(..., reference=True) computes one"
+            )
         for run in self._runs:
             _quantity(run, "angles")
         series = self._series([angle_error(run.trajectory, self._reference) for run in self._runs])
         return errors(series, "largest angle error (rad)", horizon(self._reference)).with_legend()
 
     def defects(self) -> Panels:
-        """Plot the interval defects (rad) of each run over time. Raises InputError for fewer than two samples.
+        """Plot the interval defects (rad) of each run over time. Raises InputError for fewer than
+        two samples.
 
         Those of a run of a sweep, which are not stored, are computed.
         """
@@ -267,7 +286,8 @@ class ComparisonPlots:
             if stored is not None:
                 sizes = stored[1:]
             else:
-                from rotor_mbs.models.lagrange.defects import interval_defects  # late: SciPy, and an engine
+                # late: SciPy, and an engine
+                from rotor_mbs.models.lagrange.defects import interval_defects
 
                 angles, rates = _quantity(run, "angles"), _quantity(run, "rates")
                 sizes = interval_defects(run.scene, run.time, angles, rates).sizes
@@ -280,7 +300,8 @@ class ComparisonPlots:
         return lines([("rotor angle (rad)", series)]).with_legend()
 
     def energy_error(self) -> Panels:
-        """Plot the energy error relative to the energy scale over time. Raises InputError for runs without energies."""
+        """Plot the energy error relative to the energy scale over time. Raises InputError for runs
+        without energies."""
         shares = []
         for run in self._runs:
             scale = energy_scale(run.scene, run.trajectory)
@@ -289,7 +310,10 @@ class ComparisonPlots:
 
     def _series(self, values: Sequence[Array]) -> list[Series]:
         pairs = zip(self._runs, values, strict=True)
-        return [Series(_some(run.time)[: len(array)], array, look_of(run.method)) for run, array in pairs]
+        return [
+            Series(_some(run.time)[: len(array)], array, look_of(run.method))
+            for run, array in pairs
+        ]
 
 
 class RunPlots(ComparisonPlots):
@@ -300,17 +324,23 @@ class RunPlots(ComparisonPlots):
         self._run = run
 
     def __call__(self) -> Panels:
-        """Plot angles (rad) and rates (rad/s) of rotor and pitches over time (s). Raises InputError without both."""
+        """Plot angles (rad) and rates (rad/s) of rotor and pitches over time (s). Raises InputError
+        without both."""
         run = self._run
         horizon_s = None if self._reference is None else horizon(self._reference)
-        angles, rates = (None if np.isnan(values).all() else values for values in (run.angles, run.rates))
+        angles, rates = (
+            None if np.isnan(values).all() else values for values in (run.angles, run.rates)
+        )
         shown = _quantity(run, "angles") if rates is None else angles
         return motion(_some(run.time), shown, rates, horizon_s).with_legend()
 
     def energy(self) -> Panels:
-        """Plot kinetic and potential energy, and their sum minus the work (J). Raises InputError without energies."""
+        """Plot kinetic and potential energy, and their sum minus the work (J). Raises InputError
+        without energies."""
         run = self._run
-        kinetic, potential, work = (_quantity(run, name) for name in ("kinetic_energy", "potential_energy", "work"))
+        kinetic, potential, work = (
+            _quantity(run, name) for name in ("kinetic_energy", "potential_energy", "work")
+        )
         curves = (
             (kinetic, Look(VERMILLION, "-", "", "kinetic")),
             (potential, Look(BLUE, "--", "", "potential")),
@@ -319,9 +349,11 @@ class RunPlots(ComparisonPlots):
         return lines([("energy (J)", [Series(run.time, *curve) for curve in curves])]).with_legend()
 
     def loads(self, name: str = "blade_root_force") -> Panels:
-        """Plot a load over time: a panel per axis with a line per blade, or one panel with a line per axis (or blade).
+        """Plot a load over time: a panel per axis with a line per blade, or one panel with a line
+        per axis (or blade).
 
-        name: blade_root_force, blade_root_moment, shaft_force, shaft_moment or pitch_actuator_moment (N, N m).
+        name: blade_root_force, blade_root_moment, shaft_force, shaft_moment or
+        pitch_actuator_moment (N, N m).
 
         Raises InputError if the run does not have it.
         """
@@ -345,12 +377,15 @@ def _some(time: Array) -> Array:
 
 
 def _quantity(run: Solution, name: str) -> Array:
-    """Return a quantity of a run. Raises InputError where the run does not have it, or its file does not."""
+    """Return a quantity of a run. Raises InputError where the run does not have it, or its file
+    does not."""
     _some(run.time)
     try:
         values = run[name]
     except KeyError as exc:
         raise InputError(f"{run.scene.name} {run.method} has no {exc.args[0]}") from exc
     if np.isnan(values).all():
-        raise InputError(f"{run.scene.name} {run.method}: {name} are not stored; allowed: {name} in `outputs`")
+        raise InputError(
+            f"{run.scene.name} {run.method}: {name} are not stored; allowed: {name} in `outputs`"
+        )
     return values

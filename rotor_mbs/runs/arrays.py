@@ -20,7 +20,15 @@ from rotor_mbs.runs.hdf5 import (
 )
 
 # What says how an array of another program is to be read.
-ARRAY_ATTRIBUTES = ("units", "unit", "scale_factor", "add_offset", "_FillValue", "missing_value", "_Unsigned")
+ARRAY_ATTRIBUTES = (
+    "units",
+    "unit",
+    "scale_factor",
+    "add_offset",
+    "_FillValue",
+    "missing_value",
+    "_Unsigned",
+)
 _MAX_MEMBERS = 1000  # of a group, that are listed with what they are
 
 
@@ -31,7 +39,8 @@ class StoredArrays(NamedTuple):
     ----------
     arrays : by name, of up to three dimensions, as they are stored.
     attributes : by name of the array those of `ARRAY_ATTRIBUTES` that it has, numbers and texts.
-    others : by name what else is in the group, and what that is; whether it is a column of something else than numbers.
+    others : by name what else is in the group, and what that is; whether it is a column of
+        something else than numbers.
     """
 
     arrays: dict[str, NDArray[Any]]
@@ -39,13 +48,17 @@ class StoredArrays(NamedTuple):
     others: dict[str, tuple[str, bool]]
 
 
-def read_arrays(path: Path, group: str = "", scene: str = "", max_bytes: float = math.inf) -> StoredArrays:
-    """Read arrays of numbers of up to three dimensions and their attributes from one group of any HDF5 file.
+def read_arrays(
+    path: Path, group: str = "", scene: str = "", max_bytes: float = math.inf
+) -> StoredArrays:
+    """Read arrays of numbers of up to three dimensions and their attributes from one group of any
+    HDF5 file.
 
     Parameters
     ----------
     path : the file; of another program, or of this one.
-    group : path of the group, or the end of it, "/" for the root; may be left out where one group alone has arrays, or
+    group : path of the group, or the end of it, "/" for the root; may be left out where one group
+        alone has arrays, or
         one alone but the reference below `scene`.
     scene : name of a scene, whose groups are preferred.
     max_bytes : of all arrays as float64, by what the file claims of them, before any is read.
@@ -77,7 +90,8 @@ def read_arrays(path: Path, group: str = "", scene: str = "", max_bytes: float =
 
 
 def refuse_claims(path: Path, max_bytes: float) -> None:
-    """Raise StoreError if an HDF5 file claims more than `max_bytes`, or has arrays that other files store."""
+    """Raise StoreError if an HDF5 file claims more than `max_bytes`, or has arrays that other files
+    store."""
     datasets: list[Any] = []
 
     def note(_: str, item: Any) -> None:
@@ -98,14 +112,17 @@ def _refuse_claims(path: Path, datasets: Iterable[Any], max_bytes: float) -> Non
     for dataset in datasets:
         size += 8.0 * dataset.size
         if dataset.is_virtual or dataset.external:
-            raise StoreError(f"{path}: {dataset.name} is stored in another file; allowed: arrays of this one")
+            raise StoreError(
+                f"{path}: {dataset.name} is stored in another file; allowed: arrays of this one"
+            )
     if size > max_bytes:
         allowed = f"up to {max_bytes / 2**30:g} GB: export fewer rows or arrays"
         raise StoreError(f"{path}: its arrays claim {size / 2**30:.1f} GB; allowed: {allowed}")
 
 
 def _what_it_is(group: Any, name: str) -> tuple[str, bool]:
-    """Return what a member of a group is that is no array of numbers, and whether it is a column for all that."""
+    """Return what a member of a group is that is no array of numbers, and whether it is a column
+    for all that."""
     if group.get(name, getlink=True).__class__ is not h5py.HardLink:
         return "a link to another file or place", False
     item = group[name]
@@ -127,10 +144,15 @@ def _attributes_of_array(dataset: Any) -> dict[str, Any]:
     """
     found = {}
     for name in ARRAY_ATTRIBUTES:
-        if name in dataset.attrs and dataset.attrs.get_id(name).get_space().get_simple_extent_npoints() == 1:
+        if (
+            name in dataset.attrs
+            and dataset.attrs.get_id(name).get_space().get_simple_extent_npoints() == 1
+        ):
             value = attribute(dataset, name)
             # A number keeps the type with which it was written.
-            is_text = isinstance(value, str) or (isinstance(value, list) and isinstance(value[0], str))
+            is_text = isinstance(value, str) or (
+                isinstance(value, list) and isinstance(value[0], str)
+            )
             found[name] = value if is_text else np.asarray(dataset.attrs[name]).ravel()[0]
     return found
 

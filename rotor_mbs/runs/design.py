@@ -1,4 +1,5 @@
-"""The design of a results file: the runs that are asked for, the tables of the file, and their columns."""
+"""The design of a results file: the runs that are asked for, the tables of the file, and their
+columns."""
 
 from __future__ import annotations
 
@@ -21,62 +22,108 @@ from rotor_mbs.solution.quantities import DEFECT, LOADS, SCALES, quantities, sca
 from rotor_mbs.solution.status import STATUSES
 
 MISSING = -1  # status of a row that is not stored
-# What the table of a scene's arrays repeats of the run's row in another table; in a row it has this name.
+# What the table of a scene's arrays repeats of the run's row in another table; in a row it has this
+# name.
 STATUS_COPIES = {"status": "status_repeated", "samples": "samples_repeated"}
-CHARACTER = "S1"  # kind of a column of texts that are computed: (run, characters), UTF-8, then zeros
+# kind of a column of texts that are computed: (run, characters), UTF-8, then zeros
+CHARACTER = "S1"
 RUNS = "runs"
 # What a frozen reference stores: it cannot be computed again from angles and rates as precisely.
-REFERENCE_ARRAYS = ("angles", "rates", "work", *(load.name for load in LOADS), "angle_uncertainty", "error_growth")
+REFERENCE_ARRAYS = (
+    "angles",
+    "rates",
+    "work",
+    *(load.name for load in LOADS),
+    "angle_uncertainty",
+    "error_growth",
+)
 ONCE_A_SCENE = ("angle_uncertainty", "error_growth")  # stored once a scene, over time
 
 
 def flags(names: Sequence[str], first: int = 0) -> dict[str, Any]:
     """Return the attributes of a column of codes, as CF has them: what each code from `first` on
     means."""
-    return {"flag_values": np.arange(first, first + len(names), dtype=np.int8), "flag_meanings": " ".join(names)}
+    return {
+        "flag_values": np.arange(first, first + len(names), dtype=np.int8),
+        "flag_meanings": " ".join(names),
+    }
 
 
 # What a row has beside metrics, whichever table it is in; in the order of the columns.
 _FACTS = {
     "status": RowValue(
-        "1", "outcome of the run, see the status codes; -1: not computed yet", "runs bench stability sweep", "i1"
+        "1",
+        "outcome of the run, see the status codes; -1: not computed yet",
+        "runs bench stability sweep",
+        "i1",
     ),
     "message": RowValue(
-        "1", "reason for a status other than ok and completed", "runs bench stability sweep", CHARACTER
+        "1",
+        "reason for a status other than ok and completed",
+        "runs bench stability sweep",
+        CHARACTER,
     ),
     "samples": RowValue("1", "number of samples stored", "runs bench", "<i8"),
-    "time_reached": RowValue("s", "time of the run's last sample; 0 also without any", "runs sweep"),
-    "time_limit_s": RowValue("s", "time limit that stopped the run; NaN if it was not stopped", "runs sweep"),
+    "time_reached": RowValue(
+        "s", "time of the run's last sample; 0 also without any", "runs sweep"
+    ),
+    "time_limit_s": RowValue(
+        "s", "time limit that stopped the run; NaN if it was not stopped", "runs sweep"
+    ),
     "steps": RowValue("1", "number of integration steps; -1: unknown", "runs bench sweep", "<i8"),
-    "rhs_evaluations": RowValue("1", "number of evaluations of the right-hand side; -1: unknown", "runs sweep", "<i8"),
+    "rhs_evaluations": RowValue(
+        "1", "number of evaluations of the right-hand side; -1: unknown", "runs sweep", "<i8"
+    ),
     "setup_time_s": RowValue("s", "time to build the model", "runs bench"),
     "setup_again_time_s": RowValue("s", "time to build the model a second time", "bench"),
     "run_time_s": RowValue("s", "median run time of the integration", "runs bench"),
     "run_time_min_s": RowValue("s", "shortest run time of the integration", "runs bench"),
     "run_time_q1_s": RowValue("s", "lower quartile of the run times", "bench"),
     "run_time_q3_s": RowValue("s", "upper quartile of the run times", "bench"),
-    "output_time_s": RowValue("s", "time to compute the samples after the integration", "runs bench"),
+    "output_time_s": RowValue(
+        "s", "time to compute the samples after the integration", "runs bench"
+    ),
     "repeats": RowValue("1", "number of timed runs", "runs bench", "<i8"),
     "repeatable": RowValue(
-        "1", "1 if the first and last run of every point of the curve are bitwise equal", "bench", "i1"
+        "1",
+        "1 if the first and last run of every point of the curve are bitwise equal",
+        "bench",
+        "i1",
     ),
-    "engine_success": RowValue("1", "1: the engine reported success, 0: failure; -1: no report", kind="i1"),
+    "engine_success": RowValue(
+        "1", "1: the engine reported success, 0: failure; -1: no report", kind="i1"
+    ),
     "engine_message": RowValue("1", "message of the engine", kind=CHARACTER),
     "false_success": RowValue(
-        "1", "1 if the engine reported success although the samples are wrong", "runs bench stability", "i1"
+        "1",
+        "1 if the engine reported success although the samples are wrong",
+        "runs bench stability",
+        "i1",
     ),
-    "left_out": RowValue("1", "1 if the point was omitted because of the time budget", "bench", "i1"),
+    "left_out": RowValue(
+        "1", "1 if the point was omitted because of the time budget", "bench", "i1"
+    ),
     "load_before": RowValue("1", "load average of the machine before the timing", "bench"),
     "pinned_core": RowValue("1", "number of the core used for timing; -1: any", "bench", "<i8"),
-    "order": RowValue("1", "order of convergence of the curve, fitted above its round-off floor", "bench"),
-    "step_for_target_s": RowValue("s", "largest step of the ladder with an error of at most 1e-6 rad", "stability"),
+    "order": RowValue(
+        "1", "order of convergence of the curve, fitted above its round-off floor", "bench"
+    ),
+    "step_for_target_s": RowValue(
+        "s", ("largest step of the ladder with an error of at most 1e-6 rad"), "stability"
+    ),
 }
 _LAST = {
     "code": RowValue(
-        "1", "CRC-32 of the versions (package, code, libraries of the method) that computed the run", "sweep", "<u4"
+        "1",
+        "CRC-32 of the versions (package, code, libraries of the method) that computed the run",
+        "sweep",
+        "<u4",
     ),
     "crc32": RowValue(
-        "1", "CRC-32 of the row over what is computed; not of what is known before", "bench stability sweep", "<u4"
+        "1",
+        "CRC-32 of the row over what is computed; not of what is known before",
+        "bench stability sweep",
+        "<u4",
     ),
 }
 _ROW_VALUES = _FACTS | METRICS | _LAST
@@ -94,10 +141,13 @@ COLUMNS["status"] = COLUMNS["status"]._replace(attributes=flags(("missing", *STA
 
 def columns_in(table: str) -> dict[str, Column]:
     """Return the computed columns of a table with a value a row, by its name, see `RowValue`."""
-    return {name: COLUMNS[name] for name, value in _ROW_VALUES.items() if table in value.tables.split()}
+    return {
+        name: COLUMNS[name] for name, value in _ROW_VALUES.items() if table in value.tables.split()
+    }
 
 
-# What the design says of each row of a table, in this order: units, long name. What has no entry is no column.
+# What the design says of each row of a table, in this order: units, long name. What has no entry is
+# no column.
 DESIGN_COLUMNS = {
     "scene": ("1", "name of the scene"),
     "method_name": ("1", "name of the method: model/integrator"),
@@ -115,15 +165,17 @@ NUMBERS = ("step", "tolerance", "order_expected")  # those of them that are no t
 
 _TEXT_LENGTH = 600  # characters of a message
 # The computed columns of each table of points.
-POINT_COLUMNS: Mapping[str, Mapping[str, Column]] = {table: columns_in(table) for table in ("bench", "stability")}
+POINT_COLUMNS: Mapping[str, Mapping[str, Column]] = {
+    table: columns_in(table) for table in ("bench", "stability")
+}
 
 
 @dataclass(frozen=True)
 class RunRequest:
     """A run as it is asked for: a row of the design.
 
-    versions: of what computes it, by default those of this installation; of a reference that is read from a shipped
-    file also who computed it (`frozen_with`).
+    versions: of what computes it, by default those of this installation; of a reference that is
+    read from a shipped file also who computed it (`frozen_with`).
     """
 
     scene: Scene
@@ -166,13 +218,21 @@ def metric_columns(outputs: Iterable[str]) -> dict[str, Column]:
         if quantity.judgement is not None:
             unit = "1" if quantity.judgement.scale_of else quantity.units
             error = "largest relative error" if quantity.judgement.scale_of else "largest error"
-            text = f"{long_name}: {error}" if quantity.judgement.with_reference else f"{long_name} over the run"
+            text = (
+                f"{long_name}: {error}"
+                if quantity.judgement.with_reference
+                else f"{long_name} over the run"
+            )
             columns[quantity.judgement.metric] = Column(("run",), unit, text)
         if quantity.has_peak:
             columns[f"{name}_max"] = Column(("run",), quantity.units, f"{long_name}: maximum")
-            columns[f"{name}_max_time_s"] = Column(("run",), "s", f"{long_name}: time of the maximum")
+            columns[f"{name}_max_time_s"] = Column(
+                ("run",), "s", (f"{long_name}: time of the maximum")
+            )
             if quantity.dimensions[1:2] == ("blade",):
-                columns[f"{name}_max_blade"] = Column(("run",), "1", f"{long_name}: blade of the maximum, from 1")
+                columns[f"{name}_max_blade"] = Column(
+                    ("run",), "1", (f"{long_name}: blade of the maximum, from 1")
+                )
     return columns | {"crc32": COLUMNS["crc32"]}
 
 
@@ -180,7 +240,9 @@ def arrays_of(run: RunRequest) -> dict[str, Column]:
     """Return the arrays over time that a run stores, by their name in the file."""
     method = find_method(run.method)
     # A reference is read back by its angles and rates, whatever the scene asks for.
-    outputs = (*run.scene.outputs, "angles", "rates") if run.method == REFERENCE else run.scene.outputs
+    outputs = (
+        (*run.scene.outputs, "angles", "rates") if run.method == REFERENCE else run.scene.outputs
+    )
     columns = {}
     for quantity in quantities(outputs):
         is_computed = quantity.required or quantity.name in method.arrays
@@ -204,8 +266,10 @@ class TableSpec:
     ----------
     group : where it stands in the file; "" for the root.
     runs : (rows,) the scale `run`: texts that tell the rows apart, or their numbers.
-    known : by name, column and values of the other dimensions' scales, and of what the design says of each row.
-    computed : columns that are computed, in the order in which the checksum of a row covers them. One without the
+    known : by name, column and values of the other dimensions' scales, and of what the design says
+        of each row.
+    computed : columns that are computed, in the order in which the checksum of a row covers them.
+        One without the
         dimension `run` belongs to the reference.
     attributes : of the group.
     characters : of each computed text.
@@ -221,12 +285,16 @@ class TableSpec:
     @functools.cached_property
     def row_type(self) -> np.dtype[np.void]:
         """The computed columns of one row, in the order in which its checksum covers them."""
-        lengths = {name: len(values) for name, (_, values) in self.known.items()} | {CHARACTERS: self.characters}
+        lengths = {name: len(values) for name, (_, values) in self.known.items()} | {
+            CHARACTERS: self.characters
+        }
         shapes = {
             name: tuple(lengths[dimension] for dimension in column.dimensions if dimension != "run")
             for name, column in self.computed.items()
         }
-        return np.dtype([(name, column.kind, shapes[name]) for name, column in self.computed.items()])
+        return np.dtype(
+            [(name, column.kind, shapes[name]) for name, column in self.computed.items()]
+        )
 
     def shape(self, name: str) -> tuple[int, ...]:
         """Of a computed column."""
@@ -237,7 +305,10 @@ class TableSpec:
     def known_rows(self) -> Mapping[str, Mapping[str, Any]]:
         """By run, what the design says of it."""
         columns = {name: list(values) for name, (_, values) in self.known.items()}
-        return {str(run): {name: values[i] for name, values in columns.items()} for i, run in enumerate(self.runs)}
+        return {
+            str(run): {name: values[i] for name, values in columns.items()}
+            for i, run in enumerate(self.runs)
+        }
 
     @functools.cached_property
     def row_of(self) -> Mapping[str, int]:
@@ -252,7 +323,10 @@ def known_columns(rows: Sequence[Mapping[str, object]]) -> dict[str, tuple[Colum
         if rows and name in rows[0]:
             values: Any = [row[name] for row in rows]
             is_text = isinstance(values[0], str)
-            columns[name] = Column(("run",), units, long_name), values if is_text else np.array(values, float)
+            columns[name] = (
+                Column(("run",), units, long_name),
+                values if is_text else np.array(values, float),
+            )
     return columns
 
 
@@ -265,7 +339,10 @@ def scene_scales(scene: Scene, columns: Iterable[Column]) -> dict[str, tuple[Col
         "coordinate": {"labels": scene.coordinate_labels},
     }
     return {
-        name: (Column((name,), scale.units, scale.long_name, attributes=attributes.get(name, {})), values[name])
+        name: (
+            Column((name,), scale.units, scale.long_name, attributes=attributes.get(name, {})),
+            values[name],
+        )
         for name, scale in SCALES.items()
         if name in used
     }
@@ -275,14 +352,20 @@ def runs_table(asked: Sequence[RunRequest]) -> TableSpec:
     """The table /runs of a file with these runs."""
     outputs = dict.fromkeys(output for run in asked for output in run.scene.outputs)
     known = known_columns([run.known for run in asked])
-    return TableSpec(RUNS, [run.label for run in asked], known, metric_columns(outputs), characters=_TEXT_LENGTH)
+    return TableSpec(
+        RUNS, [run.label for run in asked], known, metric_columns(outputs), characters=_TEXT_LENGTH
+    )
 
 
 def scene_table(runs: Sequence[RunRequest], arrays: Collection[str] | None = None) -> TableSpec:
-    """Return the table of the arrays of one scene's runs. arrays: names of those that are stored, by default all."""
+    """Return the table of the arrays of one scene's runs. arrays: names of those that are stored,
+    by default all."""
     scene = runs[0].scene
     computed = {
-        name: column for run in runs for name, column in arrays_of(run).items() if arrays is None or name in arrays
+        name: column
+        for run in runs
+        for name, column in arrays_of(run).items()
+        if arrays is None or name in arrays
     }
     attributes = {
         "title": scene.title,
@@ -296,7 +379,9 @@ def scene_table(runs: Sequence[RunRequest], arrays: Collection[str] | None = Non
     }
     scales = scene_scales(scene, computed.values())
     repeated = {name: COLUMNS[name] for name in STATUS_COPIES}
-    return TableSpec(scene.name, [run.method for run in runs], scales, repeated | computed, attributes)
+    return TableSpec(
+        scene.name, [run.method for run in runs], scales, repeated | computed, attributes
+    )
 
 
 def results_tables(asked: Sequence[RunRequest]) -> list[TableSpec]:
@@ -312,9 +397,12 @@ def results_tables(asked: Sequence[RunRequest]) -> list[TableSpec]:
 
 
 def row_order(run: str) -> tuple[Any, ...]:
-    """Scenes in natural order; of each the reference, then methods in the order of the catalogue."""
-    scene, method = (run.removesuffix(f"/{REFERENCE}"), REFERENCE) if run.endswith(f"/{REFERENCE}") else (
-        "/".join(run.split("/")[:-2]), "/".join(run.split("/")[-2:])
-    )  # fmt: skip
+    """Scenes in natural order; of each the reference, then methods in the order of the
+    catalogue."""
+    scene, method = (
+        (run.removesuffix(f"/{REFERENCE}"), REFERENCE)
+        if run.endswith(f"/{REFERENCE}")
+        else ("/".join(run.split("/")[:-2]), "/".join(run.split("/")[-2:]))
+    )
     names = [REFERENCE, *method_names()]
     return natural_key(scene), names.index(method) if method in names else len(names), method

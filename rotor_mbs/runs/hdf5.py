@@ -1,4 +1,5 @@
-"""Files of this program read by the HDF5 library: attributes, columns and values of groups, not the rows.
+"""Files of this program read by the HDF5 library: attributes, columns and values of groups, not the
+rows.
 
 The worker process of `runs.untrusted` loads this module, and nothing else of the package.
 """
@@ -21,7 +22,14 @@ from rotor_mbs.runs.untrusted import read_in_worker
 CHARACTERS = "characters"  # the dimension of texts that are filled in later
 # The netCDF-4 library's name for the scale of a dimension without values.
 WITHOUT_VALUES = "This is a netCDF dimension but not a netCDF variable."
-_NOT_ATTRIBUTES = ("CLASS", "NAME", "REFERENCE_LIST", "DIMENSION_LIST", "_Netcdf4Dimid", "_Netcdf4Coordinates")
+_NOT_ATTRIBUTES = (
+    "CLASS",
+    "NAME",
+    "REFERENCE_LIST",
+    "DIMENSION_LIST",
+    "_Netcdf4Dimid",
+    "_Netcdf4Coordinates",
+)
 # A text of variable length as it lies in a dataset.
 _REFERENCE = np.dtype([("length", "<u4"), ("heap", "<u8"), ("index", "<u4")])
 # Texts of variable length: for NumPy, and as the library has them in memory and in a file.
@@ -32,8 +40,8 @@ ATTEMPTS = 3  # to open a file that is being replaced
 
 
 class Column(NamedTuple):
-    """A dataset: its dimensions (names of scales; a scale has its own name), units, what it is, the type of its values
-    in the file, and further attributes."""
+    """A dataset: its dimensions (names of scales; a scale has its own name), units, what it is, the
+    type of its values in the file, and further attributes."""
 
     dimensions: tuple[str, ...]
     units: str
@@ -43,7 +51,8 @@ class Column(NamedTuple):
 
 
 class StoredRows(NamedTuple):
-    """A computed column: shape, offset in the file in bytes, and whether that is what the trailer says."""
+    """A computed column: shape, offset in the file in bytes, and whether that is what the trailer
+    says."""
 
     shape: tuple[int, ...]
     offset: int
@@ -70,7 +79,8 @@ class StoredGroup(NamedTuple):
 
 
 class Content(NamedTuple):
-    """A file without its rows: attributes, names of its groups, those that were read by name, and its inode."""
+    """A file without its rows: attributes, names of its groups, those that were read by name, and
+    its inode."""
 
     attributes: dict[str, Any]
     names: list[str]
@@ -78,7 +88,9 @@ class Content(NamedTuple):
     inode: int
 
 
-def read_content(path: Path, kinds: Collection[str], only: Collection[str] | None = None) -> Content:
+def read_content(
+    path: Path, kinds: Collection[str], only: Collection[str] | None = None
+) -> Content:
     """Read a file of this program, in the worker process unless the file is trusted.
 
     Parameters
@@ -130,7 +142,8 @@ def open_file(path: Path) -> Iterator[tuple[Any, Trailer]]:
             continue
         except OSError as exc:
             raise StoreError(
-                f"{path}: not a readable HDF5 file ({reason_of(exc)}); allowed: a file that rotor-mbs wrote"
+                f"{path}: not a readable HDF5 file ({reason_of(exc)}); allowed: a file that "
+                "rotor-mbs wrote"
             ) from exc
         with file:
             try:
@@ -171,19 +184,24 @@ def member(group: Any, name: str) -> Any:
     link = group.get(name, getlink=True)
     if not isinstance(link, h5py.HardLink):
         found = "is missing" if link is None else "is a link"
-        raise StoreError(f"{group.file.filename}: {group.name}/{name} {found}; allowed: groups and arrays of this file")
+        raise StoreError(
+            f"{group.file.filename}: {group.name}/{name} {found}; allowed: groups "
+            "and arrays of this file"
+        )
     return group[name]
 
 
 def values_of(dataset: Any) -> NDArray[Any]:
-    """Read an array of numbers, or of texts, whole. Raises StoreError where it is not in the file, or claims far more
-    than the file holds."""
+    """Read an array of numbers, or of texts, whole. Raises StoreError where it is not in the file,
+    or claims far more than the file holds."""
     place = f"{dataset.file.filename}: {dataset.name}"
     if not isinstance(dataset, h5py.Dataset) or dataset.shape is None:
         raise StoreError(f"{place} is no array")
     layout = dataset.id.get_create_plist()
     if layout.get_external_count() or layout.get_layout() != h5py.h5d.CONTIGUOUS:
-        raise StoreError(f"{place} is not contiguous in this file; allowed: an array as rotor-mbs writes it")
+        raise StoreError(
+            f"{place} is not contiguous in this file; allowed: an array as rotor-mbs writes it"
+        )
     kept, size = dataset.id.get_storage_size(), dataset.file.id.get_filesize()
     if kept > size or kept < dataset.nbytes:
         raise StoreError(f"{place} claims {dataset.nbytes:.2g} bytes and has {kept:.2g}")
@@ -192,9 +210,12 @@ def values_of(dataset: Any) -> NDArray[Any]:
         return values
     if h5py.check_string_dtype(dataset.dtype) is None:
         raise StoreError(f"{place} is no array")
-    # Each text is a reference that begins with its length, and all may refer to one text: bounded before it is read.
+    # Each text is a reference that begins with its length, and all may refer to one text: bounded
+    # before it is read.
     if dataset.size:
-        texts = np.memmap(dataset.file.filename, _REFERENCE, "r", dataset.id.get_offset(), dataset.shape)
+        texts = np.memmap(
+            dataset.file.filename, _REFERENCE, "r", dataset.id.get_offset(), dataset.shape
+        )
         if int(texts["length"].sum(dtype=np.uint64)) > size:
             raise StoreError(f"{place} claims more text than the file has")
     return np.array([plain(text) for text in dataset[()]], dtype=object)
@@ -246,7 +267,8 @@ def datasets_of(group: Any) -> dict[str, Any]:
 
 
 def _dimension(dataset: Any, axis: int, name: str, scale_names: dict[int, str]) -> str:
-    """Return the name of the scale of an axis; a dataset without one is a scale, and its own dimension.
+    """Return the name of the scale of an axis; a dataset without one is a scale, and its own
+    dimension.
 
     Parameters
     ----------
@@ -260,8 +282,8 @@ def _dimension(dataset: Any, axis: int, name: str, scale_names: dict[int, str]) 
         return name
     address = h5py.h5o.get_info(scales[0]).addr
     if address not in scale_names:
-        # By its attribute: the library would look for its path through the whole file, and its own way to a name ends
-        # the process where that is damaged.
+        # By its attribute: the library would look for its path through the whole file, and its own
+        # way to a name ends the process where that is damaged.
         scale = str(attribute(h5py.Dataset(scales[0]), "NAME"))
         scale_names[address] = CHARACTERS if scale.startswith(WITHOUT_VALUES) else scale
     return scale_names[address]
@@ -272,7 +294,9 @@ def columns_of(datasets: Mapping[str, Any]) -> dict[str, Column]:
     columns = {}
     scale_names: dict[int, str] = {}
     for name, dataset in datasets.items():
-        dimensions = tuple(_dimension(dataset, axis, name, scale_names) for axis in range(dataset.ndim))
+        dimensions = tuple(
+            _dimension(dataset, axis, name, scale_names) for axis in range(dataset.ndim)
+        )
         attributes = attributes_of(dataset)
         attributes.pop("_Encoding", None)
         for key, value in attributes.items():

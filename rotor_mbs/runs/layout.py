@@ -49,12 +49,14 @@ _HEAD_BYTES = 1 << 17  # of a file beside its rows, at most: descriptions and te
 
 
 @contextmanager
-def create_file(path: Path, tables: Sequence[TableSpec], attributes: Mapping[str, object]) -> Iterator[TableFile]:
-    """Yield a new file with room for all rows, under a temporary name; after the block it is complete under its name,
-    or not there.
+def create_file(
+    path: Path, tables: Sequence[TableSpec], attributes: Mapping[str, object]
+) -> Iterator[TableFile]:
+    """Yield a new file with room for all rows, under a temporary name; after the block it is
+    complete under its name, or not there.
 
-    Its space is reserved twice: HDF5 does not survive a disk that fills up under it, and truncates the file it begins.
-    Raises StoreError.
+    Its space is reserved twice: HDF5 does not survive a disk that fills up under it, and truncates
+    the file it begins. Raises StoreError.
 
     Parameters
     ----------
@@ -63,7 +65,10 @@ def create_file(path: Path, tables: Sequence[TableSpec], attributes: Mapping[str
     attributes : of the file.
     """
     with replacing(path) as temporary:
-        rows = sum(len(table.runs) * (table.row_type.itemsize + 8 * (4 + len(table.known))) for table in tables)
+        rows = sum(
+            len(table.runs) * (table.row_type.itemsize + 8 * (4 + len(table.known)))
+            for table in tables
+        )
         _reserve(temporary, _HEAD_BYTES + rows)
         with begin_file(temporary) as file:
             put_attributes(file, attributes)
@@ -75,12 +80,15 @@ def create_file(path: Path, tables: Sequence[TableSpec], attributes: Mapping[str
             laid.seek(0, os.SEEK_END)
             laid.write(trailer)
         _reserve(temporary, temporary.stat().st_size)
-        # All that a reader would find is known here: reading it back would take longer than writing it.
+        # All that a reader would find is known here: reading it back would take longer than writing
+        # it.
         inode = temporary.stat().st_ino
         laid_tables = []
         for table in tables:
             offsets = {name: offset for name, (offset, _) in rows_of[table.group].items()}
-            known = {name: (column, _as_stored(values)) for name, (column, values) in table.known.items()}
+            known = {
+                name: (column, _as_stored(values)) for name, (column, values) in table.known.items()
+            }
             laid_tables.append(
                 StoredTable(
                     group=table.group,
@@ -98,8 +106,9 @@ def create_file(path: Path, tables: Sequence[TableSpec], attributes: Mapping[str
 
 
 def _reserve(path: Path, size: int) -> None:
-    """Takes the space on the disk, where the system and the file system can: not on macOS and Windows, where a disk
-    that fills up is reported by the row that finds it full. Raises OSError."""
+    """Takes the space on the disk, where the system and the file system can: not on macOS and
+    Windows, where a disk that fills up is reported by the row that finds it full. Raises
+    OSError."""
     with path.open("ab") as file:
         try:
             if hasattr(os, "posix_fallocate"):
@@ -128,7 +137,8 @@ def _put_table(file: Any, table: TableSpec) -> dict[str, tuple[int, int]]:
 
 
 def begin_file(place: Path | str, **driver: object) -> Any:
-    """A new HDF5 file with the attributes of the format; on the disk, where it must not fill up, without a `driver`."""
+    """A new HDF5 file with the attributes of the format; on the disk, where it must not fill up,
+    without a `driver`."""
     file = h5py.File(place, "w", libver=("earliest", "v108"), track_order=True, **driver)
     file.attrs["Conventions"] = CONVENTIONS
     file.attrs["format"] = FORMAT
@@ -145,7 +155,8 @@ def new_group(parent: Any, name: str) -> Any:
 
 
 def put(group: Any, name: str, values: Any, column: Column) -> Any:
-    """A dataset of numbers or texts. The scales of its dimensions must be there; a scale is its own dimension."""
+    """A dataset of numbers or texts. The scales of its dimensions must be there; a scale is its own
+    dimension."""
     return _described(group.create_dataset(name, data=_as_stored(values)), group, name, column)
 
 
@@ -156,7 +167,9 @@ def _as_stored(values: Any) -> NDArray[Any]:
 
 
 def _described(dataset: Any, group: Any, name: str, column: Column) -> Any:
-    put_attributes(dataset, {"units": column.units, "long_name": column.long_name, **column.attributes})
+    put_attributes(
+        dataset, {"units": column.units, "long_name": column.long_name, **column.attributes}
+    )
     for axis, dimension in enumerate(column.dimensions):
         if dimension == name:
             dataset.make_scale(dimension)
@@ -171,9 +184,16 @@ def put_dimension(group: Any, name: str, length: int) -> None:
     scale.make_scale(f"{WITHOUT_VALUES}{length:10d}")
 
 
-def put_empty(group: Any, name: str, shape: tuple[int, ...], kind: Any, column: Column, fill: int | None = None) -> Any:
-    """A contiguous dataset that has its place in the file now and is written by others; fill: its first value, by
-    default what the file system makes of a new file, zeros."""
+def put_empty(
+    group: Any,
+    name: str,
+    shape: tuple[int, ...],
+    kind: Any,
+    column: Column,
+    fill: int | None = None,
+) -> Any:
+    """A contiguous dataset that has its place in the file now and is written by others; fill: its
+    first value, by default what the file system makes of a new file, zeros."""
     layout = h5py.h5p.create(h5py.h5p.DATASET_CREATE)
     layout.set_layout(h5py.h5d.CONTIGUOUS)
     layout.set_obj_track_times(False)  # the same call gives the same bytes
@@ -188,12 +208,14 @@ def put_empty(group: Any, name: str, shape: tuple[int, ...], kind: Any, column: 
 
 
 def put_attributes(target: Any, values: Mapping[str, object]) -> None:
-    """Write attributes that are not there: numbers as float64 or int64, truth as int8 (netCDF-4 has no booleans), lists
-    of names as strings."""
+    """Write attributes that are not there: numbers as float64 or int64, truth as int8 (netCDF-4 has
+    no booleans), lists of names as strings."""
     for name, value in values.items():
         if isinstance(value, str):
             # Nearly all are single texts, which the general way writes three times slower.
-            stored = h5py.h5a.create(target.id, name.encode(), TEXT_TYPE, h5py.h5s.create(h5py.h5s.SCALAR))
+            stored = h5py.h5a.create(
+                target.id, name.encode(), TEXT_TYPE, h5py.h5s.create(h5py.h5s.SCALAR)
+            )
             stored.write(np.array(value, TEXT), mtype=TEXT_IN_MEMORY)
         elif isinstance(value, bool):
             target.attrs[name] = np.int8(value)
@@ -205,16 +227,19 @@ def put_attributes(target: Any, values: Mapping[str, object]) -> None:
 
 @contextmanager
 def new_file(path: Path, kind: str) -> Iterator[Any]:
-    """Create an HDF5 file of a kind, put in the place of `path` when all of it is written and on the disk.
+    """Create an HDF5 file of a kind, put in the place of `path` when all of it is written and on
+    the disk.
 
-    It is made in memory: HDF5 does not survive a disk that fills up under it, a plain write does. Raises StoreError
-    where the file cannot be written; what stood there before then still stands. Whether it may be replaced is decided
-    before, by `may_extend`.
+    It is made in memory: HDF5 does not survive a disk that fills up under it, a plain write does.
+    Raises StoreError where the file cannot be written; what stood there before then still stands.
+    Whether it may be replaced is decided before, by `may_extend`.
     """
     memory = {"driver": "core", "backing_store": False, "block_size": 1 << 20}
     with begin_file(f"{path.name}.{threading.get_ident()}", **memory) as file:
         yield file
-        groups: dict[str, Mapping[str, tuple[int, int]]] = {place: {} for place in _groups_with_arrays(file)}
+        groups: dict[str, Mapping[str, tuple[int, int]]] = {
+            place: {} for place in _groups_with_arrays(file)
+        }
         file.flush()
         image = io.BytesIO(file.id.get_file_image())
     trailer = trailer_of(image, kind, groups)
@@ -225,7 +250,8 @@ def new_file(path: Path, kind: str) -> Iterator[Any]:
 
 
 def _groups_with_arrays(group: Any, place: str = "") -> Iterator[str]:
-    """Yield the path of the group of each array below a group, in the order in which they were written."""
+    """Yield the path of the group of each array below a group, in the order in which they were
+    written."""
     for name, item in group.items():
         if is_group(item):
             yield from _groups_with_arrays(item, f"{place}/{name}" if place else name)

@@ -37,11 +37,11 @@ def fit_file_to_request(
 
     replaced: (group, scene, curve or method) of stored rows that go where they are not wanted.
 
-    Where the file has all rows as they are asked for, nothing is written. Else a file is laid out beside it, the rows
-    that stay are copied, and it takes the place of the old one. A row of which anything in the design differs
-    (settings, versions, the scene's numbers) is missing afterwards. Raises InputError where runs of a scene that has
-    other numbers by now would be dropped and not computed again, or the file holds something else, StoreError where it
-    cannot be read or written.
+    Where the file has all rows as they are asked for, nothing is written. Else a file is laid out
+    beside it, the rows that stay are copied, and it takes the place of the old one. A row of which
+    anything in the design differs (settings, versions, the scene's numbers) is missing afterwards.
+    Raises InputError where runs of a scene that has other numbers by now would be dropped and not
+    computed again, or the file holds something else, StoreError where it cannot be read or written.
     """
     if path.is_symlink():  # a link stays one
         path = path.resolve()
@@ -52,10 +52,12 @@ def fit_file_to_request(
     wanted_runs = _known_rows(new.get(RUNS))
     hashes = {row["scene"]: row["scene_hash"] for row in wanted_runs.values()}
     lost = [
-        f"{path}: {row['scene']}: has {row['method_name']} of a scene of that name with other numbers, which this call "
+        f"{path}: {row['scene']}: has {row['method_name']} of a scene of that name with other "
+        "numbers, which this call "
         "would drop; allowed: another output file, or a call that has this method too"
         for run, row in _known_rows(stored.get(RUNS)).items()
-        if hashes.get(row["scene"], row["scene_hash"]) != row["scene_hash"] and run not in wanted_runs
+        if hashes.get(row["scene"], row["scene_hash"]) != row["scene_hash"]
+        and run not in wanted_runs
     ]
     if lost:
         raise InputError(lost)
@@ -70,13 +72,19 @@ def fit_file_to_request(
         rows = {
             run: row
             for run, row in _known_rows(before).items()
-            if run in asked or (group, row["scene"], row.get("curve", row["method_name"])) not in replaced
+            if run in asked
+            or (group, row["scene"], row.get("curve", row["method_name"])) not in replaced
         }
-        kept += [(group, run) for run in rows if run not in asked or _is_same(rows[run], asked[run])]
+        kept += [
+            (group, run) for run in rows if run not in asked or _is_same(rows[run], asked[run])
+        ]
         rows |= asked
         if rows:
             runs = sorted(rows, key=row_order) if group == RUNS else list(rows)
-            known = {name: (column, [rows[run][name] for run in runs]) for name, (column, _) in base.known.items()}
+            known = {
+                name: (column, [rows[run][name] for run in runs])
+                for name, (column, _) in base.known.items()
+            }
             columns = _joined(before, made)
             merged[group] = TableSpec(group, runs, known, columns, base.attributes, base.characters)
     methods: dict[str, list[str]] = {}  # by scene
@@ -85,15 +93,22 @@ def fit_file_to_request(
             methods.setdefault(scene, []).append(str(run).removeprefix(f"{scene}/"))
     for scene, own in methods.items():
         before, made = stored.get(scene), new.get(scene)
-        if before is not None and made is not None and before.attributes["scene_hash"] != made.attributes["scene_hash"]:
+        if (
+            before is not None
+            and made is not None
+            and before.attributes["scene_hash"] != made.attributes["scene_hash"]
+        ):
             before = None
         base, columns = made or stored[scene], _joined(before, made)
         merged[scene] = TableSpec(scene, own, base.known, columns, base.attributes, base.characters)
     is_same = merged.keys() == stored.keys() and all(
-        list(made.runs) == list(stored[group].runs) and made.computed.keys() == stored[group].computed.keys()
+        list(made.runs) == list(stored[group].runs)
+        and made.computed.keys() == stored[group].computed.keys()
         for group, made in merged.items()
     )
-    if is_same and len(kept) == sum(len(made.runs) for made in stored.values() if "crc32" in made.computed):
+    if is_same and len(kept) == sum(
+        len(made.runs) for made in stored.values() if "crc32" in made.computed
+    ):
         return old
     places = [(group, run, old.place(run, group)) for group, run in kept]
     rows_kept = [(group, run, place.read()) for group, run, place in places if place.is_stored]
@@ -101,21 +116,27 @@ def fit_file_to_request(
 
 
 def copy_file(source: Path, target: Path) -> None:
-    """Copy a file with tables; one at `target` is replaced where the copy has all its rows, and is of the same sweep.
+    """Copy a file with tables; one at `target` is replaced where the copy has all its rows, and is
+    of the same sweep.
 
-    Raises InputError where rows would be lost, or `target` holds something else, StoreError where it is damaged, not
-    this program's, or cannot be written.
+    Raises InputError where rows would be lost, or `target` holds something else, StoreError where
+    it is damaged, not this program's, or cannot be written.
     """
     with locked(target):
         if may_extend(target, read_trailer(source).kind):
             old, new = TableFile(target), TableFile(source)
             is_same = old.attributes.get(IDENTITY) == new.attributes.get(IDENTITY)
             for group, table in old.tables.items():
-                copied = {str(run) for run in new.tables[group].runs} if is_same and group in new.tables else set()
+                copied = (
+                    {str(run) for run in new.tables[group].runs}
+                    if is_same and group in new.tables
+                    else set()
+                )
                 for run, status in zip(map(str, table.runs), table.column("status"), strict=True):
                     if status != MISSING and run not in copied:
                         raise InputError(
-                            f"{target}: has {f'{group}: ' if group else 'run '}{run}, which would be lost; allowed: "
+                            f"{target}: has {f'{group}: ' if group else 'run '}{run}, which would "
+                            "be lost; allowed: "
                             "another name, or remove that file"
                         )
         write_file(target, source.read_bytes())
@@ -128,7 +149,8 @@ def _known_rows(table: TableSpec | None) -> Mapping[str, Mapping[str, Any]]:
 def _is_same(stored: Mapping[str, Any], asked: Mapping[str, Any]) -> bool:
     """Whether a row is as it is asked for; a number that it does not have is NaN in both."""
     return stored.keys() == asked.keys() and all(
-        value == asked[name] or (value != value and asked[name] != asked[name]) for name, value in stored.items()
+        value == asked[name] or (value != value and asked[name] != asked[name])
+        for name, value in stored.items()
     )
 
 
@@ -139,25 +161,41 @@ def _joined(before: TableSpec | None, made: TableSpec | None) -> dict[str, Colum
     return columns if checksum is None else {**columns, "crc32": checksum}
 
 
-def _write_tables(path: Path, tables: Sequence[TableSpec], rows: Sequence[tuple[str, str, Rows]]) -> TableFile:
+def _write_tables(
+    path: Path, tables: Sequence[TableSpec], rows: Sequence[tuple[str, str, Rows]]
+) -> TableFile:
     """Write a new file with these tables; of its rows those that are given, the others blank."""
     created = datetime.now(UTC).isoformat(timespec="seconds")
     count, scenes = 0, set[str]()
-    others = sorted(made.group for made in tables if made.group != RUNS and "crc32" in made.computed)
+    others = sorted(
+        made.group for made in tables if made.group != RUNS and "crc32" in made.computed
+    )
     for made in tables:
         if made.group == RUNS:
             count, scenes = len(made.runs), set(made.known["scene"][1])
     summary = f"runs: {count}, scenes: {len(scenes)}; trajectories, energies, status and errors"
     if others:
         summary += f"; tables {', '.join(others)}"
-    described = {"title": "Rotor models compared", "summary": summary, "keywords": KEYWORDS}  # as ACDD asks for them
-    attributes = {**described, **versions(), **machine(), "created": created, "date_created": created}
+    # as ACDD asks for them
+    described = {"title": "Rotor models compared", "summary": summary, "keywords": KEYWORDS}
+    attributes = {
+        **described,
+        **versions(),
+        **machine(),
+        "created": created,
+        "date_created": created,
+    }
     with create_file(path, tables, attributes) as file:
         for table in file.tables.values():
             table.clear()
         for group, run, values in rows:
             place = file.place(run, group)
             blank = blank_rows(1, place.row_type)
-            place.write({name: values.get(name, blank[name]) for name in place.row_type.names or ()})
+            place.write(
+                {name: values.get(name, blank[name]) for name in place.row_type.names or ()}
+            )
     # It is the same file under its name now.
-    return TableFile(path, laid_out_as=(attributes, [replace(table, path=path) for table in file.tables.values()]))
+    return TableFile(
+        path,
+        laid_out_as=(attributes, [replace(table, path=path) for table in file.tables.values()]),
+    )

@@ -1,5 +1,5 @@
-"""Output files of every kind: under a temporary name until they are complete, never in place of another program's file,
-and written by one process at a time."""
+"""Output files of every kind: under a temporary name until they are complete, never in place of
+another program's file, and written by one process at a time."""
 
 from __future__ import annotations
 
@@ -27,8 +27,8 @@ _OWNER = rb"(process [0-9]+ on [!-~]*)?\Z"
 
 @contextmanager
 def locked(output: Path) -> Iterator[None]:
-    """Keep other processes from writing `output` in the block; its thread may enter it again. Raises InputError,
-    StoreError."""
+    """Keep other processes from writing `output` in the block; its thread may enter it again.
+    Raises InputError, StoreError."""
     from filelock import FileLock, Timeout
 
     place = _resolved(output)
@@ -43,12 +43,20 @@ def locked(output: Path) -> Iterator[None]:
         if path.is_file():
             with suppress(OSError):
                 owner = path.read_bytes()
-        if path.is_symlink() or (path.exists() and not path.is_file()) or not re.match(_OWNER, owner):
-            raise InputError(f"{path}: was not written by rotor-mbs; allowed: another output, or remove it")
+        if (
+            path.is_symlink()
+            or (path.exists() and not path.is_file())
+            or not re.match(_OWNER, owner)
+        ):
+            raise InputError(
+                f"{path}: was not written by rotor-mbs; allowed: another output, or remove it"
+            )
         lock.acquire()
     except Timeout:
         writer = f"another process is writing it now{f' ({owner.decode()})' if owner else ''}"
-        raise InputError(f"{output}: {writer}; allowed: wait for its end, or another output") from None
+        raise InputError(
+            f"{output}: {writer}; allowed: wait for its end, or another output"
+        ) from None
     except OSError as exc:
         raise StoreError(f"{output}: cannot be written: {exc.strerror}") from exc
     try:
@@ -91,7 +99,9 @@ def store_errors(path: object) -> Iterator[None]:
     try:
         yield
     except OSError as exc:
-        raise StoreError(f"{path}: cannot be written: {exc.strerror or exc}; nothing stored before is lost") from exc
+        raise StoreError(
+            f"{path}: cannot be written: {exc.strerror or exc}; nothing stored before is lost"
+        ) from exc
 
 
 def replace_file(path: Path, content: Buffer, mark: bytes) -> None:
@@ -104,14 +114,17 @@ def replace_file(path: Path, content: Buffer, mark: bytes) -> None:
 def write_file(path: Path, content: Buffer) -> None:
     """Write `content` under a temporary name beside `path`, force it to the disk, then rename it.
 
-    Of a symbolic link the file that it points to is replaced; a device or a pipe is written to. Raises StoreError where
-    it cannot be written.
+    Of a symbolic link the file that it points to is replaced; a device or a pipe is written to.
+    Raises StoreError where it cannot be written.
     """
     if path.exists() and not path.is_file() and not path.is_dir():
         with store_errors(path):
             path.write_bytes(content)
         return
-    with replacing(path.resolve() if path.is_symlink() else path) as temporary, temporary.open("wb") as file:
+    with (
+        replacing(path.resolve() if path.is_symlink() else path) as temporary,
+        temporary.open("wb") as file,
+    ):
         file.write(content)
         file.flush()
         os.fsync(file.fileno())
@@ -121,22 +134,27 @@ def refuse_foreign(path: Path, mark: bytes) -> None:
     """Raise InputError where `path` is a file that is no output of this program of the same kind.
     For outputs that are no HDF5 files.
 
-    mark: a regular expression that is found in every output of the kind. An empty file may be replaced.
+    mark: a regular expression that is found in every output of the kind. An empty file may be
+    replaced.
     """
     if not path.is_file():
         return
     with store_errors(path):
         size = path.stat().st_size
-        is_own = size <= _LARGEST_REPLACED and (size == 0 or re.search(mark, path.read_bytes()) is not None)
+        is_own = size <= _LARGEST_REPLACED and (
+            size == 0 or re.search(mark, path.read_bytes()) is not None
+        )
     if not is_own:
         raise InputError(
-            f"{path}: is not an output of this command and is not replaced; allowed: another name, or remove that file"
+            f"{path}: is not an output of this command and is not replaced; allowed: another "
+            "name, or remove that file"
         )
 
 
 @contextmanager
 def replacing(path: Path) -> Iterator[Path]:
-    """Yield the name of a new, empty file beside `path`, which takes its place after the block. Raises StoreError.
+    """Yield the name of a new, empty file beside `path`, which takes its place after the block.
+    Raises StoreError.
 
     The name cannot be guessed, and a file or link of that name is not opened.
     """

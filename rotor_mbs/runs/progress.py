@@ -1,7 +1,8 @@
-"""The progress of long calls: one line that renews itself on a terminal or in a notebook, plain lines in a log.
+"""The progress of long calls: one line that renews itself on a terminal or in a notebook, plain
+lines in a log.
 
-What is left is estimated from the work of the runs, which differs a thousandfold, and a run that failed keeps its line:
-tqdm counts iterations, and needs ipywidgets in a notebook.
+What is left is estimated from the work of the runs, which differs a thousandfold, and a run that
+failed keeps its line: tqdm counts iterations, and needs ipywidgets in a notebook.
 """
 
 from __future__ import annotations
@@ -46,9 +47,11 @@ def span(seconds: float) -> str:
 
 
 class ProgressLine:
-    """One line that renews itself on a terminal, plain lines in a log. A context manager that clears it.
+    """One line that renews itself on a terminal, plain lines in a log. A context manager that
+    clears it.
 
-    Called after each run. What is left is estimated from the work done, not from the number of runs.
+    Called after each run. What is left is estimated from the work done, not from the number of
+    runs.
     """
 
     def __init__(self, stream: TextIO | None = None) -> None:
@@ -75,7 +78,9 @@ class ProgressLine:
         if outcome.is_shipped:
             seconds = " (read, not computed)"
         reason = f": {outcome.message}" if outcome.message else ""
-        text = f"[{done:{len(str(total))}d}/{total}] {outcome.label} {outcome.status}{seconds}{reason}"
+        text = (
+            f"[{done:{len(str(total))}d}/{total}] {outcome.label} {outcome.status}{seconds}{reason}"
+        )
         keep = outcome.status not in (*GOOD, "measured")  # a person must not miss it
         self._show(text if keep else self._estimate(outcome.share) + text, keep=keep)
 
@@ -94,7 +99,11 @@ class ProgressLine:
         """Show how many runs of a sweep have been computed, with which status: called before the
         first and after each block of runs."""
         self._statuses.update(statuses)
-        failed = [f", {count} {status}" for status, count in sorted(self._statuses.items()) if status not in GOOD]
+        failed = [
+            f", {count} {status}"
+            for status, count in sorted(self._statuses.items())
+            if status not in GOOD
+        ]
         self.stage("runs", done, total, "".join(failed))
 
     def _estimate(self, share: float) -> str:
@@ -132,7 +141,8 @@ class ProgressLine:
 
 
 class NotebookLine(ProgressLine):
-    """A line below a cell of a Jupyter notebook, which renews itself; in the end it tells how long the call took."""
+    """A line below a cell of a Jupyter notebook, which renews itself; in the end it tells how long
+    the call took."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -152,7 +162,9 @@ class NotebookLine(ProgressLine):
 
     def _clear(self) -> None:
         if self._handle is not None:
-            self._handle.update({"text/plain": f"done in {span(time.monotonic() - self._start)}"}, raw=True)
+            self._handle.update(
+                {"text/plain": f"done in {span(time.monotonic() - self._start)}"}, raw=True
+            )
 
 
 class SilentProgress(ProgressLine):
@@ -177,7 +189,8 @@ def progress_of_call(progress: bool | None) -> ProgressLine:
 
     Parameters
     ----------
-    progress : whether to show it; None: on a terminal and in a notebook, but not in a script whose messages go to a
+    progress : whether to show it; None: on a terminal and in a notebook, but not in a script whose
+        messages go to a
         file.
     """
     if progress is False:

@@ -1,12 +1,14 @@
-"""Results files read back: scenes and runs by name, rows when they are asked for; of a run also what was stored, its
-Solution, so that it can be judged again. Needs no engine.
+"""Results files read back: scenes and runs by name, rows when they are asked for; of a run also
+what was stored, its Solution, so that it can be judged again. Needs no engine.
 
-What studies store beside runs are records: tables of points, and groups of arrays with dimensions of their own.
+What studies store beside runs are records: tables of points, and groups of arrays with dimensions
+of their own.
 
 /bench                          a row per point of a curve: a method at one setting on a scene
 /stability                      a row per step of a ladder: a fixed-step method on a scene
 /modes/<scene>/<model>/<kind>   modes over speed, in a file of modes
-/comparison/<scene>/data/trajectory   data of another program and the reference at their times; modes: over speed
+/comparison/<scene>/data/trajectory   data of another program and the reference at their times;
+modes: over speed
 """
 
 from __future__ import annotations
@@ -43,8 +45,19 @@ from rotor_mbs.runs.rows import RowLocation, Rows, checksums, text_of
 from rotor_mbs.runs.table import StoredTable, TableFile, opened_tables, parsed
 from rotor_mbs.runs.trailer import MODES, SWEEP, may_extend, read_trailer
 from rotor_mbs.runs.versions import machine, versions
-from rotor_mbs.scenario.catalogue import label_with_changes, moves_as_shipped, natural_order, shipped_scene
-from rotor_mbs.scenario.scene import Scene, SceneChange, coordinate_labels, parse_scene, scene_changes
+from rotor_mbs.scenario.catalogue import (
+    label_with_changes,
+    moves_as_shipped,
+    natural_order,
+    shipped_scene,
+)
+from rotor_mbs.scenario.scene import (
+    Scene,
+    SceneChange,
+    coordinate_labels,
+    parse_scene,
+    scene_changes,
+)
 from rotor_mbs.solution.quantities import known_quantities, quantities, row_shape
 from rotor_mbs.solution.status import STATUSES, code_of
 from rotor_mbs.solution.trajectory import Integration, Solution, Trajectory
@@ -54,8 +67,8 @@ _TEXTS = ("message", "engine_message")
 
 @dataclass(frozen=True, eq=False)
 class StoredRun:
-    """A run, or the reference, or a run of a sweep, in a file; its row is read, and verified, when something of it is
-    asked for.
+    """A run, or the reference, or a run of a sweep, in a file; its row is read, and verified, when
+    something of it is asked for.
 
     Attributes
     ----------
@@ -105,7 +118,9 @@ class StoredRun:
             if name in ("status", "crc32", *STATUS_COPIES.values(), *_TEXTS) or np.ndim(value):
                 continue
             number = value.item()
-            if (isinstance(number, int) and number >= 0) or (isinstance(number, float) and number == number):
+            if (isinstance(number, int) and number >= 0) or (
+                isinstance(number, float) and number == number
+            ):
                 facts[name] = number
         return facts
 
@@ -136,7 +151,11 @@ class StoredRun:
         if not self._is_of_sweep:
             return int(self._row["samples"])
         # Its arrays are NaN after a run broke off.
-        arrays = [values for values in self._own_arrays.values() if len(values) == len(self.scales["time"])]
+        arrays = [
+            values
+            for values in self._own_arrays.values()
+            if len(values) == len(self.scales["time"])
+        ]
         is_there = [np.isfinite(values.reshape(len(values), -1)).all(axis=1) for values in arrays]
         return int(np.all(is_there, axis=0).sum()) if is_there else 0
 
@@ -148,16 +167,25 @@ class StoredRun:
     @property
     def _own_arrays(self) -> dict[str, NDArray[Any]]:
         """Return its arrays by name, with the rows after its end."""
-        return {name: values for name, values in self._row.items() if np.ndim(values) and name not in _TEXTS}
+        return {
+            name: values
+            for name, values in self._row.items()
+            if np.ndim(values) and name not in _TEXTS
+        }
 
     @functools.cached_property
     def _arrays(self) -> dict[str, NDArray[Any]]:
         """Return its arrays by name, scales included. One that its method or its scene's outputs do
         not have is NaN in all samples, and left out."""
         count = self.samples
-        scales = {name: values[:count] if name == "time" else values for name, values in self.scales.items()}
+        scales = {
+            name: values[:count] if name == "time" else values
+            for name, values in self.scales.items()
+        }
         own = {name: values[:count] for name, values in self._own_arrays.items()}
-        return scales | {name: values for name, values in own.items() if count == 0 or not np.isnan(values).all()}
+        return scales | {
+            name: values for name, values in own.items() if count == 0 or not np.isnan(values).all()
+        }
 
     @property
     def names(self) -> list[str]:
@@ -178,9 +206,9 @@ class StoredRun:
         return self._arrays.get(name)
 
     def faults(self, scene: Scene, *, complete: bool = True) -> list[str]:
-        """Return a line for every array that is missing or wrong; complete: every sample must be there, else as many as
-        there are times. A frozen reference need not have what follows from its angles and rates, a method that is not
-        built in no more than these."""
+        """Return a line for every array that is missing or wrong; complete: every sample must be
+        there, else as many as there are times. A frozen reference need not have what follows from
+        its angles and rates, a method that is not built in no more than these."""
         faults = []
         rows = len(self.array("time")) if "time" in self else scene.samples
         if complete and rows != scene.samples:
@@ -193,7 +221,9 @@ class StoredRun:
                 continue
             if may_omit_others and quantity.name not in (*always_there, *self.names):
                 continue
-            if quantity.required or (quantity.name == "angle_uncertainty" and self.method == REFERENCE):
+            if quantity.required or (
+                quantity.name == "angle_uncertainty" and self.method == REFERENCE
+            ):
                 expected[quantity.name] = (rows, *row_shape(quantity, scene))
         for name, shape in expected.items():
             if name not in self:
@@ -201,11 +231,15 @@ class StoredRun:
                 continue
             values = self.array(name)
             if values.dtype.kind != "f" or values.shape[1:] != shape[1:]:
-                faults.append(f"{name} has shape {values.shape} of {values.dtype}, not {shape} of numbers")
+                faults.append(
+                    f"{name} has shape {values.shape} of {values.dtype}, not {shape} of numbers"
+                )
             elif len(values) != shape[0]:
                 faults.append(f"{name} has {len(values)} rows, not {shape[0]}")
             elif not np.isfinite(values).all():
-                faults.append(f"{name} is not finite at sample {int(np.argwhere(~np.isfinite(values))[0][0])}")
+                faults.append(
+                    f"{name} is not finite at sample {int(np.argwhere(~np.isfinite(values))[0][0])}"
+                )
         return faults
 
     def trajectory(self, scene: Scene) -> Trajectory | None:
@@ -253,8 +287,8 @@ class StoredRun:
 
 @dataclass(frozen=True)
 class StoredScene:
-    """A scene in an open file: name, attributes (title, figures, blades, scene_toml, scene_hash) and its runs, the
-    reference first, then methods in the order of the catalogue."""
+    """A scene in an open file: name, attributes (title, figures, blades, scene_toml, scene_hash)
+    and its runs, the reference first, then methods in the order of the catalogue."""
 
     name: str
     attributes: dict[str, Any]
@@ -262,7 +296,8 @@ class StoredScene:
 
     @functools.cached_property
     def scene(self) -> Scene:
-        """Return the scene that its text describes. Raises InputError where its text is no scene."""
+        """Return the scene that its text describes. Raises InputError where its text is no
+        scene."""
         return parse_scene(str(self.attributes["scene_toml"]), self.name)
 
     @functools.cached_property
@@ -334,7 +369,8 @@ class StoredScene:
 
 @dataclass(frozen=True)
 class OpenResults:
-    """An open results file: its attributes (versions, platform, created) and its scenes by name, in natural order."""
+    """An open results file: its attributes (versions, platform, created) and its scenes by name, in
+    natural order."""
 
     path: Path
     attributes: dict[str, Any]
@@ -342,10 +378,12 @@ class OpenResults:
 
 
 @contextmanager
-def open_results(path: Path, *, verify: bool = True, only: Collection[str] | None = None) -> Iterator[OpenResults]:
-    """Open a results file; of a file that replaces it meanwhile nothing is seen. A run is compared with its checksum
-    when it is read, but for verify=False; only: names of scenes, by default all. Raises StoreError, also for whatever
-    goes wrong in the block with what the file holds."""
+def open_results(
+    path: Path, *, verify: bool = True, only: Collection[str] | None = None
+) -> Iterator[OpenResults]:
+    """Open a results file; of a file that replaces it meanwhile nothing is seen. A run is compared
+    with its checksum when it is read, but for verify=False; only: names of scenes, by default all.
+    Raises StoreError, also for whatever goes wrong in the block with what the file holds."""
     for _ in range(ATTEMPTS):
         stored = opened_tables(path, None if only is None else {RUNS, *only})
         with path.open("rb") as file:
@@ -354,20 +392,25 @@ def open_results(path: Path, *, verify: bool = True, only: Collection[str] | Non
                 continue
             with reading(path):  # what is made of it, too: rows are read when they are asked for
                 scenes = {scene.name: scene for scene in _scenes(stored, file, verify, only)}
-                yield OpenResults(path, stored.attributes, {name: scenes[name] for name in natural_order(scenes)})
+                yield OpenResults(
+                    path, stored.attributes, {name: scenes[name] for name in natural_order(scenes)}
+                )
             return
     raise StoreError(f"{path}: is being replaced by another process")
 
 
 def run_names(path: Path) -> list[tuple[str, str]]:
-    """Return scene and method of every stored run, in the order of `open_results`. Raises StoreError."""
+    """Return scene and method of every stored run, in the order of `open_results`. Raises
+    StoreError."""
     stored = opened_tables(path, {RUNS})
     if RUNS not in stored.tables:
         return []
     runs = stored.tables[RUNS]
     methods: dict[str, list[str]] = {}
     with reading(path):
-        for status, row in zip(runs.column("status").tolist(), runs.known_rows.values(), strict=True):
+        for status, row in zip(
+            runs.column("status").tolist(), runs.known_rows.values(), strict=True
+        ):
             if status != MISSING:
                 methods.setdefault(str(row["scene"]), []).append(str(row["method_name"]))
     return [(scene, method) for scene in natural_order(methods) for method in methods[scene]]
@@ -377,7 +420,11 @@ def run_arrays(path: Path, group: str = "", scene: str = "") -> dict[str, NDArra
     """Return the arrays of one run of a results file; group, scene: as for `read_arrays`, the run
     "scene/method"."""
     with open_results(path) as results:
-        runs = {f"{name}/{run.method}": run for name, known in results.scenes.items() for run in known.runs.values()}
+        runs = {
+            f"{name}/{run.method}": run
+            for name, known in results.scenes.items()
+            for run in known.runs.values()
+        }
         run = runs[chosen_group(path, list(runs), group, scene)]
         return {name: run.array(name) for name in run.names if run.array(name).ndim <= 3}
 
@@ -388,7 +435,9 @@ def is_sweep(path: Path) -> bool:
     return read_trailer(path).kind == SWEEP
 
 
-def _scenes(stored: TableFile, file: IO[bytes], verify: bool, only: Collection[str] | None) -> Iterator[StoredScene]:
+def _scenes(
+    stored: TableFile, file: IO[bytes], verify: bool, only: Collection[str] | None
+) -> Iterator[StoredScene]:
     """Yield the scenes of an open file with their runs."""
     if RUNS not in stored.tables:
         return
@@ -414,9 +463,10 @@ _MESSAGE_LENGTH = 300
 class Record:
     """A curve of a bench, a ladder of steps, or another group of arrays that belong together.
 
-    kind: a key of `POINT_COLUMNS`, "modes" or "comparison". name: the method, "lagrange/taylor"; of a bench with its
-    fixed choices behind, where they are not the default ones. arrays: (rows,) by name; `status` as codes of
-    `solution.status.STATUSES`. columns: what the arrays are, scales first; of groups of arrays alone.
+    kind: a key of `POINT_COLUMNS`, "modes" or "comparison". name: the method, "lagrange/taylor"; of
+    a bench with its fixed choices behind, where they are not the default ones. arrays: (rows,) by
+    name; `status` as codes of `solution.status.STATUSES`. columns: what the arrays are, scales
+    first; of groups of arrays alone.
     """
 
     kind: str
@@ -437,7 +487,9 @@ class Record:
     @property
     def messages(self) -> list[str]:
         """Return a message for each row."""
-        return [str(text) for text in self.attributes.get("messages", [""] * len(self.arrays["status"]))]
+        return [
+            str(text) for text in self.attributes.get("messages", [""] * len(self.arrays["status"]))
+        ]
 
 
 # Tables of points
@@ -446,7 +498,9 @@ class Record:
 def points_table(group: str, points: Sequence[Mapping[str, object]]) -> TableSpec:
     """Return the table `group` of these points, each with its known columns by name."""
     runs = [str(point["run"]) for point in points]
-    return TableSpec(group, runs, known_columns(points), POINT_COLUMNS[group], characters=_MESSAGE_LENGTH)
+    return TableSpec(
+        group, runs, known_columns(points), POINT_COLUMNS[group], characters=_MESSAGE_LENGTH
+    )
 
 
 def read_records(path: Path, kind: str) -> list[Record]:
@@ -478,15 +532,22 @@ def _point_records(stored: StoredTable) -> Iterator[Record]:
         facts: dict[str, Any] = {
             column: value
             for column, values in arrays.items()
-            if column not in ("status", "message", "setting") and (value := values[0].item()) == value
+            if column not in ("status", "message", "setting")
+            and (value := values[0].item()) == value
         }
         messages = [text_of(text) for text in arrays.pop("message")]
         if kind == "stability":  # without steps that were not needed
             used = arrays["status"] != code_of("left_out")
             arrays = {column: array[used] for column, array in arrays.items()}
-        facts |= {"messages": messages, "method": known["method_name"], "setting_kind": setting_kind}
+        facts |= {
+            "messages": messages,
+            "method": known["method_name"],
+            "setting_kind": setting_kind,
+        }
         facts |= {column: known[column] for column in ("scene_hash", "versions") if column in known}
-        yield Record(kind, scene, name, facts | parsed(known.get("options", "{}"), dict, stored.path), arrays)
+        yield Record(
+            kind, scene, name, facts | parsed(known.get("options", "{}"), dict, stored.path), arrays
+        )
 
 
 # Groups of arrays
@@ -495,8 +556,9 @@ def _point_records(stored: StoredTable) -> Iterator[Record]:
 def write_records(path: Path, records: Sequence[Record]) -> None:
     """Write records, all of one kind, into a file that has those of other scenes still.
 
-    The modes of a scene replace all earlier ones of it, a comparison those of the same name. Raises InputError where
-    `path` is a file of another kind, StoreError where it cannot be read or written.
+    The modes of a scene replace all earlier ones of it, a comparison those of the same name. Raises
+    InputError where `path` is a file of another kind, StoreError where it cannot be read or
+    written.
     """
     kind = records[0].kind
     scenes = {record.scene for record in records}
@@ -504,7 +566,9 @@ def write_records(path: Path, records: Sequence[Record]) -> None:
     with locked(path):
         earlier = read_records(path, kind) if may_extend(path, kind) else []
         for record in earlier:
-            is_replaced = record.scene in scenes if kind == MODES else (record.scene, record.name) in names
+            is_replaced = (
+                record.scene in scenes if kind == MODES else (record.scene, record.name) in names
+            )
             if not is_replaced:
                 records = [*records, record]
         with new_file(path, kind) as file:
@@ -521,5 +585,9 @@ def write_records(path: Path, records: Sequence[Record]) -> None:
 def _record(path: str, group: StoredGroup) -> Record:
     """Return the record of the group at `path`."""
     kind, *scene, owner, name = path.split("/")
-    scales_first = dict(sorted(group.columns.items(), key=lambda column: column[1].dimensions != (column[0],)))
-    return Record(kind, "/".join(scene), f"{owner}/{name}", group.attributes, group.values, scales_first)
+    scales_first = dict(
+        sorted(group.columns.items(), key=lambda column: column[1].dimensions != (column[0],))
+    )
+    return Record(
+        kind, "/".join(scene), f"{owner}/{name}", group.attributes, group.values, scales_first
+    )

@@ -1,7 +1,8 @@
-"""Rows of a table as bytes: where they lie in a file, how they are written and read, their checksums.
+"""Rows of a table as bytes: where they lie in a file, how they are written and read, their
+checksums.
 
-The bytes of a row are written to their offsets, its status after a sync: a row is stored where its status is not -1 and
-its checksum is right.
+The bytes of a row are written to their offsets, its status after a sync: a row is stored where its
+status is not -1 and its checksum is right.
 """
 
 from __future__ import annotations
@@ -37,9 +38,9 @@ Rows = dict[str, NDArray[Any]]
 class RowLocation:
     """Where consecutive rows lie in a file. Worker processes that see the file write them by it.
 
-    inode: of the file; another file of that name is not written to. first: number of the first row; its checksum begins
-    with it. offsets: bytes from the beginning of the file to the first row, by column. row_type: its columns
-    are in the order in which the checksum covers them.
+    inode: of the file; another file of that name is not written to. first: number of the first row;
+    its checksum begins with it. offsets: bytes from the beginning of the file to the first row, by
+    column. row_type: its columns are in the order in which the checksum covers them.
     """
 
     path: Path
@@ -49,8 +50,9 @@ class RowLocation:
     row_type: np.dtype[np.void]
 
     def encode(self, values: Mapping[str, object], count: int = 1) -> Rows:
-        """Return rows with these values, the same in each, by the name of their column: numbers, a text, the name of a
-        status, the first samples of an array. The other columns are blank; what is no column here is left out."""
+        """Return rows with these values, the same in each, by the name of their column: numbers, a
+        text, the name of a status, the first samples of an array. The other columns are blank; what
+        is no column here is left out."""
         rows = blank_rows(count, self.row_type)
         for name, value in values.items():
             if name == "status":
@@ -68,13 +70,21 @@ class RowLocation:
 
     def at(self, row: int) -> RowLocation:
         """The place of a later row, counted from the first."""
-        offsets = {name: offset + row * self.row_type[name].itemsize for name, offset in self.offsets.items()}
+        offsets = {
+            name: offset + row * self.row_type[name].itemsize
+            for name, offset in self.offsets.items()
+        }
         return replace(self, first=self.first + row, offsets=offsets)
 
     def write(self, rows: Rows) -> None:
-        """Store consecutive rows, their statuses last; meanwhile they are missing. Raises StoreError."""
+        """Store consecutive rows, their statuses last; meanwhile they are missing. Raises
+        StoreError."""
         columns = rows | {"crc32": checksums(self.first, rows, self.row_type)}
-        statuses = {name: columns.pop(name) for name in (STATUS_COPIES["status"], "status") if name in columns}
+        statuses = {
+            name: columns.pop(name)
+            for name in (STATUS_COPIES["status"], "status")
+            if name in columns
+        }
         with store_errors(self.path), self.path.open("r+b") as file:
             if os.fstat(file.fileno()).st_ino != self.inode:
                 raise StoreError(f"{self.path}: has been replaced by another file")
@@ -91,7 +101,8 @@ class RowLocation:
                 file.write(np.ascontiguousarray(status, np.int8).data)
 
     def read(self, count: int = 1, file: IO[bytes] | None = None) -> Rows:
-        """(count, ...) The columns of so many rows; file: one that is open. Raises OSError, ValueError."""
+        """(count, ...) The columns of so many rows; file: one that is open. Raises OSError,
+        ValueError."""
         with nullcontext(file) if file is not None else self.path.open("rb") as source:
             rows = {}
             for name in self.row_type.names or ():
@@ -109,7 +120,8 @@ class RowLocation:
         return bool(is_known and checksums(self.first, row, self.row_type)[0] == row["crc32"][0])
 
     def mark_missing(self, rows: Collection[int]) -> None:
-        """Take back the statuses of some rows, counted from the first, before they are computed again."""
+        """Take back the statuses of some rows, counted from the first, before they are computed
+        again."""
         with store_errors(self.path), self.path.open("r+b") as file:
             for row in rows:
                 for name in ("status", STATUS_COPIES["status"]):
@@ -133,7 +145,10 @@ def blank_rows(count: int, row: np.dtype[np.void]) -> Rows:
     """Rows of which nothing is known: NaN, -1, no text."""
     blanks = {"f": np.nan, "i": -1, "u": 0, "S": b""}
     kinds = {name: row[name] for name in row.names or ()}
-    return {name: np.full((count, *kind.shape), blanks[kind.base.kind], kind.base) for name, kind in kinds.items()}
+    return {
+        name: np.full((count, *kind.shape), blanks[kind.base.kind], kind.base)
+        for name, kind in kinds.items()
+    }
 
 
 def characters(text: str, length: int) -> NDArray[np.bytes_]:
@@ -159,7 +174,9 @@ def row_of_run(run: Solution, place: RowLocation, facts: Mapping[str, object]) -
             "samples": len(run.time),
             "time_reached": float(run.time[-1]) if len(run.time) else 0.0,
             "steps": -1 if integration.steps is None else integration.steps,
-            "rhs_evaluations": -1 if integration.rhs_evaluations is None else integration.rhs_evaluations,
+            "rhs_evaluations": -1
+            if integration.rhs_evaluations is None
+            else integration.rhs_evaluations,
             "engine_success": int(integration.success),
             "setup_time_s": run.setup_time_s,
             "run_time_s": float(np.median(run_times_s)),

@@ -1,7 +1,7 @@
 """The one loop that computes rows of a table: tasks to worker processes, their rows to the file.
 
-A run passes through `run_tasks_references_first`, `run_tasks`, `pool.run_in` and `TaskPool.submit` here, and in the
-worker process through `run_in_worker` and `RunTask.perform`.
+A run passes through `run_tasks_references_first`, `run_tasks`, `pool.run_in` and `TaskPool.submit`
+here, and in the worker process through `run_in_worker` and `RunTask.perform`.
 """
 
 from __future__ import annotations
@@ -28,9 +28,10 @@ _REPORTED = ("status", "message", "run_time_s")
 class RunOutcome:
     """A run, or other rows of a study, that this call computed or tried to.
 
-    status: of a run; "measured" for other rows; REFUSED where the method refused the scene. seconds: run time; NaN
-    where nothing was timed. is_stored: whether there is a row; else the same call tries again. is_shipped: read from a
-    shipped file and not computed. share: of the work of the call that was done when it ended.
+    status: of a run; "measured" for other rows; REFUSED where the method refused the scene.
+    seconds: run time; NaN where nothing was timed. is_stored: whether there is a row; else the same
+    call tries again. is_shipped: read from a shipped file and not computed. share: of the work of
+    the call that was done when it ended.
     """
 
     label: str
@@ -54,8 +55,9 @@ def ignore_progress(_done: int, _total: int, _outcome: RunOutcome) -> None:
 class Task(ABC):
     """Consecutive rows of a table, computed at once by one process.
 
-    label, method: in a line of progress. reference: where the row is that must be stored before. kill_after_s: after
-    which its process is ended, where it has not ended itself. work: roughly how much there is to compute.
+    label, method: in a line of progress. reference: where the row is that must be stored before.
+    kill_after_s: after which its process is ended, where it has not ended itself. work: roughly how
+    much there is to compute.
     """
 
     label: str
@@ -97,12 +99,14 @@ T = TypeVar("T", bound=Task)
 
 
 def run_tasks(pool: TaskPool, tasks: Iterable[T]) -> Iterator[TaskEnd[T, Rows]]:
-    """Compute tasks in a pool that is open, and store their rows: by the worker where it sees the file.
+    """Compute tasks in a pool that is open, and store their rows: by the worker where it sees the
+    file.
 
-    However the loop ends, the rows of what has ended are in the file. The `value` of a finished task has at least the
-    status and message of its stored rows, also where they are those of a failure, and the run time where there is one;
-    None where nothing is stored, and its failure and message say why: REFUSED where the method refused the scene.
-    Raises what a task raised of InputError and StoreError.
+    However the loop ends, the rows of what has ended are in the file. The `value` of a finished
+    task has at least the status and message of its stored rows, also where they are those of a
+    failure, and the run time where there is one; None where nothing is stored, and its failure and
+    message say why: REFUSED where the method refused the scene. Raises what a task raised of
+    InputError and StoreError.
     """
     work = with_method_files(partial(run_in_worker, stores=pool.shares_disk))
     for end in run_in(pool, work, tasks, lambda task: task.kill_after_s, lambda task: task.split()):
@@ -137,8 +141,8 @@ def run_in_worker(task: Task, *, stores: bool) -> Rows:
 def run_tasks_references_first(
     tasks: Sequence[Task], pool: TaskPool, on_progress: OnProgress = ignore_progress
 ) -> list[RunOutcome]:
-    """Compute tasks as `run_tasks` does, references first; then the other rows whose reference is stored, slow and fast
-    ones in turn.
+    """Compute tasks as `run_tasks` does, references first; then the other rows whose reference is
+    stored, slow and fast ones in turn.
 
     Returns what became of each task, in the order in which they ended.
     """
@@ -149,7 +153,9 @@ def run_tasks_references_first(
         nonlocal done
         done += end.task.work
         if end.value is None:
-            outcome = RunOutcome(end.task.label, end.task.method, end.failure, end.message, is_stored=False)
+            outcome = RunOutcome(
+                end.task.label, end.task.method, end.failure, end.message, is_stored=False
+            )
         else:
             outcome = end.task.outcome(end.value)
         made.append(replace(outcome, share=done / total))
@@ -159,11 +165,16 @@ def run_tasks_references_first(
         note(end)
     waiting = [task for task in tasks if task.reference is not None]
     ready = [task for task in waiting if task.reference is not None and task.reference.is_stored]
-    # Slowest first, so that no long one starts last and keeps one process busy while the others wait; between them the
-    # fastest, which are those that are compiled, so that two processes seldom compile the same code at once.
+    # Slowest first, so that no long one starts last and keeps one process busy while the others
+    # wait; between them the fastest, which are those that are compiled, so that two processes
+    # seldom compile the same code at once.
     ready.sort(key=lambda task: -task.work)
     quarter, count = len(ready) // 4, len(ready)
-    turns = [task for pair in zip(ready[:quarter], ready[count - quarter :], strict=True) for task in pair]
+    turns = [
+        task
+        for pair in zip(ready[:quarter], ready[count - quarter :], strict=True)
+        for task in pair
+    ]
     for end in run_tasks(pool, [*turns, *ready[quarter : count - quarter]]):
         note(end)
     for task in waiting:

@@ -4,7 +4,8 @@ run, variant, method_code, split   (run) which run this is
 bearing_stiffness ...              (run) a variable for each varied parameter, in its own unit
 status, steps, message ...         (run) metrics
 code                               (run) which versions computed it
-angles ...                         (run, time, coordinate) trajectories, as asked for; NaN after a run broke off
+angles ...                         (run, time, coordinate) trajectories, as asked for; NaN after a
+                                   run broke off
 """
 
 from __future__ import annotations
@@ -37,11 +38,16 @@ from rotor_mbs.solution import quantities
 from rotor_mbs.solution.quantities import SCALES
 from rotor_mbs.solution.status import code_of
 
-MESSAGE_LENGTH = 256  # bytes; the longest message seen has 242, of a singularity that ode45 does not pass
+# bytes; the longest message seen has 242, of a singularity that ode45 does not pass
+MESSAGE_LENGTH = 256
 
 COLUMNS_OF_A_RUN = columns_in("sweep") | {
-    "rotor_angle_max": Column(("run",), "rad", "largest magnitude of the rotor angle over the samples"),
-    "rotor_rate_max": Column(("run",), "rad/s", "largest magnitude of the rotor rate over the samples"),
+    "rotor_angle_max": Column(
+        ("run",), "rad", ("largest magnitude of the rotor angle over the samples")
+    ),
+    "rotor_rate_max": Column(
+        ("run",), "rad/s", ("largest magnitude of the rotor rate over the samples")
+    ),
 }
 
 
@@ -60,8 +66,8 @@ def code_of_method(method: str) -> int:
 
 
 def sweep_table(sweep: Sweep, methods: Sequence[str], numbers: range) -> TableSpec:
-    """Return the table of the runs `numbers` of a sweep; run r is row r mod rows of the design, by method r div
-    rows."""
+    """Return the table of the runs `numbers` of a sweep; run r is row r mod rows of the design, by
+    method r div rows."""
     runs, rows, options = np.arange(numbers.start, numbers.stop), sweep.design.count, sweep.design
     known: dict[str, tuple[Column, Any]] = {}
     values = sweep.design.rows(numbers.start, numbers.stop)
@@ -75,9 +81,15 @@ def sweep_table(sweep: Sweep, methods: Sequence[str], numbers: range) -> TableSp
         column = Column(("run",), "1", "split of the dataset", attributes=flags(SPLITS))
         known["split"] = column, options.splits()[runs % rows]
     kind = {"float64": "<f8", "float32": "<f4"}[options.precision]
-    asked = [quantity for quantity in quantities.quantities(sweep.outputs) if quantity.output and quantity.required]
+    asked = [
+        quantity
+        for quantity in quantities.quantities(sweep.outputs)
+        if quantity.output and quantity.required
+    ]
     trajectories = {
-        quantity.name: Column(("run", *quantity.dimensions), quantity.units, quantity.long_name, kind)
+        quantity.name: Column(
+            ("run", *quantity.dimensions), quantity.units, quantity.long_name, kind
+        )
         for quantity in asked
     }
     computed = COLUMNS_OF_A_RUN | trajectories
@@ -89,14 +101,20 @@ def sweep_table(sweep: Sweep, methods: Sequence[str], numbers: range) -> TableSp
 
 @contextmanager
 def open_sweep(
-    output: Path, table: TableSpec, attributes: Mapping[str, object], time_limit_s: float = 0.0, *, fresh: bool = False
+    output: Path,
+    table: TableSpec,
+    attributes: Mapping[str, object],
+    time_limit_s: float = 0.0,
+    *,
+    fresh: bool = False,
 ) -> Iterator[tuple[StoredTable, NDArray[np.int8]]]:
-    """Open the file `output`, laid out where it is not there, which no other process writes in the block: its table,
-    and (runs,) their statuses, MISSING where they are to be computed.
+    """Open the file `output`, laid out where it is not there, which no other process writes in the
+    block: its table, and (runs,) their statuses, MISSING where they are to be computed.
 
-    time_limit_s: runs that a shorter limit ended are missing. fresh: all runs are to be computed; what is stored of one
-    stays until it is. Raises InputError where the output holds something else, or another process is writing it,
-    StoreError where it cannot be read or written, or the disk has no room for all runs.
+    time_limit_s: runs that a shorter limit ended are missing. fresh: all runs are to be computed;
+    what is stored of one stays until it is. Raises InputError where the output holds something
+    else, or another process is writing it, StoreError where it cannot be read or written, or the
+    disk has no room for all runs.
     """
     with locked(output):
         path = output.resolve() if output.is_symlink() else output  # a link stays one
@@ -106,10 +124,15 @@ def open_sweep(
                 pass
         file = TableFile(path, [""])
         if file.attributes.get(IDENTITY) != attributes[IDENTITY]:
-            raise InputError(f"{path}: not the file of this sweep; allowed: another output file, or remove that one")
+            raise InputError(
+                f"{path}: not the file of this sweep; allowed: another output file, "
+                "or remove that one"
+            )
         stored = file.tables[""]
         statuses = stored.statuses()
-        statuses[(statuses == code_of("timed_out")) & (stored.column("time_limit_s") < time_limit_s)] = MISSING
+        statuses[
+            (statuses == code_of("timed_out")) & (stored.column("time_limit_s") < time_limit_s)
+        ] = MISSING
         taken_back = np.flatnonzero((stored.column("status") != MISSING) & (statuses == MISSING))
         stored.place().mark_missing(taken_back.tolist())  # readers see it, too
         if fresh:
@@ -122,11 +145,11 @@ def open_sweep(
 
 
 class StoredSweep:
-    """A dataset that `rotor-mbs sweep` wrote, complete or not. Raises StoreError where it is none, or is damaged; with
-    allow_damaged_runs, not where only runs are.
+    """A dataset that `rotor-mbs sweep` wrote, complete or not. Raises StoreError where it is none,
+    or is damaged; with allow_damaged_runs, not where only runs are.
 
-    columns: every dataset, scales included. keys: of the varied parameters. damaged_runs: numbers of the stored runs
-    that are not what was written, by their checksums.
+    columns: every dataset, scales included. keys: of the varied parameters. damaged_runs: numbers
+    of the stored runs that are not what was written, by their checksums.
     """
 
     def __init__(self, path: Path, *, allow_damaged_runs: bool = False) -> None:
@@ -134,19 +157,28 @@ class StoredSweep:
         file = TableFile(path, [""])
         self.attributes = file.attributes
         if IDENTITY not in self.attributes or "" not in file.tables:
-            raise StoreError(f"{path}: no sweep's dataset; allowed: a file that `rotor-mbs sweep` wrote")
+            raise StoreError(
+                f"{path}: no sweep's dataset; allowed: a file that `rotor-mbs sweep` wrote"
+            )
         self._table = table = file.tables[""]
         self._check()
         known = {name: column for name, (column, _) in table.known.items()}
-        self.columns = {"run": Column(("run",), "1", "run number, from 0"), **known, **table.computed}
+        self.columns = {
+            "run": Column(("run",), "1", "run number, from 0"),
+            **known,
+            **table.computed,
+        }
         self.keys: list[str] = self.attributes["parameter_keys"]
         with reading(path):
             is_damaged = (table.column("status") != MISSING) & (table.statuses() == MISSING)
         self.damaged_runs = table.column("run")[is_damaged]
         if len(self.damaged_runs) and not allow_damaged_runs:
-            which = ", ".join(map(str, self.damaged_runs[:5])) + (" ..." if len(self.damaged_runs) > 5 else "")
+            which = ", ".join(map(str, self.damaged_runs[:5])) + (
+                " ..." if len(self.damaged_runs) > 5 else ""
+            )
             raise StoreError(
-                f"{path}: runs {which} changed after they were written; allowed: the sweep's own command, which "
+                f"{path}: runs {which} changed after they were written; allowed: the sweep's own "
+                "command, which "
                 "computes them again"
             )
 
@@ -157,16 +189,26 @@ class StoredSweep:
         require_texts(self.attributes, texts, place)
         for name in ("methods", "parameter_keys"):
             names = self.attributes.get(name)
-            if not isinstance(names, list) or not names or not all(isinstance(one, str) for one in names):
+            if (
+                not isinstance(names, list)
+                or not names
+                or not all(isinstance(one, str) for one in names)
+            ):
                 raise StoreError(f"{place}: its attribute {name} is no list of texts; damaged")
         self.shape = parsed(self.attributes.get("shape"), list, place)  # of a grid, slowest first
         self.settings = parsed(self.attributes.get("settings"), dict, place)
         parameters = map(parameter_name, self.attributes["parameter_keys"])
         missing = {*COLUMNS_OF_A_RUN} - {*table.computed} | {*parameters} - {*table.known}
         if missing or "time" not in table.known or "method_code" not in table.known:
-            raise StoreError(f"{place}: has no {', '.join(sorted(missing)) or 'time or method_code'}; damaged")
+            raise StoreError(
+                f"{place}: has no {', '.join(sorted(missing)) or 'time or method_code'}; damaged"
+            )
         runs, codes = table.column("run"), table.column("method_code")
-        if runs.dtype.kind != "i" or (runs != np.arange(len(runs)) + runs[:1].sum()).any() or (runs < 0).any():
+        if (
+            runs.dtype.kind != "i"
+            or (runs != np.arange(len(runs)) + runs[:1].sum()).any()
+            or (runs < 0).any()
+        ):
             raise StoreError(f"{place}: run is no count; damaged")
         if ((codes < 0) | (codes >= len(self.methods))).any():
             raise StoreError(f"{place}: method_code names no method; damaged")
@@ -182,7 +224,8 @@ class StoredSweep:
         return names
 
     def column(self, name: str) -> NDArray[Any]:
-        """A dataset; computed ones as they lie in the file, read where they are indexed. Raises StoreError."""
+        """A dataset; computed ones as they lie in the file, read where they are indexed. Raises
+        StoreError."""
         if name not in self.columns:
             what = f"has no {shown_value(name)}"
             raise StoreError(f"{self._path}: {what}; allowed: a sweep whose outputs have it")
@@ -200,7 +243,9 @@ class StoredSweep:
         scales = {name: values for name, (_, values) in self._table.known.items() if name in SCALES}
         method = self.methods[int(self.column("method_code")[row])]
         known = {"settings": self.attributes["settings"]}
-        return StoredRun(str(self.attributes["base_scene"]), method, known, scales, self._table.place(row))
+        return StoredRun(
+            str(self.attributes["base_scene"]), method, known, scales, self._table.place(row)
+        )
 
     def _row_of(self, number: int) -> int:
         return number - int(self.column("run")[0])

@@ -5,12 +5,13 @@
     /bench, /stability    a row per point
     /                     of a sweep's file: one table
 
-All space is taken when a file is laid out (`runs.layout`). From then on no HDF5 metadata changes, so that the file is
-valid and can be read at every moment. What the design says of a row (its scene, method, settings, versions) is written
-with the layout and covered by the digest in the file's trailer (`runs.trailer`); rows have checksums (`runs.rows`).
+All space is taken when a file is laid out (`runs.layout`). From then on no HDF5 metadata changes,
+so that the file is valid and can be read at every moment. What the design says of a row (its scene,
+method, settings, versions) is written with the layout and covered by the digest in the file's
+trailer (`runs.trailer`); rows have checksums (`runs.rows`).
 
-An HDF5 handle that is open while rows are written reads old values, and one that writes would destroy them: nothing is
-written by the HDF5 library after the layout.
+An HDF5 handle that is open while rows are written reads old values, and one that writes would
+destroy them: nothing is written by the HDF5 library after the layout.
 """
 
 from __future__ import annotations
@@ -55,7 +56,8 @@ from rotor_mbs.runs.trailer import (
 )
 from rotor_mbs.solution.status import STATUSES
 
-IDENTITY = "sweep_identity"  # the attribute of a sweep's file with a hash of all that the design says
+# the attribute of a sweep's file with a hash of all that the design says
+IDENTITY = "sweep_identity"
 _READ_BYTES = 1 << 25  # read at once when checksums are verified
 _LONGEST_LABEL = 1000  # characters; names of files are shorter
 T = TypeVar("T")
@@ -76,8 +78,8 @@ class StoredTable(TableSpec):
     offsets: Mapping[str, int]
 
     def column(self, name: str) -> NDArray[Any]:
-        """(rows, ...) A column, or a scale, of a table in a file; a computed one as it lies there, read where it is
-        indexed. Raises StoreError where there is none of that name."""
+        """(rows, ...) A column, or a scale, of a table in a file; a computed one as it lies there,
+        read where it is indexed. Raises StoreError where there is none of that name."""
         if name == "run":
             return np.asarray(self.runs)
         if name in self.known:
@@ -109,21 +111,29 @@ class StoredTable(TableSpec):
         return statuses
 
     def clear(self) -> None:
-        """Write blank rows, which a reader of an unfinished file sees; their statuses stay as they are."""
+        """Write blank rows, which a reader of an unfinished file sees; their statuses stay as they
+        are."""
         with self.path.open("r+b") as file:
             for name, blank in blank_rows(1, self.row_type).items():
                 if name != "status":
                     file.seek(self.offsets[name])
-                    for _ in range(len(self.runs) if "run" in self.computed[name].dimensions else 1):
+                    for _ in range(
+                        len(self.runs) if "run" in self.computed[name].dimensions else 1
+                    ):
                         file.write(blank.data)
 
     def place(self, row: int = 0) -> RowLocation:
-        """Where the rows from `row` on are. Their checksums begin with the run where that is a number, else the row."""
-        is_numbered = isinstance(self.runs, np.ndarray) and self.runs.dtype.kind == "i" and len(self.runs) > 0
+        """Where the rows from `row` on are. Their checksums begin with the run where that is a
+        number, else the row."""
+        is_numbered = (
+            isinstance(self.runs, np.ndarray) and self.runs.dtype.kind == "i" and len(self.runs) > 0
+        )
         names = [name for name, column in self.computed.items() if "run" in column.dimensions]
         kinds = np.dtype([(name, self.row_type[name]) for name in names])
         offsets = {name: self.offsets[name] for name in names}
-        return RowLocation(self.path, self.inode, int(self.runs[0]) if is_numbered else 0, offsets, kinds).at(row)
+        return RowLocation(
+            self.path, self.inode, int(self.runs[0]) if is_numbered else 0, offsets, kinds
+        ).at(row)
 
 
 def parsed(text: object, kind: type[T], place: object) -> T:
@@ -133,16 +143,18 @@ def parsed(text: object, kind: type[T], place: object) -> T:
     except (ValueError, RecursionError):
         value = None
     if not isinstance(value, kind):
-        raise StoreError(f"{place}: {str(text)[:50]!r} is no JSON text of a {kind.__name__}; damaged")
+        raise StoreError(
+            f"{place}: {str(text)[:50]!r} is no JSON text of a {kind.__name__}; damaged"
+        )
     return value
 
 
 class TableFile:
     """The tables of a file, by their groups; rows are read and written by their places.
 
-    only: groups of the tables that are read, by default all. laid_out_as: attributes and all tables of a file that was
-    just laid out, which is not read. Raises StoreError where the file cannot be read, or what was laid out has changed
-    since.
+    only: groups of the tables that are read, by default all. laid_out_as: attributes and all tables
+    of a file that was just laid out, which is not read. Raises StoreError where the file cannot be
+    read, or what was laid out has changed since.
     """
 
     def __init__(
@@ -180,7 +192,8 @@ class TableFile:
             self._check_runs()
 
     def copy(self) -> TableFile:
-        """Return a copy with the same tables, to which others can be added, or from which they can be removed."""
+        """Return a copy with the same tables, to which others can be added, or from which they can
+        be removed."""
         other = copy.copy(self)
         other.tables = dict(self.tables)
         return other
@@ -190,7 +203,9 @@ class TableFile:
         rows = self.tables[RUNS].known_rows if RUNS in self.tables else {}
         for run, row in rows.items():
             scene, method = row["scene"], row["method_name"]
-            is_there = scene in self.groups and (scene not in self.tables or method in self.tables[scene].runs)
+            is_there = scene in self.groups and (
+                scene not in self.tables or method in self.tables[scene].runs
+            )
             if run != f"{scene}/{method}" or not is_there or len(run) > _LONGEST_LABEL:
                 raise StoreError(f"{self.path}: {run[:_LONGEST_LABEL]} has no arrays; damaged")
 
@@ -206,13 +221,18 @@ class TableFile:
         label = run.removeprefix(f"{scene}/")
         others = arrays.place(arrays.row_of[label])
         offsets = {STATUS_COPIES.get(name, name): offset for name, offset in others.offsets.items()}
-        kinds = [(STATUS_COPIES.get(name, name), others.row_type[name]) for name in others.row_type.names or ()]
+        kinds = [
+            (STATUS_COPIES.get(name, name), others.row_type[name])
+            for name in others.row_type.names or ()
+        ]
         for name, column in arrays.computed.items():
             if label == REFERENCE and "run" not in column.dimensions:
                 offsets[name] = arrays.offsets[name]
                 kinds.append((name, arrays.row_type[name]))
         own = [(name, place.row_type[name]) for name in place.row_type.names or ()]
-        return replace(place, offsets={**place.offsets, **offsets}, row_type=np.dtype([*own, *kinds]))
+        return replace(
+            place, offsets={**place.offsets, **offsets}, row_type=np.dtype([*own, *kinds])
+        )
 
 
 _opened: dict[tuple[Path, Path, tuple[int, ...]], TableFile] = {}
@@ -228,7 +248,8 @@ def opened_tables(path: Path, only: Collection[str] | None = None) -> TableFile:
 
     Parameters
     ----------
-    path, only : see `TableFile`; the result may have further tables, which an earlier call asked for.
+    path, only : see `TableFile`; the result may have further tables, which an earlier call asked
+        for.
     """
     try:
         state = path.stat()
@@ -254,7 +275,8 @@ def opened_tables(path: Path, only: Collection[str] | None = None) -> TableFile:
 
 
 def _table(path: Path, group: str, stored: StoredGroup, inode: int) -> StoredTable:
-    """Return the table of a group. Raises StoreError where it is not what was laid out, or is no table."""
+    """Return the table of a group. Raises StoreError where it is not what was laid out, or is no
+    table."""
     known = {name: (stored.columns[name], values) for name, values in stored.values.items()}
     computed = {name: stored.columns[name] for name in stored.rows}
     offsets = {name: rows.offset for name, rows in stored.rows.items()}
@@ -275,7 +297,9 @@ def _table(path: Path, group: str, stored: StoredGroup, inode: int) -> StoredTab
         is_wrong = rows.shape != shape or kind.kind not in "fiuS" or not rows.is_in_place
         if name in COLUMNS and name not in ONCE_A_SCENE:
             usual = COLUMNS[name]
-            is_wrong = is_wrong or kind != np.dtype(usual.kind) or column.dimensions != usual.dimensions
+            is_wrong = (
+                is_wrong or kind != np.dtype(usual.kind) or column.dimensions != usual.dimensions
+            )
         if is_wrong:
             raise StoreError(f"{path}: {group}/{name} has shape {rows.shape} of {kind}; damaged")
     _check(table)
@@ -296,7 +320,8 @@ _OF_A_SCENE = (STATUS_COPIES, ("time",), ("title", "scene_toml", "scene_hash"))
 
 
 def _check(table: StoredTable) -> None:
-    """Raise StoreError where a table lacks what every table of its kind has, or a column has another length.
+    """Raise StoreError where a table lacks what every table of its kind has, or a column has
+    another length.
 
     A digest can be right although another program wrote the file.
     """

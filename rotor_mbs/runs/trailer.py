@@ -1,13 +1,16 @@
-"""The trailer of a file of this program: behind HDF5's end, where the rows lie and a digest of every other byte.
+"""The trailer of a file of this program: behind HDF5's end, where the rows lie and a digest of
+every other byte.
 
     HDF5 | JSON | its length, 8 bytes | SHA-256, 32 bytes | MAGIC
 
-The JSON has `format_version`, `kind`, and `groups`: by group, by name of each computed column, offset and length in
-bytes of its rows, in the order in which the checksum of a row covers them. The digest covers all that stands before
-it, but for these rows, which have checksums of their own: it is right from the layout on, whichever rows are filled.
+The JSON has `format_version`, `kind`, and `groups`: by group, by name of each computed column,
+offset and length in bytes of its rows, in the order in which the checksum of a row covers them. The
+digest covers all that stands before it, but for these rows, which have checksums of their own: it
+is right from the layout on, whichever rows are filled.
 
-A flipped bit can hang the HDF5 library, or end the process: whoever opens a file reads the trailer first. It is read
-anew each time, since it is cheap: rows, nearly all of a large file, are not hashed.
+A flipped bit can hang the HDF5 library, or end the process: whoever opens a file reads the trailer
+first. It is read anew each time, since it is cheap: rows, nearly all of a large file, are not
+hashed.
 """
 
 from __future__ import annotations
@@ -24,7 +27,8 @@ from rotor_mbs.errors import InputError, StoreError
 
 FORMAT_VERSION = 3
 MAGIC = b"rmbs-end"
-# The attribute `integrity` of every file: how it is checked. By it a file is known whose trailer is gone.
+# The attribute `integrity` of every file: how it is checked. By it a file is known whose trailer is
+# gone.
 INTEGRITY = "CRC-32 of each row; SHA-256 of the rest, behind the end of HDF5"
 RESULTS, SWEEP, MODES, COMPARISON = "results", "sweep", "modes", "comparison"
 SPLIT_OF = "split of "  # and the name of the sweep's file: a split of its dataset
@@ -58,7 +62,9 @@ class Trailer(NamedTuple):
 
 def trailer_of(file: IO[bytes], kind: str, groups: Regions) -> bytes:
     """The bytes to be appended to an HDF5 file that is laid out."""
-    text = json.dumps({"format_version": FORMAT_VERSION, "kind": kind, "groups": groups}, separators=(",", ":"))
+    text = json.dumps(
+        {"format_version": FORMAT_VERSION, "kind": kind, "groups": groups}, separators=(",", ":")
+    )
     head = text.encode() + len(text.encode()).to_bytes(_LENGTH, "little")
     digest = hashlib.sha256()
     for block in _blocks(file, file.seek(0, 2), groups):
@@ -73,7 +79,8 @@ def digest_of(trailer: bytes) -> bytes:
 
 
 def is_of_this_program(path: Path) -> bool:
-    """Return whether a file ends as those that this program writes; it may be damaged all the same."""
+    """Return whether a file ends as those that this program writes; it may be damaged all the
+    same."""
     if not path.is_file():
         return False
     with path.open("rb") as file:
@@ -84,11 +91,14 @@ def is_of_this_program(path: Path) -> bool:
 def read_trailer(path: Path) -> Trailer:
     """What the trailer of a file says, which is as it was written but for its rows.
 
-    Raises StoreError where the file cannot be read, is not one of this program and format, or has changed.
+    Raises StoreError where the file cannot be read, is not one of this program and format, or has
+    changed.
     """
     if not path.is_file():
         found = "is a folder" if path.is_dir() else "no such file"
-        raise StoreError(f"{path}: {found}; allowed: a results file, as rotor-mbs run or reproduce writes it")
+        raise StoreError(
+            f"{path}: {found}; allowed: a results file, as rotor-mbs run or reproduce writes it"
+        )
     try:
         with path.open("rb") as file:
             return _checked(path, file)
@@ -102,7 +112,9 @@ def _checked(path: Path, file: IO[bytes]) -> Trailer:
     tail = file.read(_TAIL)
     if len(tail) < _TAIL or not tail.endswith(MAGIC):
         raise StoreError(f"{path}: {_why_without(path, file, size)}")
-    damaged = StoreError(f"{path}: damaged: what was laid out is not as it was written (its digest does not match)")
+    damaged = StoreError(
+        f"{path}: damaged: what was laid out is not as it was written (its digest does not match)"
+    )
     length = int.from_bytes(tail[:_LENGTH], "little")
     end = size - _TAIL - length
     if end < 0 or length > _LONGEST_JSON:
@@ -122,11 +134,14 @@ def _checked(path: Path, file: IO[bytes]) -> Trailer:
         raise damaged
     if version != FORMAT_VERSION:
         raise StoreError(
-            f"{path}: format_version {version!r}, this program reads {FORMAT_VERSION}; allowed: a file of this "
+            f"{path}: format_version {version!r}, this program reads {FORMAT_VERSION}; allowed: a "
+            "file of this "
             "version, with its runs recomputed"
         )
     if not isinstance(kind, str) or not _words(kind):
-        raise StoreError(f"{path}: damaged: kind {kind!r}; allowed: {', '.join(_KINDS)}, {SPLIT_OF}FILE")
+        raise StoreError(
+            f"{path}: damaged: kind {kind!r}; allowed: {', '.join(_KINDS)}, {SPLIT_OF}FILE"
+        )
     return Trailer(kind, groups, os.fstat(file.fileno()).st_ino, digest.digest())
 
 
@@ -134,14 +149,17 @@ def refuse_split(path: Path, kind: str) -> None:
     """Raise StoreError for a file that is a split of a sweep's dataset."""
     if kind.startswith(SPLIT_OF):
         whole = kind.removeprefix(SPLIT_OF)
-        raise StoreError(f"{path}: a split for Hugging Face datasets; allowed: the sweep's own file, {whole}")
+        raise StoreError(
+            f"{path}: a split for Hugging Face datasets; allowed: the sweep's own file, {whole}"
+        )
 
 
 def may_extend(path: Path, kind: str) -> bool:
-    """Decide what a command may write to: whether there is a file of the kind that it extends, and not nothing yet.
+    """Decide what a command may write to: whether there is a file of the kind that it extends, and
+    not nothing yet.
 
-    An empty file is nothing. Raises InputError where the file holds something else, StoreError where it is damaged, or
-    not this program's.
+    An empty file is nothing. Raises InputError where the file holds something else, StoreError
+    where it is damaged, or not this program's.
     """
     if path.is_dir():
         raise StoreError(f"{path}: is a folder; allowed: the name of a file")
@@ -150,7 +168,8 @@ def may_extend(path: Path, kind: str) -> bool:
     found = read_trailer(path).kind
     if found != kind:
         raise InputError(
-            f"{path}: holds {_words(found)}, and this command writes {_words(kind)}; allowed: another output file"
+            f"{path}: holds {_words(found)}, and this command writes {_words(kind)}; allowed: "
+            "another output file"
         )
     return True
 
@@ -160,8 +179,8 @@ def _words(kind: str) -> str:
 
 
 def _blocks(file: IO[bytes], end: int, groups: Regions) -> Iterator[bytes]:
-    """Yield the bytes before `end` outside the rows. Raises ValueError, TypeError, AttributeError where `groups` are no
-    regions one behind the other."""
+    """Yield the bytes before `end` outside the rows. Raises ValueError, TypeError, AttributeError
+    where `groups` are no regions one behind the other."""
     every = [tuple(region) for columns in groups.values() for region in columns.values()]
     position = 0
     for start, length in [*sorted(region for region in every if region[1]), (end, 0)]:
@@ -193,5 +212,8 @@ def _why_without(path: Path, file: IO[bytes], size: int) -> str:
             return "changed: another program has written to it since (its trailer is gone)"
         return "cut off, or another program has written to it (its trailer is not at its end)"
     if b"rotor_mbs" in head and b"format_version" in head:
-        return f"of an earlier format, this program reads format_version {FORMAT_VERSION}; allowed: to compute it again"
+        return (
+            f"of an earlier format, this program reads format_version {FORMAT_VERSION}; "
+            "allowed: to compute it again"
+        )
     return "not a file of this program, or damaged; allowed: a file that rotor-mbs wrote"

@@ -31,7 +31,8 @@ TIME_S = 10.0
 TIME_OF_BYTE_S = 1e-5
 MEMORY = 1 << 30
 MEMORY_OF_BYTE = 16
-_WAIT_S = 300.0  # for what takes time without the processor; also the limit where the system has none
+# for what takes time without the processor; also the limit where the system has none
+_WAIT_S = 300.0
 _SET_UP_S = 60.0
 
 
@@ -95,7 +96,9 @@ def read_in_worker(path: Path, read: Callable[[Path, T], R], argument: T) -> R:
     raise StoreError(f"{path}: {problem}; allowed: a file that rotor-mbs wrote")
 
 
-def _read_limited(arguments: tuple[float, int, Callable[[Path, T], R], Path, T]) -> tuple[R | None, bool]:
+def _read_limited(
+    arguments: tuple[float, int, Callable[[Path, T], R], Path, T],
+) -> tuple[R | None, bool]:
     """Call `read(path, argument)` within limits of this process.
 
     Returns

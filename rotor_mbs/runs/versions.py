@@ -1,4 +1,5 @@
-"""What the results depend on besides scene and method: versions, machine, and the program's own code."""
+"""What the results depend on besides scene and method: versions, machine, and the program's own
+code."""
 
 from __future__ import annotations
 
@@ -16,7 +17,8 @@ from rotor_mbs.methods.catalogue import methods
 from rotor_mbs.processes import cores
 
 _LIBRARIES = ("numpy", "h5py")
-NUMERICS = ("scenario", "solution", "methods", "models")  # folders of the package that decide a run's numbers
+# folders of the package that decide a run's numbers
+NUMERICS = ("scenario", "solution", "methods", "models")
 # Docstrings, and comments outside of strings.
 _WITHOUT_EFFECT = re.compile(
     r'^[ \t]*[rR]?"""(?:[^\\]|\\.)*?"""[ \t]*$'
@@ -27,13 +29,15 @@ _WITHOUT_EFFECT = re.compile(
 
 
 def versions() -> dict[str, str]:
-    """Versions of this package, of the engines and libraries ("not installed" where one is missing), and of Python."""
+    """Versions of this package, of the engines and libraries ("not installed" where one is
+    missing), and of Python."""
     return versions_with(*(name for method in methods() for name in method.distributions))
 
 
 @functools.cache
 def versions_with(*distributions: str) -> dict[str, str]:
-    """Versions of this package, of Python, of the libraries that every method uses, and of `distributions`."""
+    """Versions of this package, of Python, of the libraries that every method uses, and of
+    `distributions`."""
     known = {"rotor_mbs": rotor_mbs.__version__, "python": platform.python_version()}
     for name in dict.fromkeys((*distributions, *_LIBRARIES)):
         try:
@@ -44,28 +48,47 @@ def versions_with(*distributions: str) -> dict[str, str]:
 
 
 def row_versions(method: Method) -> dict[str, str]:
-    """What computes a run by this method: versions, a digest of the code, and one of a plug-in's own code."""
+    """What computes a run by this method: versions, a digest of the code, and one of a plug-in's
+    own code."""
     own = {"plug-in": code_digest(tuple(method.sources))} if method.sources else {}
     return {**versions_with(*method.distributions), "code": numerics_digest(), **own}
 
 
 @functools.cache
 def machine() -> dict[str, str]:
-    """Operating system and processor, as the system reports them; the cores that this process may use."""
+    """Operating system and processor, as the system reports them; the cores that this process may
+    use."""
     processor, information = platform.processor() or platform.machine(), Path("/proc/cpuinfo")
     if information.is_file():
-        named = re.search(r"^model name\s*:\s*(.*?)\s*$", information.read_text(errors="replace"), re.MULTILINE)
+        named = re.search(
+            r"^model name\s*:\s*(.*?)\s*$", information.read_text(errors="replace"), re.MULTILINE
+        )
         processor = named[1] if named else processor
     count = cores()
-    return {"platform": platform.platform(), "cpu": f"{processor}, {count} {'core' if count == 1 else 'cores'}"}
+    return {
+        "platform": platform.platform(),
+        "cpu": (f"{processor}, {count} {'core' if count == 1 else 'cores'}"),
+    }
 
 
 # Attributes of a file that say what made it, in the order in which they are shown.
-_MADE_WITH = ("rotor_mbs", "python", "exudyn", "heyoka", "mujoco", "numpy", "scipy", "h5py", "platform", "cpu")
+_MADE_WITH = (
+    "rotor_mbs",
+    "python",
+    "exudyn",
+    "heyoka",
+    "mujoco",
+    "numpy",
+    "scipy",
+    "h5py",
+    "platform",
+    "cpu",
+)
 
 
 def made_with(attributes: Mapping[str, object]) -> list[tuple[str, str]]:
-    """Return (what, version) of the programs and the computer that made a file, and when, from its attributes."""
+    """Return (what, version) of the programs and the computer that made a file, and when, from its
+    attributes."""
     made = [(name, str(attributes[name])) for name in _MADE_WITH if attributes.get(name)]
     created = str(attributes.get("created", ""))
     if created:
@@ -77,16 +100,24 @@ def made_with(attributes: Mapping[str, object]) -> list[tuple[str, str]]:
 def numerics_digest() -> str:
     """Of the part of this package that decides a run's numbers."""
     package = Path(rotor_mbs.__file__).parent
-    return code_digest(tuple(path for part in NUMERICS for path in sorted((package / part).rglob("*.py"))))
+    return code_digest(
+        tuple(path for part in NUMERICS for path in sorted((package / part).rglob("*.py")))
+    )
 
 
 @functools.cache
 def code_digest(sources: tuple[Path | str, ...]) -> str:
-    """Twelve hexadecimal digits of a SHA-256 over source files, or texts, without comments, docstrings and empty
-    lines."""
+    """Twelve hexadecimal digits of a SHA-256 over source files, or texts, without comments,
+    docstrings and empty lines."""
     digest = hashlib.sha256()
     for source in sources:
-        code = source if isinstance(source, str) else source.read_text(encoding="utf-8", errors="replace")
+        code = (
+            source
+            if isinstance(source, str)
+            else source.read_text(encoding="utf-8", errors="replace")
+        )
         text = _WITHOUT_EFFECT.sub(lambda match: match[1] or "", code)
-        digest.update("\n".join(line.rstrip() for line in text.splitlines() if line.strip()).encode())
+        digest.update(
+            "\n".join(line.rstrip() for line in text.splitlines() if line.strip()).encode()
+        )
     return digest.hexdigest()[:12]

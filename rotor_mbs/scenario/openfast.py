@@ -369,7 +369,9 @@ def _nodes(
     return centres, [width] * count, f"its {count} equal nodes"
 
 
-def _aerodyn14_nodes(structure: InputFile, aero: InputFile, length: float) -> tuple[list[float], list[float], str]:
+def _aerodyn14_nodes(
+    structure: InputFile, aero: InputFile, length: float
+) -> tuple[list[float], list[float], str]:
     """Return distances from the root and widths of AeroDyn 14's nodes, m, and what they are."""
     count = aero.whole("BldNodes", 1, MAX_NODES)
     header = aero.line_with("RNodes", "DRNodes")
@@ -613,7 +615,9 @@ def _left_out(main: InputFile, structure: InputFile, elastic: int, count: int) -
     if not structure.flag("PitchDOF"):
         notes.append("commands of the pitch: it is prescribed; rows [t, -pitch] are bearing.rest")
     if not structure.flag("GenDOF", default=True):
-        notes.append("a prescribed speed (GenDOF False): a rotor in balance keeps its speed by itself")
+        notes.append(
+            "a prescribed speed (GenDOF False): a rotor in balance keeps its speed by itself"
+        )
     if elastic == 2:
         notes.append("flexible blades (BeamDyn)")
     bending = ("FlapDOF1", "FlapDOF2", "EdgeDOF")
@@ -630,7 +634,9 @@ def _left_out(main: InputFile, structure: InputFile, elastic: int, count: int) -
     )  # fmt: skip
     if any(map(structure.flag, moving)):
         names = _listed(structure, moving)
-        notes.append(f"motion of nacelle, tower or platform ({names}): the shaft's bearing rests here")
+        notes.append(
+            f"motion of nacelle, tower or platform ({names}): the shaft's bearing rests here"
+        )
     for name, effect in (("PtfmPitch", "tilt less it"), ("PtfmRoll", ""), ("TTDspFA", "")):
         value = structure.number(name, default=0.0)
         if value:

@@ -148,7 +148,10 @@ def _hub_and_start_lines(rotor: OpenFastRotor) -> list[str]:
     """Return the tables of the hub, the start and the torque."""
     azimuth = rotor.azimuth - rotor.azimuth_up
     angles = [_angle(azimuth), *(_angle(-blade.pitch) for blade in rotor.blades)]
-    rates = [f'"{_plain(rotor.speed)}*pi/30"' if rotor.speed else "0.0", *["0.0"] * len(rotor.blades)]
+    rates = [
+        f'"{_plain(rotor.speed)}*pi/30"' if rotor.speed else "0.0",
+        *["0.0"] * len(rotor.blades),
+    ]
     inertia = f'inertia = "{rotor.hub_inertia_text}"'
     return [
         "[hub]",

@@ -23,7 +23,16 @@ from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 from rotor_mbs.errors import InputError, PlausibilityWarning
 from rotor_mbs.scenario import keys
-from rotor_mbs.scenario.keys import Kind, counted, file_key, invalid, list_of, read_each, restricted, within
+from rotor_mbs.scenario.keys import (
+    Kind,
+    counted,
+    file_key,
+    invalid,
+    list_of,
+    read_each,
+    restricted,
+    within,
+)
 from rotor_mbs.scenario.time_table import (
     LoadTable,
     Segment,
@@ -542,7 +551,9 @@ class Scene:
         rows = ""
         for cells in _short_keys(self):
             key, unit, value = map(escape, cells)
-            rows += f"<tr><th style='text-align:left'>{key}</th><td>{value}</td><td>{unit}</td></tr>"
+            rows += (
+                f"<tr><th style='text-align:left'>{key}</th><td>{value}</td><td>{unit}</td></tr>"
+            )
         return f"<table><caption>{escape(f'{self.label}: {self.title}')}</caption>{rows}</table>"
 
     @property
@@ -987,8 +998,11 @@ def _short_keys(scene: Scene) -> list[tuple[str, str, str]]:
     for path, value in scene_keys(scene):
         unit = unit_of(path)
         if path != ("title",) and value != []:
-            rows.append((shown_key(path), "" if unit == "1" else unit, _short_value(without_times(value))))
-    rows.sort(key=lambda row: row[0].startswith("blade["))  # unequal blades last: there may be hundreds
+            rows.append(
+                (shown_key(path), "" if unit == "1" else unit, _short_value(without_times(value)))
+            )
+    # unequal blades last: there may be hundreds
+    rows.sort(key=lambda row: row[0].startswith("blade["))
     if len(rows) > _SHOWN_KEYS:
         rows[_SHOWN_KEYS:] = [(f"... {len(rows) - _SHOWN_KEYS} more keys", "", "")]
     return rows

@@ -229,7 +229,10 @@ class Design:
     draws: int = file_key("draws", _DRAWS, default=0)
     seed: int = file_key("seed", _SEED, default=0)
     validation: float = file_key(
-        "validation", _SHARE, note=": fraction of the runs, of a grid with random axes of the draws", default=0.0
+        "validation",
+        _SHARE,
+        note=": fraction of the runs, of a grid with random axes of the draws",
+        default=0.0,
     )
     test: float = file_key("test", _SHARE, note="; validation + test < 1", default=0.0)
     axes: tuple[Axis, ...] = file_key("axis", _AXES)
@@ -326,8 +329,9 @@ class Design:
     def splits(self) -> NDArray[np.int8]:
         """Return which rows are for training, validation and test: places in `SPLITS`, (rows,).
 
-        Rows of the same draw are in the same split. Otherwise, in a grid of random and other axes, nearly every draw
-        would be in several, and a model would be tested on starts that it was trained with.
+        Rows of the same draw are in the same split. Otherwise, in a grid of random and other axes,
+        nearly every draw would be in several, and a model would be tested on starts that it was
+        trained with.
         """
         shape, drawn = self.shape, [axis.is_drawn for axis in self.axes]
         numbers = np.arange(self.count)

@@ -1,16 +1,19 @@
-"""Interval defects of a run: the closed form integrated from each sample to the next, minus the run's next sample.
+"""Interval defects of a run: the closed form integrated from each sample to the next, minus the
+run's next sample.
 
-Within one interval between samples no chaos can grow, so that defects need no horizon: every second of every run is
-judged, and a fault is located in time. Their signed sum, carried to the end by the transition matrices of the
-intervals, predicts the error of the whole run without a reference. `models.lagrange.defects` computes them.
+Within one interval between samples no chaos can grow, so that defects need no horizon: every second
+of every run is judged, and a fault is located in time. Their signed sum, carried to the end by the
+transition matrices of the intervals, predicts the error of the whole run without a reference.
+`models.lagrange.defects` computes them.
 
-The rule by which they are judged, with b the bound of a method for 0.01 s, h the length of an interval and G the growth
-of an error over it:
+The rule by which they are judged, with b the bound of a method for 0.01 s, h the length of an
+interval and G the growth of an error over it:
 
     allowed = min(b, 0.01 rad) max(1, h / 0.01 s) max(1, G),    excess = size - 3 floor
 
-An excess above what is allowed is a fault. An interval that shows no fault is not judged where its excess is more than
-0.01 rad, which is allowed only between rows that are far apart, or where rounding alone may be as large (`is_judged`).
+An excess above what is allowed is a fault. An interval that shows no fault is not judged where its
+excess is more than 0.01 rad, which is allowed only between rows that are far apart, or where
+rounding alone may be as large (`is_judged`).
 """
 
 from __future__ import annotations
@@ -25,18 +28,21 @@ from numpy.typing import NDArray
 from rotor_mbs.solution.status import OK_ERROR
 from rotor_mbs.solution.trajectory import Array, Trajectory
 
-# What the rounding of a run's own numbers makes of a defect, as it is estimated, may be this many times larger.
+# What the rounding of a run's own numbers makes of a defect, as it is estimated, may be this many
+# times larger.
 FLOOR_SAFETY = 3.0
-# s, the interval for which bounds are given: in n of them the errors of a method add up, each grown by at most G.
+# s, the interval for which bounds are given: in n of them the errors of a method add up, each grown
+# by at most G.
 _BOUND_INTERVAL = 0.01
 # rad, below any number that a defect can be told from.
 _SMALLEST_FLOOR = 1e-18
-# rad: a pitch that should stay zero has left it when it is past this: ten million times above round-off of a radian,
-# far below what a plot shows.
+# rad: a pitch that should stay zero has left it when it is past this: ten million times above
+# round-off of a radian, far below what a plot shows.
 LEFT_ZERO = 1e-9
 # Rows over which defects are added up, to show a drift that every one of them hides.
 DRIFT_ROWS = 100
-# Intervals whose matrices are worked on at once: of a run of a million samples all of them would take gigabytes.
+# Intervals whose matrices are worked on at once: of a run of a million samples all of them would
+# take gigabytes.
 BLOCK_ROWS = 40 * DRIFT_ROWS
 
 
@@ -47,17 +53,21 @@ class Defects:
     Attributes
     ----------
     time : (n,) s, sample times.
-    angles, rates : (n - 1, 1 + blades) rad and rad/s, closed form minus run; NaN if its integration fails.
-    rate_units : (1 + blades,) rad/s, scale of the rates: a rate defect times the interval is an angle.
+    angles, rates : (n - 1, 1 + blades) rad and rad/s, closed form minus run; NaN if its integration
+        fails.
+    rate_units : (1 + blades,) rad/s, scale of the rates: a rate defect times the interval is an
+        angle.
     find_transitions : function that computes `transitions`.
     moving : coordinates with inertia.
     resting : pitches that stay at zero by symmetry, where the error is the state itself.
     own_loads : loads of the closed form at the states of the run; without arrays if not requested.
     growth_units : (m,) scales of the error growth of the scene: angles, then rates.
     states : (n, m) angles, then rates, of the moving coordinates of the run.
-    rounding : (n, m) half a unit in the last place of each of these numbers, and what half a unit in the last place of
+    rounding : (n, m) half a unit in the last place of each of these numbers, and what half a unit
+        in the last place of
         the row's time makes of them.
-    conditioning : (n - 1,) factor by which the nearly singular mass matrix magnifies rounding inside an interval.
+    conditioning : (n - 1,) factor by which the nearly singular mass matrix magnifies rounding
+        inside an interval.
     start : (m,) initial state of the scene in these coordinates.
     precision : relative error of a step of the integration from row to row.
     """
@@ -79,19 +89,21 @@ class Defects:
 
     @functools.cached_property
     def transitions(self) -> Array:
-        """State transition matrices of the moving coordinates, (n - 1, m, m): angles, then rates; infinite where the
-        closed form has no end."""
+        """State transition matrices of the moving coordinates, (n - 1, m, m): angles, then rates;
+        infinite where the closed form has no end."""
         return self.find_transitions()
 
     @functools.cached_property
     def sizes(self) -> Array:
-        """Largest defect over the coordinates, of angles and of rates in `rate_units`: (n - 1,) rad; inf for NaN."""
+        """Largest defect over the coordinates, of angles and of rates in `rate_units`: (n - 1,)
+        rad; inf for NaN."""
         both = np.hstack([np.abs(self.angles), np.abs(self.rates) / self.rate_units])
         return np.asarray(np.where(np.isfinite(both), both, np.inf).max(axis=1))
 
     @property
     def channel_sizes(self) -> Array:
-        """Magnitudes of the defects of the moving coordinates: (n - 1, m) rad, angles, then rates; inf for NaN."""
+        """Magnitudes of the defects of the moving coordinates: (n - 1, m) rad, angles, then rates;
+        inf for NaN."""
         sizes = np.abs(self._vectors) / self._units
         return np.asarray(np.where(np.isfinite(sizes), sizes, np.inf))
 
@@ -104,13 +116,18 @@ class Defects:
     def floors(self) -> Array:
         """Largest defects that rounding can cause, per coordinate: (n - 1, m) rad.
 
-        That of the row at the start, carried to the end; that of the row at the end; and that of the arithmetic in
-        between, which grows as much as any other error.
+        That of the row at the start, carried to the end; that of the row at the end; and that of
+        the arithmetic in between, which grows as much as any other error.
         """
         with np.errstate(all="ignore"):
             carried = np.empty((len(self.angles), len(self.start)))
             for rows in _blocks(len(carried)):
-                np.einsum("kij,kj->ki", np.abs(self.transitions[rows]), self.rounding[rows], out=carried[rows])
+                np.einsum(
+                    "kij,kj->ki",
+                    np.abs(self.transitions[rows]),
+                    self.rounding[rows],
+                    out=carried[rows],
+                )
             floors = (carried + self.rounding[1:]) / self._units
             floors += (self._arithmetic * np.maximum(self.growth, 1.0))[:, None]
             return _with_small_numbers(floors)
@@ -126,7 +143,8 @@ class Defects:
 
     @functools.cached_property
     def channel_excess(self) -> Array:
-        """Defects beyond rounding of the moving coordinates: (n - 1, m) rad; inf where a defect is not finite."""
+        """Defects beyond rounding of the moving coordinates: (n - 1, m) rad; inf where a defect is
+        not finite."""
         sizes = self.channel_sizes
         with np.errstate(invalid="ignore"):
             excess = np.maximum(sizes - FLOOR_SAFETY * self.floors, 0.0)
@@ -136,9 +154,13 @@ class Defects:
     def excess(self) -> Array:
         """Largest defect beyond rounding over all coordinates: (n - 1,) rad."""
         fixed = [i for i in range(self.angles.shape[1]) if i not in self.moving]
-        sizes = np.hstack([np.abs(self.angles[:, fixed]), np.abs(self.rates[:, fixed]) / self.rate_units[fixed]])
+        sizes = np.hstack(
+            [np.abs(self.angles[:, fixed]), np.abs(self.rates[:, fixed]) / self.rate_units[fixed]]
+        )
         with np.errstate(invalid="ignore"):
-            of_fixed = np.where(np.isfinite(sizes), sizes - FLOOR_SAFETY * self.floor[:, None], np.inf)
+            of_fixed = np.where(
+                np.isfinite(sizes), sizes - FLOOR_SAFETY * self.floor[:, None], np.inf
+            )
         return np.asarray(np.hstack([self.channel_excess, of_fixed]).max(axis=1, initial=0.0))
 
     @functools.cached_property
@@ -148,19 +170,22 @@ class Defects:
         return np.asarray(length * np.maximum(self.growth, 1.0))
 
     def in_bound_units(self, excess: Array) -> Array:
-        """Return (n - 1,) or (n - 1, m) defects beyond rounding, each divided by its interval's `bound_factors`."""
+        """Return (n - 1,) or (n - 1, m) defects beyond rounding, each divided by its interval's
+        `bound_factors`."""
         factors = self.bound_factors.reshape(-1, *[1] * (excess.ndim - 1))
         with np.errstate(invalid="ignore"):
             return np.asarray(np.where(np.isfinite(excess), excess / factors, np.inf))
 
     @property
     def judged_sizes(self) -> Array:
-        """Values that are compared with a method's bound: (n - 1,) rad, `excess` divided by `bound_factors`."""
+        """Values that are compared with a method's bound: (n - 1,) rad, `excess` divided by
+        `bound_factors`."""
         return self.in_bound_units(self.excess)
 
     @property
     def is_resolved(self) -> NDArray[np.bool_]:
-        """Whether rounding explains at most 0.01 rad in each interval, or its defect has no end: (n - 1,)."""
+        """Whether rounding explains at most 0.01 rad in each interval, or its defect has no end: (n
+        - 1,)."""
         return np.asarray((FLOOR_SAFETY * self.floor <= OK_ERROR) | ~np.isfinite(self.sizes))
 
     @property
@@ -173,8 +198,8 @@ class Defects:
 
     @property
     def predicted(self) -> Array:
-        """Error of the angles predicted from the initial state and the defects, (n, 1 + blades) rad. Valid for errors
-        that are small compared with 1 rad."""
+        """Error of the angles predicted from the initial state and the defects, (n, 1 + blades)
+        rad. Valid for errors that are small compared with 1 rad."""
         half = len(self.moving)
         angles = np.zeros((len(self.time), self.angles.shape[1]))
         angles[:, list(self.moving)] = self._errors_and_drift[0][:, :half]
@@ -187,8 +212,8 @@ class Defects:
 
     @functools.cached_property
     def error_growth(self) -> Array:
-        """Error growth along the run, (n,): 2-norm of the state transition matrix from the start in the moving
-        coordinates."""
+        """Error growth along the run, (n,): 2-norm of the state transition matrix from the start in
+        the moving coordinates."""
         half = len(self.moving)
         free = [i for i, coordinate in enumerate(self.moving) if coordinate not in self.resting]
         rows = np.array([*free, *(half + i for i in free)])
@@ -212,7 +237,8 @@ class Defects:
 
     @property
     def mean(self) -> float:
-        """Largest signed mean of the defects over the intervals that have an end (rad); NaN if there are none."""
+        """Largest signed mean of the defects over the intervals that have an end (rad); NaN if
+        there are none."""
         finite = np.isfinite(self.sizes)
         if not finite.any():
             return float("nan")
@@ -220,10 +246,11 @@ class Defects:
         return float(np.abs(both.mean(axis=0)).max())
 
     def over_rows(self, rows: int) -> tuple[Array, Array]:
-        """Return sums of the defects over a number of rows, and the largest sums that rounding can cause.
+        """Return sums of the defects over a number of rows, and the largest sums that rounding can
+        cause.
 
-        They reveal a drift that is smaller than single defects. Roundings of the rows in between, and of their times,
-        cancel: one row ends an interval and begins the next.
+        They reveal a drift that is smaller than single defects. Roundings of the rows in between,
+        and of their times, cancel: one row ends an interval and begins the next.
 
         Returns
         -------
@@ -239,9 +266,12 @@ class Defects:
                 ends = slice(inside.start + rows, inside.stop + 1, rows)
                 products, errors = _carried(self.transitions[inside], -self._vectors[inside], rows)
                 sums[stretches] = np.abs(errors[:, -1]) / units
-                carried = np.einsum("kij,kj->ki", np.abs(products[:, -1]), self.rounding[inside][::rows])
+                carried = np.einsum(
+                    "kij,kj->ki", np.abs(products[:, -1]), self.rounding[inside][::rows]
+                )
                 floors[stretches] = (carried + self.rounding[ends]) / units
-                # The errors of the arithmetic are independent of each other, and grow as much as any other.
+                # The errors of the arithmetic are independent of each other, and grow as much as
+                # any other.
                 growth = np.maximum(_largest_entry(products[:, -1], units), 1.0)
                 size = self._arithmetic[inside].reshape(-1, rows).max(axis=1)
                 floors[stretches] += (np.sqrt(rows) * size * growth)[:, None]
@@ -265,8 +295,9 @@ class Defects:
 
     @functools.cached_property
     def _arithmetic(self) -> Array:
-        """(n - 1,) rad, error of the arithmetic within each interval: of the size of its largest number in every step,
-        independent from step to step. A step is taken to span about a radian of the fastest coordinate."""
+        """(n - 1,) rad, error of the arithmetic within each interval: of the size of its largest
+        number in every step, independent from step to step. A step is taken to span about a radian
+        of the fastest coordinate."""
         sizes = (np.abs(self.states) / self._units).max(axis=1)
         fastest = np.abs(self.states[:, len(self.moving) :]).max(axis=1)
         largest, rate = (np.maximum(values[:-1], values[1:]) for values in (sizes, fastest))
@@ -275,8 +306,8 @@ class Defects:
 
     @functools.cached_property
     def _errors_and_drift(self) -> tuple[Array, float]:
-        """Return the errors of the states that the defects add up to, (n, m), and the largest sum over `DRIFT_ROWS`
-        rows."""
+        """Return the errors of the states that the defects add up to, (n, m), and the largest sum
+        over `DRIFT_ROWS` rows."""
         half = len(self.moving)
         resting = [i for i, coordinate in enumerate(self.moving) if coordinate in self.resting]
         at_zero = [*resting, *(half + i for i in resting)]
@@ -300,13 +331,15 @@ class Defects:
 
 
 def _blocks(count: int) -> Iterator[slice]:
-    """Yield slices of at most `BLOCK_ROWS` of `count` rows, a multiple of `DRIFT_ROWS` but for the last."""
+    """Yield slices of at most `BLOCK_ROWS` of `count` rows, a multiple of `DRIFT_ROWS` but for the
+    last."""
     for start in range(0, count, BLOCK_ROWS):
         yield slice(start, min(start + BLOCK_ROWS, count))
 
 
 def _largest_entry(matrices: Array, units: Array) -> Array:
-    """Return the largest entry of each of (k, m, m) matrices in these units: (k,), infinite for NaN.
+    """Return the largest entry of each of (k, m, m) matrices in these units: (k,), infinite for
+    NaN.
 
     It is between the growth of an error and a share 1 / m of it.
     """
@@ -315,7 +348,8 @@ def _largest_entry(matrices: Array, units: Array) -> Array:
 
 
 def _with_small_numbers(floors: Array) -> Array:
-    """Return (k, m) floors with what roundings of other coordinates add by terms of second order, and at least 1e-18.
+    """Return (k, m) floors with what roundings of other coordinates add by terms of second order,
+    and at least 1e-18.
 
     A coordinate that is next to zero has nearly no rounding of its own. NaN becomes infinite.
     """
@@ -324,7 +358,8 @@ def _with_small_numbers(floors: Array) -> Array:
 
 
 def _carried(matrices: Array, offsets: Array, rows: int) -> tuple[Array, Array]:
-    """Carry on errors e that go on as matrix @ e + offset, in stretches of so many rows, all stretches at once.
+    """Carry on errors e that go on as matrix @ e + offset, in stretches of so many rows, all
+    stretches at once.
 
     Parameters
     ----------
@@ -333,8 +368,8 @@ def _carried(matrices: Array, offsets: Array, rows: int) -> tuple[Array, Array]:
     Returns
     -------
     products, errors : (stretches, 1 + rows, m, m) and (stretches, 1 + rows, m)
-        The product of the matrices since the start of the stretch, and what the offsets since then add up to. The last
-        stretch is filled with rows that change nothing.
+        The product of the matrices since the start of the stretch, and what the offsets since then
+        add up to. The last stretch is filled with rows that change nothing.
     """
     k, m = offsets.shape
     stretches = max(-(-k // rows), 1)

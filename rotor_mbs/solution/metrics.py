@@ -1,4 +1,5 @@
-"""How far a run is from a reference, and from its own energy: one set of metrics for runs, reports and checks.
+"""How far a run is from a reference, and from its own energy: one set of metrics for runs, reports
+and checks.
 
 `METRICS` declares each of them once: its unit, and which tables of a file have it.
 """
@@ -13,10 +14,18 @@ import numpy as np
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.scenario.time_table import value_at
 from rotor_mbs.solution.defects import DRIFT_ROWS, LEFT_ZERO, Defects
-from rotor_mbs.solution.quantities import Array, array_of, deviation, energy_error, known_quantities, sizes
+from rotor_mbs.solution.quantities import (
+    Array,
+    array_of,
+    deviation,
+    energy_error,
+    known_quantities,
+    sizes,
+)
 from rotor_mbs.solution.trajectory import Trajectory
 
-HORIZON_GROWTH = 1e5  # a scene's horizon: when an error of the initial state may have grown this many times
+# a scene's horizon: when an error of the initial state may have grown this many times
+HORIZON_GROWTH = 1e5
 
 Metrics = dict[str, float]
 
@@ -45,13 +54,19 @@ class RowValue:
 
 _OWN_POINTS = "of printed/ode45 over ode45's own output points instead"
 _ALL, _BENCH = "runs bench stability", "runs bench"
-# Each metric, in the order of the columns. Those of quantities are declared with them, see `Quantity`.
+# Each metric, in the order of the columns. Those of quantities are declared with them, see
+# `Quantity`.
 METRICS = {
     "energy_scale_J": RowValue("J", "energy scale, to which energy errors are relative"),
     "energy_drift_max": RowValue(
-        "1", "largest energy error over the run, relative to the energy scale", f"{_ALL} sweep", is_main=True
+        "1",
+        "largest energy error over the run, relative to the energy scale",
+        f"{_ALL} sweep",
+        is_main=True,
     ),
-    "energy_gain_J": RowValue("J", "largest increase of the total energy beyond the work", is_main=True),
+    "energy_gain_J": RowValue(
+        "J", "largest increase of the total energy beyond the work", is_main=True
+    ),
     "angle_error_max": RowValue("rad", "largest angle error up to the horizon", _ALL),
     "angle_error_predicted": RowValue(
         "rad",
@@ -61,55 +76,92 @@ METRICS = {
     ),
     "angle_error_whole": RowValue("rad", "largest angle error over the whole run"),
     "angle_error_end": RowValue("rad", "angle error at the last sample of the scene", _BENCH),
-    "tip_error_max": RowValue("m", "largest distance of a tip from the reference up to the horizon", "bench"),
+    "tip_error_max": RowValue(
+        "m", "largest distance of a tip from the reference up to the horizon", "bench"
+    ),
     "error_growth": RowValue(
         "1", "largest factor by which a small error of the initial state has grown", "sweep_growth"
     ),
     "horizon_s": RowValue(
-        "s", "time of the last sample before the error growth reaches 1e5", f"{_BENCH} sweep_growth", is_main=True
+        "s",
+        "time of the last sample before the error growth reaches 1e5",
+        f"{_BENCH} sweep_growth",
+        is_main=True,
     ),
     "uncertainty_rad": RowValue("rad", "uncertainty of the reference up to the horizon", "bench"),
-    "defect_max": RowValue("rad", "largest defect of a coordinate in an interval", f"{_BENCH} sweep", rounding=1.0),
-    "defect_median": RowValue("rad", "median of the interval defects", f"{_BENCH} sweep", rounding=1.0),
+    "defect_max": RowValue(
+        "rad", "largest defect of a coordinate in an interval", f"{_BENCH} sweep", rounding=1.0
+    ),
+    "defect_median": RowValue(
+        "rad", "median of the interval defects", f"{_BENCH} sweep", rounding=1.0
+    ),
     "defect_time": RowValue(
-        "s", "end of the interval that is furthest beyond its bound, or of the largest defect", "runs sweep"
+        "s",
+        "end of the interval that is furthest beyond its bound, or of the largest defect",
+        "runs sweep",
     ),
     "defect_judged": RowValue(
         "rad",
-        "value compared with the bound: defect beyond rounding divided by (interval / 0.01 s), if above 1, and by "
+        "value compared with the bound: defect beyond rounding divided by (interval / 0.01 s), if "
+        "above 1, and by "
         "the error growth over the interval, if above 1; largest over the run",
         rounding=1.0,
     ),
     "defect_excess": RowValue("rad", "defect beyond rounding in that interval", rounding=1.0),
-    "defect_allowed": RowValue("rad", "largest defect beyond rounding that is allowed in that interval"),
-    "defect_mean": RowValue("rad", "largest signed mean of the defects of a coordinate", rounding=1.0),
+    "defect_allowed": RowValue(
+        "rad", ("largest defect beyond rounding that is allowed in that interval")
+    ),
+    "defect_mean": RowValue(
+        "rad", "largest signed mean of the defects of a coordinate", rounding=1.0
+    ),
     "defect_drift": RowValue(
         "rad",
-        "largest sum of the defects of 100 consecutive intervals, each multiplied by the state transition matrix "
+        "largest sum of the defects of 100 consecutive intervals, each multiplied by the state "
+        "transition matrix "
         "from its interval to the last of the 100",
         rounding=DRIFT_ROWS,
     ),
     "defect_floor": RowValue("rad", "largest defect that rounding of the samples can cause"),
     "defects_not_judged": RowValue(
-        "1", "number of intervals with a defect of more than 0.01 rad, beyond rounding or because of it"
+        "1",
+        (
+            "number of intervals with a defect of more than 0.01 rad, beyond rounding or "
+            "because of it"
+        ),
     ),
-    "zero_pitch_max": RowValue("rad", "largest magnitude of the pitch angles that stay zero in the reference", _BENCH),
-    "zero_pitch_left_s": RowValue("s", "time at which a pitch angle that stays zero in the reference becomes nonzero"),
-    "zero_pitch_growth_per_s": RowValue("1/s", "growth rate of a pitch angle that stays zero in the reference"),
-    "rotor_angle_min": RowValue("rad", f"smallest rotor angle (signed) over the samples; {_OWN_POINTS}", is_main=True),
+    "zero_pitch_max": RowValue(
+        "rad", ("largest magnitude of the pitch angles that stay zero in the reference"), _BENCH
+    ),
+    "zero_pitch_left_s": RowValue(
+        "s", ("time at which a pitch angle that stays zero in the reference becomes nonzero")
+    ),
+    "zero_pitch_growth_per_s": RowValue(
+        "1/s", ("growth rate of a pitch angle that stays zero in the reference")
+    ),
+    "rotor_angle_min": RowValue(
+        "rad", (f"smallest rotor angle (signed) over the samples; {_OWN_POINTS}"), is_main=True
+    ),
     "rotor_angle_max": RowValue(
-        "rad", f"largest rotor angle (signed) over the samples; {_OWN_POINTS}", "runs sweep", is_main=True
+        "rad",
+        f"largest rotor angle (signed) over the samples; {_OWN_POINTS}",
+        "runs sweep",
+        is_main=True,
     ),
     "rotor_rate_max": RowValue(
-        "rad/s", f"largest magnitude of the rotor rate over the samples; {_OWN_POINTS}", "runs sweep", is_main=True
+        "rad/s",
+        f"largest magnitude of the rotor rate over the samples; {_OWN_POINTS}",
+        "runs sweep",
+        is_main=True,
     ),
     "pitch_max": RowValue("rad", "largest magnitude of a pitch angle", "sweep", is_main=True),
 }
 
-# rad: beyond it a double's last digit is above 1e-10 rad, and neither its sine nor an error of 1e-9 rad means anything.
+# rad: beyond it a double's last digit is above 1e-10 rad, and neither its sine nor an error of 1e-9
+# rad means anything.
 ANGLE_LIMIT = 1e6
 
-# rad: between these the departure grows exponentially; below is round-off, above the motion is no longer linear.
+# rad: between these the departure grows exponentially; below is round-off, above the motion is no
+# longer linear.
 _LINEAR_FROM, _LINEAR_TO = 1e-12, 1e-2
 
 
@@ -144,12 +196,19 @@ def angle_error(run: Trajectory, reference: Trajectory) -> Array:
 def energy_scale(scene: Scene, run: Trajectory) -> float:
     """Return the energy (J) that errors are relative to: Σ m g |r| + kinetic and spring energy at
     the start + largest |work|; zero only where nothing moves."""
-    weights = sum(blade.mass * scene.gravity * float(np.linalg.norm(blade.centre_of_mass)) for blade in scene.blades)
+    weights = sum(
+        blade.mass * scene.gravity * float(np.linalg.norm(blade.centre_of_mass))
+        for blade in scene.blades
+    )
     springs = sum(
         0.5 * stiffness * float(np.square(angle - value_at(scene.pitch_loads[i][1], 0.0)))
-        for i, (stiffness, angle) in enumerate(zip(scene.bearing_stiffness, scene.initial_angles[1:], strict=False))
+        for i, (stiffness, angle) in enumerate(
+            zip(scene.bearing_stiffness, scene.initial_angles[1:], strict=False)
+        )
     )
-    kinetic = float(run.kinetic_energy[0]) if run.kinetic_energy is not None and len(run.time) else 0.0
+    kinetic = (
+        float(run.kinetic_energy[0]) if run.kinetic_energy is not None and len(run.time) else 0.0
+    )
     work = float(np.abs(run.work).max(initial=0.0)) if run.work is not None else 0.0
     return weights + springs + kinetic + work
 
@@ -162,18 +221,23 @@ def metrics_of(
     *,
     is_corrected: bool = True,
 ) -> Metrics:
-    """Return the metrics stored with a run, by the names of the file format; those that do not exist are left out.
+    """Return the metrics stored with a run, by the names of the file format; those that do not
+    exist are left out.
 
-    is_corrected : whether the run claims the equations of the defects, so that their sum predicts its error.
+    is_corrected : whether the run claims the equations of the defects, so that their sum predicts
+        its error.
     """
     metrics: Metrics = {}
     if not len(run.time):
         return metrics
     energy = energy_error(run)
-    if energy is not None and len(energy) > 1:  # the error of the first sample is zero by definition
+    # the error of the first sample is zero by definition
+    if energy is not None and len(energy) > 1:
         scale = energy_scale(scene, run)
         metrics["energy_scale_J"] = scale
-        metrics["energy_drift_max"] = float(np.abs(energy).max()) / scale if scale else float(np.abs(energy).max())
+        metrics["energy_drift_max"] = (
+            float(np.abs(energy).max()) / scale if scale else float(np.abs(energy).max())
+        )
         metrics["energy_gain_J"] = float(energy.max())
     until = len(run.time)  # samples up to the horizon
     if reference is not None:
@@ -187,7 +251,8 @@ def metrics_of(
     metrics["rotor_angle_min"] = float(own.angles[:, 0].min())
     metrics["rotor_angle_max"] = float(own.angles[:, 0].max())
     metrics["rotor_rate_max"] = float(np.abs(own.rates[:, 0]).max())
-    peaks: Metrics = {}  # of a quantity: its largest size, the time of it in s, and the blade, from 1
+    # of a quantity: its largest size, the time of it in s, and the blade, from 1
+    peaks: Metrics = {}
     for quantity in known_quantities(scene.outputs):
         values = array_of(quantity, scene, run) if quantity.has_peak else None
         if values is not None:
@@ -204,13 +269,18 @@ def metrics_of(
         if rule is None or errors is None:
             continue
         if rule.with_reference and reference is not None and not rule.at_own_state:
-            errors = errors[: until if until > 1 else 0]  # the first sample is given, and equal in every run
+            # the first sample is given, and equal in every run
+            errors = errors[: until if until > 1 else 0]
         if len(errors):
-            metrics[rule.metric] = float(errors.max()) / (rule.scale_of(scene, run) if rule.scale_of else 1.0)
+            metrics[rule.metric] = float(errors.max()) / (
+                rule.scale_of(scene, run) if rule.scale_of else 1.0
+            )
     return metrics | peaks
 
 
-def defect_metrics(defects: Defects, horizon_s: float | None, *, is_corrected: bool = True) -> Metrics:
+def defect_metrics(
+    defects: Defects, horizon_s: float | None, *, is_corrected: bool = True
+) -> Metrics:
     """Return the numbers of a run's interval defects.
 
     Parameters
@@ -223,7 +293,9 @@ def defect_metrics(defects: Defects, horizon_s: float | None, *, is_corrected: b
         "defect_max": float(defects.sizes.max()),
         "defect_median": float(np.median(defects.sizes)),
         "defect_mean": defects.mean,
-    } | interval_metrics(defects, worst_interval(defects, is_corrected=is_corrected), is_corrected=is_corrected)
+    } | interval_metrics(
+        defects, worst_interval(defects, is_corrected=is_corrected), is_corrected=is_corrected
+    )
     if is_corrected:
         if horizon_s is None:
             until = defects.horizon_samples(HORIZON_GROWTH)
@@ -233,19 +305,23 @@ def defect_metrics(defects: Defects, horizon_s: float | None, *, is_corrected: b
             "defects_not_judged": float((~defects.is_judged).sum()),
             "defect_drift": defects.drift,
             "horizon_s": horizon_s,
-            "angle_error_predicted": float(np.abs(defects.predicted[defects.time <= horizon_s]).max()),
+            "angle_error_predicted": float(
+                np.abs(defects.predicted[defects.time <= horizon_s]).max()
+            ),
         }
     return {name: value for name, value in metrics.items() if not np.isnan(value)}
 
 
 def worst_interval(defects: Defects, *, is_corrected: bool = True) -> int:
-    """Return the interval that is furthest beyond its bound, or has the largest defect if none exceeds rounding."""
+    """Return the interval that is furthest beyond its bound, or has the largest defect if none
+    exceeds rounding."""
     judged = defects.judged_sizes if is_corrected else np.zeros(1)
     return int(judged.argmax()) if judged.any() else int(defects.sizes.argmax())
 
 
 def interval_metrics(defects: Defects, interval: int, *, is_corrected: bool = True) -> Metrics:
-    """Return the numbers of one interval, of the worst one those that are stored: its end, and how far it is beyond."""
+    """Return the numbers of one interval, of the worst one those that are stored: its end, and how
+    far it is beyond."""
     metrics = {"defect_time": float(defects.time[1 + interval])}
     if is_corrected:
         metrics["defect_excess"] = float(defects.excess[interval])
@@ -254,10 +330,12 @@ def interval_metrics(defects: Defects, interval: int, *, is_corrected: bool = Tr
 
 
 def _angle_errors(run: Trajectory, reference: Trajectory, until: int) -> Metrics:
-    """Compute errors of angles, only where there is a second sample: the first one is given, and equal in every run."""
+    """Compute errors of angles, only where there is a second sample: the first one is given, and
+    equal in every run."""
     error = angle_error(run, reference)
     metrics: Metrics = {}
-    # Pitches that are exactly zero in the reference: whether they stayed so, and if not, when and how fast they left.
+    # Pitches that are exactly zero in the reference: whether they stayed so, and if not, when and
+    # how fast they left.
     zero = [i for i in range(1, reference.angles.shape[1]) if not reference.angles[:, i].any()]
     if zero:
         away = np.abs(run.angles[:, zero]).max(axis=1)

@@ -1,5 +1,6 @@
-"""The output quantities of a run, each declared once: dimensions, units, who computes it, how it is judged and drawn.
-Further ones come from packages that have an entry point in the group `rotor_mbs.quantities`."""
+"""The output quantities of a run, each declared once: dimensions, units, who computes it, how it is
+judged and drawn. Further ones come from packages that have an entry point in the group
+`rotor_mbs.quantities`."""
 
 from __future__ import annotations
 
@@ -24,18 +25,23 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True)
 class QuantityMetric:
-    """Metric that is computed from a quantity and stored with the run, and the largest value that passes.
+    """Metric that is computed from a quantity and stored with the run, and the largest value that
+    passes.
 
-    The metric is the largest magnitude over all samples (of the vectors, if the last dimension is `axis`).
+    The metric is the largest magnitude over all samples (of the vectors, if the last dimension is
+    `axis`).
 
     Attributes
     ----------
     metric : name of the metric.
-    with_reference : whether it is that of the difference from the reference's array, up to the horizon.
+    with_reference : whether it is that of the difference from the reference's array, up to the
+        horizon.
     relative_to : (scene) -> number by which the metric is divided for the check; None for 1.
-    at_own_state : whether it is that of the difference from the array of the closed form at the run's own state, over
+    at_own_state : whether it is that of the difference from the array of the closed form at the
+        run's own state, over
         all samples.
-    scale_of : (scene, samples) -> number by which the metric is divided before it is stored; None for 1.
+    scale_of : (scene, samples) -> number by which the metric is divided before it is stored; None
+        for 1.
     check : name of a check in reference/accuracy.toml that has the bound; "" if `bound` is used.
     bound : largest value that passes, unless a check has one; None if the metric is not checked.
     channel, unit : name and unit of the value in verdicts.
@@ -58,7 +64,8 @@ class QuantityMetric:
 
 @dataclass(frozen=True, slots=True)
 class Plot:
-    """Plot of a quantity over time: title, label of the vertical axis, and whether that is logarithmic."""
+    """Plot of a quantity over time: title, label of the vertical axis, and whether that is
+    logarithmic."""
 
     title: str
     axis: str
@@ -74,8 +81,10 @@ class Quantity:
     name : name of the dataset, and of the attribute of a `Run`.
     dimensions : names of the axes: "time", then any of "coordinate", "blade" and "axis".
     units, long_name : as stored.
-    output : entry of a scene's `outputs` that requests it; "" if it is stored whenever the model computes it.
-    producer : (scene, samples) -> array, a formula for all methods; returns None if it lacks input. None if each model
+    output : entry of a scene's `outputs` that requests it; "" if it is stored whenever the model
+        computes it.
+    producer : (scene, samples) -> array, a formula for all methods; returns None if it lacks input.
+        None if each model
         computes the quantity from its own state.
     required : whether every run of a built-in method must have it where its scene requests it.
     judgement : how it is checked; None if it is not, or by a rule of its own.
@@ -85,8 +94,10 @@ class Quantity:
     Examples
     --------
     >>> angular_momentum = Quantity(
-    ...     "hub_angular_momentum", ("time",), "N m s", "angular momentum of the hub about the shaft",
-    ...     output="momentum", producer=lambda scene, samples: scene.hub_inertia * samples.rates[:, 0],
+    ...     "hub_angular_momentum", ("time",), "N m s",
+    ...     "angular momentum of the hub about the shaft",
+    ...     output="momentum",
+    ...     producer=lambda scene, samples: scene.hub_inertia * samples.rates[:, 0],
     ...     judgement=QuantityMetric("hub_angular_momentum_error_max", bound=1e-3, unit="N m s"))
     """
 
@@ -109,9 +120,13 @@ SCALES = {
     scale.name: scale
     for scale in (
         Quantity("time", ("time",), "s", "time"),
-        Quantity("coordinate", ("coordinate",), "1", "joint coordinate: 0 rotor, i pitch of blade i"),
+        Quantity(
+            "coordinate", ("coordinate",), "1", ("joint coordinate: 0 rotor, i pitch of blade i")
+        ),
         Quantity("blade", ("blade",), "1", "blade number, from 1"),
-        Quantity("axis", ("axis",), "1", "axis: 0 x, 1 y, 2 z of the frame that each variable names"),
+        Quantity(
+            "axis", ("axis",), "1", ("axis: 0 x, 1 y, 2 z of the frame that each variable names")
+        ),
     )
 }
 
@@ -152,7 +167,9 @@ def energy_balance(kinetic: Array, potential: Array, work: Array) -> Array:
 
 def energy_error(samples: Trajectory) -> Array | None:
     """Return the energy balance of a run, (n,) J; None where energies were not asked for."""
-    kinetic, potential, work = (samples.get(name) for name in ("kinetic_energy", "potential_energy", "work"))
+    kinetic, potential, work = (
+        samples.get(name) for name in ("kinetic_energy", "potential_energy", "work")
+    )
     if kinetic is None or potential is None or work is None:
         return None
     return energy_balance(kinetic, potential, work)
@@ -176,7 +193,9 @@ def _largest_root_force_at_arm(scene: Scene, run: Trajectory) -> float:
     return _largest_root_force(scene, run) * longest_arm(scene)
 
 
-def _load(name: str, dimensions: tuple[str, ...], long_name: str, title: str, look_at: str) -> Quantity:
+def _load(
+    name: str, dimensions: tuple[str, ...], long_name: str, title: str, look_at: str
+) -> Quantity:
     is_force = name.endswith("force")
     rule = QuantityMetric(
         f"{name}_error",
@@ -185,38 +204,65 @@ def _load(name: str, dimensions: tuple[str, ...], long_name: str, title: str, lo
         check="loads",
         channel=name.replace("_", " "),
         unit="of the largest",
-        fault=f"{name.replace('_', ' ')} differs by {{value}} of the largest load from the closed form at its state",
+        fault=(
+            f"{name.replace('_', ' ')} differs by {{value}} of the largest load from the closed "
+            "form at its state"
+        ),
         look_at=look_at,
     )
     plot = Plot(title, "force (N)" if is_force else "moment (N m)")
     units = "N" if is_force else "N m"
-    return Quantity(name, ("time", *dimensions), units, long_name, "loads", judgement=rule, plot=plot, has_peak=True)
+    return Quantity(
+        name,
+        ("time", *dimensions),
+        units,
+        long_name,
+        "loads",
+        judgement=rule,
+        plot=plot,
+        has_peak=True,
+    )
 
 
 # The root of a blade is on its pitch axis, at the hub's radius from the apex. Where a torque jumps,
 # the value is the one before it.
 LOADS = (
     _load(
-        "blade_root_force", ("blade", "axis"), "force of the hub on each blade at its root, in the blade's frame",
-        "Forces at the blade roots", "an acceleration of a centre of mass, or a weight",
+        "blade_root_force",
+        ("blade", "axis"),
+        ("force of the hub on each blade at its root, in the blade's frame"),
+        "Forces at the blade roots",
+        "an acceleration of a centre of mass, or a weight",
     ),
     _load(
-        "blade_root_moment", ("blade", "axis"), "moment of the hub on each blade about its root, in the blade's frame",
-        "Moments at the blade roots", "a lever, a gyroscopic moment, or a weight",
+        "blade_root_moment",
+        ("blade", "axis"),
+        ("moment of the hub on each blade about its root, in the blade's frame"),
+        "Moments at the blade roots",
+        "a lever, a gyroscopic moment, or a weight",
     ),
     _load(
-        "shaft_force", ("axis",), "force of the shaft's bearing on the rotor, in the base frame",
-        "Force of the shaft's bearing", "the sum of the forces at the roots",
+        "shaft_force",
+        ("axis",),
+        "force of the shaft's bearing on the rotor, in the base frame",
+        "Force of the shaft's bearing",
+        "the sum of the forces at the roots",
     ),
     _load(
-        "shaft_moment", ("axis",), "moment of the shaft's bearing on the rotor about the hub centre, in the base frame",
-        "Moment of the shaft's bearing", "the sum of the moments at the roots, the hub, or the torque",
+        "shaft_moment",
+        ("axis",),
+        ("moment of the shaft's bearing on the rotor about the hub centre, in the base frame"),
+        "Moment of the shaft's bearing",
+        ("the sum of the moments at the roots, the hub, or the torque"),
     ),
     _load(
-        "pitch_actuator_moment", ("blade",), "moment of each pitch actuator (torque, spring, damper) on its blade",
-        "Moments of the pitch actuators", "a spring or a damper of a pitch bearing",
+        "pitch_actuator_moment",
+        ("blade",),
+        ("moment of each pitch actuator (torque, spring, damper) on its blade"),
+        "Moments of the pitch actuators",
+        "a spring or a damper of a pitch bearing",
     ),
-)  # fmt: skip
+)
 
 
 def named_loads(
@@ -227,7 +273,10 @@ def named_loads(
     actuators."""
     forces, moments = (np.stack(vectors, axis=1) for vectors in zip(*roots, strict=True))
     arrays = forces, moments, shaft_force, shaft_moment, actuators
-    return {load.name: np.asarray(values, dtype=float) for load, values in zip(LOADS, arrays, strict=True)}
+    return {
+        load.name: np.asarray(values, dtype=float)
+        for load, values in zip(LOADS, arrays, strict=True)
+    }
 
 
 _JOINT_GAP = QuantityMetric(
@@ -246,42 +295,86 @@ _JOINT_GAP = QuantityMetric(
 DEFECT = "defect"
 
 BUILT_IN = (
-    Quantity("angles", ("time", "coordinate"), "rad", "rotor angle and pitch angles, unwrapped", "angles"),
+    Quantity(
+        "angles", ("time", "coordinate"), "rad", "rotor angle and pitch angles, unwrapped", "angles"
+    ),
     Quantity("rates", ("time", "coordinate"), "rad/s", "rotor rate and pitch rates", "rates"),
     Quantity(
-        "tip", ("time", "blade", "axis"), "m", "position of each blade tip in the base frame", "tip",
+        "tip",
+        ("time", "blade", "axis"),
+        "m",
+        "position of each blade tip in the base frame",
+        "tip",
         judgement=QuantityMetric("tip_error_max"),
     ),
     Quantity("kinetic_energy", ("time",), "J", "kinetic energy", "energy"),
     Quantity(
-        "potential_energy", ("time",), "J", "potential energy of gravity (zero at the shaft) and springs", "energy",
+        "potential_energy",
+        ("time",),
+        "J",
+        ("potential energy of gravity (zero at the shaft) and springs"),
+        "energy",
     ),
-    Quantity("work", ("time",), "J", "work of torques and commands minus the energy dissipated by dampers", "energy"),
     Quantity(
-        "energy_error", ("time",), "J", "kinetic plus potential energy minus work, minus its initial value", "energy",
+        "work",
+        ("time",),
+        "J",
+        ("work of torques and commands minus the energy dissipated by dampers"),
+        "energy",
+    ),
+    Quantity(
+        "energy_error",
+        ("time",),
+        "J",
+        ("kinetic plus potential energy minus work, minus its initial value"),
+        "energy",
         producer=lambda _, samples: energy_error(samples),
-        plot=Plot("Energy error: change of total energy minus work", "|energy error| (J)", logarithmic=True),
+        plot=Plot(
+            "Energy error: change of total energy minus work",
+            "|energy error| (J)",
+            logarithmic=True,
+        ),
     ),
     Quantity(
-        "constraint_error", ("time",), "m", "largest position gap of the joints", required=False, judgement=_JOINT_GAP,
+        "constraint_error",
+        ("time",),
+        "m",
+        "largest position gap of the joints",
+        required=False,
+        judgement=_JOINT_GAP,
         plot=Plot("Largest gap in a joint", "gap (m)", logarithmic=True),
     ),
     *LOADS,
     Quantity(
-        DEFECT, ("time",), "rad",
-        "size of the defect of the interval up to each sample, the largest over angles and rates; NaN in the first",
+        DEFECT,
+        ("time",),
+        "rad",
+        (
+            "size of the defect of the interval up to each sample, the largest over angles "
+            "and rates; "
+            "NaN in the first"
+        ),
         required=False,
     ),
     Quantity(
-        "angle_uncertainty", ("time",), "rad",
-        "estimate of the error of the angles, before rounding to double precision (half a unit in the last place)",
+        "angle_uncertainty",
+        ("time",),
+        "rad",
+        (
+            "estimate of the error of the angles, before rounding to double precision (half "
+            "a unit in "
+            "the last place)"
+        ),
         required=False,
     ),
     Quantity(
-        "error_growth", ("time",), "1", "largest factor by which a small error of the initial state has grown",
+        "error_growth",
+        ("time",),
+        "1",
+        ("largest factor by which a small error of the initial state has grown"),
         required=False,
     ),
-)  # fmt: skip
+)
 
 _OUTPUTS = frozenset(quantity.output for quantity in BUILT_IN)
 NAMES = frozenset(quantity.name for quantity in BUILT_IN)
@@ -293,7 +386,9 @@ NAMES = frozenset(quantity.name for quantity in BUILT_IN)
 def known_quantities(outputs: Iterable[str] = ()) -> tuple[Quantity, ...]:
     """Return the built-in quantities, and those that installed packages bring for `outputs`. Raises
     InputError where an output is neither."""
-    return BUILT_IN + tuple(quantity for output in outputs if output not in _OUTPUTS for quantity in installed(output))
+    return BUILT_IN + tuple(
+        quantity for output in outputs if output not in _OUTPUTS for quantity in installed(output)
+    )
 
 
 def quantities(outputs: Iterable[str]) -> tuple[Quantity, ...]:
@@ -305,12 +400,13 @@ def quantities(outputs: Iterable[str]) -> tuple[Quantity, ...]:
 
 @functools.cache
 def installed(output: str) -> tuple[Quantity, ...]:
-    """Return the quantities of the entry point called `output`. Raises InputError where there is none, or it is not
-    valid."""
+    """Return the quantities of the entry point called `output`. Raises InputError where there is
+    none, or it is not valid."""
     points = tuple(entry_points(group=ENTRY_POINT_GROUP, name=output))
     if not points:
         raise InputError(
-            f"unknown output {output!r}; allowed: {', '.join(sorted(_OUTPUTS - {''}))}, or the name of an entry point "
+            f"unknown output {output!r}; allowed: {', '.join(sorted(_OUTPUTS - {''}))}, or the "
+            "name of an entry point "
             f"in the group {ENTRY_POINT_GROUP}"
         )
     where = f"output {output!r}, from {points[0].value}"
@@ -319,8 +415,12 @@ def installed(output: str) -> tuple[Quantity, ...]:
     except Exception as exc:  # whatever the other package raises
         raise InputError(f"{where}: cannot be loaded: {type(exc).__name__}: {exc}") from exc
     brought = (loaded,) if isinstance(loaded, Quantity) else loaded
-    if not isinstance(brought, Sequence) or not all(isinstance(quantity, Quantity) for quantity in brought):
-        raise InputError(f"{where}: is a {type(loaded).__name__}; allowed: a Quantity or a sequence of them")
+    if not isinstance(brought, Sequence) or not all(
+        isinstance(quantity, Quantity) for quantity in brought
+    ):
+        raise InputError(
+            f"{where}: is a {type(loaded).__name__}; allowed: a Quantity or a sequence of them"
+        )
     problems = []
     allowed = sorted(set(SCALES) - {"time"})
     for quantity in brought:
@@ -330,9 +430,14 @@ def installed(output: str) -> tuple[Quantity, ...]:
             faults.append(f"name {name!r}; allowed: an identifier that is not taken")
         is_repeated = len(set(dimensions)) < len(dimensions)
         if dimensions[:1] != ("time",) or is_repeated or not set(dimensions[1:]) <= set(allowed):
-            faults.append(f"dimensions {dimensions}; allowed: 'time', then any of {', '.join(allowed)}, once each")
+            faults.append(
+                f"dimensions {dimensions}; allowed: 'time', then any of "
+                f"{', '.join(allowed)}, once each"
+            )
         if quantity.output != output:
-            faults.append(f"output {quantity.output!r}; allowed: {output!r}, the entry point's name")
+            faults.append(
+                f"output {quantity.output!r}; allowed: {output!r}, the entry point's name"
+            )
         problems += [f"{where}: {name}: {fault}" for fault in faults]
     if problems:
         raise InputError(problems)
@@ -355,23 +460,32 @@ def array_of(quantity: Quantity, scene: Scene, samples: Trajectory) -> Array | N
     values = np.asarray(values, dtype=np.float64)
     expected = (len(samples.time), *row_shape(quantity, scene))
     if values.shape != expected:
-        raise InputError(f"quantity {quantity.name!r}: its producer gives shape {values.shape}; allowed: {expected}")
+        raise InputError(
+            f"quantity {quantity.name!r}: its producer gives shape {values.shape}; "
+            f"allowed: {expected}"
+        )
     return values
 
 
 def arrays(scene: Scene, samples: Trajectory) -> dict[str, Array]:
-    by_name = {quantity.name: array_of(quantity, scene, samples) for quantity in quantities(scene.outputs)}
+    by_name = {
+        quantity.name: array_of(quantity, scene, samples) for quantity in quantities(scene.outputs)
+    }
     return {name: values for name, values in by_name.items() if values is not None}
 
 
 def sizes(quantity: Quantity, values: Array) -> Array:
     """Return magnitudes of an array of this quantity: with the last dimension `axis`, lengths of
     the vectors."""
-    lengths: Array = np.linalg.norm(values, axis=-1) if quantity.dimensions[-1] == "axis" else np.abs(values)
+    lengths: Array = (
+        np.linalg.norm(values, axis=-1) if quantity.dimensions[-1] == "axis" else np.abs(values)
+    )
     return lengths
 
 
-def deviation(quantity: Quantity, scene: Scene, run: Trajectory, reference: Trajectory | None) -> Array | None:
+def deviation(
+    quantity: Quantity, scene: Scene, run: Trajectory, reference: Trajectory | None
+) -> Array | None:
     """Return the size of a quantity, or of its difference from the reference, largest over the
     other axes: (common samples,). None where it is not judged, or the run or the needed reference
     does not have it."""

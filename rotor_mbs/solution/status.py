@@ -1,5 +1,5 @@
-"""How a run ended: the one list of statuses, and their integer codes. Files have CF's `flag_values` and
-`flag_meanings`, so that the order of the list may differ between files."""
+"""How a run ended: the one list of statuses, and their integer codes. Files have CF's `flag_values`
+and `flag_meanings`, so that the order of the list may differ between files."""
 
 from __future__ import annotations
 
@@ -7,24 +7,34 @@ import math
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
-# Those that a run's state can have ("unchecked": complete, with nothing to judge it by; "completed": the printed
-# equations at their end, of which nothing is claimed), a point of which no run was made, and a run whose process died.
-# Codes are places in this list: new ones go to its end.
+# Those that a run's state can have ("unchecked": complete, with nothing to judge it by;
+# "completed": the printed equations at their end, of which nothing is claimed), a point of which no
+# run was made, and a run whose process died. Codes are places in this list: new ones go to its end.
 STATUSES = (
-    "ok", "inaccurate", "diverged", "singular", "solver_failed", "timed_out", "left_out", "worker_died", "unchecked",
+    "ok",
+    "inaccurate",
+    "diverged",
+    "singular",
+    "solver_failed",
+    "timed_out",
+    "left_out",
+    "worker_died",
+    "unchecked",
     "completed",
-)  # fmt: skip
+)
 # Those of runs that reached the end.
 COMPLETE = ("ok", "inaccurate", "unchecked", "completed")
 
-# In place of a status: the run was not made, as its method cannot represent the scene. Nothing is stored.
+# In place of a status: the run was not made, as its method cannot represent the scene. Nothing is
+# stored.
 REFUSED = "refused"
 
 # Those that nobody has to look at: "ok" may be acted on, and of a "completed" run no more is asked.
 GOOD = ("ok", "completed")
 
 
-# rad: the largest error of an angle, up to the horizon, and the largest defect beyond rounding, of a run that is ok.
+# rad: the largest error of an angle, up to the horizon, and the largest defect beyond rounding, of
+# a run that is ok.
 OK_ERROR = 0.01
 
 
@@ -35,8 +45,10 @@ def code_of(status: str) -> int:
 class Comparison(NamedTuple):
     """What a status follows from, as texts for a table; "" for what a run does not have.
 
-    defect, allowed : rad, the defect furthest beyond rounding and what is allowed in its interval, or "rounding".
-    error : rad, the largest angle error up to the horizon; predicted from the defects without a reference.
+    defect, allowed : rad, the defect furthest beyond rounding and what is allowed in its interval,
+        or "rounding".
+    error : rad, the largest angle error up to the horizon; predicted from the defects without a
+        reference.
     compared : until when, of which duration.
     """
 
@@ -55,7 +67,9 @@ def comparison(metrics: Mapping[str, Any], duration: float) -> Comparison:
     if not error and (predicted := short_number(metrics.get("angle_error_predicted"))):
         error = f"{predicted} predicted"
     horizon = metrics.get("horizon_s")
-    compared = "" if horizon is None or not error else f"{_seconds(horizon)} of {_seconds(duration)} s"
+    compared = (
+        "" if horizon is None or not error else (f"{_seconds(horizon)} of {_seconds(duration)} s")
+    )
     return Comparison(short_number(defect), of_bound, error, compared)
 
 

@@ -1,5 +1,6 @@
-"""What a model returns of a run (samples by quantity, the engine's report, equations linearized about a steady state),
-and a run as a Python user has it: scene, method, samples, status, numbers, times."""
+"""What a model returns of a run (samples by quantity, the engine's report, equations linearized
+about a steady state), and a run as a Python user has it: scene, method, samples, status, numbers,
+times."""
 
 from __future__ import annotations
 
@@ -30,33 +31,46 @@ from rotor_mbs.solution.status import OK_ERROR, comparison
 
 
 class Trajectory:
-    """Samples of a run at equally spaced times, up to its end (n rows, all finite). Angles are unwrapped.
+    """Samples of a run at equally spaced times, up to its end (n rows, all finite). Angles are
+    unwrapped.
 
-    Angles and rates have the shape (n, 1 + blades); those of a file that does not have them are NaN. Other quantities
-    are in `quantities` by name; built-in ones are also attributes, None if the scene does not request them or the model
-    does not compute them."""
+    Angles and rates have the shape (n, 1 + blades); those of a file that does not have them are
+    NaN. Other quantities are in `quantities` by name; built-in ones are also attributes, None if
+    the scene does not request them or the model does not compute them."""
 
     # An array that is set elsewhere than in `quantities` would not be found.
     __slots__ = ("angles", "quantities", "rates", "refined", "time")
 
-    def __init__(self, time: Array, angles: Array, rates: Array, **quantities: Array | None) -> None:
+    def __init__(
+        self, time: Array, angles: Array, rates: Array, **quantities: Array | None
+    ) -> None:
         self.time, self.angles, self.rates = time, angles, rates
-        self.quantities = {name: values for name, values in quantities.items() if values is not None}
+        self.quantities = {
+            name: values for name, values in quantities.items() if values is not None
+        }
         # Angles and rates at the integrator's own output points, where it has such.
         self.refined: Trajectory | None = None
 
     def get(self, name: str) -> Array | None:
         """Return a quantity by name, or the time; None if the run does not have it."""
-        return {"time": self.time, "angles": self.angles, "rates": self.rates}.get(name, self.quantities.get(name))
+        return {"time": self.time, "angles": self.angles, "rates": self.rates}.get(
+            name, self.quantities.get(name)
+        )
 
     def replace(self, **changes: Array | None) -> Trajectory:
-        """Return a copy with other arrays, without `refined`; None removes an array. Arrays are not copied."""
-        arrays: dict[str, Any] = {"time": self.time, "angles": self.angles, "rates": self.rates, **self.quantities}
+        """Return a copy with other arrays, without `refined`; None removes an array. Arrays are not
+        copied."""
+        arrays: dict[str, Any] = {
+            "time": self.time,
+            "angles": self.angles,
+            "rates": self.rates,
+            **self.quantities,
+        }
         return Trajectory(**{**arrays, **changes})
 
     def __getattr__(self, name: str) -> Any:
-        # A quantity is an attribute, so that models and metrics read `run.work` whoever declared it. The type is not
-        # `Array | None`: what the scene asks for is there.
+        # A quantity is an attribute, so that models and metrics read `run.work` whoever declared
+        # it. The type is not `Array | None`: what the scene asks for is there.
         if name in NAMES:
             return self.quantities.get(name)
         raise AttributeError(f"a trajectory has no attribute {name!r}")
@@ -78,13 +92,15 @@ def shape_fault(scene: Scene, run: Trajectory) -> str:
 
 @dataclass(slots=True)
 class Integration:
-    """Report of the engine on an integration. A reported success is not relied on; a reported failure is.
+    """Report of the engine on an integration. A reported success is not relied on; a reported
+    failure is.
 
     Attributes
     ----------
     success, message : whether the engine reports that it reached the end, and the reason if not.
     time_reached : s.
-    steps, rhs_evaluations : number of steps, and of evaluations of the right-hand side; None if unknown.
+    steps, rhs_evaluations : number of steps, and of evaluations of the right-hand side; None if
+        unknown.
     out_of_time : whether the integration was stopped by its time limit.
     """
 
@@ -115,7 +131,9 @@ class RunBlock:
 
     def trajectory(self, i: int) -> Trajectory:
         n = self.samples[i]
-        return Trajectory(self.time[i, :n], **{name: values[i, :n] for name, values in self.quantities.items()})
+        return Trajectory(
+            self.time[i, :n], **{name: values[i, :n] for name, values in self.quantities.items()}
+        )
 
     def end(self, i: int, integration: Integration, samples: int) -> None:
         """Truncate run i to a number of samples; later values are set to NaN."""
@@ -137,7 +155,9 @@ def all_coordinates(scene: Scene, angles: Array, rates: Array) -> tuple[Array, A
 
 
 def finite_rows(*tables: Array) -> int:
-    finite = np.all([np.isfinite(table).all(axis=tuple(range(1, table.ndim))) for table in tables], axis=0)
+    finite = np.all(
+        [np.isfinite(table).all(axis=tuple(range(1, table.ndim))) for table in tables], axis=0
+    )
     return len(finite) if finite.all() else int(np.argmin(finite))
 
 
@@ -145,7 +165,9 @@ def finite_samples(scene: Scene, arrays: Mapping[str, Array]) -> Trajectory:
     """Return the samples of all `arrays` by name, (samples reached, ...), up to the first in which
     one is not finite."""
     n = finite_rows(*arrays.values())
-    return Trajectory(sample_times(scene)[:n], **{name: values[:n] for name, values in arrays.items()})
+    return Trajectory(
+        sample_times(scene)[:n], **{name: values[:n] for name, values in arrays.items()}
+    )
 
 
 @dataclass(frozen=True)
@@ -153,9 +175,12 @@ class Linearization:
     """Equations δq̈ + D δq̇ + K δq = 0 about a state of constant rates, the mass matrix divided
     out."""
 
-    stiffness: Array  # (n, n) 1/s²: M⁻¹ times the derivative of the forces by the coordinates, sign turned
+    # (n, n) 1/s²: M⁻¹ times the derivative of the forces by the coordinates, sign turned
+    stiffness: Array
     damping: Array  # (n, n) 1/s: the same by the rates; it has gyroscopic terms, too
-    residual: Array  # (n,) rad/s²: accelerations that remain at the state, zero where it is steady; () where not known
+    # (n,) rad/s²: accelerations that remain at the state, zero where it is steady; () where not
+    # known
+    residual: Array
 
 
 def scene_at(scene: Scene, angles: Sequence[float] | Array, speed: float, torque: float) -> Scene:
@@ -176,7 +201,10 @@ def limit_at_zero(quotients: Sequence[Array], ratio: float) -> Array:
     quotients, 4 for central ones."""
     values = list(quotients)
     for power in range(1, len(values)):
-        values = [fine + (fine - coarse) / (ratio**power - 1.0) for fine, coarse in itertools.pairwise(values)]
+        values = [
+            fine + (fine - coarse) / (ratio**power - 1.0)
+            for fine, coarse in itertools.pairwise(values)
+        ]
     return values[0]
 
 
@@ -190,12 +218,14 @@ class Solution:
     trajectory : the samples.
     integration : report of the engine.
     settings : all settings of the method.
-    setup_time_s, run_times_s, output_time_s : times (s) to build the model, for each integration, and to compute the
+    setup_time_s, run_times_s, output_time_s : times (s) to build the model, for each integration,
+        and to compute the
         samples; no run times if they are unknown.
     status, message : status determined from the samples, and its reason; "" if not assessed.
     metrics : numbers by their names in a results file, such as energy_drift_max.
 
-    Quantities are attributes and items: `solution.tip`, `solution["tip"]`; (n, ...) arrays, n samples.
+    Quantities are attributes and items: `solution.tip`, `solution["tip"]`; (n, ...) arrays, n
+    samples.
     """
 
     scene: Scene
@@ -217,12 +247,14 @@ class Solution:
 
     @property
     def angles(self) -> Array:
-        """Angles of the rotor, then the pitch of each blade: (n, 1 + blades) rad; NaN if not stored."""
+        """Angles of the rotor, then the pitch of each blade: (n, 1 + blades) rad; NaN if not
+        stored."""
         return self.trajectory.angles
 
     @property
     def rates(self) -> Array:
-        """Rates of the rotor, then the pitch of each blade: (n, 1 + blades) rad/s; NaN if not stored."""
+        """Rates of the rotor, then the pitch of each blade: (n, 1 + blades) rad/s; NaN if not
+        stored."""
         return self.trajectory.rates
 
     @property
@@ -240,8 +272,9 @@ class Solution:
         return known[name]
 
     def __getattr__(self, name: str) -> Array:
-        # Called for names that are no field: quantities of plug-ins are attributes like the built-in ones. Names that
-        # start with "_" stay unknown, as copying and pickling ask for those of an object that is not yet filled.
+        # Called for names that are no field: quantities of plug-ins are attributes like the
+        # built-in ones. Names that start with "_" stay unknown, as copying and pickling ask for
+        # those of an object that is not yet filled.
         if not name.startswith("_") and "trajectory" in self.__dict__:
             try:
                 return self[name]
@@ -260,14 +293,23 @@ class Solution:
         variables, used = {}, {"time"}
         for quantity in quantities(self.scene.outputs):
             if quantity.name in arrays:
-                variables[quantity.name] = (quantity.dimensions, arrays[quantity.name], _attributes(quantity))
+                variables[quantity.name] = (
+                    quantity.dimensions,
+                    arrays[quantity.name],
+                    _attributes(quantity),
+                )
                 used |= set(quantity.dimensions)
         coordinates = {
             name: (name, labels.get(name, scales[name]), _attributes(scale))
             for name, scale in SCALES.items()
             if name in used
         }
-        facts = {"scene": self.scene.name, "method": self.method, "status": self.status, "message": self.message}
+        facts = {
+            "scene": self.scene.name,
+            "method": self.method,
+            "status": self.status,
+            "message": self.message,
+        }
         return xarray.Dataset(variables, coordinates, {**facts, **self.metrics})
 
     def _summary(self) -> dict[str, str]:
@@ -275,7 +317,11 @@ class Solution:
         last = float(self.time[-1]) if len(self.time) else self.integration.time_reached
         reached = f"{last:g} s of {self.scene.duration:g} s, {len(self.time)} samples"
         shown = comparison(self.metrics, self.scene.duration)
-        error = f"{shown.error}, limit {OK_ERROR:g}, compared to {shown.compared}" if shown.error else ""
+        error = (
+            f"{shown.error}, limit {OK_ERROR:g}, compared to {shown.compared}"
+            if shown.error
+            else ""
+        )
         rows = {
             "method": self.method,
             "status": self.status or "not assessed",
@@ -302,13 +348,18 @@ class Solution:
         rows = self._summary() | {"arrays": self._arrays()}
         lines = [f"{self.scene.label}: {self.scene.title}"]
         for name, text in rows.items():
-            lines += textwrap.wrap(f"{name}: {text}", 110, initial_indent="  ", subsequent_indent="    ")
+            lines += textwrap.wrap(
+                f"{name}: {text}", 110, initial_indent="  ", subsequent_indent="    "
+            )
         return "\n".join(lines)
 
     def _repr_html_(self) -> str:
         rows = self._summary() | {"arrays": self._arrays()}
-        cells = "".join(f"<tr><th>{escape(k)}</th><td>{escape(v)}</td></tr>" for k, v in rows.items())
-        return f"<table><caption>{escape(f'{self.scene.label}: {self.scene.title}')}</caption>{cells}</table>"
+        cells = "".join(
+            f"<tr><th>{escape(k)}</th><td>{escape(v)}</td></tr>" for k, v in rows.items()
+        )
+        caption = escape(f"{self.scene.label}: {self.scene.title}")
+        return f"<table><caption>{caption}</caption>{cells}</table>"
 
 
 def _attributes(quantity: Quantity) -> dict[str, str]:

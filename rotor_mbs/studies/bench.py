@@ -1,6 +1,8 @@
-"""Error and run time: curves of methods over ladders of settings, a row per point in the table /bench.
+"""Error and run time: curves of methods over ladders of settings, a row per point in the table
+/bench.
 
-The curves of a scene are timed together, in rounds over all their points, by one worker process on one core.
+The curves of a scene are timed together, in rounds over all their points, by one worker process on
+one core.
 """
 
 from __future__ import annotations
@@ -21,7 +23,14 @@ import numpy as np
 from rotor_mbs.analysis.judgement import judge
 from rotor_mbs.analysis.work_precision import fitted_order, step_for, succeeded
 from rotor_mbs.analysis.work_precision import points as points_of
-from rotor_mbs.errors import SYSTEM_ERRORS, InputError, MethodRefusal, RotorError, one_line, system_errors_apart
+from rotor_mbs.errors import (
+    SYSTEM_ERRORS,
+    InputError,
+    MethodRefusal,
+    RotorError,
+    one_line,
+    system_errors_apart,
+)
 from rotor_mbs.methods import catalogue
 from rotor_mbs.methods.base import STEP, TOLERANCE, Ladder, Method
 from rotor_mbs.methods.time_limit import OutOfTimeError, caller_signals, time_limit
@@ -45,22 +54,24 @@ BENCH = "bench"
 
 LONG_RUN_S = 0.5  # runs longer than this are repeated LONG_REPEATS times at most
 LONG_REPEATS = 5
-# Of the budget, what the warm-up runs may take before expensive rungs are left out, so that there is time for about two
-# rounds; and what warm-ups and building may take together.
+# Of the budget, what the warm-up runs may take before expensive rungs are left out, so that there
+# is time for about two rounds; and what warm-ups and building may take together.
 _WARM_UP_SHARE, _BUILD_SHARE = 0.3, 0.6
 _REFERENCE_LIMIT_S = 60.0
 # A run longer than this is ended: a hanging engine must not eat the budget of the others.
 _RUN_LIMIT_S = 10.0
-# A process that has taken this many times its budget, and some time to load engines, hangs in one of them.
+# A process that has taken this many times its budget, and some time to load engines, hangs in one
+# of them.
 _HANGING, _LOADING_S = 3.0, 60.0
-# Errors are compared on at most so many sample intervals: more would make every step shorter than a coarse rung's, and
-# a bench would time the reading of samples.
+# Errors are compared on at most so many sample intervals: more would make every step shorter than a
+# coarse rung's, and a bench would time the reading of samples.
 _MOST_INTERVALS = 100
 
 
 @dataclass(frozen=True, eq=False)
 class Point:
-    """One method at one setting, a step (s) or tolerance. known: its columns that are known before it is measured."""
+    """One method at one setting, a step (s) or tolerance. known: its columns that are known before
+    it is measured."""
 
     method: str
     setting: float
@@ -70,7 +81,8 @@ class Point:
 
 @dataclass(frozen=True)
 class Curve:
-    """A method over its ladder of settings on one scene, coarse to fine: consecutive rows of the table.
+    """A method over its ladder of settings on one scene, coarse to fine: consecutive rows of the
+    table.
 
     Attributes
     ----------
@@ -109,13 +121,15 @@ class Curve:
 
 
 def curve_of(scene: Scene, method: Method, ladder: Ladder, options: Mapping[str, object]) -> Curve:
-    """Return the curve of a method's ladder. options: of the study, stored with each point, with facts of the method
-    that a page may want."""
+    """Return the curve of a method's ladder. options: of the study, stored with each point, with
+    facts of the method that a page may want."""
     name, (short, _) = method.name + ladder.variant, coarsened(scene)
     facts = {
         **options,
         "duration_s": scene.duration,
-        "linearizes": any(other.linearize for other in catalogue.methods() if other.model == method.model),
+        "linearizes": any(
+            other.linearize for other in catalogue.methods() if other.model == method.model
+        ),
         "lines": sum(len(text.splitlines()) for text in method.sources if isinstance(text, str)),
     }
     of_all: dict[str, object] = {
@@ -142,7 +156,8 @@ class PointTimer:
     Attributes
     ----------
     warm_s : s, of the warm-up run; of a point that failed until then.
-    is_repeatable, is_stopped : whether the warm-up run came back; whether it was ended at its limit.
+    is_repeatable, is_stopped : whether the warm-up run came back; whether it was ended at its
+        limit.
     times : s, of the timed runs.
     left_out : why it was not run.
     """
@@ -175,7 +190,8 @@ class PointTimer:
                     self._setup[name] = self._clock() - begun
                 if not gc.isenabled():
                     gc.collect()
-                # A limit makes engines ask after every step, which takes time: only the warm-up run of a bench has one.
+                # A limit makes engines ask after every step, which takes time: only the warm-up run
+                # of a bench has one.
                 with time_limit(self._warm_up_limit_s):
                     self.warm_s = self.run()
                 if self._integration.out_of_time:
@@ -189,7 +205,10 @@ class PointTimer:
         except MethodRefusal as exc:
             self.left_out = f"not run: {exc}"
         except Exception as exc:
-            self._failure = "solver_failed", str(exc) if isinstance(exc, RotorError) else one_line(exc)
+            self._failure = (
+                "solver_failed",
+                str(exc) if isinstance(exc, RotorError) else one_line(exc),
+            )
         if not self.is_repeatable:
             self.warm_s = self._clock() - start
 
@@ -208,8 +227,8 @@ class PointTimer:
         return {"status": status, "message": message, "run_time_s": self.warm_s, **nothing}
 
     def judge(self) -> dict[str, Any]:
-        """Return status, message, metrics and steps of the last run, and the time to read out and compute its
-        samples."""
+        """Return status, message, metrics and steps of the last run, and the time to read out and
+        compute its samples."""
         start = self._clock()
         trajectory = self._solver.observe()
         output = self._clock() - start
@@ -220,7 +239,8 @@ class PointTimer:
         del self._solver
         status = judgement.status
         return {
-            **(judgement.metrics if status in COMPLETE else {}),  # those of a run that broke off are of its part
+            # those of a run that broke off are of its part
+            **(judgement.metrics if status in COMPLETE else {}),
             "status": status,
             "message": judgement.message,
             "false_success": int(judgement.false_success),
@@ -234,7 +254,8 @@ class PointTimer:
 
 
 def statistics(times: Sequence[float]) -> dict[str, float]:
-    """Statistics of run times in s, by the names they are stored under; quartiles between the order statistics."""
+    """Statistics of run times in s, by the names they are stored under; quartiles between the order
+    statistics."""
     low, middle, high = map(float, np.quantile(times, (0.25, 0.5, 0.75)))
     return {
         "run_time_s": middle,
@@ -246,7 +267,10 @@ def statistics(times: Sequence[float]) -> dict[str, float]:
 
 
 def time_in_rounds(
-    ladders: Sequence[Sequence[PointTimer]], budget_s: float, repeats: int, clock: Callable[[], float]
+    ladders: Sequence[Sequence[PointTimer]],
+    budget_s: float,
+    repeats: int,
+    clock: Callable[[], float],
 ) -> None:
     """Warm up every point, the cheapest next rung of any ladder first, then time them in rounds.
 
@@ -259,8 +283,12 @@ def time_in_rounds(
     start = clock()
     _warm_all(ladders, budget_s, clock)
     points = [point for ladder in ladders for point in ladder if point.is_repeatable]
-    wanted = [repeats if point.warm_s <= LONG_RUN_S else min(repeats, LONG_REPEATS) for point in points]
-    allowed = allocate_repeats([max(point.warm_s, 1e-9) for point in points], wanted, budget_s - (clock() - start))
+    wanted = [
+        repeats if point.warm_s <= LONG_RUN_S else min(repeats, LONG_REPEATS) for point in points
+    ]
+    allowed = allocate_repeats(
+        [max(point.warm_s, 1e-9) for point in points], wanted, budget_s - (clock() - start)
+    )
     for round_ in range(max(allowed, default=0)):
         for point, count in zip(points, allowed, strict=True):
             if round_ and clock() - start > budget_s:  # the machine has become slower
@@ -269,9 +297,11 @@ def time_in_rounds(
                 point.times.append(point.run())
 
 
-def _warm_all(ladders: Sequence[Sequence[PointTimer]], budget_s: float, clock: Callable[[], float]) -> None:
-    """Warm up all rungs; the one expected to be cheapest comes next. What is left over when even that one does not fit
-    is left out."""
+def _warm_all(
+    ladders: Sequence[Sequence[PointTimer]], budget_s: float, clock: Callable[[], float]
+) -> None:
+    """Warm up all rungs; the one expected to be cheapest comes next. What is left over when even
+    that one does not fit is left out."""
     start, warm_s = clock(), 0.0
     waiting = [(0.0, 0, number) for number, ladder in enumerate(ladders) if ladder]
     while waiting:
@@ -292,7 +322,8 @@ def _warm_all(ladders: Sequence[Sequence[PointTimer]], budget_s: float, clock: C
 
 
 def allocate_repeats(seconds: Sequence[float], wanted: Sequence[int], budget_s: float) -> list[int]:
-    """Repeats of each point: all it wants or what an equal share of time allows, and one in any case.
+    """Repeats of each point: all it wants or what an equal share of time allows, and one in any
+    case.
 
     What points that want less than their share leave is shared by the others.
     """
@@ -306,12 +337,17 @@ def allocate_repeats(seconds: Sequence[float], wanted: Sequence[int], budget_s: 
 
 
 def measure(
-    curves: Sequence[Curve], scene: Scene, reference: Trajectory | None, repeats: int, budget_s: float
+    curves: Sequence[Curve],
+    scene: Scene,
+    reference: Trajectory | None,
+    repeats: int,
+    budget_s: float,
 ) -> list[list[dict[str, Any]]]:
-    """Measure the columns of every point, by curve: timed in rounds over all points, then the last run of each judged.
+    """Measure the columns of every point, by curve: timed in rounds over all points, then the last
+    run of each judged.
 
-    For a process that does nothing else: engines are loaded beforehand, which is part of no run's time, and the garbage
-    collector is off.
+    For a process that does nothing else: engines are loaded beforehand, which is part of no run's
+    time, and the garbage collector is off.
 
     scene, reference : as they are benched (`bench_inputs`).
     repeats, budget_s : timed runs of a point at most, and s for all of them.
@@ -319,28 +355,44 @@ def measure(
     for method in dict.fromkeys(curve.method for curve in curves):
         catalogue.find_method(method).import_engine()
     gc.disable()
-    timers = [[PointTimer(point, scene, reference, _RUN_LIMIT_S) for point in curve.points] for curve in curves]
+    timers = [
+        [PointTimer(point, scene, reference, _RUN_LIMIT_S) for point in curve.points]
+        for curve in curves
+    ]
     time_in_rounds(timers, budget_s, repeats, time.perf_counter)
     return [[timer.row() for timer in own] for own in timers]
 
 
 def bench_inputs(scene: Scene, place: RowLocation) -> tuple[Scene, Trajectory]:
-    """The scene as it is benched, without loads, and its reference, which is at `place`, at the same samples. Raises
-    InputError where there is none."""
+    """The scene as it is benched, without loads, and its reference, which is at `place`, at the
+    same samples. Raises InputError where there is none."""
     reference = read_reference(place, scene)
     if reference is None or len(reference.time) < scene.samples:
-        raise InputError(f"{scene.name}: no usable reference (it does not reach the end); a bench needs one")
+        raise InputError(
+            f"{scene.name}: no usable reference (it does not reach the end); a bench needs one"
+        )
     short, k = coarsened(scene)
     short = replace(short, outputs=tuple(name for name in short.outputs if name != "loads"))
     arrays = {name: values[::k] for name, values in reference.quantities.items()}
-    return short, Trajectory(reference.time[::k], reference.angles[::k], reference.rates[::k], **arrays)
+    return short, Trajectory(
+        reference.time[::k], reference.angles[::k], reference.rates[::k], **arrays
+    )
 
 
 def coarsened(scene: Scene) -> tuple[Scene, int]:
-    """The scene with every k-th sample, and k: the finest thinning with at most 100 intervals, or none."""
+    """The scene with every k-th sample, and k: the finest thinning with at most 100 intervals, or
+    none."""
     intervals = scene.samples - 1
-    k = next((k for k in range(1, intervals + 1) if intervals % k == 0 and intervals // k <= _MOST_INTERVALS), 1)
-    # A number of intervals without a fitting divisor would leave too few samples to see an error's largest.
+    k = next(
+        (
+            k
+            for k in range(1, intervals + 1)
+            if intervals % k == 0 and intervals // k <= _MOST_INTERVALS
+        ),
+        1,
+    )
+    # A number of intervals without a fitting divisor would leave too few samples to see an error's
+    # largest.
     k = k if intervals // k >= _MOST_INTERVALS // 5 or intervals <= _MOST_INTERVALS else 1
     return replace(scene, samples=intervals // k + 1), k
 
@@ -350,14 +402,19 @@ def coarsened(scene: Scene) -> tuple[Scene, int]:
 
 def curve_tables(curves: Sequence[Curve]) -> list[TableSpec]:
     """The table of the points of these curves, which are all of one; [] of none."""
-    return [points_table(curves[0].table, [p.known for curve in curves for p in curve.points])] if curves else []
+    return (
+        [points_table(curves[0].table, [p.known for curve in curves for p in curve.points])]
+        if curves
+        else []
+    )
 
 
 @dataclass(frozen=True, kw_only=True)
 class CurveTask(Task):
     """A curve on its way to a worker process, each of its points run once.
 
-    longest_s : a run over this is the last: the next one takes several times as long. So is one whose error is a tenth
+    longest_s : a run over this is the last: the next one takes several times as long. So is one
+        whose error is a tenth
         of the curve's target.
     limit_s : a run over this is ended.
     """
@@ -386,7 +443,10 @@ class CurveTask(Task):
             if timer.is_repeatable:
                 timer.times.append(timer.warm_s)
             points.append(timer.row())
-            if points[-1]["status"] == "ok" and points[-1].get("angle_error_max", math.inf) < 0.1 * curve.target:
+            if (
+                points[-1]["status"] == "ok"
+                and points[-1].get("angle_error_max", math.inf) < 0.1 * curve.target
+            ):
                 reason = "not run: the setting before is accurate"
             elif (timer.is_repeatable or timer.is_stopped) and timer.warm_s > self.longest_s:
                 reason = f"not run: the setting before took {timer.warm_s:.2g} s"
@@ -394,7 +454,11 @@ class CurveTask(Task):
 
 
 def curve_tasks(
-    file: TableFile, curves: Sequence[Curve], kill_after_s: float, longest_s: float, limit_s: float = math.inf
+    file: TableFile,
+    curves: Sequence[Curve],
+    kill_after_s: float,
+    longest_s: float,
+    limit_s: float = math.inf,
 ) -> list[CurveTask]:
     """kill_after_s : of a whole curve."""
     return [
@@ -424,7 +488,8 @@ def run_bench(
     workers: int,
     on_progress: OnProgress = ignore_progress,
 ) -> tuple[list[RunOutcome], list[catalogue.Refusal]]:
-    """Measure the curves of every scene into the results file `output`; what it has already is kept.
+    """Measure the curves of every scene into the results file `output`; what it has already is
+    kept.
 
     Parameters
     ----------
@@ -438,7 +503,8 @@ def run_bench(
     list of RunOutcome
         The curves measured by this call.
     list of Refusal
-        What was left out: methods that cannot represent a scene, and scenes without a usable reference.
+        What was left out: methods that cannot represent a scene, and scenes without a usable
+        reference.
 
     Raises
     ------
@@ -451,8 +517,11 @@ def run_bench(
     with locked(output):
         none: Mapping[str, Sequence[str]] = {scene.name: () for scene in scenes}
         report = run_scenes(scenes, none, output, workers=workers, timeout_s=_REFERENCE_LIMIT_S)
-        failed = {run.label.partition(" ")[0]: run for run in (*report.failures, *report.not_computed)}
-        changed = {run.label.partition(" ")[0] for run in report.computed}  # whose reference is another one now
+        failed = {
+            run.label.partition(" ")[0]: run for run in (*report.failures, *report.not_computed)
+        }
+        # whose reference is another one now
+        changed = {run.label.partition(" ")[0] for run in report.computed}
         curves: list[Curve] = []
         refused: list[catalogue.Refusal] = []
         options = {"repeats": repeats, "budget_s": budget_s}
@@ -471,12 +540,18 @@ def run_bench(
                 refused.append(catalogue.Refusal(scene.name, "", reason))
                 continue
             able, others = catalogue.supporting_methods(scene, names, are_named=bool(methods))
-            curves += [curve_of(scene, method, ladder, options) for method, ladder in chosen if method.name in able]
+            curves += [
+                curve_of(scene, method, ladder, options)
+                for method, ladder in chosen
+                if method.name in able
+            ]
             refused += others
         if not curves:
             raise InputError(map(str, refused))
         file = fit_file_to_request(output, curve_tables(curves), [curve.key for curve in curves])
-        missing = [curve for curve in curves if curve.scene.name in changed or not curve.is_stored(file)]
+        missing = [
+            curve for curve in curves if curve.scene.name in changed or not curve.is_stored(file)
+        ]
         made: list[RunOutcome] = []
         for scene in scenes:
             own = [curve for curve in missing if curve.scene.name == scene.name]
@@ -520,7 +595,9 @@ class BenchTask(Task):
         if len(self.curves) == 1:
             return []
         pairs = zip(self.curves, self.places, strict=True)
-        return [replace(self, curves=[curve], places=[place], place=place) for curve, place in pairs]
+        return [
+            replace(self, curves=[curve], places=[place], place=place) for curve, place in pairs
+        ]
 
     def parts(self, rows: Rows) -> list[Rows]:
         """Return the rows of each curve."""
@@ -532,7 +609,9 @@ class BenchTask(Task):
         return parts
 
 
-def bench_task(file: TableFile, curves: Sequence[Curve], repeats: int, budget_s: float) -> BenchTask:
+def bench_task(
+    file: TableFile, curves: Sequence[Curve], repeats: int, budget_s: float
+) -> BenchTask:
     """Return the task that measures curves of one scene, see `BenchTask`."""
     scene = curves[0].scene.name
     places = [curve.places(file)[0] for curve in curves]
@@ -555,25 +634,37 @@ def measured(task: BenchTask) -> Iterator[RunOutcome]:
         for end in run_tasks(pool, [task]):
             if end.value is None:
                 for curve in end.task.curves:
-                    yield RunOutcome(curve.label, curve.method, end.failure, end.message, is_stored=False)
+                    yield RunOutcome(
+                        curve.label, curve.method, end.failure, end.message, is_stored=False
+                    )
                 continue
             for curve, rows in zip(end.task.curves, end.task.parts(end.value), strict=True):
                 codes = rows["status"].tolist()
-                ok, inaccurate, left_out = (codes.count(code_of(status)) for status in ("ok", "inaccurate", "left_out"))
+                ok, inaccurate, left_out = (
+                    codes.count(code_of(status)) for status in ("ok", "inaccurate", "left_out")
+                )
                 failed = len(codes) - ok - inaccurate - left_out
                 counts = f"{ok} ok, {inaccurate} inaccurate, {failed} failed, {left_out} omitted"
-                yield RunOutcome(curve.label, curve.method, "measured", f"{len(codes)} points: {counts}")
+                yield RunOutcome(
+                    curve.label, curve.method, "measured", f"{len(codes)} points: {counts}"
+                )
 
 
 def rows_of_curve(
-    place: RowLocation, curve: Curve, points: Sequence[Mapping[str, Any]], facts: Mapping[str, object]
+    place: RowLocation,
+    curve: Curve,
+    points: Sequence[Mapping[str, Any]],
+    facts: Mapping[str, object],
 ) -> Rows:
     """Return the rows of a curve, with its order of convergence, or the step for its target.
 
     facts: columns that all its points have in common.
     """
     facts = {**facts, "repeatable": int(all(point.get("same", True) for point in points))}
-    each = [place.encode({**point, **facts, "left_out": int(point["status"] == "left_out")}) for point in points]
+    each = [
+        place.encode({**point, **facts, "left_out": int(point["status"] == "left_out")})
+        for point in points
+    ]
     rows = {name: np.concatenate([row[name] for row in each]) for name in each[0]}
     measured = Record(curve.table, curve.scene.name, curve.name, arrays=rows)
     if curve.target:
@@ -589,7 +680,8 @@ def rows_of_curve(
 
 
 def facts_of(short: Scene, reference: Trajectory) -> dict[str, Any]:
-    """What all points of a scene have in common; the uncertainty over the samples that errors are taken at."""
+    """What all points of a scene have in common; the uncertainty over the samples that errors are
+    taken at."""
     uncertainty = reference.angle_uncertainty
     compared = max(horizon_samples(reference), 1)
     return {

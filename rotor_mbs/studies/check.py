@@ -1,4 +1,5 @@
-"""The accuracy check: a results file against bounds, or a default set that is computed for the purpose."""
+"""The accuracy check: a results file against bounds, or a default set that is computed for the
+purpose."""
 
 from __future__ import annotations
 
@@ -52,9 +53,11 @@ _SHRINK = 10.0  # times by which a margin may be smaller than in an earlier file
 
 
 def check_file(path: Path, bounds: Bounds, required: Sequence[str] = ()) -> list[Check]:
-    """Check what is stored, and whether every scene, or the sweep, has a run of each required method.
+    """Check what is stored, and whether every scene, or the sweep, has a run of each required
+    method.
 
-    Raises InputError where there is no run of a method, as in a bench file or a file of references; StoreError.
+    Raises InputError where there is no run of a method, as in a bench file or a file of references;
+    StoreError.
     """
     checks = judge_file(path, bounds)
     if all(check.passed and check.where.method == REFERENCE for check in checks):
@@ -62,7 +65,9 @@ def check_file(path: Path, bounds: Bounds, required: Sequence[str] = ()) -> list
     methods: dict[str, list[str]] = {}  # by scene
     if is_sweep(path):
         sweep = StoredSweep(path, allow_damaged_runs=True)
-        codes = np.asarray(sweep.column("method_code"))[np.asarray(sweep.column("status")) != MISSING]
+        codes = np.asarray(sweep.column("method_code"))[
+            np.asarray(sweep.column("status")) != MISSING
+        ]
         methods[checks[0].where.scene] = [sweep.methods[code] for code in np.unique(codes)]
     else:
         for check in checks:
@@ -76,12 +81,15 @@ def check_file(path: Path, bounds: Bounds, required: Sequence[str] = ()) -> list
 
 
 def check_default_set(
-    bounds: Bounds, workers: int, on_progress: OnProgress = ignore_progress, methods: Sequence[str] = ()
+    bounds: Bounds,
+    workers: int,
+    on_progress: OnProgress = ignore_progress,
+    methods: Sequence[str] = (),
 ) -> list[Check]:
     """Compute the default set, and check it.
 
-    It is every scene of the paper by the default methods; the scenes made for checking by every method;
-    or all by the `methods` that are named, where they can represent them.
+    It is every scene of the paper by the default methods; the scenes made for checking by every
+    method; or all by the `methods` that are named, where they can represent them.
     """
     paper, own = (find_scenes([folder]) for folder in _DEFAULT_SCENES)
     corrected = [name for name in method_names(is_corrected=True) if find_method(name).is_installed]
@@ -93,8 +101,18 @@ def check_default_set(
             asked[scene.name] = corrected if scene in own else default_methods()
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "check.h5"
-        report = run_scenes([*paper, *own], asked, path, workers=workers, timeout_s=_TIMEOUT_S, on_progress=on_progress)
-        checks = [_required(run.label.partition(" ")[0], run.method, run.message) for run in report.not_computed]
+        report = run_scenes(
+            [*paper, *own],
+            asked,
+            path,
+            workers=workers,
+            timeout_s=_TIMEOUT_S,
+            on_progress=on_progress,
+        )
+        checks = [
+            _required(run.label.partition(" ")[0], run.method, run.message)
+            for run in report.not_computed
+        ]
         return checks + judge_file(path, bounds)
 
 
@@ -103,23 +121,39 @@ def _required(scene: str, method: str, hint: str, *, is_missing: bool = True) ->
 
 
 def judge_file(path: Path, bounds: Bounds) -> list[Check]:
-    """Check what is there, runs or a sweep; [] where nothing can be judged. Raises StoreError, InputError."""
-    writer = "; another process is writing it, or was killed while it did" if is_being_written(path) else ""
-    if is_sweep(path):  # all runs are there, and as written; their energies were judged when they were computed
+    """Check what is there, runs or a sweep; [] where nothing can be judged. Raises StoreError,
+    InputError."""
+    writer = (
+        "; another process is writing it, or was killed while it did"
+        if is_being_written(path)
+        else ""
+    )
+    # all runs are there, and as written; their energies were judged when they were computed
+    if is_sweep(path):
         sweep = StoredSweep(path, allow_damaged_runs=True)
         where = Where(str(sweep.attributes.get("base_scene", "sweep")), "*", "runs")
         missing, damaged = int((sweep.column("status") == MISSING).sum()), len(sweep.damaged_runs)
-        absent = f"{missing} runs missing; the sweep's own command computes them, or says why not{writer}"
-        changed = f"{damaged} runs changed after they were written" if damaged else "every run as written"
+        absent = (
+            f"{missing} runs missing; the sweep's own command computes them, or says why "
+            f"not{writer}"
+        )
+        changed = (
+            f"{damaged} runs changed after they were written" if damaged else "every run as written"
+        )
         return [
             bounded(bounds, "complete", where, missing, "runs", absent),
             bounded(bounds, "integrity", where, damaged, "runs", changed),
         ]
     with ExitStack() as stack:
         results = stack.enter_context(open_results(path, verify=False))
-        frozen = [shipped_reference(str(scene.attributes["scene_hash"])) for scene in results.scenes.values()]
+        frozen = [
+            shipped_reference(str(scene.attributes["scene_hash"]))
+            for scene in results.scenes.values()
+        ]
         shipped = [
-            stack.enter_context(open_results(file, only=[known.scene for known in frozen if known is not None]))
+            stack.enter_context(
+                open_results(file, only=[known.scene for known in frozen if known is not None])
+            )
             for file in {known.path for known in frozen if known is not None}
         ]
         with reading(path):  # within the shipped ones, which are not what is wrong
@@ -133,13 +167,16 @@ def judge_file(path: Path, bounds: Bounds) -> list[Check]:
 
 
 def runs_gone(path: Path, earlier: Path) -> Check:
-    """Check that the sweep at `path` has every run of an earlier one: its method with the same varied numbers."""
+    """Check that the sweep at `path` has every run of an earlier one: its method with the same
+    varied numbers."""
     new, old = (StoredSweep(place, allow_damaged_runs=True) for place in (path, earlier))
     methods = [*old.methods, *new.methods]
 
     def runs(sweep: StoredSweep) -> NDArray[Any]:
         is_there = np.asarray(sweep.column("status")) != MISSING
-        numbers = np.array([methods.index(name) for name in sweep.methods])[sweep.column("method_code")]
+        numbers = np.array([methods.index(name) for name in sweep.methods])[
+            sweep.column("method_code")
+        ]
         columns = [numbers, *(sweep.column(parameter_name(key)) for key in sweep.keys)]
         return np.rec.fromarrays([column[is_there] for column in columns])
 
@@ -151,7 +188,8 @@ def runs_gone(path: Path, earlier: Path) -> Check:
 
 
 def scenes_checked(path: Path | None) -> dict[str, Scene]:
-    """Return the scenes of a file by name, of a sweep the one that is varied; without a file those of the default set.
+    """Return the scenes of a file by name, of a sweep the one that is varied; without a file those
+    of the default set.
 
     Raises StoreError, and InputError where a stored scene is none.
     """
@@ -164,7 +202,9 @@ def scenes_checked(path: Path | None) -> dict[str, Scene]:
         return {name: stored.scene for name, stored in results.scenes.items()}
 
 
-def changed_scenes(new: Mapping[str, Scene], old: Mapping[str, Scene], *, are_allowed: bool = False) -> list[Check]:
+def changed_scenes(
+    new: Mapping[str, Scene], old: Mapping[str, Scene], *, are_allowed: bool = False
+) -> list[Check]:
     """Compare the scenes that have the same name: a check for each, of how many keys differ.
 
     Parameters
@@ -180,29 +220,45 @@ def changed_scenes(new: Mapping[str, Scene], old: Mapping[str, Scene], *, are_al
             told.append(f"{len(changes) - _SHOWN_CHANGES} more")
         count = float(len(changes))
         hint = f"{name}: {', '.join(told)}" if told else "as in the earlier file"
-        checks.append(Check(CHANGED, Where(name, "*", "keys"), count, count if are_allowed else 0.0, hint, "keys"))
+        checks.append(
+            Check(
+                CHANGED,
+                Where(name, "*", "keys"),
+                count,
+                count if are_allowed else 0.0,
+                hint,
+                "keys",
+            )
+        )
     return sorted(checks, key=lambda check: natural_key(check.where.scene))
 
 
 def judged_runs(checks: Iterable[Check]) -> Counter[str]:
-    """Count the runs of each method that were judged, so that whoever reads misses a run that is not there."""
+    """Count the runs of each method that were judged, so that whoever reads misses a run that is
+    not there."""
     return Counter(
-        check.where.method for check in checks if check.name == _OF_EVERY_RUN and check.where.method != REFERENCE
+        check.where.method
+        for check in checks
+        if check.name == _OF_EVERY_RUN and check.where.method != REFERENCE
     )
 
 
 def regressions(new: Sequence[Check], old: Sequence[Check]) -> list[Check]:
-    """Compare margins: a check "against" for every earlier one, how many times its margin has shrunk, which may be ten.
+    """Compare margins: a check "against" for every earlier one, how many times its margin has
+    shrunk, which may be ten.
 
     A check for every one of `old`, and one for a run that is gone. The value is
-    NaN, which fails, where `new` lacks the check or the run, and infinite where a check that passed fails. What failed
-    before and fails now is no regression.
+    NaN, which fails, where `new` lacks the check or the run, and infinite where a check that passed
+    fails. What failed before and fails now is no regression.
     """
     present = {(check.name, check.where): check for check in new}
     runs = {check.where[:2] for check in new}
     gone = {check.where[:2]: check for check in old if check.where[:2] not in runs}
     kept = [check for check in old if check.where[:2] in runs]
-    lost = [replace(check, name="run", where=check.where._replace(channel="all")) for check in gone.values()]
+    lost = [
+        replace(check, name="run", where=check.where._replace(channel="all"))
+        for check in gone.values()
+    ]
     changes = []
     for check in [*kept, *lost]:
         now = present.get((check.name, check.where))
@@ -212,11 +268,14 @@ def regressions(new: Sequence[Check], old: Sequence[Check]) -> list[Check]:
             value = math.inf if check.passed else 1.0
             if now.passed and check.passed:
                 before, after = max(check.value, _ROUNDING), max(now.value, _ROUNDING)
-                value = (after / before) * (check.bound / now.bound if now.bound and check.bound else 1.0)
+                value = (after / before) * (
+                    check.bound / now.bound if now.bound and check.bound else 1.0
+                )
             elif now.passed:
                 value = 0.0
             hint = (
-                f"margin shrank {value:,.0f}-fold (limit {_SHRINK:g}): {check.value:.2e} before, {now.value:.2e} now, "
+                f"margin shrank {value:,.0f}-fold (limit {_SHRINK:g}): {check.value:.2e} before, "
+                f"{now.value:.2e} now, "
                 f"bound {now.bound:.2e} {now.unit}; {now.hint}"
             )
         where = check.where._replace(channel=f"{check.name}: {check.where.channel}")

@@ -28,7 +28,9 @@ from rotor_mbs.solution import quantities
 from rotor_mbs.studies.stored_references import frozen_solution
 
 
-def export(scene: Scene | str | os.PathLike[str], to: str, output: str | os.PathLike[str]) -> list[Path]:
+def export(
+    scene: Scene | str | os.PathLike[str], to: str, output: str | os.PathLike[str]
+) -> list[Path]:
     """Write a scene in a format of other programs.
 
     Parameters
@@ -69,12 +71,15 @@ def export(scene: Scene | str | os.PathLike[str], to: str, output: str | os.Path
 
 
 def reference_csv(scene: Scene) -> str:
-    """Return the scene's reference, shipped or computed, as comma-separated values. StoreError where it does not
-    begin."""
+    """Return the scene's reference, shipped or computed, as comma-separated values. StoreError
+    where it does not begin."""
     solution = frozen_solution(scene) or solve(REFERENCE, scene, {})
     trajectory = solution.trajectory
     if not len(trajectory.time):
-        raise StoreError(f"{scene.name}: no reference: {solution.integration.message or 'the motion does not start'}")
+        raise StoreError(
+            f"{scene.name}: no reference: "
+            f"{solution.integration.message or 'the motion does not start'}"
+        )
     blades = [f"{blade}" for blade in range(1, 1 + len(scene.blades))]
     labels = {"coordinate": scene.coordinate_labels, "blade": blades, "axis": "xyz"}
     columns = {"time [s]": trajectory.time}
@@ -83,7 +88,9 @@ def reference_csv(scene: Scene) -> str:
         if values is None:
             continue
         parts = itertools.product(*(labels[dimension] for dimension in quantity.dimensions[1:]))
-        for part, column in zip(map(" ".join, parts), values.reshape(len(values), -1).T, strict=True):
+        for part, column in zip(
+            map(" ".join, parts), values.reshape(len(values), -1).T, strict=True
+        ):
             if quantity.name == "angles":
                 name = part
             elif quantity.name == "rates":
@@ -103,32 +110,46 @@ _STEP = 6.7e-4  # s, of the script: the largest time step: the default of exudyn
 
 _COMMENTS = {  # by kind; parts of another kind are left out
     "node": "joint angles (rad) and rates (rad/s) that move, and their initial values",
-    "object": "hub and blades: kg, m, inertia about centres of mass kg m^2; springs N m/rad, dampers N m s/rad",
+    "object": (
+        "hub and blades: kg, m, inertia about centres of mass kg m^2; springs N m/rad, "
+        "dampers N m s/rad"
+    ),
     "marker": "where a torque acts",
     "load": "torque, N m",
 }
 
 
 def exudyn_script(scene: Scene) -> str:
-    """Return the kinematic tree with the same step as a Python script for Exudyn alone; its text is a template."""
+    """Return the kinematic tree with the same step as a Python script for Exudyn alone; its text is
+    a template."""
     parts = [part for part in tree.parts(scene, Loads(scene)) if part.kind in _COMMENTS]
     moving = [0, *(1 + i for i in movable_blades(scene))]
     calls = []
     for part in parts:
-        arguments = "".join(f"    {key}={_argument(key, value)},\n" for key, value in part.parameters.items())
-        call = f"number[{part.kind!r}, {part.name!r}] = mbs.Add{part.kind.capitalize()}({part.type}("
+        arguments = "".join(
+            f"    {key}={_argument(key, value)},\n" for key, value in part.parameters.items()
+        )
+        call = (
+            f"number[{part.kind!r}, {part.name!r}] = mbs.Add{part.kind.capitalize()}({part.type}("
+        )
         calls.append(f"# {_COMMENTS[part.kind]}\n{call}\n{arguments}))")
-    template = (Path(__file__).parent / "templates" / "exudyn-script.py.txt").read_text(encoding="utf-8")
+    template = (Path(__file__).parent / "templates" / "exudyn-script.py.txt").read_text(
+        encoding="utf-8"
+    )
     return Template(template).substitute(
         title=(scene.title or scene.name).replace("\\", "/").replace('"', "'"),
         step=repr(_STEP),
         types=", ".join(dict.fromkeys(part.type for part in parts)),
         duration=repr(float(scene.duration)),
         samples=scene.samples,
-        loads=_value([[list(map(float, row)) for row in table] for table in scene.load_tables], indent=0),
+        loads=_value(
+            [[list(map(float, row)) for row in table] for table in scene.load_tables], indent=0
+        ),
         labels=_value(list(scene.coordinate_labels)),
         angles=_value(list(map(float, scene.initial_angles))),
-        rates=_value([float(rate) if i in moving else 0.0 for i, rate in enumerate(scene.initial_rates)]),
+        rates=_value(
+            [float(rate) if i in moving else 0.0 for i, rate in enumerate(scene.initial_rates)]
+        ),
         moving=_value(moving),
         parts="\n".join(calls),
     )
@@ -150,8 +171,8 @@ def _argument(key: str, value: Any) -> str:
 
 
 def _value(value: object, indent: int = 4) -> str:
-    """Numbers with all their digits; matrices as arrays, a row of a list on its own line where it is nested; indent: of
-    the line that the value is on."""
+    """Numbers with all their digits; matrices as arrays, a row of a list on its own line where it
+    is nested; indent: of the line that the value is on."""
     if isinstance(value, np.ndarray):
         return f"np.array({value.tolist()!r})"
     if isinstance(value, np.generic):
@@ -159,7 +180,9 @@ def _value(value: object, indent: int = 4) -> str:
     if isinstance(value, str) or not isinstance(value, Sequence):
         return repr(value)
     items = [_value(item, indent + 4) for item in value]
-    if any(isinstance(item, (Sequence, np.ndarray)) and not isinstance(item, str) for item in value):
+    if any(
+        isinstance(item, (Sequence, np.ndarray)) and not isinstance(item, str) for item in value
+    ):
         margin = " " * indent
         return "[\n" + "".join(f"{margin}    {item},\n" for item in items) + f"{margin}]"
     return "[" + ", ".join(items) + "]"
@@ -167,7 +190,14 @@ def _value(value: object, indent: int = 4) -> str:
 
 # By format: the ending of the file's name; its text; what is found in every such text.
 FORMATS: dict[str, tuple[str, Callable[[Scene], str], bytes]] = {
-    "mjcf": (".xml", mjcf_file, rb"\A<mujoco model=[^\0]*Start from the keyframe: mj_resetDataKeyframe"),
+    "mjcf": (
+        ".xml",
+        mjcf_file,
+        (
+            rb"\A<mujoco model=[^\0]*Start from the keyframe: "
+            rb"mj_resetDataKeyframe"
+        ),
+    ),
     "exudyn": (
         "-exudyn.py",
         exudyn_script,

@@ -1,8 +1,10 @@
-"""Examine a method: does it build, is its protocol kept, are its motions right, and what is wrong where they are not.
+"""Examine a method: does it build, is its protocol kept, are its motions right, and what is wrong
+where they are not.
 
-Every run is made in a worker process with a time limit. Its samples pass the same checks as those of `run` and `check`.
-Where a motion is wrong, other equations and numbers are tried on its own states, interval by interval: a cause is named
-if it leaves at most a thousandth of the defects and any other more than ten times as much.
+Every run is made in a worker process with a time limit. Its samples pass the same checks as those
+of `run` and `check`. Where a motion is wrong, other equations and numbers are tried on its own
+states, interval by interval: a cause is named if it leaves at most a thousandth of the defects and
+any other more than ten times as much.
 """
 
 from __future__ import annotations
@@ -19,7 +21,13 @@ from rotor_mbs.analysis.work_precision import fitted_order
 from rotor_mbs.comparison.data_defects import judged_defects
 from rotor_mbs.comparison.defect_search import DefectSearch
 from rotor_mbs.comparison.faults import UNKNOWN_FAULT, faults_in_time
-from rotor_mbs.comparison.wrong_outputs import root_mean_square, wrong_energy, wrong_loads, wrong_rows, wrong_tip
+from rotor_mbs.comparison.wrong_outputs import (
+    root_mean_square,
+    wrong_energy,
+    wrong_loads,
+    wrong_rows,
+    wrong_tip,
+)
 from rotor_mbs.errors import MethodRefusal, ResourceError, RotorError
 from rotor_mbs.methods.base import STEP, Method
 from rotor_mbs.methods.catalogue import error_line, find_method, with_method_files
@@ -81,7 +89,8 @@ def five_blades() -> Scene:
 
 
 def leaning_blades() -> Scene:
-    """Return the same rotor with a tilted shaft, a cone of each blade of its own, and a hub that loads feel."""
+    """Return the same rotor with a tilted shaft, a cone of each blade of its own, and a hub that
+    loads feel."""
     scene = five_blades()
     blades = tuple(replace(blade, cone=0.3 - 0.15 * i) for i, blade in enumerate(scene.blades))
     return replace(
@@ -95,8 +104,9 @@ def leaning_blades() -> Scene:
     )
 
 
-# Shipped scenes beside it, with durations in s that show each at work, samples, and how many times its bounds, which
-# are for slow motions, a method may need: stiff bearings take more of a fixed step.
+# Shipped scenes beside it, with durations in s that show each at work, samples, and how many times
+# its bounds, which are for slow motions, a method may need: stiff bearings take more of a fixed
+# step.
 SCENES = {
     "check/held": (0.5, 26, 1.0),  # blades without inertia about their pitch axis
     "check/point-masses": (1.0, 51, 1.0),  # blades without inertia of their own
@@ -115,8 +125,8 @@ NOT_FOUND = "cause not found"
 
 
 def _run(task: tuple[str, Scene, Mapping[str, object], int, float]) -> Solution:
-    """In a worker process: (method, scene, settings, integrations, time limit in s). Without samples, and why, where
-    the engine raises something."""
+    """In a worker process: (method, scene, settings, integrations, time limit in s). Without
+    samples, and why, where the engine raises something."""
     name, scene, settings, repeats, time_limit_s = task
     try:
         with np.errstate(all="ignore"):
@@ -126,13 +136,17 @@ def _run(task: tuple[str, Scene, Mapping[str, object], int, float]) -> Solution:
     except OutOfTimeError as exc:
         status, message = "timed_out", str(exc)
     except Exception as exc:  # whatever an engine raises is what is asked
-        status, message = "solver_failed", str(exc) if isinstance(exc, RotorError) else error_line(exc)
+        status, message = (
+            "solver_failed",
+            str(exc) if isinstance(exc, RotorError) else error_line(exc),
+        )
     return without_samples(scene, name, settings, status, message)
 
 
 @caller_signals()
 def examine(name: str, timeout_s: float = 60.0) -> list[Check]:
-    """The checks of a method, each with the most likely reason where it fails. Raises InputError for an unknown one."""
+    """The checks of a method, each with the most likely reason where it fails. Raises InputError
+    for an unknown one."""
     with WorkerPool(1) as pool:
         return _Examination(find_method(name), pool, timeout_s).checks()
 
@@ -148,35 +162,59 @@ class _Examination:
         self._has_faults_in_time: bool | None = None
 
     def checks(self) -> list[Check]:
-        self._ask(replace(only_scene(_SMOOTH), duration=0.02, samples=2, outputs=("angles", "rates")), limit=_FIRST_S)
+        self._ask(
+            replace(only_scene(_SMOOTH), duration=0.02, samples=2, outputs=("angles", "rates")),
+            limit=_FIRST_S,
+        )
         scenes = [(five_blades(), 1.0), (leaning_blades(), 1.0)]
         for name, (duration, samples, allowance) in SCENES.items():
             # The chaotic one has its own outputs: bounds on loads are for scenes that ask for them.
             outputs = only_scene(name).outputs if name == _SMOOTH else OUTPUTS
-            scenes.append((replace(only_scene(name), duration=duration, samples=samples, outputs=outputs), allowance))
+            scenes.append(
+                (
+                    replace(only_scene(name), duration=duration, samples=samples, outputs=outputs),
+                    allowance,
+                )
+            )
         for scene, allowance in scenes:
             self._scene(scene, allowance)
         able = [scene.name for scene, _ in scenes if scene.name not in self._refused]
         self._add("builds", "all", float(not able), 0.0, "rejects every scene")
         for name in EXACT:
-            self._exact(replace(only_scene(name), duration=1.0, samples=11, outputs=("angles", "rates")))
+            self._exact(
+                replace(only_scene(name), duration=1.0, samples=11, outputs=("angles", "rates"))
+            )
         if _SMOOTH in able:
-            scene = replace(only_scene(_SMOOTH), duration=0.2, samples=11, outputs=("angles", "rates"))
+            scene = replace(
+                only_scene(_SMOOTH), duration=0.2, samples=11, outputs=("angles", "rates")
+            )
             self._symmetries(scene)
             self._order(scene)
             self._stops(scene)
         return self._made
 
-    def _add(self, check: str, scene: str, value: float, bound: float, hint: str, unit: str = "") -> bool:
+    def _add(
+        self, check: str, scene: str, value: float, bound: float, hint: str, unit: str = ""
+    ) -> bool:
         made = Check(check, Where(scene, self._method.name, check), float(value), bound, hint, unit)
         self._made.append(made)
         return made.passed
 
     def _ask(
-        self, scene: Scene, settings: Mapping[str, object] | None = None, *, repeats: int = 1, limit: float = 0.0
+        self,
+        scene: Scene,
+        settings: Mapping[str, object] | None = None,
+        *,
+        repeats: int = 1,
+        limit: float = 0.0,
     ) -> Solution:
-        """A run, not judged; its status is "" where it came back, else a reason why it has no samples."""
-        name, settings, limit = self._method.name, settings or {}, repeats * (limit or self._timeout_s)
+        """A run, not judged; its status is "" where it came back, else a reason why it has no
+        samples."""
+        name, settings, limit = (
+            self._method.name,
+            settings or {},
+            repeats * (limit or self._timeout_s),
+        )
         task = (name, scene, settings, repeats, limit)
         try:
             return self._pool.submit(with_method_files(_run), task, limit + _LOAD_S).result()
@@ -189,7 +227,9 @@ class _Examination:
     def _scene(self, scene: Scene, allowance: float) -> None:
         solution = self._ask(scene)
         if solution.status == REFUSED:  # perhaps because of the loads, which a method need not have
-            without_loads = replace(scene, outputs=tuple(name for name in OUTPUTS if name != "loads"))
+            without_loads = replace(
+                scene, outputs=tuple(name for name in OUTPUTS if name != "loads")
+            )
             again = self._ask(without_loads)
             if again.status != REFUSED:
                 scene, solution = without_loads, again
@@ -220,11 +260,16 @@ class _Examination:
         # Of several checks of a name the one furthest beyond its bound.
         worst = {check.name: check for check in sorted(checks, key=lambda check: -check.margin)}
         reason = rows = ""
-        if "defect" in worst and defects is not None and not worst["defect"].value <= allowance * self._bound:
+        if (
+            "defect" in worst
+            and defects is not None
+            and not worst["defect"].value <= allowance * self._bound
+        ):
             rows = wrong_rows(scene, run, defects)
             reason = rows or self._cause(scene, run, defects)
         for name, check in worst.items():
-            if name == "error":  # what the defects add up to: of a motion that grows, they alone are the method's
+            # what the defects add up to: of a motion that grows, they alone are the method's
+            if name == "error":
                 continue
             # Loads are known as well as the accelerations, which the defects are of.
             bound = check.bound * (allowance if name in ("defect", "energy", "loads") else 1.0)
@@ -241,7 +286,10 @@ class _Examination:
                 if "defect" in worst and worst["defect"].value <= _ACCURATE * allowance:
                     hint = "the motion is right: a stored energy is wrong"
                     if "energies" in worst and worst["energies"].passed:
-                        hint = "the motion and the energies are right: the work of loads, commands or dampers is wrong"
+                        hint = (
+                            "the motion and the energies are right: the work of loads, "
+                            "commands or dampers is wrong"
+                        )
             elif name in ("energies", "loads", "tip") and not check.value <= bound:
                 hint = _wrong_output(scene, run, check)
             self._add(name, scene.name, check.value, bound, hint, check.unit)
@@ -256,7 +304,10 @@ class _Examination:
         claimed = self._method.order or 1.0
         if order >= claimed - _ORDER_BAND:
             step = self._method.defaults["step"]
-            return f"step of {step:g} s too large: half the step gives {left:.1e} rad, order {order:.1f}"
+            return (
+                f"step of {step:g} s too large: half the step gives {left:.1e} rad, order "
+                f"{order:.1f}"
+            )
         try:
             judged = judged_defects(scene, defects, self._bound)
             alike = DefectSearch(judged).textbook_causes()
@@ -282,8 +333,11 @@ class _Examination:
             self._has_faults_in_time = bool(faults)
         return (faults if self._has_faults_in_time else by_order) or NOT_FOUND
 
-    def _with_half_step(self, scene: Scene, run: Trajectory, defects: Defects) -> tuple[float, float]:
-        """Return the largest judged defect with half the step, rad, and the order by which the defects shrink.
+    def _with_half_step(
+        self, scene: Scene, run: Trajectory, defects: Defects
+    ) -> tuple[float, float]:
+        """Return the largest judged defect with half the step, rad, and the order by which the
+        defects shrink.
 
         Both are zero for a method without a step.
         """
@@ -305,13 +359,19 @@ class _Examination:
         name, angle = known
         fault = protocol_fault(solution)
         error = np.inf if fault else np.abs(solution.angles[:, 0] - angle).max()
-        # The defects of all intervals, added up; the pendulum falls, in a second by less than tenfold.
+        # The defects of all intervals, added up; the pendulum falls, in a second by less than
+        # tenfold.
         bound = 10.0 * scene.samples * self._bound
         self._add("exact", scene.name, error, bound, fault or f"{name}, solved analytically", "rad")
 
     def _symmetries(self, scene: Scene) -> None:
-        """Of a rotor whose blades are alike and symmetric: its mirror image, and its blades by other numbers."""
-        (rotor, *pitches), (spin, *rates), blades = scene.initial_angles, scene.initial_rates, len(scene.blades)
+        """Of a rotor whose blades are alike and symmetric: its mirror image, and its blades by
+        other numbers."""
+        (rotor, *pitches), (spin, *rates), blades = (
+            scene.initial_angles,
+            scene.initial_rates,
+            len(scene.blades),
+        )
         turn, sign = 2.0 * np.pi / blades, np.array([1.0, *[-1.0] * blades])
         mirrored = replace(
             scene,
@@ -329,11 +389,20 @@ class _Examination:
         if len(others):
             others = np.hstack([others[:, :1] + turn, others[:, 2:], others[:, 1:2]])
         hints = {
-            "mirror image": "the mirror image of the initial state does not give that of the motion",
+            "mirror image": (
+                "the mirror image of the initial state does not give that of the motion"
+            ),
             "renumbered": "blades by other numbers give another motion",
         }
-        for check, there in (("mirror image", image * sign if len(image) else image), ("renumbered", others)):
-            error = np.abs(angles - there).max() if angles.shape == there.shape and len(angles) else np.inf
+        for check, there in (
+            ("mirror image", image * sign if len(image) else image),
+            ("renumbered", others),
+        ):
+            error = (
+                np.abs(angles - there).max()
+                if angles.shape == there.shape and len(angles)
+                else np.inf
+            )
             bound = 10.0 * scene.samples * self._bound
             self._add(check, scene.name, error, bound, fault or hints[check], "rad")
 
@@ -355,7 +424,9 @@ class _Examination:
 
     def _stops(self, scene: Scene) -> None:
         """A run that would take long is to end at its time limit, by itself."""
-        long = replace(scene, duration=_LONG * scene.duration, samples=int(_LONG) * (scene.samples - 1) + 1)
+        long = replace(
+            scene, duration=_LONG * scene.duration, samples=int(_LONG) * (scene.samples - 1) + 1
+        )
         solution = self._ask(long, limit=_STOP_S)
         hint = f"not stopped after {_STOP_S:g} s: {solution.message}; it had to be killed"
         self._add("time limit", scene.name, float(solution.status == "worker_died"), 0.0, hint)
@@ -373,7 +444,11 @@ def _wrong_output(scene: Scene, run: Trajectory, check: Check) -> str:
         if text := wrong_loads(scene, run):
             return text
         channel = channel.replace("_", " ")
-    return f"{channel}: {text}" if text else f"{channel}: not that of its angles and rates; {NOT_FOUND}"
+    return (
+        f"{channel}: {text}"
+        if text
+        else (f"{channel}: not that of its angles and rates; {NOT_FOUND}")
+    )
 
 
 def protocol_fault(solution: Solution) -> str:
@@ -388,13 +463,20 @@ def protocol_fault(solution: Solution) -> str:
     if not rows.all():
         return f"row {1 + int(np.argmin(rows))} is not finite; a run ends before it"
     if n < scene.samples:
-        claim = "although it reports success" if integration.success else integration.message or "no reason given"
+        claim = (
+            "although it reports success"
+            if integration.success
+            else integration.message or "no reason given"
+        )
         return f"{n} of {scene.samples} samples, {claim}"
     if not integration.success:
         return f"reports a failure: {integration.message or 'no reason given'}"
     if n > scene.samples or np.abs(run.time - times).max() > 1e-9 * scene.duration:
         return "its times are not the scene's sample times"
-    turned = np.diff(run.angles, axis=0) - 0.5 * (run.rates[1:] + run.rates[:-1]) * np.diff(times)[:, None]
+    turned = (
+        np.diff(run.angles, axis=0)
+        - 0.5 * (run.rates[1:] + run.rates[:-1]) * np.diff(times)[:, None]
+    )
     # Rates in another unit differ from the angles' by a turn somewhere, too, but not all at once.
     beside = np.full((1, turned.shape[1]), 0.0)
     before, after = np.vstack([beside, turned[:-1]]), np.vstack([turned[1:], beside])
@@ -402,5 +484,8 @@ def protocol_fault(solution: Solution) -> str:
     jumps = np.argwhere((np.abs(np.abs(turned) - 2.0 * np.pi) < 0.5) & is_single)
     if len(jumps):
         row, column = jumps[0]
-        return f"{scene.coordinate_labels[column]} jumps by a turn at t = {times[row + 1]:.6g} s: angles are wrapped"
+        return (
+            f"{scene.coordinate_labels[column]} jumps by a turn at t = {times[row + 1]:.6g} s: "
+            "angles are wrapped"
+        )
     return ""

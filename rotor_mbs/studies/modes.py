@@ -1,7 +1,8 @@
-"""Modes of a scene by every model that can be linearized: at rest, over rotor speed, and over a turn under gravity.
+"""Modes of a scene by every model that can be linearized: at rest, over rotor speed, and over a
+turn under gravity.
 
-What is linearized about, the steady state, is found by the closed form and handed to all models; each says for itself
-how far from steady it is there.
+What is linearized about, the steady state, is found by the closed form and handed to all models;
+each says for itself how far from steady it is there.
 """
 
 from __future__ import annotations
@@ -34,9 +35,11 @@ from rotor_mbs.solution.trajectory import Array
 if TYPE_CHECKING:
     from rotor_mbs.models.lagrange.floquet import Turn
 
-# A source whose accelerations at the steady state are above this share of its largest stiffness is not steady there.
+# A source whose accelerations at the steady state are above this share of its largest stiffness is
+# not steady there.
 _STEADY = 1e-7
-# Share of what the weights would do if they did not balance, which is rounding in every model (finite differences).
+# Share of what the weights would do if they did not balance, which is rounding in every model
+# (finite differences).
 _STIFFNESS_ROUNDING = 1e-9
 _BALANCED = "balanced rotor: no preferred angle; modes taken at the initial angle"
 
@@ -54,7 +57,8 @@ def modes_of_scenes(
     timeout_s: float,
     on_progress: OnProgress = ignore_progress,
 ) -> list[RunOutcome]:
-    """Compute the modes of every scene into the file `output`; those that it has of other scenes are kept.
+    """Compute the modes of every scene into the file `output`; those that it has of other scenes
+    are kept.
 
     Parameters
     ----------
@@ -86,7 +90,9 @@ def modes_of_scenes(
     models = tuple(find_method(name).model for name in names)
     for name, model in zip(names, models, strict=True):
         if not any(method.linearize for method in methods() if method.model == model):
-            raise InputError(f"{name}: its model has no linearization; allowed: a model with `linearize`")
+            raise InputError(
+                f"{name}: its model has no linearization; allowed: a model with `linearize`"
+            )
     speeds = increasing_speeds(speeds)
     made: list[RunOutcome] = []
     computed: list[modal.SceneModes] = []
@@ -98,15 +104,22 @@ def modes_of_scenes(
                 label, share = f"{end.task.name} modes", done / len(scenes)
                 if isinstance(end.error, RotorError):
                     reason = str(end.error).removeprefix(f"{end.task.name}: ")
-                    made.append(RunOutcome(label, "", REFUSED, reason, is_stored=False, share=share))
+                    made.append(
+                        RunOutcome(label, "", REFUSED, reason, is_stored=False, share=share)
+                    )
                     continue  # the reason is told once, at the end
                 if end.value is None:
-                    outcome = RunOutcome(label, "", end.failure, end.message, is_stored=False, share=share)
+                    outcome = RunOutcome(
+                        label, "", end.failure, end.message, is_stored=False, share=share
+                    )
                 else:
                     computed.append(end.value)
                     status, message = "ok", ""
                     if not end.value.agrees:
-                        differ = f"models differ by up to {end.value.disagreement:.1e} of the largest eigenvalue"
+                        differ = (
+                            f"models differ by up to {end.value.disagreement:.1e} of the "
+                            "largest eigenvalue"
+                        )
                         status, message = "inaccurate", "; ".join(end.value.faults) or differ
                     outcome = RunOutcome(label, "", status, message, share=share)
                 made.append(outcome)
@@ -120,12 +133,14 @@ def modes_of_scenes(
 
 
 @caller_signals()
-def compute_modes(scene: Scene, speeds: Sequence[float] | Array = (), models: Sequence[str] = ()) -> modal.SceneModes:
+def compute_modes(
+    scene: Scene, speeds: Sequence[float] | Array = (), models: Sequence[str] = ()
+) -> modal.SceneModes:
     """Compute all modes of a scene.
 
-    At rest under gravity; in steady rotation without gravity at `speeds`; Floquet multipliers of a turn under gravity
-    at those above 0. The torque on the rotor is left out: the drive holds its speed. Pitch torques and rest angles are
-    those at t = 0.
+    At rest under gravity; in steady rotation without gravity at `speeds`; Floquet multipliers of a
+    turn under gravity at those above 0. The torque on the rotor is left out: the drive holds its
+    speed. Pitch torques and rest angles are those at t = 0.
 
     Parameters
     ----------
@@ -167,8 +182,8 @@ def compute_modes(scene: Scene, speeds: Sequence[float] | Array = (), models: Se
 def _linear(
     scene: Scene, kind: str, speeds: Array, models: Sequence[str], notes: list[str]
 ) -> dict[str, modal.LinearModes]:
-    """By model, the closed form first, then `models`, or all; one that cannot do any of the speeds is left out, with a
-    note."""
+    """By model, the closed form first, then `models`, or all; one that cannot do any of the speeds
+    is left out, with a note."""
     from rotor_mbs.models.lagrange.linearization import is_balanced, weight_stiffness
 
     points = _steady_states(scene, kind, speeds)
@@ -178,9 +193,19 @@ def _linear(
         notes.append(str(points[0]))
         return {}
     # All blades and bearings are equal, stand at equal pitches, and no gravity tells them apart.
-    bearings = scene.bearing_stiffness, scene.bearing_damping, scene.bearing_rest, scene.pitch_torque
-    same = all(len(set(values)) <= 1 for values in (scene.blades, *bearings)) and scene.blades[0].has_pitch_inertia
-    symmetric = same and all(at.gravity == 0.0 and np.ptp(angles[1:]) < 1e-9 for at, angles, _, _ in steady)
+    bearings = (
+        scene.bearing_stiffness,
+        scene.bearing_damping,
+        scene.bearing_rest,
+        scene.pitch_torque,
+    )
+    same = (
+        all(len(set(values)) <= 1 for values in (scene.blades, *bearings))
+        and scene.blades[0].has_pitch_inertia
+    )
+    symmetric = same and all(
+        at.gravity == 0.0 and np.ptp(angles[1:]) < 1e-9 for at, angles, _, _ in steady
+    )
     columns = scene.moving_coordinates
     # Of a balanced rotor all stiffness about the shaft may be rounding of the weights.
     weight_stiffnesses = [weight_stiffness(at, angles) for at, angles, _, _ in steady]
@@ -197,7 +222,9 @@ def _linear(
         return whole
 
     modes_by_model: dict[str, modal.LinearModes] = {}
-    known = {method.model: method for method in methods() if method.linearize and method.is_installed}
+    known = {
+        method.model: method for method in methods() if method.linearize and method.is_installed
+    }
     closed_form = next(iter(known), "")
     for method in known.values():
         if models and method.model not in (closed_form, *models):
@@ -228,7 +255,9 @@ def _linear(
         if not modes_by_model:
             sets = first_sets = modal.track(sets)
         else:  # modes of equal frequencies are in the same places for every model
-            sets = [modal.in_order_of(first, own) for first, own in zip(first_sets, sets, strict=True)]
+            sets = [
+                modal.in_order_of(first, own) for first, own in zip(first_sets, sets, strict=True)
+            ]
         names = (name if name == "rotor" else f"{name} pitch" for name in sets[0].names)
         modes_by_model[method.model] = modal.LinearModes(
             eigenvalues=over_speed([modes.eigenvalues for modes in sets], complex(np.nan, np.nan)),
@@ -250,11 +279,13 @@ def _linear(
 
 
 def _steady_states(scene: Scene, kind: str, speeds: Array) -> list[_Point | str]:
-    """(scene as it is linearized, angles, speed, torque) at each speed; the reason where there is no such."""
+    """(scene as it is linearized, angles, speed, torque) at each speed; the reason where there is
+    no such."""
     from rotor_mbs.models.lagrange.linearization import equilibrium, holding_torque, steady_rotation
 
     at = scene if kind == modal.REST else replace(scene, gravity=0.0)
-    start = scene  # of each slower speed: the pitches before, so that one branch is followed down to rest
+    # of each slower speed: the pitches before, so that one branch is followed down to rest
+    start = scene
     points: list[_Point | str] = []
     for speed in map(float, speeds[::-1]):
         try:
@@ -265,12 +296,15 @@ def _steady_states(scene: Scene, kind: str, speeds: Array) -> list[_Point | str]
             points.append(f"{scene.name}: singular at {speed:g} rad/s")
         else:
             start = replace(start, initial_angles=tuple(angles.tolist()))
-            points.append((replace(at, rotor_torque=()), angles, speed, holding_torque(scene, speed)))
+            points.append(
+                (replace(at, rotor_torque=()), angles, speed, holding_torque(scene, speed))
+            )
     return points[::-1]
 
 
 def _floquet_table(scene: Scene, speeds: Array) -> modal.FloquetTable:
-    """Multipliers of the periodic motion under gravity at `speeds` > 0, from the fastest down. Raises MethodRefusal."""
+    """Multipliers of the periodic motion under gravity at `speeds` > 0, from the fastest down.
+    Raises MethodRefusal."""
     from rotor_mbs.models.lagrange.floquet import periodic_turn
 
     turns: list[Turn] = []
@@ -289,13 +323,18 @@ def _floquet_table(scene: Scene, speeds: Array) -> modal.FloquetTable:
         if not turn.message and rounding < 1e-6 * sizes.min():
             error = float(np.log(sizes).sum() - turn.trace_integral)
         rows.append((every, modulus, is_stable, error, turn.torque, turn.mismatch))
-    multipliers, largest, stable, errors, torques, mismatches = map(np.array, zip(*rows, strict=True))
+    multipliers, largest, stable, errors, torques, mismatches = map(
+        np.array, zip(*rows, strict=True)
+    )
     messages = tuple(turn.message for turn in turns)
-    return modal.FloquetTable(speeds, multipliers, largest, stable, errors, torques, mismatches, messages)
+    return modal.FloquetTable(
+        speeds, multipliers, largest, stable, errors, torques, mismatches, messages
+    )
 
 
 def increasing_speeds(speeds: Sequence[float] | Array) -> list[float]:
-    """Return rotor speeds as floats. Raises InputError where they are not allowed, TypeError for what is no number."""
+    """Return rotor speeds as floats. Raises InputError where they are not allowed, TypeError for
+    what is no number."""
     try:
         numbers = [float(speed) for speed in speeds]
     except (ValueError, OverflowError):  # a text, a whole number above 1e308

@@ -1,8 +1,8 @@
 """The main job: every scene of the paper by the default methods and with each erratum alone.
 
-And error and run time of all methods on one scene, at a few settings each, in seconds: a bench takes one process on
-one core and rounds over all points; here each curve is a task beside the runs, and a point is run once. Its errors are
-those of a bench, its times are good to a factor.
+And error and run time of all methods on one scene, at a few settings each, in seconds: a bench
+takes one process on one core and rounds over all points; here each curve is a task beside the runs,
+and a point is run once. Its errors are those of a bench, its times are good to a factor.
 """
 
 from __future__ import annotations
@@ -13,7 +13,14 @@ from pathlib import Path
 import rotor_mbs
 from rotor_mbs.analysis.published import claims, finding
 from rotor_mbs.analysis.text_tables import TextTable, method_table
-from rotor_mbs.methods.catalogue import REFERENCE, Refusal, default_methods, errata_methods, ladders, supporting_methods
+from rotor_mbs.methods.catalogue import (
+    REFERENCE,
+    Refusal,
+    default_methods,
+    errata_methods,
+    ladders,
+    supporting_methods,
+)
 from rotor_mbs.processes.pool import Workers, pool_of
 from rotor_mbs.runs.design import results_tables
 from rotor_mbs.runs.merge import fit_file_to_request
@@ -26,15 +33,18 @@ from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.studies.bench import Curve, curve_of, curve_tables, curve_tasks
 from rotor_mbs.studies.run import BatchReport, asked_runs, missing_runs
 
-# The scene whose error and run time are measured by all methods: the paper's own crest, and a horizon of 6 s.
+# The scene whose error and run time are measured by all methods: the paper's own crest, and a
+# horizon of 6 s.
 BENCHED = "paper/fig11"
-_LONGEST_S = 0.25  # a run longer than this is the last of its curve: the next one takes up to eight times as long
+# a run longer than this is the last of its curve: the next one takes up to eight times as long
+_LONGEST_S = 0.25
 
 
 def reproduce(
     output: Path, *, workers: Workers, timeout_s: float, on_progress: OnProgress = ignore_progress
 ) -> tuple[BatchReport, list[Refusal]]:
-    """Compute the default set of runs and the curves into a results file; what it has already is kept.
+    """Compute the default set of runs and the curves into a results file; what it has already is
+    kept.
 
     Parameters
     ----------
@@ -73,15 +83,24 @@ def reproduce(
         unmeasured = [curve for curve in curves if is_new or not curve.is_stored(file)]
         of_curves = curve_tasks(file, unmeasured, 1.2 * timeout_s + 10.0, _LONGEST_S)
         made = run_tasks_references_first([*runs, *of_curves], pool, on_progress)
-        return BatchReport([outcome for outcome in made if outcome.label in labels], stored), refused
+        return BatchReport(
+            [outcome for outcome in made if outcome.label in labels], stored
+        ), refused
 
 
 def made_from(results: Path, timeout_s: float) -> str:
     """A digest of the results file, code, versions, scenes, references and the time limit."""
     package = Path(rotor_mbs.__file__).parent
-    sources = sorted(path for path in package.rglob("*") if path.is_file() and path.parent.name != "__pycache__")
+    sources = sorted(
+        path for path in package.rglob("*") if path.is_file() and path.parent.name != "__pycache__"
+    )
     digest = hashlib.sha256(f"{versions()} {timeout_s}".encode())
-    for path in (results, *sources, *sorted(SCENARIOS.rglob("*.toml")), *sorted(REFERENCES.iterdir())):
+    for path in (
+        results,
+        *sources,
+        *sorted(SCENARIOS.rglob("*.toml")),
+        *sorted(REFERENCES.iterdir()),
+    ):
         with path.open("rb") as file:
             digest.update(hashlib.file_digest(file, "sha256").digest())
     return digest.hexdigest()
@@ -98,7 +117,9 @@ def summary_of(path: Path) -> str:
 
 def short_curves(scene: Scene) -> list[Curve]:
     """A short curve of each method on `scene`."""
-    able, _ = supporting_methods(scene, list(dict.fromkeys(method.name for method, _ in ladders().values())))
+    able, _ = supporting_methods(
+        scene, list(dict.fromkeys(method.name for method, _ in ladders().values()))
+    )
     options = {"budget_s": _LONGEST_S, "is_short": True}
     return [
         curve_of(scene, method, ladder.coarse, options)

@@ -1,4 +1,5 @@
-"""Runs of scenes: solved, judged against the reference of their scene, and stored as rows of a results file."""
+"""Runs of scenes: solved, judged against the reference of their scene, and stored as rows of a
+results file."""
 
 from __future__ import annotations
 
@@ -29,7 +30,13 @@ from rotor_mbs.runs.design import MISSING, STATUS_COPIES, RunRequest, results_ta
 from rotor_mbs.runs.merge import fit_file_to_request
 from rotor_mbs.runs.output_files import locked
 from rotor_mbs.runs.rows import RowLocation, Rows, row_of_run, text_of
-from rotor_mbs.runs.runner import OnProgress, RunOutcome, Task, ignore_progress, run_tasks_references_first
+from rotor_mbs.runs.runner import (
+    OnProgress,
+    RunOutcome,
+    Task,
+    ignore_progress,
+    run_tasks_references_first,
+)
 from rotor_mbs.runs.table import TableFile
 from rotor_mbs.scenario.scene import Scene, scene_hash
 from rotor_mbs.solution.defects import Defects
@@ -64,25 +71,41 @@ class RunTask(Task):
         shipped = frozen_solution(asked.scene) if asked.is_shipped else None
         try:
             run = shipped or solve(
-                asked.method, asked.scene, asked.settings, _REPEATS, _REPEAT_BUDGET_S, self.time_limit_s
+                asked.method,
+                asked.scene,
+                asked.settings,
+                _REPEATS,
+                _REPEAT_BUDGET_S,
+                self.time_limit_s,
             )
         except (*SYSTEM_ERRORS, MethodRefusal):
             raise
         except OutOfTimeError as exc:  # from a method that cannot be stopped with its samples
             return self.failed("timed_out", str(exc))
         except Exception as exc:
-            return self.failed("solver_failed", str(exc) if isinstance(exc, RotorError) else error_line(exc))
+            return self.failed(
+                "solver_failed", str(exc) if isinstance(exc, RotorError) else error_line(exc)
+            )
         reference = run.trajectory if asked.method == REFERENCE else None
         if self.reference is not None:
             reference = read_reference(self.reference, asked.scene)
         run, false_success = _judged(run, reference, end)
         limit = self.time_limit_s if run.status == "timed_out" and shipped is None else np.nan
-        return row_of_run(run, self.place, {"false_success": int(false_success), "time_limit_s": limit})
+        return row_of_run(
+            run, self.place, {"false_success": int(false_success), "time_limit_s": limit}
+        )
 
     def outcome(self, rows: Rows) -> RunOutcome:
         seconds = float("nan") if self.asked.is_shipped else float(rows["run_time_s"][0])
         status, message = STATUSES[int(rows["status"][0])], text_of(rows["message"][0])
-        return RunOutcome(self.label, self.method, status, message, seconds=seconds, is_shipped=self.asked.is_shipped)
+        return RunOutcome(
+            self.label,
+            self.method,
+            status,
+            message,
+            seconds=seconds,
+            is_shipped=self.asked.is_shipped,
+        )
 
 
 def work_of(scene: Scene, method: str) -> float:
@@ -92,15 +115,21 @@ def work_of(scene: Scene, method: str) -> float:
 
 @dataclass(frozen=True)
 class BatchReport:
-    """The outcomes of a list of runs: of those that this call computed, and of those that were stored already."""
+    """The outcomes of a list of runs: of those that this call computed, and of those that were
+    stored already."""
 
     computed: list[RunOutcome]
     stored: list[RunOutcome]
 
     @property
     def failures(self) -> list[RunOutcome]:
-        """Runs that should have succeeded and did not. How far the printed equations get is data, not a failure."""
-        return [run for run in self.computed if run.is_stored and run.status != "ok" and is_corrected(run.method)]
+        """Runs that should have succeeded and did not. How far the printed equations get is data,
+        not a failure."""
+        return [
+            run
+            for run in self.computed
+            if run.is_stored and run.status != "ok" and is_corrected(run.method)
+        ]
 
     @property
     def stored_failures(self) -> list[str]:
@@ -113,7 +142,8 @@ class BatchReport:
 
     @property
     def not_computed(self) -> list[RunOutcome]:
-        """Runs whose process died or could not start; nothing is stored, the same call tries them again."""
+        """Runs whose process died or could not start; nothing is stored, the same call tries them
+        again."""
         return [run for run in self.computed if not run.is_stored]
 
 
@@ -129,7 +159,8 @@ def run_scenes(
     use_frozen: bool = True,
     on_progress: OnProgress = ignore_progress,
 ) -> BatchReport:
-    """Compute every scene's reference and runs into the results file `output`; what it has already is kept.
+    """Compute every scene's reference and runs into the results file `output`; what it has already
+    is kept.
 
     Parameters
     ----------
@@ -158,14 +189,22 @@ def asked_runs(
     *,
     use_frozen: bool = True,
 ) -> list[RunRequest]:
-    """Return the rows of these scenes by their `methods`, the reference of each scene first: the shipped one, where
-    there is one and it may be used, or one to be computed. Raises InputError."""
-    of_call = settings_for(list(dict.fromkeys(name for scene in scenes for name in methods[scene.name])), settings)
+    """Return the rows of these scenes by their `methods`, the reference of each scene first: the
+    shipped one, where there is one and it may be used, or one to be computed. Raises InputError."""
+    of_call = settings_for(
+        list(dict.fromkeys(name for scene in scenes for name in methods[scene.name])), settings
+    )
     asked: list[RunRequest] = []
     for scene in scenes:
-        runs = [RunRequest(scene, name, own_settings(scene, name) | of_call[name]) for name in methods[scene.name]]
+        runs = [
+            RunRequest(scene, name, own_settings(scene, name) | of_call[name])
+            for name in methods[scene.name]
+        ]
         digest = scene_hash(scene)
-        asked += [RunRequest(scene, REFERENCE, versions=shipped_versions(digest) if use_frozen else None), *runs]
+        asked += [
+            RunRequest(scene, REFERENCE, versions=shipped_versions(digest) if use_frozen else None),
+            *runs,
+        ]
     return asked
 
 
@@ -194,7 +233,8 @@ def missing_runs(
         place = file.place(run.label)
         row = place.read()
         status = STATUSES[row["status"][0]] if place.is_stored else ""
-        # A shipped reference may end early itself; it has a limit only where reading it was over one.
+        # A shipped reference may end early itself; it has a limit only where reading it was over
+        # one.
         limit = row["time_limit_s"][0]
         is_short = limit < timeout_s if run.is_shipped else not limit >= timeout_s
         is_over = status == "timed_out" and is_short
@@ -236,8 +276,8 @@ def solve_judged(
     compute_reference: bool = False,
     time_limit_s: float = float("inf"),
 ) -> tuple[Solution, Trajectory | None]:
-    """Solve one run in this process, with status, message and metrics, and the reference it was judged by; stores
-    nothing.
+    """Solve one run in this process, with status, message and metrics, and the reference it was
+    judged by; stores nothing.
 
     The time limit is for the run, then the reference, then the judging.
 
@@ -259,31 +299,46 @@ def solve_judged(
             is_short = True
     run, _ = _judged(run, reference, end)
     if is_short and run.status != "timed_out":
-        run = replace(run, status="timed_out", message="the reference that was asked for is over the time limit")
+        run = replace(
+            run,
+            status="timed_out",
+            message=("the reference that was asked for is over the time limit"),
+        )
     return run, reference
 
 
 def _judged(run: Solution, reference: Trajectory | None, end: float) -> tuple[Solution, bool]:
-    """The run with status, message and metrics; and whether its engine claims a success that it is not.
+    """The run with status, message and metrics; and whether its engine claims a success that it is
+    not.
 
-    What was reached by the time limit, which is at `end` of the monotonic clock, is judged in a second more.
+    What was reached by the time limit, which is at `end` of the monotonic clock, is judged in a
+    second more.
     """
     try:
         with time_limit(max(end - time.monotonic(), _JUDGING_S)):
             judgement = judge(run.scene, run, reference)
     except OutOfTimeError as exc:
-        return replace(run, status="timed_out", message=f"{exc}, while its samples were assessed"), False
+        return replace(
+            run, status="timed_out", message=f"{exc}, while its samples were assessed"
+        ), False
     advice = judgement.advice or next_to_try(run.scene, run.method, run.settings, judgement.status)
     message = judgement.message + advice
     trajectory = run.trajectory
     if judgement.defects is not None:
         trajectory = _with_defects(trajectory, judgement.defects)
-    judged = replace(run, trajectory=trajectory, status=judgement.status, message=message, metrics=judgement.metrics)
+    judged = replace(
+        run,
+        trajectory=trajectory,
+        status=judgement.status,
+        message=message,
+        metrics=judgement.metrics,
+    )
     return judged, judgement.false_success
 
 
 def _with_defects(samples: Trajectory, defects: Defects) -> Trajectory:
-    """Return the samples with the size of each interval's defect at its end; NaN where it is not known."""
+    """Return the samples with the size of each interval's defect at its end; NaN where it is not
+    known."""
     sizes = np.concatenate([[np.nan], defects.sizes])
     known = samples.replace(**{DEFECT: np.where(np.isfinite(sizes), sizes, np.nan)})
     known.refined = samples.refined
@@ -291,8 +346,8 @@ def _with_defects(samples: Trajectory, defects: Defects) -> Trajectory:
 
 
 def next_to_try(scene: Scene, method: str, settings: Mapping[str, object], status: str) -> str:
-    """What would make an inaccurate run better: the next rung of the method's ladder, or another method; else "". Of a
-    reference, which nothing else can stand for, ""."""
+    """What would make an inaccurate run better: the next rung of the method's ladder, or another
+    method; else "". Of a reference, which nothing else can stand for, ""."""
     known = find_method_or_none(method)
     if status != "inaccurate" or known is None or not known.is_corrected or method == REFERENCE:
         return ""
@@ -303,10 +358,14 @@ def next_to_try(scene: Scene, method: str, settings: Mapping[str, object], statu
     return f"; as fine as its ladder goes, next to try: {others[0]}" if others else ""
 
 
-def without_samples(scene: Scene, method: str, settings: Mapping[str, object], status: str, message: str) -> Solution:
+def without_samples(
+    scene: Scene, method: str, settings: Mapping[str, object], status: str, message: str
+) -> Solution:
     columns = 1 + len(scene.blades)
     trajectory = Trajectory(np.empty(0), np.empty((0, columns)), np.empty((0, columns)))
     chosen = find_method(method).settings.of(method, settings).as_dict()
     engine = Integration(False, message)
     # Times are not known: its process may have been ended.
-    return Solution(scene, method, trajectory, engine, chosen, math.nan, [], math.nan, status, message)
+    return Solution(
+        scene, method, trajectory, engine, chosen, math.nan, [], math.nan, status, message
+    )

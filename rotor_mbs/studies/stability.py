@@ -1,5 +1,5 @@
-"""The stability suite: every corrected method on the stiff and extreme scenes, and ladders of steps for some. As a map:
-how each method ends on every scene, and whether a smaller step helps."""
+"""The stability suite: every corrected method on the stiff and extreme scenes, and ladders of steps
+for some. As a map: how each method ends on every scene, and whether a smaller step helps."""
 
 from __future__ import annotations
 
@@ -25,14 +25,20 @@ from rotor_mbs.runs.design import RunRequest
 from rotor_mbs.runs.merge import fit_file_to_request
 from rotor_mbs.runs.output_files import locked
 from rotor_mbs.runs.read import open_results, read_records
-from rotor_mbs.runs.runner import OnProgress, RunOutcome, ignore_progress, run_tasks_references_first
+from rotor_mbs.runs.runner import (
+    OnProgress,
+    RunOutcome,
+    ignore_progress,
+    run_tasks_references_first,
+)
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.studies.bench import Curve, Point, curve_tables, curve_tasks
 from rotor_mbs.studies.run import run_scenes
 
 TARGET = 1e-6  # rad: what a method must reach on the stiff and light scenes
 
-# What the map shows of a run: its status, or one that says more. Symbol, text; colour is the report's.
+# What the map shows of a run: its status, or one that says more. Symbol, text; colour is the
+# report's.
 OUTCOMES = {
     "ok": ("✓", "ok"),
     "smaller_step": ("▾", "ok with a smaller step"),
@@ -95,8 +101,8 @@ def suite_runs(path: Path) -> list[SuiteRun]:
 
 
 def suite_table(runs: Sequence[SuiteRun]) -> TextTable:
-    """Return a row for each method, a column for each folder of scenes: "12+1 of 14" are ok, of these 1 with a smaller
-    step; of the printed equations "2 of 2 completed".
+    """Return a row for each method, a column for each folder of scenes: "12+1 of 14" are ok, of
+    these 1 with a smaller step; of the printed equations "2 of 2 completed".
 
     Without scenes that are singular and have no reference: there no motion exists.
     """
@@ -106,7 +112,9 @@ def suite_table(runs: Sequence[SuiteRun]) -> TextTable:
     for method in dict.fromkeys(run.method for run in runs):
         cells = []
         for folder in folders:
-            outcomes = [run.outcome for run in compared if (run.method, run.folder) == (method, folder)]
+            outcomes = [
+                run.outcome for run in compared if (run.method, run.folder) == (method, folder)
+            ]
             ok, smaller = outcomes.count("ok"), outcomes.count("smaller_step")
             count = f"{ok}+{smaller}" if smaller else f"{ok}"
             text = f"{count} of {len(outcomes)}"
@@ -120,13 +128,15 @@ def suite_table(runs: Sequence[SuiteRun]) -> TextTable:
 
 SUITE = ("stiff", "extreme")
 
-# The method that `run` relies on is given time for the longest scenes: a map of time-outs shows nothing.
+# The method that `run` relies on is given time for the longest scenes: a map of time-outs shows
+# nothing.
 _PATIENT_METHOD, _PATIENT_S = "lagrange/taylor", 120.0
 # A ladder takes a few times its longest run; what is over this is stuck.
 _TASK_LIMIT_S = 40.0
 STEPS = "stability"  # table
 
-# A ladder goes down by fours until it reaches the target, stops gaining, or a run is expected to take this long.
+# A ladder goes down by fours until it reaches the target, stops gaining, or a run is expected to
+# take this long.
 _FACTOR = 4
 _LONGEST_RUN_S = 1.5
 _STIFF_OR_LIGHT = ("stiff/", "extreme/light", "extreme/feather")
@@ -147,7 +157,8 @@ def run_suite(
 ) -> tuple[list[RunOutcome], list[Refusal]]:
     """Compute the suite on some scenes into a results file.
 
-    What the file has already is kept; records of these scenes that are no longer wanted are dropped.
+    What the file has already is kept; records of these scenes that are no longer wanted are
+    dropped.
 
     Parameters
     ----------
@@ -156,7 +167,8 @@ def run_suite(
     workers : parallel processes.
     timeout_s : time limit of a run in s.
     methods : names; all corrected methods if there are none.
-    settings : of the methods that have them, for the runs of the map. Ladders vary the step by themselves.
+    settings : of the methods that have them, for the runs of the map. Ladders vary the step by
+        themselves.
     on_progress : called after each run.
 
     Returns
@@ -182,13 +194,24 @@ def run_suite(
     if not any(asked.values()):
         raise InputError(map(str, refused))
     scenes = [scene for scene in scenes if asked[scene.name]]
-    patient = {name: [method for method in able if method == _PATIENT_METHOD] for name, able in asked.items()}
+    patient = {
+        name: [method for method in able if method == _PATIENT_METHOD]
+        for name, able in asked.items()
+    }
     made: list[RunOutcome] = []
     with pool_of(workers) as pool:
         for chosen, limit_s in ((patient, max(timeout_s, _PATIENT_S)), (asked, timeout_s)):
-            own = settings_of_any([name for able in chosen.values() for name in able], settings or {})
+            own = settings_of_any(
+                [name for able in chosen.values() for name in able], settings or {}
+            )
             report = run_scenes(
-                scenes, chosen, output, workers=pool, timeout_s=limit_s, settings=own, on_progress=on_progress
+                scenes,
+                chosen,
+                output,
+                workers=pool,
+                timeout_s=limit_s,
+                settings=own,
+                on_progress=on_progress,
             )
             made += report.computed
         return made + complete_ladders(scenes, asked, output, pool, on_progress), refused
@@ -203,14 +226,18 @@ def complete_ladders(
 ) -> list[RunOutcome]:
     """Complete the ladders of steps of these scenes, where the runs in `output` call for them."""
     by_name = {scene.name: scene for scene in scenes}
-    # Where a fixed step may matter: the stiff and light scenes, and runs that failed at the default step.
+    # Where a fixed step may matter: the stiff and light scenes, and runs that failed at the default
+    # step.
     wanted = [
         (by_name[run.scene], run.method)
         for run in suite_runs(output)
         if run.scene in by_name
         and run.has_reference
         and find_method(run.method).fixed_step
-        and (run.scene.startswith(_STIFF_OR_LIGHT) or run.status in ("inaccurate", "diverged", "solver_failed"))
+        and (
+            run.scene.startswith(_STIFF_OR_LIGHT)
+            or run.status in ("inaccurate", "diverged", "solver_failed")
+        )
     ]
     curves = [ladder_curve(scene, method) for scene, method in wanted]
     with locked(output), pool_of(workers) as pool:
@@ -218,17 +245,22 @@ def complete_ladders(
         replaced = [(STEPS, scene, method) for scene, able in methods.items() for method in able]
         file = fit_file_to_request(output, curve_tables(curves), replaced)
         missing = [curve for curve in curves if not curve.is_stored(file)]
-        tasks = curve_tasks(file, missing, _TASK_LIMIT_S, _LONGEST_RUN_S / _FACTOR, 2.0 * _LONGEST_RUN_S)
+        tasks = curve_tasks(
+            file, missing, _TASK_LIMIT_S, _LONGEST_RUN_S / _FACTOR, 2.0 * _LONGEST_RUN_S
+        )
         return run_tasks_references_first(tasks, pool, on_progress)
 
 
 def ladder_curve(scene: Scene, method: str) -> Curve:
-    """Its steps: the sample interval, then a quarter of the one before, as long as a run has not too many of them."""
+    """Its steps: the sample interval, then a quarter of the one before, as long as a run has not
+    too many of them."""
     steps = [scene.duration / (scene.samples - 1)]
     while scene.duration <= _MAX_STEPS * steps[-1] / _FACTOR:
         steps.append(steps[-1] / _FACTOR)
     points = []
     for step in steps:
-        known = RunRequest(scene, method, {STEP: step}).known | {"run": f"{scene.name}/{method} step={step:.6g}"}
+        known = RunRequest(scene, method, {STEP: step}).known | {
+            "run": (f"{scene.name}/{method} step={step:.6g}")
+        }
         points.append(Point(method, step, {STEP: step}, known | {STEP: step}))
     return Curve(scene, method, STEP, points, STEPS, TARGET)

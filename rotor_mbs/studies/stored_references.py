@@ -1,4 +1,5 @@
-"""References read from results files: those shipped with the package, and those computed beside the runs of a study."""
+"""References read from results files: those shipped with the package, and those computed beside the
+runs of a study."""
 
 from __future__ import annotations
 
@@ -52,7 +53,8 @@ def _shipped_by_hash(files: tuple[Path, ...]) -> dict[str, ShippedReference]:
 
 
 def shipped_versions(scene_hash: str) -> dict[str, str] | None:
-    """`versions` of a row with the shipped reference of the scene of that hash; None where there is none."""
+    """`versions` of a row with the shipped reference of the scene of that hash; None where there is
+    none."""
     shipped = shipped_reference(scene_hash)
     if shipped is None:
         return None
@@ -77,8 +79,8 @@ def read_reference(place: RowLocation, scene: Scene) -> Trajectory | None:
 
 
 def rebuilt_reference(scene: Scene, arrays: Mapping[str, NDArray[Any]]) -> Trajectory:
-    """A stored reference with what its scene asks for, computed from its angles and rates by its own closed form.
-    arrays: time and `REFERENCE_ARRAYS`, by name, as far as they are stored."""
+    """A stored reference with what its scene asks for, computed from its angles and rates by its
+    own closed form. arrays: time and `REFERENCE_ARRAYS`, by name, as far as they are stored."""
     from rotor_mbs.models.lagrange import samples
 
     known = {name: values for name, values in arrays.items() if not np.isnan(values[:1]).all()}
@@ -90,8 +92,9 @@ def rebuilt_reference(scene: Scene, arrays: Mapping[str, NDArray[Any]]) -> Traje
 
 
 def frozen_solution(scene: Scene) -> Solution | None:
-    """Return the shipped reference of a scene, with the settings and times of when it was computed; None where there is
-    none. Its arrays are shared by all callers, and read-only. Raises StoreError where it cannot be read."""
+    """Return the shipped reference of a scene, with the settings and times of when it was computed;
+    None where there is none. Its arrays are shared by all callers, and read-only. Raises StoreError
+    where it cannot be read."""
     shipped = shipped_reference(scene_hash(scene))
     return None if shipped is None else _read_shipped(shipped, scene)
 
@@ -102,9 +105,16 @@ def _read_shipped(shipped: ShippedReference, scene: Scene) -> Solution:
         stored = results.scenes[shipped.scene].reference
         assert stored is not None  # a file of references has one for each scene
         facts = stored.attributes
-        arrays = {name: stored.array(name) for name in ("time", *REFERENCE_ARRAYS) if name in stored}
+        arrays = {
+            name: stored.array(name) for name in ("time", *REFERENCE_ARRAYS) if name in stored
+        }
         trajectory = rebuilt_reference(scene, arrays)
-        for values in (trajectory.time, trajectory.angles, trajectory.rates, *trajectory.quantities.values()):
+        for values in (
+            trajectory.time,
+            trajectory.angles,
+            trajectory.rates,
+            *trajectory.quantities.values(),
+        ):
             values.flags.writeable = False
         is_complete = len(trajectory.time) == scene.samples
         engine = Integration(

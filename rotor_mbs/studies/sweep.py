@@ -1,4 +1,5 @@
-"""Sweeps: the runs of a parameter study, cut into chunks, into one dataset, in worker processes or on a cluster."""
+"""Sweeps: the runs of a parameter study, cut into chunks, into one dataset, in worker processes or
+on a cluster."""
 
 from __future__ import annotations
 
@@ -37,20 +38,28 @@ from rotor_mbs.runs.versions import machine, versions
 from rotor_mbs.scenario.scene import Scene, scene_hash
 from rotor_mbs.scenario.sweep import Sweep, Variants
 from rotor_mbs.scenario.toml_file import TableError
-from rotor_mbs.solution.metrics import Metrics, defect_metrics, energy_drifts, horizon, largest, running_growth
+from rotor_mbs.solution.metrics import (
+    Metrics,
+    defect_metrics,
+    energy_drifts,
+    horizon,
+    largest,
+    running_growth,
+)
 from rotor_mbs.solution.quantities import energy_balance, quantities
 from rotor_mbs.solution.status import REFUSED, STATUSES, code_of
 from rotor_mbs.solution.trajectory import Array, Solution, Trajectory
 
-_SIDE_BY_SIDE = ("", "angles", "rates", "tip", "energy")  # outputs that every `Method.solve_many` computes
+# outputs that every `Method.solve_many` computes
+_SIDE_BY_SIDE = ("", "angles", "rates", "tip", "energy")
 _OF_DEFECTS = ("defect_max", "defect_median", "defect_time", "angle_error_predicted")
 _GRACE_S = 5.0  # in which a run that ends itself at its limit stores what it reached
 
 
 @dataclass(frozen=True, kw_only=True)
 class Chunk(Task):
-    """Runs by one method; values: (runs, keys) the varied numbers; code: of the versions that compute them, stored with
-    each; with_defects: of runs side by side, too."""
+    """Runs by one method; values: (runs, keys) the varied numbers; code: of the versions that
+    compute them, stored with each; with_defects: of runs side by side, too."""
 
     values: NDArray[np.float64]
     variants: Variants
@@ -76,7 +85,9 @@ class Chunk(Task):
             raise InputError(f"runs {self.first} to {last}: {keys}: {error}") from error
         # Runs side by side have what is asked for, or it follows from their samples.
         asked = quantities(scenes[0].outputs)
-        is_there = all(known.output in _SIDE_BY_SIDE or known.producer or not known.required for known in asked)
+        is_there = all(
+            known.output in _SIDE_BY_SIDE or known.producer or not known.required for known in asked
+        )
         if is_there and find_method(self.method).solve_many is not None:
             rows = _side_by_side(self, scenes)
         else:
@@ -88,19 +99,25 @@ class Chunk(Task):
                 except OutOfTimeError as exc:
                     each.append(self.part(i, i + 1).failed("timed_out", str(exc)))
             rows = {name: np.concatenate([row[name] for row in each]) for name in each[0]}
-        if "error_growth" in rows:  # of the motion, from the variational equations of the closed form, by any method
+        # of the motion, from the variational equations of the closed form, by any method
+        if "error_growth" in rows:
             for i, scene in enumerate(scenes):
                 angles = np.empty((scene.samples, 0))
                 time = np.linspace(0.0, scene.duration, scene.samples)
                 motion = Trajectory(time, angles, angles, error_growth=error_growth(scene))
-                rows["error_growth"][i], rows["horizon_s"][i] = running_growth(motion)[-1], horizon(motion)
+                rows["error_growth"][i], rows["horizon_s"][i] = (
+                    running_growth(motion)[-1],
+                    horizon(motion),
+                )
         rows["time_limit_s"][rows["status"] == code_of("timed_out")] = self.time_limit_s
         rows["code"][:] = self.code
         return rows
 
     def split(self) -> list[Chunk]:
         """Its runs one by one; [] where it is one run."""
-        return [self.part(i, i + 1) for i in range(len(self.values))] if len(self.values) > 1 else []
+        return (
+            [self.part(i, i + 1) for i in range(len(self.values))] if len(self.values) > 1 else []
+        )
 
     def part(self, start: int, end: int) -> Chunk:
         values = self.values[start:end]
@@ -109,7 +126,13 @@ class Chunk(Task):
 
     def failed(self, status: str, message: str) -> Rows:
         limit = self.time_limit_s if status == "timed_out" else np.nan
-        values = {"status": status, "message": message, "time_reached": 0.0, "code": self.code, "time_limit_s": limit}
+        values = {
+            "status": status,
+            "message": message,
+            "time_reached": 0.0,
+            "code": self.code,
+            "time_limit_s": limit,
+        }
         return self.place.encode(values, len(self.values))
 
 
@@ -122,13 +145,18 @@ def _judged_row(chunk: Chunk, run: Solution) -> Rows:
     """Raises OutOfTimeError where judging takes longer than the time limit."""
     with time_limit(chunk.time_limit_s):
         judgement = judge(run.scene, run, None)
-    judged = replace(run, status=judgement.status, message=judgement.message, metrics=judgement.metrics)
-    extremes = {name: values[0] for name, values in _extremes(run.angles[None], run.rates[None]).items()}
+    judged = replace(
+        run, status=judgement.status, message=judgement.message, metrics=judgement.metrics
+    )
+    extremes = {
+        name: values[0] for name, values in _extremes(run.angles[None], run.rates[None]).items()
+    }
     return row_of_run(judged, chunk.place, extremes)
 
 
 def _extremes(angles: Array, rates: Array) -> dict[str, Array]:
-    """(runs,) the largest angle and rate of the rotor, and the largest magnitude of any pitch angle."""
+    """(runs,) the largest angle and rate of the rotor, and the largest magnitude of any pitch
+    angle."""
     return {
         "rotor_angle_max": largest(angles[:, :, 0]),
         "rotor_rate_max": largest(rates[:, :, 0]),
@@ -146,23 +174,29 @@ def _side_by_side(chunk: Chunk, scenes: Sequence[Scene]) -> Rows:
     errors = energy_balance(kinetic, found["potential_energy"], work)
     drifts = energy_drifts(scenes, kinetic, work, errors)
     angles = largest(found["angles"].reshape(len(scenes), -1))
-    # What decides whether a run is clearly ok. Without defects it is the energy: runs side by side are the closed form
-    # itself, and their defects cost ten times as much as they do.
+    # What decides whether a run is clearly ok. Without defects it is the energy: runs side by side
+    # are the closed form itself, and their defects cost ten times as much as they do.
     of_runs: list[Metrics] = []
     for i, scene in enumerate(scenes):
         defects = defects_of(scene, block.trajectory(i)) if chunk.with_defects else None
         of_defects = {} if defects is None else defect_metrics(defects, None)
         of_runs.append({"energy_drift_max": float(drifts[i]), **of_defects})
-    ok = clearly_ok(scenes, method.name, block.integrations, block.samples, of_runs, angles, method.bounds)
+    ok = clearly_ok(
+        scenes, method.name, block.integrations, block.samples, of_runs, angles, method.bounds
+    )
     row = chunk.place.row_type
     metrics = np.dtype([(name, row[name]) for name in row.names or () if name in COLUMNS])
     rows = blank_rows(len(scenes), metrics)
     for name in row.names or ():
         if name not in rows:
             values = errors if name == "energy_error" else block.quantities.get(name)
-            if values is None:  # what a plug-in's quantity makes of each run; NaN after a run broke off
+            # what a plug-in's quantity makes of each run; NaN after a run broke off
+            if values is None:
                 runs = enumerate(scenes)
-                made = [Solution(one, method.name, block.trajectory(i), block.integrations[i])[name] for i, one in runs]
+                made = [
+                    Solution(one, method.name, block.trajectory(i), block.integrations[i])[name]
+                    for i, one in runs
+                ]
                 values = np.full((len(scenes), scenes[0].samples, *made[0].shape[1:]), np.nan)
                 for run_values, samples in zip(values, made, strict=True):
                     run_values[: len(samples)] = samples
@@ -174,21 +208,28 @@ def _side_by_side(chunk: Chunk, scenes: Sequence[Scene]) -> Rows:
     for i, integration in enumerate(block.integrations):
         rows["time_reached"][i] = integration.time_reached
         rows["steps"][i] = -1 if integration.steps is None else integration.steps
-        rows["rhs_evaluations"][i] = -1 if integration.rhs_evaluations is None else integration.rhs_evaluations
+        rows["rhs_evaluations"][i] = (
+            -1 if integration.rhs_evaluations is None else integration.rhs_evaluations
+        )
     for i in np.flatnonzero(~ok).tolist():
-        run = Solution(scenes[i], method.name, block.trajectory(i), block.integrations[i], settings.as_dict())
+        run = Solution(
+            scenes[i], method.name, block.trajectory(i), block.integrations[i], settings.as_dict()
+        )
         try:
             judged = _judged_row(chunk, run)
         except OutOfTimeError as exc:
-            judged = chunk.place.encode({"status": "timed_out", "message": f"{exc}, while its samples were assessed"})
+            judged = chunk.place.encode(
+                {"status": "timed_out", "message": (f"{exc}, while its samples were assessed")}
+            )
             judged |= {name: rows[name][i : i + 1] for name in ("energy_drift_max", *_OF_DEFECTS)}
         for name in ("status", "message", "energy_drift_max", *_OF_DEFECTS):
             rows[name][i] = judged[name][0]
     return rows
 
 
-# Runs handed to a worker at once where the method computes many side by side: by the fastest one an eighth of a second
-# of work, fewer towards the end, so that all workers end together. The least fills the lanes of any processor.
+# Runs handed to a worker at once where the method computes many side by side: by the fastest one an
+# eighth of a second of work, fewer towards the end, so that all workers end together. The least
+# fills the lanes of any processor.
 _MAX_RUNS = 128
 _MIN_RUNS = 8
 _CHUNK_BYTES = 1 << 23
@@ -200,8 +241,9 @@ OnProgress = Callable[[int, int, Counter[str]], None]
 
 @dataclass(frozen=True)
 class SweepPlan:
-    """The runs first <= r < last of a sweep, by its methods; run r is row r mod rows of the design, by method r div
-    rows. settings: by method, those of the sweep that it has. refused: the methods that were left out."""
+    """The runs first <= r < last of a sweep, by its methods; run r is row r mod rows of the design,
+    by method r div rows. settings: by method, those of the sweep that it has. refused: the methods
+    that were left out."""
 
     sweep: Sweep
     methods: tuple[str, ...]
@@ -222,7 +264,9 @@ class SweepPlan:
     def table(self) -> TableSpec:
         return sweep_table(self.sweep, self.methods, range(self.first, self.last))
 
-    def chunks(self, place: RowLocation, gaps: Sequence[tuple[int, int]], workers: int = 1) -> Iterator[Chunk]:
+    def chunks(
+        self, place: RowLocation, gaps: Sequence[tuple[int, int]], workers: int = 1
+    ) -> Iterator[Chunk]:
         """Cut the runs of `gaps` into what one of `workers` does at once, by one method."""
         variants, design = self.sweep.variants(), self.sweep.design
         for first, _ in gaps[:1]:
@@ -233,7 +277,9 @@ class SweepPlan:
                 number = first // self.rows
                 method, size = find_method(self.methods[number]), 1
                 if method.solve_many is not None:
-                    most = min(_CHUNK_BYTES // place.row_type.itemsize, left // (2 * workers), _MAX_RUNS)
+                    most = min(
+                        _CHUNK_BYTES // place.row_type.itemsize, left // (2 * workers), _MAX_RUNS
+                    )
                     size = max(most // _MIN_RUNS, 1) * _MIN_RUNS
                 end = min(first + size, last, (number + 1) * self.rows)
                 values, settings = design.rows(first, end), self.settings[method.name]
@@ -254,7 +300,14 @@ class SweepPlan:
 
     def attributes(self) -> dict[str, object]:
         sweep, table = self.sweep, self.sweep.design
-        options = [table.combine, table.settings, table.precision, table.error_growth, table.defects, table.seed]
+        options = [
+            table.combine,
+            table.settings,
+            table.precision,
+            table.error_growth,
+            table.defects,
+            table.seed,
+        ]
         axes = [(axis.key, axis.is_drawn) for axis in sweep.design.axes]
         runs = [self.methods, self.first, self.last, table.validation, table.test]
         content = [scene_hash(sweep.base), sweep.outputs, axes, options, runs]
@@ -264,7 +317,8 @@ class SweepPlan:
         return {
             "title": table.title,
             "summary": (
-                f"{self.runs} runs of {sweep.base.name} with {', '.join(self.methods)}; varied: {', '.join(sweep.keys)}"
+                f"{self.runs} runs of {sweep.base.name} with {', '.join(self.methods)}; varied: "
+                f"{', '.join(sweep.keys)}"
             ),
             "keywords": KEYWORDS,
             "sweep_toml": sweep.file.text,
@@ -288,7 +342,10 @@ class SweepPlan:
 
 
 def plan_sweep(
-    sweep: Sweep, methods: Sequence[str] = (), part: tuple[int, int] = (1, 1), time_limit_s: float = 60.0
+    sweep: Sweep,
+    methods: Sequence[str] = (),
+    part: tuple[int, int] = (1, 1),
+    time_limit_s: float = 60.0,
 ) -> SweepPlan:
     """Return the runs of a part of a sweep, by the methods that can represent its base scene.
 
@@ -323,10 +380,11 @@ def plan_sweep(
 class SweepResult:
     """A sweep that is complete, but for runs that were lost.
 
-    runs, made: in the dataset, and by this call. is_ok: whether every run is ok whose method claims the correct
-    equations, and none is refused. older: how many stored runs other versions computed. lost: a line for each run whose
-    process died or could not start, also when it was tried alone: not stored. refused: a line for each method and
-    reason, of runs that are not stored because the method cannot represent them.
+    runs, made: in the dataset, and by this call. is_ok: whether every run is ok whose method claims
+    the correct equations, and none is refused. older: how many stored runs other versions computed.
+    lost: a line for each run whose process died or could not start, also when it was tried alone:
+    not stored. refused: a line for each method and reason, of runs that are not stored because the
+    method cannot represent them.
     """
 
     path: Path
@@ -349,11 +407,13 @@ def run_sweep(
     *,
     fresh: bool = False,
 ) -> SweepResult:
-    """Compute the runs that `output` misses. However it is interrupted, the same call continues from there.
+    """Compute the runs that `output` misses. However it is interrupted, the same call continues
+    from there.
 
-    on_progress: called when runs have been stored, first with those that were there. fresh: whether runs that are
-    stored are computed again. Raises InputError, MethodRefusal where the sweep cannot be done, or the output is another
-    file; StoreError where it cannot be written: what was stored stays.
+    on_progress: called when runs have been stored, first with those that were there. fresh: whether
+    runs that are stored are computed again. Raises InputError, MethodRefusal where the sweep cannot
+    be done, or the output is another file; StoreError where it cannot be written: what was stored
+    stays.
     """
     start = time.monotonic()
     opened = open_sweep(output, plan.table(), plan.attributes(), plan.time_limit_s, fresh=fresh)
@@ -367,7 +427,9 @@ def run_sweep(
         older = int((is_older & (statuses != MISSING)).sum())
         on_progress(done, plan.runs, Counter())
         # First and last of every span of missing runs.
-        edges = plan.first + np.flatnonzero(np.diff(statuses == MISSING, prepend=False, append=False))
+        edges = plan.first + np.flatnonzero(
+            np.diff(statuses == MISSING, prepend=False, append=False)
+        )
         gaps = [(int(first), int(last)) for first, last in edges.reshape(-1, 2)]
         for end in run_tasks(pool, plan.chunks(place, gaps, pool.workers)):
             chunk = end.task
@@ -395,7 +457,17 @@ def run_sweep(
         failed = np.unique((np.flatnonzero(statuses != code_of("ok")) + plan.first) // plan.rows)
         is_ok = not lines and not any(is_corrected(plan.methods[number]) for number in failed)
         counts = _counted(statuses)
-        return SweepResult(place.path, plan.runs, computed, counts, seconds, is_ok, tuple(lost), older, tuple(lines))
+        return SweepResult(
+            place.path,
+            plan.runs,
+            computed,
+            counts,
+            seconds,
+            is_ok,
+            tuple(lost),
+            older,
+            tuple(lines),
+        )
 
 
 def _counted(statuses: NDArray[np.int8]) -> Counter[str]:

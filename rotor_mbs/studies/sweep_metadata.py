@@ -1,7 +1,9 @@
-"""A sweep's dataset for those who find it without its maker: Croissant, and a folder for `datasets`.
+"""A sweep's dataset for those who find it without its maker: Croissant, and a folder for
+`datasets`.
 
     STEM.croissant.json        the variables of the dataset, with types and units
-    FOLDER/train.h5 ...        the runs of each split, and FOLDER/README.md, the dataset card, which names them
+    FOLDER/train.h5 ...        the runs of each split, and FOLDER/README.md, the dataset card, which
+                               names them
 No licence is named: whoever publishes a dataset chooses one.
 """
 
@@ -28,12 +30,15 @@ from rotor_mbs.solution.status import STATUSES
 _CROISSANT = rb'"conformsTo": "http://mlcommons.org/croissant/1.0"[^\0]*"Euler-Lagrange equations"'
 _CARD = rb"\A---\npretty_name: [^\0]*Euler-Lagrange equations"
 _TEMPLATES = jinja2.Environment(
-    loader=jinja2.FileSystemLoader(Path(__file__).parent / "templates"), trim_blocks=True, keep_trailing_newline=True
+    loader=jinja2.FileSystemLoader(Path(__file__).parent / "templates"),
+    trim_blocks=True,
+    keep_trailing_newline=True,
 )
 
 
 def describe(path: Path | str) -> Path:
-    """Write the Croissant file beside the dataset at `path`; its path. Raises StoreError where it is no sweep's."""
+    """Write the Croissant file beside the dataset at `path`; its path. Raises StoreError where it
+    is no sweep's."""
     path = Path(path)
     place, stored = path.with_suffix(".croissant.json"), StoredSweep(path)
     columns = _of_runs(stored)
@@ -49,16 +54,19 @@ def describe(path: Path | str) -> Path:
 
 
 def write_splits(path: Path | str, folder: Path) -> list[Path]:
-    """Write the dataset at `path` as a folder that `datasets.load_dataset(folder)` of Hugging Face reads.
+    """Write the dataset at `path` as a folder that `datasets.load_dataset(folder)` of Hugging Face
+    reads.
 
-    That reader takes each variable of an HDF5 file for a column, and wants one number of rows in all of them: each
-    split is a file of its own, without the scales but the time, which is repeated in every row. Runs that are missing
-    are left out; those that failed have their status. A split is held in memory while it is written.
+    That reader takes each variable of an HDF5 file for a column, and wants one number of rows in
+    all of them: each split is a file of its own, without the scales but the time, which is repeated
+    in every row. Runs that are missing are left out; those that failed have their status. A split
+    is held in memory while it is written.
 
     Parameters
     ----------
     path : a sweep's dataset.
-    folder : made where it does not exist; its files are replaced where they are earlier ones of this function.
+    folder : made where it does not exist; its files are replaced where they are earlier ones of
+        this function.
 
     Returns
     -------
@@ -67,7 +75,8 @@ def write_splits(path: Path | str, folder: Path) -> list[Path]:
     Raises
     ------
     StoreError, InputError
-        Where `path` is no sweep's dataset, or a file cannot be written, or is not an earlier output.
+        Where `path` is no sweep's dataset, or a file cannot be written, or is not an earlier
+        output.
     """
     stored = StoredSweep(Path(path))
     columns = _of_runs(stored)
@@ -89,7 +98,9 @@ def write_splits(path: Path | str, folder: Path) -> list[Path]:
                 variable.attrs.update(units=column.units, long_name=column.long_name)
             if "time" in stored.columns:
                 # The reader has no scales: each row has the times of its samples.
-                time = np.broadcast_to(stored.column("time"), (len(rows), len(stored.column("time"))))
+                time = np.broadcast_to(
+                    stored.column("time"), (len(rows), len(stored.column("time")))
+                )
                 variable = file.create_dataset("time", data=time)
                 variable.attrs.update(units="s", long_name="time, the same in all runs")
     card = folder / "README.md"
@@ -106,10 +117,14 @@ def write_splits(path: Path | str, folder: Path) -> list[Path]:
 
 def _of_runs(stored: StoredSweep) -> dict[str, Column]:
     """The variables with a value for each run."""
-    return {name: column for name, column in stored.columns.items() if column.dimensions[0] == "run"}
+    return {
+        name: column for name, column in stored.columns.items() if column.dimensions[0] == "run"
+    }
 
 
-def _text(template: str, stored: StoredSweep, columns: Mapping[str, Column], facts: Mapping[str, object]) -> str:
+def _text(
+    template: str, stored: StoredSweep, columns: Mapping[str, Column], facts: Mapping[str, object]
+) -> str:
     return _TEMPLATES.get_template(template).render(
         attributes=stored.attributes, columns=columns, keywords=KEYWORDS, **facts
     )

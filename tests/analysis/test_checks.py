@@ -1,4 +1,5 @@
-"""Checks of known arrays: one that is off by a known number gives the value that follows from it, and no other."""
+"""Checks of known arrays: one that is off by a known number gives the value that follows from it,
+and no other."""
 
 from __future__ import annotations
 
@@ -58,7 +59,9 @@ def of_samples(run: Solution) -> dict[tuple[str, str], float]:
 
 
 def checked(run: Solution, metrics: Metrics, defects: Defects | None = None) -> list[checks.Check]:
-    return list(run_checks(RunSamples(run.scene, run.method, run.trajectory, metrics, defects), BOUNDS))
+    return list(
+        run_checks(RunSamples(run.scene, run.method, run.trajectory, metrics, defects), BOUNDS)
+    )
 
 
 @pytest.mark.parametrize(
@@ -75,19 +78,27 @@ def checked(run: Solution, metrics: Metrics, defects: Defects | None = None) -> 
         ("work", 3, 1.0, ("energies", "work"), None),
     ],
 )
-def test_a_sample_off_is_seen_in_its_channel(array: str, place: Any, off: float, channel: Any, size: float) -> None:
-    """Relative to the duration, to the largest start (5 rad), to the longest tip, or to the scene's energy."""
+def test_a_sample_off_is_seen_in_its_channel(
+    array: str, place: Any, off: float, channel: Any, size: float
+) -> None:
+    """Relative to the duration, to the largest start (5 rad), to the longest tip, or to the scene's
+    energy."""
     tips = [
-        replace(blade, tip=(0.0, 0.0, length)) for blade, length in zip(general().blades, (9.0, 11.5, 3.0), strict=True)
+        replace(blade, tip=(0.0, 0.0, length))
+        for blade, length in zip(general().blades, (9.0, 11.5, 3.0), strict=True)
     ]
-    run = run_of(initial_angles=(5.0, 0.2, -0.4, 0.6), rotor_torque=((0.0, 30.0),), blades=tuple(tips))
+    run = run_of(
+        initial_angles=(5.0, 0.2, -0.4, 0.6), rotor_torque=((0.0, 30.0),), blades=tuple(tips)
+    )
     run.trajectory.quantities["energy_error"] = energy_error(run.trajectory)
     before = of_samples(run)
     getattr(run.trajectory, array)[place] += off
     if array not in ("energy_error", "tip", "time"):
         run.trajectory.quantities["energy_error"] = energy_error(run.trajectory)
     after = of_samples(run)
-    size = size or max(energy_scale(run.scene, run.trajectory), float(run.trajectory.kinetic_energy.max()))
+    size = size or max(
+        energy_scale(run.scene, run.trajectory), float(run.trajectory.kinetic_energy.max())
+    )
     assert after[channel] == pytest.approx(off / size, rel=1e-6)
     assert before[channel] < 1e-6 * after[channel]
     if array != "energy_error":
@@ -97,7 +108,9 @@ def test_a_sample_off_is_seen_in_its_channel(array: str, place: Any, off: float,
 def test_the_start_of_small_angles_is_compared_in_rad_and_a_fixed_pitch_does_not_turn() -> None:
     fixed = replace(general().blades[1], inertia=(0.0,) * 6, centre_of_mass=(0.0, 0.0, 9.0))
     blades = (general().blades[0], fixed, general().blades[2])
-    run = run_of(blades=blades, initial_angles=(0.3, 0.2, 0.4, 0.6), initial_rates=(0.1, 0.2, 0.3, 0.4))
+    run = run_of(
+        blades=blades, initial_angles=(0.3, 0.2, 0.4, 0.6), initial_rates=(0.1, 0.2, 0.3, 0.4)
+    )
     assert of_samples(run)["start", "angles, rates"] < 1e-15
     run.trajectory.angles[0, 1] += 1e-3
     assert of_samples(run)["start", "angles, rates"] == pytest.approx(1e-3, rel=1e-9)
@@ -114,7 +127,9 @@ def test_numbers_of_a_model_are_its_metrics_less_what_rounding_and_its_start_lea
     run = solve(METHOD, one, {})
     run.trajectory.angles[20, 1] += 1e-3
     run.trajectory.kinetic_energy[30] += 1e3
-    away = replace(one, initial_angles=(one.initial_angles[0] + 1e7 * np.pi, *one.initial_angles[1:]))
+    away = replace(
+        one, initial_angles=(one.initial_angles[0] + 1e7 * np.pi, *one.initial_angles[1:])
+    )
     defects = defects_of(away, run.trajectory)
     assert defects is not None
     metrics = metrics_of(away, run.trajectory, reference("paper/fig11"), defects)
@@ -137,19 +152,26 @@ def test_numbers_of_a_model_are_its_metrics_less_what_rounding_and_its_start_lea
         ("fig06", 5.0, 5),  # the largest angle at the end
     ],
 )
-def test_extremes_of_the_printed_equations_are_found_between_samples(name: str, duration: float, samples: int) -> None:
-    """To ode45's relative tolerance; samples alone miss the rate of the first two by 0.26 and 0.32 rad/s."""
+def test_extremes_of_the_printed_equations_are_found_between_samples(
+    name: str, duration: float, samples: int
+) -> None:
+    """To ode45's relative tolerance; samples alone miss the rate of the first two by 0.26 and 0.32
+    rad/s."""
     run = solve(PRINTED, paper(name, duration=duration, samples=samples), {})
     exact = metrics_of(run.scene, run.trajectory, None)
     expected = {name: pytest.approx(exact[name], rel=1e-3, abs=1e-3) for name in ANGLES | RATE}
     assert checks._own_extremes(run) == expected
 
 
-def test_extremes_between_samples_are_not_sought_after_a_break_and_under_loads_that_change() -> None:
+def test_extremes_between_samples_are_not_sought_after_a_break_and_under_loads_that_change() -> (
+    None
+):
     run = solve(PRINTED, paper("fig06", duration=5.0, samples=5), {})
     broken_off = Trajectory(run.time[:4], run.angles[:4], run.rates[:4])
     assert checks._own_extremes(replace(run, trajectory=broken_off)) == {}
-    ramp = solve(PRINTED, paper("fig06", duration=5.0, samples=5, rotor_torque=((0.0, 0.0), (5.0, 9.0))), {})
+    ramp = solve(
+        PRINTED, paper("fig06", duration=5.0, samples=5, rotor_torque=((0.0, 0.0), (5.0, 9.0))), {}
+    )
     assert checks._own_extremes(ramp) == {}
 
 
@@ -161,7 +183,11 @@ def of_stored(run: Solution, metrics: Any, name: str, stored_value: float) -> tu
 @pytest.mark.parametrize("method", [METHOD, PRINTED])
 def test_a_stored_number_may_differ_by_what_rounding_or_other_points_decide(method: str) -> None:
     """And no other at all: errors, loads, the horizon, one for nothing."""
-    short = paper("fig06", duration=5.0, samples=5) if method == PRINTED else replace(LOADED, duration=0.2, samples=41)
+    short = (
+        paper("fig06", duration=5.0, samples=5)
+        if method == PRINTED
+        else replace(LOADED, duration=0.2, samples=41)
+    )
     run = solve(method, short, {})
     metrics = judge(short, run, run.trajectory).metrics
     assert {"horizon_s", "angle_error_max", "energy_drift_max"} <= set(metrics)
@@ -172,7 +198,8 @@ def test_a_stored_number_may_differ_by_what_rounding_or_other_points_decide(meth
         floor = 3.0 * metrics["defect_floor"]
         names = ("defect_max", "defect_judged", "defect_excess", "defect_median", "defect_mean")
         allowed |= dict.fromkeys(names, floor)
-        # In proportion to the growth of an error over the interval; of no interval without an excess.
+        # In proportion to the growth of an error over the interval; of no interval without an
+        # excess.
         allowed["defect_allowed"] = 0.05 * metrics["defect_allowed"]
         if metrics["defect_excess"] <= floor:
             del allowed["defect_allowed"]
@@ -187,13 +214,21 @@ def test_a_stored_number_may_differ_by_what_rounding_or_other_points_decide(meth
 
 
 @pytest.mark.parametrize(("interval", "is_as_far"), [(0, True), (1, True), (2, False)])
-def test_the_worst_interval_may_be_another_that_is_as_far_beyond_its_bound(interval: int, is_as_far: bool) -> None:
-    """All that is stored of it is compared with the numbers of that one: its end, its excess, what is allowed."""
-    time = np.array([0.0, 0.01, 0.03, 0.04])  # in the second, twice as long, twice as much is allowed
+def test_the_worst_interval_may_be_another_that_is_as_far_beyond_its_bound(
+    interval: int, is_as_far: bool
+) -> None:
+    """All that is stored of it is compared with the numbers of that one: its end, its excess, what
+    is allowed."""
+    # in the second, twice as long, twice as much is allowed
+    time = np.array([0.0, 0.01, 0.03, 0.04])
     sizes = np.array([1e-3, 2e-3, 0.5e-3])
     defects = made_defects(sizes.tolist(), time=time)
-    judgement: Any = SimpleNamespace(defects=defects, metrics=defect_metrics(defects, 0.04) | {"defect_allowed": 1e-6})
-    found = checks._of_stored_interval(stored(attributes={"defect_time": float(time[1 + interval])}), judgement)
+    judgement: Any = SimpleNamespace(
+        defects=defects, metrics=defect_metrics(defects, 0.04) | {"defect_allowed": 1e-6}
+    )
+    found = checks._of_stored_interval(
+        stored(attributes={"defect_time": float(time[1 + interval])}), judgement
+    )
     bound = defect_bound(bounds_of(METHOD), METHOD)
     shown = [found.get(name) for name in ("defect_time", "defect_excess", "defect_allowed")]
     expected = [time[1 + interval], sizes[interval], bound * (1.0 + interval)]
@@ -204,7 +239,12 @@ def test_the_time_of_the_largest_defect_is_of_no_interval_where_all_are_rounding
     defects = made_defects([1e-17, 2e-17], rounding=np.full((3, 2), 1e-16))
     judgement: Any = SimpleNamespace(defects=defects, metrics=defect_metrics(defects, 0.02))
     assert judgement.metrics["defect_time"] == 0.02
-    assert checks._of_stored_interval(stored(attributes={"defect_time": 0.01}), judgement)["defect_time"] == 0.01
+    assert (
+        checks._of_stored_interval(stored(attributes={"defect_time": 0.01}), judgement)[
+            "defect_time"
+        ]
+        == 0.01
+    )
 
 
 def of_reference(own: Any, shipped: Any) -> dict[tuple[str, str], float]:
@@ -215,12 +255,17 @@ def of_reference(own: Any, shipped: Any) -> dict[tuple[str, str], float]:
 def test_a_reference_is_compared_with_the_shipped_one() -> None:
     two = np.array([[1.0, 4.0], [0.5, -8.0]])
     shipped = stored(
-        REFERENCE, angles=two, rates=two, error_growth=np.array([1.0, 0.0, np.inf, 8.0]), angle_uncertainty=np.ones(2)
+        REFERENCE,
+        angles=two,
+        rates=two,
+        error_growth=np.array([1.0, 0.0, np.inf, 8.0]),
+        angle_uncertainty=np.ones(2),
     )
     assert list(of_reference(shipped, shipped).values()) == [0.0] * 4
     own = stored(
         REFERENCE,
-        angles=two + np.array([[0.25, 0.0], [0.0, 1.0]]),  # of at least 1 rad: 0.25; of 8 rad: 0.125
+        # of at least 1 rad: 0.25; of 8 rad: 0.125
+        angles=two + np.array([[0.25, 0.0], [0.0, 1.0]]),
         rates=two[:1],
         error_growth=np.array([np.e, 1.0, 1.0, 8.0]),
         angle_uncertainty=np.array([np.exp(-3.0), 1.0]),
@@ -244,21 +289,33 @@ def test_the_growth_of_a_reference_is_that_of_its_samples() -> None:
     growth = exact.trajectory.error_growth.copy()
     for off, passed in ((0.04, True), (0.06, False)):
         exact.trajectory.error_growth[1:] = growth[1:] * np.exp(off)
-        found = {check.name: check for check in checks._of_run(stored(REFERENCE), BOUNDS, exact, [], None, False)}
+        found = {
+            check.name: check
+            for check in checks._of_run(stored(REFERENCE), BOUNDS, exact, [], None, False)
+        }
         assert found["growth"].value == pytest.approx(off, abs=1e-3)
         assert found["growth"].passed is passed
-        assert found["status"].value == 0.0  # judged as it was, and no report of success called false
-    assert "growth" not in {check.name for check in checks._of_run(stored(), BOUNDS, exact, [], None, False)}
+        # judged as it was, and no report of success called false
+        assert found["status"].value == 0.0
+    assert "growth" not in {
+        check.name for check in checks._of_run(stored(), BOUNDS, exact, [], None, False)
+    }
 
 
 def test_loads_are_checked_under_one_name() -> None:
     run = solve(METHOD, replace(LOADED, duration=0.2, samples=41), {})
     metrics = judge(run.scene, run, run.trajectory).metrics
     found = checked(run, metrics)
-    assert {"blade root force", "shaft moment"} < {check.where.channel for check in found if check.name == "loads"}
+    assert {"blade root force", "shaft moment"} < {
+        check.where.channel for check in found if check.name == "loads"
+    }
     for quantity, rule, _ in quantity_errors(run.scene, metrics):
         (check,) = (check for check in found if check.where.channel == rule.channel)
-        assert (check.name, check.hint, check.unit) == (rule.check, rule.look_at, "of the largest"), quantity.name
+        assert (check.name, check.hint, check.unit) == (
+            rule.check,
+            rule.look_at,
+            "of the largest",
+        ), quantity.name
 
 
 def test_a_turn_of_a_pendulum_is_off_by_what_was_added() -> None:
@@ -282,14 +339,21 @@ def test_an_early_end_is_excused_where_the_reference_ends_or_nothing_is_claimed(
     end: str, method: str, status: str, complete: bool, tmp_path: Path
 ) -> None:
     runs = {REFERENCE: end, method: status}
-    made = [Made(FIG11, name, rotor(np.sin), 0.5, attributes={"status": said}) for name, said in runs.items()]
+    made = [
+        Made(FIG11, name, rotor(np.sin), 0.5, attributes={"status": said})
+        for name, said in runs.items()
+    ]
     with open_results(store(tmp_path / "r.h5", made)) as results:
         found = checks.checks_of(results, [], BOUNDS)
     assert [check.passed for check in found if check.name == "complete"][1] is complete
 
 
-@pytest.mark.parametrize(("outputs", "passed"), [(("energy",), True), (("angles", "rates", "energy"), False)])
-def test_a_singularity_is_not_judged_without_angles(outputs: tuple[str, ...], passed: bool, tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("outputs", "passed"), [(("energy",), True), (("angles", "rates", "energy"), False)]
+)
+def test_a_singularity_is_not_judged_without_angles(
+    outputs: tuple[str, ...], passed: bool, tmp_path: Path
+) -> None:
     facts = {"status": "singular", "false_success": 1}
     made = [Made(FIG11.replace(outputs=outputs), METHOD, rotor(np.sin), 0.5, attributes=facts)]
     with open_results(store(tmp_path / "r.h5", made)) as results:
@@ -299,7 +363,13 @@ def test_a_singularity_is_not_judged_without_angles(outputs: tuple[str, ...], pa
 
 @pytest.mark.parametrize(
     ("value", "passed", "margin"),
-    [(0.5, True, 4.0), (2.0, True, 1.0), (2.1, False, 2.0 / 2.1), (0.0, True, np.inf), (np.nan, False, 0.0)],
+    [
+        (0.5, True, 4.0),
+        (2.0, True, 1.0),
+        (2.1, False, 2.0 / 2.1),
+        (0.0, True, np.inf),
+        (np.nan, False, 0.0),
+    ],
 )
 def test_the_margin_is_bound_over_value(value: float, passed: bool, margin: float) -> None:
     one = checks.Check("energy", checks.Where("s", "m", "c"), value, 2.0, "", "J")
@@ -318,10 +388,14 @@ def test_a_scene_of_the_paper_that_nobody_changed_is_judged_by_its_numbers_too(
         found = values(checks.checks_of(results, [], BOUNDS))
         assert results.scenes[scene.name].figures == figures
         assert bool(available(results.scenes)) is bool(figures)
-    assert [value for (check, _), value in found.items() if check == "published"] == pytest.approx(off)
+    assert [value for (check, _), value in found.items() if check == "published"] == pytest.approx(
+        off
+    )
 
 
-def test_a_scene_that_is_not_shipped_is_not_compared_with_the_shipped_one_of_its_name(tmp_path: Path) -> None:
+def test_a_scene_that_is_not_shipped_is_not_compared_with_the_shipped_one_of_its_name(
+    tmp_path: Path,
+) -> None:
     fewer_samples = FIG11.replace()  # its text, too
     made = store(tmp_path / "r.h5", [Made(fewer_samples, REFERENCE, rotor(np.zeros_like))])
     with open_results(made) as results, open_results(REFERENCES / "paper.h5") as shipped:

@@ -27,14 +27,25 @@ PRINTED, REFERENCE, TAYLOR = "printed/ode45", "reference", "lagrange/taylor"
 
 def number(value: float, scene: str = "paper/fig11") -> Published:
     metric = "rotor_angle_max"
-    return Published("n", "11", "«»", scene=scene, metric=metric, value=value, decimals=4, scenes=frozenset({scene}))
+    return Published(
+        "n",
+        "11",
+        "«»",
+        scene=scene,
+        metric=metric,
+        value=value,
+        decimals=4,
+        scenes=frozenset({scene}),
+    )
 
 
 def claim(*scenes: str) -> Published:
     return Published("c", "11", "«»", statement="A claim.", scenes=frozenset(scenes))
 
 
-@pytest.mark.parametrize(("value", "reproduced"), [(2.73146, True), (2.73154, True), (2.73144, False), (2.7316, False)])
+@pytest.mark.parametrize(
+    ("value", "reproduced"), [(2.73146, True), (2.73154, True), (2.73144, False), (2.7316, False)]
+)
 def test_numbers_compare_at_the_printed_digits(value: float, reproduced: bool) -> None:
     assert rounds_to(value, number(2.7315)) is reproduced
 
@@ -51,14 +62,24 @@ def test_a_number_that_the_printed_model_gives_and_the_right_one_does_not(tmp_pa
 
 def test_what_the_file_cannot_decide_is_left_out(tmp_path: Path) -> None:
     known, elsewhere = "paper/fig11", "paper/fig12"
-    with open_results(store(tmp_path / "r.h5", [Made(FIG11, PRINTED, rotor(lambda t: 0.1 * t))])) as results:
-        assert claims(results.scenes, [claim(elsewhere), claim(known, elsewhere), number(1.0, elsewhere)]) == []
+    with open_results(
+        store(tmp_path / "r.h5", [Made(FIG11, PRINTED, rotor(lambda t: 0.1 * t))])
+    ) as results:
+        assert (
+            claims(
+                results.scenes, [claim(elsewhere), claim(known, elsewhere), number(1.0, elsewhere)]
+            )
+            == []
+        )
         words, one = claims(results.scenes, [claim(known), number(1.0)])
     assert (words.printed, one.printed, one.corrected) == (None, pytest.approx(1.0), None)
 
 
 def test_the_reference_stands_for_right_and_without_it_the_closed_form(tmp_path: Path) -> None:
-    right = [Made(FIG11, name, rotor(np.zeros_like)) for name in ("exudyn_tree/rk67", TAYLOR, REFERENCE, PRINTED)]
+    right = [
+        Made(FIG11, name, rotor(np.zeros_like))
+        for name in ("exudyn_tree/rk67", TAYLOR, REFERENCE, PRINTED)
+    ]
     with open_results(store(tmp_path / "a.h5", right)) as results:
         assert results.scenes["paper/fig11"].corrected.method == REFERENCE
         assert list(results.scenes["paper/fig11"].runs)[:2] == [REFERENCE, PRINTED]
@@ -78,7 +99,12 @@ def test_the_finding_counts_what_was_put_in(tmp_path: Path) -> None:
         Made(fig08, PRINTED, still, gain=8.0e3),  # a thousandth of the energy scale is 7.8 kJ
         Made(fig09, PRINTED, still, gain=7.6e3),
         Made(FIG11, TAYLOR, off),
-        Made(fig12, TAYLOR, rotor(lambda t: np.full_like(t, 1.0)), attributes={"status": "inaccurate"}),
+        Made(
+            fig12,
+            TAYLOR,
+            rotor(lambda t: np.full_like(t, 1.0)),
+            attributes={"status": "inaccurate"},
+        ),
     ]
     with open_results(store(tmp_path / "r.h5", runs)) as results:
         rows = finding(results.scenes, [])
@@ -99,7 +125,9 @@ def test_the_finding_counts_numbers_that_are_known_and_the_claims_of_the_study()
         claim("paper/fig11"),
     ]
     study = claim_study()
-    printed, corrected = (f"{study.count(method, HOLDS)} of {len(study.verdicts)}" for method in study.methods)
+    printed, corrected = (
+        f"{study.count(method, HOLDS)} of {len(study.verdicts)}" for method in study.methods
+    )
     assert finding({}, evaluated) == [
         ("Published numbers reproduced", "1 of 1", "0 of 2"),
         ("Published claims that hold", printed, corrected),

@@ -14,7 +14,9 @@ from rotor_mbs.analysis.kinematics import exact_rotor_angle, potential_energy
 from rotor_mbs.scenario.scene import Scene
 
 RIGID = replace(paper("fig03").blades[0], inertia=(3e5, 4e5, 2e5, 0.0, 0.0, 0.0))
-ONE, THREE = (paper(name, hub_inertia=1e6, blades=(RIGID,) * n) for name, n in (("fig03", 1), ("fig05", 3)))
+ONE, THREE = (
+    paper(name, hub_inertia=1e6, blades=(RIGID,) * n) for name, n in (("fig03", 1), ("fig05", 3))
+)
 TURNING: dict[str, Any] = {"initial_rates": (0.5, 0.0, 0.0, 0.0)}
 DESIGN_COLUMNS = {
     "pendulum": ONE,
@@ -31,7 +33,9 @@ def test_exact_solutions_are_those_of_the_equations(name: str) -> None:
     assert found is not None
     assert found[0] == name
     # DOP853 at a relative tolerance of 1e-11 over some hundred steps.
-    assert found[1] == pytest.approx(other_code.trajectory(DESIGN_COLUMNS[name], time)[0][:, 0], abs=1e-8)
+    assert found[1] == pytest.approx(
+        other_code.trajectory(DESIGN_COLUMNS[name], time)[0][:, 0], abs=1e-8
+    )
 
 
 def test_a_spring_has_its_energy_from_its_rest_angle() -> None:
@@ -49,11 +53,19 @@ UNKNOWN = {
     "a pitch that moves": replace(THREE, initial_rates=(0.0, 0.0, 0.1, 0.0)),
     "a torque on a pitch": replace(THREE, pitch_torque=((), ((0.0, 1.0),), ())),
     "a damped rotor": replace(THREE, shaft_damping=1.0),
-    "a blade heavier than the others": replace(THREE, blades=(*THREE.blades[:2], replace(_BLADE, mass=1.0))),
+    "a blade heavier than the others": replace(
+        THREE, blades=(*THREE.blades[:2], replace(_BLADE, mass=1.0))
+    ),
     "a torque over time": replace(THREE, rotor_torque=((0.0, 0.0), (1.0, 5.0))),
-    "a centre of mass off the plane": replace(THREE, blades=(replace(_BLADE, centre_of_mass=(0.1, 0.1, 15.0)),) * 3),
-    "products of inertia": replace(THREE, blades=(replace(_BLADE, inertia=(9.0, 9.0, 9.0, 1.0, 0.0, 0.0)),) * 3),
-    "and others": replace(THREE, blades=(replace(_BLADE, inertia=(9.0, 9.0, 9.0, 0.0, 0.0, 1.0)),) * 3),
+    "a centre of mass off the plane": replace(
+        THREE, blades=(replace(_BLADE, centre_of_mass=(0.1, 0.1, 15.0)),) * 3
+    ),
+    "products of inertia": replace(
+        THREE, blades=(replace(_BLADE, inertia=(9.0, 9.0, 9.0, 1.0, 0.0, 0.0)),) * 3
+    ),
+    "and others": replace(
+        THREE, blades=(replace(_BLADE, inertia=(9.0, 9.0, 9.0, 0.0, 0.0, 1.0)),) * 3
+    ),
     "a driven pendulum": replace(ONE, rotor_torque=((0.0, 5.0),)),
     "a thrown pendulum": replace(ONE, initial_rates=(0.1, 0.0)),
     "a pendulum without gravity": replace(ONE, gravity=0.0),

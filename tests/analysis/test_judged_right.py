@@ -1,4 +1,5 @@
-"""Verdicts on runs that are hard to judge: what is right is ok, what is wrong is not, at any distance of the rows."""
+"""Verdicts on runs that are hard to judge: what is right is ok, what is wrong is not, at any
+distance of the rows."""
 
 from __future__ import annotations
 
@@ -37,7 +38,12 @@ def chaotic(samples: int, **changes: Any) -> Scene:
 
 def one_thin_blade(samples: int, duration: float) -> Scene:
     """A point mass 5e-6 m off its pitch axis, whose rates count in units of 1300 rad/s."""
-    blade = Blade(3.1067823166830557, (5.491515224181091e-06, 0.0, 3.764094163734493), (0.0,) * 6, (2.4, 1.1, 7.3))
+    blade = Blade(
+        3.1067823166830557,
+        (5.491515224181091e-06, 0.0, 3.764094163734493),
+        (0.0,) * 6,
+        (2.4, 1.1, 7.3),
+    )
     return Scene(
         "thin", "one thin blade", (), 9.8, duration, samples, ("angles", "rates"), (blade,), 0.0,
         (-3.0709748585978156, 0.6701360068912425), (0.0, 0.0),
@@ -47,31 +53,68 @@ def one_thin_blade(samples: int, duration: float) -> Scene:
 def four_thin_blades(samples: int, duration: float) -> Scene:
     """Blades whose inertia about the pitch axis is 1e-9 of m |r|²; springs, dampers and loads in the joints."""
     blades = (
-        Blade(1036.9, (1.1913512100296516e-05, 0.0, 1.1757000163153923), (0.0,) * 6, (0.4, -0.07, 2.4)),
         Blade(
-            591.8, (3.238365165982712e-07, 0.0, 0.9774464747761304),
-            (1.2032e-4, 1.3043e-4, 1.07247e-5, -1.51763e-6, 2.93205e-5, 3.21219e-6), (0.2, 0.3, 1.9),
+            1036.9, (1.1913512100296516e-05, 0.0, 1.1757000163153923), (0.0,) * 6, (0.4, -0.07, 2.4)
         ),
-    )  # fmt: skip
+        Blade(
+            591.8,
+            (3.238365165982712e-07, 0.0, 0.9774464747761304),
+            (1.2032e-4, 1.3043e-4, 1.07247e-5, -1.51763e-6, 2.93205e-5, 3.21219e-6),
+            (0.2, 0.3, 1.9),
+        ),
+    )
     return Scene(
-        "thin blades", "two thin blades", (), 9.81, duration, samples, ("angles", "rates"), blades, 0.0,
-        (-0.67, 0.73, 1.11), (-2.1, -1.46, 0.0), bearing_stiffness=(2.5e-5, 2.4e-3), bearing_damping=(9.6e-8, 2e-6),
-        bearing_rest=(((0.0, 0.34),), ((0.0, 0.3),)), shaft_damping=46.0,
-    )  # fmt: skip
+        "thin blades",
+        "two thin blades",
+        (),
+        9.81,
+        duration,
+        samples,
+        ("angles", "rates"),
+        blades,
+        0.0,
+        (-0.67, 0.73, 1.11),
+        (-2.1, -1.46, 0.0),
+        bearing_stiffness=(2.5e-5, 2.4e-3),
+        bearing_damping=(9.6e-8, 2e-6),
+        bearing_rest=(((0.0, 0.34),), ((0.0, 0.3),)),
+        shaft_damping=46.0,
+    )
 
 
 def ill_conditioned(samples: int = 51) -> Scene:
     """Blades of 1e-9 m |r|² about their pitch axis: an engine that forms it from terms about the root loses 1e-9."""
     rows = [
-        (865.6, (1.008e-4, 3.27763e-4, 1.45493), (1.385e-5, 1.383e-5, 2.717e-7, 1.517e-8, -2.228e-8, -8.699e-7)),
-        (873.6, (3.97962e-4, 2.27197e-3, 0.78795), (3.22e-6, 3.137e-6, 1.077e-7, 2.465e-8, -9.439e-8, 3.431e-7)),
-        (689.1, (5.3198e-5, -7.52599e-4, 1.75197), (1.9691e-4, 1.8392e-4, 1.684e-5, -4.221e-7, 3.097e-6, -4.044e-5)),
+        (
+            865.6,
+            (1.008e-4, 3.27763e-4, 1.45493),
+            (1.385e-5, 1.383e-5, 2.717e-7, 1.517e-8, -2.228e-8, -8.699e-7),
+        ),
+        (
+            873.6,
+            (3.97962e-4, 2.27197e-3, 0.78795),
+            (3.22e-6, 3.137e-6, 1.077e-7, 2.465e-8, -9.439e-8, 3.431e-7),
+        ),
+        (
+            689.1,
+            (5.3198e-5, -7.52599e-4, 1.75197),
+            (1.9691e-4, 1.8392e-4, 1.684e-5, -4.221e-7, 3.097e-6, -4.044e-5),
+        ),
     ]
     blades = tuple(Blade(mass, centre, inertia, (0.1, 0.0, 3.0)) for mass, centre, inertia in rows)
     return Scene(
-        "ill conditioned", "three thin blades", (), 1.62, 0.15, samples, ("angles", "rates", "loads"), blades, 875.0,
-        (-3.05, 0.64, 0.87, 0.70), (1.13, -0.22, 0.79, -0.18),
-    )  # fmt: skip
+        "ill conditioned",
+        "three thin blades",
+        (),
+        1.62,
+        0.15,
+        samples,
+        ("angles", "rates", "loads"),
+        blades,
+        875.0,
+        (-3.05, 0.64, 0.87, 0.70),
+        (1.13, -0.22, 0.79, -0.18),
+    )
 
 
 def judged(scene: Scene, motion: Trajectory, method: str = OWN) -> Judgement:
@@ -113,7 +156,11 @@ def with_late_fault(scene: Scene, share: float) -> Trajectory:
 @pytest.mark.parametrize("samples", [pytest.param(81, marks=pytest.mark.full), 41])
 @pytest.mark.parametrize(
     "fault",
-    [lambda s: with_jump(s, 0.05), lambda s: with_jump(s, 0.015), lambda s: with_late_fault(s, 0.003)],
+    [
+        lambda s: with_jump(s, 0.05),
+        lambda s: with_jump(s, 0.015),
+        lambda s: with_late_fault(s, 0.003),
+    ],
     ids=["jump of 0.05 rad", "jump of 0.015 rad", "gravity 0.3 % wrong from 60 % on"],
 )
 def test_a_fault_between_rows_that_are_far_apart_is_seen(fault: Any, samples: int) -> None:
@@ -126,7 +173,8 @@ def test_a_fault_between_rows_that_are_far_apart_is_seen(fault: Any, samples: in
 
 
 @pytest.mark.parametrize(
-    "method", [TAYLOR, "lagrange/ode45", "exudyn_tree/rk67", "exudyn_chain/extrapolated", "mujoco/rk4"]
+    "method",
+    [TAYLOR, "lagrange/ode45", "exudyn_tree/rk67", "exudyn_chain/extrapolated", "mujoco/rk4"],
 )
 def test_a_right_run_with_rows_that_are_far_apart_is_ok(method: str) -> None:
     if not find_method(method).is_installed:
@@ -166,7 +214,13 @@ def test_what_an_ill_conditioned_mass_matrix_loses_of_the_loads_is_no_fault(meth
     verdict = judge(scene, run, None)
     assert (verdict.status, verdict.message) == ("ok", "")
     if method == "mujoco/rk4":  # far more than its bound, 1e-12
-        assert max(verdict.metrics["blade_root_force_error"], verdict.metrics["blade_root_moment_error"]) > 1e-10
+        assert (
+            max(
+                verdict.metrics["blade_root_force_error"],
+                verdict.metrics["blade_root_moment_error"],
+            )
+            > 1e-10
+        )
     # Ten times what may be lost, in a single row, is seen.
     motion = run.trajectory
     lost = load_conditioning(scene, motion.time, motion.angles, motion.rates)["blade_root_force"]
@@ -188,7 +242,9 @@ def test_the_closed_form_is_excused_no_loads() -> None:
     assert judge(scene, wrong, None).status == "inaccurate"
 
 
-TWO = chaotic(101, blades=(BLADE,) * 2, initial_angles=(0.4, 0.5, -0.6), initial_rates=(1.0, 0.5, -0.3))
+TWO = chaotic(
+    101, blades=(BLADE,) * 2, initial_angles=(0.4, 0.5, -0.6), initial_rates=(1.0, 0.5, -0.3)
+)
 TWO = replace(TWO, duration=1.0, outputs=("angles", "rates", "tip", "energy"))
 
 
@@ -226,13 +282,20 @@ def test_a_run_that_starts_elsewhere_or_has_other_times_is_not_ok() -> None:
 
 # ---- The smallest fault that each bound sees
 
-METHODS = ("lagrange/dop853", "exudyn_tree/rk67", "exudyn_tree/generalized_alpha", "exudyn_chain/extrapolated", OWN)
+METHODS = (
+    "lagrange/dop853",
+    "exudyn_tree/rk67",
+    "exudyn_tree/generalized_alpha",
+    "exudyn_chain/extrapolated",
+    OWN,
+)
 
 
 @pytest.mark.parametrize("samples", [101, 21])
 @pytest.mark.parametrize("method", METHODS)
 def test_a_defect_of_twice_what_is_allowed_is_seen(method: str, samples: int) -> None:
-    """b · max(1, h / 0.01 s) · max(1, G), planted as a jump that stays: no more than half of it hides in the run."""
+    """b · max(1, h / 0.01 s) · max(1, G), planted as a jump that stays: no more than half of it
+    hides in the run."""
     scene = chaotic(samples, duration=2.0)
     motion = right(scene)
     clean = judged(scene, motion, method)
@@ -265,7 +328,11 @@ def test_a_defect_of_twice_what_is_allowed_is_seen(method: str, samples: int) ->
 @pytest.mark.parametrize(
     ("name", "array", "unit"),
     [
-        ("tip", "tip", lambda scene: max(float(np.linalg.norm(blade.tip)) for blade in scene.blades)),
+        (
+            "tip",
+            "tip",
+            lambda scene: max(float(np.linalg.norm(blade.tip)) for blade in scene.blades),
+        ),
         ("start", "angles", lambda _: 1.0),
     ],
 )
@@ -286,7 +353,8 @@ def test_another_number_of_twice_its_bound_is_seen(name: str, array: str, unit: 
 
 
 def examine(seed: int, methods: tuple[str, ...]) -> None:
-    """No run is ok that is off by more than 0.01 rad before its horizon, and no right run is refused."""
+    """No run is ok that is off by more than 0.01 rad before its horizon, and no right run is
+    refused."""
     found = list(verdicts(seed, methods))
     assert found
     assert [verdict for verdict in found if verdict.fault] == []
@@ -312,7 +380,12 @@ def test_many_random_rotors_are_judged_right(seed: int) -> None:
 
 
 def stiffness_map(stiffnesses: Any, dampings: Any, samples: Any) -> None:
-    base = replace(chaotic(11), duration=2.0, outputs=("angles", "rates", "energy"), initial_rates=(1.3, 0.0, 0.0, 0.0))
+    base = replace(
+        chaotic(11),
+        duration=2.0,
+        outputs=("angles", "rates", "energy"),
+        initial_rates=(1.3, 0.0, 0.0, 0.0),
+    )
     for stiffness in stiffnesses:
         for damping in dampings:
             for count in samples:

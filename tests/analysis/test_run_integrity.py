@@ -20,7 +20,8 @@ def test_settings_are_all_of_the_methods_and_none_else() -> None:
     assert faults("exudyn_tree/rk44", step=1e-3) == []
     assert faults("exudyn_tree/rk44") == ["step is missing"]
     assert len(faults("exudyn_tree/rk44", step=-1.0, stride=2)) == 1
-    assert len(faults("exudyn_chain/extrapolated", tolerance=0.011)) == 1  # coarser than what is called ok
+    # coarser than what is called ok
+    assert len(faults("exudyn_chain/extrapolated", tolerance=0.011)) == 1
     alpha = "exudyn_tree/generalized_alpha"  # which a spectral radius above 1 makes unstable
     assert len(faults(alpha, **{**find_method(alpha).defaults, "spectral_radius": 1.1})) == 1
     assert faults("of/another", step=-1.0) == []  # a plug-in that is not installed
@@ -30,4 +31,6 @@ def test_defaults_are_the_settings_that_the_bounds_were_found_with() -> None:
     known = tomllib.loads((Path(__file__).parent / "default_settings.toml").read_text())
     for name, settings in known.items():
         # One that is not there is None, which TOML has no word for.
-        assert {key: value for key, value in find_method(name).defaults.items() if value is not None} == settings, name
+        assert {
+            key: value for key, value in find_method(name).defaults.items() if value is not None
+        } == settings, name

@@ -1,6 +1,8 @@
-"""The smallest fault that a bound on defects sees is what the rule states: planted at twice its size it is seen.
+"""The smallest fault that a bound on defects sees is what the rule states: planted at twice its
+size it is seen.
 
-In the frozen references of the shipped scenes, which are exact to rounding, by the bound of every method.
+In the frozen references of the shipped scenes, which are exact to rounding, by the bound of every
+method.
 """
 
 from __future__ import annotations
@@ -65,13 +67,23 @@ def _judge_faults(name: str, row: int) -> int:
                 defects = interval(name, row, *wrong)
                 seen = defects.judged_sizes[0]
                 # Moved to a singular pitch, where nothing is known, a run is not ok either.
-                assert seen > bound or not defects.is_judged[0], (name, row, coordinate, methods, seen)
+                assert seen > bound or not defects.is_judged[0], (
+                    name,
+                    row,
+                    coordinate,
+                    methods,
+                    seen,
+                )
                 planted += 1
         # And what is well below is no fault; beside a singular pitch all of it may be.
         if largest <= 0.1 * allowed and clean.conditioning[0] < _ILL_CONDITIONED:
             moved_angles = angles.copy()
             moved_angles[1, moving[0]] += 0.4 * allowed
-            assert interval(name, row, moved_angles, rates).judged_sizes[0] <= bound, (name, row, methods)
+            assert interval(name, row, moved_angles, rates).judged_sizes[0] <= bound, (
+                name,
+                row,
+                methods,
+            )
     return planted
 
 

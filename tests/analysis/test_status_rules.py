@@ -1,4 +1,5 @@
-"""The status rules on constructed runs whose status is known: each rule from both sides of its limit."""
+"""The status rules on constructed runs whose status is known: each rule from both sides of its
+limit."""
 
 from __future__ import annotations
 
@@ -31,14 +32,29 @@ BOUNDS = shipped_bounds()
 LONG = Blade(1000.0, (0.1, 0.0, 10.0), (0.0,) * 6, (0.1, 0.0, 20.0))
 SHORT = Blade(1000.0, (0.1, 0.0, 5.0), (0.0,) * 6, (0.1, 0.0, 20.0))
 SCENE = Scene(
-    "rules", "three point masses in uniform rotation", (), 0.5, 1.0, 11, ("angles", "rates", "energy"),
-    (SHORT, LONG, LONG), 0.0, (0.0, 0.5, 0.0, 0.0), (0.5, 0.0, 0.0, 0.0),
-    bearing_stiffness=(2e4, 0.0, 0.0), bearing_rest=(((0.0, -0.5),), (), ()),
-)  # fmt: skip
+    "rules",
+    "three point masses in uniform rotation",
+    (),
+    0.5,
+    1.0,
+    11,
+    ("angles", "rates", "energy"),
+    (SHORT, LONG, LONG),
+    0.0,
+    (0.0, 0.5, 0.0, 0.0),
+    (0.5, 0.0, 0.0, 0.0),
+    bearing_stiffness=(2e4, 0.0, 0.0),
+    bearing_rest=(((0.0, -0.5),), (), ()),
+)
 WORK_J = 3000.0
 KINETIC_J = 0.5 * 1000.0 * (3 * 0.1**2 + 2 * 10.0**2 + 5.0**2) * 0.5**2
 # What an energy error is relative to: kinetic energy, work, the spring's, the weights'.
-ENERGY_J = KINETIC_J + WORK_J + 0.5 * 2e4 * 1.0**2 + 1000.0 * 0.5 * (2.0 * math.hypot(0.1, 10.0) + math.hypot(0.1, 5.0))
+ENERGY_J = (
+    KINETIC_J
+    + WORK_J
+    + 0.5 * 2e4 * 1.0**2
+    + 1000.0 * 0.5 * (2.0 * math.hypot(0.1, 10.0) + math.hypot(0.1, 5.0))
+)
 JUST = 1e-2  # how far on either side of a bound, relatively: far above round-off of a state
 SIDES = ((1.0 - JUST, "ok"), (1.0 + JUST, "inaccurate"))
 QUARTER = 0.5 * math.pi
@@ -46,7 +62,8 @@ QUARTER = 0.5 * math.pi
 
 @pytest.fixture(autouse=True)
 def _without_defects(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The motions made here are none that the scene could have: what is tested are the other rules."""
+    """The motions made here are none that the scene could have: what is tested are the other
+    rules."""
     monkeypatch.setattr(judgement_module, "defects_of", lambda *_, **__: None)
     for name in ("_checks_of_rows", "_checks_of_outputs"):
         monkeypatch.setattr(run_checks, name, lambda *_: iter(()))
@@ -54,7 +71,10 @@ def _without_defects(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def status(
-    run: Trajectory, engine: Integration = DONE, reference: Trajectory | None = None, method: str = METHOD
+    run: Trajectory,
+    engine: Integration = DONE,
+    reference: Trajectory | None = None,
+    method: str = METHOD,
 ) -> Any:
     """(status, whether the engine's claim of success is false)."""
     solution = Solution(SCENE, method, run, engine)
@@ -64,7 +84,8 @@ def status(
 
 
 def moving(pitch: float = 0.0, growth: float | None = None) -> Trajectory:
-    """Uniform rotation, every pitch at `pitch` rad; energies that change into each other without loss.
+    """Uniform rotation, every pitch at `pitch` rad; energies that change into each other without
+    loss.
 
     growth   of errors: one until sample 3, then this
     """
@@ -72,7 +93,11 @@ def moving(pitch: float = 0.0, growth: float | None = None) -> Trajectory:
     angles, rates = np.full((11, 4), pitch), np.zeros((11, 4))
     angles[:, 0], rates[:, 0] = 0.5 * time, 0.5
     work = WORK_J * time
-    energies = {"kinetic_energy": KINETIC_J + 3.0 * work, "potential_energy": 7.0 - 2.0 * work, "work": work}
+    energies = {
+        "kinetic_energy": KINETIC_J + 3.0 * work,
+        "potential_energy": 7.0 - 2.0 * work,
+        "work": work,
+    }
     trajectory = Trajectory(time, angles, rates, **energies)
     if growth is not None:
         trajectory.quantities["error_growth"] = np.where(np.arange(11) < 4, 1.0, growth)
@@ -112,7 +137,10 @@ def test_energy_angles_and_gap_have_a_bound_each(method: str) -> None:
     energy = BOUNDS.of("energy", method).value
     for side, expected in (*SIDES, (math.nan, "inaccurate")):
         assert status(with_drift(exact, side * energy), method=method)[0] == expected
-        assert status(with_error(exact, side * OK_ERROR), reference=exact, method=method)[0] == expected
+        assert (
+            status(with_error(exact, side * OK_ERROR), reference=exact, method=method)[0]
+            == expected
+        )
         if BOUNDS.find("gap", method):
             gap = side * BOUNDS.of("gap", method).value
             assert status(with_gap(exact, gap), method=method)[0] == expected
@@ -126,19 +154,29 @@ def test_the_largest_defect_has_a_bound(method: str, monkeypatch: pytest.MonkeyP
     for side, expected in (*SIDES, (math.nan, "inaccurate")):
         # The second undoes the first: they add up to no more than one.
         defects = made_defects((side * bound, -side * bound))
-        monkeypatch.setattr(judgement_module, "defects_of", lambda *_, defects=defects, **__: defects)
+        monkeypatch.setattr(
+            judgement_module, "defects_of", lambda *_, defects=defects, **__: defects
+        )
         assert status(moving(), method=method)[0] == expected
 
 
-def test_the_median_of_the_defects_has_the_bound_of_a_methods_own(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_median_of_the_defects_has_the_bound_of_a_methods_own(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     """A tenth of that of the largest defect; without defects nothing is asked."""
     own = Bound("defect median", METHOD, 0.1 * BOUNDS.of("defect", METHOD).value, "none")
-    monkeypatch.setattr(judgement_module, "find_method_or_none", lambda _: replace(find_method(METHOD), bounds=(own,)))
+    monkeypatch.setattr(
+        judgement_module,
+        "find_method_or_none",
+        lambda _: replace(find_method(METHOD), bounds=(own,)),
+    )
     run = Solution(SCENE, METHOD, moving(), DONE)
     assert judge(SCENE, run, None).status == "ok"
     for side, expected in SIDES:
         defects = made_defects([side * own.value] * 3)
-        monkeypatch.setattr(judgement_module, "defects_of", lambda *_, defects=defects, **__: defects)
+        monkeypatch.setattr(
+            judgement_module, "defects_of", lambda *_, defects=defects, **__: defects
+        )
         assert judge(SCENE, run, None).status == expected
 
 
@@ -147,7 +185,8 @@ def test_the_median_of_the_defects_has_the_bound_of_a_methods_own(monkeypatch: p
 def test_a_defect_of_a_hundredth_of_a_radian_is_never_within_an_ok(
     cause: str, side: float, expected: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Rounding alone may be as large, or rows are so far apart, or errors grow so much, that a bound allows as much."""
+    """Rounding alone may be as large, or rows are so far apart, or errors grow so much, that a
+    bound allows as much."""
     size = side * OK_ERROR
     if cause == "rounding":
         rounding = np.zeros((3, 2))
@@ -168,31 +207,49 @@ def test_a_defect_of_a_hundredth_of_a_radian_is_never_within_an_ok(
         assert judgement.status == expected
     if expected == "unchecked":
         assert "would not be seen; more samples" in judgement.message
-    metrics = {"energy_drift_max": 0.0} | defect_metrics(defects, None) | {"angle_error_predicted": 0.0}
+    metrics = (
+        {"energy_drift_max": 0.0} | defect_metrics(defects, None) | {"angle_error_predicted": 0.0}
+    )
     (is_ok,) = clearly_ok([SCENE], METHOD, [DONE], [SCENE.samples], [metrics], np.ones(1))
     assert is_ok == (expected == "ok")
 
 
-def test_a_bound_of_more_than_a_hundredth_of_a_radian_counts_as_that(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_bound_of_more_than_a_hundredth_of_a_radian_counts_as_that(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     own = Bound("defect", METHOD, 1.0, "none")
-    monkeypatch.setattr(judgement_module, "find_method_or_none", lambda _: replace(find_method(METHOD), bounds=(own,)))
+    monkeypatch.setattr(
+        judgement_module,
+        "find_method_or_none",
+        lambda _: replace(find_method(METHOD), bounds=(own,)),
+    )
     for side, expected in SIDES:
         defects = made_defects((side * OK_ERROR, -side * OK_ERROR))
-        monkeypatch.setattr(judgement_module, "defects_of", lambda *_, defects=defects, **__: defects)
+        monkeypatch.setattr(
+            judgement_module, "defects_of", lambda *_, defects=defects, **__: defects
+        )
         judgement = judge(SCENE, Solution(SCENE, METHOD, moving(), DONE), None)
         assert judgement.status == expected
         assert judgement.metrics["defect_allowed"] == pytest.approx(OK_ERROR)
 
 
 NOTHING = Trajectory(np.empty(0), np.empty((0, 4)), np.empty((0, 4)))
-NEAR, FAR = (moving(math.acos(math.sqrt(share))) for share in (0.8e-3, 1.2e-3))  # of the rotor's inertia left
+# of the rotor's inertia left
+NEAR, FAR = (moving(math.acos(math.sqrt(share))) for share in (0.8e-3, 1.2e-3))
 PAST = moving(growth=2e5)  # the horizon is sample 3
-AT_ONCE = PAST.replace(error_growth=np.where(np.arange(11) < 1, 1.0, 2e5))  # the start alone is before its horizon
+# the start alone is before its horizon
+AT_ONCE = PAST.replace(error_growth=np.where(np.arange(11) < 1, 1.0, 2e5))
 DESIGN_COLUMNS = {
     "complete": (moving(), DONE, None, "ok", False),
     "nothing to judge it by": (without_energies(moving()), DONE, None, "unchecked", False),
     "judged by its angles alone": (without_energies(moving()), DONE, moving(), "ok", False),
-    "without energies, past the horizon at once": (without_energies(moving()), DONE, AT_ONCE, "unchecked", False),
+    "without energies, past the horizon at once": (
+        without_energies(moving()),
+        DONE,
+        AT_ONCE,
+        "unchecked",
+        False,
+    ),
     "complete, a failure": (moving(), FAILED, None, "solver_failed", False),
     "a sample short, success": (cut(moving(), 10), DONE, None, "diverged", True),
     "a sample short, a failure": (cut(moving(), 10), FAILED, None, "solver_failed", False),
@@ -206,15 +263,45 @@ DESIGN_COLUMNS = {
     "last singular start": (moving(QUARTER - 4 * math.ulp(1.0)), DONE, None, "singular", True),
     "first regular start": (moving(QUARTER - 5 * math.ulp(1.0)), DONE, None, "ok", False),
     "past the end of the motion": (moving(), DONE, cut(NEAR, 5), "singular", True),
-    "past the end of a motion that ends at its start": (moving(), DONE, cut(NEAR, 1), "singular", True),
+    "past the end of a motion that ends at its start": (
+        moving(),
+        DONE,
+        cut(NEAR, 1),
+        "singular",
+        True,
+    ),
     "past the end of a reference that merely stops": (FAR, DONE, cut(FAR, 5), "ok", False),
     # A hundredth of the scale, or a radian, parts a coarse run from one that is another motion.
-    "coarse by its energy": (with_drift(moving(), (1.0 - JUST) * 1e-2), DONE, None, "inaccurate", False),
-    "another motion by its energy": (with_drift(moving(), (1.0 + JUST) * 1e-2), DONE, None, "inaccurate", True),
+    "coarse by its energy": (
+        with_drift(moving(), (1.0 - JUST) * 1e-2),
+        DONE,
+        None,
+        "inaccurate",
+        False,
+    ),
+    "another motion by its energy": (
+        with_drift(moving(), (1.0 + JUST) * 1e-2),
+        DONE,
+        None,
+        "inaccurate",
+        True,
+    ),
     "coarse by its angles": (with_error(moving(), 1.0 - JUST), DONE, moving(), "inaccurate", False),
     "coarse by its gap": (with_gap(moving(), (1.0 - JUST) * 1e-2), DONE, None, "inaccurate", False),
-    "another motion by its gap": (with_gap(moving(), (1.0 + JUST) * 1e-2), DONE, None, "inaccurate", True),
-    "another motion by its angles": (with_error(moving(), 1.0 + JUST), DONE, moving(), "inaccurate", True),
+    "another motion by its gap": (
+        with_gap(moving(), (1.0 + JUST) * 1e-2),
+        DONE,
+        None,
+        "inaccurate",
+        True,
+    ),
+    "another motion by its angles": (
+        with_error(moving(), 1.0 + JUST),
+        DONE,
+        moving(),
+        "inaccurate",
+        True,
+    ),
 }
 
 
@@ -232,14 +319,17 @@ def test_an_angle_beyond_the_limit_has_no_digits(side: float, expected: str) -> 
 
 
 @pytest.mark.parametrize(("beyond", "expected"), [(0.001, "singular"), (-0.001, "solver_failed")])
-def test_a_run_that_would_have_been_singular_within_a_sample_is(beyond: float, expected: str) -> None:
+def test_a_run_that_would_have_been_singular_within_a_sample_is(
+    beyond: float, expected: str
+) -> None:
     on_the_way = cut(moving(math.acos(math.sqrt(1e-3)) - 0.1 + beyond), 5)
     on_the_way.rates[-1, 1:] = 1.0
     assert status(on_the_way, FAILED)[0] == expected
 
 
 def passing(quarter: float, step: float, others: float | None = None) -> Trajectory:
-    """Pitches past quarter·π in the middle between samples 5 and 6, the fastest `step` rad at once; `others` stay.
+    """Pitches past quarter·π in the middle between samples 5 and 6, the fastest `step` rad at once;
+    `others` stay.
 
     At different rates: they are at quarter·π together at that instant alone.
     """
@@ -252,7 +342,8 @@ def passing(quarter: float, step: float, others: float | None = None) -> Traject
 
 
 def one_by_one() -> Trajectory:
-    """Two pitches through π/2 between the same two samples, at different instants; the third stays there."""
+    """Two pitches through π/2 between the same two samples, at different instants; the third stays
+    there."""
     run = moving(QUARTER)
     late = np.where(np.arange(11) <= 5, -1.0, 0.0)
     run.angles[:, 1] = QUARTER + late + 0.2
@@ -283,11 +374,15 @@ def test_near_a_quarter_turn_the_energy_magnifies_round_off(side: float, expecte
     assert status(with_drift(moving(math.acos(math.sqrt(1e-13))), drift))[0] == expected
 
 
-def test_what_defects_add_up_to_is_the_error_where_there_is_no_reference(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_what_defects_add_up_to_is_the_error_where_there_is_no_reference(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     """Ten of a tenth of what is called ok, each within the bound of newmark_index2."""
     for side, expected in SIDES:
         defects = made_defects([side * 0.1 * OK_ERROR] * 10)
-        monkeypatch.setattr(judgement_module, "defects_of", lambda *_, defects=defects, **__: defects)
+        monkeypatch.setattr(
+            judgement_module, "defects_of", lambda *_, defects=defects, **__: defects
+        )
         assert status(moving(), method="exudyn_chain/newmark_index2")[0] == expected
         assert status(moving(), reference=moving(), method="exudyn_chain/newmark_index2")[0] == "ok"
 
@@ -321,8 +416,13 @@ def test_metrics_of_a_run_that_is_off_by_known_amounts() -> None:
     wrong.tip[1, 2] = (3.0, 0.0, 4.0)
     wrong.tip[8, 1] = (30.0, 0.0, 40.0)
     whole = metrics_of(SCENE, wrong, exact)
-    expected = {"horizon_s": 0.3, "angle_error_max": 0.1, "angle_error_whole": 0.3, "angle_error_end": 0.3,
-                "tip_error_max": 5.0}  # fmt: skip
+    expected = {
+        "horizon_s": 0.3,
+        "angle_error_max": 0.1,
+        "angle_error_whole": 0.3,
+        "angle_error_end": 0.3,
+        "tip_error_max": 5.0,
+    }
     assert {name: whole[name] for name in expected} == pytest.approx(expected, rel=1e-12)
 
 
@@ -339,17 +439,22 @@ ERRORS = {"angle_error_max", "tip_error_max"}
     ],
     ids=["stopped early", "past its reference", "stopped at the start", "past the horizon at once"],
 )
-def test_errors_are_stored_as_far_as_they_are_known(rows: int, reference: Trajectory, names: set[str]) -> None:
+def test_errors_are_stored_as_far_as_they_are_known(
+    rows: int, reference: Trajectory, names: set[str]
+) -> None:
     tips = np.zeros((11, 3, 3))
     run = cut(moving(), rows).replace(tip=tips[:rows])
     reference = reference if len(reference.time) < 11 else reference.replace(tip=tips)
-    given = metrics_of(SCENE, run, reference).keys() & (ERRORS | {"angle_error_whole", "angle_error_end"})
+    given = metrics_of(SCENE, run, reference).keys() & (
+        ERRORS | {"angle_error_whole", "angle_error_end"}
+    )
     assert given == names
 
 
 @pytest.mark.parametrize("scene", find_scenes(["check"]), ids=lambda scene: scene.name)
 def test_the_rotors_share_of_inertia_is_that_of_its_mass_matrix(scene: Scene) -> None:
-    """At random angles; T is ½ q̇·M q̇, so that M follows by polarisation from the kinetic energy."""
+    """At random angles; T is ½ q̇·M q̇, so that M follows by polarisation from the kinetic
+    energy."""
     count = 1 + len(scene.blades)
 
     def shares() -> Iterator[tuple[float, float]]:
@@ -357,7 +462,9 @@ def test_the_rotors_share_of_inertia_is_that_of_its_mass_matrix(scene: Scene) ->
             mass = np.zeros((count, count))
             for i, j in itertools.product(range(count), repeat=2):
                 rates = [np.eye(count)[i] + sign * np.eye(count)[j] for sign in (1.0, -1.0)]
-                plus, minus = (kinematics.kinetic_energy(scene, angles, rate[None])[0] for rate in rates)
+                plus, minus = (
+                    kinematics.kinetic_energy(scene, angles, rate[None])[0] for rate in rates
+                )
                 mass[i, j] = 0.5 * (plus - minus)
             free = scene.moving_coordinates[1:]
             eliminated = sum(mass[0, i] ** 2 / mass[i, i] for i in free) / mass[0, 0]

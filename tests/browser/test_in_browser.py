@@ -1,7 +1,8 @@
-"""Every page of a report in a headless Chromium: no error, no request, no sideways scrolling, axe-core content.
+"""Every page of a report in a headless Chromium: no error, no request, no sideways scrolling,
+axe-core content.
 
-Run with -m browser. Needs Chromium, and npm for axe-core. The report is a small one made here, or the folder that the
-environment variable ROTOR_MBS_REPORT names.
+Run with -m browser. Needs Chromium, and npm for axe-core. The report is a small one made here, or
+the folder that the environment variable ROTOR_MBS_REPORT names.
 """
 
 from __future__ import annotations
@@ -59,20 +60,29 @@ def report(tmp_path_factory: pytest.TempPathFactory) -> Path:
     runs = []
     for name in ("fig11", "fig14c", "fig03"):
         scene = paper(name, samples=201)
-        curve = SWING if len(scene.blades) == 3 else lambda t: np.stack([np.sin(t), 0.1 * t], axis=1)
+        curve = (
+            SWING if len(scene.blades) == 3 else lambda t: np.stack([np.sin(t), 0.1 * t], axis=1)
+        )
         runs += [Made(scene, "reference", curve), Made(scene, "exudyn_tree/rk67", curve)]
-        runs.append(Made(scene, "printed/ode45", lambda t, c=curve: 1.1 * c(t), until=0.7, gain=1e6))
+        runs.append(
+            Made(scene, "printed/ode45", lambda t, c=curve: 1.1 * c(t), until=0.7, gain=1e6)
+        )
     results = store(folder / "r.h5", runs)
     out = write_report(results, folder / "out").parent
     own = results_file(folder / "own.h5", ["turbine/pitch-step"], ["lagrange/dop853"])
-    suite = results_file(folder / "suite.h5", ["stiff/bearing-1e6", "extreme/toy"], ["lagrange/dop853"])
+    suite = results_file(
+        folder / "suite.h5", ["stiff/bearing-1e6", "extreme/toy"], ["lagrange/dop853"]
+    )
     others = {
         "own": write_report(own, folder / "own"),
         "sweep": write_report(made_sweep(folder, GRID), folder / "sweep"),
-        "modes": write_page(folder / "modes", modes_page([compute_modes(paper("fig11"), [0.0, 2.0, 3.0])]), {}),
+        "modes": write_page(
+            folder / "modes", modes_page([compute_modes(paper("fig11"), [0.0, 2.0, 3.0])]), {}
+        ),
         "suite": write_report(suite, folder / "suite"),
         "comparison": compare(
-            {"time": np.linspace(0.0, 10.0, 201), "angles": SWING(np.linspace(0.0, 10.0, 201))}, "paper/fig11"
+            {"time": np.linspace(0.0, 10.0, 201), "angles": SWING(np.linspace(0.0, 10.0, 201))},
+            "paper/fig11",
         ).to_html(folder / "comparison"),
     }
     for name, index in others.items():
@@ -91,7 +101,9 @@ def axe(tmp_path_factory: pytest.TempPathFactory) -> str:
     if not shutil.which("npm"):
         pytest.skip("no npm to get axe-core with")
     folder = tmp_path_factory.mktemp("axe")
-    done = subprocess.run(["npm", "pack", "axe-core@4"], cwd=folder, capture_output=True, text=True, check=False)
+    done = subprocess.run(
+        ["npm", "pack", "axe-core@4"], cwd=folder, capture_output=True, text=True, check=False
+    )
     if done.returncode:
         pytest.skip(f"npm could not get axe-core: {done.stderr.strip()[-200:]}")
     with tarfile.open(next(folder.glob("axe-core-*.tgz"))) as packed:
@@ -101,7 +113,9 @@ def axe(tmp_path_factory: pytest.TempPathFactory) -> str:
 
 
 @pytest.mark.parametrize("width", SIZES)
-def test_no_error_no_request_no_sideways_scrolling(page: Page, pages: list[Path], width: int) -> None:
+def test_no_error_no_request_no_sideways_scrolling(
+    page: Page, pages: list[Path], width: int
+) -> None:
     for path in pages:
         page.open(path, width)
         assert page.faults == [], path.name
@@ -119,19 +133,27 @@ def test_every_plot_is_drawn_text_is_legible_and_tables_fit_their_cards(
 ) -> None:
     for path in pages:
         page.open(path, width)
-        drawn = "[...document.querySelectorAll('.plot')].map(p => [p.dataset.plot.slice(0, 60), p.querySelectorAll("
+        drawn = (
+            "[...document.querySelectorAll('.plot')].map(p => [p.dataset.plot.slice(0, 60), "
+            "p.querySelectorAll("
+        )
         for name, count in page.run(f"{drawn}':scope > svg .curve').length])"):
             assert count > 0, (path.name, name)
         small = page.run(
-            "[...document.querySelectorAll('body *')].filter(e => [...e.childNodes].some(n => n.nodeType === 3 &&"
-            "n.textContent.trim()) && e.getClientRects().length && !e.closest('noscript, sub, script')).filter(e => {"
+            "[...document.querySelectorAll('body *')].filter(e => [...e.childNodes].some(n => "
+            "n.nodeType === 3 &&"
+            "n.textContent.trim()) && e.getClientRects().length && !e.closest('noscript, sub, "
+            "script')).filter(e => {"
             "const svg = e.closest('svg'), box = svg && (svg.ownerSVGElement ?? svg);"
-            "const view = box?.viewBox.baseVal, scale = view ? box.getBoundingClientRect().width / view.width : 1;"
-            "return parseFloat(getComputedStyle(e).fontSize) * scale < 11.9; }).map(e => e.textContent.slice(0, 40))"
+            "const view = box?.viewBox.baseVal, scale = view ? box.getBoundingClientRect().width "
+            "/ view.width : 1;"
+            "return parseFloat(getComputedStyle(e).fontSize) * scale < 11.9; }).map(e => "
+            "e.textContent.slice(0, 40))"
         )
         assert small == [], path.name
         wide = page.run(
-            "[...document.querySelectorAll('.card .table')].filter(t => t.scrollWidth > t.clientWidth + 1).map("
+            "[...document.querySelectorAll('.card .table')].filter(t => t.scrollWidth > "
+            "t.clientWidth + 1).map("
             "t => t.textContent.slice(0, 60))"
         )
         assert wide == [], path.name
@@ -144,22 +166,31 @@ def test_a_page_opens_with_its_answer(page: Page, pages: list[Path]) -> None:
         top = page.run("document.querySelector('.answer')?.getBoundingClientRect().top ?? null")
         assert top is not None, path.name
         assert top < 300, path.name
-        before = "e => document.querySelector('.answer').compareDocumentPosition(e) & Node.DOCUMENT_POSITION_PRECEDING"
-        assert page.run(f"[...document.querySelectorAll('.facts, .plot, table')].filter({before}).length") == 0, (
-            path.name
+        before = (
+            "e => document.querySelector('.answer').compareDocumentPosition(e) & "
+            "Node.DOCUMENT_POSITION_PRECEDING"
         )
+        assert (
+            page.run(
+                f"[...document.querySelectorAll('.facts, .plot, table')].filter({before}).length"
+            )
+            == 0
+        ), path.name
 
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 @pytest.mark.parametrize("width", SIZES)
-def test_axe_finds_nothing(page: Page, pages: list[Path], axe: str, width: int, scheme: str) -> None:
+def test_axe_finds_nothing(
+    page: Page, pages: list[Path], axe: str, width: int, scheme: str
+) -> None:
     found = []
     for path in pages:
         page.open(path, width, scheme=scheme)
         page.run(f"{axe}; 0")
         options = {"runOnly": {"type": "tag", "values": AXE_RULES}, "resultTypes": ["violations"]}
         violations = page.run(
-            f"axe.run({json.dumps(options)}).then(r => r.violations.map(v => [v.id, v.nodes.length, "
+            f"axe.run({json.dumps(options)}).then(r => r.violations.map(v => [v.id, "
+            "v.nodes.length, "
             "v.nodes[0].target.join(' '), v.nodes[0].failureSummary]))"
         )
         found += [(path.name, *violation) for violation in violations]
@@ -169,7 +200,10 @@ def test_axe_finds_nothing(page: Page, pages: list[Path], axe: str, width: int, 
 def open_viewer(page: Page, report: Path, width: int = 1440) -> bytes:
     """A scene's page, with the viewer in sight and its keyboard; what is seen."""
     page.open(report / "paper-fig11.html", width)
-    page.run("document.querySelector('.viewer').scrollIntoView(); document.querySelector('.viewer canvas').focus()")
+    page.run(
+        "document.querySelector('.viewer').scrollIntoView(); document.querySelector('.viewer "
+        "canvas').focus()"
+    )
     return settled(page)
 
 
@@ -216,7 +250,9 @@ def test_the_viewer_obeys_the_keyboard(page: Page, report: Path) -> None:
     reached = set()
     for _ in range(60):
         page.key("Tab", number=9)
-        reached.add(page.run("document.activeElement.dataset.part || document.activeElement.tagName"))
+        reached.add(
+            page.run("document.activeElement.dataset.part || document.activeElement.tagName")
+        )
     assert {"play", "time", "speed", "mode", "offset", "CANVAS", "BUTTON"} <= reached
 
 
@@ -263,7 +299,8 @@ def test_a_map_shows_the_curves_of_its_cell(page: Page, report: Path) -> None:
     numbers = "[...document.querySelectorAll('.heat td[data-run]')].map(c => c.textContent)"
     before = page.run(numbers)
     page.run(
-        "(q => { q.selectedIndex = 1; q.dispatchEvent(new Event('change')); })(document.getElementById('quantity'))"
+        "(q => { q.selectedIndex = 1; q.dispatchEvent(new Event('change')); "
+        "})(document.getElementById('quantity'))"
     )
     assert page.run(numbers) != before
     assert page.faults == []
@@ -286,7 +323,9 @@ _DRAWN = """(() => {{
 }})()"""
 
 
-def test_drawn_angles_are_those_of_the_data_and_fast_paths_are_round(page: Page, tmp_path: Path) -> None:
+def test_drawn_angles_are_those_of_the_data_and_fast_paths_are_round(
+    page: Page, tmp_path: Path
+) -> None:
     """A rotor at 4 rad/s for 300 s, which 361 frames and the shorter way round drew backwards.
 
     At 20 random times, to h² max|q̈| / 8 = 0.016 rad of straight lines between frames and their rounding to 1e-4 rad.
@@ -301,11 +340,20 @@ def test_drawn_angles_are_those_of_the_data_and_fast_paths_are_round(page: Page,
         drawn, lines = page.run(_DRAWN.format(value=1000.0 * share, chosen="line.length === 2"))
         wanted = np.array([np.interp(share * time[-1], time, column) for column in angles.T])
         np.testing.assert_allclose(drawn, wanted, atol=0.016 + 0.5e-4)
-        # A blade's axis, from the hub, as it stands in the picture: from above, clockwise in this view.
-        hub, axis = next(np.array(line) for line in lines if len(line) == 2 and math.dist(*line) > 50.0)
+        # A blade's axis, from the hub, as it stands in the picture: from above, clockwise in this
+        # view.
+        hub, axis = next(
+            np.array(line) for line in lines if len(line) == 2 and math.dist(*line) > 50.0
+        )
         turned = np.arctan2(axis[0] - hub[0], hub[1] - axis[1])
-        phases = [0.0, 2.0 * np.pi / 3.0, 4.0 * np.pi / 3.0]  # the blade that is drawn first is the farthest
-        assert min(abs(np.remainder(turned - wanted[0] - p + np.pi, 2 * np.pi) - np.pi) for p in phases) < 0.02
+        # the blade that is drawn first is the farthest
+        phases = [0.0, 2.0 * np.pi / 3.0, 4.0 * np.pi / 3.0]
+        assert (
+            min(
+                abs(np.remainder(turned - wanted[0] - p + np.pi, 2 * np.pi) - np.pi) for p in phases
+            )
+            < 0.02
+        )
     _, lines = page.run(_DRAWN.format(value=1000, chosen="line.length > 300"))
     trails = [np.array(line) for line in lines]
     assert trails
@@ -317,8 +365,11 @@ def test_drawn_angles_are_those_of_the_data_and_fast_paths_are_round(page: Page,
 @pytest.mark.parametrize("how", ["mouse", "touch"])
 def test_the_view_turns_by_dragging(page: Page, report: Path, how: str) -> None:
     still = open_viewer(page, report, 390)
-    x, y = page.run("(() => { const b = document.querySelector('.viewer canvas').getBoundingClientRect();"
-                    "return [b.left + 150, b.top + 120]; })()")  # fmt: skip
+    x, y = page.run(
+        "(() => { const b = document.querySelector('.viewer "
+        "canvas').getBoundingClientRect();"
+        "return [b.left + 150, b.top + 120]; })()"
+    )
     if how == "mouse":
         for kind, way in (("Pressed", 0), ("Moved", 40), ("Moved", 90), ("Released", 90)):
             pressed = {"button": "left", "buttons": 1, "clickCount": 1}
@@ -352,10 +403,14 @@ def test_without_scripts_the_answer_the_tables_and_the_main_plots_are_there(
     assert page.run("document.querySelector('table').offsetHeight") > 20
     assert page.run("document.querySelector('noscript').textContent.includes('JavaScript')")
     stills = page.run(
-        "[...document.querySelectorAll('.still svg')].filter(s => s.getBoundingClientRect().height > 100).length"
+        "[...document.querySelectorAll('.still svg')].filter(s => "
+        "s.getBoundingClientRect().height > 100).length"
     )
     assert 1 <= stills <= 6
-    empty = "[...document.querySelectorAll('.card')].filter(c => c.offsetHeight > 0 && c.offsetHeight < 30).length"
+    empty = (
+        "[...document.querySelectorAll('.card')].filter(c => c.offsetHeight > 0 && "
+        "c.offsetHeight < 30).length"
+    )
     assert page.run(empty) == 0
     assert page.run("document.documentElement.scrollWidth") <= 390
     assert page.run("document.querySelector('.viewer')?.offsetHeight ?? 0") == 0
@@ -366,7 +421,8 @@ def test_in_print_the_plots_stand_and_the_viewer_does_not(page: Page, report: Pa
     page.call("Emulation.setEmulatedMedia", media="print")
     viewer = page.run("document.querySelector('.viewer').offsetHeight")
     plots = page.run(
-        "[...document.querySelectorAll('#motion > .grid2 .plot > svg')].map(s => s.getBoundingClientRect().height)"
+        "[...document.querySelectorAll('#motion > .grid2 .plot > svg')].map(s => "
+        "s.getBoundingClientRect().height)"
     )
     nav = page.run("document.querySelector('nav').offsetHeight")
     page.call("Emulation.setEmulatedMedia", media="")

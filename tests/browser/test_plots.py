@@ -1,4 +1,5 @@
-"""The script that draws plots, in a headless Chromium: reading, zoom, legend, keys, gaps, jumps, constants, no data.
+"""The script that draws plots, in a headless Chromium: reading, zoom, legend, keys, gaps, jumps,
+constants, no data.
 
 Run with -m browser. Every curve is a known function, so that what is read can be computed.
 """
@@ -48,7 +49,9 @@ def curve(values: Any, key: str = "one", look: Look = ONE, **more: Any) -> Curve
 
 
 PLOTS = {
-    "lines": plot("lines", curve(2.0 * TIME), curve(TIME**2, "two", TWO), marks=[Mark("half", x=5.0)]),
+    "lines": plot(
+        "lines", curve(2.0 * TIME), curve(TIME**2, "two", TWO), marks=[Mark("half", x=5.0)]
+    ),
     "other": plot("other", curve(np.cos(TIME))),
     "constant": plot("constant", curve(np.full(101, 7.0))),
     "zero": plot("zero", curve(np.zeros(101)), least=1e-6),
@@ -63,7 +66,9 @@ PLOTS = {
     "far": plot("far", curve(1e6 + TIME)),
     "sides": plot("sides", curve(np.linspace(-420.0, 380.0, 101))),
     "small": plot("small", curve(1.5e-4 * TIME)),
-    "table": plot("table", Curve("one", ONE, np.array([0.0, 4.0, 4.0, 10.0]), np.array([1.0, 1.0, 3.0, 3.0]))),
+    "table": plot(
+        "table", Curve("one", ONE, np.array([0.0, 4.0, 4.0, 10.0]), np.array([1.0, 1.0, 3.0, 3.0]))
+    ),
 }
 SPEED = Plot(
     "frequency", "rad/s", Horizontal("speed", "rad/s", "speed", 0.0, 3.0),
@@ -76,28 +81,44 @@ def written(tmp_path_factory: pytest.TempPathFactory) -> Path:
     table = PageTable(
         "numbers",
         ("name", "value"),
-        [["b", TableCell("2", order=2)], ["a", TableCell("10", order=10)], ["c", TableCell("1", order=1)]],
+        [
+            ["b", TableCell("2", order=2)],
+            ["a", TableCell("10", order=10)],
+            ["c", TableCell("1", order=1)],
+        ],
         sortable=True,
     )
     legend = Legend([("one", ONE), ("two", TWO)])
     cards = [[one] for one in PLOTS.values()]
     sections = [
-        Section("first", "First", [legend, Grid(2, cards), Fold("Folded", "", [plot("folded", curve(TIME))])]),
-        Section("second", "Second", [legend, Grid(2, [[SPEED], [plot("apart", curve(TIME))]]), table]),
+        Section(
+            "first",
+            "First",
+            [legend, Grid(2, cards), Fold("Folded", "", [plot("folded", curve(TIME))])],
+        ),
+        Section(
+            "second", "Second", [legend, Grid(2, [[SPEED], [plot("apart", curve(TIME))]]), table]
+        ),
     ]
     path = tmp_path_factory.mktemp("plots") / "index.html"
     path.write_text(render(PageContent("<b>Plots</b>", "", [], [], sections)), encoding="utf-8")
     return path
 
 
-FIND = "[...document.querySelectorAll('.plot')].find(p => JSON.parse(p.dataset.plot).name === '{name}')"
+FIND = (
+    "[...document.querySelectorAll('.plot')].find(p => JSON.parse(p.dataset.plot).name === "
+    "'{name}')"
+)
 
 
 def find(name: str) -> str:
     return FIND.format(name=name)
 
 
-LABELS = "[...{find}.querySelectorAll(':scope > svg > text[text-anchor=end]')].map(label => label.textContent)"
+LABELS = (
+    "[...{find}.querySelectorAll(':scope > svg > text[text-anchor=end]')].map(label => "
+    "label.textContent)"
+)
 
 
 def opened(page: Page, path: Path, width: int = 1440, scheme: str = "light") -> None:
@@ -109,8 +130,10 @@ def box_of(page: Page, name: str) -> dict[str, float]:
     """Where the drawing of a plot is in the window, and its frame: left edge, right edge."""
     page.run(f"{find(name)}.scrollIntoView({{block: 'center'}})")
     found: dict[str, float] = page.run(
-        f"(() => {{ const p = {find(name)}, s = p.querySelector('svg'), r = s.getBoundingClientRect();"
-        "const [left, , right] = s.querySelector('.axis').getAttribute('d').match(/[\\d.]+/g).map(Number).filter("
+        f"(() => {{ const p = {find(name)}, s = p.querySelector('svg'), r = "
+        "s.getBoundingClientRect();"
+        "const [left, , right] = "
+        "s.querySelector('.axis').getAttribute('d').match(/[\\d.]+/g).map(Number).filter("
         "(_, i) => i !== 1); return {x: r.left, y: r.top, height: r.height, left, right}; })()"
     )
     return found
@@ -120,27 +143,38 @@ def point(page: Page, name: str, seconds: float, kind: str = "Moved", **more: An
     """The mouse at a time in the middle of a plot."""
     box = box_of(page, name)
     x = box["x"] + box["left"] + (box["right"] - box["left"]) * seconds / 10.0
-    page.call("Input.dispatchMouseEvent", type=f"mouse{kind}", x=x, y=box["y"] + 0.5 * box["height"], **more)
+    page.call(
+        "Input.dispatchMouseEvent",
+        type=f"mouse{kind}",
+        x=x,
+        y=box["y"] + 0.5 * box["height"],
+        **more,
+    )
 
 
 def read(page: Page, name: str) -> list[str]:
     """The text of the box with the values: heading, then name and value of each curve."""
     found: list[str] = page.run(
         f"(() => {{ const t = {find(name)}.querySelector('.tip'); return t.hidden ? [] :"
-        "[t.querySelector('b'), ...t.querySelectorAll('td:not(:first-child)')].map(c => c.textContent);"
+        "[t.querySelector('b'), ...t.querySelectorAll('td:not(:first-child)')].map(c => "
+        "c.textContent);"
         "})()"
     )
     return found
 
 
 def path_of(page: Page, name: str, number: int = 0) -> str:
-    drawn: str = page.run(f"{find(name)}.querySelectorAll(':scope > svg .curve')[{number}].getAttribute('d')")
+    drawn: str = page.run(
+        f"{find(name)}.querySelectorAll(':scope > svg .curve')[{number}].getAttribute('d')"
+    )
     return drawn
 
 
 def labels(page: Page, name: str) -> list[str]:
     """The texts of a plot."""
-    found: list[str] = page.run(f"[...{find(name)}.querySelectorAll(':scope > svg text')].map(t => t.textContent)")
+    found: list[str] = page.run(
+        f"[...{find(name)}.querySelectorAll(':scope > svg text')].map(t => t.textContent)"
+    )
     return found
 
 
@@ -168,8 +202,10 @@ def test_the_box_stands_on_the_side_away_from_the_pointer(page: Page, written: P
     for seconds in (1.0, 9.0):
         point(page, "lines", seconds)
         middle = page.run(
-            f"(() => {{ const b = {find('lines')}.getBoundingClientRect(), t = {find('lines')}.querySelector('.tip')"
-            ".getBoundingClientRect(); return [t.left > b.left && t.right < b.right, (t.left + t.right) / 2 - b.left,"
+            f"(() => {{ const b = {find('lines')}.getBoundingClientRect(), t = "
+            f"{find('lines')}.querySelector('.tip')"
+            ".getBoundingClientRect(); return [t.left > b.left && t.right < b.right, (t.left + "
+            "t.right) / 2 - b.left,"
             "b.width]; })()"
         )
         sides.append(middle)
@@ -179,7 +215,9 @@ def test_the_box_stands_on_the_side_away_from_the_pointer(page: Page, written: P
     assert late < 0.9 * width
 
 
-def test_a_drag_zooms_all_plots_of_time_and_a_double_click_shows_all(page: Page, written: Path) -> None:
+def test_a_drag_zooms_all_plots_of_time_and_a_double_click_shows_all(
+    page: Page, written: Path
+) -> None:
     opened(page, written)
     whole, other, speed = path_of(page, "lines"), path_of(page, "other"), path_of(page, "frequency")
     pressed = {"button": "left", "buttons": 1, "clickCount": 1}
@@ -190,7 +228,8 @@ def test_a_drag_zooms_all_plots_of_time_and_a_double_click_shows_all(page: Page,
     assert page.run(f"{pill}.hidden") is False
     ends = re.fullmatch(r"([\d.]+) to ([\d.]+) s · show all", page.run(f"{pill}.textContent"))
     assert ends is not None
-    assert [float(end) for end in ends.groups()] == pytest.approx([2.0, 4.0], abs=0.03)  # a pixel is 0.015 s
+    # a pixel is 0.015 s
+    assert [float(end) for end in ends.groups()] == pytest.approx([2.0, 4.0], abs=0.03)
     assert path_of(page, "lines") != whole
     assert path_of(page, "other") != other
     assert path_of(page, "frequency") == speed  # over something else
@@ -251,10 +290,13 @@ def test_a_jump_is_a_gap_and_a_gap_in_the_data_stays_one(page: Page, written: Pa
     opened(page, written)
     assert path_of(page, "jump").count("M") == 2
     assert path_of(page, "gap").count("M") == 2
-    # The last point before the jump and the first after it are neighbours in time, at different heights.
+    # The last point before the jump and the first after it are neighbours in time, at different
+    # heights.
     before, after = path_of(page, "jump").split("M")[1:]
-    (x0, y0), (x1, y1) = ([float(n) for n in re.findall(r"[\d.]+", part)][slice_] for part, slice_ in
-                          ((before, slice(-2, None)), (after, slice(0, 2))))  # fmt: skip
+    (x0, y0), (x1, y1) = (
+        [float(n) for n in re.findall(r"[\d.]+", part)][slice_]
+        for part, slice_ in ((before, slice(-2, None)), (after, slice(0, 2)))
+    )
     assert 0.0 < x1 - x0 < 10.0
     assert y1 < y0 - 50.0
     point(page, "gap", 4.0)
@@ -262,11 +304,13 @@ def test_a_jump_is_a_gap_and_a_gap_in_the_data_stays_one(page: Page, written: Pa
 
 
 def test_constants_and_rounding_errors_are_not_magnified(page: Page, written: Path) -> None:
-    """A constant has a tenth of its size on both sides; what is rounding error lies on a line between -1 and 1."""
+    """A constant has a tenth of its size on both sides; what is rounding error lies on a line
+    between -1 and 1."""
     opened(page, written)
     for name, low, high in (("constant", 6.3, 7.7), ("zero", -1.0, 1.0), ("noise", -1.0, 1.0)):
         heights = page.run(
-            f"[...{find(name)}.querySelectorAll(':scope > svg > text[text-anchor=end]')].map(t => t.textContent)"
+            f"[...{find(name)}.querySelectorAll(':scope > svg > text[text-anchor=end]')].map(t => "
+            "t.textContent)"
         )
         numbers = [float(text.replace("−", "-")) for text in heights]
         assert low <= min(numbers) < max(numbers) <= high, name
@@ -302,7 +346,9 @@ def test_zero_is_a_gap_on_a_logarithmic_axis(page: Page, written: Path) -> None:
 
 def test_a_runaway_is_cut_until_it_is_asked_for(page: Page, written: Path) -> None:
     opened(page, written)
-    assert "▼ second: to −2.2×10⁴" in labels(page, "clip") or "▼ second: to −22000" in labels(page, "clip")
+    assert "▼ second: to −2.2×10⁴" in labels(page, "clip") or "▼ second: to −22000" in labels(
+        page, "clip"
+    )
     page.run(f"{find('clip')}.querySelector('.full').click()")
     assert not [text for text in labels(page, "clip") if text.startswith("▼")]
     assert page.run(f"{find('clip')}.querySelector('.full').getAttribute('aria-pressed')") == "true"
@@ -318,7 +364,9 @@ def test_values_far_from_zero_keep_their_digits(page: Page, written: Path) -> No
 
 
 @pytest.mark.parametrize("width", [390, 1024, 1440])
-def test_text_is_12_px_at_every_width_and_nothing_scrolls_sideways(page: Page, written: Path, width: int) -> None:
+def test_text_is_12_px_at_every_width_and_nothing_scrolls_sideways(
+    page: Page, written: Path, width: int
+) -> None:
     opened(page, written, width)
     sizes = page.run(
         "[...document.querySelectorAll('.plot > svg')].filter(s => s.clientWidth).map(s => "
@@ -334,7 +382,9 @@ def test_a_plot_is_drawn_anew_when_it_is_unfolded(page: Page, written: Path) -> 
     page.run("document.querySelector('details').open = true")
     time.sleep(0.2)
     width = page.run(f"{find('folded')}.clientWidth")
-    assert page.run(f"{find('folded')}.querySelector('svg').viewBox.baseVal.width") == pytest.approx(width, abs=1)
+    assert page.run(
+        f"{find('folded')}.querySelector('svg').viewBox.baseVal.width"
+    ) == pytest.approx(width, abs=1)
 
 
 def test_colours_follow_the_scheme(page: Page, written: Path) -> None:
@@ -374,7 +424,8 @@ def test_eleven_plots_are_drawn_in_a_moment(page: Page, written: Path) -> None:
     """A redraw of all of them, as every step of a zoom makes: not a second, on a machine in use."""
     opened(page, written)
     spent = page.run(
-        "(() => { const t = performance.now(); document.dispatchEvent(new CustomEvent('shown-run', {detail: 0}));"
+        "(() => { const t = performance.now(); document.dispatchEvent(new "
+        "CustomEvent('shown-run', {detail: 0}));"
         "return performance.now() - t; })()"
     )
     assert spent < 1000.0, json.dumps(spent)

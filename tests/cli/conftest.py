@@ -1,4 +1,5 @@
-"""Commands of these tests work in a folder of their own, and leave no methods of files to later tests."""
+"""Commands of these tests work in a folder of their own, and leave no methods of files to later
+tests."""
 
 from collections.abc import Iterator
 from pathlib import Path

@@ -1,4 +1,5 @@
-"""A batch goes on: a method that refuses a scene is a line with the reason, never the end of the others."""
+"""A batch goes on: a method that refuses a scene is a line with the reason, never the end of the
+others."""
 
 from __future__ import annotations
 
@@ -56,7 +57,8 @@ def not_run(ended: Ended) -> list[str]:
 
 
 def test_methods_that_refuse_a_scene_are_lines_of_run(folder: Path) -> None:
-    """Refused beforehand, when it is built, and because a setting does not fit; the other method is stored."""
+    """Refused beforehand, when it is built, and because a setting does not fit; the other method is
+    stored."""
     (folder / "refuses.py").write_text(REFUSES_WHEN_BUILT)
     methods = ("printed/ode45", "refuses.py", "exudyn_tree/rk44", "lagrange/dop853")
     words = [word for name in methods for word in ("-m", name)]
@@ -65,7 +67,8 @@ def test_methods_that_refuse_a_scene_are_lines_of_run(folder: Path) -> None:
     assert ended.status == 1
     assert not_run(ended) == [
         f"not run: printed/ode45 on short: {HUB_REASON}",
-        "not run: exudyn_tree/rk44 on short: step = 1e-12 requires more than 1e+09 steps for 0.1 s; allowed: a step of "
+        "not run: exudyn_tree/rk44 on short: step = 1e-12 requires more than 1e+09 steps for 0.1 "
+        "s; allowed: a step of "
         "at least 1e-10 s",
         "not run: refuses/late on short: has no place for this scene",
     ]
@@ -89,7 +92,16 @@ def test_a_call_whose_runs_are_all_refused_is_bad_input(folder: Path) -> None:
 
 
 def test_wrong_names_and_values_end_a_batch_before_it_begins(folder: Path) -> None:
-    command = ["run", with_hub(folder), "-m", "printed/ode45", "-m", "exudyn_tree/rk44", "-o", "r.h5"]
+    command = [
+        "run",
+        with_hub(folder),
+        "-m",
+        "printed/ode45",
+        "-m",
+        "exudyn_tree/rk44",
+        "-o",
+        "r.h5",
+    ]
     for words in (["-m", "lagrange/tailor"], ["--set", "stpe=1e-3"], ["--set", "step=-1"]):
         ended = rotor_mbs(*command, *words)
         assert ended.status == 2
@@ -100,7 +112,9 @@ def test_wrong_names_and_values_end_a_batch_before_it_begins(folder: Path) -> No
 def test_a_method_that_the_rule_selects_and_that_refuses_is_a_line_and_no_fault(
     folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("rotor_mbs.methods.catalogue.default_methods", lambda: ("lagrange/dop853", "printed/ode45"))
+    monkeypatch.setattr(
+        "rotor_mbs.methods.catalogue.default_methods", lambda: ("lagrange/dop853", "printed/ode45")
+    )
     ended = rotor_mbs("run", with_hub(folder), "-o", "r.h5", "-j", 1)
     assert (ended.status, not_run(ended)) == (0, [f"not run: printed/ode45 on short: {HUB_REASON}"])
 
@@ -110,7 +124,8 @@ def test_methods_and_variants_that_are_refused_are_lines_of_a_sweep(folder: Path
     (folder / "refuses.py").write_text(REFUSES_WHEN_BUILT.replace(", items=lambda scene: []", ""))
     short_scene(folder)
     Path("s.toml").write_text(
-        'title = "hubs"\nscene = "short.toml"\nsamples = 3\n[[axis]]\nkey = "hub.inertia"\nvalues = [0.0, 3.0, 4.0]\n'
+        'title = "hubs"\nscene = "short.toml"\nsamples = 3\n[[axis]]\nkey = "hub.inertia"\nvalues '
+        "= [0.0, 3.0, 4.0]\n"
     )
     methods = ("-m", "refuses.py", "-m", "printed/ode45", "-m", "lagrange/dop853")
     ended = rotor_mbs("sweep", "s.toml", *methods, "-o", "s.h5", "-j", 1)
@@ -119,7 +134,14 @@ def test_methods_and_variants_that_are_refused_are_lines_of_a_sweep(folder: Path
         "not run: refuses/late on short: has no place for this scene",
         f"not run: printed/ode45 on 2 runs (1 to 2): {HUB_REASON}",
     ]
-    assert StoredSweep(Path("s.h5")).column("status").tolist() == [code_of("completed"), MISSING, MISSING, 0, 0, 0]
+    assert StoredSweep(Path("s.h5")).column("status").tolist() == [
+        code_of("completed"),
+        MISSING,
+        MISSING,
+        0,
+        0,
+        0,
+    ]
     ended = rotor_mbs("sweep", "s.toml", "-m", "refuses.py", "-o", "none.h5", "-j", 1)
     assert (ended.status, Path("none.h5").exists()) == (2, False)
 
@@ -145,7 +167,17 @@ def test_a_bench_leaves_out_what_cannot_be_measured(folder: Path) -> None:
     """A scene without a motion to compare with, and a method that refuses the other scene."""
     pytest.importorskip("mujoco")
     scene = short_scene(folder)
-    command = ["bench", "extreme/singular-start", scene, "-m", "lagrange/dop853", "-o", "b.h5", "--budget", 1]
+    command = [
+        "bench",
+        "extreme/singular-start",
+        scene,
+        "-m",
+        "lagrange/dop853",
+        "-o",
+        "b.h5",
+        "--budget",
+        1,
+    ]
     ended = rotor_mbs(*command)
     assert ended.status == 1
     (line,) = not_run(ended)

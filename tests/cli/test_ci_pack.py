@@ -1,4 +1,5 @@
-"""What CI systems take: a comparison with an earlier file, JUnit, summaries; the GitHub action and the GitLab job."""
+"""What CI systems take: a comparison with an earlier file, JUnit, summaries; the GitHub action and
+the GitLab job."""
 
 from __future__ import annotations
 
@@ -33,7 +34,8 @@ def earlier(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def loosened(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The same run at a longer step: its energy drift grows thirtyfold and stays below its bound."""
+    """The same run at a longer step: its energy drift grows thirtyfold and stays below its
+    bound."""
     return results_of(tmp_path_factory.mktemp("loosened"), METHOD, step=0.006)
 
 
@@ -51,7 +53,11 @@ def test_a_loosened_run_that_passes_its_bounds_is_found(earlier: Path, loosened:
 def test_a_run_that_is_gone_is_found(earlier: Path, folder: Path) -> None:
     compared = rotor_mbs("check", results_of(folder, "lagrange/dop853"), "--against", earlier)
     assert compared.status == 1
-    (line,) = [line for line in compared.out.splitlines() if line.startswith(f"FAIL against: {SCENE} {METHOD}")]
+    (line,) = [
+        line
+        for line in compared.out.splitlines()
+        if line.startswith(f"FAIL against: {SCENE} {METHOD}")
+    ]
     assert "run: all: nan" in line
     assert "missing in this one" in line
     assert rotor_mbs("check", earlier, "--against", folder / "none.h5").status == 2
@@ -68,7 +74,9 @@ def test_a_run_that_is_gone_is_found(earlier: Path, folder: Path) -> None:
         (0.5, float("nan"), False),
     ],
 )
-def test_a_margin_may_shrink_tenfold(before: float, now: float, passes: bool, earlier: Path) -> None:
+def test_a_margin_may_shrink_tenfold(
+    before: float, now: float, passes: bool, earlier: Path
+) -> None:
     verdict = replace(judge_file(earlier, shipped_bounds())[0], bound=1.0)
     (compared,) = regressions([replace(verdict, value=now)], [replace(verdict, value=before)])
     assert compared.passed == passes
@@ -89,7 +97,11 @@ def _bash(script: str, folder: Path, **variables: str) -> subprocess.CompletedPr
     path = f"{command.parent}:{os.environ['PATH']}"
     environment = {**os.environ, "PYTHONPATH": f"{folder}:{ROOT}", **variables, "PATH": path}
     return subprocess.run(
-        ["bash", "-eo", "pipefail", "-c", script], cwd=folder, env=environment, capture_output=True, text=True
+        ["bash", "-eo", "pipefail", "-c", script],
+        cwd=folder,
+        env=environment,
+        capture_output=True,
+        text=True,
     )
 
 
@@ -99,18 +111,27 @@ def _run_action(folder: Path, **given: str) -> list[subprocess.CompletedProcess[
     done = []
     for step in ACTION["runs"]["steps"]:
         assert step["shell"] == "bash"
-        assert "${{" not in step["run"]  # an input is a value of a variable, never a piece of the script
-        names = {key: re.fullmatch(r"\$\{\{ inputs\.(\w+) \}\}", text) for key, text in step["env"].items()}
+        # an input is a value of a variable, never a piece of the script
+        assert "${{" not in step["run"]
+        names = {
+            key: re.fullmatch(r"\$\{\{ inputs\.(\w+) \}\}", text)
+            for key, text in step["env"].items()
+        }
         values = {key: str(inputs[match[1]]) for key, match in names.items() if match}
         assert len(values) == len(step["env"])
-        values |= {"GITHUB_ACTION_PATH": str(folder), "GITHUB_STEP_SUMMARY": str(folder / "summary.md")}
+        values |= {
+            "GITHUB_ACTION_PATH": str(folder),
+            "GITHUB_STEP_SUMMARY": str(folder / "summary.md"),
+        }
         done.append(_bash(step["run"], folder, **values))
         if done[-1].returncode:
             break
     return done
 
 
-def test_the_action_fails_on_a_loosened_run_and_leaves_its_files(earlier: Path, loosened: Path, folder: Path) -> None:
+def test_the_action_fails_on_a_loosened_run_and_leaves_its_files(
+    earlier: Path, loosened: Path, folder: Path
+) -> None:
     done = _run_action(folder, file=str(loosened), against=str(earlier), require=METHOD, package="")
     assert [step.returncode for step in done] == [0, 1], done[-1]
     assert "::error title=rotor-mbs against" in done[-1].stdout
@@ -131,12 +152,15 @@ def test_the_action_takes_no_command_from_an_input(folder: Path) -> None:
 
 def test_the_action_installs_the_checkout_it_is_from(folder: Path) -> None:
     script = ACTION["runs"]["steps"][0]["run"].replace("python -m pip", "echo")
-    done = _bash(script, folder, PACKAGE=".", GITHUB_ACTION_PATH=str(ROOT / ".github/actions/check"))
+    done = _bash(
+        script, folder, PACKAGE=".", GITHUB_ACTION_PATH=str(ROOT / ".github/actions/check")
+    )
     place = Path(done.stdout.split()[-1])
     assert (place / "pyproject.toml").samefile(ROOT / "pyproject.toml")
 
 
-# The whole workflows of docs/check.md: without an earlier file, with one, and with one and a fault in a model since.
+# The whole workflows of docs/check.md: without an earlier file, with one, and with one and a fault
+# in a model since.
 
 DOCUMENT = (ROOT / "docs/check.md").read_text()
 GITHUB, GITLAB = map(yaml.safe_load, re.findall(r"```yaml\n(.*?)```", DOCUMENT, re.DOTALL))
@@ -188,14 +212,17 @@ def test_action_and_job_may_allow_a_scene_that_was_changed(project: Path) -> Non
         done_job = _bash("\n".join(JOB["script"]), project, **job | {"ALLOW_CHANGED": allowed})
         for told in (done.stdout, done_job.stdout):
             assert "duration 0.2 -> 0.1" in told
-        assert (done.returncode, done_job.returncode) == ((1, 1) if allowed == "false" else (0, 0)), done
+        assert (done.returncode, done_job.returncode) == (
+            (1, 1) if allowed == "false" else (0, 0)
+        ), done
 
 
 @pytest.mark.full
 def test_the_workflow_for_github_compares_with_the_file_of_the_main_branch(project: Path) -> None:
     steps = GITHUB["jobs"]["accuracy"]["steps"]
     caches = [step for step in steps if "actions/cache" in step.get("uses", "")]
-    assert [step["with"]["path"] for step in caches] == [EARLIER, EARLIER]  # restored first, saved at last
+    # restored first, saved at last
+    assert [step["with"]["path"] for step in caches] == [EARLIER, EARLIER]
     output, summary = project / "rotor-mbs-check", project / "summary.md"
     for against, has_fault in (("", False), (EARLIER, False), (EARLIER, True)):
         if has_fault:
@@ -222,8 +249,16 @@ def test_the_workflow_for_github_compares_with_the_file_of_the_main_branch(proje
 @pytest.mark.nightly
 def test_the_pipeline_for_gitlab_compares_with_the_file_of_the_main_branch(project: Path) -> None:
     assert GITLAB["accuracy"]["extends"] == ".rotor-mbs-check"
-    job = {**JOB, **GITLAB["accuracy"], "variables": {**JOB["variables"], **GITLAB["accuracy"]["variables"]}}
-    assert GITLAB["keep"]["cache"][0]["paths"] == job["cache"][0]["paths"] == [job["variables"]["AGAINST"]]
+    job = {
+        **JOB,
+        **GITLAB["accuracy"],
+        "variables": {**JOB["variables"], **GITLAB["accuracy"]["variables"]},
+    }
+    assert (
+        GITLAB["keep"]["cache"][0]["paths"]
+        == job["cache"][0]["paths"]
+        == [job["variables"]["AGAINST"]]
+    )
     assert job["artifacts"]["when"] == "always"
     script = "\n".join([*job["before_script"], *job["script"]]).replace(PIP, "echo")
     for is_first, has_fault in ((True, False), (False, False), (False, True)):

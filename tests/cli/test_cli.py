@@ -27,7 +27,9 @@ def first_run(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Ended]:
     """The results file of `quick`, and the command that made it."""
     folder = tmp_path_factory.mktemp("quick")
     (folder / "quick.toml").write_text(QUICK)
-    return folder / "r.h5", rotor_mbs("run", folder / "quick.toml", *BOTH, "-o", folder / "r.h5", "-j", "1")
+    return folder / "r.h5", rotor_mbs(
+        "run", folder / "quick.toml", *BOTH, "-o", folder / "r.h5", "-j", "1"
+    )
 
 
 @pytest.fixture
@@ -49,7 +51,9 @@ def test_list_has_scenes_sweeps_and_methods() -> None:
     text = rotor_mbs("list").out
     headings = {line for line in text.splitlines() if line and not line.startswith(" ")}
     assert {"scenes: paper", "scenes: stiff", "sweeps", "methods"} <= headings
-    assert all(f"  {name}  " in text for name in ("paper/fig11", "sweeps/fig11-spread", "lagrange/taylor"))
+    assert all(
+        f"  {name}  " in text for name in ("paper/fig11", "sweeps/fig11-spread", "lagrange/taylor")
+    )
     rows = json.loads(rotor_mbs("list", "--json").out)
     assert {row["kind"] for row in rows} == {"scene", "sweep", "method"}
 
@@ -69,7 +73,16 @@ def test_list_and_every_help_load_no_library_that_takes_time() -> None:
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     loaded = set(done.stdout.splitlines()[-1].split())
-    assert not loaded & {"numpy", "scipy", "pydantic", "h5py", "matplotlib", "exudyn", "heyoka", "mujoco"}
+    assert not loaded & {
+        "numpy",
+        "scipy",
+        "pydantic",
+        "h5py",
+        "matplotlib",
+        "exudyn",
+        "heyoka",
+        "mujoco",
+    }
 
 
 def test_show_build_lists_what_a_scene_needs_and_no_more() -> None:
@@ -90,7 +103,9 @@ def test_settings_are_stored_and_unknown_ones_refused(quick: Path, stored: Path)
     assert ended.status == 1  # inaccurate
     assert "1 run computed" in ended.out
     with open_results(stored) as results:
-        assert results.scenes["quick"].runs["lagrange/dop853"].settings["relative_tolerance"] == 1e-6
+        assert (
+            results.scenes["quick"].runs["lagrange/dop853"].settings["relative_tolerance"] == 1e-6
+        )
         notes = [str(cell.note) for cell, *_ in agreement_table(results.scenes["quick"]).rows]
         assert "lagrange/dop853, relative_tolerance = 1e-06" in notes
     assert "NAME=VALUE" in refusal(*command, "x")
@@ -103,7 +118,9 @@ def test_run_writes_every_run_and_a_second_one_has_nothing_to_do(
     assert first.status == 0, first.err
     assert "3 runs computed (3 ok)" in first.out
     table = [line.split()[:3] for line in first.out.splitlines() if line.startswith("quick ")]
-    assert table == [["quick", method, "ok"] for method in ("reference", "lagrange/dop853", "exudyn_tree/rk67")]
+    assert table == [
+        ["quick", method, "ok"] for method in ("reference", "lagrange/dop853", "exudyn_tree/rk67")
+    ]
     before = stored.read_bytes()
     assert "nothing to do, 3 " in rotor_mbs("run", quick, *BOTH, "-o", stored, "-j", "1").out
     assert stored.read_bytes() == before
@@ -121,16 +138,24 @@ def test_a_run_over_its_time_limit_is_recorded_and_the_rest_goes_on(quick: Path)
 
 
 @pytest.mark.parametrize("command", ["run", "sweep"])
-def test_a_misspelt_method_of_a_file_is_told_with_the_other_errors(command: str, quick: Path) -> None:
+def test_a_misspelt_method_of_a_file_is_told_with_the_other_errors(
+    command: str, quick: Path
+) -> None:
     quick.write_text('methods = ["lagrange/tailor"]\nsamples = 1\n')
     ended = rotor_mbs(command, quick)
     assert ended.status == 2
-    assert f"{quick}:1: methods: unknown method 'lagrange/tailor', perhaps lagrange/taylor; allowed: " in ended.err
+    assert (
+        f"{quick}:1: methods: unknown method 'lagrange/tailor', perhaps lagrange/taylor; allowed: "
+    ) in ended.err
     assert f"{quick}:2: samples: 1 is out of range" in ended.err
 
 
 ARRAYS = ("angles", "rates", "tip")
-ALL = [chosen for count in range(1, 1 + len(OUTPUTS)) for chosen in itertools.combinations(OUTPUTS, count)]
+ALL = [
+    chosen
+    for count in range(1, 1 + len(OUTPUTS))
+    for chosen in itertools.combinations(OUTPUTS, count)
+]
 
 
 @pytest.mark.full
@@ -140,7 +165,9 @@ def test_every_combination_of_outputs_runs_is_checked_and_reported(tmp_path: Pat
     for chosen in ALL:
         scene = paper("fig11", samples=6, duration=0.1, outputs=chosen)
         (folder / f"{'-'.join(chosen)}.toml").write_text(scene_toml(scene))
-    ended = rotor_mbs("run", folder, "-m", "lagrange/taylor", "-m", "exudyn_tree/rk67", "-o", results, "-j", 1)
+    ended = rotor_mbs(
+        "run", folder, "-m", "lagrange/taylor", "-m", "exudyn_tree/rk67", "-o", results, "-j", 1
+    )
     assert ended.status in (0, 1), ended.err
     with open_results(results) as stored:
         for chosen in ALL:

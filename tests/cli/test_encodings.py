@@ -29,14 +29,17 @@ COMMANDS = (
     "new {folder}/a.txt",
     pytest.param("report {results} -o {folder}/pages", marks=pytest.mark.full),
     pytest.param("modes check/general -o {folder}/m.h5 -j 1", marks=pytest.mark.full),
-    pytest.param("stability extreme/passage-1e-3 -m mujoco/rk4 -o {folder}/s.h5 -j 1", marks=pytest.mark.full),
+    pytest.param(
+        "stability extreme/passage-1e-3 -m mujoco/rk4 -o {folder}/s.h5 -j 1", marks=pytest.mark.full
+    ),
     pytest.param("compare {data} --scene paper/fig08 -o {folder}/c", marks=pytest.mark.full),
     pytest.param("compare {data} --scene paper/fig08 --json -o {folder}/c", marks=pytest.mark.full),
 )
 
 
 def printed(words: list[str], encoding: str) -> tuple[int, str, str]:
-    """Exit status, standard output and standard error of a command whose streams have an encoding."""
+    """Exit status, standard output and standard error of a command whose streams have an
+    encoding."""
     out, err = (io.TextIOWrapper(io.BytesIO(), encoding=encoding, newline="\n") for _ in range(2))
     with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
         status = main(words)
@@ -58,13 +61,20 @@ def data(results: Path, folder: Path) -> Path:
     path = folder / "data.csv"
     names = ["time (s)", "rotor (°)", *(f"pitch {i} (°)" for i in range(1, degrees.shape[1]))]
     np.savetxt(
-        path, np.column_stack([time, degrees]), delimiter=",", header=",".join(names), comments="", encoding="utf-8"
+        path,
+        np.column_stack([time, degrees]),
+        delimiter=",",
+        header=",".join(names),
+        comments="",
+        encoding="utf-8",
     )
     return path
 
 
 @pytest.mark.parametrize("command", COMMANDS)
-def test_every_command_prints_to_the_end_in_any_encoding(command: str, results: Path, data: Path, folder: Path) -> None:
+def test_every_command_prints_to_the_end_in_any_encoding(
+    command: str, results: Path, data: Path, folder: Path
+) -> None:
     words = command.format(results=results, data=data, folder=folder).split()
     status, out, err = printed(words, "utf-8")
     is_quick = words[0] in ("list", "show", "check", "new")
@@ -94,7 +104,9 @@ def test_a_command_whose_reader_has_gone_does_all_its_work(folder: Path) -> None
     command = [*PROGRAM, "modes", "check/general", "-o", "m.h5", "-j", "1"]
     try:
         environment = {**os.environ, "PYTHONUNBUFFERED": "1"}
-        ended = subprocess.run(command, stdout=writing, stderr=subprocess.PIPE, text=True, env=environment)
+        ended = subprocess.run(
+            command, stdout=writing, stderr=subprocess.PIPE, text=True, env=environment
+        )
     finally:
         os.close(writing)
     assert ended.returncode == 1, ended.stderr

@@ -1,4 +1,5 @@
-"""What the environment sets or lacks is ignored where it does not matter, and is never the result of a method."""
+"""What the environment sets or lacks is ignored where it does not matter, and is never the result
+of a method."""
 
 from __future__ import annotations
 
@@ -13,9 +14,11 @@ from support.commands import PROGRAM, rotor_mbs
 import rotor_mbs as rm
 from rotor_mbs.errors import ResourceError, system_errors_apart
 
-NO_HOME = {"HOME": os.devnull, "XDG_CACHE_HOME": "", "MPLCONFIGDIR": ""}  # a folder that cannot be made
+# a folder that cannot be made
+NO_HOME = {"HOME": os.devnull, "XDG_CACHE_HOME": "", "MPLCONFIGDIR": ""}
 BROKEN = {**NO_HOME, "MPLBACKEND": "broken", "SOURCE_DATE_EPOCH": "abc"}
-# A method that loads a library which does not load while there is no file `licence`, with an error of its own.
+# A method that loads a library which does not load while there is no file `licence`, with an error
+# of its own.
 LOADS_A_LIBRARY = """
 import sys
 from rotor_mbs import Method
@@ -37,7 +40,9 @@ if not Path(FOLDER, "licence").exists():
 def in_environment(variables: dict[str, str], *words: object) -> subprocess.CompletedProcess[str]:
     environment = {name: value for name, value in {**os.environ, **variables}.items() if value}
     command = [*PROGRAM, *map(str, words)]
-    return subprocess.run(command, env=environment, stdin=subprocess.DEVNULL, capture_output=True, text=True)
+    return subprocess.run(
+        command, env=environment, stdin=subprocess.DEVNULL, capture_output=True, text=True
+    )
 
 
 @pytest.mark.parametrize(
@@ -49,7 +54,9 @@ def in_environment(variables: dict[str, str], *words: object) -> subprocess.Comp
         (BROKEN, ("figures", "FILE", "--figure", "8", "-o", "figures"), 0),
         pytest.param(BROKEN, ("check", "FILE"), 0, marks=pytest.mark.full),
         pytest.param(BROKEN, ("report", "FILE", "-o", "pages"), 0, marks=pytest.mark.full),
-        pytest.param(BROKEN, ("animate", "paper/fig08", "FILE", "-o", "a.gif"), 0, marks=pytest.mark.full),
+        pytest.param(
+            BROKEN, ("animate", "paper/fig08", "FILE", "-o", "a.gif"), 0, marks=pytest.mark.full
+        ),
     ],
 )
 def test_variables_that_do_not_matter_are_ignored(
@@ -73,7 +80,10 @@ def test_workers_of_a_command_that_is_inspected_are_not(folder: Path) -> None:
 def test_a_valid_backend_stays_that_of_the_caller() -> None:
     program = "import rotor_mbs.report.canvas, matplotlib; print(matplotlib.get_backend())"
     ended = subprocess.run(
-        [sys.executable, "-c", program], env={**os.environ, "MPLBACKEND": "pdf"}, capture_output=True, text=True
+        [sys.executable, "-c", program],
+        env={**os.environ, "MPLBACKEND": "pdf"},
+        capture_output=True,
+        text=True,
     )
     assert (ended.stdout, ended.stderr) == ("pdf\n", "")
 
@@ -85,8 +95,13 @@ def test_a_library_that_does_not_load_is_no_result_of_a_method(folder: Path) -> 
     command = ["run", scene.name, "-m", "loads.py", "-o", "r.h5", "-j", 1]
     ended = rotor_mbs(*command, processes=True)
     assert ended.status == 1
-    reason = "code cannot be loaded: ImportError: ValueError: no licence, also when it was retried alone"
-    assert f"{scene.name} loads/loads: not computed ({reason}); repeat the command to try again" in ended.err
+    reason = (
+        "code cannot be loaded: ImportError: ValueError: no licence, also when it was retried alone"
+    )
+    assert (
+        f"{scene.name} loads/loads: not computed ({reason}); repeat the command to try again"
+        in ended.err
+    )
     assert list(rm.open("r.h5")[scene.name]) == ["reference"]
 
     (folder / "licence").touch()

@@ -1,5 +1,5 @@
-"""The main job, `reproduce`: on a scene, a second call, when there is something to do. All scenes, all curves of error
-and run time: `.ci/wheel`."""
+"""The main job, `reproduce`: on a scene, a second call, when there is something to do. All scenes,
+all curves of error and run time: `.ci/wheel`."""
 
 from __future__ import annotations
 
@@ -42,12 +42,15 @@ def calls(tmp_path_factory: pytest.TempPathFactory) -> Calls:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(reproduce, "find_scenes", only_some)
         patch.setattr(reproduce, "short_curves", lambda scene: curves(scene)[:2])
-        first, second = (rotor_mbs("reproduce", "-j", 1, "--timeout", 600, "-o", folder) for _ in range(2))
+        first, second = (
+            rotor_mbs("reproduce", "-j", 1, "--timeout", 600, "-o", folder) for _ in range(2)
+        )
     return Calls(folder, first, second)
 
 
 def test_every_method_has_run_and_those_of_the_correct_equations_are_ok(calls: Calls) -> None:
-    """The printed equations gain more than a thousandth of all energy in most figures, the right ones at most 1e-9."""
+    """The printed equations gain more than a thousandth of all energy in most figures, the right
+    ones at most 1e-9."""
     assert calls.first.status == 0, calls.first.err
     printed_drifts = []
     with open_results(calls.folder / "results.h5") as results:
@@ -56,7 +59,10 @@ def test_every_method_has_run_and_those_of_the_correct_equations_are_ok(calls: C
             assert scene.reference is not None
             assert set(scene.methods) >= {PRINTED, *RIGHT, "exudyn_chain/extrapolated"}
             assert {run.status for run in scene.runs.values() if is_corrected(run.method)} == {"ok"}
-            drift = {name: run.attributes.get("energy_drift_max", 0.0) for name, run in scene.methods.items()}
+            drift = {
+                name: run.attributes.get("energy_drift_max", 0.0)
+                for name, run in scene.methods.items()
+            }
             assert max(drift[name] for name in RIGHT) <= 1e-9
             printed_drifts.append(drift[PRINTED])
     assert sum(drift > 1e-3 for drift in printed_drifts) > len(printed_drifts) / 2
@@ -71,7 +77,11 @@ def test_the_report_is_whole(calls: Calls) -> None:
 def test_the_second_call_has_nothing_to_do_and_shows_the_same(calls: Calls) -> None:
     assert calls.second.status == 0
     assert "nothing to do" in calls.second.out
-    summary = [line for line in calls.first.out.splitlines() if line.startswith(("lagrange/", "exudyn_", "printed/"))]
+    summary = [
+        line
+        for line in calls.first.out.splitlines()
+        if line.startswith(("lagrange/", "exudyn_", "printed/"))
+    ]
     assert summary
     assert set(summary) <= set(calls.second.out.splitlines())
 
@@ -83,7 +93,8 @@ def test_its_results_pass_check(calls: Calls) -> None:
 
 @pytest.fixture
 def again(folder: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., bool]:
-    """Calls `reproduce`, with work that writes a results file and an index; returns whether the work was done."""
+    """Calls `reproduce`, with work that writes a results file and an index; returns whether the
+    work was done."""
     done: list[Path] = []
 
     def compute(results: Path, **_: object) -> tuple[BatchReport, list[object]]:

@@ -1,4 +1,5 @@
-"""Progress and tables on a terminal and in a log; interrupts; output without a reader, and a full one."""
+"""Progress and tables on a terminal and in a log; interrupts; output without a reader, and a full
+one."""
 
 from __future__ import annotations
 
@@ -54,7 +55,8 @@ def test_a_terminal_shows_the_share_of_the_work(monkeypatch: pytest.MonkeyPatch)
     with ProgressLine(screen) as progress:
         progress(1, 100, outcome(share=0.25))
         assert " 25%, about" in screen.getvalue()
-        progress(2, 100, outcome(status="diverged", message="x" * 200))  # wider than any terminal: kept whole
+        # wider than any terminal: kept whole
+        progress(2, 100, outcome(status="diverged", message="x" * 200))
     assert "x" * 200 in screen.getvalue()
     assert "\x1b[31mdiverged\x1b[0m" in screen.getvalue()
 
@@ -70,9 +72,11 @@ def _ends_by(patch: pytest.MonkeyPatch, action: Callable[[], object]) -> tuple[i
 def test_an_interrupt_inside_compiled_code_is_an_interrupt(
     error: type[Exception], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """h5py's locks make a SystemError of it, loading an engine an ImportError, which may be taken for a lack.
+    """h5py's locks make a SystemError of it, loading an engine an ImportError, which may be taken
+    for a lack.
 
-    Without an interrupt, code that cannot be loaded (where there is no memory for a library, for example) is one line.
+    Without an interrupt, code that cannot be loaded (where there is no memory for a library, for
+    example) is one line.
     """
 
     def fail(cause: BaseException | None = None) -> None:
@@ -87,9 +91,12 @@ def test_an_interrupt_inside_compiled_code_is_an_interrupt(
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
-def test_an_interrupt_that_becomes_another_error_without_a_trace(number: int, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_interrupt_that_becomes_another_error_without_a_trace(
+    number: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """NumPy's own loading: PyCapsule_Import("datetime") forgets why the import failed."""
-    if signal.getsignal(number) == signal.SIG_IGN:  # as nohup does with SIGHUP, which then is not the command's
+    # as nohup does with SIGHUP, which then is not the command's
+    if signal.getsignal(number) == signal.SIG_IGN:
         pytest.skip("the signal is ignored here")
 
     def interrupted() -> None:
@@ -100,7 +107,9 @@ def test_an_interrupt_that_becomes_another_error_without_a_trace(number: int, mo
     assert _ends_by(monkeypatch, interrupted)[0] == 130
 
 
-def test_an_interrupt_where_python_ignores_exceptions_comes_again(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_interrupt_where_python_ignores_exceptions_comes_again(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     class Interrupted:
         def __del__(self) -> None:
             raise KeyboardInterrupt
@@ -114,12 +123,17 @@ def test_an_interrupt_where_python_ignores_exceptions_comes_again(monkeypatch: p
 
 
 @pytest.mark.parametrize(("words", "status"), [(("list",), 0), (("new", "mine.toml"), 1)])
-def test_a_closed_pipe_is_no_success_but_of_a_command_that_only_prints(words: tuple[str, ...], status: int) -> None:
+def test_a_closed_pipe_is_no_success_but_of_a_command_that_only_prints(
+    words: tuple[str, ...], status: int
+) -> None:
     """As by `| true`."""
     reading, writing = os.pipe()
     os.close(reading)
     try:
-        assert subprocess.run([*PROGRAM, *words], stdout=writing, stderr=subprocess.DEVNULL).returncode == status
+        assert (
+            subprocess.run([*PROGRAM, *words], stdout=writing, stderr=subprocess.DEVNULL).returncode
+            == status
+        )
     finally:
         os.close(writing)
 
@@ -129,7 +143,10 @@ def test_a_closed_pipe_is_no_success_but_of_a_command_that_only_prints(words: tu
 def test_full_output_and_closed_errors_lose_no_run(folder: Path) -> None:
     Path("s.toml").write_text(THREE_RUNS)
     command = [*PROGRAM, "sweep", "s.toml", "-o", "o.h5", "-j", "1"]
-    assert subprocess.run(["sh", "-c", 'exec "$@" 2>&- > /dev/full', "sh", *command]).returncode == 1  # no summary
+    # no summary
+    assert (
+        subprocess.run(["sh", "-c", 'exec "$@" 2>&- > /dev/full', "sh", *command]).returncode == 1
+    )
     assert StoredSweep(folder / "o.h5").column("status").tolist() == [0, 0, 0]
 
 
@@ -139,15 +156,22 @@ GOOD, BAD = "lagrange/dop853", "exudyn_tree/rk67"
 def test_a_row_for_each_run_and_of_many_runs_one_for_each_method(tmp_path: Path) -> None:
     runs = []
     for i in range(14):
-        scene = replace(paper("fig05"), name=f"paper/s{i}", samples=11, outputs=("angles", "rates", "energy"))
+        scene = replace(
+            paper("fig05"), name=f"paper/s{i}", samples=11, outputs=("angles", "rates", "energy")
+        )
         runs += [Made(scene, "reference", rotor(np.sin), versions={"frozen_with": "1.0"})]
-        runs += [Made(scene, GOOD, rotor(lambda t: np.sin(t) + 1e-9), attributes={"defect_max": 3e-12})]
-        runs += [Made(scene, BAD, rotor(lambda t: np.sin(t) + 0.25), attributes={"status": "inaccurate"})]
+        runs += [
+            Made(scene, GOOD, rotor(lambda t: np.sin(t) + 1e-9), attributes={"defect_max": 3e-12})
+        ]
+        runs += [
+            Made(scene, BAD, rotor(lambda t: np.sin(t) + 0.25), attributes={"status": "inaccurate"})
+        ]
     with open_results(store(tmp_path / "r.h5", runs)) as results:
         few = table_of_runs(results.scenes, {"paper/s0": [GOOD, BAD], "not there": [GOOD]})
         many = table_of_runs(results.scenes, {name: [GOOD, BAD] for name in results.scenes})
     assert few.rows == [
-        ("paper/s0", "reference", "ok", "", "", "", "", "0.0e+00", "read"),  # shipped, and no error against itself
+        # shipped, and no error against itself
+        ("paper/s0", "reference", "ok", "", "", "", "", "0.0e+00", "read"),
         ("paper/s0", GOOD, "ok", "3.0e-12", "", "1.0e-09", "12 of 12 s", "0.0e+00", "0.002"),
         ("paper/s0", BAD, "inaccurate", "", "", "2.5e-01", "12 of 12 s", "0.0e+00", "0.002"),
     ]

@@ -1,4 +1,5 @@
-"""Loads of other codes: right ones are accepted at 1e-9, each wrong axis, sign, unit, frame and point is named."""
+"""Loads of other codes: right ones are accepted at 1e-9, each wrong axis, sign, unit, frame and
+point is named."""
 
 from __future__ import annotations
 
@@ -36,7 +37,12 @@ def data_of(name: str) -> tuple[Arrays, Defects]:
     scene = short(name)
     time = np.linspace(0.0, scene.duration, scene.samples)
     angles, rates = other_code.trajectory(scene, time)
-    arrays = {"time": time, "angles": angles, "rates": rates, **other_code.loads(scene, time, angles, rates)}
+    arrays = {
+        "time": time,
+        "angles": angles,
+        "rates": rates,
+        **other_code.loads(scene, time, angles, rates),
+    }
     return arrays, interval_defects(scene, time, angles, rates)
 
 
@@ -47,7 +53,8 @@ def judged(name: str, changes: Arrays, tolerance: float = 1e-6) -> LoadCompariso
 
 
 @pytest.mark.parametrize(
-    "name", ["paper/fig08", "paper/fig11", "paper/fig15-10kNm", "check/general", "check/pitch-loads"]
+    "name",
+    ["paper/fig08", "paper/fig11", "paper/fig15-10kNm", "check/general", "check/pitch-loads"],
 )
 def test_right_loads_are_accepted_at_1e_9(name: str) -> None:
     found = judged(name, {}, 1e-9)
@@ -63,20 +70,28 @@ def about(point: Callable[[Any], Any]) -> Callable[[Scene, Arrays], Arrays]:
 
     def change(scene: Scene, data: Arrays) -> Arrays:
         arms = np.array([point(blade) for blade in scene.blades])
-        return {"blade_root_moment": data["blade_root_moment"] - np.cross(arms, data["blade_root_force"])}
+        return {
+            "blade_root_moment": data["blade_root_moment"]
+            - np.cross(arms, data["blade_root_force"])
+        }
 
     return change
 
 
 def in_rotor(_: Scene, data: Arrays) -> Arrays:
     force, angles = data["blade_root_force"], data["angles"]
-    turned = [other_code.about("z", angles[:, 1 + i]).apply(force[:, i]) for i in range(force.shape[1])]
+    turned = [
+        other_code.about("z", angles[:, 1 + i]).apply(force[:, i]) for i in range(force.shape[1])
+    ]
     return {"blade_root_force": np.stack(turned, axis=1)}
 
 
 def in_base(scene: Scene, data: Arrays) -> Arrays:
     force, angles = in_rotor(scene, data)["blade_root_force"], data["angles"]
-    turned = [other_code.about("y", angles[:, 0] + phase).apply(force[:, i]) for i, phase in enumerate(scene.phases)]
+    turned = [
+        other_code.about("y", angles[:, 0] + phase).apply(force[:, i])
+        for i, phase in enumerate(scene.phases)
+    ]
     return {"blade_root_force": np.stack(turned, axis=1)}
 
 
@@ -90,14 +105,17 @@ def with_torque(scene: Scene, data: Arrays) -> Arrays:
 
 
 def without(forgotten: str) -> Callable[[Scene, Arrays], Arrays]:
-    """Root forces m (a + g up) of which the weight, or what the coordinates' accelerations make of a, is forgotten."""
+    """Root forces m (a + g up) of which the weight, or what the coordinates' accelerations make of
+    a, is forgotten."""
 
     def change(scene: Scene, data: Arrays) -> Arrays:
         force = data["blade_root_force"].copy()
         for i, blade in enumerate(scene.blades):
             spin, pitch_rate = data["rates"][:, 0], data["rates"][:, 1 + i]
             azimuth, pitch = data["angles"][:, 0] + scene.phases[i], data["angles"][:, 1 + i]
-            up = other_code.about("z", -pitch).apply(other_code.about("y", -azimuth).apply([0.0, 0.0, 1.0]))
+            up = other_code.about("z", -pitch).apply(
+                other_code.about("y", -azimuth).apply([0.0, 0.0, 1.0])
+            )
             weight = blade.mass * scene.gravity * up
             if forgotten == "weight":
                 force[:, i] -= weight
@@ -123,37 +141,54 @@ REVERSED = "sign reversed (action in place of reaction)"
 MISTAKES: dict[str, tuple[Change, list[str]]] = {
     "kN": (lambda _, d: {"blade_root_force": d["blade_root_force"] / 1e3}, ["kN taken as N"]),
     "N in a column of kN": (
-        lambda _, d: {"shaft_moment [kN m]": d["shaft_moment"], "shaft_moment": None}, ["N taken as kN"],
+        lambda _, d: {"shaft_moment [kN m]": d["shaft_moment"], "shaft_moment": None},
+        ["N taken as kN"],
     ),
     "sign": (lambda _, d: {"blade_root_force": -d["blade_root_force"]}, [REVERSED]),
-    "sign and kN": (lambda _, d: {"shaft_moment": -d["shaft_moment"] / 1e3}, [f"{REVERSED}, kN taken as N"]),
+    "sign and kN": (
+        lambda _, d: {"shaft_moment": -d["shaft_moment"] / 1e3},
+        [f"{REVERSED}, kN taken as N"],
+    ),
     "x and y exchanged": (
         lambda _, d: {"blade_root_force": d["blade_root_force"][:, :, [1, 0, 2]]},
-        ["columns exchanged: blade root force 1 x is blade root force 1 y, blade root force 1 y is blade root force"],
+        [
+            (
+                "columns exchanged: blade root force 1 x is blade root force 1 y, blade root "
+                "force 1 y "
+                "is blade root force"
+            )
+        ],
     ),
     "blades 1 and 2 exchanged": (
         lambda _, d: {"blade_root_moment": d["blade_root_moment"][:, [1, 0, 2]]},
         ["columns exchanged: blade root moment 1 x is blade root moment 2 x"],
     ),
     "about the centre of mass": (
-        about(lambda blade: blade.centre_of_mass), ["about the centre of mass in place of the root"],
+        about(lambda blade: blade.centre_of_mass),
+        [("about the centre of mass in place of the root")],
     ),
     "at a hub radius": (
-        about(lambda _: (0.0, 0.0, 1.5)), ["about the point (0, 0, 1.5) m of the blade's own frame in place of"],
+        about(lambda _: (0.0, 0.0, 1.5)),
+        [("about the point (0, 0, 1.5) m of the blade's own frame in place of")],
     ),
     "tower top": (
-        lambda _, d: {"shaft_moment": d["shaft_moment"] - np.cross([0.0, -2.0, 0.0], d["shaft_force"])},
+        lambda _, d: {
+            "shaft_moment": d["shaft_moment"] - np.cross([0.0, -2.0, 0.0], d["shaft_force"])
+        },
         ["about the point (0, -2, 0) m of the base frame in place of the hub centre"],
     ),
     "a row late": (late, [": a row late"]),
     "without weight": (without("weight"), [": without the weight"]),
-    "without accelerations": (without("accelerations"), [": without the accelerations of rotor and pitches"]),
+    "without accelerations": (
+        without("accelerations"),
+        [(": without the accelerations of rotor and pitches")],
+    ),
     "weight alone": (without("inertia"), [": of the weight alone, without inertia forces"]),
     "without pitch": (in_rotor, ["in the rotor frame"]),
     "in the base": (in_base, ["in the base frame"]),
     "turning with the shaft": (shaft_in_rotor, ["in the rotor frame"]),
     "with the torque": (with_torque, ["shaft moment y: with the torque on the rotor in it"]),
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize("mistake", MISTAKES)
@@ -162,7 +197,9 @@ def test_a_mistake_is_named(mistake: str) -> None:
     arrays, _ = data_of("check/pitch-loads")
     changes = change(short("check/pitch-loads"), arrays)
     found = judged("check/pitch-loads", changes)
-    assert found.message.split(":")[0].startswith(next(iter(changes)).partition(" ")[0].replace("_", " "))
+    assert found.message.split(":")[0].startswith(
+        next(iter(changes)).partition(" ")[0].replace("_", " ")
+    )
     for text, likely in zip(texts, found.likely, strict=True):
         assert text in likely, found.likely
 
@@ -170,7 +207,9 @@ def test_a_mistake_is_named(mistake: str) -> None:
 @pytest.mark.parametrize("point", ["centre_of_mass", "tip"])
 def test_another_point_is_named_for_point_masses_too(point: str) -> None:
     """About whose own place nothing is left."""
-    changes = about(lambda blade: getattr(blade, point))(short("paper/fig11"), data_of("paper/fig11")[0])
+    changes = about(lambda blade: getattr(blade, point))(
+        short("paper/fig11"), data_of("paper/fig11")[0]
+    )
     (text,) = judged("paper/fig11", changes).likely
     assert f": about the {point.replace('_', ' ')} in place of the root" in text
 
@@ -178,7 +217,12 @@ def test_another_point_is_named_for_point_masses_too(point: str) -> None:
 def test_what_nothing_explains_has_no_cause() -> None:
     force = data_of("check/general")[0]["blade_root_force"]
     noise = np.random.default_rng(3).normal(0.0, 3e-6 * np.abs(force).max(), force.shape)
-    for wrong in (1.01 * force, force + noise, force + 1.0, force * np.linspace(1.0, 1.1, len(force))[:, None, None]):
+    for wrong in (
+        1.01 * force,
+        force + noise,
+        force + 1.0,
+        force * np.linspace(1.0, 1.1, len(force))[:, None, None],
+    ):
         found = judged("check/general", {"blade_root_force": wrong})
         assert found.message.startswith("blade root force")
         assert found.likely == ()
@@ -186,7 +230,9 @@ def test_what_nothing_explains_has_no_cause() -> None:
 
 def test_an_error_just_above_the_tolerance_is_no_other_point() -> None:
     """A point is always found that takes a little of it away."""
-    moment, force = (data_of("check/general")[0][f"blade_root_{kind}"] for kind in ("moment", "force"))
+    moment, force = (
+        data_of("check/general")[0][f"blade_root_{kind}"] for kind in ("moment", "force")
+    )
     near = (
         moment
         - np.cross([2e-6, -2e-6, 1e-6], force)
@@ -211,50 +257,96 @@ def test_only_columns_that_are_there_are_judged_and_omit_leaves_out(tmp_path: Pa
     pitch = other_code.about("z", arrays["angles"][:, 2]).apply(moment)
     columns = {
         "time [s]": arrays["time"],
-        **dict(zip(["rotor [rad]", *(f"pitch {i} [rad]" for i in (1, 2, 3))], arrays["angles"].T, strict=True)),
-        **dict(zip(["rotor rate", *(f"pitch {i} rate" for i in (1, 2, 3))], arrays["rates"].T, strict=True)),
-        "RootFxb1 [kN]": -force[:, 1] / 1e3, "RootFyb1 [kN]": force[:, 0] / 1e3, "RootFzb1 [kN]": -force[:, 2] / 1e3,
-        "RootMxc2 [kN-m]": -pitch[:, 1] / 1e3, "RootMyc2 [kN-m]": pitch[:, 0] / 1e3,
+        **dict(
+            zip(
+                ["rotor [rad]", *(f"pitch {i} [rad]" for i in (1, 2, 3))],
+                arrays["angles"].T,
+                strict=True,
+            )
+        ),
+        **dict(
+            zip(
+                ["rotor rate", *(f"pitch {i} rate" for i in (1, 2, 3))],
+                arrays["rates"].T,
+                strict=True,
+            )
+        ),
+        "RootFxb1 [kN]": -force[:, 1] / 1e3,
+        "RootFyb1 [kN]": force[:, 0] / 1e3,
+        "RootFzb1 [kN]": -force[:, 2] / 1e3,
+        "RootMxc2 [kN-m]": -pitch[:, 1] / 1e3,
+        "RootMyc2 [kN-m]": pitch[:, 0] / 1e3,
         "shaft_moment_y_kNm": -arrays["shaft_moment"][:, 1] / 1e3,  # wrong
-    }  # fmt: skip
+    }
     table = np.column_stack(list(columns.values()))
-    np.savetxt(tmp_path / "d.csv", table, delimiter=",", header=",".join(columns), comments="", fmt="%.17g")
+    np.savetxt(
+        tmp_path / "d.csv", table, delimiter=",", header=",".join(columns), comments="", fmt="%.17g"
+    )
     scene = short("check/pitch-loads")
-    found = rm.compare(tmp_path / "d.csv", scene, columns={"omit": ["shaft_moment"]}, tolerance=1e-9)
+    found = rm.compare(
+        tmp_path / "d.csv", scene, columns={"omit": ["shaft_moment"]}, tolerance=1e-9
+    )
     assert (found.status, found.message, len(found.verdict.channels)) == ("ok", "", 13)
     assert "shaft_moment_y_kNm" in found.verdict.unused
-    (tmp_path / "own.toml").write_text(rm.scene("check/pitch-loads").replace(duration=0.3, samples=61).text)
-    wrong = rotor_mbs("compare", tmp_path / "d.csv", "--scene", tmp_path / "own.toml", "-o", tmp_path / "page")
+    (tmp_path / "own.toml").write_text(
+        rm.scene("check/pitch-loads").replace(duration=0.3, samples=61).text
+    )
+    wrong = rotor_mbs(
+        "compare", tmp_path / "d.csv", "--scene", tmp_path / "own.toml", "-o", tmp_path / "page"
+    )
     assert wrong.status == 1
     assert "blade root force 1 y = -'RootFxb1' [kN]" in wrong.out
     assert "blade root moment 2 x, coned frame = 'RootMyc2' [kN-m]" in wrong.out
     assert f"shaft moment y: {REVERSED}" in wrong.out
     page = (tmp_path / "page" / "index.html").read_text()
-    assert all(text in page for text in ("blade root moment 2 x, coned frame", "of the largest", "shaft moment y"))
+    assert all(
+        text in page
+        for text in ("blade root moment 2 x, coned frame", "of the largest", "shaft moment y")
+    )
 
 
 def test_stored_loads_are_the_datas_and_the_closed_forms() -> None:
     arrays, _ = data_of("paper/fig11")
-    found = rm.compare(arrays | {"shaft_force": 1.5 * arrays["shaft_force"]}, short("paper/fig11")).to_xarray()
-    np.testing.assert_allclose(found.shaft_force_z_reference, arrays["shaft_force"][:, 2], rtol=1e-9)
-    np.testing.assert_allclose(found.shaft_force_z_error, 0.5 * arrays["shaft_force"][:, 2], rtol=1e-8)
+    found = rm.compare(
+        arrays | {"shaft_force": 1.5 * arrays["shaft_force"]}, short("paper/fig11")
+    ).to_xarray()
+    np.testing.assert_allclose(
+        found.shaft_force_z_reference, arrays["shaft_force"][:, 2], rtol=1e-9
+    )
+    np.testing.assert_allclose(
+        found.shaft_force_z_error, 0.5 * arrays["shaft_force"][:, 2], rtol=1e-8
+    )
     assert (found.shaft_force_z.attrs["units"], found.shaft_moment_x.attrs["units"]) == ("N", "N m")
 
 
 def test_a_mapping_says_column_unit_sign_and_frame_of_a_load() -> None:
     arrays, _ = data_of("paper/fig11")
     turned = in_rotor(short("paper/fig11"), arrays)["blade_root_force"]
-    states = {"time": "time", "rotor": "angles[0]", **{f"pitch_{i}": f"angles[{i}]" for i in (1, 2, 3)}}
+    states = {
+        "time": "time",
+        "rotor": "angles[0]",
+        **{f"pitch_{i}": f"angles[{i}]" for i in (1, 2, 3)},
+    }
     mapping = {"blade_root_force_2_x": {"column": "fx", "unit": "kN", "sign": -1, "frame": "rotor"}}
-    found = rm.compare({**arrays, "fx": -turned[:, 1, 0] / 1e3}, short("paper/fig11"), columns=states | mapping)
+    found = rm.compare(
+        {**arrays, "fx": -turned[:, 1, 0] / 1e3}, short("paper/fig11"), columns=states | mapping
+    )
     compared = [channel.name for channel in found.verdict.channels]
     assert found.status == "ok"
     assert "blade root force 2 x, rotor frame" in compared
     assert "blade root force 2 x" not in compared
-    with pytest.raises(InputError, match="shaft_force_x: frame 'blade'; allowed: base, shaft, rotor"):
-        rm.compare(arrays, short("paper/fig11"), columns={"shaft_force_x": {"column": "time", "frame": "blade"}})
+    with pytest.raises(
+        InputError, match=("shaft_force_x: frame 'blade'; allowed: base, shaft, rotor")
+    ):
+        rm.compare(
+            arrays,
+            short("paper/fig11"),
+            columns={"shaft_force_x": {"column": "time", "frame": "blade"}},
+        )
     with pytest.raises(InputError, match="no column for an angle or a rate"):
-        rm.compare({"time": arrays["time"], "shaft_force": arrays["shaft_force"]}, short("paper/fig11"))
+        rm.compare(
+            {"time": arrays["time"], "shaft_force": arrays["shaft_force"]}, short("paper/fig11")
+        )
 
 
 def test_loads_of_few_digits_are_judged_by_them() -> None:

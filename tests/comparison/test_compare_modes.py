@@ -1,4 +1,5 @@
-"""Tables of frequencies over rotor speed: right ones are ok, wrong units and missing stiffening are named."""
+"""Tables of frequencies over rotor speed: right ones are ok, wrong units and missing stiffening are
+named."""
 
 from __future__ import annotations
 
@@ -23,13 +24,16 @@ DAMPED, SPRUNG, UNEQUAL = "stiff/nrel-5mw-damped", "stiff/nrel-5mw", "check/gene
 
 @functools.cache
 def tables(name: str) -> tuple[Array, Array]:
-    """(speeds, modes) damped and undamped frequencies by Exudyn's linearization of its own model, rad/s."""
+    """(speeds, modes) damped and undamped frequencies by Exudyn's linearization of its own model,
+    rad/s."""
     scene = rm.scene(name).replace(gravity=0.0)
     modes = compute_modes(scene, SPEEDS, models=("exudyn_tree",)).rotation["exudyn_tree"]
     return modes.damped_frequencies, modes.undamped_frequencies
 
 
-def compare(name: str, frequencies: Array, speeds: Array = SPEEDS, key: str = "frequencies") -> DataComparison:
+def compare(
+    name: str, frequencies: Array, speeds: Array = SPEEDS, key: str = "frequencies"
+) -> DataComparison:
     return rm.compare({"speed": speeds, key: frequencies}, name)
 
 
@@ -49,22 +53,32 @@ def test_right_frequencies_of_another_engine_are_ok(name: str) -> None:
 
 MISTAKES: dict[str, tuple[str, Callable[[Array, Array], tuple[Array, Array]], str]] = {
     "Hz": (SPRUNG, lambda f, _: (SPEEDS, f / (2.0 * math.pi)), "frequencies in Hz taken as rad/s"),
-    "per minute": (SPRUNG, lambda f, _: (SPEEDS, f * 30.0 / math.pi), "frequencies in rpm taken as rad/s"),
+    "per minute": (
+        SPRUNG,
+        lambda f, _: (SPEEDS, f * 30.0 / math.pi),
+        ("frequencies in rpm taken as rad/s"),
+    ),
     "rpm": (UNEQUAL, lambda f, _: (SPEEDS * 30.0 / math.pi, f), "speeds in rpm taken as rad/s"),
     "rpm and Hz": (
-        UNEQUAL, lambda f, _: (SPEEDS * 30.0 / math.pi, f / (2.0 * math.pi)),
+        UNEQUAL,
+        lambda f, _: (SPEEDS * 30.0 / math.pi, f / (2.0 * math.pi)),
         "frequencies in Hz taken as rad/s; and speeds in rpm taken as rad/s",
     ),
     "undamped": (DAMPED, lambda _, u: (SPEEDS, u), "undamped frequencies"),
     "whirl": (
-        UNEQUAL, lambda f, _: (SPEEDS, np.abs(f[:, 1:] - SPEEDS[:, None])),
-        "frequencies in the fixed frame (whirl), the rotor's speed below or above those in the rotor's frame",
+        UNEQUAL,
+        lambda f, _: (SPEEDS, np.abs(f[:, 1:] - SPEEDS[:, None])),
+        (
+            "frequencies in the fixed frame (whirl), the rotor's speed below or above those in the "
+            "rotor's frame"
+        ),
     ),
     "unequal blades, softened": (
-        UNEQUAL, lambda _, u: (SPEEDS, np.sqrt(u[:1, 1:] ** 2 - 0.4 * SPEEDS[:, None] ** 2)),
+        UNEQUAL,
+        lambda _, u: (SPEEDS, np.sqrt(u[:1, 1:] ** 2 - 0.4 * SPEEDS[:, None] ** 2)),
         "centrifugal stiffening is missing: f² = f0² - α Ω², α = 0.4",
     ),
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize("mistake", MISTAKES)

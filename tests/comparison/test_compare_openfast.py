@@ -1,4 +1,5 @@
-"""OpenFAST's output without a word of mapping: signs, wrapped azimuths, frames, points and weights."""
+"""OpenFAST's output without a word of mapping: signs, wrapped azimuths, frames, points and
+weights."""
 
 from __future__ import annotations
 
@@ -21,10 +22,21 @@ PROGRAM = {"program": "openfast"}
 
 
 def rotor(**changes: object) -> Scene:
-    """Three blades with offsets on springs, tilt and cones, a hub with mass and roots at a radius, turning."""
+    """Three blades with offsets on springs, tilt and cones, a hub with mass and roots at a radius,
+    turning."""
     scene = rm.scene("check/general").replace(duration=0.4, samples=21)
-    keys = {"hub.radius": 0.5, "hub.mass": 300.0, "initial.rates[0]": 18.0, "outputs": ["angles", "rates", "loads"]}
-    keys |= {"shaft.tilt": -0.1, "blade[0].cone": -0.06, "blade[1].cone": -0.06, "blade[2].cone": 0.2}
+    keys = {
+        "hub.radius": 0.5,
+        "hub.mass": 300.0,
+        "initial.rates[0]": 18.0,
+        "outputs": ["angles", "rates", "loads"],
+    }
+    keys |= {
+        "shaft.tilt": -0.1,
+        "blade[0].cone": -0.06,
+        "blade[1].cone": -0.06,
+        "blade[2].cone": 0.2,
+    }
     return scene.replace(**{**keys, **changes})
 
 
@@ -43,19 +55,30 @@ def loads_compared(comparison: rm.DataComparison) -> set[str]:
 
 
 def test_every_channel_is_known_by_the_head_of_the_file(tmp_path: Path) -> None:
-    """Root loads in both frames, shaft loads in both, pitches, azimuth from 0 to 360 degrees, speed in rpm."""
+    """Root loads in both frames, shaft loads in both, pitches, azimuth from 0 to 360 degrees, speed
+    in rpm."""
     scene = rotor()
     columns = output_of(scene)
     assert (np.abs(np.diff(columns["Azimuth"][1])) > 180.0).any()
     names = [name for name in columns if not name.startswith("LSSTipMx")]
     for chosen in (
-        [name for name in names if not (name.startswith("Root") and name[6] == "b") and not name.endswith("a")],
-        [name for name in names if not (name.startswith("Root") and name[6] == "c") and not name.endswith("s")],
+        [
+            name
+            for name in names
+            if not (name.startswith("Root") and name[6] == "b") and not name.endswith("a")
+        ],
+        [
+            name
+            for name in names
+            if not (name.startswith("Root") and name[6] == "c") and not name.endswith("s")
+        ],
     ):
         write_output(tmp_path / "model.out", columns, chosen)
         found = rm.compare(tmp_path / "model.out", scene)
         assert (found.status, found.message, found.likely) == ("ok", "", ())
-        assert found.verdict.read[0].startswith("OpenFAST's output, by its head: pitch with opposite sign")
+        assert found.verdict.read[0].startswith(
+            "OpenFAST's output, by its head: pitch with opposite sign"
+        )
         assert len(loads_compared(found)) == 18 + 5
     assert "strain gages" in str(found.verdict.unused) or "LSSGagMya" not in chosen
 
@@ -63,7 +86,16 @@ def test_every_channel_is_known_by_the_head_of_the_file(tmp_path: Path) -> None:
 def test_numbers_of_the_model_are_in_the_mapping() -> None:
     """AzimB1Up shifts the azimuth, HubCM moves the hub's weight; `new --from` writes both."""
     scene = rotor()
-    names = ["Time", "Azimuth", "RotSpeed", "BldPitch1", "BldPitch2", "BldPitch3", "LSSTipMys", "LSSTipMzs"]
+    names = [
+        "Time",
+        "Azimuth",
+        "RotSpeed",
+        "BldPitch1",
+        "BldPitch2",
+        "BldPitch3",
+        "LSSTipMys",
+        "LSSTipMzs",
+    ]
     data = in_python(output_of(scene, azimuth_up=90.0, hub_centre=0.7), names)
     numbers = {"AzimB1Up": 90.0, "HubCM": 0.7}
     found = rm.compare(data, scene, columns=PROGRAM | {"openfast": numbers})
@@ -80,12 +112,15 @@ def test_a_column_that_is_mapped_goes_before_its_name() -> None:
     scene = rotor()
     columns = output_of(scene)
     columns["BldPitch1"] = ("deg", -columns["BldPitch1"][1])
-    data = in_python(columns, ["Time", "Azimuth", "RotSpeed", "BldPitch1", "BldPitch2", "BldPitch3"])
+    data = in_python(
+        columns, ["Time", "Azimuth", "RotSpeed", "BldPitch1", "BldPitch2", "BldPitch3"]
+    )
     assert rm.compare(data, scene, columns=PROGRAM | {"pitch_1": "BldPitch1"}).status == "ok"
 
 
 @pytest.mark.parametrize(
-    ("column", "factor"), [("BldPitch2", -1.0), ("RootFxc1", -1.0), ("RootMyc2", 1.01), ("LSShftFys", -1.0)]
+    ("column", "factor"),
+    [("BldPitch2", -1.0), ("RootFxc1", -1.0), ("RootMyc2", 1.01), ("LSShftFys", -1.0)],
 )
 def test_a_wrong_column_is_seen(column: str, factor: float) -> None:
     scene = rotor()
@@ -97,19 +132,30 @@ def test_a_wrong_column_is_seen(column: str, factor: float) -> None:
 def test_a_table_of_python_is_openfasts_by_the_mapping() -> None:
     """Without units they are OpenFAST's."""
     scene = rotor()
-    data = {name: values for name, (_, values) in output_of(scene).items() if not name.startswith(("Root", "LSS"))}
+    data = {
+        name: values
+        for name, (_, values) in output_of(scene).items()
+        if not name.startswith(("Root", "LSS"))
+    }
     del data["RotThrust"]
     assert rm.compare(data, scene, columns=PROGRAM).status == "ok"
 
 
 def test_from_a_model_to_a_verdict(tmp_path: Path) -> None:
-    """What `new --from` writes is what its output needs: a two-bladed model, blade 1 up at 10 degrees, HubCM 0.25 m."""
+    """What `new --from` writes is what its output needs: a two-bladed model, blade 1 up at 10
+    degrees, HubCM 0.25 m."""
     model = write_model(tmp_path, "OpenFAST 3.1", 2, {"UndSling": "0", "TMax": "1"})
-    scene, mapping, output = tmp_path / "my.toml", tmp_path / "my.columns.toml", tmp_path / "model.out"
+    scene, mapping, output = (
+        tmp_path / "my.toml",
+        tmp_path / "my.columns.toml",
+        tmp_path / "model.out",
+    )
     assert rotor_mbs("new", scene, "--from", model).status == 0
     turning = rm.load(scene)
     write_output(output, output_of(turning, azimuth_up=10.0, hub_centre=0.25))
-    ended = rotor_mbs("compare", output, "--scene", scene, "--columns", mapping, "-o", tmp_path / "page", "--json")
+    ended = rotor_mbs(
+        "compare", output, "--scene", scene, "--columns", mapping, "-o", tmp_path / "page", "--json"
+    )
     found = json.loads(ended.out)
     assert (ended.status, found["agrees"]) == (0, True)
     assert "BldPitch" in " ".join(found["read"])
@@ -118,9 +164,23 @@ def test_from_a_model_to_a_verdict(tmp_path: Path) -> None:
 def test_the_program_is_one_that_is_known(tmp_path: Path) -> None:
     (tmp_path / "data.csv").write_text("time,rotor\n0,0\n1,1\n2,2\n")
     (tmp_path / "map.toml").write_text('program = "bladed"\n')
-    line = refusal("compare", tmp_path / "data.csv", "--scene", "paper/fig03", "--columns", tmp_path / "map.toml")
+    line = refusal(
+        "compare",
+        tmp_path / "data.csv",
+        "--scene",
+        "paper/fig03",
+        "--columns",
+        tmp_path / "map.toml",
+    )
     assert 'map.toml:1: program: "bladed" is not one of them; allowed: one of openfast' in line
     (tmp_path / "map.toml").write_text('program = "openfast"\n[openfast]\nAzimB1 = 3\n')
-    line = refusal("compare", tmp_path / "data.csv", "--scene", "paper/fig03", "--columns", tmp_path / "map.toml")
+    line = refusal(
+        "compare",
+        tmp_path / "data.csv",
+        "--scene",
+        "paper/fig03",
+        "--columns",
+        tmp_path / "map.toml",
+    )
     assert "map.toml:3: openfast.AzimB1: " in line
     assert "perhaps AzimB1Up" in line

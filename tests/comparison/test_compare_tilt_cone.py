@@ -1,4 +1,5 @@
-"""Data of a rotor with tilt and cone, by Newton's and Euler's laws: right ones are ok, each mistake is named."""
+"""Data of a rotor with tilt and cone, by Newton's and Euler's laws: right ones are ok, each mistake
+is named."""
 
 from __future__ import annotations
 
@@ -27,7 +28,9 @@ SCENE = general(
     duration=0.6, samples=61, shaft_tilt=math.radians(-5.0), hub_radius=0.4, hub_mass=200.0,
     outputs=("angles", "rates", "loads"),
 )  # fmt: skip
-SCENE = replace(SCENE, blades=tuple(replace(blade, cone=math.radians(-3.0)) for blade in SCENE.blades))
+SCENE = replace(
+    SCENE, blades=tuple(replace(blade, cone=math.radians(-3.0)) for blade in SCENE.blades)
+)
 
 
 @functools.cache
@@ -39,7 +42,9 @@ def motion(scene: Scene) -> dict[str, Array]:
         return np.concatenate([y[COUNT:], measure(scene, y[:COUNT], y[COUNT:], t).accelerations])
 
     start = np.array([*scene.initial_angles, *scene.initial_rates])
-    run = solve_ivp(derivative, (0.0, scene.duration), start, "DOP853", times, rtol=1e-11, atol=1e-12)
+    run = solve_ivp(
+        derivative, (0.0, scene.duration), start, "DOP853", times, rtol=1e-11, atol=1e-12
+    )
     return {"time": times, "angles": run.y[:COUNT].T, "rates": run.y[COUNT:].T}
 
 
@@ -54,7 +59,8 @@ def stored(load: str) -> Array:
 
 
 def in_frame(load: str, frame: str) -> Array:
-    """Return a load of the scene in another frame: the blades' axes, turned back one rotation after the other."""
+    """Return a load of the scene in another frame: the blades' axes, turned back one rotation after
+    the other."""
     rows = []
     for angles, state in zip(motion(SCENE)["angles"], states(), strict=True):
         shaft = turn(0, SCENE.shaft_tilt)
@@ -72,14 +78,24 @@ def in_frame(load: str, frame: str) -> Array:
     return np.array(rows)
 
 
-LOADS = ("blade_root_force", "blade_root_moment", "shaft_force", "shaft_moment", "pitch_actuator_moment")
+LOADS = (
+    "blade_root_force",
+    "blade_root_moment",
+    "shaft_force",
+    "shaft_moment",
+    "pitch_actuator_moment",
+)
 
 
 def test_right_data_are_ok_with_loads_in_every_frame() -> None:
     data = motion(SCENE) | {load: stored(load) for load in LOADS}
     found = rm.compare(data, SCENE, tolerance=1e-9)
     assert (found.status, found.likely) == ("ok", ())
-    names = {"time": "time", "rotor": "angles[0]", **{f"pitch_{i}": f"angles[{i}]" for i in (1, 2, 3)}}
+    names = {
+        "time": "time",
+        "rotor": "angles[0]",
+        **{f"pitch_{i}": f"angles[{i}]" for i in (1, 2, 3)},
+    }
     columns: dict[str, Array] = {}
     mapping: dict[str, Any] = {}
     for frame, load, index in [
@@ -91,7 +107,9 @@ def test_right_data_are_ok_with_loads_in_every_frame() -> None:
         ("rotor", "shaft_moment", (2,)),
     ]:
         column = f"c{len(columns)}"
-        columns[column] = in_frame(load, frame)[(slice(None), *((index[0] - 1,) if len(index) > 1 else ()), index[-1])]
+        columns[column] = in_frame(load, frame)[
+            (slice(None), *((index[0] - 1,) if len(index) > 1 else ()), index[-1])
+        ]
         blade = f"_{index[0]}" if len(index) > 1 else ""
         mapping[f"{load}{blade}_{'xyz'[index[-1]]}"] = {"column": column, "frame": frame}
     found = rm.compare(motion(SCENE) | columns, SCENE, columns=names | mapping, tolerance=1e-9)
@@ -102,11 +120,23 @@ def test_right_data_are_ok_with_loads_in_every_frame() -> None:
 
 MOTIONS: dict[str, tuple[Callable[[Scene], Scene], str]] = {
     "no tilt": (lambda scene: replace(scene, shaft_tilt=0.0), "without the tilt of the shaft"),
-    "tilt": (lambda scene: replace(scene, shaft_tilt=-scene.shaft_tilt), "tilt of the shaft with opposite sign"),
+    "tilt": (
+        lambda scene: replace(scene, shaft_tilt=-scene.shaft_tilt),
+        ("tilt of the shaft with opposite sign"),
+    ),
     "no cone": (lambda scene: with_cone(scene, 0.0), "without the cone of the blades"),
-    "cone": (lambda scene: with_cone(scene, math.radians(3.0)), "cone of the blades with opposite sign"),
-    "another tilt": (lambda scene: replace(scene, shaft_tilt=math.radians(-6.0)), "shaft.tilt off by -0.01745 rad"),
-    "another cone": (lambda scene: with_cone(scene, math.radians(-2.5)), "blade.cone off by +0.008727 rad"),
+    "cone": (
+        lambda scene: with_cone(scene, math.radians(3.0)),
+        ("cone of the blades with opposite sign"),
+    ),
+    "another tilt": (
+        lambda scene: replace(scene, shaft_tilt=math.radians(-6.0)),
+        "shaft.tilt off by -0.01745 rad",
+    ),
+    "another cone": (
+        lambda scene: with_cone(scene, math.radians(-2.5)),
+        ("blade.cone off by +0.008727 rad"),
+    ),
 }
 
 
@@ -114,7 +144,9 @@ def with_cone(scene: Scene, cone: float) -> Scene:
     return replace(scene, blades=tuple(replace(blade, cone=cone) for blade in scene.blades))
 
 
-@pytest.mark.parametrize("mistake", [pytest.param(name, marks=pytest.mark.full) for name in MOTIONS])
+@pytest.mark.parametrize(
+    "mistake", [pytest.param(name, marks=pytest.mark.full) for name in MOTIONS]
+)
 def test_a_mistake_in_tilt_or_cone_is_named(mistake: str) -> None:
     change, text = MOTIONS[mistake]
     found = rm.compare(motion(change(SCENE)), replace(SCENE, outputs=("angles", "rates")))
@@ -133,13 +165,24 @@ def test_a_scene_that_lacks_tilt_and_cone_is_told_so() -> None:
 
 def about_apex() -> dict[str, Array]:
     arm = np.array([0.0, 0.0, SCENE.hub_radius])
-    return {"blade_root_moment": stored("blade_root_moment") + np.cross(arm, stored("blade_root_force"))}
+    return {
+        "blade_root_moment": stored("blade_root_moment") + np.cross(arm, stored("blade_root_force"))
+    }
 
 
 FAULTS: dict[str, tuple[Callable[[], dict[str, Array]], str]] = {
-    "coned": (lambda: {"blade_root_force": in_frame("blade_root_force", "coned")}, "in the coned frame"),
-    "rotor": (lambda: {"blade_root_force": in_frame("blade_root_force", "rotor")}, "in the rotor frame"),
-    "root in shaft": (lambda: {"blade_root_force": in_frame("blade_root_force", "shaft")}, "in the shaft frame"),
+    "coned": (
+        lambda: {"blade_root_force": in_frame("blade_root_force", "coned")},
+        "in the coned frame",
+    ),
+    "rotor": (
+        lambda: {"blade_root_force": in_frame("blade_root_force", "rotor")},
+        "in the rotor frame",
+    ),
+    "root in shaft": (
+        lambda: {"blade_root_force": in_frame("blade_root_force", "shaft")},
+        "in the shaft frame",
+    ),
     "shaft": (lambda: {"shaft_force": in_frame("shaft_force", "shaft")}, "in the shaft frame"),
     "apex": (about_apex, "about the apex in place of the root"),
     "hub": (

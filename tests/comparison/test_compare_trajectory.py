@@ -31,7 +31,9 @@ def uneven(duration: float, rows: int = 240) -> np.ndarray:
 
 def scene_of(name: str, duration: float) -> Scene:
     scene = rm.scene(name)
-    return replace(scene, duration=duration, samples=1 + round(duration * (scene.samples - 1) / scene.duration))
+    return replace(
+        scene, duration=duration, samples=1 + round(duration * (scene.samples - 1) / scene.duration)
+    )
 
 
 @pytest.fixture(scope="module")
@@ -59,12 +61,14 @@ def test_a_correct_code_agrees(tmp_path: Path, name: str, kind: str, duration: f
     FORMATS[kind](tmp_path / kind, scene, time, *other_code.trajectory(scene, time))
     found = rm.compare(tmp_path / kind, scene)
     assert (found.status, found.message, found.likely) == ("ok", "", ())
-    # SciPy at 1e-11 makes errors of some 1e-11 a step; a wrong digit in the equations, at least 1e-4.
+    # SciPy at 1e-11 makes errors of some 1e-11 a step; a wrong digit in the equations, at least
+    # 1e-4.
     assert max(channel.defect or 0.0 for channel in found.verdict.channels) < 1e-8
 
 
 def test_the_reference_at_the_times_of_the_data_is_the_frozen_one() -> None:
-    """At the scene's samples: the shipped file, bit for bit; between them: what a finer sampling has there."""
+    """At the scene's samples: the shipped file, bit for bit; between them: what a finer sampling
+    has there."""
     pytest.importorskip("heyoka")
     scene, frozen = rm.scene("paper/fig08"), references.reference("paper/fig08")
     time = np.union1d(frozen.time, uneven(10.0))
@@ -74,7 +78,8 @@ def test_the_reference_at_the_times_of_the_data_is_the_frozen_one() -> None:
 
 
 def test_growth_of_each_channel_is_at_most_that_of_all(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A row of the state transition matrix is no longer than its norm; without heyoka it is the same by differences."""
+    """A row of the state transition matrix is no longer than its norm; without heyoka it is the
+    same by differences."""
     scene = scene_of("paper/fig09", 0.5)
     found = reference.reference_at(scene, np.linspace(0.0, 0.5, 6))
     largest = found.growth.max(axis=1)
@@ -109,12 +114,17 @@ def test_the_command_prints_a_table_and_writes_a_page(tmp_path: Path) -> None:
     text = page.read_text()
     assert text.count("<svg role") + text.count('role="img"') >= 2
     assert "inaccurate" in text
-    assert rotor_mbs("report", page.with_name("comparison.h5"), "-o", tmp_path / "again").status == 0
+    assert (
+        rotor_mbs("report", page.with_name("comparison.h5"), "-o", tmp_path / "again").status == 0
+    )
     assert (tmp_path / "again" / "index.html").read_text() == text
 
 
-def test_the_stored_comparison_has_data_reference_and_errors_in_si(run: rm.Run, tmp_path: Path) -> None:
-    """Of a file in degrees with a channel left out; both readers of netCDF-4 take it, with scales and units."""
+def test_the_stored_comparison_has_data_reference_and_errors_in_si(
+    run: rm.Run, tmp_path: Path
+) -> None:
+    """Of a file in degrees with a channel left out; both readers of netCDF-4 take it, with scales
+    and units."""
     late = run.time <= 9.0
     pitch = np.degrees(run.angles[late, 1]) + 1e-3
     found = rm.compare({"t_ms": 1e3 * run.time[late], "pitch_1_deg": pitch}, run.scene)
@@ -126,12 +136,18 @@ def test_the_stored_comparison_has_data_reference_and_errors_in_si(run: rm.Run, 
             data = tree["comparison/paper/fig03/data/trajectory"].to_dataset()
         np.testing.assert_array_equal(data.time, found.record.arrays["time"])
         np.testing.assert_allclose(data.pitch_1, run.angles[late, 1] + np.radians(1e-3), atol=1e-15)
-        np.testing.assert_allclose(data.pitch_1_reference, run.reference.angles[late, 1], atol=1e-12)
+        np.testing.assert_allclose(
+            data.pitch_1_reference, run.reference.angles[late, 1], atol=1e-12
+        )
         np.testing.assert_array_equal(data.pitch_1_error, data.pitch_1 - data.pitch_1_reference)
         assert np.isnan(data.pitch_1_defect[0])
         assert np.nanmax(data.pitch_1_defect) < 1e-6  # a zero that is elsewhere has next to none
         assert {one.attrs["units"] for one in data.data_vars.values()} == {"rad"}
-        assert (data.time.attrs["units"], data.attrs["status"], data.attrs["tolerance"]) == ("s", "inaccurate", 1e-6)
+        assert (data.time.attrs["units"], data.attrs["status"], data.attrs["tolerance"]) == (
+            "s",
+            "inaccurate",
+            1e-6,
+        )
         xarray.testing.assert_equal(data, found.to_xarray())
     (record,) = read_records(tmp_path / "c.h5", "comparison")
     assert as_dictionary(verdict_of(record)) == as_dictionary(found.verdict)
@@ -142,7 +158,9 @@ def test_the_stored_comparison_has_data_reference_and_errors_in_si(run: rm.Run, 
 
 def test_a_test_of_another_project(run: rm.Run) -> None:
     tolerance = np.float32(1e-6)
-    assert assert_agrees(run.time, run.angles, scene="paper/fig03", rates=run.rates, tolerance=tolerance).agrees
+    assert assert_agrees(
+        run.time, run.angles, scene="paper/fig03", rates=run.rates, tolerance=tolerance
+    ).agrees
     with pytest.raises(AssertionError, match="first row"):
         assert_agrees(run.time, run.angles + 1e-4, scene=run.scene)
     with pytest.raises(rm.InputError, match="different lengths"):
@@ -151,7 +169,8 @@ def test_a_test_of_another_project(run: rm.Run) -> None:
 
 @pytest.mark.full
 def test_a_row_far_beyond_the_horizon_is_not_ok() -> None:
-    """From 6 to 20 s in one interval errors grow over 1e5-fold, so that no angle there says anything."""
+    """From 6 to 20 s in one interval errors grow over 1e5-fold, so that no angle there says
+    anything."""
     scene = rm.scene("paper/fig11").replace(duration=20.0, samples=201)
     run = rm.run(scene, "lagrange/dop853")
     rows = np.r_[0:61, 200]
@@ -161,7 +180,11 @@ def test_a_row_far_beyond_the_horizon_is_not_ok() -> None:
     run = rm.run(coarse, "lagrange/dop853")
     for columns, of in ((data, scene), ({"time": run.time, "angles": run.angles}, coarse)):
         found = rm.compare(columns, of)
-        assert (found.status, found.message[:17], found.likely) == ("unchecked", "after the horizon", ())
+        assert (found.status, found.message[:17], found.likely) == (
+            "unchecked",
+            "after the horizon",
+            (),
+        )
 
 
 @pytest.mark.full
@@ -172,7 +195,9 @@ def test_rows_that_are_far_apart_are_judged() -> None:
     rows = np.r_[0:31, 250:1001:250]
     for factor, status in ((1.0, "ok"), (0.9, "inaccurate")):
         rates = run.rates * np.where(run.time < 2.0, 1.0, factor)[:, None]
-        found = rm.compare({"time": run.time[rows], "angles": run.angles[rows], "rates": rates[rows]}, scene)
+        found = rm.compare(
+            {"time": run.time[rows], "angles": run.angles[rows], "rates": rates[rows]}, scene
+        )
         assert found.status == status
 
 
@@ -184,7 +209,10 @@ def test_tables_of_other_libraries_are_data(run: rm.Run) -> None:
 
 def test_numbers_without_sense_are_inaccurate(run: rm.Run) -> None:
     found = rm.compare({"time": run.time, "rotor": 1e300 * run.angles[:, 0]}, run.scene)
-    assert (found.status, found.likely) == ("inaccurate", ("rotor: too large by a factor of 1e+300",))
+    assert (found.status, found.likely) == (
+        "inaccurate",
+        ("rotor: too large by a factor of 1e+300",),
+    )
 
 
 def test_channels_may_be_missing_and_rates_alone_are_judged(run: rm.Run) -> None:
@@ -192,10 +220,16 @@ def test_channels_may_be_missing_and_rates_alone_are_judged(run: rm.Run) -> None
     assert (alone.status, len(alone.verdict.channels)) == ("unchecked", 1)
     assert alone.message == 'no column for rotor; allowed: omit = ["rotor"] in a mapping file'
     assert "missing angles: rotor" in alone.verdict.notes
-    assert rm.compare({"t": run.time, "pitch_1": run.angles[:, 1]}, run.scene, columns={"omit": ["rotor"]}).agrees
+    assert rm.compare(
+        {"t": run.time, "pitch_1": run.angles[:, 1]}, run.scene, columns={"omit": ["rotor"]}
+    ).agrees
     without = {"omit": ["rotor", "pitch_1"]}
-    assert rm.compare({"t": run.time, "rotor_rate": run.rates[:, 0]}, run.scene, columns=without).agrees
-    wrong = rm.compare({"t": run.time, "rotor_rate": 1.001 * run.rates[:, 0]}, run.scene, columns=without)
+    assert rm.compare(
+        {"t": run.time, "rotor_rate": run.rates[:, 0]}, run.scene, columns=without
+    ).agrees
+    wrong = rm.compare(
+        {"t": run.time, "rotor_rate": 1.001 * run.rates[:, 0]}, run.scene, columns=without
+    )
     assert wrong.message.startswith("rotor")
     assert wrong.likely == ("rotor rate: too large by a factor of 1.001",)
 
@@ -214,7 +248,8 @@ def test_data_without_a_likely_cause_are_told_where_they_start() -> None:
 
 
 def test_numbers_of_few_digits_are_noticed(run: rm.Run, tmp_path: Path) -> None:
-    """OpenFAST's usual four digits: a right run is ok as far as they tell, which the page says; a wrong one is not."""
+    """OpenFAST's usual four digits: a right run is ok as far as they tell, which the page says; a
+    wrong one is not."""
     head = "\n".join(["", "OpenFAST", "", "", "", "", "Time Azimuth BldPitch1", "(s) (deg) (deg)"])
     rows = np.column_stack([run.time, np.degrees(run.angles)])
     np.savetxt(tmp_path / "low.out", rows, header=head, comments="", fmt="%10.3E")
@@ -226,11 +261,24 @@ def test_numbers_of_few_digits_are_noticed(run: rm.Run, tmp_path: Path) -> None:
 
 
 def test_settled_angles_of_few_decimals_are_right_and_have_no_cause() -> None:
-    """Of stiff bearings: each has few values, and one rounding error over many rows, which no rest angle explains."""
-    stiff = {"bearing_stiffness": (1e6,) * 3, "bearing_damping": (3e4,) * 3, "initial_rates": (0.0,) * 4}
-    scene = replace(rm.scene("check/general"), duration=3.0, samples=151, initial_angles=(0.5, 0.0, 0.0, 0.0), **stiff)
+    """Of stiff bearings: each has few values, and one rounding error over many rows, which no rest
+    angle explains."""
+    stiff = {
+        "bearing_stiffness": (1e6,) * 3,
+        "bearing_damping": (3e4,) * 3,
+        "initial_rates": (0.0,) * 4,
+    }
+    scene = replace(
+        rm.scene("check/general"),
+        duration=3.0,
+        samples=151,
+        initial_angles=(0.5, 0.0, 0.0, 0.0),
+        **stiff,
+    )
     run = rm.run(scene, "lagrange/radau")
-    found = rm.compare({"time": run.time, "angles": run.angles.round(4), "rates": run.rates.round(4)}, scene)
+    found = rm.compare(
+        {"time": run.time, "angles": run.angles.round(4), "rates": run.rates.round(4)}, scene
+    )
     assert (found.status, found.likely) == ("ok", ())
     assert found.verdict.notes == ("numbers of 4 decimals: rounding error 5e-05",)
     nothing = rm.compare({"time": run.time, "angles": 0.0 * run.angles}, scene)

@@ -1,5 +1,5 @@
-"""Files as other programs write them: what is read by which library, which names and units are known, and that nothing
-is dropped silently. The data are written here, from one short motion."""
+"""Files as other programs write them: what is read by which library, which names and units are
+known, and that nothing is dropped silently. The data are written here, from one short motion."""
 
 from __future__ import annotations
 
@@ -25,8 +25,12 @@ from rotor_mbs.errors import InputError
 
 SCENE = paper("fig11", duration=1.0, samples=101)
 TIME = np.linspace(0.0, 1.0, 101)
-ANGLES = np.stack([0.5 + 0.3 * TIME, np.cos(TIME), 0.1 * TIME - 0.7, 0.2 * np.sin(3.0 * TIME)], axis=1)
-RATES = np.stack([0.3 + 0.0 * TIME, -np.sin(TIME), 0.1 + 0.0 * TIME, 0.6 * np.cos(3.0 * TIME)], axis=1)
+ANGLES = np.stack(
+    [0.5 + 0.3 * TIME, np.cos(TIME), 0.1 * TIME - 0.7, 0.2 * np.sin(3.0 * TIME)], axis=1
+)
+RATES = np.stack(
+    [0.3 + 0.0 * TIME, -np.sin(TIME), 0.1 + 0.0 * TIME, 0.6 * np.cos(3.0 * TIME)], axis=1
+)
 NAMES = [channel.name for channel in channels(SCENE)[1:9]]
 BY_NAME = dict(zip(NAMES, np.hstack([ANGLES, RATES]).T, strict=True))
 TABLE = {"time": TIME, **BY_NAME}
@@ -36,7 +40,9 @@ def assert_complete(data: ForeignData, rates: bool = True, atol: float = 1e-14) 
     """All angles, and rates, are those of the motion."""
     assert data.columns == list(range(8 if rates else 4))
     np.testing.assert_allclose(data.time, TIME, atol=1e-15)
-    np.testing.assert_allclose(data.values, np.hstack([ANGLES, RATES])[:, data.columns], rtol=0.0, atol=atol)
+    np.testing.assert_allclose(
+        data.values, np.hstack([ANGLES, RATES])[:, data.columns], rtol=0.0, atol=atol
+    )
 
 
 def write_csv(path: Path, table: Mapping[str, Any]) -> None:
@@ -84,7 +90,8 @@ def test_names_of_other_programs(case: str, tmp_path: Path) -> None:
     "names",
     [
         ["q[1]", "q[2]", "q[3]"],  # one is missing, nobody knows which
-        ["theta[1]", "theta[2]", "theta[3]", "theta[4]"],  # more pitches than blades: the rotor may be among them
+        # more pitches than blades: the rotor may be among them
+        ["theta[1]", "theta[2]", "theta[3]", "theta[4]"],
         ["psi_1", "psi_2", "psi_3"],  # azimuths of blades
         ["der(der(phi))", "der(time)", "der(q)", "qdd[1]", "abs(rotor)", "rotor_acc"],
     ],
@@ -114,7 +121,9 @@ def test_units_in_any_spelling(unit: str, kind: str, factor: float | None) -> No
 
 @pytest.mark.parametrize("form", ["{} [{}]", "{} ({})", "{} in {}", "{}, {}", "{} / {}"])
 def test_units_behind_names_of_columns(form: str) -> None:
-    units = dict.fromkeys(NAMES[:4], "deg") | dict.fromkeys(NAMES[4:], "deg/s" if "/" in form else "deg s^-1")
+    units = dict.fromkeys(NAMES[:4], "deg") | dict.fromkeys(
+        NAMES[4:], "deg/s" if "/" in form else "deg s^-1"
+    )
     arrays = {form.format(name, unit): np.degrees(BY_NAME[name]) for name, unit in units.items()}
     assert_complete(load_data({form.format("time", "ms"): 1e3 * TIME, **arrays}, SCENE), atol=1e-13)
 
@@ -128,11 +137,17 @@ def test_the_unit_of_a_derivative_is_that_of_its_angle_per_second() -> None:
 
 
 def test_indexes_and_levels_of_a_data_frame() -> None:
-    frame = pd.DataFrame({(name, "rad/s" if "rate" in name else "rad"): values for name, values in BY_NAME.items()})
+    frame = pd.DataFrame(
+        {(name, "rad/s" if "rate" in name else "rad"): values for name, values in BY_NAME.items()}
+    )
     assert_complete(load_data(frame.set_index(pd.Index(TIME)), SCENE))
     assert_complete(load_data(frame.set_index(pd.Index(TIME, name="t")), SCENE))
-    assert_complete(load_data(frame.set_index(pd.to_timedelta(np.round(1e6 * TIME), unit="us")), SCENE))
-    degrees = pd.DataFrame({("time", "s"): TIME} | {(name, "deg"): np.degrees(BY_NAME[name]) for name in NAMES[:4]})
+    assert_complete(
+        load_data(frame.set_index(pd.to_timedelta(np.round(1e6 * TIME), unit="us")), SCENE)
+    )
+    degrees = pd.DataFrame(
+        {("time", "s"): TIME} | {(name, "deg"): np.degrees(BY_NAME[name]) for name in NAMES[:4]}
+    )
     assert_complete(load_data(degrees, SCENE), rates=False)
     quantities = {("rotor", "angle"): ANGLES[:, 0], ("rotor", "rate"): RATES[:, 0]}
     assert load_data(pd.DataFrame({("time", ""): TIME} | quantities), SCENE).columns == [0, 4]
@@ -179,7 +194,11 @@ def durations(path: Path) -> None:
 
 def dated_times(path: Path) -> None:
     attributes = {"units": "seconds since 2020-01-01 00:00:00"}
-    arrays = {"q": (("time", "c"), ANGLES), "qd": (("time", "c"), RATES), "time": ("time", TIME, attributes)}
+    arrays = {
+        "q": (("time", "c"), ANGLES),
+        "qd": (("time", "c"), RATES),
+        "time": ("time", TIME, attributes),
+    }
     xr.Dataset(arrays).to_netcdf(path, engine="h5netcdf")
 
 
@@ -213,7 +232,8 @@ def solution_of_exudyn(path: Path) -> None:
     head = (
         "Exudyn explicit time integration (RK67) solver solution file\n"
         "columns contain: time, ODE2 displacements, ODE2 velocities, ODE2 accelerations\n"
-        "number of written coordinates [nODE2, nVel2, nAcc2, nODE1, nVel1, nAlgebraic, nData] = [4,4,4,0,0,0,0]\n"
+        "number of written coordinates [nODE2, nVel2, nAcc2, nODE1, nVel1, nAlgebraic, nData] = "
+        "[4,4,4,0,0,0,0]\n"
     )
     rows = np.column_stack([TIME, ANGLES, RATES, 0.0 * RATES])
     np.savetxt(path, rows, delimiter=",", header=head, comments="#", fmt="%.17g")
@@ -289,7 +309,13 @@ def test_the_last_of_several_solves_is_read(tmp_path: Path) -> None:
     head = "Exudyn time integration sensor output file\nOutputVariableType = Coordinates\n"
     for solve in (2.0, 1.0):
         with (tmp_path / "sensor.txt").open("ab") as file:
-            np.savetxt(file, np.column_stack([TIME, solve * ANGLES]), delimiter=",", header=head, fmt="%.17g")
+            np.savetxt(
+                file,
+                np.column_stack([TIME, solve * ANGLES]),
+                delimiter=",",
+                header=head,
+                fmt="%.17g",
+            )
     text = (tmp_path / "sensor.txt").read_text().replace("# ", "#")
     (tmp_path / "sensor.txt").write_text(text)
     data = load_data(tmp_path / "sensor.txt", SCENE)
@@ -326,14 +352,20 @@ NOT_NUMBERS: dict[str, tuple[str, Callable[[Path], Any], str]] = {
     "null": (
         "data.json",
         lambda path: path.write_text(
-            json.dumps({name: values.tolist() for name, values in TABLE.items()} | {"pitch 3 rate": [None, *TIME[1:]]})
+            json.dumps(
+                {name: values.tolist() for name, values in TABLE.items()}
+                | {"pitch 3 rate": [None, *TIME[1:]]}
+            )
         ),
         "column 'pitch 3 rate' is nan in row 1 of 101",
     ),
     "text in JSON": (
         "data.json",
         lambda path: path.write_text(
-            json.dumps({name: values.tolist() for name, values in TABLE.items()} | {"pitch 3 rate": [*TIME[1:], "x"]})
+            json.dumps(
+                {name: values.tolist() for name, values in TABLE.items()}
+                | {"pitch 3 rate": [*TIME[1:], "x"]}
+            )
         ),
         "column 'pitch 3 rate': row 101 has 'x', no number",
     ),
@@ -349,9 +381,9 @@ NOT_NUMBERS: dict[str, tuple[str, Callable[[Path], Any], str]] = {
     ),
     "texts in HDF5": (
         "data.h5",
-        lambda path: xr.Dataset({"time": ("t", TIME), "rotor": ("t", TIME), "pitch_1": ("t", ["a"] * 101)}).to_netcdf(
-            path, engine="h5netcdf"
-        ),
+        lambda path: xr.Dataset(
+            {"time": ("t", TIME), "rotor": ("t", TIME), "pitch_1": ("t", ["a"] * 101)}
+        ).to_netcdf(path, engine="h5netcdf"),
         "column 'pitch_1': no numbers",
     ),
 }
@@ -377,18 +409,28 @@ def test_a_channel_without_numbers_ends_with_status_2(case: str, tmp_path: Path)
         (np.full(101, "2020-01-01", "datetime64[s]"), "dates, no numbers"),
     ],
 )
-def test_an_array_without_numbers_that_is_named_as_a_channel_is_refused(values: Any, message: str) -> None:
+def test_an_array_without_numbers_that_is_named_as_a_channel_is_refused(
+    values: Any, message: str
+) -> None:
     arrays = {**TABLE, "pitch 3 rate": values}
     with pytest.raises(InputError, match=f"data: column 'pitch 3 rate'.*{message}"):
         load_data(arrays, SCENE)
     # Unless it is omitted, or another column is that channel.
     left_out = load_data(arrays, SCENE, {"omit": ["pitch_3_rate"]})
     assert "pitch 3 rate" in left_out.unused
-    assert load_data({**arrays, "w": RATES[:, 3]}, SCENE, {"pitch_3_rate": "w"}).columns == list(range(8))
+    assert load_data({**arrays, "w": RATES[:, 3]}, SCENE, {"pitch_3_rate": "w"}).columns == list(
+        range(8)
+    )
 
 
 def test_every_column_is_compared_or_listed_with_the_reason() -> None:
-    arrays = TABLE | {"wind": TIME, "status": ["good"] * 101, "sampling": 100.0, "title": "run 7", "w": RATES[:, 3]}
+    arrays = TABLE | {
+        "wind": TIME,
+        "status": ["good"] * 101,
+        "sampling": 100.0,
+        "title": "run 7",
+        "w": RATES[:, 3],
+    }
     mapping = {"pitch_3_rate": "w", "omit": ["pitch_1_rate"]}
     data = load_data(arrays, SCENE, mapping)
     assert data.columns == [0, 1, 2, 3, 4, 6, 7]
@@ -414,14 +456,23 @@ def test_a_text_column_beside_numbers_is_listed(tmp_path: Path) -> None:
 
 
 def test_a_mapping_adds_to_what_is_known_by_name() -> None:
-    arrays = {"time": TIME, "a": -np.degrees(ANGLES[:, 0]), **{name: BY_NAME[name] for name in NAMES[1:]}}
+    arrays = {
+        "time": TIME,
+        "a": -np.degrees(ANGLES[:, 0]),
+        **{name: BY_NAME[name] for name in NAMES[1:]},
+    }
     data = load_data(arrays, SCENE, {"rotor": {"column": "a", "unit": "deg", "sign": -1}})
     assert_complete(data)
 
 
 def test_loads_that_are_left_out_are_said_and_no_ok_stands_without_them() -> None:
     run = rm.run(SCENE, "lagrange/dop853")
-    arrays = {"time": run.time, "angles": run.angles, "rates": run.rates, "shaft_moment_y": 1e6 + run.time}
+    arrays = {
+        "time": run.time,
+        "angles": run.angles,
+        "rates": run.rates,
+        "shaft_moment_y": 1e6 + run.time,
+    }
     wrong = rm.compare(arrays, SCENE)
     assert wrong.status == "inaccurate"
     # A mapping of angles alone does not hide them.
@@ -432,7 +483,9 @@ def test_loads_that_are_left_out_are_said_and_no_ok_stands_without_them() -> Non
     assert restricted.status == "unchecked"
     assert "loads of the data that are not compared: shaft moment y" in restricted.message
     assert 'omit = ["shaft_moment_y"]' in restricted.message
-    assert rm.compare(arrays, SCENE, columns={"only": angles, "omit": ["shaft_moment"]}).status == "ok"
+    assert (
+        rm.compare(arrays, SCENE, columns={"only": angles, "omit": ["shaft_moment"]}).status == "ok"
+    )
 
 
 def test_rates_by_der_are_judged() -> None:

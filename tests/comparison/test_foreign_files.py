@@ -1,4 +1,5 @@
-"""Files of other programs: every format gives the same numbers; names guessed or mapped; wrong input is one line."""
+"""Files of other programs: every format gives the same numbers; names guessed or mapped; wrong
+input is one line."""
 
 from __future__ import annotations
 
@@ -21,8 +22,12 @@ from rotor_mbs.errors import InputError, RotorError
 
 SCENE = paper("fig08")
 TIME = np.linspace(0.0, 10.0, 201)
-ANGLES = np.stack([0.3 - 2.0 * TIME, 0.7 * np.cos(TIME), 0.1 * TIME, 0.2 * np.sin(3.0 * TIME)], axis=1)
-RATES = np.stack([-2.0 + 0.0 * TIME, -0.7 * np.sin(TIME), 0.1 + 0.0 * TIME, 0.6 * np.cos(3.0 * TIME)], axis=1)
+ANGLES = np.stack(
+    [0.3 - 2.0 * TIME, 0.7 * np.cos(TIME), 0.1 * TIME, 0.2 * np.sin(3.0 * TIME)], axis=1
+)
+RATES = np.stack(
+    [-2.0 + 0.0 * TIME, -0.7 * np.sin(TIME), 0.1 + 0.0 * TIME, 0.6 * np.cos(3.0 * TIME)], axis=1
+)
 STATES = np.hstack([ANGLES, RATES])
 
 
@@ -46,7 +51,13 @@ _ROWS = [(0.0, 165.0, -2.0), (0.05, 164.5, 1e-3), (0.1, 1000.25, -1.5e-7)]
 _NAMES = ("time", "rotor [deg]", "pitch 1 [deg]")
 
 
-def _table(divider: str, names: Sequence[str] = _NAMES, decimal: str = ".", end: str = "\n", form: str = "{!r}") -> str:
+def _table(
+    divider: str,
+    names: Sequence[str] = _NAMES,
+    decimal: str = ".",
+    end: str = "\n",
+    form: str = "{!r}",
+) -> str:
     rows = [[form.format(value).replace(".", decimal) for value in row] for row in _ROWS]
     return "".join(divider.join(words) + end for words in (names, *rows))
 
@@ -64,14 +75,21 @@ REAL_LIFE = {
     "comments between": _table(",").replace("\n", "\n# begins\n", 2) + "# ends\n",
     "a line about it": "Simulator 3, run 7\nof a rotor, again\n\n" + _table(","),
     "quotes": _table(",", [f'"{name}"' for name in _NAMES]),
-    "Fortran's exponents": _table(" ", ("time", "rotor_deg", "pitch_1_deg"), form="{:.9E}").replace("E", "D"),
+    "Fortran's exponents": _table(" ", ("time", "rotor_deg", "pitch_1_deg"), form="{:.9E}").replace(
+        "E", "D"
+    ),
     "empty rows at the end": _table(",") + ",,\n,,\n",
-    "a column without a name": "\n".join(f"{i},{row}" for i, row in enumerate(_table(",").split("\n"), -1) if row)[2:],
-    "vectors in a field": "time,q [deg]\n" + "\n".join(f"{t!r},{a!r} {b!r} 0.0 0.0" for t, a, b in _ROWS),
+    "a column without a name": "\n".join(
+        f"{i},{row}" for i, row in enumerate(_table(",").split("\n"), -1) if row
+    )[2:],
+    "vectors in a field": "time,q [deg]\n"
+    + "\n".join(f"{t!r},{a!r} {b!r} 0.0 0.0" for t, a, b in _ROWS),
     "text below the numbers": _table(",") + "\nThis file was closed on 19-Oct-2018 at 10:15:16.\n",
     "names in a comment above another": "# "
     + _table(" ", ("time", "rotor_deg", "pitch_1_deg")).replace("\n", "\n# run\n", 1),
-    "columns of one name that are not used": "\n".join(f"{row},0,0" for row in _table(",").splitlines()),
+    "columns of one name that are not used": "\n".join(
+        f"{row},0,0" for row in _table(",").splitlines()
+    ),
 }
 
 
@@ -82,7 +100,9 @@ def test_text_as_other_programs_write_it(tmp_path: Path, name: str) -> None:
     data = load_data(tmp_path / "data.csv", SCENE)
     assert data.columns[:2] == [0, 1]
     np.testing.assert_allclose(data.time, [row[0] for row in _ROWS], rtol=1e-15)
-    np.testing.assert_allclose(np.degrees(data.values[:, :2]), [row[1:] for row in _ROWS], rtol=1e-14)
+    np.testing.assert_allclose(
+        np.degrees(data.values[:, :2]), [row[1:] for row in _ROWS], rtol=1e-14
+    )
 
 
 @pytest.mark.parametrize(
@@ -133,11 +153,16 @@ def column_of(text: str) -> np.ndarray:
 
 @pytest.mark.parametrize("digits", [4, 6, 9])
 def test_the_last_digit_is_found(digits: int) -> None:
-    """Of significant digits half a unit of the last one of each number, of decimals the same of all."""
+    """Of significant digits half a unit of the last one of each number, of decimals the same of
+    all."""
     written = column_of(f"%.{digits - 1}e")
     exponents = np.floor(np.log10(np.abs(written)))
-    np.testing.assert_allclose(rounding_of_printed(written), 0.5 * 10.0 ** (exponents + 1 - digits), rtol=1e-12)
-    np.testing.assert_allclose(rounding_of_printed(column_of(f"%.{digits}f")), 0.5 * 10.0**-digits, rtol=1e-12)
+    np.testing.assert_allclose(
+        rounding_of_printed(written), 0.5 * 10.0 ** (exponents + 1 - digits), rtol=1e-12
+    )
+    np.testing.assert_allclose(
+        rounding_of_printed(column_of(f"%.{digits}f")), 0.5 * 10.0**-digits, rtol=1e-12
+    )
 
 
 def test_the_last_digit_of_single_and_double_precision_and_of_few_values() -> None:
@@ -146,18 +171,27 @@ def test_the_last_digit_of_single_and_double_precision_and_of_few_values() -> No
     single = double.astype(np.float32).astype(float)
     np.testing.assert_array_equal(rounding_of_printed(single), np.abs(single) * 2.0**-24)
     # A pitch that stays at 0.1 rad says nothing of digits.
-    np.testing.assert_array_equal(rounding_of_printed(np.full(50, 0.1)), np.full(50, 0.1 * 2.0**-53))
+    np.testing.assert_array_equal(
+        rounding_of_printed(np.full(50, 0.1)), np.full(50, 0.1 * 2.0**-53)
+    )
     assert not rounding_of_printed(np.zeros(50)).any()
     # But other columns may.
-    np.testing.assert_array_equal(rounding_of_printed(np.full(50, 0.1), [[column_of("%.4f")]]), np.full(50, 0.5e-4))
-    np.testing.assert_array_equal(rounding_of_printed(np.full(50, 0.1), [[double]]), np.full(50, 0.1 * 2.0**-53))
-    # Nor does a number next to the smallest there is, as a flipped bit may make: no unit of it can be written.
+    np.testing.assert_array_equal(
+        rounding_of_printed(np.full(50, 0.1), [[column_of("%.4f")]]), np.full(50, 0.5e-4)
+    )
+    np.testing.assert_array_equal(
+        rounding_of_printed(np.full(50, 0.1), [[double]]), np.full(50, 0.1 * 2.0**-53)
+    )
+    # Nor does a number next to the smallest there is, as a flipped bit may make: no unit of it can
+    # be written.
     assert rounding_of_printed(np.array([1.0 / 3.0, 2.0 / 3.0, 5e-324])).max() < 1e-15
 
 
 def test_a_mapping_says_column_unit_sign_zero_and_subset(tmp_path: Path) -> None:
     path = tmp_path / "mine.csv"
-    table = np.column_stack([1e3 * TIME, -(np.degrees(ANGLES[:, 0]) + 90.0), RATES[:, 2] * 30.0 / np.pi])
+    table = np.column_stack(
+        [1e3 * TIME, -(np.degrees(ANGLES[:, 0]) + 90.0), RATES[:, 2] * 30.0 / np.pi]
+    )
     np.savetxt(path, table, delimiter=";", header="zeit;a;b", comments="", fmt="%.17g")
     mapping = tmp_path / "map.toml"
     mapping.write_text(
@@ -193,14 +227,20 @@ def _write(text: str) -> Callable[[Path], None]:
 
 HEAD = "time [s],rotor [rad]\n"
 WRONG: dict[str, tuple[Callable[[Path], object], str]] = {
-    "unknown columns": (_write("time,a,b\n0,1,2\n1,2,3\n2,3,4\n"), "no column for an angle or a rate"),
+    "unknown columns": (
+        _write("time,a,b\n0,1,2\n1,2,3\n2,3,4\n"),
+        ("no column for an angle or a rate"),
+    ),
     "no time": (_write("rotor,pitch 1\n0,1\n1,2\n2,3\n"), "no column for the time"),
     "other lengths": (_write(HEAD + "0,1\n1,2\n2\n"), "1 fields, where the rows above have 2"),
     "nothing": (lambda path: path.touch(), "empty"),
     "one column": (_write("rotor\n0\n1\n2\n"), "one column of numbers; allowed: a column of times"),
     "no header": (_write("0,1\n1,2\n2,3\n"), "no header line"),
     "2 GB": (_sparse, "2.0 GB; allowed: up to 0.5 GB"),
-    "wrong unit": (_write("time [s],rotor [kg]\n0,1\n1,2\n2,3\n"), "'kg'; allowed: rad, deg, turns"),
+    "wrong unit": (
+        _write("time [s],rotor [kg]\n0,1\n1,2\n2,3\n"),
+        ("'kg'; allowed: rad, deg, turns"),
+    ),
     "NaN": (_write(HEAD + "0,1\n1,nan\n2,3\n"), "is nan in row 2 of 3"),
     "repeated time": (_write(HEAD + "0,1\n1,2\n1,3\n"), "the time of row 3, 1 s, repeats"),
     "two rows at one time": (
@@ -208,7 +248,10 @@ WRONG: dict[str, tuple[Callable[[Path], object], str]] = {
         "the time of row 4, 2 s, repeats that of row 2 with other numbers",
     ),
     "too few rows": (_write(HEAD + "0,1\n1,2\n"), "2 rows; allowed: 3 or more"),
-    "before the start": (_write(HEAD + "-4,1\n-3,2\n-1,3\n"), "ends at t = -1 s; allowed: times from 0"),
+    "before the start": (
+        _write(HEAD + "-4,1\n-3,2\n-1,3\n"),
+        ("ends at t = -1 s; allowed: times from 0"),
+    ),
     "a comma between thousands": (
         _write('time [ms],rotor\n0,1\n"1,000",2\n"2,000",3\n'),
         "column 'time': row 2 (line 3) has '1,000', no number",
@@ -217,14 +260,29 @@ WRONG: dict[str, tuple[Callable[[Path], object], str]] = {
         _write(HEAD + "12:00:01,1\n12:00:02,2\n12:00:03,3\n"),
         "column 'time': row 1 (line 2) has '12:00:01', no number",
     ),
-    "two columns for one channel": (_write("time,rotor,azimuth\n0,1,1\n1,2,2\n2,3,3\n"), "could be rotor"),
+    "two columns for one channel": (
+        _write("time,rotor,azimuth\n0,1,1\n1,2,2\n2,3,3\n"),
+        "could be rotor",
+    ),
     "a text that begins as JSON": (_write('{"time": [0, 1'), "allowed: text with a header"),
     "JSON of no arrays": (_write('{"time": {"a": 1}}'), "allowed: "),
-    "Parquet": (lambda path: path.write_bytes(b"PAR1\x15\x04" + bytes(60)), "not a format that can be read"),
+    "Parquet": (
+        lambda path: path.write_bytes(b"PAR1\x15\x04" + bytes(60)),
+        ("not a format that can be read"),
+    ),
     "a damaged archive": (lambda path: path.write_bytes(b"PK\x03\x04damaged"), "cannot be read"),
-    "a damaged HDF5 file": (lambda path: path.write_bytes(b"\x89HDF\r\n\x1a\n" + bytes(100)), "not a readable HDF5"),
-    "a damaged MAT file": (lambda path: path.write_bytes(b"MATLAB 5.0 MAT-file".ljust(200)), "cannot be read"),
-    "a program": (lambda path: path.write_bytes(b"\x7fELF" + bytes(100)), "not a format that can be read"),
+    "a damaged HDF5 file": (
+        lambda path: path.write_bytes(b"\x89HDF\r\n\x1a\n" + bytes(100)),
+        "not a readable HDF5",
+    ),
+    "a damaged MAT file": (
+        lambda path: path.write_bytes(b"MATLAB 5.0 MAT-file".ljust(200)),
+        "cannot be read",
+    ),
+    "a program": (
+        lambda path: path.write_bytes(b"\x7fELF" + bytes(100)),
+        ("not a format that can be read"),
+    ),
 }
 
 
@@ -241,7 +299,10 @@ def test_wrong_input_is_one_line_and_status_2(tmp_path: Path, case: str) -> None
     ("arrays", "message"),
     [
         ({}, "no columns of numbers"),
-        ({"time": TIME, "rotor": np.ma.masked_less(ANGLES[:, 0], -1.0)}, "column 'rotor' is nan in row"),
+        (
+            {"time": TIME, "rotor": np.ma.masked_less(ANGLES[:, 0], -1.0)},
+            ("column 'rotor' is nan in row"),
+        ),
         ({"time": TIME, "angles": [[1.0, 2.0], [3.0]]}, "rows of different lengths"),
         ({"time": TIME[1:], "rotor": ANGLES[:, 0]}, "columns of different lengths"),
         ({"time": 3.0, "rotor": 2.0}, "no columns of numbers"),
@@ -256,14 +317,23 @@ def test_wrong_arrays_are_refused(arrays: Any, message: str) -> None:
 @pytest.mark.parametrize(
     ("mapping", "message"),
     [
-        ('time = "t"\nrotr = "a"', "map.toml:2: rotr: unknown key, perhaps rotor; allowed: time, rotor, pitch_1"),
+        (
+            'time = "t"\nrotr = "a"',
+            ("map.toml:2: rotr: unknown key, perhaps rotor; allowed: time, rotor, pitch_1"),
+        ),
         ('rotor = "c"', "no column 'c'; available: t, a, b"),
         ('rotor = { column = "a", unit = "rpm" }', "'rpm'; allowed: rad, deg, turns"),
         ('rotor = { column = "a", sign = 2 }', "rotor.sign: 2 is out of range; allowed: 1, -1"),
-        ("rotor = 3", "rotor: 3 is not a table; allowed: a column's name, or a table with `column`"),
+        (
+            "rotor = 3",
+            ("rotor: 3 is not a table; allowed: a column's name, or a table with `column`"),
+        ),
         ('time = "t"', "no column for an angle or a rate; available: t, a, b"),
         ("omit = []", "says nothing; allowed: time, rotor, pitch_1"),
-        ('only = ["rotor"]\npitch_1 = "a"', 'pitch_1: is not in `only`; allowed: "pitch_1" in `only`, or no column'),
+        (
+            'only = ["rotor"]\npitch_1 = "a"',
+            ('pitch_1: is not in `only`; allowed: "pitch_1" in `only`, or no column'),
+        ),
         ('only = ["rotr"]', "is not one of them, perhaps rotor; allowed: a list of rotor"),
         ("rotor", "not TOML"),
     ],
@@ -287,7 +357,9 @@ def test_without_its_package_a_binary_openfast_file_says_how_to_get_it(
 
 
 @pytest.mark.parametrize("name", FORMATS)
-def test_a_reader_that_ends_its_process_is_a_line(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_reader_that_ends_its_process_is_a_line(
+    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """Every format is read apart: here by a library that ends its process when it is loaded."""
     FORMATS[name](tmp_path / name, SCENE, TIME, ANGLES, RATES)
     (tmp_path / "numpy.py").write_text("import os\nos.abort()\n")

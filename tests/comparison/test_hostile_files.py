@@ -1,7 +1,8 @@
 """Files of other programs that are made to harm: each ends in one line, in bounded time and memory.
 
-The files are small, and what they claim is large. That time is bounded is shown by inputs on which an expression that
-is not linear takes hours, beside the reading process's own limit, whose message is another one.
+The files are small, and what they claim is large. That time is bounded is shown by inputs on which
+an expression that is not linear takes hours, beside the reading process's own limit, whose message
+is another one.
 """
 
 from __future__ import annotations
@@ -46,8 +47,12 @@ def refusal_of(path: Path) -> str:
     return line
 
 
-@pytest.mark.parametrize("mark", ["[", "(", " ", "[1,", "/ ", " /", "a [", "[]", "1", "_", "{", '"'])
-def test_a_header_of_marks_takes_time_in_proportion_to_its_length(tmp_path: Path, mark: str) -> None:
+@pytest.mark.parametrize(
+    "mark", ["[", "(", " ", "[1,", "/ ", " /", "a [", "[]", "1", "_", "{", '"']
+)
+def test_a_header_of_marks_takes_time_in_proportion_to_its_length(
+    tmp_path: Path, mark: str
+) -> None:
     """200,000 marks: 4e10 steps where they are compared with each other, some hours."""
     header = mark * (200_000 // len(mark))
     (tmp_path / "data.csv").write_text(f"{header},b\n{ROWS}")
@@ -67,15 +72,21 @@ def test_long_names_are_cut_and_stay_distinct(tmp_path: Path) -> None:
 
 @pytest.mark.full
 def test_a_comparison_with_long_names_is_stored(tmp_path: Path) -> None:
-    """An attribute of an HDF5 file has 64 kB, which 100 names of 200 characters of six bytes are more than."""
+    """An attribute of an HDF5 file has 64 kB, which 100 names of 200 characters of six bytes are
+    more than."""
     names = [f"{number}{'ж' * 300}" for number in range(100)]
     run = rm.run("paper/fig03", "lagrange/dop853")
     columns = dict.fromkeys(names, run.time) | {"time": run.time, "rotor": run.angles[:, 0]}
     text = "\n".join(
-        [";".join(columns), *(";".join(map(repr, row)) for row in np.array([*columns.values()]).T.tolist())]
+        [
+            ";".join(columns),
+            *(";".join(map(repr, row)) for row in np.array([*columns.values()]).T.tolist()),
+        ]
     )
     (tmp_path / "data.csv").write_text(text, encoding="utf-8")
-    compared = rm.compare(tmp_path / "data.csv", "paper/fig03", columns={"omit": ["pitch_1"], "rotor": "rotor"})
+    compared = rm.compare(
+        tmp_path / "data.csv", "paper/fig03", columns={"omit": ["pitch_1"], "rotor": "rotor"}
+    )
     compared.save(tmp_path / "comparison.h5")
 
 
@@ -85,7 +96,9 @@ def test_records_of_json_on_one_line_may_be_of_any_length(tmp_path: Path) -> Non
     assert len(load_data(tmp_path / "data.json", SCENE).time) == 10_000
 
 
-@pytest.mark.parametrize("text", ['{"a":' * 100_000, '{"a": ' + "[" * 100_000 + "]" * 100_000 + "}", '{"a": [[1, [2'])
+@pytest.mark.parametrize(
+    "text", ['{"a":' * 100_000, '{"a": ' + "[" * 100_000 + "]" * 100_000 + "}", '{"a": [[1, [2']
+)
 def test_nested_json_is_one_line(tmp_path: Path, text: str) -> None:
     (tmp_path / "data.json").write_text(text)
     assert "cannot be read" in refusal_of(tmp_path / "data.json")
@@ -93,7 +106,9 @@ def test_nested_json_is_one_line(tmp_path: Path, text: str) -> None:
 
 def _npy_head(shape: tuple[int, ...]) -> bytes:
     file = io.BytesIO()
-    np.lib.format.write_array_header_1_0(file, {"descr": "<f8", "fortran_order": False, "shape": shape})
+    np.lib.format.write_array_header_1_0(
+        file, {"descr": "<f8", "fortran_order": False, "shape": shape}
+    )
     return file.getvalue()
 
 
@@ -150,7 +165,11 @@ def channels_that_claim_more(path: Path) -> None:
 CLAIMS: dict[str, tuple[str, Callable[[Path], None], str]] = {
     "zip": ("data.npz", archive_that_inflates, "its arrays claim 3.0 GB; allowed: up to 0.5 GB"),
     "npy": ("data.npz", archive_whose_array_claims_more, "cannot be read"),
-    "mat": ("data.mat", matlab_array_that_inflates, "its arrays claim 3.0 GB; allowed: up to 0.5 GB"),
+    "mat": (
+        "data.mat",
+        matlab_array_that_inflates,
+        ("its arrays claim 3.0 GB; allowed: up to 0.5 GB"),
+    ),
     "hdf5": ("data.h5", dataset_that_inflates, "its arrays claim 8.0 GB; allowed: up to 0.5 GB"),
     "netcdf3": ("data.nc", variable_that_claims_more, ""),  # refused by SciPy, or by its size
     "outb": ("data.outb", channels_that_claim_more, "fewer numbers than it claims"),
@@ -172,7 +191,9 @@ def test_texts_and_units_of_any_number_are_not_read(tmp_path: Path) -> None:
     with h5py.File(tmp_path / "data.h5", "w") as file:
         file["time"], file["rotor"] = TIME, 2.0 * TIME
         file["rotor"].attrs.create("units", ["deg"] * 4000, dtype=h5py.string_dtype())
-        file.create_dataset("texts", (60_000_000,), h5py.string_dtype(), chunks=(1 << 20,), compression="gzip")
+        file.create_dataset(
+            "texts", (60_000_000,), h5py.string_dtype(), chunks=(1 << 20,), compression="gzip"
+        )
     data = load_data(tmp_path / "data.h5", SCENE)
     assert data.read[1] == "rotor = 'rotor' [rad] (unit assumed)"
 
@@ -184,7 +205,9 @@ def test_arrays_in_other_files_are_not_read(tmp_path: Path, kind: str) -> None:
     with h5py.File(tmp_path / "data.h5", "w") as file:
         file["time"] = TIME
         if kind == "external":
-            file.create_dataset("rotor", (201,), "f8", external=[(str(tmp_path / "other"), 0, h5py.h5f.UNLIMITED)])
+            file.create_dataset(
+                "rotor", (201,), "f8", external=[(str(tmp_path / "other"), 0, h5py.h5f.UNLIMITED)]
+            )
         else:
             layout = h5py.VirtualLayout((201,), "f8")
             layout[:] = h5py.VirtualSource(str(tmp_path / "other"), "rotor", shape=(201,))
@@ -193,7 +216,12 @@ def test_arrays_in_other_files_are_not_read(tmp_path: Path, kind: str) -> None:
 
 
 def test_structures_of_any_size_are_not_read(tmp_path: Path) -> None:
-    content: dict[str, Any] = {"time": TIME, "angles": np.zeros((201, 4)), "s": {"a": {"b": TIME}}, "texts": ["a", "b"]}
+    content: dict[str, Any] = {
+        "time": TIME,
+        "angles": np.zeros((201, 4)),
+        "s": {"a": {"b": TIME}},
+        "texts": ["a", "b"],
+    }
     scipy.io.savemat(tmp_path / "data.mat", content)
     assert load_data(tmp_path / "data.mat", SCENE).columns == [0, 1, 2, 3]
 
@@ -206,7 +234,8 @@ def test_the_number_of_columns_is_bounded(tmp_path: Path) -> None:
 
 
 def test_reading_has_a_limit_of_memory(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Where no check foresees what a library allocates: here 480 MB, less than arrays may have, of 400 MB."""
+    """Where no check foresees what a library allocates: here 480 MB, less than arrays may have, of
+    400 MB."""
     pytest.importorskip("resource")
     monkeypatch.setattr(files, "MEMORY_LIMIT", 400_000_000)
     with zipfile.ZipFile(tmp_path / "data.npz", "w") as archive:
@@ -215,7 +244,9 @@ def test_reading_has_a_limit_of_memory(tmp_path: Path, monkeypatch: pytest.Monke
 
 
 @pytest.mark.parametrize("name", FORMATS)
-def test_reading_has_a_limit_of_time(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_reading_has_a_limit_of_time(
+    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """Every format is read apart: here a library that all of them need does not end."""
     FORMATS[name](tmp_path / name, SCENE, TIME, np.zeros((201, 4)), np.zeros((201, 4)))
     (tmp_path / "numpy.py").write_text("import time\ntime.sleep(600)\n")
@@ -225,7 +256,9 @@ def test_reading_has_a_limit_of_time(name: str, tmp_path: Path, monkeypatch: pyt
         load_data(tmp_path / name, SCENE)
 
 
-@pytest.mark.parametrize("name", ["q[,]", "q[]", "q[9]", "q[1,99999999999]", "q[" + "1" * 5000 + "]", "f" + "1" * 5000])
+@pytest.mark.parametrize(
+    "name", ["q[,]", "q[]", "q[9]", "q[1,99999999999]", "q[" + "1" * 5000 + "]", "f" + "1" * 5000]
+)
 def test_names_with_odd_numbers_are_no_channels(name: str) -> None:
     """Python refuses to read numbers of more than 4,300 digits."""
     assert channel_from_name(name, 4, channels(SCENE)) is None

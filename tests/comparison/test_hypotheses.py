@@ -1,4 +1,5 @@
-"""The search for causes: what explains a difference, which of several is named, and no more than asked is tried."""
+"""The search for causes: what explains a difference, which of several is named, and no more than
+asked is tried."""
 
 from __future__ import annotations
 
@@ -8,7 +9,10 @@ import pytest
 
 from rotor_mbs.comparison.hypotheses import Explanation, Hypothesis, cheapest, closest, explanations
 
-HYPOTHESES = [Hypothesis(f"{left:g}", left, price) for left, price in ((0.5, 2), (0.1, 1), (0.2, 1), (math.nan, 1))]
+HYPOTHESES = [
+    Hypothesis(f"{left:g}", left, price)
+    for left, price in ((0.5, 2), (0.1, 1), (0.2, 1), (math.nan, 1))
+]
 
 
 def left(change: float) -> float:
@@ -22,7 +26,11 @@ def texts(explained: list[Explanation[float]]) -> list[str]:
 def test_what_leaves_no_more_than_is_allowed_explains() -> None:
     assert texts(list(explanations(HYPOTHESES, left, 0.2))) == ["0.1", "0.2"]
     # Without a bound all but what explains nothing.
-    assert texts(list(explanations([*HYPOTHESES, Hypothesis("inf", math.inf)], left))) == ["0.5", "0.1", "0.2"]
+    assert texts(list(explanations([*HYPOTHESES, Hypothesis("inf", math.inf)], left))) == [
+        "0.5",
+        "0.1",
+        "0.2",
+    ]
 
 
 def test_the_first_explanation_ends_the_search() -> None:

@@ -1,6 +1,8 @@
-"""Inputs that were once misread, each with the verdict that it must have; the numbers are a run of this program.
+"""Inputs that were once misread, each with the verdict that it must have; the numbers are a run of
+this program.
 
-Formats are read in this process: that a process of its own does it is shown in test_foreign_files.py.
+Formats are read in this process: that a process of its own does it is shown in
+test_foreign_files.py.
 """
 
 from __future__ import annotations
@@ -31,7 +33,9 @@ Array = Any
 @pytest.fixture(autouse=True)
 def _files_are_read_here(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(
-        comparison_data, "read_table", lambda path, group, scene: read_in_worker((Path(path), group, scene))
+        comparison_data,
+        "read_table",
+        lambda path, group, scene: read_in_worker((Path(path), group, scene)),
     )
 
 
@@ -98,7 +102,9 @@ def packed(path: Path, run: rm.Run, step: float = 1e-8) -> None:
                 # As a processor rounds what does not fit.
                 whole = np.where(np.abs(whole) < 2.0**31, whole, -(2.0**31))
                 file[name] = whole.astype(np.int32)
-                file[name].attrs.update({"scale_factor": [step], "add_offset": [0.25], "units": unit_of(name)})
+                file[name].attrs.update(
+                    {"scale_factor": [step], "add_offset": [0.25], "units": unit_of(name)}
+                )
 
 
 def missing_rows(path: Path, run: rm.Run) -> None:
@@ -129,13 +135,16 @@ def in_degrees(run: rm.Run) -> xr.Dataset:
 
 def matlab(path: Path, run: rm.Run, *, is_struct: bool) -> None:
     arrays = {"t": run.time, "q": run.angles, "qd": run.rates}
-    scipy.io.savemat(path, {"out": arrays} if is_struct else arrays, format="5" if is_struct else "4")
+    scipy.io.savemat(
+        path, {"out": arrays} if is_struct else arrays, format="5" if is_struct else "4"
+    )
 
 
 def solution_of_exudyn(path: Path, run: rm.Run) -> None:
     head = (
         "Exudyn explicit time integration (RK67) solver solution file\n"
-        "number of written coordinates [nODE2, nVel2, nAcc2, nODE1, nVel1, nAlgebraic, nData] = [4,4,4,0,0,0,0]\n"
+        "number of written coordinates [nODE2, nVel2, nAcc2, nODE1, nVel1, nAlgebraic, nData] = "
+        "[4,4,4,0,0,0,0]\n"
     )
     rows = np.column_stack([run.time, run.angles, run.rates, 0.0 * run.rates])
     np.savetxt(path, rows, delimiter=",", header=head, comments="#", fmt="%.17g")
@@ -187,9 +196,13 @@ class Case:
 
 CASES = {
     "single precision": Case("a.npz", lambda p, r: float32(p, r, "angles", "rates")),
-    "single precision, no rates": Case("a.npz", lambda p, r: float32(p, r, "angles"), note="times of single precision"),
+    "single precision, no rates": Case(
+        "a.npz", lambda p, r: float32(p, r, "angles"), note="times of single precision"
+    ),
     "null": Case("a.json", null_rate, refusal="column 'pitch 3 rate' is nan in row 1 of 101"),
-    "derivatives": Case("a.csv", derivatives, "inaccurate", likely="pitch 3 rate: too large by a factor of 1.7"),
+    "derivatives": Case(
+        "a.csv", derivatives, "inaccurate", likely=("pitch 3 rate: too large by a factor of 1.7")
+    ),
     "q from 1": Case("a.csv", lambda p, r: csv(p, named(r, "q[{}]", "qd[{}]", 1))),
     "angles from 1": Case("a.csv", lambda p, r: csv(p, named(r, "angles[{}]", first=1))),
     "two indices": Case("a.csv", lambda p, r: csv(p, named(r, "q[{},1]", first=1))),
@@ -198,7 +211,9 @@ CASES = {
     "the root beside a group": Case("a.h5", root_and_group, columns={"group": "/"}),
     "packed": Case("a.nc", packed),
     "packed, too large": Case(
-        "a.nc", lambda p, r: packed(p, r, 1e-9), refusal="has -2147483648, packed from a number that did not fit"
+        "a.nc",
+        lambda p, r: packed(p, r, 1e-9),
+        refusal=("has -2147483648, packed from a number that did not fit"),
     ),
     "missing rows": Case("a.nc", missing_rows, refusal="column 'rotor' is nan in row 99 of 101"),
     "units in arrays": Case("a.h5", units_in_array),
@@ -207,18 +222,31 @@ CASES = {
     "a struct": Case("a.mat", lambda p, r: matlab(p, r, is_struct=True)),
     "MATLAB 4": Case("a.mat", lambda p, r: matlab(p, r, is_struct=False)),
     "Exudyn's solution": Case("coordinatesSolution.txt", solution_of_exudyn),
-    "stars": Case("a.txt", lambda p, r: fortran(p, r, "*******"), refusal="row 1 (line 2) has '*******', no number"),
+    "stars": Case(
+        "a.txt",
+        lambda p, r: fortran(p, r, "*******"),
+        refusal=("row 1 (line 2) has '*******', no number"),
+    ),
     "three digits": Case("a.txt", lambda p, r: fortran(p, r, "0.123456-101")),
     "events": Case("a.csv", events_at_ends, note="2 rows are there twice"),
     "below zero": Case("a.csv", below_zero),
     "rotor a row late": Case("a.csv", rotor_late, "inaccurate", likely="rotor: a row late"),
     "steps of a solver": Case("a.csv", solver_steps, note="times of 3 decimals"),
-}  # fmt: skip
+}
 # The four that were `ok` and wrong, and one of each further family.
-FAST = {"single precision", "null", "derivatives", "a group beside the root", "packed, too large", "events"}
+FAST = {
+    "single precision",
+    "null",
+    "derivatives",
+    "a group beside the root",
+    "packed, too large",
+    "events",
+}
 
 
-@pytest.mark.parametrize("case", [pytest.param(case, marks=() if case in FAST else pytest.mark.full) for case in CASES])
+@pytest.mark.parametrize(
+    "case", [pytest.param(case, marks=() if case in FAST else pytest.mark.full) for case in CASES]
+)
 def test_an_input_has_its_verdict(case: str, run: rm.Run, tmp_path: Path) -> None:
     expected = CASES[case]
     expected.write(tmp_path / expected.name, run)
@@ -260,7 +288,10 @@ def motion(run: rm.Run, rows: Any) -> dict[str, Array]:
     ("rows", "note"),
     [
         (np.arange(101)[::-1], "the rows are from the end to the start: sorted"),
-        (np.random.default_rng(1).permutation(101), "the rows are not in the order of their times: sorted"),
+        (
+            np.random.default_rng(1).permutation(101),
+            ("the rows are not in the order of their times: sorted"),
+        ),
     ],
 )
 def test_rows_in_any_order_are_sorted_with_a_note(rows: Array, note: str, run: rm.Run) -> None:
@@ -287,9 +318,17 @@ def test_two_rows_at_one_time_are_those_beside_a_jump_of_a_load_or_refused() -> 
     columns["shaft_moment_y"][50] += 1e4  # the load before the jump
     compared = rm.compare(columns, scene)
     assert compared.status == "ok"
-    assert any("before a jump of a load are not compared" in note for note in compared.verdict.notes)
+    assert any(
+        "before a jump of a load are not compared" in note for note in compared.verdict.notes
+    )
     columns["angles"][50, 1] += 1e-3
-    with pytest.raises(rm.InputError, match=r"the time of row 52, 0\.5 s, repeats that of row 51 with other numbers"):
+    with pytest.raises(
+        rm.InputError,
+        match=(
+            r"the time of row 52, 0\.5 s, repeats that of row 51 "
+            r"with other numbers"
+        ),
+    ):
         rm.compare(columns, scene)
     with pytest.raises(rm.InputError, match="repeats that of row 51 with other numbers"):
         rm.compare(motion(run, rows) | {"shaft_moment_y": np.arange(102.0)}, SCENE)
@@ -299,7 +338,8 @@ def test_two_rows_at_one_time_are_those_beside_a_jump_of_a_load_or_refused() -> 
 
 
 def test_a_difference_within_the_tolerance_is_told_with_its_cause() -> None:
-    """Without the Coriolis terms the closed form of fig. 8 is 5e-12 rad off in an interval; the digits say 1e-16."""
+    """Without the Coriolis terms the closed form of fig. 8 is 5e-12 rad off in an interval; the
+    digits say 1e-16."""
     from support import other_code  # late: SciPy's integrators
 
     scene = paper("fig08", duration=2.0, samples=201)
@@ -308,8 +348,12 @@ def test_a_difference_within_the_tolerance_is_told_with_its_cause() -> None:
     angles, _ = other_code.trajectory(scene, time, other_code.Mistakes(coriolis=0.0), **accurate)
     compared = rm.compare({"time": time, "angles": angles}, scene)
     assert compared.status == "ok"
-    assert compared.likely == ("without the Coriolis terms (products of rotor rate and pitch rate)",)
-    assert any("times what the digits of the data explain" in note for note in compared.verdict.notes)
+    assert compared.likely == (
+        ("without the Coriolis terms (products of rotor rate and pitch rate)"),
+    )
+    assert any(
+        "times what the digits of the data explain" in note for note in compared.verdict.notes
+    )
 
 
 @pytest.mark.parametrize("digits", [4, 7, 10, 12, 14, 15, 16])
@@ -319,10 +363,14 @@ def test_right_numbers_of_any_digits_are_not_systematic(digits: int, run: rm.Run
     for rates in ({}, {"rates": exact.rates[:101]}):
         columns = {"time": run.time, "angles": exact.angles[:101]} | rates
         written = {
-            name: np.vectorize(lambda x: float(f"{x:.{digits - 1}e}"))(values) if name != "time" else values
+            name: np.vectorize(lambda x: float(f"{x:.{digits - 1}e}"))(values)
+            if name != "time"
+            else values
             for name, values in columns.items()
         }
         compared = rm.compare(written, SCENE)
         assert compared.status == "ok"
-        assert not any("times what the digits" in note for note in compared.verdict.notes), compared.verdict.notes
+        assert not any("times what the digits" in note for note in compared.verdict.notes), (
+            compared.verdict.notes
+        )
         assert compared.likely == ()

@@ -1,4 +1,5 @@
-"""Mistakes that people make, planted in trajectories of a code of its own: each is named or refused, none is ok."""
+"""Mistakes that people make, planted in trajectories of a code of its own: each is named or
+refused, none is ok."""
 
 from __future__ import annotations
 
@@ -36,8 +37,11 @@ def steps(*rows: tuple[float, float]) -> tuple[tuple[float, float], ...]:
 
 @functools.cache
 def short(name: str) -> Scene:
-    """A shipped scene; "driven": fig. 11 with a torque that jumps; "sprung": that with three different bearings."""
-    shipped = {"driven": "paper/fig11", "sprung": "paper/fig11", "ramped": "paper/fig11"}.get(name, name)
+    """A shipped scene; "driven": fig. 11 with a torque that jumps; "sprung": that with three
+    different bearings."""
+    shipped = {"driven": "paper/fig11", "sprung": "paper/fig11", "ramped": "paper/fig11"}.get(
+        name, name
+    )
     scene = replace(rm.scene(shipped), duration=DURATION, samples=ROWS)
     if name in ("driven", "sprung"):
         scene = replace(scene, rotor_torque=steps((0.5, JUMP)))
@@ -45,7 +49,9 @@ def short(name: str) -> Scene:
         scene = replace(rm.scene("paper/fig11"), duration=DURATION, samples=ROWS)
         return replace(scene, rotor_torque=((0.0, 0.0), (DURATION, JUMP)))
     if name == "sprung":
-        scene = replace(scene, bearing_stiffness=(6e3, 5e3, 8e3), bearing_damping=(300.0, 500.0, 400.0))
+        scene = replace(
+            scene, bearing_stiffness=(6e3, 5e3, 8e3), bearing_damping=(300.0, 500.0, 400.0)
+        )
     return scene
 
 
@@ -82,7 +88,8 @@ def off(number: str, share: float) -> Callable[[Scene], Scene]:
 
 
 def pitched(angle: float) -> Callable[[Scene], Scene]:
-    """Blades whose pitch is counted from where it should be `angle`: the mass point is elsewhere at pitch 0."""
+    """Blades whose pitch is counted from where it should be `angle`: the mass point is elsewhere at
+    pitch 0."""
 
     def changed(scene: Scene) -> Scene:
         x, _, z = scene.blades[0].centre_of_mass
@@ -118,7 +125,9 @@ def noise(size: float) -> Callable[[Array, Array, Array], tuple[Array, Array, Ar
 # Faults at a time
 
 
-def with_row(row: int, angles: int, off: float = 0.0) -> Callable[[Array, Array, Array], tuple[Array, Array, Array]]:
+def with_row(
+    row: int, angles: int, off: float = 0.0
+) -> Callable[[Array, Array, Array], tuple[Array, Array, Array]]:
     """The numbers of a row are those of another, its second pitch off."""
 
     def spoilt(time: Array, q: Array, w: Array) -> tuple[Array, Array, Array]:
@@ -138,7 +147,10 @@ def kicked(time: Array, q: Array, w: Array) -> tuple[Array, Array, Array]:
     """From row 30 on the motion from a rate that is wrong there."""
     start = w[30] + [0.0, 0.0, 1e-3, 0.0]
     after = replace(
-        short("driven"), rotor_torque=steps((0.2, JUMP)), initial_angles=tuple(q[30]), initial_rates=tuple(start)
+        short("driven"),
+        rotor_torque=steps((0.2, JUMP)),
+        initial_angles=tuple(q[30]),
+        initial_rates=tuple(start),
     )
     then, rates = other_code.trajectory(after, time[30:] - time[30])
     return time, np.vstack([q[:30], then]), np.vstack([w[:30], rates])
@@ -163,15 +175,22 @@ def between(degree: int) -> Callable[[Array, Array, Array], tuple[Array, Array, 
 
     def spoilt(time: Array, q: Array, w: Array) -> tuple[Array, Array, Array]:
         knots = slice(0, None, 5)
-        return (time, *(make_interp_spline(time[knots], values[knots], degree)(time) for values in (q, w)))
+        return (
+            time,
+            *(make_interp_spline(time[knots], values[knots], degree)(time) for values in (q, w)),
+        )
 
     return spoilt
 
 
 def interval_means(time: Array, *_: Array) -> tuple[Array, Array, Array]:
     """Of ten samples of the interval before each row."""
-    fine = other_code.trajectory(short("paper/fig11"), np.linspace(0.0, DURATION, 10 * (ROWS - 1) + 1))
-    means = [np.vstack([values[:1], values[1:].reshape(ROWS - 1, 10, 4).mean(axis=1)]) for values in fine]
+    fine = other_code.trajectory(
+        short("paper/fig11"), np.linspace(0.0, DURATION, 10 * (ROWS - 1) + 1)
+    )
+    means = [
+        np.vstack([values[:1], values[1:].reshape(ROWS - 1, 10, 4).mean(axis=1)]) for values in fine
+    ]
     return time, means[0], means[1]
 
 
@@ -199,20 +218,31 @@ THIRD = 2.0 * np.pi / 3.0
 QUARTER = np.array([np.pi / 2.0, 0.0, 0.0, 0.0])
 # Scenes: those in which the mistake changes the motion.
 PLANTS = {
-    "degrees": Plant("degrees taken as rad", spoilt=lambda t, q, w: (t, np.degrees(q), np.degrees(w))),
+    "degrees": Plant(
+        "degrees taken as rad", spoilt=lambda t, q, w: (t, np.degrees(q), np.degrees(w))
+    ),
     "sign of pitch": Plant(
-        "sign reversed", spoilt=lambda t, q, w: (t, q * [1, -1, -1, -1], w * [1, -1, -1, -1]),
+        "sign reversed",
+        spoilt=lambda t, q, w: (t, q * [1, -1, -1, -1], w * [1, -1, -1, -1]),
     ),
     "another zero": Plant("rotor: zero off by 1.5708", spoilt=lambda t, q, w: (t, q + QUARTER, w)),
-    "a factor": Plant("too large by a factor of 1.001", spoilt=lambda t, q, w: (t, 1.001 * q, 1.001 * w)),
-    "blade order": Plant("columns exchanged: pitch 1 is pitch 3", spoilt=columns(0, 3, 1, 2)),
-    "phase": Plant("blades numbered in the opposite sense", mistakes=Mistakes(phases=(0.0, 2.0 * THIRD, THIRD))),
-    "blade 2 a little off": Plant(
-        "azimuth of blade 2 off by +0.05 rad", mistakes=Mistakes(phases=(0.0, THIRD + 0.05, 2.0 * THIRD))
+    "a factor": Plant(
+        "too large by a factor of 1.001", spoilt=lambda t, q, w: (t, 1.001 * q, 1.001 * w)
     ),
-    "no phases": Plant("all blades at the azimuth of blade 1", mistakes=Mistakes(phases=(0.0, 0.0, 0.0))),
+    "blade order": Plant("columns exchanged: pitch 1 is pitch 3", spoilt=columns(0, 3, 1, 2)),
+    "phase": Plant(
+        "blades numbered in the opposite sense", mistakes=Mistakes(phases=(0.0, 2.0 * THIRD, THIRD))
+    ),
+    "blade 2 a little off": Plant(
+        "azimuth of blade 2 off by +0.05 rad",
+        mistakes=Mistakes(phases=(0.0, THIRD + 0.05, 2.0 * THIRD)),
+    ),
+    "no phases": Plant(
+        "all blades at the azimuth of blade 1", mistakes=Mistakes(phases=(0.0, 0.0, 0.0))
+    ),
     "phases in degrees": Plant(
-        "azimuths of the blades in degrees taken as rad", mistakes=Mistakes(phases=(0.0, 120.0, 240.0))
+        "azimuths of the blades in degrees taken as rad",
+        mistakes=Mistakes(phases=(0.0, 120.0, 240.0)),
     ),
     "blade 1 down": Plant(
         "blade 1 at an azimuth of 180 degrees where it is 0",
@@ -221,29 +251,45 @@ PLANTS = {
     "pitch from flat": Plant(
         "pitch angles from another zero: 90 degrees where they are 0", changed=pitched(np.pi / 2.0)
     ),
-    "pitch from the chord": Plant(  # the paper's A and B are its mass point's place: atan2(B, A) is in its pitch zero
-        "zero of the pitch of all blades off by +0.3588 rad", changed=pitched(np.arctan2(0.03, 0.08))
+    # the paper's A and B are its mass point's place: atan2(B, A) is in its pitch zero
+    "pitch from the chord": Plant(
+        "zero of the pitch of all blades off by +0.3588 rad",
+        changed=pitched(np.arctan2(0.03, 0.08)),
     ),
     "gravity": Plant("gravity of 9.81 m/s^2", changed=with_gravity(9.81)),
-    "mass 1 % off, driven": Plant("blade.mass off by +1 %", "paper/fig15-10kNm", changed=off("mass", 0.01)),
+    "mass 1 % off, driven": Plant(
+        "blade.mass off by +1 %", "paper/fig15-10kNm", changed=off("mass", 0.01)
+    ),
     "c 1 % off": Plant("blade.centre_of_mass[0] off by +1 %", changed=off("offset", 0.01)),
     "missing Coriolis": Plant("without the Coriolis terms", mistakes=Mistakes(coriolis=0.0)),
     "E1": Plant("erratum E1 of", mistakes=Mistakes(e1=True)),
     "E2": Plant("erratum E2 of", mistakes=Mistakes(e2=True)),
-    "as printed": Plant("erratum E1 and E2 and E3 of", mistakes=Mistakes(e1=True, e2=True, e3=True)),
+    "as printed": Plant(
+        "erratum E1 and E2 and E3 of", mistakes=Mistakes(e1=True, e2=True, e3=True)
+    ),
     "one sample late": Plant(
         "a constant lag of 0.01 s, 1 rows (late)",
         spoilt=lambda t, q, w: (t, np.vstack([q[:1], q[:-1]]), np.vstack([w[:1], w[:-1]])),
     ),
-    "half a sample late": Plant("a constant lag of 0.005 s (late)", spoilt=lambda t, q, w: (t + 0.005, q, w)),
+    "half a sample late": Plant(
+        "a constant lag of 0.005 s (late)", spoilt=lambda t, q, w: (t + 0.005, q, w)
+    ),
     "time in ms": Plant("time in ms taken as s", spoilt=lambda t, q, w: (1e3 * t, q, w)),
-    "numbers of rows": Plant("row numbers taken as s", spoilt=lambda t, q, w: (np.arange(1.0 * len(t)), q, w)),
-    "wrapped": Plant("wrapped, taken as unwrapped", "paper/fig12", spoilt=lambda t, q, w: (t, wrapped(q), w)),
+    "numbers of rows": Plant(
+        "row numbers taken as s", spoilt=lambda t, q, w: (np.arange(1.0 * len(t)), q, w)
+    ),
+    "wrapped": Plant(
+        "wrapped, taken as unwrapped", "paper/fig12", spoilt=lambda t, q, w: (t, wrapped(q), w)
+    ),
     "rates as angles": Plant(
-        "rotor is rotor rate, pitch 1 is pitch 1 rate", with_rates=False, spoilt=lambda t, q, w: (t, w, q)
+        "rotor is rotor rate, pitch 1 is pitch 1 rate",
+        with_rates=False,
+        spoilt=lambda t, q, w: (t, w, q),
     ),
     "noise": Plant("scatter from row to row, standard deviation 1", spoilt=noise(1e-4)),
-    "truncated": Plant("the data end at t = 1.49 s of 2 s", spoilt=lambda t, q, w: (t[:150], q[:150], w[:150])),
+    "truncated": Plant(
+        "the data end at t = 1.49 s of 2 s", spoilt=lambda t, q, w: (t[:150], q[:150], w[:150])
+    ),
     "late": Plant("begin at t = 0.6 s", spoilt=lambda t, q, w: (t[60:], q[60:], w[60:])),
     "another scene": Plant("the scene paper/fig09", changed=lambda _: short("paper/fig09")),
     "from the end, rates turned": Plant(
@@ -251,39 +297,59 @@ PLANTS = {
         spoilt=lambda t, q, w: (t, q[::-1], -w[::-1]),
     ),
     "a second late": Plant("`offset = -1` of the time", spoilt=lambda t, q, w: (t + 1.0, q, w)),
-    "a stuck row": Plant("a stuck row, or one at a wrong time: row 41, t = 0.4 s", "driven", spoilt=with_row(40, 39)),
-    "an outlier": Plant("a single wrong row: row 41, t = 0.4 s", "driven", spoilt=with_row(40, 40, 1e-3)),
+    "a stuck row": Plant(
+        "a stuck row, or one at a wrong time: row 41, t = 0.4 s", "driven", spoilt=with_row(40, 39)
+    ),
+    "an outlier": Plant(
+        "a single wrong row: row 41, t = 0.4 s", "driven", spoilt=with_row(40, 40, 1e-3)
+    ),
     "a row repeated": Plant(
-        "a row repeated, or times late by less than an interval, at t = 0.31 s", "driven",
+        "a row repeated, or times late by less than an interval, at t = 0.31 s",
+        "driven",
         spoilt=rows(*range(31), *range(30, 200)),
     ),
     "a clock that goes on": Plant(
-        "a row repeated, or times late by less than an interval, at t = 0.314 s", "driven",
+        "a row repeated, or times late by less than an interval, at t = 0.314 s",
+        "driven",
         spoilt=lambda t, q, w: (t + 0.004 * (np.arange(ROWS) > 30), q, w),
     ),
     "a row left out": Plant(
-        "a row omitted and the others renumbered, or times early by less than an interval, at t = 0.31 s", "driven",
+        (
+            "a row omitted and the others renumbered, or times early by less than an interval, at "
+            "t = 0.31 s"
+        ),
+        "driven",
         spoilt=rows(*range(31), *range(32, 101)),
     ),
-    "a wrong rate": Plant("a jump of rates, or a load of one interval, before t = 0.3 s", "driven", spoilt=kicked),
+    "a wrong rate": Plant(
+        "a jump of rates, or a load of one interval, before t = 0.3 s", "driven", spoilt=kicked
+    ),
     "a load of an interval": Plant(
-        "a jump of rates, or a load of one interval, before t = 0.31 s", "driven",
+        "a jump of rates, or a load of one interval, before t = 0.31 s",
+        "driven",
         changed=driven((0.3, JUMP), (0.31, 0.0), (0.5, JUMP)),
     ),
     "a late edge": Plant(
-        "the load on the rotor jumps a row late at t = 0.5 s, or has a wrong value in this row", "driven",
+        "the load on the rotor jumps a row late at t = 0.5 s, or has a wrong value in this row",
+        "driven",
         changed=driven((0.51, JUMP)),
     ),
     "smoothed over three rows": Plant(
-        "the load on the rotor is smoothed over its jump at t = 0.5 s", "driven",
+        "the load on the rotor is smoothed over its jump at t = 0.5 s",
+        "driven",
         changed=driven((0.49, JUMP / 3.0), (0.5, 2.0 * JUMP / 3.0), (0.51, JUMP)),
     ),
     "missing": Plant(
-        "a load that is wrong or missing from t = 0.7 to 0.8 s: on average -5e+04 N m on the rotor", "driven",
+        "a load that is wrong or missing from t = 0.7 to 0.8 s: on average -5e+04 N m on the rotor",
+        "driven",
         changed=driven((0.5, JUMP), (0.7, 0.0), (0.8, JUMP)),
     ),
     "two loads at once": Plant(
-        "wrong or missing from t = 0.7 to 0.8 s: on average +5e+04 N m on the rotor and +100 N m on the pitch 3",
+        (
+            "wrong or missing from t = 0.7 to 0.8 s: on average +5e+04 N m on the rotor and "
+            "+100 N m "
+            "on the pitch 3"
+        ),
         "driven",
         changed=lambda scene: replace(
             driven((0.5, JUMP), (0.7, 2.0 * JUMP), (0.8, JUMP))(scene),
@@ -291,16 +357,21 @@ PLANTS = {
         ),
     ),
     "damping of one bearing": Plant(
-        "bearing.damping[0] off by +10 % (uncertainty ", "sprung",
+        "bearing.damping[0] off by +10 % (uncertainty ",
+        "sprung",
         changed=lambda scene: replace(scene, bearing_damping=(330.0, 500.0, 400.0)),
     ),
     "bearings exchanged": Plant(
-        "bearing.damping of blades 1 and 2 exchanged", "sprung",
+        "bearing.damping of blades 1 and 2 exchanged",
+        "sprung",
         changed=lambda scene: replace(scene, bearing_damping=(500.0, 300.0, 400.0)),
     ),
-    "c of a blade reversed": Plant("blade[1].centre_of_mass[0] with opposite sign", changed=reversed_c),
+    "c of a blade reversed": Plant(
+        "blade[1].centre_of_mass[0] with opposite sign", changed=reversed_c
+    ),
     "rest angle": Plant(
-        "bearing.rest off by -0.1 rad (uncertainty ", "sprung",
+        "bearing.rest off by -0.1 rad (uncertainty ",
+        "sprung",
         changed=lambda scene: replace(scene, bearing_rest=(((0.0, -0.1),),) * 3),
     ),
     "central differences": Plant(
@@ -311,7 +382,9 @@ PLANTS = {
         "the mean over the interval before each row",
         spoilt=lambda t, q, w: (t, q, np.vstack([w[:1], np.diff(q, axis=0) / np.diff(t)[:, None]])),
     ),
-    "rates a row late": Plant("pitch 3 rate: a row late", spoilt=lambda t, q, w: (t, q, late(w, 0, 1, 2, 3))),
+    "rates a row late": Plant(
+        "pitch 3 rate: a row late", spoilt=lambda t, q, w: (t, q, late(w, 0, 1, 2, 3))
+    ),
     "rotor a row late": Plant("rotor: a row late", spoilt=lambda t, q, w: (t, late(q, 0), w)),
     "rows held": Plant(
         "every row is held for 5 rows",
@@ -319,19 +392,41 @@ PLANTS = {
     ),
     "interpolated": Plant("interpolated linearly between every 5 rows", spoilt=between(1)),
     "a spline": Plant("interpolated by a cubic spline between every 5 rows", spoilt=between(3)),
-    "moving average": Plant("mean of 5 rows around each row", spoilt=lambda *arrays: averaged(*arrays)),
-    "averaged and decimated": Plant("mean of 10 samples of the interval before each row", spoilt=interval_means),
-    "encoder": Plant("rounded to steps of 0.00153398 rad, 4096 a turn", spoilt=lambda t, q, w: (t, in_steps(q), w)),
-    "half precision": Plant("numbers of half precision", spoilt=lambda t, q, w: (t, half(q), half(w))),
+    "moving average": Plant(
+        "mean of 5 rows around each row", spoilt=lambda *arrays: averaged(*arrays)
+    ),
+    "averaged and decimated": Plant(
+        "mean of 10 samples of the interval before each row", spoilt=interval_means
+    ),
+    "encoder": Plant(
+        "rounded to steps of 0.00153398 rad, 4096 a turn",
+        spoilt=lambda t, q, w: (t, in_steps(q), w),
+    ),
+    "half precision": Plant(
+        "numbers of half precision", spoilt=lambda t, q, w: (t, half(q), half(w))
+    ),
     "a fast clock": Plant("a clock that is 0.1 % fast", spoilt=lambda t, q, w: (1.001 * t, q, w)),
-    "a clock of single precision": Plant("times are sums of 0.01 s in single precision", spoilt=single_clock),
+    "a clock of single precision": Plant(
+        "times are sums of 0.01 s in single precision", spoilt=single_clock
+    ),
     "loads held": Plant("loads held from each row to the next", "ramped", changed=held_ramp),
     "gravity and c": Plant(
-        "gravity off by -1 % (uncertainty", changed=lambda scene: off("offset", 0.01)(off("gravity", -0.01)(scene))
+        "gravity off by -1 % (uncertainty",
+        changed=lambda scene: off("offset", 0.01)(off("gravity", -0.01)(scene)),
     ),
-}  # fmt: skip
-# One of each kind: in the columns, in time, in the scene, at a time. The others carry the mark full.
-FAST = {"rotor a row late", "rows held", "degrees", "blade order", "truncated", "one sample late", "gravity", "missing"}
+}
+# One of each kind: in the columns, in time, in the scene, at a time. The others carry the mark
+# full.
+FAST = {
+    "rotor a row late",
+    "rows held",
+    "degrees",
+    "blade order",
+    "truncated",
+    "one sample late",
+    "gravity",
+    "missing",
+}
 
 
 @pytest.mark.parametrize(
@@ -341,12 +436,18 @@ def test_a_mistake_is_named(name: str) -> None:
     plant = PLANTS[name]
     comparison = rm.compare(plant.data(), short(plant.scene))
     assert comparison.status != "ok"
-    assert any(plant.says in text for text in (comparison.message, *comparison.likely)), comparison.likely
+    assert any(plant.says in text for text in (comparison.message, *comparison.likely)), (
+        comparison.likely
+    )
 
 
 def test_what_is_within_the_tolerance_but_not_random_is_named() -> None:
-    """A mass that the motion cannot tell from a torque: both are named, also where the tolerance allows it."""
-    data, scene = Plant("", "paper/fig15-10kNm", changed=off("mass", 0.01)).data(), short("paper/fig15-10kNm")
+    """A mass that the motion cannot tell from a torque: both are named, also where the tolerance
+    allows it."""
+    data, scene = (
+        Plant("", "paper/fig15-10kNm", changed=off("mass", 0.01)).data(),
+        short("paper/fig15-10kNm"),
+    )
     comparison = rm.compare(data, scene, tolerance=1e-3)
     assert comparison.status == "ok"
     for cause in ("blade.mass off by +1 %", "torque.rotor off by -0.9901 %"):
@@ -360,7 +461,9 @@ def test_data_of_another_time_are_refused() -> None:
     with pytest.raises(rm.InputError, match="`offset = -10` of the time"):
         rm.compare(late, short("paper/fig11"))
     found = rm.compare(PLANTS["time in ms"].data(), short("paper/fig11"))
-    assert found.message.startswith(f"1 of {ROWS} rows within the 2 s of paper/fig11; is the time in s? ")
+    assert found.message.startswith(
+        f"1 of {ROWS} rows within the 2 s of paper/fig11; is the time in s? "
+    )
 
 
 @pytest.mark.parametrize("scene", ["paper/fig11", "check/general"])
@@ -370,8 +473,12 @@ def test_a_true_run_with_the_noise_of_rounding_is_ok(scene: str) -> None:
 
 
 def averaged(time: Array, *arrays: Array) -> tuple[Array, Array, Array]:
-    """A filter leaves the first and the last two rows as they were: the largest defects are there."""
-    angles, rates = (np.vstack([a[:2], sum(a[i : len(a) - 4 + i] for i in range(5)) / 5.0, a[-2:]]) for a in arrays)
+    """A filter leaves the first and the last two rows as they were: the largest defects are
+    there."""
+    angles, rates = (
+        np.vstack([a[:2], sum(a[i : len(a) - 4 + i] for i in range(5)) / 5.0, a[-2:]])
+        for a in arrays
+    )
     return time, angles, rates
 
 
@@ -383,10 +490,16 @@ WRONG_IN_ALL_ROWS = {
 
 
 @pytest.mark.parametrize(
-    "name", [pytest.param(one, marks=() if one == "averaged" else pytest.mark.full) for one in WRONG_IN_ALL_ROWS]
+    "name",
+    [
+        pytest.param(one, marks=() if one == "averaged" else pytest.mark.full)
+        for one in WRONG_IN_ALL_ROWS
+    ],
 )
 def test_what_is_wrong_in_all_rows_is_no_fault_at_a_time(name: str) -> None:
-    comparison = rm.compare(Plant("", "driven", spoilt=WRONG_IN_ALL_ROWS[name]).data(), short("driven"))
+    comparison = rm.compare(
+        Plant("", "driven", spoilt=WRONG_IN_ALL_ROWS[name]).data(), short("driven")
+    )
     assert comparison.status == "inaccurate"
     assert not any(" t = " in text for text in comparison.likely), comparison.likely
 

@@ -1,4 +1,5 @@
-"""The same numbers have the same verdict, whatever names, formats, precision, units and order of rows they have."""
+"""The same numbers have the same verdict, whatever names, formats, precision, units and order of
+rows they have."""
 
 from __future__ import annotations
 
@@ -19,12 +20,18 @@ WRONG = 1.05  # factor of angles and rates of the first pitch
 
 
 @pytest.mark.parametrize(
-    "seeds", [range(25), pytest.param(range(25, 2025), marks=pytest.mark.nightly, id="2000")], ids=["25", None]
+    "seeds",
+    [range(25), pytest.param(range(25, 2025), marks=pytest.mark.nightly, id="2000")],
+    ids=["25", None],
 )
-def test_the_same_numbers_have_the_same_verdict(seeds: range, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_same_numbers_have_the_same_verdict(
+    seeds: range, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """Read in this process: a process for each file would take most of the time."""
     monkeypatch.setattr(
-        comparison_data, "read_table", lambda path, group, scene: read_in_worker((Path(path), group, scene))
+        comparison_data,
+        "read_table",
+        lambda path, group, scene: read_in_worker((Path(path), group, scene)),
     )
     exact = references.reference("paper/fig11")
     time, angles, rates = exact.time[:31], exact.angles[:31], exact.rates[:31]
@@ -32,7 +39,9 @@ def test_the_same_numbers_have_the_same_verdict(seeds: range, tmp_path: Path, mo
     for seed in seeds:
         is_wrong, has_rates = seed % 3 == 0, seed % 4 != 1
         factor = np.where(is_wrong, [1.0, WRONG, 1.0, 1.0], 1.0)
-        table = random_table(tmp_path, seed, time, angles * factor, rates * factor if has_rates else None)
+        table = random_table(
+            tmp_path, seed, time, angles * factor, rates * factor if has_rates else None
+        )
         try:
             compared = rm.compare(table.data, SCENE)
         except rm.InputError as exc:
@@ -49,5 +58,8 @@ def test_the_same_numbers_have_the_same_verdict(seeds: range, tmp_path: Path, mo
         else:
             is_as_expected &= not verdict.likely
         if not is_as_expected:
-            problems.append(f"{table.text}: {verdict.status} {verdict.message} {verdict.likely} {dict(verdict.unused)}")
+            problems.append(
+                f"{table.text}: {verdict.status} {verdict.message} {verdict.likely} "
+                f"{dict(verdict.unused)}"
+            )
     assert problems == []

@@ -1,5 +1,5 @@
-"""Calls of the API from threads, a running event loop and daemonic processes: the answer of the same call made alone,
-or the line of an InputError.
+"""Calls of the API from threads, a running event loop and daemonic processes: the answer of the
+same call made alone, or the line of an InputError.
 
 The long form (100 calls in each way): `pytest -m nightly tests/fuzz/test_calls.py`.
 """
@@ -19,7 +19,8 @@ import rotor_mbs as rm
 from rotor_mbs.errors import InputError
 from rotor_mbs.scenario.scene import Scene
 
-# Not Radau: its answer differed once between two processes, by what is not known; its steps solve equations by LAPACK.
+# Not Radau: its answer differed once between two processes, by what is not known; its steps solve
+# equations by LAPACK.
 METHOD, OTHER = "lagrange/dop853", "lagrange/ode45"
 
 
@@ -31,12 +32,19 @@ def scene(number: int) -> Scene:
 
 def swept(number: int, **options: object) -> rm.Runs:
     values = (0.1 * i for i in range(number % 3 + 1))
-    return rm.sweep(scene(number), {"initial.angles[1]": values}, methods=[METHOD], samples=3, **options)
+    return rm.sweep(
+        scene(number), {"initial.angles[1]": values}, methods=[METHOD], samples=3, **options
+    )
 
 
 def compared(number: int) -> dict[str, rm.Run]:
     run = rm.run(scene(number), METHOD)
-    assert rm.compare({"time": run.time, "angles": run.angles, "rates": run.rates}, scene(number)).status == "ok"
+    assert (
+        rm.compare(
+            {"time": run.time, "angles": run.angles, "rates": run.rates}, scene(number)
+        ).status
+        == "ok"
+    )
     return {METHOD: run}
 
 
@@ -56,7 +64,9 @@ def answer(number: int) -> str:
     """The digest of what a call returns, or its line."""
     name = list(CALLS)[number % len(CALLS)]
     try:
-        runs = [(label, run.status, run.angles.tobytes()) for label, run in CALLS[name](number).items()]
+        runs = [
+            (label, run.status, run.angles.tobytes()) for label, run in CALLS[name](number).items()
+        ]
         return f"{name}: {hashlib.sha256(repr(runs).encode()).hexdigest()}"
     except InputError as error:
         return f"{name}: {error}"
@@ -68,7 +78,8 @@ async def _in_loop(number: int) -> str:
 
 
 @pytest.mark.parametrize(
-    "count", [pytest.param(24, marks=pytest.mark.full), pytest.param(100, marks=pytest.mark.nightly)]
+    "count",
+    [pytest.param(24, marks=pytest.mark.full), pytest.param(100, marks=pytest.mark.nightly)],
 )
 def test_a_call_has_its_own_answer_wherever_it_is_made(count: int) -> None:
     alone = [answer(number) for number in range(count)]

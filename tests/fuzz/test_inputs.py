@@ -1,5 +1,6 @@
-"""Damaged files, this program's and others, and random scenes: a verdict or a line, never a crash, a hang or a wrong
-value. The long form (1,000 files, 10,000 scenes): `pytest -m nightly tests/fuzz/test_inputs.py`."""
+"""Damaged files, this program's and others, and random scenes: a verdict or a line, never a crash,
+a hang or a wrong value. The long form (1,000 files, 10,000 scenes): `pytest -m nightly
+tests/fuzz/test_inputs.py`."""
 
 from __future__ import annotations
 
@@ -27,17 +28,58 @@ from rotor_mbs.scenario.sweep import load_sweep
 from rotor_mbs.studies.run import run_scenes
 
 METHOD = "lagrange/dop853"
-SWEEP = f'title = "s"\nscene = "a.toml"\nmethods = ["{METHOD}"]\n[[axis]]\nkey = "gravity"\nvalues = [9.7, 9.8]\n'
+SWEEP = (
+    f'title = "s"\nscene = "a.toml"\nmethods = ["{METHOD}"]\n[[axis]]\nkey = '
+    '"gravity"\nvalues = [9.7, 9.8]\n'
+)
 OWN = ("results.h5", "sweep.h5")
 FOREIGN = tuple(FORMATS)
-# What a word of a text file may be replaced by: not numbers, numbers that are hard to hold, names with odd indices.
+# What a word of a text file may be replaced by: not numbers, numbers that are hard to hold, names
+# with odd indices.
 ODD_WORDS = (
-    "nan", "-inf", "1e999", "1e308", "5e-324", "-1e308", "", "x", "1" * 5000, "0x10", "1_000", "12:00", "****",
+    "nan",
+    "-inf",
+    "1e999",
+    "1e308",
+    "5e-324",
+    "-1e308",
+    "",
+    "x",
+    "1" * 5000,
+    "0x10",
+    "1_000",
+    "12:00",
+    "****",
     "0.12-101",
-    '"', "'", "[", "{", "[1, 2]", "null", "true", ",", ";", "\t", "\n", "\x00", "\u2028", "é", "time", "t / s", "speed",
-    "f1", "f" + "9" * 5000, "q[0]", "q[,]", "q[9]", "q[0,1]", "rotor [deg]", "rotor [", "RootMxb1",
-)  # fmt: skip
-_EDGE = 8192  # bytes at both ends: most of a large file is arrays, descriptions are at its beginning and its end
+    '"',
+    "'",
+    "[",
+    "{",
+    "[1, 2]",
+    "null",
+    "true",
+    ",",
+    ";",
+    "\t",
+    "\n",
+    "\x00",
+    "\u2028",
+    "é",
+    "time",
+    "t / s",
+    "speed",
+    "f1",
+    "f" + "9" * 5000,
+    "q[0]",
+    "q[,]",
+    "q[9]",
+    "q[0,1]",
+    "rotor [deg]",
+    "rotor [",
+    "RootMxb1",
+)
+# bytes at both ends: most of a large file is arrays, descriptions are at its beginning and its end
+_EDGE = 8192
 _LIMIT_S = 120.0  # for one file
 
 
@@ -46,7 +88,11 @@ def damaged(content: bytes, seed: int) -> bytes:
     chance, changed = random.Random(seed), bytearray(content)
     edge = min(_EDGE, len(changed))
     place = chance.choice(
-        [chance.randrange(len(changed)), chance.randrange(edge), len(changed) - 1 - chance.randrange(edge)]
+        [
+            chance.randrange(len(changed)),
+            chance.randrange(edge),
+            len(changed) - 1 - chance.randrange(edge),
+        ]
     )
     kind = chance.choice(["bit", "bit", "bit", "bit", "bits", "piece", "cut"])
     if kind == "cut":
@@ -62,7 +108,8 @@ def damaged(content: bytes, seed: int) -> bytes:
 
 
 def edited(text: str, seed: int) -> str:
-    """With some words replaced by odd ones; of some files also the first line gone, twice, or joined with the next."""
+    """With some words replaced by odd ones; of some files also the first line gone, twice, or
+    joined with the next."""
     chance = random.Random(seed)
     words = re.split(r"([ ,\t\n:\[\]{}]+)", text)
     near_head = min(40, len(words))
@@ -112,10 +159,15 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     run = rm.run(scene, METHOD)
     for name in FOREIGN:
         FORMATS[name](folder / name, scene, run.time, run.angles, run.rates)
-    rows = [{"time": t, "q": q.tolist()} for t, q in zip(run.time.tolist(), run.angles, strict=True)]
+    rows = [
+        {"time": t, "q": q.tolist()} for t, q in zip(run.time.tolist(), run.angles, strict=True)
+    ]
     write(folder / "rows.jsonl", "\n".join(map(json.dumps, rows)))
     vectors = [f"{row['time']},{' '.join(map(repr, row['q']))}" for row in rows]
-    write(folder / "vectors.csv", "\n".join(["time,q", *vectors, "This file was closed on 19-Oct-2018."]))
+    write(
+        folder / "vectors.csv",
+        "\n".join(["time,q", *vectors, ("This file was closed on 19-Oct-2018.")]),
+    )
     return folder
 
 
@@ -146,7 +198,9 @@ def test_a_damaged_file_of_another_program(name: str, count: int, folder: Path) 
 
 @pytest.mark.parametrize("count", [1, pytest.param(100, marks=pytest.mark.nightly)])
 @pytest.mark.parametrize("name", FOREIGN)
-def test_a_damaged_file_of_another_program_is_data_or_one_line(name: str, count: int, folder: Path) -> None:
+def test_a_damaged_file_of_another_program_is_data_or_one_line(
+    name: str, count: int, folder: Path
+) -> None:
     """As far as its channels: without the comparison."""
     scene, broken = paper("fig11"), folder / f"broken-{name}"
 
@@ -159,10 +213,14 @@ def test_a_damaged_file_of_another_program_is_data_or_one_line(name: str, count:
 
 @pytest.mark.parametrize("count", [150, pytest.param(10_000, marks=pytest.mark.nightly)])
 @pytest.mark.parametrize(
-    "name", ["data.csv", "data.txt", "sensor.txt", "data.out", "data.json", "rows.jsonl", "vectors.csv"]
+    "name",
+    ["data.csv", "data.txt", "sensor.txt", "data.out", "data.json", "rows.jsonl", "vectors.csv"],
 )
-def test_edited_text_of_another_program_is_data_or_refused(name: str, count: int, folder: Path) -> None:
-    """Read in this process: what is raised there is one line of the reading process (tests/comparison)."""
+def test_edited_text_of_another_program_is_data_or_refused(
+    name: str, count: int, folder: Path
+) -> None:
+    """Read in this process: what is raised there is one line of the reading process
+    (tests/comparison)."""
     scene, broken = paper("fig11"), folder / f"edited-{name}"
     text = (folder / name).read_text()
 
@@ -170,7 +228,14 @@ def test_edited_text_of_another_program_is_data_or_refused(name: str, count: int
         broken.write_text(edited(text, seed), encoding="utf-8")
         try:
             table = read_columns(broken, "", "")
-        except (RotorError, ValueError, TypeError, AttributeError, csv.Error, RecursionError) as refusal:
+        except (
+            RotorError,
+            ValueError,
+            TypeError,
+            AttributeError,
+            csv.Error,
+            RecursionError,
+        ) as refusal:
             return [f"refused: {type(refusal).__name__}"]
         return [outcome_of_call(lambda: str(data_of_table(table, scene).is_modes))]
 
@@ -179,12 +244,20 @@ def test_edited_text_of_another_program_is_data_or_refused(name: str, count: int
 
 # Random scenes
 
-METHODS = ("lagrange/dop853", "lagrange/radau", "exudyn_tree/rk44", "exudyn_tree/dopri5", "printed/ode45", "mujoco/rk4")
+METHODS = (
+    "lagrange/dop853",
+    "lagrange/radau",
+    "exudyn_tree/rk44",
+    "exudyn_tree/dopri5",
+    "printed/ode45",
+    "mujoco/rk4",
+)
 METHODS += ("exudyn_chain/generalized_alpha", "lagrange/ode45")
 
 
 @pytest.mark.parametrize(
-    "count", [pytest.param(40, marks=pytest.mark.full), pytest.param(10_000, marks=pytest.mark.nightly)]
+    "count",
+    [pytest.param(40, marks=pytest.mark.full), pytest.param(10_000, marks=pytest.mark.nightly)],
 )
 def test_random_scenes(tmp_path: Path, count: int) -> None:
     """Shown, and run by one method: nothing but a status, or a refusal with its reason."""
@@ -196,7 +269,8 @@ def test_random_scenes(tmp_path: Path, count: int) -> None:
         def run() -> str:
             scene = parse_scene(path.read_text(), "scene")
             run = rm.run(scene, METHODS[seed % len(METHODS)], timeout=0.2)
-            assert "Error: " not in run.message, run.message  # an exception of the code in place of a reason
+            # an exception of the code in place of a reason
+            assert "Error: " not in run.message, run.message
             return run.status
 
         return [shown, outcome_of_call(run)]

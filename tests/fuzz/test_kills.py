@@ -1,6 +1,8 @@
-"""Commands and their workers, ended by a signal at random moments: nothing lost, nothing left behind.
+"""Commands and their workers, ended by a signal at random moments: nothing lost, nothing left
+behind.
 
-The long form (200 signals over all commands below, about 25 minutes): `pytest -m nightly tests/fuzz/test_kills.py`.
+The long form (200 signals over all commands below, about 25 minutes): `pytest -m nightly
+tests/fuzz/test_kills.py`.
 """
 
 from __future__ import annotations
@@ -29,7 +31,8 @@ pytestmark = [
 ]
 
 SWEEP = (
-    'title = "s"\nscene = "a.toml"\n[[axis]]\nkey = "initial.angles[1]"\nlinear = {start = 0, end = 0.1, count = 100}\n'
+    'title = "s"\nscene = "a.toml"\n[[axis]]\nkey = "initial.angles[1]"\nlinear = {start = 0, end '
+    "= 0.1, count = 100}\n"
 )
 # A limit that no run of a loaded machine reaches.
 METHODS, LIMIT = "-m lagrange/dop853 -m exudyn_tree/rk67", "--timeout 1000"
@@ -61,16 +64,21 @@ def prepare(folder: Path) -> None:
 
 
 def finish(folder: Path, command: str) -> None:
-    done = subprocess.run([*PROGRAM, *command.split()], cwd=folder, capture_output=True, text=True, check=False)
+    done = subprocess.run(
+        [*PROGRAM, *command.split()], cwd=folder, capture_output=True, text=True, check=False
+    )
     assert done.returncode == 0, done.stderr[-500:]
 
 
 def processes_of(mark: str) -> dict[int, str]:
-    """Command line by number of the processes that have this mark in their environment: started by one another."""
+    """Command line by number of the processes that have this mark in their environment: started by
+    one another."""
     found = {}
     for place in Path("/proc").glob("[0-9]*"):
         try:
-            is_marked = f"ROTOR_MBS_FUZZ={mark}".encode() in (place / "environ").read_bytes().split(b"\0")
+            is_marked = f"ROTOR_MBS_FUZZ={mark}".encode() in (place / "environ").read_bytes().split(
+                b"\0"
+            )
             state = (place / "stat").read_text().rpartition(")")[2].split()[0]
             if is_marked and state != "Z":
                 found[int(place.name)] = (place / "cmdline").read_text().replace("\0", " ")
@@ -80,24 +88,31 @@ def processes_of(mark: str) -> dict[int, str]:
 
 
 def end_once(folder: Path, name: str, chance: random.Random) -> bool:
-    """The command, ended by a signal at a random moment, and what must hold then; whether it has done all.
+    """The command, ended by a signal at a random moment, and what must hold then; whether it has
+    done all.
 
-    Every fourth signal is a kill of one of its workers: the command then ends by itself, with 1 and a line on what is
-    not computed where that worker had taken a task.
+    Every fourth signal is a kill of one of its workers: the command then ends by itself, with 1 and
+    a line on what is not computed where that worker had taken a task.
     """
     before, stored = temporaries(folder), stored_runs(folder / OUTPUTS["sweep"])
     mark, number = uuid.UUID(int=chance.getrandbits(128)).hex, chance.choice(SIGNALS)
     hits_worker = chance.random() < 0.25
     with (folder / "log").open("wb") as log:
         process = subprocess.Popen(
-            [*PROGRAM, *COMMANDS[name].split()], cwd=folder, env=os.environ | {"ROTOR_MBS_FUZZ": mark},
-            stdout=log, stderr=log, start_new_session=True,
-        )  # fmt: skip
+            [*PROGRAM, *COMMANDS[name].split()],
+            cwd=folder,
+            env=os.environ | {"ROTOR_MBS_FUZZ": mark},
+            stdout=log,
+            stderr=log,
+            start_new_session=True,
+        )
     hit = False
     try:
         process.wait(chance.uniform(0.05, LATEST_SIGNAL_S[name]))
     except subprocess.TimeoutExpired:
-        workers = sorted(number for number, line in processes_of(mark).items() if "import serve" in line)
+        workers = sorted(
+            number for number, line in processes_of(mark).items() if "import serve" in line
+        )
         if not hits_worker:
             process.send_signal(number)
         elif workers:
@@ -105,8 +120,9 @@ def end_once(folder: Path, name: str, chance: random.Random) -> bool:
                 os.kill(chance.choice(workers), signal.SIGKILL)
                 hit = True
     status, printed = process.wait(300.0), (folder / "log").read_text()
-    # 130 in order; -number before Python has started, and always for SIGKILL. `python -m` itself makes an end by SIGINT
-    # of a 130 where the interrupt passed through generated code (a dataclass that is loaded): 130 for a shell.
+    # 130 in order; -number before Python has started, and always for SIGKILL. `python -m` itself
+    # makes an end by SIGINT of a 130 where the interrupt passed through generated code (a dataclass
+    # that is loaded): 130 for a shell.
     allowed = (0, 1) if hit else (0,) if hits_worker else (0, 130, -signal.SIGINT, -number)
     assert status in allowed, (name, number, hit, status, printed[-500:])
     assert "Traceback" not in printed or status < 0, (name, number, hit, printed[-2000:])
@@ -116,9 +132,12 @@ def end_once(folder: Path, name: str, chance: random.Random) -> bool:
     assert not left, (name, number, left)
     assert stored_runs(folder / OUTPUTS["sweep"]) >= stored, "finished runs were lost"
     if number != signal.SIGKILL:
-        assert temporaries(folder) <= before, (name, number)  # those of killed processes stay until the next call
+        # those of killed processes stay until the next call
+        assert temporaries(folder) <= before, (name, number)
     known = ("a.", "b.", "s.", "log", "whole.", *(Path(output).stem for output in OUTPUTS.values()))
-    unknown = [path.name for path in folder.iterdir() if not path.name.lstrip(".").startswith(known)]
+    unknown = [
+        path.name for path in folder.iterdir() if not path.name.lstrip(".").startswith(known)
+    ]
     assert not unknown, (name, number, unknown)
     return status == 0
 
@@ -130,7 +149,9 @@ def temporaries(folder: Path) -> set[str]:
 def assert_same(name: str, disturbed: Path, undisturbed: Path) -> None:
     """The outputs of a command that was disturbed many times and of one that was not."""
     if name == "sweep":
-        assert (undisturbed / OUTPUTS[name]).read_bytes() == (disturbed / OUTPUTS[name]).read_bytes()
+        assert (undisturbed / OUTPUTS[name]).read_bytes() == (
+            disturbed / OUTPUTS[name]
+        ).read_bytes()
     elif name in COMPUTING and name != "bench":  # whose numbers are times
         file = OUTPUTS[name] if name == "run" else f"{OUTPUTS[name]}/results.h5"
         assert contents(disturbed / file) == contents(undisturbed / file) != {}
@@ -141,7 +162,9 @@ def assert_same(name: str, disturbed: Path, undisturbed: Path) -> None:
     [(("run", "sweep"), 4), pytest.param(tuple(COMMANDS), 200, marks=pytest.mark.nightly)],
     ids=["short", "long"],
 )
-def test_nothing_is_lost_and_nothing_is_left(tmp_path: Path, names: tuple[str, ...], signals: int) -> None:
+def test_nothing_is_lost_and_nothing_is_left(
+    tmp_path: Path, names: tuple[str, ...], signals: int
+) -> None:
     disturbed, undisturbed = tmp_path / "disturbed", tmp_path / "undisturbed"
     prepare(disturbed)
     prepare(undisturbed)
@@ -162,4 +185,8 @@ def test_nothing_is_lost_and_nothing_is_left(tmp_path: Path, names: tuple[str, .
     for name in names:
         finish(disturbed, COMMANDS[name])
         assert_same(name, disturbed, undisturbed)
-    assert not [path.name for path in disturbed.iterdir() if path.name.endswith((".tmp", ".lock", ".full.h5"))]
+    assert not [
+        path.name
+        for path in disturbed.iterdir()
+        if path.name.endswith((".tmp", ".lock", ".full.h5"))
+    ]

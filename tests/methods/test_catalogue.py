@@ -1,4 +1,5 @@
-"""The catalogue of methods; the rule that takes one where none is named: what it takes, what it refuses, and why."""
+"""The catalogue of methods; the rule that takes one where none is named: what it takes, what it
+refuses, and why."""
 
 from __future__ import annotations
 
@@ -32,17 +33,27 @@ DEFAULT_METHODS = tuple(method.name for method in methods() if method.is_default
 def test_scenes_of_the_paper_keep_the_default_set() -> None:
     for name in PAPER_SCENES:
         methods, reason = recommend(paper(name), DEFAULT_METHODS)
-        assert methods[0] == "lagrange/taylor"  # not the printed model, which comes first in the paper's comparison
+        # not the printed model, which comes first in the paper's comparison
+        assert methods[0] == "lagrange/taylor"
         assert set(methods) == set(DEFAULT_METHODS), name
         assert reason.startswith("not stiff, nearly singular or long")
 
 
 def test_an_unknown_method_of_a_scene_is_named_with_the_scene() -> None:
-    with pytest.raises(InputError, match=r"^paper/fig05: methods: unknown method 'lagrange/tayler', perhaps"):
+    with pytest.raises(
+        InputError,
+        match=(
+            r"^paper/fig05: methods: unknown method "
+            r"'lagrange/tayler', perhaps"
+        ),
+    ):
         selected_methods([paper("fig05").replace(methods=["lagrange/tayler"])])
 
 
-CHOOSE_THEIR_STEP, IMPLICIT = ("lagrange/taylor", "exudyn_tree/dopri5"), ("lagrange/taylor", "lagrange/radau")
+CHOOSE_THEIR_STEP, IMPLICIT = (
+    ("lagrange/taylor", "exudyn_tree/dopri5"),
+    ("lagrange/taylor", "lagrange/radau"),
+)
 
 
 @pytest.mark.parametrize(
@@ -56,13 +67,16 @@ CHOOSE_THEIR_STEP, IMPLICIT = ("lagrange/taylor", "exudyn_tree/dopri5"), ("lagra
         ("shaft-damping", IMPLICIT),
     ],
 )
-def test_stiff_scenes_get_methods_that_stay_within_their_bounds(name: str, expected: tuple[str, ...]) -> None:
+def test_stiff_scenes_get_methods_that_stay_within_their_bounds(
+    name: str, expected: tuple[str, ...]
+) -> None:
     methods, reason = recommend(shipped(f"stiff/{name}"), DEFAULT_METHODS)
     assert methods == expected
     assert "\n" not in reason
 
 
-# No method at all: rates that overflow when squared, and 7.9e6 s of simulated time within the suite's time limit.
+# No method at all: rates that overflow when squared, and 7.9e6 s of simulated time within the
+# suite's time limit.
 _NOTHING_HOLDS = ("extreme/rate-1e200", "extreme/pendulum-million")
 _QUICK = ("stiff/bearing-1e8-damping-0.7", "extreme/light-1e-4")
 
@@ -76,7 +90,8 @@ def installed(names: Iterable[str]) -> list[str]:
 
 
 def _mark_of(number: int, name: str) -> Any:
-    """Of scenes that differ in one number every third; all of them, and an hour of chaos, every night."""
+    """Of scenes that differ in one number every third; all of them, and an hour of chaos, every
+    night."""
     if name in _QUICK:
         return ()
     return pytest.mark.nightly if name == "extreme/hour-chaos" or number % 3 else pytest.mark.full
@@ -90,34 +105,57 @@ def _mark_of(number: int, name: str) -> Any:
     ],
 )
 def test_what_the_rule_takes_holds(name: str) -> None:
-    """Every method that claims to be right, at its default settings, against the frozen reference."""
+    """Every method that claims to be right, at its default settings, against the frozen
+    reference."""
     chosen = shipped(name)
     if singular_reason(chosen) or name in _NOTHING_HOLDS:
         pytest.skip("refused, or beyond every method")
-    is_chaos = name == "extreme/hour-chaos"  # for an hour, in samples of 10 s: only the energy is known
+    # for an hour, in samples of 10 s: only the energy is known
+    is_chaos = name == "extreme/hour-chaos"
     stored = None if is_chaos else reference(name)
     for method in installed(recommend(chosen, DEFAULT_METHODS)[0]):
         if is_corrected(method):
             result = solve(method, chosen, {}, time_limit_s=120.0)
             verdict = judge(chosen, result, stored)
-            assert verdict.status == ("unchecked" if is_chaos else "ok"), f"{method}: {verdict.message}"
+            assert verdict.status == ("unchecked" if is_chaos else "ok"), (
+                f"{method}: {verdict.message}"
+            )
 
 
 @pytest.mark.parametrize(
-    "changes", [{"hub_inertia": 1e-6}, {"bearing_stiffness": (1e6,)}], ids=["with a hub", "held by a spring"]
+    "changes",
+    [{"hub_inertia": 1e-6}, {"bearing_stiffness": (1e6,)}],
+    ids=["with a hub", "held by a spring"],
 )
 def test_one_blade_is_taken_where_it_does_not_end(changes: dict[str, object]) -> None:
     assert recommend(replace(shipped("extreme/singular-one-blade"), **changes), DEFAULT_METHODS)[0]
 
 
-@pytest.mark.parametrize(("inertia", "hub", "refused"), [(0.0, 0.0, True), (4.0, 0.0, False), (0.0, 4.0, False)])
-def test_balanced_blades_turn_by_themselves_or_with_the_hub(inertia: float, hub: float, refused: bool) -> None:
-    """Centres of mass on the shaft: no gravity, no length and no arm; without any inertia no equations either."""
-    blade = replace(paper("fig05").blades[0], centre_of_mass=(0.0, 0.0, 0.0), inertia=(inertia,) * 3 + (0.0,) * 3)
+@pytest.mark.parametrize(
+    ("inertia", "hub", "refused"), [(0.0, 0.0, True), (4.0, 0.0, False), (0.0, 4.0, False)]
+)
+def test_balanced_blades_turn_by_themselves_or_with_the_hub(
+    inertia: float, hub: float, refused: bool
+) -> None:
+    """Centres of mass on the shaft: no gravity, no length and no arm; without any inertia no
+    equations either."""
+    blade = replace(
+        paper("fig05").blades[0],
+        centre_of_mass=(0.0, 0.0, 0.0),
+        inertia=(inertia,) * 3 + (0.0,) * 3,
+    )
     balanced = replace(
-        paper("fig05"), name="balanced", blades=(blade,) * 2, initial_angles=(0.0,) * 3, initial_rates=(1.0, 0.0, 0.0),
-        hub_inertia=hub, duration=1.0, samples=3, outputs=("angles",), text="",
-    )  # fmt: skip
+        paper("fig05"),
+        name="balanced",
+        blades=(blade,) * 2,
+        initial_angles=(0.0,) * 3,
+        initial_rates=(1.0, 0.0, 0.0),
+        hub_inertia=hub,
+        duration=1.0,
+        samples=3,
+        outputs=("angles",),
+        text="",
+    )
     if refused:
         with pytest.raises(MethodRefusal, match="no inertia about the shaft"):
             recommend(balanced, DEFAULT_METHODS)
@@ -125,7 +163,8 @@ def test_balanced_blades_turn_by_themselves_or_with_the_hub(inertia: float, hub:
     for method in installed(recommend(balanced, DEFAULT_METHODS)[0]):
         if not method.startswith("printed"):
             run = solve(method, balanced, {})
-            assert abs(run.angles[-1, 0] - 1.0) < 1e-6  # at constant rate; Newton's tolerance leaves the chain 5e-9
+            # at constant rate; Newton's tolerance leaves the chain 5e-9
+            assert abs(run.angles[-1, 0] - 1.0) < 1e-6
             assert judge(balanced, run, None).status in ("ok", "unchecked")
 
 
@@ -156,7 +195,8 @@ def test_an_unknown_name_is_refused_with_the_nearest_one() -> None:
         assert line.startswith(f"unknown method {name!r}{nearest} allowed: ")
         assert line.endswith("allowed: " + ", ".join(method.name for method in methods()))
     with pytest.raises(InputError, match="unknown method 'reference'"):
-        catalogue.check_names(["reference"])  # it is computed for every scene, and not asked for by name
+        # it is computed for every scene, and not asked for by name
+        catalogue.check_names(["reference"])
 
 
 def test_facts_of_the_built_in_methods_agree_with_each_other() -> None:
@@ -167,22 +207,32 @@ def test_facts_of_the_built_in_methods_agree_with_each_other() -> None:
         assert not (method.erratum and (method.is_corrected or method.is_default))
         assert not method.fallback or find_method(method.fallback).is_corrected
     assert [*catalogue.ladders(["exudyn_tree/generalized_alpha"])] == [
-        "exudyn_tree/generalized_alpha", "exudyn_tree/generalized_alpha_rho0.7", "exudyn_tree/generalized_alpha_rho1.0",
-    ]  # fmt: skip
+        "exudyn_tree/generalized_alpha",
+        "exudyn_tree/generalized_alpha_rho0.7",
+        "exudyn_tree/generalized_alpha_rho1.0",
+    ]
 
 
 def test_plug_ins_that_cannot_be_used_are_left_out_with_one_line_each(
     site: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
-    entry_points = {"a": "no_such_module:METHOD", "b": "made_up:MISSING", "c": "made_up:np", "d": "made_up:TAKEN"}
+    entry_points = {
+        "a": "no_such_module:METHOD",
+        "b": "made_up:MISSING",
+        "c": "made_up:np",
+        "d": "made_up:TAKEN",
+    }
     install(site, "made_up", MADE_UP, GROUP, {**entry_points, "e": "made_up:METHOD"})
     install(site, "own_exit", "raise SystemExit(3)\n", GROUP, {"x": "own_exit:X"})
     assert "outside/rk4" in {method.name for method in methods()}
     assert find_method("outside/rk4").distributions == ("made_up",)
     assert sorted(record.getMessage().partition(" omitted")[0] for record in caplog.records) == [
-        "plug-in a of no_such_module:METHOD", "plug-in b of made_up:MISSING", "plug-in c of made_up:np",
-        "plug-in d of made_up:TAKEN: method lagrange/taylor", "plug-in x of own_exit:X",
-    ]  # fmt: skip
+        "plug-in a of no_such_module:METHOD",
+        "plug-in b of made_up:MISSING",
+        "plug-in c of made_up:np",
+        "plug-in d of made_up:TAKEN: method lagrange/taylor",
+        "plug-in x of own_exit:X",
+    ]
     assert "omitted: SystemExit: 3" in caplog.text
 
 

@@ -1,4 +1,5 @@
-"""Methods in a Python file that is named by its path: in every command, with whatever somebody's code may do."""
+"""Methods in a Python file that is named by its path: in every command, with whatever somebody's
+code may do."""
 
 from __future__ import annotations
 
@@ -93,7 +94,9 @@ METHOD = Method(name="own", label="own", build=lambda scene, settings: None, set
 def test_the_documents_example_is_short_complete_and_right() -> None:
     """40 lines of code; its tolerance leaves 1e-12 an interval, on a scene with every term."""
     assert len([line for line in EXAMPLE.splitlines() if line.strip()]) <= 40
-    scene = rm.scene("check/pitch-loads").replace(duration=0.7, samples=36, outputs=["angles", "rates"])
+    scene = rm.scene("check/pitch-loads").replace(
+        duration=0.7, samples=36, outputs=["angles", "rates"]
+    )
     found = rm.run(scene, "mine.py")
     assert (found.status, found.method) == ("ok", "mine/lsoda")
     assert found.metrics["defect_max"] < 1e-11
@@ -162,7 +165,8 @@ def test_a_file_that_cannot_be_used_is_one_line(
     assert not Path("o.h5").exists()
 
 
-@pytest.mark.full  # what each of them becomes in the program itself: test_pool.py, test_judgement.py
+# what each of them becomes in the program itself: test_pool.py, test_judgement.py
+@pytest.mark.full
 def test_whatever_a_method_does_is_one_line_and_loses_nothing(
     capfd: pytest.CaptureFixture[str],
 ) -> None:
@@ -175,9 +179,12 @@ def test_whatever_a_method_does_is_one_line_and_loses_nothing(
     runs = rm.open("o.h5")["one"]
     statuses = {name: runs[name].status for name in runs if name != "reference"}
     assert statuses == {
-        "bad/Raises": "solver_failed", "bad/Hangs": "timed_out", "bad/Prints": "inaccurate", "mine/lsoda": "ok",
+        "bad/Raises": "solver_failed",
+        "bad/Hangs": "timed_out",
+        "bad/Prints": "inaccurate",
+        "mine/lsoda": "ok",
         "bad/Shape": "solver_failed",
-    }  # fmt: skip
+    }
     assert runs["bad/Shape"].message == "bad/Shape: angles has the shape (6, 1); allowed: (6, 4)"
     assert runs["bad/Raises"].message == "bad.py:9: ZeroDivisionError: division by zero"
     assert ended.err.count("one bad/Dies: not computed (its process died (exit code 9)") == 1
@@ -193,7 +200,8 @@ def test_whatever_a_method_does_is_one_line_and_loses_nothing(
 def test_a_build_that_ends_or_hangs_its_process_is_one_line(
     act: str, line: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """What a method without `items` refuses is known from building it, not in the process of the command."""
+    """What a method without `items` refuses is known from building it, not in the process of the
+    command."""
     monkeypatch.setattr(method_file, "_LOAD_S", 5.0 if "sleep" in act else 60.0)
     Path("bad.py").write_text(BAD_BUILD.format(act))
     ended = rotor_mbs("run", "one.toml", "-m", "bad.py", "-o", "o.h5")
@@ -216,7 +224,9 @@ def test_the_answer_to_an_interrupted_question_is_not_the_next_ones(
 
 def test_a_sweep_and_python_take_a_file() -> None:
     scene = rm.load("one.toml").replace(outputs=["angles", "rates", "energy"])
-    runs = rm.sweep(scene, {"gravity": [10.0]}, methods="mine.py", outputs=["angles", "rates"], workers=1)
+    runs = rm.sweep(
+        scene, {"gravity": [10.0]}, methods="mine.py", outputs=["angles", "rates"], workers=1
+    )
     assert runs.statuses == {"ok": 1}
     assert np.array_equal(runs[0].angles, rm.run(scene.replace(gravity=10.0), "mine/lsoda").angles)
     Path("bad.py").write_text(BAD)
@@ -232,14 +242,21 @@ def test_a_sweep_and_python_take_a_file() -> None:
 def test_what_modes_and_bench_need_is_named() -> None:
     ended = rotor_mbs("modes", "one.toml", "-m", "mine.py")
     assert ended.status == 2
-    assert ended.err == "mine/lsoda: its model has no linearization; allowed: a model with `linearize`\n"
+    assert ended.err == (
+        "mine/lsoda: its model has no linearization; allowed: a model with `linearize`\n"
+    )
     ended = rotor_mbs("bench", "one.toml", "-m", "mine.py")
     assert ended.status == 2
-    assert "no ladder for method 'mine/lsoda' (a Method of a file needs a setting `step` or" in ended.err
+    assert (
+        "no ladder for method 'mine/lsoda' (a Method of a file needs a setting `step` or"
+        in ended.err
+    )
 
 
 @pytest.mark.parametrize("mended", ["file", "module"])
-def test_a_file_that_failed_is_loaded_again(mended: str, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_file_that_failed_is_loaded_again(
+    mended: str, folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """Where it was mended in the same session, or a module that it imports was."""
     library = folder / "library"
     library.mkdir()
@@ -263,7 +280,13 @@ def test_a_file_that_is_late_under_a_memory_limit_says_so(monkeypatch: pytest.Mo
     Path("mine.py").write_text("while True: pass\n")
     resource.setrlimit(resource.RLIMIT_AS, (1 << 46, limits[1]))
     try:
-        with pytest.raises(rm.InputError, match=r"not loaded within 0\.5 s under a memory limit \(ulimit -v\)"):
+        with pytest.raises(
+            rm.InputError,
+            match=(
+                r"not loaded within 0\.5 s under a memory limit "
+                r"\(ulimit -v\)"
+            ),
+        ):
             catalogue.check_names("mine.py")
     finally:
         resource.setrlimit(resource.RLIMIT_AS, limits)

@@ -1,4 +1,5 @@
-"""Settings of methods: what is refused, for every method, and that the message says what is allowed."""
+"""Settings of methods: what is refused, for every method, and that the message says what is
+allowed."""
 
 from __future__ import annotations
 
@@ -28,7 +29,10 @@ def refused(method: Method, **given: object) -> str:
     (line,) = caught.value.problems
     assert "\n" not in line
     assert line.startswith(f"{method.name}: ")
-    assert all(f"{name} (" in line and f"default {value}" in line for name, value in method.defaults.items())
+    assert all(
+        f"{name} (" in line and f"default {value}" in line
+        for name, value in method.defaults.items()
+    )
     return line
 
 
@@ -38,7 +42,9 @@ def test_an_unknown_setting_is_refused_with_the_list_of_settings(method: Method)
     assert "relative_tolerance" in refused(method, relative_tolerance=-1)
 
 
-@pytest.mark.parametrize("value", [-1, math.nan, math.inf, "1e-3", True, np.array([1e-3])], ids=repr)
+@pytest.mark.parametrize(
+    "value", [-1, math.nan, math.inf, "1e-3", True, np.array([1e-3])], ids=repr
+)
 @pytest.mark.parametrize(("method", "name"), NUMBERS)
 def test_an_impossible_value_is_refused(method: Method, name: str, value: object) -> None:
     assert f"{name} = " in refused(method, **{name: value})
@@ -48,9 +54,14 @@ def test_an_impossible_value_is_refused(method: Method, name: str, value: object
 def test_defaults_and_the_settings_of_every_ladder_are_allowed(method: Method) -> None:
     assert method.settings.of(method.name, method.defaults).as_dict() == method.defaults
     assert all(len(ladder.settings_by_value(0.1)) >= 6 for ladder in method.ladders)
-    given = [settings for ladder in method.ladders for settings in ladder.settings_by_value(0.1).values()]
+    given = [
+        settings for ladder in method.ladders for settings in ladder.settings_by_value(0.1).values()
+    ]
     for settings in given:
-        assert method.settings.of(method.name, settings).as_dict() == {**method.defaults, **settings}
+        assert method.settings.of(method.name, settings).as_dict() == {
+            **method.defaults,
+            **settings,
+        }
     assert all(setting["doc"] for setting in method.settings.declared().values())
 
 
@@ -58,7 +69,10 @@ def test_the_range_of_scipys_tolerance_starts_where_scipy_would_change_it() -> N
     least = 100.0 * float(np.finfo(float).eps)
     for name in ("lagrange/dop853", "lagrange/radau"):
         settings = find_method(name).settings
-        assert settings.of(name, {"relative_tolerance": least}).as_dict()["relative_tolerance"] == least
+        assert (
+            settings.of(name, {"relative_tolerance": least}).as_dict()["relative_tolerance"]
+            == least
+        )
         assert "at least 2.22045e-14" in refused(find_method(name), relative_tolerance=0.99 * least)
 
 
@@ -77,9 +91,16 @@ def test_numbers_are_converted_to_the_declared_type() -> None:
 
 def test_settings_go_to_the_methods_that_have_them() -> None:
     names = ["lagrange/taylor", "exudyn_tree/rk67"]
-    assert settings_for(names, {"step": 1e-3}) == {"lagrange/taylor": {}, "exudyn_tree/rk67": {"step": 1e-3}}
+    assert settings_for(names, {"step": 1e-3}) == {
+        "lagrange/taylor": {},
+        "exudyn_tree/rk67": {"step": 1e-3},
+    }
     with pytest.raises(
-        InputError, match=r"no setting 'stp', perhaps step; allowed: .*lagrange/taylor, exudyn_tree/rk67"
+        InputError,
+        match=(
+            r"no setting 'stp', perhaps step; allowed: .*lagrange/taylor, "
+            r"exudyn_tree/rk67"
+        ),
     ):
         settings_for(names, {"stp": 1e-3})
     with pytest.raises(InputError, match=r"step = -1 is not allowed"):

@@ -1,4 +1,5 @@
-"""Time limits leave nothing behind; the caller's alarm, pytest-timeout's for one, passes through every call."""
+"""Time limits leave nothing behind; the caller's alarm, pytest-timeout's for one, passes through
+every call."""
 
 # ruff: noqa: PT012  (what is tested is where in a block it is ended)
 
@@ -24,7 +25,13 @@ import rotor_mbs as rm
 from rotor_mbs.errors import RotorError
 from rotor_mbs.methods import time_limit as module
 from rotor_mbs.methods.catalogue import find_method
-from rotor_mbs.methods.time_limit import OutOfTimeError, caller_signals, is_over, samples_kept_at_limit, time_limit
+from rotor_mbs.methods.time_limit import (
+    OutOfTimeError,
+    caller_signals,
+    is_over,
+    samples_kept_at_limit,
+    time_limit,
+)
 from rotor_mbs.studies.method_test import examine
 
 pytestmark = pytest.mark.skipif(not hasattr(signal, "SIGALRM"), reason="needs SIGALRM")
@@ -41,9 +48,14 @@ def late(_number: int, _frame: FrameType | None) -> None:
 def state() -> tuple[object, ...]:
     """What a call must leave as it was."""
     return (
-        [signal.getsignal(number) for number in sorted(signal.valid_signals())], signal.getitimer(signal.ITIMER_REAL),
-        gc.isenabled(), np.geterr(), sys.unraisablehook, is_over(), _time_left(),
-    )  # fmt: skip
+        [signal.getsignal(number) for number in sorted(signal.valid_signals())],
+        signal.getitimer(signal.ITIMER_REAL),
+        gc.isenabled(),
+        np.geterr(),
+        sys.unraisablehook,
+        is_over(),
+        _time_left(),
+    )
 
 
 def _time_left() -> bool:
@@ -95,7 +107,8 @@ def test_an_inner_limit_leaves_the_outer_one_its_time() -> None:
 
 
 def test_an_outer_limit_ends_an_inner_block_too() -> None:
-    """Also where the inner one asks, and keeps its samples: the outer block is ended by itself then."""
+    """Also where the inner one asks, and keeps its samples: the outer block is ended by itself
+    then."""
     inner_ended = False
     with pytest.raises(OutOfTimeError), time_limit(0.05):
         with pytest.raises(OutOfTimeError), time_limit(10.0):
@@ -126,8 +139,12 @@ def test_limits_of_other_threads_touch_no_signal() -> None:
         assert not other.submit(limited).result(10.0)
 
 
-def test_an_import_and_the_end_of_a_context_are_not_broken_off(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    (tmp_path / "slowly_imported.py").write_text("import time\nfor _ in range(50):\n    time.sleep(0.001)\nDONE = 1\n")
+def test_an_import_and_the_end_of_a_context_are_not_broken_off(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "slowly_imported.py").write_text(
+        "import time\nfor _ in range(50):\n    time.sleep(0.001)\nDONE = 1\n"
+    )
     monkeypatch.syspath_prepend(tmp_path)
     ended = []
 
@@ -167,7 +184,8 @@ def test_the_callers_timer_keeps_what_is_left_of_its_time(seconds: float, interv
     except OutOfTimeError:
         assert seconds < 1.0
     remaining, repeats = signal.getitimer(signal.ITIMER_REAL)
-    # What has passed: the block at least, and at most all until now. The system counts in microseconds.
+    # What has passed: the block at least, and at most all until now. The system counts in
+    # microseconds.
     assert 5.0 - (time.monotonic() - begun) - 1e-3 < remaining < 5.0 - min(seconds, 0.05) + 1e-3
     assert (repeats, signal.getsignal(signal.SIGALRM)) == (interval, late)
 
@@ -273,7 +291,9 @@ def test_an_alarm_of_the_caller_at_any_line_comes_once() -> None:
 
 
 @pytest.mark.parametrize("error", [Late, SystemExit, KeyboardInterrupt, ValueError])
-def test_what_a_handler_raises_is_raised_again_where_it_was_caught(error: type[BaseException]) -> None:
+def test_what_a_handler_raises_is_raised_again_where_it_was_caught(
+    error: type[BaseException],
+) -> None:
     raised = error("mine")
 
     def handler(_number: int, _frame: FrameType | None) -> None:
@@ -323,10 +343,19 @@ SHORT = rm.scene("paper/fig08").replace(duration=0.2, samples=11)
 LONG = rm.scene("paper/fig11").replace(duration=2e4, samples=2_000_001, outputs=["angles", "rates"])
 DOP853 = "lagrange/dop853"
 METHODS = (
-    "lagrange/taylor", DOP853, "lagrange/radau", "lagrange/ode45", "printed/ode45", "mujoco/rk4", "exudyn_tree/rk67",
-    "exudyn_tree/dopri5", "exudyn_tree/generalized_alpha", "exudyn_chain/generalized_alpha",
-    "exudyn_chain/newmark_index2", "exudyn_chain/extrapolated",
-)  # fmt: skip
+    "lagrange/taylor",
+    DOP853,
+    "lagrange/radau",
+    "lagrange/ode45",
+    "printed/ode45",
+    "mujoco/rk4",
+    "exudyn_tree/rk67",
+    "exudyn_tree/dopri5",
+    "exudyn_tree/generalized_alpha",
+    "exudyn_chain/generalized_alpha",
+    "exudyn_chain/newmark_index2",
+    "exudyn_chain/extrapolated",
+)
 
 
 def alarmed(call: Callable[[], object], seconds: float, error: type[BaseException] = Late) -> None:
@@ -356,23 +385,32 @@ A_FILE_MAY_STAY_OPEN = pytest.mark.filterwarnings("ignore::pytest.PytestUnraisab
 @pytest.mark.parametrize("timeout", [100.0, float("inf")])
 @pytest.mark.parametrize("method", METHODS)
 @A_FILE_MAY_STAY_OPEN
-def test_the_callers_alarm_passes_through_a_method(method: str, timeout: float, error: type[BaseException]) -> None:
+def test_the_callers_alarm_passes_through_a_method(
+    method: str, timeout: float, error: type[BaseException]
+) -> None:
     if not find_method(method).is_installed:
         pytest.skip(f"{method} is not installed")
-    rm.run(SHORT, method)  # so that the alarm does not come while the engine is loaded, which Python cannot do again
+    # so that the alarm does not come while the engine is loaded, which Python cannot do again
+    rm.run(SHORT, method)
     # The printed equations break off after 19 s, which takes longer than this.
     alarmed(lambda: rm.run(LONG, method, timeout=timeout), 0.1, error)
 
 
 CALLS: dict[str, Callable[[], object]] = {
     "several methods": lambda: rm.run(LONG, ["exudyn_tree/rk67", DOP853]),
-    "several methods with a limit": lambda: rm.run(LONG, ["exudyn_tree/rk67", DOP853], timeout=100.0),
+    "several methods with a limit": lambda: rm.run(
+        LONG, ["exudyn_tree/rk67", DOP853], timeout=100.0
+    ),
     "a reference": lambda: rm.run(LONG, DOP853, reference=True, timeout=100.0),
-    "a comparison": lambda: rm.compare({"time": np.linspace(0.0, 1e4, 10), "rotor": np.zeros(10)}, LONG),
+    "a comparison": lambda: rm.compare(
+        {"time": np.linspace(0.0, 1e4, 10), "rotor": np.zeros(10)}, LONG
+    ),
     "a comparison with a limit": lambda: rm.compare(
         {"time": np.linspace(0.0, 1e4, 10), "rotor": np.zeros(10)}, LONG, timeout=100.0
     ),
-    "a sweep": lambda: rm.sweep(LONG, {"gravity": [9.0, 9.8]}, methods=["exudyn_tree/rk67"], samples=101),
+    "a sweep": lambda: rm.sweep(
+        LONG, {"gravity": [9.0, 9.8]}, methods=["exudyn_tree/rk67"], samples=101
+    ),
 }
 
 
@@ -422,20 +460,28 @@ LIMITED: tuple[Callable[[float], object], ...] = (
 
 
 def _spoilt(seed: int, calls: int) -> list[tuple[int, float]]:
-    """The calls, by kind and limit, after which a call without a limit gives other bits, or anything is left."""
+    """The calls, by kind and limit, after which a call without a limit gives other bits, or
+    anything is left."""
     random = np.random.default_rng(seed)
     expected, before = rm.run(SHORT, DOP853), state()
     others = set(threading.enumerate())
     spoilt = []
     for _ in range(calls):
-        kind, limit_s = int(random.integers(len(LIMITED))), float(10.0 ** random.uniform(-12.0, 0.0))
+        kind, limit_s = (
+            int(random.integers(len(LIMITED))),
+            float(10.0 ** random.uniform(-12.0, 0.0)),
+        )
         with suppress(RotorError):  # the refused scene; a comparison without a reference
             LIMITED[kind](limit_s)
         run = rm.run(SHORT, DOP853)
         is_same = run.status == "ok" and all(
             np.array_equal(run[name], expected[name], equal_nan=True) for name in run.quantities
         )
-        is_same = is_same and np.array_equal(run.angles, expected.angles) and np.array_equal(run.rates, expected.rates)
+        is_same = (
+            is_same
+            and np.array_equal(run.angles, expected.angles)
+            and np.array_equal(run.rates, expected.rates)
+        )
         if not is_same or state() != before or set(threading.enumerate()) != others:
             spoilt.append((kind, limit_s))
     return spoilt

@@ -1,4 +1,5 @@
-"""The cross-check itself: independent models against the quad reference, on every scene of the paper."""
+"""The cross-check itself: independent models against the quad reference, on every scene of the
+paper."""
 
 from __future__ import annotations
 
@@ -19,13 +20,21 @@ from rotor_mbs.solution.metrics import angle_error, horizon_samples, metrics_of,
 from rotor_mbs.solution.trajectory import Solution, Trajectory
 
 BEST = ("lagrange/taylor", "exudyn_tree/rk67", "mujoco/rk4")
-# rad up to the horizon, where an error may have grown 1e5-fold, and of the energy scale; MuJoCo's at four times its
-# default step, and until its rounding has moved a pitch that stays zero by 1e-4 rad, which fig. 8 amplifies.
-BOUND = {"lagrange/taylor": (1e-10, 1e-12), "exudyn_tree/rk67": (1e-9, 1e-12), "mujoco/rk4": (1e-4, 1e-8)}
+# rad up to the horizon, where an error may have grown 1e5-fold, and of the energy scale; MuJoCo's
+# at four times its default step, and until its rounding has moved a pitch that stays zero by 1e-4
+# rad, which fig. 8 amplifies.
+BOUND = {
+    "lagrange/taylor": (1e-10, 1e-12),
+    "exudyn_tree/rk67": (1e-9, 1e-12),
+    "mujoco/rk4": (1e-4, 1e-8),
+}
 SETTINGS: dict[str, dict[str, float]] = {"mujoco/rk4": {"step": 1e-3}}
-# One of each kind: a pendulum, rest, an invariant set, chaos, a driven rotor. The others take longer than they add.
+# One of each kind: a pendulum, rest, an invariant set, chaos, a driven rotor. The others take
+# longer than they add.
 _QUICK = ("fig03", "fig05", "fig08", "fig11", "fig12", "fig15-100kNm")
-SCENES = [name if name in _QUICK else pytest.param(name, marks=pytest.mark.full) for name in PAPER_SCENES]
+SCENES = [
+    name if name in _QUICK else pytest.param(name, marks=pytest.mark.full) for name in PAPER_SCENES
+]
 
 
 def reference(name: str) -> Trajectory:
@@ -39,22 +48,31 @@ def run(scene: Scene, method: str) -> Solution:
     return solve(method, scene, SETTINGS.get(method, {}))
 
 
-# The chains: settings, the growth of errors up to which they are compared, and rad. The default of `extrapolated` has
-# the bound that comparisons of the paper are read by; 2.9e-5 rad was seen on fig13b.
+# The chains: settings, the growth of errors up to which they are compared, and rad. The default of
+# `extrapolated` has the bound that comparisons of the paper are read by; 2.9e-5 rad was seen on
+# fig13b.
 ALPHA, EXTRAPOLATED = "exudyn_chain/generalized_alpha", "exudyn_chain/extrapolated"
 CHAINS = {
     "second order": (ALPHA, {}, 1e3, 1e-3),
     "default": (EXTRAPOLATED, {}, 1e5, 1e-4),
     "tight": (EXTRAPOLATED, {"tolerance": 1e-10}, 1e5, 1e-6),
 }
-_QUICK_CHAINS = {("second order", "fig03"), ("second order", "fig11"), ("default", "fig03"), ("default", "fig08")}
+_QUICK_CHAINS = {
+    ("second order", "fig03"),
+    ("second order", "fig11"),
+    ("default", "fig03"),
+    ("default", "fig08"),
+}
 
 
 def cut(name: str, growth: float) -> tuple[Scene, Trajectory]:
     """The scene, and its reference, as far as an error has grown less than `growth`-fold."""
     whole, scene = reference(name), paper(name)
     rows = max(int((running_growth(whole) < growth).sum()), 2)
-    parts = {part: getattr(whole, part)[:rows] for part in ("time", "angles", "rates", "tip", "error_growth")}
+    parts = {
+        part: getattr(whole, part)[:rows]
+        for part in ("time", "angles", "rates", "tip", "error_growth")
+    }
     return replace(scene, duration=float(whole.time[rows - 1]), samples=rows), Trajectory(**parts)
 
 
@@ -86,7 +104,11 @@ def _mark_of(case: str, name: str) -> Any:
 
 @pytest.mark.parametrize(
     ("case", "name"),
-    [pytest.param(case, name, marks=_mark_of(case, name)) for case in CHAINS for name in PAPER_SCENES],
+    [
+        pytest.param(case, name, marks=_mark_of(case, name))
+        for case in CHAINS
+        for name in PAPER_SCENES
+    ],
 )
 def test_the_chain_while_errors_grow_little(case: str, name: str) -> None:
     method, settings, growth, bound = CHAINS[case]

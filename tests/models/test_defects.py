@@ -1,4 +1,5 @@
-"""Interval defects: round-off for a right run, a known pattern for every known fault, and a sum that is the error."""
+"""Interval defects: round-off for a right run, a known pattern for every known fault, and a sum
+that is the error."""
 
 from __future__ import annotations
 
@@ -47,7 +48,9 @@ def fig11_run() -> Trajectory:
 JUMPS = ((0.0, 0.0), (0.5, 2e6), (0.7525, 3e6), (0.7525, -2e6), (1.2, 1e6))
 RIGHT = {
     "one blade": paper("fig03", duration=2.0, samples=201),
-    "a torque that jumps inside an interval": paper("fig03", duration=2.0, samples=201, rotor_torque=JUMPS),
+    "a torque that jumps inside an interval": paper(
+        "fig03", duration=2.0, samples=201, rotor_torque=JUMPS
+    ),
     "chaos": paper("fig11", duration=2.0, samples=201),
     "a stiff bearing": shipped("stiff/bearing-1e8"),
     "a damped turbine": shipped("stiff/nrel-5mw-damped"),
@@ -72,12 +75,15 @@ def test_without_heyoka_the_defects_are_the_same(monkeypatch: pytest.MonkeyPatch
     without = defects_of(FIG11, run)
     np.testing.assert_allclose(without.angles, with_heyoka.angles, rtol=0, atol=1e-12)
     np.testing.assert_allclose(
-        without.rates / without.rate_units, with_heyoka.rates / without.rate_units, rtol=0, atol=1e-12
+        without.rates / without.rate_units,
+        with_heyoka.rates / without.rate_units,
+        rtol=0,
+        atol=1e-12,
     )
 
 
-# ---- Wrong numbers of a model are seen in test_planted_faults.py; a wrong load, a wrong row and others in
-# comparison/test_planted_mistakes.py.
+# ---- Wrong numbers of a model are seen in test_planted_faults.py; a wrong load, a wrong row and
+# others in comparison/test_planted_mistakes.py.
 
 
 def test_a_wrong_start_has_no_defect_but_is_in_the_predicted_error() -> None:
@@ -86,7 +92,9 @@ def test_a_wrong_start_has_no_defect_but_is_in_the_predicted_error() -> None:
     run = solve(DOP853, replace(FIG11, initial_angles=angles), {}).trajectory
     defects = defects_of(FIG11, run)
     assert defects.sizes.max() < 1e-12  # what dop853 leaves in an interval
-    np.testing.assert_allclose(defects.predicted, run.angles - fig11_run().angles, rtol=0, atol=1e-9)
+    np.testing.assert_allclose(
+        defects.predicted, run.angles - fig11_run().angles, rtol=0, atol=1e-9
+    )
 
 
 # ---- The sum of the defects is the error
@@ -105,10 +113,13 @@ COARSE: dict[str, dict[str, float]] = {"exudyn_tree/rk67": {"step": 5e-3}}
     ],
 )
 def test_the_predicted_error_is_the_true_one_within_a_fifth(name: str, method: str) -> None:
-    """Of the largest so far, up to the horizon, between ten times what round-off becomes and 0.1 rad."""
+    """Of the largest so far, up to the horizon, between ten times what round-off becomes and 0.1
+    rad."""
     exact, scene = reference(f"paper/{name}"), paper(name)
     rows = horizon_samples(exact)
-    scene = replace(scene, duration=float(exact.time[rows - 1]), samples=rows, outputs=("angles", "rates"))
+    scene = replace(
+        scene, duration=float(exact.time[rows - 1]), samples=rows, outputs=("angles", "rates")
+    )
     run = solve(method, scene, COARSE.get(method, {})).trajectory
     defects = defects_of(scene, run)
     true = run.angles - exact.angles[:rows]
@@ -121,14 +132,17 @@ def test_the_predicted_error_is_the_true_one_within_a_fifth(name: str, method: s
 
 
 def change_by_start(scene: Scene, step: float) -> Array:
-    """(n, 2c, 2c) of the c moving angles and their rates: how each row changes with those of the start."""
+    """(n, 2c, 2c) of the c moving angles and their rates: how each row changes with those of the
+    start."""
     moving = scene.moving_coordinates
 
     def states(changed: Array) -> Array:
         angles, rates = np.array(scene.initial_angles), np.array(scene.initial_rates)
         angles[moving] += changed[: len(moving)]
         rates[moving] += changed[len(moving) :]
-        moved = replace(scene, initial_angles=tuple(angles.tolist()), initial_rates=tuple(rates.tolist()))
+        moved = replace(
+            scene, initial_angles=tuple(angles.tolist()), initial_rates=tuple(rates.tolist())
+        )
         run = solve(TAYLOR if is_available() else DOP853, moved, {}).trajectory
         return np.hstack([run.angles[:, moving], run.rates[:, moving]])
 
@@ -145,10 +159,14 @@ def change_by_start(scene: Scene, step: float) -> Array:
         ("fig11", {"samples": 11, "initial_rates": (np.pi / 10.0, 30.0, 0.0, 0.0)}),
     ],
 )
-def test_the_transition_matrices_are_those_of_the_variational_equations(name: str, changes: dict[str, Any]) -> None:
-    """Each carries their product on by one interval, to 1e-4 of its size, angles in rad and rates in their units.
+def test_the_transition_matrices_are_those_of_the_variational_equations(
+    name: str, changes: dict[str, Any]
+) -> None:
+    """Each carries their product on by one interval, to 1e-4 of its size, angles in rad and rates
+    in their units.
 
-    Their product: what becomes of small differences of the start, by central differences, good to 1e-8 of it.
+    Their product: what becomes of small differences of the start, by central differences, good to
+    1e-8 of it.
     """
     scene = replace(paper(name, duration=1.0, samples=101, outputs=("angles", "rates")), **changes)
     exact = change_by_start(scene, 1e-6)
@@ -162,7 +180,11 @@ def test_the_transition_matrices_are_those_of_the_variational_equations(name: st
 @pytest.mark.parametrize("name", PAPER_SCENES)
 def test_pitches_at_rest_by_symmetry_are_those_that_stay_exactly_zero(name: str) -> None:
     scene, exact = paper(name), reference(f"paper/{name}")
-    zero = [i for i in scene.moving_coordinates[1:] if not exact.angles[:, i].any() and not exact.rates[:, i].any()]
+    zero = [
+        i
+        for i in scene.moving_coordinates[1:]
+        if not exact.angles[:, i].any() and not exact.rates[:, i].any()
+    ]
     assert list(resting_pitches(scene)) == zero
 
 
@@ -173,7 +195,11 @@ SIZES = (1e-9, 3e-9, 2e-9)
 
 def test_numbers_of_defects() -> None:
     metrics = defect_metrics(made_defects(SIZES), None)  # rad, of intervals of 0.01 s
-    assert (metrics["defect_max"], metrics["defect_median"], metrics["defect_time"]) == (3e-9, 2e-9, 0.02)
+    assert (metrics["defect_max"], metrics["defect_median"], metrics["defect_time"]) == (
+        3e-9,
+        2e-9,
+        0.02,
+    )
     assert (metrics["defect_mean"], metrics["angle_error_predicted"]) == pytest.approx((2e-9, 6e-9))
     assert metrics["defects_not_judged"] == 0
     of_others = defect_metrics(made_defects(SIZES), None, is_corrected=False)
@@ -185,9 +211,12 @@ def judged(sizes: Sequence[float], **changes: Any) -> list[float]:
 
 
 def test_a_bound_is_multiplied_by_the_length_of_an_interval_and_by_the_growth_over_it() -> None:
-    """Ten times as much is allowed in ten times as long, and as many times as errors grow; rounding in addition."""
+    """Ten times as much is allowed in ten times as long, and as many times as errors grow; rounding
+    in addition."""
     assert judged(SIZES) == pytest.approx(SIZES)
-    assert judged(SIZES, time=0.1 * np.arange(4.0)) == pytest.approx([size / 10.0 for size in SIZES])
+    assert judged(SIZES, time=0.1 * np.arange(4.0)) == pytest.approx(
+        [size / 10.0 for size in SIZES]
+    )
     assert judged(SIZES, time=1e-3 * np.arange(4.0)) == pytest.approx(SIZES)
     transitions = np.tile(np.eye(2), (3, 1, 1))
     transitions[1] *= 4.0
@@ -198,7 +227,8 @@ def test_a_bound_is_multiplied_by_the_length_of_an_interval_and_by_the_growth_ov
 
 
 def test_each_interval_and_each_coordinate_has_its_own_floor() -> None:
-    """Three times: of the row before, carried on, and the row after; a row that is rough excuses no other."""
+    """Three times: of the row before, carried on, and the row after; a row that is rough excuses no
+    other."""
     rounding = np.zeros((4, 2))
     rounding[2:, 0] = 1e-10
     transitions = np.tile(np.eye(2), (3, 1, 1))
@@ -217,12 +247,15 @@ def test_near_a_singular_pitch_the_arithmetic_of_an_interval_loses_more() -> Non
 
 
 @pytest.mark.parametrize(("share", "not_judged"), [(0.9, 0), (1.1, 1)])
-def test_an_interval_is_not_judged_where_rounding_may_be_a_hundredth_of_a_radian(share: float, not_judged: int) -> None:
+def test_an_interval_is_not_judged_where_rounding_may_be_a_hundredth_of_a_radian(
+    share: float, not_judged: int
+) -> None:
     """But one without an end, which fails whatever rounding there is."""
     rounding = np.zeros((4, 2))
     rounding[2, 0] = share * OK_ERROR / (3.0 * 1.0)
     metrics = defect_metrics(made_defects((0.0, 0.0, 0.0), rounding=rounding), None)
-    assert metrics["defects_not_judged"] == 2 * not_judged  # of the row that ends one interval and begins the next
+    # of the row that ends one interval and begins the next
+    assert metrics["defects_not_judged"] == 2 * not_judged
     endless = defect_metrics(made_defects((0.0, np.nan, 0.0), rounding=rounding), None)
     assert (endless["defect_max"], endless["defect_judged"]) == (np.inf, np.inf)
 
@@ -274,12 +307,15 @@ MAX_STEPS, MIN_STEPS = 10_000, 50
 RATES = [1e6, 1e12, 1e100, 1e150, 1e153, 1e160, 1e200, 1.7e308]
 
 
-@pytest.mark.parametrize("rows", [slice(40, 41), pytest.param(slice(None), marks=pytest.mark.full)], ids=["one", "all"])
+@pytest.mark.parametrize(
+    "rows", [slice(40, 41), pytest.param(slice(None), marks=pytest.mark.full)], ids=["one", "all"]
+)
 @pytest.mark.parametrize("rate", RATES)
 def test_samples_that_are_no_motion_are_assessed_in_bounded_work(
     rate: float, rows: slice, evaluations: list[int]
 ) -> None:
-    """One interval's steps, those of the next ones, which are halved, and the fewest of each; of twelve evaluations.
+    """One interval's steps, those of the next ones, which are halved, and the fewest of each; of
+    twelve evaluations.
 
     Three times that, since a step may be tried again and is looked at after some have been made.
     """
@@ -296,7 +332,8 @@ def test_samples_that_are_no_motion_are_assessed_in_bounded_work(
 @pytest.mark.parametrize("method", [DOP853, "lagrange/radau"])
 @pytest.mark.parametrize("rate", [rate for rate in RATES if 1e6 < rate < 1e300])
 def test_a_start_far_from_any_motion_ends_by_itself(method: str, rate: float) -> None:
-    """Without a time limit: a million turns a second are many steps, which is seen from the first ones."""
+    """Without a time limit: a million turns a second are many steps, which is seen from the first
+    ones."""
     with np.errstate(all="ignore"):
         run = solve(method, FIG11.replace(**{"initial.rates[2]": rate}), {})
     assert not run.integration.success
@@ -304,11 +341,17 @@ def test_a_start_far_from_any_motion_ends_by_itself(method: str, rate: float) ->
 
 
 @pytest.mark.parametrize(
-    "method", [TAYLOR, "exudyn_tree/rk67", pytest.param("exudyn_chain/generalized_alpha", marks=pytest.mark.full)]
+    "method",
+    [
+        TAYLOR,
+        "exudyn_tree/rk67",
+        pytest.param("exudyn_chain/generalized_alpha", marks=pytest.mark.full),
+    ],
 )
 @pytest.mark.parametrize("samples", [101, 11])
 def test_how_far_apart_samples_are_decides_no_status(method: str, samples: int) -> None:
-    """Over a second errors grow up to 200 times, and a method's own ones add up: the run is the same."""
+    """Over a second errors grow up to 200 times, and a method's own ones add up: the run is the
+    same."""
     if not find_method(method).is_installed:
         pytest.skip(f"{method} is not installed")
     scene = replace(paper("fig11"), samples=samples, outputs=("angles", "rates"))
@@ -317,7 +360,8 @@ def test_how_far_apart_samples_are_decides_no_status(method: str, samples: int) 
 
 
 def test_a_run_that_left_the_symmetry_is_compared_to_the_horizon_of_its_scene() -> None:
-    """Rounding moves a pitch that is zero; without a reference the defects say the same, to the run's own horizon."""
+    """Rounding moves a pitch that is zero; without a reference the defects say the same, to the
+    run's own horizon."""
     pytest.importorskip("heyoka")
     pytest.importorskip("mujoco")
     scene = replace(paper("fig08"), samples=101, outputs=("angles", "rates", "tip"))
@@ -330,7 +374,9 @@ def test_a_run_that_left_the_symmetry_is_compared_to_the_horizon_of_its_scene() 
     assert alone.metrics["angle_error_predicted"] > 1.0
     for verdict in (compared, alone):
         assert verdict.status == "inaccurate"
-        assert re.match(r"pitch [23] leaves zero at t = 1\.[89]\d* s, where symmetry keeps it", verdict.message)
+        assert re.match(
+            r"pitch [23] leaves zero at t = 1\.[89]\d* s, where symmetry keeps it", verdict.message
+        )
         assert "keeps zeros" in verdict.advice
 
 
@@ -339,22 +385,33 @@ def test_a_run_that_left_the_symmetry_is_compared_to_the_horizon_of_its_scene() 
 
 @pytest.mark.parametrize(
     ("name", "duration", "samples"),
-    [("fig03", 1.0, 101), ("fig04b", 1.0, 101), ("fig11", 1.0, 101), ("fig09", 10.0, 51), ("fig14a", 10.0, 101)],
+    [
+        ("fig03", 1.0, 101),
+        ("fig04b", 1.0, 101),
+        ("fig11", 1.0, 101),
+        ("fig09", 10.0, 51),
+        ("fig14a", 10.0, 101),
+    ],
 )
 def test_rates_are_found_from_the_angles(name: str, duration: float, samples: int) -> None:
     """To the rounding of five angles."""
     scene = paper(name, duration=duration, samples=samples, outputs=("angles", "rates"))
     run = solve(DOP853, scene, {}).trajectory
-    np.testing.assert_allclose(fitted_rates(scene, run.time, run.angles).rates, run.rates, rtol=0, atol=1e-10)
+    np.testing.assert_allclose(
+        fitted_rates(scene, run.time, run.angles).rates, run.rates, rtol=0, atol=1e-10
+    )
     if duration == 1.0:  # rows so near that a wrong one takes nothing from the others
         wrong = run.angles.copy()
         wrong[50, 0] += 0.1
         rates = fitted_rates(scene, run.time, wrong).rates
-        np.testing.assert_allclose(np.delete(rates - run.rates, np.s_[44:57], axis=0), 0.0, rtol=0, atol=1e-8)
+        np.testing.assert_allclose(
+            np.delete(rates - run.rates, np.s_[44:57], axis=0), 0.0, rtol=0, atol=1e-8
+        )
 
 
 def test_defects_over_rows_are_those_of_every_tenth_row() -> None:
-    """A wrong gravity: ten defects, each carried on, are what the closed form finds from row to tenth row."""
+    """A wrong gravity: ten defects, each carried on, are what the closed form finds from row to
+    tenth row."""
     run = solve(DOP853, replace(FIG11, gravity=1.001 * FIG11.gravity), {}).trajectory
     every = slice(None, None, 10)
     whole = defects_of(FIG11, run)
@@ -369,9 +426,12 @@ def test_defects_over_rows_are_those_of_every_tenth_row() -> None:
 
 
 def test_roundings_of_rows_in_between_and_of_their_times_cancel_in_a_sum() -> None:
-    """Rows and times in single precision: ten intervals leave what the two ends do, not ten times as much."""
+    """Rows and times in single precision: ten intervals leave what the two ends do, not ten times
+    as much."""
     run = fig11_run()
-    time, angles, rates = (values.astype(np.float32).astype(float) for values in (run.time, run.angles, run.rates))
+    time, angles, rates = (
+        values.astype(np.float32).astype(float) for values in (run.time, run.angles, run.rates)
+    )
     rounding = 2.0**-24 * np.abs(np.hstack([angles, rates]))
     defects = interval_defects(FIG11, time, angles, rates, rounding, 2.0**-24 * time)
     assert (defects.channel_sizes <= FLOOR_SAFETY * defects.floors).all()
@@ -380,8 +440,11 @@ def test_roundings_of_rows_in_between_and_of_their_times_cancel_in_a_sum() -> No
     assert np.median(floors) < 2.0 * np.median(defects.floors)
 
 
-def test_what_is_worked_on_block_by_block_is_as_of_all_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A run of a million samples would take gigabytes; what is left over in the last block counts, too."""
+def test_what_is_worked_on_block_by_block_is_as_of_all_at_once(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """A run of a million samples would take gigabytes; what is left over in the last block counts,
+    too."""
     run = solve("lagrange/ode45", FIG11, {}).trajectory
     whole = defects_of(FIG11, run)
     monkeypatch.setattr(defects_module, "BLOCK_ROWS", 30)
@@ -389,7 +452,9 @@ def test_what_is_worked_on_block_by_block_is_as_of_all_at_once(monkeypatch: pyte
     monkeypatch.setattr(solution_defects, "DRIFT_ROWS", 10)
     parts = defects_of(FIG11, run)
     for name in ("transitions", "floors", "growth", "error_growth"):
-        np.testing.assert_allclose(getattr(parts, name), getattr(whole, name), rtol=1e-9, err_msg=name)
+        np.testing.assert_allclose(
+            getattr(parts, name), getattr(whole, name), rtol=1e-9, err_msg=name
+        )
     np.testing.assert_allclose(parts.predicted, whole.predicted, rtol=1e-9, atol=1e-15)
     np.testing.assert_allclose(parts.over_rows(7), whole.over_rows(7), rtol=1e-9)
     for defects in (parts, whole):
@@ -401,10 +466,17 @@ def test_what_is_worked_on_block_by_block_is_as_of_all_at_once(monkeypatch: pyte
 
 
 @pytest.mark.parametrize(
-    "name", ["stiff/bearing-1e8-damping-100", "stiff/shaft-damping", "stiff/bearing-1e12", "extreme/light-1e-4"]
+    "name",
+    [
+        "stiff/bearing-1e8-damping-100",
+        "stiff/shaft-damping",
+        "stiff/bearing-1e12",
+        "extreme/light-1e-4",
+    ],
 )
 def test_where_explicit_steps_are_too_long_the_matrices_are_known_all_the_same(name: str) -> None:
-    """They carry a small change of the state from row to row: to a share of 1e-3 of the largest entry."""
+    """They carry a small change of the state from row to row: to a share of 1e-3 of the largest
+    entry."""
     scene = replace(shipped(name), outputs=("angles", "rates"))
     scene = replace(scene, duration=scene.duration / (scene.samples - 1) * 10, samples=11)
     run = solve(TAYLOR if is_available() else DOP853, scene, {}).trajectory

@@ -15,8 +15,8 @@ from rotor_mbs.analysis import kinematics
 from rotor_mbs.methods.catalogue import REFERENCE, find_method
 from rotor_mbs.models.exudyn import methods
 
-# Explicit schemes resolve these slow motions to round-off; order 2 at 2.5e-4 to 5e-4 s leaves h² times the fourth
-# derivative, some 1e-8, and the constraints of the chain their Newton tolerance.
+# Explicit schemes resolve these slow motions to round-off; order 2 at 2.5e-4 to 5e-4 s leaves h²
+# times the fourth derivative, some 1e-8, and the constraints of the chain their Newton tolerance.
 EXUDYN = [method.name for method in methods.METHODS]
 CHAIN = [name for name in EXUDYN if name.startswith("exudyn_chain")]
 EXPLICIT = ["exudyn_tree/rk44", "exudyn_tree/rk67", "exudyn_tree/dopri5"]
@@ -41,9 +41,11 @@ def ramp_motion(t):
 
 
 # Of each scene the rotor's angle and the pitch at times t; None: pitches stay where they were.
-# At zero pitch a point mass lies in the plane of rotation, turned from the blade's axis by atan(c / d).
+# At zero pitch a point mass lies in the plane of rotation, turned from the blade's axis by atan(c /
+# d).
 POLE = replace(PAPER_BLADE, centre_of_mass=(0.0, 0.0, ARM))
-K_PITCH, D_PITCH, J_PITCH = 40.0, 3.0, 7.0  # with AXIAL, of which rotor and pitch do not feel each other
+# with AXIAL, of which rotor and pitch do not feel each other
+K_PITCH, D_PITCH, J_PITCH = 40.0, 3.0, 7.0
 
 
 def oscillator(start, rate, t, damping=D_PITCH):
@@ -70,21 +72,28 @@ CONSTANT_LOADS = {
 CASES = {
     "pendulum": (
         make_scene([11 * pi / 12, 0], [0, 0], duration=2.5, samples=251),
-        lambda t: pendulum(11 * pi / 12, hypot(OFFSET, ARM), np.arctan2(OFFSET, ARM), 9.8, t), None,
+        lambda t: pendulum(11 * pi / 12, hypot(OFFSET, ARM), np.arctan2(OFFSET, ARM), 9.8, t),
+        None,
     ),
     "pendulum of a pitch without inertia": (
         make_scene([11 * pi / 12, 0.25], [0, 0.0], (POLE,), duration=2.0),
-        lambda t: pendulum(11 * pi / 12, ARM, 0.0, 9.8, t), None,
+        lambda t: pendulum(11 * pi / 12, ARM, 0.0, 9.8, t),
+        None,
     ),
     "three equal blades turn": (
-        make_scene([pi / 6, 0, 0, 0], [pi / 10, 0, 0, 0]), lambda t: pi / 6 + pi / 10 * t, None
+        make_scene([pi / 6, 0, 0, 0], [pi / 10, 0, 0, 0]),
+        lambda t: pi / 6 + pi / 10 * t,
+        None,
     ),
     "torque over time with kinks and jumps": (
-        make_scene([0] * 4, [0] * 4, gravity=0.0, duration=1.0, samples=34, rotor_torque=RAMP), ramp_motion, None
+        make_scene([0] * 4, [0] * 4, gravity=0.0, duration=1.0, samples=34, rotor_torque=RAMP),
+        ramp_motion,
+        None,
     ),
     "shaft damping": (
         make_scene([0.2, 0, 0, 0], [2, 0, 0, 0], gravity=0.0, shaft_damping=1.5 * INERTIA),
-        lambda t: 0.2 + 2 / 1.5 * (1 - np.exp(-1.5 * t)), None,
+        lambda t: 0.2 + 2 / 1.5 * (1 - np.exp(-1.5 * t)),
+        None,
     ),
     # About 12/k beside the angle of rest; the rotor's inertia is 12 + 50·9 kg m².
     "constant torques and angle of rest": (
@@ -94,23 +103,29 @@ CASES = {
     ),
     "a growing torque and a constant angle of rest": (
         axial(
-            0.2, -0.5, damping=0.0, duration=2.0,
-            pitch_torque=(((0.0, 0.0), (2.0, 24.0)),), bearing_rest=(((0.0, 0.7),),),
+            0.2,
+            -0.5,
+            damping=0.0,
+            duration=2.0,
+            pitch_torque=(((0.0, 0.0), (2.0, 24.0)),),
+            bearing_rest=(((0.0, 0.7),),),
         ),
         lambda t: 0.1 + t,
         lambda t: 0.7 + 12.0 * t / K_PITCH + oscillator(-0.5, -0.5 - 12.0 / K_PITCH, t, 0.0),
     ),
     "a step of the command between samples": (
-        axial(0.0, 0.0, duration=2.0, bearing_rest=(((0.43, 0.0), (0.43, 0.3)),)), lambda t: 0.1 + t,
+        axial(0.0, 0.0, duration=2.0, bearing_rest=(((0.43, 0.0), (0.43, 0.3)),)),
+        lambda t: 0.1 + t,
         lambda t: np.where(t < 0.43, 0.0, 0.3 + oscillator(-0.3, 0.0, t - 0.43)),
     ),
     **{f"torsion from {start:.1f} rad": torsion(start) for start in (0.7, -9.0, 3 * pi + 0.3)},
-}  # fmt: skip
+}
 
 
 def bound_of(name, case):
     if case == "shaft damping" and name in CHAIN:
-        # order 2 leaves λ³h²t/12, 1e-7; Newton's relative tolerance of 1e-8 on positions is 1e-8/h, some 1e-5, on rates
+        # order 2 leaves λ³h²t/12, 1e-7; Newton's relative tolerance of 1e-8 on positions is 1e-8/h,
+        # some 1e-5, on rates
         return 2e-5
     # Euler parameters turn too little by h²θ'³/12 a second: 1.7e-4 rad/s at 20 rad/s and 5e-4 s
     return 2e-4 if CASES[case][2] and name not in FINE else BOUND[name]
@@ -119,7 +134,8 @@ def bound_of(name, case):
 @pytest.mark.parametrize("case", CASES)
 @every_method
 def test_every_model_has_the_exact_motion(name, case) -> None:
-    """And its energy, of which the work is integrated from rates alone, to the accuracy of the scheme."""
+    """And its energy, of which the work is integrated from rates alone, to the accuracy of the
+    scheme."""
     (scene, rotor, pitch), bound = CASES[case], bound_of(name, case)
     got = run(name, scene)
     exact = np.tile(np.array(scene.initial_angles), (len(got.time), 1))
@@ -127,7 +143,8 @@ def test_every_model_has_the_exact_motion(name, case) -> None:
     if pitch:
         exact[:, 1] = pitch(got.time)
     assert np.abs(got.angles - exact).max() < bound
-    if not pitch and name not in CHAIN:  # an exact zero has nothing to grow from, though the equilibrium is unstable
+    # an exact zero has nothing to grow from, though the equilibrium is unstable
+    if not pitch and name not in CHAIN:
         assert np.array_equal(got.angles[:, 1:], exact[:, 1:])
         assert not got.rates[:, 1:].any()
     assert got.work[0] == 0.0
@@ -137,7 +154,8 @@ def test_every_model_has_the_exact_motion(name, case) -> None:
 @pytest.mark.parametrize("name", EXUDYN)
 def test_a_thousand_radians_a_second_are_counted_turn_by_turn(name) -> None:
     scene = make_scene([0.0, -50.0], [0.0, 1000.0], (AXIAL,), gravity=0.0, duration=1.0)
-    # the rotation vector turns uniformly without error, and 5 rad a step; a turn missed would show as 6.28 rad
+    # the rotation vector turns uniformly without error, and 5 rad a step; a turn missed would show
+    # as 6.28 rad
     settings, bound = {}, 1e-6
     if name == "exudyn_chain/extrapolated":
         settings, bound = {"tolerance": 1e-9}, 1e-5  # of a hundred intervals, of 10 rad each
@@ -153,7 +171,9 @@ def test_repeats_are_bit_identical(name) -> None:
     method = find_method(name)
     if not method.is_installed:
         pytest.skip(f"{name} is not installed")
-    scene = make_scene([0.3, 0.4], [1.0, 0.5], (STOUT,), duration=0.2, samples=21, rotor_torque=RAMP)
+    scene = make_scene(
+        [0.3, 0.4], [1.0, 0.5], (STOUT,), duration=0.2, samples=21, rotor_torque=RAMP
+    )
     solver = method.build(scene, method.settings())
     first_report, first = solver.integrate(), solver.observe()
     second_report, second = solver.integrate(), solver.observe()
@@ -164,11 +184,20 @@ def test_repeats_are_bit_identical(name) -> None:
 
 # rad, of the scene with every load, at these settings.
 ALL_LOADS_BOUND = {
-    "lagrange/dop853": 1e-10, "lagrange/taylor": 1e-10, REFERENCE: 1e-10, "exudyn_tree/rk67": 1e-10,
-    "exudyn_tree/rk44": 1e-9, "exudyn_tree/dopri5": 1e-9, "mujoco/rk4": 1e-9, "exudyn_chain/extrapolated": 1e-9,
-    "exudyn_tree/generalized_alpha": 5e-5, "exudyn_chain/generalized_alpha": 5e-5, "exudyn_chain/newmark_index2": 5e-5,
-    "lagrange/ode45": 1e-10, "lagrange/radau": 1e-10,
-}  # fmt: skip
+    "lagrange/dop853": 1e-10,
+    "lagrange/taylor": 1e-10,
+    REFERENCE: 1e-10,
+    "exudyn_tree/rk67": 1e-10,
+    "exudyn_tree/rk44": 1e-9,
+    "exudyn_tree/dopri5": 1e-9,
+    "mujoco/rk4": 1e-9,
+    "exudyn_chain/extrapolated": 1e-9,
+    "exudyn_tree/generalized_alpha": 5e-5,
+    "exudyn_chain/generalized_alpha": 5e-5,
+    "exudyn_chain/newmark_index2": 5e-5,
+    "lagrange/ode45": 1e-10,
+    "lagrange/radau": 1e-10,
+}
 SETTINGS = {
     "lagrange/ode45": {"relative_tolerance": 1e-13, "absolute_tolerance": 1e-13},
     "lagrange/radau": {"relative_tolerance": 1e-12, "absolute_tolerance": 1e-14},
@@ -177,7 +206,11 @@ SLOW = ("lagrange/taylor", REFERENCE, "exudyn_chain/newmark_index2", "lagrange/r
 
 
 @pytest.mark.parametrize(
-    "method", [pytest.param(name, marks=pytest.mark.full) if name in SLOW else name for name in ALL_LOADS_BOUND]
+    "method",
+    [
+        pytest.param(name, marks=pytest.mark.full) if name in SLOW else name
+        for name in ALL_LOADS_BOUND
+    ],
 )
 def test_every_load_at_once_follows_the_equations_written_anew(method: str) -> None:
     """Angles, tips, energies and work; those of low order to what their steps leave."""
@@ -185,7 +218,9 @@ def test_every_load_at_once_follows_the_equations_written_anew(method: str) -> N
     bound = ALL_LOADS_BOUND[method]
     assert np.abs(result.angles - exact[:, :4]).max() < bound
     for i, blade in enumerate(MIXED.blades):
-        assert np.abs(result.tip[:, i] - blade_points(MIXED, exact, i, blade.tip)).max() < 10 * bound
+        assert (
+            np.abs(result.tip[:, i] - blade_points(MIXED, exact, i, blade.tip)).max() < 10 * bound
+        )
     kinetic, potential = energies(MIXED, exact)
     scale = np.abs(kinetic).max()
     assert np.abs(result.kinetic_energy - kinetic).max() < 10 * bound * scale
@@ -193,5 +228,6 @@ def test_every_load_at_once_follows_the_equations_written_anew(method: str) -> N
     balance = result.kinetic_energy + result.potential_energy - result.work
     assert np.abs(balance - balance[0]).max() < 10 * bound * scale
     own = kinematics.potential_energy(MIXED, result.time, result.angles)
-    gap = 1e-7 if method.startswith("exudyn_chain") else 1e-12  # its bodies leave the joints by some 1e-9 m
+    # its bodies leave the joints by some 1e-9 m
+    gap = 1e-7 if method.startswith("exudyn_chain") else 1e-12
     assert np.abs(result.potential_energy - own).max() < gap * scale

@@ -48,9 +48,12 @@ def test_any_number_of_blades(name, bound, count) -> None:
     assert angle_error(run(name, scene), closed_form(scene)) < bound
 
 
-@pytest.mark.parametrize("name", ["exudyn_tree/generalized_alpha", "exudyn_chain/generalized_alpha"])
+@pytest.mark.parametrize(
+    "name", ["exudyn_tree/generalized_alpha", "exudyn_chain/generalized_alpha"]
+)
 def test_sixteen_blades_take_another_path_through_the_engine_to_the_same_motion(name) -> None:
-    """The chain a sparse factorization, the tree an old Jacobian; a second order error as with few blades."""
+    """The chain a sparse factorization, the tree an old Jacobian; a second order error as with few
+    blades."""
     scene = unlike_blades(16, duration=0.2, samples=21)
     error = angle_error(run(name, scene, step=5e-4), closed_form(scene))
     finer = angle_error(run(name, scene, step=2.5e-4), closed_form(scene))
@@ -64,7 +67,10 @@ def test_large_chains_alone_are_solved_by_a_sparse_factorization() -> None:
     def sizes(blades: int) -> tuple[int, int]:  # Euler parameters and their norms
         return 7 * (1 + blades), (1 + blades) + 5 * (1 + blades)
 
-    assert [linear_solver(*sizes(blades)) for blades in (3, 6, 12, 96)] == [*["EigenDense"] * 2, *["EigenSparse"] * 2]
+    assert [linear_solver(*sizes(blades)) for blades in (3, 6, 12, 96)] == [
+        *["EigenDense"] * 2,
+        *["EigenSparse"] * 2,
+    ]
     assert linear_solver(97, 0) == "EigenDense"
     assert linear_solver(200, 0) == "EigenDense"
 
@@ -88,14 +94,18 @@ def test_order_of_convergence(name, order, steps, short_motion) -> None:
 
 def test_order_of_dopri5_in_its_tolerance(short_motion) -> None:
     tolerances = [1e-7, 1e-8, 1e-9, 1e-10]
-    errors = [angle_error(run("exudyn_tree/dopri5", SHORT, absolute_tolerance=t), short_motion) for t in tolerances]
+    errors = [
+        angle_error(run("exudyn_tree/dopri5", SHORT, absolute_tolerance=t), short_motion)
+        for t in tolerances
+    ]
     # error per step kept at the tolerance: the global error falls as its power 4/5 to 1
     assert 0.7 < np.polyfit(np.log(tolerances), np.log(errors), 1)[0] < 1.1
     assert errors[-1] < 1e-8
 
 
 def test_long_runs_lose_no_sample() -> None:
-    """Thousands of sample intervals: the engine adds them up, and rounding must not make a row come a step too late.
+    """Thousands of sample intervals: the engine adds them up, and rounding must not make a row come
+    a step too late.
 
     The sixth-order error of some 50,000 equal steps adds up to less than 1e-6 rad on a pendulum.
     """

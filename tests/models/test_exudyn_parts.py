@@ -1,4 +1,5 @@
-"""What is built and what is not, how failures are told, and the quadrature of work where no verdict can tell."""
+"""What is built and what is not, how failures are told, and the quadrature of work where no verdict
+can tell."""
 
 from __future__ import annotations
 
@@ -62,12 +63,15 @@ def extra(name, scene):
 @pytest.mark.parametrize(
     ("scene", "tree", "chain"),
     [
-        ("gravity", {}, {"marker": 3, "load": 3}),  # one for each blade; the tree has it in its one object
+        # one for each blade; the tree has it in its one object
+        ("gravity", {}, {"marker": 3, "load": 3}),
         ("tip", {"sensor": 3}, {"sensor": 3}),
-        ("energy", {"sensor": 6}, {"sensor": 3}),  # position and velocity; the chain reads positions anyhow
+        # position and velocity; the chain reads positions anyhow
+        ("energy", {"sensor": 6}, {"sensor": 3}),
         ("torque", {"marker": 1, "load": 1}, {"load": 1}),
         ("torque over time", {"marker": 1, "load": 1}, {"load": 1}),
-        ("springs", {}, {"node": 2, "object": 2}),  # a spring and its turn counter where there is stiffness
+        # a spring and its turn counter where there is stiffness
+        ("springs", {}, {"node": 2, "object": 2}),
         ("dampers", {}, {"object": 2}),
         ("hub", {}, {}),
     ],
@@ -79,15 +83,22 @@ def test_a_scene_builds_what_it_needs_and_no_more(scene, tree, chain) -> None:
 
 @pytest.mark.parametrize(
     ("outputs", "damping", "along_the_path"),
-    [(("angles", "energy"), 1.0, True), (("angles", "energy"), 0.0, False), (("angles",), 1.0, False)],
+    [
+        (("angles", "energy"), 1.0, True),
+        (("angles", "energy"), 0.0, False),
+        (("angles",), 1.0, False),
+    ],
 )
 def test_work_is_integrated_along_the_path_where_it_is_asked_for_and_not_known(
     outputs, damping, along_the_path
 ) -> None:
     """The tree keeps rows between samples for it, and the extrapolated chain the work itself."""
-    scene = replace(paper("fig11"), duration=0.2, samples=21, outputs=outputs, shaft_damping=damping)
+    scene = replace(
+        paper("fig11"), duration=0.2, samples=21, outputs=outputs, shaft_damping=damping
+    )
     tree, extrapolated = (
-        METHODS[name].build(scene, METHODS[name].settings()) for name in (TREE, "exudyn_chain/extrapolated")
+        METHODS[name].build(scene, METHODS[name].settings())
+        for name in (TREE, "exudyn_chain/extrapolated")
     )
     assert tree.integrate().success
     assert extrapolated.integrate().success
@@ -112,7 +123,8 @@ def test_samples_the_engine_cannot_tell_apart_are_refused() -> None:
         METHODS[TREE].chosen(paper("fig08"), {"step": 1e-12})
 
 
-# One blade runs into θ = π/2, where nothing holds the rotor: the rates go to infinity at about 0.06 s.
+# One blade runs into θ = π/2, where nothing holds the rotor: the rates go to infinity at about 0.06
+# s.
 SINGULAR = make_scene([0.3, 1.2], [0.5, 3.0], duration=1.0)
 
 
@@ -144,7 +156,8 @@ def test_a_solve_that_fails_is_counted_to_the_last_step_that_it_took(name) -> No
 def test_counts_of_steps_and_evaluations() -> None:
     scene = replace(paper("fig11"), duration=0.1, samples=11)
     rk44 = solve("exudyn_tree/rk44", scene, {"step": 3e-3}).integration
-    assert (rk44.steps, rk44.rhs_evaluations) == (40, 160)  # four steps of at most 3 ms in each 10 ms
+    # four steps of at most 3 ms in each 10 ms
+    assert (rk44.steps, rk44.rhs_evaluations) == (40, 160)
     rk67 = solve("exudyn_tree/rk67", scene, {"step": 3e-3}).integration
     assert (rk67.steps, rk67.rhs_evaluations, rk67.time_reached) == (40, 280, 0.1)
     alpha = solve(CHAIN, scene, {"step": 1e-3}).integration
@@ -152,26 +165,37 @@ def test_counts_of_steps_and_evaluations() -> None:
     assert alpha.rhs_evaluations >= 200
     dopri5 = solve("exudyn_tree/dopri5", scene, {}).integration
     assert dopri5.rhs_evaluations % 7 == 0
-    assert 0 < dopri5.rhs_evaluations // 7 - dopri5.steps < 10  # fewer are rejected than intervals begun
-    assert solve("exudyn_tree/dopri5", scene, {"absolute_tolerance": 1.0}).integration.steps == 10  # one to a sample
-    kinked = replace(scene, rotor_torque=((0.0, 0.0), (0.05, 0.0), (0.1, 1.0)))  # two intervals, of the same steps
+    # fewer are rejected than intervals begun
+    assert 0 < dopri5.rhs_evaluations // 7 - dopri5.steps < 10
+    # one to a sample
+    assert solve("exudyn_tree/dopri5", scene, {"absolute_tolerance": 1.0}).integration.steps == 10
+    # two intervals, of the same steps
+    kinked = replace(scene, rotor_torque=((0.0, 0.0), (0.05, 0.0), (0.1, 1.0)))
     assert solve("exudyn_tree/rk44", kinked, {"step": 3e-3}).integration.steps == 40
-    linear = replace(BARE, blades=(POLE,) * 3, initial_rates=(1.0, 0.0, 0.0, 0.0), duration=0.1, samples=11)
+    linear = replace(
+        BARE, blades=(POLE,) * 3, initial_rates=(1.0, 0.0, 0.0, 0.0), duration=0.1, samples=11
+    )
     turning = solve("exudyn_tree/generalized_alpha", linear, {"step": 1e-3}).integration
-    assert (turning.steps, turning.rhs_evaluations) == (100, 200)  # an iteration a step, and the residual once more
+    # an iteration a step, and the residual once more
+    assert (turning.steps, turning.rhs_evaluations) == (100, 200)
 
 
 def test_loads_and_rotation_vectors_are_refused_together_alone() -> None:
     settings, loads = METHODS[CHAIN].settings, replace(BARE, outputs=("angles", "rates", "loads"))
     for scene, node in ((BARE, "rotation_vector"), (loads, "euler_parameters")):
-        assert engine_counts(METHODS[CHAIN].build(scene, settings(node=node))) == listed(CHAIN, scene)
+        assert engine_counts(METHODS[CHAIN].build(scene, settings(node=node))) == listed(
+            CHAIN, scene
+        )
     with pytest.raises(MethodRefusal, match="euler_parameters"):
         METHODS[CHAIN].build(loads, settings(node="rotation_vector"))
 
 
 def test_ctrl_c_inside_a_solve_is_an_interrupt() -> None:
     scene = replace(paper("fig11"), duration=2.0, samples=201)
-    with pytest.raises(KeyboardInterrupt), subprocess.Popen(["sh", "-c", f"sleep 0.5; kill -INT {os.getpid()}"]):
+    with (
+        pytest.raises(KeyboardInterrupt),
+        subprocess.Popen(["sh", "-c", (f"sleep 0.5; kill -INT {os.getpid()}")]),
+    ):
         solve(CHAIN, scene, {"step": 1e-4})
 
 
@@ -181,12 +205,27 @@ TORQUE = ((0.0, 0.0), (4.0, 4.0), (4.0, 10.0), (8.0, 10.0))
 
 @pytest.mark.parametrize(
     ("rows", "at_jump"),
-    [(30, 4.0), (41, 4.0), (81, 4.0), (81, math.nextafter(4.0, 0.0)), (81, math.nextafter(4.0, 8.0))],
-    ids=["short of the jump", "up to it", "across it", "a row before it by rounding", "a row behind it by rounding"],
+    [
+        (30, 4.0),
+        (41, 4.0),
+        (81, 4.0),
+        (81, math.nextafter(4.0, 0.0)),
+        (81, math.nextafter(4.0, 8.0)),
+    ],
+    ids=[
+        "short of the jump",
+        "up to it",
+        "across it",
+        "a row before it by rounding",
+        "a row behind it by rounding",
+    ],
 )
 def test_work_of_a_torque_that_jumps(rows: int, at_jump: float) -> None:
-    """The row at the jump belongs to both segments, on whichever side of the jump its time was rounded to."""
-    scene = make_scene([0.0, 0.0], [1.0, 0.0], (PAPER_BLADE,), duration=8.0, samples=81, rotor_torque=TORQUE)
+    """The row at the jump belongs to both segments, on whichever side of the jump its time was
+    rounded to."""
+    scene = make_scene(
+        [0.0, 0.0], [1.0, 0.0], (PAPER_BLADE,), duration=8.0, samples=81, rotor_torque=TORQUE
+    )
     time = np.linspace(0.0, 8.0, 81)
     time[40] = at_jump
     time = time[:rows]
@@ -198,7 +237,8 @@ def test_work_of_a_torque_that_jumps(rows: int, at_jump: float) -> None:
 
 
 def test_the_window_stands_in_the_middle() -> None:
-    """Eight points, four on either side: an interval's error is 2497/3628800 h⁹ f⁽⁸⁾; one row off, 3233/3628800."""
+    """Eight points, four on either side: an interval's error is 2497/3628800 h⁹ f⁽⁸⁾; one row off,
+    3233/3628800."""
     h = 0.25
     time = np.arange(41) * h
     errors = np.diff(sensor_samples.cumulative_integral(time, np.exp(time)) - np.exp(time))

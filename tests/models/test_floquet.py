@@ -1,4 +1,5 @@
-"""Periodic motion of a turning rotor under gravity, and its multipliers: Mathieu's equation, Liouville's rule."""
+"""Periodic motion of a turning rotor under gravity, and its multipliers: Mathieu's equation,
+Liouville's rule."""
 
 from __future__ import annotations
 
@@ -19,7 +20,8 @@ from rotor_mbs.scenario.scene import Blade, Scene
 
 pytest.importorskip("heyoka")
 
-# Its centre of mass off the pitch axis, in the plane of rotation: gravity on it is a stiffness that comes and goes.
+# Its centre of mass off the pitch axis, in the plane of rotation: gravity on it is a stiffness that
+# comes and goes.
 BLADE = Blade(120.0, (0.5, 0.0, 6.0), (900.0, 880.0, 40.0, 0.0, 3.0 * 120.0, 0.0), (0.5, 0.0, 9.0))
 PITCH_INERTIA = 40.0 + 120.0 * 0.25
 DAMPED = general(bearing_damping=(30.0, 20.0, 10.0), shaft_damping=50.0)
@@ -28,7 +30,12 @@ DAMPED = general(bearing_damping=(30.0, 20.0, 10.0), shaft_damping=50.0)
 def slow_blade(speed: float, stiffness: float) -> Scene:
     """One blade on a hub so heavy that nothing changes its speed."""
     return make_scene(
-        [0.3, 0.0], [speed, 0.0], (BLADE,), gravity=9.81, hub_inertia=1e15, bearing_stiffness=(stiffness,)
+        [0.3, 0.0],
+        [speed, 0.0],
+        (BLADE,),
+        gravity=9.81,
+        hub_inertia=1e15,
+        bearing_stiffness=(stiffness,),
     )
 
 
@@ -39,14 +46,16 @@ def others(scene: Scene, speed: float):
 
 
 def mathieu_numbers(speed: float, stiffness: float) -> tuple[float, float]:
-    """(a, q) of θ'' + (a - 2q cos 2s) θ = 0, a turn being s = π: Jzz θ̈ + (k + (Jyy - Jxx) Ω² + m g x sin φ) θ = 0."""
+    """(a, q) of θ'' + (a - 2q cos 2s) θ = 0, a turn being s = π: Jzz θ̈ + (k + (Jyy - Jxx) Ω² + m g
+    x sin φ) θ = 0."""
     unit = PITCH_INERTIA * speed**2 / 4.0
     centrifugal = (880.0 + 120.0 * 0.25 - 900.0) * speed**2
     return (stiffness + centrifugal) / unit, 120.0 * 9.81 * 0.5 / (2.0 * unit)
 
 
 def mathieu_trace(a: float, q: float) -> float:
-    """Trace of the transition matrix over s = π by Hill's determinant: 2 - 4 Δ(0) sin²(π √a / 2)."""
+    """Trace of the transition matrix over s = π by Hill's determinant: 2 - 4 Δ(0) sin²(π √a /
+    2)."""
     before, determinant = 1.0, 1.0
     ratios = q / ((2.0 * np.arange(-4000, 4001)) ** 2 - a)
     for given, other in pairwise(ratios.tolist()):
@@ -68,17 +77,27 @@ def oracle(scene: Scene, turn: Turn):
     driven = replace(scene, rotor_torque=((0.0, turn.torque),))
     span = (0.0, 2.0 * math.pi / turn.speed)
     return solve_ivp(
-        lambda t, y: acceleration(driven, t, y), span, turn.start, "DOP853", rtol=1e-12, atol=1e-13, dense_output=True
+        lambda t, y: acceleration(driven, t, y),
+        span,
+        turn.start,
+        "DOP853",
+        rtol=1e-12,
+        atol=1e-13,
+        dense_output=True,
     )
 
 
 LOADED = replace(
-    DAMPED, pitch_torque=(((0.0, 300.0),), (), ((0.0, -200.0),)), bearing_rest=((), ((0.0, 0.2),), ((0.0, -0.1),))
+    DAMPED,
+    pitch_torque=(((0.0, 300.0),), (), ((0.0, -200.0),)),
+    bearing_rest=((), ((0.0, 0.2),), ((0.0, -0.1),)),
 )
 
 
 @pytest.mark.parametrize(
-    "scene", [pytest.param(DAMPED, marks=pytest.mark.full), LOADED], ids=["damped", "pitch torques and rest angles"]
+    "scene",
+    [pytest.param(DAMPED, marks=pytest.mark.full), LOADED],
+    ids=["damped", "pitch torques and rest angles"],
 )
 def test_the_motion_repeats_itself_after_a_turn_also_by_other_equations(scene: Scene) -> None:
     turn = periodic_turn(scene, 1.2)
@@ -98,7 +117,9 @@ def test_without_gravity_the_multipliers_are_those_of_the_eigenvalues():
     angles = [0.3, *turn.start[1:4]]
     linear = linearize(scene, angles, [2.0, 0, 0, 0], turn.torque)
     n = len(linear.stiffness)
-    values = np.linalg.eigvals(np.block([[np.zeros((n, n)), np.eye(n)], [-linear.stiffness, -linear.damping]]))
+    values = np.linalg.eigvals(
+        np.block([[np.zeros((n, n)), np.eye(n)], [-linear.stiffness, -linear.damping]])
+    )
     expected = np.exp(values * math.pi)
     for multiplier in expected:
         assert np.abs(result - multiplier).min() < 1e-7

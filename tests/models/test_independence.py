@@ -1,4 +1,5 @@
-"""Each model runs without the others' engines, says how to get its own, and importing the package costs little."""
+"""Each model runs without the others' engines, says how to get its own, and importing the package
+costs little."""
 
 from __future__ import annotations
 
@@ -23,8 +24,13 @@ assert not [name for name in {others!r} if f"rotor_mbs.models.{{name}}" in sys.m
 
 def python(code: str, blocked: tuple[str, ...] = ()) -> subprocess.CompletedProcess[str]:
     """Runs `code` in a process in which these modules cannot be imported."""
-    start = f"import sys\nsys.modules.update(dict.fromkeys({blocked!r}))\nsys.path.insert(0, {TESTS!r})\n"
-    return subprocess.run([sys.executable, "-W", "error", "-c", start + code], capture_output=True, text=True)
+    start = (
+        f"import sys\nsys.modules.update(dict.fromkeys({blocked!r}))\nsys.path.insert(0, "
+        f"{TESTS!r})\n"
+    )
+    return subprocess.run(
+        [sys.executable, "-W", "error", "-c", start + code], capture_output=True, text=True
+    )
 
 
 @pytest.mark.parametrize(
@@ -34,7 +40,9 @@ def python(code: str, blocked: tuple[str, ...] = ()) -> subprocess.CompletedProc
         ("lagrange/taylor", ("exudyn", "scipy", "mujoco", "h5py")),
         pytest.param("reference", ("exudyn", "heyoka", "mujoco"), marks=pytest.mark.full),
         ("exudyn_tree/rk67", ("heyoka", "scipy", "mujoco", "h5py")),
-        pytest.param("exudyn_chain/generalized_alpha", ("heyoka", "scipy", "mujoco"), marks=pytest.mark.full),
+        pytest.param(
+            "exudyn_chain/generalized_alpha", ("heyoka", "scipy", "mujoco"), marks=pytest.mark.full
+        ),
         ("printed/ode45", ("heyoka", "scipy", "exudyn", "mujoco")),
         ("mujoco/rk4", ("heyoka", "scipy", "exudyn")),
     ],
@@ -45,7 +53,11 @@ def test_a_model_runs_without_the_other_engines(method: str, blocked: tuple[str,
     if method.startswith("mujoco"):
         pytest.importorskip("mujoco")
     model = method.split("/")[0]
-    others = [name for name in ("printed", "lagrange", "exudyn", "mujoco") if name != PACKAGES.get(model, model)]
+    others = [
+        name
+        for name in ("printed", "lagrange", "exudyn", "mujoco")
+        if name != PACKAGES.get(model, model)
+    ]
     done = python(RUN.format(method=method, others=others), blocked)
     assert done.returncode == 0, done.stderr
     assert done.stdout == ""
@@ -58,7 +70,9 @@ def test_a_model_runs_without_the_other_engines(method: str, blocked: tuple[str,
         ("mujoco", "mujoco/rk4", "MuJoCo is not installed: pip install 'rotor_mbs[mujoco]'"),
     ],
 )
-def test_without_its_engine_a_method_says_how_to_get_it(engine: str, method: str, hint: str, tmp_path: Path) -> None:
+def test_without_its_engine_a_method_says_how_to_get_it(
+    engine: str, method: str, hint: str, tmp_path: Path
+) -> None:
     """And belongs to no default set."""
     arguments = ["run", "paper/fig08", "-m", method, "-o", str(tmp_path / "x.h5")]
     done = python(

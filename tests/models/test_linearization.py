@@ -1,4 +1,5 @@
-"""Linearized models: exact derivatives, exact cases, and closed form, tree, chain and MuJoCo beside each other."""
+"""Linearized models: exact derivatives, exact cases, and closed form, tree, chain and MuJoCo beside
+each other."""
 
 from __future__ import annotations
 
@@ -31,13 +32,18 @@ def linear(scene: Scene, speed: float):
     """The closed form about the scene's steady state: without gravity where it turns."""
     rates = [speed] + [0.0] * len(scene.blades)
     return closed.linearize(
-        without_gravity(scene, speed), state(scene, speed), rates, closed.holding_torque(scene, speed)
+        without_gravity(scene, speed),
+        state(scene, speed),
+        rates,
+        closed.holding_torque(scene, speed),
     )
 
 
 def frequencies(linearization, scene: Scene, speed: float) -> np.ndarray:
     is_cyclic = scene.gravity == 0.0 or speed > 0.0
-    return modes_of(linearization.stiffness, linearization.damping, is_cyclic=is_cyclic).undamped_frequencies
+    return modes_of(
+        linearization.stiffness, linearization.damping, is_cyclic=is_cyclic
+    ).undamped_frequencies
 
 
 def test_derivatives_of_the_closed_form_are_those_of_the_equations_written_once_more():
@@ -49,7 +55,11 @@ def test_derivatives_of_the_closed_form_are_those_of_the_equations_written_once_
         step[k] = 1e-3
         # Of the sixth order: weights 45, -9, 1 over 60.
         change = sum(
-            w * (acceleration(DAMPED, 0.0, start + j * step) - acceleration(DAMPED, 0.0, start - j * step))
+            w
+            * (
+                acceleration(DAMPED, 0.0, start + j * step)
+                - acceleration(DAMPED, 0.0, start - j * step)
+            )
             for j, w in ((1, 45.0), (2, -9.0), (3, 1.0))
         )
         column = -change[4:] / (60.0 * 1e-3)
@@ -59,10 +69,14 @@ def test_derivatives_of_the_closed_form_are_those_of_the_equations_written_once_
 
 def test_pendulum():
     blade, J = AXIAL, AXIAL.inertia[1] + AXIAL.mass * 9.0
-    hanging = make_scene([2.5, 0.1], [0, 0], (blade,), gravity=9.81, hub_inertia=20.0, bearing_stiffness=(70.0,))
+    hanging = make_scene(
+        [2.5, 0.1], [0, 0], (blade,), gravity=9.81, hub_inertia=20.0, bearing_stiffness=(70.0,)
+    )
     assert closed.equilibrium(hanging) == pytest.approx([math.pi, 0.0], abs=1e-12)
     expected = [math.sqrt(blade.mass * 9.81 * 3.0 / (J + 20.0)), math.sqrt(10.0)]
-    assert frequencies(linear(hanging, 0.0), hanging, 0.0) == pytest.approx(sorted(expected), rel=1e-13)
+    assert frequencies(linear(hanging, 0.0), hanging, 0.0) == pytest.approx(
+        sorted(expected), rel=1e-13
+    )
     upright = replace(hanging, initial_angles=(0.0, 0.0))
     assert closed.equilibrium(upright) == pytest.approx([0.0, 0.0], abs=0.0)
     rates = modes_of(linear(upright, 0.0).stiffness, np.zeros((2, 2)), is_cyclic=False).growth_rates
@@ -70,7 +84,9 @@ def test_pendulum():
 
 
 DRIVEN = replace(
-    DAMPED, pitch_torque=(((0.0, 300.0),), (), ((0.0, -200.0),)), bearing_rest=((), ((0.0, 0.2),), ((0.0, -0.1),))
+    DAMPED,
+    pitch_torque=(((0.0, 300.0),), (), ((0.0, -200.0),)),
+    bearing_rest=((), ((0.0, 0.2),), ((0.0, -0.1),)),
 )
 SOURCES = [
     (DRIVEN, 0.0),
@@ -85,7 +101,9 @@ SOURCES = [
 ]
 
 
-@pytest.mark.parametrize(("scene", "speed"), SOURCES, ids=lambda value: getattr(value, "name", value))
+@pytest.mark.parametrize(
+    ("scene", "speed"), SOURCES, ids=lambda value: getattr(value, "name", value)
+)
 def test_closed_form_tree_chain_and_mujoco_have_the_same_frequencies(scene, speed):
     ours, angles, at = linear(scene, speed), state(scene, speed), without_gravity(scene, speed)
     others = [engine.linearize_tree(at, angles, speed, closed.holding_torque(scene, speed))]
@@ -98,7 +116,11 @@ def test_closed_form_tree_chain_and_mujoco_have_the_same_frequencies(scene, spee
     significant = expected > 1e-6 * np.nanmax(expected)
     size = max(np.abs(ours.stiffness).max(), 1e-3)
     for other in others:
-        np.testing.assert_allclose(frequencies(other, scene, speed)[significant], expected[significant], rtol=1e-8)
+        np.testing.assert_allclose(
+            frequencies(other, scene, speed)[significant], expected[significant], rtol=1e-8
+        )
         np.testing.assert_allclose(other.stiffness, ours.stiffness, atol=1e-8 * size)
-        np.testing.assert_allclose(other.damping, ours.damping, atol=1e-8 * max(1.0, np.abs(ours.damping).max()))
+        np.testing.assert_allclose(
+            other.damping, ours.damping, atol=1e-8 * max(1.0, np.abs(ours.damping).max())
+        )
         assert np.abs(other.residual).max() < 1e-8 * size

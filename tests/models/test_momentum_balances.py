@@ -1,5 +1,5 @@
-"""Momentum of the runs of every model against the impulses of what acts on them: a proof without their equations of
-motion, from the samples alone."""
+"""Momentum of the runs of every model against the impulses of what acts on them: a proof without
+their equations of motion, from the samples alone."""
 
 from __future__ import annotations
 
@@ -20,7 +20,9 @@ WITH_LOADS = ("angles", "rates", "energy", "loads")
 JUMPS = ((0.0, 0.0), (0.5, 20000.0), (0.7525, 30000.0), (0.7525, -15000.0), (1.2, 10000.0))
 SCENES = {
     "fig11": paper("fig11", outputs=WITH_LOADS),
-    "jumps": general(outputs=WITH_LOADS, duration=2.0, samples=401, shaft_damping=4000.0, rotor_torque=JUMPS),
+    "jumps": general(
+        outputs=WITH_LOADS, duration=2.0, samples=401, shaft_damping=4000.0, rotor_torque=JUMPS
+    ),
     "NREL": replace(find_scenes(["stiff/nrel-5mw-damped"])[0], outputs=WITH_LOADS, samples=1001),
 }
 
@@ -38,7 +40,8 @@ _QUICK = {("fig11", method) for method in METHODS} | {("jumps", METHODS[0]), ("N
     ],
 )
 def test_momentum_is_the_impulse_of_torque_weights_and_bearing(name: str, method: str) -> None:
-    """About the shaft, and in space where no torque jumps. Seen: 3e-11 after jumps, else 1e-13; MuJoCo 1e-7."""
+    """About the shaft, and in space where no torque jumps. Seen: 3e-11 after jumps, else 1e-13;
+    MuJoCo 1e-7."""
     if not find_method(method).is_installed:
         pytest.skip(f"{method} is not installed")
     scene = SCENES[name]
@@ -61,7 +64,8 @@ def _turning(scene: Scene, angle) -> Trajectory:
 
 
 def test_torque_tables_are_integrated_exactly() -> None:
-    """A ramp from 0 to 60 N m with a jump back between samples, under which the rotor turns at constant speed.
+    """A ramp from 0 to 60 N m with a jump back between samples, under which the rotor turns at
+    constant speed.
 
     Nothing may act on it: what is left at the end is the area of the table.
     """
@@ -79,7 +83,8 @@ def test_samples_that_do_not_resolve_the_motion_give_no_balance() -> None:
 
 
 def test_a_bearing_faster_than_the_samples_gives_no_linear_balance() -> None:
-    """189 rad/s against samples 10 ms apart: the force swings in between, which no polynomial through them knows."""
+    """189 rad/s against samples 10 ms apart: the force swings in between, which no polynomial
+    through them knows."""
     scene = replace(SCENES["NREL"], samples=101)
     run = solve("lagrange/dop853", scene, {}).trajectory
     angular = angular_balance(scene, run)
@@ -89,10 +94,15 @@ def test_a_bearing_faster_than_the_samples_gives_no_linear_balance() -> None:
 
 
 def test_a_wrong_force_of_the_bearing_is_noticed() -> None:
-    scene = general(outputs=WITH_LOADS, duration=2.0, samples=401, bearing_damping=(200.0, 100.0, 300.0))
+    scene = general(
+        outputs=WITH_LOADS, duration=2.0, samples=401, bearing_damping=(200.0, 100.0, 300.0)
+    )
     run = solve("lagrange/dop853", scene, {}).trajectory
     force = run.shaft_force
-    right, wrong = (linear_balance(scene, run.replace(shaft_force=force * factor)) for factor in (1.0, 1.0 + 1e-6))
+    right, wrong = (
+        linear_balance(scene, run.replace(shaft_force=force * factor))
+        for factor in (1.0, 1.0 + 1e-6)
+    )
     assert right is not None
     assert wrong is not None
     assert right.largest < 1e-9 < wrong.largest

@@ -1,4 +1,5 @@
-"""MATLAB's ode45, alone: its pair by order conditions, its step rules written anew, its results by exact solutions."""
+"""MATLAB's ode45, alone: its pair by order conditions, its step rules written anew, its results by
+exact solutions."""
 
 from __future__ import annotations
 
@@ -66,7 +67,15 @@ def test_the_pair_is_of_orders_five_and_four():
 def test_interpolant_meets_state_and_slope_at_both_ends():
     assert [sum(row) for row in INTERPOLANT] == [*B[:6], 0]
     assert [row[0] for row in INTERPOLANT] == [1, 0, 0, 0, 0, 0, 0]
-    assert [sum(k * x for k, x in enumerate(row, start=1)) for row in INTERPOLANT] == [0, 0, 0, 0, 0, 0, 1]
+    assert [sum(k * x for k, x in enumerate(row, start=1)) for row in INTERPOLANT] == [
+        0,
+        0,
+        0,
+        0,
+        0,
+        0,
+        1,
+    ]
 
 
 def steps_of_matlab(f, end, start, rel_tol=1e-3, abs_tol=1e-6):
@@ -86,12 +95,15 @@ def steps_of_matlab(f, end, start, rel_tol=1e-3, abs_tol=1e-6):
                 new = y + h * sum(float(a) * x for a, x in zip(row, k, strict=True))
                 k.append(np.array(f(t + float(node) * h, new)))
             scale = np.maximum(np.maximum(np.abs(y), np.abs(new)), threshold)
-            error = h * np.max(np.abs(sum(float(e) * x for e, x in zip(ERROR, k, strict=True))) / scale)
+            error = h * np.max(
+                np.abs(sum(float(e) * x for e, x in zip(ERROR, k, strict=True))) / scale
+            )
             if error <= rel_tol:
                 break
             if h <= shortest:
                 return times
-            first = h * np.fmax(0.1, 0.8 * (rel_tol / error) ** power)  # MATLAB's max passes over what is no number
+            # MATLAB's max passes over what is no number
+            first = h * np.fmax(0.1, 0.8 * (rel_tol / error) ** power)
             h, done, has_failed = max(shortest, 0.5 * h if has_failed else first), False, True
         t, y, slope = t + h, new, k[-1]
         times.append(t)
@@ -114,9 +126,10 @@ def two_walls(t, y):
     return [*wall(0.4041)(t, y), 0.0]
 
 
-# Right-hand side, end, start, tolerances. Constant slopes have no error: steps grow fivefold to a tenth of the span;
-# begun with two steps of together 0.09001 the last one is stretched, with 0.08999 it is cut. At a wall a step fails at
-# once and again, until it fits, or until none is short enough.
+# Right-hand side, end, start, tolerances. Constant slopes have no error: steps grow fivefold to a
+# tenth of the span; begun with two steps of together 0.09001 the last one is stretched, with
+# 0.08999 it is cut. At a wall a step fails at once and again, until it fits, or until none is short
+# enough.
 STEPPED = {
     "no step fails": (harmonic, 10.0, [1.0, 0.0], 1e-8, 1e-11),
     "errors below the threshold are absolute": (harmonic, 10.0, [5e-4, 0.0], 1e-8, 1e-11),
@@ -128,7 +141,13 @@ STEPPED = {
     "halved once": (wall(0.4041), 1.0, [1.0], 1e-3, 1e-6),
     "halved three times": (wall(0.4013), 1.0, [1.0], 1e-3, 1e-6),
     "not a number in the first component": (two_walls, 1.0, [1.0, 1.0], 1e-3, 1e-6),
-    "not a number in the last component": (lambda t, y: two_walls(t, y)[::-1], 1.0, [1.0, 1.0], 1e-3, 1e-6),
+    "not a number in the last component": (
+        lambda t, y: two_walls(t, y)[::-1],
+        1.0,
+        [1.0, 1.0],
+        1e-3,
+        1e-6,
+    ),
     "no growth after a failure": (wall(0.45), 1.0, [1.0], 1e-3, 1e-6),
     "a motion that ends": (lambda _, y: [y[0] ** 2], 2.0, [1.0], 1e-6, 1e-9),
 }
@@ -140,7 +159,9 @@ def test_steps_are_those_of_matlabs_rules(case):
     result, expected = ode45(*STEPPED[case]), steps_of_matlab(*STEPPED[case])
     np.testing.assert_allclose(result.time, expected, rtol=1e-12)
     assert result.success == (expected[-1] == STEPPED[case][1])
-    assert result.success or result.message.startswith(f"Failure at t={expected[-1]:e}. Unable to meet")
+    assert result.success or result.message.startswith(
+        f"Failure at t={expected[-1]:e}. Unable to meet"
+    )
 
 
 def test_no_step_at_all():
@@ -160,7 +181,8 @@ def test_read_off_between_and_at_the_steps():
     np.testing.assert_allclose(np.diff(time)[:4], result.time[1] / 4.0, rtol=1e-12)
     assert np.array_equal(state, result.at(time))
     times = np.linspace(0.0, 10.0, 777)[::-1]
-    # The interpolant is one order lower than the steps: its own error is h⁵ k with h ~ 0.08, k < 1e-2, so 1e-7.
+    # The interpolant is one order lower than the steps: its own error is h⁵ k with h ~ 0.08, k <
+    # 1e-2, so 1e-7.
     np.testing.assert_allclose(result.at(times), harmonic_exact(times), atol=1e-7)
     with pytest.raises(ValueError, match="covers"):
         result.at(np.array([10.1]))

@@ -1,4 +1,5 @@
-"""A wrong number in an engine's model is seen by the interval defects wherever the motion exercises it, to the end."""
+"""A wrong number in an engine's model is seen by the interval defects wherever the motion exercises
+it, to the end."""
 
 from __future__ import annotations
 
@@ -25,19 +26,22 @@ from rotor_mbs.solution.trajectory import Array, Trajectory
 SCENES = {scene.name.removeprefix("paper/"): scene for scene in find_scenes(["paper"])}
 ENGINES = ("exudyn_tree/rk67", "mujoco/rk4", "exudyn_chain/extrapolated")
 ROWS = 40  # of a stretch near the end, which is run with the fault
-# A fault is planted four times as large as its signature, which no engine has computed, says that the bounds see it;
-# up to 100 % of a number, and 400 % of a torque.
+# A fault is planted four times as large as its signature, which no engine has computed, says that
+# the bounds see it; up to 100 % of a number, and 400 % of a torque.
 MARGIN = 4.0
 SMALL = 1e-7  # relative: far above rounding, and the defects are linear in it
 LARGEST_SHARE = {"c": 1.0, "gravity": 1.0, "torque": 4.0}
 
-# In so many of the scenes at least a fault can be seen by the method's bounds. In figs. 5 and 6 the rotor stands or
-# swings by so little that nothing is, and a horizontal rotor has no weight to turn it.
+# In so many of the scenes at least a fault can be seen by the method's bounds. In figs. 5 and 6 the
+# rotor stands or swings by so little that nothing is, and a horizontal rotor has no weight to turn
+# it.
 SEEN_IN = {"c": 9, "gravity": 10, "torque": 4}
 
 
 def with_wrong_torque(scene: Scene, share: float) -> Scene:
-    return replace(scene, rotor_torque=tuple((t, torque * (1.0 + share)) for t, torque in scene.rotor_torque))
+    return replace(
+        scene, rotor_torque=tuple((t, torque * (1.0 + share)) for t, torque in scene.rotor_torque)
+    )
 
 
 WRONG = {
@@ -48,14 +52,19 @@ WRONG = {
 
 
 def near_the_end(scene: Scene) -> tuple[Scene, Trajectory]:
-    """The reference's motion from 0.5 s before the end, far beyond the old horizons of a second, as a scene."""
+    """The reference's motion from 0.5 s before the end, far beyond the old horizons of a second, as
+    a scene."""
     whole, first = reference(scene.name), scene.samples - 51
     rows = slice(first, first + ROWS + 1)
     motion = Trajectory(whole.time[rows] - whole.time[first], whole.angles[rows], whole.rates[rows])
     part = replace(
-        scene, duration=float(motion.time[-1]), samples=ROWS + 1, outputs=("angles", "rates"),
-        initial_angles=tuple(motion.angles[0].tolist()), initial_rates=tuple(motion.rates[0].tolist()),
-    )  # fmt: skip
+        scene,
+        duration=float(motion.time[-1]),
+        samples=ROWS + 1,
+        outputs=("angles", "rates"),
+        initial_angles=tuple(motion.angles[0].tolist()),
+        initial_rates=tuple(motion.rates[0].tolist()),
+    )
     return part, motion
 
 
@@ -81,12 +90,19 @@ def signatures(scene: Scene, motion: Trajectory) -> dict[str, Array]:
         rows = closed_form.accelerations(list(angles), list(rates), form, loads, np.sin, np.cos)
         return np.array([np.broadcast_to(row, angles[0].shape) for row in rows])
 
-    differences = {name: accelerations(wrong(scene, SMALL)) - accelerations(scene) for name, wrong in WRONG.items()}
-    return {name: np.abs(each * interval / units).max(axis=0) / SMALL for name, each in differences.items()}
+    differences = {
+        name: accelerations(wrong(scene, SMALL)) - accelerations(scene)
+        for name, wrong in WRONG.items()
+    }
+    return {
+        name: np.abs(each * interval / units).max(axis=0) / SMALL
+        for name, each in differences.items()
+    }
 
 
 def smallest_share(name: str, method: str, fault: str) -> float:
-    """The relative fault that one of the bounds would see, by its signature; inf where the motion has none of it."""
+    """The relative fault that one of the bounds would see, by its signature; inf where the motion
+    has none of it."""
     sizes = signatures(*near_the_end(SCENES[name]))[fault]
     with np.errstate(divide="ignore"):
         return float(np.min(np.array(limits(name, method)) / [sizes.max(), np.median(sizes)]))
@@ -94,9 +110,15 @@ def smallest_share(name: str, method: str, fault: str) -> float:
 
 @pytest.mark.parametrize("fault", SEEN_IN)
 @pytest.mark.parametrize(
-    "method", [pytest.param(name, marks=pytest.mark.full) if "extrapolated" in name else name for name in ENGINES]
+    "method",
+    [
+        pytest.param(name, marks=pytest.mark.full) if "extrapolated" in name else name
+        for name in ENGINES
+    ],
 )
-def test_a_fault_near_the_end_is_seen_where_the_motion_exercises_it(method: str, fault: str) -> None:
+def test_a_fault_near_the_end_is_seen_where_the_motion_exercises_it(
+    method: str, fault: str
+) -> None:
     if not find_method(method).is_installed:
         pytest.skip(f"{method} is not installed")
     shares = {name: MARGIN * smallest_share(name, method, fault) for name in SCENES}

@@ -1,4 +1,5 @@
-"""The printed model: its literal text, the paper's derivation, and the right equations made here from T and V alone."""
+"""The printed model: its literal text, the paper's derivation, and the right equations made here
+from T and V alone."""
 
 from __future__ import annotations
 
@@ -23,7 +24,9 @@ def phases(blades):
 
 
 def random_motion(rng, blades):
-    return rng.uniform(-np.pi, np.pi, 1 + blades).tolist(), rng.uniform(-2.0, 2.0, 1 + blades).tolist()
+    return rng.uniform(-np.pi, np.pi, 1 + blades).tolist(), rng.uniform(
+        -2.0, 2.0, 1 + blades
+    ).tolist()
 
 
 def constants(rng):
@@ -48,10 +51,13 @@ def test_literal_text_is_the_derivation_with_all_errata(blades):
         torques = rng.uniform(-1.0, 1.0, 1 + blades).tolist()
         rotor = DerivedRotor(m, c, d, g, phases(blades), AS_PRINTED)
         derived = np.array(rotor.accelerations(torques, angles, rates))
-        # Rounding, some 1e-15, times the condition of the mass matrix, which is singular at a pitch of ±π/2.
+        # Rounding, some 1e-15, times the condition of the mass matrix, which is singular at a pitch
+        # of ±π/2.
         bound = 1e-14 * np.linalg.cond(mass_matrix(rotor, angles)) * max(1.0, np.abs(derived).max())
         assert bound < 1e-2 * max(1.0, np.abs(derived).max())
-        np.testing.assert_allclose(text(m, c, d, g, torques, angles + rates), derived, rtol=0.0, atol=bound)
+        np.testing.assert_allclose(
+            text(m, c, d, g, torques, angles + rates), derived, rtol=0.0, atol=bound
+        )
 
 
 @pytest.mark.parametrize("name", GRAVITY_ROWS)
@@ -61,7 +67,8 @@ def test_every_way_of_writing_the_first_row_of_56_is_equal_but_for_rounding(name
         q2, q3, q4, q5 = rng.uniform(-np.pi, np.pi, 4)
         sines = [f(q) for q in (q2, q3, q4, q5) for f in (math.sin, math.cos)]
         printed = literal.gravity_three(M, C, G, *sines)[0]
-        # Of 1.3e4 N m, some units of 1.8e-12; of three weights m g d = 2.3e6 N m, some units of 4.7e-10.
+        # Of 1.3e4 N m, some units of 1.8e-12; of three weights m g d = 2.3e6 N m, some units of
+        # 4.7e-10.
         allowed = 2e-11 if name != SUMMED else 1e-8
         written = moment(name, M, C, D, G, q2, math.cos(q3), math.cos(q4), math.cos(q5))
         assert written == pytest.approx(printed, rel=0.0, abs=allowed)
@@ -77,18 +84,27 @@ def test_figure_5_starts_in_an_equilibrium_that_only_rounding_leaves():
 def closed_form_accelerations(m, c, d, g, torques, angles, rates, blades):
     blade = Blade(m, (c, 0.0, d), (0.0,) * 6, (c, 0.0, d))
     zero = (0.0,) * (1 + blades)
-    form = rotor_form(Scene("random", "", (), g, 1.0, 2, ("angles",), (blade,) * blades, 0.0, zero, zero))
-    return closed_form.accelerations(angles, rates, form, LoadValues(torques[0], torques[1:]), math.sin, math.cos)
+    form = rotor_form(
+        Scene("random", "", (), g, 1.0, 2, ("angles",), (blade,) * blades, 0.0, zero, zero)
+    )
+    return closed_form.accelerations(
+        angles, rates, form, LoadValues(torques[0], torques[1:]), math.sin, math.cos
+    )
 
 
 @pytest.mark.parametrize("blades", [1, 2, 3, 5])
 @pytest.mark.parametrize("errata", [CORRECTED, Errata(e1=False, e2=False, e3=True)])
 def test_the_corrected_derivation_is_the_closed_form(blades, errata):
-    """E3 changes nothing where E2 is corrected. That the closed form is Lagrange's is shown in test_lagrange.py."""
+    """E3 changes nothing where E2 is corrected. That the closed form is Lagrange's is shown in
+    test_lagrange.py."""
     rng = np.random.default_rng(6)
     for _ in range(5):
         angles, rates = random_motion(rng, blades)
         chosen, torques = constants(rng), rng.uniform(-1.0, 1.0, 1 + blades).tolist()
-        derived = DerivedRotor(*chosen, phases(blades), errata).accelerations(torques, angles, rates)
+        derived = DerivedRotor(*chosen, phases(blades), errata).accelerations(
+            torques, angles, rates
+        )
         exact = np.array(closed_form_accelerations(*chosen, torques, angles, rates, blades))
-        np.testing.assert_allclose(derived, exact, rtol=0.0, atol=3e-13 * max(1.0, np.abs(exact).max()))
+        np.testing.assert_allclose(
+            derived, exact, rtol=0.0, atol=3e-13 * max(1.0, np.abs(exact).max())
+        )

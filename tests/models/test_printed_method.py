@@ -45,9 +45,12 @@ def drift(trajectory):
     ],
 )
 def test_one_blade_is_a_pendulum_that_does_not_pitch(given, lean, method):
-    """Without c every erratum is without effect; with it E2 and E3 at zero pitch and pitch rate. q2 = π hangs down."""
+    """Without c every erratum is without effect; with it E2 and E3 at zero pitch and pitch rate. q2
+    = π hangs down."""
     result = run(given, method, **TIGHT)
-    exact = pendulum(11 * PI / 12, math.hypot(lean, D), math.atan2(lean, D), 9.8, result.trajectory.time)
+    exact = pendulum(
+        11 * PI / 12, math.hypot(lean, D), math.atan2(lean, D), 9.8, result.trajectory.time
+    )
     # Tolerance 1e-12 a step, some 1e3 steps.
     np.testing.assert_allclose(result.trajectory.angles[:, 0], exact, atol=1e-9)
     assert not result.trajectory.angles[:, 1].any()
@@ -67,7 +70,11 @@ def test_constant_torque_turns_a_balanced_rotor():
 def test_right_equations_keep_energy_and_printed_ones_make_it():
     # Energy drifts by the tolerance a step at most; 2e3 steps, most of them at far less.
     assert drift(run(FIG11, "printed_e3/ode45", **CLOSE).trajectory) < 1e-8
-    for method, gain in {"printed/ode45": 0.1, "printed_e1/ode45": 1e-4, "printed_e2/ode45": 0.1}.items():
+    for method, gain in {
+        "printed/ode45": 0.1,
+        "printed_e1/ode45": 1e-4,
+        "printed_e2/ode45": 0.1,
+    }.items():
         assert drift(run(FIG11, method).trajectory) > gain
 
 
@@ -75,7 +82,8 @@ def test_work_of_torques_that_ramp_and_jump_on_rotor_and_pitches():
     table = ((0.4, 0.0), (0.8, 4e5), (1.2, 4e5), (1.2, -3e5), (1.8, 1e5))
     on_pitches = (((0.0, 9e3),), ((0.4, 0.0), (1.0, -2e4)), ())
     given = replace(FIG11, duration=2.0, rotor_torque=table, pitch_torque=on_pitches)
-    # Steps cross the kinks of the table with their error held to the tolerance, 1e-9; the work adds nothing to it.
+    # Steps cross the kinks of the table with their error held to the tolerance, 1e-9; the work adds
+    # nothing to it.
     trajectory = run(given, "printed_e3/ode45", **CLOSE).trajectory
     assert drift(trajectory) < 1e-7
     assert np.abs(trajectory.work).max() > 0.01 * WEIGHT
@@ -100,9 +108,17 @@ def test_a_singularity_ends_the_run_with_what_was_reached():
 @pytest.mark.parametrize(
     ("given", "word"),
     [
-        (replace(FIG11, blades=(BLADE,) * 2, initial_angles=(0.0,) * 3, initial_rates=(0.0,) * 3), "1 or 3 blades"),
+        (
+            replace(
+                FIG11, blades=(BLADE,) * 2, initial_angles=(0.0,) * 3, initial_rates=(0.0,) * 3
+            ),
+            "1 or 3 blades",
+        ),
         (replace(FIG11, blades=(BLADE, BLADE, replace(BLADE, mass=1.0))), "equal"),
-        (replace(FIG11, blades=(replace(BLADE, inertia=(1.0, 1.0, 1.0, 0.0, 0.0, 0.0)),) * 3), "point-mass"),
+        (
+            replace(FIG11, blades=(replace(BLADE, inertia=(1.0, 1.0, 1.0, 0.0, 0.0, 0.0)),) * 3),
+            "point-mass",
+        ),
         (replace(FIG11, blades=(replace(BLADE, centre_of_mass=(C, 0.1, D)),) * 3), "y = 0"),
         (replace(FIG11, hub_inertia=1.0), "hub inertia"),
         (replace(FIG11, bearing_stiffness=(0.0, 1.0, 0.0)), "bearing"),

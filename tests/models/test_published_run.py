@@ -1,8 +1,10 @@
-"""A published run of another program: FAST v8's certification test 10, a rigid two-bladed rotor at 71.9 rpm.
+"""A published run of another program: FAST v8's certification test 10, a rigid two-bladed rotor at
+71.9 rpm.
 
-Half a unit in the last printed digit is the bound: the model has no degrees of freedom, so that its loads have closed
-forms, and FAST printed four digits. It ran in single precision, with azimuths of up to 188 rad. The wind acts
-on both blades alike: radial forces, differences between the blades and moments about the shaft do not have it.
+Half a unit in the last printed digit is the bound: the model has no degrees of freedom, so that its
+loads have closed forms, and FAST printed four digits. It ran in single precision, with azimuths of
+up to 188 rad. The wind acts on both blades alike: radial forces, differences between the blades and
+moments about the shaft do not have it.
 """
 
 from __future__ import annotations
@@ -38,7 +40,9 @@ def half_digit(values: Array) -> Array:
 
 def loads_of_scene(model: Path, time: Array, method: str) -> dict[str, Array]:
     """What FAST calls these loads, from a run of the model's scene, at the times of the output."""
-    scene = rm.scene_from_openfast(model).replace(duration=25.0, samples=251, outputs=["angles", "rates", "loads"])
+    scene = rm.scene_from_openfast(model).replace(
+        duration=25.0, samples=251, outputs=["angles", "rates", "loads"]
+    )
     run = rm.run(scene, method)
     assert run.status == "ok"
     rows = np.searchsorted(run.time, time - 1e-6)
@@ -49,12 +53,16 @@ def loads_of_scene(model: Path, time: Array, method: str) -> dict[str, Array]:
         pitch = run.angles[rows, blade]
         loads[f"RootFyc{blade}"] = np.cos(pitch) * x - np.sin(pitch) * y
         loads[f"RootFzc{blade}"] = -z
-    # The gages turn with the shaft, and have the force of rotor and hub at their distance, beside the moment.
+    # The gages turn with the shaft, and have the force of rotor and hub at their distance, beside
+    # the moment.
     azimuth = run.angles[rows, 0]
     turned = {}
     for name in ("shaft_force", "shaft_moment"):
         x, _, z = getattr(run, name)[rows].T
-        turned[name] = np.cos(azimuth) * x - np.sin(azimuth) * z, np.sin(azimuth) * x + np.cos(azimuth) * z
+        turned[name] = (
+            np.cos(azimuth) * x - np.sin(azimuth) * z,
+            np.sin(azimuth) * x + np.cos(azimuth) * z,
+        )
     (force_x, force_z), (moment_x, moment_z) = turned["shaft_force"], turned["shaft_moment"]
     loads["LSSGagMya"] = moment_x - GAGE * force_z
     loads["LSSGagMza"] = -moment_z - GAGE * force_x
@@ -62,10 +70,14 @@ def loads_of_scene(model: Path, time: Array, method: str) -> dict[str, Array]:
 
 
 def excess(model: Path, method: str = "lagrange/taylor") -> dict[str, float]:
-    """Largest difference from the published loads, in units of what their digits and rounding allow."""
+    """Largest difference from the published loads, in units of what their digits and rounding
+    allow."""
     output = published()
     loads = loads_of_scene(model, output["Time"], method)
-    pairs = {name: (loads[name], output[name], half_digit(output[name])) for name in ("RootFzc1", "RootFzc2")}
+    pairs = {
+        name: (loads[name], output[name], half_digit(output[name]))
+        for name in ("RootFzc1", "RootFzc2")
+    }
     in_plane = [output["RootFyc1"], output["RootFyc2"]]
     pairs["RootFyc1 - RootFyc2"] = (
         loads["RootFyc1"] - loads["RootFyc2"],
@@ -83,7 +95,8 @@ def excess(model: Path, method: str = "lagrange/taylor") -> dict[str, float]:
 
 
 def with_nodes(folder: Path, nodes: int) -> Path:
-    """The model with another number of nodes: with many, the node sum is the integral of the density."""
+    """The model with another number of nodes: with many, the node sum is the integral of the
+    density."""
     for file in HERE.iterdir():
         text = file.read_text()
         (folder / file.name).write_text(text.replace("21  BldNodes", f"{nodes}  BldNodes"))

@@ -32,7 +32,8 @@ def _propagated(name: str, tolerance: float) -> Any:
     return run.states[:, : len(scene.moving_coordinates)]
 
 
-# The closed form with 180 bits at tolerance 1e-42: the true motion, as far as quad precision can tell
+# The closed form with 180 bits at tolerance 1e-42: the true motion, as far as quad precision can
+# tell
 
 _BITS = 180
 _TOLERANCE = "1e-42"
@@ -42,7 +43,10 @@ def moving_angles(scene: Scene) -> Any:
     """(samples, coordinates that move) rad, numbers of 180 bits."""
     (equations, parameters), columns = build_system(scene), scene.moving_coordinates
     count, kind = len(columns), {"fp_type": heyoka().real, "tol": heyoka().real(_TOLERANCE, _BITS)}
-    values = [*(scene.initial_angles[i] for i in columns), *(scene.initial_rates[i] for i in columns)]
+    values = [
+        *(scene.initial_angles[i] for i in columns),
+        *(scene.initial_rates[i] for i in columns),
+    ]
     start = _numbers([*values, *[0.0] * (len(equations) - 2 * count)])
     integrator = heyoka().taylor_adaptive(equations, state=start, compact_mode=True, **kind)
     set_parameters(integrator, _numbers(parameters.values))
@@ -58,7 +62,8 @@ def moving_angles(scene: Scene) -> Any:
 
 
 def distance(angles: Any, exact: Any) -> Any:
-    """(n,) rad: largest over the coordinates, of doubles or quad numbers from numbers of 180 bits."""
+    """(n,) rad: largest over the coordinates, of doubles or quad numbers from numbers of 180
+    bits."""
     real = heyoka().real
     wide = np.array([[real(value, _BITS) for value in row] for row in angles])
     return np.abs((wide - exact).astype(float)).max(axis=1)
@@ -67,17 +72,30 @@ def distance(angles: Any, exact: Any) -> Any:
 def _numbers(values: Any) -> Any:
     real = heyoka().real
     fractions = [Fraction(value) for value in values]
-    return np.array([real(str(f.numerator), _BITS) / real(str(f.denominator), _BITS) for f in fractions])
+    return np.array(
+        [real(str(f.numerator), _BITS) / real(str(f.denominator), _BITS) for f in fractions]
+    )
 
 
-# Of each kind: rest, a pendulum, uniform rotation, constant torque, coordinates at exact zero, general rigid blades.
-_OF_EACH_KIND = ("paper/fig05", "paper/fig04b", "paper/fig06", "paper/fig15-100kNm", "paper/fig08", "check/general")
+# Of each kind: rest, a pendulum, uniform rotation, constant torque, coordinates at exact zero,
+# general rigid blades.
+_OF_EACH_KIND = (
+    "paper/fig05",
+    "paper/fig04b",
+    "paper/fig06",
+    "paper/fig15-100kNm",
+    "paper/fig08",
+    "check/general",
+)
 _OTHERS = [f"paper/{name}" for name in PAPER_SCENES if f"paper/{name}" not in _OF_EACH_KIND]
 
 
-@pytest.mark.parametrize("name", [*_OF_EACH_KIND, *(pytest.param(name, marks=pytest.mark.nightly) for name in _OTHERS)])
+@pytest.mark.parametrize(
+    "name", [*_OF_EACH_KIND, *(pytest.param(name, marks=pytest.mark.nightly) for name in _OTHERS)]
+)
 def test_uncertainty_bounds_the_true_error_at_every_sample(name: str) -> None:
-    """Of the quad run; of the doubles that are stored, together with half a unit in the last place."""
+    """Of the quad run; of the doubles that are stored, together with half a unit in the last
+    place."""
     pytest.importorskip("heyoka")
     exact, frozen = moving_angles(shipped(name)), frozen_reference(name)
     rows = min(len(exact), len(frozen.time))
@@ -99,11 +117,15 @@ def test_the_uncertainty_is_ten_times_difference_and_rounding_and_never_falls() 
 def test_a_reference_that_fails_says_why_and_how_far_the_better_run_came(failing: str) -> None:
     """`steps` and the time are those of the run that is kept, whichever fails."""
     runs = {
-        name: Integration(name != failing, f"{name} failed" if name == failing else "", reached, steps)
+        name: Integration(
+            name != failing, f"{name} failed" if name == failing else "", reached, steps
+        )
         for name, reached, steps in (("best", 2.0, 20), ("check", 1.0, 10))
     }
     solver: Any = object.__new__(ReferenceSolver)
-    solver._runs = [SimpleNamespace(integrate=lambda report=report: report) for report in runs.values()]
+    solver._runs = [
+        SimpleNamespace(integrate=lambda report=report: report) for report in runs.values()
+    ]
     result = solver.integrate()
     assert (result.success, result.time_reached, result.steps) == (not failing, 2.0, 20)
     assert result.message == (f"{failing} failed" if failing else "")
@@ -146,7 +168,9 @@ def test_quotients_are_known_as_far_as_both_runs_went(monkeypatch: pytest.Monkey
     def ends_early(start: Scene, tolerances: tuple[float, float], times: Any) -> Any:
         run = solver_of(start, tolerances, times)
         run.integrate()
-        return SimpleNamespace(integrate=lambda: None, states=run.states[: 4 if start == scene else 2])
+        return SimpleNamespace(
+            integrate=lambda: None, states=run.states[: 4 if start == scene else 2]
+        )
 
     monkeypatch.setattr(reference_module, "_in_doubles", ends_early)
     result = reference_module._matrices_by_quotients(scene, np.linspace(0.0, 0.1, 4))
@@ -154,14 +178,17 @@ def test_quotients_are_known_as_far_as_both_runs_went(monkeypatch: pytest.Monkey
     assert np.isposinf(result[2:]).all()
 
 
-@pytest.mark.parametrize(("known", "finite"), [(2, [True, True, False]), (3, [True] * 3), (4, [True] * 3)])
+@pytest.mark.parametrize(
+    ("known", "finite"), [(2, [True, True, False]), (3, [True] * 3), (4, [True] * 3)]
+)
 def test_growth_is_known_as_far_as_the_variational_equations_went(
     known: int, finite: list[bool], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     pytest.importorskip("heyoka")
     matrices = np.full((known, 4, 4), 3.0)  # rows of norm 6, columns in units of 1
     monkeypatch.setattr(reference_module, "_transition_matrices", lambda _scene, _times: matrices)
-    scene = paper("fig03", duration=0.1, samples=3, initial_angles=(0.5, 0.1))  # of which no pitch is at rest
+    # of which no pitch is at rest
+    scene = paper("fig03", duration=0.1, samples=3, initial_angles=(0.5, 0.1))
     result = reference_at(scene, np.linspace(0.0, 0.1, 3))
     assert result.growth.tolist() == [[6.0 if is_finite else np.inf] * 4 for is_finite in finite]
     assert result.trajectory.error_growth is not None
@@ -172,7 +199,9 @@ def test_a_pitch_that_is_fixed_has_no_growth_and_no_unit(monkeypatch: pytest.Mon
     monkeypatch.setattr(reference_module, "is_available", lambda: False)
     free = paper("fig03").blades[0]
     blades = (replace(free, centre_of_mass=(0.0, 0.0, 5.0)), free)
-    scene = replace(paper("fig03"), blades=blades, initial_angles=(0.2, 0.0, 0.1), initial_rates=(0.5, 0.0, 0.2))
+    scene = replace(
+        paper("fig03"), blades=blades, initial_angles=(0.2, 0.0, 0.1), initial_rates=(0.5, 0.0, 0.2)
+    )
     scene = replace(scene, bearing_stiffness=(0.0, 1e8), duration=0.1, samples=3)
     assert list(scene.moving_coordinates) == [0, 2]
     result = reference_at(scene, np.linspace(0.0, 0.1, 3))
@@ -182,10 +211,15 @@ def test_a_pitch_that_is_fixed_has_no_growth_and_no_unit(monkeypatch: pytest.Mon
 
 
 def test_error_growth_of_a_stiff_oscillation_is_one() -> None:
-    """An undamped spring of 1000 rad/s turns (angle, rate/ω) in a circle: no error of it grows, in either channel."""
+    """An undamped spring of 1000 rad/s turns (angle, rate/ω) in a circle: no error of it grows, in
+    either channel."""
     pytest.importorskip("heyoka", reason="quotients of differences have four digits")
-    scene = make_scene([0, 0.01], [0, 0], (AXIAL,), gravity=0.0, duration=0.1, samples=6, bearing_stiffness=(7e6,))
+    scene = make_scene(
+        [0, 0.01], [0, 0], (AXIAL,), gravity=0.0, duration=0.1, samples=6, bearing_stiffness=(7e6,)
+    )
     result = reference_at(scene, np.linspace(0.0, 0.1, 6))
     np.testing.assert_allclose(result.units, [1.0, 1.0, 1.0, 1000.0])
     np.testing.assert_allclose(result.growth[:, [1, 3]], 1.0, rtol=1e-9)
-    np.testing.assert_allclose(result.growth[:, 0], np.hypot(1.0, result.trajectory.time), rtol=1e-9)
+    np.testing.assert_allclose(
+        result.growth[:, 0], np.hypot(1.0, result.trajectory.time), rtol=1e-9
+    )

@@ -1,4 +1,5 @@
-"""Integrators over the segments of the loads: what is counted, where a run ends, the unit that its work counts in."""
+"""Integrators over the segments of the loads: what is counted, where a run ends, the unit that its
+work counts in."""
 
 from __future__ import annotations
 
@@ -16,16 +17,27 @@ from rotor_mbs.methods.catalogue import find_method
 from rotor_mbs.methods.solve import solve
 from rotor_mbs.models.lagrange.closed_form import load_values
 from rotor_mbs.models.lagrange.heyoka_adapter import array_of
-from rotor_mbs.models.lagrange.ode_solvers import OdeSolver, ode45_integrator, scipy_integrator, work_unit
+from rotor_mbs.models.lagrange.ode_solvers import (
+    OdeSolver,
+    ode45_integrator,
+    scipy_integrator,
+    work_unit,
+)
 from rotor_mbs.models.lagrange.samples import at_constant_rests
 from rotor_mbs.models.lagrange.taylor import Propagation
 
 
 @pytest.mark.parametrize("method", ["lagrange/dop853", "lagrange/taylor"])
 def test_a_run_counts_all_its_segments_and_ends_in_the_one_that_fails(method: str) -> None:
-    """One more of 0.1 s after a second; a blade that runs into its singularity in the second of three."""
-    one = paper("fig03", duration=1.0, samples=11, rotor_torque=((0.0, 0.0), (1.0, 10.0), (2.0, 0.0)))
-    reports = [solve(method, scene, {}).integration for scene in (one, replace(one, duration=1.1, samples=12))]
+    """One more of 0.1 s after a second; a blade that runs into its singularity in the second of
+    three."""
+    one = paper(
+        "fig03", duration=1.0, samples=11, rotor_torque=((0.0, 0.0), (1.0, 10.0), (2.0, 0.0))
+    )
+    reports = [
+        solve(method, scene, {}).integration
+        for scene in (one, replace(one, duration=1.1, samples=12))
+    ]
     assert [report.time_reached for report in reports] == [1.0, 1.1]
     end = solve(method, one, {})
     rest = replace(
@@ -38,8 +50,17 @@ def test_a_run_counts_all_its_segments_and_ends_in_the_one_that_fails(method: st
     if reports[0].rhs_evaluations is not None:
         assert isinstance(reports[0].rhs_evaluations, int)
         assert reports[1].rhs_evaluations == reports[0].rhs_evaluations + reports[2].rhs_evaluations
-    failing = replace(one, gravity=0.0, initial_angles=(1.0, 1.2), initial_rates=(0.0, 1.0), duration=3.0, samples=301)
-    failed = solve(method, replace(failing, rotor_torque=((0.0, 0.0), (0.05, 10.0), (2.0, 0.0))), {}).integration
+    failing = replace(
+        one,
+        gravity=0.0,
+        initial_angles=(1.0, 1.2),
+        initial_rates=(0.0, 1.0),
+        duration=3.0,
+        samples=301,
+    )
+    failed = solve(
+        method, replace(failing, rotor_torque=((0.0, 0.0), (0.05, 10.0), (2.0, 0.0))), {}
+    ).integration
     assert not failed.success
     assert failed.message
     assert not failed.out_of_time
@@ -62,14 +83,17 @@ def test_every_evaluation_is_counted(name: str) -> None:
         return [-state[0]]
 
     result = INTEGRATORS[name](decay, 1.0, 3.0, np.ones(1), np.array([1.5, 2.0, 3.0]))
-    # Radau's differences of the right-hand side for its Jacobian are no steps of it; SciPy does not count them.
+    # Radau's differences of the right-hand side for its Jacobian are no steps of it; SciPy does not
+    # count them.
     assert result.evaluations == len(calls) or (name == "Radau" and result.evaluations < len(calls))
     assert result.states[:, 0] == pytest.approx(np.exp(-np.array([0.5, 1.0, 2.0])), rel=1e-5)
     assert result.end[0] == pytest.approx(math.exp(-2.0), rel=1e-5)
     assert not result.message
     if name != "ode45":
         tolerances = {"DOP853": (1e-9, 1e-12), "Radau": (1e-6, 1e-9)}[name]
-        alone = solve_ivp(decay, (1.0, 3.0), np.ones(1), name, rtol=tolerances[0], atol=tolerances[1])
+        alone = solve_ivp(
+            decay, (1.0, 3.0), np.ones(1), name, rtol=tolerances[0], atol=tolerances[1]
+        )
         assert result.steps == len(alone.t) - 1
 
 
@@ -85,7 +109,9 @@ def test_a_state_that_has_diverged_has_no_derivative() -> None:
 @pytest.mark.parametrize("name", INTEGRATORS)
 def test_a_motion_that_ends_is_a_run_that_says_why(name: str) -> None:
     """1 / (1 - t) at t = 1."""
-    result = INTEGRATORS[name](lambda _, y: [y[0] * y[0]], 0.0, 2.0, np.ones(1), np.array([0.5, 1.5]))
+    result = INTEGRATORS[name](
+        lambda _, y: [y[0] * y[0]], 0.0, 2.0, np.ones(1), np.array([0.5, 1.5])
+    )
     assert len(result.states) == 1
     assert "step size" in result.message
 
@@ -107,7 +133,8 @@ def test_a_solver_at_chosen_times_has_those(engine: str) -> None:
 
 @pytest.mark.parametrize("settings", [{}, {"tolerance": 1e-9}])
 def test_the_order_of_taylors_series_is_that_of_its_tolerance(settings: dict[str, float]) -> None:
-    """⌈1 - ln(tol) / 2⌉: A. Jorba, M. Zou, Exp. Math. 14 (2005). At round-off neither errors nor steps show it."""
+    """⌈1 - ln(tol) / 2⌉: A. Jorba, M. Zou, Exp. Math. 14 (2005). At round-off neither errors nor
+    steps show it."""
     pytest.importorskip("heyoka")
     method = find_method("lagrange/taylor")
     solver: Any = method.build(paper("fig03"), method.settings.of(method.name, settings))
@@ -116,9 +143,17 @@ def test_the_order_of_taylors_series_is_that_of_its_tolerance(settings: dict[str
 
 
 def test_a_load_over_time_is_in_quad_precision_in_a_quad_run() -> None:
-    """A torque that grows by a third of 1000 N m a second, which no double is, on a balanced rotor: s t³ / 6 I."""
+    """A torque that grows by a third of 1000 N m a second, which no double is, on a balanced rotor:
+    s t³ / 6 I."""
     pytest.importorskip("heyoka")
-    scene = paper("fig06", gravity=0.0, initial_angles=(0.0,) * 4, initial_rates=(0.0,) * 4, duration=3.0, samples=2)
+    scene = paper(
+        "fig06",
+        gravity=0.0,
+        initial_angles=(0.0,) * 4,
+        initial_rates=(0.0,) * 4,
+        duration=3.0,
+        samples=2,
+    )
     scene = replace(scene, rotor_torque=((0.0, 0.0), (3.0, 1000.0)))
     run = Propagation(scene, quad=True, tol=1e-32, compact_mode=True)
     assert run.integrate().success
@@ -129,7 +164,8 @@ def test_a_load_over_time_is_in_quad_precision_in_a_quad_run() -> None:
 
 
 def test_constant_rest_angles_do_no_work() -> None:
-    """After the rotor's torque a torque and a rest angle for each of four pitches, of which the third is fixed."""
+    """After the rotor's torque a torque and a rest angle for each of four pitches, of which the
+    third is fixed."""
     loads = load_values([0.0, 1.0, 0.1, 2.0, 0.2, 3.0, 0.3, 4.0, 0.4], (1, 2, 4))
     assert (loads.pitches, loads.rests) == ([1.0, 2.0, 4.0], [0.1, 0.2, 0.4])
     assert at_constant_rests((False, True, False), loads).rests == [0.0, 0.2, 0.0]

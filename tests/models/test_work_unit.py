@@ -1,4 +1,5 @@
-"""The work is a variable in units of the scene's energy: it sets the accuracy of no other number."""
+"""The work is a variable in units of the scene's energy: it sets the accuracy of no other
+number."""
 
 from __future__ import annotations
 
@@ -10,7 +11,8 @@ from rotor_mbs.analysis.judgement import defects_of
 from rotor_mbs.methods.solve import solve
 from rotor_mbs.solution.metrics import energy_scale
 
-# A turbine's rotor on damped bearings, with a step of its torque; in J its work is some 1e7 times an angle.
+# A turbine's rotor on damped bearings, with a step of its torque; in J its work is some 1e7 times
+# an angle.
 STIFF = shipped("stiff/nrel-5mw-damped").replace(
     **{
         "outputs": ["angles", "rates", "energy"],

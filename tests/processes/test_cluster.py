@@ -1,4 +1,5 @@
-"""A sweep on a real dask cluster on this machine: a scheduler, two worker processes, one of them killed on the way."""
+"""A sweep on a real dask cluster on this machine: a scheduler, two worker processes, one of them
+killed on the way."""
 
 from __future__ import annotations
 
@@ -32,12 +33,18 @@ def cluster() -> Iterator[tuple[str, list[subprocess.Popen[bytes]]]]:
         port = free.getsockname()[1]
     address = f"tcp://127.0.0.1:{port}"
     dask = [sys.executable, "-m", "distributed.cli"]
-    commands = [[f"{dask[2]}.dask_scheduler", "--host", "127.0.0.1", "--port", str(port), "--no-dashboard"]]
-    commands += [[f"{dask[2]}.dask_worker", address, "--nthreads", "1", "--no-nanny", "--no-dashboard"]] * 2
+    commands = [
+        [f"{dask[2]}.dask_scheduler", "--host", "127.0.0.1", "--port", str(port), "--no-dashboard"]
+    ]
+    commands += [
+        [f"{dask[2]}.dask_worker", address, "--nthreads", "1", "--no-nanny", "--no-dashboard"]
+    ] * 2
     with ExitStack() as stack:
         processes = [
             stack.enter_context(
-                subprocess.Popen([*dask[:2], *command], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+                subprocess.Popen(
+                    [*dask[:2], *command], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
+                )
             )
             for command in commands
         ]
@@ -48,11 +55,26 @@ def cluster() -> Iterator[tuple[str, list[subprocess.Popen[bytes]]]]:
             process.kill()
 
 
-def swept(folder: Path, address: str, victim: subprocess.Popen[bytes], draws: int) -> tuple[str, str, int]:
-    """Output, errors and status of s.toml into dask.h5 on a cluster of which a process is killed after five runs."""
+def swept(
+    folder: Path, address: str, victim: subprocess.Popen[bytes], draws: int
+) -> tuple[str, str, int]:
+    """Output, errors and status of s.toml into dask.h5 on a cluster of which a process is killed
+    after five runs."""
     path, output = starts_file(folder, draws, 21, 3.0), folder / "dask.h5"
-    command = [sys.executable, "-m", "rotor_mbs", "sweep", str(path), "-o", str(output), "--engine", f"dask:{address}"]
-    with subprocess.Popen(command, stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as sweep:
+    command = [
+        sys.executable,
+        "-m",
+        "rotor_mbs",
+        "sweep",
+        str(path),
+        "-o",
+        str(output),
+        "--engine",
+        f"dask:{address}",
+    ]
+    with subprocess.Popen(
+        command, stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+    ) as sweep:
         while sweep.poll() is None and stored_runs(output) < 5:
             time.sleep(0.01)
         assert sweep.poll() is None, sweep.communicate()
@@ -76,7 +98,13 @@ def test_a_worker_with_other_code_or_another_version_is_refused() -> None:
     assert {"rotor_mbs", "numpy", "heyoka", "python", "code of rotor_mbs"} <= set(here)
     for name in here:
         other = SerialPool().submit(partial(_run_as_worker, here | {name: "other"}), 3, 1.0)
-        with pytest.raises(InputError, match=rf"allowed: workers with the same \(on .*: {name} .* \(here other\)\)"):
+        with pytest.raises(
+            InputError,
+            match=(
+                rf"allowed: workers with the same \(on .*: {name} .* "
+                r"\(here other\)\)"
+            ),
+        ):
             other.result()
     assert SerialPool().submit(partial(_run_as_worker, here), -3, 1.0).result() == 3
 
@@ -92,13 +120,24 @@ def test_a_scheduler_that_dies_ends_in_one_line(
     _, errors, status = swept(tmp_path, address, scheduler, 4000)
     assert status == 1, errors
     assert "Traceback" not in errors
-    assert errors.strip().splitlines()[-1].startswith("engine dask: the scheduler was lost; stored runs are kept")
+    assert (
+        errors.strip()
+        .splitlines()[-1]
+        .startswith("engine dask: the scheduler was lost; stored runs are kept")
+    )
 
 
 def test_a_cluster_that_is_not_there_and_one_without_workers_are_a_line(
     tmp_path: Path, cluster: tuple[str, list[subprocess.Popen[bytes]]]
 ) -> None:
-    told = refusal("sweep", "sweeps/fig11-spread", "-o", tmp_path / "o.h5", "--engine", "dask:tcp://127.0.0.1:9")
+    told = refusal(
+        "sweep",
+        "sweeps/fig11-spread",
+        "-o",
+        tmp_path / "o.h5",
+        "--engine",
+        "dask:tcp://127.0.0.1:9",
+    )
     assert "engine dask:tcp://127.0.0.1:9: no dask scheduler answers there" in told
     address, (_, *workers) = cluster
     with Client(address, timeout=30, set_as_default=False) as client:

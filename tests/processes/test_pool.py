@@ -136,12 +136,20 @@ def test_a_system_without_room_for_a_process_costs_the_tasks_of_that_time() -> N
             os.kill(pid, signal.SIGKILL)
             with pytest.raises((TaskLostError, ResourceError), match=r"died|could not be started"):
                 pool.submit(_pid, None, _LONG_S).result()  # where its end is not yet known
-            with pytest.raises(ResourceError, match=r"a process could not be started: .*open files"):
+            with pytest.raises(
+                ResourceError,
+                match=(
+                    r"a process could not be started: "
+                    r".*open files"
+                ),
+            ):
                 pool.submit(_pid, None, _LONG_S).result()
         assert pool.submit(_pid, None, _LONG_S).result() != pid
 
 
-def test_a_system_without_room_for_a_timer_costs_the_tasks_of_that_time(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_system_without_room_for_a_timer_costs_the_tasks_of_that_time(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     def refuse(*_: object) -> None:
         raise RuntimeError("can't start new thread")
 
@@ -165,7 +173,9 @@ def test_a_system_without_room_for_a_thread_is_told(monkeypatch: pytest.MonkeyPa
         WorkerPool(1, gc.collect)
 
 
-def _ends(work: Callable[[Any], Any], tasks: Iterable[Any], pool: TaskPool) -> list[TaskEnd[Any, Any]]:
+def _ends(
+    work: Callable[[Any], Any], tasks: Iterable[Any], pool: TaskPool
+) -> list[TaskEnd[Any, Any]]:
     with pool:
         return list(run_in(pool, work, tasks, _LONG_S))
 
@@ -201,7 +211,8 @@ def test_dead_processes_leave_no_open_files() -> None:
     assert [end.failure for end in ended] == ["worker_died"] * 4
 
 
-# Endless, in Python or in C code that keeps the interpreter's lock, after the number of the process.
+# Endless, in Python or in C code that keeps the interpreter's lock, after the number of the
+# process.
 _BUSY = {
     "loop": "import os; os.write(2, b'%d\\n' % os.getpid())\nwhile True: pass",
     "C code": "import os; os.write(2, b'%d\\n' % os.getpid()); sum(range(10**13))",
@@ -244,7 +255,8 @@ def _fork_and_die(file: Path) -> None:
 
 
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="no fork here")
-@pytest.mark.filterwarnings("ignore:This process:DeprecationWarning")  # multi-threaded, says Python 3.12
+# multi-threaded, says Python 3.12
+@pytest.mark.filterwarnings("ignore:This process:DeprecationWarning")
 def test_a_process_that_a_task_forked_keeps_nobody_waiting(tmp_path: Path) -> None:
     """It has the pipes of its parent, whose end would not be seen."""
     with WorkerPool(1) as pool:
@@ -263,11 +275,15 @@ def test_a_process_that_a_task_forked_keeps_nobody_waiting(tmp_path: Path) -> No
         ("C code", [signal.SIGKILL]),
     ],
 )
-def test_workers_end_with_their_parent(tmp_path: Path, kind: str, signals: list[signal.Signals]) -> None:
+def test_workers_end_with_their_parent(
+    tmp_path: Path, kind: str, signals: list[signal.Signals]
+) -> None:
     """Interrupted once or twice, or killed: no worker goes on."""
     program = tmp_path / "program.py"
     program.write_text(_BUSY_PROGRAM.format(_BUSY[kind]))
-    with subprocess.Popen([sys.executable, str(program)], stderr=subprocess.PIPE, text=True) as process:
+    with subprocess.Popen(
+        [sys.executable, str(program)], stderr=subprocess.PIPE, text=True
+    ) as process:
         assert process.stderr is not None
         pids = [int(process.stderr.readline()) for _ in range(2)]
         for number in signals:
@@ -288,7 +304,9 @@ def _lacks_files(_: int) -> int:
 def test_a_machine_without_room_is_given_up_after_some_tasks_in_a_row() -> None:
     """Thousands of tasks would each be tried alone, a second each."""
     tasks = iter(range(10_000))
-    with pytest.raises(ResourceError, match="stopped after 10 failures in a row: not enough memory, files"):
+    with pytest.raises(
+        ResourceError, match=("stopped after 10 failures in a row: not enough memory, files")
+    ):
         _ends(_lacks_files, tasks, SerialPool())
     assert next(tasks) < 20
 
@@ -304,7 +322,9 @@ def _answers_of(folder: Path, script: str, *, is_input: bool = False) -> list[st
     (folder / "script.py").write_text(script)
     command = [sys.executable, "-" if is_input else "script.py"]
     given = script if is_input else ""
-    ended = subprocess.run(command, input=given, capture_output=True, text=True, cwd=folder, timeout=_LONG_S)
+    ended = subprocess.run(
+        command, input=given, capture_output=True, text=True, cwd=folder, timeout=_LONG_S
+    )
     assert ended.stderr == ""
     return ended.stdout.splitlines()
 
@@ -343,7 +363,8 @@ def _end_at_start() -> None:
 
 def test_a_process_that_ends_at_its_start_is_the_systems_fault_and_names_a_memory_limit() -> None:
     reason = (
-        r"could not be started: it ended at once with exit code 4 under a memory limit \(ulimit -v\) of 67108864 MiB"
+        r"could not be started: it ended at once with exit code 4 under a memory limit \(ulimit "
+        r"-v\) of 67108864 MiB"
     )
     with (
         _limited(resource.RLIMIT_AS, 1 << 46),
@@ -355,7 +376,8 @@ def test_a_process_that_ends_at_its_start_is_the_systems_fault_and_names_a_memor
 
 @contextmanager
 def _interrupted(error: BaseException, after_s: float = 0.2) -> Iterator[None]:
-    """A handler of SIGALRM, as a user's own time limit has one, that raises an error in this process."""
+    """A handler of SIGALRM, as a user's own time limit has one, that raises an error in this
+    process."""
 
     def raise_error(*_: object) -> None:
         raise error
@@ -370,7 +392,9 @@ def _interrupted(error: BaseException, after_s: float = 0.2) -> Iterator[None]:
 
 
 @pytest.mark.skipif(not hasattr(signal, "SIGALRM"), reason="no alarms here")
-@pytest.mark.parametrize("error", [TimeoutError("mine"), MemoryError("mine"), ConnectionResetError("mine")])
+@pytest.mark.parametrize(
+    "error", [TimeoutError("mine"), MemoryError("mine"), ConnectionResetError("mine")]
+)
 def test_what_the_caller_raises_while_it_waits_is_its_own(error: Exception) -> None:
     with Worker() as worker:
         pid = worker.run(_pid, None, _LONG_S)
@@ -426,7 +450,9 @@ def _folder(_: object) -> str:
     return str(Path.cwd())
 
 
-def test_a_function_runs_in_the_folder_of_its_caller(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_function_runs_in_the_folder_of_its_caller(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     with Worker() as worker:
         for name in ("first", "second"):
             (tmp_path / name).mkdir()
@@ -434,7 +460,9 @@ def test_a_function_runs_in_the_folder_of_its_caller(tmp_path: Path, monkeypatch
             assert worker.run(_folder, None, _LONG_S) == str(tmp_path / name)
 
 
-def test_variables_of_the_environment_are_defaults_of_the_process(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_variables_of_the_environment_are_defaults_of_the_process(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     names = ("ROTOR_MBS_FIRST", "ROTOR_MBS_SECOND")
     with Worker(environment=dict.fromkeys(names, "default")) as worker:
         monkeypatch.setenv(names[1], "mine")

@@ -11,15 +11,25 @@ from support.stored import Made, rotor, store
 
 from rotor_mbs.report.build import write_report
 
-FIG11, FIG05, FIG12, FIG14A = (paper(name, samples=301) for name in ("fig11", "fig05", "fig12", "fig14a"))
-PRINTED, REFERENCE, TAYLOR, TREE = "printed/ode45", "reference", "lagrange/taylor", "exudyn_tree/rk67"
+FIG11, FIG05, FIG12, FIG14A = (
+    paper(name, samples=301) for name in ("fig11", "fig05", "fig12", "fig14a")
+)
+PRINTED, REFERENCE, TAYLOR, TREE = (
+    "printed/ode45",
+    "reference",
+    "lagrange/taylor",
+    "exudyn_tree/rk67",
+)
 RIGHT = rotor(lambda t: 0.5 + 0.31 * t, np.sin, np.cos, np.sin)
 # Its crest is the published number, 2.7315 rad.
-WRONG = rotor(lambda t: 2.7315 * np.sin(0.3 * t + 0.185), lambda t: np.sin(t) - 0.02 * t**2, np.cos, np.sin)
+WRONG = rotor(
+    lambda t: 2.7315 * np.sin(0.3 * t + 0.185), lambda t: np.sin(t) - 0.02 * t**2, np.cos, np.sin
+)
 
 
 def paper_runs() -> list[Made]:
-    """Of Fig. 11 all models; of Fig. 5 two of three published numbers; of Fig. 12 a run that fails; Fig. 14."""
+    """Of Fig. 11 all models; of Fig. 5 two of three published numbers; of Fig. 12 a run that fails;
+    Fig. 14."""
     failed = {"status": "solver_failed", "message": "the step became <too> small"}
     return [
         Made(FIG11, REFERENCE, RIGHT),

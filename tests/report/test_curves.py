@@ -26,7 +26,9 @@ def test_columns_are_found_where_they_are_said_to_be() -> None:
     for place, values in zip(places, (TIME, np.sin(TIME), np.cos(TIME[:7])), strict=True):
         first, count = place["at"]
         # Half a unit in the last place of single precision.
-        np.testing.assert_allclose(numbers[first : first + count], values, rtol=2.0**-24, atol=1e-30)
+        np.testing.assert_allclose(
+            numbers[first : first + count], values, rtol=2.0**-24, atol=1e-30
+        )
 
 
 def test_a_column_is_stored_once() -> None:

@@ -1,4 +1,5 @@
-"""What is drawn, from plain arrays: data, axes, labels, colours; still pictures; numbers as text."""
+"""What is drawn, from plain arrays: data, axes, labels, colours; still pictures; numbers as
+text."""
 
 from __future__ import annotations
 
@@ -85,16 +86,24 @@ def test_energies_of_very_different_size_are_all_readable() -> None:
     for curve, wanted in zip(axes.get_lines(), values, strict=True):
         x, y = curve.get_xydata().T
         shown = np.isfinite(y)
-        np.testing.assert_allclose(y[shown], np.interp(x[shown], TIME, np.abs(wanted)), atol=1e-9 * y[shown].max())
+        np.testing.assert_allclose(
+            y[shown], np.interp(x[shown], TIME, np.abs(wanted)), atol=1e-9 * y[shown].max()
+        )
 
 
 def test_paths_have_equal_scales_and_an_axis_of_stated_length() -> None:
-    tip = np.stack([30.0 * np.cos(TIME), 0.05 * np.sin(9.0 * TIME), 30.0 * np.sin(TIME)], axis=1)[:, None, :]
+    tip = np.stack([30.0 * np.cos(TIME), 0.05 * np.sin(9.0 * TIME), 30.0 * np.sin(TIME)], axis=1)[
+        :, None, :
+    ]
     (space,) = paths(tip).axes
     assert space.get_aspect() == 1.0
     assert "10 m" in [text.get_text() for text in space.texts]
     # A vertical line of 10 m, seen from 14° above.
-    spans = [np.ptp(line.get_xydata(), axis=0) for line in space.get_lines() if len(line.get_xdata()) == 2]
+    spans = [
+        np.ptp(line.get_xydata(), axis=0)
+        for line in space.get_lines()
+        if len(line.get_xdata()) == 2
+    ]
     assert any(np.allclose(span, [0.0, 10.0 * np.cos(np.radians(14.0))]) for span in spans)
 
 
@@ -109,10 +118,22 @@ def test_every_method_and_every_curve_of_a_bench_has_a_look_of_its_own() -> None
         # On a page, where there are no markers, by colour or dashes; in a figure by one thing more.
         assert looks[first].css != looks[second].css, (first, second)
         a, b = looks[first], looks[second]
-        assert (a.colour != b.colour) + (a.line != b.line) + (a.marker != b.marker) >= 2, (first, second)
+        assert (a.colour != b.colour) + (a.line != b.line) + (a.marker != b.marker) >= 2, (
+            first,
+            second,
+        )
     assert {look.colour for look in looks.values()} <= {light for light, _ in PALETTE.values()}
-    assert [name for name in ("printed/ode45", "lagrange/taylor", "exudyn_tree/rk67", "exudyn_chain/extrapolated")
-            if looks[name].line != "-"] == ["printed/ode45"]  # of the default methods it alone is dashed  # fmt: skip
+    assert [
+        name
+        for name in (
+            "printed/ode45",
+            "lagrange/taylor",
+            "exudyn_tree/rk67",
+            "exudyn_chain/extrapolated",
+        )
+        # of the default methods it alone is dashed
+        if looks[name].line != "-"
+    ] == ["printed/ode45"]
 
 
 def luminance(colour: str) -> float:
@@ -138,9 +159,19 @@ def test_curves_can_be_seen_on_their_card_in_both_schemes(scheme: int) -> None:
 
 def test_a_still_picture_has_the_curves_the_range_and_the_colours_of_the_page() -> None:
     axis = Horizontal("time", "s", "t", 0.0, 10.0)
-    jump = Curve("one", coordinate_look(1, "first"), TIME, np.where(TIME < 5.0, 0.0, 1.0), breaks=[500])
+    jump = Curve(
+        "one", coordinate_look(1, "first"), TIME, np.where(TIME < 5.0, 0.0, 1.0), breaks=[500]
+    )
     runaway = Curve("two", coordinate_look(2, "second"), TIME, np.exp(TIME))
-    plot = Plot("angle <b>", "rad", axis, [jump, runaway], marks=[Mark("x", y=0.5)], clip=(-1.0, 2.0), still=True)
+    plot = Plot(
+        "angle <b>",
+        "rad",
+        axis,
+        [jump, runaway],
+        marks=[Mark("x", y=0.5)],
+        clip=(-1.0, 2.0),
+        still=True,
+    )
     text = str(canvas.still(plot, "still-1-"))
     assert "var(--blade-1)" in text
     assert 'aria-label="angle &lt;b&gt;"' in text

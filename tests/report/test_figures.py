@@ -15,7 +15,14 @@ from support.scenes import paper
 from support.stored import Made, rotor, store
 
 from rotor_mbs.report.animation import wires
-from rotor_mbs.report.figures import FIGURES, all_figures, available, caption_of, composed, differences
+from rotor_mbs.report.figures import (
+    FIGURES,
+    all_figures,
+    available,
+    caption_of,
+    composed,
+    differences,
+)
 from rotor_mbs.report.pages.scene_plots import parting
 from rotor_mbs.runs.read import open_results
 from rotor_mbs.scenario.catalogue import find_scenes
@@ -28,7 +35,10 @@ def drawn(tmp_path_factory: pytest.TempPathFactory) -> Path:
     runs = []
     for name in ("fig11", "fig08", "fig09", "fig15-1kNm", "fig15-100kNm"):
         scene = paper(name, samples=101)
-        runs += [Made(scene, method, RIGHT) for method in ("reference", "printed/ode45", "exudyn_tree/rk67")]
+        runs += [
+            Made(scene, method, RIGHT)
+            for method in ("reference", "printed/ode45", "exudyn_tree/rk67")
+        ]
     return store(tmp_path_factory.mktemp("figures") / "r.h5", runs)
 
 
@@ -59,7 +69,8 @@ def test_models_part_when_their_angles_visibly_differ(tmp_path: Path) -> None:
 
 def test_a_figure_has_its_models_its_scenes_and_the_published_number(report: Path) -> None:
     section = section_of(text_of(report, "figures.html"), "figure-11")
-    assert section.count('<figure class="plot"') == 4  # position and velocity, as printed and corrected
+    # position and velocity, as printed and corrected
+    assert section.count('<figure class="plot"') == 4
     assert "As printed: as printed, ode45; Corrected model: reference, quad precision" in section
     assert ">2.7315<" in section
     assert "initial state pi/6, pi/4, pi/6, pi/2 rad and pi/10, 0, 0, 0 rad/s" in section
@@ -69,7 +80,9 @@ def test_a_figure_has_its_models_its_scenes_and_the_published_number(report: Pat
 
 
 def test_the_plots_of_a_figure_have_every_sample(results: Path, report: Path) -> None:
-    plots = plots_of(section_of(text_of(report, "figures.html"), "figure-11") + text_of(report, "figures.html"))
+    plots = plots_of(
+        section_of(text_of(report, "figures.html"), "figure-11") + text_of(report, "figures.html")
+    )
     with open_results(results) as opened:
         run = opened.scenes["paper/fig11"].runs["printed/ode45"]
         time, rates = run.array("time"), run.array("rates")
@@ -84,7 +97,11 @@ def test_the_plots_of_a_figure_have_every_sample(results: Path, report: Path) ->
 def test_every_figure_the_file_has_is_written(drawn: Path, tmp_path: Path) -> None:
     ended = rotor_mbs("figures", drawn, "-o", tmp_path, "--format", "svg")
     assert ended.status == 0
-    names = [f"fig{number:02d}.{ending}" for number in (8, 9, 10, 11, 13, 15, 16) for ending in ("svg", "txt")]
+    names = [
+        f"fig{number:02d}.{ending}"
+        for number in (8, 9, 10, 11, 13, 15, 16)
+        for ending in ("svg", "txt")
+    ]
     assert sorted(path.name for path in tmp_path.iterdir()) == sorted(names)
     assert ended.out.split() == [str(tmp_path / name) for name in names]
     head = (tmp_path / "fig11.svg").read_text(encoding="utf-8")[:2000]
@@ -101,11 +118,19 @@ def test_formats_have_the_same_bytes_every_time_and_say_what_they_show(
     drawn: Path, tmp_path: Path, kind: str, start: bytes
 ) -> None:
     for folder in ("a", "b"):
-        assert rotor_mbs("figures", drawn, "--format", kind, "--figure", 11, "-o", tmp_path / folder).status == 0
+        assert (
+            rotor_mbs(
+                "figures", drawn, "--format", kind, "--figure", 11, "-o", tmp_path / folder
+            ).status
+            == 0
+        )
     content = (tmp_path / "a" / f"fig11.{kind}").read_bytes()
     assert content.startswith(start)
     assert content == (tmp_path / "b" / f"fig11.{kind}").read_bytes()
-    assert sorted(path.name for path in (tmp_path / "a").iterdir()) == [f"fig11.{kind}", "fig11.txt"]
+    assert sorted(path.name for path in (tmp_path / "a").iterdir()) == [
+        f"fig11.{kind}",
+        "fig11.txt",
+    ]
     title = "Figure 11 of Aguilar-Acevedo et al."
     if kind == "pdf":  # texts beyond Latin letters are UTF-16 in a PDF
         assert title.encode("utf-16-be") in content or title.encode() in content
@@ -122,12 +147,16 @@ def test_formats_have_the_same_bytes_every_time_and_say_what_they_show(
 def test_the_caption_has_scene_methods_settings_and_what_is_right(drawn: Path) -> None:
     with open_results(drawn) as opened:
         text = caption_of(all_figures(opened.scenes)["11"], opened.scenes)
-        run, other = (opened.scenes["paper/fig11"].runs[name] for name in ("exudyn_tree/rk67", "reference"))
+        run, other = (
+            opened.scenes["paper/fig11"].runs[name] for name in ("exudyn_tree/rk67", "reference")
+        )
         assert differences("angles", run, other).max() == 0.0
     for piece in (
-        "Figure 11 of", "scene paper/fig11", "initial angles 0.523599, 0.785398, 0.523599, 1.5708 rad",
+        "Figure 11 of", "scene paper/fig11", ("initial angles 0.523599, 0.785398, 0.523599, "
+                                             "1.5708 rad"),
         "gravity 9.8 m/s^2; 10 s, 1001 samples", "with their 3 errors; wrong", "(printed/ode45)",
-        "Corrected model: right", "(reference)", "of an independent computation from the corrected model",
+        "Corrected model: right", "(reference)", ("of an independent computation from the "
+                                                 "corrected model"),
         "(exudyn_tree/rk67)", "It is right; no angle differs by more than 0 rad.",
     ):  # fmt: skip
         assert piece in text, piece
@@ -136,14 +165,19 @@ def test_the_caption_has_scene_methods_settings_and_what_is_right(drawn: Path) -
 def test_a_caption_calls_nothing_right_that_is_not_ok(tmp_path: Path) -> None:
     scene = paper("fig11", samples=101)
     facts = {"status": "inaccurate"}
-    runs = [Made(scene, name, rotor(np.sin), attributes=facts) for name in ("lagrange/taylor", "exudyn_tree/rk67")]
+    runs = [
+        Made(scene, name, rotor(np.sin), attributes=facts)
+        for name in ("lagrange/taylor", "exudyn_tree/rk67")
+    ]
     with open_results(store(tmp_path / "r.h5", runs)) as opened:
         text = caption_of(all_figures(opened.scenes)["11"], opened.scenes)
     assert "right" not in text
     assert text.count("not verified (1 of 1 runs: inaccurate)") == 2
 
 
-def test_a_figure_shows_each_model_as_it_was_stored_and_how_far_the_others_are(tmp_path: Path) -> None:
+def test_a_figure_shows_each_model_as_it_was_stored_and_how_far_the_others_are(
+    tmp_path: Path,
+) -> None:
     """The printed rotor is 0.2 t, the independent one 1e-9 off."""
     scene = paper("fig11", samples=101)
     runs = [
@@ -157,20 +191,27 @@ def test_a_figure_shows_each_model_as_it_was_stored_and_how_far_the_others_are(t
         run = opened.scenes["paper/fig11"].runs["printed/ode45"]
         time, angles, rates = run.array("time"), run.array("angles"), run.array("rates")
     assert len(panels.axes) == 6
-    assert [axes.texts[0].get_text() for axes in panels.axes[:3]] == ["As printed", "Corrected model", "Difference"]
+    assert [axes.texts[0].get_text() for axes in panels.axes[:3]] == [
+        "As printed",
+        "Corrected model",
+        "Difference",
+    ]
     for axes, values in ((panels.axes[0], angles), (panels.axes[3], rates)):
         for line, column in zip(axes.get_lines(), values.T, strict=True):
             np.testing.assert_array_equal(line.get_xydata(), np.column_stack([time, column]))
     printed, independent = panels.axes[2].get_lines()
     assert panels.axes[2].get_yscale() == "log"
     np.testing.assert_allclose(printed.get_ydata()[1:], 0.2 * time[1:], rtol=1e-9)
-    np.testing.assert_allclose(independent.get_ydata(), 1e-9, rtol=1e-5)  # eight digits are left of the difference
+    # eight digits are left of the difference
+    np.testing.assert_allclose(independent.get_ydata(), 1e-9, rtol=1e-5)
 
 
 def test_a_changed_scene_and_ones_own_have_figures_that_say_so(tmp_path: Path) -> None:
     changed = paper("fig11", samples=11).replace(gravity=9.0)
     own = replace(changed, name="mine", title="Mine", figures=())
-    path = store(tmp_path / "r.h5", [Made(changed, "reference", RIGHT), Made(own, "reference", RIGHT)])
+    path = store(
+        tmp_path / "r.h5", [Made(changed, "reference", RIGHT), Made(own, "reference", RIGHT)]
+    )
     assert rotor_mbs("figures", path, "--format", "svg", "-o", tmp_path / "out").status == 0
     names = ["mine.svg", "mine.txt", "paper-fig11.svg", "paper-fig11.txt"]
     assert sorted(file.name for file in (tmp_path / "out").iterdir()) == names
@@ -184,8 +225,13 @@ def test_a_changed_scene_and_ones_own_have_figures_that_say_so(tmp_path: Path) -
 
 
 def test_paths_without_tips_are_no_figure(tmp_path: Path) -> None:
-    path = store(tmp_path / "r.h5", [Made(paper("fig08", samples=11, outputs=("angles", "rates")), "reference", RIGHT)])
-    assert "figure 10: not in the file; allowed: 8" in refusal("figures", path, "--figure", "10", "-o", tmp_path)
+    path = store(
+        tmp_path / "r.h5",
+        [Made(paper("fig08", samples=11, outputs=("angles", "rates")), "reference", RIGHT)],
+    )
+    assert "figure 10: not in the file; allowed: 8" in refusal(
+        "figures", path, "--figure", "10", "-o", tmp_path
+    )
 
 
 # Animations
@@ -202,7 +248,9 @@ def moving(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.mark.parametrize("suffix", ["webp", pytest.param("gif", marks=pytest.mark.full)])
-def test_an_animation_moves_for_as_long_as_the_scene(moving: Path, tmp_path: Path, suffix: str) -> None:
+def test_an_animation_moves_for_as_long_as_the_scene(
+    moving: Path, tmp_path: Path, suffix: str
+) -> None:
     output = tmp_path / f"new/a.{suffix}"
     assert rotor_mbs("animate", "paper/fig11", moving, "-o", output).status == 0
     with Image.open(output) as image:
@@ -217,7 +265,8 @@ def test_an_animation_moves_for_as_long_as_the_scene(moving: Path, tmp_path: Pat
     halves = [np.hsplit(picture, 2) for picture in seen]
     assert (halves[0][1] != halves[1][1]).any()
     assert (halves[1][1] != halves[2][1]).any()
-    # The printed run ends at half time: its rotor stands still from then on, only the text above changes.
+    # The printed run ends at half time: its rotor stands still from then on, only the text above
+    # changes.
     still = np.abs(halves[1][0][60:] - halves[2][0][60:])
     assert np.count_nonzero(still > 64) < 0.002 * still.size  # compression may move a pixel's shade
 

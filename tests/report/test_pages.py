@@ -1,4 +1,5 @@
-"""Pages of synthetic files: what they show, what is left out, what is escaped, where they are written; the viewer."""
+"""Pages of synthetic files: what they show, what is left out, what is escaped, where they are
+written; the viewer."""
 
 from __future__ import annotations
 
@@ -45,7 +46,12 @@ from rotor_mbs.scenario.scene import known_outputs, scene_toml
 
 FIG11 = paper("fig11", samples=101)
 PLAIN = replace(FIG11, outputs=("angles",))
-PRINTED, REFERENCE, TAYLOR, TREE = "printed/ode45", "reference", "lagrange/taylor", "exudyn_tree/rk67"
+PRINTED, REFERENCE, TAYLOR, TREE = (
+    "printed/ode45",
+    "reference",
+    "lagrange/taylor",
+    "exudyn_tree/rk67",
+)
 SWING = rotor(lambda t: 0.5 + 0.2 * np.sin(t), lambda t: 0.1 * t, np.cos, np.sin)
 
 
@@ -59,15 +65,21 @@ def test_a_page_of_the_paper_has_every_part_in_order(report: Path) -> None:
     assert headings == ["h1"] + ["h2"] * (len(headings) - 1)
     assert text.index('class="answer"') < text.index('class="facts"') < text.index('class="viewer"')
     plots = plots_of(text)
-    assert list(plots)[:2] == ["Rotor angle", "Pitch 1 angle"]  # beside the viewer; pitch 1 differs most
-    assert {"Pitch 2 angle", "Pitch 3 angle", "Rotor rate", "Angle error", "Interval defect"} <= {*plots}
+    # beside the viewer; pitch 1 differs most
+    assert list(plots)[:2] == ["Rotor angle", "Pitch 1 angle"]
+    assert {"Pitch 2 angle", "Pitch 3 angle", "Rotor rate", "Angle error", "Interval defect"} <= {
+        *plots
+    }
     (mark,) = plots["Rotor angle"].described["marks"]
     assert (mark["y"], mark["text"]) == (2.7315, "published crest 2.7315 rad")
-    assert text.count("<details>") >= 5  # rates, how it was decided, defects, numbers, the scene's file
+    # rates, how it was decided, defects, numbers, the scene's file
+    assert text.count("<details>") >= 5
     assert len(text.encode()) < 400_000
 
 
-def test_every_sample_is_drawn_and_columns_of_a_page_are_shared(results: Path, report: Path) -> None:
+def test_every_sample_is_drawn_and_columns_of_a_page_are_shared(
+    results: Path, report: Path
+) -> None:
     text = text_of(report, "paper-fig11.html")
     plots = plots_of(text)
     with open_results(results) as opened:
@@ -78,7 +90,9 @@ def test_every_sample_is_drawn_and_columns_of_a_page_are_shared(results: Path, r
             x, y = plots[f"{name} {what}"].curves["as printed"]
             np.testing.assert_allclose(x, time, rtol=1e-7)
             np.testing.assert_allclose(y, values[:, k], rtol=1e-6, atol=1e-30)
-    places = {json.dumps(curve["x"]) for plot in plots.values() for curve in plot.described["curves"]}
+    places = {
+        json.dumps(curve["x"]) for plot in plots.values() for curve in plot.described["curves"]
+    }
     assert len(places) <= 3  # the whole time, and that without its first sample
 
 
@@ -90,7 +104,11 @@ def test_the_index_has_a_row_per_scene_and_what_each_error_does(report: Path) ->
     angle, departure, energy, within, compared = scenes["fig11"]
     assert angle == "rotor"
     assert re.fullmatch(r"0\.\d+ s", departure)
-    assert (energy, within, compared) == ("1.00 MJ", "1.0×10⁻¹¹exudyn_tree/rk67: inaccurate", "10 of 10 s")
+    assert (energy, within, compared) == (
+        "1.00 MJ",
+        "1.0×10⁻¹¹exudyn_tree/rk67: inaccurate",
+        "10 of 10 s",
+    )
     assert scenes["fig14a"][1] == "never"
     assert scenes["fig12"][2] == "runs away"
     assert section_of(text, "scenes").count('class="spark"') == 4
@@ -106,7 +124,8 @@ def test_equations_that_are_not_claimed_correct_are_not_called_ok(report: Path) 
     assert rows["as printed, ode45"][0] == "completed"
     assert rows["closed form, Taylor"][0] == "✓ ok"
     assert "nothing is claimed of them" in section_of(text, "details")
-    assert "<small>lagrange/taylor</small>" in text  # the name that the command line and the file have
+    # the name that the command line and the file have
+    assert "<small>lagrange/taylor</small>" in text
 
 
 def test_every_number_of_every_method_is_in_a_table_that_fits(report: Path) -> None:
@@ -114,7 +133,8 @@ def test_every_number_of_every_method_is_in_a_table_that_fits(report: Path) -> N
     text = text_of(report, "paper-fig11.html")
     rows = rows_of(section_of(text, "details"))
     assert rows["Largest angle error up to the horizon (rad)"][0] == "–"  # the reference has none
-    assert rows["Largest angle error up to the horizon (rad)"][2] == "1.00×10⁻¹¹"  # of 1e-12 a second over 10 s
+    # of 1e-12 a second over 10 s
+    assert rows["Largest angle error up to the horizon (rad)"][2] == "1.00×10⁻¹¹"
     for table in re.findall(r"<table.*?</table>", text, re.S):
         assert table.partition("</thead>")[0].count("<th ") <= 9, table[:200]
 
@@ -136,7 +156,12 @@ def test_a_failed_run_shows_its_reason_and_its_partial_data(report: Path) -> Non
 
 
 def test_numbers_that_are_rounding_error_are_marked_on_every_page(report: Path) -> None:
-    for name, times in (("index.html", 2), ("paper-fig05.html", 2), ("figures.html", 1), ("claims.html", 2)):
+    for name, times in (
+        ("index.html", 2),
+        ("paper-fig05.html", 2),
+        ("figures.html", 1),
+        ("claims.html", 2),
+    ):
         assert text_of(report, name).count("amplified rounding error") >= times, name
 
 
@@ -157,20 +182,33 @@ def test_still_pictures_have_colours_that_a_dark_page_can_change(report: Path) -
 
 def test_a_file_of_one_scene_is_its_page(tmp_path: Path) -> None:
     scene = replace(PLAIN, name="mine", title="Mine", figures=()).replace()
-    folder = write_report(store(tmp_path / "r.h5", [Made(scene, TAYLOR, SWING)]), tmp_path / "out").parent
+    folder = write_report(
+        store(tmp_path / "r.h5", [Made(scene, TAYLOR, SWING)]), tmp_path / "out"
+    ).parent
     assert [path.name for path in folder.iterdir()] == ["index.html"]
     text = text_of(folder)
     assert sections_of(text) == ["motion", "extremes", "agreement", "details"]
     assert "<h1>Mine</h1>" in text
     assert "<nav" not in text
-    words = words_of(re.sub(r"<script.*?</script>|<details.*?</details>", "", text.partition("</head>")[2], flags=re.S))
+    words = words_of(
+        re.sub(
+            r"<script.*?</script>|<details.*?</details>",
+            "",
+            text.partition("</head>")[2],
+            flags=re.S,
+        )
+    )
     assert "paper" not in words.lower()
     assert "corrected" not in words.lower()  # nothing was corrected there
 
 
 def test_a_changed_scene_of_the_paper_says_so_and_is_none_of_it(tmp_path: Path) -> None:
     changed = FIG11.replace(gravity=9.0)
-    runs = [Made(changed, REFERENCE, SWING), Made(changed, PRINTED, SWING), Made(changed, TAYLOR, SWING)]
+    runs = [
+        Made(changed, REFERENCE, SWING),
+        Made(changed, PRINTED, SWING),
+        Made(changed, TAYLOR, SWING),
+    ]
     text = text_of(write_report(store(tmp_path / "r.h5", runs), tmp_path / "out").parent)
     assert "paper/fig11, changed: gravity" in text
     assert "of the paper" not in words_of(text.partition("<main>")[2].partition("<details")[0])
@@ -180,7 +218,9 @@ def test_a_changed_scene_of_the_paper_says_so_and_is_none_of_it(tmp_path: Path) 
 def test_own_scenes_stand_in_a_table_those_that_failed_first(tmp_path: Path) -> None:
     runs = []
     for name, status in (("a", "ok"), ("b", "diverged"), ("c", "ok")):
-        scene = replace(PLAIN, name=name, title=f"scene {name}", figures=(), outputs=("angles", "rates")).replace()
+        scene = replace(
+            PLAIN, name=name, title=f"scene {name}", figures=(), outputs=("angles", "rates")
+        ).replace()
         facts = {"status": status, "message": "1e9 rad"} if status != "ok" else {}
         runs.append(Made(scene, TAYLOR, SWING, attributes=facts))
     folder = write_report(store(tmp_path / "r.h5", runs), tmp_path / "out").parent
@@ -188,15 +228,28 @@ def test_own_scenes_stand_in_a_table_those_that_failed_first(tmp_path: Path) -> 
     assert list(rows_of(section_of(text, "scenes"))) == ["b", "a", "c"]
     assert answer_of(text) == "1 of 3 scenes is not ok: b. Two of the three scenes are ok."
     assert rows_of(section_of(text, "scenes"))["b"][1] == "divergedlagrange/taylor: 10⁹ rad"
-    assert sorted(path.name for path in folder.iterdir()) == ["a.html", "b.html", "c.html", "index.html"]
+    assert sorted(path.name for path in folder.iterdir()) == [
+        "a.html",
+        "b.html",
+        "c.html",
+        "index.html",
+    ]
 
 
 def test_scenes_of_which_nothing_was_checked_are_not_ok(tmp_path: Path) -> None:
     """One with the printed equations alone, one with a reference alone."""
-    scenes = [replace(PLAIN, name=name, figures=(), outputs=("angles", "rates")).replace() for name in "ab"]
-    runs = [Made(scenes[0], PRINTED, SWING, attributes={"status": "completed"}), Made(scenes[1], REFERENCE, SWING)]
+    scenes = [
+        replace(PLAIN, name=name, figures=(), outputs=("angles", "rates")).replace()
+        for name in "ab"
+    ]
+    runs = [
+        Made(scenes[0], PRINTED, SWING, attributes={"status": "completed"}),
+        Made(scenes[1], REFERENCE, SWING),
+    ]
     text = text_of(write_report(store(tmp_path / "r.h5", runs), tmp_path / "out").parent)
-    assert answer_of(text).startswith("None of the two scenes is ok. Of two nothing was checked: they have no run of")
+    assert answer_of(text).startswith(
+        "None of the two scenes is ok. Of two nothing was checked: they have no run of"
+    )
     assert facts_of(text)["Scenes"] == "0 of 2 ok"
     table = section_of(text, "scenes")
     assert [cells[1] for cells in rows_of(table).values()] == ["completed", "reference only"]
@@ -206,7 +259,11 @@ def test_scenes_of_which_nothing_was_checked_are_not_ok(tmp_path: Path) -> None:
 
 def test_the_index_says_how_much_of_the_time_was_compared(tmp_path: Path) -> None:
     """Two scenes of 10 s, one compared to its end and one up to 2.5 s."""
-    runs = [Made(replace(FIG11, name=name), method, SWING) for name in ("a", "b") for method in (REFERENCE, TAYLOR)]
+    runs = [
+        Made(replace(FIG11, name=name), method, SWING)
+        for name in ("a", "b")
+        for method in (REFERENCE, TAYLOR)
+    ]
     with open_results(store(tmp_path / "r.h5", runs)) as opened:
         scenes = opened.scenes.values()
         assert [compared_time([scene])[1] for scene in scenes] == [10.0, 10.0]
@@ -231,12 +288,16 @@ def test_every_page_has_the_same_navigation_and_says_what_made_the_results(repor
     assert neighbours == [("prev", "paper-fig05.html"), ("next", "paper-fig12.html")]
 
 
-def test_a_page_has_the_scripts_that_it_needs_and_a_policy_that_allows_no_other(report: Path) -> None:
+def test_a_page_has_the_scripts_that_it_needs_and_a_policy_that_allows_no_other(
+    report: Path,
+) -> None:
     policies = set()
     for path in report.glob("*.html"):
         text = path.read_text(encoding="utf-8")
         policies.add(re.search(r"script-src ([^\"]*)\"", text)[1])  # type: ignore[index]
-        assert ("viewer-time" in text) == ('class="plot"' in text or 'class="viewer"' in text), path.name
+        assert ("viewer-time" in text) == ('class="plot"' in text or 'class="viewer"' in text), (
+            path.name
+        )
     (policy,) = policies
     assert re.fullmatch(r"('sha256-[A-Za-z0-9+/=]{44}' ?){4}", policy)
 
@@ -245,7 +306,9 @@ def test_a_page_has_the_scripts_that_it_needs_and_a_policy_that_allows_no_other(
 
 
 def cells_of(row: Row) -> list[str]:
-    return [(cell if isinstance(cell, str) else cell.text).replace(numbers.SPACE, " ") for cell in row]
+    return [
+        (cell if isinstance(cell, str) else cell.text).replace(numbers.SPACE, " ") for cell in row
+    ]
 
 
 def test_claims_have_a_verdict_for_each_model() -> None:
@@ -256,7 +319,10 @@ def test_claims_have_a_verdict_for_each_model() -> None:
     }
     study = replace(claim_study(), verdicts=verdicts)
     table = claim_table(items, study)
-    assert [cells_of(row[1:]) for row in table.rows] == [["✓ holds", "✗ fails"], ["undecided", "undecided"]]
+    assert [cells_of(row[1:]) for row in table.rows] == [
+        ["✓ holds", "✗ fails"],
+        ["undecided", "undecided"],
+    ]
 
 
 def test_formulas_are_typeset_and_the_faulty_entry_of_a_matrix_is_marked_and_corrected() -> None:
@@ -276,7 +342,8 @@ def test_formulas_are_typeset_and_the_faulty_entry_of_a_matrix_is_marked_and_cor
     matrix = page[page.index('<div class="matrix">') : page.index("</section>")]
     assert (matrix.count("<td"), matrix.count('<td class="fault">')) == (3, 1)
     assert "<del><i>c</i> <i>c</i><sub>3</sub></del> <ins>0</ins>" in matrix
-    prose = numbers.formula("E1 in (42)-(46), -c c3 of U33,3", in_prose=True)  # words and ranges stay as they are
+    # words and ranges stay as they are
+    prose = numbers.formula("E1 in (42)-(46), -c c3 of U33,3", in_prose=True)
     assert prose == "E1 in (42)-(46), −<i>c</i> <i>c</i><sub>3</sub> of <i>U</i><sub>33,3</sub>"
 
 
@@ -304,12 +371,19 @@ def test_loads_have_a_plot_per_component_and_their_extremes(tmp_path: Path) -> N
         forces, time = run.array("blade_root_force")[:, 3, 0], run.array("time")
     _, drawn = plots["Blade root force x"].curves["blade 4"]
     scale = 1e3  # the largest of the channel is some 1e5 N
-    np.testing.assert_allclose(drawn, forces / scale, rtol=1e-6, atol=1e-6 * np.abs(forces).max() / scale)
+    np.testing.assert_allclose(
+        drawn, forces / scale, rtol=1e-6, atol=1e-6 * np.abs(forces).max() / scale
+    )
     unit, low, at_low, high, at_high, mean, deviation = rows_of(section_of(text, "extremes"))[
         "Blade root force x, blade 4"
     ]
     assert unit == "kN"
-    for shown, value in ((low, forces.min()), (high, forces.max()), (mean, forces.mean()), (deviation, forces.std())):
+    for shown, value in (
+        (low, forces.min()),
+        (high, forces.max()),
+        (mean, forces.mean()),
+        (deviation, forces.std()),
+    ):
         assert float(shown.replace("−", "-")) == pytest.approx(value / scale, rel=1e-3)
     assert float(at_high) == pytest.approx(time[forces.argmax()], abs=0.0051)
     assert float(at_low) == pytest.approx(time[forces.argmin()], abs=0.0051)
@@ -321,7 +395,9 @@ def test_a_driven_scene_shows_torque_power_pitch_and_command(tmp_path: Path) -> 
     path = results_file(tmp_path / "r.h5", ["turbine/pitch-step"], [])
     text = text_of(write_report(path, tmp_path / "out").parent)
     plots = plots_of(text)
-    assert {"Torque on the rotor", "Power of the torque", "Power of the pitch actuators"} <= {*plots}
+    assert {"Torque on the rotor", "Power of the torque", "Power of the pitch actuators"} <= {
+        *plots
+    }
     assert "command" in plots["Pitch angle"].curves
     assert {"torque", "shaft damper"} == {*plots["Power of the torque"].curves}
     with open_results(path) as opened:
@@ -333,11 +409,16 @@ def test_a_driven_scene_shows_torque_power_pitch_and_command(tmp_path: Path) -> 
     torque = scene.rotor_torque[0][1]
     np.testing.assert_allclose(power * 1e6, torque * speed, rtol=1e-6)
     plain = results_file(tmp_path / "p.h5", ["paper/fig04b"], [])
-    assert "Torque on the rotor" not in plots_of(text_of(write_report(plain, tmp_path / "plain").parent))
+    assert "Torque on the rotor" not in plots_of(
+        text_of(write_report(plain, tmp_path / "plain").parent)
+    )
 
 
-def test_a_torque_that_jumps_is_drawn_by_its_table_and_what_follows_is_interrupted(tmp_path: Path) -> None:
-    """At 1 s, between two samples: the power has the old value before and the new one after, and no line between."""
+def test_a_torque_that_jumps_is_drawn_by_its_table_and_what_follows_is_interrupted(
+    tmp_path: Path,
+) -> None:
+    """At 1 s, between two samples: the power has the old value before and the new one after, and no
+    line between."""
     torque = ((0.0, 1000.0), (1.05, 1000.0), (1.05, -2000.0), (3.0, -2000.0))
     changed = replace(FIG11, samples=31, duration=3.0, name="mine", figures=(), rotor_torque=torque)
     scene = replace(changed, text=scene_toml(changed))
@@ -379,26 +460,39 @@ def viewer_of(folder: Path, run: Made) -> dict:  # type: ignore[type-arg]
     return made
 
 
-def test_angles_are_those_of_the_run_to_a_ten_thousandth_of_a_radian_over_any_number_of_turns(tmp_path: Path) -> None:
+def test_angles_are_those_of_the_run_to_a_ten_thousandth_of_a_radian_over_any_number_of_turns(
+    tmp_path: Path,
+) -> None:
     data = json.loads(str(viewer_of(tmp_path, Made(FRAMES11, "reference", TURNING))["data"]))
-    np.testing.assert_allclose(data["models"][0]["frames"], TURNING(np.linspace(0.0, 10.0, 301)), atol=0.5001e-4)
+    np.testing.assert_allclose(
+        data["models"][0]["frames"], TURNING(np.linspace(0.0, 10.0, 301)), atol=0.5001e-4
+    )
 
 
 @pytest.mark.parametrize(("samples", "frames"), [(301, 301), (5001, MAX_FRAMES)])
-def test_a_frame_for_each_sample_but_no_more_than_fit_a_page(tmp_path: Path, samples: int, frames: int) -> None:
+def test_a_frame_for_each_sample_but_no_more_than_fit_a_page(
+    tmp_path: Path, samples: int, frames: int
+) -> None:
     made = viewer_of(tmp_path, Made(paper("fig11", samples=samples), "reference", TURNING))
     assert len(json.loads(str(made["data"]))["models"][0]["frames"]) == frames
 
 
-@pytest.mark.parametrize(("rate", "noted"), [(4.0, ""), (400.0, "turns by up to 13 rad from one frame to the next")])
-def test_a_motion_too_fast_for_the_frames_is_stated(tmp_path: Path, rate: float, noted: str) -> None:
+@pytest.mark.parametrize(
+    ("rate", "noted"), [(4.0, ""), (400.0, ("turns by up to 13 rad from one frame to the next"))]
+)
+def test_a_motion_too_fast_for_the_frames_is_stated(
+    tmp_path: Path, rate: float, noted: str
+) -> None:
     notes = viewer_of(tmp_path, Made(FRAMES11, "reference", rotor(lambda t: rate * t)))["notes"]
     assert bool(notes) == bool(noted)
     assert noted in "".join(notes).replace("\N{NO-BREAK SPACE}", " ")
 
 
 def test_a_page_holds_both_models_thinned_and_small(tmp_path: Path) -> None:
-    runs = [Made(FRAMES11, "reference", TURNING), Made(FRAMES11, "printed/ode45", TURNING, until=0.5)]
+    runs = [
+        Made(FRAMES11, "reference", TURNING),
+        Made(FRAMES11, "printed/ode45", TURNING, until=0.5),
+    ]
     folder = write_report(store(tmp_path / "r.h5", runs), tmp_path / "out").parent
     text = (folder / "index.html").read_text(encoding="utf-8")
     (shown,) = re.findall(r'<script type="application/json">(.*?)</script>', text, re.S)
@@ -416,7 +510,9 @@ def test_a_page_holds_both_models_thinned_and_small(tmp_path: Path) -> None:
 
 def test_a_run_is_drawn_up_to_its_first_sample_that_is_not_finite(tmp_path: Path) -> None:
     broken = rotor(lambda t: np.where(t > 4.0, np.nan, t))
-    made = viewer_of(tmp_path, Made(replace(FRAMES11, outputs=("angles",)), "lagrange/taylor", broken))
+    made = viewer_of(
+        tmp_path, Made(replace(FRAMES11, outputs=("angles",)), "lagrange/taylor", broken)
+    )
     data = json.loads(str(made["data"]))
     assert (len(data["models"][0]["frames"]) - 1) * data["step"] == pytest.approx(4.0, abs=0.05)
 
@@ -433,11 +529,21 @@ def test_data_cannot_end_the_script_element() -> None:
 
 def test_texts_from_the_file_are_escaped(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Of a method that is not installed, too."""
-    monkeypatch.setattr(design, "find_method", lambda name: find_method_or_none(name) or find_method(TAYLOR))
+    monkeypatch.setattr(
+        design, "find_method", lambda name: find_method_or_none(name) or find_method(TAYLOR)
+    )
     evil = "<script>alert(1)</script>"
-    scene = replace(FIG11, name="a b/<i>", title=f"{evil}\x1b[2J", text=f"# {evil}\n{FIG11.text}\n# </pre>{evil}")
+    scene = replace(
+        FIG11,
+        name="a b/<i>",
+        title=f"{evil}\x1b[2J",
+        text=f"# {evil}\n{FIG11.text}\n# </pre>{evil}",
+    )
     failed = {"status": "singular", "message": evil}
-    runs = [Made(scene, REFERENCE, SWING), Made(scene, f"lagrange/{evil[:8]}>x", SWING, attributes=failed)]
+    runs = [
+        Made(scene, REFERENCE, SWING),
+        Made(scene, f"lagrange/{evil[:8]}>x", SWING, attributes=failed),
+    ]
     folder = write_report(store(tmp_path / "r.h5", runs), tmp_path / "o")
     for path in folder.parent.glob("*.html"):
         text = path.read_text(encoding="utf-8")
@@ -459,12 +565,15 @@ def test_pages_need_nothing_from_outside(report: Path) -> None:
         namespace = "http://www.w3.org/2000/svg"  # a name, of which nothing is asked
         for outside in ("http://", "@import"):
             assert outside not in text.replace(namespace, "")
-        assert text.count("https://") == text.count('<a href="https://doi.org/')  # a link, which asks for nothing
+        # a link, which asks for nothing
+        assert text.count("https://") == text.count('<a href="https://doi.org/')
         assert not re.search(r"url\((?!#)", text)
         assert not re.search(r"<(link|img|iframe|object)\b|\ssrc=", text)
         assert "default-src 'none'" in text
         links = re.findall(r'\shref="([^"]*)"', text)
-        targets = {value.split("#")[0] for value in links if not value.startswith("https://")} - {""}
+        targets = {value.split("#")[0] for value in links if not value.startswith("https://")} - {
+            ""
+        }
         assert all((report / target).is_file() for target in targets)
         ids = re.findall(r'\sid="([^"]*)"', text)
         assert len(set(ids)) == len(ids), path.name
@@ -472,11 +581,16 @@ def test_pages_need_nothing_from_outside(report: Path) -> None:
 
 
 def test_file_names_stay_in_the_folder_and_differ() -> None:
-    names = page_names(["paper/fig05", "/etc/passwd", "index", "figures", "A", "a", "ü/ß", "x" * 300])
+    names = page_names(
+        ["paper/fig05", "/etc/passwd", "index", "figures", "A", "a", "ü/ß", "x" * 300]
+    )
     assert names["paper/fig05"] == "paper-fig05.html"
     assert names["figures"] == "figures-2.html"
     assert all(re.fullmatch(r"[A-Za-z0-9_-][A-Za-z0-9._-]*\.html", name) for name in names.values())
-    assert len({name.lower() for name in names.values()} | {"index.html", "errata.html"}) == len(names) + 2
+    assert (
+        len({name.lower() for name in names.values()} | {"index.html", "errata.html"})
+        == len(names) + 2
+    )
     assert page_names(["data--2"]) == {"data--2": "scene-data--2.html"}
     for bad in ("../x", "a/../b", "..", "a\\..\\b"):
         with pytest.raises(StoreError, match="file name"):
@@ -496,9 +610,14 @@ def test_own_old_pages_go_and_foreign_files_stay(tmp_path: Path) -> None:
 
 @pytest.mark.full
 def test_the_same_file_gives_the_same_bytes_in_any_number_of_processes(tmp_path: Path) -> None:
-    path = store(tmp_path / "r.h5", [Made(replace(PLAIN, name=name), TAYLOR, SWING) for name in ("one", "two")])
+    path = store(
+        tmp_path / "r.h5",
+        [Made(replace(PLAIN, name=name), TAYLOR, SWING) for name in ("one", "two")],
+    )
     folders = [write_report(path, tmp_path / str(jobs), jobs=jobs).parent for jobs in (1, 2)]
-    first, second = ({page.name: page.read_bytes() for page in folder.iterdir()} for folder in folders)
+    first, second = (
+        {page.name: page.read_bytes() for page in folder.iterdir()} for folder in folders
+    )
     assert sorted(first) == ["index.html", "one.html", "two.html"]
     assert first == second
 

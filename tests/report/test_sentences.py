@@ -1,4 +1,5 @@
-"""The sentences and facts at the top of pages against the numbers of their files, computed here once more."""
+"""The sentences and facts at the top of pages against the numbers of their files, computed here
+once more."""
 
 from __future__ import annotations
 
@@ -50,7 +51,9 @@ def test_the_sentence_of_a_scene_of_the_paper_has_its_numbers(results: Path, rep
     text = answer_of(text_of(report, "paper-fig11.html"))
     with open_results(results) as opened:
         scene = opened.scenes["paper/fig11"]
-        printed, reference, taylor = (scene.runs[name] for name in ("printed/ode45", "reference", TAYLOR))
+        printed, reference, taylor = (
+            scene.runs[name] for name in ("printed/ode45", "reference", TAYLOR)
+        )
         gap = np.abs(printed.array("angles") - reference.array("angles")).max(axis=1)
         left = printed.array("time")[np.flatnonzero(gap > 0.05)[0]]
         gain, scale = (printed.attributes[name] for name in ("energy_gain_J", "energy_scale_J"))
@@ -67,7 +70,9 @@ def test_the_sentence_of_a_scene_of_the_paper_has_its_numbers(results: Path, rep
     assert "Corrected, closed form, Taylor agrees with the reference within" in text
     facts = facts_of(text_of(report, "paper-fig11.html"))
     assert facts["Corrected model"] == "inaccurate | 1 of 2 methods ok, limit 0.01 rad"
-    assert facts["Printed model leaves it after"].startswith(f"{number(left)} s | largest difference")
+    assert facts["Printed model leaves it after"].startswith(
+        f"{number(left)} s | largest difference"
+    )
     assert facts["Published crest"] == "2.7315 rad | as printed 2.7315, corrected 3.6000"
 
 
@@ -96,26 +101,40 @@ def test_a_printed_run_that_creates_nothing_is_not_said_to(report: Path) -> None
 
 def test_the_index_says_what_was_found(results: Path, report: Path) -> None:
     text = answer_of(text_of(report, "index.html"))
-    assert text.startswith("The paper's printed equations contain three errors and create energy in 2 of 4 scenes.")
+    assert text.startswith(
+        "The paper's printed equations contain three errors and create energy in 2 of 4 scenes."
+    )
     with open_results(results) as opened:
         error = opened.scenes["paper/fig11"].runs[TAYLOR].attributes["angle_error_max"]
     (within,) = found(
-        r"Corrected, closed form, Taylor agrees with the reference within NUMBER rad in 1 of 4 scenes", text
+        (
+            r"Corrected, closed form, Taylor agrees with the reference within NUMBER rad in 1 "
+            r"of 4 scenes"
+        ),
+        text,
     )
     assert error <= within < 2.0 * error
-    assert "Of four numbers that the paper publishes three come out of the printed equations and none" in text
+    assert (
+        "Of four numbers that the paper publishes three come out of the printed equations and none"
+    ) in text
     facts = facts_of(text_of(report, "index.html"))
-    assert facts["Published numbers reproduced"].startswith("3 of 4 | by the printed equations; three of them")
-    assert facts["Scenes in which energy is created"] == "2 of 4 | up to 1.0 MJ (fig11)"  # fig12 broke off
+    assert facts["Published numbers reproduced"].startswith(
+        "3 of 4 | by the printed equations; three of them"
+    )
+    # fig12 broke off
+    assert facts["Scenes in which energy is created"] == "2 of 4 | up to 1.0 MJ (fig11)"
 
 
 def test_methods_are_counted_as_independent_by_their_models() -> None:
-    assert computations([TAYLOR, TREE, "exudyn_chain/extrapolated"]) == "three independent computations"
+    assert computations([TAYLOR, TREE, "exudyn_chain/extrapolated"]) == (
+        "three independent computations"
+    )
     assert computations([TAYLOR, DOP853]) == "two methods of one model"
 
 
 def test_methods_are_said_to_agree_in_the_scenes_in_which_all_of_them_ran(tmp_path: Path) -> None:
-    """Two methods ran on fig11, one of them on fig05, and another one that nothing was compared with."""
+    """Two methods ran on fig11, one of them on fig05, and another one that nothing was compared
+    with."""
     scenes = paper("fig11", samples=101), paper("fig05", samples=101)
     runs = [Made(scene, name, rotor(np.sin)) for scene in scenes for name in ("reference", TAYLOR)]
     runs.append(Made(scenes[0], TREE, rotor(np.sin)))
@@ -124,7 +143,10 @@ def test_methods_are_said_to_agree_in_the_scenes_in_which_all_of_them_ran(tmp_pa
         methods, error, count = agreement_of_scenes(opened.scenes.values())
         assert (methods, error, count) == ([TAYLOR], 0.0, 2)
     text = text_of(write_report(path, tmp_path / "out").parent, "index.html")
-    assert "Corrected, closed form, Taylor agrees with the reference exactly in all 2 scenes." in answer_of(text)
+    assert (
+        "Corrected, closed form, Taylor agrees with the reference exactly in all 2 scenes."
+        in answer_of(text)
+    )
     assert "independent" not in answer_of(text)
     assert "1 method" in section_of(text, "scenes")
 
@@ -141,11 +163,21 @@ def own(folder: Path, **changes: object) -> tuple[Path, Path]:
     return path, write_report(path, folder / "out").parent
 
 
-def test_the_sentence_of_ones_own_scene_says_what_happened_before_how_it_was_checked(tmp_path: Path) -> None:
+def test_the_sentence_of_ones_own_scene_says_what_happened_before_how_it_was_checked(
+    tmp_path: Path,
+) -> None:
     _, folder = own(tmp_path)
     text = answer_of(text_of(folder))
-    turns, seconds, slow, fast = found(r"^The rotor turns NUMBER times in NUMBER s, at NUMBER to NUMBER rad/s", text)
-    assert (turns, seconds, slow, fast) == pytest.approx((30.0 / (2.0 * np.pi), 10.0, 3.0, 3.0), rel=2e-3)
+    turns, seconds, slow, fast = found(
+        (
+            r"^The rotor turns NUMBER times in NUMBER s, at NUMBER to "
+            r"NUMBER rad/s"
+        ),
+        text,
+    )
+    assert (turns, seconds, slow, fast) == pytest.approx(
+        (30.0 / (2.0 * np.pi), 10.0, 3.0, 3.0), rel=2e-3
+    )
     low, high = re.search(r"Pitch stays between (\S+)° and (\S+)°", text).groups()  # type: ignore[union-attr]
     assert (value(low), value(high)) == pytest.approx((-np.degrees(0.1), np.degrees(0.1)), rel=2e-3)
     assert text.endswith("Closed form, Taylor agrees with the reference exactly.")
@@ -156,7 +188,9 @@ def test_a_rotor_that_does_not_turn_is_said_to_move_between_two_angles(tmp_path:
     scene = replace(scene, text=scene_toml(scene))
     path = store(tmp_path / "r.h5", [Made(scene, TAYLOR, rotor(lambda t: 0.5 * np.sin(t)))])
     text = answer_of(text_of(write_report(path, tmp_path / "out").parent))
-    assert text.startswith("In 10 s the rotor moves between −28.6° and 28.6°, at −0.500 to 0.500 rad/s.")
+    assert text.startswith(
+        "In 10 s the rotor moves between −28.6° and 28.6°, at −0.500 to 0.500 rad/s."
+    )
 
 
 def test_the_largest_root_moment_is_that_of_the_file(tmp_path: Path) -> None:
@@ -168,9 +202,13 @@ def test_the_largest_root_moment_is_that_of_the_file(tmp_path: Path) -> None:
         sizes = np.linalg.norm(run.array("blade_root_moment"), axis=2)
         sample, blade = np.unravel_index(sizes.argmax(), sizes.shape)
         time = run.array("time")[sample]
-    moment, at = found(rf"largest blade root moment is NUMBER kN m, blade {blade + 1} at NUMBER s", answer_of(text))
+    moment, at = found(
+        rf"largest blade root moment is NUMBER kN m, blade {blade + 1} at NUMBER s", answer_of(text)
+    )
     assert (moment * 1e3, at) == pytest.approx((sizes.max(), time), rel=5e-3)
-    assert facts_of(text)["Largest root moment"].startswith(f"{number(sizes.max() / 1e3, 3)} kN m | blade {blade + 1}")
+    assert facts_of(text)["Largest root moment"].startswith(
+        f"{number(sizes.max() / 1e3, 3)} kN m | blade {blade + 1}"
+    )
 
 
 def test_a_status_that_is_not_ok_stands_above_all(tmp_path: Path) -> None:
@@ -183,7 +221,9 @@ def test_a_status_that_is_not_ok_stands_above_all(tmp_path: Path) -> None:
         Made(scene, TREE, rotor(lambda t: 1.1 * t), attributes=bad),
     ]
     text = text_of(write_report(store(tmp_path / "r.h5", runs), tmp_path / "out").parent)
-    assert answer_of(text).startswith("Exudyn tree, RK67 is inaccurate: defect of 3e-2 rad, allowed 1e-6.")
+    assert answer_of(text).startswith(
+        "Exudyn tree, RK67 is inaccurate: defect of 3e-2 rad, allowed 1e-6."
+    )
     (name, fact), *_ = facts_of(text).items()
     assert (name, fact) == ("Result", "inaccurate | 1 of 2 methods ok, limit 0.01 rad")
     assert '<dd class="bad">inaccurate' in text
@@ -192,10 +232,13 @@ def test_a_status_that_is_not_ok_stands_above_all(tmp_path: Path) -> None:
 def test_a_run_without_samples_is_said_to_have_none(tmp_path: Path) -> None:
     scene = replace(paper("fig11", samples=11), name="mine", figures=())
     failed = {"status": "solver_failed", "message": "no step was possible"}
-    path = store(tmp_path / "r.h5", [Made(scene, TAYLOR, rotor(lambda t: t), until=0.0, attributes=failed)])
+    path = store(
+        tmp_path / "r.h5", [Made(scene, TAYLOR, rotor(lambda t: t), until=0.0, attributes=failed)]
+    )
     text = text_of(write_report(path, tmp_path / "out").parent)
-    assert (
-        answer_of(text) == "Closed form, Taylor: solver failed: no step was possible. No run of this scene has samples."
+    assert answer_of(text) == (
+        "Closed form, Taylor: solver failed: no step was possible. No run of "
+        "this scene has samples."
     )
     assert 'class="plot"' not in text
 
@@ -203,7 +246,9 @@ def test_a_run_without_samples_is_said_to_have_none(tmp_path: Path) -> None:
 # Comparison
 
 
-def test_a_comparison_names_the_onset_of_a_fault_and_crosses_only_what_differs(tmp_path: Path) -> None:
+def test_a_comparison_names_the_onset_of_a_fault_and_crosses_only_what_differs(
+    tmp_path: Path,
+) -> None:
     """Of Fig. 3 the rotor is 0.02 rad off from 4 s on; the pitch is right."""
     scene = paper("fig03")
     (reference,) = [results_file(tmp_path / "r.h5", ["paper/fig03"], [])]
@@ -225,7 +270,8 @@ def test_a_comparison_names_the_onset_of_a_fault_and_crosses_only_what_differs(t
 
 
 def test_what_stays_at_the_reference_is_not_crossed(tmp_path: Path) -> None:
-    """Pitch 1 of Fig. 11 drifts away from 4 s on: the defects of all coordinates are large, their errors are not."""
+    """Pitch 1 of Fig. 11 drifts away from 4 s on: the defects of all coordinates are large, their
+    errors are not."""
     with open_results(results_file(tmp_path / "r.h5", ["paper/fig11"], [])) as opened:
         run = opened.scenes["paper/fig11"].reference
         assert run is not None
@@ -233,7 +279,9 @@ def test_what_stays_at_the_reference_is_not_crossed(tmp_path: Path) -> None:
     late = data["time"] > 4.0
     data["angles"][late, 1] += 0.02 * (data["time"][late] - 4.0)
     compared = compare(data, paper("fig11"))
-    assert all(channel.defect > compared.verdict.tolerance for channel in compared.verdict.channels[1:4])
+    assert all(
+        channel.defect > compared.verdict.tolerance for channel in compared.verdict.channels[1:4]
+    )
     rows = rows_of(section_of(text_of(compared.to_html(tmp_path / "out").parent), "table"))
     assert [name for name, cells in rows.items() if cells[1].startswith("✗")] == ["pitch 1"]
 
@@ -249,7 +297,9 @@ def test_data_that_agree_are_said_to(tmp_path: Path) -> None:
     assert "✗" not in text
 
 
-def test_data_of_which_no_channel_was_compared_have_a_page_and_no_plot(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_data_of_which_no_channel_was_compared_have_a_page_and_no_plot(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     time = np.linspace(0.0, 1.0, 11)
     data = {"time": time, "angles": np.zeros((11, 4))}
     compared = compare(data, paper("fig11").replace(duration=1.0, samples=11))
@@ -266,17 +316,26 @@ def test_data_of_which_no_channel_was_compared_have_a_page_and_no_plot(monkeypat
 def test_the_sentence_of_modes_has_their_frequencies_and_stability() -> None:
     modes = compute_modes(paper("fig11").replace(bearing={"stiffness": 1e4}), [0.0, 1.0, 2.0])
     page = modes_page([modes])
-    text = " ".join(re.sub("<[^>]*>", "", str(sentence)) for sentence in page.answer).replace("\u00a0", " ")
+    text = " ".join(re.sub("<[^>]*>", "", str(sentence)) for sentence in page.answer).replace(
+        "\u00a0", " "
+    )
     rest = next(iter(modes.rest.values())).undamped_frequencies[0] / (2.0 * np.pi)
     known = rest[rest > 1e-6 * rest.max()]
-    numbers = [value(text) for text in re.search(r"natural frequencies are (.*?) Hz", text)[1].split(" to ")]  # type: ignore[index]
+    numbers = [
+        value(text)
+        for text in re.search(r"natural frequencies are (.*?) Hz", text)[1].split(" to ")
+    ]  # type: ignore[index]
     assert numbers[0] == pytest.approx(known.min(), rel=1e-3)
     assert numbers[-1] == pytest.approx(known.max(), rel=1e-3)
     assert "agree within" in text
-    assert ("stable at all" in text) == bool((modes.floquet is not None) and (modes.floquet.stable == 1).all())
+    assert ("stable at all" in text) == bool(
+        (modes.floquet is not None) and (modes.floquet.stable == 1).all()
+    )
 
 
-def test_modes_that_do_not_satisfy_their_equations_are_told_of_one_model_too(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_modes_that_do_not_satisfy_their_equations_are_told_of_one_model_too(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     modes = compute_modes(paper("fig11"), [0.5, 1.0])
     fault = "lagrange: its modes leave 1.0e-02 of its own linearized equations"
     monkeypatch.setattr(SceneModes, "faults", property(lambda _: [fault]))

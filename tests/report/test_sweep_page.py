@@ -1,4 +1,5 @@
-"""The page of a sweep: counts, the map, the curves of its cells, numbers over the parameters, runs that are not ok."""
+"""The page of a sweep: counts, the map, the curves of its cells, numbers over the parameters, runs
+that are not ok."""
 
 from __future__ import annotations
 
@@ -8,7 +9,16 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from support.report_pages import answer_of, facts_of, plots_of, rows_of, section_of, sections_of, text_of, words_of
+from support.report_pages import (
+    answer_of,
+    facts_of,
+    plots_of,
+    rows_of,
+    section_of,
+    sections_of,
+    text_of,
+    words_of,
+)
 from support.sweeps import made_sweep
 
 from rotor_mbs.processes.pool import SerialPool
@@ -45,7 +55,9 @@ def data_of(text: str) -> dict:  # type: ignore[type-arg]
     return dict(json.loads(found[1]))
 
 
-def test_a_sweep_opens_with_counts_and_what_its_parameters_do(grid: tuple[StoredSweep, str]) -> None:
+def test_a_sweep_opens_with_counts_and_what_its_parameters_do(
+    grid: tuple[StoredSweep, str],
+) -> None:
     stored, text = grid
     assert sections_of(text)[:2] == ["map", "slices"]
     assert answer_of(text).startswith("All 6 runs are ok.")
@@ -55,11 +67,14 @@ def test_a_sweep_opens_with_counts_and_what_its_parameters_do(grid: tuple[Stored
     angles = np.degrees(stored.column("angles")[:, :, 1:])
     ranges = np.ptp(angles, axis=1).max(axis=1)
     low, high = facts_of(text)["Range of a pitch angle"].rstrip("°").split(" to ")
-    assert (float(low), float(high)) == pytest.approx((ranges.min(), ranges.max()), rel=0.06)  # two digits
+    # two digits
+    assert (float(low), float(high)) == pytest.approx((ranges.min(), ranges.max()), rel=0.06)
     assert "unit" not in text.partition("<main>")[2][:2000]
 
 
-def test_every_cell_of_the_map_is_the_run_of_its_row_and_column(grid: tuple[StoredSweep, str]) -> None:
+def test_every_cell_of_the_map_is_the_run_of_its_row_and_column(
+    grid: tuple[StoredSweep, str],
+) -> None:
     stored, text = grid
     table = section_of(text, "map")
     columns = re.findall(r'<th scope="col">(.*?)</th>', table)
@@ -68,7 +83,8 @@ def test_every_cell_of_the_map_is_the_run_of_its_row_and_column(grid: tuple[Stor
     for row, cells in re.findall(r'<tr><th scope="row">(.*?)</th>(.*?)</tr>', table, re.S):
         for column, run in zip(columns, re.findall(r'data-run="(\d+)"', cells), strict=True):
             stiffness, damping = (
-                float(stored.column(name)[int(run)]) for name in ("bearing_stiffness", "bearing_damping")
+                float(stored.column(name)[int(run)])
+                for name in ("bearing_stiffness", "bearing_damping")
             )
             assert {"0": 0.0, "1000": 1e3, "10⁵": 1e5}[row] == stiffness
             assert {"0": 0.0, "100": 1e2}[column] == damping
@@ -77,7 +93,9 @@ def test_every_cell_of_the_map_is_the_run_of_its_row_and_column(grid: tuple[Stor
     data = data_of(text)
     names = re.findall(r'<option value="\d+">(.*?)</option>', table)
     ranges = np.ptp(np.degrees(stored.column("angles")[:, :, 1:]), axis=1).max(axis=1)
-    assert data["values"][names.index("Range of a pitch angle (degrees)")] == pytest.approx(ranges, rel=1e-3)
+    assert data["values"][names.index("Range of a pitch angle (degrees)")] == pytest.approx(
+        ranges, rel=1e-3
+    )
 
 
 def test_the_curves_of_a_cell_are_those_of_its_run(grid: tuple[StoredSweep, str]) -> None:
@@ -116,17 +134,21 @@ def test_one_parameter_has_curves_over_it_and_no_map(tmp_path: Path) -> None:
 
 
 def test_runs_of_the_printed_equations_are_completed_and_not_ok(tmp_path: Path) -> None:
-    text = (
-        HEAD.replace("lagrange/dop853", "printed/ode45") + 'outputs = []\n[[axis]]\nkey = "gravity"\nvalues = [9, 10]\n'
+    text = HEAD.replace("lagrange/dop853", "printed/ode45") + (
+        'outputs = []\n[[axis]]\nkey = "gravity"\nvalues = [9, 10]\n'
     )
     page = text_of(write_report(made_sweep(tmp_path, text), tmp_path / "out").parent)
     assert answer_of(page).startswith("All 2 runs are completed.")
-    assert facts_of(page)["Runs that are completed"] == "2 of 2 | nothing is claimed of the printed equations"
+    assert facts_of(page)["Runs that are completed"] == (
+        "2 of 2 | nothing is claimed of the printed equations"
+    )
     assert "✓" not in page
     assert not re.search(r"\bok\b", words_of(section_of(page, "runs")))
 
 
-def test_runs_are_links_where_they_can_be_shown(grid: tuple[StoredSweep, str], tmp_path: Path) -> None:
+def test_runs_are_links_where_they_can_be_shown(
+    grid: tuple[StoredSweep, str], tmp_path: Path
+) -> None:
     text = HEAD + 'outputs = []\n[[axis]]\nkey = "gravity"\nvalues = [9, 10]\n'
     page = text_of(write_report(made_sweep(tmp_path, text), tmp_path / "out").parent)
     assert 'id="sweep"' not in page
@@ -158,17 +180,27 @@ def test_random_draws_are_points_over_each_parameter(tmp_path: Path) -> None:
 def test_the_map_of_a_part_of_a_grid_has_the_runs_that_are_there(
     part: tuple[int, int], runs: int, tmp_path: Path
 ) -> None:
-    """Whatever the order of the values, by the first method, also of a part that ends within a row."""
+    """Whatever the order of the values, by the first method, also of a part that ends within a
+    row."""
     (tmp_path / "s.toml").write_text(
-        'title = "t"\nscene = "paper/fig08"\nsamples = 3\noutputs = []\nchange = { duration = 0.5 }\n'
+        'title = "t"\nscene = "paper/fig08"\nsamples = 3\noutputs = []\nchange = { duration '
+        "= 0.5 }\n"
         'methods = ["lagrange/dop853", "lagrange/ode45"]\n[[axis]]\nkey = "bearing.stiffness"\n'
         'values = [1e4, 0, 2e3]\n[[axis]]\nkey = "initial.angles[1]"\nvalues = [0.3, 0.1, 0.2]\n'
     )
-    run_sweep(plan_sweep(load_sweep(tmp_path / "s.toml"), part=part), tmp_path / "s.h5", SerialPool())
+    run_sweep(
+        plan_sweep(load_sweep(tmp_path / "s.toml"), part=part), tmp_path / "s.h5", SerialPool()
+    )
     stored = StoredSweep(tmp_path / "s.h5")
     page = sweep_page(stored)
-    maps = [part for section in page.sections for grid in section.elements for card in getattr(grid, "cards", ())
-            for part in card if isinstance(part, HeatMap)]  # fmt: skip
+    maps = [
+        part
+        for section in page.sections
+        for grid in section.elements
+        for card in getattr(grid, "cards", ())
+        for part in card
+        if isinstance(part, HeatMap)
+    ]
     (shown,) = maps
     assert "By lagrange/dop853 alone." in shown.note or "By lagrange/ode45 alone." in shown.note
     numbers = [cell[0] for line in shown.cells for cell in line if cell is not None]
@@ -182,14 +214,17 @@ def test_the_map_of_a_part_of_a_grid_has_the_runs_that_are_there(
     assert runs >= len(numbers)
 
 
-def test_runs_that_are_not_ok_are_grouped_by_status_and_reason_with_their_ranges(tmp_path: Path) -> None:
+def test_runs_that_are_not_ok_are_grouped_by_status_and_reason_with_their_ranges(
+    tmp_path: Path,
+) -> None:
     """A step that is far too long for the two stiffest bearings."""
     path = made_sweep(
         tmp_path,
         'title = "t"\nscene = "paper/fig08"\nsamples = 11\nmethods = ["exudyn_tree/rk44"]\n'
         'outputs = ["angles", "rates"]\n'
         'change = { "initial.angles[1]" = 0.2, duration = 1 }\nsettings = { step = 0.05 }\n'
-        '[[axis]]\nkey = "bearing.stiffness"\nvalues = [0, 1e6, 1e7]\n[[axis]]\nkey = "gravity"\nvalues = [9, 10]\n',
+        '[[axis]]\nkey = "bearing.stiffness"\nvalues = [0, 1e6, 1e7]\n[[axis]]\nkey = '
+        '"gravity"\nvalues = [9, 10]\n',
     )
     stored = StoredSweep(path)
     bad = np.flatnonzero(stored.column("status")[()] != 0)
@@ -206,14 +241,18 @@ def test_runs_that_are_not_ok_are_grouped_by_status_and_reason_with_their_ranges
     assert {int(run) for run, kind in kinds if kind} == {*bad.tolist()}
 
 
-def test_of_many_runs_the_curves_of_corners_faults_and_every_kth_are_kept(grid: tuple[StoredSweep, str]) -> None:
+def test_of_many_runs_the_curves_of_corners_faults_and_every_kth_are_kept(
+    grid: tuple[StoredSweep, str],
+) -> None:
     stored, _ = grid
     sweep = _Sweep(stored)
     everything = np.ones(6, bool)
     assert chosen_runs(sweep, everything, 6).tolist() == list(range(6))
     few = chosen_runs(sweep, everything, 4)
     assert len(few) <= 4
-    stiffness, damping = (stored.column(name)[()] for name in ("bearing_stiffness", "bearing_damping"))
+    stiffness, damping = (
+        stored.column(name)[()] for name in ("bearing_stiffness", "bearing_damping")
+    )
     corners = [run for run in few if stiffness[run] in (0.0, 1e5) and damping[run] in (0.0, 1e2)]
     assert len(corners) >= 2
 

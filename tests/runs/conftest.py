@@ -1,4 +1,5 @@
-"""A file of every kind that the program writes, made once for all tests of this folder; for reading only."""
+"""A file of every kind that the program writes, made once for all tests of this folder; for reading
+only."""
 
 from __future__ import annotations
 
@@ -15,7 +16,8 @@ SCENE = "check/held"
 
 @pytest.fixture(scope="session")
 def files(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """results.h5, modes.h5 and comparison.h5 of one scene, the last with its data.csv; s.h5, with its s.toml."""
+    """results.h5, modes.h5 and comparison.h5 of one scene, the last with its data.csv; s.h5, with
+    its s.toml."""
     folder = tmp_path_factory.mktemp("files")
     results_file(folder / "results.h5", [SCENE], ["lagrange/dop853"])
     made_sweep(folder, THREE_RUNS)

@@ -1,6 +1,8 @@
-"""Single bits that flip, and files that are cut off: each command ends, and nothing changed passes as unchanged.
+"""Single bits that flip, and files that are cut off: each command ends, and nothing changed passes
+as unchanged.
 
-The long form (nightly) runs in a process of its own, which a bit that hangs HDF5 cannot keep from being ended.
+The long form (nightly) runs in a process of its own, which a bit that hangs HDF5 cannot keep from
+being ended.
 """
 
 from __future__ import annotations
@@ -26,13 +28,24 @@ SCENE = "check/held"
 KINDS = ("results", "s", "modes", "comparison")
 FLIPS, CUTS = 2000, 300
 _SIGNATURES = (
-    b"\x89HDF", b"GCOL", b"HEAP", b"TREE", b"SNOD", b"OHDR", b"OCHK", b"FRHP", b"FHDB", b"BTHD", b"BTLF",
-)  # fmt: skip
+    b"\x89HDF",
+    b"GCOL",
+    b"HEAP",
+    b"TREE",
+    b"SNOD",
+    b"OHDR",
+    b"OCHK",
+    b"FRHP",
+    b"FHDB",
+    b"BTHD",
+    b"BTLF",
+)
 LIMIT_S = 10.0  # for a file, in the long form
 
 
 def metadata(content: bytes, path: Path) -> list[int]:
-    """Offsets in HDF5's heaps and headers: within 512 bytes behind a signature of theirs; rows left out."""
+    """Offsets in HDF5's heaps and headers: within 512 bytes behind a signature of theirs; rows left
+    out."""
     rows = [region for columns in read_trailer(path).groups.values() for region in columns.values()]
     near = set[int]()
     for signature in _SIGNATURES:
@@ -40,7 +53,11 @@ def metadata(content: bytes, path: Path) -> list[int]:
         while start >= 0:
             near.update(range(start, min(start + 512, len(content))))
             start = content.find(signature, start + 1)
-    return sorted(place for place in near if not any(start <= place < start + length for start, length in rows))
+    return sorted(
+        place
+        for place in near
+        if not any(start <= place < start + length for start, length in rows)
+    )
 
 
 def damages(folder: Path, flips: int, cuts: int, seed: int) -> Iterator[tuple[str, str, bytes]]:
@@ -69,7 +86,9 @@ def read_all(kind: str, path: Path) -> None:
             for scene in results.scenes.values():
                 for run in scene.runs.values():
                     _ = run.attributes, [run.array(name) for name in run.names]
-            runs = [f"{scene.name}/{name}" for scene in results.scenes.values() for name in scene.runs]
+            runs = [
+                f"{scene.name}/{name}" for scene in results.scenes.values() for name in scene.runs
+            ]
         if runs != [f"{SCENE}/reference", f"{SCENE}/lagrange/dop853"]:
             raise StoreError(f"{path}: a run is missing")
     elif kind == "s":
@@ -81,7 +100,8 @@ def read_all(kind: str, path: Path) -> None:
 
 
 def attempt(kind: str, content: bytes, folder: Path, command: str) -> str:
-    """What becomes of a damaged file. Raises whatever is no refusal, AssertionError where a change is not seen."""
+    """What becomes of a damaged file. Raises whatever is no refusal, AssertionError where a change
+    is not seen."""
     path = folder / "damaged.h5"
     path.write_bytes(content)
     status = 0
@@ -110,17 +130,24 @@ def try_all(folder: Path, out: Path, flips: int, cuts: int, seed: int) -> Counte
 
 
 def test_a_flipped_bit_or_a_cut_is_found(files: Path, tmp_path: Path) -> None:
-    """The short form: the digest is compared before HDF5 sees the file, so that it cannot hang this process."""
+    """The short form: the digest is compared before HDF5 sees the file, so that it cannot hang this
+    process."""
     outcomes = try_all(files, tmp_path, 96, 16, seed=1)
     assert sum(outcomes.values()) == 112
 
 
 @pytest.mark.nightly
-def test_two_thousand_flipped_bits_and_three_hundred_cuts_are_found(files: Path, tmp_path: Path) -> None:
+def test_two_thousand_flipped_bits_and_three_hundred_cuts_are_found(
+    files: Path, tmp_path: Path
+) -> None:
     process = subprocess.run(
-        [sys.executable, __file__, str(files), str(tmp_path)], capture_output=True, text=True, check=False,
-        timeout=(FLIPS + CUTS) * LIMIT_S, env={**os.environ, "PYTHONPATH": str(Path(__file__).parents[1])},
-    )  # fmt: skip
+        [sys.executable, __file__, str(files), str(tmp_path)],
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=(FLIPS + CUTS) * LIMIT_S,
+        env={**os.environ, "PYTHONPATH": str(Path(__file__).parents[1])},
+    )
     assert process.returncode == 0, process.stderr
     print(process.stdout)
 

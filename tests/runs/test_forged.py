@@ -1,5 +1,5 @@
-"""Files of this program that were forged, with a right digest and right checksums: every command ends with one line, or
-says what it can; nothing is read that is larger than the file."""
+"""Files of this program that were forged, with a right digest and right checksums: every command
+ends with one line, or says what it can; nothing is read that is larger than the file."""
 
 from __future__ import annotations
 
@@ -45,7 +45,11 @@ def everywhere(kind: str, value: object) -> Callable[[h5py.File], None]:
 
     def change(file: h5py.File) -> None:
         def note(_: str, item: object) -> None:
-            if isinstance(item, h5py.Dataset) and item.dtype.kind == "f" and item.dtype.itemsize == 8:
+            if (
+                isinstance(item, h5py.Dataset)
+                and item.dtype.kind == "f"
+                and item.dtype.itemsize == 8
+            ):
                 item[...] = value
 
         file[kind].visititems(note)
@@ -114,7 +118,10 @@ FORGED: dict[str, tuple[str, Callable[[h5py.File], object]]] = {
     "modes infinite": ("modes", everywhere("modes", np.inf)),
     "modes huge": ("modes", everywhere("modes", 1e308)),
     "modes nan": ("modes", everywhere("modes", np.nan)),
-    "labels a number": ("modes", lambda file: _of_modes(file).attrs.__setitem__("mode_labels", 1e308)),
+    "labels a number": (
+        "modes",
+        lambda file: _of_modes(file).attrs.__setitem__("mode_labels", 1e308),
+    ),
     "labels fewer": ("modes", lambda file: _of_modes(file).attrs.__setitem__("mode_labels", ["a"])),
     "gravity a list": ("modes", lambda file: _of_modes(file).attrs.__setitem__("gravity", ["a"])),
     "no frequencies": ("modes", lambda file: _of_modes(file).__delitem__("eigenvalue_imag")),
@@ -130,7 +137,10 @@ def _replace(file: h5py.File, group: str, name: str, values: object) -> None:
     attributes = dict(file[group][name].attrs)
     del file[group][name]
     dataset = file[group].create_dataset(name, data=values)
-    dataset.attrs["units"], dataset.attrs["long_name"] = attributes["units"], attributes["long_name"]
+    dataset.attrs["units"], dataset.attrs["long_name"] = (
+        attributes["units"],
+        attributes["long_name"],
+    )
 
 
 def with_right_checksums(path: Path) -> None:
@@ -152,7 +162,10 @@ def read_in_every_way(path: Path, kind: str, files: Path) -> list[str]:
     said = []
     commands: list[list[object]] = [["check", path], ["show", path], ["show", path, "--json"]]
     if kind == "results":
-        commands += [["animate", SCENE, path, "-o", path.with_name("a.webp")], ["figures", path, "-o", path.parent]]
+        commands += [
+            ["animate", SCENE, path, "-o", path.with_name("a.webp")],
+            ["figures", path, "-o", path.parent],
+        ]
         commands += [["run", SCENE, "-m", "lagrange/dop853", "-j", "1", "-o", path]]
     if kind == "s":
         commands += [["sweep", files / "s.toml", "-j", "1", "-o", path]]
@@ -175,7 +188,9 @@ def read_in_every_way(path: Path, kind: str, files: Path) -> list[str]:
     return said
 
 
-@pytest.mark.parametrize("name", [pytest.param(one, marks=() if one in _QUICK else pytest.mark.full) for one in FORGED])
+@pytest.mark.parametrize(
+    "name", [pytest.param(one, marks=() if one in _QUICK else pytest.mark.full) for one in FORGED]
+)
 @pytest.mark.filterwarnings("error")
 def test_a_forged_file_is_a_line(name: str, files: Path, tmp_path: Path) -> None:
     kind, change = FORGED[name]
@@ -204,19 +219,32 @@ def test_a_group_that_is_not_there_is_a_line(files: Path, tmp_path: Path) -> Non
 
 
 TRAILERS = [
-    NESTED, "null", "3", '{"format_version": 3}', '{"format_version": 3, "kind": "results", "groups": [1]}',
+    NESTED,
+    "null",
+    "3",
+    '{"format_version": 3}',
+    ('{"format_version": 3, "kind": "results", "groups": [1]}'),
     '{"format_version": 3, "kind": ["results"], "groups": {}}',
     '{"format_version": 3, "kind": "results", "groups": {"runs": {"status": [-5, 10]}}}',
     '{"format_version": 3, "kind": "results", "groups": {"runs": {"status": ["a", 1e400]}}}',
     '{"format_version": 3, "kind": "results", "groups": {"no/group": {}}}',
-    json.dumps({"format_version": 3, "kind": "results", "groups": {f"check/{i}": {} for i in range(30_000)}}),
-]  # fmt: skip
+    json.dumps(
+        {
+            "format_version": 3,
+            "kind": "results",
+            "groups": {f"check/{i}": {} for i in range(30_000)},
+        }
+    ),
+]
 _QUICK_TRAILERS = (0, 4, 6)  # no text of ours, of another structure, with regions that are none
 
 
 @pytest.mark.parametrize(
     "text",
-    [pytest.param(text, marks=() if i in _QUICK_TRAILERS else pytest.mark.full) for i, text in enumerate(TRAILERS)],
+    [
+        pytest.param(text, marks=() if i in _QUICK_TRAILERS else pytest.mark.full)
+        for i, text in enumerate(TRAILERS)
+    ],
     ids=range(len(TRAILERS)),
 )
 def test_a_trailer_of_other_text_is_a_line(text: str, files: Path, tmp_path: Path) -> None:
@@ -230,7 +258,9 @@ def test_a_trailer_of_other_text_is_a_line(text: str, files: Path, tmp_path: Pat
         trailer = path.read_bytes()[len(content) :]
         assert len(trailer) > 48
     except (ValueError, TypeError, KeyError, AttributeError, RecursionError):
-        path.write_bytes(content + text.encode() + len(text).to_bytes(8, "little") + bytes(32) + b"rmbs-end")
+        path.write_bytes(
+            content + text.encode() + len(text).to_bytes(8, "little") + bytes(32) + b"rmbs-end"
+        )
     run = ["run", SCENE, "-m", "lagrange/dop853", "-j", "1", "-o", path]
     for line in (*read_in_every_way(path, "modes", files), rotor_mbs(*run).err.strip()):
         assert str(path) in line
@@ -238,7 +268,8 @@ def test_a_trailer_of_other_text_is_a_line(text: str, files: Path, tmp_path: Pat
 
 
 def test_texts_are_bounded_before_they_are_read(files: Path, tmp_path: Path) -> None:
-    """Sixty million empty texts in a compressed array of 250 kB; references to one text of a megabyte."""
+    """Sixty million empty texts in a compressed array of 250 kB; references to one text of a
+    megabyte."""
     path = Path(shutil.copy(files / "results.h5", tmp_path / "forged.h5"))
     with forged(path) as file:
         group = file["runs"]
@@ -258,14 +289,16 @@ def test_texts_are_bounded_before_they_are_read(files: Path, tmp_path: Path) -> 
     with h5py.File(path) as file:
         offset = file["runs/scene_hash"].id.get_offset()
     content = bytearray(path.read_bytes())
-    content[offset : offset + 4] = (2**31).to_bytes(4, "little")  # a length that the file does not have
+    # a length that the file does not have
+    content[offset : offset + 4] = (2**31).to_bytes(4, "little")
     known = read_trailer(path)
     path.write_bytes(content)
     with h5py.File(path, "r+"):
         pass
     append_trailer(path, known.kind, known.groups)
     assert "claims more text than the file has" in rotor_mbs("check", path).err
-    assert tracemalloc.get_traced_memory()[1] < 100e6  # bytes; the texts would take 480 MB, and 2 GB
+    # bytes; the texts would take 480 MB, and 2 GB
+    assert tracemalloc.get_traced_memory()[1] < 100e6
     tracemalloc.stop()
 
 

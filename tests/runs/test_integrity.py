@@ -1,4 +1,5 @@
-"""Whatever changes in a file after it was written is found, and is a line: in runs, in sweeps, in files not of ours."""
+"""Whatever changes in a file after it was written is found, and is a line: in runs, in sweeps, in
+files not of ours."""
 
 from __future__ import annotations
 
@@ -101,7 +102,15 @@ def test_checksums_are_as_the_documentation_says(written: Path, swept: Path) -> 
 def test_the_last_bit_of_every_column_of_a_run_is_found(copy: Path) -> None:
     place = TableFile(copy).place(RUN)
     columns = place.row_type.names or ()
-    assert {"angles", "rates", "tip", "kinetic_energy", "energy_error", "energy_drift_max", "message"} <= {*columns}
+    assert {
+        "angles",
+        "rates",
+        "tip",
+        "kinetic_energy",
+        "energy_error",
+        "energy_drift_max",
+        "message",
+    } <= {*columns}
     for column in columns:
         change_byte(place, column)
         assert not place.is_stored, column
@@ -112,7 +121,9 @@ def test_the_last_bit_of_every_column_of_a_run_is_found(copy: Path) -> None:
 
 def test_a_damaged_run_is_neither_reported_nor_read(copy: Path, tmp_path: Path) -> None:
     damage(copy, RUN, "angles")
-    assert f"{RUN} changed after it was written" in refusal("report", copy, "-o", tmp_path / "report")
+    assert f"{RUN} changed after it was written" in refusal(
+        "report", copy, "-o", tmp_path / "report"
+    )
     with pytest.raises(StoreError, match=f"{RUN} changed after it was written"):
         _ = rm.open(copy)[RUN]
 
@@ -168,7 +179,9 @@ def test_a_file_that_is_being_filled_is_told_from_a_damaged_one(copy: Path) -> N
     assert ended.status == 1
     assert "1 runs missing; the command that wrote the file computes them\n" in ended.out
     with ThreadPoolExecutor(1) as other, locked(copy):
-        assert "another process is writing it" in other.submit(rotor_mbs, "check", copy).result().out
+        assert (
+            "another process is writing it" in other.submit(rotor_mbs, "check", copy).result().out
+        )
 
 
 @pytest.mark.parametrize("offset", [0, 8, 40, 100, -1, -9, -41, -60])
@@ -192,8 +205,8 @@ def test_a_newer_format_is_named(copy: Path, monkeypatch: pytest.MonkeyPatch) ->
     assert "format_version 99, this program reads 3" in refusal("check", copy)
 
 
-# By the check that finds it: a run, and a change in it that has the right checksum. With a growth of 1e6 at the second
-# sample nothing is compared any more, and a wrong run could be called ok.
+# By the check that finds it: a run, and a change in it that has the right checksum. With a growth
+# of 1e6 at the second sample nothing is compared any more, and a wrong run could be called ok.
 EDITS: dict[str, tuple[str, Callable[[Rows], object]]] = {
     "growth": (f"{SCENE}/reference", lambda row: row["error_growth"].__setitem__(1, 1e6)),
     "energies": (RUN, lambda row: row["energy_error"].__setitem__(5, row["energy_error"][5] + 1.0)),
@@ -215,12 +228,16 @@ def test_settings_that_are_not_the_methods_are_found(copy: Path) -> None:
 
 
 FOREIGN: dict[str, Callable[[h5py.Group, Path], object]] = {
-    "an external link": lambda scene, place: scene.__setitem__("angles", h5py.ExternalLink(str(place), "/x")),
+    "an external link": lambda scene, place: scene.__setitem__(
+        "angles", h5py.ExternalLink(str(place), "/x")
+    ),
     "a soft link": lambda scene, _: scene.__setitem__("angles", h5py.SoftLink(f"/{SCENE}/rates")),
     "another file's bytes": lambda scene, place: scene.create_dataset(
         "angles", (2, 151, 4), "f8", external=[(str(place), 0, 2 * 151 * 32)]
     ),
-    "30 GB that are not there": lambda scene, _: scene.create_dataset("angles", (10**9, 4), "f8", chunks=(1000, 4)),
+    "30 GB that are not there": lambda scene, _: scene.create_dataset(
+        "angles", (10**9, 4), "f8", chunks=(1000, 4)
+    ),
     "a group": lambda scene, _: scene.create_group("angles"),
     "a text": lambda scene, _: scene.create_dataset("angles", data="text"),
     "an array of nothing": lambda scene, _: scene.create_dataset("angles", data=h5py.Empty("f8")),
@@ -285,12 +302,16 @@ def test_files_that_are_not_ours_are_refused_with_one_line(
         raise PermissionError(13, "Permission denied")
 
     monkeypatch.setattr(Path, "open", refuse)
-    with pytest.raises(StoreError, match="cannot be read: Permission denied"), hdf5.open_file(written):
+    with (
+        pytest.raises(StoreError, match="cannot be read: Permission denied"),
+        hdf5.open_file(written),
+    ):
         pass
 
 
 def test_an_attribute_that_became_a_list_is_not_read(copy: Path) -> None:
-    """One bit makes a list of a text, at which the HDF5 library ends the process that reads it: of forged files."""
+    """One bit makes a list of a text, at which the HDF5 library ends the process that reads it: of
+    forged files."""
     known, refused = read_trailer(copy), 0
     with h5py.File(copy, "r+"):  # cuts the trailer off
         pass
@@ -300,7 +321,11 @@ def test_an_attribute_that_became_a_list_is_not_read(copy: Path) -> None:
         append_trailer(copy, known.kind, known.groups)
         try:
             with open_results(copy) as results:
-                _ = [run.attributes for scene in results.scenes.values() for run in scene.runs.values()]
+                _ = [
+                    run.attributes
+                    for scene in results.scenes.values()
+                    for run in scene.runs.values()
+                ]
         except StoreError:
             refused += 1
     assert refused > 10
@@ -309,8 +334,12 @@ def test_an_attribute_that_became_a_list_is_not_read(copy: Path) -> None:
 # Sweeps
 
 
-@pytest.mark.parametrize("column", ["angles", "energy_drift_max", "status", "gravity", "time", "crc32"])
-def test_a_changed_number_of_a_finished_sweep_is_found(column: str, swept: Path, tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    "column", ["angles", "energy_drift_max", "status", "gravity", "time", "crc32"]
+)
+def test_a_changed_number_of_a_finished_sweep_is_found(
+    column: str, swept: Path, tmp_path: Path
+) -> None:
     copy = Path(shutil.copy(swept, tmp_path / "s.h5"))
     with h5py.File(copy) as file:
         place = file[column].id.get_offset()
@@ -326,6 +355,10 @@ def test_a_changed_number_of_a_finished_sweep_is_found(column: str, swept: Path,
     with pytest.raises(StoreError, match="runs 0 changed"):
         StoredSweep(copy)
     assert "runs 0 changed" in refusal("report", copy, "-o", tmp_path / "report")
-    for read in (partial(rm.Runs.column, name="time"), partial(rm.Runs.at, name="angles", sample=0), rm.Runs.to_xarray):
+    for read in (
+        partial(rm.Runs.column, name="time"),
+        partial(rm.Runs.at, name="angles", sample=0),
+        rm.Runs.to_xarray,
+    ):
         with pytest.raises(StoreError, match="runs 0 changed"):
             read(rm.open(copy))

@@ -1,5 +1,5 @@
-"""Every command that writes HDF5 over every kind of file: it extends its own kind and loses nothing, and leaves the
-bytes of any other; the table of docs/data.md."""
+"""Every command that writes HDF5 over every kind of file: it extends its own kind and loses
+nothing, and leaves the bytes of any other; the table of docs/data.md."""
 
 from __future__ import annotations
 
@@ -62,7 +62,10 @@ def folder(files: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
     short = paper("fig08", samples=11)
     for name in ("results", "unfinished results"):
-        store(made / name, [Made(short, "reference", rotor(np.sin)), Made(short, METHOD, rotor(np.sin))])
+        store(
+            made / name,
+            [Made(short, "reference", rotor(np.sin)), Made(short, METHOD, rotor(np.sin))],
+        )
     TableFile(made / "unfinished results").place(f"{OTHER}/{METHOD}").mark_missing([0])
     known = {"run": "one", "scene": OTHER, "method_name": METHOD, "step": 0.5, "tolerance": np.nan}
     table = points_table("stability", [known])
@@ -128,7 +131,9 @@ def stored(path: Path) -> dict[str, object]:
     found: dict[str, object] = {}
 
     def note(name: str, item: object) -> None:
-        if isinstance(item, h5py.Dataset) and (name.startswith(("modes/", "comparison/")) or "/" not in name):
+        if isinstance(item, h5py.Dataset) and (
+            name.startswith(("modes/", "comparison/")) or "/" not in name
+        ):
             found[name] = np.asarray(item[()]).tobytes()
 
     with h5py.File(path) as file:
@@ -140,16 +145,26 @@ def stored(path: Path) -> dict[str, object]:
         for run, known in tables.tables[group].known_rows.items():
             place = tables.place(run, group)
             if known["scene"] == OTHER and place.is_stored:
-                found |= {f"{group} {run} {name}": values.tobytes() for name, values in place.read().items()}
-    return {name: content for name, content in found.items() if not name.endswith("crc32")}  # has the row's number
+                found |= {
+                    f"{group} {run} {name}": values.tobytes()
+                    for name, values in place.read().items()
+                }
+    # has the row's number
+    return {name: content for name, content in found.items() if not name.endswith("crc32")}
 
 
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize(
-    "command", [pytest.param(name, marks=() if name in _QUICK else pytest.mark.full) for name in EXTENDS]
+    "command",
+    [pytest.param(name, marks=() if name in _QUICK else pytest.mark.full) for name in EXTENDS],
 )
 def test_a_command_extends_its_own_kind_and_leaves_every_other(
-    command: str, kind: str, folder: Path, files: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    command: str,
+    kind: str,
+    folder: Path,
+    files: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     names = {"compare": "comparison.h5", "datasets of a sweep": "train.h5"}
     path = tmp_path / names.get(command, "file.h5")
@@ -176,7 +191,8 @@ def test_the_documentation_has_the_same_table() -> None:
         if line.startswith("|")
     ]
     extended = {
-        row[0]: {kind for kind, cell in zip(heads[1:], row[1:], strict=True) if cell == "extends"} for row in rows
+        row[0]: {kind for kind, cell in zip(heads[1:], row[1:], strict=True) if cell == "extends"}
+        for row in rows
     }
     told = {
         "`run`, `reference`, `bench`, `stability`, `reproduce`": "run",
@@ -192,7 +208,9 @@ def test_the_documentation_has_the_same_table() -> None:
 
 
 @pytest.mark.parametrize("command", ["run", "sweep", "modes", "compare", "save of runs"])
-def test_an_empty_file_is_a_new_one(command: str, files: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_empty_file_is_a_new_one(
+    command: str, files: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     path = tmp_path / ("comparison.h5" if command == "compare" else "file.h5")
     path.touch()
     assert answer(command, path, files, monkeypatch) == ""
@@ -207,6 +225,8 @@ def test_a_copy_of_runs_replaces_one_with_the_same_runs(files: Path, tmp_path: P
         assert runs.save(target).read_bytes() == runs.path.read_bytes()
     results_file(target, [SCENE], ["lagrange/ode45"])
     before = target.read_bytes()
-    with pytest.raises(rm.InputError, match="has runs: check/held/lagrange/ode45, which would be lost"):
+    with pytest.raises(
+        rm.InputError, match=("has runs: check/held/lagrange/ode45, which would be lost")
+    ):
         runs.save(target)
     assert target.read_bytes() == before

@@ -1,4 +1,5 @@
-"""Where commands write: what stands there is not lost, links and devices stay what they are, folders are refused."""
+"""Where commands write: what stands there is not lost, links and devices stay what they are,
+folders are refused."""
 
 from __future__ import annotations
 
@@ -34,10 +35,17 @@ def dataset(files: Path) -> Path:
 
 @pytest.mark.parametrize(
     "command",
-    [["reference", "paper/fig03"], ["reproduce"], ["run", "paper/fig03"], ["sweep", "sweeps/fig11-spread"]],
+    [
+        ["reference", "paper/fig03"],
+        ["reproduce"],
+        ["run", "paper/fig03"],
+        ["sweep", "sweeps/fig11-spread"],
+    ],
     ids=lambda command: command[0],
 )
-def test_no_command_writes_what_another_process_is_writing(command: list[str], tmp_path: Path) -> None:
+def test_no_command_writes_what_another_process_is_writing(
+    command: list[str], tmp_path: Path
+) -> None:
     """The lock of a process that has begun with an output which is not there yet."""
     output = tmp_path / "results.h5"
     with ThreadPoolExecutor(1) as other, locked(output):
@@ -58,7 +66,9 @@ def test_no_command_writes_what_another_process_is_writing(command: list[str], t
     ],
     ids=["pipe", "folder", "link", "file"],
 )
-def test_a_lock_that_is_no_file_of_ours_is_refused(make: Callable[[Path], object], tmp_path: Path) -> None:
+def test_a_lock_that_is_no_file_of_ours_is_refused(
+    make: Callable[[Path], object], tmp_path: Path
+) -> None:
     """A link would be written through, a pipe waited for."""
     (tmp_path / "another").write_text("kept")
     make(tmp_path / ".r.h5.lock")
@@ -94,8 +104,8 @@ def test_a_pipe_is_written_to(tmp_path: Path) -> None:
     assert pipe.is_fifo()
 
 
-# Every option that names an output and what its earlier output is called in `kinds`; other commands that write HDF5 are
-# in test_output_kinds.
+# Every option that names an output and what its earlier output is called in `kinds`; other commands
+# that write HDF5 are in test_output_kinds.
 OUTPUTS = {
     "export mjcf": (["export", "check/held", "--to", "mjcf", "-o"], "mjcf"),
     "export exudyn": (["export", "check/held", "--to", "exudyn", "-o"], "exudyn"),
@@ -116,7 +126,16 @@ def kinds(dataset: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[str, 
     folder = tmp_path_factory.mktemp("kinds")
     results = folder / "results.h5"
     words = {"results": results, "sweep": dataset.with_name("s.toml")}
-    for name in ("run", "export mjcf", "export exudyn", "export csv", "check junit", "check json", "animate", "sweep"):
+    for name in (
+        "run",
+        "export mjcf",
+        "export exudyn",
+        "export csv",
+        "check junit",
+        "check json",
+        "animate",
+        "sweep",
+    ):
         command, kind = OUTPUTS[name]
         suffix = {"run": ".h5", "animate": ".webp"}.get(name, "")
         ended = rotor_mbs(*(word.format(**words) for word in command), folder / f"{kind}{suffix}")
@@ -125,7 +144,9 @@ def kinds(dataset: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[str, 
     (folder / "data").write_text("time [s],rotor [rad],pitch 1 [rad]\n0.0,0.5,0.1\n0.1,0.5,0.1\n")
     (folder / "page").write_text("<!DOCTYPE html>\n<title>mine</title>\n")
     (folder / "numbers").write_text('[\n {\n  "mine": 1\n }\n]')
-    (folder / "suite").write_text("<?xml version='1.0' encoding='utf-8'?>\n<testsuites name=\"mine\"/>\n")
+    (folder / "suite").write_text(
+        "<?xml version='1.0' encoding='utf-8'?>\n<testsuites name=\"mine\"/>\n"
+    )
     with h5py.File(folder / "foreign", "w") as file:
         file["time"] = [0.0, 1.0]
     (folder / "note").write_bytes(b"rotor_mbs: \xff\x00 mine\n")
@@ -133,14 +154,20 @@ def kinds(dataset: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[str, 
 
 
 @pytest.mark.parametrize(
-    "output", [pytest.param(name, marks=() if name in _QUICK_OUTPUTS else pytest.mark.full) for name in OUTPUTS]
+    "output",
+    [
+        pytest.param(name, marks=() if name in _QUICK_OUTPUTS else pytest.mark.full)
+        for name in OUTPUTS
+    ],
 )
 def test_an_output_replaces_nothing_but_its_own_earlier_output(
     output: str, kinds: dict[str, Path], dataset: Path, tmp_path: Path
 ) -> None:
     words, own = OUTPUTS[output]
     suffix = ".webp" if output == "animate" else ".file"
-    words = [word.format(results=kinds["results"], sweep=dataset.with_name("s.toml")) for word in words]
+    words = [
+        word.format(results=kinds["results"], sweep=dataset.with_name("s.toml")) for word in words
+    ]
     for kind, path in kinds.items():
         there = tmp_path / f"{kind}{suffix}"
         there.write_bytes(path.read_bytes())
@@ -208,7 +235,10 @@ def test_pages_figures_and_saved_runs_replace_no_other_file(tmp_path: Path) -> N
         ("run paper/fig03 -o ..", "allowed: a file's name, not a folder"),
         ("sweep x.toml -o ''", "allowed: a file's name, not a folder"),
         ("check --junit .", "allowed: a file's name, not a folder"),
-        ("compare none.csv --scene paper/fig03 -o {sweep}", "allowed: a folder that can be written"),
+        (
+            "compare none.csv --scene paper/fig03 -o {sweep}",
+            ("allowed: a folder that can be written"),
+        ),
         ("reproduce -o {sweep}/new", "allowed: a folder that can be written"),
         ("report {results} -o {sweep}", "allowed: a folder that can be written"),
         ("export check/held --to csv -o /", ""),
@@ -223,8 +253,12 @@ def test_pages_figures_and_saved_runs_replace_no_other_file(tmp_path: Path) -> N
         ("report {dataset} -o /proc/none/x", ""),
     ],
 )
-def test_an_output_that_cannot_be_written_is_a_line(command: str, allowed: str, results: Path, dataset: Path) -> None:
+def test_an_output_that_cannot_be_written_is_a_line(
+    command: str, allowed: str, results: Path, dataset: Path
+) -> None:
     """Found with the arguments where it can be, before anything is read or computed."""
     sweep = dataset.with_name("s.toml")
-    assert allowed in refusal(*shlex.split(command.format(results=results, dataset=dataset, sweep=sweep)))
+    assert allowed in refusal(
+        *shlex.split(command.format(results=results, dataset=dataset, sweep=sweep))
+    )
     assert "[[axis]]" in sweep.read_text()

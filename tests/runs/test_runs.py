@@ -1,4 +1,5 @@
-"""Runs into a results file: what is stored stays, what was lost is tried again, and nothing but what was asked for."""
+"""Runs into a results file: what is stored stays, what was lost is tried again, and nothing but
+what was asked for."""
 
 from __future__ import annotations
 
@@ -61,9 +62,12 @@ def test_only_what_was_asked_for_is_stored(tmp_path: Path) -> None:
     scene = find_scenes(["check/held"])[0].replace(outputs=["tip"])
     run_scenes([scene], {scene.name: METHODS[:1]}, tmp_path / "r.h5", workers=0, timeout_s=60.0)
     with open_results(tmp_path / "r.h5") as results:
-        by_dop853, exact = (results.scenes[scene.name].runs[name] for name in (METHODS[0], "reference"))
+        by_dop853, exact = (
+            results.scenes[scene.name].runs[name] for name in (METHODS[0], "reference")
+        )
         assert set(by_dop853.names) == {"time", "blade", "axis", "coordinate", "tip"}
-        assert {"angles", "rates", "error_growth"} <= set(exact.names)  # which other runs are judged by
+        # which other runs are judged by
+        assert {"angles", "rates", "error_growth"} <= set(exact.names)
     with h5py.File(tmp_path / "r.h5") as file:
         assert "kinetic_energy" not in file[scene.name]
 
@@ -74,17 +78,27 @@ def test_names_and_units_keep_the_contract(results: Path) -> None:
         assert file.attrs["format_version"] == 3
         assert file.attrs["Conventions"].startswith("CF-")
         scene, runs = file["paper/fig11"], file["runs"]
-        units = {"angles": "rad", "rates": "rad/s", "tip": "m", "kinetic_energy": "J", "work": "J", "time": "s"}
+        units = {
+            "angles": "rad",
+            "rates": "rad/s",
+            "tip": "m",
+            "kinetic_energy": "J",
+            "work": "J",
+            "time": "s",
+        }
         assert {name: scene[name].attrs["units"] for name in units} == units
         assert {"title", "figures", "blades", "scene_toml", "scene_hash"} <= set(scene.attrs)
         columns = (
-            "scene method_name status message settings samples time_reached time_limit_s steps rhs_evaluations "
-            "setup_time_s run_time_s run_time_min_s repeats angle_error_max energy_drift_max horizon_s rotor_angle_max "
+            "scene method_name status message settings samples time_reached time_limit_s steps "
+            "rhs_evaluations "
+            "setup_time_s run_time_s run_time_min_s repeats angle_error_max energy_drift_max "
+            "horizon_s rotor_angle_max "
             "engine_success engine_message versions crc32"
         )
         assert set(columns.split()) <= set(runs)
         of_scene = runs["scene"].asstr()[()] == "paper/fig11"
-        for name in ("status", "samples"):  # in the table of the scene, too, so that one group is enough
+        # in the table of the scene, too, so that one group is enough
+        for name in ("status", "samples"):
             np.testing.assert_array_equal(scene[name][()], runs[name][of_scene])
 
 
@@ -126,7 +140,10 @@ def without_memory(task: RunTask) -> Rows:
 
 def test_runs_whose_reference_was_not_computed_are_not_computed(tmp_path: Path) -> None:
     report = run(tmp_path / "r.h5", perform=without_memory)
-    assert [outcome.status for outcome in report.not_computed] == ["worker_died", *["no_reference"] * 3]
+    assert [outcome.status for outcome in report.not_computed] == [
+        "worker_died",
+        *["no_reference"] * 3,
+    ]
     assert stored(tmp_path / "r.h5") == []
     assert len(made(run(tmp_path / "r.h5"))) == 4
 
@@ -154,7 +171,9 @@ def test_workers_that_do_not_share_the_disk_store_the_same(tmp_path: Path) -> No
     run(tmp_path / "remote.h5", workers=Remote())
     run(tmp_path / "local.h5")
     for label in stored(tmp_path / "local.h5"):
-        rows = [TableFile(tmp_path / name).place(label).read() for name in ("remote.h5", "local.h5")]
+        rows = [
+            TableFile(tmp_path / name).place(label).read() for name in ("remote.h5", "local.h5")
+        ]
         assert all(rows[0][name].tobytes() == rows[1][name].tobytes() for name in rows[0])
     assert len(stored(tmp_path / "remote.h5")) == 4
 
@@ -174,11 +193,14 @@ def test_a_damaged_row_is_computed_again_by_the_same_command(tmp_path: Path, col
 
 def test_a_run_that_a_shorter_limit_ended_is_computed_again(tmp_path: Path) -> None:
     def slow(task: RunTask) -> Rows:
-        return task.failed("timed_out", "too slow") if task.asked.method == METHODS[0] else blank(task)
+        return (
+            task.failed("timed_out", "too slow") if task.asked.method == METHODS[0] else blank(task)
+        )
 
     run(tmp_path / "r.h5", perform=slow, timeout_s=5.0)
     with open_results(tmp_path / "r.h5") as results:
-        assert run_row(results.scenes[SCENE.name].runs[METHODS[0]])[-1] == ""  # nobody knows how long it took
+        # nobody knows how long it took
+        assert run_row(results.scenes[SCENE.name].runs[METHODS[0]])[-1] == ""
     again = run(tmp_path / "r.h5", perform=slow, timeout_s=5.0)
     assert made(again) == []
     assert again.stored_failures == [f"{SCENE.name} {METHODS[0]} timed_out: too slow"]
@@ -187,7 +209,8 @@ def test_a_run_that_a_shorter_limit_ended_is_computed_again(tmp_path: Path) -> N
 
 
 def test_the_time_reached_is_that_of_the_last_sample(tmp_path: Path) -> None:
-    """As the message has it, whatever the engine says: of a reference, the slower of its two runs has the last one."""
+    """As the message has it, whatever the engine says: of a reference, the slower of its two runs
+    has the last one."""
     path = store(tmp_path / "r.h5", [Made(SCENE, "reference", rotor(np.sin), until=0.5)])
     with open_results(path) as results:
         run = results.scenes[SCENE.name].runs["reference"]
@@ -198,14 +221,21 @@ def test_a_shipped_reference_that_was_not_read_in_time_is_read_again(tmp_path: P
     """But not one that ends early itself: it has no limit."""
 
     def slow(task: RunTask) -> Rows:
-        return task.failed("timed_out", "too slow") if task.asked.method == "reference" else blank(task)
+        return (
+            task.failed("timed_out", "too slow")
+            if task.asked.method == "reference"
+            else blank(task)
+        )
 
     def short(task: RunTask) -> Rows:
         return {**slow(task), "time_limit_s": np.array([np.nan])}
 
     run(tmp_path / "r.h5", METHODS[:1], perform=slow, timeout_s=5.0)
     assert made(run(tmp_path / "r.h5", METHODS[:1], timeout_s=4.0)) == []
-    assert made(run(tmp_path / "r.h5", METHODS[:1], perform=short, timeout_s=6.0)) == ["reference", METHODS[0]]
+    assert made(run(tmp_path / "r.h5", METHODS[:1], perform=short, timeout_s=6.0)) == [
+        "reference",
+        METHODS[0],
+    ]
     assert made(run(tmp_path / "r.h5", METHODS[:1], timeout_s=7.0)) == []
 
 
@@ -255,7 +285,9 @@ def test_a_full_disk_is_one_line_and_what_was_stored_stays(tmp_path: Path) -> No
     try:
         with pytest.raises(StoreError, match="cannot be written: File too large"):
             run(path)
-        ended = rotor_mbs("run", "paper/fig08", "-m", METHODS[0], "-m", METHODS[1], "-o", path, "-j", "1")
+        ended = rotor_mbs(
+            "run", "paper/fig08", "-m", METHODS[0], "-m", METHODS[1], "-o", path, "-j", "1"
+        )
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, limits)
     assert ended.status != 0
@@ -265,14 +297,17 @@ def test_a_full_disk_is_one_line_and_what_was_stored_stays(tmp_path: Path) -> No
 
 
 def test_the_defect_of_every_interval_is_stored_with_its_run(results: Path) -> None:
-    """At the end of the interval, and as a quantity of a `Run`; the largest is the metric of that name."""
+    """At the end of the interval, and as a quantity of a `Run`; the largest is the metric of that
+    name."""
     with open_results(results) as opened:
         for scene in opened.scenes.values():
             for stored in scene.runs.values():
                 sizes = stored.array("defect")
                 samples = (stored.array(name) for name in ("time", "angles", "rates"))
                 assert np.isnan(sizes[0])
-                assert sizes[1:].tobytes() == interval_defects(scene.scene, *samples).sizes.tobytes()
+                assert (
+                    sizes[1:].tobytes() == interval_defects(scene.scene, *samples).sizes.tobytes()
+                )
     short = SCENE.replace(duration=0.1, samples=11)
     computed = rm.run(short, "lagrange/dop853")
     assert computed.defect[1:].max() == computed.metrics["defect_max"]

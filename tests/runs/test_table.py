@@ -27,7 +27,10 @@ ENGINES = ("h5netcdf", "netcdf4")
 
 
 def _table() -> TableSpec:
-    time = Column(("time",), "s", "time", attributes={"standard_name": "time"}), np.linspace(0.0, 1.0, SAMPLES)
+    time = (
+        Column(("time",), "s", "time", attributes={"standard_name": "time"}),
+        np.linspace(0.0, 1.0, SAMPLES),
+    )
     computed = {
         "status": COLUMNS["status"],
         "message": Column(("run", CHARACTERS), "1", "message", CHARACTER),
@@ -35,7 +38,10 @@ def _table() -> TableSpec:
         "angles": Column(("run", "time"), "rad", "angles"),
         "crc32": Column(("run",), "1", "checksum", "<u4"),
     }
-    known = {"time": time, "stiffness": (Column(("run",), "N m/rad", "stiffness"), np.arange(ROWS, dtype=float))}
+    known = {
+        "time": time,
+        "stiffness": (Column(("run",), "N m/rad", "stiffness"), np.arange(ROWS, dtype=float)),
+    }
     return TableSpec("", np.arange(ROWS), known, computed, characters=40)
 
 
@@ -140,17 +146,26 @@ def _runs(path: Path) -> list[str]:
 
 def test_more_rows_keep_those_that_are_stored(tmp_path: Path) -> None:
     path, first = tmp_path / "r.h5", "paper/fig08/lagrange/taylor"
-    _write(fit_file_to_request(path, results_tables(_asked("reference", "lagrange/taylor"))), first, 1.0)
-    file = fit_file_to_request(path, results_tables(_asked("exudyn_chain/generalized_alpha", "lagrange/taylor")))
+    _write(
+        fit_file_to_request(path, results_tables(_asked("reference", "lagrange/taylor"))),
+        first,
+        1.0,
+    )
+    file = fit_file_to_request(
+        path, results_tables(_asked("exudyn_chain/generalized_alpha", "lagrange/taylor"))
+    )
     assert _runs(path) == [first]
     assert (file.place(first).read()["angles"] == 1.0).all()
     assert file.tables["paper/fig08"].runs.tolist() == [
         "reference", "lagrange/taylor", "exudyn_chain/generalized_alpha",
     ]  # fmt: skip
-    assert np.isnan(file.place(first).read()["constraint_error"]).all()  # a column that it does not have
+    # a column that it does not have
+    assert np.isnan(file.place(first).read()["constraint_error"]).all()
 
 
-def test_the_tables_of_a_new_file_are_known_without_reading_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_tables_of_a_new_file_are_known_without_reading_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     path = tmp_path / "r.h5"
     with monkeypatch.context() as patch:
         patch.setattr("rotor_mbs.runs.table.read_content", None)
@@ -158,15 +173,24 @@ def test_the_tables_of_a_new_file_are_known_without_reading_it(tmp_path: Path, m
     read = TableFile(path)
     assert laid.groups == read.groups
     for group, table in read.tables.items():
-        assert (laid.tables[group].offsets, laid.tables[group].inode) == (table.offsets, table.inode)
+        assert (laid.tables[group].offsets, laid.tables[group].inode) == (
+            table.offsets,
+            table.inode,
+        )
         assert laid.tables[group].row_type == table.row_type
         assert laid.tables[group].known_rows == table.known_rows
 
 
 def test_runs_of_other_numbers_are_not_dropped_without_being_computed_again(tmp_path: Path) -> None:
     path = tmp_path / "r.h5"
-    _write(fit_file_to_request(path, results_tables(_asked("lagrange/taylor"))), "paper/fig08/lagrange/taylor", 1.0)
-    with pytest.raises(InputError, match="has lagrange/taylor of a scene of that name with other numbers"):
+    _write(
+        fit_file_to_request(path, results_tables(_asked("lagrange/taylor"))),
+        "paper/fig08/lagrange/taylor",
+        1.0,
+    )
+    with pytest.raises(
+        InputError, match=("has lagrange/taylor of a scene of that name with other numbers")
+    ):
         fit_file_to_request(path, results_tables(_asked("exudyn_tree/rk67", gravity=9.81)))
     assert _runs(path) == ["paper/fig08/lagrange/taylor"]
     fit_file_to_request(path, results_tables(_asked("lagrange/taylor", gravity=9.81)))
@@ -176,14 +200,24 @@ def test_runs_of_other_numbers_are_not_dropped_without_being_computed_again(tmp_
 def test_tables_of_other_studies_stay_beside_the_runs(tmp_path: Path) -> None:
     path = tmp_path / "r.h5"
     fit_file_to_request(path, results_tables(_asked("lagrange/taylor")))
-    point = {"run": "a", "scene": "paper/fig08", "method_name": "lagrange/taylor", "step": 0.5, "tolerance": np.nan}
+    point = {
+        "run": "a",
+        "scene": "paper/fig08",
+        "method_name": "lagrange/taylor",
+        "step": 0.5,
+        "tolerance": np.nan,
+    }
     file = fit_file_to_request(path, [points_table("stability", [point])])
     place = file.place("a", "stability")
     place.write(place.encode({"status": "ok", "angle_error_max": 0.25}))
     file = fit_file_to_request(path, results_tables(_asked("lagrange/taylor", "exudyn_tree/rk67")))
     assert file.place("a", "stability").is_stored
     assert file.place("a", "stability").read()["angle_error_max"].tolist() == [0.25]
-    assert fit_file_to_request(path, [points_table("stability", [point])]).place("a", "stability").is_stored
+    assert (
+        fit_file_to_request(path, [points_table("stability", [point])])
+        .place("a", "stability")
+        .is_stored
+    )
     changed = fit_file_to_request(path, [points_table("stability", [point | {"step": 0.25}])])
     assert not changed.place("a", "stability").is_stored
     file = fit_file_to_request(path, [], replaced=[("stability", "paper/fig08", "lagrange/taylor")])
@@ -191,14 +225,17 @@ def test_tables_of_other_studies_stay_beside_the_runs(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("engine", ENGINES)
-def test_a_results_file_opens_in_one_call_and_methods_are_told_by_label(results: Path, engine: str) -> None:
+def test_a_results_file_opens_in_one_call_and_methods_are_told_by_label(
+    results: Path, engine: str
+) -> None:
     import xarray as xr
 
     with xr.open_datatree(results, engine=engine) as tree:
         data = tree["paper/fig11"].ds
         off = abs(data.angles - data.angles.sel(run="reference"))
         assert float(off.sel(run="reference").max()) == 0.0
-        assert 0.0 < float(off.sel(run="exudyn_tree/rk67").isel(time=slice(600)).max()) < 1e-9  # rad, to the horizon
+        # rad, to the horizon
+        assert 0.0 < float(off.sel(run="exudyn_tree/rk67").isel(time=slice(600)).max()) < 1e-9
         overview = tree["runs"].ds.to_dataframe()
         assert overview.loc["paper/fig11/lagrange/dop853", "method_name"] == "lagrange/dop853"
         assert overview["steps"]["paper/fig11/exudyn_tree/rk67"] > 0
@@ -216,11 +253,17 @@ def test_no_other_process_writes_a_locked_output(path: Path) -> None:
         "    sys.stdin.read()\n"
     )
     other = subprocess.Popen(
-        [sys.executable, "-c", program, str(path)], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+        [sys.executable, "-c", program, str(path)],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        text=True,
     )
     assert other.stdout is not None
     assert other.stdout.readline() == "locked\n"
-    with pytest.raises(InputError, match=f"another process is writing it now .process {other.pid}"), locked(path):
+    with (
+        pytest.raises(InputError, match=f"another process is writing it now .process {other.pid}"),
+        locked(path),
+    ):
         pass
     other.send_signal(signal.SIGKILL)
     other.communicate()

@@ -1,5 +1,5 @@
-"""Files whose HDF5 structures were forged, under a right digest: the HDF5 library hangs on them, ends its process or
-takes all memory, and every command ends with one line all the same."""
+"""Files whose HDF5 structures were forged, under a right digest: the HDF5 library hangs on them,
+ends its process or takes all memory, and every command ends with one line all the same."""
 
 from __future__ import annotations
 
@@ -36,7 +36,8 @@ def short_limit(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def heap_without_end(content: bytearray) -> None:
-    """Give the last object of each global heap, the free space, no size: the library stays at it."""
+    """Give the last object of each global heap, the free space, no size: the library stays at
+    it."""
     for heap in re.finditer(b"GCOL", content):
         (size,) = struct.unpack_from("<Q", content, heap.start() + 8)
         place = heap.start() + 16
@@ -50,7 +51,8 @@ def heap_without_end(content: bytearray) -> None:
 
 
 def lists_of_scales_without_version(content: bytearray) -> None:
-    """Give the dataspace of the attribute that lists an array's scales no version: the library ends the process."""
+    """Give the dataspace of the attribute that lists an array's scales no version: the library ends
+    the process."""
     name = b"DIMENSION_LIST\0\0"
     for attribute in re.finditer(name, content):
         type_length, space = 16, attribute.end() + 16
@@ -79,7 +81,11 @@ def forge(path: Path, change: Callable[[bytearray], None]) -> None:
     with h5py.File(path, "r+"):  # cuts the trailer off
         pass
     content = bytearray(path.read_bytes())
-    rows = [(start, content[start : start + size]) for all in known.groups.values() for start, size in all.values()]
+    rows = [
+        (start, content[start : start + size])
+        for all in known.groups.values()
+        for start, size in all.values()
+    ]
     change(content)
     for start, values in rows:
         content[start : start + len(values)] = values
@@ -87,15 +93,28 @@ def forge(path: Path, change: Callable[[bytearray], None]) -> None:
     append_trailer(path, known.kind, known.groups)
 
 
-@pytest.mark.parametrize("forgery", [pytest.param("hangs", marks=pytest.mark.full), "dies", "takes memory"])
-@pytest.mark.parametrize("kind", [KINDS[0], *(pytest.param(kind, marks=pytest.mark.full) for kind in KINDS[1:])])
-def test_every_command_ends_with_a_line(forgery: str, kind: str, files: Path, tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    "forgery", [pytest.param("hangs", marks=pytest.mark.full), "dies", "takes memory"]
+)
+@pytest.mark.parametrize(
+    "kind", [KINDS[0], *(pytest.param(kind, marks=pytest.mark.full) for kind in KINDS[1:])]
+)
+def test_every_command_ends_with_a_line(
+    forgery: str, kind: str, files: Path, tmp_path: Path
+) -> None:
     path = Path(shutil.copy(files / f"{kind}.h5", tmp_path / "forged.h5"))
     forge(path, FORGERIES[forgery])
     before = path.read_bytes()
-    commands: list[list[object]] = [["check", path], ["show", path], ["report", path, "-o", tmp_path / "pages"]]
+    commands: list[list[object]] = [
+        ["check", path],
+        ["show", path],
+        ["report", path, "-o", tmp_path / "pages"],
+    ]
     if kind == "results":
-        commands += [["animate", SCENE, path, "-o", tmp_path / "a.webp"], ["figures", path, "-o", tmp_path]]
+        commands += [
+            ["animate", SCENE, path, "-o", tmp_path / "a.webp"],
+            ["figures", path, "-o", tmp_path],
+        ]
         commands += [["run", SCENE, "-m", "lagrange/dop853", "-j", "1", "-o", path]]
     elif kind == "s":
         commands += [["sweep", files / "s.toml", "-j", "1", "-o", path]]
@@ -132,7 +151,9 @@ def _process(path: Path, argument: None) -> int:  # noqa: ARG001
 
 
 @pytest.mark.parametrize(
-    ("read", "argument"), [(_wait, 100.0), (_take, 1 << 31), (_die, signal.SIGSEGV)], ids=["time", "memory", "signal"]
+    ("read", "argument"),
+    [(_wait, 100.0), (_take, 1 << 31), (_die, signal.SIGSEGV)],
+    ids=["time", "memory", "signal"],
 )
 def test_the_limits_of_the_worker(
     read: Callable[[Path, object], object], argument: object, files: Path, tmp_path: Path
@@ -205,6 +226,15 @@ def test_only_files_of_others_are_read_by_the_worker(files: Path, tmp_path: Path
 def test_the_worker_needs_no_more_than_it_reads_with() -> None:
     """Or each command would wait longer for it."""
     program = "import sys, rotor_mbs.runs.hdf5; print(*sys.modules)"
-    modules = set(subprocess.run([sys.executable, "-c", program], capture_output=True, text=True).stdout.split())
+    modules = set(
+        subprocess.run(
+            [sys.executable, "-c", program], capture_output=True, text=True
+        ).stdout.split()
+    )
     assert "h5py" in modules
-    assert not modules & {"rotor_mbs.scenario.scene", "rotor_mbs.methods.catalogue", "rotor_mbs.runs.table", "scipy"}
+    assert not modules & {
+        "rotor_mbs.scenario.scene",
+        "rotor_mbs.methods.catalogue",
+        "rotor_mbs.runs.table",
+        "scipy",
+    }

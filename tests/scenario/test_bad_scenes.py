@@ -1,4 +1,5 @@
-"""Wrong scene and bounds files: a readable line per error, with file, line, key and what is allowed; no traceback."""
+"""Wrong scene and bounds files: a readable line per error, with file, line, key and what is
+allowed; no traceback."""
 
 from __future__ import annotations
 
@@ -47,37 +48,117 @@ inertia = 1
 [shaft]
 damping = 3
 """
-BLADE = "[blade]\nmass = 2\ncentre_of_mass = [0.5, 0, 3]\ninertia = [1, 1, 1, 0, 0, 0]\ntip = [0.5, 0, 7]\n"
+BLADE = (
+    "[blade]\nmass = 2\ncentre_of_mass = [0.5, 0, 3]\ninertia = [1, 1, 1, 0, 0, 0]\ntip = "
+    "[0.5, 0, 7]\n"
+)
 ON_THE_AXIS = "[blade]\nmass = 2\ncentre_of_mass = [0, 0, 3]\ntip = [0.5, 0, 7]\n"
 
 # What to write for what, and the line and key of the one error, with a piece of its message.
 WRONG = {
     "title empty": ('"A good scene"', '"  "', 1, "title", "is empty"),
     "unknown key": ("blades = 2", "blades = 2\nbaldes = 2", 3, "baldes", "perhaps blades"),
-    "blades astronomical": ("blades = 2", f"blades = 0x{'f' * 5000}", 2, "blades", "a number of over 30 digits"),
+    "blades astronomical": (
+        "blades = 2",
+        f"blades = 0x{'f' * 5000}",
+        2,
+        "blades",
+        "a number of over 30 digits",
+    ),
     "blades true": ("blades = 2", "blades = true", 2, "blades", "true is not a whole number"),
-    "outputs unknown": ('["angles", "tip"]', '["angles", "tips"]', 6, r"outputs\[1\]",
-     '"tips" is not one of them, perhaps tip'),
+    "outputs unknown": (
+        '["angles", "tip"]',
+        '["angles", "tips"]',
+        6,
+        r"outputs\[1\]",
+        '"tips" is not one of them, perhaps tip',
+    ),
     "mass missing": ("mass = 2\n", "", 8, r"blade\.mass", "is missing"),
-    "inertia of no triangle": ("[1, 1, 1, 0, 0, 0]", "[1, 1, 2.1, 0, 0, 0]", 11, r"blade\.inertia", "no rigid body"),
+    "inertia of no triangle": (
+        "[1, 1, 1, 0, 0, 0]",
+        "[1, 1, 2.1, 0, 0, 0]",
+        11,
+        r"blade\.inertia",
+        "no rigid body",
+    ),
     "tip missing where wanted": ("tip = [0.5, 0, 7]\n", "", 8, r"blade\.tip", "is missing"),
-    "angles too few": ("angles = [0, 0, 0]", "angles = [0, 0]", 15, r"initial\.angles", "2 numbers for a rotor and 2"),
-    "torque entry": ("rotor = 5", "rotor = [[0, 1], [1, nan]]", 23, r"torque\.rotor\[1\]\[1\]", "nan"),
-    "torque from before": ("rotor = 5", "rotor = [[-1, 1], [1, 1]]", 23, r"torque\.rotor", "below 0"),
-    "torque two jumps at once": ("rotor = 5", "rotor = [[1, 1], [1, 2], [1, 3]]", 23, r"torque\.rotor",
-     "three rows have t = 1"),
-    "rest back in time": ("damping = 2", "rest = [[[0, 1], [1, 1]], [[1, 1], [0, 1]]]", 20,
-     r"bearing\.rest\[1\]", "t = 0 comes after t = 1"),
-    "one of two blade tables": ("[blade]", "[[blade]]", 8, "blade", r"1 \[\[blade\]\] table for 2 blades"),
+    "angles too few": (
+        "angles = [0, 0, 0]",
+        "angles = [0, 0]",
+        15,
+        r"initial\.angles",
+        "2 numbers for a rotor and 2",
+    ),
+    "torque entry": (
+        "rotor = 5",
+        "rotor = [[0, 1], [1, nan]]",
+        23,
+        r"torque\.rotor\[1\]\[1\]",
+        "nan",
+    ),
+    "torque from before": (
+        "rotor = 5",
+        "rotor = [[-1, 1], [1, 1]]",
+        23,
+        r"torque\.rotor",
+        "below 0",
+    ),
+    "torque two jumps at once": (
+        "rotor = 5",
+        "rotor = [[1, 1], [1, 2], [1, 3]]",
+        23,
+        r"torque\.rotor",
+        "three rows have t = 1",
+    ),
+    "rest back in time": (
+        "damping = 2",
+        "rest = [[[0, 1], [1, 1]], [[1, 1], [0, 1]]]",
+        20,
+        r"bearing\.rest\[1\]",
+        "t = 0 comes after t = 1",
+    ),
+    "one of two blade tables": (
+        "[blade]",
+        "[[blade]]",
+        8,
+        "blade",
+        (
+            r"1 \[\[blade\]\] table "
+            r"for 2 blades"
+        ),
+    ),
     "mass too large": ("mass = 2", "mass = 1e200", 9, r"blade\.mass", "allowed: sizes from 1e-25"),
-    "tilt in degrees": ("damping = 3", "tilt = 5", 29, r"shaft\.tilt", "5 is out of range; .*from -pi/2 to pi/2"),
-    "cone of a cylinder": ("mass = 2", "mass = 2\ncone = -2", 10, r"blade\.cone", "-2 is out of range; .*from -1.5"),
-    "hub radius negative": ("inertia = 1\n", "radius = -1\n", 26, r"hub\.radius", "-1 is out of range"),
+    "tilt in degrees": (
+        "damping = 3",
+        "tilt = 5",
+        29,
+        r"shaft\.tilt",
+        ("5 is out of range; .*from -pi/2 to pi/2"),
+    ),
+    "cone of a cylinder": (
+        "mass = 2",
+        "mass = 2\ncone = -2",
+        10,
+        r"blade\.cone",
+        "-2 is out of range; .*from -1.5",
+    ),
+    "hub radius negative": (
+        "inertia = 1\n",
+        "radius = -1\n",
+        26,
+        r"hub\.radius",
+        "-1 is out of range",
+    ),
     "hub mass not a number": ("inertia = 1\n", "mass = '5 t'\n", 26, r"hub\.mass", "5 t"),
-    "second blade table": (BLADE,
-     BLADE.replace("[blade]", "[[blade]]") + BLADE.replace("[blade]", "[[blade]]").replace("= 2", "= 0"), 14,
-     r"blade\[1\]\.mass", "0 is out of range"),
-}  # fmt: skip
+    "second blade table": (
+        BLADE,
+        BLADE.replace("[blade]", "[[blade]]")
+        + BLADE.replace("[blade]", "[[blade]]").replace("= 2", "= 0"),
+        14,
+        r"blade\[1\]\.mass",
+        "0 is out of range",
+    ),
+}
 
 
 def _problems(folder: Path, content: str | bytes) -> list[str]:
@@ -94,18 +175,22 @@ def _problems(folder: Path, content: str | bytes) -> list[str]:
 
 
 @pytest.mark.parametrize(("old", "new", "line", "key", "message"), WRONG.values(), ids=WRONG)
-def test_one_error_is_one_line(tmp_path: Path, old: str, new: str, line: int, key: str, message: str) -> None:
+def test_one_error_is_one_line(
+    tmp_path: Path, old: str, new: str, line: int, key: str, message: str
+) -> None:
     assert SCENE.count(old) == 1
     (problem,) = _problems(tmp_path, SCENE.replace(old, new))
     assert re.match(rf":{line}: {key}: .*{message}", problem), problem
 
 
 def test_a_run_that_cannot_fit_in_memory(tmp_path: Path) -> None:
-    # 20 blades: time, 21 angles, 21 rates, 60 tip coordinates are 103 values; 103 * 8 B * 3e6 = 2.3 GiB.
+    # 20 blades: time, 21 angles, 21 rates, 60 tip coordinates are 103 values; 103 * 8 B * 3e6 = 2.3
+    # GiB.
     text = SCENE.replace("blades = 2", "blades = 20").replace("[0, 0, 0]\n", str([0] * 21) + "\n")
     (problem,) = _problems(tmp_path, text.replace("samples = 11", "samples = 3000000"))
     assert problem.startswith(
-        ":5: samples: 3000000 samples of 103 values of 8 bytes are 2.302 GiB; allowed: at most 2 GiB"
+        ":5: samples: 3000000 samples of 103 values of 8 bytes are 2.302 GiB; allowed: at "
+        "most 2 GiB"
     )
 
 
@@ -115,21 +200,35 @@ def test_a_pitch_without_inertia_takes_no_rate_and_no_bearing(tmp_path: Path) ->
     assert rates.startswith(
         ":15: initial.rates: a pitch rate for blade 2, whose pitch has no inertia; allowed: 0 there"
     )
-    assert stiffness.startswith(":18: bearing.stiffness: acts on blades 1, 2, whose pitch has no inertia")
+    assert stiffness.startswith(
+        ":18: bearing.stiffness: acts on blades 1, 2, whose pitch has no inertia"
+    )
     assert damping.startswith(":19: bearing.damping: acts on blades 1, 2")
     tables = (BLADE + ON_THE_AXIS).replace("[blade]", "[[blade]]")
-    (problem,) = _problems(tmp_path, SCENE.replace(BLADE, tables).replace("stiffness = 1", "stiffness = [1, 0]"))
+    (problem,) = _problems(
+        tmp_path, SCENE.replace(BLADE, tables).replace("stiffness = 1", "stiffness = [1, 0]")
+    )
     assert problem.startswith(":24: bearing.damping: acts on blade 2, whose pitch has no inertia")
 
 
 def test_all_errors_of_a_file_in_the_order_of_its_lines(tmp_path: Path) -> None:
     text = SCENE
-    for name in ("title empty", "blades true", "outputs unknown", "inertia of no triangle", "torque entry"):
+    for name in (
+        "title empty",
+        "blades true",
+        "outputs unknown",
+        "inertia of no triangle",
+        "torque entry",
+    ):
         text = text.replace(*WRONG[name][:2])
     places = [problem.split(": ")[:2] for problem in _problems(tmp_path, text)]
     assert places == [
-        [":1", "title"], [":2", "blades"], [":6", "outputs[1]"], [":11", "blade.inertia"], [":23", "torque.rotor[1][1]"]
-    ]  # fmt: skip
+        [":1", "title"],
+        [":2", "blades"],
+        [":6", "outputs[1]"],
+        [":11", "blade.inertia"],
+        [":23", "torque.rotor[1][1]"],
+    ]
 
 
 @pytest.mark.parametrize(
@@ -166,7 +265,8 @@ NO_NAMES = ("", "../paper/fig05", "/paper/fig05", "paper/fig05\n", "paper/\0")
         ("text.txt", "is not a TOML file"),
         ("odd name.toml", "cannot name a scene"),
         ("bench.toml", "bench is a reserved name"),
-        ("circle.toml", "circle.toml: cannot be re"),  # resolved to a file; from Python 3.13 on: read
+        # resolved to a file; from Python 3.13 on: read
+        ("circle.toml", "circle.toml: cannot be re"),
         ("pipe.toml", "is not a regular file"),
         ("study.toml", "study.toml: is a sweep; allowed: a scene, or: rotor-mbs sweep study.toml"),
     ],
@@ -180,7 +280,9 @@ def test_arguments_that_name_no_scene(
         Path(name).write_text(SCENE, encoding="utf-8")
     Path("circle.toml").symlink_to("circle.toml")
     os.mkfifo("pipe.toml")
-    Path("study.toml").write_text('scene = "paper/fig11"\n[[axis]]\nkey = "gravity"\nvalues = [1]\n', encoding="utf-8")
+    Path("study.toml").write_text(
+        'scene = "paper/fig11"\n[[axis]]\nkey = "gravity"\nvalues = [1]\n', encoding="utf-8"
+    )
     with pytest.raises(InputError) as caught:
         find_scenes([argument])
     (problem,) = caught.value.problems
@@ -190,21 +292,50 @@ def test_arguments_that_name_no_scene(
 
 def test_errors_of_all_arguments_and_files_at_once(tmp_path: Path) -> None:
     for name in ("one", "two"):
-        (tmp_path / f"{name}.toml").write_text(SCENE.replace("mass = 2", "mass = -2"), encoding="utf-8")
+        (tmp_path / f"{name}.toml").write_text(
+            SCENE.replace("mass = 2", "mass = -2"), encoding="utf-8"
+        )
     with pytest.raises(InputError) as caught:
         find_scenes(["paper/fig08", "nonsense", str(tmp_path), "paper/fig00"])
     assert len(caught.value.problems) == 4
 
 
 _SNIPPETS = st.sampled_from(
-    ["[", "]", "{", "}", "=", '"', "'''", "nan", "-1", "1e999", "true", "[[blade]]\n", "blade.", "\n", "[]",
-     "{}", "#", "0"]
-)  # fmt: skip
+    [
+        "[",
+        "]",
+        "{",
+        "}",
+        "=",
+        '"',
+        "'''",
+        "nan",
+        "-1",
+        "1e999",
+        "true",
+        "[[blade]]\n",
+        "blade.",
+        "\n",
+        "[]",
+        "{}",
+        "#",
+        "0",
+    ]
+)
 
 
-@settings(suppress_health_check=[HealthCheck.function_scoped_fixture], max_examples=60, deadline=None)
-@given(st.lists(st.tuples(st.integers(0, len(SCENE)), st.integers(0, 12), _SNIPPETS | st.text(max_size=5)), max_size=4))
-def test_no_damage_to_a_file_gives_a_traceback(tmp_path: Path, damages: list[tuple[int, int, str]]) -> None:
+@settings(
+    suppress_health_check=[HealthCheck.function_scoped_fixture], max_examples=60, deadline=None
+)
+@given(
+    st.lists(
+        st.tuples(st.integers(0, len(SCENE)), st.integers(0, 12), _SNIPPETS | st.text(max_size=5)),
+        max_size=4,
+    )
+)
+def test_no_damage_to_a_file_gives_a_traceback(
+    tmp_path: Path, damages: list[tuple[int, int, str]]
+) -> None:
     text = SCENE
     for start, length, snippet in damages:
         text = text[:start] + snippet + text[start + length :]
@@ -250,10 +381,14 @@ def test_a_file_of_another_kind_is_refused(tmp_path: Path, text: str) -> None:
 
 def test_entries_in_front_count_first_and_the_shipped_ones_stay(tmp_path: Path) -> None:
     own = tmp_path / "own.toml"
-    own.write_text('[[bound]]\ncheck = "energy"\nmethod = "mine/*"\nvalue = 1e-3\nreason = "explicit method"\n')
+    own.write_text(
+        '[[bound]]\ncheck = "energy"\nmethod = "mine/*"\nvalue = 1e-3\nreason = "explicit method"\n'
+    )
     bounds = shipped_bounds().with_entries(read_bounds(own))
     assert bounds.of("energy", "mine/euler") == Bound("energy", "mine/*", 1e-3, "explicit method")
     brought = Bound("energy", "mine/euler", 1e-4, "of the method")
     bounds = shipped_bounds().with_entries([brought])
     assert bounds.of("energy", "mine/euler") == brought
-    assert bounds.of("energy", "lagrange/taylor") == shipped_bounds().of("energy", "lagrange/taylor")
+    assert bounds.of("energy", "lagrange/taylor") == shipped_bounds().of(
+        "energy", "lagrange/taylor"
+    )

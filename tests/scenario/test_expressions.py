@@ -1,4 +1,5 @@
-"""Quoted arithmetic: what it may hold, that it is Python's float arithmetic, and that nothing else gets through."""
+"""Quoted arithmetic: what it may hold, that it is Python's float arithmetic, and that nothing else
+gets through."""
 
 from __future__ import annotations
 
@@ -22,7 +23,8 @@ from rotor_mbs.scenario.keys import read_number
     ],
 )  # fmt: skip
 def test_value(text: str, value: float) -> None:
-    """What `test_agrees_with_python_to_the_last_bit` does not write: spaces, ways of writing numbers, degrees."""
+    """What `test_agrees_with_python_to_the_last_bit` does not write: spaces, ways of writing
+    numbers, degrees."""
     assert evaluate(text) == value
 
 
@@ -42,7 +44,9 @@ def test_refused_with_one_sentence_that_says_what_is_allowed(text: str) -> None:
     assert str(caught.value).isprintable()
 
 
-_CONSTANTS = st.floats(min_value=0, max_value=1e20, allow_subnormal=False).map(ast.Constant) | st.just(ast.Name("pi"))
+_CONSTANTS = st.floats(min_value=0, max_value=1e20, allow_subnormal=False).map(
+    ast.Constant
+) | st.just(ast.Name("pi"))
 _OPERATORS = st.sampled_from([ast.Add(), ast.Sub(), ast.Mult(), ast.Div(), ast.Pow()])
 
 
@@ -57,7 +61,8 @@ def _larger(parts: st.SearchStrategy[ast.expr]) -> st.SearchStrategy[ast.expr]:
 
 @given(st.recursive(_CONSTANTS, _larger, max_leaves=8))
 def test_agrees_with_python_to_the_last_bit(tree: ast.expr) -> None:
-    # `ast.unparse` writes only the brackets that Python's precedence needs, so precedence is tested as well.
+    # `ast.unparse` writes only the brackets that Python's precedence needs, so precedence is tested
+    # as well.
     text = ast.unparse(tree)
     assume(len(text) <= MAX_LENGTH)
     try:

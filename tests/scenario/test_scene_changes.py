@@ -1,4 +1,5 @@
-"""Scenes changed through Scene.replace, scenes written as TOML, and outputs that installed packages add."""
+"""Scenes changed through Scene.replace, scenes written as TOML, and outputs that installed packages
+add."""
 
 from __future__ import annotations
 
@@ -72,7 +73,9 @@ def test_a_written_scene_is_read_as_the_same_scene(name: str) -> None:
 
 
 def test_every_key_of_the_scene_file_can_be_changed() -> None:
-    assert {field.name for field in fields(Scene)} - {"name", "text"} == {name for _, name in CHANGES.values()}
+    assert {field.name for field in fields(Scene)} - {"name", "text"} == {
+        name for _, name in CHANGES.values()
+    }
 
 
 @pytest.mark.parametrize("key", CHANGES)
@@ -80,7 +83,10 @@ def test_a_change_reaches_its_field_alone_and_the_text(general: Scene, key: str)
     value, name = CHANGES[key]
     changed = general.replace(**{key: value})
     parts = {field.name: field.metadata["role"] for field in fields(Scene)}
-    assert {each for each in parts if getattr(changed, each) != getattr(general, each)} == {name, "text"}
+    assert {each for each in parts if getattr(changed, each) != getattr(general, each)} == {
+        name,
+        "text",
+    }
     assert (scene_hash(changed) != scene_hash(general)) == (parts[name] != "label")
     assert (changed.rotor_key != general.rotor_key) == (parts[name] == "rotor")
     assert parse_scene(changed.text, changed.name) == changed
@@ -91,11 +97,17 @@ def test_a_table_for_all_blades_and_one_for_each(general: Scene) -> None:
     every = general.replace(**{"bearing.rest": step})
     assert every.bearing_rest == (step,) * 3
     assert every.replace(**{"bearing.rest[1]": 0}).bearing_rest == (step, (), step)
-    assert every.replace(**{"bearing.rest[2][1][1]": 0.2}).bearing_rest == (step, step, ((1.0, 0.0), (1.0, 0.2)))
+    assert every.replace(**{"bearing.rest[2][1][1]": 0.2}).bearing_rest == (
+        step,
+        step,
+        ((1.0, 0.0), (1.0, 0.2)),
+    )
     mixed = general.replace(**{"torque.pitch": [step, 3, 0]})
     assert mixed.pitch_torque == (step, ((0.0, 3.0),), ())
     assert not mixed.has_constant_loads
-    assert general.replace(**{"torque.pitch": 0, "bearing.rest": [0, 0, 0], "torque.rotor": 0}).has_constant_loads
+    assert general.replace(
+        **{"torque.pitch": 0, "bearing.rest": [0, 0, 0], "torque.rotor": 0}
+    ).has_constant_loads
 
 
 def test_the_number_of_blades_can_be_changed_with_what_depends_on_it() -> None:
@@ -109,14 +121,23 @@ def test_the_number_of_blades_can_be_changed_with_what_depends_on_it() -> None:
     ("key", "value", "message"),
     [
         ("gravty", 9.81, "paper/fig11: gravty: unknown key, perhaps gravity; allowed: title, "),
-        ("initial.angles[4]", 1.0, r"initial.angles: has 4 entries; allowed: initial.angles\[0\] to "),
+        (
+            "initial.angles[4]",
+            1.0,
+            (
+                r"initial.angles: has 4 entries; allowed: "
+                r"initial.angles\[0\] to "
+            ),
+        ),
         ("initial.angles", 1.0, "initial.angles: 1.0 is not a list; allowed: 1 \\+ blades numbers"),
         ("gravity", [], "gravity: .* is not a number"),
         ("blade.mass", 1.0, r"blade: is a list; allowed: blade\[0\].mass to blade\[2\].mass$"),
         ("a b", 1.0, "'a b' is not the path of a key; allowed: the path"),
     ],
 )
-def test_an_impossible_change_is_refused_with_its_key(key: str, value: object, message: str) -> None:
+def test_an_impossible_change_is_refused_with_its_key(
+    key: str, value: object, message: str
+) -> None:
     with pytest.raises(InputError, match=message):
         find_scenes(["paper/fig11"])[0].replace(**{"blade[1].mass": 1e4}).replace(**{key: value})
 
@@ -149,13 +170,19 @@ FIG11 = find_scenes(["paper/fig11"])[0]
         ({}, []),
     ],
 )
-def test_what_differs_between_two_scenes_is_told_by_key(changes: dict[str, Any], told: list[str]) -> None:
+def test_what_differs_between_two_scenes_is_told_by_key(
+    changes: dict[str, Any], told: list[str]
+) -> None:
     before = FIG11.replace(**{"blade.mass": 17740.0, "initial.angles[1]": 0.5})
     assert [str(change) for change in scene_changes(before, before.replace(**changes))] == told
 
 
 def test_a_changed_scene_that_is_shipped_says_so_by_its_name() -> None:
-    assert FIG11.label == FIG11.replace(samples=11, outputs=["angles"], title="Another").label == "paper/fig11"
+    assert (
+        FIG11.label
+        == FIG11.replace(samples=11, outputs=["angles"], title="Another").label
+        == "paper/fig11"
+    )
     changed = FIG11.replace(gravity=9.81, **{"blade.mass": 12000.0})
     assert changed.label == "paper/fig11, changed: gravity, blade.mass"
     assert repr(changed).startswith(f"{changed.label}: ")

@@ -81,7 +81,8 @@ def test_the_paper_folder_holds_the_scenes_of_the_captions_in_order() -> None:
 def test_shipped_scene_has_the_numbers_of_its_caption(name: str) -> None:
     scene = find_scenes([name])[0]
     figures, angles, rates, torque = PAPER[name]
-    # pi/6 and the like are one correctly rounded operation here and in the file: equal to the last bit.
+    # pi/6 and the like are one correctly rounded operation here and in the file: equal to the last
+    # bit.
     assert scene.figures == figures
     assert scene.initial_angles == angles
     assert scene.initial_rates == rates
@@ -94,7 +95,9 @@ def test_shipped_scene_has_the_numbers_of_its_caption(name: str) -> None:
         assert blade.tip == (c, 0.0, 33.38)
         assert blade.is_point_mass
     assert scene.gravity == 9.8
-    assert (scene.duration, scene.samples) == ((12.0, 1201) if name == "paper/fig05" else (10.0, 1001))
+    assert (scene.duration, scene.samples) == (
+        (12.0, 1201) if name == "paper/fig05" else (10.0, 1001)
+    )
     assert scene.outputs == DEFAULT_OUTPUTS
     assert not scene.has_damping
     assert scene.hub_inertia == 0.0
@@ -108,7 +111,9 @@ def _load(folder: Path, text: str) -> Scene:
 
 
 def test_what_is_optional_is_left_out(tmp_path: Path) -> None:
-    scene = _load(tmp_path, SCENE + "[torque]\nrotor = 0\n[bearing]\nstiffness = 0\ndamping = [0, 0]\n")
+    scene = _load(
+        tmp_path, SCENE + ("[torque]\nrotor = 0\n[bearing]\nstiffness = 0\ndamping = [0, 0]\n")
+    )
     assert (scene.rotor_torque, scene.bearing_stiffness, scene.bearing_damping) == ((), (), ())
     assert scene.figures == ()
     assert scene.blades[0].tip == scene.blades[0].centre_of_mass == (0.5, 0.0, 3.0)
@@ -126,30 +131,47 @@ def test_hash_ignores_how_the_scene_is_written(tmp_path: Path) -> None:
     assert scene_hash(_load(tmp_path, rewritten)) == plain
 
 
-def test_tilt_cone_and_hub_are_numbers_of_the_scene_and_zeros_are_as_if_they_were_not_there(tmp_path: Path) -> None:
+def test_tilt_cone_and_hub_are_numbers_of_the_scene_and_zeros_are_as_if_they_were_not_there(
+    tmp_path: Path,
+) -> None:
     plain = _load(tmp_path, SCENE)
-    zeros = SCENE.replace("[blade]", "[blade]\ncone = 0") + "[shaft]\ntilt = 0.0\n[hub]\nmass = 0\nradius = 0\n"
+    zeros = SCENE.replace("[blade]", "[blade]\ncone = 0") + (
+        "[shaft]\ntilt = 0.0\n[hub]\nmass = 0\nradius = 0\n"
+    )
     assert scene_hash(_load(tmp_path, zeros)) == scene_hash(plain)
     table = "[[blade]]\nmass = 2\ncentre_of_mass = [0.5, 0, 3]\ncone = 'deg({})'\n"
-    text = SCENE.replace("[blade]\nmass = 2\ncentre_of_mass = [0.5, 0, 3]\n", table.format(-2.5) + table.format(4))
+    text = SCENE.replace(
+        "[blade]\nmass = 2\ncentre_of_mass = [0.5, 0, 3]\n", table.format(-2.5) + table.format(4)
+    )
     scene = _load(tmp_path, text + "[shaft]\ntilt = 'deg(-5)'\n[hub]\nmass = 56780\nradius = 1.5\n")
     assert [blade.cone for blade in scene.blades] == [-2.5 * pi / 180, 4 * pi / 180]
     assert (scene.shaft_tilt, scene.hub_mass, scene.hub_radius) == (-5 * pi / 180, 56780.0, 1.5)
     assert replace(parse_scene(scene_toml(scene), "scene"), text=scene.text) == scene
-    assert len({scene_hash(each) for each in (plain, scene, replace(scene, blades=scene.blades[::-1]))}) == 3
+    assert (
+        len(
+            {scene_hash(each) for each in (plain, scene, replace(scene, blades=scene.blades[::-1]))}
+        )
+        == 3
+    )
 
 
 @given(
     arrays(float, (5, 3), elements=st.floats(-10, 10).map(lambda x: x if abs(x) > 1e-90 else 0.0)),
-    arrays(float, 5, elements=st.floats(0, 10).map(lambda m: m if m > 1e-90 else 0.0)),  # no product underflows
+    # no product underflows
+    arrays(float, 5, elements=st.floats(0, 10).map(lambda m: m if m > 1e-90 else 0.0)),
 )
 def test_every_set_of_point_masses_is_a_rigid_body(r: np.ndarray, m: np.ndarray) -> None:
-    J = sum(mass * (point @ point * np.eye(3) - np.outer(point, point)) for mass, point in zip(m, r, strict=True))
+    J = sum(
+        mass * (point @ point * np.eye(3) - np.outer(point, point))
+        for mass, point in zip(m, r, strict=True)
+    )
     assert is_rigid_body_inertia([J[0, 0], J[1, 1], J[2, 2], J[0, 1], J[0, 2], J[1, 2]])
 
 
 @given(st.integers(0, 2), arrays(float, (3, 3), elements=st.floats(-1, 1)), st.floats(1e-6, 10.0))
-def test_a_broken_triangle_inequality_is_found_in_any_frame(axis: int, random: np.ndarray, excess: float) -> None:
+def test_a_broken_triangle_inequality_is_found_in_any_frame(
+    axis: int, random: np.ndarray, excess: float
+) -> None:
     moments = np.array([1.0, 1.0, 1.0])
     moments[axis] = 2.0 + excess
     R, _ = np.linalg.qr(random)
@@ -187,7 +209,9 @@ x = -26
 '''
 
 
-def _leaves(value: Any, path: tuple[str | int, ...] = ()) -> list[tuple[tuple[str | int, ...], int]]:
+def _leaves(
+    value: Any, path: tuple[str | int, ...] = ()
+) -> list[tuple[tuple[str | int, ...], int]]:
     if isinstance(value, dict):
         return [leaf for key, part in value.items() for leaf in _leaves(part, (*path, key))]
     if isinstance(value, list):
@@ -215,7 +239,9 @@ def test_arguments_keep_their_order_and_name_a_scene_once(tmp_path: Path) -> Non
     own = tmp_path / "own.toml"
     own.write_text(SCENE, encoding="utf-8")
     fig05 = SCENARIOS / "paper" / "fig05.toml"
-    scenes = find_scenes(["paper/fig08", str(fig05), str(own), "paper/fig05", str(tmp_path), "paper"])
+    scenes = find_scenes(
+        ["paper/fig08", str(fig05), str(own), "paper/fig05", str(tmp_path), "paper"]
+    )
     names = [scene.name for scene in scenes]
     assert names[:3] == ["paper/fig08", "paper/fig05", "own"]
     assert names[3:] == [name for name in PAPER if name not in names[:3]]
@@ -232,20 +258,28 @@ def test_two_files_with_one_name_are_refused(tmp_path: Path) -> None:
 
 
 def test_the_inertia_about_the_apex_is_that_of_the_blades_particles() -> None:
-    """Six particles summed about the apex, and about their centre of mass; 1e-13 is some hundred roundings."""
+    """Six particles summed about the apex, and about their centre of mass; 1e-13 is some hundred
+    roundings."""
     chance = np.random.default_rng(3)
-    masses, places = chance.uniform(1.0, 9.0, 6), chance.normal([0.3, -0.2, 9.0], [0.2, 0.1, 5.0], (6, 3))
+    masses, places = (
+        chance.uniform(1.0, 9.0, 6),
+        chance.normal([0.3, -0.2, 9.0], [0.2, 0.1, 5.0], (6, 3)),
+    )
 
     def tensor(points: np.ndarray[Any, np.dtype[np.float64]]) -> list[float]:
         squares = (points**2).sum(axis=1)[:, None, None] * np.eye(3)
-        J = (masses[:, None, None] * (squares - points[:, :, None] * points[:, None, :])).sum(axis=0)
+        J = (masses[:, None, None] * (squares - points[:, :, None] * points[:, None, :])).sum(
+            axis=0
+        )
         return [J[0, 0], J[1, 1], J[2, 2], J[0, 1], J[0, 2], J[1, 2]]
 
     centre = masses @ places / masses.sum()
     xx, yy, zz, xy, xz, yz = tensor(places - centre)
     blade = Blade(masses.sum(), tuple(centre.tolist()), (xx, yy, zz, xy, xz, yz), (0.0, 0.0, 9.0))
     about_apex = tensor(places)
-    assert blade.inertia_about_apex() == pytest.approx(about_apex, rel=1e-13, abs=1e-13 * max(about_apex))
+    assert blade.inertia_about_apex() == pytest.approx(
+        about_apex, rel=1e-13, abs=1e-13 * max(about_apex)
+    )
     exact = [float(element) for element in blade.inertia_about_apex(Fraction)]
     assert exact == pytest.approx(about_apex, rel=1e-13, abs=1e-13 * max(about_apex))
     assert blade.pitch_inertia == blade.inertia_about_apex()[2]

@@ -28,7 +28,11 @@ def _design(axes: tuple[Axis, ...], **options: Any) -> Design:
 
 
 def test_a_grid_runs_through_its_axes_the_last_one_fastest_and_zip_through_all_at_once() -> None:
-    axes = (Axis("a", (1.0, 2.0)), Axis("b", linear=Range(0.0, 1.0, 3)), Axis("c", log=Range(1.0, 100.0, 3)))
+    axes = (
+        Axis("a", (1.0, 2.0)),
+        Axis("b", linear=Range(0.0, 1.0, 3)),
+        Axis("c", log=Range(1.0, 100.0, 3)),
+    )
     design = _design(axes)
     expected = list(itertools.product([1.0, 2.0], [0.0, 0.5, 1.0], [1.0, 10.0, 100.0]))
     assert design.count == 18
@@ -50,7 +54,11 @@ def test_random_axes_are_drawn_together_by_their_seed_and_combined_with_the_othe
 
 
 def test_draws_have_the_distribution_that_was_asked_for() -> None:
-    axes = (Axis("u", uniform=(2.0, 3.0)), Axis("n", normal=(2.0, 3.0)), Axis("s", sobol=(2.0, 3.0)))
+    axes = (
+        Axis("u", uniform=(2.0, 3.0)),
+        Axis("n", normal=(2.0, 3.0)),
+        Axis("s", sobol=(2.0, 3.0)),
+    )
     uniform, normal, sobol = _design(axes, draws=4096).rows(0, 4096).T
     for values in (uniform, sobol):
         assert 2.0 <= values.min() < 2.01 < 2.99 < values.max() < 3.0
@@ -76,7 +84,9 @@ def test_no_draw_stands_in_two_splits() -> None:
     scene = find_scenes(["paper/fig11"])[0]
     for order in ((random, other), (other, random)):
         axes = {random: {"uniform": [0.0, 1.0]}, other: [0.0, 1e3, 1e4]}
-        design = sweep_of(scene, {key: axes[key] for key in order}, draws=40, validation=0.2, test=0.1).design
+        design = sweep_of(
+            scene, {key: axes[key] for key in order}, draws=40, validation=0.2, test=0.1
+        ).design
         codes, starts = design.splits(), design.rows(0, design.count)[:, order.index(random)]
         assert np.bincount(codes).tolist() == [84, 24, 12]
         for start in np.unique(starts):
@@ -87,7 +97,10 @@ def test_no_draw_stands_in_two_splits() -> None:
 
 def test_a_sweep_without_a_file_is_that_of_its_text(tmp_path: Path) -> None:
     scene = find_scenes(["paper/fig11"])[0]
-    axes = {"gravity": [9.0, 10.0], "initial.angles[1]": {"linear": {"start": 0, "end": 1, "count": 3}}}
+    axes = {
+        "gravity": [9.0, 10.0],
+        "initial.angles[1]": {"linear": {"start": 0, "end": 1, "count": 3}},
+    }
     made = sweep_of(scene, axes, samples=21, outputs=["angles"], validation=0.5)
     (tmp_path / "s.toml").write_text(made.file.text)
     read = load_sweep(tmp_path / "s.toml")
@@ -106,7 +119,11 @@ def test_a_row_is_the_scene_with_its_numbers_in_place(tmp_path: Path) -> None:
     )
     scene = sweep.variants().scene(sweep.design.rows(0, 1)[0].tolist())
     assert scene.bearing_stiffness == (2 * math.pi,) * 3
-    assert (scene.initial_rates[0], scene.blades[1].mass, scene.blades[0].mass) == (0.5, 7.0, 15000.0)
+    assert (scene.initial_rates[0], scene.blades[1].mass, scene.blades[0].mass) == (
+        0.5,
+        7.0,
+        15000.0,
+    )
     assert (scene.gravity, scene.samples, sweep.base.gravity) == (1.5, 11, 1.5)
     assert scene.initial_angles == sweep.base.initial_angles
     assert sweep.units == ("N m/rad", "rad/s", "kg")
@@ -114,40 +131,87 @@ def test_a_row_is_the_scene_with_its_numbers_in_place(tmp_path: Path) -> None:
 
 def test_a_scene_is_no_sweep(tmp_path: Path) -> None:
     (tmp_path / "scene.toml").write_text(find_scenes(["paper/fig11"])[0].text)
-    with pytest.raises(InputError, match=r"scene\.toml: is a scene; allowed: .* rotor-mbs run \S+scene\.toml$"):
+    with pytest.raises(
+        InputError,
+        match=(
+            r"scene\.toml: is a scene; allowed: .* rotor-mbs run "
+            r"\S+scene\.toml$"
+        ),
+    ):
         load_sweep(tmp_path / "scene.toml")
 
 
 _BAD = {
-    "no rows for training": ('validation = 0.5\ntest = 0.5\n[[axis]]\nkey = "gravity"\nvalues = [1, 2]', 4,
-     "test: .*no runs left for training; allowed: a number"),
-    "an unknown key of two values, reported once": ('[[axis]]\nkey = "initial.angels[1]"\nvalues = [1, 2]', 4,
-     r"^[^\n]*: initial\.angels: unknown key[^\n]*$"),
-    "no path": ('[[axis]]\nkey = "initial..x"\nvalues = [1]', 4, "is not the path of a key; allowed"),
-    "another shape": ('[[axis]]\nkey = "blades"\nvalues = [1, 2]', 4, "have the same blades; allowed"),
+    "no rows for training": (
+        ('validation = 0.5\ntest = 0.5\n[[axis]]\nkey = "gravity"\nvalues = [1, 2]'),
+        4,
+        "test: .*no runs left for training; allowed: a number",
+    ),
+    "an unknown key of two values, reported once": (
+        ('[[axis]]\nkey = "initial.angels[1]"\nvalues = [1, 2]'),
+        4,
+        r"^[^\n]*: initial\.angels: unknown key[^\n]*$",
+    ),
+    "no path": (
+        '[[axis]]\nkey = "initial..x"\nvalues = [1]',
+        4,
+        ("is not the path of a key; allowed"),
+    ),
+    "another shape": (
+        '[[axis]]\nkey = "blades"\nvalues = [1, 2]',
+        4,
+        "have the same blades; allowed",
+    ),
     "random without draws": ('[[axis]]\nkey = "gravity"\nuniform = [1, 2]', 3, "draws is missing"),
-    "a range upside down": ('draws = 3\n[[axis]]\nkey = "gravity"\nuniform = [2, 1]', 6, "not below the second"),
-    "log to zero": ('[[axis]]\nkey = "gravity"\nlog = {start = 0, end = 1, count = 3}', 5, "reaches 0 or less"),
-    "a key twice": ('[[axis]]\nkey = "gravity"\nvalues = [1]\n[[axis]]\nkey = "gravity"\nvalues = [1]', 3,
-     "more than one"),
-    "a value out of range": ('[[axis]]\nkey = "blade.mass"\nlinear = {start = 9, end = -9, count = 5}', 4, "above 0"),
+    "a range upside down": (
+        'draws = 3\n[[axis]]\nkey = "gravity"\nuniform = [2, 1]',
+        6,
+        "not below the second",
+    ),
+    "log to zero": (
+        '[[axis]]\nkey = "gravity"\nlog = {start = 0, end = 1, count = 3}',
+        5,
+        "reaches 0 or less",
+    ),
+    "a key twice": (
+        ('[[axis]]\nkey = "gravity"\nvalues = [1]\n[[axis]]\nkey = "gravity"\nvalues = [1]'),
+        3,
+        "more than one",
+    ),
+    "a value out of range": (
+        ('[[axis]]\nkey = "blade.mass"\nlinear = {start = 9, end = -9, count = 5}'),
+        4,
+        "above 0",
+    ),
     "unequal lists zipped": (
-     'combine = "zip"\n[[axis]]\nkey = "gravity"\nvalues = [1]\n[[axis]]\nkey = "hub.inertia"\nvalues = [1, 2]',
-     3, "gravity has 1, hub.inertia has 2; allowed: with zip"),
-    "1e12 runs": ('[[axis]]\nkey = "gravity"\nlinear = {start = 0, end = 1, count = 1000000000000}', 3,
-     "1,000,000,000,000 runs; allowed: at most"),
-}  # fmt: skip
+        (
+            'combine = "zip"\n[[axis]]\nkey = "gravity"\nvalues = [1]\n[[axis]]\nkey = '
+            '"hub.inertia"\nvalues = [1, 2]'
+        ),
+        3,
+        "gravity has 1, hub.inertia has 2; allowed: with zip",
+    ),
+    "1e12 runs": (
+        '[[axis]]\nkey = "gravity"\nlinear = {start = 0, end = 1, count = 1000000000000}',
+        3,
+        "1,000,000,000,000 runs; allowed: at most",
+    ),
+}
 
 
 @pytest.mark.parametrize(("text", "line", "message"), _BAD.values(), ids=list(_BAD))
-def test_errors_name_file_line_key_and_what_is_allowed(tmp_path: Path, text: str, line: int, message: str) -> None:
+def test_errors_name_file_line_key_and_what_is_allowed(
+    tmp_path: Path, text: str, line: int, message: str
+) -> None:
     with pytest.raises(InputError, match=message) as caught:
         _load(tmp_path, text)
     for problem in caught.value.problems:
         assert problem.startswith(f"{tmp_path / 's.toml'}:")
         assert "\n" not in problem
         assert "allowed" in problem
-    assert int(caught.value.problems[0].removeprefix(f"{tmp_path / 's.toml'}:").split(":")[0]) == line
+    assert (
+        int(caught.value.problems[0].removeprefix(f"{tmp_path / 's.toml'}:").split(":")[0]) == line
+    )
 
 
 @pytest.mark.parametrize("path", sorted(SWEEPS.glob("*.toml")), ids=lambda path: path.stem)

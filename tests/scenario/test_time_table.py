@@ -35,12 +35,16 @@ def drawn_table(chance: random.Random) -> LoadTable:
 
 
 def test_segments_have_the_values_of_their_tables() -> None:
-    """At a jump those of the side they are on; 2e-16 of the largest value is its last digit, 20 of them a bound."""
+    """At a jump those of the side they are on; 2e-16 of the largest value is its last digit, 20 of
+    them a bound."""
     chance = random.Random(7)
     for _ in range(200):
         tables = [drawn_table(chance) for _ in range(3)] + [()]
         parts = segments(tables, 1.0)
-        assert [parts[0].start, *(part.end for part in parts)] == [*(part.start for part in parts), 1.0]
+        assert [parts[0].start, *(part.end for part in parts)] == [
+            *(part.start for part in parts),
+            1.0,
+        ]
         for part in parts:
             for share in (0.0, 0.37, 0.999):
                 time = part.start + share * (part.end - part.start)
@@ -51,14 +55,24 @@ def test_segments_have_the_values_of_their_tables() -> None:
 
 
 @pytest.mark.parametrize(
-    "scene", find_scenes(["check/loads", "check/pitch-loads", "check/general"]), ids=lambda s: s.name
+    "scene",
+    find_scenes(["check/loads", "check/pitch-loads", "check/general"]),
+    ids=lambda s: s.name,
 )
 def test_each_load_of_a_scene_is_at_its_place(scene: Scene) -> None:
-    """Against the keys of the scene file, not the tables that the segments are cut from; bounds as above."""
+    """Against the keys of the scene file, not the tables that the segments are cut from; bounds as
+    above."""
     pitches = range(1, 1 + len(scene.blades))
-    torques = {pitch: scene.pitch_torque[pitch - 1] if scene.pitch_torque else () for pitch in pitches}
-    rests = {pitch: scene.bearing_rest[pitch - 1] if scene.bearing_rest else () for pitch in pitches}
-    rows = [*scene.rotor_torque, *(row for table in (*torques.values(), *rests.values()) for row in table)]
+    torques = {
+        pitch: scene.pitch_torque[pitch - 1] if scene.pitch_torque else () for pitch in pitches
+    }
+    rests = {
+        pitch: scene.bearing_rest[pitch - 1] if scene.bearing_rest else () for pitch in pitches
+    }
+    rows = [
+        *scene.rotor_torque,
+        *(row for table in (*torques.values(), *rests.values()) for row in table),
+    ]
     inside = {time for time, _ in rows if 0.0 < time < scene.duration}
     assert set(scene.kink_times) <= inside
     assert scene.kink_times == [segment.start for segment in scene.load_segments[1:]]
@@ -66,10 +80,16 @@ def test_each_load_of_a_scene_is_at_its_place(scene: Scene) -> None:
     for segment in scene.load_segments:
         time = segment.start + 0.37 * (segment.end - segment.start)
         loads = segment.loads_at(time)
-        assert loads[ROTOR_TORQUE] == pytest.approx(value_at(scene.rotor_torque, time), rel=4e-15, abs=4e-12)
+        assert loads[ROTOR_TORQUE] == pytest.approx(
+            value_at(scene.rotor_torque, time), rel=4e-15, abs=4e-12
+        )
         for pitch in pitches:
-            assert loads[torque_place(pitch)] == pytest.approx(value_at(torques[pitch], time), rel=4e-15, abs=4e-12)
-            assert loads[rest_place(pitch)] == pytest.approx(value_at(rests[pitch], time), rel=4e-15, abs=4e-12)
+            assert loads[torque_place(pitch)] == pytest.approx(
+                value_at(torques[pitch], time), rel=4e-15, abs=4e-12
+            )
+            assert loads[rest_place(pitch)] == pytest.approx(
+                value_at(rests[pitch], time), rel=4e-15, abs=4e-12
+            )
 
 
 def test_a_sample_on_a_jump_has_the_value_before_it() -> None:
@@ -84,22 +104,32 @@ def test_a_sample_on_a_jump_has_the_value_before_it() -> None:
 
 def test_intervals_meet_samples_and_kinks() -> None:
     parts = segments([RAMP], 1.0)
-    assert [(p.start, p.values[0]) for p in parts] == [(0.0, 0.0), (0.3, 0.0), (0.47, 5.0), (0.8, 1.0)]
+    assert [(p.start, p.values[0]) for p in parts] == [
+        (0.0, 0.0),
+        (0.3, 0.0),
+        (0.47, 5.0),
+        (0.8, 1.0),
+    ]
     few = intervals(parts, 11, every_sample=False)
     assert np.allclose([interval.end for interval in few], [0.3, 0.4, 0.47, 0.5, 0.8, 1.0])
     assert [interval.sample_intervals for interval in few] == [3, 1, 1, 1, 3, 2]
     assert [interval.ends_at_sample for interval in few] == [True, True, False, True, True, True]
     every = intervals(parts, 11, every_sample=True)
-    assert [interval.end for interval in every if interval.ends_at_sample] == np.linspace(0.0, 1.0, 11)[1:].tolist()
+    assert [interval.end for interval in every if interval.ends_at_sample] == np.linspace(
+        0.0, 1.0, 11
+    )[1:].tolist()
     assert [interval.end for interval in every if not interval.ends_at_sample] == [0.47]
     assert all(
-        interval.segment.start <= 0.5 * (interval.start + interval.end) <= interval.segment.end for interval in every
+        interval.segment.start <= 0.5 * (interval.start + interval.end) <= interval.segment.end
+        for interval in every
     )
 
 
 def test_the_last_interval_ends_at_the_end_and_not_beside_it() -> None:
     """49 times 1/49 is less than 1 in double precision."""
-    assert intervals(segments([RAMP], 1.0), 50, every_sample=False)[-1].end == 1.0 != 49 * (1.0 / 49)
+    assert (
+        intervals(segments([RAMP], 1.0), 50, every_sample=False)[-1].end == 1.0 != 49 * (1.0 / 49)
+    )
 
 
 def test_a_kink_that_is_off_a_sample_by_rounding_is_on_it() -> None:
@@ -113,7 +143,8 @@ def test_a_kink_that_is_off_a_sample_by_rounding_is_on_it() -> None:
 def test_rows_between_samples_are_a_divisor_of_the_steps() -> None:
     assert steps_and_rows(0.01, 0.01 / 15, False) == (15, 1)
     assert steps_and_rows(0.01, 1e-4, True) == (100, 100)
-    for steps in range(101, 1000, 37):  # a finer step has at least half as many rows as the coarser ones
+    # a finer step has at least half as many rows as the coarser ones
+    for steps in range(101, 1000, 37):
         taken, rows = steps_and_rows(0.01, 0.01 / steps, True)
         assert taken >= steps
         assert taken % rows == 0

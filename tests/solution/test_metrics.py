@@ -1,4 +1,5 @@
-"""Metrics of hand-made motions, and of loads: extremes, pitches that leave zero, loads in judgement and drawings."""
+"""Metrics of hand-made motions, and of loads: extremes, pitches that leave zero, loads in judgement
+and drawings."""
 
 from __future__ import annotations
 
@@ -38,7 +39,9 @@ def test_a_metric_is_declared_where_it_is_computed_and_nowhere_else() -> None:
     columns = metric_columns(scene.outputs)
     assert {"angle_error_max", "defect_judged", "tip_error_max"} <= metrics.keys() <= columns.keys()
     of_runs = [name for name, value in METRICS.items() if "runs" in value.tables.split()]
-    assert [name for name in columns if name in METRICS and name not in {"tip_error_max"}] == of_runs
+    assert [
+        name for name in columns if name in METRICS and name not in {"tip_error_max"}
+    ] == of_runs
 
 
 def test_a_declared_metric_is_a_column_of_its_tables() -> None:
@@ -62,14 +65,17 @@ def test_extremes_of_the_rotor_have_their_sign_and_the_rate_has_none() -> None:
         (1e-11 * np.exp(230.0 * TIME), 230.0),  # ten samples: enough for a slope
         (1e-11 * np.exp(240.0 * TIME), None),  # nine
         (np.full(201, 1.0), None),  # never small: nothing of it is exponential growth
-        (np.where(TIME > 1.0, 1e-10 * np.exp(10.0 * (TIME - 1.0)), 1.0), None),  # large first, small later
+        # large first, small later
+        (np.where(TIME > 1.0, 1e-10 * np.exp(10.0 * (TIME - 1.0)), 1.0), None),
     ],
 )
 def test_a_pitch_that_leaves_zero(pitch: Array, rate: float | None) -> None:
     metrics = metrics_of(SCENE, motion(TIME, pitch), motion(TIME, np.zeros(201)))
     assert metrics["zero_pitch_max"] == pitch.max()
     assert metrics["zero_pitch_left_s"] == TIME[np.argmax(pitch > 1e-9)]
-    assert metrics.get("zero_pitch_growth_per_s") == (None if rate is None else pytest.approx(rate, rel=1e-9))
+    assert metrics.get("zero_pitch_growth_per_s") == (
+        None if rate is None else pytest.approx(rate, rel=1e-9)
+    )
 
 
 LOADED = replace(find_scenes(["check/loads"])[0], duration=0.2, samples=41)
@@ -94,11 +100,14 @@ def test_the_largest_loads_with_their_times_and_blades(run: Solution) -> None:
 
 @pytest.mark.parametrize("load", [load.name for load in LOADS])
 def test_a_load_that_is_off_is_inaccurate(run: Solution, load: str) -> None:
-    """By a millionth of the largest force (at the arm): a hundred thousand times the bound, not yet another motion."""
+    """By a millionth of the largest force (at the arm): a hundred thousand times the bound, not yet
+    another motion."""
     exact, metric = run.trajectory, f"{load}_error"
     result = judge(LOADED, run, exact)
     assert (result.status, result.metrics[metric]) == ("ok", 0.0)
-    force = np.linalg.norm(exact.blade_root_force, axis=2).max() * (1.0 if load.endswith("force") else 6.0)
+    force = np.linalg.norm(exact.blade_root_force, axis=2).max() * (
+        1.0 if load.endswith("force") else 6.0
+    )
     for share, is_false in ((1e-6, False), (0.1, True)):
         wrong = exact.get(load).copy()
         wrong[20].flat[0] += share * force
@@ -110,12 +119,15 @@ def test_a_load_that_is_off_is_inaccurate(run: Solution, load: str) -> None:
 
 
 def test_loads_are_drawn_from_python() -> None:
-    """A panel per axis with a line per blade, in the unit of its label; of the shaft a line per axis."""
+    """A panel per axis with a line per blade, in the unit of its label; of the shaft a line per
+    axis."""
     run = rm.run(LOADED, "lagrange/dop853")
     roots, shaft = run.plot.loads(), run.plot.loads("shaft_moment")
     assert [len(axes.lines) for axes in roots.axes] == [4, 4, 4]
     assert "kN" in roots.axes[1].get_ylabel()
-    assert roots.axes[1].lines[3].get_ydata() == pytest.approx(1e-3 * run.blade_root_force[:, 3, 1], rel=1e-15)
+    assert roots.axes[1].lines[3].get_ydata() == pytest.approx(
+        1e-3 * run.blade_root_force[:, 3, 1], rel=1e-15
+    )
     assert [len(axes.lines) for axes in shaft.axes] == [3]
     with pytest.raises(InputError, match="no load 'angles'"):
         run.plot.loads("angles")

@@ -1,4 +1,5 @@
-"""What a diagram says in numbers, against values by hand: front, interpolation, orders, exponents, failure rail."""
+"""What a diagram says in numbers, against values by hand: front, interpolation, orders, exponents,
+failure rail."""
 
 from __future__ import annotations
 
@@ -31,7 +32,11 @@ from rotor_mbs.solution.status import STATUSES
 
 
 def curve(
-    name: str, errors: list[float], seconds: list[float], statuses: list[str] | None = None, **attributes: object
+    name: str,
+    errors: list[float],
+    seconds: list[float],
+    statuses: list[str] | None = None,
+    **attributes: object,
 ) -> Record:
     n = len(errors)
     statuses = statuses or ["ok"] * n
@@ -44,13 +49,26 @@ def curve(
         "repeats": np.full(n, 20),
         "steps": np.full(n, 100),
     }
-    arrays |= dict.fromkeys(("angle_error_end", "tip_error_max", "energy_drift_max"), np.array(errors))
+    arrays |= dict.fromkeys(
+        ("angle_error_end", "tip_error_max", "energy_drift_max"), np.array(errors)
+    )
     arrays |= dict.fromkeys(("run_time_min_s", "run_time_q1_s", "run_time_q3_s"), np.array(seconds))
-    arrays |= dict.fromkeys(("setup_time_s", "setup_again_time_s", "output_time_s"), np.full(n, 0.5))
+    arrays |= dict.fromkeys(
+        ("setup_time_s", "setup_again_time_s", "output_time_s"), np.full(n, 0.5)
+    )
     facts = {
-        "method": name, "setting_kind": "step", "horizon_s": 6.0, "duration_s": 10.0, "uncertainty_rad": 1e-15,
-        "samples": 101, "budget_s": 28.0, "load_before": 0.1, "pinned_core": 1, "messages": [""] * n, "scene_hash": "1",
-    }  # fmt: skip
+        "method": name,
+        "setting_kind": "step",
+        "horizon_s": 6.0,
+        "duration_s": 10.0,
+        "uncertainty_rad": 1e-15,
+        "samples": 101,
+        "budget_s": 28.0,
+        "load_before": 0.1,
+        "pinned_core": 1,
+        "messages": [""] * n,
+        "scene_hash": "1",
+    }
     return Record("bench", "paper/fig09", name, {**facts, **attributes}, arrays)
 
 
@@ -68,7 +86,8 @@ SLOW = curve(
 
 def test_time_to_reach_is_straight_in_the_logarithms() -> None:
     """Half way between 1e-2 and 1e-6 (in decades) lies 1e-4; between 1 s and 100 s, 10 s."""
-    errors, seconds = np.array([1e-2, 1e-1, 1e-6]), np.array([1.0, 50.0, 100.0])  # the second beaten by the first
+    # the second beaten by the first
+    errors, seconds = np.array([1e-2, 1e-1, 1e-6]), np.array([1.0, 50.0, 100.0])
     for target, expected in ((1e-1, 1.0), (1e-4, 10.0), (1e-6, 100.0)):
         assert time_to_reach(errors, seconds, target) == pytest.approx(expected)
     assert time_to_reach(errors, seconds, 1e-7) is None
@@ -83,7 +102,8 @@ def test_ratios_are_to_the_fastest() -> None:
     assert slow.seconds == pytest.approx(1e-2 * 10**0.5)
     assert (fast.ratio, slow.ratio) == (1.0, pytest.approx(slow.seconds / fast.seconds))
     assert [one.name for one, _ in fastest([SLOW, FAST], 1e-6)] == ["lagrange/taylor"]
-    cut, coarse = bench_table([SLOW, curve("mine/euler", [1e-2, 1e-4], [1.0, 10.0])]).rows  # one cut by the budget
+    # one cut by the budget
+    cut, coarse = bench_table([SLOW, curve("mine/euler", [1e-2, 1e-4], [1.0, 10.0])]).rows
     assert cut[2:] == ("2 of 5", "1.0e-04", "3.16e-02", "not measured", "not measured")
     assert coarse == ("paper/fig09", "mine/euler", "2 of 2", "1.0e-04", "3.16e+00", "", "")
 
@@ -91,16 +111,25 @@ def test_ratios_are_to_the_fastest() -> None:
 def test_a_row_for_each_engine_with_dashes_for_what_the_file_does_not_say(tmp_path: Path) -> None:
     versions = '{"python": "3.11", "code": "ab", "plug-in": "cd", "pin": "4.1.0"}'
     own = curve(
-        "mine/euler", [1e-2, 1e-3], [2e-3, 8e-3], order=0.98, order_expected=1.0, versions=versions, lines=99,
+        "mine/euler",
+        [1e-2, 1e-3],
+        [2e-3, 8e-3],
+        order=0.98,
+        order_expected=1.0,
+        versions=versions,
+        lines=99,
         linearizes=False,
-    )  # fmt: skip
+    )
     columns: list[tuple[Record, dict[str, list[float]]]] = [
         (FAST, {"defect_max": [1e-3, 1e-7, 1e-13], "zero_pitch_max": [0.0] * 3}),
         (SLOW, {"defect_max": [np.nan, 1e-3, 1e-5, 0.0, 0.0]}),
         (own, {"defect_max": [1e-4, 1e-5], "zero_pitch_max": [0.0, 0.5]}),
     ]
     curves = [
-        replace(known, arrays={**known.arrays, **{name: np.array(values) for name, values in more.items()}})
+        replace(
+            known,
+            arrays={**known.arrays, **{name: np.array(values) for name, values in more.items()}},
+        )
         for known, more in columns
     ]
     with open_results(stored(tmp_path / "a.h5", FAST)) as results:
@@ -110,18 +139,50 @@ def test_a_row_for_each_engine_with_dashes_for_what_the_file_does_not_say(tmp_pa
         return [cell if isinstance(cell, str) else cell.text for cell in row]
 
     assert [texts(row)[1:] for row in reached.rows] == [
-        ["1 of 1", "adaptive", "1.0×10⁻¹³", "1.0×10⁻¹⁰", "1 of 1, × 1.0", "1 of 1, × 1.0", "1 of 1, × 1.0", "–", "kept",
-         "none failed"],
-        ["1 of 1", "5.9 (nominal 6)", "≤ 1.0×10⁻⁵", "≤ 1.0×10⁻⁴", *["not measured"] * 3, "–", "–", "1 of 2 failed"],
-        ["1 of 1", "0.98 (nominal 1)", "1.0×10⁻⁵", "0.0010", *["0 of 1"] * 3, "–", "lost", "none failed"],
-    ]  # fmt: skip
+        [
+            "1 of 1",
+            "adaptive",
+            "1.0×10⁻¹³",
+            "1.0×10⁻¹⁰",
+            "1 of 1, × 1.0",
+            "1 of 1, × 1.0",
+            "1 of 1, × 1.0",
+            "–",
+            "kept",
+            "none failed",
+        ],
+        [
+            "1 of 1",
+            "5.9 (nominal 6)",
+            "≤ 1.0×10⁻⁵",
+            "≤ 1.0×10⁻⁴",
+            *["not measured"] * 3,
+            "–",
+            "–",
+            "1 of 2 failed",
+        ],
+        [
+            "1 of 1",
+            "0.98 (nominal 1)",
+            "1.0×10⁻⁵",
+            "0.0010",
+            *["0 of 1"] * 3,
+            "–",
+            "lost",
+            "none failed",
+        ],
+    ]
     assert [texts(row)[1:] for row in able.rows] == [
         ["–"] * 6, ["–"] * 6, ["–", "–", "–", "no", "pin 4.1.0", "99"]
     ]  # fmt: skip
 
 
-def test_a_scene_on_which_no_setting_is_useful_is_counted_beside_the_error_of_the_others(tmp_path: Path) -> None:
-    useless = replace(FAST, arrays={**FAST.arrays, "angle_error_max": np.full(len(FAST.statuses), 2.0)})
+def test_a_scene_on_which_no_setting_is_useful_is_counted_beside_the_error_of_the_others(
+    tmp_path: Path,
+) -> None:
+    useless = replace(
+        FAST, arrays={**FAST.arrays, "angle_error_max": np.full(len(FAST.statuses), 2.0)}
+    )
     with open_results(stored(tmp_path / "a.h5", FAST)) as results:
         reached, _ = engine_tables(results, {"paper/fig09": [FAST], "paper/fig11": [useless]})
     cell: Any = reached.rows[0][4]
@@ -165,7 +226,9 @@ def test_the_diagram_draws_what_was_measured() -> None:
 def test_the_sentence_names_the_fastest_and_how_much_slower_another_model_is() -> None:
     other = curve("exudyn_tree/rk67", [1e-4, 1e-8], [2e-2, 1e-1])
     six, nine = map(str, bench_answer({"paper/fig09": [FAST, other]}))
-    assert six.startswith("To an error of 10⁻⁶ rad <b>closed form, Taylor</b> is the fastest; of another model")
+    assert six.startswith(
+        "To an error of 10⁻⁶ rad <b>closed form, Taylor</b> is the fastest; of another model"
+    )
     # 1e-6 is half way, in decades, from 1e-4 to 1e-8: sqrt(0.02 * 0.1) s, against 2e-3 s.
     assert "Exudyn tree, RK67, 22 times slower" in six
     assert "another model" not in nine
@@ -176,10 +239,18 @@ def stored(path: Path, *curves: Record) -> Path:
     points = [point for curve in curves for point in known_points(curve)]
     file = fit_file_to_request(path, [points_table("bench", points)])
     for curve in curves:
-        facts = {name: value for name, value in curve.attributes.items() if name in POINT_COLUMNS["bench"]}
+        facts = {
+            name: value
+            for name, value in curve.attributes.items()
+            if name in POINT_COLUMNS["bench"]
+        }
         for i, point in enumerate(known_points(curve)):
             place = file.place(str(point["run"]), "bench")
-            values = {name: array[i] for name, array in curve.arrays.items() if name not in ("setting", "status")}
+            values = {
+                name: array[i]
+                for name, array in curve.arrays.items()
+                if name not in ("setting", "status")
+            }
             values |= {"status": curve.statuses[i], "message": curve.messages[i]}
             place.write(place.encode(facts | values))
     return path
@@ -188,28 +259,45 @@ def stored(path: Path, *curves: Record) -> Path:
 def known_points(curve: Record) -> list[dict[str, object]]:
     facts = curve.attributes
     known = {
-        "scene": curve.scene, "method_name": curve.method, "curve": curve.name, "setting_kind": "step",
-        "scene_hash": facts["scene_hash"], "order_expected": facts.get("order_expected", np.nan),
+        "scene": curve.scene,
+        "method_name": curve.method,
+        "curve": curve.name,
+        "setting_kind": "step",
+        "scene_hash": facts["scene_hash"],
+        "order_expected": facts.get("order_expected", np.nan),
         "options": '{"budget_s": 28.0, "duration_s": 10.0}',
-    }  # fmt: skip
-    return [known | {"run": f"{curve.scene}/{curve.name} {x:g}", "step": x} for x in curve.arrays["setting"].tolist()]
+    }
+    return [
+        known | {"run": f"{curve.scene}/{curve.name} {x:g}", "step": x}
+        for x in curve.arrays["setting"].tolist()
+    ]
 
 
-def test_curves_are_read_as_they_are_stored_and_one_without_a_point_is_not_shown(tmp_path: Path) -> None:
+def test_curves_are_read_as_they_are_stored_and_one_without_a_point_is_not_shown(
+    tmp_path: Path,
+) -> None:
     stored(tmp_path / "a.h5", FAST)
     stored(tmp_path / "a.h5", SLOW)
     for curve, read in zip((FAST, SLOW), read_records(tmp_path / "a.h5", "bench"), strict=True):
         assert (read.name, read.messages) == (curve.name, curve.messages)
         np.testing.assert_array_equal(read.arrays["run_time_s"], curve.arrays["run_time_s"])
-    TableFile(tmp_path / "a.h5").place("paper/fig09/lagrange/taylor 0.05", "bench").mark_missing([0])
-    assert [curve.name for curve in read_records(tmp_path / "a.h5", "bench")] == ["exudyn_tree/rk67"]
+    TableFile(tmp_path / "a.h5").place("paper/fig09/lagrange/taylor 0.05", "bench").mark_missing(
+        [0]
+    )
+    assert [curve.name for curve in read_records(tmp_path / "a.h5", "bench")] == [
+        "exudyn_tree/rk67"
+    ]
 
 
 def test_a_file_of_curves_alone_is_opened_and_shown(tmp_path: Path) -> None:
     curves = rm.open(stored(tmp_path / "a.h5", FAST, SLOW))
     assert list(curves) == ["paper/fig09/lagrange/taylor", "paper/fig09/exudyn_tree/rk67"]
-    np.testing.assert_array_equal(curves["paper/fig09/lagrange/taylor"]["run_time_s"], FAST.arrays["run_time_s"])
-    assert repr(curves).splitlines()[0] == f"{tmp_path / 'a.h5'}: 2 curves of error against run time"
+    np.testing.assert_array_equal(
+        curves["paper/fig09/lagrange/taylor"]["run_time_s"], FAST.arrays["run_time_s"]
+    )
+    assert repr(curves).splitlines()[0] == (
+        f"{tmp_path / 'a.h5'}: 2 curves of error against run time"
+    )
     assert "lagrange/taylor" in curves._repr_html_()
     assert curves.to_html(tmp_path / "pages").is_file()
     shown = rotor_mbs("show", tmp_path / "a.h5").out

@@ -1,4 +1,5 @@
-"""Fair timing by a clock that is wound by hand; a bench's points, their resuming, and workers that are lost."""
+"""Fair timing by a clock that is wound by hand; a bench's points, their resuming, and workers that
+are lost."""
 
 from __future__ import annotations
 
@@ -42,7 +43,8 @@ class Clock:
 
 @dataclass
 class FakeMethod:
-    """Takes 10 s to build, 3 s to read out, the next of `durations` to run; after its start it is `error` rad off."""
+    """Takes 10 s to build, 3 s to read out, the next of `durations` to run; after its start it is
+    `error` rad off."""
 
     clock: Clock
     durations: list[float]
@@ -97,14 +99,22 @@ def test_only_the_integration_is_timed(monkeypatch: pytest.MonkeyPatch) -> None:
     # The median between 2 and 4, the quartiles a quarter of the way from 2 down and from 4 up.
     names = ("run_time_min_s", "run_time_q1_s", "run_time_s", "run_time_q3_s", "repeats")
     assert [row[name] for name in names] == [1.0, 1.75, 3.0, 5.0, 4]
-    names = ("setup_time_s", "setup_again_time_s", "status", "false_success", "steps", "output_time_s")
+    names = (
+        "setup_time_s",
+        "setup_again_time_s",
+        "status",
+        "false_success",
+        "steps",
+        "output_time_s",
+    )
     assert [row[name] for name in names] == [10.0, 10.0, "ok", 0, 7, 3.0]
     assert (row["angle_error_max"], row["same"]) == (1e-3, True)
 
 
 def test_a_point_has_the_status_of_any_run_and_a_reason(monkeypatch: pytest.MonkeyPatch) -> None:
     for error, rows, success, status, false in (
-        (0.2, 11, True, "inaccurate", False),  # above 0.01 rad nothing is ok, but it resembles the motion
+        # above 0.01 rad nothing is ok, but it resembles the motion
+        (0.2, 11, True, "inaccurate", False),
         (2.0, 11, True, "inaccurate", True),
         (0.0, 5, True, "diverged", True),
         (0.0, 5, False, "solver_failed", False),
@@ -127,9 +137,17 @@ def test_a_point_that_raises_is_a_failure_with_its_reason(monkeypatch: pytest.Mo
 class FakeTimer(PointTimer):
     """Takes `seconds` a run, and says when it is repeated."""
 
-    def __init__(self, one: Point, seconds: float, order: list[Point], clock: Clock, hangs: bool) -> None:
+    def __init__(
+        self, one: Point, seconds: float, order: list[Point], clock: Clock, hangs: bool
+    ) -> None:
         super().__init__(one, SCENE, None, clock=clock)
-        self.point, self.seconds, self.order, self.clock, self.hangs = one, seconds, order, clock, hangs
+        self.point, self.seconds, self.order, self.clock, self.hangs = (
+            one,
+            seconds,
+            order,
+            clock,
+            hangs,
+        )
 
     def warm_up(self) -> None:
         self.clock.now += self.seconds
@@ -150,7 +168,10 @@ def run_conduct(
     timers = [FakeTimer(one, taken, order, clock, one == hanging) for one, taken in seconds.items()]
     names = dict.fromkeys(one.method for one in seconds)
     time_in_rounds(
-        [[timer for timer in timers if timer.point.method == name] for name in names], budget, repeats, clock
+        [[timer for timer in timers if timer.point.method == name] for name in names],
+        budget,
+        repeats,
+        clock,
     )
     return timers, order
 
@@ -165,16 +186,22 @@ def test_rounds_go_over_all_points_in_turn_and_over_long_runs_five_times() -> No
 
 
 def test_what_cheap_points_leave_of_the_budget_goes_to_dear_ones() -> None:
-    """Of 10 s, the cheap one wants 20 · 0.1 = 2; the two dear ones share 8: four runs of 1 s each."""
+    """Of 10 s, the cheap one wants 20 · 0.1 = 2; the two dear ones share 8: four runs of 1 s
+    each."""
     assert allocate_repeats([1.0, 0.1, 1.0], [20, 20, 20], 10.0) == [4, 20, 4]
     assert allocate_repeats([1.0, 1.0], [5, 5], 0.0) == [1, 1]
     assert allocate_repeats([1.0], [5], 100.0) == [5]
 
 
-def test_a_rung_that_does_not_fit_the_budget_is_told_those_after_it_too_and_no_cheap_ladder_is_cut() -> None:
-    """1, 2, 4 s warm up of the 9 s (three tenths of 30); the next, 8 s, would not fit, nor what comes after it."""
+def test_a_rung_that_does_not_fit_the_budget_is_told_those_after_it_too_and_no_cheap_ladder_is_cut() -> (
+    None
+):
+    """1, 2, 4 s warm up of the 9 s (three tenths of 30); the next, 8 s, would not fit, nor what
+    comes after it."""
     seconds = {point("dear", rung): 2.0**rung for rung in range(6)}
-    timers, _ = run_conduct(seconds | {point("cheap", rung): 0.01 for rung in range(9)}, budget=30.0)
+    timers, _ = run_conduct(
+        seconds | {point("cheap", rung): 0.01 for rung in range(9)}, budget=30.0
+    )
     assert [bool(timer.times) for timer in timers] == [True] * 3 + [False] * 3 + [True] * 9
     assert [bool(timer.left_out) for timer in timers] == [False] * 3 + [True] * 3 + [False] * 9
     assert timers[3].left_out == "not run: about 8 s over the time budget"
@@ -203,15 +230,19 @@ def curves_of(path: Path) -> dict[str, Record]:
 
 
 @pytest.mark.full
-def test_the_stored_points_keep_the_contract_and_a_bench_goes_on_where_it_was(tmp_path: Path) -> None:
+def test_the_stored_points_keep_the_contract_and_a_bench_goes_on_where_it_was(
+    tmp_path: Path,
+) -> None:
     path = tmp_path / "b.h5"
     ended = rotor_mbs("bench", *QUICK, "-o", path)
     assert ended.status == 0, ended.err
     with h5py.File(path) as file:
         table = file["bench"]
         columns = (
-            "angle_error_max angle_error_end tip_error_max energy_drift_max run_time_s run_time_min_s run_time_q1_s "
-            "run_time_q3_s setup_time_s output_time_s repeats steps status step tolerance left_out crc32"
+            "angle_error_max angle_error_end tip_error_max energy_drift_max run_time_s "
+            "run_time_min_s run_time_q1_s "
+            "run_time_q3_s setup_time_s output_time_s repeats steps status step tolerance "
+            "left_out crc32"
         )
         for name in columns.split():
             assert table[name].dims[0][0].name == "/bench/run", name
@@ -226,7 +257,9 @@ def test_the_stored_points_keep_the_contract_and_a_bench_goes_on_where_it_was(tm
     second = curves_of(path)
     assert set(second) == {"lagrange/dop853", "exudyn_tree/rk44"}
     # Kept, not measured again.
-    np.testing.assert_array_equal(second[first.name].arrays["run_time_s"], first.arrays["run_time_s"])
+    np.testing.assert_array_equal(
+        second[first.name].arrays["run_time_s"], first.arrays["run_time_s"]
+    )
     assert (tmp_path / "b-report" / "index.html").is_file()
     assert sorted(entry.name for entry in tmp_path.iterdir()) == ["b-report", "b.h5"]
 
@@ -241,7 +274,9 @@ class DyingTask(bench.BenchTask):
 
 
 @pytest.mark.full
-def test_curves_are_tried_alone_where_their_process_dies(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_curves_are_tried_alone_where_their_process_dies(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(bench, "BenchTask", DyingTask)
     ((method, ladder),) = ladders(["lagrange/ode45"]).values()
     short = replace(ladder, values=(1e-3,))
@@ -249,7 +284,10 @@ def test_curves_are_tried_alone_where_their_process_dies(tmp_path: Path, monkeyp
     curves = [bench.curve_of(SCENE, method, ladder, {}) for ladder in variants]
     run_scenes([SCENE], {SCENE.name: ()}, tmp_path / "b.h5", workers=0, timeout_s=60.0)
     file = fit_file_to_request(tmp_path / "b.h5", [*bench.curve_tables(curves)])
-    ended = {outcome.label.split()[-2]: outcome for outcome in bench.measured(bench.bench_task(file, curves, 2, 5.0))}
+    ended = {
+        outcome.label.split()[-2]: outcome
+        for outcome in bench.measured(bench.bench_task(file, curves, 2, 5.0))
+    }
     assert [curve.is_stored(file) for curve in curves] == [True, False, True]
     assert (ended["deadly"].status, ended["deadly"].is_stored) == ("worker_died", False)
     assert ended["deadly"].message.endswith("also when it was retried alone")

@@ -15,7 +15,15 @@ from xml.etree import ElementTree
 
 import numpy as np
 import pytest
-from support.checking import EVERY_SECOND_SAMPLE, WRONG, add_run, failed, faulty_run, judged, results_file
+from support.checking import (
+    EVERY_SECOND_SAMPLE,
+    WRONG,
+    add_run,
+    failed,
+    faulty_run,
+    judged,
+    results_file,
+)
 from support.commands import PROGRAM, refusal, rotor_mbs
 from support.frozen_references import digests, freeze
 from support.scenes import paper, shipped
@@ -40,7 +48,9 @@ SCENE, METHOD = "check/general", "lagrange/dop853"
 @pytest.fixture(scope="module")
 def good(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A scene made for checking by two right models: every check of it passes."""
-    return results_file(tmp_path_factory.mktemp("check") / "good.h5", [SCENE], (METHOD, "exudyn_tree/rk67"))
+    return results_file(
+        tmp_path_factory.mktemp("check") / "good.h5", [SCENE], (METHOD, "exudyn_tree/rk67")
+    )
 
 
 @pytest.fixture
@@ -69,9 +79,24 @@ def test_what_is_shipped_passes_in_short(good: Path) -> None:
     lines = lines_of(good, "-v", status=0)
     assert lines[-1].endswith(" passed, 0 failed")
     names = (
-        "integrity", "complete", "status", "metrics", "times", "start", "defect", "defect median", "error", "energy",
-        "energies", "tip", "reference", "growth", "uncertainty", "frozen", "settings",
-    )  # fmt: skip
+        "integrity",
+        "complete",
+        "status",
+        "metrics",
+        "times",
+        "start",
+        "defect",
+        "defect median",
+        "error",
+        "energy",
+        "energies",
+        "tip",
+        "reference",
+        "growth",
+        "uncertainty",
+        "frozen",
+        "settings",
+    )
     assert lines[-2] == f"runs checked: 1 {METHOD}, 1 exudyn_tree/rk67"
     assert {line.split(":")[0] for line in lines[:-2]} == {f"pass {name}" for name in names}
 
@@ -79,7 +104,9 @@ def test_what_is_shipped_passes_in_short(good: Path) -> None:
 def test_where_there_is_nothing_to_judge_the_command_says_so(tmp_path: Path) -> None:
     fit_file_to_request(tmp_path / "empty.h5", [])
     for path in (results_file(tmp_path / "reference.h5", [SCENE], []), tmp_path / "empty.h5"):
-        assert refusal("check", path, "--require", METHOD) == f"{path}: nothing to check: no run of a method"
+        assert refusal("check", path, "--require", METHOD) == (
+            f"{path}: nothing to check: no run of a method"
+        )
 
 
 @pytest.mark.nightly  # .ci/wheel runs and checks the scenes of the paper by these methods
@@ -92,17 +119,28 @@ def test_the_default_set_passes(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    "scene", ["check/general", *(pytest.param(f"paper/{name}", marks=pytest.mark.full) for name in ("fig08", "fig11"))]
+    "scene",
+    [
+        "check/general",
+        *(pytest.param(f"paper/{name}", marks=pytest.mark.full) for name in ("fig08", "fig11")),
+    ],
 )
 def test_a_reference_computed_now_is_the_frozen_one(scene: str) -> None:
     pytest.importorskip("heyoka")
-    frozen, own = (run.trajectory for run in (frozen_solution(shipped(scene)), solve(REFERENCE, shipped(scene), {})))
+    frozen, own = (
+        run.trajectory
+        for run in (frozen_solution(shipped(scene)), solve(REFERENCE, shipped(scene), {}))
+    )
     assert own.angle_uncertainty is not None
     growth = np.abs(np.log(running_growth(own) / running_growth(frozen)))[: horizon_samples(frozen)]
     used = (own.angle_uncertainty > 0.0) & (frozen.angle_uncertainty > 0.0)
     uncertainty = np.abs(np.log(own.angle_uncertainty[used] / frozen.angle_uncertainty[used]))
     beyond = np.abs(own.angles - frozen.angles).max(axis=1) - own.angle_uncertainty
-    for name, differences in {"reference": beyond, "growth": growth, "uncertainty": uncertainty}.items():
+    for name, differences in {
+        "reference": beyond,
+        "growth": growth,
+        "uncertainty": uncertainty,
+    }.items():
         assert differences.max(initial=0.0) <= shipped_bounds().of(name, REFERENCE).value
 
 
@@ -122,7 +160,10 @@ def _without_last_sample(row: Rows) -> None:
 
 
 TAMPERING: dict[str, tuple[Callable[[Rows], None], tuple[str, ...]]] = {
-    "a sample missing": (_without_last_sample, ("FAIL complete", "stored as ok; 150 of 151 samples")),
+    "a sample missing": (
+        _without_last_sample,
+        ("FAIL complete", "stored as ok; 150 of 151 samples"),
+    ),
     "a channel missing": (_with("tip", ..., math.nan), ("FAIL complete", "tip is missing")),
     "a NaN": (_with("rates", 7, math.nan), ("FAIL complete", "rates is not finite at sample 7")),
     "a touched angle": (_with("angles", 20, 3.0), ("FAIL tip",)),
@@ -146,11 +187,16 @@ def test_a_run_that_was_changed_together_with_its_checksum_fails(fault: str, cop
 def test_a_changed_byte_is_of_its_run(column: str, bit: int, copy: Path) -> None:
     """Whatever it does to the other checks: a number of samples below zero."""
     damage(copy, f"{SCENE}/{METHOD}", column, bit=bit)
-    named(lines_of(copy, status=1), f"FAIL integrity: {SCENE} {METHOD} row", "changed after it was written")
+    named(
+        lines_of(copy, status=1),
+        f"FAIL integrity: {SCENE} {METHOD} row",
+        ("changed after it was written"),
+    )
 
 
 def test_a_false_success_and_an_edited_status_fail(copy: Path) -> None:
-    """A run that is wrong, stored as it was judged, fails by its numbers; called ok, by its status too."""
+    """A run that is wrong, stored as it was judged, fails by its numbers; called ok, by its status
+    too."""
     scene = shipped("check/general")
     add_run(copy, scene, faulty_run("offset", scene, METHOD, 0.5))
     lines = lines_of(copy, status=1)
@@ -162,7 +208,11 @@ def test_a_false_success_and_an_edited_status_fail(copy: Path) -> None:
         row["status"][...] = row["false_success"][...] = 0
 
     change_row(copy, f"{SCENE}/{METHOD}", call_it_ok)
-    line = named(lines_of(copy, status=1), f"FAIL status: check/general {METHOD}", "stored ok, its samples give")
+    line = named(
+        lines_of(copy, status=1),
+        f"FAIL status: check/general {METHOD}",
+        "stored ok, its samples give",
+    )
     assert "report of success is false" in line
 
 
@@ -173,7 +223,12 @@ def test_a_model_that_is_not_there_is_missed_where_it_is_required(copy: Path) ->
     lines_of(copy, status=0)
     lines = lines_of(copy, *required, "--require", "mine/lsoda", status=1)
     for method in (METHOD, "mine/lsoda"):
-        named(lines, "FAIL required: check/general", method, "not in the file, which has reference, exudyn_tree/rk67")
+        named(
+            lines,
+            "FAIL required: check/general",
+            method,
+            ("not in the file, which has reference, exudyn_tree/rk67"),
+        )
 
 
 def test_a_sweep_is_checked_for_methods_and_for_runs_of_an_earlier_file(tmp_path: Path) -> None:
@@ -182,8 +237,16 @@ def test_a_sweep_is_checked_for_methods_and_for_runs_of_an_earlier_file(tmp_path
         made_sweep(tmp_path / name, THREE_RUNS.replace("9.7, 9.8, 9.9", values))
     old, new = tmp_path / "old/s.h5", tmp_path / "new/s.h5"
     lines_of(old, "--require", METHOD, "--against", new, status=0)
-    named(lines_of(old, "--require", "mine/lsoda", status=1), "FAIL required: paper/fig11", f"has {METHOD}")
-    named(lines_of(new, "--against", old, status=1), "FAIL against", "1 of 3 runs of the earlier file")
+    named(
+        lines_of(old, "--require", "mine/lsoda", status=1),
+        "FAIL required: paper/fig11",
+        f"has {METHOD}",
+    )
+    named(
+        lines_of(new, "--against", old, status=1),
+        "FAIL against",
+        ("1 of 3 runs of the earlier file"),
+    )
 
 
 def test_a_scene_that_changed_since_the_earlier_file_fails_unless_it_may(tmp_path: Path) -> None:
@@ -224,7 +287,11 @@ def test_a_sweep_of_a_changed_scene_fails_against_an_earlier_one(tmp_path: Path)
 
 def test_a_reference_that_is_altered_or_not_there_fails(copy: Path) -> None:
     change_row(copy, f"{SCENE}/reference", _with("angles", 50, 1.2345))
-    named(lines_of(copy, status=1), f"FAIL reference: {SCENE} reference angles", "an altered reference")
+    named(
+        lines_of(copy, status=1),
+        f"FAIL reference: {SCENE} reference angles",
+        "an altered reference",
+    )
     drop(copy, SCENE, "reference")
     named(lines_of(copy, status=1), f"FAIL reference: {SCENE} reference all", "no reference")
 
@@ -238,7 +305,8 @@ def test_references_of_a_results_file_are_frozen_bit_for_bit(good: Path, tmp_pat
 
 
 def test_the_shipped_references_are_bit_for_bit_those_that_were_frozen(tmp_path: Path) -> None:
-    """A number touched in its last bit is found, beyond its horizon, too, where no agreement would tell."""
+    """A number touched in its last bit is found, beyond its horizon, too, where no agreement would
+    tell."""
     for path in REFERENCES.glob("*.h5"):
         assert digests(path) == path.with_suffix(".sha256").read_text()
 
@@ -247,8 +315,13 @@ def test_the_shipped_references_are_bit_for_bit_those_that_were_frozen(tmp_path:
 
     touched = Path(shutil.copy(REFERENCES / "paper.h5", tmp_path))
     change_row(touched, "paper/fig12/reference", touch)
-    now, frozen = digests(touched).splitlines(), (REFERENCES / "paper.sha256").read_text().splitlines()
-    assert [new.split()[1:] for new, old in zip(now, frozen, strict=True) if new != old] == [["paper/fig12", "angles"]]
+    now, frozen = (
+        digests(touched).splitlines(),
+        (REFERENCES / "paper.sha256").read_text().splitlines(),
+    )
+    assert [new.split()[1:] for new, old in zip(now, frozen, strict=True) if new != old] == [
+        ["paper/fig12", "angles"]
+    ]
 
 
 # Bounds
@@ -261,14 +334,19 @@ def test_every_bound_is_below_what_a_known_fault_gives() -> None:
 
 
 def _known_faults() -> Iterator[tuple[Bound, str, str, float]]:
-    """Each bound whose known fault is a number of a scene that is off: with the scene, a method, and by how much."""
+    """Each bound whose known fault is a number of a scene that is off: with the scene, a method,
+    and by how much."""
     for bound in shipped_bounds().entries:
         text, _, place = bound.known_fault.rstrip(")").partition(" (")
         scene = place if "/" in place else f"paper/{place}"
         own = replace(shipped_bounds(), scene="" if bound.scenes == "*" else scene)
-        methods = [name for name in method_names(is_corrected=True) if own.find(bound.check, name) == bound]
+        methods = [
+            name for name in method_names(is_corrected=True) if own.find(bound.check, name) == bound
+        ]
         if methods and (bound.check in WRONG or bound.check == "gap"):
-            share = {"no gravity": -1.0, "every second sample omitted": EVERY_SECOND_SAMPLE}.get(text)
+            share = {"no gravity": -1.0, "every second sample omitted": EVERY_SECOND_SAMPLE}.get(
+                text
+            )
             if share is None:
                 number, percent = re.findall(r"error of (\S+)( %)?", text)[0]
                 share = float(number) * (0.01 if percent else 1.0)
@@ -294,14 +372,19 @@ def test_a_known_fault_reaches_what_its_bound_says(
     path = results_file(tmp_path / "fault.h5", [scene_name], [])
     add_run(path, scene, faulty_run(bound.check, scene, method, share))
     values = [
-        check.value for check in failed(judged(path)) if (check.name, check.where.method) == (bound.check, method)
+        check.value
+        for check in failed(judged(path))
+        if (check.name, check.where.method) == (bound.check, method)
     ]
     assert max(values) >= bound.fault
 
 
 def test_a_users_bound_goes_before_the_shipped_one(good: Path, tmp_path: Path) -> None:
     own = tmp_path / "own.toml"
-    own.write_text('[[bound]]\ncheck = "energy"\nmethod = "exudyn_*"\nvalue = 0\nreason = "nothing is good enough"\n')
+    own.write_text(
+        '[[bound]]\ncheck = "energy"\nmethod = "exudyn_*"\nvalue = 0\nreason = '
+        '"nothing is good enough"\n'
+    )
     lines = lines_of(good, "--bounds", own, status=1)
     assert {line.split(":")[0] for line in lines[:-2]} == {"FAIL energy"}
     assert all("exudyn_tree" in line and "bound 0.00e+00" in line for line in lines[:-2])
@@ -310,9 +393,12 @@ def test_a_users_bound_goes_before_the_shipped_one(good: Path, tmp_path: Path) -
 # Stored numbers
 
 
-@pytest.mark.parametrize("name", ["horizon_s", "defect_max", "angle_uncertainty", "error_growth", "rates"])
+@pytest.mark.parametrize(
+    "name", ["horizon_s", "defect_max", "angle_uncertainty", "error_growth", "rates"]
+)
 def test_a_number_of_the_reference_that_is_edited_is_seen(name: str, copy: Path) -> None:
-    """With a new checksum; halved, a defect by 1e-9 rad, and of its arrays the last bit of one number."""
+    """With a new checksum; halved, a defect by 1e-9 rad, and of its arrays the last bit of one
+    number."""
 
     def edit(row: Rows) -> None:
         if row[name].ndim:
@@ -332,7 +418,9 @@ def test_a_number_of_the_reference_that_is_edited_is_seen(name: str, copy: Path)
 
 
 def test_a_stored_scene_that_is_none_is_refused(tmp_path: Path) -> None:
-    path = store(tmp_path / "r.h5", [Made(paper("fig11", text="blades = 'three'"), METHOD, rotor(np.sin))])
+    path = store(
+        tmp_path / "r.h5", [Made(paper("fig11", text="blades = 'three'"), METHOD, rotor(np.sin))]
+    )
     assert rotor_mbs("check", path).status == 2
 
 
@@ -342,7 +430,10 @@ def test_a_stored_scene_that_is_none_is_refused(tmp_path: Path) -> None:
 def test_hostile_texts_in_a_file_come_out_as_text(tmp_path: Path) -> None:
     scene = replace(paper("fig11", samples=11), name="check/h]]><&", title="<script>\x1b")
     told = {"status": "singular", "message": "<b>\x1b[2J\n::error::%0A&"}
-    made = [Made(scene, REFERENCE, rotor(np.sin)), Made(scene, METHOD, rotor(np.sin), attributes=told, until=0.5)]
+    made = [
+        Made(scene, REFERENCE, rotor(np.sin)),
+        Made(scene, METHOD, rotor(np.sin), attributes=told, until=0.5),
+    ]
     path = store(tmp_path / "hostile.h5", made)
     files = ("--github", "--junit", tmp_path / "c.xml", "--json", tmp_path / "c.json", "-v")
     lines = lines_of(path, *files, status=1)
@@ -350,18 +441,23 @@ def test_hostile_texts_in_a_file_come_out_as_text(tmp_path: Path) -> None:
     assert len([line for line in lines if line.startswith("::error ")]) == formats.WORST
     assert not any(line.startswith("::error::") for line in lines)
     (suite,) = ElementTree.parse(tmp_path / "c.xml").getroot()
-    annotations = [line for line in lines if line.startswith("::error ")]  # in place of the lines of these failures
+    # in place of the lines of these failures
+    annotations = [line for line in lines if line.startswith("::error ")]
     failures = len(annotations) + sum(line.startswith("FAIL") for line in lines)
     assert suite.attrib["name"] == scene.name
     assert suite.attrib["failures"] == str(len(list(suite.iter("failure")))) == str(failures)
-    rows = json.loads((tmp_path / "c.json").read_text(), parse_constant=pytest.fail)  # NaN is no JSON
+    # NaN is no JSON
+    rows = json.loads((tmp_path / "c.json").read_text(), parse_constant=pytest.fail)
     assert [row["passed"] for row in rows].count(False) == failures
     assert len(rows) == len(annotations) + sum(line[:4] in ("pass", "FAIL") for line in lines)
 
 
 def test_a_run_without_samples_says_why_and_one_file_is_not_written_twice(tmp_path: Path) -> None:
     failure = {"status": "solver_failed", "message": "no step"}
-    path = store(tmp_path / "r.h5", [Made(paper("fig11"), METHOD, rotor(np.sin), attributes=failure, until=0.0)])
+    path = store(
+        tmp_path / "r.h5",
+        [Made(paper("fig11"), METHOD, rotor(np.sin), attributes=failure, until=0.0)],
+    )
     line = named(lines_of(path, status=1), "FAIL complete", METHOD)
     assert line.endswith("; stored as solver_failed: no step; no samples")
     assert rotor_mbs("check", "--junit", tmp_path / "a", "--json", tmp_path / "a").status == 2

@@ -1,4 +1,5 @@
-"""Engines with one mistake each fail `test-method` with the right reason or none; right ones of any order pass."""
+"""Engines with one mistake each fail `test-method` with the right reason or none; right ones of any
+order pass."""
 
 from __future__ import annotations
 
@@ -7,7 +8,15 @@ from pathlib import Path
 
 import pytest
 from support import broken_engines
-from support.broken_engines import BROKEN, NOT_FOUND, RIGHT, as_records, checks_of_first_scene, is_right, reasons
+from support.broken_engines import (
+    BROKEN,
+    NOT_FOUND,
+    RIGHT,
+    as_records,
+    checks_of_first_scene,
+    is_right,
+    reasons,
+)
 
 from rotor_mbs.analysis.run_checks import Check
 from rotor_mbs.methods import catalogue
@@ -54,7 +63,13 @@ QUICK = ("r04_tip_no_pitch", "r12_loads_of_blade_1", "r07_rates_in_degrees")
     "name",
     [
         pytest.param(name, marks=() if name in QUICK else pytest.mark.full)
-        for name in (*QUICK, "r10_potential_sign", "r03_kinetic_without_hub", "n04_last_step_short", "n06_no_jumps")
+        for name in (
+            *QUICK,
+            "r10_potential_sign",
+            "r03_kinetic_without_hub",
+            "n04_last_step_short",
+            "n06_no_jumps",
+        )
     ],
 )
 def test_a_mistake_is_named_by_the_first_scene(name: str) -> None:

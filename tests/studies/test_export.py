@@ -21,10 +21,12 @@ from rotor_mbs.solution.trajectory import Trajectory
 from rotor_mbs.studies.export import export
 from rotor_mbs.studies.method_test import leaning_blades
 
-# Springs, dampers, full inertia, torque with a jump between samples; blades that cannot pitch; point masses, chaotic.
+# Springs, dampers, full inertia, torque with a jump between samples; blades that cannot pitch;
+# point masses, chaotic.
 SCENES = ("check/general", "check/held", pytest.param("paper/fig11", marks=pytest.mark.full))
 
-# Steps of one file through plain MuJoCo: torques by the file's own segments, samples every so many steps.
+# Steps of one file through plain MuJoCo: torques by the file's own segments, samples every so many
+# steps.
 PLAIN_MUJOCO = """
 import sys
 import mujoco, numpy
@@ -46,9 +48,14 @@ numpy.save(sys.argv[4], rows)
 
 def plain_python(*arguments: object) -> subprocess.CompletedProcess[str]:
     """In a process without this package on its path, with warnings as errors."""
-    blocked = f"import sys, runpy; sys.modules['rotor_mbs'] = None; sys.argv = {[str(a) for a in arguments]!r}; "
+    blocked = (
+        "import sys, runpy; sys.modules['rotor_mbs'] = None; sys.argv = "
+        f"{[str(a) for a in arguments]!r}; "
+    )
     code = blocked + "runpy.run_path(sys.argv[0], run_name='__main__')"
-    return subprocess.run([sys.executable, "-I", "-W", "error", "-c", code], capture_output=True, text=True)
+    return subprocess.run(
+        [sys.executable, "-I", "-W", "error", "-c", code], capture_output=True, text=True
+    )
 
 
 @pytest.mark.parametrize("name", SCENES)
@@ -73,7 +80,8 @@ def test_the_exudyn_script_in_plain_python(name: str, tmp_path: Path) -> None:
     (path,) = export(scene, "exudyn", tmp_path / "scene.py")
     text = path.read_text(encoding="utf-8")
     assert "rotor_mbs" not in text
-    assert text[text.index("\nLOADS = [\n    [") :].partition("],\n]\n")[1]  # each bracket below its line
+    # each bracket below its line
+    assert text[text.index("\nLOADS = [\n    [") :].partition("],\n]\n")[1]
     done = plain_python(path, tmp_path / "out.csv")
     assert done.returncode == 0, done.stderr
     with (tmp_path / "out.csv").open(encoding="utf-8", newline="") as file:

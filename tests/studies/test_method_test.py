@@ -1,4 +1,5 @@
-"""`test-method`: every shipped method passes, and broken engines fail, each with a right reason or none."""
+"""`test-method`: every shipped method passes, and broken engines fail, each with a right reason or
+none."""
 
 from __future__ import annotations
 
@@ -21,7 +22,13 @@ from rotor_mbs.analysis.kinematics import kinetic_energy, potential_energy, tip_
 from rotor_mbs.comparison.data_defects import judged_defects
 from rotor_mbs.comparison.defect_search import DefectSearch
 from rotor_mbs.comparison.faults import faults_in_time
-from rotor_mbs.comparison.wrong_outputs import root_mean_square, wrong_energy, wrong_loads, wrong_rows, wrong_tip
+from rotor_mbs.comparison.wrong_outputs import (
+    root_mean_square,
+    wrong_energy,
+    wrong_loads,
+    wrong_rows,
+    wrong_tip,
+)
 from rotor_mbs.methods import catalogue
 from rotor_mbs.methods.catalogue import find_method, method_names
 from rotor_mbs.methods.solve import solve
@@ -33,7 +40,8 @@ from rotor_mbs.studies.method_test import NOT_FOUND, examine, five_blades, proto
 
 DOCUMENT = (Path(__file__).parents[2] / "docs" / "your-engine.md").read_text()
 (EXAMPLE,) = re.findall(r"```python\n(.*?)METHOD", DOCUMENT, re.DOTALL)
-# The equations of the document by classical Runge-Kutta steps that end at every sample and at every jump.
+# The equations of the document by classical Runge-Kutta steps that end at every sample and at every
+# jump.
 RK4 = (
     EXAMPLE
     + """
@@ -83,41 +91,63 @@ METHOD = Method(name="rk4", label="own, RK4", build=Rk4, settings=Steps, order=4
 """
 ).replace("np.array(part.loads_at(t))\n        M =", "self.loads(t, part)\n        M =")
 PAST = "np.array([value_at(table, {}) for table in self.scene.load_tables])"
-# What is put in place of what, and what a reason may say beside "cause not found"; more in support/broken_engines.py.
+# What is put in place of what, and what a reason may say beside "cause not found"; more in
+# support/broken_engines.py.
 BROKEN = {
     "Coriolis sign": ("rotor -= 2 *", "rotor -= -2 *", "opposite sign of the Coriolis terms"),
     "inertia about the wrong point": (
-        "+= np.array([m *", "+= np.array([2 * m *", "inertia about the root used as inertia about"
+        "+= np.array([m *",
+        "+= np.array([2 * m *",
+        "inertia about the root used as inertia about",
     ),
-    "damping ignored": (" - self.d * v[1:]", "", "without the dampers of the bearings|damping off by -100 %"),
-    "torque late by a step": ("np.array(part.loads_at(t))", PAST.format("t - self.step"), "load|torque"),
+    "damping ignored": (
+        " - self.d * v[1:]",
+        "",
+        ("without the dampers of the bearings|damping off by -100 %"),
+    ),
+    "torque late by a step": (
+        "np.array(part.loads_at(t))",
+        PAST.format("t - self.step"),
+        "load|torque",
+    ),
     "NaN with success": (
-        "return Integration(True", "self.states[-3:] = [np.nan * y] * 3\n        return Integration(True",
+        "return Integration(True",
+        ("self.states[-3:] = [np.nan * y] * 3\n        return Integration(True"),
         "row [0-9]+ is not finite",
     ),
     "no jump handling": (
-        "intervals(self.scene.load_segments,", "intervals(segments([()] * 9, self.scene.duration),", "load|jump"
+        "intervals(self.scene.load_segments,",
+        "intervals(segments([()] * 9, self.scene.duration),",
+        "load|jump",
     ),
     "first order": (
-        "return y + h / 6 * (k1 + 2 * k2 + 2 * k3 + k4)", "return y + h * k1",
+        "return y + h / 6 * (k1 + 2 * k2 + 2 * k3 + k4)",
+        "return y + h * k1",
         "order (1.0|1.1|0.9)|order 2.* where 4 is expected",
     ),
     "state kept": (
         "        y = self.start()",
-        "        Rk4.runs = getattr(Rk4, 'runs', 0) + 1\n        y = self.start() + 1e-12 * Rk4.runs",
+        (
+            "        Rk4.runs = getattr(Rk4, 'runs', 0) + 1\n        y = self.start() + 1e-12 "
+            "* Rk4.runs"
+        ),
         "state kept between runs",
     ),
     "a step too few": (
-        "for i in range(count)", "for i in range(count - (stop.end == self.scene.duration))",
+        "for i in range(count)",
+        "for i in range(count - (stop.end == self.scene.duration))",
         "times late|row repeated|row omitted|its step|continues from another state",
     ),
     "angles wrapped": (
-        "return Trajectory(self.time[: len(self.states)], *np.split(np.array(self.states), 2, axis=1))",
+        (
+            "return Trajectory(self.time[: len(self.states)], *np.split(np.array(self.states), "
+            "2, axis=1))"
+        ),
         "q, v = np.split(np.array(self.states), 2, axis=1)\n"
         "        return Trajectory(self.time, (q + np.pi) % (2 * np.pi) - np.pi, v)",
         "angles are wrapped",
     ),
-}  # fmt: skip
+}
 
 
 @pytest.fixture(autouse=True)
@@ -138,12 +168,17 @@ def test_the_engine_that_is_broken_below_passes() -> None:
     assert [check for check in examined(RK4) if not check.passed] == []
 
 
-# Half a minute each: of the others every night; on the first scene alone more of them are in test_engines_tried.py.
+# Half a minute each: of the others every night; on the first scene alone more of them are in
+# test_engines_tried.py.
 _IN_CI = ("no jump handling",)
 
 
 @pytest.mark.parametrize(
-    "fault", [pytest.param(one, marks=pytest.mark.full if one in _IN_CI else pytest.mark.nightly) for one in BROKEN]
+    "fault",
+    [
+        pytest.param(one, marks=pytest.mark.full if one in _IN_CI else pytest.mark.nightly)
+        for one in BROKEN
+    ],
 )
 def test_a_broken_engine_fails_with_a_right_reason_or_none(fault: str) -> None:
     old, new, right = BROKEN[fault]
@@ -162,7 +197,9 @@ def test_a_broken_engine_fails_with_a_right_reason_or_none(fault: str) -> None:
         "exact": "solved analytically",
     }
     for check in failed:
-        assert NOT_FOUND in check.hint or re.search(f"{right}|{own.get(check.name, right)}", check.hint), check
+        assert NOT_FOUND in check.hint or re.search(
+            f"{right}|{own.get(check.name, right)}", check.hint
+        ), check
     assert any(re.search(right, check.hint) for check in failed)
     # What an engine raises is no reason.
     assert not any(re.match(r"[^;]*Error", check.hint) for check in failed)
@@ -197,7 +234,9 @@ def test_the_command_prints_a_table_and_writes_what_a_script_reads() -> None:
         ({"time": np.linspace(0.0, 0.9, 5)}, True, "its times are not the scene's sample times"),
     ],
 )  # fmt: skip
-def test_what_is_wrong_with_the_form_of_a_run_is_said(change: dict[str, object], success: bool, fault: str) -> None:
+def test_what_is_wrong_with_the_form_of_a_run_is_said(
+    change: dict[str, object], success: bool, fault: str
+) -> None:
     scene = only_scene("paper/fig03").replace(duration=1.0, samples=5)
     run = Trajectory(np.linspace(0.0, 1.0, 5), np.zeros((5, 2)), np.zeros((5, 2))).replace(**change)
     assert protocol_fault(Solution(scene, "a/b", run, Integration(success))) == fault
@@ -270,7 +309,9 @@ def test_tips_that_are_made_wrongly_are_named() -> None:
     without_pitch = tip_paths(FIVE, run.angles * [1, 0, 0, 0, 0, 0])
     tips = [blade.tip for blade in FIVE.blades]
     tips[1] = (0.1, 0.2, 2.5)
-    longer = replace(FIVE, blades=tuple(replace(b, tip=tip) for b, tip in zip(FIVE.blades, tips, strict=True)))
+    longer = replace(
+        FIVE, blades=tuple(replace(b, tip=tip) for b, tip in zip(FIVE.blades, tips, strict=True))
+    )
     for tip, expected in (
         (without_pitch, "tips without the rotation by the pitch"),
         (own[:, ::-1], "tips of the blades in reverse order"),
@@ -284,11 +325,18 @@ def test_tips_that_are_made_wrongly_are_named() -> None:
 
 def test_energies_that_are_made_wrongly_are_named() -> None:
     run = right_run()
-    kinetic, potential = kinetic_energy(FIVE, run.angles, run.rates), potential_energy(FIVE, run.time, run.angles)
+    kinetic, potential = (
+        kinetic_energy(FIVE, run.angles, run.rates),
+        potential_energy(FIVE, run.time, run.angles),
+    )
     without_hub = replace(FIVE, hub_inertia=0.0)
     run = run.replace(kinetic_energy=kinetic, potential_energy=potential, work=0.0 * kinetic)
     for name, energy, expected in (
-        ("kinetic energy", kinetic_energy(without_hub, run.angles, run.rates), "without the hub's inertia"),
+        (
+            "kinetic energy",
+            kinetic_energy(without_hub, run.angles, run.rates),
+            "without the hub's inertia",
+        ),
         ("kinetic energy", kinetic + 0.01 * run.time, ""),
         ("potential energy", -potential, "opposite sign"),
         ("potential energy", potential + 100.0, "zero at another height"),
@@ -305,9 +353,18 @@ def test_loads_that_are_made_wrongly_are_named() -> None:
     centres = np.array([blade.centre_of_mass for blade in FIVE.blades])
     about_centre = moment - np.cross(centres, force)
     for changed, expected in (
-        ({"blade_root_force": -force}, "blade root force: sign reversed (action in place of reaction)"),
-        ({"blade_root_force": np.roll(force, -1, axis=1)}, "blade root force: of the next blade for each blade"),
-        ({"blade_root_moment": about_centre}, "blade root moment: about the centre of mass in place of the root"),
+        (
+            {"blade_root_force": -force},
+            ("blade root force: sign reversed (action in place of reaction)"),
+        ),
+        (
+            {"blade_root_force": np.roll(force, -1, axis=1)},
+            ("blade root force: of the next blade for each blade"),
+        ),
+        (
+            {"blade_root_moment": about_centre},
+            ("blade root moment: about the centre of mass in place of the root"),
+        ),
         ({"shaft_force": 1e-3 * loads["shaft_force"]}, "shaft force: kN taken as N"),
         ({"shaft_force": loads["shaft_force"] + run.time[:, None]}, ""),
     ):
@@ -319,7 +376,10 @@ def test_rates_in_degrees_are_no_wrapped_angles() -> None:
     turning = replace(FIVE, initial_rates=(20.0, *FIVE.initial_rates[1:]))
     fast = Trajectory(run.time, *other_code.trajectory(turning, run.time))
     wrapped = fast.replace(angles=(fast.angles + np.pi) % (2.0 * np.pi) - np.pi)
-    for rows, fault in ((wrapped, "angles are wrapped"), (fast.replace(rates=np.degrees(fast.rates)), "")):
+    for rows, fault in (
+        (wrapped, "angles are wrapped"),
+        (fast.replace(rates=np.degrees(fast.rates)), ""),
+    ):
         text = protocol_fault(Solution(turning, "a/b", rows, Integration(True)))
         assert fault in text
         assert bool(fault) == bool(text)
@@ -333,7 +393,10 @@ def test_a_motion_that_falls_behind_in_many_intervals_is_late() -> None:
     motion = other_code.trajectory(scene, time - 1e-3 * np.cumsum(is_late))
     defects = interval_defects(scene, time, *motion)
     (text,) = faults_in_time(judged_defects(scene, defects, 1e-6))
-    assert text == "the motion is late by 0.001 s more in each of 10 intervals from t = 0 to 0.56 s: steps, or times"
+    assert text == (
+        "the motion is late by 0.001 s more in each of 10 intervals from t = 0 to 0.56 "
+        "s: steps, or times"
+    )
 
 
 # ---- Causes, on the states of a run by other equations
@@ -357,16 +420,28 @@ OTHERS: dict[str, tuple[Any, Mistakes, str]] = {
     "hub": ({"hub_inertia": 25.0}, other_code.NONE, "the hub's inertia once for each blade"),
     "rest": ({"bearing_rest": ()}, other_code.NONE, "rest angles of the springs ignored"),
     "Steiner": ({"blades": changed_blades(FIVE, 0.0)}, other_code.NONE, "without Steiner's share"),
-    "Steiner twice": ({"blades": changed_blades(FIVE, 2.0)}, other_code.NONE, "inertia about the root used"),
+    "Steiner twice": (
+        {"blades": changed_blades(FIVE, 2.0)},
+        other_code.NONE,
+        ("inertia about the root used"),
+    ),
     "half": ({}, Mistakes(coriolis=0.5), "half of the Coriolis terms"),
-    "azimuths": ({}, Mistakes(phases=tuple(np.arange(5) * 2.0 * np.pi / 3.0)), "blades at multiples of 120 degrees"),
+    "azimuths": (
+        {},
+        Mistakes(phases=tuple(np.arange(5) * 2.0 * np.pi / 3.0)),
+        "blades at multiples of 120 degrees",
+    ),
     "dampers twice": (
         {"bearing_damping": tuple(2.0 * d for d in FIVE.bearing_damping)},
         other_code.NONE,
         "twice the dampers of the bearings",
     ),
     "rest in degrees": (
-        {"bearing_rest": tuple(tuple((t, np.radians(r)) for t, r in table) for table in FIVE.bearing_rest)},
+        {
+            "bearing_rest": tuple(
+                tuple((t, np.radians(r)) for t, r in table) for table in FIVE.bearing_rest
+            )
+        },
         other_code.NONE,
         "rest angles of the springs in rad taken as degrees",
     ),
@@ -404,7 +479,9 @@ OTHERS: dict[str, tuple[Any, Mistakes, str]] = {
 _QUICK = ("right", "Steiner")
 
 
-@pytest.mark.parametrize("name", [pytest.param(one, marks=() if one in _QUICK else pytest.mark.full) for one in OTHERS])
+@pytest.mark.parametrize(
+    "name", [pytest.param(one, marks=() if one in _QUICK else pytest.mark.full) for one in OTHERS]
+)
 def test_a_textbook_cause_is_named_alone_and_nothing_else(name: str) -> None:
     changes, mistakes, expected = OTHERS[name]
     motion = other_code.trajectory(replace(FIVE, **changes), sample_times(FIVE), mistakes)
@@ -420,10 +497,13 @@ def test_a_textbook_cause_is_named_alone_and_nothing_else(name: str) -> None:
 
 
 def test_the_order_of_a_step_is_that_of_root_mean_squares() -> None:
-    """Of both sizes the same quantity: halved steps of an engine of order four leave a sixteenth."""
+    """Of both sizes the same quantity: halved steps of an engine of order four leave a
+    sixteenth."""
     scene = replace(FIVE, rotor_torque=(), bearing_rest=())
     coarse, fine = (
         interval_defects(scene, run.time, run.angles, run.rates)
-        for run in (solve("exudyn_tree/rk44", scene, {"step": step}).trajectory for step in (0.02, 0.01))
+        for run in (
+            solve("exudyn_tree/rk44", scene, {"step": step}).trajectory for step in (0.02, 0.01)
+        )
     )
     assert np.log2(root_mean_square(coarse) / root_mean_square(fine)) == pytest.approx(4.0, abs=0.3)

@@ -1,4 +1,5 @@
-"""The modes study: models agree and a planted error shows, records keep every number, the command, page and API."""
+"""The modes study: models agree and a planted error shows, records keep every number, the command,
+page and API."""
 
 from __future__ import annotations
 
@@ -24,7 +25,11 @@ from rotor_mbs.studies import modes as study
 
 NREL = find_scenes(["stiff/nrel-5mw"])[0]
 SOFT = replace(
-    NREL, name="soft", bearing_stiffness=(1e5,) * 3, bearing_damping=(5e3,) * 3, initial_angles=(0.5, 0.0, 0.0, 0.0)
+    NREL,
+    name="soft",
+    bearing_stiffness=(1e5,) * 3,
+    bearing_damping=(5e3,) * 3,
+    initial_angles=(0.5, 0.0, 0.0, 0.0),
 )
 
 
@@ -56,7 +61,8 @@ def change_one_model(monkeypatch, part, share):
 
 @pytest.mark.parametrize(("part", "off"), [("bearing_stiffness", 5e-7), ("bearing_damping", 5e-8)])
 def test_a_model_of_another_rotor_is_found_out(part, off, monkeypatch):
-    """Half a millionth of the frequency, or a millionth of a decay rate that is a twentieth of it."""
+    """Half a millionth of the frequency, or a millionth of a decay rate that is a twentieth of
+    it."""
     change_one_model(monkeypatch, part, 1e-6)
     found = study.compute_modes(general(gravity=0.0, bearing_damping=(300.0, 500.0, 400.0)))
     assert not found.agrees
@@ -92,7 +98,8 @@ def hold_rotor(stiffness):
 
 @pytest.mark.parametrize("change", [couple_pitches, hold_rotor])
 def test_a_linearization_that_its_modes_do_not_satisfy_is_found_out(change, monkeypatch, tmp_path):
-    """Modes of symmetric equations are computed from a part of the matrices, which is right here."""
+    """Modes of symmetric equations are computed from a part of the matrices, which is right
+    here."""
     break_matrices(monkeypatch, change)
     found = study.compute_modes(replace(SOFT, gravity=0.0), [1.2])
     assert not found.agrees
@@ -107,7 +114,8 @@ def test_a_linearization_that_its_modes_do_not_satisfy_is_found_out(change, monk
 
 
 def test_a_slow_mode_that_is_wrong_is_found_out(monkeypatch):
-    """A pendulum on bearings over a thousand times faster, whose frequency is below what is compared."""
+    """A pendulum on bearings over a thousand times faster, whose frequency is below what is
+    compared."""
     scene = replace(general(bearing_stiffness=(3e8,) * 3), bearing_damping=())
     found = study.compute_modes(scene)
     values = np.abs(found.rest["lagrange"].eigenvalues)
@@ -122,17 +130,28 @@ def test_a_slow_mode_that_is_wrong_is_found_out(monkeypatch):
 
 
 def test_models_that_agree_to_rounding_of_the_largest_eigenvalue_agree():
-    """A mode 600 times slower than the largest has 2e-8 of its own frequency from rounding of 2e-11 of that."""
+    """A mode 600 times slower than the largest has 2e-8 of its own frequency from rounding of 2e-11
+    of that."""
     blade = {
         "mass": 5735.873229895609,
         "centre_of_mass": [-0.12268342394039689, 0.14314354773890337, 12.592758364323915],
         "inertia": [
-            85519.73186439436, 86726.09939908709, 1578.6863819026487, -295.9626892286708, -2578.226239776899,
+            85519.73186439436,
+            86726.09939908709,
+            1578.6863819026487,
+            -295.9626892286708,
+            -2578.226239776899,
             1084.554916651137,
         ],
         "tip": [0.0, 0.0, 22.0],
-    }  # fmt: skip
-    angles = [2.1916749052073907, 0.489647641963062, -0.04283653238530771, -1.1838732991132703, 0.14028002379495041]
+    }
+    angles = [
+        2.1916749052073907,
+        0.489647641963062,
+        -0.04283653238530771,
+        -1.1838732991132703,
+        0.14028002379495041,
+    ]
     stiffness = [22807.77811834454, 54485.32665326917, 16882.012736492943, 16766.434760896558]
     tables = {
         "title": "r", "blades": 4, "gravity": 9.81, "duration": 1.0, "samples": 11, "blade": blade,
@@ -146,7 +165,8 @@ def test_models_that_agree_to_rounding_of_the_largest_eigenvalue_agree():
 
 @pytest.mark.parametrize("share", [-1e-13, 1e-13])
 def test_modes_of_equal_frequency_are_in_the_same_places_for_every_model(share, monkeypatch):
-    """Of equal blades with unequal dampers the last bits of each model decide which is the slowest."""
+    """Of equal blades with unequal dampers the last bits of each model decide which is the
+    slowest."""
     change_one_model(monkeypatch, "bearing_stiffness", share)
     found = study.compute_modes(replace(SOFT, gravity=0.0, bearing_damping=(3e3, 4e3, 5e3)), [3.0])
     ratios = [model.damping_ratios for model in found.rotation.values()]
@@ -167,11 +187,28 @@ def test_records_keep_every_number(tmp_path):
     found = study.compute_modes(SOFT, [1.2, 3.0])
     write_records(tmp_path / "modes.h5", to_records(found))
     read = read_modes(tmp_path / "modes.h5")["soft"]
-    assert (read.title, read.blades, read.gravity, read.notes) == (found.title, 3, found.gravity, found.notes)
+    assert (read.title, read.blades, read.gravity, read.notes) == (
+        found.title,
+        3,
+        found.gravity,
+        found.notes,
+    )
     for model, one in found.rotation.items():
         other = read.rotation[model]
-        assert (other.names, other.label, other.coordinates) == (one.names, one.label, one.coordinates)
-        for name in ("speeds", "angles", "stiffness", "damping", "eigenvalues", "shapes", "multiblade_shapes"):
+        assert (other.names, other.label, other.coordinates) == (
+            one.names,
+            one.label,
+            one.coordinates,
+        )
+        for name in (
+            "speeds",
+            "angles",
+            "stiffness",
+            "damping",
+            "eigenvalues",
+            "shapes",
+            "multiblade_shapes",
+        ):
             np.testing.assert_array_equal(getattr(other, name), getattr(one, name))
     for name in ("speeds", "multipliers", "largest", "stable", "torque", "mismatch"):
         np.testing.assert_array_equal(getattr(read.floquet, name), getattr(found.floquet, name))
@@ -181,13 +218,25 @@ def test_records_keep_every_number(tmp_path):
         read_modes(tmp_path / "none.h5")
 
 
-@pytest.mark.parametrize("speeds", [(1.0, 0.5), (-1.0,), (1.0, 1.0), (float("nan"),), ("a",), (1e-320,), (10**400,)])
+@pytest.mark.parametrize(
+    "speeds", [(1.0, 0.5), (-1.0,), (1.0, 1.0), (float("nan"),), ("a",), (1e-320,), (10**400,)]
+)
 def test_speeds_that_do_not_increase_from_zero_are_refused(speeds):
-    with pytest.raises(InputError, match=r"speeds: .*[1na].*; allowed: increasing numbers, each 0 or from"):
+    with pytest.raises(
+        InputError,
+        match=(
+            r"speeds: .*[1na].*; allowed: increasing numbers, each "
+            r"0 or from"
+        ),
+    ):
         study.compute_modes(SOFT, speeds)
 
 
-RIGID = {"blade.centre_of_mass": [0.0, 0.0, 20.0], "blade.inertia": [0.0] * 6, "bearing.stiffness": 0.0}
+RIGID = {
+    "blade.centre_of_mass": [0.0, 0.0, 20.0],
+    "blade.inertia": [0.0] * 6,
+    "bearing.stiffness": 0.0,
+}
 AXIAL = {**RIGID, "blade.inertia": [4e6, 4e6, 2e4, 0.0, 0.0, 0.0]}
 BALANCED = "balanced rotor: no preferred angle; modes taken at the initial angle"
 
@@ -211,7 +260,8 @@ def at_rest(changes: dict[str, object], *pitches: float) -> Scene:
     ],
 )
 def test_a_balanced_rotor_has_its_modes_at_the_initial_angle(changes, pitches):
-    """Weights that balance leave rounding of 1e-16 of them, which is no stiffness, and no torque."""
+    """Weights that balance leave rounding of 1e-16 of them, which is no stiffness, and no
+    torque."""
     found = study.compute_modes(at_rest(changes, *pitches))
     assert found.notes == (BALANCED,)
     assert found.agrees
@@ -224,8 +274,11 @@ def test_a_balanced_rotor_has_its_modes_at_the_initial_angle(changes, pitches):
 
 
 def test_weights_that_soft_bearings_do_not_balance_turn_the_rotor():
-    """On springs of 1e5 N m/rad the pitches move by 0.1 rad a turn: the energy has minima at every sixth of one."""
-    found = study.compute_modes(at_rest({"bearing.stiffness": 1e5, "bearing.rest": 0.5}, 0.5, 0.5, 0.5))
+    """On springs of 1e5 N m/rad the pitches move by 0.1 rad a turn: the energy has minima at every
+    sixth of one."""
+    found = study.compute_modes(
+        at_rest({"bearing.stiffness": 1e5, "bearing.rest": 0.5}, 0.5, 0.5, 0.5)
+    )
     assert found.notes == ()
     assert found.rest["lagrange"].angles[0, 0] == pytest.approx(np.pi / 6.0, abs=1e-9)
 
@@ -237,7 +290,10 @@ def test_no_steady_state_is_one_line_and_no_file(tmp_path):
     scene = replace(at_rest(FREE_TORQUE, 0.1, 0.1, 0.1), name="free")
     (tmp_path / "free.toml").write_text(scene.text, encoding="utf-8")
     output = tmp_path / "modes.h5"
-    reason = "no steady state at 0 rad/s: a torque of 500 N m acts on pitch 1, which has no spring, and nothing"
+    reason = (
+        "no steady state at 0 rad/s: a torque of 500 N m acts on pitch 1, which has no "
+        "spring, and nothing"
+    )
     shown = rotor_mbs("modes", "-o", output, "-j", 1, tmp_path / "free.toml", "--speeds=0:0.001:2")
     assert shown == (2, "", f"not run: free: {reason} balances it\n")
     assert not output.exists()
@@ -295,7 +351,9 @@ def test_the_command_writes_a_file_that_opens_in_xarray_and_a_page(tmp_path: Pat
     page = (tmp_path / "modes-report" / "index.html").read_text(encoding="utf-8")
     for text in ("Campbell diagram", "collective pitch", "Floquet multipliers", "forward whirl"):
         assert text in page
-    held = rotor_mbs("modes", "check/held", "--speeds", "0:2:3", "-o", tmp_path / "held.h5", "-j", 1)
+    held = rotor_mbs(
+        "modes", "check/held", "--speeds", "0:2:3", "-o", tmp_path / "held.h5", "-j", 1
+    )
     assert held.status == 0
     assert "under gravity at 0, unknown at 2 of 2 speeds" in held.out
     page = (tmp_path / "held-report" / "index.html").read_text(encoding="utf-8")
@@ -321,7 +379,9 @@ def test_other_speeds_take_the_place_of_all_that_was_stored_for_the_scene(tmp_pa
     found = read_modes(output)
     assert found["soft"].rest
     assert not found["soft"].rotation
-    general_before, general_now = (modes["general"].rotation["lagrange"] for modes in (first, found))
+    general_before, general_now = (
+        modes["general"].rotation["lagrange"] for modes in (first, found)
+    )
     np.testing.assert_array_equal(general_now.eigenvalues, general_before.eigenvalues)
 
 
@@ -359,4 +419,6 @@ def test_the_api_has_tables_figures_files(found, tmp_path):
     data = found.to_xarray()
     assert data.solver.long_name == "model"
     expected = found.rotation["lagrange"].undamped_frequencies[:, 2]
-    np.testing.assert_array_equal(data.undamped_frequency.sel(solver="lagrange", mode="cosine pitch"), expected)
+    np.testing.assert_array_equal(
+        data.undamped_frequency.sel(solver="lagrange", mode="cosine pitch"), expected
+    )

@@ -1,4 +1,5 @@
-"""Stiff and extreme scenes against what is known of them exactly: quadrature, elliptic functions; ladders of steps."""
+"""Stiff and extreme scenes against what is known of them exactly: quadrature, elliptic functions;
+ladders of steps."""
 
 from __future__ import annotations
 
@@ -30,13 +31,14 @@ mp.dps = 30
 
 
 class Passage:
-    """One blade without gravity in 30 digits: time and rotor angle as integrals over the pitch. Knows no model of ours.
+    """One blade without gravity in 30 digits: time and rotor angle as integrals over the pitch.
+    Knows no model of ours.
 
-    Kept are E = ½ S Ω² + ½ J u² and p = S Ω + b u with u = θ̇ + b Ω / J, b = -m c d sin θ, J = m c²,
-    S = h + m (c² + d²) cos² θ.
-    Eliminating: θ̇ = √(N / S) / J and Ω = (p - b u) / S, u = (p b + √(S N)) / (b² + S J), N = 2 E b² - J p² + 2 E S J,
-    for the branch with θ̇ > 0 that starts at Ω = 0. With cos θ = sin x, x = π/2 - θ = ε sinh y, ε² = h / (m (c² + d²)),
-    the integrand is smooth in y through x = 0.
+    Kept are E = ½ S Ω² + ½ J u² and p = S Ω + b u with u = θ̇ + b Ω / J, b = -m c d sin θ, J = m
+    c², S = h + m (c² + d²) cos² θ. Eliminating: θ̇ = √(N / S) / J and Ω = (p - b u) / S, u = (p b +
+    √(S N)) / (b² + S J), N = 2 E b² - J p² + 2 E S J, for the branch with θ̇ > 0 that starts at Ω =
+    0. With cos θ = sin x, x = π/2 - θ = ε sinh y, ε² = h / (m (c² + d²)), the integrand is smooth
+    in y through x = 0.
 
     From pitch `start` (rad), with the rotor at rest and a pitch rate of 1 rad/s.
     """
@@ -55,7 +57,8 @@ class Passage:
 
     def time_and_rotor(self, pitch: float) -> tuple[Any, Any]:
         """s and rad (from the start) at which `pitch` is reached."""
-        # The integrand is analytic to y = ± iπ/2, so that Gauss's rule converges fast on panels of width 1.
+        # The integrand is analytic to y = ± iπ/2, so that Gauss's rule converges fast on panels of
+        # width 1.
         y1 = self._y(pitch)
         panels = mp.linspace(y1, self.y0, 2 + int(abs(self.y0 - y1)))
         time, rotor = (
@@ -82,7 +85,8 @@ class Passage:
     "hub", ["1e0", "1e-6", *(pytest.param(hub, marks=pytest.mark.full) for hub in ("1e3", "1e-3"))]
 )
 def test_through_the_singular_pitch(hub: str) -> None:
-    """Time and rotor angle at every tenth pitch that the run passes, against 30-digit integrals over the pitch."""
+    """Time and rotor angle at every tenth pitch that the run passes, against 30-digit integrals
+    over the pitch."""
     one = shipped(f"extreme/passage-{hub}")
     found = solve(TAYLOR, one, {}).trajectory
     x, _, z = one.blades[0].centre_of_mass
@@ -90,17 +94,21 @@ def test_through_the_singular_pitch(hub: str) -> None:
     assert found.angles[0, 1] < np.pi / 2 < found.angles[-1, 1]
     for k in range(10, len(found.time), 10):
         time, rotor = exact.time_and_rotor(float(found.angles[k, 1]))
-        assert abs(float(time) - found.time[k]) * exact.pitch_rate(float(found.angles[k, 1])) <= 1e-9
+        assert (
+            abs(float(time) - found.time[k]) * exact.pitch_rate(float(found.angles[k, 1])) <= 1e-9
+        )
         spin = abs(found.rates[k, 0])
         assert abs(float(rotor) - found.angles[k, 0]) <= 1e-9 + spin * 1e-9
 
 
 @pytest.mark.full
 def test_an_hour_of_a_regular_motion() -> None:
-    """Errors of the start grow with the time and no faster; the closed form is right to the end, and the tree is.
+    """Errors of the start grow with the time and no faster; the closed form is right to the end,
+    and the tree is.
 
-    A rate off by δ turns the rotor by δ t: growth t / s. Pitch errors swing with at most the highest pitch frequency.
-    The tree makes 720 000 steps of order 6 at ωh = 0.07: (ωh)^7/7! a step, a few 1e-12 of the pitch, 1e-8 at most.
+    A rate off by δ turns the rotor by δ t: growth t / s. Pitch errors swing with at most the
+    highest pitch frequency. The tree makes 720 000 steps of order 6 at ωh = 0.07: (ωh)^7/7! a step,
+    a few 1e-12 of the pitch, 1e-8 at most.
     """
     one = shipped("extreme/hour-small")
     exact = reference(one.name)
@@ -116,8 +124,11 @@ def test_an_hour_of_a_regular_motion() -> None:
 
 
 def test_generalized_alpha_has_no_limit() -> None:
-    """ωh = 1000 on a linear swing: what it draws is wrong, but does not grow. (The chain's Newton fails.)"""
-    one = replace(shipped("stiff/bearing-1e12"), duration=5.0, samples=51, outputs=("angles", "rates"))
+    """ωh = 1000 on a linear swing: what it draws is wrong, but does not grow. (The chain's Newton
+    fails.)"""
+    one = replace(
+        shipped("stiff/bearing-1e12"), duration=5.0, samples=51, outputs=("angles", "rates")
+    )
     found = solve("exudyn_tree/generalized_alpha", one, {"step": 0.01}).trajectory
     assert len(found.time) == one.samples
     assert np.abs(found.angles[:, 1:]).max() <= 2e-3
@@ -134,7 +145,8 @@ def test_a_ladder_of_runs_that_fail_at_once_ends(tmp_path: Path) -> None:
     light, method = shipped("extreme/light-1e-8"), "exudyn_chain/generalized_alpha"
     curve = ladder_curve(light, method)
     file = fit_file_to_request(
-        tmp_path / "s.h5", [*results_tables([RunRequest(light, "reference")]), *curve_tables([curve])]
+        tmp_path / "s.h5",
+        [*results_tables([RunRequest(light, "reference")]), *curve_tables([curve])],
     )
     (task,) = curve_tasks(file, [curve], 60.0, 0.5, 3.0)
     rows = task.perform()
@@ -146,9 +158,11 @@ def test_a_ladder_of_runs_that_fail_at_once_ends(tmp_path: Path) -> None:
 
 @pytest.mark.nightly
 def test_a_million_periods_of_the_pendulum() -> None:
-    """Against sn of Jacobi; energy within a random walk of round-off, 2e-14·√steps at most, all along.
+    """Against sn of Jacobi; energy within a random walk of round-off, 2e-14·√steps at most, all
+    along.
 
-    An energy off by δ shifts the period by about δ, and the angle by δ·2π·10⁶ at the end: with δ ≤ 1e-12, 6e-6 rad.
+    An energy off by δ shifts the period by about δ, and the angle by δ·2π·10⁶ at the end: with δ ≤
+    1e-12, 6e-6 rad.
     """
     from scipy.special import ellipj, ellipk
 

@@ -1,4 +1,5 @@
-"""The suite itself: a killed worker, a hung run, the map and its pages; scenes that say what they stress."""
+"""The suite itself: a killed worker, a hung run, the map and its pages; scenes that say what they
+stress."""
 
 from __future__ import annotations
 
@@ -35,9 +36,13 @@ def test_no_run_of_ours_claims_success_and_the_pages_have_every_outcome(tmp_path
     assert {cell.scene for cell in found} == set(SCENES)
     ours = [cell for cell in found if cell.method.startswith("lagrange")]
     assert not [cell for cell in ours if cell.false_success]
-    assert [cell for cell in found if cell.false_success]  # Exudyn's explicit methods on the overdamped bearing
-    assert not [cell for cell in found if cell.status == "ok" and cell.scene == "extreme/rate-1e200"]
-    # A fault of this package would be stored as a run that failed, with the exception's name before its text.
+    # Exudyn's explicit methods on the overdamped bearing
+    assert [cell for cell in found if cell.false_success]
+    assert not [
+        cell for cell in found if cell.status == "ok" and cell.scene == "extreme/rate-1e200"
+    ]
+    # A fault of this package would be stored as a run that failed, with the exception's name before
+    # its text.
     assert not [cell for cell in found if re.match(r"\w+Error: ", cell.message)]
 
     folder = tmp_path / "stability-report"
@@ -46,22 +51,36 @@ def test_no_run_of_ours_claims_success_and_the_pages_have_every_outcome(tmp_path
         assert words in page
         assert symbol in page
     for scene in SCENES:
-        assert "# Stresses" in (folder / (scene.replace("/", "-") + ".html")).read_text(encoding="utf-8")
-    assert [row[0] for row in suite_table(found).rows] == list(dict.fromkeys(cell.method for cell in found))
+        assert "# Stresses" in (folder / (scene.replace("/", "-") + ".html")).read_text(
+            encoding="utf-8"
+        )
+    assert [row[0] for row in suite_table(found).rows] == list(
+        dict.fromkeys(cell.method for cell in found)
+    )
 
 
 @pytest.mark.nightly
 def test_a_run_of_which_only_the_energy_is_known_is_unchecked(tmp_path: Path) -> None:
-    """A needle sampled at its two ends, 100 s apart: between them errors grow until nothing is known of the motion."""
+    """A needle sampled at its two ends, 100 s apart: between them errors grow until nothing is
+    known of the motion."""
     pytest.importorskip("heyoka")
     path = tmp_path / "needle.h5"
     (one,) = find_scenes(["extreme/needle-fig05-1e-15"])
     short = replace(one, samples=2, duration=100.0)
-    run_scenes([short], {one.name: ["lagrange/taylor"]}, path, workers=0, timeout_s=60.0, settings={"tolerance": 1e-15})
+    run_scenes(
+        [short],
+        {one.name: ["lagrange/taylor"]},
+        path,
+        workers=0,
+        timeout_s=60.0,
+        settings={"tolerance": 1e-15},
+    )
     (cell,) = suite_runs(path)
     assert (cell.status, cell.outcome) == ("unchecked", "unchecked")
     assert cell.message.startswith("rows 100 s apart")
-    assert cell.message.endswith("in 1 intervals a defect of 0.01 rad would not be seen; more samples")
+    assert cell.message.endswith(
+        "in 1 intervals a defect of 0.01 rad would not be seen; more samples"
+    )
     assert suite_table([cell]).rows == [("lagrange/taylor", "0 of 1", "0")]
     page = write_report(path, tmp_path / "report").read_text(encoding="utf-8")
     assert cell.message in page
@@ -78,7 +97,8 @@ def test_runs_are_counted_by_folder() -> None:
         made_run("a", "ok"),
         made_run("a", "smaller_step", "stiff/b"),
         made_run("a", "diverged", "extreme/feather-1", false_success=True),
-        made_run("a", "singular", "extreme/passage-1", has_reference=False),  # no motion exists: not counted
+        # no motion exists: not counted
+        made_run("a", "singular", "extreme/passage-1", has_reference=False),
         made_run("b", "ok"),
         made_run("printed/ode45", "completed"),
         made_run("printed/ode45", "diverged"),
@@ -87,13 +107,17 @@ def test_runs_are_counted_by_folder() -> None:
     assert table.head == ("method", "stiff", "extreme", "reported as success")
     printed = ("printed/ode45", "1 of 2 completed", "", "0")
     assert table.rows == [("a", "1+1 of 2", "0 of 1", "1"), ("b", "1 of 1", "", "0"), printed]
-    assert {*STATUSES} - {"left_out", "worker_died"} <= {*OUTCOMES}  # the map shows whatever a stored run can have
+    # the map shows whatever a stored run can have
+    assert {*STATUSES} - {"left_out", "worker_died"} <= {*OUTCOMES}
 
 
 def test_an_interrupted_suite_goes_on_where_it_stopped(tmp_path: Path) -> None:
     """Each row is stored when it is computed; what is there is not computed again."""
     path, name = tmp_path / "s.h5", "extreme/light-1e-2"
-    scenes, methods = find_scenes([name]), ["exudyn_tree/generalized_alpha", "exudyn_tree/rk67", "exudyn_tree/rk44"]
+    scenes, methods = (
+        find_scenes([name]),
+        ["exudyn_tree/generalized_alpha", "exudyn_tree/rk67", "exudyn_tree/rk44"],
+    )
     run_scenes(scenes, {name: methods}, path, workers=0, timeout_s=60.0)
 
     def interrupt(*_: object) -> None:
@@ -103,6 +127,8 @@ def test_an_interrupted_suite_goes_on_where_it_stopped(tmp_path: Path) -> None:
         complete_ladders(scenes, {name: methods}, path, 0, interrupt)
     begun = {record.method for record in read_records(path, STEPS)}
     assert len(begun) in (1, 2)  # one more may have ended
-    assert {outcome.method for outcome in complete_ladders(scenes, {name: methods}, path, 0)} == {*methods} - begun
+    assert {outcome.method for outcome in complete_ladders(scenes, {name: methods}, path, 0)} == {
+        *methods
+    } - begun
     assert complete_ladders(scenes, {name: methods}, path, 0) == []
     assert [file.name for file in tmp_path.iterdir()] == ["s.h5"]

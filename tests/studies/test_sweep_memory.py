@@ -44,7 +44,10 @@ def test_a_worker_does_not_grow(tmp_path: Path, method: str, samples: int, durat
                 before = pool.submit(_resident, None, 60.0).result()
             pool.submit(Chunk.perform, chunk, 60.0).result()
         after = pool.submit(_resident, None, 60.0).result()
-    print(f"\n{method}, {samples} samples: {before:.1f} MB after 1,000 runs, {after:.1f} MB after 11,000")
+    print(
+        f"\n{method}, {samples} samples: {before:.1f} MB after 1,000 runs, {after:.1f} MB "
+        "after 11,000"
+    )
     assert after - before < 20.0
 
 
@@ -52,7 +55,17 @@ def test_the_parent_of_100_000_runs_is_small(tmp_path: Path) -> None:
     path = starts_file(tmp_path, 100_000, 11, 0.1, "lagrange/taylor")
     code = "import resource, sys; from rotor_mbs.cli import main; status = main(sys.argv[1:]); "
     code += "print('KB', resource.getrusage(resource.RUSAGE_SELF).ru_maxrss); sys.exit(status)"
-    command = [sys.executable, "-c", code, "sweep", str(path), "-o", str(tmp_path / "o.h5"), "-j", "2"]
+    command = [
+        sys.executable,
+        "-c",
+        code,
+        "sweep",
+        str(path),
+        "-o",
+        str(tmp_path / "o.h5"),
+        "-j",
+        "2",
+    ]
     done = subprocess.run(command, capture_output=True, text=True, check=True)
     most = int(done.stdout.split()[-1]) / 1024
     print(f"\n{most:.0f} MB")

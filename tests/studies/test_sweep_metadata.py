@@ -59,10 +59,16 @@ def splits(dataset: Path) -> Iterator[tuple[str, dict[str, np.ndarray]]]:
 
 
 def test_croissant_names_every_variable_and_the_content(dataset: Path) -> None:
-    croissant = json.loads(dataset.with_suffix(".croissant.json").read_text(), parse_constant=pytest.fail)
-    assert croissant["distribution"][0]["sha256"] == hashlib.sha256(dataset.read_bytes()).hexdigest()
+    croissant = json.loads(
+        dataset.with_suffix(".croissant.json").read_text(), parse_constant=pytest.fail
+    )
+    assert (
+        croissant["distribution"][0]["sha256"] == hashlib.sha256(dataset.read_bytes()).hexdigest()
+    )
     with h5py.File(dataset) as file:
-        along_runs = {name for name, item in file.items() if item.shape[0] == 18 and name != "message_byte"}
+        along_runs = {
+            name for name, item in file.items() if item.shape[0] == 18 and name != "message_byte"
+        }
     assert {field["name"] for field in croissant["recordSet"][0]["field"]} == along_runs
 
 
@@ -70,7 +76,8 @@ def test_croissant_names_every_variable_and_the_content(dataset: Path) -> None:
 @pytest.mark.filterwarnings("ignore::DeprecationWarning")  # of the validator and what it imports
 def test_croissant_is_valid(dataset: Path) -> None:
     mlcroissant = pytest.importorskip("mlcroissant")
-    mlcroissant.Dataset(jsonld=str(dataset.with_suffix(".croissant.json")))  # raises where it is not
+    # raises where it is not
+    mlcroissant.Dataset(jsonld=str(dataset.with_suffix(".croissant.json")))
 
 
 def test_a_split_has_its_runs_bit_for_bit(dataset: Path) -> None:
@@ -89,9 +96,13 @@ def test_a_dataset_card_replaces_its_own_kind_only(dataset: Path, tmp_path: Path
     text = card.read_text()
     assert [file.name for file in files] == ["train.h5", "validation.h5", "test.h5"]
     assert all(f"path: {file.name}" in text for file in files)
-    with pytest.raises(StoreError, match=f"a split for .*; allowed: the sweep's own file, {dataset.name}"):
+    with pytest.raises(
+        StoreError, match=(f"a split for .*; allowed: the sweep's own file, {dataset.name}")
+    ):
         StoredSweep(files[0])
-    assert "a split for Hugging Face datasets; allowed: the sweep's own file" in refusal("show", files[0])
+    assert "a split for Hugging Face datasets; allowed: the sweep's own file" in refusal(
+        "show", files[0]
+    )
     write_splits(dataset, tmp_path)
     card.write_text("of somebody else")
     with pytest.raises(InputError, match="is not an output of this command"):
@@ -111,9 +122,12 @@ def test_hugging_face_reads_the_folder_bit_for_bit(dataset: Path, tmp_path: Path
 
 
 def test_the_loader_of_the_documentation(dataset: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Its text, run with a stand-in for PyTorch: normalized inputs and angles of the training runs."""
+    """Its text, run with a stand-in for PyTorch: normalized inputs and angles of the training
+    runs."""
     [code] = re.findall(
-        r"```python\n(import h5py[^`]*, torch\n[^`]*)```", (ROOT / "docs/sweeps.md").read_text(), re.DOTALL
+        r"```python\n(import h5py[^`]*, torch\n[^`]*)```",
+        (ROOT / "docs/sweeps.md").read_text(),
+        re.DOTALL,
     )
     data = SimpleNamespace(TensorDataset=lambda *arrays: arrays)
     torch = SimpleNamespace(utils=SimpleNamespace(data=data), from_numpy=lambda array: array)

@@ -1,4 +1,5 @@
-"""Sweeps end to end: the same bytes with one worker or two, after kills and interrupts; a run that kills is found."""
+"""Sweeps end to end: the same bytes with one worker or two, after kills and interrupts; a run that
+kills is found."""
 
 from __future__ import annotations
 
@@ -51,7 +52,10 @@ def test_side_by_side_or_not_the_runs_are_the_same(tmp_path: Path) -> None:
         np.testing.assert_array_equal(file["angles"][:, 0, 1], file["initial_angles_1"])
         assert file["variant"][()].tolist() == [*range(8)] * 2
         assert file["method_code"][()].tolist() == [0] * 8 + [1] * 8
-        assert file["method_code"].attrs["flag_meanings"].split() == ["lagrange/taylor", "lagrange/dop853"]
+        assert file["method_code"].attrs["flag_meanings"].split() == [
+            "lagrange/taylor",
+            "lagrange/dop853",
+        ]
         assert file["split"][()].tolist()[:8] == file["split"][()].tolist()[8:]
         assert file["split"][:8].sum() == 2
         assert (file["energy_drift_max"][()] < 1e-11).all()
@@ -83,7 +87,9 @@ def test_parts_of_a_job_array_are_the_slices_of_the_whole(tmp_path: Path) -> Non
     for name in ("run", "angles", "initial_angles_1", "status", "split", "crc32"):
         joined = np.concatenate([part.column(name) for part in parts])
         np.testing.assert_array_equal(joined, whole.column(name), err_msg=name)
-    empty = rotor_mbs("sweep", tmp_path / "s.toml", "--part", "1/9", "-o", tmp_path / "empty.h5", "-j", 1)
+    empty = rotor_mbs(
+        "sweep", tmp_path / "s.toml", "--part", "1/9", "-o", tmp_path / "empty.h5", "-j", 1
+    )
     assert (empty.status, empty.out) == (0, "no runs in this part\n")
     assert not (tmp_path / "empty.h5").exists()
 
@@ -91,8 +97,11 @@ def test_parts_of_a_job_array_are_the_slices_of_the_whole(tmp_path: Path) -> Non
 # Rows of other versions, and damaged ones
 
 
-def test_runs_of_other_versions_are_kept_and_counted(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Here a plug-in whose code is corrected under the same version; fresh: all runs are computed again."""
+def test_runs_of_other_versions_are_kept_and_counted(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Here a plug-in whose code is corrected under the same version; fresh: all runs are computed
+    again."""
     source, output, sweep = tmp_path / "plug_in.py", tmp_path / "o.h5", load_sweep(_file(tmp_path))
     monkeypatch.setitem(find_method("lagrange/dop853").__dict__, "sources", (source,))
 
@@ -150,14 +159,20 @@ def test_a_run_that_kills_its_worker_is_found_and_the_others_go_on(
 
 def test_a_misspelt_setting_is_one_line_and_no_file(tmp_path: Path) -> None:
     path = _file(tmp_path)
-    path.write_text(path.read_text().replace("samples", "settings = { tolerence = 1e-15 }\nsamples", 1))
+    path.write_text(
+        path.read_text().replace("samples", "settings = { tolerence = 1e-15 }\nsamples", 1)
+    )
     told = refusal("sweep", path, "-o", tmp_path / "o.h5", "-j", 1)
-    assert "s.toml:5: settings: lagrange/dop853: no setting 'tolerence'; allowed: relative_tol" in told
+    assert (
+        "s.toml:5: settings: lagrange/dop853: no setting 'tolerence'; allowed: relative_tol" in told
+    )
     assert not list(tmp_path.glob("o.h5*"))
 
 
 def test_a_dry_run_tells_runs_and_size_and_writes_nothing(tmp_path: Path) -> None:
-    ended = rotor_mbs("sweep", _file(tmp_path), "-o", tmp_path / "o.h5", "--dry-run", "--json", "-j", 1)
+    ended = rotor_mbs(
+        "sweep", _file(tmp_path), "-o", tmp_path / "o.h5", "--dry-run", "--json", "-j", 1
+    )
     assert ended.status == 0
     facts = json.loads(ended.out)
     assert facts["runs"] == 8
@@ -186,7 +201,8 @@ values = [0, 9.8]
 
 
 def test_the_error_growth_is_that_of_the_frozen_reference(tmp_path: Path) -> None:
-    """Both from double precision variational equations, whose own rounding is far below a thousandth."""
+    """Both from double precision variational equations, whose own rounding is far below a
+    thousandth."""
     pytest.importorskip("heyoka")
     (scene,) = find_scenes(["paper/fig11"])
     assert scene.gravity == 9.8

@@ -1,4 +1,5 @@
-"""The scenes of the NREL 5-MW rotor: their frozen references against what can be worked out by hand."""
+"""The scenes of the NREL 5-MW rotor: their frozen references against what can be worked out by
+hand."""
 
 from __future__ import annotations
 
@@ -28,7 +29,8 @@ BLADE, ARM = 17740.0, 1.5 + 20.475  # kg, m
 def test_at_rated_speed_the_generator_takes_the_rated_power() -> None:
     found, scene = references.reference("turbine/steady"), shipped("turbine/steady")
     assert np.abs(found.rates[:, 0] - RATED).max() < 1e-14
-    assert scene.torque_at(0.0) * RATED == pytest.approx(5.29661e6, rel=1e-6)  # W: the report's rated mechanical power
+    # W: the report's rated mechanical power
+    assert scene.torque_at(0.0) * RATED == pytest.approx(5.29661e6, rel=1e-6)
     assert scene.shaft_damping * RATED == pytest.approx(TORQUE, rel=1e-15)
     # The hub carries each blade's weight and its centrifugal force.
     forces = found.quantities["blade_root_force"]
@@ -39,21 +41,30 @@ def test_at_rated_speed_the_generator_takes_the_rated_power() -> None:
 
 @pytest.mark.parametrize("name", ["steady", "imbalance"])
 def test_scipys_integrators_are_not_stopped_by_megawatts_that_balance(name: str) -> None:
-    """Drive less damper is rounding error, 1e-9 W: held to 1e-16 J as the work was, no step was short enough."""
+    """Drive less damper is rounding error, 1e-9 W: held to 1e-16 J as the work was, no step was
+    short enough."""
     scene, exact = shipped(f"turbine/{name}"), references.reference(f"turbine/{name}")
     found = solve("lagrange/dop853", scene, {}, time_limit_s=20.0)
     assert found.integration.success
     assert np.abs(found.trajectory.angles - exact.angles).max() < 1e-11
-    assert np.abs(found.trajectory.work - exact.work).max() < 1e-12 * np.abs(exact.kinetic_energy).max()
+    assert (
+        np.abs(found.trajectory.work - exact.work).max()
+        < 1e-12 * np.abs(exact.kinetic_energy).max()
+    )
 
 
 @pytest.mark.parametrize(("factor", "status"), [(1.0, "ok"), (1.0 + 1e-12, "inaccurate")])
-def test_loads_of_a_stiff_bearing_are_known_to_the_rounding_of_its_angle(factor: float, status: str) -> None:
+def test_loads_of_a_stiff_bearing_are_known_to_the_rounding_of_its_angle(
+    factor: float, status: str
+) -> None:
     """9.7e8 N m/rad: a unit in the last place of a pitch is 4e-14 of the largest load."""
     scene = shipped("turbine/feather-stuck")
     exact = frozen_solution(scene)
     assert exact is not None
-    angles, forces = exact.trajectory.angles.copy(), factor * exact.trajectory.quantities["shaft_force"]
+    angles, forces = (
+        exact.trajectory.angles.copy(),
+        factor * exact.trajectory.quantities["shaft_force"],
+    )
     angles[:, 1:] = np.nextafter(angles[:, 1:], 0.0)
     moved = replace(exact, trajectory=exact.trajectory.replace(angles=angles, shaft_force=forces))
     assert judge(scene, moved, exact.trajectory).status == status
@@ -70,8 +81,9 @@ def test_the_work_of_a_bearing_that_swings_between_samples(method: str) -> None:
 # Rotors of public OpenFAST models, with tilt, cone and hub
 
 
-# Mass, first and second moment of a blade about its root, and mass and inertia of the rotor with cone and without
-# generator, as the programs printed them; sources in the scene files. IEA 15 MW: the blade of its windIO file.
+# Mass, first and second moment of a blade about its root, and mass and inertia of the rotor with
+# cone and without generator, as the programs printed them; sources in the scene files. IEA 15 MW:
+# the blade of its windIO file.
 PUBLISHED = {
     "nrel-5mw-overspeed": (17536.614, 362132.653, 11752352.265, 109389.842, 38677040.613),
     "windpact-start-up": (3912.590, 46618.784, 800799.912, 26885.770, 2962443.885),
@@ -88,9 +100,19 @@ def test_masses_of_public_models_are_the_published_ones(name: str) -> None:
     (blade,) = set(scene.blades)
     arm = blade.centre_of_mass[2] - scene.hub_radius
     about_apex = blade.inertia[0] + blade.mass * blade.centre_of_mass[2] ** 2
-    turning = scene.hub_inertia - GENERATORS[name] + len(scene.blades) * about_apex * np.cos(blade.cone) ** 2
+    turning = (
+        scene.hub_inertia
+        - GENERATORS[name]
+        + len(scene.blades) * about_apex * np.cos(blade.cone) ** 2
+    )
     rotor_mass = scene.hub_mass + len(scene.blades) * blade.mass
-    found = (blade.mass, blade.mass * arm, blade.inertia[0] + blade.mass * arm**2, rotor_mass, turning)
+    found = (
+        blade.mass,
+        blade.mass * arm,
+        blade.inertia[0] + blade.mass * arm**2,
+        rotor_mass,
+        turning,
+    )
     assert found == pytest.approx(PUBLISHED[name], rel=1e-6, abs=2e-3)
 
 
@@ -102,7 +124,8 @@ def test_the_blade_of_the_iea_15_mw_turbine_is_that_of_its_windio_file() -> None
 
 
 def impulse(table: Sequence[tuple[float, float]], time: float) -> float:
-    """Integral of a torque from 0 to a time: linear between the rows of its table, constant outside."""
+    """Integral of a torque from 0 to a time: linear between the rows of its table, constant
+    outside."""
     (first, before), (last, behind) = table[0], table[-1]
     total = before * min(time, first) + behind * max(time - last, 0.0)
     for (left, a), (right, b) in pairwise(table):
@@ -115,8 +138,9 @@ def impulse(table: Sequence[tuple[float, float]], time: float) -> float:
 
 @pytest.mark.parametrize("name", ["nrel-5mw-overspeed", "uae-overspeed"])
 def test_momentum_and_weight_of_a_balanced_rotor_with_cone(name: str) -> None:
-    """Equal blades with mass on their axes: the torque alone changes the momentum about the shaft, to which a coned
-    blade's pitch rate adds; the bearing carries the weight of blades and hub, which is that of the published mass."""
+    """Equal blades with mass on their axes: the torque alone changes the momentum about the shaft,
+    to which a coned blade's pitch rate adds; the bearing carries the weight of blades and hub,
+    which is that of the published mass."""
     found, scene = references.reference(f"turbine/{name}"), shipped(f"turbine/{name}")
     (blade,), count = set(scene.blades), len(scene.blades)
     sine, cosine = np.sin(blade.cone), np.cos(blade.cone)
@@ -127,4 +151,5 @@ def test_momentum_and_weight_of_a_balanced_rotor_with_cone(name: str) -> None:
     assert np.abs(momentum - momentum[0] - impulses).max() < 1e-13 * np.abs(momentum).max()
     weight = PUBLISHED[name][3] * scene.gravity
     forces = found.quantities["shaft_force"]
-    assert np.abs(forces - [0.0, 0.0, weight]).max() < 2e-3 * scene.gravity  # of the last printed digit, 1e-3 kg
+    # of the last printed digit, 1e-3 kg
+    assert np.abs(forces - [0.0, 0.0, weight]).max() < 2e-3 * scene.gravity

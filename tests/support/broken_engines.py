@@ -1,10 +1,12 @@
-"""Engines with one mistake each, written without a look at how `test-method` searches, and right ones.
+"""Engines with one mistake each, written without a look at how `test-method` searches, and right
+ones.
 
     python tests/support/broken_engines.py FOLDER [-o docs/engines-tried.md] [--engines NAME,NAME]
 
-examines each with `rotor-mbs test-method`, keeps its checks in FOLDER/NAME.json (what is there already is not run
-again), and writes the table of the document. With `--first` it examines them in this process by the first scene alone,
-which takes seconds, and keeps that in FOLDER/NAME.first.json; the document says which have been examined by no more.
+examines each with `rotor-mbs test-method`, keeps its checks in FOLDER/NAME.json (what is there
+already is not run again), and writes the table of the document. With `--first` it examines them in
+this process by the first scene alone, which takes seconds, and keeps that in
+FOLDER/NAME.first.json; the document says which have been examined by no more.
 """
 
 from __future__ import annotations
@@ -32,7 +34,8 @@ LAGRANGE = re.findall(r"```python\n(.*?METHOD = .*?\n)```", _DOCUMENT, re.DOTALL
 NOT_FOUND = "cause not found"
 # Not of the mistake itself, but of what it does to another check.
 _CONSEQUENCE = (
-    "see the defect|the motion is right: a stored energy is wrong|measured order|solved analytically|"
+    "see the defect|the motion is right: a stored energy is wrong|measured order|solved "
+    "analytically|"
     "does not give that of the motion|by other numbers give another motion"
 )
 
@@ -84,7 +87,10 @@ _DOP853 = """        K = np.zeros((DOP853.n_stages, len(y)))
         return y + h * DOP853.B @ K
 
 """
-_SETTINGS = [("self.scene, self.step = scene, settings.step", "self.scene = scene"), (", settings=Step", "")]
+_SETTINGS = [
+    ("self.scene, self.step = scene, settings.step", "self.scene = scene"),
+    (", settings=Step", ""),
+]
 _SOLVE_IVP = ("import numpy as np\n", "import numpy as np\nfrom scipy.integrate import solve_ivp\n")
 _LAW = "f[1:] = act - n[:, 2]"
 _PHASES = "np.array(scene.phases)"
@@ -107,15 +113,23 @@ PHYSICS = {
         ],
         r"gravity along \+x",
     ),
-    "p02_gravity_up": Engine("gravity upwards", [("w = self.m * self.g\n", "w = -self.m * self.g\n")], r"along \+z"),
+    "p02_gravity_up": Engine(
+        "gravity upwards", [("w = self.m * self.g\n", "w = -self.m * self.g\n")], r"along \+z"
+    ),
     "p03_phase_degrees": Engine(
-        "azimuths taken as degrees", [(_PHASES, "np.radians(scene.phases)")], "azimuths .* taken as degrees"
+        "azimuths taken as degrees",
+        [(_PHASES, "np.radians(scene.phases)")],
+        ("azimuths .* taken as degrees"),
     ),
     "p04_damping_twice": Engine(
-        "pitch dampers twice", [(_LAW, "f[1:] = act - self.d * v - n[:, 2]")], "twice the dampers of the bearings"
+        "pitch dampers twice",
+        [(_LAW, "f[1:] = act - self.d * v - n[:, 2]")],
+        ("twice the dampers of the bearings"),
     ),
     "p05_no_shaft_damping": Engine(
-        "no shaft damper", [("self.D = scene.shaft_damping", "self.D = 0.0")], "without the damper of the shaft"
+        "no shaft damper",
+        [("self.D = scene.shaft_damping", "self.D = 0.0")],
+        "without the damper of the shaft",
     ),
     "p06_pitch_torque_reacts": Engine(
         "pitch torques react on the rotor",
@@ -133,7 +147,9 @@ PHYSICS = {
         "without gravity in the equations of the pitches",
     ),
     "p09_no_gyroscopic_term": Engine(
-        "ω x J ω missing", [(" + np.cross(omega, L)\n        n -=", "\n        n -=")], "without the gyroscopic"
+        "ω x J ω missing",
+        [(" + np.cross(omega, L)\n        n -=", "\n        n -=")],
+        "without the gyroscopic",
     ),
     "p10_gravity_at_axis": Engine(
         "weights on the pitch axes",
@@ -142,13 +158,20 @@ PHYSICS = {
     ),
     "p11_bearing_of_blade_1": Engine(
         "bearing of blade 1 at all blades",
-        [("pair[0] for pair", "scene.bearings[0][0] for pair"), ("pair[1] for pair", "scene.bearings[0][1] for pair")],
+        [
+            ("pair[0] for pair", "scene.bearings[0][0] for pair"),
+            ("pair[1] for pair", "scene.bearings[0][1] for pair"),
+        ],
         "bearing 1 at all blades|bearing.stiffness of blade 1 at all",
     ),
     "p12_phase_direction": Engine(
-        "azimuths against the rotation", [(_PHASES, "-np.array(scene.phases)")], "numbered in the opposite sense"
+        "azimuths against the rotation",
+        [(_PHASES, "-np.array(scene.phases)")],
+        ("numbered in the opposite sense"),
     ),
-    "p13_coupling_sign": Engine("coupling in the mass matrix reversed", [("= Ja[i, 2]", "= -Ja[i, 2]")]),
+    "p13_coupling_sign": Engine(
+        "coupling in the mass matrix reversed", [("= Ja[i, 2]", "= -Ja[i, 2]")]
+    ),
     "p14_pitch_sense_in_gravity": Engine(
         "weight turned against the pitch",
         [("np.cos(th) * gx, -np.sin(th) * gx, gz", "np.cos(th) * gx, np.sin(th) * gx, gz")],
@@ -159,10 +182,14 @@ PHYSICS = {
         "rest angles .* taken as degrees",
     ),
     "p16_gravity_9_8": Engine(
-        "gravity of 9.8", [("self.g = scene.gravity", "self.g = 9.8 if scene.gravity else 0.0")], "gravity of 9.8 "
+        "gravity of 9.8",
+        [("self.g = scene.gravity", "self.g = 9.8 if scene.gravity else 0.0")],
+        "gravity of 9.8 ",
     ),
     "p17_no_hub": Engine(
-        "no hub", [("self.scene.hub_inertia + np.sum(a * Ja)", "np.sum(a * Ja)")], "without the hub's inertia"
+        "no hub",
+        [("self.scene.hub_inertia + np.sum(a * Ja)", "np.sum(a * Ja)")],
+        "without the hub's inertia",
     ),
     "p18_diagonal_inertia": Engine(
         "no products of inertia",
@@ -175,9 +202,14 @@ PHYSICS = {
     ),
     "p20_hub_radius": Engine(
         "m z² twice on the shaft",
-        [("inertia + np.sum(a * Ja)", "inertia + np.sum(a * Ja) + np.sum(self.m * self.r[:, 2] ** 2)")],
+        [
+            (
+                "inertia + np.sum(a * Ja)",
+                ("inertia + np.sum(a * Ja) + np.sum(self.m * self.r[:, 2] ** 2)"),
+            )
+        ],
     ),
-}  # fmt: skip
+}
 
 NUMERICS = {
     "n01_last_stage": Engine(
@@ -201,7 +233,8 @@ NUMERICS = {
             (
                 "        angles, rates = rows",
                 "        some = np.unique(np.append(np.arange(0, len(rows), 5), len(rows) - 1))\n"
-                "        rows = np.stack([np.interp(time, time[some], column[some]) for column in rows.T], axis=1)\n"
+                "        rows = np.stack([np.interp(time, time[some], column[some]) for column in "
+                "rows.T], axis=1)\n"
                 "        kept = {}\n"
                 "        angles, rates = rows",
             )
@@ -223,7 +256,10 @@ NUMERICS = {
         [
             _SOLVE_IVP,
             *_SETTINGS,
-            (_ADVANCE, "        return solve_ivp(self.dynamics, (a, b), y, args=(part,)).y[:, -1]\n\n"),
+            (
+                _ADVANCE,
+                ("        return solve_ivp(self.dynamics, (a, b), y, args=(part,)).y[:, -1]\n\n"),
+            ),
             (", " + _ORDER, ""),
         ],
         "tolerance|step",
@@ -234,7 +270,14 @@ NUMERICS = {
             (_PART_LOADS, "np.array(part.loads_at(min(t, part.end)))"),
             ("            t = part.start\n", "            t = self.time[i - 1]\n"),
             ("self.time[i] <= part.end + tiny:", "t < part.end - tiny:"),
-            ("            if part.end - t > tiny:\n                y = self.advance(t, part.end, y, part)\n", ""),
+            (
+                (
+                    "            if part.end - t > tiny:\n                y = self.advance(t, "
+                    "part.end, "
+                    "y, part)\n"
+                ),
+                "",
+            ),
         ],
         _LOAD,
     ),
@@ -280,7 +323,12 @@ ROWS = {
     ),
     "r05_loads_in_base": Engine(
         "root forces in the base frame",
-        [('"blade_root_force"].append(force)', '"blade_root_force"].append(self.to_base(turn, th, force))')],
+        [
+            (
+                '"blade_root_force"].append(force)',
+                ('"blade_root_force"].append(self.to_base(turn, th, force))'),
+            )
+        ],
         "blade root force: in the base frame",
     ),
     "r06_state_kept": Engine(
@@ -340,35 +388,56 @@ ROWS = {
         # Where the pitches move alike, their moments tell the order.
         "pitches are in the reverse order|pitch actuator moment: of the blades in reverse order",
     ),
-}  # fmt: skip
+}
 
 # The mistakes of an audit, in the engine of docs/your-engine.md; the last four in the other one.
 GIVEN = {
     "b01_no_steiner": Engine(
-        "Steiner's share missing", [("self.J += np.array([m *", "self.J += np.array([0 * m *")],
-        "without Steiner's share", LAGRANGE,
+        "Steiner's share missing",
+        [("self.J += np.array([m *", "self.J += np.array([0 * m *")],
+        "without Steiner's share",
+        LAGRANGE,
     ),
     "b02_hub_per_blade": Engine(
-        "hub once for each blade", [("scene.hub_inertia +", "len(q[1:]) * scene.hub_inertia +")],
-        "hub's inertia once for each blade", LAGRANGE,
+        "hub once for each blade",
+        [("scene.hub_inertia +", "len(q[1:]) * scene.hub_inertia +")],
+        "hub's inertia once for each blade",
+        LAGRANGE,
     ),
     "b03_rest_ignored": Engine(
-        "rest angles ignored", [("(loads[2::2] - q[1:])", "(0 - q[1:])")], "rest angles .* ignored", LAGRANGE
+        "rest angles ignored",
+        [("(loads[2::2] - q[1:])", "(0 - q[1:])")],
+        "rest angles .* ignored",
+        LAGRANGE,
     ),
     "b04_damper_to_ground": Engine(
-        "dampers see the rotor's rate", [("self.d * v[1:]", "self.d * (v[1:] + 0.2 * v[0])")],
-        "rate that the bearings' dampers see off by", LAGRANGE,
+        "dampers see the rotor's rate",
+        [("self.d * v[1:]", "self.d * (v[1:] + 0.2 * v[0])")],
+        "rate that the bearings' dampers see off by",
+        LAGRANGE,
     ),
     "b05_product_sign": Engine(
         "products of inertia reversed",
-        [("        self.J += np", "        self.J = (2 * np.eye(3) - 1) * self.J\n        self.J += np")],
-        "products of inertia with opposite sign", LAGRANGE,
+        [
+            (
+                "        self.J += np",
+                ("        self.J = (2 * np.eye(3) - 1) * self.J\n        self.J += np"),
+            )
+        ],
+        "products of inertia with opposite sign",
+        LAGRANGE,
     ),
     "b06_gyro_half": Engine(
-        "half of the Coriolis terms", [("rotor -= 2 *", "rotor -= 1 *")], "half of the Coriolis", LAGRANGE
+        "half of the Coriolis terms",
+        [("rotor -= 2 *", "rotor -= 1 *")],
+        "half of the Coriolis",
+        LAGRANGE,
     ),
     "b07_torque_held": Engine(
-        "ramps held", [(_PART_LOADS, "np.array(part.loads_at(part.start))")], "ramps of loads held", LAGRANGE
+        "ramps held",
+        [(_PART_LOADS, "np.array(part.loads_at(part.start))")],
+        "ramps of loads held",
+        LAGRANGE,
     ),
     "b08_wrong_tip": Engine(
         "tips 1 mm off",
@@ -387,18 +456,23 @@ GIVEN = {
     ),
     "b10_rates_lag": Engine("rates a row late", [_OBSERVED], "rates are a row late", LAGRANGE),
     "b12_only_three": Engine(
-        "right for three blades alone", [(_PHASES, "np.arange(len(q) - 1) * 2 * np.pi / 3")],
-        "blades at multiples of 120 degrees", LAGRANGE,
+        "right for three blades alone",
+        [(_PHASES, "np.arange(len(q) - 1) * 2 * np.pi / 3")],
+        "blades at multiples of 120 degrees",
+        LAGRANGE,
     ),
     "b13_work_without_damping": Engine(
         "work without the bearings' dampers",
-        [("torque * v - self.d * v**2", "torque * v")], "the work of loads, commands or dampers is wrong",
+        [("torque * v - self.d * v**2", "torque * v")],
+        ("the work of loads, commands or dampers is wrong"),
     ),
     "b14_stale_load_jump": Engine(
         "loads stale after a jump",
-        [(_PART_LOADS, "np.array(part.loads_at(t if t > part.start + 0.02 else part.start))")], _LOAD, LAGRANGE,
+        [(_PART_LOADS, "np.array(part.loads_at(t if t > part.start + 0.02 else part.start))")],
+        _LOAD,
+        LAGRANGE,
     ),
-}  # fmt: skip
+}
 
 RIGHT = {
     "euler": Engine(
@@ -406,7 +480,10 @@ RIGHT = {
         [
             (_STEP, _EULER),
             ("number(1e-3", "number(1e-4"),
-            ("import numpy as np\n", "import numpy as np\nfrom rotor_mbs.scenario.accuracy_bounds import Bound\n"),
+            (
+                "import numpy as np\n",
+                ("import numpy as np\nfrom rotor_mbs.scenario.accuracy_bounds import Bound\n"),
+            ),
             (
                 _ORDER,
                 'order=1, fixed_step=True, bounds=(Bound("defect", "euler/rk4", 3e-4, "order 1"),'
@@ -417,7 +494,13 @@ RIGHT = {
     "heun": Engine(
         "",
         [
-            (_STEP, "        k1 = f(t, y, part)\n        return y + h / 2 * (k1 + f(t + h, y + h * k1, part))\n\n"),
+            (
+                _STEP,
+                (
+                    "        k1 = f(t, y, part)\n        return y + h / 2 * (k1 + f(t + h, y + h "
+                    "* k1, part))\n\n"
+                ),
+            ),
             ("number(1e-3", "number(1e-4"),
             ("order=4", "order=2"),
         ],
@@ -439,14 +522,15 @@ RIGHT = {
             *_SETTINGS,
             (
                 _ADVANCE,
-                '        return solve_ivp(self.dynamics, (a, b), y, "DOP853", args=(part,), rtol=1e-12, atol=1e-13)'
+                '        return solve_ivp(self.dynamics, (a, b), y, "DOP853", args=(part,), '
+                "rtol=1e-12, atol=1e-13)"
                 ".y[:, -1]\n\n",
             ),
             (_ORDER, "order=8"),
         ],
     ),
     "document": Engine("", [], text=LAGRANGE),
-}  # fmt: skip
+}
 
 BROKEN = {**PHYSICS, **NUMERICS, **ROWS, **GIVEN}
 ENGINES = {**BROKEN, **RIGHT}
@@ -495,7 +579,8 @@ class _HerePool:
 
 
 def checks_of_first_scene(name: str, folder: Path) -> list[Check]:
-    """Return the checks of an engine on the five blades alone; its file is written into the folder."""
+    """Return the checks of an engine on the five blades alone; its file is written into the
+    folder."""
     file = folder / f"{name}.py"
     file.write_text(ENGINES[name].source())
     (method,) = catalogue.check_names(str(file))
@@ -508,7 +593,12 @@ def as_records(checks: Sequence[Check]) -> list[dict[str, Any]]:
     """Return checks as `test-method --json` writes them."""
     records = []
     for check in checks:
-        record = {"check": check.name, "scene": check.where.scene, "value": check.value, "bound": check.bound}
+        record = {
+            "check": check.name,
+            "scene": check.where.scene,
+            "value": check.value,
+            "bound": check.bound,
+        }
         records.append(record | {"passed": check.passed, "hint": check.hint})
     return records
 
@@ -542,7 +632,11 @@ def table(folder: Path) -> str:
         verdict = verdict if given else "PASSES"
         broken.append(f"| {name} | {engine.mistake} | {scenes} | {verdict} | {cause} | {word} |")
     lines = [
-        f"{len(broken)} broken engines: {sum('PASSES' in line for line in broken)} pass, {named} have the right cause,",
+        (
+            f"{len(broken)} broken engines: {sum('PASSES' in line for line in broken)} "
+            f"pass, {named} "
+            "have the right cause,"
+        ),
         f"{wrong} a wrong one, {len(broken) - named - wrong} none.",
         "",
         "| engine | mistake | scenes | verdict | cause named | right? |",
@@ -562,8 +656,12 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("folder", type=Path)
     parser.add_argument("-o", "--output", type=Path, help="the document, whose tables are replaced")
-    parser.add_argument("--first", action="store_true", help="by the first scene alone, in this process")
-    parser.add_argument("--engines", default=",".join(ENGINES), help="names, separated by commas; '' for none")
+    parser.add_argument(
+        "--first", action="store_true", help=("by the first scene alone, in this process")
+    )
+    parser.add_argument(
+        "--engines", default=",".join(ENGINES), help=("names, separated by commas; '' for none")
+    )
     arguments = parser.parse_args()
     arguments.folder.mkdir(exist_ok=True)
     for name in filter(None, arguments.engines.split(",")):
@@ -572,7 +670,9 @@ def main() -> None:
         if arguments.first and not kept.exists():
             kept = arguments.folder / f"{name}.first.json"
             if not kept.exists():
-                kept.write_text(json.dumps(as_records(checks_of_first_scene(name, arguments.folder))))
+                kept.write_text(
+                    json.dumps(as_records(checks_of_first_scene(name, arguments.folder)))
+                )
         checks = json.loads(kept.read_text()) if kept.exists() else examined(name, arguments.folder)
         for reason, at in reasons(checks).items():
             print(f"  {is_right(ENGINES[name], reason)}: {reason} ({at})", flush=True)

@@ -1,4 +1,5 @@
-"""For tests of `check`: results files made in this process, from true runs or from runs with a known fault."""
+"""For tests of `check`: results files made in this process, from true runs or from runs with a
+known fault."""
 
 from __future__ import annotations
 
@@ -28,10 +29,14 @@ from rotor_mbs.studies.run import run_scenes
 from rotor_mbs.studies.stored_references import read_reference
 
 
-def results_file(path: Path, scenes: Sequence[str], methods: Sequence[str], timeout_s: float = 60.0) -> Path:
+def results_file(
+    path: Path, scenes: Sequence[str], methods: Sequence[str], timeout_s: float = 60.0
+) -> Path:
     """A batch as `run` makes it."""
     chosen = find_scenes(scenes)
-    run_scenes(chosen, {scene.name: methods for scene in chosen}, path, workers=0, timeout_s=timeout_s)
+    run_scenes(
+        chosen, {scene.name: methods for scene in chosen}, path, workers=0, timeout_s=timeout_s
+    )
     return path
 
 
@@ -40,7 +45,13 @@ def add_run(path: Path, scene: Scene, run: Solution) -> None:
     asked = RunRequest(scene, run.method, run.settings)
     file = fit_file_to_request(path, results_tables([asked]))
     judgement = judge(scene, run, read_reference(file.place(f"{scene.name}/{REFERENCE}"), scene))
-    run = replace(run, scene=scene, status=judgement.status, message=judgement.message, metrics=judgement.metrics)
+    run = replace(
+        run,
+        scene=scene,
+        status=judgement.status,
+        message=judgement.message,
+        metrics=judgement.metrics,
+    )
     place = file.place(asked.label)
     place.write(row_of_run(run, place, {"false_success": int(judgement.false_success)}))
 
@@ -53,17 +64,20 @@ def failed(checks: Sequence[Check]) -> list[Check]:
     return [check for check in checks if not check.passed]
 
 
-# Known faults: what a method makes of a scene a little wrong, handed in as its answer to the right one.
+# Known faults: what a method makes of a scene a little wrong, handed in as its answer to the right
+# one.
 
 
 def with_wrong_number(scene: Scene, number: str, share: float) -> Scene:
-    """The gravity, the start, or of each blade its mass, its tip, or the offset c of its centre of mass from the pitch
-    axis, off by `share` of its size."""
+    """The gravity, the start, or of each blade its mass, its tip, or the offset c of its centre of
+    mass from the pitch axis, off by `share` of its size."""
     factor = 1.0 + share
     if number == "gravity":
         return replace(scene, gravity=scene.gravity * factor)
     if number == "start":
-        return replace(scene, initial_angles=tuple(angle * factor for angle in scene.initial_angles))
+        return replace(
+            scene, initial_angles=tuple(angle * factor for angle in scene.initial_angles)
+        )
     blades = []
     for blade in scene.blades:
         (x, y, z), tip = blade.centre_of_mass, blade.tip
@@ -76,7 +90,8 @@ def with_wrong_number(scene: Scene, number: str, share: float) -> Scene:
     return replace(scene, blades=tuple(blades))
 
 
-EVERY_SECOND_SAMPLE = 2.0  # in place of a share of gravity: the others are left out, and the rest renumbered
+# in place of a share of gravity: the others are left out, and the rest renumbered
+EVERY_SECOND_SAMPLE = 2.0
 
 # By the name of a check, the number whose fault it shall see.
 WRONG = {
@@ -88,7 +103,8 @@ WRONG = {
 
 
 def faulty_run(check_name: str, scene: Scene, method: str, share: float) -> Solution:
-    """The run of a model that has the fault. For the energy balance: its energies do not have it."""
+    """The run of a model that has the fault. For the energy balance: its energies do not have
+    it."""
     if check_name == "gap":
         with _wrong_seat(share):
             return solve(method, scene, {})
@@ -99,16 +115,22 @@ def faulty_run(check_name: str, scene: Scene, method: str, share: float) -> Solu
     run = solve(method, with_wrong_number(scene, WRONG[check_name], share), {})
     if check_name == "energy":
         motion = run.trajectory
-        motion.quantities["kinetic_energy"] = kinematics.kinetic_energy(scene, motion.angles, motion.rates)
-        motion.quantities["potential_energy"] = kinematics.potential_energy(scene, motion.time, motion.angles)
+        motion.quantities["kinetic_energy"] = kinematics.kinetic_energy(
+            scene, motion.angles, motion.rates
+        )
+        motion.quantities["potential_energy"] = kinematics.potential_energy(
+            scene, motion.time, motion.angles
+        )
     return run
 
 
 @contextlib.contextmanager
 def _wrong_seat(share: float) -> Iterator[None]:
-    """The blades' own markers at the bearings off by `share` of their distance from the centre of mass.
+    """The blades' own markers at the bearings off by `share` of their distance from the centre of
+    mass.
 
-    They are put there once the bodies' places are known: what is off is where the joint holds, not where the body is.
+    They are put there once the bodies' places are known: what is off is where the joint holds, not
+    where the body is.
     """
     right = chain.parts
 

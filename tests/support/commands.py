@@ -1,4 +1,5 @@
-"""The command line, called in this process; and as a process of its own, for tests of signals and streams."""
+"""The command line, called in this process; and as a process of its own, for tests of signals and
+streams."""
 
 from __future__ import annotations
 
@@ -25,11 +26,15 @@ class Ended(NamedTuple):
 def rotor_mbs(*words: object, processes: bool = False) -> Ended:
     """Call a command in this process.
 
-    What `-j 1` would give to a worker process is done here, too, unless a test is about processes: to start one and
-    load the engines takes longer than most runs of tests.
+    What `-j 1` would give to a worker process is done here, too, unless a test is about processes:
+    to start one and load the engines takes longer than most runs of tests.
     """
     out, err = io.StringIO(), io.StringIO()
-    workers = contextlib.nullcontext() if processes else mock.patch.object(pool, "WorkerPool", _pool_without_process)
+    workers = (
+        contextlib.nullcontext()
+        if processes
+        else mock.patch.object(pool, "WorkerPool", _pool_without_process)
+    )
     with workers, contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
         try:
             status = main([str(word) for word in words])

@@ -12,7 +12,8 @@ from rotor_mbs.solution.trajectory import Trajectory
 
 
 def made_defects(sizes: Sequence[float], **changes: Any) -> Defects:
-    """Intervals of 0.01 s and one coordinate, with defects of its angle (rad), in which no error grows."""
+    """Intervals of 0.01 s and one coordinate, with defects of its angle (rad), in which no error
+    grows."""
     count, nothing = len(sizes), np.zeros((1, 1))
     fields: dict[str, Any] = {
         "time": 0.01 * np.arange(count + 1.0),

@@ -1,4 +1,5 @@
-"""Files of this program that somebody changed on purpose: with a right digest, and rows with right checksums."""
+"""Files of this program that somebody changed on purpose: with a right digest, and rows with right
+checksums."""
 
 from __future__ import annotations
 
@@ -19,7 +20,9 @@ def forged(path: Path) -> Iterator[h5py.File]:
     with h5py.File(path, "r+") as file:  # cuts the trailer off
         yield file
     with h5py.File(path) as file:
-        groups = {group: _places(file[group or "/"], columns) for group, columns in trailer.groups.items()}
+        groups = {
+            group: _places(file[group or "/"], columns) for group, columns in trailer.groups.items()
+        }
     append_trailer(path, trailer.kind, groups)
 
 
@@ -36,7 +39,11 @@ def _places(group: h5py.Group, columns: Any) -> dict[str, tuple[int, int]]:
     for name in columns:
         is_own = isinstance(group.get(name, getlink=True), h5py.HardLink)
         dataset = group[name] if is_own else None
-        if isinstance(dataset, h5py.Dataset) and dataset.shape is not None and dataset.id.get_offset() is not None:
+        if (
+            isinstance(dataset, h5py.Dataset)
+            and dataset.shape is not None
+            and dataset.id.get_offset() is not None
+        ):
             places[name] = dataset.id.get_offset(), dataset.nbytes
         else:
             places[name] = 0, 0

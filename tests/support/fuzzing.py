@@ -17,9 +17,16 @@ from rotor_mbs.scenario.scene import OUTPUTS, scene_toml
 from support.commands import rotor_mbs
 
 SCENES = (
-    "check/general", "check/pitch-loads", "check/point-masses", "extreme/toy", "extreme/tumbling", "paper/fig04b",
-    "paper/fig11", "stiff/torque-steps", "turbine/pitch-step",
-)  # fmt: skip
+    "check/general",
+    "check/pitch-loads",
+    "check/point-masses",
+    "extreme/toy",
+    "extreme/tumbling",
+    "paper/fig04b",
+    "paper/fig11",
+    "stiff/torque-steps",
+    "turbine/pitch-step",
+)
 USUAL = (0.0, 0.1, 1.0, 2.5, 9.8, 1000.0)
 # What a value may be replaced by.
 ODD = (
@@ -29,21 +36,27 @@ ODD = (
 
 
 def scene_text(seed: int) -> str:
-    """A shipped scene, short, with a share of its numbers in other sizes; of every fourth one a line is damaged."""
+    """A shipped scene, short, with a share of its numbers in other sizes; of every fourth one a
+    line is damaged."""
     chance = random.Random(seed)
     scene = find_scenes([chance.choice(SCENES)])[0]
     outputs = tuple(chance.sample(OUTPUTS, chance.randint(1, len(OUTPUTS))))
-    text = scene_toml(replace(scene, duration=0.1, samples=chance.choice([2, 3, 11]), outputs=outputs))
+    text = scene_toml(
+        replace(scene, duration=0.1, samples=chance.choice([2, 3, 11]), outputs=outputs)
+    )
     share, decades = chance.choice([0.02, 0.1, 0.5]), chance.choice([1.0, 1.0, 5.0, 30.0])
 
     def change(found: re.Match[str]) -> str:
         if chance.random() > share:
             return found[0]
-        return repr(chance.choice([*USUAL, float(found[0]) * 10.0 ** chance.uniform(-decades, decades)]))
+        return repr(
+            chance.choice([*USUAL, float(found[0]) * 10.0 ** chance.uniform(-decades, decades)])
+        )
 
     lines = text.splitlines()
     for i, line in enumerate(lines):
-        is_linked = line.startswith("inertia") or " = [[" in line  # numbers that depend on one another
+        # numbers that depend on one another
+        is_linked = line.startswith("inertia") or " = [[" in line
         if not is_linked or chance.random() < 0.1:
             lines[i] = re.sub(r"\b\d+\.\d+(e[+-]?\d+)?\b", change, line)
     text = "\n".join(lines) + "\n"
@@ -55,12 +68,15 @@ def damaged_line(chance: random.Random, text: str) -> str:
     lines = text.splitlines()
     place = chance.randrange(len(lines))
     line, key = lines[place], lines[place].partition("=")[0]
-    lines[place] = chance.choice(["", f"{line}\n{line}", line[: len(line) // 2], f"{key}= {chance.choice(ODD)}"])
+    lines[place] = chance.choice(
+        ["", f"{line}\n{line}", line[: len(line) // 2], f"{key}= {chance.choice(ODD)}"]
+    )
     return "\n".join(lines) + "\n"
 
 
 def try_all(seeds: Iterable[int], attempt: Callable[[int], Iterable[str]]) -> None:
-    """Calls `attempt` with every seed. It returns outcomes, which are counted, or raises, which is a fault."""
+    """Calls `attempt` with every seed. It returns outcomes, which are counted, or raises, which is
+    a fault."""
     outcomes: Counter[str] = Counter()
     faults = []
     for seed in seeds:
@@ -97,8 +113,18 @@ def contents(path: Path) -> dict[object, tuple[object, ...]]:
     """By run: status, message, angles, rates and metrics but times."""
     found: dict[object, tuple[object, ...]] = {}
     for label, run in rm.open(path).items():
-        metrics = {name: value for name, value in run.metrics.items() if not name.endswith(("_s", "repeats"))}
-        found[label] = run.status, run.message, run.angles.tobytes(), run.rates.tobytes(), repr(metrics)
+        metrics = {
+            name: value
+            for name, value in run.metrics.items()
+            if not name.endswith(("_s", "repeats"))
+        }
+        found[label] = (
+            run.status,
+            run.message,
+            run.angles.tobytes(),
+            run.rates.tobytes(),
+            repr(metrics),
+        )
     return found
 
 

@@ -1,8 +1,10 @@
-"""Ways of writing the first row of (56), the moment of the weights about the shaft: equal but for rounding.
+"""Ways of writing the first row of (56), the moment of the weights about the shaft: equal but for
+rounding.
 
-Fig. 5 starts in an unstable equilibrium of the printed equations, so that its motion is amplified rounding error and
-depends on the order in which this row is evaluated. All but the last are the printed row with its factor c m g, its
-halves and its root multiplied in or left outside; the last is the sum over the blades that (56) was simplified from.
+Fig. 5 starts in an unstable equilibrium of the printed equations, so that its motion is amplified
+rounding error and depends on the order in which this row is evaluated. All but the last are the
+printed row with its factor c m g, its halves and its root multiplied in or left outside; the last
+is the sum over the blades that (56) was simplified from.
 """
 
 from __future__ import annotations
@@ -24,7 +26,9 @@ GRAVITY_ROWS = {
     "multiplied_in": "-c m g c2 c3 + c m g (c2/2 + √3/2 s2) c4 + c m g (c2/2 - √3/2 s2) c5",
     "factor_outside": "c m g (-c2 c3 + (c2/2 + √3/2 s2) c4 + (c2/2 - √3/2 s2) c5)",
     "reversed": "c m g (c2/2 - √3/2 s2) c5 + c m g (c2/2 + √3/2 s2) c4 - c m g c2 c3",
-    "distributed": "-c m g c2 c3 + c m g c2/2 c4 + √3/2 c m g s2 c4 + c m g c2/2 c5 - √3/2 c m g s2 c5",
+    "distributed": (
+        "-c m g c2 c3 + c m g c2/2 c4 + √3/2 c m g s2 c4 + c m g c2/2 c5 - √3/2 c m g s2 c5"
+    ),
     "root_times_sine": "-c m g c2 c3 + c m g (c2/2 + √3 s2/2) c4 + c m g (c2/2 - √3 s2/2) c5",
     "halves_first": "-c m g c2 c3 + c m g (c2 0.5 + √3 0.5 s2) c4 + c m g (c2 0.5 - √3 0.5 s2) c5",
     "halves_outside": "-c m g c2 c3 + c m g/2 (c2 + √3 s2) c4 + c m g/2 (c2 - √3 s2) c5",
@@ -36,7 +40,9 @@ GRAVITY_ROWS = {
 }
 
 
-def moment(row: str, m: float, c: float, d: float, g: float, q2: float, c3: float, c4: float, c5: float) -> float:
+def moment(
+    row: str, m: float, c: float, d: float, g: float, q2: float, c3: float, c4: float, c5: float
+) -> float:
     """N m at the rotor angle q2 (rad) and the cosines of the pitches."""
     if row != SUMMED:
         sines = {"s2": math.sin(q2), "c2": math.cos(q2), "c3": c3, "c4": c4, "c5": c5}
@@ -54,7 +60,8 @@ _FUNCTIONS = {"sin": math.sin, "cos": math.cos, "pi": math.pi}
 
 
 def value(text: str, names: Mapping[str, float]) -> float:
-    """The formula, in the paper's notation, at the values of its symbols, in the order in which it is written.
+    """The formula, in the paper's notation, at the values of its symbols, in the order in which it
+    is written.
 
     >>> names = {"c": 2.0, "s3": 0.5, "√3": 3.0**0.5}
     >>> value("-c s3 + 2 c² - (c + √3/2)", names) == -2.0 * 0.5 + 2.0 * 2.0**2 - (2.0 + 3.0**0.5 / 2.0)

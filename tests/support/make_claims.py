@@ -1,5 +1,5 @@
-"""Makes claim_runs.json, the paper's claims on many runs and its numbers under other conditions, and the verdicts that
-follow from them, reference/claims.json.
+"""Makes claim_runs.json, the paper's claims on many runs and its numbers under other conditions,
+and the verdicts that follow from them, reference/claims.json.
 
     python tests/support/make_claims.py [--jobs N]
 
@@ -50,12 +50,16 @@ SPREAD = 1e-15  # rad
 ENERGY_GAIN = 1e3  # of the energy scale: a run that gains as much decides nothing
 SAMPLES_PER_SECOND = 100
 MARKS = {True: "y", False: "n", None: "-"}
-SURE = 0.95  # share of the deciding runs from which on a claim holds; 1 - SURE: up to which it fails
+# share of the deciding runs from which on a claim holds; 1 - SURE: up to which it fails
+SURE = 0.95
 DECIDING = 0.5  # share of the runs that must decide
 RULE = (
-    f"A claim holds if it is true in at least {100 * SURE:.0f} % of the deciding runs for every duration, fails if it "
-    f"is true in at most {100 * (1 - SURE):.0f} % for every duration, and is undecided otherwise, or if fewer than "
-    f"{100 * DECIDING:.0f} % of the runs are deciding. A run that ended early, or whose energy rose by a thousand "
+    f"A claim holds if it is true in at least {100 * SURE:.0f} % of the deciding runs for every "
+    "duration, fails if it "
+    f"is true in at most {100 * (1 - SURE):.0f} % for every duration, and is undecided otherwise, "
+    "or if fewer than "
+    f"{100 * DECIDING:.0f} % of the runs are deciding. A run that ended early, or whose energy "
+    "rose by a thousand "
     "times the energy scale, is not deciding."
 )
 Row = dict[str, Any]  # of a table of claim_runs.json
@@ -65,7 +69,8 @@ Row = dict[str, Any]  # of a table of claim_runs.json
 
 
 class TrajectoryNumber(NamedTuple):
-    """A number read off a trajectory: scene, "angle" or "rate", coordinate (0 rotor, i pitch of blade i), statistic."""
+    """A number read off a trajectory: scene, "angle" or "rate", coordinate (0 rotor, i pitch of
+    blade i), statistic."""
 
     scene: str
     quantity: str
@@ -79,7 +84,8 @@ def _reversals(x: Array) -> float:
 
 
 def _growth(t: Array, x: Array) -> float | None:
-    """Largest departure from the start over the second half of the time reached by that over the first half."""
+    """Largest departure from the start over the second half of the time reached by that over the
+    first half."""
     first = t <= 0.5 * (t[0] + t[-1])
     away = np.abs(x - x[0])
     before = float(away[first].max())
@@ -114,7 +120,8 @@ def measure(time: Array, angles: Array, rates: Array, asked: TrajectoryNumber) -
 
 # Claims in words
 
-# What is read off the runs of one model: None where it is undefined; without it where no run can decide.
+# What is read off the runs of one model: None where it is undefined; without it where no run can
+# decide.
 NumberValues = Mapping[TrajectoryNumber, float | None]
 RELATIONS: Mapping[str, Callable[[float, float], bool]] = {
     "<": operator.lt,
@@ -125,14 +132,20 @@ RELATIONS: Mapping[str, Callable[[float, float], bool]] = {
 
 def numbers_of(item: Published) -> list[TrajectoryNumber]:
     """All that is read off runs for a claim, each once."""
-    sides = [TrajectoryNumber(*test[side]) for test in item.tests for side in ("of", "than") if side in test]
+    sides = [
+        TrajectoryNumber(*test[side])
+        for test in item.tests
+        for side in ("of", "than")
+        if side in test
+    ]
     return list(dict.fromkeys(sides))
 
 
 def claim_holds(item: Published, values: NumberValues) -> bool | None:
     """Whether all tests of a claim in words hold for what was read off the runs.
 
-    False as soon as one fails, even where others cannot be decided; None where none fails and one is undecided.
+    False as soon as one fails, even where others cannot be decided; None where none fails and one
+    is undecided.
     """
     undecided = not item.tests
     for test in item.tests:
@@ -147,31 +160,42 @@ def claim_holds(item: Published, values: NumberValues) -> bool | None:
 
 
 def moved_starts(scene: Scene, runs: int, seed: int) -> np.ndarray[Any, Any]:
-    """(runs + 1, 1 + blades) rad: the scene's own start, then every angle moved by chance; the first k do not depend on
-    `runs`."""
+    """(runs + 1, 1 + blades) rad: the scene's own start, then every angle moved by chance; the
+    first k do not depend on `runs`."""
     starts = np.tile(scene.initial_angles, (runs + 1, 1))
     for i in range(starts.shape[1]):
         starts[1:, i] += np.random.default_rng([seed, i]).uniform(-SPREAD, SPREAD, runs)
     return starts
 
 
-def values_of_run(scene: Scene, asked: Sequence[TrajectoryNumber], method: str, start: Sequence[float]) -> NumberValues:
-    """The numbers read off the samples; none of a run that ended early or gained a thousand times the energy scale."""
+def values_of_run(
+    scene: Scene, asked: Sequence[TrajectoryNumber], method: str, start: Sequence[float]
+) -> NumberValues:
+    """The numbers read off the samples; none of a run that ended early or gained a thousand times
+    the energy scale."""
     run = solve(method, replace(scene, initial_angles=tuple(start)), {})
     with np.errstate(all="ignore"):
         judgement = judge(scene, run, None)
-    if judgement.status not in COMPLETE or not judgement.metrics.get("energy_drift_max", math.nan) < ENERGY_GAIN:
+    if (
+        judgement.status not in COMPLETE
+        or not judgement.metrics.get("energy_drift_max", math.nan) < ENERGY_GAIN
+    ):
         return {}
     return {number: measure(run.time, run.angles, run.rates, number) for number in asked}
 
 
 def claim_shares(
-    items: Sequence[Published], durations: Sequence[float], runs: int, seed: int = SEED, jobs: int = 1
+    items: Sequence[Published],
+    durations: Sequence[float],
+    runs: int,
+    seed: int = SEED,
+    jobs: int = 1,
 ) -> list[Row]:
     """Every claim in words by the printed equations and by the corrected closed form.
 
-    marks: one for each run, the first from the start as given, the others from moved starts: "y" where the claim holds,
-    "n" where it fails, "-" where the run decides nothing. Run k of one scene is compared with run k of another.
+    marks: one for each run, the first from the start as given, the others from moved starts: "y"
+    where the claim holds, "n" where it fails, "-" where the run decides nothing. Run k of one scene
+    is compared with run k of another.
     """
     claims = [item for item in items if not item.is_number]
     asked = dict.fromkeys(number for item in claims for number in numbers_of(item))
@@ -189,23 +213,29 @@ def claim_shares(
                 own = [number for number in asked if number.scene == scene.name]
                 work = partial(values_of_run, base, own, method)
                 starts = moved_starts(scene, runs, seed).tolist()
-                for known, more in zip(values[method], pool.map(work, starts, chunksize=4), strict=True):
+                for known, more in zip(
+                    values[method], pool.map(work, starts, chunksize=4), strict=True
+                ):
                     known |= more
                 print(f"{scene.name} {method} {duration:g} s", flush=True)
             for item, method in product(claims, METHODS):
                 marks = "".join(MARKS[claim_holds(item, read)] for read in values[method])
-                shares.append({"claim": item.id, "method": method, "duration": duration, "marks": marks})
+                shares.append(
+                    {"claim": item.id, "method": method, "duration": duration, "marks": marks}
+                )
     return shares
 
 
 def share_of(marks: str) -> tuple[float | None, int]:
-    """Share of the deciding runs from moved starts in which the claim holds, None where none decides; how many do."""
+    """Share of the deciding runs from moved starts in which the claim holds, None where none
+    decides; how many do."""
     deciding = len(marks) - 1 - marks[1:].count("-")
     return marks[1:].count("y") / deciding if deciding else None, deciding
 
 
 def verdict_of(all_marks: Sequence[str]) -> str:
-    """ "holds", "fails" or "undecided" of the marks for each duration: the same for all of them, or undecided."""
+    """ "holds", "fails" or "undecided" of the marks for each duration: the same for all of them, or
+    undecided."""
     verdicts = set()
     for marks in all_marks:
         share, deciding = share_of(marks)
@@ -220,7 +250,8 @@ def verdict_of(all_marks: Sequence[str]) -> str:
 
 
 class Conditions(NamedTuple):
-    """What the paper does not print: way of writing the first row of (56), duration (s), tolerances of ode45."""
+    """What the paper does not print: way of writing the first row of (56), duration (s), tolerances
+    of ode45."""
 
     gravity_row: str
     duration: float
@@ -241,7 +272,9 @@ def written_as(name: str) -> Iterator[None]:
         at.update(d=d, q2=state[0])
         return accelerations(m, c, d, g, torques, state)
 
-    def rotor_gravity(m: float, c: float, g: float, _s2: float, _c2: float, c3: float, c4: float, c5: float) -> float:
+    def rotor_gravity(
+        m: float, c: float, g: float, _s2: float, _c2: float, c3: float, c4: float, c5: float
+    ) -> float:
         return moment(name, m, c, at["d"], g, at["q2"], c3, c4, c5)
 
     with (
@@ -254,10 +287,13 @@ def written_as(name: str) -> Iterator[None]:
 def numbers_of_run(task: tuple[Scene, Conditions]) -> dict[str, float | None]:
     """By its id, every published number that is read off a scene; None where it is not."""
     scene, conditions = task
-    tolerances = {name: getattr(conditions, name) for name in ("relative_tolerance", "absolute_tolerance")}
+    tolerances = {
+        name: getattr(conditions, name) for name in ("relative_tolerance", "absolute_tolerance")
+    }
     with written_as(conditions.gravity_row):
         run = solve(PRINTED, replace(scene, duration=conditions.duration), tolerances).trajectory
-    extremes = metrics_of(scene, run, None, None)  # at ode45's own output points, as off a printed figure
+    # at ode45's own output points, as off a printed figure
+    extremes = metrics_of(scene, run, None, None)
     return {item.id: extremes[item.metric] for item in published() if item.scene == scene.name}
 
 
@@ -265,23 +301,39 @@ def usual_conditions() -> Conditions:
     """Of the paper's own runs, but for the duration, which it does not print: that of Fig. 5."""
     settings = find_method(PRINTED).defaults
     (scene,) = find_scenes([AT_REST])
-    tolerances = (float(str(settings[name])) for name in ("relative_tolerance", "absolute_tolerance"))
+    tolerances = (
+        float(str(settings[name])) for name in ("relative_tolerance", "absolute_tolerance")
+    )
     return Conditions(DEFAULT_ROW, scene.duration, *tolerances)
 
 
 def number_trials(
-    rows: Sequence[str], durations: Sequence[float], tolerances: Sequence[tuple[float, float]], jobs: int = 1
+    rows: Sequence[str],
+    durations: Sequence[float],
+    tolerances: Sequence[tuple[float, float]],
+    jobs: int = 1,
 ) -> list[Row]:
-    """All published numbers for every row and duration, and for every pair of tolerances with the usual ones.
+    """All published numbers for every row and duration, and for every pair of tolerances with the
+    usual ones.
 
     remainder: N m, the row's value at the start of Fig. 5: zero but for rounding.
     """
     items = [item for item in published() if item.is_number]
-    scenes = {scene.name: scene for scene in find_scenes(sorted({name for item in items for name in item.scenes}))}
+    scenes = {
+        scene.name: scene
+        for scene in find_scenes(sorted({name for item in items for name in item.scenes}))
+    }
     usual = usual_conditions()
-    tried = [usual._replace(gravity_row=row, duration=duration) for row in rows for duration in durations]
-    tried += [usual._replace(relative_tolerance=pair[0], absolute_tolerance=pair[1]) for pair in tolerances]
-    tasks = [(scene, conditions) for conditions in dict.fromkeys(tried) for scene in scenes.values()]
+    tried = [
+        usual._replace(gravity_row=row, duration=duration) for row in rows for duration in durations
+    ]
+    tried += [
+        usual._replace(relative_tolerance=pair[0], absolute_tolerance=pair[1])
+        for pair in tolerances
+    ]
+    tasks = [
+        (scene, conditions) for conditions in dict.fromkeys(tried) for scene in scenes.values()
+    ]
     values: dict[tuple[Conditions, str], float | None] = {}
     with Pool(jobs) as pool:
         for (_, conditions), numbers in zip(tasks, pool.imap(numbers_of_run, tasks), strict=True):
@@ -318,11 +370,20 @@ def trials_under(study: Mapping[str, Any]) -> dict[Conditions, list[Row]]:
 
 def runs_as_json(shares: Sequence[Row], trials: Sequence[Row], runs: int, seed: int) -> str:
     """The text of claim_runs.json."""
-    rows = [{"name": name, "formula": row, "is_of_56": name != SUMMED} for name, row in GRAVITY_ROWS.items()]
+    rows = [
+        {"name": name, "formula": row, "is_of_56": name != SUMMED}
+        for name, row in GRAVITY_ROWS.items()
+    ]
     facts = {
-        "seed": seed, "runs": runs, "spread": SPREAD, "made_with": versions(), "usual": usual_conditions()._asdict(),
-        "rows": rows, "shares": shares, "trials": trials,
-    }  # fmt: skip
+        "seed": seed,
+        "runs": runs,
+        "spread": SPREAD,
+        "made_with": versions(),
+        "usual": usual_conditions()._asdict(),
+        "rows": rows,
+        "shares": shares,
+        "trials": trials,
+    }
     return as_json(facts, ("rows", "shares", "trials"))
 
 
@@ -334,14 +395,25 @@ def verdicts_as_json(study: Mapping[str, Any]) -> str:
         methods[share["method"]][share["duration"]] = share["marks"]
     trials, usual = trials_under(study), Conditions(**study["usual"])
 
-    def row(conditions: Conditions, *labels: str) -> tuple[list[str], list[float | None], list[bool]]:
+    def row(
+        conditions: Conditions, *labels: str
+    ) -> tuple[list[str], list[float | None], list[bool]]:
         tried = trials[conditions]
-        return [*labels], [trial["value"] for trial in tried], [trial["reproduced"] for trial in tried]
+        return (
+            [*labels],
+            [trial["value"] for trial in tried],
+            [trial["reproduced"] for trial in tried],
+        )
 
     over = f", over {with_unit(usual.duration, 's')}"
-    by_duration = sorted(tried for tried in trials if tried == usual._replace(duration=tried.duration))
+    by_duration = sorted(
+        tried for tried in trials if tried == usual._replace(duration=tried.duration)
+    )
     by_tolerance = sorted(tried for tried in trials if tried[:2] == usual[:2])
-    by_form = [(usual._replace(gravity_row=written["name"]), written["formula"]) for written in study["rows"]]
+    by_form = [
+        (usual._replace(gravity_row=written["name"]), written["formula"])
+        for written in study["rows"]
+    ]
     tables = [
         {
             "caption": "The published numbers by the duration of the run",
@@ -352,13 +424,17 @@ def verdicts_as_json(study: Mapping[str, Any]) -> str:
             "caption": f"The published numbers by the tolerances of ode45{over}",
             "head": ["RelTol", "AbsTol"],
             "rows": [
-                row(tried, ten_to(tried.relative_tolerance), ten_to(tried.absolute_tolerance)) for tried in by_tolerance
+                row(tried, ten_to(tried.relative_tolerance), ten_to(tried.absolute_tolerance))
+                for tried in by_tolerance
             ],
         },
         {
             "caption": f"The published numbers by form of the first row of (56){over}",
             "head": ["Row", "At the start (N m)"],
-            "rows": [row(tried, formula, number(trials[tried][0]["remainder"])) for tried, formula in by_form],
+            "rows": [
+                row(tried, formula, number(trials[tried][0]["remainder"]))
+                for tried, formula in by_form
+            ],
         },
     ]
     facts = {
@@ -372,7 +448,10 @@ def verdicts_as_json(study: Mapping[str, Any]) -> str:
             for claim, methods in marks.items()
         },
         "shares": {
-            claim: {method: [share_of(of_time) for of_time in by_time.values()] for method, by_time in methods.items()}
+            claim: {
+                method: [share_of(of_time) for of_time in by_time.values()]
+                for method, by_time in methods.items()
+            }
             for claim, methods in marks.items()
         },
         "numbers": [trial["number"] for trial in trials[usual]],
@@ -387,7 +466,10 @@ def as_json(facts: Mapping[str, Any], tables: Container[str]) -> str:
     for name, value in facts.items():
         text = json.dumps(value, ensure_ascii=False)
         if name in tables and isinstance(value, dict):
-            lines = [f'  "{key}": {json.dumps(entry, ensure_ascii=False)}' for key, entry in value.items()]
+            lines = [
+                f'  "{key}": {json.dumps(entry, ensure_ascii=False)}'
+                for key, entry in value.items()
+            ]
             text = "{\n" + ",\n".join(lines) + "\n }"
         elif name in tables:
             lines = [f"  {json.dumps(entry, ensure_ascii=False)}" for entry in value]

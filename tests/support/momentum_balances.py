@@ -1,6 +1,6 @@
-"""Balances of momentum, from a run's own samples, independent of its equations of motion and energies: about the shaft
-L(t) - L(0) = ∫ (torque + moment of the weights - damping) dt; in space p(t) - p(0) = ∫ (force of the bearing + weights)
-dt."""
+"""Balances of momentum, from a run's own samples, independent of its equations of motion and
+energies: about the shaft L(t) - L(0) = ∫ (torque + moment of the weights - damping) dt; in space
+p(t) - p(0) = ∫ (force of the bearing + weights) dt."""
 
 from __future__ import annotations
 
@@ -12,7 +12,8 @@ import numpy as np
 from rotor_mbs.scenario.scene import Blade, Scene
 from rotor_mbs.solution.trajectory import Array, Trajectory
 
-# Samples that one polynomial goes through; a narrower one shows how much is left open between samples.
+# Samples that one polynomial goes through; a narrower one shows how much is left open between
+# samples.
 _POINTS_WITH_SLOPES = (6, 4)
 _POINTS_WITHOUT_SLOPES = (10, 8)
 # How many times that difference counts: at a spike both polynomials are off.
@@ -32,8 +33,9 @@ class Balance(NamedTuple):
 
 
 def angular_balance(scene: Scene, run: Trajectory) -> Balance | None:
-    """About the shaft, relative to the largest momentum, the torque's impulse, and what the weights give in a fall.
-    None where the samples do not resolve the motion, or are too few to show what they leave open."""
+    """About the shaft, relative to the largest momentum, the torque's impulse, and what the weights
+    give in a fall. None where the samples do not resolve the motion, or are too few to show what
+    they leave open."""
     if len(run.time) < max(_POINTS_WITH_SLOPES) or not _is_resolved(scene, run):
         return None
     angles, rates, step = run.angles, run.rates, run.time[1]
@@ -44,15 +46,22 @@ def angular_balance(scene: Scene, run: Trajectory) -> Balance | None:
         change += blade.mass * scene.gravity * velocity[:, 0]
     momentum, torque = angular_momentum(scene, angles, rates), _torque_impulse(scene, run.time)
     wide, narrow = (_impulse(step, moment, change, points) for points in _POINTS_WITH_SLOPES)
-    residual = momentum - momentum[0] - torque + scene.shaft_damping * (angles[:, 0] - angles[0, 0]) - wide
-    fall = sum(blade.mass * _arm(blade) * np.sqrt(scene.gravity * _arm(blade)) for blade in scene.blades)
-    return Balance(_beyond(residual, wide - narrow), float(np.abs(momentum).max() + np.abs(torque).max() + fall))
+    residual = (
+        momentum - momentum[0] - torque + scene.shaft_damping * (angles[:, 0] - angles[0, 0]) - wide
+    )
+    fall = sum(
+        blade.mass * _arm(blade) * np.sqrt(scene.gravity * _arm(blade)) for blade in scene.blades
+    )
+    return Balance(
+        _beyond(residual, wide - narrow),
+        float(np.abs(momentum).max() + np.abs(torque).max() + fall),
+    )
 
 
 def linear_balance(scene: Scene, run: Trajectory) -> Balance | None:
-    """In space, relative to the largest momentum and what the weights give in a fall. None where the run has no force
-    of the bearing, where a load has a kink (the force jumps there), or as for `angular_balance`, oscillations of a
-    stiff bearing among the motion."""
+    """In space, relative to the largest momentum and what the weights give in a fall. None where
+    the run has no force of the bearing, where a load has a kink (the force jumps there), or as for
+    `angular_balance`, oscillations of a stiff bearing among the motion."""
     force = run.get("shaft_force")
     if force is None or len(run.time) < max(_POINTS_WITHOUT_SLOPES) or scene.kink_times:
         return None
@@ -68,7 +77,9 @@ def linear_balance(scene: Scene, run: Trajectory) -> Balance | None:
     for i, blade in enumerate(scene.blades):
         momentum += blade.mass * _centre(scene, run.angles, run.rates, i)[1]
     weights = np.array([0.0, 0.0, mass * scene.gravity])
-    wide, narrow = (_impulse(run.time[1], force - weights, None, points) for points in _POINTS_WITHOUT_SLOPES)
+    wide, narrow = (
+        _impulse(run.time[1], force - weights, None, points) for points in _POINTS_WITHOUT_SLOPES
+    )
     residual = np.linalg.norm(momentum - momentum[0] - wide, axis=1)
     fall = sum(blade.mass * np.sqrt(scene.gravity * _arm(blade)) for blade in scene.blades)
     scale = float(np.linalg.norm(momentum, axis=1).max() + fall)
@@ -76,9 +87,12 @@ def linear_balance(scene: Scene, run: Trajectory) -> Balance | None:
 
 
 def _is_resolved(scene: Scene, run: Trajectory, frequency: float = 0.0) -> bool:
-    """Whether little happens from sample to sample: at the run's rates, and at a frequency in rad/s."""
+    """Whether little happens from sample to sample: at the run's rates, and at a frequency in
+    rad/s."""
     step = scene.duration / (scene.samples - 1)
-    return len(run.time) > 1 and bool(max(np.abs(run.rates).max(), frequency) * step < _MAX_TURN_PER_SAMPLE)
+    return len(run.time) > 1 and bool(
+        max(np.abs(run.rates).max(), frequency) * step < _MAX_TURN_PER_SAMPLE
+    )
 
 
 def _beyond(residual: Array, uncertainty: Array) -> Array:
@@ -101,8 +115,8 @@ def _torque_impulse(scene: Scene, times: Array) -> Array:
 
 
 def angular_momentum(scene: Scene, angles: Array, rates: Array) -> Array:
-    """(n,) kg m²/s about the shaft, from (n, 1 + blades) rad and rad/s: L = J_hub Ω + Σ e·(J ω), e the shaft's
-    direction and ω the blade's angular velocity, both in the blade's own frame."""
+    """(n,) kg m²/s about the shaft, from (n, 1 + blades) rad and rad/s: L = J_hub Ω + Σ e·(J ω), e
+    the shaft's direction and ω the blade's angular velocity, both in the blade's own frame."""
     spin = rates[:, 0]
     total = scene.hub_inertia * spin
     for i, blade in enumerate(scene.blades):
@@ -126,7 +140,9 @@ def _centre(scene: Scene, angles: Array, rates: Array, blade: int) -> tuple[Arra
     azimuth = angles[:, 0] + scene.phases[blade]
     sin_phi, cos_phi = np.sin(azimuth), np.cos(azimuth)
     across, along = x * c - y * s, x * s + y * c
-    position = np.stack([cos_phi * across + sin_phi * z, along, cos_phi * z - sin_phi * across], axis=1)
+    position = np.stack(
+        [cos_phi * across + sin_phi * z, along, cos_phi * z - sin_phi * across], axis=1
+    )
     spin, rate = rates[:, 0], rates[:, 1 + blade]
     by_pitch = np.stack([-cos_phi * along, across, sin_phi * along], axis=1)
     by_rotor = np.stack([position[:, 2], np.zeros_like(spin), -position[:, 0]], axis=1)
@@ -135,14 +151,17 @@ def _centre(scene: Scene, angles: Array, rates: Array, blade: int) -> tuple[Arra
 
 @functools.cache
 def _interval_weights(points: int, interval: int, *, with_slopes: bool) -> tuple[Array, Array]:
-    """Weights of values and slopes at the nodes 0 ... points - 1 in the integral from `interval` to the next node, of
-    the polynomial through all of them; exact by Gauss's points."""
+    """Weights of values and slopes at the nodes 0 ... points - 1 in the integral from `interval` to
+    the next node, of the polynomial through all of them; exact by Gauss's points."""
     nodes = np.arange(points, dtype=float)
     abscissae, gauss = np.polynomial.legendre.leggauss(points)
     at, gauss = interval + 0.5 + 0.5 * abscissae, 0.5 * gauss
     gaps = nodes[:, None] - nodes + np.eye(points)
     basis = np.array(
-        [np.prod((at[:, None] - np.delete(nodes, j)) / np.delete(gaps[j], j), axis=1) for j in range(points)]
+        [
+            np.prod((at[:, None] - np.delete(nodes, j)) / np.delete(gaps[j], j), axis=1)
+            for j in range(points)
+        ]
     )
     if not with_slopes:
         return basis @ gauss, np.zeros(points)
@@ -153,7 +172,8 @@ def _interval_weights(points: int, interval: int, *, with_slopes: bool) -> tuple
 
 
 def _impulse(step: float, values: Array, slopes: Array | None, points: int) -> Array:
-    """(n, ...) integral from the first of n samples, `step` s apart, to each; slopes: their time derivatives."""
+    """(n, ...) integral from the first of n samples, `step` s apart, to each; slopes: their time
+    derivatives."""
     n = len(values)
     points = min(points, n)
     first = np.clip(np.arange(n - 1) - (points // 2 - 1), 0, n - points)

@@ -1,10 +1,12 @@
-"""The mutation run: one change to the source at a time, and `rotor-mbs check` or a test must notice.
+"""The mutation run: one change to the source at a time, and `rotor-mbs check` or a test must
+notice.
 
     python tests/support/mutation.py [PATTERN] [--every N] [--jobs N] [--log FILE] [--limit S]
 
-Each mutant has a process of its own, forked from one that has loaded the engines. There the package is imported with
-the changed module, a few scenes are run and judged as `check` does it, and where no check fails, the tests that belong
-to the module are run. A mutant that raises or does not end is noticed, too: `check` fails for a run that failed.
+Each mutant has a process of its own, forked from one that has loaded the engines. There the package
+is imported with the changed module, a few scenes are run and judged as `check` does it, and where
+no check fails, the tests that belong to the module are run. A mutant that raises or does not end is
+noticed, too: `check` fails for a run that failed.
 """
 
 from __future__ import annotations
@@ -41,7 +43,8 @@ class Target(NamedTuple):
     names   with blanks between; "*": all of them
     kind    of the runs that are judged, a key of RUNS
     tests   run where no check fails
-    share   by how much a number is changed; 0.5 and ode45's: conditions and whole numbers are changed, too
+    share   by how much a number is changed; 0.5 and ode45's: conditions and whole numbers are
+    changed, too
     """
 
     module: str
@@ -60,7 +63,10 @@ _CHECKED = "check/held check/general check/pitch-loads"
 RUNS: dict[str, list[tuple[str, str]]] = {
     "tests alone": [],
     "lagrange": [(_CHECKED, "lagrange/dop853")],
-    "printed": [("check/point-masses paper/fig04b", "printed/ode45"), ("paper/fig05 paper/fig11", "printed/ode45")],
+    "printed": [
+        ("check/point-masses paper/fig04b", "printed/ode45"),
+        ("paper/fig05 paper/fig11", "printed/ode45"),
+    ],
     "tree": [(_CHECKED, "exudyn_tree/rk67"), ("check/held", "exudyn_chain/generalized_alpha")],
     "chain": [(_CHECKED, "exudyn_chain/generalized_alpha")],
     "mujoco": [(_CHECKED, "mujoco/rk4")],
@@ -80,13 +86,19 @@ RUNS: dict[str, list[tuple[str, str]]] = {
         ("check/pitch-loads", "exudyn_tree/dopri5"),
         ("check/held check/loads", "exudyn_chain/generalized_alpha"),
     ],
-    "integration": [(_CHECKED, "lagrange/taylor"), (_CHECKED, "lagrange/dop853"), (_CHECKED, "lagrange/ode45")],
+    "integration": [
+        (_CHECKED, "lagrange/taylor"),
+        (_CHECKED, "lagrange/dop853"),
+        (_CHECKED, "lagrange/ode45"),
+    ],
 }
 
 _M, _L, _P = "rotor_mbs.models.exudyn", "rotor_mbs.models.lagrange", "rotor_mbs.models.printed"
 _J, _A = "rotor_mbs.models.mujoco", "rotor_mbs.analysis"
 _PARTS = ("models/test_exudyn_parts.py",)
-_ALL_LOADS = "models/test_exact_solutions.py::test_every_load_at_once_follows_the_equations_written_anew"
+_ALL_LOADS = (
+    "models/test_exact_solutions.py::test_every_load_at_once_follows_the_equations_written_anew"
+)
 _EXACT = "models/test_exact_solutions.py::test_every_model_has_the_exact_motion"
 _CONSTANT = "constant torques and angle of rest"
 _PRINTED = ("models/test_printed.py", "analysis/test_errata.py")
@@ -111,114 +123,268 @@ _JUDGED_RIGHT = ("analysis/test_judged_right.py",)
 _SWEEP = ("models/test_sweep_ensemble.py",)
 _CHECK = "studies/test_check.py::test_"
 _LEANING = "models/test_tilt_cone.py::test_"
-_LEANING_MOTION = f"{_LEANING}a_motion_has_the_angles_energies_tips_and_loads_of_newtons_and_eulers_laws"
+_LEANING_MOTION = (
+    f"{_LEANING}a_motion_has_the_angles_energies_tips_and_loads_of_newtons_and_eulers_laws"
+)
 _TIME_TABLE = ("scenario/test_time_table.py",)
-_SAMPLES = ("models/test_segments.py", f"{_ALL_LOADS}[lagrange/dop853]", f"{_EXACT}[lagrange/dop853-{_CONSTANT}]")
+_SAMPLES = (
+    "models/test_segments.py",
+    f"{_ALL_LOADS}[lagrange/dop853]",
+    f"{_EXACT}[lagrange/dop853-{_CONSTANT}]",
+)
 _TARGETS = (
-    Target(f"{_L}.closed_form", "accelerations power rest_energy energies point_path", "lagrange",
-           (*_PRINTED, f"{_LEANING}the_closed_form_obeys_newtons_and_eulers_laws")),
-    Target(f"{_L}.parameters",
-           "rotor_form _form _inertia_about_hub _rotor_inertia _coefficients _lean_coefficients leans _lean "
-           "_cosine_of_turn "
-           "_cosine_and_sine _power_series",
-           "lagrange", (*_PRINTED, f"{_LEANING}the_closed_form_obeys_newtons_and_eulers_laws")),
+    Target(
+        f"{_L}.closed_form",
+        "accelerations power rest_energy energies point_path",
+        "lagrange",
+        (*_PRINTED, f"{_LEANING}the_closed_form_obeys_newtons_and_eulers_laws"),
+    ),
+    Target(
+        f"{_L}.parameters",
+        "rotor_form _form _inertia_about_hub _rotor_inertia _coefficients _lean_coefficients "
+        "leans _lean "
+        "_cosine_of_turn "
+        "_cosine_and_sine _power_series",
+        "lagrange",
+        (*_PRINTED, f"{_LEANING}the_closed_form_obeys_newtons_and_eulers_laws"),
+    ),
     # What all but the printed equations share.
-    Target("rotor_mbs.scenario.time_table",
-           "value_at values_at constant_value kink_times torque_place rest_place values at segments values_before",
-           "lagrange", _TIME_TABLE),
-    Target("rotor_mbs.scenario.scene", "inertia_about_apex", "tests alone", ("scenario/test_scene_files.py",)),
+    Target(
+        "rotor_mbs.scenario.time_table",
+        (
+            "value_at values_at constant_value kink_times torque_place rest_place values at "
+            "segments values_before"
+        ),
+        "lagrange",
+        _TIME_TABLE,
+    ),
+    Target(
+        "rotor_mbs.scenario.scene",
+        "inertia_about_apex",
+        "tests alone",
+        ("scenario/test_scene_files.py",),
+    ),
     Target("rotor_mbs.scenario.time_table", "intervals steps_and_rows", "tree", _TIME_TABLE),
     Target(f"{_L}.samples", "trajectory _energies constant_work", "lagrange", _SAMPLES),
-    Target(f"{_P}.literal", "*", "printed",
-           (*_PRINTED, "models/test_printed_method.py::test_one_blade_is_a_pendulum_that_does_not_pitch")),
+    Target(
+        f"{_P}.literal",
+        "*",
+        "printed",
+        (
+            *_PRINTED,
+            "models/test_printed_method.py::test_one_blade_is_a_pendulum_that_does_not_pitch",
+        ),
+    ),
     Target(f"{_P}.derivation", "*", "printed", _PRINTED),
     Target(f"{_P}.observables", "tip_path kinetic_energy potential_energy _sines", "printed", ()),
-    Target(f"{_M}.geometry",
-           "rotation_x rotation_y rotation_z mounting shaft_axis _turn blade_body hub_body fixed_blade_rotation "
-           "body_of_point",
-           "tree", (*_PARTS, f"{_LEANING_MOTION}[exudyn_tree/rk67]")),
+    Target(
+        f"{_M}.geometry",
+        "rotation_x rotation_y rotation_z mounting shaft_axis _turn blade_body hub_body "
+        "fixed_blade_rotation "
+        "body_of_point",
+        "tree",
+        (*_PARTS, f"{_LEANING_MOTION}[exudyn_tree/rk67]"),
+    ),
     # About the common centre of mass, which a change moves to second order alone.
     Target(f"{_M}.geometry", "_joined", "tree", _PARTS, 0.001),
     Target(f"{_M}.tree", "_tree", "tree", _PARTS),
     Target(f"{_M}.sensor_samples", "springs work cumulative_integral _fields", "tree", _SENSORS),
     Target(f"{_M}.loads", "at prescribed_moments moment_on", "tree", ()),
-    Target(f"{_M}.geometry", "quaternion _quaternion_product quaternion_rate", "chain",
-           (*_PARTS, f"{_LEANING_MOTION}[exudyn_chain/extrapolated]"), 0.01),
-    Target(f"{_M}.chain",
-           "placed_bodies _rotor_rotation _body _marker _on_body _torque_on_shaft _pitch_spring _spring_torque",
-           "chain",
-           (*_PARTS, f"{_LEANING_MOTION}[exudyn_chain/extrapolated]",
-            f"{_EXACT}[exudyn_chain/generalized_alpha-a growing torque and a constant angle of rest]"),
-           0.01),
+    Target(
+        f"{_M}.geometry",
+        "quaternion _quaternion_product quaternion_rate",
+        "chain",
+        (*_PARTS, f"{_LEANING_MOTION}[exudyn_chain/extrapolated]"),
+        0.01,
+    ),
+    Target(
+        f"{_M}.chain",
+        (
+            "placed_bodies _rotor_rotation _body _marker _on_body _torque_on_shaft _pitch_spring "
+            "_spring_torque"
+        ),
+        "chain",
+        (
+            *_PARTS,
+            f"{_LEANING_MOTION}[exudyn_chain/extrapolated]",
+            (
+                f"{_EXACT}[exudyn_chain/generalized_alpha-a growing torque and a constant "
+                "angle of rest]"
+            ),
+        ),
+        0.01,
+    ),
     Target(f"{_M}.sensor_samples", "_joint_motion _dot unwrap", "chain", _SENSORS, 0.01),
     # Of fourth order: this model is bound to 1e-8.
-    Target(f"{_J}.mjcf", "loads_of model _blade _joint _inertial _possible", "mujoco",
-           (f"{_MUJOCO}point_masses_have_no_inertia_that_the_scene_does_not_give",
+    Target(
+        f"{_J}.mjcf",
+        "loads_of model _blade _joint _inertial _possible",
+        "mujoco",
+        (
+            f"{_MUJOCO}point_masses_have_no_inertia_that_the_scene_does_not_give",
             f"{_MUJOCO}an_inertia_at_the_limit_of_the_triangle_inequality",
-            f"{_ALL_LOADS}[mujoco/rk4]", f"{_LEANING_MOTION}[mujoco/rk4]"), 0.001),
-    Target(f"{_J}.solver", "_advance observe _work _springs", "mujoco",
-           (f"{_MUJOCO}steps_and_evaluations_are_counted", f"{_MUJOCO}the_work_of_loads_and_dampers_is_of_fourth_order",
-            f"{_ALL_LOADS}[mujoco/rk4]"), 0.001),
-    Target(f"{_A}.judgement",
-           "judge clearly_ok _is_close largest_angle_error _status _too_far_apart smallest_rotor_inertia_share "
-           "_RESEMBLES _RESEMBLING_ANGLE _CLEAR_SHARE", "tests alone", (*_RULES, *_SWEEP), 0.5),
-    Target(f"{_A}.run_checks", "*", "tests alone",
-           (*_RULES, "solution/test_metrics.py::test_a_load_that_is_off_is_inaccurate", "analysis/test_checks.py",
-            *_JUDGED_RIGHT), 0.5),
+            f"{_ALL_LOADS}[mujoco/rk4]",
+            f"{_LEANING_MOTION}[mujoco/rk4]",
+        ),
+        0.001,
+    ),
+    Target(
+        f"{_J}.solver",
+        "_advance observe _work _springs",
+        "mujoco",
+        (
+            f"{_MUJOCO}steps_and_evaluations_are_counted",
+            f"{_MUJOCO}the_work_of_loads_and_dampers_is_of_fourth_order",
+            f"{_ALL_LOADS}[mujoco/rk4]",
+        ),
+        0.001,
+    ),
+    Target(
+        f"{_A}.judgement",
+        "judge clearly_ok _is_close largest_angle_error _status _too_far_apart "
+        "smallest_rotor_inertia_share "
+        "_RESEMBLES _RESEMBLING_ANGLE _CLEAR_SHARE",
+        "tests alone",
+        (*_RULES, *_SWEEP),
+        0.5,
+    ),
+    Target(
+        f"{_A}.run_checks",
+        "*",
+        "tests alone",
+        (
+            *_RULES,
+            "solution/test_metrics.py::test_a_load_that_is_off_is_inaccurate",
+            "analysis/test_checks.py",
+            *_JUDGED_RIGHT,
+        ),
+        0.5,
+    ),
     Target(f"{_L}.singularity", "*", "tests alone", _RULES, 0.5),
-    Target("rotor_mbs.solution.metrics",
-           "running_growth horizon_samples angle_error energy_scale metrics_of defect_metrics _angle_errors largest "
-           "energy_drifts HORIZON_GROWTH",
-           "tests alone", (*_RULES, "solution/test_metrics.py", *_DEFECTS, *_SWEEP), 0.5),
-    Target("rotor_mbs.solution.defects", "*", "tests alone", (*_DEFECTS, *_RULES, *_JUDGED_RIGHT), 0.5),
+    Target(
+        "rotor_mbs.solution.metrics",
+        "running_growth horizon_samples angle_error energy_scale metrics_of defect_metrics "
+        "_angle_errors largest "
+        "energy_drifts HORIZON_GROWTH",
+        "tests alone",
+        (*_RULES, "solution/test_metrics.py", *_DEFECTS, *_SWEEP),
+        0.5,
+    ),
+    Target(
+        "rotor_mbs.solution.defects", "*", "tests alone", (*_DEFECTS, *_RULES, *_JUDGED_RIGHT), 0.5
+    ),
     Target(f"{_L}.defects", "*", "tests alone", (*_DEFECTS, *_RULES, *_JUDGED_RIGHT), 0.5),
     # Of a tableau's fractions any may be changed.
     Target("rotor_mbs.models.ode45", "*", "ode45", (_DEFAULTS, "models/test_ode45.py"), 0.001),
     Target(f"{_M}.schemes", "*", "schemes", (_DEFAULTS, *_PARTS, *_EXTRAPOLATION), 0.5),
-    Target(f"{_M}.solvers", "_scheme build_tree build_chain __init__ integrate", "schemes",
-           (_DEFAULTS, *_PARTS, *_EXTRAPOLATION, f"{_ALL_LOADS}[exudyn_chain/extrapolated]"), 0.5),
-    Target(f"{_L}.methods", "tolerance check_tolerance relative_tolerance absolute_tolerance", "schemes",
-           (_DEFAULTS, "methods/test_settings.py"), 0.5),
-    Target(f"{_M}.adapter", "*", "adapter",
-           (*_PARTS, *_EXTRAPOLATION, "models/test_linearization.py",
+    Target(
+        f"{_M}.solvers",
+        "_scheme build_tree build_chain __init__ integrate",
+        "schemes",
+        (_DEFAULTS, *_PARTS, *_EXTRAPOLATION, f"{_ALL_LOADS}[exudyn_chain/extrapolated]"),
+        0.5,
+    ),
+    Target(
+        f"{_L}.methods",
+        "tolerance check_tolerance relative_tolerance absolute_tolerance",
+        "schemes",
+        (_DEFAULTS, "methods/test_settings.py"),
+        0.5,
+    ),
+    Target(
+        f"{_M}.adapter",
+        "*",
+        "adapter",
+        (
+            *_PARTS,
+            *_EXTRAPOLATION,
+            "models/test_linearization.py",
             "models/test_loads.py::test_at_a_jump_of_the_torque_stands_the_load_before_it[exudyn_tree/rk67]",
             f"{_EXACT}[exudyn_chain/extrapolated-torsion from 9.7 rad]",
-            "models/test_exudyn_models.py::test_large_chains_alone_are_solved_by_a_sparse_factorization"), 0.5),
+            "models/test_exudyn_models.py::test_large_chains_alone_are_solved_by_a_sparse_factorization",
+        ),
+        0.5,
+    ),
     Target(f"{_L}.ode_solvers", "*", "integration", ("models/test_segments.py",), 0.5),
-    Target(f"{_L}.samples", "over_segments loads_at loads_at_start at_constant_rests", "integration", _SAMPLES, 0.5),
-    Target(f"{_L}.taylor", "*", "integration",
-           ("models/test_segments.py", "models/test_lagrange.py", "models/test_sweep_ensemble.py"), 0.5),
+    Target(
+        f"{_L}.samples",
+        "over_segments loads_at loads_at_start at_constant_rests",
+        "integration",
+        _SAMPLES,
+        0.5,
+    ),
+    Target(
+        f"{_L}.taylor",
+        "*",
+        "integration",
+        ("models/test_segments.py", "models/test_lagrange.py", "models/test_sweep_ensemble.py"),
+        0.5,
+    ),
     # What the causes of a defect leave out of the equations is in test_planted_mistakes.py.
-    Target(f"{_L}.reference",
-           "__init__ integrate observe uncertainty build _in_quad _in_doubles error_growth _transition_matrices "
-           "_variational_matrices _matrices_by_quotients _largest_growth free_variables _in_units reference_at",
-           "tests alone",
-           ("models/test_reference.py", f"{_CHECK}a_reference_computed_now_is_the_frozen_one[check/general]",
+    Target(
+        f"{_L}.reference",
+        "__init__ integrate observe uncertainty build _in_quad _in_doubles error_growth "
+        "_transition_matrices "
+        "_variational_matrices _matrices_by_quotients _largest_growth free_variables _in_units "
+        "reference_at",
+        "tests alone",
+        (
+            "models/test_reference.py",
+            f"{_CHECK}a_reference_computed_now_is_the_frozen_one[check/general]",
             "comparison/test_compare_trajectory.py::test_growth_of_each_channel_is_at_most_that_of_all",
             "comparison/test_compare_trajectory.py"
-            "::test_the_reference_at_the_times_of_the_data_is_the_frozen_one"), 0.5),
-    Target(f"{_A}.kinematics", "*", "tests alone",
-           ("analysis/test_exact.py", "analysis/test_claims.py", "analysis/test_checks.py",
-            f"{_CHECK}what_is_shipped_passes_in_short")),
-    Target(f"{_A}.checks", "*", "tests alone",
-           ("analysis/test_checks.py", _DEFAULTS, f"{_CHECK}what_is_shipped_passes_in_short",
+            "::test_the_reference_at_the_times_of_the_data_is_the_frozen_one",
+        ),
+        0.5,
+    ),
+    Target(
+        f"{_A}.kinematics",
+        "*",
+        "tests alone",
+        (
+            "analysis/test_exact.py",
+            "analysis/test_claims.py",
+            "analysis/test_checks.py",
+            f"{_CHECK}what_is_shipped_passes_in_short",
+        ),
+    ),
+    Target(
+        f"{_A}.checks",
+        "*",
+        "tests alone",
+        (
+            "analysis/test_checks.py",
+            _DEFAULTS,
+            f"{_CHECK}what_is_shipped_passes_in_short",
             f"{_CHECK}a_run_that_was_changed_together_with_its_checksum_fails",
-            f"{_CHECK}a_changed_byte_is_of_its_run", f"{_CHECK}a_false_success_and_an_edited_status_fail",
+            f"{_CHECK}a_changed_byte_is_of_its_run",
+            f"{_CHECK}a_false_success_and_an_edited_status_fail",
             f"{_CHECK}a_number_of_the_reference_that_is_edited_is_seen",
             f"{_CHECK}a_reference_that_is_altered_or_not_there_fails",
-            "runs/test_integrity.py::test_an_edit_behind_a_right_checksum_is_found"), 0.5),
-    Target(f"{_A}.published", "ENERGY_RISE claims rounds_to finding", "tests alone",
-           ("analysis/test_claims.py",), 0.5),
-)  # fmt: skip
+            "runs/test_integrity.py::test_an_edit_behind_a_right_checksum_is_found",
+        ),
+        0.5,
+    ),
+    Target(
+        f"{_A}.published",
+        "ENERGY_RISE claims rounds_to finding",
+        "tests alone",
+        ("analysis/test_claims.py",),
+        0.5,
+    ),
+)
 # An engine that is not installed has no mutants.
-TARGETS = tuple(target for target in _TARGETS if target.kind != "mujoco" or importlib.util.find_spec("mujoco"))
+TARGETS = tuple(
+    target for target in _TARGETS if target.kind != "mujoco" or importlib.util.find_spec("mujoco")
+)
 
 
 # Making mutants
 
 
 class Mutant(NamedTuple):
-    """The change of this number in the order of a target's source; name: "rotor_mbs.models.ode45._step 12:30 ..."."""
+    """The change of this number in the order of a target's source; name:
+    "rotor_mbs.models.ode45._step 12:30 ..."."""
 
     target: Target
     number: int
@@ -243,8 +409,12 @@ def changed_modules(target: Target) -> Iterator[tuple[str, ast.Module]]:
             continue
         for parent, field, at, node in body:
             for what, changed in _changes(node, parent, target):
-                name = f"{target.module}.{scope} {getattr(node, 'lineno', 0)}:{getattr(node, 'col_offset', 0)} {what}"
-                while name in names:  # a sum in a sum begins at one place, and of its text the beginning is told
+                name = (
+                    f"{target.module}.{scope} "
+                    f"{getattr(node, 'lineno', 0)}:{getattr(node, 'col_offset', 0)} {what}"
+                )
+                # a sum in a sum begins at one place, and of its text the beginning is told
+                while name in names:
                     name += ", inside"
                 names.add(name)
                 _put(parent, field, at, ast.fix_missing_locations(ast.copy_location(changed, node)))
@@ -257,7 +427,8 @@ def parsed(module: str) -> ast.Module:
     return ast.parse((ROOT / (module.replace(".", "/") + ".py")).read_text())
 
 
-Place = tuple[ast.AST, str, "int | None", ast.AST]  # a node's parent, the field and index where it stands, the node
+# a node's parent, the field and index where it stands, the node
+Place = tuple[ast.AST, str, "int | None", ast.AST]
 
 
 def _put(parent: ast.AST, field: str, at: int | None, node: ast.AST) -> None:
@@ -268,7 +439,8 @@ def _put(parent: ast.AST, field: str, at: int | None, node: ast.AST) -> None:
 
 
 def scopes(tree: ast.Module) -> Iterator[tuple[str, list[Place]]]:
-    """Functions, methods, the module's constants and its classes' defaults; of nested functions the outer one."""
+    """Functions, methods, the module's constants and its classes' defaults; of nested functions the
+    outer one."""
     classes = [node for node in tree.body if isinstance(node, ast.ClassDef)]
     for node in [*tree.body, *(inner for outer in classes for inner in outer.body)]:
         match node:
@@ -278,7 +450,8 @@ def scopes(tree: ast.Module) -> Iterator[tuple[str, list[Place]]]:
                 yield name, list(_places(node))
 
 
-_TEXTS = (ast.JoinedStr, ast.Raise, ast.arguments)  # neither these nor annotations and indices are terms
+# neither these nor annotations and indices are terms
+_TEXTS = (ast.JoinedStr, ast.Raise, ast.arguments)
 
 
 def _places(parent: ast.AST) -> Iterator[Place]:
@@ -292,8 +465,18 @@ def _places(parent: ast.AST) -> Iterator[Place]:
 
 
 _OTHER = {"sin": "cos", "cos": "sin", "min": "max", "max": "min"}
-_OPPOSITE = {ast.Lt: ast.GtE, ast.LtE: ast.Gt, ast.Gt: ast.LtE, ast.GtE: ast.Lt, ast.Eq: ast.NotEq, ast.NotEq: ast.Eq,
-             ast.Is: ast.IsNot, ast.IsNot: ast.Is, ast.In: ast.NotIn, ast.NotIn: ast.In}  # fmt: skip
+_OPPOSITE = {
+    ast.Lt: ast.GtE,
+    ast.LtE: ast.Gt,
+    ast.Gt: ast.LtE,
+    ast.GtE: ast.Lt,
+    ast.Eq: ast.NotEq,
+    ast.NotEq: ast.Eq,
+    ast.Is: ast.IsNot,
+    ast.IsNot: ast.Is,
+    ast.In: ast.NotIn,
+    ast.NotIn: ast.In,
+}
 _STATUSES = ("ok", "inaccurate", "diverged", "singular", "solver_failed", "timed_out", "unchecked")
 
 
@@ -307,7 +490,10 @@ def _changes(node: ast.AST, parent: ast.AST, target: Target) -> Iterator[tuple[s
                 if isinstance(term, (ast.List, ast.ListComp, ast.Tuple, ast.JoinedStr)):
                     return
                 if not _is_sum(term):
-                    yield f"{side} side of {text} scaled", _with(node, **{side: _scaled(term, target.share)})
+                    yield (
+                        f"{side} side of {text} scaled",
+                        _with(node, **{side: _scaled(term, target.share)}),
+                    )
         case ast.BinOp(op=ast.Mult() | ast.Div()) if not (_is_sum(parent) or _is_product(parent)):
             yield f"{text} scaled", _scaled(node, target.share)
         case ast.UnaryOp(op=ast.USub(), operand=operand):
@@ -325,14 +511,24 @@ def _changes(node: ast.AST, parent: ast.AST, target: Target) -> Iterator[tuple[s
 
 
 def _other_numbers(value: float, parent: ast.AST, target: Target) -> Iterator[tuple[str, ast.AST]]:
-    """Numbers that are no factor of a product: entries, results, arguments, bounds of a comparison."""
-    holders: tuple[type, ...] = (ast.Tuple, ast.List, ast.Return, ast.Assign, ast.AnnAssign, ast.IfExp, ast.Dict)
+    """Numbers that are no factor of a product: entries, results, arguments, bounds of a
+    comparison."""
+    holders: tuple[type, ...] = (
+        ast.Tuple,
+        ast.List,
+        ast.Return,
+        ast.Assign,
+        ast.AnnAssign,
+        ast.IfExp,
+        ast.Dict,
+    )
     if target.is_program:
         holders += (ast.Call, ast.keyword, ast.Compare)
     if not isinstance(parent, holders) or getattr(parent, "arg", "") == "axis":
         return
     if isinstance(value, float) or target.kind == "printed":
-        other = value * (1.0 + target.share) if value else 1e3 * target.share  # of units of order one
+        # of units of order one
+        other = value * (1.0 + target.share) if value else 1e3 * target.share
     elif target.is_program:
         other = value + 1
     else:
@@ -345,11 +541,19 @@ def _other_decisions(node: ast.AST, text: str) -> Iterator[tuple[str, ast.AST]]:
         case ast.Compare(ops=[operator]):
             yield f"{text} turned round", _with(node, ops=[_OPPOSITE[type(operator)]()])
         case ast.BoolOp(op=operator):
-            yield f"and, or in {text}", _with(node, op=ast.Or() if isinstance(operator, ast.And) else ast.And())
+            yield (
+                f"and, or in {text}",
+                _with(node, op=ast.Or() if isinstance(operator, ast.And) else ast.And()),
+            )
         case ast.UnaryOp(op=ast.Not(), operand=operand):
             yield f"{text} without not", operand
-        case ast.If(test=test) | ast.IfExp(test=test) if not isinstance(test, (ast.Compare, ast.UnaryOp)):
-            yield f"if {ast.unparse(test)[:60]}: turned round", _with(node, test=ast.UnaryOp(ast.Not(), test))
+        case ast.If(test=test) | ast.IfExp(test=test) if not isinstance(
+            test, (ast.Compare, ast.UnaryOp)
+        ):
+            yield (
+                f"if {ast.unparse(test)[:60]}: turned round",
+                _with(node, test=ast.UnaryOp(ast.Not(), test)),
+            )
         case ast.Constant(value=str() as status) if status in _STATUSES:
             other = "diverged" if status != "diverged" else "ok"
             yield f"{status} -> {other}", ast.Constant(other)
@@ -394,7 +598,8 @@ class _Changed(SourceFileLoader):
 
 
 def noticed_by(mutant: Mutant) -> str:
-    """Which check or test failed first, or what was raised; "" where none did. For a process of its own."""
+    """Which check or test failed first, or what was raised; "" where none did. For a process of its
+    own."""
     module = mutant.target.module
     _, tree = next(islice(changed_modules(mutant.target), mutant.number, None))
     sys.meta_path.insert(0, _Changed(module, tree))  # type: ignore[arg-type]
@@ -417,10 +622,17 @@ class _FirstFailure:
 def first_failure(kind: str, tests: tuple[str, ...]) -> str:
     from support.checking import failed, judged, results_file
 
-    with redirect_stdout(io.StringIO()), redirect_stderr(io.StringIO()), tempfile.TemporaryDirectory() as folder:
+    with (
+        redirect_stdout(io.StringIO()),
+        redirect_stderr(io.StringIO()),
+        tempfile.TemporaryDirectory() as folder,
+    ):
         for number, (scenes, method) in enumerate(RUNS[kind]):
-            # What does not end is ended by the fork's limit: on a busy machine a right run may take its minute.
-            path = results_file(Path(folder) / f"{number}.h5", scenes.split(), [method], timeout_s=1e4)
+            # What does not end is ended by the fork's limit: on a busy machine a right run may take
+            # its minute.
+            path = results_file(
+                Path(folder) / f"{number}.h5", scenes.split(), [method], timeout_s=1e4
+            )
             for check in failed(judged(path)):
                 return f"check {check.name}: {' '.join(check.where)}"
         first = _FirstFailure()
@@ -431,7 +643,8 @@ def first_failure(kind: str, tests: tuple[str, ...]) -> str:
 
 
 def answer_of_fork(call: Callable[[], str], limit_s: float | None = None) -> str:
-    """Return what a call returns in a fork of this process, or that it has not returned within the limit."""
+    """Return what a call returns in a fork of this process, or that it has not returned within the
+    limit."""
     context = get_context("fork")
     receiver, sender = context.Pipe(duplex=False)
     fork = context.Process(target=lambda: sender.send(call()))
@@ -451,10 +664,18 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("pattern", nargs="?", default="", help="mutants whose name has it")
     parser.add_argument("--every", type=int, default=1, metavar="N", help="each N-th of them alone")
-    parser.add_argument("--jobs", type=int, default=2, metavar="N", help="at a time (default: %(default)s)")
-    parser.add_argument("--log", type=Path, metavar="FILE", help="mutants that it has are not tried again")
     parser.add_argument(
-        "--limit", type=float, default=TIME_LIMIT_S, metavar="S", help="a mutant's (default: %(default)s)"
+        "--jobs", type=int, default=2, metavar="N", help=("at a time (default: %(default)s)")
+    )
+    parser.add_argument(
+        "--log", type=Path, metavar="FILE", help=("mutants that it has are not tried again")
+    )
+    parser.add_argument(
+        "--limit",
+        type=float,
+        default=TIME_LIMIT_S,
+        metavar="S",
+        help=("a mutant's (default: %(default)s)"),
     )
     arguments = parser.parse_args()
     sys.path[:0] = [str(ROOT), str(ROOT / "tests")]
@@ -470,7 +691,10 @@ def main() -> None:
     with ThreadPoolExecutor(arguments.jobs) as pool:
         tests = tuple(dict.fromkeys(test for mutant in mutants for test in mutant.target.tests))
         kinds = dict.fromkeys(mutant.target.kind for mutant in mutants)
-        calls = [*(partial(first_failure, kind, ()) for kind in kinds), partial(first_failure, "tests alone", tests)]
+        calls = [
+            *(partial(first_failure, kind, ()) for kind in kinds),
+            partial(first_failure, "tests alone", tests),
+        ]
         for failure in pool.map(answer_of_fork, calls):
             if failure:
                 raise SystemExit(f"without any change: {failure}")

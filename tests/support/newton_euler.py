@@ -1,7 +1,9 @@
-"""Newton's and Euler's laws for a rotor with tilt and cone, by rotation matrices; shares nothing with the models.
+"""Newton's and Euler's laws for a rotor with tilt and cone, by rotation matrices; shares nothing
+with the models.
 
-Everything is in the base frame and about the apex: of each blade the axes R = Rx(tilt) Ry(q + phase) Rx(-cone) Rz(θ),
-its angular velocity Ω shaft + θ' axis, and the force and moment that its motion and weight ask of the hub.
+Everything is in the base frame and about the apex: of each blade the axes R = Rx(tilt) Ry(q +
+phase) Rx(-cone) Rz(θ), its angular velocity Ω shaft + θ' axis, and the force and moment that its
+motion and weight ask of the hub.
 """
 
 from __future__ import annotations
@@ -50,25 +52,35 @@ def turn(axis: int, angle: float) -> Array:
 
 
 def blade_axes(scene: Scene, blade: int, angles: Array) -> Array:
-    """Return the rotation matrix of a blade (from 0): its columns are the blade's axes in the base frame."""
+    """Return the rotation matrix of a blade (from 0): its columns are the blade's axes in the base
+    frame."""
     azimuth = angles[0] + 2.0 * math.pi * blade / len(scene.blades)
     leaning = turn(0, -scene.blades[blade].cone)
     return turn(0, scene.shaft_tilt) @ turn(1, azimuth) @ leaning @ turn(2, angles[1 + blade])
 
 
 def measure(scene: Scene, angles: Array, rates: Array, time: float = 0.0) -> State:
-    """Return accelerations, energies, tips and loads of a rotor at one state, its loads as at `time`."""
+    """Return accelerations, energies, tips and loads of a rotor at one state, its loads as at
+    `time`."""
     count = len(scene.blades)
     shaft = turn(0, scene.shaft_tilt)[:, 1]
     rotations = [blade_axes(scene, i, angles) for i in range(count)]
     torque = value_at(scene.rotor_torque, time)
     torques = [value_at(table, time) for table in scene.pitch_torque or ((),) * count]
     rests = [value_at(table, time) for table in scene.bearing_rest or ((),) * count]
-    stiffness, damping = scene.bearing_stiffness or (0.0,) * count, scene.bearing_damping or (0.0,) * count
-    actuators = np.array(torques) - np.array(stiffness) * (angles[1:] - np.array(rests)) - np.array(damping) * rates[1:]
+    stiffness, damping = (
+        scene.bearing_stiffness or (0.0,) * count,
+        scene.bearing_damping or (0.0,) * count,
+    )
+    actuators = (
+        np.array(torques)
+        - np.array(stiffness) * (angles[1:] - np.array(rests))
+        - np.array(damping) * rates[1:]
+    )
 
     def asked(accelerations: Array) -> tuple[list[tuple[Array, Array]], Array]:
-        """Return forces and moments on the blades, and the moments on shaft and pitches that accelerations need."""
+        """Return forces and moments on the blades, and the moments on shaft and pitches that
+        accelerations need."""
         of_blades, needed = [], np.zeros(1 + count)
         needed[0] = scene.hub_inertia * accelerations[0]
         for i, (blade, R) in enumerate(zip(scene.blades, rotations, strict=True)):
@@ -83,7 +95,9 @@ def measure(scene: Scene, angles: Array, rates: Array, time: float = 0.0) -> Sta
 
     moving = [0, *(i for i, blade in enumerate(scene.blades, 1) if blade.has_pitch_inertia)]
     _, still = asked(np.zeros(1 + count))
-    matrix = np.stack([asked(unit)[1] - still for unit in np.eye(1 + count)[moving]], axis=1)[moving]
+    matrix = np.stack([asked(unit)[1] - still for unit in np.eye(1 + count)[moving]], axis=1)[
+        moving
+    ]
     driven = np.array([torque - scene.shaft_damping * rates[0], *actuators]) - still
     accelerations = np.zeros(1 + count)
     accelerations[moving] = np.linalg.solve(matrix, driven[moving])
@@ -113,7 +127,9 @@ def measure(scene: Scene, angles: Array, rates: Array, time: float = 0.0) -> Sta
     return State(accelerations, kinetic, potential, tips, loads, np.array(rotations))
 
 
-def _load(blade: Blade, R: Array, omega: Array, alpha: Array, gravity: float) -> tuple[Array, Array]:
+def _load(
+    blade: Blade, R: Array, omega: Array, alpha: Array, gravity: float
+) -> tuple[Array, Array]:
     """Return the force on a blade and its moment about the apex, base frame."""
     r = R @ blade.centre_of_mass
     inertia = R @ blade.inertia_tensor @ R.T

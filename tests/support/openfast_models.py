@@ -1,11 +1,13 @@
-"""Small OpenFAST models written from numbers: a uniform blade, in the form of each generation of files."""
+"""Small OpenFAST models written from numbers: a uniform blade, in the form of each generation of
+files."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-# What distinguishes the generations: where gravity stands, columns of blade files, lines that came later.
+# What distinguishes the generations: where gravity stands, columns of blade files, lines that came
+# later.
 GENERATIONS = ("FAST v8", "OpenFAST 2", "OpenFAST 3.1", "OpenFAST 4.2", "OpenFAST 5")
 LENGTH, HUB_RADIUS, DENSITY, NODES = 8.0, 2.0, 12.5, 5
 
@@ -35,16 +37,25 @@ def write_model(
     age = GENERATIONS.index(generation)
     changed = dict(changes or {})
     main: list[tuple[str, str]] = [
-        ("20", "TMax"), ("0.01", "DT"), ("1", "CompElast"), ("0", "CompInflow"), ("2", "CompAero"), ("1", "CompServo"),
-    ]  # fmt: skip
+        ("20", "TMax"),
+        ("0.01", "DT"),
+        ("1", "CompElast"),
+        ("0", "CompInflow"),
+        ("2", "CompAero"),
+        ("1", "CompServo"),
+    ]
     if age == 4:
         main += [("1", "NRotors"), ("F T", "MirrorRotor")]
     if age >= 2:
         main += [("0", "MHK"), ("9.81", "Gravity")]
     main += [
-        ('"parts\\ElastoDyn.dat"', "EDFile"), ('"unused"', "BDBldFile(1)"), ('"missing/wind.dat"', "InflowFile"),
-        ('"missing/aero.dat"', "AeroFile"), ('"parts/ServoDyn.dat"', "ServoFile"), ("30, 60", "LinTimes"),
-    ]  # fmt: skip
+        ('"parts\\ElastoDyn.dat"', "EDFile"),
+        ('"unused"', "BDBldFile(1)"),
+        ('"missing/wind.dat"', "InflowFile"),
+        ('"missing/aero.dat"', "AeroFile"),
+        ('"parts/ServoDyn.dat"', "ServoFile"),
+        ("30, 60", "LinTimes"),
+    ]
 
     structure: list[tuple[str, str]] = []
     if age < 2:
@@ -57,7 +68,13 @@ def write_model(
     structure += [("40", "Azimuth"), ("12", "RotSpeed"), (str(blades), "NumBl")]
     structure += [(repr(HUB_RADIUS + LENGTH), "TipRad"), (repr(HUB_RADIUS), "HubRad")]
     structure += [("-2.5", f"PreCone({number})") for number in (1, 2, 3)]
-    structure += [("0.25", "HubCM"), ("0.75", "UndSling"), ("10", "AzimB1Up"), ("1.5", "ShftGagL"), ("-5", "ShftTilt")]
+    structure += [
+        ("0.25", "HubCM"),
+        ("0.75", "UndSling"),
+        ("10", "AzimB1Up"),
+        ("1.5", "ShftGagL"),
+        ("-5", "ShftTilt"),
+    ]
     structure += [("3.5", f"TipMass({number})") for number in (1, 2, 3)]
     if age == 4:
         structure += [("20", f"PBrIner({number})") for number in (1, 2, 3)]
@@ -68,7 +85,9 @@ def write_model(
     structure += [("2.5", "GenIner"), (str(NODES), "BldNodes")]
     # Written as on Windows, and without brackets in newer files.
     name = "BldFile{}" if age >= 3 else "BldFile({})"
-    structure += [('"..\\blades of steel\\blade.dat"', name.format(number)) for number in range(1, blades + 1)]
+    structure += [
+        ('"..\\blades of steel\\blade.dat"', name.format(number)) for number in range(1, blades + 1)
+    ]
     structure += [('"missing.dat"', name.format(number)) for number in range(blades + 1, 4)]
     structure += [("97.5", "GBoxEff"), ("30", "GBRatio"), (".false.", "Furling"), ("OutList", "")]
 
@@ -82,9 +101,15 @@ def write_model(
     (folder / "blades of steel").mkdir(exist_ok=True)
     files = {
         folder / "model.fst": _lines(f"{generation} file", main, changed),
-        folder / "parts" / "ElastoDyn.dat": [*_lines("ElastoDyn", structure, changed), '"TipRad"  a channel'],
+        folder / "parts" / "ElastoDyn.dat": [
+            *_lines("ElastoDyn", structure, changed),
+            '"TipRad"  a channel',
+        ],
         folder / "parts" / "ServoDyn.dat": _lines("ServoDyn", servo, changed),
-        folder / "blades of steel" / "blade.dat": [*_lines("a blade", blade, changed), *_table(age < 3)],
+        folder / "blades of steel" / "blade.dat": [
+            *_lines("a blade", blade, changed),
+            *_table(age < 3),
+        ],
     }
     for path, lines in files.items():
         path.write_bytes("\r\n".join(lines).encode(encoding))
@@ -92,8 +117,13 @@ def write_model(
 
 
 def _lines(title: str, entries: Sequence[tuple[str, str]], changes: Mapping[str, str]) -> list[str]:
-    """Return the lines of a file: two of text, then value, name and comment, separated by tabs and blanks."""
-    lines = [f"------- {title} INPUT FILE -------", "An unbalanced rotor, 90\u00b0 of TipRad", "------- PART -------"]
+    """Return the lines of a file: two of text, then value, name and comment, separated by tabs and
+    blanks."""
+    lines = [
+        f"------- {title} INPUT FILE -------",
+        "An unbalanced rotor, 90\u00b0 of TipRad",
+        "------- PART -------",
+    ]
     for value, name in entries:
         given = changes.get(name, value)
         if given:
@@ -102,9 +132,13 @@ def _lines(title: str, entries: Sequence[tuple[str, str]], changes: Mapping[str,
 
 
 def _table(has_pitch_axis: bool) -> list[str]:
-    """Return the table of a uniform blade of DENSITY/1.25 kg/m, with or without the column that older files have."""
+    """Return the table of a uniform blade of DENSITY/1.25 kg/m, with or without the column that
+    older files have."""
     lines = ["---- DISTRIBUTED BLADE PROPERTIES ----"]
-    names, units = ["BlFract", "StrcTwst", "BMassDen", "FlpStff"], ["(-)", "(deg)", "(kg/m)", "(Nm^2)"]
+    names, units = (
+        ["BlFract", "StrcTwst", "BMassDen", "FlpStff"],
+        ["(-)", "(deg)", "(kg/m)", "(Nm^2)"],
+    )
     if has_pitch_axis:
         names.insert(1, "PitchAxis")
         units.insert(1, "(-)")
@@ -118,7 +152,8 @@ def _table(has_pitch_axis: bool) -> list[str]:
 
 
 def write_aerodyn14(folder: Path, radii: Sequence[float]) -> None:
-    """Write the file of AeroDyn 14 that the model names, with nodes at these radii from the apex, m."""
+    """Write the file of AeroDyn 14 that the model names, with nodes at these radii from the apex,
+    m."""
     lines = ["AeroDyn v14 INPUT FILE", "text", f"{len(radii)}  BldNodes - nodes"]
     lines += ["RNodes  AeroTwst  DRNodes  Chord  NFoil  PrnElm"]
     lines += [f"{radius!r} 0.0 9.9 1.0 1 NOPRINT" for radius in radii]
@@ -141,7 +176,13 @@ def write_beamdyn(
     twist : deg.
     matrix : (6, 6), of mass.
     """
-    lines = ["BEAMDYN INPUT FILE", "text", "--- GEOMETRY ---", "1 member_total - members", f"{len(points)} kp_total -"]
+    lines = [
+        "BEAMDYN INPUT FILE",
+        "text",
+        "--- GEOMETRY ---",
+        "1 member_total - members",
+        f"{len(points)} kp_total -",
+    ]
     lines += [
         f"1 {len(points)} - Member number; Number of key points",
         "kp_xr kp_yr kp_zr initial_twist",
@@ -150,8 +191,18 @@ def write_beamdyn(
     lines += [f"{x!r} {y!r} {z!r} {twist!r}" for x, y, z in points]
     lines += ['"blade.bd"  BldFile - properties']
     (folder / "beam.dat").write_text("\n".join(lines))
-    lines = ["BEAMDYN INDIVIDUAL BLADE INPUT FILE", "text", "3 station_total - stations", "1 damp_type - damping"]
-    lines += ["--- DAMPING ---", "mu1 mu2 mu3 mu4 mu5 mu6", "(-) (-) (-) (-) (-) (-)", "0.01 0.01 0.01 0.01 0.01 0.01"]
+    lines = [
+        "BEAMDYN INDIVIDUAL BLADE INPUT FILE",
+        "text",
+        "3 station_total - stations",
+        "1 damp_type - damping",
+    ]
+    lines += [
+        "--- DAMPING ---",
+        "mu1 mu2 mu3 mu4 mu5 mu6",
+        "(-) (-) (-) (-) (-) (-)",
+        "0.01 0.01 0.01 0.01 0.01 0.01",
+    ]
     lines += ["--- DISTRIBUTED PROPERTIES ---"]
     stiffness = "\t1E9 -0.0 0.0 0.0 0.0 0.0"
     for fraction in ("0.0", "0.3", "1.0"):

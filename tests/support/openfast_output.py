@@ -1,4 +1,5 @@
-"""OpenFAST's output of a rigid rotor: its axes, signs, units and names, from states and independent loads."""
+"""OpenFAST's output of a rigid rotor: its axes, signs, units and names, from states and independent
+loads."""
 
 from __future__ import annotations
 
@@ -27,9 +28,9 @@ def columns_of(
 ) -> dict[str, tuple[str, Array]]:
     """Return unit and numbers of OpenFAST's channels by name.
 
-    Frames are those of OpenFAST's manual: s turned by the tilt about y, a by the azimuth about x, c by cone about y,
-    b by the pitch about -z. Its loads are those of a blade on the hub, about the root, and of rotor and hub on the
-    shaft, about the apex; forces in kN.
+    Frames are those of OpenFAST's manual: s turned by the tilt about y, a by the azimuth about x, c
+    by cone about y, b by the pitch about -z. Its loads are those of a blade on the hub, about the
+    root, and of rotor and hub on the shaft, about the apex; forces in kN.
 
     Parameters
     ----------
@@ -57,7 +58,9 @@ def columns_of(
         force, moment = TO_SCENE.T @ force, TO_SCENE.T @ moment
         moment = moment + np.cross(hub_centre * in_s[:, 0], weight)
         for frame, axes in (("s", in_s), ("a", in_a)):
-            for axis, of_force, of_moment in zip("xyz", axes.T @ force, axes.T @ moment, strict=True):
+            for axis, of_force, of_moment in zip(
+                "xyz", axes.T @ force, axes.T @ moment, strict=True
+            ):
                 put(f"LSShftF{axis}{frame}", of_force / 1e3)
                 put(f"LSSTipM{axis}{frame}", of_moment / 1e3)
         put("RotThrust", float((in_s.T @ force)[0]) / 1e3)
@@ -72,7 +75,9 @@ def columns_of(
             root_force = TO_SCENE.T @ own @ -state.loads["blade_root_force"][i - 1]
             root_moment = TO_SCENE.T @ own @ -state.loads["blade_root_moment"][i - 1]
             for frame, axes in (("c", in_c), ("b", in_b)):
-                for axis, of_force, of_moment in zip("xyz", axes.T @ root_force, axes.T @ root_moment, strict=True):
+                for axis, of_force, of_moment in zip(
+                    "xyz", axes.T @ root_force, axes.T @ root_moment, strict=True
+                ):
                     put(f"RootF{axis}{frame}{i}", of_force / 1e3)
                     put(f"RootM{axis}{frame}{i}", of_moment / 1e3)
     return {name: (_unit(name), np.array(values)) for name, values in table.items()}
@@ -80,20 +85,36 @@ def columns_of(
 
 def _unit(name: str) -> str:
     """Return the unit in which OpenFAST has a channel."""
-    by_beginning = {"Time": "s", "Azimuth": "deg", "RotSpeed": "rpm", "BldPitch": "deg", "BldPRate": "deg/s"}
+    by_beginning = {
+        "Time": "s",
+        "Azimuth": "deg",
+        "RotSpeed": "rpm",
+        "BldPitch": "deg",
+        "BldPRate": "deg/s",
+    }
     for beginning, unit in by_beginning.items():
         if name.startswith(beginning):
             return unit
     return "kN" if "F" in name or name == "RotThrust" else "kN-m"
 
 
-def write_output(path: Path, columns: dict[str, tuple[str, Array]], names: Sequence[str] = ()) -> None:
+def write_output(
+    path: Path, columns: dict[str, tuple[str, Array]], names: Sequence[str] = ()
+) -> None:
     """Write a text output file, of all columns or of some."""
     chosen = list(names) or list(columns)
     head = [
-        "", "Predictions were generated on 27-Nov-2026 at 12:00:00 using OpenFAST, compiled as a 64-bit application",
-        " linked with NWTC Subroutine Library; ElastoDyn", "", "Description from the FAST input file: rigid", "",
-        "\t".join(chosen), "\t".join(f"({columns[name][0]})" for name in chosen),
-    ]  # fmt: skip
+        "",
+        (
+            "Predictions were generated on 27-Nov-2026 at 12:00:00 using OpenFAST, compiled as a "
+            "64-bit application"
+        ),
+        " linked with NWTC Subroutine Library; ElastoDyn",
+        "",
+        ("Description from the FAST input file: rigid"),
+        "",
+        "\t".join(chosen),
+        "\t".join(f"({columns[name][0]})" for name in chosen),
+    ]
     table = np.column_stack([columns[name][1] for name in chosen])
     np.savetxt(path, table, header="\n".join(head), comments="", fmt="%20.12E", delimiter="\t")

@@ -1,4 +1,5 @@
-"""Python packages as an installer leaves them, for tests of plug-ins; what a process knows of methods, forgotten."""
+"""Python packages as an installer leaves them, for tests of plug-ins; what a process knows of
+methods, forgotten."""
 
 from __future__ import annotations
 
@@ -9,13 +10,15 @@ from rotor_mbs.methods import catalogue
 
 
 def forget_method_files() -> None:
-    """Empty what the catalogue knows of methods in files, which later tests have under the same names."""
+    """Empty what the catalogue knows of methods in files, which later tests have under the same
+    names."""
     catalogue._files.clear()
     catalogue._of_files.clear()
 
 
 def forget_what_is_installed() -> None:
-    """Empty the caches of rotor_mbs, of which some hold the methods and quantities that were found."""
+    """Empty the caches of rotor_mbs, of which some hold the methods and quantities that were
+    found."""
     for name, module in list(sys.modules.items()):
         if name.startswith("rotor_mbs."):
             for value in vars(module).values():

@@ -1,7 +1,8 @@
-"""Every printed entry of the paper's matrices and equations by name, compared between three sources.
+"""Every printed entry of the paper's matrices and equations by name, compared between three
+sources.
 
-A value is found by (equation, entry): ("(8)", "row 2 column 4"), ("(52)", "q̇2 q̇3"). The sources: the formulas as
-printed, the paper's derivation with chosen errata, and derivatives of (3) alone.
+A value is found by (equation, entry): ("(8)", "row 2 column 4"), ("(52)", "q̇2 q̇3"). The sources:
+the formulas as printed, the paper's derivation with chosen errata, and derivatives of (3) alone.
 """
 
 from __future__ import annotations
@@ -95,33 +96,45 @@ def derived_entries(state: State, errata: Errata) -> Entries:
     names = state.names
     entries: Entries = {}
     for equation, name in MATRICES:
-        entries |= _matrix_entries(equation, _call(getattr(derivation, name), {**names, "errata": errata}))
-    terms = [blade_terms(q2, q3, state.m, state.c, state.d, state.g, errata) for q2, q3 in state.blades]
+        entries |= _matrix_entries(
+            equation, _call(getattr(derivation, name), {**names, "errata": errata})
+        )
+    terms = [
+        blade_terms(q2, q3, state.m, state.c, state.d, state.g, errata) for q2, q3 in state.blades
+    ]
     return entries | assembled_entries(terms, errata.e3)
 
 
 def right_entries(state: State) -> Entries:
-    """The entries from (3) alone: derivatives of the matrix, of the kinetic and of the potential energy.
+    """The entries from (3) alone: derivatives of the matrix, of the kinetic and of the potential
+    energy.
 
-    For a point mass at p(q), T = ½ m ṗ·ṗ and V = m g p_z, Lagrange's equations are Σ_j m p_i·p_j q̈_j
-    + Σ_jk m p_i·p_jk q̇_j q̇_k + m g p_i,z, where indices of p are derivatives.
+    For a point mass at p(q), T = ½ m ṗ·ṗ and V = m g p_z, Lagrange's equations are Σ_j m p_i·p_j
+    q̈_j + Σ_jk m p_i·p_jk q̇_j q̇_k + m g p_i,z, where indices of p are derivatives.
     """
     entries: Entries = {}
-    for (equation, _), matrix in zip(MATRICES, derivatives_of_a3(*state.blades[0], state), strict=True):
+    for (equation, _), matrix in zip(
+        MATRICES, derivatives_of_a3(*state.blades[0], state), strict=True
+    ):
         entries |= _matrix_entries(equation, matrix)
-    return entries | assembled_entries([_right_terms(q2, q3, state) for q2, q3 in state.blades], first_power=False)
+    return entries | assembled_entries(
+        [_right_terms(q2, q3, state) for q2, q3 in state.blades], first_power=False
+    )
 
 
 def derivatives_of_a3(q2: float, q3: float, state: State) -> tuple[Array, ...]:
     """Derivatives of (3) by q2, q3, q2 q2, q2 q3, q3 q2, q3 q3: the right (8), (9), (16)-(19).
 
-    In each angle (3) is a + b cos q + e sin q, and of such a function (f(q + π/2) - f(q - π/2))/2 is the derivative
-    itself: no step to choose, no truncation error, and it can be taken again.
+    In each angle (3) is a + b cos q + e sin q, and of such a function (f(q + π/2) - f(q - π/2))/2
+    is the derivative itself: no step to choose, no truncation error, and it can be taken again.
     """
     quarter = math.pi / 2.0
 
     def a3(q2: float, q3: float) -> Array:
-        return np.array(derivation.a3(math.sin(q2), math.cos(q2), math.sin(q3), math.cos(q3), state.c, state.d), float)
+        return np.array(
+            derivation.a3(math.sin(q2), math.cos(q2), math.sin(q3), math.cos(q3), state.c, state.d),
+            float,
+        )
 
     def by_q2(f: Callable[[float, float], Array]) -> Callable[[float, float], Array]:
         return lambda q2, q3: (f(q2 + quarter, q3) - f(q2 - quarter, q3)) / 2.0
@@ -137,16 +150,29 @@ def assembled_entries(terms: Sequence[BladeTerms], first_power: bool) -> Entries
     """(25), (29), (30), (32) of the first blade and (39)-(56) of three; first_power: E3 is in."""
     one = terms[0]
     entries = _mass_entries((("(25)",) * 2,) * 2, ((one.d_22, one.d_23), (one.d_23, one.d_33)))
-    entries |= {("(29)", "q̇2²"): one.h_2_22, ("(29)", "q̇2 q̇3"): one.h_2_23, ("(29)", "q̇3²"): one.h_2_33}
-    entries |= {("(30)", "q̇2²"): one.h_3_22, ("(30)", "q̇2 q̇3"): one.h_3_23, ("(30)", "q̇3²"): one.h_3_33}
+    entries |= {
+        ("(29)", "q̇2²"): one.h_2_22,
+        ("(29)", "q̇2 q̇3"): one.h_2_23,
+        ("(29)", "q̇3²"): one.h_2_33,
+    }
+    entries |= {
+        ("(30)", "q̇2²"): one.h_3_22,
+        ("(30)", "q̇2 q̇3"): one.h_3_23,
+        ("(30)", "q̇3²"): one.h_3_33,
+    }
     entries |= _gravity_entries("(32)", (one.gravity_2, one.gravity_3))
     mass: list[list[Any]] = [[0] * 4 for _ in range(4)]
     mass[0][0] = sum(blade.d_22 for blade in terms)
     entries["(52)", "q̇2²"] = sum(blade.h_2_22 for blade in terms)
-    for i, (blade, row, number) in enumerate(zip(terms, _PITCH_ROWS, _PITCHES, strict=True), start=1):
+    for i, (blade, row, number) in enumerate(
+        zip(terms, _PITCH_ROWS, _PITCHES, strict=True), start=1
+    ):
         mass[0][i] = mass[i][0] = blade.d_23
         mass[i][i] = blade.d_33
-        entries["(52)", f"q̇2 q̇{number}"], entries["(52)", f"q̇{number}²"] = blade.h_2_23, blade.h_2_33
+        entries["(52)", f"q̇2 q̇{number}"], entries["(52)", f"q̇{number}²"] = (
+            blade.h_2_23,
+            blade.h_2_33,
+        )
         entries[row, "q̇2²"], entries[row, f"q̇2 q̇{number}"] = blade.h_3_22, blade.h_3_23
         entries[row, f"q̇{number}"] = blade.h_3_33 if first_power else 0
         entries[row, f"q̇{number}²"] = 0 if first_power else blade.h_3_33
@@ -174,11 +200,16 @@ def _right_terms(q2: float, q3: float, state: State) -> BladeTerms:
 
 def _call(formula: Callable[..., Any], names: Mapping[str, Any]) -> Any:
     """The formula at the symbols it names in its signature."""
-    return formula(**{name: names[name] for name in inspect.signature(formula).parameters if name in names})
+    return formula(
+        **{name: names[name] for name in inspect.signature(formula).parameters if name in names}
+    )
 
 
-def _rate_coefficients(row: Callable[..., Any], names: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
-    """The row is linear in its products of rates: each one's coefficient is the row where it is 1 and the rest 0."""
+def _rate_coefficients(
+    row: Callable[..., Any], names: Mapping[str, Any]
+) -> Iterator[tuple[str, Any]]:
+    """The row is linear in its products of rates: each one's coefficient is the row where it is 1
+    and the rest 0."""
     products = [name for name in inspect.signature(row).parameters if name in _RATES]
     for product in products:
         yield _RATES[product], _call(row, {**names, **dict.fromkeys(products, 0), product: 1})
@@ -204,18 +235,22 @@ def _gravity_entries(equation: str, rows: Sequence[Any]) -> Entries:
     return {(equation, f"C({i})"): value for i, value in enumerate(rows, start=1)}
 
 
-# Lengths, mass and gravity are drawn of order one: rounding is some 1e-16, a wrong formula some 1e-1.
+# Lengths, mass and gravity are drawn of order one: rounding is some 1e-16, a wrong formula some
+# 1e-1.
 TOLERANCE = 1e-12
 NAMES = ("E1", "E2", "E3")
 
 
 def check_errata(states: Sequence[State]) -> dict[Key, tuple[float, str]]:
-    """Every entry of (8), (9), (16)-(19), (25), (29), (30), (32), (39)-(56), in the order of the equations: how far the
-    print is from what is right, and the errata that explain it, as "E1, E2"; "" where it agrees or nothing does."""
+    """Every entry of (8), (9), (16)-(19), (25), (29), (30), (32), (39)-(56), in the order of the
+    equations: how far the print is from what is right, and the errata that explain it, as "E1, E2";
+    "" where it agrees or nothing does."""
     printed = [printed_entries(state.names) for state in states]
     right = [right_entries(state) for state in states]
     derived = {
-        subset: [derived_entries(state, Errata(*(name in subset for name in NAMES))) for state in states]
+        subset: [
+            derived_entries(state, Errata(*(name in subset for name in NAMES))) for state in states
+        ]
         for size in range(len(NAMES) + 1)  # the fewest first
         for subset in combinations(NAMES, size)
     }
@@ -224,23 +259,31 @@ def check_errata(states: Sequence[State]) -> dict[Key, tuple[float, str]]:
         off = difference(key, printed, right)
         explanation: tuple[str, ...] = ()
         if off > TOLERANCE and difference(key, derived[()], right) <= TOLERANCE:
-            fits = (subset for subset in derived if difference(key, printed, derived[subset]) <= TOLERANCE)
+            fits = (
+                subset
+                for subset in derived
+                if difference(key, printed, derived[subset]) <= TOLERANCE
+            )
             explanation = next(fits, ())
         found[key] = off, ", ".join(explanation)
     return found
 
 
 def random_states(seed: int, count: int) -> list[State]:
-    """States with angles anywhere and constants of order one: an identity holds for all of them or is none."""
+    """States with angles anywhere and constants of order one: an identity holds for all of them or
+    is none."""
     rng = np.random.default_rng(seed)
     return [
-        State(tuple(rng.uniform(-np.pi, np.pi, 4).tolist()), *rng.uniform(0.5, 2.0, 4).tolist()) for _ in range(count)
+        State(tuple(rng.uniform(-np.pi, np.pi, 4).tolist()), *rng.uniform(0.5, 2.0, 4).tolist())
+        for _ in range(count)
     ]
 
 
 def difference(key: Key, first: Sequence[Entries], second: Sequence[Entries]) -> float:
     """The largest over the states, of the entry's size or of 1."""
-    pairs = [(float(a.get(key, 0)), float(b.get(key, 0))) for a, b in zip(first, second, strict=True)]
+    pairs = [
+        (float(a.get(key, 0)), float(b.get(key, 0))) for a, b in zip(first, second, strict=True)
+    ]
     return max(abs(a - b) / max(1.0, abs(a), abs(b)) for a, b in pairs)
 
 

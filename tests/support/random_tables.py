@@ -1,4 +1,5 @@
-"""Tables of one motion as people write them: random names, formats, numbers, units and orders of rows."""
+"""Tables of one motion as people write them: random names, formats, numbers, units and orders of
+rows."""
 
 from __future__ import annotations
 
@@ -22,13 +23,21 @@ PRECISIONS = ("float64", "float32", "9 digits")
 UNITS = {
     "time": [("s", 1.0), ("sec", 1.0), ("ms", 1e3), ("milliseconds", 1e3), ("min", 1.0 / 60.0)],
     "angle": [
-        ("rad", 1.0), ("radian", 1.0), ("deg", 180.0 / np.pi), ("degrees", 180.0 / np.pi), ("turns", 0.5 / np.pi),
+        ("rad", 1.0),
+        ("radian", 1.0),
+        ("deg", 180.0 / np.pi),
+        ("degrees", 180.0 / np.pi),
+        ("turns", 0.5 / np.pi),
     ],
     "rate": [
-        ("rad/s", 1.0), ("rad s^-1", 1.0), ("radian/second", 1.0), ("deg/s", 180.0 / np.pi), ("rpm", 30.0 / np.pi),
+        ("rad/s", 1.0),
+        ("rad s^-1", 1.0),
+        ("radian/second", 1.0),
+        ("deg/s", 180.0 / np.pi),
+        ("rpm", 30.0 / np.pi),
         ("1/s", 1.0),
     ],
-}  # fmt: skip
+}
 # Names of the time, the rotor, a pitch with its number, and their rates.
 WORDS = [
     ("time", "rotor", "pitch {}", "rotor rate", "pitch {} rate"),
@@ -39,9 +48,14 @@ WORDS = [
 ]
 # Names of columns of an array, and the number of the first.
 ARRAYS = [
-    ("q[{}]", "qd[{}]", 0), ("q[{}]", "qd[{}]", 1), ("q[{}]", "der(q[{}])", 1), ("qpos_{}", "qvel_{}", 0),
-    ("angles[{}]", "rates[{}]", 1), ("q({})", "qdot({})", 1), ("q[{},1]", "qd[{},1]", 1),
-]  # fmt: skip
+    ("q[{}]", "qd[{}]", 0),
+    ("q[{}]", "qd[{}]", 1),
+    ("q[{}]", "der(q[{}])", 1),
+    ("qpos_{}", "qvel_{}", 0),
+    ("angles[{}]", "rates[{}]", 1),
+    ("q({})", "qdot({})", 1),
+    ("q[{},1]", "qd[{},1]", 1),
+]
 MATRICES = [("angles", "rates"), ("q", "qd"), ("qpos", "qvel"), ("Coordinates", "Coordinates_t")]
 
 
@@ -49,7 +63,8 @@ MATRICES = [("angles", "rates"), ("q", "qd"), ("qpos", "qvel"), ("Coordinates", 
 class RandomTable:
     """A table and what it is.
 
-    data : a file, or a table in memory. text : what it is, for messages. others : names that no channel has.
+    data : a file, or a table in memory. text : what it is, for messages. others : names that no
+        channel has.
     """
 
     data: Any
@@ -57,7 +72,9 @@ class RandomTable:
     others: tuple[str, ...]
 
 
-def random_table(folder: Path, seed: int, time: Array, angles: Array, rates: Array | None) -> RandomTable:
+def random_table(
+    folder: Path, seed: int, time: Array, angles: Array, rates: Array | None
+) -> RandomTable:
     """Write a motion, (n,) s, (n, 4) rad and rad/s, as `seed` has it."""
     rng = np.random.default_rng(seed)
 
@@ -68,7 +85,10 @@ def random_table(folder: Path, seed: int, time: Array, angles: Array, rates: Arr
     has_arrays = kind in ("npz", "mat", "nc", "h5", "json", "mapping", "Dataset")
     # A variable of MATLAB has a plain name, without marks and unit.
     is_matrix = has_arrays and (rng.random() < 0.4 or kind == "mat")
-    units = {channel: spellings[0] if kind == "mat" else choice(spellings) for channel, spellings in UNITS.items()}
+    units = {
+        channel: spellings[0] if kind == "mat" else choice(spellings)
+        for channel, spellings in UNITS.items()
+    }
     order = choice(["as it is", "as it is", "reversed", "shuffled", "twice", "before 0"])
     rows = np.arange(len(time))
     if order == "reversed":
@@ -130,9 +150,13 @@ def random_table(folder: Path, seed: int, time: Array, angles: Array, rates: Arr
 
 
 def write_table(
-    folder: Path, kind: str, arrays: dict[str, Array], attributes: dict[str, dict[str, str]] | None = None
+    folder: Path,
+    kind: str,
+    arrays: dict[str, Array],
+    attributes: dict[str, dict[str, str]] | None = None,
 ) -> Any:
-    """Return a table in memory, or the file that is written; arrays (n,) or (n, k), attributes by name."""
+    """Return a table in memory, or the file that is written; arrays (n,) or (n, k), attributes by
+    name."""
     attributes = attributes or {name: {} for name in arrays}
     if kind in ("csv", "txt", "jsonl", "DataFrame"):
         # Which have columns alone.
@@ -158,9 +182,13 @@ def write_table(
     elif kind == "txt":
         pd.DataFrame(arrays).to_csv(path, index=False, sep="\t")
     elif kind == "json":
-        path.write_text(json.dumps({name: values.astype(float).tolist() for name, values in arrays.items()}))
+        path.write_text(
+            json.dumps({name: values.astype(float).tolist() for name, values in arrays.items()})
+        )
     elif kind == "jsonl":
-        rows = pd.DataFrame({name: values.astype(float) for name, values in arrays.items()}).to_dict("records")
+        rows = pd.DataFrame(
+            {name: values.astype(float) for name, values in arrays.items()}
+        ).to_dict("records")
         path.write_text("\n".join(json.dumps(row) for row in rows))
     elif kind == "npz":
         np.savez(path, **arrays)

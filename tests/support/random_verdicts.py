@@ -1,4 +1,5 @@
-"""Judge runs of random rotors, and compare each verdict with an integration that is not the package's.
+"""Judge runs of random rotors, and compare each verdict with an integration that is not the
+package's.
 
     python tests/support/random_verdicts.py verdicts.csv --seeds 0:200
 
@@ -71,7 +72,9 @@ class Verdict:
     fault: str
 
 
-def verdicts(seed: int, methods: Sequence[str], limit_s: float = LIMIT_S, angles: Any = None) -> Iterator[Verdict]:
+def verdicts(
+    seed: int, methods: Sequence[str], limit_s: float = LIMIT_S, angles: Any = None
+) -> Iterator[Verdict]:
     """Yield the verdict on a run by each method that has the rotor of a seed.
 
     Parameters
@@ -96,7 +99,9 @@ def verdicts(seed: int, methods: Sequence[str], limit_s: float = LIMIT_S, angles
         before = np.flatnonzero(run.time <= horizon)
         error = float(np.abs(run.angles[before] - angles[before]).max(initial=0.0))
         fault = _fault(method, judgement.status, judgement.message, error)
-        yield Verdict(seed, method, judgement.status, judgement.message, error, horizon, scene.duration, fault)
+        yield Verdict(
+            seed, method, judgement.status, judgement.message, error, horizon, scene.duration, fault
+        )
 
 
 def independent_angles(seed: int) -> Any:
@@ -147,7 +152,9 @@ def main() -> None:
     parser.add_argument("file", type=Path)
     parser.add_argument("--seeds", default="0:200", help="first:end")
     parser.add_argument("--limit", type=float, default=LIMIT_S, help="s, of each run")
-    parser.add_argument("--cpu", type=float, default=600.0, help="s, of the independent integration")
+    parser.add_argument(
+        "--cpu", type=float, default=600.0, help=("s, of the independent integration")
+    )
     arguments = parser.parse_args()
     first, end = map(int, arguments.seeds.split(":"))
     names = [field.name for field in fields(Verdict)]

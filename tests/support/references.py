@@ -13,10 +13,15 @@ from support.scenes import shipped
 
 @functools.cache
 def _arrays(group: str) -> dict[str, dict[str, Array]]:
-    """Of every reference in a file: to open and verify it takes a second, to read all of it no more."""
+    """Of every reference in a file: to open and verify it takes a second, to read all of it no
+    more."""
     with open_results(REFERENCES / f"{group}.h5") as results:
         runs = {name: stored.reference for name, stored in results.scenes.items()}
-        return {name: {array: run.array(array) for array in run.names} for name, run in runs.items() if run}
+        return {
+            name: {array: run.array(array) for array in run.names}
+            for name, run in runs.items()
+            if run
+        }
 
 
 def referenced(group: str) -> list[str]:

@@ -1,4 +1,5 @@
-"""A page's HTML taken apart: its plots with the numbers that they draw, its tables, its sentences."""
+"""A page's HTML taken apart: its plots with the numbers that they draw, its tables, its
+sentences."""
 
 from __future__ import annotations
 
@@ -32,7 +33,8 @@ class DrawnPlot:
 
 
 def plots_of(text: str, run: int = 0) -> dict[str, DrawnPlot]:
-    """The plots of a page by name, with the columns that the script reads; run: of a sweep, which row of its tables."""
+    """The plots of a page by name, with the columns that the script reads; run: of a sweep, which
+    row of its tables."""
     stored = re.search(r'<script type="text/plain" id="curves">(.*?)</script>', text, re.S)
     numbers = np.frombuffer(base64.b64decode(stored[1]) if stored else b"", "<f4").astype(float)
 
@@ -44,7 +46,9 @@ def plots_of(text: str, run: int = 0) -> dict[str, DrawnPlot]:
     plots = {}
     for described in re.findall(r'<figure class="plot" data-plot="(.*?)">', text):
         plot = json.loads(html.unescape(described))
-        curves = {curve["name"]: (column(curve["x"]), column(curve["y"])) for curve in plot["curves"]}
+        curves = {
+            curve["name"]: (column(curve["x"]), column(curve["y"])) for curve in plot["curves"]
+        }
         plots.setdefault(plot["name"], DrawnPlot(plot, curves))
     return plots
 
@@ -78,7 +82,8 @@ def section_of(text: str, name: str) -> str:
 
 
 def rows_of(text: str) -> dict[str, list[str]]:
-    """The cells of each row of the tables in a text, by the row's heading, without notes and markup."""
+    """The cells of each row of the tables in a text, by the row's heading, without notes and
+    markup."""
     rows = {}
     for heading, cells in re.findall(r'<tr><th scope="row"[^>]*>(.*?)</th>(.*?)</tr>', text, re.S):
         rows[words_of(heading.partition("<small")[0])] = [

@@ -1,4 +1,5 @@
-"""Scenes for tests: the shipped ones by name, changed where a test wants; and rotors made by hand."""
+"""Scenes for tests: the shipped ones by name, changed where a test wants; and rotors made by
+hand."""
 
 from __future__ import annotations
 
@@ -22,12 +23,21 @@ def paper(name: str, **changes: Any) -> Scene:
 
 
 def general(**changes: Any) -> Scene:
-    """Three different rigid blades of full inertia on a heavy hub, sprung and moving: nothing is zero or equal."""
+    """Three different rigid blades of full inertia on a heavy hub, sprung and moving: nothing is
+    zero or equal."""
     scene = replace(
-        shipped("check/general"), name="general", text="", duration=4.0, samples=401,
-        rotor_torque=(), shaft_damping=0.0, bearing_damping=(0.0,) * 3, bearing_stiffness=(2.0e4, 1.5e4, 3.0e4),
-        initial_angles=(0.3, 0.2, -0.4, 0.6), initial_rates=(0.5, -0.3, 0.2, 0.4),
-    )  # fmt: skip
+        shipped("check/general"),
+        name="general",
+        text="",
+        duration=4.0,
+        samples=401,
+        rotor_torque=(),
+        shaft_damping=0.0,
+        bearing_damping=(0.0,) * 3,
+        bearing_stiffness=(2.0e4, 1.5e4, 3.0e4),
+        initial_angles=(0.3, 0.2, -0.4, 0.6),
+        initial_rates=(0.5, -0.3, 0.2, 0.4),
+    )
     return replace(scene, **changes)
 
 
@@ -40,8 +50,11 @@ AXIAL = Blade(50.0, (0.0, 0.0, 3.0), (12.0, 12.0, 7.0, 0.0, 0.0, 0.0), (0.2, 0.0
 ALL = ("angles", "rates", "tip", "energy")
 
 
-def make_scene(angles, rates, blades=None, gravity=9.8, duration=1.0, samples=101, outputs=ALL, **more) -> Scene:
-    """A scene with as many of the paper's blades as there are pitch angles, unless told otherwise."""
+def make_scene(
+    angles, rates, blades=None, gravity=9.8, duration=1.0, samples=101, outputs=ALL, **more
+) -> Scene:
+    """A scene with as many of the paper's blades as there are pitch angles, unless told
+    otherwise."""
     return Scene(
         name="test",
         title="test",
@@ -58,7 +71,8 @@ def make_scene(angles, rates, blades=None, gravity=9.8, duration=1.0, samples=10
     )
 
 
-# Every load at once, constant, with ramps and with jumps between samples, on unlike blades of full inertia.
+# Every load at once, constant, with ramps and with jumps between samples, on unlike blades of full
+# inertia.
 MIXED = make_scene(
     [0.3, 0.4, -0.2, 1.0],
     [1.0, 0.5, -0.3, 0.2],
@@ -71,5 +85,9 @@ MIXED = make_scene(
     shaft_damping=200.0,
     rotor_torque=((0.1234, 0.0), (0.777, 2000.0), (0.777, -1000.0), (1.5, -1000.0), (1.5, 500.0)),
     pitch_torque=(((0.0, 40.0),), ((0.2, 0.0), (0.55, 90.0), (0.55, -60.0)), ()),
-    bearing_rest=(((0.0, 0.2),), ((0.4, 0.0), (0.9, 0.3)), ((0.777, 0.1), (0.777, -0.5), (1.3, 0.4))),
+    bearing_rest=(
+        ((0.0, 0.2),),
+        ((0.4, 0.0), (0.9, 0.3)),
+        ((0.777, 0.1), (0.777, -0.5), (1.3, 0.4)),
+    ),
 )

@@ -1,4 +1,5 @@
-"""Results files made by hand: known curves in place of trajectories, stored as a batch stores them."""
+"""Results files made by hand: known curves in place of trajectories, stored as a batch stores
+them."""
 
 from __future__ import annotations
 
@@ -40,18 +41,25 @@ class Made:
 
     def run(self) -> Solution:
         scene = self.scene
-        time = np.linspace(0.0, scene.duration, scene.samples)[: max(int(self.until * scene.samples), 0)]
+        time = np.linspace(0.0, scene.duration, scene.samples)[
+            : max(int(self.until * scene.samples), 0)
+        ]
         angles = np.broadcast_to(self.angles(time), (len(time), 1 + len(scene.blades))).copy()
         rates = np.gradient(angles, time, axis=0) if len(time) > 1 else np.zeros_like(angles)
         fields = {}
         if len(time) and scene.wants("tip"):
             turned = angles[:, :1] + np.array(scene.phases)
-            fields["tip"] = 33.0 * np.stack([np.sin(turned), 1e-3 * np.sin(angles[:, 1:]), np.cos(turned)], axis=2)
+            fields["tip"] = 33.0 * np.stack(
+                [np.sin(turned), 1e-3 * np.sin(angles[:, 1:]), np.cos(turned)], axis=2
+            )
         if len(time) and scene.wants("energy"):
             fields["kinetic_energy"] = 1e6 + self.gain * time / scene.duration
             fields["potential_energy"] = fields["work"] = np.zeros(len(time))
         if self.method == "reference":
-            fields |= {"angle_uncertainty": np.full(len(time), 1e-30), "error_growth": np.ones(len(time))}
+            fields |= {
+                "angle_uncertainty": np.full(len(time), 1e-30),
+                "error_growth": np.ones(len(time)),
+            }
         if len(time) and scene.wants("angles") and scene.wants("rates"):
             fields["defect"] = np.concatenate([[np.nan], np.full(len(time) - 1, 1e-12)])
         trajectory = Trajectory(time, angles, rates, **fields)
@@ -60,13 +68,22 @@ class Made:
 
 def store(path: Path, runs: Sequence[Made]) -> Path:
     """The runs in one file, each compared with its scene's reference where there is one."""
-    references = {made.scene.name: made.run().trajectory for made in runs if made.method == "reference"}
+    references = {
+        made.scene.name: made.run().trajectory for made in runs if made.method == "reference"
+    }
     file = fit_file_to_request(
-        path, results_tables([RunRequest(made.scene, made.method, versions=made.versions) for made in runs])
+        path,
+        results_tables(
+            [RunRequest(made.scene, made.method, versions=made.versions) for made in runs]
+        ),
     )
     for made in runs:
         run = made.run()
-        metrics = metrics_of(made.scene, run.trajectory, references.get(made.scene.name)) if made.until else {}
+        metrics = (
+            metrics_of(made.scene, run.trajectory, references.get(made.scene.name))
+            if made.until
+            else {}
+        )
         facts = {**metrics, **made.attributes}
         run.status, run.message = str(facts.pop("status", "ok")), str(facts.pop("message", ""))
         place = file.place(f"{made.scene.name}/{made.method}")
@@ -75,7 +92,8 @@ def store(path: Path, runs: Sequence[Made]) -> Path:
 
 
 def rotor(curve: Callable[[Any], Any], *pitches: Callable[[Any], Any]) -> Curve:
-    """Angles of the rotor and of as many pitches as are given; the rest are zero, for three blades."""
+    """Angles of the rotor and of as many pitches as are given; the rest are zero, for three
+    blades."""
     curves = [curve, *pitches] + [np.zeros_like] * (3 - len(pitches))
     return lambda time: np.stack([one(time) for one in curves], axis=1)
 
@@ -84,7 +102,12 @@ class Arrays:
     """Arrays by name in place of a stored run; None is one that cannot be read."""
 
     def __init__(
-        self, method: str, status: str = "ok", attributes: Any = (), settings: Any = (), **arrays: Any
+        self,
+        method: str,
+        status: str = "ok",
+        attributes: Any = (),
+        settings: Any = (),
+        **arrays: Any,
     ) -> None:
         self.scene, self.method, self.status, self.arrays = "scene", method, status, arrays
         self.attributes, self.settings, self.is_frozen = dict(attributes), dict(settings), False
@@ -115,7 +138,8 @@ def change_byte(place: RowLocation, column: str, at: int = 0, bit: int = 0) -> N
 
 
 def change_row(path: Path, run: str, change: Callable[[Rows], None]) -> None:
-    """Change the columns of a stored run in place; its row has the checksum of what it holds then."""
+    """Change the columns of a stored run in place; its row has the checksum of what it holds
+    then."""
     place = TableFile(path).place(run)
     row = {name: values.copy() for name, values in place.read().items()}
     change({name: values[0, ...] for name, values in row.items()})

@@ -42,7 +42,9 @@ values = [9.7, 9.8, 9.9]
 """
 
 
-def starts_file(folder: Path, draws: int, samples: int, duration: float, method: str = "lagrange/dop853") -> Path:
+def starts_file(
+    folder: Path, draws: int, samples: int, duration: float, method: str = "lagrange/dop853"
+) -> Path:
     """s.toml: fig. 11 for `duration` (s) from random angles of a pitch."""
     path = folder / "s.toml"
     path.write_text(f"""title = "starts"
@@ -60,9 +62,15 @@ uniform = [0.5, 1.0]
 
 
 def run_local(
-    sweep: Sweep, output: Path, workers: int, methods: Sequence[str] = (), timeout_s: float = 60.0, **options: Any
+    sweep: Sweep,
+    output: Path,
+    workers: int,
+    methods: Sequence[str] = (),
+    timeout_s: float = 60.0,
+    **options: Any,
 ) -> SweepResult:
-    """The sweep by worker processes of this machine, 0: by this process; options: of `run_sweep`."""
+    """The sweep by worker processes of this machine, 0: by this process; options: of
+    `run_sweep`."""
     plan = plan_sweep(sweep, methods, time_limit_s=timeout_s)
     with open_task_pool("local", workers) as pool:
         return run_sweep(plan, output, pool, **options)

@@ -1,9 +1,10 @@
-"""Right and wrong data of the paper's scenes in every format and precision: the verdicts, as a table.
+"""Right and wrong data of the paper's scenes in every format and precision: the verdicts, as a
+table.
 
     python tests/support/verdict_matrix.py [SECONDS] > matrix.md
 
-The verdict depends on the numbers alone. It is computed once for each scene, precision, and with or without rates; of
-every format it is shown that the numbers come out of it as they went in.
+The verdict depends on the numbers alone. It is computed once for each scene, precision, and with or
+without rates; of every format it is shown that the numbers come out of it as they went in.
 """
 
 from __future__ import annotations
@@ -42,7 +43,8 @@ def in_precision(values: Array, precision: str) -> Array:
 
 
 def motions(name: str, seconds: float) -> Iterator[tuple[str, Scene, Array, Array, Array]]:
-    """The right motion of a scene, its reference, and one in another gravity: what, scene, time, angles, rates."""
+    """The right motion of a scene, its reference, and one in another gravity: what, scene, time,
+    angles, rates."""
     shipped = rm.scene(name)
     exact = references.reference(name)
     duration = min(seconds, shipped.duration)
@@ -59,7 +61,8 @@ def motions(name: str, seconds: float) -> Iterator[tuple[str, Scene, Array, Arra
 
 
 def rows_of(name: str, seconds: float) -> Iterator[tuple[str, ...]]:
-    """Yield a row for each precision, with and without rates: the verdicts, and formats with other numbers."""
+    """Yield a row for each precision, with and without rates: the verdicts, and formats with other
+    numbers."""
     folder = Path(tempfile.mkdtemp())
     cells: dict[tuple[str, str], dict[str, str]] = {}
     others: dict[tuple[str, str], list[str]] = {}
@@ -73,22 +76,35 @@ def rows_of(name: str, seconds: float) -> Iterator[tuple[str, ...]]:
                     arrays["rates"] = in_precision(rates, precision)
                 key = (precision, "with rates" if with_rates else "angles alone")
                 verdict = rm.compare(arrays, scene).verdict
-                cause = "" if verdict.status == "ok" else f" ({verdict.likely[0] if verdict.likely else 'no cause'})"
+                cause = (
+                    ""
+                    if verdict.status == "ok"
+                    else f" ({verdict.likely[0] if verdict.likely else 'no cause'})"
+                )
                 cells.setdefault(key, {})[what] = f"{verdict.status}{cause}"
                 if what == "wrong":
                     continue
                 expected = load_data(arrays, scene)
                 for kind in FILES:
-                    # Text of a number in single precision is another number: it has the digits that tell it apart.
+                    # Text of a number in single precision is another number: it has the digits that
+                    # tell it apart.
                     of_text = {name: values.astype(float) for name, values in arrays.items()}
                     is_text = kind in ("csv", "txt", "jsonl")
                     path = write_table(folder, kind, of_text if is_text else arrays)
                     read = data_of_table(read_in_worker((path, "", scene.name)), scene)
-                    are_equal = read.columns == expected.columns and np.array_equal(read.values, expected.values)
+                    are_equal = read.columns == expected.columns and np.array_equal(
+                        read.values, expected.values
+                    )
                     if not (are_equal and np.array_equal(read.rounding, expected.rounding)):
                         others.setdefault(key, []).append(kind)
     for key, statuses in cells.items():
-        yield name, *key, statuses["right"], statuses["wrong"], ", ".join(others.get(key, [])) or "none"
+        yield (
+            name,
+            *key,
+            statuses["right"],
+            statuses["wrong"],
+            ", ".join(others.get(key, [])) or "none",
+        )
 
 
 def main() -> None:

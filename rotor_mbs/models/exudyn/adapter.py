@@ -1,4 +1,5 @@
-"""The one place that imports Exudyn: without window, console output or files, in its fast build (no range checks)."""
+"""The one place that imports Exudyn: without window, console output or files, in its fast build (no
+range checks)."""
 
 from __future__ import annotations
 
@@ -12,7 +13,13 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from rotor_mbs.errors import MethodRefusal
-from rotor_mbs.methods.time_limit import MESSAGE, OutOfTimeError, caller_signals, must_ask, raise_if_over
+from rotor_mbs.methods.time_limit import (
+    MESSAGE,
+    OutOfTimeError,
+    caller_signals,
+    must_ask,
+    raise_if_over,
+)
 from rotor_mbs.models.exudyn.geometry import LISTS, Part, Ref
 from rotor_mbs.models.exudyn.schemes import Scheme
 from rotor_mbs.scenario.time_table import Interval, Segment, steps_and_rows
@@ -27,12 +34,14 @@ with contextlib.redirect_stdout(io.StringIO()):  # it greets on import
 _engine: Any = exudyn
 _engine.config.printToConsole = False
 _engine.config.suppressWarnings = True
-# Not by the engine's environment variable, with which it would set matplotlib's backend to Agg, the caller's plots too.
+# Not by the engine's environment variable, with which it would set matplotlib's backend to Agg, the
+# caller's plots too.
 _engine.special.userInterface.SuppressAll(True)
 
 
 class Linearized(NamedTuple):
-    """M δq̈ + D δq̇ + K δq + C δλ = 0 in the engine's coordinates; M, K, D (n, n), C (n, constraints), SI units."""
+    """M δq̈ + D δq̇ + K δq + C δλ = 0 in the engine's coordinates; M, K, D (n, n), C (n,
+    constraints), SI units."""
 
     M: Array
     K: Array
@@ -57,12 +66,16 @@ class System:
         self._of_accelerations = [
             part.name
             for part in parts
-            if part.kind == "sensor" and "Acceleration" in str(part.parameters["outputVariableType"])
+            if part.kind == "sensor"
+            and "Acceleration" in str(part.parameters["outputVariableType"])
         ]
-        self._initial_values: dict[str, Array] = {}  # by sensor, where the solver does not know them
+        # by sensor, where the solver does not know them
+        self._initial_values: dict[str, Array] = {}
         try:
             for part in parts:
-                arguments = {key: self._argument(key, value) for key, value in part.parameters.items()}
+                arguments = {
+                    key: self._argument(key, value) for key, value in part.parameters.items()
+                }
                 item = getattr(itemInterface, part.type)(name=part.name, **arguments)
                 add = getattr(self._mbs, f"Add{part.kind.capitalize()}")
                 self._numbers[Ref(part.kind, part.name)] = add(item)
@@ -80,7 +93,8 @@ class System:
         return _TRANSLATIONS[key](value) if key in _TRANSLATIONS else value
 
     def rows(self, sensor: str) -> Array:
-        """Return the rows that a sensor kept in the last integration, (n, 1 + k): time in s, then its k values."""
+        """Return the rows that a sensor kept in the last integration, (n, 1 + k): time in s, then
+        its k values."""
         number = self._numbers[Ref("sensor", sensor)]
         stored = np.array(self._mbs.GetSensorStoredData(number), dtype=float, ndmin=2)
         if sensor in self._initial_values:
@@ -88,7 +102,8 @@ class System:
         return stored
 
     def linearized(self, step: float) -> Linearized:
-        """Return the engine's linearization at the initial state, by one-sided differences of `step` (rad, m)."""
+        """Return the engine's linearization at the initial state, by one-sided differences of
+        `step` (rad, m)."""
         settings = _engine.SimulationSettings()
         settings.solution.file.write = False
         differences = settings.staticSolver.newton.numericalDifferentiation
@@ -98,7 +113,8 @@ class System:
         return Linearized(np.array(M), np.array(K), np.array(D), np.array(C))
 
     def forces(self) -> Array:
-        """Return applied and gyroscopic forces on the coordinates at the initial state, (n,), without the joints'."""
+        """Return applied and gyroscopic forces on the coordinates at the initial state, (n,),
+        without the joints'."""
         solver, settings = _engine.MainSolverStatic(), _engine.SimulationSettings()
         settings.solution.file.write = False
         solver.InitializeSolver(self._mbs, settings)
@@ -148,7 +164,9 @@ class System:
                 if scheme.trial_steps:
                     trials.append(time)
                 if len(trials) > scheme.trial_steps:
-                    raise RuntimeError(f"no progress in {scheme.trial_steps} trial steps near t = {time:.6g} s")
+                    raise RuntimeError(
+                        f"no progress in {scheme.trial_steps} trial steps near t = {time:.6g} s"
+                    )
                 return True
 
             self._mbs.SetPreStepUserFunction(before_trial)
@@ -156,9 +174,12 @@ class System:
         for interval in intervals:
             set_segment(interval.segment)
             if interval is intervals[0] and scheme.lacks_initial_accelerations:
-                # What sensors of accelerations read at the initial state: only an implicit solver computes it. From a
-                # singular start the run itself will fail.
-                plain, implicit = _engine.SimulationSettings(), _engine.MainSolverImplicitSecondOrder()
+                # What sensors of accelerations read at the initial state: only an implicit solver
+                # computes it. From a singular start the run itself will fail.
+                plain, implicit = (
+                    _engine.SimulationSettings(),
+                    _engine.MainSolverImplicitSecondOrder(),
+                )
                 plain.solution.file.write = False
                 with contextlib.suppress(_engine.ExudynError, RuntimeError):
                     implicit.InitializeSolver(self._mbs, plain)
@@ -170,19 +191,29 @@ class System:
             trials.clear()
             settings.solution.sensors.append = interval is not intervals[0]
             span = (interval.end - interval.start) / interval.sample_intervals
-            steps, rows = (1, 1) if scheme.step is None else steps_and_rows(span, scheme.step, rows_between)
+            steps, rows = (
+                (1, 1) if scheme.step is None else steps_and_rows(span, scheme.step, rows_between)
+            )
             integration.startTime, integration.endTime = interval.start, interval.end
             integration.numberOfSteps = steps * interval.sample_intervals
             every_step = scheme.step is None and rows_between
-            # The engine adds up periods: shortened by a tenth of a step over the whole interval, rounding makes none
-            # come late.
+            # The engine adds up periods: shortened by a tenth of a step over the whole interval,
+            # rounding makes none come late.
             period = span / rows * (1.0 - 0.1 / integration.numberOfSteps)
             settings.solution.sensors.writePeriod = 0.0 if every_step else period
-            solver = _engine.MainSolverExplicit() if scheme.stages else _engine.MainSolverImplicitSecondOrder()
+            solver = (
+                _engine.MainSolverExplicit()
+                if scheme.stages
+                else _engine.MainSolverImplicitSecondOrder()
+            )
             failure, it = self._solve(solver, settings, scheme.stages, total), solver.it
             total.success, total.message = not failure, failure
             total.out_of_time = failure == MESSAGE
-            total.time_reached = max(interval.start, it.currentTime - it.currentStepSize) if failure else interval.end
+            total.time_reached = (
+                max(interval.start, it.currentTime - it.currentStepSize)
+                if failure
+                else interval.end
+            )
             if failure:
                 break
             # The next interval starts where this one ended.
@@ -200,11 +231,13 @@ class System:
     @property
     def reference(self) -> Array:
         """What the coordinates are displacements from."""
-        return np.array(self._mbs.systemData.GetODE2Coordinates(_engine.ConfigurationType.Reference))
+        return np.array(
+            self._mbs.systemData.GetODE2Coordinates(_engine.ConfigurationType.Reference)
+        )
 
     def begin(self, scheme: Scheme, *, with_rows: bool) -> None:
-        """Go back to the initial state, to be integrated by an implicit scheme; sensors keep every step of the last
-        `advance`, or nothing."""
+        """Go back to the initial state, to be integrated by an implicit scheme; sensors keep every
+        step of the last `advance`, or nothing."""
         data = self._mbs.systemData
         data.SetSystemState(self._initial_state, _engine.ConfigurationType.Initial)
         self._settings = _settings(scheme, data.ODE2Size(), data.AEsize())
@@ -213,7 +246,8 @@ class System:
         self._solver = _engine.MainSolverImplicitSecondOrder()
 
     def initial_values(self, time: float) -> tuple[Array, Array]:
-        """Compute the state that an integration from a time (s) starts from, accelerations and multipliers included.
+        """Compute the state that an integration from a time (s) starts from, accelerations and
+        multipliers included.
 
         Returns
         -------
@@ -222,8 +256,9 @@ class System:
         turns : ndarray
             As of `turns`.
         """
-        # The engine differentiates the constraints' velocities by one-sided differences. They are polynomials of third
-        # degree in the coordinates, so that three steps, extrapolated to zero, leave rounding errors.
+        # The engine differentiates the constraints' velocities by one-sided differences. They are
+        # polynomials of third degree in the coordinates, so that three steps, extrapolated to zero,
+        # leave rounding errors.
         integration = self._settings.timeIntegration
         integration.startTime, integration.endTime, integration.numberOfSteps = time, time + 1.0, 1
         integration.generalizedAlpha.computeInitialAccelerations = True
@@ -258,7 +293,8 @@ class System:
         return self._solve(self._solver, self._settings, 0, total)
 
     def values(self) -> Array:
-        """Return coordinates, rates, accelerations and multipliers where the last integration ended."""
+        """Return coordinates, rates, accelerations and multipliers where the last integration
+        ended."""
         data, current = self._mbs.systemData, _engine.ConfigurationType.Current
         return np.concatenate(
             [
@@ -270,7 +306,8 @@ class System:
         )
 
     def turns(self) -> Array:
-        """Return the data coordinates where the last integration ended: angles of springs over many turns."""
+        """Return the data coordinates where the last integration ended: angles of springs over many
+        turns."""
         return np.array(self._mbs.systemData.GetDataCoordinates(_engine.ConfigurationType.Current))
 
     def start_from(self, values: Array, turns: Array) -> None:
@@ -306,8 +343,8 @@ class System:
         return readings
 
     def _solve(self, solver: Any, settings: Any, stages: int, total: Integration) -> str:
-        """Run the solver from start to end time, its work counted in `total`; why it failed, or "". stages: evaluations
-        in an explicit step, 0 of an implicit solver."""
+        """Run the solver from start to end time, its work counted in `total`; why it failed, or "".
+        stages: evaluations in an explicit step, 0 of an implicit solver."""
         failure = ""
         with caller_signals():  # whose exceptions, as Ctrl-C, the engine makes its own
             try:
@@ -316,12 +353,18 @@ class System:
             except (_engine.ExudynError, OutOfTimeError, RuntimeError, SystemError) as exc:
                 failure = MESSAGE
                 if not _is_caused_by_limit(exc):
-                    failure = _one_line(str(exc)) or _one_line(solver.GetErrorString()) or _NO_REASON
-        # The engine's index is one ahead of the steps it took, and two where the last one failed; an implicit step
-        # evaluates its residual once more than it iterates.
+                    failure = (
+                        _one_line(str(exc)) or _one_line(solver.GetErrorString()) or _NO_REASON
+                    )
+        # The engine's index is one ahead of the steps it took, and two where the last one failed;
+        # an implicit step evaluates its residual once more than it iterates.
         it = solver.it
         taken = max(0, it.currentStepIndex - (2 if failure else 1))
-        evaluations = stages * (taken + it.rejectedAutomaticStepSizeSteps) if stages else it.newtonStepsCount + taken
+        evaluations = (
+            stages * (taken + it.rejectedAutomaticStepSizeSteps)
+            if stages
+            else it.newtonStepsCount + taken
+        )
         total.steps = (total.steps or 0) + taken
         total.rhs_evaluations = (total.rhs_evaluations or 0) + evaluations
         return failure
@@ -329,23 +372,28 @@ class System:
 
 _NO_REASON = "the engine gave no reason"
 
-# Coordinates and constraints of a chain of twelve blades, from which on a sparse factorization costs less than a dense
-# one: its cost grows with their number, that of a dense one with a power of 2.5.
+# Coordinates and constraints of a chain of twelve blades, from which on a sparse factorization
+# costs less than a dense one: its cost grows with their number, that of a dense one with a power of
+# 2.5.
 _SPARSE_FROM = 140
 
-# Coordinates of a tree from which on a Jacobian, which takes as many evaluations, costs more than the iterations that
-# an old one takes. Of a chain a Jacobian costs no more than two evaluations, whatever the number of bodies.
+# Coordinates of a tree from which on a Jacobian, which takes as many evaluations, costs more than
+# the iterations that an old one takes. Of a chain a Jacobian costs no more than two evaluations,
+# whatever the number of bodies.
 _OLD_JACOBIAN_FROM = 13
 
 
 def linear_solver(coordinates: int, constraints: int) -> str:
     """Return the engine's name of the linear solver for a system of that size."""
     # A tree, without constraints, is one dense block.
-    return "EigenSparse" if constraints and coordinates + constraints >= _SPARSE_FROM else "EigenDense"
+    return (
+        "EigenSparse" if constraints and coordinates + constraints >= _SPARSE_FROM else "EigenDense"
+    )
 
 
 def _settings(scheme: Scheme, coordinates: int, constraints: int) -> Any:
-    """Return the engine's settings for a scheme and a system of so many coordinates and constraints."""
+    """Return the engine's settings for a scheme and a system of so many coordinates and
+    constraints."""
     settings = _engine.SimulationSettings()
     settings.solution.file.write = False
     integration = settings.timeIntegration

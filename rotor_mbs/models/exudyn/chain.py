@@ -1,5 +1,6 @@
-"""The rotor as a chain of free bodies connected by joints: ground, hub, blades; redundant coordinates. Nodes stand at
-centres of mass. A hub without mass or inertia is a body with none: its joints fix it."""
+"""The rotor as a chain of free bodies connected by joints: ground, hub, blades; redundant
+coordinates. Nodes stand at centres of mass. A hub without mass or inertia is a body with none: its
+joints fix it."""
 
 from __future__ import annotations
 
@@ -11,7 +12,14 @@ import numpy as np
 from rotor_mbs.methods.base import BuiltItem
 from rotor_mbs.models.exudyn import geometry
 from rotor_mbs.models.exudyn.geometry import Part, Ref, sensor
-from rotor_mbs.models.exudyn.loads import Loads, Moment, along_shaft, chain_sensors, is_driven, moment_on
+from rotor_mbs.models.exudyn.loads import (
+    Loads,
+    Moment,
+    along_shaft,
+    chain_sensors,
+    is_driven,
+    moment_on,
+)
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.scenario.time_table import constant_value, is_constant
 from rotor_mbs.solution.trajectory import Array
@@ -46,14 +54,20 @@ def placed_bodies(scene: Scene) -> list[Placed]:
         if cone:
             unpitched = unpitched @ geometry.rotation_x(-cone)
         axis = unpitched[:, 2].copy()
-        rotation, pose = unpitched @ geometry.rotation_z(pitch), geometry.quaternion(about_shaft, pitch, tilt, cone)
+        rotation, pose = (
+            unpitched @ geometry.rotation_z(pitch),
+            geometry.quaternion(about_shaft, pitch, tilt, cone),
+        )
         body = geometry.blade_body(scene.blades[i])
-        bodies.append(Placed(f"blade {i + 1}", body, rotation, pose, axis, spin + pitch_rate * axis))
+        bodies.append(
+            Placed(f"blade {i + 1}", body, rotation, pose, axis, spin + pitch_rate * axis)
+        )
     return bodies
 
 
 def _rotor_rotation(scene: Scene, about_shaft: float) -> Array:
-    """Return the rotation from a frame of the rotor, turned by an angle (rad) about the shaft, to the base frame."""
+    """Return the rotation from a frame of the rotor, turned by an angle (rad) about the shaft, to
+    the base frame."""
     turned = geometry.rotation_y(np.cos(about_shaft), np.sin(about_shaft))
     return geometry.rotation_x(scene.shaft_tilt) @ turned if scene.shaft_tilt else turned
 
@@ -73,17 +87,35 @@ def parts(scene: Scene, loads: Loads, node: str = "euler_parameters") -> list[Pa
         built += _body(placed, node)
         # The engine has no gravity of its own: it is a load on every body.
         if scene.gravity != 0.0 and placed.body.mass:
-            mass = Part("marker", f"{placed.name} mass", "MarkerBodyMass", {"bodyNumber": Ref("object", placed.name)})
-            weight = {"markerNumber": Ref("marker", mass.name), "loadVector": [0.0, 0.0, -scene.gravity]}
-            built += [mass, Part("load", f"gravity on {placed.name}", "LoadMassProportional", weight)]
-    ground = _marker("ground", "at shaft", geometry.rotation_x(scene.shaft_tilt) @ geometry.ALONG_SHAFT, np.zeros(3))
+            mass = Part(
+                "marker",
+                f"{placed.name} mass",
+                "MarkerBodyMass",
+                {"bodyNumber": Ref("object", placed.name)},
+            )
+            weight = {
+                "markerNumber": Ref("marker", mass.name),
+                "loadVector": [0.0, 0.0, -scene.gravity],
+            }
+            built += [
+                mass,
+                Part("load", f"gravity on {placed.name}", "LoadMassProportional", weight),
+            ]
+    ground = _marker(
+        "ground",
+        "at shaft",
+        geometry.rotation_x(scene.shaft_tilt) @ geometry.ALONG_SHAFT,
+        np.zeros(3),
+    )
     built += _bearing("shaft bearing", ground, _on_body(hub, "at shaft", geometry.ALONG_SHAFT))
     for i, blade in zip(geometry.movable_blades(scene), blades, strict=True):
         seat = _on_body(hub, f"at bearing {i + 1}", geometry.mounting(scene, i))
         built += _bearing(f"pitch bearing {i + 1}", seat, _on_body(blade, "at bearing", np.eye(3)))
         built += _pitch_spring(scene, loads, i, seat.name, f"{blade.name} at bearing")
     if scene.shaft_damping:
-        built.append(_spring("shaft damper", "ground at shaft", "hub at shaft", damping=scene.shaft_damping))
+        built.append(
+            _spring("shaft damper", "ground at shaft", "hub at shaft", damping=scene.shaft_damping)
+        )
     if scene.has_torque:
         load: dict[str, object] = {
             "markerNumber": Ref("marker", "hub at shaft"),
@@ -99,14 +131,27 @@ def parts(scene: Scene, loads: Loads, node: str = "euler_parameters") -> list[Pa
         name, of_node = placed.name, Ref("node", placed.name)
         built.append(sensor(f"{name} position", "SensorNode", "Position", nodeNumber=of_node))
         built.append(sensor(f"{name} rotation", "SensorNode", "RotationMatrix", nodeNumber=of_node))
-        built.append(sensor(f"{name} spin", "SensorNode", "AngularVelocityLocal", nodeNumber=of_node))
+        built.append(
+            sensor(f"{name} spin", "SensorNode", "AngularVelocityLocal", nodeNumber=of_node)
+        )
         if scene.wants("energy") and placed.body.mass:
             built.append(sensor(f"{name} velocity", "SensorNode", "Velocity", nodeNumber=of_node))
     if scene.wants("tip"):
         for i, tip in enumerate(blade.tip for blade in scene.blades):
             number, point = geometry.body_of_point(scene, i, tip)
-            body, position = Ref("object", bodies[number].name), list(point - bodies[number].body.com)
-            built.append(sensor(f"tip {i + 1}", "SensorBody", "Position", bodyNumber=body, localPosition=position))
+            body, position = (
+                Ref("object", bodies[number].name),
+                list(point - bodies[number].body.com),
+            )
+            built.append(
+                sensor(
+                    f"tip {i + 1}",
+                    "SensorBody",
+                    "Position",
+                    bodyNumber=body,
+                    localPosition=position,
+                )
+            )
     if scene.wants("loads"):
         built += chain_sensors(scene, hub.body)
     return built
@@ -118,10 +163,12 @@ def items(scene: Scene) -> list[BuiltItem]:
 
 
 def _body(placed: Placed, node: str) -> list[Part]:
-    """Return the node and the object of a body; `placed`: where it is at the start; node: as in the settings."""
+    """Return the node and the object of a body; `placed`: where it is at the start; node: as in the
+    settings."""
     body, name = placed.body, placed.name
     position = placed.rotation @ body.com
-    with np.errstate(over="ignore", invalid="ignore"):  # of a rate that has no bound: the run says so
+    # of a rate that has no bound: the run says so
+    with np.errstate(over="ignore", invalid="ignore"):
         velocity = np.cross(placed.omega, position)
     p = placed.quaternion
     if node == "euler_parameters":
@@ -139,7 +186,8 @@ def _body(placed: Placed, node: str) -> list[Part]:
     inertia = {
         "nodeNumber": Ref("node", name),
         "mass": body.mass,
-        "inertia": [*np.diag(tensor), tensor[1, 2], tensor[0, 2], tensor[0, 1]],  # the engine's order
+        # the engine's order
+        "inertia": [*np.diag(tensor), tensor[1, 2], tensor[0, 2], tensor[0, 1]],
     }
     what = f"{body.mass:g} kg" if body.mass else "massless"
     return [
@@ -154,7 +202,8 @@ def _on_body(placed: Placed, where: str, rotation: Array) -> Part:
 
 
 def _marker(body: str, where: str, rotation: Array, position: Array) -> Part:
-    """Return a marker fixed on a body: (3, 3) rotation and (3,) position in m, both in the body's frame."""
+    """Return a marker fixed on a body: (3, 3) rotation and (3,) position in m, both in the body's
+    frame."""
     parameters = {"bodyNumber": Ref("object", body), "localHT": (rotation, position)}
     return Part("marker", f"{body} {where}", "MarkerBodyRigid", parameters)
 
@@ -187,7 +236,10 @@ def _pitch_spring(scene: Scene, loads: Loads, blade: int, seat: str, root: str) 
     built, counter = [], ""
     if stiffness:
         counter = f"turns of {name}"
-        turns = {"initialCoordinates": [scene.initial_angles[1 + blade]], "numberOfDataCoordinates": 1}
+        turns = {
+            "initialCoordinates": [scene.initial_angles[1 + blade]],
+            "numberOfDataCoordinates": 1,
+        }
         built.append(Part("node", counter, "NodeGenericData", turns, "the angle over many turns"))
     spring = _spring(name, seat, root, counter, **constants)
     if "torque" not in constants and moment.terms:
@@ -207,7 +259,8 @@ def _torque_on_shaft(scene: Scene, moment: Moment) -> Callable[..., list[float]]
 
 
 def _spring_torque(moment: Moment) -> Callable[..., float]:
-    """Return the spring's law as the engine asks for it: N m that resist a rotation (rad) and its rate (rad/s)."""
+    """Return the spring's law as the engine asks for it: N m that resist a rotation (rad) and its
+    rate (rad/s)."""
 
     def torque(
         _system: object, time: float, _item: int, rotation: float, rate: float,
@@ -219,8 +272,12 @@ def _spring_torque(moment: Moment) -> Callable[..., float]:
 
 
 def _spring(name: str, first: str, second: str, counter: str = "", **constants: float) -> Part:
-    """Return a torsional spring and damper between two markers; counter: the node that counts its turns."""
-    parameters: dict[str, object] = {"markerNumbers": (Ref("marker", first), Ref("marker", second)), **constants}
+    """Return a torsional spring and damper between two markers; counter: the node that counts its
+    turns."""
+    parameters: dict[str, object] = {
+        "markerNumbers": (Ref("marker", first), Ref("marker", second)),
+        **constants,
+    }
     if counter:
         parameters["nodeNumber"] = Ref("node", counter)
     detail = ", ".join(f"{key} {value:g}" for key, value in constants.items())

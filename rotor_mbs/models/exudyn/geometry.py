@@ -1,6 +1,7 @@
-"""Rotations and rigid bodies of the rotor. Base frame: z up; the shaft is y of the shaft frame, which is the base frame
-turned by the tilt about x. Blade i stands in the hub frame turned by its phase about y and by its cone about -x, and
-turns by its pitch about its own z: R_i = Rx(tilt) Ry(rotor + phase_i) Rx(-cone_i) Rz(pitch_i)."""
+"""Rotations and rigid bodies of the rotor. Base frame: z up; the shaft is y of the shaft frame,
+which is the base frame turned by the tilt about x. Blade i stands in the hub frame turned by its
+phase about y and by its cone about -x, and turns by its pitch about its own z: R_i = Rx(tilt)
+Ry(rotor + phase_i) Rx(-cone_i) Rz(pitch_i)."""
 
 from __future__ import annotations
 
@@ -50,7 +51,8 @@ def rotation_x(angle: float) -> Array:
 
 
 def mounting(scene: Scene, index: int) -> Array:
-    """Return the rotation from the zero-pitch frame of blade `index` (from 0) to the hub frame, (3, 3)."""
+    """Return the rotation from the zero-pitch frame of blade `index` (from 0) to the hub frame, (3,
+    3)."""
     mounted, cone = rotation_y(*_turn(index, len(scene.blades))), scene.blades[index].cone
     return mounted @ rotation_x(-cone) if cone else mounted
 
@@ -76,12 +78,16 @@ def _turn(part: int, whole: int) -> tuple[float, float]:
 
 
 def quaternion(about_shaft: float, pitch: float, tilt: float = 0.0, cone: float = 0.0) -> Array:
-    """Return the Euler parameters of Rx(tilt) Ry(about_shaft) Rx(-cone) Rz(pitch), (4,), scalar first."""
+    """Return the Euler parameters of Rx(tilt) Ry(about_shaft) Rx(-cone) Rz(pitch), (4,), scalar
+    first."""
     c, s = math.cos(0.5 * about_shaft), math.sin(0.5 * about_shaft)
     cp, sp = math.cos(0.5 * pitch), math.sin(0.5 * pitch)
     if not (tilt or cone):
         return np.array([c * cp, s * sp, s * cp, c * sp])
-    about_x = [np.array([math.cos(0.5 * angle), math.sin(0.5 * angle), 0.0, 0.0]) for angle in (tilt, -cone)]
+    about_x = [
+        np.array([math.cos(0.5 * angle), math.sin(0.5 * angle), 0.0, 0.0])
+        for angle in (tilt, -cone)
+    ]
     rotor = _quaternion_product(about_x[0], np.array([c, 0.0, s, 0.0]))
     blade = _quaternion_product(about_x[1], np.array([cp, 0.0, 0.0, sp]))
     return _quaternion_product(rotor, blade)
@@ -106,24 +112,28 @@ def quaternion_rate(p: Array, omega: Array) -> Array:
 
 
 def rotation_vector(p: Array) -> Array:
-    """Return axis times angle, (3,) rad and at most π long, of the rotation with Euler parameters `p`."""
+    """Return axis times angle, (3,) rad and at most π long, of the rotation with Euler parameters
+    `p`."""
     p = p if p[0] >= 0.0 else -p  # both are the same rotation
     length = float(np.linalg.norm(p[1:]))
     return 2.0 * p[1:] if length == 0.0 else p[1:] * (2.0 * math.atan2(length, p[0]) / length)
 
 
 def movable_blades(scene: Scene) -> tuple[int, ...]:
-    """Return the indices (from 0) of the blades whose pitch has inertia; the others are rigidly part of the hub."""
+    """Return the indices (from 0) of the blades whose pitch has inertia; the others are rigidly
+    part of the hub."""
     return tuple(i for i, blade in enumerate(scene.blades) if blade.has_pitch_inertia)
 
 
 def fixed_blade_rotation(scene: Scene, index: int) -> Array:
-    """Return the rotation from the frame of a blade fixed at its initial pitch to the hub frame, (3, 3)."""
+    """Return the rotation from the frame of a blade fixed at its initial pitch to the hub frame,
+    (3, 3)."""
     return mounting(scene, index) @ rotation_z(scene.initial_angles[1 + index])
 
 
 def body_of_point(scene: Scene, index: int, point: Sequence[float]) -> tuple[int, Array]:
-    """Return the body that a point of a blade is on, and the place of the point in that body's frame.
+    """Return the body that a point of a blade is on, and the place of the point in that body's
+    frame.
 
     Parameters
     ----------
@@ -149,10 +159,12 @@ def blade_body(blade: Blade) -> Body:
 
 
 def hub_body(scene: Scene) -> Body:
-    """Return the hub as a thin disc about the shaft, with every blade that cannot pitch made part of it.
+    """Return the hub as a thin disc about the shaft, with every blade that cannot pitch made part
+    of it.
 
-    The disc's other two moments, half of the axial one, are never felt: they make it a body that can exist. Neither is
-    its mass, at the apex, but by the shaft bearing: it has one where loads are wanted.
+    The disc's other two moments, half of the axial one, are never felt: they make it a body that
+    can exist. Neither is its mass, at the apex, but by the shaft bearing: it has one where loads
+    are wanted.
     """
     half = 0.5 * scene.hub_inertia
     mass = scene.hub_mass if scene.wants("loads") else 0.0
@@ -194,7 +206,8 @@ class Ref:
 
 @dataclass(frozen=True)
 class Part:
-    """One item: `type` is the engine's name of it, `parameters` its arguments, with Ref where they name other parts."""
+    """One item: `type` is the engine's name of it, `parameters` its arguments, with Ref where they
+    name other parts."""
 
     kind: str
     name: str

@@ -1,8 +1,8 @@
 """The engine's models linearized by it, its one-sided quotients extrapolated.
 
-For joints the engine leaves out the geometric stiffness, by which constraint forces turn with the bodies: that is added
-from its constraint Jacobian beside the state. Without it the chain's frequencies under gravity are wrong by several
-percent.
+For joints the engine leaves out the geometric stiffness, by which constraint forces turn with the
+bodies: that is added from its constraint Jacobian beside the state. Without it the chain's
+frequencies under gravity are wrong by several percent.
 """
 
 from __future__ import annotations
@@ -23,7 +23,9 @@ from rotor_mbs.solution.trajectory import Array, Linearization, limit_at_zero, s
 _STEPS = tuple(1e-3 * 2.0**k for k in range(6))
 
 
-def linearize_tree(scene: Scene, angles: Sequence[float] | Array, speed: float, torque: float) -> Linearization:
+def linearize_tree(
+    scene: Scene, angles: Sequence[float] | Array, speed: float, torque: float
+) -> Linearization:
     """Linearize the tree.
 
     Parameters
@@ -45,10 +47,13 @@ def linearize_tree(scene: Scene, angles: Sequence[float] | Array, speed: float, 
     return Linearization(inverse @ linear.K, inverse @ linear.D, inverse @ system.forces())
 
 
-def linearize_chain(scene: Scene, angles: Sequence[float] | Array, speed: float, torque: float) -> Linearization:
+def linearize_chain(
+    scene: Scene, angles: Sequence[float] | Array, speed: float, torque: float
+) -> Linearization:
     """Linearize the chain at rest.
 
-    With N a basis of what the joints allow and λ their forces, its stiffness is Nᵀ (K + ∂(C λ)/∂q) N.
+    With N a basis of what the joints allow and λ their forces, its stiffness is Nᵀ (K + ∂(C λ)/∂q)
+    N.
 
     Parameters
     ----------
@@ -76,7 +81,9 @@ def linearize_chain(scene: Scene, angles: Sequence[float] | Array, speed: float,
     vectors, singular_values, _ = np.linalg.svd(linear.C)
     rank = int(np.count_nonzero(singular_values > 1e-10 * singular_values[0]))
     N: Array = np.asarray(vectors[:, rank:])
-    geometric = limit_at_zero([_geometric_stiffness(system, multipliers, N, step) for step in _STEPS], 2.0)
+    geometric = limit_at_zero(
+        [_geometric_stiffness(system, multipliers, N, step) for step in _STEPS], 2.0
+    )
     joint = _joint_rates(state) @ N
     mass = N.T @ linear.M @ N
 
@@ -89,9 +96,11 @@ def linearize_chain(scene: Scene, angles: Sequence[float] | Array, speed: float,
 
 
 def _joint_rates(scene: Scene) -> Array:
-    """Return the joints' rates as a linear function of the rates of all bodies' coordinates, (bodies, 7 bodies).
+    """Return the joints' rates as a linear function of the rates of all bodies' coordinates,
+    (bodies, 7 bodies).
 
-    Coordinates are positions and Euler parameters (e0, e); the angular velocity is 2 (e0 ė - ė0 e + e × ė).
+    Coordinates are positions and Euler parameters (e0, e); the angular velocity is 2 (e0 ė - ė0 e +
+    e × ė).
     """
     bodies = chain.placed_bodies(scene)
     rows = np.zeros((len(bodies), 7 * len(bodies)))

@@ -1,7 +1,8 @@
-"""Loads that drive the rotor, as load functions of the engine; and the loads in N and N m on blade roots and hub.
+"""Loads that drive the rotor, as load functions of the engine; and the loads in N and N m on blade
+roots and hub.
 
-Of the chain these follow from multipliers of joints and moments of connectors; of the tree, and of a blade that is
-part of the hub, from Newton's and Euler's laws on the engine's accelerations.
+Of the chain these follow from multipliers of joints and moments of connectors; of the tree, and of
+a blade that is part of the hub, from Newton's and Euler's laws on the engine's accelerations.
 """
 
 from __future__ import annotations
@@ -27,7 +28,14 @@ from rotor_mbs.models.exudyn.geometry import (
     shaft_axis,
 )
 from rotor_mbs.scenario.scene import Scene
-from rotor_mbs.scenario.time_table import ROTOR_TORQUE, Segment, is_constant, rest_place, torque_place, values_before
+from rotor_mbs.scenario.time_table import (
+    ROTOR_TORQUE,
+    Segment,
+    is_constant,
+    rest_place,
+    torque_place,
+    values_before,
+)
 from rotor_mbs.solution.quantities import named_loads
 from rotor_mbs.solution.trajectory import Array
 
@@ -48,7 +56,8 @@ class PrescribedMoment(NamedTuple):
 
 
 def prescribed_moments(scene: Scene) -> list[PrescribedMoment]:
-    """Return the moments that loads exert: torques, and k r of springs whose rest angle r changes over time.
+    """Return the moments that loads exert: torques, and k r of springs whose rest angle r changes
+    over time.
 
     A rest angle that is constant is a parameter of the spring itself.
     """
@@ -66,7 +75,8 @@ def prescribed_moments(scene: Scene) -> list[PrescribedMoment]:
 
 
 class Loads:
-    """The loads of the interval that is being integrated, which the engine asks for by load functions."""
+    """The loads of the interval that is being integrated, which the engine asks for by load
+    functions."""
 
     def __init__(self, scene: Scene) -> None:
         self.segment = scene.load_segments[0]
@@ -111,7 +121,8 @@ def moment_on(scene: Scene, loads: Loads, coordinate: int) -> Moment:
 
 
 def is_driven(scene: Scene, blade: int) -> bool:
-    """Return whether a spring, a damper or a torque acts on the pitch of a blade (counted from 0)."""
+    """Return whether a spring, a damper or a torque acts on the pitch of a blade (counted from
+    0)."""
     if any(scene.bearings[blade]):
         return True
     return any(moment.coordinate == 1 + blade for moment in prescribed_moments(scene))
@@ -122,7 +133,8 @@ Sampled = Callable[[str], Array]
 
 
 def _motion_outputs(scene: Scene, i: int) -> dict[str, str]:
-    """Return what Newton's and Euler's laws need of blade i: names of the engine's outputs by name of sensor."""
+    """Return what Newton's and Euler's laws need of blade i: names of the engine's outputs by name
+    of sensor."""
     outputs = {"root acceleration": "Acceleration", "root rotation": "RotationMatrix"}
     if not scene.blades[i].is_point_mass:
         outputs["root spin"] = "AngularVelocityLocal"
@@ -133,7 +145,8 @@ def _motion_outputs(scene: Scene, i: int) -> dict[str, str]:
 def _newton_euler(scene: Scene, i: int, sampled: Sampled) -> tuple[Array, Array, Array]:
     """Compute the load on a blade's root by Newton's and Euler's laws.
 
-    F = m (a + g e_z), M = I α + ω × I ω + r × F, with r the centre of mass and I the inertia about it.
+    F = m (a + g e_z), M = I α + ω × I ω + r × F, with r the centre of mass and I the inertia about
+    it.
 
     Parameters
     ----------
@@ -165,8 +178,8 @@ def _newton_euler(scene: Scene, i: int, sampled: Sampled) -> tuple[Array, Array,
 def tree_loads(scene: Scene, time: Array, sampled: Sampled) -> dict[str, Array]:
     """Compute the loads of the tree from the engine's accelerations.
 
-    Every blade by Newton's and Euler's laws; their sum, with the hub's share, is the load at the shaft, and the moment
-    of a pitch actuator is what they leave about the pitch axis.
+    Every blade by Newton's and Euler's laws; their sum, with the hub's share, is the load at the
+    shaft, and the moment of a pitch actuator is what they leave about the pitch axis.
 
     Parameters
     ----------
@@ -205,33 +218,44 @@ def _add_along_shaft(scene: Scene, moments: Array, sizes: Array) -> None:
 
 
 def _at_root(scene: Scene, force: Array, moment: Array) -> tuple[Array, Array]:
-    """Return force and moment about the root of a blade, from those about the apex; (n, 3) in the blade's frame."""
+    """Return force and moment about the root of a blade, from those about the apex; (n, 3) in the
+    blade's frame."""
     if scene.hub_radius:
         moment = moment - np.cross([0.0, 0.0, scene.hub_radius], force)
     return force, moment
 
 
 def tree_sensors(scene: Scene, on_link: Callable[[str, str, int, Array], Part]) -> list[Part]:
-    """Return the sensors that `tree_loads` reads; on_link: (name, quantity, link, point) -> sensor."""
+    """Return the sensors that `tree_loads` reads; on_link: (name, quantity, link, point) ->
+    sensor."""
     sensors = []
     for i, blade in enumerate(scene.blades):
         place = body_of_point(scene, i, blade.centre_of_mass)
-        sensors += [on_link(name, output, *place) for name, output in _motion_outputs(scene, i).items()]
+        sensors += [
+            on_link(name, output, *place) for name, output in _motion_outputs(scene, i).items()
+        ]
     if scene.hub_inertia:
         sensors.append(on_link("hub spin rate", "AngularAccelerationLocal", 0, np.zeros(3)))
     return sensors
 
 
 def chain_sensors(scene: Scene, hub: Body) -> list[Part]:
-    """Return what `chain_loads` reads beside rotations: joints, connectors, and blades that are part of the hub."""
+    """Return what `chain_loads` reads beside rotations: joints, connectors, and blades that are
+    part of the hub."""
     sensors = _joint_sensors("shaft bearing", "shaft damper" if scene.shaft_damping else "")
     for i in range(len(scene.blades)):
         if i in movable_blades(scene):
-            sensors += _joint_sensors(f"pitch bearing {i + 1}", f"pitch spring {i + 1}" if is_driven(scene, i) else "")
+            sensors += _joint_sensors(
+                f"pitch bearing {i + 1}", f"pitch spring {i + 1}" if is_driven(scene, i) else ""
+            )
             continue
         point = list(body_of_point(scene, i, scene.blades[i].centre_of_mass)[1] - hub.com)
         for name, output in _motion_outputs(scene, i).items():
-            sensors.append(sensor(name, "SensorBody", output, bodyNumber=Ref("object", "hub"), localPosition=point))
+            sensors.append(
+                sensor(
+                    name, "SensorBody", output, bodyNumber=Ref("object", "hub"), localPosition=point
+                )
+            )
     return sensors
 
 
@@ -281,10 +305,11 @@ def chain_loads(scene: Scene, sampled: Sampled) -> dict[str, Array]:
 
 
 def _joint_reaction(joint: str, seat: Array, root: Array, sampled: Sampled) -> tuple[Array, Array]:
-    """Compute the force and the moment of a joint on its second body, (n, 3) each in the base frame.
+    """Compute the force and the moment of a joint on its second body, (n, 3) each in the base
+    frame.
 
-    The engine gives the force on the first body, and multipliers λ of the constraints x₁·z₀ = 0 and y₁·z₀ = 0, which
-    are the moment λ₀ z₀ × x₁ + λ₁ z₀ × y₁.
+    The engine gives the force on the first body, and multipliers λ of the constraints x₁·z₀ = 0 and
+    y₁·z₀ = 0, which are the moment λ₀ z₀ × x₁ + λ₁ z₀ × y₁.
 
     Parameters
     ----------

@@ -1,4 +1,5 @@
-"""The seven methods of Exudyn: two models, each with its integrators. The engine is loaded when a system is built."""
+"""The seven methods of Exudyn: two models, each with its integrators. The engine is loaded when a
+system is built."""
 
 from __future__ import annotations
 
@@ -46,7 +47,8 @@ _TREE_ALPHA_LADDERS = tuple(
     for radius, (variant, label) in _RADII.items()
 )
 _NEWMARK_LADDERS = tuple(
-    step_ladder(7, choices={"node": node}, variant=variant, label=label) for node, (variant, label) in _NODES.items()
+    step_ladder(7, choices={"node": node}, variant=variant, label=label)
+    for node, (variant, label) in _NODES.items()
 )
 
 
@@ -58,50 +60,88 @@ def _chain_alpha_ladders() -> tuple[Ladder, ...]:
             labels = [label for label in (radius_label, node_label) if label]
             choices = {"spectral_radius": radius, "node": node}
             variant = radius_variant + node_variant
-            ladders.append(step_ladder(7, choices=choices, variant=variant, label=", ".join(labels)))
+            ladders.append(
+                step_ladder(7, choices=choices, variant=variant, label=", ".join(labels))
+            )
     return tuple(ladders)
 
 
 METHODS = (
     _method(
-        "exudyn_tree", "rk44", "RK44",
-        settings=schemes.Rk44Settings, order=4, fixed_step=True,
+        "exudyn_tree",
+        "rk44",
+        "RK44",
+        settings=schemes.Rk44Settings,
+        order=4,
+        fixed_step=True,
         ladders=(step_ladder(10),),
     ),
     _method(
-        "exudyn_tree", "rk67", "RK67",
-        settings=schemes.Rk67Settings, order=6, fixed_step=True, is_default=True,
-        ladders=(step_ladder(8),), linearize=lazy(f"{_LINEARIZATION}:linearize_tree"),
+        "exudyn_tree",
+        "rk67",
+        "RK67",
+        settings=schemes.Rk67Settings,
+        order=6,
+        fixed_step=True,
+        is_default=True,
+        ladders=(step_ladder(8),),
+        linearize=lazy(f"{_LINEARIZATION}:linearize_tree"),
     ),
     _method(
-        "exudyn_tree", "dopri5", "DOPRI5",
+        "exudyn_tree",
+        "dopri5",
+        "DOPRI5",
         settings=schemes.Dopri5Settings,
         ladders=(
             tolerance_ladder(
                 lambda tol: {"relative_tolerance": 0.0, "absolute_tolerance": tol},
-                1e-2, 1e-4, 1e-6, 1e-8, 1e-10, 1e-12, 1e-14,
+                1e-2,
+                1e-4,
+                1e-6,
+                1e-8,
+                1e-10,
+                1e-12,
+                1e-14,
             ),
         ),
     ),
     _method(
-        "exudyn_tree", "generalized_alpha", "generalized-α",
-        settings=schemes.AlphaSettings, order=2, fixed_step=True,
+        "exudyn_tree",
+        "generalized_alpha",
+        "generalized-α",
+        settings=schemes.AlphaSettings,
+        order=2,
+        fixed_step=True,
         ladders=_TREE_ALPHA_LADDERS,
     ),
     _method(
-        "exudyn_chain", "extrapolated", "extrapolated", builder="extrapolated",
-        settings=schemes.ExtrapolatedSettings, is_default=True,
-        ladders=(tolerance_ladder(lambda tol: {"tolerance": tol}, *(10.0**-k for k in range(3, 12))),),
+        "exudyn_chain",
+        "extrapolated",
+        "extrapolated",
+        builder="extrapolated",
+        settings=schemes.ExtrapolatedSettings,
+        is_default=True,
+        ladders=(
+            tolerance_ladder(lambda tol: {"tolerance": tol}, *(10.0**-k for k in range(3, 12))),
+        ),
         linearize=lazy(f"{_LINEARIZATION}:linearize_chain"),
     ),
     _method(
-        "exudyn_chain", "generalized_alpha", "generalized-α",
-        settings=schemes.ChainAlphaSettings, order=2, fixed_step=True,
+        "exudyn_chain",
+        "generalized_alpha",
+        "generalized-α",
+        settings=schemes.ChainAlphaSettings,
+        order=2,
+        fixed_step=True,
         ladders=_chain_alpha_ladders(),
     ),
     _method(
-        "exudyn_chain", "newmark_index2", "Newmark index 2",
-        settings=schemes.ChainNewmarkSettings, order=2, fixed_step=True,
+        "exudyn_chain",
+        "newmark_index2",
+        "Newmark index 2",
+        settings=schemes.ChainNewmarkSettings,
+        order=2,
+        fixed_step=True,
         ladders=_NEWMARK_LADDERS,
     ),
-)  # fmt: skip
+)

@@ -1,4 +1,5 @@
-"""The engine's time integrations as data: which solver, which options, and the settings that a user may choose."""
+"""The engine's time integrations as data: which solver, which options, and the settings that a user
+may choose."""
 
 from __future__ import annotations
 
@@ -20,7 +21,8 @@ class Scheme:
     stages : evaluations in a step; 0 for an implicit one.
     options : values by dotted path below the engine's settings of a time integration.
     step : s, the largest; None where the scheme chooses its own.
-    trial_steps : of a scheme that chooses its step: trials within one integration interval after which the run is given
+    trial_steps : of a scheme that chooses its step: trials within one integration interval after
+        which the run is given
         up (the engine itself repeats a rejected smallest step for ever).
     """
 
@@ -31,8 +33,13 @@ class Scheme:
     trial_steps: int = 0
 
     def with_accelerations(self) -> Scheme:
-        """Return this scheme with accelerations at the end of every step; an implicit one has them anyway."""
-        return replace(self, options={**self.options, _END_ACCELERATIONS: True}) if self.stages else self
+        """Return this scheme with accelerations at the end of every step; an implicit one has them
+        anyway."""
+        return (
+            replace(self, options={**self.options, _END_ACCELERATIONS: True})
+            if self.stages
+            else self
+        )
 
     @property
     def lacks_initial_accelerations(self) -> bool:
@@ -40,7 +47,8 @@ class Scheme:
         return bool(self.options.get(_END_ACCELERATIONS))
 
 
-# Stage evaluations are all that a state needs: one more at the end of a step would only serve to know accelerations.
+# Stage evaluations are all that a state needs: one more at the end of a step would only serve to
+# know accelerations.
 _EXPLICIT = {_END_ACCELERATIONS: False, "explicit.useLieGroupIntegration": False}
 
 
@@ -66,12 +74,19 @@ class Rk67Settings(Settings):
 
 @dataclass(frozen=True)
 class Dopri5Settings(Settings):
-    """Dormand-Prince 5(4) with the engine's step control. It scales the error by absolute + relative · max(x, x_new),
-    without the magnitude of x, which vanishes at x = -absolute/relative: hence a relative tolerance of 0."""
+    """Dormand-Prince 5(4) with the engine's step control. It scales the error by absolute +
+    relative · max(x, x_new), without the magnitude of x, which vanishes at x = -absolute/relative:
+    hence a relative tolerance of 0."""
 
-    relative_tolerance: float = number(0.0, at_least=0.0, doc="relative tolerance of the local error")
-    absolute_tolerance: float = number(1e-11, above=0.0, doc="absolute tolerance of the local error, rad and rad/s")
-    trial_steps: int = number(10_000, at_least=1, doc="largest number of trial steps between two samples")
+    relative_tolerance: float = number(
+        0.0, at_least=0.0, doc=("relative tolerance of the local error")
+    )
+    absolute_tolerance: float = number(
+        1e-11, above=0.0, doc=("absolute tolerance of the local error, rad and rad/s")
+    )
+    trial_steps: int = number(
+        10_000, at_least=1, doc=("largest number of trial steps between two samples")
+    )
 
     def scheme(self) -> Scheme:
         options = {
@@ -90,11 +105,17 @@ class NewtonSettings(Settings):
     """The trapezoidal rule (Newmark), constraints at velocity level (index 2), order 2."""
 
     step: float = step(2.5e-4)
-    newton_relative_tolerance: float = number(1e-8, above=0.0, doc="relative tolerance of Newton's residual")
-    newton_absolute_tolerance: float = number(1e-10, above=0.0, doc="absolute tolerance of Newton's residual")
+    newton_relative_tolerance: float = number(
+        1e-8, above=0.0, doc=("relative tolerance of Newton's residual")
+    )
+    newton_absolute_tolerance: float = number(
+        1e-10, above=0.0, doc=("absolute tolerance of Newton's residual")
+    )
 
     def scheme(self) -> Scheme:
-        return self._implicit({"generalizedAlpha.useNewmark": True, "generalizedAlpha.useIndex2Constraints": True})
+        return self._implicit(
+            {"generalizedAlpha.useNewmark": True, "generalizedAlpha.useIndex2Constraints": True}
+        )
 
     def _implicit(self, options: Mapping[str, object]) -> Scheme:
         """Return the implicit scheme with options of its own."""
@@ -111,13 +132,19 @@ class NewtonSettings(Settings):
 class AlphaSettings(NewtonSettings):
     """Generalized-alpha, constraints at position level (index 3), order 2."""
 
-    spectral_radius: float = number(0.9, at_least=0.0, at_most=1.0, doc="1: no numerical damping, 0: largest")
+    spectral_radius: float = number(
+        0.9, at_least=0.0, at_most=1.0, doc=("1: no numerical damping, 0: largest")
+    )
 
     def scheme(self) -> Scheme:
         return self._implicit({"generalizedAlpha.spectralRadius": self.spectral_radius})
 
 
-_NODE = choice("euler_parameters", ("euler_parameters", "rotation_vector"), doc="coordinates of a body's rotation")
+_NODE = choice(
+    "euler_parameters",
+    ("euler_parameters", "rotation_vector"),
+    doc=("coordinates of a body's rotation"),
+)
 
 
 @dataclass(frozen=True)
@@ -141,10 +168,15 @@ _NEWTON_SHARE, _LEAST_NEWTON_TOLERANCE = 0.1, 1e-12
 
 @dataclass(frozen=True)
 class ExtrapolatedSettings(Settings):
-    """The trapezoidal rule, constraints at velocity level (index 2), extrapolated within every sample interval."""
+    """The trapezoidal rule, constraints at velocity level (index 2), extrapolated within every
+    sample interval."""
 
     tolerance: float = number(
-        3e-8, above=0.0, at_most=1e-2, unit="rad", doc="tolerance for the estimated error of each interval"
+        3e-8,
+        above=0.0,
+        at_most=1e-2,
+        unit="rad",
+        doc=("tolerance for the estimated error of each interval"),
     )
 
     @property
@@ -154,8 +186,9 @@ class ExtrapolatedSettings(Settings):
 
     def scheme(self) -> Scheme:
         """Return the trapezoidal rule that is extrapolated."""
-        # The engine's Jacobian leaves out how the constraints' directions turn, so that Newton's method converges
-        # linearly with a new Jacobian as with an old one: one for each step, and no other while the residual falls.
+        # The engine's Jacobian leaves out how the constraints' directions turn, so that Newton's
+        # method converges linearly with a new Jacobian as with an old one: one for each step, and
+        # no other while the residual falls.
         options = {
             "generalizedAlpha.useNewmark": True,
             "generalizedAlpha.useIndex2Constraints": True,

@@ -1,4 +1,5 @@
-"""From the recorded rows of the sensors of both models to a trajectory; energy of the springs, work of the loads."""
+"""From the recorded rows of the sensors of both models to a trajectory; energy of the springs, work
+of the loads."""
 
 from __future__ import annotations
 
@@ -12,7 +13,14 @@ from rotor_mbs.models.exudyn.geometry import Body, mounting, movable_blades, rot
 from rotor_mbs.models.exudyn.loads import chain_loads, matrices, prescribed_moments, tree_loads
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.scenario.time_table import ROTOR_TORQUE, Segment, is_constant, values_at
-from rotor_mbs.solution.trajectory import Array, Trajectory, all_coordinates, finite_rows, finite_samples, sample_times
+from rotor_mbs.solution.trajectory import (
+    Array,
+    Trajectory,
+    all_coordinates,
+    finite_rows,
+    finite_samples,
+    sample_times,
+)
 
 # Points of the local polynomial that stands in for the power between rows.
 _POINTS = 8
@@ -27,7 +35,9 @@ class _Reader:
     samples : the row of each sample that was reached.
     """
 
-    def __init__(self, scene: Scene, recorded: Callable[[str], Array], state: Iterable[str]) -> None:
+    def __init__(
+        self, scene: Scene, recorded: Callable[[str], Array], state: Iterable[str]
+    ) -> None:
         """Find the rows, from the tables of the sensors named in `state`.
 
         Parameters
@@ -66,7 +76,8 @@ class _Reader:
 
 
 def tree_trajectory(scene: Scene, recorded: Callable[[str], Array]) -> Trajectory:
-    """Return the samples of the tree, whose coordinates are the angles; recorded: as of `_Reader`."""
+    """Return the samples of the tree, whose coordinates are the angles; recorded: as of
+    `_Reader`."""
     read = _Reader(scene, recorded, ("angles", "rates"))
     angles, rates = all_coordinates(scene, read.all("angles"), read.all("rates"))
     bodies = [(tree.link_name(link), body) for link, body in enumerate(tree.bodies(scene))]
@@ -76,10 +87,13 @@ def tree_trajectory(scene: Scene, recorded: Callable[[str], Array]) -> Trajector
     return finite_samples(scene, fields)
 
 
-def chain_trajectory(scene: Scene, recorded: Callable[[str], Array], has_work: bool = False) -> Trajectory:
+def chain_trajectory(
+    scene: Scene, recorded: Callable[[str], Array], has_work: bool = False
+) -> Trajectory:
     """Return the samples of the chain.
 
-    Joint angles are those of the bodies' rotation matrices, rates those of their angular velocities.
+    Joint angles are those of the bodies' rotation matrices, rates those of their angular
+    velocities.
 
     Parameters
     ----------
@@ -158,7 +172,12 @@ def _dot(a: Array, b: Array) -> Array:
 
 
 def _fields(
-    scene: Scene, read: _Reader, angles: Array, rates: Array, bodies: Sequence[tuple[str, Body]], has_work: bool = False
+    scene: Scene,
+    read: _Reader,
+    angles: Array,
+    rates: Array,
+    bodies: Sequence[tuple[str, Body]],
+    has_work: bool = False,
 ) -> dict[str, Array]:
     """Return the quantities that the scene requests, at the samples, loads not among them.
 
@@ -219,8 +238,8 @@ def unwrap(time: Array, wrapped: Array, rates: Array, start: float) -> Array:
 def springs(scene: Scene, angles: Array) -> tuple[Array, Array]:
     """Compute the energy of the springs, and the work of moving rest angles that `work` leaves out.
 
-    The energy is ½ k (θ - r)². Of the work -∫ k (θ - r) dr of a rest angle r, jumps included, `work` has ∫ k r dθ; the
-    rest of it is the change of ½ k r (r - 2θ).
+    The energy is ½ k (θ - r)². Of the work -∫ k (θ - r) dr of a rest angle r, jumps included,
+    `work` has ∫ k r dθ; the rest of it is the change of ½ k r (r - 2θ).
 
     Parameters
     ----------
@@ -248,7 +267,8 @@ def springs(scene: Scene, angles: Array) -> tuple[Array, Array]:
 def work(scene: Scene, time: Array, angles: Array, rates: Array) -> Array:
     """Compute the work of the torques less what the dampers took, (n,) J.
 
-    A spring whose rest angle r changes counts as one that is unloaded at 0 and a torque k r; see `springs`.
+    A spring whose rest angle r changes counts as one that is unloaded at 0 and a torque k r; see
+    `springs`.
 
     Parameters
     ----------
@@ -267,7 +287,8 @@ def work(scene: Scene, time: Array, angles: Array, rates: Array) -> Array:
 
     # The power jumps with a load, so that no polynomial may go through both sides of a jump.
     out, done = np.zeros(len(time)), 0.0
-    slack = 1e-9 * scene.duration / (scene.samples - 1)  # s, by which rounding may put a row beside a jump
+    # s, by which rounding may put a row beside a jump
+    slack = 1e-9 * scene.duration / (scene.samples - 1)
     for segment in scene.load_segments:
         first, last = np.searchsorted(time, [segment.start - slack, segment.end + slack])
         if last - first < 2:
@@ -298,8 +319,8 @@ def power(scene: Scene, segment: Segment, time: Array, rates: Array) -> Array:
 def cumulative_integral(time: Array, values: Array) -> Array:
     """Integrate from the first row to each row, (n,).
 
-    Each interval by the polynomial through the eight nearest rows, which need not be equally spaced, and this exactly,
-    by Gauss and Legendre's points.
+    Each interval by the polynomial through the eight nearest rows, which need not be equally
+    spaced, and this exactly, by Gauss and Legendre's points.
 
     Parameters
     ----------
@@ -307,7 +328,8 @@ def cumulative_integral(time: Array, values: Array) -> Array:
     values : (n,) integrand.
     """
     points = min(_POINTS, len(time))
-    # Of each interval: the rows that its polynomial goes through, as many on both sides as there are.
+    # Of each interval: the rows that its polynomial goes through, as many on both sides as there
+    # are.
     first = np.clip(np.arange(len(time) - 1) - (points // 2 - 1), 0, len(time) - points)
     window = first[:, None] + np.arange(points)
     nodes, known = time[window], values[window]

@@ -1,4 +1,5 @@
-"""The engine's systems as solvers; the chain also by extrapolation within each interval between samples."""
+"""The engine's systems as solvers; the chain also by extrapolation within each interval between
+samples."""
 
 from __future__ import annotations
 
@@ -15,7 +16,12 @@ from rotor_mbs.models.exudyn import chain, sensor_samples, tree
 from rotor_mbs.models.exudyn.adapter import System
 from rotor_mbs.models.exudyn.geometry import Part
 from rotor_mbs.models.exudyn.loads import Loads
-from rotor_mbs.models.exudyn.schemes import ChainSettings, ExtrapolatedSettings, Scheme, SchemeSettings
+from rotor_mbs.models.exudyn.schemes import (
+    ChainSettings,
+    ExtrapolatedSettings,
+    Scheme,
+    SchemeSettings,
+)
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.scenario.time_table import Interval, intervals
 from rotor_mbs.solution.trajectory import Array, Integration, Trajectory, all_coordinates
@@ -29,8 +35,9 @@ _MOST_HALVINGS = 12
 # No estimate is smaller than some units in the last place of Euler parameters.
 _ROUNDING = 100.0 * float(np.finfo(float).eps)
 
-# Components below this share of the largest of their kind are rounding errors, and set to zero. Else motions that a
-# symmetry forbids (pitches that stay at zero) begin with 1e-27 rad and grow to the size of the others.
+# Components below this share of the largest of their kind are rounding errors, and set to zero.
+# Else motions that a symmetry forbids (pitches that stay at zero) begin with 1e-27 rad and grow to
+# the size of the others.
 _INSIGNIFICANT = 0.5 * float(np.finfo(float).eps)
 
 
@@ -50,7 +57,8 @@ def neville(previous: Sequence[Array], values: Array) -> list[Array]:
     Returns
     -------
     list of ndarray
-        The values, then those without the error's terms of second, fourth, ... power of the substep.
+        The values, then those without the error's terms of second, fourth, ... power of the
+        substep.
     """
     column = len(previous)
     row = [values]
@@ -60,13 +68,15 @@ def neville(previous: Sequence[Array], values: Array) -> list[Array]:
     return row
 
 
-# Extrapolation within each interval between samples (Gragg, Bulirsch, Stoer): from the same state the trapezoidal rule
-# takes 2, 4, 6, ... equal substeps, Neville's scheme in the square of the substep eliminates one even power of the
-# error with each column, and the next interval starts from what the table ends with.
+# Extrapolation within each interval between samples (Gragg, Bulirsch, Stoer): from the same state
+# the trapezoidal rule takes 2, 4, 6, ... equal substeps, Neville's scheme in the square of the
+# substep eliminates one even power of the error with each column, and the next interval starts from
+# what the table ends with.
 #
-# E. Hairer, S. P. Nørsett, G. Wanner, Solving Ordinary Differential Equations I, 2nd ed., II.9; E. Hairer, G. Wanner,
-# II, VI.5. Numbers of substeps are even: with constraints at velocity level an error of the accelerations along the
-# constraints changes its sign with every step, and only after an even number of steps is it the same in all columns.
+# E. Hairer, S. P. Nørsett, G. Wanner, Solving Ordinary Differential Equations I, 2nd ed., II.9; E.
+# Hairer, G. Wanner, II, VI.5. Numbers of substeps are even: with constraints at velocity level an
+# error of the accelerations along the constraints changes its sign with every step, and only after
+# an even number of steps is it the same in all columns.
 
 
 class _Kept(NamedTuple):
@@ -104,14 +114,17 @@ class ExtrapolatedSolver:
         for number, part in enumerate(parts):
             if part.kind == "sensor":
                 stored = part.name in self._of_rates
-                parts[number] = replace(part, parameters={**part.parameters, "storeInternal": stored})
+                parts[number] = replace(
+                    part, parameters={**part.parameters, "storeInternal": stored}
+                )
         self.system = System(parts)
         # Of each body the displacement from a reference and the change of four Euler parameters.
         self._reference = self.system.reference.reshape(-1, 7)
         self._sizes = np.abs(self._reference).max(axis=0)
         self._coordinates = self._reference.size
         places = np.arange(3 * self._coordinates).reshape(3, -1, 7)
-        self._rotations = places[:, :, 3:].reshape(3, -1)  # of Euler parameters, their rates and accelerations
+        # of Euler parameters, their rates and accelerations
+        self._rotations = places[:, :, 3:].reshape(3, -1)
         self._total = Integration(True)
         self._halvings = 0
         self.columns: list[int] = []  # of each part
@@ -145,7 +158,8 @@ class ExtrapolatedSolver:
     def _cross(self, interval: Interval, start: float, end: float, halvings: int) -> str:
         """Integrate over a part of an interval, in one go or in halves.
 
-        Parts are as small as the last ones had to be, and twice as large again where two columns less would do.
+        Parts are as small as the last ones had to be, and twice as large again where two columns
+        less would do.
 
         Parameters
         ----------
@@ -172,7 +186,8 @@ class ExtrapolatedSolver:
         return failure or self._cross(interval, middle, end, halvings + 1)
 
     def _part(self, interval: Interval, start: float, end: float) -> str:
-        """Extrapolate over a part of an interval, adding columns until the estimated error is small enough.
+        """Extrapolate over a part of an interval, adding columns until the estimated error is small
+        enough.
 
         Parameters and the returned text are those of `_cross`: interval, start, end.
         """
@@ -187,7 +202,8 @@ class ExtrapolatedSolver:
             if self._integrates_work:
                 values = np.append(values, self._work(interval))
             row = neville(row, values)
-            # The error of the value beside it in the table, which has two orders less than what is kept.
+            # The error of the value beside it in the table, which has two orders less than what is
+            # kept.
             if column and self._is_met(row[-1] - row[-2], row[-1], end - start):
                 self.columns.append(column + 1)
                 state, gained = row[-1], 0.0
@@ -196,12 +212,16 @@ class ExtrapolatedSolver:
                 work = self.kept[-1].work + gained
                 self._keep(end, interval, self._consistent(state), self.system.turns(), work)
                 return ""
-        return f"near t = {start:.6g} s the error of an interval of {end - start:.3g} s remains above the tolerance"
+        return (
+            f"near t = {start:.6g} s the error of an interval of {end - start:.3g} s remains "
+            "above the tolerance"
+        )
 
     def _work(self, interval: Interval) -> float:
         """Return the work of loads and dampers over the substeps of one column, J.
 
-        By the trapezoidal rule, whose error is a power series of the substep's square, as the state's is.
+        By the trapezoidal rule, whose error is a power series of the substep's square, as the
+        state's is.
         """
         tables = {name: self.system.rows(name) for name in self._of_rates}
         time = tables["hub spin"][:, 0]
@@ -213,8 +233,9 @@ class ExtrapolatedSolver:
     def _is_met(self, difference: Array, values: Array, span: float) -> bool:
         """Return whether an estimated error is within the tolerance.
 
-        Euler parameters are half of an angle, and so their error may be half of the tolerance. Newton's method stops at
-        a share of the forces: an error as small as it leaves cannot be made smaller by another column.
+        Euler parameters are half of an angle, and so their error may be half of the tolerance.
+        Newton's method stops at a share of the forces: an error as small as it leaves cannot be
+        made smaller by another column.
 
         Parameters
         ----------
@@ -229,10 +250,12 @@ class ExtrapolatedSolver:
         return bool(error <= self._newton_tolerance * span**2 * accelerations)
 
     def _consistent(self, values: Array) -> Array:
-        """Return an extrapolated state whose Euler parameters have length one, and rates that keep it.
+        """Return an extrapolated state whose Euler parameters have length one, and rates that keep
+        it.
 
-        The engine takes both for granted: else what errors of the length do to the motion is ten times as much as all
-        other errors. Rounding errors are set to zero. `values`: as of `System.values`; changed in place.
+        The engine takes both for granted: else what errors of the length do to the motion is ten
+        times as much as all other errors. Rounding errors are set to zero. `values`: as of
+        `System.values`; changed in place.
         """
         # Three derivatives, bodies, displacement (3) and Euler parameters (4).
         kinds = values[: 3 * self._coordinates].reshape(3, -1, 7)
@@ -244,19 +267,23 @@ class ExtrapolatedSolver:
         sizes = np.abs(kinds)
         for columns in (slice(0, 3), slice(3, 7)):
             largest = sizes[:, :, columns].max(axis=(1, 2))
-            # Coordinates are displacements: their rounding is that of what they are displacements from.
+            # Coordinates are displacements: their rounding is that of what they are displacements
+            # from.
             largest[0] = max(largest[0], self._sizes[columns].max())
             insignificant = sizes[:, :, columns] < _INSIGNIFICANT * largest[:, None, None]
             kinds[:, :, columns][insignificant] = 0.0
         return values
 
-    def _keep(self, time: float, interval: Interval, values: Array, turns: Array, work: float) -> None:
+    def _keep(
+        self, time: float, interval: Interval, values: Array, turns: Array, work: float
+    ) -> None:
         """Keep a state, from which the next part starts."""
         self.system.start_from(values, turns)
         self.kept.append(_Kept(time, interval, values, turns, work))
 
     def observe(self) -> Trajectory:
-        """Return the samples, from what the sensors read of each state under the load before a jump."""
+        """Return the samples, from what the sensors read of each state under the load before a
+        jump."""
         tables: dict[str, list[Array]] = {name: [] for name in self.system.sensors}
         for kept in self.kept:
             self._loads.set_segment(kept.interval.segment)
@@ -264,9 +291,12 @@ class ExtrapolatedSolver:
                 tables[name].append(np.concatenate([[kept.time], read]))
         rows = {name: np.array(table) for name, table in tables.items()}
         rows["work"] = np.array([[kept.time, kept.work] for kept in self.kept])
-        # A diverging state may overflow in its energies; the rows are cut where they stop being finite.
+        # A diverging state may overflow in its energies; the rows are cut where they stop being
+        # finite.
         with np.errstate(over="ignore", invalid="ignore"):
-            return sensor_samples.chain_trajectory(self._scene, rows.__getitem__, self._integrates_work)
+            return sensor_samples.chain_trajectory(
+                self._scene, rows.__getitem__, self._integrates_work
+            )
 
 
 Reading = Callable[[Scene, Callable[[str], Array]], Trajectory]
@@ -279,7 +309,13 @@ class MultibodySolver:
     """A system under one of the engine's own time integrations; see `methods.base.Solver`."""
 
     def __init__(
-        self, scene: Scene, parts: Sequence[Part], loads: Loads, scheme: Scheme, reading: Reading, rows_between: bool
+        self,
+        scene: Scene,
+        parts: Sequence[Part],
+        loads: Loads,
+        scheme: Scheme,
+        reading: Reading,
+        rows_between: bool,
     ) -> None:
         """Build the system.
 
@@ -299,16 +335,21 @@ class MultibodySolver:
         """
         self._scene, self._loads, self._scheme, self._reading = scene, loads, scheme, reading
         self._rows_between = rows_between
-        self._intervals = intervals(scene.load_segments, scene.samples, every_sample=scheme.step is None)
+        self._intervals = intervals(
+            scene.load_segments, scene.samples, every_sample=scheme.step is None
+        )
         self.system = System(parts)
 
     def integrate(self) -> Integration:
         """Integrate from the initial state to the end, or to the first failure."""
-        return self.system.integrate(self._scheme, self._intervals, self._rows_between, self._loads.set_segment)
+        return self.system.integrate(
+            self._scheme, self._intervals, self._rows_between, self._loads.set_segment
+        )
 
     def observe(self) -> Trajectory:
         """Return the samples of the last integration."""
-        # A diverging state may overflow in its energies; the rows are cut where they stop being finite.
+        # A diverging state may overflow in its energies; the rows are cut where they stop being
+        # finite.
         with np.errstate(over="ignore", invalid="ignore"):
             return self._reading(self._scene, self.system.rows)
 
@@ -319,21 +360,27 @@ def build_tree(scene: Scene, settings: SchemeSettings) -> Solver:
     if scene.wants("loads"):
         scheme = scheme.with_accelerations()
     parts = tree.parts(scene, loads)
-    return MultibodySolver(scene, parts, loads, scheme, sensor_samples.tree_trajectory, scene.work_needs_path)
+    return MultibodySolver(
+        scene, parts, loads, scheme, sensor_samples.tree_trajectory, scene.work_needs_path
+    )
 
 
 def build_chain(scene: Scene, settings: ChainSettings) -> Solver:
-    """Build the chain of a scene. Raises MethodRefusal for loads with the node whose multipliers are wrong."""
+    """Build the chain of a scene. Raises MethodRefusal for loads with the node whose multipliers
+    are wrong."""
     scheme = _scheme(scene, settings)
     if scene.wants("loads") and settings.node == "rotation_vector":
         raise MethodRefusal(
-            "exudyn_chain: loads need the setting node = euler_parameters: with rotation_vector the engine's "
+            "exudyn_chain: loads need the setting node = euler_parameters: with rotation_vector "
+            "the engine's "
             "first multipliers are wrong, and those of newmark_index2 remain wrong"
         )
     loads = Loads(scene)
     parts = chain.parts(scene, loads, settings.node)
     # Its angles are unwrapped from row to row, so rows are kept between samples.
-    return MultibodySolver(scene, parts, loads, scheme, sensor_samples.chain_trajectory, rows_between=True)
+    return MultibodySolver(
+        scene, parts, loads, scheme, sensor_samples.chain_trajectory, rows_between=True
+    )
 
 
 def build_extrapolated(scene: Scene, settings: ExtrapolatedSettings) -> Solver:
@@ -342,7 +389,10 @@ def build_extrapolated(scene: Scene, settings: ExtrapolatedSettings) -> Solver:
 
 
 def _scheme(scene: Scene, settings: SchemeSettings | ExtrapolatedSettings) -> Scheme:
-    """Return the time integration of the settings. Raises MethodRefusal for samples that are too close."""
+    """Return the time integration of the settings. Raises MethodRefusal for samples that are too
+    close."""
     if scene.duration / (scene.samples - 1) < _SHORTEST_INTERVAL:
-        raise MethodRefusal(f"Exudyn cannot resolve samples less than {_SHORTEST_INTERVAL:g} s apart")
+        raise MethodRefusal(
+            f"Exudyn cannot resolve samples less than {_SHORTEST_INTERVAL:g} s apart"
+        )
     return settings.scheme()

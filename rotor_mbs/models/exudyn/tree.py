@@ -1,4 +1,5 @@
-"""The rotor as a kinematic tree, hub and blades as links; its coordinates are the angles: exact zeros stay exact."""
+"""The rotor as a kinematic tree, hub and blades as links; its coordinates are the angles: exact
+zeros stay exact."""
 
 from __future__ import annotations
 
@@ -42,7 +43,10 @@ def parts(scene: Scene, loads: Loads) -> list[Part]:
         "initialCoordinates_t": [scene.initial_rates[column] for column in moving],
         "numberOfODE2Coordinates": len(moving),
     }
-    built = [Part("node", _NODE.name, "NodeGenericODE2", node, f"{len(moving)} coordinates"), _tree(scene)]
+    built = [
+        Part("node", _NODE.name, "NodeGenericODE2", node, f"{len(moving)} coordinates"),
+        _tree(scene),
+    ]
     for number, column in enumerate(moving):
         moment = moment_on(scene, loads, column)
         if not moment.terms:
@@ -52,7 +56,10 @@ def parts(scene: Scene, loads: Loads) -> list[Part]:
             angle_name, torque_name = f"pitch angle {column}", f"pitch torque {column}"
         marker = {"nodeNumber": _NODE, "coordinate": number}
         built.append(Part("marker", angle_name, "MarkerNodeCoordinate", marker))
-        load: dict[str, object] = {"markerNumber": Ref("marker", angle_name), "load": moment.at(0.0)}
+        load: dict[str, object] = {
+            "markerNumber": Ref("marker", angle_name),
+            "load": moment.at(0.0),
+        }
         # The engine asks for a load by a function, which costs time, only where it changes.
         detail = "constant"
         if not all(is_constant(scene.load_tables[place]) for place, _ in moment.terms):
@@ -65,7 +72,9 @@ def parts(scene: Scene, loads: Loads) -> list[Part]:
     ]
     if scene.wants("tip"):
         for i, blade in enumerate(scene.blades):
-            built.append(_link_sensor(f"tip {i + 1}", "Position", *body_of_point(scene, i, blade.tip)))
+            built.append(
+                _link_sensor(f"tip {i + 1}", "Position", *body_of_point(scene, i, blade.tip))
+            )
     if scene.wants("energy"):
         for link, body in enumerate(bodies(scene)):
             name = link_name(link)
@@ -73,7 +82,9 @@ def parts(scene: Scene, loads: Loads) -> list[Part]:
                 built.append(_link_sensor(f"{name} position", "Position", link, body.com))
                 built.append(_link_sensor(f"{name} velocity", "Velocity", link, body.com))
             if np.any(body.inertia):
-                built.append(_link_sensor(f"{name} spin", "AngularVelocityLocal", link, np.zeros(3)))
+                built.append(
+                    _link_sensor(f"{name} spin", "AngularVelocityLocal", link, np.zeros(3))
+                )
     if scene.wants("loads"):
         built += tree_sensors(scene, _link_sensor)
     return built
@@ -114,7 +125,10 @@ def _tree(scene: Scene) -> Part:
         detail += ", gravity"
     if any(stiffness := [scene.bearings[i][0] for i in blades]):
         parameters["jointPControlVector"] = [0.0, *stiffness]
-        parameters["jointPositionOffsetVector"] = [0.0, *(constant_value(scene.pitch_loads[i][1]) for i in blades)]
+        parameters["jointPositionOffsetVector"] = [
+            0.0,
+            *(constant_value(scene.pitch_loads[i][1]) for i in blades),
+        ]
         detail += ", bearing stiffness"
     damping = [scene.dampings[column] for column in scene.moving_coordinates]
     if any(damping):
@@ -126,4 +140,11 @@ def _tree(scene: Scene) -> Part:
 
 def _link_sensor(name: str, quantity: str, link: int, point: Array) -> Part:
     """Return a sensor at a point, (3,) m in the frame of a link."""
-    return sensor(name, "SensorKinematicTree", quantity, objectNumber=_TREE, linkNumber=link, localPosition=list(point))
+    return sensor(
+        name,
+        "SensorKinematicTree",
+        quantity,
+        objectNumber=_TREE,
+        linkNumber=link,
+        localPosition=list(point),
+    )

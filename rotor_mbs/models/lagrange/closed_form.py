@@ -1,20 +1,22 @@
-"""The closed form: accelerations by an arrowhead solve, energies, tip. One text for NumPy, SciPy and heyoka.
+"""The closed form: accelerations by an arrowhead solve, energies, tip. One text for NumPy, SciPy
+and heyoka.
 
-Every function takes numbers of any kind that knows + - * / (floats, arrays, quad precision, symbolic expressions)
-together with a sine and a cosine for that kind, and contains no branch on a value.
+Every function takes numbers of any kind that knows + - * / (floats, arrays, quad precision,
+symbolic expressions) together with a sine and a cosine for that kind, and contains no branch on a
+value.
 
-Symbols: φ = q2 + 2π(i-1)/N azimuth of blade i, θ its pitch, Ω = q̇2, s = sin θ, c = cos θ; τ tilt, β cone.
-The blade's axes in the base frame are Rx(τ) Ry(φ) Rx(-β) Rz(θ), so that its angular velocity in its own axes is
-ω = (Ω cos β s, Ω cos β c, θ̇ + Ω sin β). With J the blade's inertia about the apex,
-a = Jxx s² + Jyy c² + 2 Jxy s c and b = Jxz s + Jyz c, T = ½ J_hub Ω² + ½ Σ ω·J ω is
-T = ½ (J_hub + Σ A) Ω² + Σ B Ω θ̇ + ½ Σ Jzz θ̇²,
-A = cos²β a + 2 sin β cos β b + sin²β Jzz,  B = cos β b + sin β Jzz,
-V = Σ m g h + ½ k (θ - r)², r the rest angle of the spring, and with u = x c - y s, v = x s + y c
-h = sin τ (v cos β + z sin β) + cos τ (-u sin φ + (z cos β - v sin β) cos φ).
-The mass matrix is an arrowhead; eliminating the pitches leaves the Schur complement
-S = J_hub + Σ (A - B²/Jzz) = J_hub + Σ cos²β (a - b²/Jzz).
+Symbols: φ = q2 + 2π(i-1)/N azimuth of blade i, θ its pitch, Ω = q̇2, s = sin θ, c = cos θ; τ tilt,
+β cone. The blade's axes in the base frame are Rx(τ) Ry(φ) Rx(-β) Rz(θ), so that its angular
+velocity in its own axes is ω = (Ω cos β s, Ω cos β c, θ̇ + Ω sin β). With J the blade's inertia
+about the apex, a = Jxx s² + Jyy c² + 2 Jxy s c and b = Jxz s + Jyz c, T = ½ J_hub Ω² + ½ Σ ω·J ω is
+T = ½ (J_hub + Σ A) Ω² + Σ B Ω θ̇ + ½ Σ Jzz θ̇², A = cos²β a + 2 sin β cos β b + sin²β Jzz,  B = cos
+β b + sin β Jzz, V = Σ m g h + ½ k (θ - r)², r the rest angle of the spring, and with u = x c - y s,
+v = x s + y c h = sin τ (v cos β + z sin β) + cos τ (-u sin φ + (z cos β - v sin β) cos φ). The mass
+matrix is an arrowhead; eliminating the pitches leaves the Schur complement S = J_hub + Σ (A -
+B²/Jzz) = J_hub + Σ cos²β (a - b²/Jzz).
 
-What is linear in s and c by tilt or cone is in `BladeForm.lean`, and costs an upright rotor nothing.
+What is linear in s and c by tilt or cone is in `BladeForm.lean`, and costs an upright rotor
+nothing.
 """
 
 from __future__ import annotations
@@ -36,7 +38,8 @@ class LoadValues:
 
     rotor: Number  # N m on the rotor
     pitches: Sequence[Number] = ()  # (form.blades,) N m between hub and blade; () for none
-    rests: Sequence[Number] = ()  # (form.blades,) rad, at which the bearings' springs are unloaded; () for 0
+    # (form.blades,) rad, at which the bearings' springs are unloaded; () for 0
+    rests: Sequence[Number] = ()
 
 
 def load_values(values: Sequence[Any], pitches: Sequence[int]) -> LoadValues:
@@ -55,7 +58,12 @@ def load_values(values: Sequence[Any], pitches: Sequence[int]) -> LoadValues:
 
 
 def accelerations(
-    angles: Sequence[Number], rates: Sequence[Number], form: RotorForm, loads: LoadValues, sin: Function, cos: Function
+    angles: Sequence[Number],
+    rates: Sequence[Number],
+    form: RotorForm,
+    loads: LoadValues,
+    sin: Function,
+    cos: Function,
 ) -> list[Number]:
     """Compute the accelerations by Lagrange's equations of T - V above.
 
@@ -63,7 +71,8 @@ def accelerations(
 
     Parameters
     ----------
-    angles, rates : of the rotor, then of the pitches that move: 1 + len(form.blades) in rad and rad/s.
+    angles, rates : of the rotor, then of the pitches that move: 1 + len(form.blades) in rad and
+        rad/s.
     form : the coefficients.
     loads : the loads of the coordinates that move.
     sin, cos : for the kind of number.
@@ -79,7 +88,8 @@ def accelerations(
     moment = loads.rotor - form.shaft_damping * spin
     for weight, cos_phase, sin_phase in form.fixed:
         moment = moment + weight * (sin_q * cos_phase + cos_q * sin_phase)
-    # s and c stand outside: an integrator that works with series pays for every product of two of them.
+    # s and c stand outside: an integrator that works with series pays for every product of two of
+    # them.
     pitched = []
     for blade, theta, rate, torque, rest in pitches(form, angles, rates, loads):
         s, c = sin(theta), cos(theta)
@@ -89,9 +99,12 @@ def accelerations(
         ratio = blade.ratio_s * s + blade.ratio_c * c  # B / Jzz, without tilt and cone
         resistance = blade.stiffness * (theta - rest) + blade.damping * rate - torque
         # ½ ∂A/∂θ Ω² and gravity, both on the pitch: s·on_s + c·on_c
-        on_s = blade.half_slope_sc * c_turn - blade.half_slope_cs * s_turn - blade.weight_x * sin_phi
+        on_s = (
+            blade.half_slope_sc * c_turn - blade.half_slope_cs * s_turn - blade.weight_x * sin_phi
+        )
         on_c = blade.half_slope_cs * c_turn - blade.weight_y * sin_phi
-        # In the rotor's moment, pitch eliminated, ½ ∂A/∂θ times drag: Coriolis, and B / Jzz times what turns the pitch.
+        # In the rotor's moment, pitch eliminated, ½ ∂A/∂θ times drag: Coriolis, and B / Jzz times
+        # what turns the pitch.
         drag = 2.0 * (spin * rate) + (blade.ratio_s * s_turn + blade.ratio_c * c_turn)
         lean = blade.lean
         if lean:
@@ -103,13 +116,19 @@ def accelerations(
         lever = blade.lever_cc * c + blade.lever_sc * s
         rotor_c = blade.weight_x * cos_phi + sin_phi * lever - blade.coupling_s * (rate * rate)
         rotor_c = rotor_c - blade.half_slope_sc * (s * drag) - blade.half_slope_cs * (c * drag)
-        rotor_s = blade.lever_ss * (s * sin_phi) - blade.weight_y * cos_phi + blade.coupling_c * (rate * rate)
+        rotor_s = (
+            blade.lever_ss * (s * sin_phi)
+            - blade.weight_y * cos_phi
+            + blade.coupling_c * (rate * rate)
+        )
         rotor_s = rotor_s + blade.half_slope_cs * (s * drag)
         if lean:
             rotor_c = rotor_c - lean.slope_c * drag + lean.weight_x * (ratio * up)
             rotor_s = rotor_s - lean.slope_s * drag - lean.weight_y * (ratio * up)
         moment = moment + (c * rotor_c + s * rotor_s) + ratio * resistance
-        schur = schur + (blade.schur_ss * (s * s) + blade.schur_cc * (c * c) + blade.schur_sc * (s * c))
+        schur = schur + (
+            blade.schur_ss * (s * s) + blade.schur_cc * (c * c) + blade.schur_sc * (s * c)
+        )
     rotor = moment / schur
     result = [rotor]
     for blade, (s, c, on_s, on_c, resistance) in zip(form.blades, pitched, strict=True):
@@ -125,14 +144,22 @@ def pitches(
 ) -> Iterator[tuple[BladeForm, Number, Number, Number, Number]]:
     """Yield blade, angle, rate, torque and rest angle of each pitch that moves."""
     nothing = (0.0,) * len(form.blades)
-    return zip(form.blades, angles[1:], rates[1:], loads.pitches or nothing, loads.rests or nothing, strict=True)
+    return zip(
+        form.blades,
+        angles[1:],
+        rates[1:],
+        loads.pitches or nothing,
+        loads.rests or nothing,
+        strict=True,
+    )
 
 
 def power(rates: Sequence[Number], form: RotorForm, loads: LoadValues) -> Number:
-    """Return the power (W) of the torques and of the moments k r of springs at rest at r, less what the dampers take.
+    """Return the power (W) of the torques and of the moments k r of springs at rest at r, less what
+    the dampers take.
 
-    The work of a spring whose rest angle moves, -∫ k (θ - r) dr, is that of k r on the pitch and the change of
-    `rest_energy`.
+    The work of a spring whose rest angle moves, -∫ k (θ - r) dr, is that of k r on the pitch and
+    the change of `rest_energy`.
     """
     spin = rates[0]
     total = loads.rotor * spin - form.shaft_damping * (spin * spin)
@@ -142,7 +169,8 @@ def power(rates: Sequence[Number], form: RotorForm, loads: LoadValues) -> Number
 
 
 def rest_energy(angles: Sequence[Number], form: RotorForm, rests: Sequence[Number]) -> Number:
-    """Return the energy (J) that springs with these rest angles have beyond those unloaded at 0, ½ k r (r - 2θ)."""
+    """Return the energy (J) that springs with these rest angles have beyond those unloaded at 0, ½
+    k r (r - 2θ)."""
     return sum(
         0.5 * blade.stiffness * (rest * (rest - 2.0 * theta))
         for blade, theta, rest in zip(form.blades, angles[1:], rests, strict=True)
@@ -150,9 +178,15 @@ def rest_energy(angles: Sequence[Number], form: RotorForm, rests: Sequence[Numbe
 
 
 def energies(
-    angles: Sequence[Number], rates: Sequence[Number], form: RotorForm, loads: LoadValues, sin: Function, cos: Function
+    angles: Sequence[Number],
+    rates: Sequence[Number],
+    form: RotorForm,
+    loads: LoadValues,
+    sin: Function,
+    cos: Function,
 ) -> tuple[Number, Number]:
-    """Return kinetic and potential energy (J), gravity's about the apex's height, and that of bearing springs.
+    """Return kinetic and potential energy (J), gravity's about the apex's height, and that of
+    bearing springs.
 
     Parameters are those of `accelerations`: angles, rates, form, loads, sin, cos.
     """
@@ -165,27 +199,43 @@ def energies(
     potential = potential + form.fixed_height
     for blade, theta, rate, _, rest in pitches(form, angles, rates, loads):
         s, c = sin(theta), cos(theta)
-        inertia = blade.inertia_ss * (s * s) + blade.inertia_cc * (c * c) + blade.inertia_sc * (s * c)
+        inertia = (
+            blade.inertia_ss * (s * s) + blade.inertia_cc * (c * c) + blade.inertia_sc * (s * c)
+        )
         coupling = blade.coupling_s * s + blade.coupling_c * c
         if blade.lean:
             inertia = inertia + (blade.lean.inertia_s * s + blade.lean.inertia_c * c)
             coupling = coupling + blade.lean.coupling
-        of_blade = 0.5 * inertia * (spin * spin) + coupling * spin * rate + 0.5 * blade.pitch_inertia * (rate * rate)
+        of_blade = (
+            0.5 * inertia * (spin * spin)
+            + coupling * spin * rate
+            + 0.5 * blade.pitch_inertia * (rate * rate)
+        )
         kinetic = kinetic + of_blade
         sin_phi = sin_q * blade.cos_phase + cos_q * blade.sin_phase
         cos_phi = cos_q * blade.cos_phase - sin_q * blade.sin_phase
         height = cos_phi * blade.weight_z - sin_phi * (blade.weight_x * c - blade.weight_y * s)
         if blade.lean:
             up = blade.lean.axial - blade.lean.radial * cos_phi
-            height = height + (blade.lean.weight_x * s + blade.lean.weight_y * c) * up + blade.lean.height
+            height = (
+                height
+                + (blade.lean.weight_x * s + blade.lean.weight_y * c) * up
+                + blade.lean.height
+            )
         potential = potential + height + 0.5 * blade.stiffness * ((theta - rest) * (theta - rest))
     return kinetic, potential
 
 
 def point_path(
-    azimuth: Number, pitch: Number, point: Sequence[float], sin: Function, cos: Function, lean: Lean | None = None
+    azimuth: Number,
+    pitch: Number,
+    point: Sequence[float],
+    sin: Function,
+    cos: Function,
+    lean: Lean | None = None,
 ) -> tuple[Number, Number, Number]:
-    """Return a point of a blade in the base frame, (x, y, z) in m: Rx(tilt)·Ry(azimuth)·Rx(-cone)·Rz(pitch)·point.
+    """Return a point of a blade in the base frame, (x, y, z) in m:
+    Rx(tilt)·Ry(azimuth)·Rx(-cone)·Rz(pitch)·point.
 
     Parameters
     ----------
@@ -198,8 +248,14 @@ def point_path(
     s, c = sin(pitch), cos(pitch)
     across, along = x * c - y * s, x * s + y * c
     if lean:
-        along, z = along * lean.cos_cone + z * lean.sin_cone, z * lean.cos_cone - along * lean.sin_cone
+        along, z = (
+            along * lean.cos_cone + z * lean.sin_cone,
+            z * lean.cos_cone - along * lean.sin_cone,
+        )
     x, z = cos(azimuth) * across + sin(azimuth) * z, cos(azimuth) * z - sin(azimuth) * across
     if lean:
-        along, z = along * lean.cos_tilt - z * lean.sin_tilt, along * lean.sin_tilt + z * lean.cos_tilt
+        along, z = (
+            along * lean.cos_tilt - z * lean.sin_tilt,
+            along * lean.sin_tilt + z * lean.cos_tilt,
+        )
     return x, along, z

@@ -1,4 +1,5 @@
-"""Interval defects by the closed form: from each sample of a run to the next one, exact at jumps of the loads."""
+"""Interval defects by the closed form: from each sample of a run to the next one, exact at jumps of
+the loads."""
 
 from __future__ import annotations
 
@@ -27,36 +28,43 @@ from rotor_mbs.solution.defects import BLOCK_ROWS, Defects
 from rotor_mbs.solution.metrics import ANGLE_LIMIT
 from rotor_mbs.solution.trajectory import Array, Trajectory
 
-# Of one interval, by heyoka and by DOP853. A stiff bearing of 1e12 N m/rad takes some 600 and 900, a minute of chaos
-# 2,900 and 8,400; samples far from any motion would take for ever. An interval that needs more is none of this rotor.
+# Of one interval, by heyoka and by DOP853. A stiff bearing of 1e12 N m/rad takes some 600 and 900,
+# a minute of chaos 2,900 and 8,400; samples far from any motion would take for ever. An interval
+# that needs more is none of this rotor.
 _MAX_STEPS_TAYLOR = 5_000
 _MAX_STEPS_DOP853 = 10_000
-# Such intervals decide the status, which more of them do not change: each halves what the next may take, down to this,
-# so that samples that are all far from a motion take little more than one interval's steps.
+# Such intervals decide the status, which more of them do not change: each halves what the next may
+# take, down to this, so that samples that are all far from a motion take little more than one
+# interval's steps.
 _FEWEST_STEPS = 50
 _TAYLOR = 2.0**-52  # tolerance
 _DOP853 = (2.3e-14, 1e-16)  # tolerances, the tightest that SciPy takes
 _EVALUATIONS_PER_STEP = 12  # by it, whether a step is kept or tried again
-# Runge-Kutta steps of order 4 over a quarter of a radian leave a share of about 1e-5 of the transition matrices.
+# Runge-Kutta steps of order 4 over a quarter of a radian leave a share of about 1e-5 of the
+# transition matrices.
 _RADIANS_PER_STEP = 0.25
-# Where rates change within an interval, they leave more. It shows in the state at the end, which is known better: over
-# the paper's motions, up to this distance (rad and rate units) the matrices are right to a share of 4e-4.
+# Where rates change within an interval, they leave more. It shows in the state at the end, which is
+# known better: over the paper's motions, up to this distance (rad and rate units) the matrices are
+# right to a share of 4e-4.
 _ROUGH_END = 3e-5
-# Of an interval. Beyond some 75 steps the integration of every interval by itself is faster, and always more accurate.
+# Of an interval. Beyond some 75 steps the integration of every interval by itself is faster, and
+# always more accurate.
 _MAX_RUNGE_KUTTA_STEPS = 32
 # Rows of a window in which rates are found from angles: two leave no residual, and noise as it is.
 FIT_ROWS = 5
 _FIT_ROUNDS = 12
 _STANDS_STILL = 1e-9  # rad in an interval: the error that is left is the square of it
-# rad in an interval, median of the rows: from differences that are this near, right data of the paper's motions always
-# came to stand still; from 0.8 on some did not.
+# rad in an interval, median of the rows: from differences that are this near, right data of the
+# paper's motions always came to stand still; from 0.8 on some did not.
 _NEAR = 0.5
 _SIDE = 1e-9  # of a step
 _UNIT_ROUNDOFF = 2.0**-53
 # Below this share of its inertia a rotor is singular, and nothing is known of the interval.
 _SMALLEST_SHARE = 1e-30
-_DIFFERENCE = 1e-7  # rad and rate units: rounding and curvature are a share of 1e-8 or so of a matrix's entries
-# Where errors grow so much that such a difference is no small one at the end of the interval, a smaller one is tried.
+# rad and rate units: rounding and curvature are a share of 1e-8 or so of a matrix's entries
+_DIFFERENCE = 1e-7
+# Where errors grow so much that such a difference is no small one at the end of the interval, a
+# smaller one is tried.
 _SMALL_DIFFERENCE = 1e-11
 _SMALL_AT_END = 0.1  # rad and rate units
 
@@ -75,20 +83,23 @@ def interval_defects(
     ----------
     time : (n,) s, increasing, within the scene's duration.
     angles, rates : (n, 1 + blades) rad and rad/s.
-    rounding : (2 + 2 blades,), or for each row: half a unit in the last digit of angles, then rates; that of doubles
+    rounding : (2 + 2 blades,), or for each row: half a unit in the last digit of angles, then
+        rates; that of doubles
         where left out.
     time_rounding : (n,) s, likewise.
 
     Returns
     -------
     Defects
-        Of n - 1 intervals. By heyoka at its tightest, or by SciPy's DOP853 where that is not installed.
+        Of n - 1 intervals. By heyoka at its tightest, or by SciPy's DOP853 where that is not
+        installed.
     """
     moving = scene.moving_coordinates
     states = np.hstack([angles[:, moving], rates[:, moving]])
     half = len(moving)
     ends = interval_ends(scene, time[:-1], time[1:], states[:-1])
-    angle_defects, rate_defects = angles[:-1] - angles[1:], rates[:-1] - rates[1:]  # of pitches that are fixed
+    # of pitches that are fixed
+    angle_defects, rate_defects = angles[:-1] - angles[1:], rates[:-1] - rates[1:]
     angle_defects[:, moving] = ends[:, :half] - states[1:, :half]
     rate_defects[:, moving] = ends[:, half:] - states[1:, half:]
     units = np.full(angles.shape[1], 1.0)
@@ -99,13 +110,17 @@ def interval_defects(
     last_digits = _UNIT_ROUNDOFF * np.abs(states)
     if rounding is not None:
         count = angles.shape[1]
-        last_digits = np.maximum(last_digits, rounding[..., [*moving, *(count + i for i in moving)]])
+        last_digits = np.maximum(
+            last_digits, rounding[..., [*moving, *(count + i for i in moving)]]
+        )
     if time_rounding is None:
         time_rounding = _UNIT_ROUNDOFF * np.abs(time)
     # A row is at its time to half a digit of that: by as much the state goes on.
     last_digits = last_digits + time_rounding[:, None] * rates_of_change(scene, time, states)
     shares = least_inertia_shares(scene, angles)
-    start = np.concatenate([np.array(scene.initial_angles)[moving], np.array(scene.initial_rates)[moving]])
+    start = np.concatenate(
+        [np.array(scene.initial_angles)[moving], np.array(scene.initial_rates)[moving]]
+    )
     return Defects(
         time=time,
         angles=angle_defects,
@@ -116,7 +131,8 @@ def interval_defects(
         resting=resting_pitches(scene),
         states=states,
         rounding=last_digits,
-        conditioning=1.0 / np.sqrt(np.maximum(np.minimum(shares[:-1], shares[1:]), _SMALLEST_SHARE)),
+        conditioning=1.0
+        / np.sqrt(np.maximum(np.minimum(shares[:-1], shares[1:]), _SMALLEST_SHARE)),
         start=start,
         growth_units=np.concatenate([np.ones(half), rate_units(scene)]),
         own_loads=Trajectory(time, angles, rates, **loads),
@@ -125,17 +141,23 @@ def interval_defects(
 
 
 def rates_of_change(scene: Scene, time: Array, states: Array) -> Array:
-    """Return the largest |dy/dt| at (n, m) states, (n, m) 1/s; at a jump of a load that of either side."""
+    """Return the largest |dy/dt| at states, (n, m) 1/s; at a jump of a load of either side."""
     half = states.shape[1] // 2
     angles, rates = list(states[:, :half].T), states[:, half:].T
     form, changes = rotor_form(scene), np.zeros(states.shape)
     changes[:, :half] = np.abs(states[:, half:])
     sides = [loads_at(scene, time)]
     if not scene.has_constant_loads:
-        sides.append(load_values(list(values_before(scene.load_segments, time)), scene.moving_coordinates[1:]))
+        sides.append(
+            load_values(
+                list(values_before(scene.load_segments, time)), scene.moving_coordinates[1:]
+            )
+        )
     with np.errstate(all="ignore"):
         for loads in sides:
-            accelerations = closed_form.accelerations(angles, list(rates), form, loads, np.sin, np.cos)
+            accelerations = closed_form.accelerations(
+                angles, list(rates), form, loads, np.sin, np.cos
+            )
             for i, values in enumerate(accelerations):
                 changes[:, half + i] = np.maximum(changes[:, half + i], np.abs(values))
     return changes
@@ -148,7 +170,8 @@ class FittedRates:
     Attributes
     ----------
     rates : (n, 1 + blades) rad/s.
-    sensitivity : (n, half, FIT_ROWS half) 1/s, of the rate of each moving coordinate, by each angle of its window.
+    sensitivity : (n, half, FIT_ROWS half) 1/s, of the rate of each moving coordinate, by each angle
+        of its window.
     windows : (n,) first row of the window of each row.
     """
 
@@ -157,16 +180,18 @@ class FittedRates:
     windows: NDArray[np.int64]
 
     def rounding(self, rounding: Array) -> Array:
-        """Return what (n, half) rad of rounding in the angles make of the rates, (n, half) rad/s."""
+        """Return what (n, half) rad of rounding in the angles make of the rates, (n, half)
+        rad/s."""
         of_window = np.hstack([rounding[self.windows + row] for row in range(FIT_ROWS)])
         return np.asarray(np.einsum("kij,kj->ki", np.abs(self.sensitivity), of_window))
 
 
 def fitted_rates(scene: Scene, time: Array, angles: Array) -> FittedRates:
-    """Compute rates of data that have angles alone, by the closed form through five rows around each.
+    """Compute rates of data that have angles alone, by the closed form through five rows around
+    each.
 
-    Least squares over the state at the first row of every window, carried through it by the transition matrices; from
-    differences, until the rates stand still.
+    Least squares over the state at the first row of every window, carried through it by the
+    transition matrices; from differences, until the rates stand still.
 
     Parameters
     ----------
@@ -176,15 +201,18 @@ def fitted_rates(scene: Scene, time: Array, angles: Array) -> FittedRates:
     Raises
     ------
     InputError
-        Where there are fewer rows than a window has, the motion is too stiff to carry a state from row to row, or the
-        rows are too far apart: from differences the rates do not come to stand still. Where they do not although the
-        rows are near, no motion passes through some rows; the rates of the others are found.
+        Where there are fewer rows than a window has, the motion is too stiff to carry a state from
+        row to row, or the rows are too far apart: from differences the rates do not come to stand
+        still. Where they do not although the rows are near, no motion passes through some rows; the
+        rates of the others are found.
     """
     count = len(time)
     if count < FIT_ROWS:
         raise InputError(f"{count} rows; allowed: at least {FIT_ROWS} to compute rates from angles")
     if not np.abs(angles).max() <= ANGLE_LIMIT:
-        raise InputError(f"angles over {ANGLE_LIMIT:g} rad: their rounding errors are too large to compute rates")
+        raise InputError(
+            f"angles over {ANGLE_LIMIT:g} rad: their rounding errors are too large to compute rates"
+        )
     moving = scene.moving_coordinates
     half = len(moving)
     rates = np.zeros_like(angles)
@@ -212,11 +240,17 @@ def fitted_rates(scene: Scene, time: Array, angles: Array) -> FittedRates:
         design = np.concatenate([matrix[:, :half] * scale for matrix in matrices], axis=1)
         residual = np.concatenate([offset[:, :half] for offset in offsets], axis=1)
         if not (np.isfinite(design).all() and np.isfinite(residual).all()):
-            raise InputError("the rates cannot be computed from the angles: errors grow without bound between the rows")
+            raise InputError(
+                "the rates cannot be computed from the angles: errors grow without "
+                "bound between the rows"
+            )
         inverse = np.linalg.pinv(design)
         at_first = -np.einsum("kij,kj->ki", inverse, residual) * scale
         all_rows = np.stack(
-            [np.einsum("kij,kj->ki", m, at_first) + offset for m, offset in zip(matrices, offsets, strict=True)]
+            [
+                np.einsum("kij,kj->ki", m, at_first) + offset
+                for m, offset in zip(matrices, offsets, strict=True)
+            ]
         )
         correction = all_rows[places, windows, half:]
         rates[:, moving] += correction
@@ -232,7 +266,9 @@ def fitted_rates(scene: Scene, time: Array, angles: Array) -> FittedRates:
     if is_near or change <= _STANDS_STILL:
         at_rows = np.stack(matrices)[places, windows, half:] * scale
         return FittedRates(rates, at_rows @ inverse[windows], windows)
-    raise InputError("the rates cannot be computed from the angles: the rows are too far apart for this motion")
+    raise InputError(
+        "the rates cannot be computed from the angles: the rows are too far apart for this motion"
+    )
 
 
 def interval_ends(
@@ -255,7 +291,9 @@ def interval_ends(
     advance, max_steps = integration or _integration_of(scene, states.shape[1])
     reached_states = states.astype(float)
     place = 0
-    for k, (state, begin, end) in enumerate(zip(states, begins.tolist(), ends.tolist(), strict=True)):
+    for k, (state, begin, end) in enumerate(
+        zip(states, begins.tolist(), ends.tolist(), strict=True)
+    ):
         raise_if_over()
         reached = begin
         while place + 1 < len(segments) and segments[place].end <= reached:
@@ -273,26 +311,33 @@ def interval_ends(
     return reached_states
 
 
-# (segment, start, end, state at the start, most steps) -> state at the end, NaN where it is not reached; steps taken
+# (segment, start, end, state at the start, most steps) -> state at the end, NaN where it is not
+# reached; steps taken
 _Advance = Callable[[Segment, float, float, Array, int], tuple[Array, int]]
 _Integration = tuple[_Advance, int]  # and the most steps that it may take in an interval
 
 
 def _integration_of(scene: Scene, count: int) -> _Integration:
-    """Return the integration of (count,) variables from sample to sample: by heyoka, or without it by DOP853."""
+    """Return the integration of (count,) variables from sample to sample: by heyoka, or without it
+    by DOP853."""
     if is_available():
         return _advance_by_taylor(scene, count), _MAX_STEPS_TAYLOR
     return _advance_by_dop853(scene), _MAX_STEPS_DOP853
 
 
 def _advance_by_taylor(scene: Scene, count: int) -> _Advance:
-    """Return the integration of (count,) variables by the code that is compiled for lagrange/taylor."""
-    propagation = Propagation(scene, tol=_TAYLOR, compact_mode=is_compact(scene), high_accuracy=True)
+    """Return the integration of (count,) variables by the code that is compiled for
+    lagrange/taylor."""
+    propagation = Propagation(
+        scene, tol=_TAYLOR, compact_mode=is_compact(scene), high_accuracy=True
+    )
     integrator = propagation.integrator
     state = integrator.state
     entered: list[Segment] = []
 
-    def advance(segment: Segment, start: float, end: float, values: Array, max_steps: int) -> tuple[Array, int]:
+    def advance(
+        segment: Segment, start: float, end: float, values: Array, max_steps: int
+    ) -> tuple[Array, int]:
         if not entered or entered[-1] is not segment:
             entered[:] = [segment]
             propagation.set_segment(segment)
@@ -308,9 +353,13 @@ def _advance_by_taylor(scene: Scene, count: int) -> _Advance:
 
 
 def _advance_by_dop853(scene: Scene) -> _Advance:
-    solver = OdeSolver(replace(scene, outputs=("angles", "rates")), scipy_integrator("DOP853", *_DOP853))
+    solver = OdeSolver(
+        replace(scene, outputs=("angles", "rates")), scipy_integrator("DOP853", *_DOP853)
+    )
 
-    def advance(segment: Segment, start: float, end: float, values: Array, max_steps: int) -> tuple[Array, int]:
+    def advance(
+        segment: Segment, start: float, end: float, values: Array, max_steps: int
+    ) -> tuple[Array, int]:
         integrator = scipy_integrator("DOP853", *_DOP853, max_steps)
         function = solver.right_hand_side(Segment(start, end, segment.linear_loads))
         part = integrator(function, start, end, values, np.empty(0))
@@ -341,18 +390,25 @@ def _transitions(scene: Scene, time: Array, states: Array, ends: Array) -> Array
     for start in range(0, len(ends), BLOCK_ROWS):
         rows = start + np.flatnonzero(is_finite[start : start + BLOCK_ROWS])
         lengths = time[rows + 1] - time[rows]
-        steps = explicit_steps(scene, lengths, states[rows], _MAX_RUNGE_KUTTA_STEPS) if len(rows) else None
+        steps = (
+            explicit_steps(scene, lengths, states[rows], _MAX_RUNGE_KUTTA_STEPS)
+            if len(rows)
+            else None
+        )
         if steps is not None:
             matrices, quick = _quick_transitions(scene, time, states, rows, units, steps)
             is_near = (np.abs(quick - ends[rows]) / units <= _ROUGH_END).all(axis=1)
             is_near &= np.isfinite(matrices).all(axis=(1, 2))
             transitions[rows[is_near]] = matrices[is_near]
             is_rough[rows[is_near]] = False
-    # Explicit steps are too long there: differences of the ends that the integrator of the defects itself finds.
+    # Explicit steps are too long there: differences of the ends that the integrator of the defects
+    # itself finds.
     rows = np.flatnonzero(is_rough)
     for difference in (_DIFFERENCE, _SMALL_DIFFERENCE):
         if len(rows):
-            matrices, is_linear = _difference_transitions(scene, time, states, ends, rows, difference * units)
+            matrices, is_linear = _difference_transitions(
+                scene, time, states, ends, rows, difference * units
+            )
             transitions[rows[is_linear]] = matrices[is_linear]
             rows = rows[~is_linear]
     transitions[~np.isfinite(transitions).all(axis=(1, 2))] = np.inf
@@ -360,7 +416,12 @@ def _transitions(scene: Scene, time: Array, states: Array, ends: Array) -> Array
 
 
 def _difference_transitions(
-    scene: Scene, time: Array, states: Array, ends: Array, rows: NDArray[np.int64], differences: Array
+    scene: Scene,
+    time: Array,
+    states: Array,
+    ends: Array,
+    rows: NDArray[np.int64],
+    differences: Array,
 ) -> tuple[Array, NDArray[np.bool_]]:
     """Find matrices of the intervals after `rows` from ends of moved states.
 
@@ -371,8 +432,8 @@ def _difference_transitions(
     Returns
     -------
     matrices, is_linear : (k, m, m), (k,)
-        And whether every moved end is next to the interval's own. Where errors have grown to the size of the motion
-        the matrix is none: it says that they grow no more.
+        And whether every moved end is next to the interval's own. Where errors have grown to the
+        size of the motion the matrix is none: it says that they grow no more.
     """
     count = states.shape[1]
     units = differences / differences[0]
@@ -394,9 +455,11 @@ def _difference_transitions(
 def _quick_transitions(
     scene: Scene, time: Array, states: Array, rows: NDArray[np.int64], units: Array, steps: int
 ) -> tuple[Array, Array]:
-    """Return matrices of the intervals after `rows`, (k, m, m), and their ends, (k, m), by Runge-Kutta steps."""
+    """Return matrices of the intervals after `rows`, (k, m, m), and their ends, (k, m), by
+    Runge-Kutta steps."""
     count = states.shape[1]
-    # (m, 1 + directions, k): the state of every interval, as it is and moved by a difference in every direction.
+    # (m, 1 + directions, k): the state of every interval, as it is and moved by a difference in
+    # every direction.
     moved = np.repeat(states[rows].T[:, None, :], 1 + count, axis=1)
     for i in range(count):
         moved[i, 1 + i] += _DIFFERENCE * units[i]
@@ -407,22 +470,30 @@ def _quick_transitions(
 
 
 def explicit_steps(scene: Scene, intervals: Array, states: Array, most: int) -> int | None:
-    """Return how many Runge-Kutta steps each of (n,) intervals (s) takes; None where they are more than `most`."""
+    """Return how many Runge-Kutta steps each of (n,) intervals (s) takes; None where they are more
+    than `most`."""
     half = states.shape[1] // 2
     fastest = float(np.max(np.where(np.isfinite(states[:, half:]), np.abs(states[:, half:]), 0.0)))
     for blade in rotor_form(scene).blades:
         moment = blade.stiffness + pitch_weight(blade)
-        fastest = max(fastest, math.sqrt(moment / blade.pitch_inertia), blade.damping / blade.pitch_inertia)
+        fastest = max(
+            fastest, math.sqrt(moment / blade.pitch_inertia), blade.damping / blade.pitch_inertia
+        )
     steps = fastest * float(intervals.max()) / _RADIANS_PER_STEP
     return max(math.ceil(steps), 1) if steps <= most else None
 
 
 def quick_ends(
-    scene: Scene, begins: Array, ends: Array, states: Array, steps: int, equations: Accelerations | None = None
+    scene: Scene,
+    begins: Array,
+    ends: Array,
+    states: Array,
+    steps: int,
+    equations: Accelerations | None = None,
 ) -> Array:
-    """Compute the ends of n intervals from (m, ..., n) states, all at once, in steps of order 4; by `equations` in
-    place of the closed form's. Differences of two calls are right to a share of some 1e-5, but where rates change
-    within an interval."""
+    """Compute the ends of n intervals from (m, ..., n) states, all at once, in steps of order 4; by
+    `equations` in place of the closed form's. Differences of two calls are right to a share of some
+    1e-5, but where rates change within an interval."""
     form, half = rotor_form(scene), len(states) // 2
     equations = equations or closed_form.accelerations
     h = (ends - begins) / steps
@@ -432,7 +503,12 @@ def quick_ends(
         # At a jump the interval's own side of it counts.
         inside = np.clip(at, begins + _SIDE * h, ends - _SIDE * h)
         accelerations = equations(angles, rates, form, loads_at(scene, inside), np.sin, np.cos)
-        return np.concatenate([state[half:], np.stack([np.broadcast_to(row, rates[0].shape) for row in accelerations])])
+        return np.concatenate(
+            [
+                state[half:],
+                np.stack([np.broadcast_to(row, rates[0].shape) for row in accelerations]),
+            ]
+        )
 
     with np.errstate(all="ignore"):
         for step in range(steps):

@@ -1,7 +1,8 @@
 """Many runs of lagrange/taylor at once, by heyoka's batch integrator in Hamilton's variables.
 
-One run per SIMD lane, one compile per structure. A run's numbers do not depend on its neighbours in the other lanes, so
-that any partition of a sweep gives the same bits. One thread: processes are the parallelism.
+One run per SIMD lane, one compile per structure. A run's numbers do not depend on its neighbours in
+the other lanes, so that any partition of a sweep gives the same bits. One thread: processes are the
+parallelism.
 """
 
 from __future__ import annotations
@@ -21,14 +22,16 @@ from rotor_mbs.models.lagrange.samples import constant_work
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.trajectory import Array, Integration, RunBlock
 
-# rad. From 1e14 on a vector's sines are found in another way, which rounds those of the other lanes otherwise, too.
+# rad. From 1e14 on a vector's sines are found in another way, which rounds those of the other lanes
+# otherwise, too.
 _HUGE = 1e13
 
 _ENERGIES = ("kinetic_energy", "potential_energy", "work")
 
 # Samples of all runs side by side: what is worked on stays near the processor.
 _SAMPLES_PER_CHUNK = 4096
-# Samples of a run whose tips and energies are evaluated at once, with the rotor's numbers anew for each of them.
+# Samples of a run whose tips and energies are evaluated at once, with the rotor's numbers anew for
+# each of them.
 _OBSERVED_PER_CALL = 1024
 
 
@@ -70,14 +73,15 @@ def solve_many(scenes: Sequence[Scene], tolerance: float) -> RunBlock:
         arrays[name] = np.empty((*time.shape, *shape))
     block = RunBlock(time, arrays, [Integration(False)] * runs, [0] * runs)
 
-    # By rotor: (parameters,) of the equations, then of the tips; and the structure, in which rotors agree that share
-    # compiled code.
+    # By rotor: (parameters,) of the equations, then of the tips; and the structure, in which rotors
+    # agree that share compiled code.
     rotors: dict[tuple[object, ...], tuple[Array, tuple[int, ...]]] = {}
     groups: dict[tuple[int, ...], list[int]] = {}
     keys: dict[int, tuple[object, ...]] = {}  # of each run: its rotor, and its unit of work
     for i, scene in enumerate(scenes):
         if not scene.has_constant_loads:
-            # It is integrated from one kink of its loads to the next, which are at other times in each run.
+            # It is integrated from one kink of its loads to the next, which are at other times in
+            # each run.
             run = solve("lagrange/taylor", scene, {"tolerance": tolerance})
             n = len(run.trajectory.time)
             for name, values in block.quantities.items():
@@ -104,7 +108,8 @@ def solve_many(scenes: Sequence[Scene], tolerance: float) -> RunBlock:
 
 
 def _tip_numbers(scene: Scene, parameters: Parameters) -> list[tuple[list[Any], Lean | None]]:
-    """Return tip (m), and cosines and sines of cone and tilt of each blade; [] without such an output.
+    """Return tip (m), and cosines and sines of cone and tilt of each blade; [] without such an
+    output.
 
     These numbers come after those of the equations.
     """
@@ -123,7 +128,8 @@ def _momenta(example: Scene) -> Any:
 
 
 def _observables(example: Scene) -> Any:
-    """Compile rates, then tips and energies that the scene requests, as a function of angles and momenta.
+    """Compile rates, then tips and energies that the scene requests, as a function of angles and
+    momenta.
 
     It takes a tenth of NumPy's time for the same formulas. `example`: a scene of the structure.
     """
@@ -143,7 +149,9 @@ def _observables(example: Scene) -> Any:
     observables: list[Any] = [*rates]
     for i, (point, lean) in enumerate(points):
         azimuth = angles[0] + example.phases[i]
-        observables += closed_form.point_path(azimuth, pitches[i], point, engine.sin, engine.cos, lean)
+        observables += closed_form.point_path(
+            azimuth, pitches[i], point, engine.sin, engine.cos, lean
+        )
     if example.wants("energy"):
         observables += closed_form.energies(angles, rates, form, loads, engine.sin, engine.cos)
     return _compiled_rows(example, observables, [*angles, *momenta])
@@ -151,7 +159,8 @@ def _observables(example: Scene) -> Any:
 
 def _compiled_rows(example: Scene, rows: Sequence[Any], variables: Sequence[Any]) -> Any:
     """Compile expressions as a function of variables."""
-    # Where all terms of a row vanish, the closed form gives the number zero: the engine asks for an expression.
+    # Where all terms of a row vanish, the closed form gives the number zero: the engine asks for an
+    # expression.
     expressions = [heyoka().expression(0.0) + row for row in rows]
     return heyoka().cfunc(expressions, variables, compact_mode=taylor.is_compact(example))
 
@@ -177,7 +186,9 @@ def _observed(function: Any, states: Array, numbers: Array) -> Array:
         part = states[: function.nvars, :, i : i + _OBSERVED_PER_CALL]
         count = part.shape[2]
         # The engine wants the parameters anew for every state.
-        spread = np.broadcast_to(numbers[: function.nparams, :, None], (function.nparams, runs, count))
+        spread = np.broadcast_to(
+            numbers[: function.nparams, :, None], (function.nparams, runs, count)
+        )
         inputs = np.ascontiguousarray(part).reshape(len(part), -1)
         pars = np.ascontiguousarray(spread).reshape(len(spread), -1)
         rows = function(inputs, pars=pars, batch_parallel=False)
@@ -189,7 +200,12 @@ class _Group:
     """Runs of one structure, and the compiled code for them."""
 
     def __init__(
-        self, places: list[int], scenes: list[Scene], structure: tuple[int, ...], numbers: Array, tolerance: float
+        self,
+        places: list[int],
+        scenes: list[Scene],
+        structure: tuple[int, ...],
+        numbers: Array,
+        tolerance: float,
     ) -> None:
         """Compile the code, or take what is compiled for another group of the structure.
 
@@ -206,21 +222,34 @@ class _Group:
 
         def integrator() -> Any:
             equations, _ = taylor.build_system(example, in_momenta=True)
-            options = {"tol": tolerance, "compact_mode": taylor.is_compact(example), "high_accuracy": True}
-            return heyoka().taylor_adaptive_batch(equations, state=np.zeros((len(equations), lanes())), **options)
+            options = {
+                "tol": tolerance,
+                "compact_mode": taylor.is_compact(example),
+                "high_accuracy": True,
+            }
+            return heyoka().taylor_adaptive_batch(
+                equations, state=np.zeros((len(equations), lanes())), **options
+            )
 
         self.integrator = taylor.compiled(("batch", tolerance, structure), integrator, self)
         outputs = example.wants("tip"), example.wants("energy")
-        self.observables = taylor.compiled(("observables", *outputs, structure), lambda: _observables(example), self)
+        self.observables = taylor.compiled(
+            ("observables", *outputs, structure), lambda: _observables(example), self
+        )
         self.momenta = taylor.compiled(("momenta", structure), lambda: _momenta(example), self)
         self.moving = example.moving_coordinates
         fixed = [i for i in range(len(example.initial_angles)) if i not in self.moving]
         angles = np.array([scene.initial_angles for scene in scenes]).T
         rates = np.array([scene.initial_rates for scene in scenes]).T
         self.initial = np.zeros((self.integrator.state.shape[0], len(scenes)))
-        self.initial[: 2 * len(self.moving)] = np.concatenate([angles[self.moving], rates[self.moving]])
-        self.times = np.linspace(0.0, np.array([scene.duration for scene in scenes]), example.samples)
-        self.numbers = np.concatenate([numbers, angles[fixed]])  # of the rotor, then the pitches that are fixed
+        self.initial[: 2 * len(self.moving)] = np.concatenate(
+            [angles[self.moving], rates[self.moving]]
+        )
+        self.times = np.linspace(
+            0.0, np.array([scene.duration for scene in scenes]), example.samples
+        )
+        # of the rotor, then the pitches that are fixed
+        self.numbers = np.concatenate([numbers, angles[fixed]])
 
     def run(self, block: RunBlock) -> None:
         """Run all, and write them to the block; as many at once as stay near the processor."""
@@ -239,7 +268,8 @@ class _Group:
             independent &= [integration.success for integration in integrations]
             affected = {i // width for i in np.flatnonzero(~independent).tolist()}
             for i in [i for i in range(len(columns)) if i // width in affected]:
-                # One lane's failure ends all lanes: each runs again with itself alone in every lane.
+                # One lane's failure ends all lanes: each runs again with itself alone in every
+                # lane.
                 alone = [columns[i]] * width
                 states, observed, integrations = self.solve(alone)
                 # What follows the first sample that is not finite is no motion.
@@ -295,7 +325,8 @@ class _Group:
         observed: Array,
         integrations: Sequence[Integration],
     ) -> None:
-        """Write the runs of the first len(integrations) columns to the block; states, observed: as of `solve`."""
+        """Write the runs of the first len(integrations) columns to the block; states, observed: as
+        of `solve`."""
         runs, count = len(integrations), len(self.moving)
         states, observed = states[:, :runs], observed[:, :runs]
         places = [self.places[i] for i in columns[:runs]]

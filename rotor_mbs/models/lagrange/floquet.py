@@ -1,5 +1,6 @@
-"""A rotor that turns under gravity: its periodic motion at a mean speed, the rotor one turn further after each, and the
-state transition matrix over one turn, whose eigenvalues are the Floquet multipliers. Needs heyoka."""
+"""A rotor that turns under gravity: its periodic motion at a mean speed, the rotor one turn further
+after each, and the state transition matrix over one turn, whose eigenvalues are the Floquet
+multipliers. Needs heyoka."""
 
 from __future__ import annotations
 
@@ -15,7 +16,12 @@ from rotor_mbs.errors import InputError
 from rotor_mbs.models.lagrange import closed_form
 from rotor_mbs.models.lagrange.closed_form import load_values
 from rotor_mbs.models.lagrange.heyoka_adapter import Parameters, array_of, failure, heyoka
-from rotor_mbs.models.lagrange.linearization import holding_torque, linearize, slopes, steady_rotation
+from rotor_mbs.models.lagrange.linearization import (
+    holding_torque,
+    linearize,
+    slopes,
+    steady_rotation,
+)
 from rotor_mbs.models.lagrange.parameters import rotor_form
 from rotor_mbs.models.lagrange.samples import loads_at_start
 from rotor_mbs.models.lagrange.taylor import compiled, state_symbols
@@ -23,13 +29,14 @@ from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.scenario.time_table import value_at
 from rotor_mbs.solution.trajectory import Array
 
-# What is left of a turn's mismatch, in rad and in shares of the speed: Newton's method ends at the first, and its best
-# state counts as periodic below the second. (A multiplier of 1e9 amplifies the rounding of 1e-16 to 1e-7.)
+# What is left of a turn's mismatch, in rad and in shares of the speed: Newton's method ends at the
+# first, and its best state counts as periodic below the second. (A multiplier of 1e9 amplifies the
+# rounding of 1e-16 to 1e-7.)
 _CLOSED = 1e-13
 _ACCEPTED = 1e-9
 _MAX_CORRECTIONS = 12
-# Of the integrator: a turn of a stiff bearing takes about two steps for each of its oscillations; a rotor that has
-# left for good takes more and more.
+# Of the integrator: a turn of a stiff bearing takes about two steps for each of its oscillations; a
+# rotor that has left for good takes more and more.
 _STEPS, _STEPS_PER_OSCILLATION = 500, 10
 _MOST_STEPS = 10**9  # days of computing: a turn that may take more is not begun
 # rad: a motion that ends a turn this far from its start is not on its way to a periodic one.
@@ -38,33 +45,40 @@ _LOST = 20.0
 
 @dataclass(frozen=True)
 class Turn:
-    """A motion that repeats itself after a turn, and how small departures from it grow over that turn."""
+    """A motion that repeats itself after a turn, and how small departures from it grow over that
+    turn."""
 
     speed: float  # rad/s, of the rotor, averaged over the turn
-    start: Array  # (2n,) angles in rad and rates in rad/s at its start, of the coordinates that move
+    # (2n,) angles in rad and rates in rad/s at its start, of the coordinates that move
+    start: Array
     torque: float  # N m on the rotor, constant: what the dampers take in a turn is put in by it
     transition: Array  # (2n, 2n) state transition matrix over the turn
-    # (2n,) derivative at the start of what the motion keeps, energy less the torque's work; zero where dampers take
-    # energy
+    # (2n,) derivative at the start of what the motion keeps, energy less the torque's work; zero
+    # where dampers take energy
     gradient: Array
     flow: Array  # (2n,) time derivative of the state at the start
-    # ∫ tr A dt over the turn, A the derivative of the state's rate by the state: the logarithm of the determinant of
-    # `transition`, computed without it
+    # ∫ tr A dt over the turn, A the derivative of the state's rate by the state: the logarithm of
+    # the determinant of `transition`, computed without it
     trace_integral: float
-    mismatch: float  # largest difference between end and start: rad, and rates as shares of the speed
+    # largest difference between end and start: rad, and rates as shares of the speed
+    mismatch: float
     message: str = ""  # why no periodic motion was found; "" where it was
 
 
 def periodic_turn(scene: Scene, speed: float, guess: Turn | None = None) -> Turn:
-    """Find the periodic motion of `scene` at a mean `speed` above 0 in rad/s, from the scene's initial rotor angle, by
-    Newton's method; the torque is an unknown. `guess` is a motion at a speed nearby, else steady rotation without
-    gravity. Where there is no such motion, `message` says why. Raises MethodRefusal where heyoka is not installed."""
+    """Find the periodic motion of `scene` at a mean `speed` above 0 in rad/s, from the scene's
+    initial rotor angle, by Newton's method; the torque is an unknown. `guess` is a motion at a
+    speed nearby, else steady rotation without gravity. Where there is no such motion, `message`
+    says why. Raises MethodRefusal where heyoka is not installed."""
     try:
         system = _Variational(scene)
         n = system.coordinates
         if guess is None:
             angles = steady_rotation(scene, speed)[scene.moving_coordinates]
-            state, torque = np.concatenate([angles, [speed], np.zeros(n - 1)]), holding_torque(scene, speed)
+            state, torque = (
+                np.concatenate([angles, [speed], np.zeros(n - 1)]),
+                holding_torque(scene, speed),
+            )
         else:
             state, torque = guess.start * np.repeat([1.0, speed / guess.speed], n), guess.torque
         units = np.repeat([1.0, speed], n)
@@ -74,7 +88,9 @@ def periodic_turn(scene: Scene, speed: float, guess: Turn | None = None) -> Turn
         form, constant_loads = rotor_form(scene), loads_at_start(scene)
 
         def energy(state: Sequence[Any]) -> Any:
-            return sum(closed_form.energies(state[:n], state[n:], form, constant_loads, np.sin, np.cos))
+            return sum(
+                closed_form.energies(state[:n], state[n:], form, constant_loads, np.sin, np.cos)
+            )
 
         best: Turn | None = None
         for _ in range(_MAX_CORRECTIONS):
@@ -83,32 +99,42 @@ def periodic_turn(scene: Scene, speed: float, guess: Turn | None = None) -> Turn
             residual = (end - state - shift) / units
             mismatch = float(np.abs(residual).max())
             if best is None or mismatch < best.mismatch:
-                # Gradient of energy less the torques' work, zero where dampers act; and the state's time derivative.
+                # Gradient of energy less the torques' work, zero where dampers act; and the state's
+                # time derivative.
                 loads, gradient = loads_at_start(scene, torque), slopes(energy, state)
                 gradient[:n] -= [torque, *loads.pitches]
                 gradient = np.zeros(2 * n) if scene.has_damping else gradient
                 angles, rates = state[:n].tolist(), state[n:].tolist()
-                accelerations = closed_form.accelerations(angles, rates, form, loads, math.sin, math.cos)
+                accelerations = closed_form.accelerations(
+                    angles, rates, form, loads, math.sin, math.cos
+                )
                 flow = np.array([*rates, *accelerations])
                 best = Turn(speed, state, torque, by_state, gradient, flow, trace, mismatch)
             if mismatch < _CLOSED or mismatch > _LOST:
                 break
-            jacobian = np.column_stack([by_torque, (by_state - np.eye(2 * n))[:, 1:]]) / units[:, None]
+            jacobian = (
+                np.column_stack([by_torque, (by_state - np.eye(2 * n))[:, 1:]]) / units[:, None]
+            )
             sizes = np.maximum(np.linalg.norm(jacobian, axis=0), 1e-300)
             change = np.linalg.lstsq(jacobian / sizes, -residual, rcond=1e-13)[0] / sizes
             torque, state = torque + change[0], state + np.concatenate([[0.0], change[1:]])
         if best is None or best.mismatch > _ACCEPTED:
             left = math.inf if best is None else best.mismatch
-            raise InputError(f"no periodic motion found: the state changes by {left:.3g} rad in a revolution")
+            raise InputError(
+                f"no periodic motion found: the state changes by {left:.3g} rad in a revolution"
+            )
     except InputError as exc:
         size = 2 * len(scene.moving_coordinates)
         nothing, matrix = np.full(size, np.nan), np.full((size, size), np.nan)
-        return Turn(speed, nothing, math.nan, matrix, nothing, nothing, math.nan, math.nan, str(exc))
+        return Turn(
+            speed, nothing, math.nan, matrix, nothing, nothing, math.nan, math.nan, str(exc)
+        )
     return best
 
 
 class _Variational:
-    """The closed form with its first variational equations by state and torque; compiled once per structure."""
+    """The closed form with its first variational equations by state and torque; compiled once per
+    structure."""
 
     def __init__(self, scene: Scene) -> None:
         engine = heyoka()
@@ -116,11 +142,15 @@ class _Variational:
         form = rotor_form(scene, parameters)
         parameters.structure.append(int(scene.has_tilt_or_cone))
         self.coordinates = 1 + len(form.blades)
-        pitch_loads = [parameters(Fraction(value_at(table, 0.0))) for table in scene.load_tables[1:]]
+        pitch_loads = [
+            parameters(Fraction(value_at(table, 0.0))) for table in scene.load_tables[1:]
+        ]
         torque = parameters.own(Fraction(0))
         angles, rates = state_symbols(form)
         loads = load_values([torque, *pitch_loads], scene.moving_coordinates[1:])
-        accelerations = closed_form.accelerations(angles, rates, form, loads, engine.sin, engine.cos)
+        accelerations = closed_form.accelerations(
+            angles, rates, form, loads, engine.sin, engine.cos
+        )
         symbols = [*angles, *rates]
         equations = [*zip(symbols, [*rates, *accelerations], strict=True)]
 
@@ -137,8 +167,8 @@ class _Variational:
         self._frequency = math.sqrt(np.abs(still.stiffness).max())
 
     def propagate(self, state: Array, torque: float, period: float) -> tuple[Array, Array, float]:
-        """(2n,) state after a turn, (2n, 2n + 1) its derivatives by initial state and torque, and ∫ tr A dt; raises
-        InputError."""
+        """(2n,) state after a turn, (2n, 2n + 1) its derivatives by initial state and torque, and ∫
+        tr A dt; raises InputError."""
         count, integrator = len(state), self._integrator
         integrator.pars[:] = [*self._values[:-1], torque][: len(integrator.pars)]
         integrator.time = 0.0

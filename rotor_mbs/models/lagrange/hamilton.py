@@ -1,4 +1,5 @@
-"""The closed form in Hamilton's variables, angles and momenta p = ∂T/∂q̇: for sweeps; fewer and cheaper steps.
+"""The closed form in Hamilton's variables, angles and momenta p = ∂T/∂q̇: for sweeps; fewer and
+cheaper steps.
 
 Symbols as in `closed_form`:
 p_0 = (J_hub + Σ A) Ω + Σ B θ̇,  p_i = B Ω + Jzz θ̇,
@@ -20,13 +21,20 @@ from rotor_mbs.scenario.scene import Scene
 Numbers = Sequence[Any]
 
 
-def momenta(angles: Numbers, rates: Numbers, form: RotorForm, sin: Function, cos: Function) -> list[Any]:
-    """Return the momenta, (1 + blades) kg m²/s; angles and rates as of `closed_form.accelerations`."""
+def momenta(
+    angles: Numbers, rates: Numbers, form: RotorForm, sin: Function, cos: Function
+) -> list[Any]:
+    """Return the momenta, (1 + blades) kg m²/s; angles and rates as of
+    `closed_form.accelerations`."""
     spin, total, of_pitches = rates[0], form.inertia * rates[0], []
     for blade, theta, rate in zip(form.blades, angles[1:], rates[1:], strict=True):
         s, c = sin(theta), cos(theta)
         b = blade.coupling_s * s + blade.coupling_c * c
-        total = total + (blade.inertia_ss * (s * s) + blade.inertia_cc * (c * c) + blade.inertia_sc * (s * c)) * spin
+        total = (
+            total
+            + (blade.inertia_ss * (s * s) + blade.inertia_cc * (c * c) + blade.inertia_sc * (s * c))
+            * spin
+        )
         if blade.lean:
             b = b + blade.lean.coupling
             total = total + (blade.lean.inertia_s * s + blade.lean.inertia_c * c) * spin
@@ -35,7 +43,9 @@ def momenta(angles: Numbers, rates: Numbers, form: RotorForm, sin: Function, cos
     return [total, *of_pitches]
 
 
-def rates(angles: Numbers, momenta: Numbers, form: RotorForm, sin: Function, cos: Function) -> list[Any]:
+def rates(
+    angles: Numbers, momenta: Numbers, form: RotorForm, sin: Function, cos: Function
+) -> list[Any]:
     """Return the rates, (1 + blades) rad/s: the inverse of `momenta`.
 
     By the Schur complement; singular where that is 0.
@@ -44,7 +54,9 @@ def rates(angles: Numbers, momenta: Numbers, form: RotorForm, sin: Function, cos
     ratios = []
     for blade, theta, p in zip(form.blades, angles[1:], momenta[1:], strict=True):
         s, c = sin(theta), cos(theta)
-        schur = schur + (blade.schur_ss * (s * s) + blade.schur_cc * (c * c) + blade.schur_sc * (s * c))
+        schur = schur + (
+            blade.schur_ss * (s * s) + blade.schur_cc * (c * c) + blade.schur_sc * (s * c)
+        )
         ratio = blade.ratio_s * s + blade.ratio_c * c
         ratios.append(ratio + blade.lean.ratio if blade.lean else ratio)
         rest = rest - ratios[-1] * p
@@ -54,7 +66,12 @@ def rates(angles: Numbers, momenta: Numbers, form: RotorForm, sin: Function, cos
 
 
 def forces(
-    angles: Numbers, rates: Numbers, form: RotorForm, loads: LoadValues, sin: Function, cos: Function
+    angles: Numbers,
+    rates: Numbers,
+    form: RotorForm,
+    loads: LoadValues,
+    sin: Function,
+    cos: Function,
 ) -> list[Any]:
     """Return the time derivatives of the momenta, (1 + blades) N m.
 
@@ -69,13 +86,17 @@ def forces(
         s, c = sin(theta), cos(theta)
         sin_phi = sine * blade.cos_phase + cosine * blade.sin_phase
         cos_phi = cosine * blade.cos_phase - sine * blade.sin_phase
-        moment = moment + blade.weight_z * sin_phi + cos_phi * (blade.weight_x * c - blade.weight_y * s)
+        moment = (
+            moment + blade.weight_z * sin_phi + cos_phi * (blade.weight_x * c - blade.weight_y * s)
+        )
         half_slope = blade.half_slope_sc * (s * c) + blade.half_slope_cs * (c * c - s * s)
         force = spin * (half_slope * spin + (blade.coupling_s * c - blade.coupling_c * s) * rate)
         force = force - sin_phi * (blade.weight_x * s + blade.weight_y * c)
         if lean := blade.lean:
             force = force + spin * spin * (lean.slope_s * s + lean.slope_c * c)
-            force = force - (lean.axial - lean.radial * cos_phi) * (lean.weight_x * c - lean.weight_y * s)
+            force = force - (lean.axial - lean.radial * cos_phi) * (
+                lean.weight_x * c - lean.weight_y * s
+            )
             moment = moment - lean.radial * (lean.weight_x * s + lean.weight_y * c) * sin_phi
         of_pitches.append(force - blade.stiffness * (theta - rest) - blade.damping * rate + torque)
     return [moment, *of_pitches]
@@ -94,19 +115,22 @@ def resting_pitches(scene: Scene) -> tuple[int, ...]:
         if blade.stiffness:
             loads += [value for _, value in rest]
         start = scene.initial_angles[column], scene.initial_rates[column]
-        if not any([*start, *loads]) and _stays_at_zero(replace(blade, cos_phase=Fraction(1), sin_phase=Fraction(0))):
+        if not any([*start, *loads]) and _stays_at_zero(
+            replace(blade, cos_phase=Fraction(1), sin_phase=Fraction(0))
+        ):
             resting.append(column)
     return tuple(resting)
 
 
-# Cosine and sine of an azimuth, and a rotor rate: with four, a force α Ω² + β sin φ + γ cos φ + δ that is zero at
-# all of them is zero everywhere.
+# Cosine and sine of an azimuth, and a rotor rate: with four, a force α Ω² + β sin φ + γ cos φ + δ
+# that is zero at all of them is zero everywhere.
 _ROTOR_STATES = ((1, 0, 1), (0, 1, 2), (-1, 0, 3), (0, -1, 5))
 
 
 @functools.lru_cache(maxsize=256)
 def _stays_at_zero(blade: BladeForm) -> bool:
-    """Return whether momentum and force of a pitch without a load vanish at zero, whatever the rotor does.
+    """Return whether momentum and force of a pitch without a load vanish at zero, whatever the
+    rotor does.
 
     Parameters
     ----------
@@ -115,7 +139,10 @@ def _stays_at_zero(blade: BladeForm) -> bool:
     form = RotorForm((blade,), (), Fraction(0), Fraction(0))
     for cos_q, sin_q, spin in _ROTOR_STATES:
         # The rotor's angle stands for itself, the pitch's is 0.
-        sines, cosines = {"rotor": Fraction(sin_q), 0: Fraction(0)}, {"rotor": Fraction(cos_q), 0: Fraction(1)}
+        sines, cosines = (
+            {"rotor": Fraction(sin_q), 0: Fraction(0)},
+            {"rotor": Fraction(cos_q), 0: Fraction(1)},
+        )
         state = ["rotor", 0], [Fraction(spin), Fraction(0)], form
         of_pitch = momenta(*state, sines.__getitem__, cosines.__getitem__)[1]
         force = forces(*state, LoadValues(Fraction(0)), sines.__getitem__, cosines.__getitem__)[1]

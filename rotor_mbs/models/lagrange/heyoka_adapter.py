@@ -1,4 +1,5 @@
-"""The only file that knows heyoka: symbols and parameters, Taylor integrators, quad precision numbers."""
+"""The only file that knows heyoka: symbols and parameters, Taylor integrators, quad precision
+numbers."""
 
 from __future__ import annotations
 
@@ -25,9 +26,12 @@ def heyoka() -> ModuleType:
     except MemoryError as exc:
         raise ResourceError("heyoka cannot be loaded: not enough memory") from exc
     except ImportError as exc:
-        if not isinstance(exc, ModuleNotFoundError):  # it is there, and the system could not load it
+        # it is there, and the system could not load it
+        if not isinstance(exc, ModuleNotFoundError):
             raise ResourceError(f"heyoka cannot be loaded: {exc}") from exc
-        raise MethodRefusal(f"heyoka is not installed: {_HINT}; lagrange/dop853 needs SciPy only") from exc
+        raise MethodRefusal(
+            f"heyoka is not installed: {_HINT}; lagrange/dop853 needs SciPy only"
+        ) from exc
     if not _is_writable(engine.llvm_state.get_diskcache_path()):
         # The engine would warn twice of every system that it compiles.
         engine.llvm_state.set_diskcache_enabled(False)
@@ -35,7 +39,8 @@ def heyoka() -> ModuleType:
 
 
 def _is_writable(cache: Path) -> bool:
-    """Return whether the engine can keep compiled code in a folder, which is made; there is none without a home."""
+    """Return whether the engine can keep compiled code in a folder, which is made; there is none
+    without a home."""
     if cache == Path():
         return False
     try:
@@ -55,14 +60,15 @@ def is_available() -> bool:
 
 
 def compile_anew() -> None:
-    """From now on no compiled code is taken from, or left in, the engine's cache on disk: for timing a cold start."""
+    """From now on no compiled code is taken from, or left in, the engine's cache on disk: for
+    timing a cold start."""
     heyoka().llvm_state.set_diskcache_enabled(False)
 
 
 class Parameters:
-    """Turns numbers into runtime parameters: equal ones share one of the `values`, exact zeros vanish from the
-    equations. `structure` has the index (-1: zero) of every number in the order asked for: one compiled integrator
-    serves every scene of an equal structure."""
+    """Turns numbers into runtime parameters: equal ones share one of the `values`, exact zeros
+    vanish from the equations. `structure` has the index (-1: zero) of every number in the order
+    asked for: one compiled integrator serves every scene of an equal structure."""
 
     def __init__(self) -> None:
         self.values: list[Fraction] = []
@@ -79,7 +85,8 @@ class Parameters:
         return self._parameter(self._known[value])
 
     def own(self, value: Fraction) -> Any:
-        """A parameter of its own, even when zero or equal to another: for what changes during a run, or with it."""
+        """A parameter of its own, even when zero or equal to another: for what changes during a
+        run, or with it."""
         self.values.append(value)
         return self._parameter(len(self.values) - 1)
 
@@ -89,7 +96,8 @@ class Parameters:
 
 
 def array_of(values: Sequence[Fraction], *, quad: bool) -> Any:
-    """(len(values),) float64, or real128 where `quad`: each number rounded once (quad: at most twice)."""
+    """(len(values),) float64, or real128 where `quad`: each number rounded once (quad: at most
+    twice)."""
     if not quad:
         return np.array([float(value) for value in values])
     real128 = heyoka().real128
@@ -97,8 +105,11 @@ def array_of(values: Sequence[Fraction], *, quad: bool) -> Any:
     return np.array(numbers, dtype=real128)
 
 
-def quad_arithmetic() -> tuple[Callable[[Fraction], Any], Callable[[Any], Any], Callable[[Any], Any]]:
-    """To a quad number; sine and cosine of arrays of them as objects, which NumPy multiplies by doubles, too."""
+def quad_arithmetic() -> tuple[
+    Callable[[Fraction], Any], Callable[[Any], Any], Callable[[Any], Any]
+]:
+    """To a quad number; sine and cosine of arrays of them as objects, which NumPy multiplies by
+    doubles, too."""
     real128 = heyoka().real128
 
     def of_objects(function: Callable[[Any], Any]) -> Callable[[Any], Any]:
@@ -108,7 +119,8 @@ def quad_arithmetic() -> tuple[Callable[[Fraction], Any], Callable[[Any], Any], 
 
 
 def failure(outcome: Any) -> str:
-    """The engine's status of a propagation: "" where it reports that it reached the end, else its reason."""
+    """The engine's status of a propagation: "" where it reports that it reached the end, else its
+    reason."""
     outcomes = heyoka().taylor_outcome
     if outcome == outcomes.time_limit:
         return ""

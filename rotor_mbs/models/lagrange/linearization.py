@@ -1,4 +1,5 @@
-"""The closed form linearized, and its steady states: equilibrium at rest, steady rotation without gravity."""
+"""The closed form linearized, and its steady states: equilibrium at rest, steady rotation without
+gravity."""
 
 from __future__ import annotations
 
@@ -27,26 +28,33 @@ _ALL, _PITCHES = slice(None), slice(1, None)
 
 
 def slopes(function: Function, values: Sequence[float] | Array) -> Array:
-    """(n,) derivatives of an analytic function of n numbers, (m, n) of one that returns m, by an imaginary step: no
-    difference is taken, so that they are exact to rounding."""
+    """(n,) derivatives of an analytic function of n numbers, (m, n) of one that returns m, by an
+    imaginary step: no difference is taken, so that they are exact to rounding."""
     step = 1e-30
-    moved = np.asarray(values)[:, None] + 1j * step * np.eye(len(values))  # each number over all directions
+    # each number over all directions
+    moved = np.asarray(values)[:, None] + 1j * step * np.eye(len(values))
     return np.asarray(np.imag(function(list(moved))) / step)
 
 
 def linearize(
     scene: Scene, angles: Sequence[float] | Array, rates: Sequence[float] | Array, torque: float
 ) -> Linearization:
-    """Linearize the closed form in `scene.moving_coordinates` at (1 + blades,) rad and rad/s, `torque` N m on the
-    rotor, other loads as at t = 0. Raises ZeroDivisionError at the singular configuration."""
-    form, columns, loads = rotor_form(scene), scene.moving_coordinates, loads_at_start(scene, torque)
+    """Linearize the closed form in `scene.moving_coordinates` at (1 + blades,) rad and rad/s,
+    `torque` N m on the rotor, other loads as at t = 0. Raises ZeroDivisionError at the singular
+    configuration."""
+    form, columns, loads = (
+        rotor_form(scene),
+        scene.moving_coordinates,
+        loads_at_start(scene, torque),
+    )
     n = len(columns)
     state = [*(float(angles[i]) for i in columns), *(float(rates[i]) for i in columns)]
 
     def accelerations(state: Sequence[Any], sin: Function, cos: Function) -> list[Any]:
         return closed_form.accelerations(state[:n], state[n:], form, loads, sin, cos)
 
-    residual = np.array(accelerations(state, math.sin, math.cos))  # first: a float's division by zero raises
+    # first: a float's division by zero raises
+    residual = np.array(accelerations(state, math.sin, math.cos))
     derivatives = slopes(lambda state: accelerations(state, np.sin, np.cos), state)
     return Linearization(-derivatives[:, :n], -derivatives[:, n:], residual)
 
@@ -59,8 +67,8 @@ def holding_torque(scene: Scene, speed: float) -> float:
 def steady_rotation(scene: Scene, speed: float) -> Array:
     """Return the angles at which the rotor turns steadily at `speed` rad/s without gravity.
 
-    Stationary points of V - ½ Ω² a - Σ τ θ, downhill from the scene's initial pitches, kept where they are stationary
-    already, stable or not. The rotor keeps its initial angle.
+    Stationary points of V - ½ Ω² a - Σ τ θ, downhill from the scene's initial pitches, kept where
+    they are stationary already, stable or not. The rotor keeps its initial angle.
 
     Returns
     -------
@@ -69,7 +77,8 @@ def steady_rotation(scene: Scene, speed: float) -> Array:
     Raises
     ------
     InputError
-        If a pitch torque is larger than all that can balance it, or no such state is found within 200 steps.
+        If a pitch torque is larger than all that can balance it, or no such state is found within
+        200 steps.
     """
     still = replace(scene, gravity=0.0)
     return _checked(still, speed, _stationary(still, speed, _PITCHES))
@@ -78,8 +87,8 @@ def steady_rotation(scene: Scene, speed: float) -> Array:
 def equilibrium(scene: Scene) -> Array:
     """Return the angles at which the rotor rests without a torque, found as by `steady_rotation`.
 
-    A balanced rotor (`is_balanced`) keeps its initial angle. Any other rotor turns downhill as well, from the initial
-    angles.
+    A balanced rotor (`is_balanced`) keeps its initial angle. Any other rotor turns downhill as
+    well, from the initial angles.
 
     Returns
     -------
@@ -104,10 +113,11 @@ def equilibrium(scene: Scene) -> Array:
 def is_balanced(scene: Scene, angles: Sequence[float] | Array) -> bool:
     """Return whether gravity gives a rotor at rest no preferred angle.
 
-    The rotor's torque is zero at `angles`, and remains zero to first order where the rotor is turned and the pitches
-    follow: both up to the rounding of the weights that balance. Bearing springs move the pitches of equal blades once a
-    turn, so that their weights balance to third order of the deflection only: on stiff bearings that is rounding, on
-    soft ones the rotor has a preferred angle.
+    The rotor's torque is zero at `angles`, and remains zero to first order where the rotor is
+    turned and the pitches follow: both up to the rounding of the weights that balance. Bearing
+    springs move the pitches of equal blades once a turn, so that their weights balance to third
+    order of the deflection only: on stiff bearings that is rounding, on soft ones the rotor has a
+    preferred angle.
 
     Parameters
     ----------
@@ -127,9 +137,11 @@ def is_balanced(scene: Scene, angles: Sequence[float] | Array) -> bool:
 
 
 def weight_stiffness(scene: Scene, angles: Sequence[float] | Array) -> float:
-    """Return the moments of all weights about the shaft, divided by the rotor's inertia at `angles`, in 1/s².
+    """Return the moments of all weights about the shaft, divided by the rotor's inertia at
+    `angles`, in 1/s².
 
-    The size of the stiffness of a rotor whose weights do not balance: the unit of rounding where they do.
+    The size of the stiffness of a rotor whose weights do not balance: the unit of rounding where
+    they do.
     """
     form, loads = rotor_form(scene), loads_at_start(scene)
     moving = [float(angles[column]) for column in scene.moving_coordinates]
@@ -152,9 +164,11 @@ class _Potential(NamedTuple):
 
 
 def _stationary(scene: Scene, speed: float, free: slice) -> Array:
-    """Return (1 + blades,) rad, where the forces on the `free` ones of the coordinates that move are zero.
+    """Return (1 + blades,) rad, where the forces on the `free` ones of the coordinates that move
+    are zero.
 
-    Newton's method with the absolute eigenvalues of the Hessian, and a step halved until it goes downhill.
+    Newton's method with the absolute eigenvalues of the Hessian, and a step halved until it goes
+    downhill.
     """
     form, columns, loads = rotor_form(scene), scene.moving_coordinates, loads_at_start(scene)
     _refuse_large_torques(scene, form, speed, loads)
@@ -171,7 +185,9 @@ def _stationary(scene: Scene, speed: float, free: slice) -> Array:
         trial = angles.copy()
         for halving in range(30):
             trial[changed] = angles[changed] + 0.5**halving * step
-            if _is_lower(_amended_potential(form, trial[columns], speed, loads), potential, step, free):
+            if _is_lower(
+                _amended_potential(form, trial[columns], speed, loads), potential, step, free
+            ):
                 break
         angles = trial
     message = f"no steady state at {speed:g} rad/s found in {_MAX_STEPS} steps from its start"
@@ -179,10 +195,12 @@ def _stationary(scene: Scene, speed: float, free: slice) -> Array:
 
 
 def _refuse_large_torques(scene: Scene, form: RotorForm, speed: float, loads: LoadValues) -> None:
-    """Raise InputError where a pitch has no spring, and a torque above all that gravity and rotation can balance."""
+    """Raise InputError where a pitch has no spring, and a torque above all that gravity and
+    rotation can balance."""
     columns = scene.moving_coordinates[1:]
     for column, blade, torque in zip(columns, form.blades, loads.pitches, strict=True):
-        # The largest values over the pitch of x s + y c and of ½ ∂A/∂θ = ½ half_slope_sc sin 2θ + half_slope_cs cos 2θ
+        # The largest values over the pitch of x s + y c and of ½ ∂A/∂θ = ½ half_slope_sc sin 2θ +
+        # half_slope_cs cos 2θ
         largest = pitch_weight(blade)
         slope = math.hypot(0.5 * blade.half_slope_sc, blade.half_slope_cs)
         if blade.lean:
@@ -193,14 +211,15 @@ def _refuse_large_torques(scene: Scene, form: RotorForm, speed: float, loads: Lo
             if largest:
                 balance = f"gravity and rotation balance at most {largest:g} N m"
             raise InputError(
-                f"{scene.name}: no steady state at {speed:g} rad/s: a torque of {torque:g} N m acts on pitch {column}, "
+                f"{scene.name}: no steady state at {speed:g} rad/s: a torque of {torque:g} N m "
+                f"acts on pitch {column}, "
                 f"which has no spring, and {balance}"
             )
 
 
 def _checked(scene: Scene, speed: float, angles: Array) -> Array:
-    """Return the angles of a steady state. Raises InputError where the accelerations say that it is none: they keep
-    differences that the energies' rounding hides."""
+    """Return the angles of a steady state. Raises InputError where the accelerations say that it is
+    none: they keep differences that the energies' rounding hides."""
     rates = [speed] + [0.0] * len(scene.blades)
     linear = linearize(scene, angles, rates, holding_torque(scene, speed))
     scale = max(np.abs(linear.stiffness).max(), weight_stiffness(scene, angles))
@@ -211,14 +230,19 @@ def _checked(scene: Scene, speed: float, angles: Array) -> Array:
 
 
 def _is_lower(trial: _Potential, start: _Potential, step: Array, free: slice) -> bool:
-    """Whether a step went downhill, also where rounding hides by how much: the approximate Wolfe condition of W. W.
-    Hager and H. Zhang, SIAM J. Optim. 16 (2005) 170-192."""
+    """Whether a step went downhill, also where rounding hides by how much: the approximate Wolfe
+    condition of W. W. Hager and H. Zhang, SIAM J. Optim. 16 (2005) 170-192."""
     allowed = start.value + 1e-12 * abs(start.value)
-    return trial.value <= allowed and bool(trial.slope[free] @ step <= -0.8 * (start.slope[free] @ step))
+    return trial.value <= allowed and bool(
+        trial.slope[free] @ step <= -0.8 * (start.slope[free] @ step)
+    )
 
 
-def _amended_potential(form: RotorForm, angles: Array, speed: float, loads: LoadValues) -> _Potential:
-    """The pitches at rest, their constant torques in V, the rotor turning at `speed` rad/s without its torque."""
+def _amended_potential(
+    form: RotorForm, angles: Array, speed: float, loads: LoadValues
+) -> _Potential:
+    """The pitches at rest, their constant torques in V, the rotor turning at `speed` rad/s without
+    its torque."""
     rates = [speed, *(0.0 for _ in form.blades)]
 
     def value(angles: Any) -> Any:
@@ -232,7 +256,10 @@ def _amended_potential(form: RotorForm, angles: Array, speed: float, loads: Load
 
 
 def _newton_step(form: RotorForm, potential: _Potential, free: slice, *, downhill: bool) -> Array:
-    """(free,) rad: -H⁻¹ g, with |H| where `downhill`; at most 0.5 rad, none where nothing holds the rotor."""
+    """Return -H⁻¹ g, (free,) rad, with |H| where `downhill`.
+
+    It is at most 0.5 rad, and none where nothing holds the rotor.
+    """
     gradient, hessian = potential.slope[free], potential.curvature[free, free]
     least = max(1e-9 * _weights(form), 1e-300)
     scale = 1.0 / np.sqrt(np.maximum(np.abs(np.diag(hessian)), least))

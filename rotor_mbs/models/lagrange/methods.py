@@ -23,7 +23,9 @@ _SOLVE_MANY = "rotor_mbs.models.lagrange.ensemble:solve_many"
 class TaylorSettings(Settings):
     """heyoka's adaptive Taylor method, double precision."""
 
-    tolerance: float = number(_EPS, above=0.0, doc="tolerance of the local error, absolute and relative")
+    tolerance: float = number(
+        _EPS, above=0.0, doc=("tolerance of the local error, absolute and relative")
+    )
 
 
 @dataclass(frozen=True)
@@ -63,13 +65,17 @@ class RadauSettings(Settings):
 def _build_taylor(scene: Scene, settings: TaylorSettings) -> Solver:
     from rotor_mbs.models.lagrange.taylor import Propagation, is_compact
 
-    return Propagation(scene, tol=settings.tolerance, compact_mode=is_compact(scene), high_accuracy=True)
+    return Propagation(
+        scene, tol=settings.tolerance, compact_mode=is_compact(scene), high_accuracy=True
+    )
 
 
 def _build_ode45(scene: Scene, settings: Ode45Settings) -> Solver:
     from rotor_mbs.models.lagrange.ode_solvers import OdeSolver, ode45_integrator
 
-    return OdeSolver(scene, ode45_integrator(settings.relative_tolerance, settings.absolute_tolerance))
+    return OdeSolver(
+        scene, ode45_integrator(settings.relative_tolerance, settings.absolute_tolerance)
+    )
 
 
 def _linearize(scene: Scene, angles: Any, speed: float, torque: float) -> Linearization:
@@ -78,13 +84,18 @@ def _linearize(scene: Scene, angles: Any, speed: float, torque: float) -> Linear
     return linearize(scene, angles, [speed, *(0.0 for _ in scene.blades)], torque)
 
 
-def _scipy_method(solver: str, settings: type[Settings], ladder: Ladder, relative_cost: float) -> Method:
-    """Return the method of one of SciPy's solvers; settings, ladder and relative_cost as of `Method`."""
+def _scipy_method(
+    solver: str, settings: type[Settings], ladder: Ladder, relative_cost: float
+) -> Method:
+    """Return the method of one of SciPy's solvers; settings, ladder and relative_cost as of
+    `Method`."""
 
     def build(scene: Scene, chosen: Any) -> Solver:
         from rotor_mbs.models.lagrange.ode_solvers import OdeSolver, scipy_integrator
 
-        return OdeSolver(scene, scipy_integrator(solver, chosen.relative_tolerance, chosen.absolute_tolerance))
+        return OdeSolver(
+            scene, scipy_integrator(solver, chosen.relative_tolerance, chosen.absolute_tolerance)
+        )
 
     return Method(
         name=f"lagrange/{solver.lower()}",

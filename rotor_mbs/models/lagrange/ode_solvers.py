@@ -1,4 +1,5 @@
-"""The closed form on plain floats under integrators for any right-hand side: SciPy's by name, MATLAB's ode45."""
+"""The closed form on plain floats under integrators for any right-hand side: SciPy's by name,
+MATLAB's ode45."""
 
 from __future__ import annotations
 
@@ -14,7 +15,12 @@ from rotor_mbs.models import ode45 as matlab
 from rotor_mbs.models.lagrange import closed_form, samples
 from rotor_mbs.models.lagrange.closed_form import load_values
 from rotor_mbs.models.lagrange.parameters import changing_rests, rotor_form
-from rotor_mbs.models.lagrange.samples import Advance, at_constant_rests, loads_at_start, over_segments
+from rotor_mbs.models.lagrange.samples import (
+    Advance,
+    at_constant_rests,
+    loads_at_start,
+    over_segments,
+)
 from rotor_mbs.models.ode45 import RightHandSide
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.scenario.time_table import Segment
@@ -25,7 +31,8 @@ Integrator = Callable[[RightHandSide, float, float, Array, Array], Advance]
 
 
 class OdeSolver:
-    """Any integrator over the scene, one call per segment of the loads; `times` as of `taylor.Propagation`."""
+    """Any integrator over the scene, one call per segment of the loads; `times` as of
+    `taylor.Propagation`."""
 
     def __init__(self, scene: Scene, integrator: Integrator, times: Array | None = None) -> None:
         self._scene, self._integrator = scene, integrator
@@ -39,14 +46,19 @@ class OdeSolver:
         self.states: Array = self._initial[None, :]
 
     def integrate(self) -> Integration:
-        self.states, integration = over_segments(self._times, self._segments, self._initial, self.advance)
+        self.states, integration = over_segments(
+            self._times, self._segments, self._initial, self.advance
+        )
         return integration
 
     def advance(self, segment: Segment, state: Array, times: Array) -> Advance:
-        return self._integrator(self.right_hand_side(segment), segment.start, segment.end, state, times)
+        return self._integrator(
+            self.right_hand_side(segment), segment.start, segment.end, state, times
+        )
 
     def right_hand_side(self, segment: Segment) -> RightHandSide:
-        """Return d/dt of (angles, rates[, work]) on plain floats: for a handful of blades faster than arrays."""
+        """Return d/dt of (angles, rates[, work]) on plain floats: for a handful of blades faster
+        than arrays."""
         form, work_unit = self._form, self._work_unit
         count = 1 + len(form.blades)
         changing, pitches = changing_rests(self._scene), self._scene.moving_coordinates[1:]
@@ -57,9 +69,12 @@ class OdeSolver:
             angles, rates = values[:count], values[count : 2 * count]
             loads = constant or load_values(segment.loads_at(time), pitches)
             try:
-                accelerations = closed_form.accelerations(angles, rates, form, loads, math.sin, math.cos)
+                accelerations = closed_form.accelerations(
+                    angles, rates, form, loads, math.sin, math.cos
+                )
             except (ZeroDivisionError, ValueError, OverflowError):
-                # A singular mass matrix, or a state that has diverged: not a number, as in array arithmetic.
+                # A singular mass matrix, or a state that has diverged: not a number, as in array
+                # arithmetic.
                 return [math.nan] * len(values)
             if not work_unit:
                 return [*rates, *accelerations]
@@ -76,21 +91,29 @@ class OdeSolver:
 
 
 def work_unit(scene: Scene) -> float:
-    """J of the work variable: the power of two below the scene's energies and torques, at least 1. In J its absolute
-    tolerance could be far below its own rounding."""
+    """J of the work variable: the power of two below the scene's energies and torques, at least 1.
+    In J its absolute tolerance could be far below its own rounding."""
     form, columns = rotor_form(scene), scene.moving_coordinates
-    angles, rates = ([values[i] for i in columns] for values in (scene.initial_angles, scene.initial_rates))
-    kinetic, _ = closed_form.energies(angles, rates, form, loads_at_start(scene), math.sin, math.cos)
-    weights = sum(blade.mass * scene.gravity * math.hypot(*blade.centre_of_mass) for blade in scene.blades)
+    angles, rates = (
+        [values[i] for i in columns] for values in (scene.initial_angles, scene.initial_rates)
+    )
+    kinetic, _ = closed_form.energies(
+        angles, rates, form, loads_at_start(scene), math.sin, math.cos
+    )
+    weights = sum(
+        blade.mass * scene.gravity * math.hypot(*blade.centre_of_mass) for blade in scene.blades
+    )
     torques = max((abs(torque) for _, torque in scene.rotor_torque), default=0.0)
     size = kinetic + weights + torques
     return 2.0 ** max(math.floor(math.log2(size)), 0) if 0.0 < size < math.inf else 1.0
 
 
-# Evaluations within one step, however often it is tried. SciPy shortens a step up to 460 times, where it begins at 0,
-# with 12 evaluations each. More are an endless loop: where the slope overflows, its first step is no number.
+# Evaluations within one step, however often it is tried. SciPy shortens a step up to 460 times,
+# where it begins at 0, with 12 evaluations each. More are an endless loop: where the slope
+# overflows, its first step is no number.
 _MAX_STEP_EVALUATIONS = 100_000
-# Steps after which it is seen how many the whole interval will take, and the share by which they may be too many.
+# Steps after which it is seen how many the whole interval will take, and the share by which they
+# may be too many.
 _OUTLOOK_STEPS = 2_000
 _OUTLOOK_SHARE = 10.0
 
@@ -98,7 +121,8 @@ _OUTLOOK_SHARE = 10.0
 def scipy_integrator(
     name: str, relative_tolerance: float, absolute_tolerance: float, max_steps: float = MAX_STEPS
 ) -> Integrator:
-    """Return SciPy's solver `name`, step by step, samples by its own interpolant; it ends at the time limit.
+    """Return SciPy's solver `name`, step by step, samples by its own interpolant; it ends at the
+    time limit.
 
     It fails after `max_steps`, or as soon as it is seen that it would take many more.
     """
@@ -106,7 +130,9 @@ def scipy_integrator(
 
     solver_type = getattr(scipy.integrate, name)
 
-    def advance(function: RightHandSide, start: float, end: float, state: Array, times: Array) -> Advance:
+    def advance(
+        function: RightHandSide, start: float, end: float, state: Array, times: Array
+    ) -> Advance:
         in_step = 0  # evaluations
 
         def watched(time: float, values: Sequence[float]) -> list[float]:
@@ -116,14 +142,17 @@ def scipy_integrator(
             if in_step > _MAX_STEP_EVALUATIONS:
                 raise ValueError("no step is small enough")
             slope = function(time, values)
-            if solver is None and in_step == 1 and not all(map(math.isfinite, slope)):  # at the start
+            # at the start
+            if solver is None and in_step == 1 and not all(map(math.isfinite, slope)):
                 raise ValueError("the derivative of the state is not finite")
             return slope
 
         rows, steps, message, solver = [np.empty((0, len(state)))], 0, "", None
         with np.errstate(all="ignore"), time_limit.samples_kept_at_limit():
             try:
-                solver = solver_type(watched, start, state, end, rtol=relative_tolerance, atol=absolute_tolerance)
+                solver = solver_type(
+                    watched, start, state, end, rtol=relative_tolerance, atol=absolute_tolerance
+                )
                 done = 0
                 while solver.status == "running":
                     in_step = 0
@@ -142,7 +171,8 @@ def scipy_integrator(
                         raise ValueError(f"more than {max_steps:g} steps")
             except OutOfTimeError:
                 message = time_limit.MESSAGE
-            except (ValueError, np.linalg.LinAlgError) as exc:  # also of its linear algebra, on what is not finite
+            # also of its linear algebra, on what is not finite
+            except (ValueError, np.linalg.LinAlgError) as exc:
                 message = f"SciPy: {exc}"
         last, evaluations = (state, 0) if solver is None else (solver.y, solver.nfev)
         return Advance(np.concatenate(rows), last, steps, evaluations, message)
@@ -151,23 +181,35 @@ def scipy_integrator(
 
 
 def _is_too_long(steps: int, max_steps: float, share: float) -> bool:
-    """Return whether an interval, of which the steps so far have crossed a share, takes too many."""
+    """Return whether an interval, of which the steps so far have crossed a share, takes too
+    many."""
     is_seen = steps % _OUTLOOK_STEPS == 0 and steps > _OUTLOOK_SHARE * max_steps * share
     return steps >= max_steps or is_seen
 
 
 def ode45_integrator(relative_tolerance: float, absolute_tolerance: float) -> Integrator:
-    """Return MATLAB's ode45; its clock starts at zero on every segment. Samples are lost at the time limit."""
+    """Return MATLAB's ode45; its clock starts at zero on every segment. Samples are lost at the
+    time limit."""
 
-    def advance(function: RightHandSide, start: float, end: float, state: Array, times: Array) -> Advance:
+    def advance(
+        function: RightHandSide, start: float, end: float, state: Array, times: Array
+    ) -> Advance:
         def watched(time: float, values: Sequence[float]) -> list[float]:
             raise_if_over()  # of threads, which no signal ends
             return function(start + time, values)
 
-        result = matlab.ode45(watched, end - start, state.tolist(), relative_tolerance, absolute_tolerance)
+        result = matlab.ode45(
+            watched, end - start, state.tolist(), relative_tolerance, absolute_tolerance
+        )
         reached = result.time[-1]
         inside = np.minimum(times - start, end - start)
         last = result.at(result.time[-1:])[0]
-        return Advance(result.at(inside[inside <= reached]), last, result.steps, result.evaluations, result.message)
+        return Advance(
+            result.at(inside[inside <= reached]),
+            last,
+            result.steps,
+            result.evaluations,
+            result.message,
+        )
 
     return advance

@@ -1,7 +1,7 @@
 """A scene's numbers as the closed form needs them.
 
-Coefficients are in exact rational arithmetic until the last step: of a point mass some vanish identically, and near a
-pitch of ±π/2 a rounding remainder would be the inertia.
+Coefficients are in exact rational arithmetic until the last step: of a point mass some vanish
+identically, and near a pitch of ±π/2 a rounding remainder would be the inertia.
 """
 
 from __future__ import annotations
@@ -19,11 +19,14 @@ from rotor_mbs.scenario.scene import Blade, Scene
 from rotor_mbs.scenario.time_table import is_constant
 from rotor_mbs.solution.trajectory import Array
 
-# A number of whatever kind the equations are to be evaluated in: float, quad precision, symbolic parameter.
+# A number of whatever kind the equations are to be evaluated in: float, quad precision, symbolic
+# parameter.
 Number = Any
 Convert = Callable[[Fraction], Number]
 
-PI = Fraction("3.14159265358979323846264338327950288419716939937510582097494459230781640628620899862803")
+PI = Fraction(
+    "3.14159265358979323846264338327950288419716939937510582097494459230781640628620899862803"
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,9 +38,11 @@ class BladeForm:
     schur_ss: Number  # kg m², its share of the Schur complement, a quadratic form in (s, c)
     schur_cc: Number
     schur_sc: Number
-    half_slope_sc: Number  # kg m², ½ ∂a/∂θ = half_slope_sc·s c + half_slope_cs·(c² - s²), a as below
+    # kg m², ½ ∂a/∂θ = half_slope_sc·s c + half_slope_cs·(c² - s²), a as below
+    half_slope_sc: Number
     half_slope_cs: Number
-    coupling_s: Number  # kg m², b = coupling_s·s + coupling_c·c, the rotor-pitch entry of the mass matrix
+    # kg m², b = coupling_s·s + coupling_c·c, the rotor-pitch entry of the mass matrix
+    coupling_s: Number
     coupling_c: Number
     ratio_s: Number  # b / Jzz
     ratio_c: Number
@@ -45,7 +50,8 @@ class BladeForm:
     weight_x: Number  # N m, m g (x, y, z) of the centre of mass
     weight_y: Number
     weight_z: Number
-    lever_ss: Number  # N m, gravity's moment on the rotor, pitch eliminated, per sine of the azimuth
+    # N m, gravity's moment on the rotor, pitch eliminated, per sine of the azimuth
+    lever_ss: Number
     lever_cc: Number
     lever_sc: Number
     stiffness: Number  # N m/rad, N m s/rad
@@ -58,7 +64,8 @@ class BladeForm:
 
 @dataclass(frozen=True, slots=True)
 class LeanForm:
-    """What tilt τ and cone β of one blade add to `BladeForm`, whose coefficients have their cosines."""
+    """What tilt τ and cone β of one blade add to `BladeForm`, whose coefficients have their
+    cosines."""
 
     ratio: Number  # sin β, added to b / Jzz
     coupling: Number  # kg m², Jzz sin β, added to b
@@ -96,7 +103,9 @@ class RotorForm:
 
 
 def rotor_form(
-    scene: Scene, convert: Convert = float, phases: Sequence[tuple[Fraction, Fraction]] | None = None
+    scene: Scene,
+    convert: Convert = float,
+    phases: Sequence[tuple[Fraction, Fraction]] | None = None,
 ) -> RotorForm:
     """Return the coefficients of a scene, whose doubles are taken as exact.
 
@@ -104,7 +113,8 @@ def rotor_form(
     ----------
     scene : the rotor.
     convert : rounds each coefficient once, to the kind of number to compute with.
-    phases : (blades,) cosines and sines of the mounting angles; those of `Scene.phases` where left out.
+    phases : (blades,) cosines and sines of the mounting angles; those of `Scene.phases` where left
+        out.
     """
     if convert is float and phases is None:
         return _form_in_doubles(scene)
@@ -116,7 +126,9 @@ def _form_in_doubles(scene: Scene) -> RotorForm:
     return _form(scene, float, None)
 
 
-def _form(scene: Scene, convert: Convert, phases: Sequence[tuple[Fraction, Fraction]] | None) -> RotorForm:
+def _form(
+    scene: Scene, convert: Convert, phases: Sequence[tuple[Fraction, Fraction]] | None
+) -> RotorForm:
     gravity = Fraction(scene.gravity)
     count = len(scene.blades)
     forms: list[BladeForm] = []
@@ -126,7 +138,12 @@ def _form(scene: Scene, convert: Convert, phases: Sequence[tuple[Fraction, Fract
         phase = phases[i] if phases else phase_of(i, count)
         if blade.has_pitch_inertia:
             bearing = (Fraction(value) for value in scene.bearings[i])
-            values = [*phase, *_coefficients(blade, gravity, scene.shaft_tilt), *bearing, *_rotor_inertia(blade)]
+            values = [
+                *phase,
+                *_coefficients(blade, gravity, scene.shaft_tilt),
+                *bearing,
+                *_rotor_inertia(blade),
+            ]
             form = BladeForm(*(convert(value) for value in values))
             if scene.has_tilt_or_cone:
                 of_lean = _lean_coefficients(blade, gravity, scene.shaft_tilt)
@@ -140,11 +157,14 @@ def _form(scene: Scene, convert: Convert, phases: Sequence[tuple[Fraction, Fract
             weight *= lean.cos_tilt * lean.cos_cone
             fixed.append((convert(weight), convert(phase[0]), convert(phase[1])))
     damping = Fraction(scene.shaft_damping)
-    return RotorForm(tuple(forms), tuple(fixed), convert(inertia), convert(damping), convert(fixed_height))
+    return RotorForm(
+        tuple(forms), tuple(fixed), convert(inertia), convert(damping), convert(fixed_height)
+    )
 
 
 def leans(scene: Scene, convert: Convert = float) -> list[Lean | None]:
-    """Return cosines and sines of cone and tilt of each blade, rounded once; None for each where all are upright."""
+    """Return cosines and sines of cone and tilt of each blade, rounded once; None for each where
+    all are upright."""
     if not scene.has_tilt_or_cone:
         return [None] * len(scene.blades)
     converted: list[Lean | None] = []
@@ -162,10 +182,14 @@ def _lean(cone: float, tilt: float) -> Lean:
 
 def phase_of(blade: int, count: int) -> tuple[Fraction, Fraction]:
     """Return cosine and sine of the mounting angle of a blade, counted from 0, of `count`."""
-    return _cosine_of_turn(Fraction(blade, count)), _cosine_of_turn(Fraction(blade, count) - Fraction(1, 4))
+    return _cosine_of_turn(Fraction(blade, count)), _cosine_of_turn(
+        Fraction(blade, count) - Fraction(1, 4)
+    )
 
 
-def _inertia_about_hub(blade: Blade) -> tuple[Fraction, Fraction, Fraction, Fraction, Fraction, Fraction]:
+def _inertia_about_hub(
+    blade: Blade,
+) -> tuple[Fraction, Fraction, Fraction, Fraction, Fraction, Fraction]:
     """Return the inertia J = J_com + m (r·r I - r rᵀ) about the hub centre: xx yy zz xy xz yz."""
     m = Fraction(blade.mass)
     x, y, z = (Fraction(value) for value in blade.centre_of_mass)
@@ -182,7 +206,8 @@ def _inertia_about_hub(blade: Blade) -> tuple[Fraction, Fraction, Fraction, Frac
 
 @functools.lru_cache(maxsize=256)
 def _rotor_inertia(blade: Blade) -> tuple[Fraction, Fraction, Fraction]:
-    """Return ss, cc, sc of the blade's inertia about the shaft, A = inertia_ss s² + inertia_cc c² + inertia_sc s c."""
+    """Return ss, cc, sc of the blade's inertia about the shaft, A = inertia_ss s² + inertia_cc c² +
+    inertia_sc s c."""
     xx, yy, zz, xy, _, _ = _inertia_about_hub(blade)
     lean = _lean(blade.cone, 0.0)
     cone_cc, cone_ss = lean.cos_cone**2, lean.sin_cone**2
@@ -190,7 +215,8 @@ def _rotor_inertia(blade: Blade) -> tuple[Fraction, Fraction, Fraction]:
     return cone_cc * xx + cone_ss * zz, cone_cc * yy + cone_ss * zz, 2 * cone_cc * xy
 
 
-@functools.lru_cache(maxsize=256)  # the blades of a rotor are mostly equal, and so are the rotors of a sweep
+# the blades of a rotor are mostly equal, and so are the rotors of a sweep
+@functools.lru_cache(maxsize=256)
 def _coefficients(blade: Blade, gravity: Fraction, tilt: float) -> list[Fraction]:
     """Return schur_ss ... lever_sc of BladeForm, in its order."""
     xx, yy, zz, xy, xz, yz = _inertia_about_hub(blade)
@@ -199,7 +225,11 @@ def _coefficients(blade: Blade, gravity: Fraction, tilt: float) -> list[Fraction
     cos_cone, squared = lean.cos_cone, lean.cos_cone**2
     weight = Fraction(blade.mass) * gravity * lean.cos_tilt
     schur = [xx - xz * xz / zz, yy - yz * yz / zz, 2 * (xy - xz * yz / zz)]
-    lever = [weight * (z + xz * x / zz), weight * (z + yz * y / zz), weight * (xz * y + yz * x) / zz]
+    lever = [
+        weight * (z + xz * x / zz),
+        weight * (z + yz * y / zz),
+        weight * (xz * y + yz * x) / zz,
+    ]
     return [
         *(squared * value for value in (*schur, xx - yy, xy)),
         *(cos_cone * value for value in (xz, yz, xz / zz, yz / zz)),
@@ -238,7 +268,8 @@ _FIXED_POINT = 10**60  # whole numbers stand for this many times a fraction
 
 @functools.lru_cache(maxsize=4096)
 def _cosine_of_turn(turn: Fraction) -> Fraction:
-    """Return cos(2π·turn) to 50 digits: so that a third of a turn is -1/2 in double and in quad precision."""
+    """Return cos(2π·turn) to 50 digits: so that a third of a turn is -1/2 in double and in quad
+    precision."""
     angle = 2 * PI * ((turn + Fraction(1, 2)) % 1 - Fraction(1, 2))
     return _power_series(angle * angle, 1)
 
@@ -250,7 +281,8 @@ def _cosine_and_sine(angle: Fraction) -> tuple[Fraction, Fraction]:
 
 
 def _power_series(square: Fraction, first: int) -> Fraction:
-    """Return the sum of (-square)^n over the product of the first 2n numbers from `first` on, to 50 digits.
+    """Return the sum of (-square)^n over the product of the first 2n numbers from `first` on, to 50
+    digits.
 
     With first = 1 it is the cosine of the square's root, with 2 the sine divided by that root.
     """
@@ -275,7 +307,8 @@ def changing_rests(scene: Scene) -> tuple[bool, ...]:
     return tuple(not is_constant(rest) for rest in rests)
 
 
-# Up to this natural frequency, rad/s, a rate counts in rad/s as an angle counts in rad (the paper's blades: 10.7).
+# Up to this natural frequency, rad/s, a rate counts in rad/s as an angle counts in rad (the paper's
+# blades: 10.7).
 _UNIT_FREQUENCY = 100.0
 
 
@@ -286,10 +319,12 @@ def pitch_weight(blade: BladeForm) -> float:
 
 
 def rate_units(scene: Scene) -> Array:
-    """Return what counts as 1 in a rate, (1 + moving blades,) rad/s, where a radian counts as 1 in an angle.
+    """Return what counts as 1 in a rate, (1 + moving blades,) rad/s, where a radian counts as 1 in
+    an angle.
 
-    It is 1, or a coordinate's own frequency at the start (spring, gravity, turning) above 100 rad/s. Else the quarter
-    period that turns an angle into a rate would count as growth of an error: 1e5-fold on a bearing of 1e12 N m/rad.
+    It is 1, or a coordinate's own frequency at the start (spring, gravity, turning) above 100
+    rad/s. Else the quarter period that turns an angle into a rate would count as growth of an
+    error: 1e5-fold on a bearing of 1e12 N m/rad.
     """
     form = rotor_form(scene)
     spin = abs(scene.initial_rates[0])
@@ -297,4 +332,6 @@ def rate_units(scene: Scene) -> Array:
     for blade in form.blades:
         moment = blade.stiffness + pitch_weight(blade)
         frequencies.append(max(math.sqrt(moment / blade.pitch_inertia), spin))
-    return np.array([frequency if frequency > _UNIT_FREQUENCY else 1.0 for frequency in frequencies])
+    return np.array(
+        [frequency if frequency > _UNIT_FREQUENCY else 1.0 for frequency in frequencies]
+    )

@@ -1,4 +1,5 @@
-"""The reference: the closed form in quad precision, a bound on its error from two tolerances, and the growth of errors.
+"""The reference: the closed form in quad precision, a bound on its error from two tolerances, and
+the growth of errors.
 
 Also at chosen times, and the closed form with terms left out or with blades at other azimuths.
 """
@@ -26,17 +27,18 @@ from rotor_mbs.models.lagrange.taylor import Propagation
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.trajectory import Array, Integration, Trajectory
 
-# The uncertainty is this many times what two runs show. They differ in their truncation errors and in the rounding of
-# each step, but not in what they share: the rounded coefficients, and the rounding of a motion that both step through
-# alike (a uniform rotation). Against 180 bits at tolerance 1e-42 the error of the shipped scenes is at most 5.0 times
-# the sum of difference and rounding (paper/fig15-100kNm).
+# The uncertainty is this many times what two runs show. They differ in their truncation errors and
+# in the rounding of each step, but not in what they share: the rounded coefficients, and the
+# rounding of a motion that both step through alike (a uniform rotation). Against 180 bits at
+# tolerance 1e-42 the error of the shipped scenes is at most 5.0 times the sum of difference and
+# rounding (paper/fig15-100kNm).
 SAFETY = 10.0
 
 _QUAD_EPSILON = 2.0**-112
 
 
-# Where heyoka is not installed: DOP853 at the tightest that SciPy takes, 100 eps, and a hundred times looser beside it,
-# which shows how much the tolerance still decides.
+# Where heyoka is not installed: DOP853 at the tightest that SciPy takes, 100 eps, and a hundred
+# times looser beside it, which shows how much the tolerance still decides.
 _TIGHTEST = (2.3e-14, 1e-16)
 _LOOSER = (2.3e-12, 1e-14)
 _DOUBLE_EPSILON = float(np.finfo(float).eps)
@@ -47,18 +49,22 @@ _PERTURBATION = 1e-9
 class ReferenceSolver:
     """Two runs over the scene's sample times, and how errors grow along them.
 
-    The tolerance of the run that is kept, the first, is a thousandth of the other's (without heyoka a hundredth): their
-    distance is the truncation error of the other.
+    The tolerance of the run that is kept, the first, is a thousandth of the other's (without heyoka
+    a hundredth): their distance is the truncation error of the other.
     """
 
-    def __init__(self, scene: Scene, runs: Sequence[Propagation | OdeSolver], epsilon: float) -> None:
+    def __init__(
+        self, scene: Scene, runs: Sequence[Propagation | OdeSolver], epsilon: float
+    ) -> None:
         self._scene, self._runs, self._epsilon = scene, runs, epsilon
 
     def integrate(self) -> Integration:
         """Integrate both runs; the report is the first's, with the failure of either."""
         best, check = (run.integrate() for run in self._runs)
         failed = best if not best.success else check
-        return replace(best, success=failed.success, message=failed.message, out_of_time=failed.out_of_time)
+        return replace(
+            best, success=failed.success, message=failed.message, out_of_time=failed.out_of_time
+        )
 
     def observe(self) -> Trajectory:
         """Return the samples of the first run, with its uncertainty and the growth of errors."""
@@ -70,11 +76,15 @@ class ReferenceSolver:
             result.quantities |= quad_loads(self._scene, result.time, best)
         angles = slice(len(self._scene.moving_coordinates))
         difference = np.abs((best - check)[:, angles]).astype(float).max(axis=1)
-        result.quantities["angle_uncertainty"] = uncertainty(difference, result.angles, self._epsilon)
+        result.quantities["angle_uncertainty"] = uncertainty(
+            difference, result.angles, self._epsilon
+        )
         # Over what was reached: the rest of a run that its time limit ended may take for ever.
         if rows > 1:
             reached = replace(self._scene, duration=float(result.time[-1]), samples=rows)
-            result.quantities["error_growth"] = _largest_growth(reached, _transition_matrices(reached, result.time))
+            result.quantities["error_growth"] = _largest_growth(
+                reached, _transition_matrices(reached, result.time)
+            )
         else:
             result.quantities["error_growth"] = np.ones(rows)
         return result
@@ -83,8 +93,9 @@ class ReferenceSolver:
 def uncertainty(difference: Array, angles: Array, epsilon: float) -> Array:
     """Return a bound on the error of angles, but for their rounding to doubles, (n,) rad.
 
-    It is `SAFETY` times the sum of the difference of two runs and of the rounding of the largest angle, because two
-    runs may round alike; of it the largest so far, because they may meet by chance.
+    It is `SAFETY` times the sum of the difference of two runs and of the rounding of the largest
+    angle, because two runs may round alike; of it the largest so far, because they may meet by
+    chance.
 
     Parameters
     ----------
@@ -112,22 +123,30 @@ def _in_quad(scene: Scene, tolerance: float, times: Array | None = None) -> Prop
     return Propagation(scene, quad=True, tol=tolerance, compact_mode=True, times=times)
 
 
-def _in_doubles(scene: Scene, tolerances: tuple[float, float], times: Array | None = None) -> OdeSolver:
+def _in_doubles(
+    scene: Scene, tolerances: tuple[float, float], times: Array | None = None
+) -> OdeSolver:
     return OdeSolver(scene, scipy_integrator("DOP853", *tolerances), times)
 
 
 def error_growth(scene: Scene) -> Array:
     """Return how many times a small error of the initial state may have grown, at most, (samples,).
 
-    It is the largest singular value of the state transition matrix (rad, `rate_units`) in the coordinates that the
-    motion can have, which pitches at rest by symmetry are not; infinite once past what double precision can hold.
+    It is the largest singular value of the state transition matrix (rad, `rate_units`) in the
+    coordinates that the motion can have, which pitches at rest by symmetry are not; infinite once
+    past what double precision can hold.
     """
     return _largest_growth(scene, _variational_matrices(scene))
 
 
 def _transition_matrices(scene: Scene, times: Array) -> Array:
-    """Return the state transition matrices, (n, 2k, 2k) for k coordinates that move, as far as the motion goes."""
-    return _variational_matrices(scene, times) if is_available() else _matrices_by_quotients(scene, times)
+    """Return the state transition matrices, (n, 2k, 2k) for k coordinates that move, as far as the
+    motion goes."""
+    return (
+        _variational_matrices(scene, times)
+        if is_available()
+        else _matrices_by_quotients(scene, times)
+    )
 
 
 def _variational_matrices(scene: Scene, times: Array | None = None) -> Array:
@@ -139,7 +158,8 @@ def _variational_matrices(scene: Scene, times: Array | None = None) -> Array:
 
 
 def _matrices_by_quotients(scene: Scene, times: Array) -> Array:
-    """Return the state transition matrices by difference quotients of runs from neighbouring starts.
+    """Return the state transition matrices by difference quotients of runs from neighbouring
+    starts.
 
     scene : the run; times : (n,) s. Infinite where the neighbouring run did not get.
     """
@@ -164,7 +184,8 @@ def _matrices_by_quotients(scene: Scene, times: Array) -> Array:
 
 
 def _largest_growth(scene: Scene, matrices: Array) -> Array:
-    """Return the growth of errors, (samples,), from the state transition matrices of the first samples.
+    """Return the growth of errors, (samples,), from the state transition matrices of the first
+    samples.
 
     It is infinite where these are not finite.
     """
@@ -177,7 +198,8 @@ def _largest_growth(scene: Scene, matrices: Array) -> Array:
 
 
 def free_variables(scene: Scene) -> NDArray[np.int64]:
-    """Return the places of variables that are not at rest by symmetry, among angles, then rates, of what moves."""
+    """Return the places of variables that are not at rest by symmetry, among angles, then rates, of
+    what moves."""
     moving, resting = scene.moving_coordinates, resting_pitches(scene)
     free = np.array([i for i, coordinate in enumerate(moving) if coordinate not in resting])
     return np.concatenate([free, len(moving) + free])
@@ -199,9 +221,10 @@ class TimedReference:
     Attributes
     ----------
     trajectory : as far as it got: time, angles, rates, error_growth.
-    growth : (n, 2 (1 + blades)), for angles, then rates: how many times larger than an error of the initial state
-        theirs may be, at most. 2-norms of the rows of the state transition matrix; 1 for a pitch that is fixed or at
-        rest by symmetry.
+    growth : (n, 2 (1 + blades)), for angles, then rates: how many times larger than an error of the
+        initial state
+        theirs may be, at most. 2-norms of the rows of the state transition matrix; 1 for a pitch
+        that is fixed or at rest by symmetry.
     units : (2 (1 + blades),) rad or rad/s, what counts as 1 in these norms.
     """
 
@@ -243,7 +266,8 @@ def reference_at(scene: Scene, times: Array) -> TimedReference:
 
 
 def with_azimuths(scene: Scene, azimuths: Sequence[float]) -> Accelerations:
-    """Return the closed form with the blades at other angles about the shaft than `Scene.phases`, (blades,) rad."""
+    """Return the closed form with the blades at other angles about the shaft than `Scene.phases`,
+    (blades,) rad."""
     phases = [(Fraction(math.cos(azimuth)), Fraction(math.sin(azimuth))) for azimuth in azimuths]
     form = rotor_form(scene, phases=phases)
     return lambda angles, rates, _form, *rest: closed_form.accelerations(angles, rates, form, *rest)
@@ -265,8 +289,9 @@ def combined_equations(*parts: tuple[float, float, float]) -> Accelerations:
     return equations
 
 
-# The accelerations are linear in the dampers' moments and quadratic in the rates otherwise; with one kind of rate at a
-# time, and with rates reversed, each kind of product is taken out without another text of the equations.
+# The accelerations are linear in the dampers' moments and quadratic in the rates otherwise; with
+# one kind of rate at a time, and with rates reversed, each kind of product is taken out without
+# another text of the equations.
 REDUCED_EQUATIONS: Mapping[str, Accelerations] = {
     "Coriolis terms (products of rotor rate and pitch rate)": combined_equations(
         (1.0, 1, 0), (1.0, 0, 1), (-1.0, 0, 0)

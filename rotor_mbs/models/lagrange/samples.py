@@ -1,11 +1,12 @@
 """The run of any integrator from segment to segment of the loads, and the trajectory of its states.
 
-Loads on roots, shaft bearing and actuators follow by Newton's and Euler's laws from the closed form's accelerations.
+Loads on roots, shaft bearing and actuators follow by Newton's and Euler's laws from the closed
+form's accelerations.
 
-Symbols, in the frame of a blade with azimuth φ, pitch θ, cone β: s = sin θ, c = cos θ; angular velocity
-ω = (Ω cos β s, Ω cos β c, θ̇ + Ω sin β) and acceleration α = dω/dt; centre of mass r, inertia I about it; up = the base
-frame's z; root at e = (0, 0, hub radius).
-F = m (α × r + ω × (ω × r) + g up),  M = I α + ω × I ω + (r - e) × F: of the hub on the blade, about its root.
+Symbols, in the frame of a blade with azimuth φ, pitch θ, cone β: s = sin θ, c = cos θ; angular
+velocity ω = (Ω cos β s, Ω cos β c, θ̇ + Ω sin β) and acceleration α = dω/dt; centre of mass r,
+inertia I about it; up = the base frame's z; root at e = (0, 0, hub radius). F = m (α × r + ω × (ω ×
+r) + g up),  M = I α + ω × I ω + (r - e) × F: of the hub on the blade, about its root.
 """
 
 from __future__ import annotations
@@ -41,7 +42,13 @@ from rotor_mbs.scenario.time_table import (
     values_before,
 )
 from rotor_mbs.solution.quantities import named_loads
-from rotor_mbs.solution.trajectory import Array, Integration, Trajectory, all_coordinates, finite_rows
+from rotor_mbs.solution.trajectory import (
+    Array,
+    Integration,
+    Trajectory,
+    all_coordinates,
+    finite_rows,
+)
 
 _DIFFERENCE = 1e-6  # rad and rad/s: far above rounding, and yet linear
 
@@ -105,7 +112,9 @@ def over_segments(
     states = np.concatenate(rows)
     states = states[: finite_rows(states.astype(float, copy=False))]
     reached = float(times[max(len(states) - 1, 0)])
-    return states, Integration(not message, message, reached, steps, evaluations, message == time_limit.MESSAGE)
+    return states, Integration(
+        not message, message, reached, steps, evaluations, message == time_limit.MESSAGE
+    )
 
 
 def trajectory(scene: Scene, times: Array, states: Array) -> Trajectory:
@@ -115,7 +124,8 @@ def trajectory(scene: Scene, times: Array, states: Array) -> Trajectory:
     ----------
     scene : the run.
     times : (samples,) s.
-    states : (n, 2k) angles, then rates, of the k coordinates that move; with the work (J) as one more column, or not.
+    states : (n, 2k) angles, then rates, of the k coordinates that move; with the work (J) as one
+        more column, or not.
     """
     count, time = len(scene.moving_coordinates), times[: len(states)]
     angles, rates = all_coordinates(scene, states[:, :count], states[:, count : 2 * count])
@@ -136,7 +146,9 @@ def trajectory(scene: Scene, times: Array, states: Array) -> Trajectory:
     return Trajectory(time, angles, rates, **fields)
 
 
-def _energies(scene: Scene, time: Array, all_angles: Array, all_rates: Array, states: Array) -> dict[str, Array]:
+def _energies(
+    scene: Scene, time: Array, all_angles: Array, all_rates: Array, states: Array
+) -> dict[str, Array]:
     """Return energies and work, (n,) J.
 
     Parameters
@@ -150,7 +162,8 @@ def _energies(scene: Scene, time: Array, all_angles: Array, all_rates: Array, st
     angles = list(all_angles[:, columns].T)
     rates = list(all_rates[:, columns].T)
     loads = loads_at(scene, time)
-    with np.errstate(over="ignore", invalid="ignore"):  # of rates like 1e200; the judgement sees what is not finite
+    # of rates like 1e200; the judgement sees what is not finite
+    with np.errstate(over="ignore", invalid="ignore"):
         kinetic, potential = closed_form.energies(angles, rates, form, loads, np.sin, np.cos)
         if states.shape[1] <= 2 * len(columns):
             work = constant_work(scene, all_angles)
@@ -165,7 +178,8 @@ def _energies(scene: Scene, time: Array, all_angles: Array, all_rates: Array, st
 
 
 def loads_at(scene: Scene, time: Array) -> LoadValues:
-    """Return the loads at (n,) s: numbers where they are constant, else (n,) arrays; at a jump, the values after it."""
+    """Return the loads at (n,) s: numbers where they are constant, else (n,) arrays; at a jump, the
+    values after it."""
     values: list[Any] = []
     for table in scene.load_tables:
         values.append(value_at(table, 0.0) if is_constant(table) else values_at(table, time))
@@ -173,14 +187,16 @@ def loads_at(scene: Scene, time: Array) -> LoadValues:
 
 
 def loads_at_start(scene: Scene, torque: float = 0.0) -> LoadValues:
-    """Return the loads of the pitches at t = 0, with `torque` (N m) on the rotor in place of the scene's."""
+    """Return the loads of the pitches at t = 0, with `torque` (N m) on the rotor in place of the
+    scene's."""
     values = [value_at(table, 0.0) for table in scene.load_tables]
     values[ROTOR_TORQUE] = torque
     return load_values(values, scene.moving_coordinates[1:])
 
 
 def at_constant_rests(changing: Sequence[bool], loads: LoadValues) -> LoadValues:
-    """Return loads without the rest angles that are constant, which do no work; changing: as of `changing_rests`."""
+    """Return loads without the rest angles that are constant, which do no work; changing: as of
+    `changing_rests`."""
     rests = [rest if changes else 0.0 for rest, changes in zip(loads.rests, changing, strict=True)]
     return LoadValues(loads.rotor, loads.pitches, rests)
 
@@ -194,7 +210,8 @@ def constant_work(scene: Scene, angles: Array) -> Array:
 
 
 def sampled_loads(scene: Scene, times: Array, angles: Array, rates: Array) -> dict[str, Array]:
-    """Return the load quantities at (n,) times in s; angles, rates: (n, 1 + blades) rad and rad/s."""
+    """Return the load quantities at (n,) times in s; angles, rates: (n, 1 + blades) rad and
+    rad/s."""
     with np.errstate(all="ignore"):  # near a singularity; what is not finite cuts the run
         return _loads(scene, times, angles, rates, float, np.sin, np.cos)
 
@@ -215,17 +232,22 @@ class LoadParts:
     rates: float = 1.0
 
 
-def partial_loads(scene: Scene, times: Array, angles: Array, rates: Array, parts: LoadParts) -> dict[str, Array]:
-    """Return the load quantities with some parts forgotten, as `sampled_loads` returns them whole."""
+def partial_loads(
+    scene: Scene, times: Array, angles: Array, rates: Array, parts: LoadParts
+) -> dict[str, Array]:
+    """Return the load quantities with some parts forgotten, as `sampled_loads` returns them
+    whole."""
     with np.errstate(all="ignore"):
         return _loads(scene, times, angles, rates, float, np.sin, np.cos, parts)
 
 
 def load_rounding(scene: Scene, times: Array, angles: Array, rates: Array) -> dict[str, Array]:
-    """Return how much of the load quantities the last digits of a state leave open, in the shape of each.
+    """Return how much of the load quantities the last digits of a state leave open, in the shape of
+    each.
 
-    A stiff bearing's moment is a small difference of large ones. Of each number two roundings count, half a unit in the
-    last place: its own, and that of what it is compared with, such as the angle of a pitch command.
+    A stiff bearing's moment is a small difference of large ones. Of each number two roundings
+    count, half a unit in the last place: its own, and that of what it is compared with, such as the
+    angle of a pitch command.
 
     Parameters
     ----------
@@ -238,7 +260,8 @@ def load_rounding(scene: Scene, times: Array, angles: Array, rates: Array) -> di
     numbers, count = np.column_stack([times, angles, rates]), angles.shape[1]
     for column, values in enumerate(numbers.T):
         moved = numbers.copy()
-        moved[:, column] -= _DIFFERENCE  # back in time, so that a jump of a load counts from its own sample on
+        # back in time, so that a jump of a load counts from its own sample on
+        moved[:, column] -= _DIFFERENCE
         last_digits = np.finfo(float).eps * np.abs(values) / _DIFFERENCE
         moved_times, moved_angles, moved_rates = np.split(moved, [1, 1 + count], axis=1)
         others = sampled_loads(scene, moved_times[:, 0], moved_angles, moved_rates)
@@ -248,25 +271,32 @@ def load_rounding(scene: Scene, times: Array, angles: Array, rates: Array) -> di
 
 
 def load_conditioning(scene: Scene, times: Array, angles: Array, rates: Array) -> dict[str, Array]:
-    """Return how much of the load quantities the arithmetic of any engine may lose, in the shape of each.
+    """Return how much of the load quantities the arithmetic of any engine may lose, in the shape of
+    each.
 
-    An engine forms the moments of inertia forces and weights from terms about some point, each rounded once. What is
-    lost of them turns into accelerations by the inverse of the mass matrix, and these into loads. Of a blade whose
-    inertia about its pitch axis is small beside m |r|^2 that is far more than the last digits of its state.
+    An engine forms the moments of inertia forces and weights from terms about some point, each
+    rounded once. What is lost of them turns into accelerations by the inverse of the mass matrix,
+    and these into loads. Of a blade whose inertia about its pitch axis is small beside m |r|^2 that
+    is far more than the last digits of its state.
 
     Parameters
     ----------
     times, angles, rates : (n,) s, and (n, 1 + blades) rad and rad/s.
     """
     form, moving = rotor_form(scene), scene.moving_coordinates
-    applied = load_values(list(values_before(scene.load_segments, times)), scene.moving_coordinates[1:])
+    applied = load_values(
+        list(values_before(scene.load_segments, times)), scene.moving_coordinates[1:]
+    )
     with np.errstate(all="ignore"):
         accelerations = closed_form.accelerations(
             list(angles[:, moving].T), list(rates[:, moving].T), form, applied, np.sin, np.cos
         )
-        sizes = np.abs(np.stack([np.broadcast_to(row, times.shape) for row in accelerations], axis=1))
+        sizes = np.abs(
+            np.stack([np.broadcast_to(row, times.shape) for row in accelerations], axis=1)
+        )
 
-        # Moments, (n, moving), of which an engine may lose a rounding: on the rotor those of all blades.
+        # Moments, (n, moving), of which an engine may lose a rounding: on the rotor those of all
+        # blades.
         moments = np.zeros(sizes.shape)
         moments[:, 0] = scene.hub_inertia * sizes[:, 0]
         for i, blade in enumerate(scene.blades):
@@ -283,12 +313,15 @@ def load_conditioning(scene: Scene, times: Array, angles: Array, rates: Array) -
         inverse = _inverse_mass_matrices(scene, angles)
         lost = 2.0**-53 * np.einsum("nij,nj->ni", np.abs(inverse), moments)  # of each acceleration
 
-        # The loads of unit accelerations at rest, without gravity: loads are linear in accelerations.
+        # The loads of unit accelerations at rest, without gravity: loads are linear in
+        # accelerations.
         still, conditioning = np.zeros_like(rates), dict[str, Array]()
         for place, coordinate in enumerate(moving):
             unit = np.zeros_like(rates)
             unit[:, coordinate] = 1.0
-            roots, shaft_force, shaft_moment = _reactions(scene, angles, still, unit, 0.0, float, np.sin, np.cos)
+            roots, shaft_force, shaft_moment = _reactions(
+                scene, angles, still, unit, 0.0, float, np.sin, np.cos
+            )
             _add_about_shaft(shaft_moment, scene.hub_inertia * unit[:, 0], scene, float)
             loads = named_loads(roots, shaft_force, shaft_moment, np.zeros_like(angles[:, 1:]))
             for name, values in loads.items():
@@ -298,7 +331,8 @@ def load_conditioning(scene: Scene, times: Array, angles: Array, rates: Array) -
 
 
 def _inverse_mass_matrices(scene: Scene, angles: Array) -> Array:
-    """Return the inverse of the mass matrix at (n, 1 + blades) rad: (n, moving, moving), by the Schur complement."""
+    """Return the inverse of the mass matrix at (n, 1 + blades) rad: (n, moving, moving), by the
+    Schur complement."""
     form, moving = rotor_form(scene), scene.moving_coordinates
     schur = np.full(len(angles), form.inertia)
     levers = [np.full(len(angles), -1.0)]  # of each coordinate on the rotor: -1, then B / Jzz
@@ -315,7 +349,8 @@ def _inverse_mass_matrices(scene: Scene, angles: Array) -> Array:
 
 
 def quad_loads(scene: Scene, times: Array, states: Any) -> dict[str, Array]:
-    """Return the loads in quad precision, rounded at the end; states: (n, 2 × moving coordinates) angles, rates."""
+    """Return the loads in quad precision, rounded at the end; states: (n, 2 × moving coordinates)
+    angles, rates."""
     count = len(scene.moving_coordinates)
     states = states.astype(object)
     angles, rates = all_coordinates(scene, states[:, :count], states[:, count : 2 * count])
@@ -345,19 +380,25 @@ def _loads(
     moving, applied = scene.moving_coordinates, values_before(scene.load_segments, times)
     accelerations = np.zeros_like(angles)
     form, loads = rotor_form(scene, convert), load_values(list(applied), moving[1:])
-    of_moving = closed_form.accelerations(angles[:, moving].T, rates[:, moving].T, form, loads, sin, cos)
+    of_moving = closed_form.accelerations(
+        angles[:, moving].T, rates[:, moving].T, form, loads, sin, cos
+    )
     for column, values in zip(moving, of_moving, strict=True):
         accelerations[:, column] = values
     actuators = np.zeros_like(angles[:, 1:])
     for column in moving[1:]:
         stiffness, damping = scene.bearings[column - 1]
         torque, rest = applied[torque_place(column)], applied[rest_place(column)]
-        actuators[:, column - 1] = torque - stiffness * (angles[:, column] - rest) - damping * rates[:, column]
+        actuators[:, column - 1] = (
+            torque - stiffness * (angles[:, column] - rest) - damping * rates[:, column]
+        )
     gravity = scene.gravity
     if parts is not None:
         gravity, rates = parts.weight * gravity, parts.rates * rates
         accelerations = parts.accelerations * accelerations
-    roots, shaft_force, shaft_moment = _reactions(scene, angles, rates, accelerations, gravity, convert, sin, cos)
+    roots, shaft_force, shaft_moment = _reactions(
+        scene, angles, rates, accelerations, gravity, convert, sin, cos
+    )
     about_shaft = scene.hub_inertia * accelerations[:, 0] - applied[ROTOR_TORQUE]
     _add_about_shaft(shaft_moment, about_shaft, scene, convert)
     if scene.hub_mass:
@@ -385,7 +426,8 @@ def _reactions(
     sin: Function,
     cos: Function,
 ) -> tuple[list[tuple[Numbers, Numbers]], Numbers, Numbers]:
-    """Return force and moment at each root, and the sums of both about the apex in the base frame."""
+    """Return force and moment at each root, and the sums of both about the apex in the base
+    frame."""
     sin_q, cos_q = sin(angles[:, 0]), cos(angles[:, 0])
     radius = convert(Fraction(scene.hub_radius)) if scene.hub_radius else 0.0
     roots, in_base = [], []
@@ -400,7 +442,9 @@ def _reactions(
             root = np.array([0.0, 0.0, 1.0]) * radius
             moment = about_apex - np.cross(root, force)
         roots.append((force, moment))
-        in_base.append([_in_base_frame(vectors, azimuth, pitch, lean) for vectors in (force, about_apex)])
+        in_base.append(
+            [_in_base_frame(vectors, azimuth, pitch, lean) for vectors in (force, about_apex)]
+        )
     shaft_force, shaft_moment = (sum(vectors) for vectors in zip(*in_base, strict=True))
     return roots, shaft_force, shaft_moment
 
@@ -427,7 +471,9 @@ def root_load(
     spin, rate, spin_rate, rate_rate = turning
     if lean is None:
         omega = np.stack([spin * s, spin * c, rate], axis=1)
-        alpha = np.stack([spin_rate * s + spin * rate * c, spin_rate * c - spin * rate * s, rate_rate], axis=1)
+        alpha = np.stack(
+            [spin_rate * s + spin * rate * c, spin_rate * c - spin * rate * s, rate_rate], axis=1
+        )
         up = np.stack([-sin_phi * c, sin_phi * s, cos_phi], axis=1)
     else:
         # Components along the blade's y and z axes at zero pitch, which the cone turns.
@@ -447,14 +493,24 @@ def root_load(
 
 
 def _in_base_frame(
-    vectors: Numbers, azimuth: tuple[Numbers, Numbers], pitch: tuple[Numbers, Numbers], lean: Lean | None
+    vectors: Numbers,
+    azimuth: tuple[Numbers, Numbers],
+    pitch: tuple[Numbers, Numbers],
+    lean: Lean | None,
 ) -> Numbers:
-    """Return (n, 3) vectors of a blade's frame in the base frame: Rx(τ)·Ry(φ)·Rx(-β)·Rz(θ)·vector."""
+    """Return (n, 3) vectors of a blade's frame in the base frame:
+    Rx(τ)·Ry(φ)·Rx(-β)·Rz(θ)·vector."""
     (sin_phi, cos_phi), (s, c), (x, y, z) = azimuth, pitch, vectors.T
     across, along = x * c - y * s, x * s + y * c
     if lean:
-        along, z = along * lean.cos_cone + z * lean.sin_cone, z * lean.cos_cone - along * lean.sin_cone
+        along, z = (
+            along * lean.cos_cone + z * lean.sin_cone,
+            z * lean.cos_cone - along * lean.sin_cone,
+        )
     x, z = cos_phi * across + sin_phi * z, cos_phi * z - sin_phi * across
     if lean:
-        along, z = along * lean.cos_tilt - z * lean.sin_tilt, along * lean.sin_tilt + z * lean.cos_tilt
+        along, z = (
+            along * lean.cos_tilt - z * lean.sin_tilt,
+            along * lean.sin_tilt + z * lean.cos_tilt,
+        )
     return np.stack([x, along, z], axis=1)

@@ -1,7 +1,8 @@
 """How near a rotor is to pitches at which its mass matrix is singular.
 
-S = J_hub + Σ cos²β (a - b²/Jzz) is the rotor's inertia with every pitch free to give way, the Schur complement of
-`closed_form`: m (c² + d²) cos²β cos²θ for point masses, which vanishes where all pitches are ±π/2.
+S = J_hub + Σ cos²β (a - b²/Jzz) is the rotor's inertia with every pitch free to give way, the Schur
+complement of `closed_form`: m (c² + d²) cos²β cos²θ for point masses, which vanishes where all
+pitches are ±π/2.
 """
 
 from __future__ import annotations
@@ -14,10 +15,11 @@ from rotor_mbs.solution.trajectory import Array
 
 
 def rotor_inertia_shares(scene: Scene, angles: Array) -> Array:
-    """Return S as a share of the inertia that the rotor has with fixed pitches: (n,) for (n, 1 + blades) rad.
+    """Return S as a share of the inertia that the rotor has with fixed pitches: (n,) for (n, 1 +
+    blades) rad.
 
-    In exact arithmetic until the last step: of a point mass the first coefficient vanishes, whose rounding is no
-    inertia.
+    In exact arithmetic until the last step: of a point mass the first coefficient vanishes, whose
+    rounding is no inertia.
     """
     form = rotor_form(scene)
     remaining = np.full(len(angles), form.inertia)
@@ -32,9 +34,11 @@ def rotor_inertia_shares(scene: Scene, angles: Array) -> Array:
 
 
 def least_inertia_shares(scene: Scene, angles: Array) -> Array:
-    """Return the smallest share at each row and on the straight way to the next: (n,) for (n, 1 + blades) rad.
+    """Return the smallest share at each row and on the straight way to the next: (n,) for (n, 1 +
+    blades) rad.
 
-    On the way it is sought where a pitch passes ±π/2, unless a pitch moves by a right angle or more.
+    On the way it is sought where a pitch passes ±π/2, unless a pitch moves by a right angle or
+    more.
     """
     shares = rotor_inertia_shares(scene, angles)
     near = np.abs(np.diff(angles[:, 1:], axis=0)).max(axis=1, initial=0.0) < 0.5 * np.pi

@@ -1,4 +1,5 @@
-"""lagrange/taylor: the closed form as a symbolic system of heyoka, and its propagation over the samples."""
+"""lagrange/taylor: the closed form as a symbolic system of heyoka, and its propagation over the
+samples."""
 
 from __future__ import annotations
 
@@ -18,20 +19,29 @@ from rotor_mbs.models.lagrange import closed_form, hamilton, samples
 from rotor_mbs.models.lagrange.closed_form import LoadValues, load_values
 from rotor_mbs.models.lagrange.heyoka_adapter import Parameters, array_of, failure, heyoka
 from rotor_mbs.models.lagrange.ode_solvers import work_unit
-from rotor_mbs.models.lagrange.parameters import RotorForm, changing_loads, changing_rests, rotor_form
+from rotor_mbs.models.lagrange.parameters import (
+    RotorForm,
+    changing_loads,
+    changing_rests,
+    rotor_form,
+)
 from rotor_mbs.models.lagrange.samples import Advance, at_constant_rests, over_segments
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.scenario.time_table import Segment
 from rotor_mbs.solution.trajectory import Array, Integration, Trajectory, sample_times
 
-# Unrolled code is twice as fast as compact code, but its compile time grows with the number of blades.
+# Unrolled code is twice as fast as compact code, but its compile time grows with the number of
+# blades.
 _UNROLLED_BLADES = 4
 
 
-def build_system(scene: Scene, *, in_momenta: bool = False) -> tuple[list[tuple[Any, Any]], Parameters]:
-    """First-order equations [(symbol, right-hand side)] in heyoka's symbols, of angles, rates (or momenta), and the
-    work (in `work_unit`) where it is integrated; and their parameters, the last of which are offset and slope of each
-    of `changing_loads`. Raises MethodRefusal where heyoka is not installed."""
+def build_system(
+    scene: Scene, *, in_momenta: bool = False
+) -> tuple[list[tuple[Any, Any]], Parameters]:
+    """First-order equations [(symbol, right-hand side)] in heyoka's symbols, of angles, rates (or
+    momenta), and the work (in `work_unit`) where it is integrated; and their parameters, the last
+    of which are offset and slope of each of `changing_loads`. Raises MethodRefusal where heyoka is
+    not installed."""
     engine = heyoka()
     parameters = Parameters()
     form, loads, work_per_joule = equation_numbers(scene, parameters)
@@ -64,11 +74,15 @@ def equation_numbers(scene: Scene, parameters: Parameters) -> tuple[RotorForm, L
     """
     form = rotor_form(scene, parameters)
     parameters.structure.append(int(scene.has_tilt_or_cone))
-    # The engine's step control is relative to the largest variable. In J the work would be that by far, and set the
-    # accuracy of all others.
-    work_per_joule = parameters.own(1 / Fraction(work_unit(scene))) if scene.work_needs_path else 0.0
+    # The engine's step control is relative to the largest variable. In J the work would be that by
+    # far, and set the accuracy of all others.
+    work_per_joule = (
+        parameters.own(1 / Fraction(work_unit(scene))) if scene.work_needs_path else 0.0
+    )
     linear_loads, changing = scene.load_segments[0].linear_loads, changing_loads(scene)
-    values = [0.0 if i in changing else parameters(offset) for i, (offset, _) in enumerate(linear_loads)]
+    values = [
+        0.0 if i in changing else parameters(offset) for i, (offset, _) in enumerate(linear_loads)
+    ]
     for i in changing:
         offset, slope = linear_loads[i]
         values[i] = parameters.own(offset) + parameters.own(slope) * heyoka().time
@@ -82,8 +96,8 @@ _idle: dict[tuple[object, ...], list[Any]] = {}  # copies of it whose owners are
 def compiled(key: tuple[object, ...], make: Callable[[], Any], owner: object) -> Any:
     """Return compiled code that no other owner uses meanwhile, since it holds a state.
 
-    It is made once per process and structure. When its owner is gone, the next one gets it as it was left: state, time
-    and parameters are to be set.
+    It is made once per process and structure. When its owner is gone, the next one gets it as it
+    was left: state, time and parameters are to be set.
     """
     if key not in _compiled:
         _compiled[key], _idle[key] = make(), []
@@ -96,7 +110,8 @@ def compiled(key: tuple[object, ...], make: Callable[[], Any], owner: object) ->
 
 
 def set_parameters(integrator: Any, values: Any) -> None:
-    """Set the parameters that the equations of motion use; the ones after them belong to energies alone."""
+    """Set the parameters that the equations of motion use; the ones after them belong to energies
+    alone."""
     integrator.pars[:] = values[: len(integrator.pars)]
 
 
@@ -112,7 +127,8 @@ class Propagation:
     ----------
     integrator : heyoka's.
     times : (n,) s of the samples.
-    states : (rows, variables) of the last run, before the first row that is not finite; where variational, followed by
+    states : (rows, variables) of the last run, before the first row that is not finite; where
+        variational, followed by
         the state transition matrix row by row.
     """
 
@@ -146,7 +162,9 @@ class Propagation:
         equations, parameters = build_system(scene)
         self._changing = changing_loads(scene)
         structure = (*parameters.structure, len(equations), *self._changing)
-        values = [scene.initial_angles[i] for i in columns] + [scene.initial_rates[i] for i in columns]
+        values = [scene.initial_angles[i] for i in columns] + [
+            scene.initial_rates[i] for i in columns
+        ]
         values += [0.0] * (len(equations) - count)  # the work, where it is a variable
         start = array_of([Fraction(value) for value in values], quad=quad)
         # What the compiled code depends on.
@@ -156,7 +174,9 @@ class Propagation:
         if variational:
             equations, start = equations[:count], start[:count]
             equations = engine.var_ode_sys(equations, args=engine.var_args.vars, order=1)
-        self.integrator = compiled(key, lambda: engine.taylor_adaptive(equations, state=start, **options), self)
+        self.integrator = compiled(
+            key, lambda: engine.taylor_adaptive(equations, state=start, **options), self
+        )
         set_parameters(self.integrator, array_of(parameters.values, quad=quad))
         self._initial = np.concatenate([start, np.eye(count).ravel()]) if variational else start
         self._segments = scene.load_segments
@@ -167,14 +187,18 @@ class Propagation:
         """Integrate from the initial state to the end, or to the first failure."""
         self.integrator.time = self._initial.dtype.type(0)
         self.integrator.state[:] = self._initial
-        self.states, integration = over_segments(self.times, self._segments, self._initial, self._advance)
+        self.states, integration = over_segments(
+            self.times, self._segments, self._initial, self._advance
+        )
         return integration
 
     def set_segment(self, segment: Segment) -> None:
         """Set the loads to those of a segment."""
         if self._changing:
             numbers = [number for i in self._changing for number in segment.linear_loads[i]]
-            self.integrator.pars[-len(numbers) :] = array_of(numbers, quad=self._initial.dtype != np.float64)
+            self.integrator.pars[-len(numbers) :] = array_of(
+                numbers, quad=self._initial.dtype != np.float64
+            )
 
     def _advance(self, segment: Segment, _state: Array, times: Array) -> Advance:
         """Integrate over a segment from where the integrator is, the end of the segment before."""
@@ -184,13 +208,17 @@ class Propagation:
         end = [] if len(times) and times[-1] == segment.end else [segment.end]
         grid = np.concatenate([[segment.start], times, end]).astype(kind)
         with time_limit.samples_kept_at_limit():
-            outcome, _, _, steps, _, states = integrator.propagate_grid(grid, callback=time_limit.step_callback())
+            outcome, _, _, steps, _, states = integrator.propagate_grid(
+                grid, callback=time_limit.step_callback()
+            )
         message = time_limit.MESSAGE if time_limit.is_over() else failure(outcome)
         return Advance(states[1 : 1 + len(times)], integrator.state, steps, None, message)
 
     def observe(self) -> Trajectory:
         states = self.states.astype(float)
-        if self._scene.work_needs_path and states.shape[1] > 2 * len(self._scene.moving_coordinates):
+        if self._scene.work_needs_path and states.shape[1] > 2 * len(
+            self._scene.moving_coordinates
+        ):
             states[:, -1] *= work_unit(self._scene)
         return samples.trajectory(self._scene, self.times, states)
 

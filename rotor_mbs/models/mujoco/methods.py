@@ -1,4 +1,5 @@
-"""The methods of this package: one model with three of the engine's integrators. No import of MuJoCo."""
+"""The methods of this package: one model with three of the engine's integrators. No import of
+MuJoCo."""
 
 from __future__ import annotations
 
@@ -26,13 +27,15 @@ class Rk4Settings(Settings):
 
 @dataclass(frozen=True)
 class FirstOrderSettings(Settings):
-    """Semi-implicit Euler, dampers at the end of the step; `implicit` has Coriolis forces there, too."""
+    """Semi-implicit Euler, dampers at the end of the step; `implicit` has Coriolis forces there,
+    too."""
 
     step: float = step(5e-5)
 
 
 def _items(scene: Scene) -> list[BuiltItem]:
-    """Return the items of a scene. Raises MethodRefusal, with the way to get it, where MuJoCo is not installed."""
+    """Return the items of a scene. Raises MethodRefusal, with the way to get it, where MuJoCo is
+    not installed."""
     if not METHODS[0].is_installed:
         raise MethodRefusal(f"MuJoCo is not installed: {_HINT}")
     from rotor_mbs.models.mujoco import mjcf
@@ -41,7 +44,8 @@ def _items(scene: Scene) -> list[BuiltItem]:
 
 
 def _build(integrator: str, scene: Scene, settings: Rk4Settings | FirstOrderSettings) -> Solver:
-    """Build the model of a scene. Raises MethodRefusal as `_items`, and where MuJoCo does not take the model."""
+    """Build the model of a scene. Raises MethodRefusal as `_items`, and where MuJoCo does not take
+    the model."""
     _items(scene)
     from rotor_mbs.models.mujoco.solver import MujocoSolver
 
@@ -65,18 +69,24 @@ def _method(integrator: str, label: str, **facts: Any) -> Method:
 
 METHODS = (
     _method(
-        "rk4", "RK4", settings=Rk4Settings, order=4,
+        "rk4",
+        "RK4",
+        settings=Rk4Settings,
+        order=4,
         ladders=(step_ladder(10),),
         linearize=lazy("rotor_mbs.models.mujoco.solver:linearize"),
     ),
-    # First the new rates, with forces at the start of the step and dampers at its end; then angles with these rates.
-    # The ladders of these first-order methods begin where something is left of a motion. The engine's Euler has the
-    # same dampers, and gives the bits of implicitfast.
+    # First the new rates, with forces at the start of the step and dampers at its end; then angles
+    # with these rates. The ladders of these first-order methods begin where something is left of a
+    # motion. The engine's Euler has the same dampers, and gives the bits of implicitfast.
     *(
         _method(
-            integrator, label, settings=FirstOrderSettings, order=1,
+            integrator,
+            label,
+            settings=FirstOrderSettings,
+            order=1,
             ladders=(step_ladder(10, first=5),),
         )
         for integrator, label in (("implicitfast", "implicit fast"), ("implicit", "implicit"))
     ),
-)  # fmt: skip
+)

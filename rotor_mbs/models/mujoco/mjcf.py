@@ -1,19 +1,21 @@
 """The rotor as a model in MuJoCo's own format (MJCF), from raw scene data.
 
-World frame: z up. The hub's body is turned by the tilt of the shaft about x, and turns about its own y by the hinge
-"rotor"; blade i is a child of the hub, mounted at its phase about y and then its cone about -x, and turns about its own
-z by the hinge "pitch i". Hinge angles are the scene's angles, unwrapped. All origins are at the apex.
-A blade without inertia about its pitch axis has no hinge: it is welded to the hub at its initial pitch.
+World frame: z up. The hub's body is turned by the tilt of the shaft about x, and turns about its
+own y by the hinge "rotor"; blade i is a child of the hub, mounted at its phase about y and then its
+cone about -x, and turns about its own z by the hinge "pitch i". Hinge angles are the scene's
+angles, unwrapped. All origins are at the apex. A blade without inertia about its pitch axis has no
+hinge: it is welded to the hub at its initial pitch.
 
-Loads are actuators with the activation dynamics da/dt = u: the activation a is the torque in N m, the control u its
-slope in N m/s. So a torque that is linear in time enters every stage of a step at the stage's own time. A spring's rest
-angle is its `springref` where it is constant; where it changes, it is the activation (rad) of an actuator whose gain is
-the spring's stiffness.
+Loads are actuators with the activation dynamics da/dt = u: the activation a is the torque in N m,
+the control u its slope in N m/s. So a torque that is linear in time enters every stage of a step at
+the stage's own time. A spring's rest angle is its `springref` where it is constant; where it
+changes, it is the activation (rad) of an actuator whose gain is the spring's stiffness.
 
-MuJoCo compiles no moving body whose mass or one of whose principal moments is 1e-15 or less: in this text a point mass,
-and a hub without inertia, have `LEAST`. `solver.Engine` sets them to zero in the compiled model. A file that MuJoCo
-itself loads keeps them, an error of LEAST / J for a blade's moment J about its pitch axis: below round-off for the
-paper's blade (J = 110 kg m²), but 1e-5 for a toy of 1 g with J = 2.5e-10 kg m².
+MuJoCo compiles no moving body whose mass or one of whose principal moments is 1e-15 or less: in
+this text a point mass, and a hub without inertia, have `LEAST`. `solver.Engine` sets them to zero
+in the compiled model. A file that MuJoCo itself loads keeps them, an error of LEAST / J for a
+blade's moment J about its pitch axis: below round-off for the paper's blade (J = 110 kg m²), but
+1e-5 for a toy of 1 g with J = 2.5e-10 kg m².
 """
 
 from __future__ import annotations
@@ -94,7 +96,8 @@ def joint_name(coordinate: int) -> str:
 
 
 def model(scene: Scene, integrator: str, step: float) -> ET.Element:
-    """Return the MJCF element tree of a scene; integrator: a key of `INTEGRATORS`; step: time step in s."""
+    """Return the MJCF element tree of a scene; integrator: a key of `INTEGRATORS`; step: time step
+    in s."""
     root = ET.Element("mujoco", model=scene.name or "rotor")
     ET.SubElement(root, "compiler", angle="radian")
     option = ET.SubElement(
@@ -109,9 +112,13 @@ def model(scene: Scene, integrator: str, step: float) -> ET.Element:
     world = ET.SubElement(root, "worldbody")
     hub = ET.SubElement(world, "body", name="hub")
     if scene.shaft_tilt:
-        hub.set("quat", numbers(math.cos(0.5 * scene.shaft_tilt), math.sin(0.5 * scene.shaft_tilt), 0.0, 0.0))
+        hub.set(
+            "quat",
+            numbers(math.cos(0.5 * scene.shaft_tilt), math.sin(0.5 * scene.shaft_tilt), 0.0, 0.0),
+        )
     _joint(hub, 0, "0 1 0", 0.0, scene.shaft_damping)
-    half = 0.5 * scene.hub_inertia  # a thin disc about the shaft: the other two moments are never felt
+    # a thin disc about the shaft: the other two moments are never felt
+    half = 0.5 * scene.hub_inertia
     # Neither is its mass, but by the shaft's bearing.
     hub_mass = scene.hub_mass if scene.wants("loads") else 0.0
     _inertial(hub, hub_mass, (0.0, 0.0, 0.0), (half, scene.hub_inertia, half, 0.0, 0.0, 0.0))
@@ -155,7 +162,8 @@ def _blade(hub: ET.Element, scene: Scene, number: int) -> None:
     """Add a blade (1, 2, ...) to the hub: body, hinge, inertia and tip."""
     blade, phase = scene.blades[number - 1], scene.phases[number - 1]
     pitch = 0.0 if blade.has_pitch_inertia else scene.initial_angles[number]
-    # The quaternion of Ry(phase) Rz(pitch), scalar part first; with a cone Rx(-cone) is between the two.
+    # The quaternion of Ry(phase) Rz(pitch), scalar part first; with a cone Rx(-cone) is between the
+    # two.
     c, s = math.cos(0.5 * phase), math.sin(0.5 * phase)
     cp, sp = math.cos(0.5 * pitch), math.sin(0.5 * pitch)
     mounting = c * cp, s * sp, s * cp, c * sp
@@ -166,13 +174,27 @@ def _blade(hub: ET.Element, scene: Scene, number: int) -> None:
     body = ET.SubElement(hub, "body", name=f"blade {number}", quat=numbers(*mounting))
     if blade.has_pitch_inertia:
         stiffness, damping = scene.bearings[number - 1]
-        _joint(body, number, "0 0 1", stiffness, damping, constant_value(scene.pitch_loads[number - 1][1]))
+        _joint(
+            body,
+            number,
+            "0 0 1",
+            stiffness,
+            damping,
+            constant_value(scene.pitch_loads[number - 1][1]),
+        )
     _inertial(body, blade.mass, blade.centre_of_mass, blade.inertia)
     if scene.wants("tip"):
         ET.SubElement(body, "site", name=f"tip {number}", pos=numbers(*blade.tip))
 
 
-def _joint(body: ET.Element, coordinate: int, axis: str, stiffness: float, damping: float, rest: float = 0.0) -> None:
+def _joint(
+    body: ET.Element,
+    coordinate: int,
+    axis: str,
+    stiffness: float,
+    damping: float,
+    rest: float = 0.0,
+) -> None:
     """Add a hinge about an axis to a body: N m/rad, N m s/rad, and the rest angle in rad."""
     joint = ET.SubElement(body, "joint", name=joint_name(coordinate), type="hinge", axis=axis)
     if stiffness:
@@ -183,7 +205,9 @@ def _joint(body: ET.Element, coordinate: int, axis: str, stiffness: float, dampi
         joint.set("damping", numbers(damping))
 
 
-def _inertial(body: ET.Element, mass: float, centre: Iterable[float], inertia: Sequence[float]) -> None:
+def _inertial(
+    body: ET.Element, mass: float, centre: Iterable[float], inertia: Sequence[float]
+) -> None:
     """Add mass (kg) and principal moments to a body.
 
     Parameters
@@ -204,7 +228,8 @@ def _inertial(body: ET.Element, mass: float, centre: Iterable[float], inertia: S
 
 
 def _possible(moments: list[float]) -> list[float]:
-    """Return principal moments that MuJoCo takes: none below `LEAST`, none above the sum of the others by rounding."""
+    """Return principal moments that MuJoCo takes: none below `LEAST`, none above the sum of the
+    others by rounding."""
     least = [max(moment, LEAST) for moment in moments]
     total = sum(least)
     return [min(moment, total - moment) for moment in least]
@@ -218,8 +243,9 @@ def numbers(*values: float) -> str:
 def mjcf_file(scene: Scene) -> str:
     """Return the MJCF text of a scene for plain MuJoCo.
 
-    Its step is a whole part of the sample interval. The keyframe "start" has the initial state and the loads at t = 0;
-    a numeric "segment i" has the time, torques or rest angles, and slopes of each segment; capsules are to look at.
+    Its step is a whole part of the sample interval. The keyframe "start" has the initial state and
+    the loads at t = 0; a numeric "segment i" has the time, torques or rest angles, and slopes of
+    each segment; capsules are to look at.
     """
     spacing = scene.duration / (scene.samples - 1)
     steps, _ = steps_and_rows(spacing, _FILE_STEP, rows_between=False)
@@ -231,9 +257,15 @@ def mjcf_file(scene: Scene) -> str:
     for number, blade in enumerate(scene.blades, start=1):
         if any(blade.tip):
             ET.SubElement(
-                bodies[f"blade {number}"], "geom", type="capsule", fromto=numbers(0.0, 0.0, 0.0, *blade.tip),
-                size=numbers(0.01 * reach), mass="0", contype="0", conaffinity="0",
-            )  # fmt: skip
+                bodies[f"blade {number}"],
+                "geom",
+                type="capsule",
+                fromto=numbers(0.0, 0.0, 0.0, *blade.tip),
+                size=numbers(0.01 * reach),
+                mass="0",
+                contype="0",
+                conaffinity="0",
+            )
     moving = scene.moving_coordinates
     key = ET.Element("key", name="start")
     key.set("qpos", numbers(*(scene.initial_angles[i] for i in moving)))
@@ -253,19 +285,40 @@ def mjcf_file(scene: Scene) -> str:
 
 
 def _header(scene: Scene, steps: int, has_loads: bool) -> str:
-    """Return the comment at the head of a file: how to run it, with so many steps from sample to sample."""
+    """Return the comment at the head of a file: how to run it, with so many steps from sample to
+    sample."""
     lines = [
         scene.title or scene.name,
-        f"SI units, rad. {scene.samples} samples over {scene.duration!r} s, {steps} steps from one to the next.",
-        "Start from the keyframe: mj_resetDataKeyframe(model, data, 0); then mj_step(model, data, nstep=...).",
+        (
+            f"SI units, rad. {scene.samples} samples over {scene.duration!r} s, {steps} steps from "
+            "one to the next."
+        ),
+        (
+            "Start from the keyframe: mj_resetDataKeyframe(model, data, 0); then "
+            "mj_step(model, data, "
+            "nstep=...)."
+        ),
     ]
     if has_loads:
         lines += [
-            "An actuator's activation is its torque in N m, its control the slope of the torque in N m/s. An actuator",
-            '"rest ..." has the rest angle of a spring in rad instead, and the stiffness as its gain.',
-            "At the start of each segment (custom numerics: time, values, slopes) set data.act and data.ctrl to them.",
+            (
+                "An actuator's activation is its torque in N m, its control the slope of "
+                "the torque "
+                "in N m/s. An actuator"
+            ),
+            (
+                '"rest ..." has the rest angle of a spring in rad instead, and the stiffness as '
+                "its gain."
+            ),
+            (
+                "At the start of each segment (custom numerics: time, values, slopes) set data.act "
+                "and data.ctrl to them."
+            ),
             "Where a segment starts between two steps, shorten model.opt.timestep to stop there.",
         ]
-    lines.append("Point masses have the least inertia that MuJoCo compiles, 2e-15 kg m^2 about the centre of mass.")
+    lines.append(
+        "Point masses have the least inertia that MuJoCo compiles, 2e-15 kg m^2 about "
+        "the centre of mass."
+    )
     # Two hyphens end a comment.
     return "\n  " + "\n  ".join(line.replace("--", "- -") for line in lines) + "\n"

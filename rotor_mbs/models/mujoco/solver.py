@@ -1,4 +1,5 @@
-"""The rotor in MuJoCo: runs from sample to sample, energies and tips of its bodies, and the model linearized.
+"""The rotor in MuJoCo: runs from sample to sample, energies and tips of its bodies, and the model
+linearized.
 
 The only module that imports MuJoCo.
 """
@@ -16,7 +17,14 @@ from rotor_mbs.errors import MethodRefusal
 from rotor_mbs.methods import time_limit
 from rotor_mbs.models.mujoco import mjcf
 from rotor_mbs.scenario.scene import Scene
-from rotor_mbs.scenario.time_table import Interval, Segment, intervals, is_constant, steps_and_rows, values_at
+from rotor_mbs.scenario.time_table import (
+    Interval,
+    Segment,
+    intervals,
+    is_constant,
+    steps_and_rows,
+    values_at,
+)
 from rotor_mbs.solution.quantities import named_loads
 from rotor_mbs.solution.trajectory import (
     Array,
@@ -30,7 +38,8 @@ from rotor_mbs.solution.trajectory import (
     scene_at,
 )
 
-# The engine's types are compiled. Without this, it writes its warnings to a file in the working folder.
+# The engine's types are compiled. Without this, it writes its warnings to a file in the working
+# folder.
 _engine: Any = mujoco
 _engine.set_mju_user_warning(lambda _message: None)
 
@@ -41,7 +50,8 @@ _BAD_STATE_WARNINGS = (
     _engine.mjtWarning.mjWARN_BADQACC,
 )
 
-# Steps in one call, a few hundredths of a second: the engine looks for no signal and no time limit in between.
+# Steps in one call, a few hundredths of a second: the engine looks for no signal and no time limit
+# in between.
 _PORTION = 10_000
 
 
@@ -69,7 +79,8 @@ class Poses:
 
 
 class Engine:
-    """The compiled model of a scene, and its state; masses and moments of `mjcf.LEAST` are set to zero."""
+    """The compiled model of a scene, and its state; masses and moments of `mjcf.LEAST` are set to
+    zero."""
 
     def __init__(self, scene: Scene, integrator: str, step: float) -> None:
         """Compile the model; arguments as of `mjcf.model`.
@@ -80,9 +91,13 @@ class Engine:
             With MuJoCo's reason, where it does not take the model.
         """
         try:
-            self._model = _engine.MjModel.from_xml_string(mjcf.text(mjcf.model(scene, integrator, step)))
+            self._model = _engine.MjModel.from_xml_string(
+                mjcf.text(mjcf.model(scene, integrator, step))
+            )
         except ValueError as exc:
-            raise MethodRefusal(f"MuJoCo rejected this model: {' '.join(str(exc).split())[:300]}") from exc
+            raise MethodRefusal(
+                f"MuJoCo rejected this model: {' '.join(str(exc).split())[:300]}"
+            ) from exc
         for values in (self._model.body_mass, self._model.body_inertia):
             values[values <= mjcf.LEAST] = 0.0
         self._data = _engine.MjData(self._model)
@@ -90,11 +105,14 @@ class Engine:
         self.moments: Array = np.array(self._model.body_inertia[1:])
 
     def start(self, angles: Sequence[float], rates: Sequence[float]) -> None:
-        """Set the initial state, (coordinates,) rad and rad/s; nothing of an earlier run is left."""
+        """Set the initial state, (coordinates,) rad and rad/s; nothing of an earlier run is
+        left."""
         _engine.mj_resetData(self._model, self._data)
         self._data.qpos[:], self._data.qvel[:] = angles, rates
 
-    def advance(self, step: float, steps: int, loads: Sequence[float], slopes: Sequence[float]) -> tuple[int, str]:
+    def advance(
+        self, step: float, steps: int, loads: Sequence[float], slopes: Sequence[float]
+    ) -> tuple[int, str]:
         """Take equal steps.
 
         Parameters
@@ -112,7 +130,8 @@ class Engine:
         """
         model, data = self._model, self._data
         model.opt.timestep = step
-        # The engine integrates activations with the state, so that a load is right at every stage of a step.
+        # The engine integrates activations with the state, so that a load is right at every stage
+        # of a step.
         if loads:
             data.act[:], data.ctrl[:] = loads, slopes
         taken = 0
@@ -125,7 +144,8 @@ class Engine:
             if not (np.isfinite(data.qpos).all() and np.isfinite(data.qvel).all()):
                 for warning in _BAD_STATE_WARNINGS:
                     if data.warning[warning].number:
-                        return taken, f"MuJoCo: {_engine.mju_warningText(warning, data.warning[warning].lastinfo)}"
+                        last = data.warning[warning].lastinfo
+                        return taken, f"MuJoCo: {_engine.mju_warningText(warning, last)}"
                 return taken, "MuJoCo: the state is not finite"
         return taken, ""
 
@@ -135,7 +155,8 @@ class Engine:
         return self._data.qpos, self._data.qvel
 
     def poses(self, angles: Array, rates: Array, loads: Array) -> Poses:
-        """Return bodies and sites at given states, (n, coordinates) rad and rad/s, (n, actuators) N m or rad."""
+        """Return bodies and sites at given states, (n, coordinates) rad and rad/s, (n, actuators) N
+        m or rad."""
         rows = [self._pose(*state) for state in zip(angles, rates, loads, strict=True)]
         fields = [np.array(values) for values in zip(*rows, strict=True)]
         return Poses(*fields)
@@ -160,7 +181,8 @@ class Engine:
         return centres, velocities, spins, sites, accelerations, frames, wrench
 
 
-# rad, rad/s: steps of the difference quotients of `linearize`, whose error is a power series of the step's square.
+# rad, rad/s: steps of the difference quotients of `linearize`, whose error is a power series of the
+# step's square.
 _STEPS = (1e-3, 2e-3, 4e-3, 8e-3)
 
 # Evaluations of the equations of motion in a step.
@@ -189,7 +211,8 @@ class MujocoSolver:
     """The model of a scene under one of MuJoCo's integrators; see `methods.base.Solver`."""
 
     def __init__(self, scene: Scene, integrator: str, step: float) -> None:
-        """Build the model; integrator: a key of `mjcf.INTEGRATORS`; step: s, the largest. Raises as `Engine`."""
+        """Build the model; integrator: a key of `mjcf.INTEGRATORS`; step: s, the largest. Raises as
+        `Engine`."""
         self._scene, self._step, self._stages = scene, step, _STAGES[integrator]
         self._moving = scene.moving_coordinates
         self._loads = mjcf.loads_of(scene)
@@ -202,7 +225,9 @@ class MujocoSolver:
         """Integrate from the initial state to the end, or to the first failure."""
         self._rows = []
         initial_angles, initial_rates = self._scene.initial_angles, self._scene.initial_rates
-        self.engine.start([initial_angles[i] for i in self._moving], [initial_rates[i] for i in self._moving])
+        self.engine.start(
+            [initial_angles[i] for i in self._moving], [initial_rates[i] for i in self._moving]
+        )
         self._keep(0.0, self._intervals[0].segment, is_sample=True)
         steps, message = 0, ""
         with time_limit.samples_kept_at_limit():
@@ -214,7 +239,9 @@ class MujocoSolver:
                 if message:
                     break
         out_of_time = message == time_limit.MESSAGE
-        return Integration(not message, message, self._rows[-1].time, steps, steps * self._stages, out_of_time)
+        return Integration(
+            not message, message, self._rows[-1].time, steps, steps * self._stages, out_of_time
+        )
 
     def _advance(self, interval: Interval) -> tuple[int, str]:
         """Integrate over one interval; return the steps taken, and why it ended early or ""."""
@@ -244,7 +271,10 @@ class MujocoSolver:
     def observe(self) -> Trajectory:
         """Return the samples of the last integration."""
         scene, rows = self._scene, self._rows
-        angles, rates = np.array([row.angles for row in rows]), np.array([row.rates for row in rows])
+        angles, rates = (
+            np.array([row.angles for row in rows]),
+            np.array([row.rates for row in rows]),
+        )
         at = [i for i, row in enumerate(rows) if row.is_sample]
         fields: dict[str, Array] = {}
         fields["angles"], fields["rates"] = all_coordinates(scene, angles[at], rates[at])
@@ -258,7 +288,8 @@ class MujocoSolver:
             if scene.wants("energy"):
                 masses, moments = self.engine.masses, self.engine.moments
                 twice = masses[:, None] * poses.velocity**2 + moments * poses.spin**2
-                weights = scene.gravity * (poses.centre[:, :, 2] @ masses)  # zero at the height of the apex
+                # zero at the height of the apex
+                weights = scene.gravity * (poses.centre[:, :, 2] @ masses)
                 springs, of_rests = _springs(scene, fields["angles"])
                 work = self._work(angles, rates, poses.acceleration, values)
                 fields["kinetic_energy"] = 0.5 * twice.sum(axis=(1, 2))[at]
@@ -272,7 +303,8 @@ class MujocoSolver:
     def _root_loads(self, poses: Poses, values: Array) -> dict[str, Array]:
         """Return the loads at roots and shaft by quantity: what each body's parent does to it.
 
-        The moment of an actuator is the part about the pitch axis. `values`: (rows, actuators) activations.
+        The moment of an actuator is the part about the pitch axis. `values`: (rows, actuators)
+        activations.
         """
         moment, force = poses.wrench[:, :, :3], poses.wrench[:, :, 3:]
         # In the frame of each body; the first is the hub.
@@ -284,18 +316,22 @@ class MujocoSolver:
         if self._scene.has_torque:
             torque = values[:, 0]  # the first of `mjcf.loads_of`
             if self._scene.shaft_tilt:
-                shaft_moment -= torque[:, None] * poses.frame[:, 0, :, 1]  # along the hub's own y axis
+                # along the hub's own y axis
+                shaft_moment -= torque[:, None] * poses.frame[:, 0, :, 1]
             else:
                 shaft_moment[:, 1] -= torque
         has_hinge = np.isin(np.arange(1, 1 + len(self._scene.blades)), self._moving)
         actuators = np.where(has_hinge, root_moments[:, :, 2].T, 0.0)
-        return named_loads(zip(root_forces, root_moments, strict=True), force[:, 0], shaft_moment, actuators)
+        return named_loads(
+            zip(root_forces, root_moments, strict=True), force[:, 0], shaft_moment, actuators
+        )
 
     def _work(self, angles: Array, rates: Array, accelerations: Array, values: Array) -> Array:
         """Compute the work of the actuators less what the dampers took, (rows,) J.
 
-        Of constant loads without dampers it is torque times angle. Else the power P is integrated from row to row by
-        ∫ P dt ≈ h (P₀ + P₁)/2 + h² (P₀' - P₁')/12, of order 4 like the best integrator here.
+        Of constant loads without dampers it is torque times angle. Else the power P is integrated
+        from row to row by ∫ P dt ≈ h (P₀ + P₁)/2 + h² (P₀' - P₁')/12, of order 4 like the best
+        integrator here.
 
         Parameters
         ----------
@@ -351,7 +387,9 @@ def _springs(scene: Scene, angles: Array) -> tuple[Array, Array]:
     return energy, work
 
 
-def linearize(scene: Scene, angles: Sequence[float] | Array, speed: float, torque: float) -> Linearization:
+def linearize(
+    scene: Scene, angles: Sequence[float] | Array, speed: float, torque: float
+) -> Linearization:
     """Linearize the model by difference quotients of the engine's accelerations.
 
     Parameters

@@ -1,9 +1,10 @@
-"""The paper's own way from its matrices to the equations of motion, (24)-(38), for any number of blades, with each of
-the errata left in or corrected. E3 stands in (53)-(55) alone: (30), for one blade, is printed with the square of the
-pitch rate. The coefficient of that term is zero once E2 is corrected.
+"""The paper's own way from its matrices to the equations of motion, (24)-(38), for any number of
+blades, with each of the errata left in or corrected. E3 stands in (53)-(55) alone: (30), for one
+blade, is printed with the square of the pitch rate. The coefficient of that term is zero once E2 is
+corrected.
 
-First the transformation matrix (3) and its derivatives as printed, from sines and cosines of q2, q3 (numbers, arrays or
-symbols) and the lengths c, d; the constants d1, d2 of (2), (3) are zero.
+First the transformation matrix (3) and its derivatives as printed, from sines and cosines of q2, q3
+(numbers, arrays or symbols) and the lengths c, d; the constants d1, d2 of (2), (3) are zero.
 """
 
 from __future__ import annotations
@@ -19,8 +20,9 @@ LAST_ROW_OF_DERIVATIVE = (0, 0, 0, 0)
 
 @dataclass(frozen=True, slots=True)
 class Errata:
-    """Which faults are in: e1, (8) row 2 column 4 is c c3 (and (17) its derivative), where y does not depend on q2; e2,
-    (19) row 1 column 4 has s2 in place of c2; e3, the last terms of (53)-(55) have the pitch rate, not its square."""
+    """Which faults are in: e1, (8) row 2 column 4 is c c3 (and (17) its derivative), where y does
+    not depend on q2; e2, (19) row 1 column 4 has s2 in place of c2; e3, the last terms of (53)-(55)
+    have the pitch rate, not its square."""
 
     e1: bool = True
     e2: bool = True
@@ -32,7 +34,8 @@ CORRECTED = Errata(e1=False, e2=False, e3=False)
 
 
 def a3(s2: Any, c2: Any, s3: Any, c3: Any, c: Any, d: Any) -> Matrix:
-    """Return (3), base from frame 3, whose origin is the blade's mass point: Ry(q2) Rz(q3), the origin at (c, 0, d)."""
+    """Return (3), base from frame 3, whose origin is the blade's mass point: Ry(q2) Rz(q3), the
+    origin at (c, 0, d)."""
     return (
         (c2 * c3, -c2 * s3, s2, c * c2 * c3 + d * s2),
         (s3, c3, 0, c * s3),
@@ -118,7 +121,8 @@ class BladeTerms(NamedTuple):
 
 
 def trace(u: Matrix, m: float, v: Matrix) -> float:
-    """Return the trace of U J3 Vᵀ in (24) and (26); J3 of (20) is that of a point mass m (kg) in frame 3's origin."""
+    """Return the trace of U J3 Vᵀ in (24) and (26); J3 of (20) is that of a point mass m (kg) in
+    frame 3's origin."""
     u0, u1, u2, _ = u  # the last row of a derivative is zero
     v0, v1, v2, _ = v
     total: float = m * (u0[3] * v0[3] + u1[3] * v1[3] + u2[3] * v2[3])
@@ -155,16 +159,24 @@ def blade_terms(
         h_3_22=trace(by_22, m, by_3),
         h_3_23=trace(by_23, m, by_3) + trace(by_32, m, by_3),
         h_3_33=trace(by_33, m, by_3),
-        gravity_2=m * g * by_2[2][3],  # (31): gravity (0, 0, -g, 0), the mass in the origin of frame 3
+        # (31): gravity (0, 0, -g, 0), the mass in the origin of frame 3
+        gravity_2=m * g * by_2[2][3],
         gravity_3=m * g * by_3[2][3],
     )
 
 
 class DerivedRotor:
-    """Blades alike, each a point mass m (kg) at (c, 0, d) (m), at the given phases (rad); gravity g (m/s²)."""
+    """Blades alike, each a point mass m (kg) at (c, 0, d) (m), at the given phases (rad); gravity g
+    (m/s²)."""
 
     def __init__(
-        self, m: float, c: float, d: float, g: float, phases: Sequence[float], errata: Errata = AS_PRINTED
+        self,
+        m: float,
+        c: float,
+        d: float,
+        g: float,
+        phases: Sequence[float],
+        errata: Errata = AS_PRINTED,
     ) -> None:
         self._constants = m, c, d, g, errata
         self._phases = tuple(phases)
@@ -177,18 +189,33 @@ class DerivedRotor:
             for phase, pitch in zip(self._phases, angles[1:], strict=True)
         ]
 
-    def forces(self, blades: Sequence[BladeTerms], rates: Sequence[float]) -> tuple[float, list[float]]:
-        """Return H + C of the rotor's row and of every pitch row, N m; rates (1 + blades,) rad/s."""
+    def forces(
+        self, blades: Sequence[BladeTerms], rates: Sequence[float]
+    ) -> tuple[float, list[float]]:
+        """Return H + C of the rotor's row and of every pitch row, N m; rates (1 + blades,)
+        rad/s."""
         v2 = rates[0]
         rotor = 0.0
         pitches = []
         for terms, v3 in zip(blades, rates[1:], strict=True):
-            rotor += terms.h_2_22 * v2 * v2 + terms.h_2_23 * v2 * v3 + terms.h_2_33 * v3 * v3 + terms.gravity_2
+            rotor += (
+                terms.h_2_22 * v2 * v2
+                + terms.h_2_23 * v2 * v3
+                + terms.h_2_33 * v3 * v3
+                + terms.gravity_2
+            )
             last = v3 if self._first_power else v3 * v3
-            pitches.append(terms.h_3_22 * v2 * v2 + terms.h_3_23 * v2 * v3 + terms.h_3_33 * last + terms.gravity_3)
+            pitches.append(
+                terms.h_3_22 * v2 * v2
+                + terms.h_3_23 * v2 * v3
+                + terms.h_3_33 * last
+                + terms.gravity_3
+            )
         return rotor, pitches
 
-    def accelerations(self, torques: Sequence[float], angles: Sequence[float], rates: Sequence[float]) -> list[float]:
+    def accelerations(
+        self, torques: Sequence[float], angles: Sequence[float], rates: Sequence[float]
+    ) -> list[float]:
         """Solve τ = D q̈ + H + C for q̈ (rad/s²), the pitches eliminated one by one.
 
         Parameters
@@ -205,4 +232,10 @@ class DerivedRotor:
             inertia += terms.d_22 - ratio * terms.d_23
             moment += ratio * force
         a2 = moment / inertia
-        return [a2, *((-f - terms.d_23 * a2) / terms.d_33 for terms, f in zip(blades, pitches, strict=True))]
+        return [
+            a2,
+            *(
+                (-f - terms.d_23 * a2) / terms.d_33
+                for terms, f in zip(blades, pitches, strict=True)
+            ),
+        ]

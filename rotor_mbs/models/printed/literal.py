@@ -1,17 +1,19 @@
-"""The paper's equations of motion as printed: (33) with (25), (29), (30), (32), one blade; (39)-(56), three blades.
+"""The paper's equations of motion as printed: (33) with (25), (29), (30), (32), one blade;
+(39)-(56), three blades.
 
-Nothing is corrected here: E1 and E2 are in the coefficients, E3 in the last terms of (53)-(55). Every formula is a
-function of the symbols it is printed with, so that its numbers and its text have one source. It is
-run in the order of the print, with one exception: the factor of the first row of (56) is multiplied in, see
-`rotor_gravity`.
+Nothing is corrected here: E1 and E2 are in the coefficients, E3 in the last terms of (53)-(55).
+Every formula is a function of the symbols it is printed with, so that its numbers and its text have
+one source. It is run in the order of the print, with one exception: the factor of the first row of
+(56) is multiplied in, see `rotor_gravity`.
 
 s2, c2 .. s5, c5   sines and cosines of q2 (rotor), q3, q4, q5 (pitch of blade 1, 2, 3)
-w22, w23, w33, ..  products of rates: w23 = q̇2 q̇3, w33 = q̇3²; w3 = q̇3 to the first power, printed in (53)-(55)
-m, c, d, g         mass (kg) and place (c, 0, d) (m) of the point mass; gravity (m/s²) along -z
-root3              the square root of 3
+w22, w23, w33, ..  products of rates: w23 = q̇2 q̇3, w33 = q̇3²; w3 = q̇3 to the first power,
+printed in (53)-(55) m, c, d, g         mass (kg) and place (c, 0, d) (m) of the point mass; gravity
+(m/s²) along -z root3              the square root of 3
 
-Where the machine reading of the print is damaged, the undamaged equation it follows from tells what was printed:
-(54), (55) are (30) at q2 + 2π/3 and q2 + 4π/3 by (35), (36); the pitch rows of (56) are (32) at the same angles.
+Where the machine reading of the print is damaged, the undamaged equation it follows from tells what
+was printed: (54), (55) are (30) at q2 + 2π/3 and q2 + 4π/3 by (35), (36); the pitch rows of (56)
+are (32) at the same angles.
 """
 
 from __future__ import annotations
@@ -43,7 +45,11 @@ def h2(m: Any, c: Any, d: Any, s2: Any, c2: Any, s3: Any, c3: Any, w23: Any, w33
 
 def h3(m: Any, c: Any, s2: Any, c2: Any, s3: Any, c3: Any, w22: Any, w23: Any, w33: Any) -> Any:
     """Return (30), N m: with the square of q̇3, unlike (53)."""
-    return c**2 * m * c3 * s3 * w22 - c**2 * m * c3 * s3 * w23 + c**2 * m * c3 * s3 * (s2 * c2 - c2**2) * w33
+    return (
+        c**2 * m * c3 * s3 * w22
+        - c**2 * m * c3 * s3 * w23
+        + c**2 * m * c3 * s3 * (s2 * c2 - c2**2) * w33
+    )
 
 
 def gravity_one(m: Any, c: Any, d: Any, g: Any, s2: Any, c2: Any, s3: Any, c3: Any) -> Row:
@@ -90,17 +96,31 @@ def h_1(
     return (
         -3 * c**2 * m * (s3 * c3 * w23 + s4 * c4 * w24 + s5 * c5 * w25)
         + c * m * c3 * (c * c3 * (s2**2 - s2 * c2) - d * (s2**2 + s2 * c2) - c * s3) * w33
-        + c * m * c4 * (
-            c * c4 * ((1 - root3) / 4 * s2**2 + (2 - 2 * root3) / 4 * s2 * c2 + (3 + root3) / 4 * c2**2)
-            - d * ((1 + root3) / 4 * s2**2 - (2 + 2 * root3) / 4 * s2 * c2 + (3 - root3) / 4 * c2**2)
+        + c
+        * m
+        * c4
+        * (
+            c
+            * c4
+            * ((1 - root3) / 4 * s2**2 + (2 - 2 * root3) / 4 * s2 * c2 + (3 + root3) / 4 * c2**2)
+            - d
+            * ((1 + root3) / 4 * s2**2 - (2 + 2 * root3) / 4 * s2 * c2 + (3 - root3) / 4 * c2**2)
             - c * s4
-        ) * w44
-        + c * m * c5 * (
-            c * c5 * ((1 + root3) / 4 * s2**2 + (2 + 2 * root3) / 4 * s2 * c2 + (3 - root3) / 4 * c2**2)
-            - d * ((1 - root3) / 4 * s2**2 - (2 - 2 * root3) / 4 * s2 * c2 + (3 + root3) / 4 * c2**2)
+        )
+        * w44
+        + c
+        * m
+        * c5
+        * (
+            c
+            * c5
+            * ((1 + root3) / 4 * s2**2 + (2 + 2 * root3) / 4 * s2 * c2 + (3 - root3) / 4 * c2**2)
+            - d
+            * ((1 - root3) / 4 * s2**2 - (2 - 2 * root3) / 4 * s2 * c2 + (3 + root3) / 4 * c2**2)
             - c * s5
-        ) * w55
-    )  # fmt: skip
+        )
+        * w55
+    )
 
 
 def h_2(m: Any, c: Any, s2: Any, c2: Any, s3: Any, c3: Any, w22: Any, w23: Any, w3: Any) -> Any:
@@ -108,13 +128,35 @@ def h_2(m: Any, c: Any, s2: Any, c2: Any, s3: Any, c3: Any, w22: Any, w23: Any, 
     return c**2 * m * s3 * c3 * (w22 - w23 + (s2 * c2 - c2**2) * w3)
 
 
-def h_3(m: Any, c: Any, s2: Any, c2: Any, s4: Any, c4: Any, w22: Any, w24: Any, w4: Any, root3: Any = ROOT3) -> Any:
+def h_3(
+    m: Any,
+    c: Any,
+    s2: Any,
+    c2: Any,
+    s4: Any,
+    c4: Any,
+    w22: Any,
+    w24: Any,
+    w4: Any,
+    root3: Any = ROOT3,
+) -> Any:
     """Return (54), N m; q̇4 to the first power in the last term (E3)."""
     last = (-3 + root3) / 4 * s2**2 - (2 + 2 * root3) / 4 * s2 * c2 - (1 + root3) / 4 * c2**2
     return c**2 * m * s4 * c4 * (w22 - w24 + last * w4)
 
 
-def h_4(m: Any, c: Any, s2: Any, c2: Any, s5: Any, c5: Any, w22: Any, w25: Any, w5: Any, root3: Any = ROOT3) -> Any:
+def h_4(
+    m: Any,
+    c: Any,
+    s2: Any,
+    c2: Any,
+    s5: Any,
+    c5: Any,
+    w22: Any,
+    w25: Any,
+    w5: Any,
+    root3: Any = ROOT3,
+) -> Any:
     """Return (55), N m; q̇5 to the first power in the last term (E3)."""
     last = (-3 - root3) / 4 * s2**2 - (2 - 2 * root3) / 4 * s2 * c2 - (1 - root3) / 4 * c2**2
     return c**2 * m * s5 * c5 * (w22 - w25 + last * w5)
@@ -124,7 +166,8 @@ def gravity_three(
     m: Any, c: Any, g: Any, s2: Any, c2: Any, s3: Any, c3: Any, s4: Any, c4: Any, s5: Any, c5: Any,
     root3: Any = ROOT3,
 ) -> Row:  # fmt: skip
-    """Return (56), rows of q2, q3, q4, q5; N m. The distance d has cancelled out of the first row."""
+    """Return (56), rows of q2, q3, q4, q5; N m. The distance d has cancelled out of the first
+    row."""
     return (
         c * m * g * (-c2 * c3 + (c2 / 2 + root3 / 2 * s2) * c4 + (c2 / 2 - root3 / 2 * s2) * c5),
         c * m * g * s2 * s3,
@@ -133,18 +176,23 @@ def gravity_three(
     )
 
 
-def rotor_gravity(m: Any, c: Any, g: Any, s2: Any, c2: Any, c3: Any, c4: Any, c5: Any, root3: Any = ROOT3) -> Any:
-    """Return the first row of (56) as it is run, N m: its factor c m g multiplied into the three terms.
+def rotor_gravity(
+    m: Any, c: Any, g: Any, s2: Any, c2: Any, c3: Any, c4: Any, c5: Any, root3: Any = ROOT3
+) -> Any:
+    """Return the first row of (56) as it is run, N m: its factor c m g multiplied into the three
+    terms.
 
-    Rounding decides Fig. 5, which starts at rest in an unstable equilibrium: the printed bracket is exactly zero there,
-    and nothing moves; the three terms leave -4.2e-13 N m, with which the published numbers come out for T = 12 s. Other
-    ways: reference/claims.json.
+    Rounding decides Fig. 5, which starts at rest in an unstable equilibrium: the printed bracket is
+    exactly zero there, and nothing moves; the three terms leave -4.2e-13 N m, with which the
+    published numbers come out for T = 12 s. Other ways: reference/claims.json.
     """
     second, third = c2 / 2 + root3 / 2 * s2, c2 / 2 - root3 / 2 * s2
     return -c * m * g * c2 * c3 + c * m * g * second * c4 + c * m * g * third * c5
 
 
-def fixed_pitch_acceleration(m: float, d: float, g: float, torque: float, q2: float, phases: Sequence[float]) -> float:
+def fixed_pitch_acceleration(
+    m: float, d: float, g: float, torque: float, q2: float, phases: Sequence[float]
+) -> float:
     """Return q̈2 (rad/s²) where c = 0.
 
     There (47) is zero, and the first row of (33) is a pendulum's, summed over the blades.
@@ -187,7 +235,8 @@ def three_blade_accelerations(
 ) -> tuple[float, float, float, float]:
     """Solve (39)-(56) for q̈2..q̈5 in rad/s².
 
-    By (39)-(41) each pitch row holds q̈2 and its own pitch only, so the pitches are eliminated one by one.
+    By (39)-(41) each pitch row holds q̈2 and its own pitch only, so the pitches are eliminated one
+    by one.
 
     Parameters
     ----------
@@ -203,7 +252,9 @@ def three_blade_accelerations(
         m, c, d, s3, c3, s4, c4, s5, c5
     )
     v22, v23, v24, v25 = v2 * v2, v2 * v3, v2 * v4, v2 * v5
-    b1 = torques[0] - h_1(m, c, d, s2, c2, s3, c3, s4, c4, s5, c5, v23, v24, v25, v3 * v3, v4 * v4, v5 * v5)
+    b1 = torques[0] - h_1(
+        m, c, d, s2, c2, s3, c3, s4, c4, s5, c5, v23, v24, v25, v3 * v3, v4 * v4, v5 * v5
+    )
     b2 = torques[1] - h_2(m, c, s2, c2, s3, c3, v22, v23, v3)
     b3 = torques[2] - h_3(m, c, s2, c2, s4, c4, v22, v24, v4)
     b4 = torques[3] - h_4(m, c, s2, c2, s5, c5, v22, v25, v5)

@@ -1,4 +1,5 @@
-"""The methods printed/ode45, the paper's equations as printed, and printed_e1, _e2, _e3/ode45, one erratum alone."""
+"""The methods printed/ode45, the paper's equations as printed, and printed_e1, _e2, _e3/ode45, one
+erratum alone."""
 
 from __future__ import annotations
 
@@ -29,7 +30,9 @@ Accelerations = Callable[[Sequence[float], Sequence[float]], Sequence[float]]
 class PrintedSolver:
     """The equations as printed or, with errata, the paper's derivation, integrated by ode45."""
 
-    def __init__(self, name: str, errata: Errata | None, scene: Scene, settings: Ode45Settings) -> None:
+    def __init__(
+        self, name: str, errata: Errata | None, scene: Scene, settings: Ode45Settings
+    ) -> None:
         """Build the equations. Raises MethodRefusal where they cannot represent the scene."""
         self._scene, self._errata = scene, errata
         self._rotor = rotor = point_mass_rotor(name, errata, scene)
@@ -44,14 +47,21 @@ class PrintedSolver:
         from rotor_mbs.models.ode45 import ode45
         from rotor_mbs.solution.trajectory import Integration
 
-        result = ode45(self._right_hand_side, self._scene.duration, self._initial, *self._tolerances)
+        result = ode45(
+            self._right_hand_side, self._scene.duration, self._initial, *self._tolerances
+        )
         self._result = result
         return Integration(
-            result.success, result.message, float(result.time[-1]), result.steps, rhs_evaluations=result.evaluations
+            result.success,
+            result.message,
+            float(result.time[-1]),
+            result.steps,
+            rhs_evaluations=result.evaluations,
         )
 
     def observe(self) -> Trajectory:
-        """Return the samples of the last integration, with ode45's own output points where nothing is corrected."""
+        """Return the samples of the last integration, with ode45's own output points where nothing
+        is corrected."""
         import numpy as np
 
         from rotor_mbs.models.printed.observables import torque_work
@@ -75,7 +85,8 @@ class PrintedSolver:
         if scene.wants("loads"):
             before = np.nextafter(time, 0.0).tolist()  # where a torque jumps, the value before it
             torque = np.array([scene.torque_at(t) for t in before])
-            accelerations = np.zeros((len(time), len(scene.initial_angles)))  # zero of a fixed pitch
+            # zero of a fixed pitch
+            accelerations = np.zeros((len(time), len(scene.initial_angles)))
             for row, t, state in zip(accelerations, before, states.tolist(), strict=True):
                 row[: self._moving] = self._right_hand_side(t, state)[self._moving :]
             fields |= rotor.loads(angles, rates, accelerations, torque)
@@ -109,7 +120,9 @@ def point_mass_rotor(name: str, errata: Errata | None, scene: Scene) -> PointMas
     refusals = {
         f"{name} requires 1 or 3 blades; the scene has {count}": not errata and count not in (1, 3),
         f"{name} requires equal blades": any(other != blade for other in scene.blades),
-        f"{name} requires point-mass blades, without inertia about the centre of mass": not blade.is_point_mass,
+        f"{name} requires point-mass blades, without inertia about the centre of mass": (
+            not blade.is_point_mass
+        ),
         f"{name} requires the centre of mass in the blade's x-z plane: y = 0, not {y:g}": y != 0.0,
         f"{name} does not include hub inertia; it must be 0": scene.hub_inertia != 0.0,
         f"{name} does not include bearing stiffness or damping; both must be 0": (
@@ -134,7 +147,9 @@ def equations(rotor: PointMassRotor, errata: Errata | None) -> Accelerations:
     """Return the equations of motion: as printed or, with errata, derived anew with these."""
     m, c, d, g = rotor.m, rotor.c, rotor.d, rotor.g
     if not rotor.pitches_move:
-        return lambda torques, state: [literal.fixed_pitch_acceleration(m, d, g, torques[0], state[0], rotor.phases)]
+        return lambda torques, state: [
+            literal.fixed_pitch_acceleration(m, d, g, torques[0], state[0], rotor.phases)
+        ]
     if errata:
         derived = DerivedRotor(m, c, d, g, rotor.phases, errata)
         n = 1 + len(rotor.phases)
@@ -145,7 +160,8 @@ def equations(rotor: PointMassRotor, errata: Errata | None) -> Accelerations:
 
 
 def items(name: str, errata: Errata | None, scene: Scene) -> list[BuiltItem]:
-    """Return the terms of a scene, and where in the paper the rows of rotor and pitches stand, in the form that is run.
+    """Return the terms of a scene, and where in the paper the rows of rotor and pitches stand, in
+    the form that is run.
 
     Raises MethodRefusal as `point_mass_rotor`.
     """
@@ -155,7 +171,9 @@ def items(name: str, errata: Errata | None, scene: Scene) -> list[BuiltItem]:
         return equation_items(scene, (f"(24)-(38) rederived, with {left}",) * 2)
     if len(scene.blades) == 1:
         return equation_items(scene, ("(33), rotor row", "(33), pitch row"))
-    return equation_items(scene, ("(42)-(45), (52), (56) with its factor expanded", "(46)-(51), (53)-(56)"))
+    return equation_items(
+        scene, ("(42)-(45), (52), (56) with its factor expanded", "(46)-(51), (53)-(56)")
+    )
 
 
 def _torque_tables(scene: Scene, moving: int) -> tuple[LoadTable, ...]:
@@ -164,7 +182,8 @@ def _torque_tables(scene: Scene, moving: int) -> tuple[LoadTable, ...]:
 
 
 def right_hand_side(scene: Scene, accelerations: Accelerations, moving: int) -> RightHandSide:
-    """Return y' = f(t, y) of y = (angles, rates) of the `moving` coordinates; NaN where the equations are singular."""
+    """Return y' = f(t, y) of y = (angles, rates) of the `moving` coordinates; NaN where the
+    equations are singular."""
     undefined = [math.nan] * (2 * moving)
     tables = _torque_tables(scene, moving)
     # Looked up once where they are constant, as in all scenes of the paper.
@@ -174,14 +193,16 @@ def right_hand_side(scene: Scene, accelerations: Accelerations, moving: int) -> 
         torques = constant or [value_at(table, t) for table in tables]
         try:
             return [*y[moving:], *accelerations(torques, y)]
-        except (ZeroDivisionError, OverflowError, ValueError):  # the last is the sine of an infinite angle
+        # the last is the sine of an infinite angle
+        except (ZeroDivisionError, OverflowError, ValueError):
             return undefined
 
     return f
 
 
 def _method(name: str, label: str, errata: Errata | None = None, erratum: str = "") -> Method:
-    """Return a method; errata: what is left in where the equations are derived anew; erratum: the one it is of."""
+    """Return a method; errata: what is left in where the equations are derived anew; erratum: the
+    one it is of."""
     return Method(
         name=name,
         label=label,

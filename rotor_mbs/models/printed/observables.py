@@ -1,7 +1,7 @@
 """Tip path, energies, work and loads of the printed model's motion, from the paper's matrix (3).
 
-Energies and loads are the physical ones, whatever equations made the motion: they tell how much energy those equations
-make, and how large their fictitious moments are.
+Energies and loads are the physical ones, whatever equations made the motion: they tell how much
+energy those equations make, and how large their fictitious moments are.
 """
 
 from __future__ import annotations
@@ -25,12 +25,14 @@ _GAUSS_WEIGHTS = np.array([5.0, 8.0, 5.0]) / 18.0
 
 @dataclass(frozen=True, slots=True)
 class PointMassRotor:
-    """The printed symbols of a scene: blades alike, each a mass m (kg) at (c, 0, d) (m); gravity g (m/s²).
+    """The printed symbols of a scene: blades alike, each a mass m (kg) at (c, 0, d) (m); gravity g
+    (m/s²).
 
     Attributes
     ----------
     phases : (blades,) rad.
-    tip : (3,) m, the point whose path is drawn, seen from the mass in the directions of the blade frame.
+    tip : (3,) m, the point whose path is drawn, seen from the mass in the directions of the blade
+        frame.
     """
 
     m: float
@@ -46,7 +48,8 @@ class PointMassRotor:
         return self.c != 0.0
 
     def tip_path(self, angles: Array) -> Array:
-        """Return the tips' paths, (n, blades, 3) m in the base frame: (3) applied to the tip as frame 3 sees it.
+        """Return the tips' paths, (n, blades, 3) m in the base frame: (3) applied to the tip as
+        frame 3 sees it.
 
         angles : (n, 1 + blades) rad.
         """
@@ -78,7 +81,9 @@ class PointMassRotor:
             total += self.m * self.g * height
         return total
 
-    def loads(self, angles: Array, rates: Array, accelerations: Array, torque: Array) -> dict[str, Array]:
+    def loads(
+        self, angles: Array, rates: Array, accelerations: Array, torque: Array
+    ) -> dict[str, Array]:
         """Compute the loads at roots and shaft that the motion needs, by quantity.
 
         Parameters
@@ -106,8 +111,11 @@ class PointMassRotor:
         actuators = np.stack([moment[:, 2] for moment in moments], axis=1)
         return named_loads(zip(forces, moments, strict=True), shaft_force, shaft_moment, actuators)
 
-    def _acceleration(self, sines: tuple[Array, Array, Array, Array], rates: Array, accelerations: Array) -> Array:
-        """Return the acceleration of the mass, (n, 3) m/s²: last columns of (8), (9), (16)-(19), E1 and E2 corrected.
+    def _acceleration(
+        self, sines: tuple[Array, Array, Array, Array], rates: Array, accelerations: Array
+    ) -> Array:
+        """Return the acceleration of the mass, (n, 3) m/s²: last columns of (8), (9), (16)-(19), E1
+        and E2 corrected.
 
         sines : as of `_sines`; rates, accelerations : (n, 2) of q2 and q3, rad/s and rad/s².
         """
@@ -139,8 +147,8 @@ class PointMassRotor:
 def torque_work(scene: Scene, run: Ode45Result, coordinate: int, times: Array) -> Array:
     """Compute the work of the torque on a coordinate from angles alone.
 
-    Where the torque τ is linear, ∫τ q̇ dt = [τ q] - τ' ∫q dt, and the integral is exact for the interpolant, a quartic
-    in each step.
+    Where the torque τ is linear, ∫τ q̇ dt = [τ q] - τ' ∫q dt, and the integral is exact for the
+    interpolant, a quartic in each step.
 
     Parameters
     ----------

@@ -1,5 +1,5 @@
-"""One module per page: a report's data to the content of the page. Here what several pages have: the report itself,
-cells, tables and sentences about stored runs."""
+"""One module per page: a report's data to the content of the page. Here what several pages have:
+the report itself, cells, tables and sentences about stored runs."""
 
 from __future__ import annotations
 
@@ -13,7 +13,13 @@ from markupsafe import Markup
 from rotor_mbs.analysis import published
 from rotor_mbs.analysis.published import ClaimStudy, Erratum, Published, claims, rounds_to
 from rotor_mbs.analysis.work_precision import by_scene
-from rotor_mbs.methods.catalogue import PRINTED, REFERENCE, errata_methods, find_method_or_none, is_corrected
+from rotor_mbs.methods.catalogue import (
+    PRINTED,
+    REFERENCE,
+    errata_methods,
+    find_method_or_none,
+    is_corrected,
+)
 from rotor_mbs.report.elements import Array, PageTable, Row, TableCell
 from rotor_mbs.report.files import INDEX, page_names
 from rotor_mbs.report.looks import label_of, with_capital
@@ -29,7 +35,8 @@ class Report(OpenResults):
 
     @cached_property
     def is_suite(self) -> bool:
-        """Whether the file is of the stability suite: it has ladders of steps, or all its scenes are of the suite."""
+        """Whether the file is of the stability suite: it has ladders of steps, or all its scenes
+        are of the suite."""
         folders = {name.partition("/")[0] for name, scene in self.scenes.items() if scene.methods}
         return bool(read_records(self.path, "stability")) or (bool(folders) and folders <= {*SUITE})
 
@@ -48,7 +55,8 @@ class Report(OpenResults):
 
     @cached_property
     def conditions(self) -> Mapping[str, str]:
-        """Conditions of the paper's runs that it does not print and that were found out, by scene."""
+        """Conditions of the paper's runs that it does not print and that were found out, by
+        scene."""
         return published.conditions() if self.claims else {}
 
     @cached_property
@@ -58,9 +66,14 @@ class Report(OpenResults):
 
     @cached_property
     def errata(self) -> Sequence[Erratum]:
-        """The errors in the printed equations; empty where no run is of equations that have them."""
+        """The errors in the printed equations; empty where no run is of equations that have
+        them."""
         printed = {PRINTED, *errata_methods().values()}
-        return published.errata() if any(printed & {*scene.runs} for scene in self.scenes.values()) else ()
+        return (
+            published.errata()
+            if any(printed & {*scene.runs} for scene in self.scenes.values())
+            else ()
+        )
 
     @cached_property
     def curves(self) -> Mapping[str, Sequence[Record]]:
@@ -73,11 +86,25 @@ class Report(OpenResults):
 
 
 METRICS = (
-    "angle_error_max", "angle_error_whole", "angle_error_predicted", "defect_max", "defect_median", "defect_time",
-    "tip_error_max", "energy_gain_J", "energy_drift_max", "constraint_error_max",
-    "zero_pitch_max", "zero_pitch_left_s", "zero_pitch_growth_per_s", "time_reached", "steps", "rhs_evaluations",
-    "run_time_s", "setup_time_s",
-)  # fmt: skip
+    "angle_error_max",
+    "angle_error_whole",
+    "angle_error_predicted",
+    "defect_max",
+    "defect_median",
+    "defect_time",
+    "tip_error_max",
+    "energy_gain_J",
+    "energy_drift_max",
+    "constraint_error_max",
+    "zero_pitch_max",
+    "zero_pitch_left_s",
+    "zero_pitch_growth_per_s",
+    "time_reached",
+    "steps",
+    "rhs_evaluations",
+    "run_time_s",
+    "setup_time_s",
+)
 # Against the reference, which has none itself.
 _ERRORS_OF_RUNS = ("angle_error_max", "angle_error_predicted", "angle_error_whole", "tip_error_max")
 _SPAN = 30.0  # between the smallest and the largest value, beyond which an axis is logarithmic
@@ -85,8 +112,11 @@ _METHODS_IN_A_TABLE = 8  # side by side on a page of 1440 px
 
 
 def status_text(run: StoredRun) -> str:
-    """Return "solver failed" for "solver_failed"; for equations that are not claimed to be correct never "ok"."""
-    return words_of("completed" if run.status == "ok" and not is_corrected(run.method) else run.status)
+    """Return "solver failed" for "solver_failed"; for equations that are not claimed to be correct
+    never "ok"."""
+    return words_of(
+        "completed" if run.status == "ok" and not is_corrected(run.method) else run.status
+    )
 
 
 def words_of(status: str) -> str:
@@ -94,7 +124,8 @@ def words_of(status: str) -> str:
 
 
 def status_cell(run: StoredRun, suite_run: SuiteRun | None = None) -> TableCell:
-    """Return the status, and the reason where it is not ok; of a run of the suite also what its ladder found."""
+    """Return the status, and the reason where it is not ok; of a run of the suite also what its
+    ladder found."""
     text, message = status_text(run), str(run.attributes.get("message", ""))
     tone = "good" if text == "ok" else "" if run.status in GOOD else "bad"
     if suite_run is not None and suite_run.outcome != run.status:
@@ -116,7 +147,11 @@ def run_cell(run: StoredRun) -> TableCell | str:
     """Return a run's method, and below it the settings that are not the method's defaults."""
     method = find_method_or_none(run.method)
     defaults = {} if method is None else method.defaults
-    own = [f"{name} = {value}" for name, value in run.settings.items() if defaults.get(name, value) != value]
+    own = [
+        f"{name} = {value}"
+        for name, value in run.settings.items()
+        if defaults.get(name, value) != value
+    ]
     note = ", ".join([run.method, *own])
     return TableCell(label_of(run.method), note=note) if own else method_cell(run.method)
 
@@ -140,7 +175,8 @@ def horizon_of(scene: StoredScene) -> float | None:
 
 
 def compared_time(scenes: Iterable[StoredScene]) -> tuple[float, float]:
-    """Return how much of the scenes' time (s) lies before their horizons, and how much they have in all."""
+    """Return how much of the scenes' time (s) lies before their horizons, and how much they have in
+    all."""
     compared = whole = 0.0
     for scene in scenes:
         if scene.reference is not None and scene.reference.samples:
@@ -162,7 +198,8 @@ def models_of(methods: Collection[str]) -> int:
 
 
 def computations(methods: Collection[str]) -> str:
-    """Return what these methods are, as the subject of a sentence: "three independent computations".
+    """Return what these methods are, as the subject of a sentence: "three independent
+    computations".
 
     >>> computations(["lagrange/taylor", "exudyn_tree/rk67"])
     'two independent computations'
@@ -180,9 +217,11 @@ def computations(methods: Collection[str]) -> str:
 
 
 def agreement(scene: StoredScene) -> tuple[list[str], float | None]:
-    """Return the corrected methods of a scene that are ok, and the largest of their angle errors up to the horizon.
+    """Return the corrected methods of a scene that are ok, and the largest of their angle errors up
+    to the horizon.
 
-    Methods that were not compared with a reference are left out; where none was, the error (rad) is None.
+    Methods that were not compared with a reference are left out; where none was, the error (rad) is
+    None.
     """
     errors: dict[str, float] = {}
     for name, run in scene.corrected_runs.items():
@@ -197,8 +236,10 @@ def agreement_of_scenes(scenes: Iterable[StoredScene]) -> tuple[list[str], float
 
     Returns
     -------
-    methods : those that are ok in every scene that was compared at all; none, where the scenes have different ones.
-    error : rad, the largest angle error of any run that is ok; None where none was compared with a reference.
+    methods : those that are ok in every scene that was compared at all; none, where the scenes have
+        different ones.
+    error : rad, the largest angle error of any run that is ok; None where none was compared with a
+        reference.
     count : of the scenes that were compared.
     """
     common: list[str] = []
@@ -216,18 +257,24 @@ def agree_within(methods: Sequence[str], error: float, digits: int = 1) -> Marku
 
     Parameters
     ----------
-    methods : that agree; of one it is said that it agrees with the reference, of none what they have in common.
+    methods : that agree; of one it is said that it agrees with the reference, of none what they
+        have in common.
     error : rad, the largest.
     digits : of the error, which is rounded up.
     """
-    within = Markup("<b>exactly</b>") if error == 0.0 else Markup("within <b>{} rad</b>").format(up_to(error, digits))
+    within = (
+        Markup("<b>exactly</b>")
+        if error == 0.0
+        else Markup("within <b>{} rad</b>").format(up_to(error, digits))
+    )
     subject = computations(methods) if methods else "all runs that are ok"
     verb = "agrees with the reference" if len(methods) == 1 else "agree"
     return Markup("{} {} {}").format(subject, verb, within)
 
 
 def reproduced(numbers: Iterable[Published]) -> tuple[int, int]:
-    """Return how many published numbers come out of the printed equations, and how many out of the corrected ones."""
+    """Return how many published numbers come out of the printed equations, and how many out of the
+    corrected ones."""
     printed = corrected = 0
     for claim in numbers:
         printed += claim.printed is not None and rounds_to(claim.printed, claim)
@@ -242,17 +289,24 @@ def numbers_sentence(claims: Iterable[Published]) -> Markup:
         return Markup()
     printed, corrected = reproduced(numbers)
     if printed == len(numbers) and corrected == 0:
-        text = "All {} numbers that the paper publishes come out of the printed equations and none out of the "
+        text = (
+            "All {} numbers that the paper publishes come out of the printed equations and "
+            "none out of the "
+        )
         text += "corrected ones: its curves show the errors, not the rotor."
         return Markup(text).format(in_words(len(numbers)))
-    text = "Of {} numbers that the paper publishes <b>{}</b> come out of the printed equations and <b>{}</b> out of "
+    text = (
+        "Of {} numbers that the paper publishes <b>{}</b> come out of the printed equations "
+        "and <b>{}</b> out of "
+    )
     text += "the corrected ones."
     words = [in_words(count) if count else "none" for count in (printed, corrected)]
     return Markup(text).format(in_words(len(numbers)), *words)
 
 
 def agreement_text(scene: StoredScene) -> Markup:
-    """Return a sentence about how near the scene's corrected methods are to each other; "" where nothing is known."""
+    """Return a sentence about how near the scene's corrected methods are to each other; "" where
+    nothing is known."""
     methods, error = agreement(scene)
     if error is None:
         return Markup()
@@ -273,19 +327,28 @@ def agreement_table(scene: StoredScene, suite_runs: Sequence[SuiteRun] = ()) -> 
                 row.append(NOTHING)
                 continue
             is_over = name == "angle_error_max" and value is not None and not value <= OK_ERROR
-            row.append(number_cell(value, tone="bad" if is_over and is_corrected(run.method) else ""))
+            row.append(
+                number_cell(value, tone="bad" if is_over and is_corrected(run.method) else "")
+            )
         rows.append(row)
     head = (
-        "Method", "Status", "Largest angle error up to the horizon (rad)", "Largest interval defect (rad)",
-        "Energy error / energy scale", "Run time (s)",
-    )  # fmt: skip
+        "Method",
+        "Status",
+        "Largest angle error up to the horizon (rad)",
+        ("Largest interval defect (rad)"),
+        "Energy error / energy scale",
+        "Run time (s)",
+    )
     return PageTable("Runs of this scene", head, rows, wide=(3, 5), sortable=True)
 
 
 def metrics_tables(scene: StoredScene) -> list[PageTable]:
-    """Return every number of every run: a row per quantity, a column per run, in tables that fit a page."""
+    """Return every number of every run: a row per quantity, a column per run, in tables that fit a
+    page."""
     columns = metric_columns(scene.scene.outputs)
-    judged = [name for name in columns if name.endswith(("_error_max", "_error")) and name not in METRICS]
+    judged = [
+        name for name in columns if name.endswith(("_error_max", "_error")) and name not in METRICS
+    ]
     names = [name for name in (*METRICS, *judged) if name in columns]
     runs = list(scene.runs.values())
     tables = []
@@ -294,7 +357,9 @@ def metrics_tables(scene: StoredScene) -> list[PageTable]:
         rows: list[Row] = []
         for name in names:
             unit = "" if columns[name].units == "1" else f" ({columns[name].units})"
-            row: list[TableCell | str] = [with_capital(columns[name].long_name.partition("; -1")[0]) + unit]
+            row: list[TableCell | str] = [
+                with_capital(columns[name].long_name.partition("; -1")[0]) + unit
+            ]
             for run in shown:
                 is_its_own = run.method == REFERENCE and name in _ERRORS_OF_RUNS
                 value = None if is_its_own else metric(run, name)
@@ -302,5 +367,7 @@ def metrics_tables(scene: StoredScene) -> list[PageTable]:
                 row.append(str(int(value or 0)) if is_count else number(value, 3))
             if any(cell != NOTHING for cell in row[1:]):
                 rows.append(row)
-        tables.append(PageTable("All numbers of every method", ("Quantity", *map(run_cell, shown)), rows))
+        tables.append(
+            PageTable("All numbers of every method", ("Quantity", *map(run_cell, shown)), rows)
+        )
     return tables

@@ -62,7 +62,8 @@ _METHODS_IN_A_TABLE = 7  # beside the scene
 
 
 def bench_page(results: OpenResults) -> PageContent:
-    """Return the content of the page: the diagram of one scene, what each method reaches on all, every setting."""
+    """Return the content of the page: the diagram of one scene, what each method reaches on all,
+    every setting."""
     grouped = work_precision.by_scene(read_records(results.path, "bench"))
     scenes = {name: grouped[name] for name in natural_order(grouped)}
     sections = []
@@ -72,7 +73,9 @@ def bench_page(results: OpenResults) -> PageContent:
     others = []
     for name in [*scenes][1:]:
         note = Note(_conditions(name, scenes[name]))
-        others.append(Fold(name, _winner(scenes[name]), [*diagrams(scenes[name], f"{name} "), note]))
+        others.append(
+            Fold(name, _winner(scenes[name]), [*diagrams(scenes[name], f"{name} "), note])
+        )
     if others:
         elements += others
     sections.append(Section("diagram", f"Error against run time: {first}", elements, _LOWER_LEFT))
@@ -86,7 +89,9 @@ def bench_page(results: OpenResults) -> PageContent:
         folds.append(Fold(name, f"{count} settings", [_reach_table(curves), points]))
     say = "Those that are not ok; all are in the file." if whole > _MAX_POINTS else ""
     sections.append(Section("points", "Every setting", folds, say))
-    return PageContent("Error and run time", results.path.name, bench_answer(scenes), _facts(scenes), sections)
+    return PageContent(
+        "Error and run time", results.path.name, bench_answer(scenes), _facts(scenes), sections
+    )
 
 
 _LOWER_LEFT = (
@@ -97,7 +102,8 @@ _LOWER_LEFT = (
 
 
 def bench_answer(scenes: Mapping[str, Sequence[Record]]) -> list[Markup]:
-    """Return which method is the fastest to each error, and how much slower the fastest of another model is."""
+    """Return which method is the fastest to each error, and how much slower the fastest of another
+    model is."""
     sentences = []
     for target in (1e-6, 1e-9):
         wins: Counter[str] = Counter()
@@ -110,7 +116,9 @@ def bench_answer(scenes: Mapping[str, Sequence[Record]]) -> list[Markup]:
             reached += 1
             winner = ranked[0][0].method
             wins[winner] += 1
-            other = next((pair for pair in ranked if _model(pair[0].method) != _model(winner)), None)
+            other = next(
+                (pair for pair in ranked if _model(pair[0].method) != _model(winner)), None
+            )
             if other is not None:
                 ratios.setdefault(other[0].method, []).append(other[1].ratio)
         if not wins:
@@ -124,7 +132,9 @@ def bench_answer(scenes: Mapping[str, Sequence[Record]]) -> list[Markup]:
         if ratios:
             second = max(ratios, key=lambda method: len(ratios[method]))
             factor = number(float(np.median(ratios[second])))
-            text += Markup("; of another model {}, {} times slower").format(label_of(second), factor)
+            text += Markup("; of another model {}, {} times slower").format(
+                label_of(second), factor
+            )
         sentences.append(text + ".")
     return sentences
 
@@ -134,7 +144,8 @@ def _model(method: str) -> str:
 
 
 def _facts(scenes: Mapping[str, Sequence[Record]]) -> list[Fact]:
-    """Return the facts at the top of the page: how many scenes, methods and settings, and how many failed."""
+    """Return the facts at the top of the page: how many scenes, methods and settings, and how many
+    failed."""
     curves = [curve for of_scene in scenes.values() for curve in of_scene]
     measured = sum(status != "left_out" for curve in curves for status in curve.statuses)
     count = sum(len(curve.statuses) for curve in curves)
@@ -142,7 +153,11 @@ def _facts(scenes: Mapping[str, Sequence[Record]]) -> list[Fact]:
     methods = len({curve.method for curve in curves})
     return [
         Fact("Scenes", str(len(scenes))),
-        Fact("Methods", str(methods), f"{len({curve.name for curve in curves})} with their variants"),
+        Fact(
+            "Methods",
+            str(methods),
+            (f"{len({curve.name for curve in curves})} with their variants"),
+        ),
         Fact(
             "Settings that were timed",
             f"{measured} of {count}",
@@ -165,34 +180,47 @@ def _conditions(name: str, curves: Sequence[Record]) -> str:
     facts = curves[0].attributes
     if facts["horizon_s"] < facts["duration_s"]:
         text = (
-            f"Times are for the whole {number(facts['duration_s'], 3)} s; errors are evaluated up to "
-            f"{with_unit(facts['horizon_s'], 's', 3)}, the last of the samples used here before the horizon."
+            f"Times are for the whole {number(facts['duration_s'], 3)} s; errors are "
+            "evaluated up to "
+            f"{with_unit(facts['horizon_s'], 's', 3)}, the last of the samples used here before "
+            "the horizon."
         )
     else:
-        text = f"Times and errors are for the whole {number(facts['duration_s'], 3)} s; the horizon is not reached."
+        text = (
+            f"Times and errors are for the whole {number(facts['duration_s'], 3)} s; the "
+            "horizon is not reached."
+        )
     text += f" Uncertainty of the reference: {with_unit(facts['uncertainty_rad'], 'rad')}. "
     if "is_short" in facts:
         return text + (
-            "Each method has a few settings, each run once in parallel with other runs: times may be wrong by a factor "
+            "Each method has a few settings, each run once in parallel with other runs: times may "
+            "be wrong by a factor "
             f"of four or more. rotor-mbs bench {name} measures them accurately."
         )
     core = "any core" if facts["pinned_core"] < 0 else f"core {facts['pinned_core']}"
     return text + (
-        f"One process at a time on {core}, garbage collection disabled, all points timed in alternating rounds, within "
-        f"{number(facts['budget_s'], 3)} s; load average of the machine before: {number(facts['load_before'])}."
+        f"One process at a time on {core}, garbage collection disabled, all points timed in "
+        "alternating rounds, within "
+        f"{number(facts['budget_s'], 3)} s; load average of the machine before: "
+        f"{number(facts['load_before'])}."
     )
 
 
 def curve_looks(curves: Sequence[Record]) -> dict[str, Look]:
-    """Return a look for each curve; methods of files, which would all be grey, have a colour for each file."""
+    """Return a look for each curve; methods of files, which would all be grey, have a colour for
+    each file."""
     looks = {curve.name: look_of(curve.name) for curve in curves}
     unknown = dict.fromkeys(_model(name) for name, look in looks.items() if look.colour == GREY)
     colours = dict(zip(unknown, cycle(COORDINATES), strict=False))
-    return {name: replace(look, colour=colours.get(_model(name), look.colour)) for name, look in looks.items()}
+    return {
+        name: replace(look, colour=colours.get(_model(name), look.colour))
+        for name, look in looks.items()
+    }
 
 
 def diagrams(curves: Sequence[Record], group: str = "") -> list[Legend | Grid]:
-    """Return the legend and the two work-precision diagrams of a scene, over angle error and over interval defect.
+    """Return the legend and the two work-precision diagrams of a scene, over angle error and over
+    interval defect.
 
     group: before the keys of the curves, where a page has several.
     """
@@ -209,9 +237,14 @@ def diagrams(curves: Sequence[Record], group: str = "") -> list[Legend | Grid]:
     return [Legend(items), Grid(len(plots), [[plot] for plot in plots])]
 
 
-def diagram(curves: Sequence[Record], error: str, name: str, looks: Mapping[str, Look], group: str = "") -> Plot | None:
-    """Return all curves of a scene, an error over run time, upon the Pareto front; None where no point stands on it."""
-    points = {curve.name: work_precision.points(curve, error) for curve in curves if error in curve.arrays}
+def diagram(
+    curves: Sequence[Record], error: str, name: str, looks: Mapping[str, Look], group: str = ""
+) -> Plot | None:
+    """Return all curves of a scene, an error over run time, upon the Pareto front; None where no
+    point stands on it."""
+    points = {
+        curve.name: work_precision.points(curve, error) for curve in curves if error in curve.arrays
+    }
     drawn = {method: of_curve for method, of_curve in points.items() if len(of_curve[0])}
     if not drawn:
         return None
@@ -220,19 +253,29 @@ def diagram(curves: Sequence[Record], error: str, name: str, looks: Mapping[str,
     plotted = []
     if len(front) > 1:
         order = front[np.argsort(seconds[front])]
-        plotted.append(Curve("front", _FRONT, seconds[order], np.maximum(errors[order], _LOWEST_ERROR)))
+        plotted.append(
+            Curve("front", _FRONT, seconds[order], np.maximum(errors[order], _LOWEST_ERROR))
+        )
     for method, (own_errors, own_seconds) in drawn.items():
         order = work_precision.pareto(own_errors, own_seconds)  # by rising time
         shown = np.maximum(own_errors[order], _LOWEST_ERROR)
-        plotted.append(Curve(f"{group}{method}", looks[method], own_seconds[order], shown, dots="line"))
+        plotted.append(
+            Curve(f"{group}{method}", looks[method], own_seconds[order], shown, dots="line")
+        )
     low, high = float(seconds.min()), float(seconds.max())
     axis = Horizontal("run time", "s", "time", 0.8 * low, max(1.25 * high, 1.0001 * low), log=True)
     marks = []
     # In quad precision it is far below all errors.
-    uncertainty = max((float(curve.attributes.get("uncertainty_rad", 0.0)) for curve in curves), default=0.0)
-    if error == work_precision.ANGLE_ERROR and uncertainty > max(float(errors.min()), _LOWEST_ERROR):
+    uncertainty = max(
+        (float(curve.attributes.get("uncertainty_rad", 0.0)) for curve in curves), default=0.0
+    )
+    if error == work_precision.ANGLE_ERROR and uncertainty > max(
+        float(errors.min()), _LOWEST_ERROR
+    ):
         marks.append(Mark("uncertainty of the reference", y=uncertainty))
-    return Plot(name, "rad", axis, plotted, 320, "over run time (s)", log=True, marks=marks, still=not group)
+    return Plot(
+        name, "rad", axis, plotted, 320, "over run time (s)", log=True, marks=marks, still=not group
+    )
 
 
 def _reach_table(curves: Sequence[Record]) -> PageTable:
@@ -246,7 +289,9 @@ def _reach_table(curves: Sequence[Record]) -> PageTable:
             continue
         rows.append([method_cell(method), *(cell or NOTHING for cell in cells)])
     if missing:
-        rows.append([TableCell("not measured", note=", ".join(missing)), *[NOTHING] * (len(table.head) - 2)])
+        rows.append(
+            [TableCell("not measured", note=", ".join(missing)), *[NOTHING] * (len(table.head) - 2)]
+        )
     return PageTable("Run time to reach an angle error", table.head[1:], rows, sortable=True)
 
 
@@ -279,7 +324,9 @@ def _reach_section(scenes: Mapping[str, Sequence[Record]]) -> Section:
                 else:
                     row.append(TableCell("✗ not reached", "bad"))
             rows.append(row)
-        tables.append(PageTable("Time to 1e-6 rad", ("Scene", *(label_of(method) for method in shown)), rows))
+        tables.append(
+            PageTable("Time to 1e-6 rad", ("Scene", *(label_of(method) for method in shown)), rows)
+        )
     say = (
         "✓: reaches 10⁻⁶ rad, with its run time relative to the fastest there. Not measured: finer "
         "settings did not fit the time budget."
@@ -301,7 +348,9 @@ def _methods_section(results: OpenResults, scenes: Mapping[str, Sequence[Record]
             if text not in ("", NOTHING):
                 items.append((with_capital(_in_a_line(head)), text))
         name = row[0] if isinstance(row[0], str) else row[0].text
-        count, best, reach = ((cell if isinstance(cell, str) else cell.text) for cell in (row[1], row[4], row[5]))
+        count, best, reach = (
+            (cell if isinstance(cell, str) else cell.text) for cell in (row[1], row[4], row[5])
+        )
         unit = " rad" if best[-1:].isdigit() or best[-1:] in "⁰¹²³⁴⁵⁶⁷⁸⁹" else ""
         hint = f"ok on {count}; best error {best}{unit}; to 10⁻⁶ rad: {reach}"
         folds.append(Fold(name, hint, [Listing(items)]))
@@ -330,13 +379,17 @@ _EXPLAINED = (
 
 
 def engine_tables(results: OpenResults, scenes: Mapping[str, Sequence[Record]]) -> list[PageTable]:
-    """Return a row per method: what it reaches over all scenes and what that costs; what it can compute. What the file
-    does not know is a dash."""
+    """Return a row per method: what it reaches over all scenes and what that costs; what it can
+    compute. What the file does not know is a dash."""
     curves = [curve for of_scene in scenes.values() for curve in of_scene]
     parsed = {name: stored.scene for name, stored in results.scenes.items()}
-    suite = [run for run in suite_runs(results.path) if run.scene.startswith(("stiff/", "extreme/"))]
+    suite = [
+        run for run in suite_runs(results.path) if run.scene.startswith(("stiff/", "extreme/"))
+    ]
     # The shortest that is long enough.
-    durations = {name: scene.duration for name, scene in parsed.items() if results.scenes[name].methods}
+    durations = {
+        name: scene.duration for name, scene in parsed.items() if results.scenes[name].methods
+    }
     long = min(
         (name for name in durations if durations[name] >= _LONG_S),
         key=lambda name: durations[name],
@@ -345,26 +398,44 @@ def engine_tables(results: OpenResults, scenes: Mapping[str, Sequence[Record]]) 
     reached: list[Row] = []
     able: list[Row] = []
     for method in dict.fromkeys(curve.method for curve in curves):
-        own = {name: [curve for curve in of_scene if curve.method == method] for name, of_scene in scenes.items()}
+        own = {
+            name: [curve for curve in of_scene if curve.method == method]
+            for name, of_scene in scenes.items()
+        }
         own = {name: of_scene for name, of_scene in own.items() if of_scene}
-        reached.append([
-            method_cell(method),
-            f"{sum(any('ok' in curve.statuses for curve in curves) for curves in own.values())} of {len(own)}",
-            _order_cell([curve for of_scene in own.values() for curve in of_scene]),
-            _worst_cell(own, "defect_max"),
-            _worst_cell(own, work_precision.ANGLE_ERROR),
-            *(_reach_cell(scenes, own, target) for target in _ENGINE_TARGETS),
-            _drift_cell(results.scenes[long].methods.get(method)) if long else NOTHING,
-            _zero_pitch_cell(own),
-            _false_success_cell(own, [run for run in suite if run.method == method]),
-        ])  # fmt: skip
+        with_ok = [curves for curves in own.values() if any("ok" in c.statuses for c in curves)]
+        reached.append(
+            [
+                method_cell(method),
+                f"{len(with_ok)} of {len(own)}",
+                _order_cell([curve for of_scene in own.values() for curve in of_scene]),
+                _worst_cell(own, "defect_max"),
+                _worst_cell(own, work_precision.ANGLE_ERROR),
+                *(_reach_cell(scenes, own, target) for target in _ENGINE_TARGETS),
+                _drift_cell(results.scenes[long].methods.get(method)) if long else NOTHING,
+                _zero_pitch_cell(own),
+                _false_success_cell(own, [run for run in suite if run.method == method]),
+            ]
+        )
         facts = next(iter(own.values()))[0].attributes
         damped = {name: own[name] for name in own if name in parsed and parsed[name].has_damping}
-        loaded = {name: own[name] for name in own if name in parsed and not parsed[name].has_constant_loads}
-        with_loads = [stored.runs.get(method) for name, stored in results.scenes.items() if parsed[name].wants("loads")]
-        loads = ["yes" if "blade_root_force" in run else "no" for run in with_loads if run is not None]
+        loaded = {
+            name: own[name]
+            for name in own
+            if name in parsed and not parsed[name].has_constant_loads
+        }
+        with_loads = [
+            stored.runs.get(method)
+            for name, stored in results.scenes.items()
+            if parsed[name].wants("loads")
+        ]
+        loads = [
+            "yes" if "blade_root_force" in run else "no" for run in with_loads if run is not None
+        ]
         versions = json.loads(facts.get("versions", "{}"))
-        engine = [f"{name} {version}" for name, version in versions.items() if name not in _NO_ENGINE]
+        engine = [
+            f"{name} {version}" for name, version in versions.items() if name not in _NO_ENGINE
+        ]
         able.append([
             method_cell(method),
             _worst_cell(damped, work_precision.ANGLE_ERROR),
@@ -377,13 +448,25 @@ def engine_tables(results: OpenResults, scenes: Mapping[str, Sequence[Record]]) 
     drift = f"energy drift in {durations[long]:g} s" if long else "energy drift"
     targets = [f"time to {shortest(target)} rad" for target in _ENGINE_TARGETS]
     head = [
-        "method", "ok on scenes", "measured order", "best defect (rad)", "best error (rad)", *targets, drift,
-        "zero pitch", "wrong but reported as success",
-    ]  # fmt: skip
+        "method",
+        "ok on scenes",
+        "measured order",
+        "best defect (rad)",
+        "best error (rad)",
+        *targets,
+        drift,
+        "zero pitch",
+        "wrong but reported as success",
+    ]
     able_head = [
-        "method", "joint damping: best error (rad)", "load over time: best error (rad)", "loads", "linearization",
-        "software", "lines of code",
-    ]  # fmt: skip
+        "method",
+        "joint damping: best error (rad)",
+        "load over time: best error (rad)",
+        "loads",
+        "linearization",
+        "software",
+        "lines of code",
+    ]
     return [
         PageTable("Accuracy and cost over all scenes", head, reached),
         PageTable("Capabilities", able_head, able),
@@ -391,16 +474,21 @@ def engine_tables(results: OpenResults, scenes: Mapping[str, Sequence[Record]]) 
 
 
 def _worst_cell(own: Mapping[str, Sequence[Record]], column: str) -> TableCell | str:
-    """Return the best value of a method on the scene where it does worst, and on how many scenes it has none."""
+    """Return the best value of a method on the scene where it does worst, and on how many scenes it
+    has none."""
     values = {name: work_precision.values_of(curves, column) for name, curves in own.items()}
     known = {name: min(of_scene) for name, of_scene in values.items() if of_scene}
     if not known:
         is_cut = any(work_precision.left_out(curve) for curves in own.values() for curve in curves)
-        return (TableCell("not measured") if is_cut else TableCell("none", "bad")) if own else NOTHING
+        return (
+            (TableCell("not measured") if is_cut else TableCell("none", "bad")) if own else NOTHING
+        )
     worst = max(known, key=lambda name: known[name])
     bound = "≤ " if any(map(work_precision.left_out, own[worst])) else ""
     note = worst if len(own) > 1 else ""
-    failed = sum(not any(map(work_precision.left_out, own[name])) for name in own.keys() - known.keys())
+    failed = sum(
+        not any(map(work_precision.left_out, own[name])) for name in own.keys() - known.keys()
+    )
     if failed:
         note += f"; fails on {failed} of {len(own)}"
     return TableCell(bound + number(known[worst]), "bad" if failed else "", note=note)
@@ -409,7 +497,8 @@ def _worst_cell(own: Mapping[str, Sequence[Record]], column: str) -> TableCell |
 def _reach_cell(
     scenes: Mapping[str, Sequence[Record]], own: Mapping[str, Sequence[Record]], target: float
 ) -> TableCell:
-    """Return on how many scenes a method reaches an error, and how much slower than the fastest one it is there.
+    """Return on how many scenes a method reaches an error, and how much slower than the fastest one
+    it is there.
 
     Parameters
     ----------
@@ -420,7 +509,9 @@ def _reach_cell(
     cut = 0  # scenes on which it was not measured to there
     for name, curves in own.items():
         ranked = work_precision.fastest(scenes[name], target)
-        reach = next((reach for curve, reach in ranked if any(curve is one for one in curves)), None)
+        reach = next(
+            (reach for curve, reach in ranked if any(curve is one for one in curves)), None
+        )
         if reach is not None:
             reached[name] = reach
         elif any(work_precision.left_out(curve) for curve in curves):
@@ -437,9 +528,16 @@ def _reach_cell(
 
 
 def _order_cell(curves: Sequence[Record]) -> str:
-    """Return the order that was fitted to a method with a fixed step, and the order that it claims."""
-    claimed = [curve.attributes["order_expected"] for curve in curves if "order_expected" in curve.attributes]
-    seen = [curve.attributes["order"] for curve in curves if claimed and "order" in curve.attributes]
+    """Return the order that was fitted to a method with a fixed step, and the order that it
+    claims."""
+    claimed = [
+        curve.attributes["order_expected"]
+        for curve in curves
+        if "order_expected" in curve.attributes
+    ]
+    seen = [
+        curve.attributes["order"] for curve in curves if claimed and "order" in curve.attributes
+    ]
     if not claimed:
         return "adaptive"
     return f"{number(float(np.median(seen)) if seen else None)} (nominal {claimed[0]:g})"
@@ -457,13 +555,21 @@ def _drift_cell(run: StoredRun | None) -> TableCell | str:
 
 def _zero_pitch_cell(own: Mapping[str, Sequence[Record]]) -> TableCell | str:
     """Return whether pitches that are zero in the reference are zero at every setting."""
-    known = work_precision.values_of((curve for curves in own.values() for curve in curves), "zero_pitch_max")
+    known = work_precision.values_of(
+        (curve for curves in own.values() for curve in curves), "zero_pitch_max"
+    )
     if not known:
         return NOTHING
-    return "kept" if not any(known) else TableCell("lost", "bad", note=f"up to {with_unit(max(known), 'rad')}")
+    return (
+        "kept"
+        if not any(known)
+        else TableCell("lost", "bad", note=f"up to {with_unit(max(known), 'rad')}")
+    )
 
 
-def _false_success_cell(own: Mapping[str, Sequence[Record]], suite: Sequence[SuiteRun]) -> TableCell | str:
+def _false_success_cell(
+    own: Mapping[str, Sequence[Record]], suite: Sequence[SuiteRun]
+) -> TableCell | str:
     """Return how often an engine reported success for a wrong result.
 
     Of the runs of the stability suite, where the file has them; else of the settings on this page.
@@ -492,14 +598,20 @@ def _false_success_cell(own: Mapping[str, Sequence[Record]], suite: Sequence[Sui
 
 
 def point_table(curves: Sequence[Record], *, only_faults: bool = False) -> PageTable:
-    """Return a row per point that was run, with the reason where it is not ok; one for all that the budget left out.
+    """Return a row per point that was run, with the reason where it is not ok; one for all that the
+    budget left out.
 
     only_faults: whether points that are ok or left out have none.
     """
-    columns = {name: COLUMNS[name] for name in _POINT_COLUMNS if all(name in curve.arrays for curve in curves)}
+    columns = {
+        name: COLUMNS[name]
+        for name in _POINT_COLUMNS
+        if all(name in curve.arrays for curve in curves)
+    }
     units = [f" ({column.units})" if column.units != "1" else "" for column in columns.values()]
     names = [
-        f"{column.long_name.partition('; -1')[0]}{unit}" for column, unit in zip(columns.values(), units, strict=True)
+        f"{column.long_name.partition('; -1')[0]}{unit}"
+        for column, unit in zip(columns.values(), units, strict=True)
     ]
     rows: list[Row] = []
     for curve in curves:
@@ -517,11 +629,17 @@ def point_table(curves: Sequence[Record], *, only_faults: bool = False) -> PageT
                 else:
                     values.append(number(float(value) if np.isfinite(value) else None, 3))
             size = float(curve.arrays["setting"][i])
-            setting = with_unit(size, "s", 3) if curve.attributes["setting_kind"] == "step" else number(size)
+            setting = (
+                with_unit(size, "s", 3)
+                if curve.attributes["setting_kind"] == "step"
+                else number(size)
+            )
             if i in left_out[:-1]:
                 setting += f" and {len(left_out) - 1} finer"
             claim = "the engine reported success" if curve.arrays["false_success"][i] else ""
             message = "; ".join(filter(None, (curve.messages[i], claim)))
-            outcome = TableCell(words_of(status), tone="" if status == "ok" else "bad", note=message)
+            outcome = TableCell(
+                words_of(status), tone="" if status == "ok" else "bad", note=message
+            )
             rows.append([method_cell(curve.name), setting, outcome, *values])
     return PageTable("Every setting", ("method", "setting", "status", *names), rows)

@@ -11,7 +11,14 @@ import numpy as np
 from markupsafe import Markup
 
 from rotor_mbs.comparison.channels import channel_key
-from rotor_mbs.comparison.verdict import ChannelErrors, DataVerdict, axis_unit, channel_table, unused_lines, verdict_of
+from rotor_mbs.comparison.verdict import (
+    ChannelErrors,
+    DataVerdict,
+    axis_unit,
+    channel_table,
+    unused_lines,
+    verdict_of,
+)
 from rotor_mbs.errors import InputError
 from rotor_mbs.report import canvas, plots
 from rotor_mbs.report.canvas import Panels
@@ -34,7 +41,15 @@ from rotor_mbs.report.elements import (
     TableCell,
 )
 from rotor_mbs.report.looks import GREY, INK, PALETTE, Look, coordinate_look, with_capital
-from rotor_mbs.report.numbers import SPACE, seconds, shortest, typeset, typeset_title, up_to, with_unit
+from rotor_mbs.report.numbers import (
+    SPACE,
+    seconds,
+    shortest,
+    typeset,
+    typeset_title,
+    up_to,
+    with_unit,
+)
 from rotor_mbs.report.pages import scene_plots as draw
 from rotor_mbs.report.plots import Series
 from rotor_mbs.runs.read import Record
@@ -45,7 +60,8 @@ _CHANNELS_SHOWN = 8  # plots; those of further channels are folded
 
 
 def comparison_page(record: Record) -> PageContent:
-    """Return the content of the page: the verdict and the onset of a fault, plots, channels, how the data were read."""
+    """Return the content of the page: the verdict and the onset of a fault, plots, channels, how
+    the data were read."""
     verdict = verdict_of(record)
     is_time = verdict.axis == "time"
     onset = onset_of(record, verdict)
@@ -69,17 +85,22 @@ def comparison_page(record: Record) -> PageContent:
         facts.append(Fact(name, _place(onset[0], verdict), onset[1]))
     largest = max(verdict.channels, key=lambda channel: channel.error_max, default=None)
     if largest is not None:
-        facts.append(Fact("Largest error", with_unit(largest.error_max, largest.unit), largest.name))
+        facts.append(
+            Fact("Largest error", with_unit(largest.error_max, largest.unit), largest.name)
+        )
     compared = f"{verdict.rows} rows"
     if verdict.horizon_s is not None and verdict.horizon_s < verdict.compared_until:
         compared += f"; errors checked up to the horizon at {seconds(verdict.horizon_s)}"
     facts.append(Fact("Compared up to", _place(verdict.compared_until, verdict), compared))
-    title = f"{Path(verdict.source).name} against {record.attributes.get('scene_label', verdict.scene)}"
+    title = (
+        f"{Path(verdict.source).name} against {record.attributes.get('scene_label', verdict.scene)}"
+    )
     return PageContent(title, about, comparison_answer(verdict, onset), facts, sections)
 
 
 def comparison_answer(verdict: DataVerdict, onset: tuple[float, str] | None) -> list[Markup]:
-    """Return whether the data agree, from when on they do not, which channels do, and the probable causes.
+    """Return whether the data agree, from when on they do not, which channels do, and the probable
+    causes.
 
     onset: see `onset_of`.
     """
@@ -89,19 +110,23 @@ def comparison_answer(verdict: DataVerdict, onset: tuple[float, str] | None) -> 
         if defects and not any(defects):
             text += " to the rounding of their own digits"
         elif defects:
-            text += Markup(": beyond rounding no channel differs by more than <b>{}</b>, allowed {}").format(
-                up_to(max(defects)), shortest(verdict.tolerance)
-            )
+            text += Markup(
+                ": beyond rounding no channel differs by more than <b>{}</b>, allowed {}"
+            ).format(up_to(max(defects)), shortest(verdict.tolerance))
         sentences = [text + "."]
     elif onset is not None:
-        text = Markup('<span class="bad">The data differ from {}</span> from <b>{}</b> on, first in {}.')
+        text = Markup(
+            '<span class="bad">The data differ from {}</span> from <b>{}</b> on, first in {}.'
+        )
         sentences = [text.format(verdict.scene, _place(onset[0], verdict), onset[1])]
     else:
         sentences = [Markup('<span class="bad">The data are {}</span>.').format(verdict.status)]
     good = [channel.name for channel in verdict.channels if not _is_outside(channel, verdict)]
     if not verdict.agrees and good and len(good) < len(verdict.channels):
         sentences.append(
-            Markup("{} within the tolerance: {}.").format("Channel" if len(good) == 1 else "Channels", ", ".join(good))
+            Markup("{} within the tolerance: {}.").format(
+                "Channel" if len(good) == 1 else "Channels", ", ".join(good)
+            )
         )
     if verdict.message:
         sentences.append(Markup("{}.").format(with_capital(typeset(verdict.message.rstrip(".")))))
@@ -113,23 +138,26 @@ def comparison_answer(verdict: DataVerdict, onset: tuple[float, str] | None) -> 
 def _is_outside(channel: ChannelErrors, verdict: DataVerdict) -> bool:
     """Return whether a channel is what is wrong with the data.
 
-    Its defect must be beyond the tolerance. A wrong value in one coordinate gives defects in the others, too, which
-    follow the reference: as long as some channel departs from the reference, those that do not are not outside.
-    A channel that cannot be judged is not outside.
+    Its defect must be beyond the tolerance. A wrong value in one coordinate gives defects in the
+    others, too, which follow the reference: as long as some channel departs from the reference,
+    those that do not are not outside. A channel that cannot be judged is not outside.
     """
 
     def is_beyond(size: float | None) -> bool:
         return size is not None and not size <= verdict.tolerance
 
-    is_explained = any(is_beyond(other.defect) and is_beyond(other.error_whole) for other in verdict.channels)
+    is_explained = any(
+        is_beyond(other.defect) and is_beyond(other.error_whole) for other in verdict.channels
+    )
     return is_beyond(channel.defect) and (is_beyond(channel.error_whole) or not is_explained)
 
 
 def onset_of(record: Record, verdict: DataVerdict) -> tuple[float, str] | None:
-    """Return the first time, or speed, at which a channel is outside the tolerance, and its name; None where none is.
+    """Return the first time, or speed, at which a channel is outside the tolerance, and its name;
+    None where none is.
 
-    Of an angle or a rate it is the beginning of the first interval with a defect beyond tolerance and rounding; of a
-    load the first row with such an error.
+    Of an angle or a rate it is the beginning of the first interval with a defect beyond tolerance
+    and rounding; of a load the first row with such an error.
     """
     rows = record.arrays[verdict.axis]
     found: list[tuple[float, str]] = []
@@ -172,7 +200,8 @@ def _axis_of(record: Record, verdict: DataVerdict) -> Horizontal:
 
 
 def _marks(record: Record, verdict: DataVerdict, onset: tuple[float, str] | None) -> list[Mark]:
-    """Return marks of the onset of a fault, where there is one, and of the horizon, where it lies within the data."""
+    """Return marks of the onset of a fault, where there is one, and of the horizon, where it lies
+    within the data."""
     marks = [] if onset is None else [Mark("first outside", onset[0])]
     horizon, axis = verdict.horizon_s, _axis_of(record, verdict)
     if horizon is not None and axis.first < horizon < axis.last:
@@ -197,16 +226,30 @@ def _channel_section(record: Record, verdict: DataVerdict, marks: Sequence[Mark]
         if len(curves) == 2:
             clip = draw.range_of(curves[0].y, data)
         state = " · outside the tolerance" if _is_outside(channel, verdict) else ""
-        plots.append(Plot(
-            with_capital(channel.name), f"{channel.unit}{state}", axis, curves, 170, clip=clip,
-            marks=marks if not plots else [Mark("", mark.x) for mark in marks], still=len(plots) < 2,
-        ))  # fmt: skip
+        plots.append(
+            Plot(
+                with_capital(channel.name),
+                f"{channel.unit}{state}",
+                axis,
+                curves,
+                170,
+                clip=clip,
+                marks=marks if not plots else [Mark("", mark.x) for mark in marks],
+                still=len(plots) < 2,
+            )
+        )
     legend = Legend([("reference", _REFERENCE), ("data", Look(INK, "-", "", "data"))])
     first, others = plots[:_CHANNELS_SHOWN], plots[_CHANNELS_SHOWN:]
     elements: list[Grid | Fold | Element] = [legend, Grid(2, [[plot] for plot in first])]
     if others:
-        elements.append(Fold("Other channels", str(len(others)), [Grid(2, [[plot] for plot in others])]))
-    heading = "Data and reference" if verdict.axis == "time" else "Frequencies of the data and of the reference"
+        elements.append(
+            Fold("Other channels", str(len(others)), [Grid(2, [[plot] for plot in others])])
+        )
+    heading = (
+        "Data and reference"
+        if verdict.axis == "time"
+        else ("Frequencies of the data and of the reference")
+    )
     say = "" if verdict.axis == "time" else "Horizontally: rotor speed (rad/s)."
     return Section("channels", heading, elements if plots else [], say)
 
@@ -220,9 +263,13 @@ def _error_section(record: Record, verdict: DataVerdict, marks: Sequence[Mark]) 
         look = replace(_look(channel), label=channel.name)
         name = channel_key(channel.name)
         if f"{name}_error" in record.arrays:
-            errors.append(Curve(channel.name, look, rows, draw.positive(_array(record, channel, "_error"))))
+            errors.append(
+                Curve(channel.name, look, rows, draw.positive(_array(record, channel, "_error")))
+            )
         if channel.defect_unit == "rad" and f"{name}_defect" in record.arrays:
-            defects.append(Curve(channel.name, look, rows, draw.positive(_array(record, channel, "_defect"))))
+            defects.append(
+                Curve(channel.name, look, rows, draw.positive(_array(record, channel, "_defect")))
+            )
     plots: list[list[Element]] = []
     if errors:
         plots.append([Plot("Error", channels[0].unit, axis, errors, 240, log=True, marks=marks)])
@@ -232,10 +279,19 @@ def _error_section(record: Record, verdict: DataVerdict, marks: Sequence[Mark]) 
             Mark(f"tolerance {shortest(verdict.tolerance)} rad", y=verdict.tolerance),
         ]
         note = "including the rounding of the data"
-        plots.append([Plot("Interval defect", "rad", axis, defects, 240, note, log=True, marks=allowed)])
-    legend = Legend([(channel.name, replace(_look(channel), label=channel.name)) for channel in channels])
+        plots.append(
+            [Plot("Interval defect", "rad", axis, defects, 240, note, log=True, marks=allowed)]
+        )
+    legend = Legend(
+        [(channel.name, replace(_look(channel), label=channel.name)) for channel in channels]
+    )
     say = (
-        "The defect of an interval tells where in time the data depart from the equations of motion." if defects else ""
+        (
+            "The defect of an interval tells where in time the data depart from the equations "
+            "of motion."
+        )
+        if defects
+        else ""
     )
     return Section("errors", "Errors", [legend, Grid(len(plots), plots)] if plots else [], say)
 
@@ -263,10 +319,16 @@ def _table_section(verdict: DataVerdict) -> Section:
 def _reading_section(verdict: DataVerdict) -> Section:
     """Return how the data were read, and what else is to know."""
     read = Listing([(place, line) for place, line in enumerate_lines(verdict.read)])
-    folds: list[Fold | Grid | Element] = [Fold("Columns", f"{len(verdict.read)} that were read", [read])]
+    folds: list[Fold | Grid | Element] = [
+        Fold("Columns", f"{len(verdict.read)} that were read", [read])
+    ]
     if verdict.unused:
         folds.append(
-            Fold("Columns not used", str(len(verdict.unused)), [Note(line) for line in unused_lines(verdict, 1000)])
+            Fold(
+                "Columns not used",
+                str(len(verdict.unused)),
+                [Note(line) for line in unused_lines(verdict, 1000)],
+            )
         )
     others = [*(f"Probable cause: {cause}" for cause in verdict.likely[2:]), *verdict.notes]
     if others:
@@ -284,15 +346,20 @@ def enumerate_lines(lines: Sequence[str]) -> list[tuple[str, str]]:
 
 
 def error_panels(record: Record) -> Panels:
-    """Plot the error of each channel over time, on a logarithmic axis. Raises InputError without channels."""
+    """Plot the error of each channel over time, on a logarithmic axis. Raises InputError without
+    channels."""
     verdict = verdict_of(record)
     channels = _drawn(verdict)
     if not channels:
         raise InputError(f"{verdict.source}: no channel was compared; nothing to plot")
     rows = record.arrays[verdict.axis]
-    series = [Series(rows, np.abs(_array(record, channel, "_error")), _look(channel)) for channel in channels]
+    series = [
+        Series(rows, np.abs(_array(record, channel, "_error")), _look(channel))
+        for channel in channels
+    ]
     panels = plots.errors(series, f"error ({channels[0].unit})", verdict.horizon_s)
-    if len(rows) and rows[-1] > rows[0]:  # also where no error is above zero, so that nothing is drawn
+    # also where no error is above zero, so that nothing is drawn
+    if len(rows) and rows[-1] > rows[0]:
         panels.axes[-1].set_xlim(rows[0], rows[-1])
     if verdict.axis == "speed":
         panels.axes[-1].set_xlabel(canvas.SPEED_AXIS)
@@ -306,10 +373,14 @@ def defect_panels(record: Record) -> Panels | None:
     series = []
     for channel in _drawn(verdict):
         if channel.defect is not None and channel.defect_unit == "rad":
-            series.append(Series(time, np.nan_to_num(_array(record, channel, "_defect")[1:]), _look(channel)))
+            series.append(
+                Series(time, np.nan_to_num(_array(record, channel, "_defect")[1:]), _look(channel))
+            )
     if not series:
         return None
-    series.append(Series(time, np.full(len(time), verdict.tolerance), Look(GREY, ":", "", "tolerance")))
+    series.append(
+        Series(time, np.full(len(time), verdict.tolerance), Look(GREY, ":", "", "tolerance"))
+    )
     return plots.errors(series, "defect of an interval (rad)")
 
 
@@ -318,7 +389,8 @@ def _array(record: Record, channel: ChannelErrors, ending: str = "") -> Any:
 
 
 def _drawn(verdict: DataVerdict) -> Sequence[ChannelErrors]:
-    """Return the channels that are drawn: the angles, else those with the first one's unit; of none, none."""
+    """Return the channels that are drawn: the angles, else those with the first one's unit; of
+    none, none."""
     units = [channel.unit for channel in verdict.channels]
     if not units:
         return []

@@ -1,4 +1,5 @@
-"""The page that goes through the paper's figures, each in the paper's own layout beside the corrected model."""
+"""The page that goes through the paper's figures, each in the paper's own layout beside the
+corrected model."""
 
 from __future__ import annotations
 
@@ -43,10 +44,12 @@ _KINDS = {
 }
 _NOTES = {
     "6": "The caption prints π/10 rad/s, the running text 1/10; the caption's value is plotted.",
-    "13": "According to the text, panel (b) is the run of Fig. 12 (blade 1 at π/5 rad/s), the caption "
+    "13": "According to the text, panel (b) is the run of Fig. 12 (blade 1 at π/5 rad/s), "
+    "the caption "
     "prints π/8; the caption's value is plotted.",
     "14": "As read from the PDF, the caption gives three initial states for four panels: which one "
-    "belongs to which panel is uncertain, and that of panel (d) is not known. Nothing is drawn for it.",
+    "belongs to which panel is uncertain, and that of panel (d) is not known. Nothing is "
+    "drawn for it.",
     "15": "1 and 100 kN m are printed in the caption of Fig. 16; the paper's other torques are not "
     "known, 10 and 50 kN m were chosen.",
 }
@@ -72,10 +75,15 @@ def figures_page(report: Report) -> PageContent:
     if known:
         count = sum(known.values())
         text = Markup(
-            "In <b>{} of {} scenes</b> of these figures the printed equations depart visibly from the corrected ones."
+            "In <b>{} of {} scenes</b> of these figures the printed equations depart visibly from "
+            "the corrected ones."
         )
         answer.append(text.format(count, len(known)))
-    answer.append(Markup("Each of the {} figures stands in the paper's own layout.").format(in_words(len(sections))))
+    answer.append(
+        Markup("Each of the {} figures stands in the paper's own layout.").format(
+            in_words(len(sections))
+        )
+    )
     sections.append(
         Section(
             "files",
@@ -91,9 +99,12 @@ def _figure_section(
     pictures: Mapping[str, Mapping[str, Mapping[str, StoredRun]]],
     report: Report,
 ) -> Section:
-    """Return one figure: a column per model, the numbers that the paper prints, and what its panels are."""
+    """Return one figure: a column per model, the numbers that the paper prints, and what its panels
+    are."""
     elements: list[Grid | Fold | Element] = []
-    numbers = paper.number_table([claim for claim in report.claims if claim.figure == figure.number], with_figure=False)
+    numbers = paper.number_table(
+        [claim for claim in report.claims if claim.figure == figure.number], with_figure=False
+    )
     if figure.kind == PATHS:
         elements.append(_path_plots(figure.number, pictures))
     else:
@@ -107,11 +118,19 @@ def _figure_section(
         angles, rates = (", ".join(map(str, initial[key])) for key in ("angles", "rates"))
         before = f"({letter}) " if letter else ""
         text = Markup('{}{}; initial state {} rad and {} rad/s: <a href="{}">{}</a>')
-        elements.append(Note(text.format(before, typeset_title(stored.title), angles, rates, report.files[name], name)))
+        elements.append(
+            Note(
+                text.format(
+                    before, typeset_title(stored.title), angles, rates, report.files[name], name
+                )
+            )
+        )
     if figure.number in _NOTES:
         elements.append(Note(_NOTES[figure.number]))
     methods = {
-        key: label_of(next(iter(runs.values())).method) for row in pictures.values() for key, runs in row.items()
+        key: label_of(next(iter(runs.values())).method)
+        for row in pictures.values()
+        for key, runs in row.items()
     }
     say = "; ".join(f"{HEADINGS[key]}: {methods[key]}" for key in SIDES if key in methods)
     return Section(
@@ -122,7 +141,9 @@ def _figure_section(
     )
 
 
-def _motion_plots(figure: PaperFigure, row: Mapping[str, Mapping[str, StoredRun]]) -> tuple[Legend, Grid]:
+def _motion_plots(
+    figure: PaperFigure, row: Mapping[str, Mapping[str, StoredRun]]
+) -> tuple[Legend, Grid]:
     """Return position above velocity, a column per model, over one time."""
     runs = [run for side in SIDES for run in row.get(side, {}).values()]
     axis = whole_time(runs)
@@ -139,7 +160,9 @@ def _motion_plots(figure: PaperFigure, row: Mapping[str, Mapping[str, StoredRun]
                     curves.append(Curve(label, look, time, values[:, 0]))
                 else:
                     for k, coordinate in enumerate(run.labels):
-                        curves.append(Curve(coordinate, coordinate_look(k, coordinate), time, values[:, k]))
+                        curves.append(
+                            Curve(coordinate, coordinate_look(k, coordinate), time, values[:, k])
+                        )
             for curve in curves:
                 looks.setdefault(curve.key, curve.look)
             if curves:
@@ -181,6 +204,8 @@ def _path_plots(number: str, pictures: Mapping[str, Mapping[str, Mapping[str, St
         for side in SIDES:
             for label, run in row.get(side, {}).items():
                 text = f"({label}) {HEADINGS[side]}" if label else HEADINGS[side]
-                drawn = canvas.path_picture(plots.paths(run.array("tip")), f"f{number}-{letter}-{side}-", text)
+                drawn = canvas.path_picture(
+                    plots.paths(run.array("tip")), f"f{number}-{letter}-{side}-", text
+                )
                 cards.append([drawn])
     return Grid(4, cards)

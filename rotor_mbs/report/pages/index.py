@@ -1,5 +1,6 @@
-"""The index of a file with several scenes: what was found, then every scene in a row. Of the paper's scenes the finding
-about the paper; of a user's own scenes how they ended, those that failed first."""
+"""The index of a file with several scenes: what was found, then every scene in a row. Of the
+paper's scenes the finding about the paper; of a user's own scenes how they ended, those that failed
+first."""
 
 from __future__ import annotations
 
@@ -24,7 +25,15 @@ from rotor_mbs.report.elements import (
     TableCell,
 )
 from rotor_mbs.report.looks import coordinate_look, with_capital
-from rotor_mbs.report.numbers import NOTHING, formula, in_words, number, prefixed, typeset_title, with_unit
+from rotor_mbs.report.numbers import (
+    NOTHING,
+    formula,
+    in_words,
+    number,
+    prefixed,
+    typeset_title,
+    with_unit,
+)
 from rotor_mbs.report.pages import (
     Report,
     agree_within,
@@ -58,8 +67,8 @@ def index_page(report: Report) -> PageContent:
 
 
 def created_energy(scene: StoredScene) -> float | None:
-    """Return the energy (J) that the printed equations create in a scene; None where it is below a thousandth of the
-    energy scale, or not known."""
+    """Return the energy (J) that the printed equations create in a scene; None where it is below a
+    thousandth of the energy scale, or not known."""
     run = scene.printed
     if run is None:
         return None
@@ -75,7 +84,8 @@ def paper_answer(report: Report) -> list[Markup]:
     sentences = []
     if report.errata and with_printed:
         text = Markup(
-            "The paper's printed equations contain <b>{} errors</b> and create energy in <b>{} of {} scenes</b>."
+            "The paper's printed equations contain <b>{} errors</b> and create energy in <b>{} of "
+            "{} scenes</b>."
         )
         sentences.append(text.format(in_words(len(report.errata)), len(rising), len(with_printed)))
     methods, error, agreeing = agreement_of_scenes(scenes)
@@ -108,7 +118,9 @@ def _paper_index(report: Report) -> PageContent:
         )
     )
     sections += [_errata_section(report), _published_section(report), _methods_section(report)]
-    return PageContent("A published rotor model, checked", paper.PAPER, paper_answer(report), facts, sections)
+    return PageContent(
+        "A published rotor model, checked", paper.PAPER, paper_answer(report), facts, sections
+    )
 
 
 def _paper_facts(report: Report) -> list[Fact]:
@@ -121,11 +133,23 @@ def _paper_facts(report: Report) -> list[Fact]:
     with_printed = [scene for scene in report.scenes.values() if scene.printed is not None]
     if with_printed:
         gains = {scene.name: created_energy(scene) for scene in with_printed}
-        complete = {scene.name for scene in with_printed if scene.printed is not None and scene.printed.status in GOOD}
-        known = [(gain, name) for name, gain in gains.items() if gain is not None and name in complete]
-        note = f"up to {prefixed(max(known)[0], 'J', 2)} ({short_name(max(known)[1])})" if known else ""
+        complete = {
+            scene.name
+            for scene in with_printed
+            if scene.printed is not None and scene.printed.status in GOOD
+        }
+        known = [
+            (gain, name) for name, gain in gains.items() if gain is not None and name in complete
+        ]
+        note = (
+            f"up to {prefixed(max(known)[0], 'J', 2)} ({short_name(max(known)[1])})"
+            if known
+            else ""
+        )
         count = sum(gain is not None for gain in gains.values())
-        facts.append(Fact("Scenes in which energy is created", f"{count} of {len(with_printed)}", note))
+        facts.append(
+            Fact("Scenes in which energy is created", f"{count} of {len(with_printed)}", note)
+        )
     _, error, _ = agreement_of_scenes(report.scenes.values())
     if error is not None:
         runs = [run for scene in report.scenes.values() for run in scene.corrected_runs.values()]
@@ -154,7 +178,8 @@ def _paper_facts(report: Report) -> list[Fact]:
 
 
 def _hero_scene(report: Report) -> StoredScene | None:
-    """Return the scene with a published number that is no rounding error; else one with both models."""
+    """Return the scene with a published number that is no rounding error; else one with both
+    models."""
     both = [
         scene
         for scene in report.scenes.values()
@@ -192,12 +217,15 @@ def _hero_section(scene: StoredScene, report: Report) -> Section:
 
 
 def scene_table(report: Report) -> PageTable:
-    """Return a row per scene of the paper: the angle that differs most, when and by how much energy; agreement."""
+    """Return a row per scene of the paper: the angle that differs most, when and by how much
+    energy; agreement."""
     rows: list[Row] = []
     most = max((len(agreement(scene)[0]) for scene in report.scenes.values()), default=0)
     for name, scene in report.scenes.items():
         note = typeset_title(scene.title)
-        row: list[TableCell | str] = [TableCell(short_name(scene.label), href=report.files[name], note=note)]
+        row: list[TableCell | str] = [
+            TableCell(short_name(scene.label), href=report.files[name], note=note)
+        ]
         row += _departure_cells(scene)
         methods, error = agreement(scene)
         failed = [run for run in scene.corrected_runs.values() if run.status not in GOOD]
@@ -221,7 +249,8 @@ def scene_table(report: Report) -> PageTable:
 
 
 def _departure_cells(scene: StoredScene) -> list[TableCell | str]:
-    """Return the cells about the printed model: a drawing, when it departs, the energy that it creates."""
+    """Return the cells about the printed model: a drawing, when it departs, the energy that it
+    creates."""
     sides = scene.sides
     if len(sides) < 2 or not all("angles" in run for run in sides.values()):
         return ["", "", ""]
@@ -239,15 +268,25 @@ def _departure_cells(scene: StoredScene) -> list[TableCell | str]:
         high + room,
     )
     left, _ = draw.parting(printed, corrected)
-    cells: list[TableCell | str] = [TableCell("", note=corrected.labels[coordinate], picture=picture, order=coordinate)]
-    cells.append(TableCell("never", order=1e9) if left is None else TableCell(with_unit(left, "s"), order=left))
+    cells: list[TableCell | str] = [
+        TableCell("", note=corrected.labels[coordinate], picture=picture, order=coordinate)
+    ]
+    cells.append(
+        TableCell("never", order=1e9)
+        if left is None
+        else TableCell(with_unit(left, "s"), order=left)
+    )
     gain = metric(printed, "energy_gain_J")
     if gain is None:
         cells.append("")
     elif printed.status not in GOOD:
         cells.append(TableCell("runs away", order=gain))
     elif created_energy(scene) is None:
-        cells.append(TableCell("none", note=f"{prefixed(gain, 'J', 2) if gain >= 1.0 else 'below 1 J'}", order=gain))
+        cells.append(
+            TableCell(
+                "none", note=f"{prefixed(gain, 'J', 2) if gain >= 1.0 else 'below 1 J'}", order=gain
+            )
+        )
     else:
         cells.append(TableCell(prefixed(gain, "J"), order=gain))
     return cells
@@ -305,7 +344,9 @@ def _published_section(report: Report) -> Section:
                 Note(Markup("{} runs of each scene with moved starts. ").format(study.runs) + link),
             ]
         )
-    return Section("published", "Published numbers and claims", [Grid(len(cards), cards)] if cards else [])
+    return Section(
+        "published", "Published numbers and claims", [Grid(len(cards), cards)] if cards else []
+    )
 
 
 def _methods_section(report: Report) -> Section:
@@ -327,14 +368,24 @@ def _methods_section(report: Report) -> Section:
             row.append(number_cell(max(values, default=None)))
         rows.append(row)
     head = (
-        "Method", "ok", "Largest angle error (rad)", "Largest interval defect (rad)", "Energy error / energy scale",
+        "Method",
+        "ok",
+        "Largest angle error (rad)",
+        "Largest interval defect (rad)",
+        "Energy error / energy scale",
         "Longest run (s)",
-    )  # fmt: skip
+    )
     elements: list[Element] = (
-        [PageTable("Methods over all scenes", head, rows, wide=(3, 5), sortable=True)] if rows else []
+        [PageTable("Methods over all scenes", head, rows, wide=(3, 5), sortable=True)]
+        if rows
+        else []
     )
     if report.curves:
-        elements.append(Note(Markup('<a href="bench.html">Error against run time for all methods and steps</a>')))
+        elements.append(
+            Note(
+                Markup('<a href="bench.html">Error against run time for all methods and steps</a>')
+            )
+        )
     return Section("methods", "Methods over all scenes", elements)
 
 
@@ -362,14 +413,20 @@ def _own_index(report: Report) -> PageContent:
         subject = in_words(len(good)).capitalize() if good else "None"
         answer.append(text.format(subject, in_words(count), _is_or_are(max(len(good), 1))))
     if unchecked:
-        text = Markup("Of {} nothing was checked: {} no run of a corrected model beside the reference.")
+        text = Markup(
+            "Of {} nothing was checked: {} no run of a corrected model beside the reference."
+        )
         answer.append(text.format(in_words(unchecked), "it has" if unchecked == 1 else "they have"))
     methods, error, agreeing = agreement_of_scenes(scenes)
     if error is not None:
         text = Markup("{} in {} of {} scenes.")
         sentence = Markup(with_capital(agree_within(methods, error)))
         answer.append(text.format(sentence, agreeing, count))
-    say = "Those that are not ok first; click a heading to sort." if failed else "Click a heading to sort."
+    say = (
+        "Those that are not ok first; click a heading to sort."
+        if failed
+        else "Click a heading to sort."
+    )
     table = own_table(report, [*failed, *(scene for scene in scenes if scene not in failed)])
     sections = [Section("scenes", f"{count} scenes", [table], say), _methods_section(report)]
     tone = "bad" if failed else "good" if len(good) == count else ""
@@ -409,7 +466,8 @@ def _largest_moment(scenes: Sequence[StoredScene]) -> tuple[float, str] | None:
 
 
 def _status_cell(scene: StoredScene) -> TableCell:
-    """Return how the runs of a scene ended: those that are not good with their messages, else how many are ok."""
+    """Return how the runs of a scene ended: those that are not good with their messages, else how
+    many are ok."""
     bad = [run for run in scene.methods.values() if run.status not in GOOD]
     if bad:
         notes = "; ".join(f"{run.method}: {run.attributes.get('message', '')}" for run in bad)
@@ -424,14 +482,17 @@ def _status_cell(scene: StoredScene) -> TableCell:
 
 
 def own_table(report: Report, scenes: Sequence[StoredScene]) -> PageTable:
-    """Return a row per scene: its rotor speed, how its runs ended, its largest load, and how its methods agree."""
+    """Return a row per scene: its rotor speed, how its runs ended, its largest load, and how its
+    methods agree."""
     rows: list[Row] = []
     for scene in scenes:
         row: list[TableCell | str] = [
             TableCell(scene.label, href=report.files[scene.name], note=typeset_title(scene.title))
         ]
         run = scene.corrected or scene.printed
-        name = "" if run is None else next((name for name in ("rates", "angles") if name in run), "")
+        name = (
+            "" if run is None else next((name for name in ("rates", "angles") if name in run), "")
+        )
         if run is not None and name:
             values = run.array(name)[:, 0]
             low, high = float(np.nanmin(values)), float(np.nanmax(values))

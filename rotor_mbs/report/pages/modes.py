@@ -55,7 +55,8 @@ class ModePlots:
         self._modes = modes
 
     def __call__(self) -> Panels:
-        """Plot the Campbell diagram: damped frequencies (rad/s) over rotor speed, with multiples of the speed."""
+        """Plot the Campbell diagram: damped frequencies (rad/s) over rotor speed, with multiples of
+        the speed."""
         modes = self._rotation()
         panel = panels((2.9, 1.7), SPEED_AXIS)
         frequencies, speeds = modes.damped_frequencies, modes.speeds
@@ -67,7 +68,9 @@ class ModePlots:
             panel.axes[0].plot(speeds, k * speeds, color=GREY, linewidth=0.7, linestyle=":")
             if apart or k == harmonics[-1]:
                 end = min(float(speeds[-1]), top / k)
-                panel.axes[0].text(end, k * end, f"{k}P", color=GREY, ha="right", va="bottom", fontsize=8.0)
+                panel.axes[0].text(
+                    end, k * end, f"{k}P", color=GREY, ha="right", va="bottom", fontsize=8.0
+                )
         for k, known in enumerate(frequencies.T):
             first = known[np.flatnonzero(np.isfinite(known))[:1]]
             change = np.where(np.nanmax(known) > 1e-6 * top, known - first, np.nan)
@@ -87,7 +90,8 @@ class ModePlots:
         return panel.with_legend()
 
     def damping(self) -> Panels:
-        """Plot damping ratios and growth rates (1/s) over rotor speed. Raises InputError without speeds."""
+        """Plot damping ratios and growth rates (1/s) over rotor speed. Raises InputError without
+        speeds."""
         modes = self._rotation()
         panel = panels((2.0, 2.0), SPEED_AXIS)
         curves = {"damping ratio": modes.damping_ratios, "growth rate (1/s)": modes.growth_rates}
@@ -98,10 +102,13 @@ class ModePlots:
         return panel.with_legend()
 
     def multipliers(self) -> Panels:
-        """Plot moduli of the Floquet multipliers over rotor speed. Raises InputError if there are none."""
+        """Plot moduli of the Floquet multipliers over rotor speed. Raises InputError if there are
+        none."""
         table = self._modes.floquet
         if table is None:
-            raise InputError(f"{self._modes.scene}: no Floquet multipliers; they need gravity and speeds above 0")
+            raise InputError(
+                f"{self._modes.scene}: no Floquet multipliers; they need gravity and speeds above 0"
+            )
         panel = panels((2.6,), SPEED_AXIS)
         axes = panel.axes[0]
         sizes = np.abs(table.multipliers)
@@ -122,7 +129,9 @@ class ModePlots:
     def _rotation(self) -> LinearModes:
         for linear in self._modes.rotation.values():
             return linear
-        raise InputError(f"{self._modes.scene}: no modes over speed; allowed: modes computed with speeds")
+        raise InputError(
+            f"{self._modes.scene}: no modes over speed; allowed: modes computed with speeds"
+        )
 
 
 def mode_look(index: int, name: str) -> Look:
@@ -134,7 +143,8 @@ def mode_look(index: int, name: str) -> Look:
 
 
 def modes_page(modes: Sequence[SceneModes]) -> PageContent:
-    """Return the content of the page: of each scene its modes at rest, over speed, and under gravity."""
+    """Return the content of the page: of each scene its modes at rest, over speed, and under
+    gravity."""
     sections: list[Section] = []
     answer: list[Markup] = []
     facts: list[Fact] = []
@@ -143,7 +153,11 @@ def modes_page(modes: Sequence[SceneModes]) -> PageContent:
         if not facts:
             facts = _facts(scene)
         sections += _scene_sections(scene, f"scene{place}", with_name=len(modes) > 1)
-    title = typeset_title(modes[0].title) if len(modes) == 1 else f"Modes of {in_words(len(modes))} scenes"
+    title = (
+        typeset_title(modes[0].title)
+        if len(modes) == 1
+        else f"Modes of {in_words(len(modes))} scenes"
+    )
     about = ", ".join(scene.label for scene in modes)
     return PageContent(title, f"Modes and Campbell diagram of {about}", answer, facts, sections)
 
@@ -153,20 +167,31 @@ def _first(kind: Mapping[str, LinearModes]) -> LinearModes | None:
 
 
 def mode_answer(scene: SceneModes) -> list[Markup]:
-    """Return whether the modes satisfy their equations and the models agree, frequencies at rest, and stability."""
+    """Return whether the modes satisfy their equations and the models agree, frequencies at rest,
+    and stability."""
     sentences = []
     models = max(len(scene.rest), len(scene.rotation))
     for fault in scene.faults:
         sentences.append(Markup('<span class="bad">{}: {}</span>.').format(scene.label, fault))
     if models > 1:
-        how = Markup("agree within <b>{}</b> of the largest eigenvalue").format(up_to(scene.disagreement))
+        how = Markup("agree within <b>{}</b> of the largest eigenvalue").format(
+            up_to(scene.disagreement)
+        )
         if scene.disagreement > AGREEMENT:
-            how = Markup('<span class="bad">do not agree: they differ by {} of the largest eigenvalue</span>')
+            how = Markup(
+                '<span class="bad">do not agree: they differ by {} of the largest eigenvalue</span>'
+            )
             how = how.format(number(scene.disagreement))
-        sentences.append(Markup("{}: the modes of {} models {}.").format(scene.label, in_words(models), how))
+        sentences.append(
+            Markup("{}: the modes of {} models {}.").format(scene.label, in_words(models), how)
+        )
     rest = _first(scene.rest)
     if rest is not None:
-        known = [value for value in rest.undamped_frequencies[0].tolist() if math.isfinite(value) and value > 0.0]
+        known = [
+            value
+            for value in rest.undamped_frequencies[0].tolist()
+            if math.isfinite(value) and value > 0.0
+        ]
         known = [value for value in known if value > _ZERO * max(known)]
         if known:
             low, high = min(known), max(known)
@@ -179,8 +204,14 @@ def mode_answer(scene: SceneModes) -> list[Markup]:
         unstable = table.speeds[table.stable == 0]
         known_count = int((table.stable != -1).sum())
         if len(unstable):
-            text = Markup('Under gravity its rotation is <span class="bad">unstable at {} of {} speeds</span>, {}.')
-            where = f"{number(float(unstable.min()), 3)} to {number(float(unstable.max()), 3)}{SPACE}rad/s"
+            text = Markup(
+                'Under gravity its rotation is <span class="bad">unstable at {} of {} '
+                "speeds</span>, {}."
+            )
+            where = (
+                f"{number(float(unstable.min()), 3)} to "
+                f"{number(float(unstable.max()), 3)}{SPACE}rad/s"
+            )
             sentences.append(text.format(len(unstable), known_count, where))
         elif known_count:
             every = "all" if known_count == len(table.speeds) else f"{known_count} of"
@@ -209,7 +240,9 @@ def _facts(scene: SceneModes) -> list[Fact]:
         damped = rotation.damping_ratios[np.isfinite(rotation.damping_ratios)]
         if len(damped) and float(np.abs(damped).max()) > _NOTHING:
             low, high = float(damped.min()), float(damped.max())
-            facts.append(Fact("Damping ratio", f"{_shown(low, 3)} to {_shown(high, 3)}", "over all speeds"))
+            facts.append(
+                Fact("Damping ratio", f"{_shown(low, 3)} to {_shown(high, 3)}", "over all speeds")
+            )
     if scene.floquet is not None and np.isfinite(scene.floquet.largest).any():
         largest = float(np.nanmax(scene.floquet.largest))
         is_bad = bool((scene.floquet.stable == 0).any())
@@ -219,29 +252,40 @@ def _facts(scene: SceneModes) -> list[Fact]:
 
 
 def _scene_sections(scene: SceneModes, name: str, *, with_name: bool) -> list[Section]:
-    """Return the sections of one scene; `name` begins their ids, the scene's own name their headings."""
+    """Return the sections of one scene; `name` begins their ids, the scene's own name their
+    headings."""
     before = f"{scene.label}: " if with_name else ""
     axis_name = f"rotor speed of {scene.label}" if with_name else "rotor speed"
     sections = []
     rest, rotation = _first(scene.rest), _first(scene.rotation)
-    if rotation is not None and len(rotation.speeds) > 1 and not np.isnan(rotation.growth_rates).all():
+    if (
+        rotation is not None
+        and len(rotation.speeds) > 1
+        and not np.isnan(rotation.growth_rates).all()
+    ):
         legend, cards = _campbell(rotation, name, axis_name)
         say = (
             "Horizontally: rotor speed (rad/s), in steady rotation without gravity; a torque "
             "keeps the speed. Frequencies are in the rotor's frame; 1P, 2P: multiples of the "
             "rotor speed."
         )
-        sections.append(Section(f"{name}-rotation", f"{before}Campbell diagram", [legend, Grid(2, cards)], say))
+        sections.append(
+            Section(f"{name}-rotation", f"{before}Campbell diagram", [legend, Grid(2, cards)], say)
+        )
     turning = _turning(scene, name, axis_name)
     if turning is not None:
         sections.append(replace(turning, heading=f"{before}{turning.heading}"))
     if rest is not None:
-        sections.append(Section(f"{name}-rest", f"{before}At rest", [*_tables(rest, 0), Note(_AT_REST)]))
+        sections.append(
+            Section(f"{name}-rest", f"{before}At rest", [*_tables(rest, 0), Note(_AT_REST)])
+        )
     folds: list[Grid | Fold | Element] = []
     if rotation is not None:
         last = len(rotation.speeds) - 1
         hint = f"{number(float(rotation.speeds[last]), 4)} rad/s"
-        folds.append(Fold("Modes at the highest speed", hint, [*_tables(rotation, last), Note(_FRAMES)]))
+        folds.append(
+            Fold("Modes at the highest speed", hint, [*_tables(rotation, last), Note(_FRAMES)])
+        )
     if scene.floquet is not None:
         folds.append(
             Fold(
@@ -251,7 +295,13 @@ def _scene_sections(scene: SceneModes, name: str, *, with_name: bool) -> list[Se
             )
         )
     if scene.notes:
-        folds.append(Fold("Not computed", counted(len(scene.notes), "note"), [Note(text) for text in scene.notes]))
+        folds.append(
+            Fold(
+                "Not computed",
+                counted(len(scene.notes), "note"),
+                [Note(text) for text in scene.notes],
+            )
+        )
     sources = max((list(kind.values()) for kind in (scene.rest, scene.rotation)), key=len)
     models = ", ".join(f"{linear.label} ({linear.source})" for linear in sources)
     folds.append(Fold("Models", models, [Note(_SMALL_MOTIONS)]))
@@ -259,8 +309,11 @@ def _scene_sections(scene: SceneModes, name: str, *, with_name: bool) -> list[Se
     return sections
 
 
-def _campbell(rotation: LinearModes, name: str, axis_name: str) -> tuple[Legend, list[list[Element]]]:
-    """Return the legend and the plots over speed: frequencies with multiples of the speed, their change, damping.
+def _campbell(
+    rotation: LinearModes, name: str, axis_name: str
+) -> tuple[Legend, list[list[Element]]]:
+    """Return the legend and the plots over speed: frequencies with multiples of the speed, their
+    change, damping.
 
     Parameters
     ----------
@@ -282,9 +335,13 @@ def _campbell(rotation: LinearModes, name: str, axis_name: str) -> tuple[Legend,
     for k in multiples:
         line = np.where(k * speeds <= top, k * speeds, np.nan)
         harmonics.append(Curve(f"{name} harmonics", Look(GREY, ":", "", f"{k}P"), speeds, line))
-    first = np.array([column[np.flatnonzero(np.isfinite(column))[:1]].sum() for column in frequencies.T])
+    first = np.array(
+        [column[np.flatnonzero(np.isfinite(column))[:1]].sum() for column in frequencies.T]
+    )
     plots = [
-        Plot("Damped frequency", "rad/s", axis, [*harmonics, *curves(frequencies)], 300, still=True),
+        Plot(
+            "Damped frequency", "rad/s", axis, [*harmonics, *curves(frequencies)], 300, still=True
+        ),
         Plot(
             "Change from the lowest speed",
             "rad/s",
@@ -295,16 +352,25 @@ def _campbell(rotation: LinearModes, name: str, axis_name: str) -> tuple[Legend,
         ),
     ]
     damping, growth = rotation.damping_ratios, rotation.growth_rates
-    if max(np.nanmax(np.abs(damping), initial=0.0), np.nanmax(np.abs(growth), initial=0.0)) > _NOTHING:
+    if (
+        max(np.nanmax(np.abs(damping), initial=0.0), np.nanmax(np.abs(growth), initial=0.0))
+        > _NOTHING
+    ):
         plots.append(Plot("Damping ratio", "", axis, curves(damping), 200, least=_NOTHING))
         plots.append(Plot("Growth rate", "1/s", axis, curves(growth), 200, least=_NOTHING))
     items = [(f"{name} {k}", look) for k, look in enumerate(looks)]
-    items.append((f"{name} harmonics", Look(GREY, ":", "", f"{', '.join(f'{k}P' for k in multiples)} from below")))
+    items.append(
+        (
+            f"{name} harmonics",
+            Look(GREY, ":", "", f"{', '.join(f'{k}P' for k in multiples)} from below"),
+        )
+    )
     return Legend(items), [[plot] for plot in plots]
 
 
 def _turning(scene: SceneModes, name: str, axis_name: str) -> Section | None:
-    """Return the Floquet multipliers over speed; None without any. name, axis_name: as for `_campbell`."""
+    """Return the Floquet multipliers over speed; None without any. name, axis_name: as for
+    `_campbell`."""
     table = scene.floquet
     if table is None or len(table.speeds) < 2 or not np.isfinite(table.largest).any():
         return None
@@ -312,7 +378,10 @@ def _turning(scene: SceneModes, name: str, axis_name: str) -> Section | None:
     axis = Horizontal(axis_name, "rad/s", "speed", float(speeds[0]), float(speeds[-1]))
     sizes = np.abs(table.multipliers)
     shown = np.where(sizes > 0.0, sizes, np.nan)
-    each = [Curve(f"{name} each", Look(BLUE, "-", "", "each"), speeds, column, dots="only") for column in shown.T]
+    each = [
+        Curve(f"{name} each", Look(BLUE, "-", "", "each"), speeds, column, dots="only")
+        for column in shown.T
+    ]
     largest = Curve(f"{name} largest", Look(VERMILLION, "-", "", "largest"), speeds, table.largest)
     known = shown[np.isfinite(shown)]
     is_log = is_wide(known)
@@ -328,9 +397,13 @@ def _turning(scene: SceneModes, name: str, axis_name: str) -> Section | None:
         least=10.0 * GROWTH,
     )
     rates = Plot(
-        "Growth rate", "1/s", axis, [Curve("growth", Look(VERMILLION, "-", "", "largest"), speeds, table.growth_rates)],
-        240, least=_NOTHING,
-    )  # fmt: skip
+        "Growth rate",
+        "1/s",
+        axis,
+        [Curve("growth", Look(VERMILLION, "-", "", "largest"), speeds, table.growth_rates)],
+        240,
+        least=_NOTHING,
+    )
     say = (
         "Under gravity a rotating rotor has no equilibrium but a periodic motion. Multipliers "
         "are the eigenvalues of its state transition matrix over one revolution; the largest "
@@ -356,7 +429,9 @@ _SMALL_MOTIONS = "The geometric stiffness of the chain's constraint forces is in
 def _multipliers(table: FloquetTable) -> PageTable:
     """Return the table of Floquet multipliers over the speed."""
     rows: list[Row] = []
-    for i, (speed, largest) in enumerate(zip(table.speeds.tolist(), table.largest.tolist(), strict=True)):
+    for i, (speed, largest) in enumerate(
+        zip(table.speeds.tolist(), table.largest.tolist(), strict=True)
+    ):
         text = "unknown" if table.stable[i] == -1 else _shown(largest, 7)
         cell = TableCell(text, "bad" if table.stable[i] == 0 else "", note=table.messages[i])
         numbers = ((table.growth_rates, 4), (table.product_error, 2), (table.torque, 4))

@@ -1,4 +1,5 @@
-"""The paper: its numbers and claims as tables, its errata, its figures on a page and for a manuscript."""
+"""The paper: its numbers and claims as tables, its errata, its figures on a page and for a
+manuscript."""
 
 from __future__ import annotations
 
@@ -51,10 +52,16 @@ PAPER = Markup(
 
 
 def quantity_of(claim: Published) -> str:
-    """Return what a published number is: "crest" of a rotor angle's maximum, "largest rotor rate"."""
+    """Return what a published number is: "crest" of a rotor angle's maximum, "largest rotor
+    rate"."""
     if claim.id.endswith("-crest"):
         return "crest"
-    return COLUMNS[claim.metric].long_name.partition(" (")[0].partition(" over")[0].replace("magnitude of the ", "")
+    return (
+        COLUMNS[claim.metric]
+        .long_name.partition(" (")[0]
+        .partition(" over")[0]
+        .replace("magnitude of the ", "")
+    )
 
 
 def unit_of_claim(claim: Published) -> str:
@@ -73,7 +80,9 @@ def number_table(claims: Iterable[Published], *, with_figure: bool = True) -> Pa
         cells = [_verdict(value, claim) for value in (claim.printed, claim.corrected)]
         quantity = TableCell(f"{quantity_of(claim)} ({unit_of_claim(claim)})", note=note)
         rows.append([quantity, fixed(claim.value, claim.decimals), *cells])
-    return PageTable("Published numbers", ("Quantity", "Published", "As printed", "Corrected"), rows)
+    return PageTable(
+        "Published numbers", ("Quantity", "Published", "As printed", "Corrected"), rows
+    )
 
 
 def _verdict(value: float | None, item: Published) -> TableCell:
@@ -81,7 +90,9 @@ def _verdict(value: float | None, item: Published) -> TableCell:
     if value is None:
         return TableCell(NOTHING)
     holds = rounds_to(value, item)
-    return TableCell(f"{'✓' if holds else '✗'} {fixed(value, item.decimals + 1)}", "good" if holds else "bad")
+    return TableCell(
+        f"{'✓' if holds else '✗'} {fixed(value, item.decimals + 1)}", "good" if holds else "bad"
+    )
 
 
 def _claim_cell(verdict: str) -> TableCell:
@@ -95,7 +106,9 @@ def claim_table(claims: Iterable[Published], study: ClaimStudy) -> PageTable:
     for claim in claims:
         if claim.is_number:
             continue
-        statement = TableCell(claim.statement, note=f"Fig. {claim.figure}: «{claim.quote}»", note_language="es")
+        statement = TableCell(
+            claim.statement, note=f"Fig. {claim.figure}: «{claim.quote}»", note_language="es"
+        )
         rows.append(
             [
                 statement,
@@ -108,15 +121,22 @@ def claim_table(claims: Iterable[Published], study: ClaimStudy) -> PageTable:
 def count_table(study: ClaimStudy) -> PageTable:
     """Return how many claims hold, fail or are undecided, for each model."""
     names = {HOLDS: "hold", FAILS: "fail", UNDECIDED: "undecided: rounding decides"}
-    rows = [[text, *(str(study.count(method, verdict)) for method in study.methods)] for verdict, text in names.items()]
-    return PageTable("Published claims", (f"{len(study.verdicts)} claims", "As printed", "Corrected"), rows)
+    rows = [
+        [text, *(str(study.count(method, verdict)) for method in study.methods)]
+        for verdict, text in names.items()
+    ]
+    return PageTable(
+        "Published claims", (f"{len(study.verdicts)} claims", "As printed", "Corrected"), rows
+    )
 
 
 def study_note(study: ClaimStudy) -> str:
     durations = ", ".join(f"{duration:g}" for duration in study.durations)
     return (
-        f"Based on {study.runs} runs of each scene for each of the durations {durations} s, with initial angles moved "
-        f"by up to {number(study.spread)} rad. A run is deciding if it reached its end without a large energy gain. "
+        f"Based on {study.runs} runs of each scene for each of the durations {durations} s, with "
+        "initial angles moved "
+        f"by up to {number(study.spread)} rad. A run is deciding if it reached its end without a "
+        "large energy gain. "
         f"{study.rule}"
     )
 
@@ -127,18 +147,32 @@ def claims_section(claims: Sequence[Published], report: Report, scene: StoredSce
     study = report.study
     for claim in claims:
         if claim.is_number:
-            what = f"Published {quantity_of(claim)}: {fixed(claim.value, claim.decimals)} {unit_of_claim(claim)}"
+            what = (
+                f"Published {quantity_of(claim)}: {fixed(claim.value, claim.decimals)} "
+                f"{unit_of_claim(claim)}"
+            )
             note = f"Fig. {claim.figure}: «{claim.quote}»"
             if claim.rounding:
                 what += f"; {ROUNDING}"
             statement = TableCell(what, note=note, note_language="es")
-            rows.append([statement, *(_verdict(value, claim) for value in (claim.printed, claim.corrected))])
+            rows.append(
+                [statement, *(_verdict(value, claim) for value in (claim.printed, claim.corrected))]
+            )
         elif study is not None:
-            statement = TableCell(claim.statement, note=f"Fig. {claim.figure}: «{claim.quote}»", note_language="es")
-            rows.append([statement, *(_claim_cell(study.verdicts[claim.id][method]) for method in study.methods)])
+            statement = TableCell(
+                claim.statement, note=f"Fig. {claim.figure}: «{claim.quote}»", note_language="es"
+            )
+            rows.append(
+                [
+                    statement,
+                    *(_claim_cell(study.verdicts[claim.id][method]) for method in study.methods),
+                ]
+            )
     elements: list[Grid | Fold | Element] = []
     if rows:
-        elements.append(PageTable("What the paper says", ("Statement", "As printed", "Corrected"), rows))
+        elements.append(
+            PageTable("What the paper says", ("Statement", "As printed", "Corrected"), rows)
+        )
     notes: list[Element] = []
     if study is not None and any(not claim.is_number for claim in claims):
         notes.append(Note(study_note(study)))
@@ -160,12 +194,16 @@ def claims_page(report: Report) -> PageContent:
     sections = []
     if study is not None:
         holds = [study.count(method, HOLDS) for method in study.methods]
-        text = Markup("Of {} claims in words {} hold for the printed equations and {} for the corrected ones.")
+        text = Markup(
+            "Of {} claims in words {} hold for the printed equations and {} for the corrected ones."
+        )
         answer.append(text.format(len(study.verdicts), *(in_words(count) for count in holds)))
         words = [claim for claim in claims if not claim.is_number]
         count = Grid(2, [[number_table(claims)], [count_table(study)]])
         sections.append(Section("numbers", "Numbers and counts", [count]))
-        sections.append(Section("claims", "Claims", [claim_table(words, study), Note(study_note(study))]))
+        sections.append(
+            Section("claims", "Claims", [claim_table(words, study), Note(study_note(study))])
+        )
     elif numbers:
         sections.append(Section("numbers", "Numbers", [number_table(claims)]))
     notes = [Note(text) for text in report.conditions.values()]
@@ -187,13 +225,19 @@ def errata_page(report: Report) -> PageContent:
     count = len(report.errata)
     answer = [
         Markup("The printed equations contain <b>{} errors</b>.").format(in_words(count)),
-        Markup("With them {} of {} printed entries differ from what follows from the paper's own transformation (3).")
-        .format(len(differing), len(entries)),
-        Markup("The {} errors explain <b>{} of these {}</b>; the other entries agree to {}.").format(
-            in_words(count), "all" if explained == len(differing) else explained, len(differing),
+        Markup(
+            "With them {} of {} printed entries differ from what follows from the paper's own "
+            "transformation (3)."
+        ).format(len(differing), len(entries)),
+        Markup(
+            "The {} errors explain <b>{} of these {}</b>; the other entries agree to {}."
+        ).format(
+            in_words(count),
+            "all" if explained == len(differing) else explained,
+            len(differing),
             up_to(largest_agreeing),
         ),
-    ]  # fmt: skip
+    ]
     facts = []
     for erratum in report.errata:
         effect = _effect(report, erratum.id)
@@ -208,20 +252,30 @@ def errata_page(report: Report) -> PageContent:
         ]
         if erratum.evidence:
             listed = Markup("").join(
-                Markup("<li>{}</li>").format(formula(text, in_prose=True)) for text in erratum.evidence
+                Markup("<li>{}</li>").format(formula(text, in_prose=True))
+                for text in erratum.evidence
             )
             items.append(("Evidence", Markup("<ul>{}</ul>").format(listed)))
         if erratum.reaches:
             items.append(("Equations affected", Markup("{}").format(", ".join(erratum.reaches))))
         elements: list[Element] = [Listing(items)]
         for equation, rows in matrices(entries, erratum.stands_in):
-            text = f"{equation} as printed; wrong entries are struck out and followed by the correct ones"
+            text = (
+                f"{equation} as printed; wrong entries are struck out and followed by the "
+                "correct ones"
+            )
             elements.append(Matrix(text, rows))
-        sections.append(Section(erratum.id, f"{erratum.id}: {', '.join(erratum.stands_in)}", [Grid(1, [elements])]))
+        sections.append(
+            Section(
+                erratum.id, f"{erratum.id}: {', '.join(erratum.stands_in)}", [Grid(1, [elements])]
+            )
+        )
     head = ("Equation", "Entry", "Printed", "Correct", "Difference", "Explained by")
     rows_of_entries: list[Row] = []
     for entry in differing:
-        printed, right = (TableCell("", picture=formula(text)) for text in (entry.printed, entry.right))
+        printed, right = (
+            TableCell("", picture=formula(text)) for text in (entry.printed, entry.right)
+        )
         difference = number_cell(entry.difference)
         rows_of_entries.append(
             [
@@ -234,7 +288,10 @@ def errata_page(report: Report) -> PageContent:
             ]
         )
     hint = f"{len(differing)} that differ"
-    say = "Difference: the largest over random states, relative to the larger of 1, the printed and the correct value."
+    say = (
+        "Difference: the largest over random states, relative to the larger of 1, the printed "
+        "and the correct value."
+    )
     table = PageTable("Printed entries that differ", head, rows_of_entries, wide=(4,))
     sections.append(Section("entries", "Checked entries", [Fold("Entries", hint, [table])], say))
     sections.append(Section("method", "How they were found", [Note(_METHOD), Note(_ALONE)]))
@@ -257,7 +314,8 @@ _ALONE = (
 
 
 def _effect(report: Report, erratum: str) -> tuple[str, str]:
-    """Return the largest angle error that one erratum alone makes, and where; "–" where no run has it."""
+    """Return the largest angle error that one erratum alone makes, and where; "–" where no run has
+    it."""
     largest = largest_of(report, errata_methods().get(erratum, ""), "angle_error_max")
     if largest is None:
         return NOTHING, "no run with it alone"
@@ -266,7 +324,8 @@ def _effect(report: Report, erratum: str) -> tuple[str, str]:
 
 
 def largest_of(report: Report, method: str, name: str) -> tuple[float, str] | None:
-    """Return the largest finite number `name` of a method's runs, and the scene; None where there is none."""
+    """Return the largest finite number `name` of a method's runs, and the scene; None where there
+    is none."""
     found = []
     for scene in report.scenes.values():
         run = scene.runs.get(method)
@@ -276,7 +335,9 @@ def largest_of(report: Report, method: str, name: str) -> tuple[float, str] | No
     return max(found) if found else None
 
 
-def matrices(entries: Sequence[CheckedEntry], equations: Sequence[str]) -> list[tuple[str, list[list[Cell]]]]:
+def matrices(
+    entries: Sequence[CheckedEntry], equations: Sequence[str]
+) -> list[tuple[str, list[list[Cell]]]]:
     """Return (equation, rows of its matrix) of those of `equations` that are matrices."""
     shown = []
     for equation in equations:

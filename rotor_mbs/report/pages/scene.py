@@ -1,5 +1,6 @@
-"""The page of a scene: what happened, loads, agreement of the methods, and all numbers. A scene of the paper shows the
-printed model beside the corrected one; any other one the motion and the loads of its best run."""
+"""The page of a scene: what happened, loads, agreement of the methods, and all numbers. A scene of
+the paper shows the printed model beside the corrected one; any other one the motion and the loads
+of its best run."""
 
 from __future__ import annotations
 
@@ -41,7 +42,17 @@ from rotor_mbs.report.looks import (
     look_of,
     with_capital,
 )
-from rotor_mbs.report.numbers import SPACE, fixed, number, prefixed, seconds, span, typeset_title, up_to, with_unit
+from rotor_mbs.report.numbers import (
+    SPACE,
+    fixed,
+    number,
+    prefixed,
+    seconds,
+    span,
+    typeset_title,
+    up_to,
+    with_unit,
+)
 from rotor_mbs.report.pages import (
     Report,
     agree_within,
@@ -84,7 +95,11 @@ _RPM = 30.0 / math.pi  # rev/min of a rad/s
 def scene_page(name: str, report: Report) -> PageContent:
     """Return the content of the page of a scene."""
     scene = report.scenes[name]
-    is_paper = bool(scene.figures) and len(scene.sides) == 2 and all("angles" in run for run in scene.sides.values())
+    is_paper = (
+        bool(scene.figures)
+        and len(scene.sides) == 2
+        and all("angles" in run for run in scene.sides.values())
+    )
     claims = [claim for claim in report.claims if name in claim.scenes]
     content = _paper_page(scene, report, claims) if is_paper else _own_page(scene, report)
     pages = list(report.files.items())
@@ -115,7 +130,8 @@ def described(scene: StoredScene) -> str:
 
 
 def _drawn_runs(scene: StoredScene) -> dict[str, StoredRun]:
-    """Return the runs with samples: the printed model and the one that stands for the corrected one, then others."""
+    """Return the runs with samples: the printed model and the one that stands for the corrected
+    one, then others."""
     drawn = {run.method: run for run in scene.sides.values()}
     for method, run in scene.runs.items():
         if run.samples:
@@ -144,7 +160,8 @@ def _paper_page(scene: StoredScene, report: Report, claims: Sequence[Published])
 
 
 def paper_answer(scene: StoredScene) -> list[Markup]:
-    """Return what was found of a scene of the paper: how the corrected runs agree, and what the printed one does."""
+    """Return what was found of a scene of the paper: how the corrected runs agree, and what the
+    printed one does."""
     printed, corrected = scene.sides[PRINTED], scene.sides[CORRECTED]
     sentences = _faults(scene)
     methods, error = agreement(scene)
@@ -160,15 +177,19 @@ def paper_answer(scene: StoredScene) -> list[Markup]:
         sentences.append(text + ".")
     left, difference = draw.parting(printed, corrected)
     if left is None:
-        text = Markup("The equations as printed stay within <b>{} rad</b> of them").format(up_to(difference))
-    else:
-        text = Markup("The equations as printed depart from them by more than {} rad at <b>{}</b>").format(
-            f"{draw.VISIBLE:g}", with_unit(left, "s")
+        text = Markup("The equations as printed stay within <b>{} rad</b> of them").format(
+            up_to(difference)
         )
+    else:
+        text = Markup(
+            "The equations as printed depart from them by more than {} rad at <b>{}</b>"
+        ).format(f"{draw.VISIBLE:g}", with_unit(left, "s"))
     gain, scale = metric(printed, "energy_gain_J"), metric(printed, "energy_scale_J")
     if printed.status not in GOOD:
         end = float(printed.array("time")[-1])
-        text += Markup(" and break off at <b>{}</b> ({})").format(seconds(end), status_text(printed))
+        text += Markup(" and break off at <b>{}</b> ({})").format(
+            seconds(end), status_text(printed)
+        )
     elif gain is not None and scale and gain > ENERGY_RISE * scale:
         share = f"{number(100.0 * gain / scale)}{SPACE}%"
         text += Markup(" and create <b>{}</b> of energy, {} of what the scene contains").format(
@@ -184,10 +205,18 @@ def _paper_facts(scene: StoredScene, claims: Sequence[Published]) -> list[Fact]:
     facts = [_result_fact(scene, "Corrected model", "✓ verified")]
     left, difference = draw.parting(printed, corrected)
     note = f"largest difference {number(difference, 3)} rad"
-    facts.append(Fact("Printed model leaves it after", "never" if left is None else with_unit(left, "s"), note))
+    facts.append(
+        Fact(
+            "Printed model leaves it after", "never" if left is None else with_unit(left, "s"), note
+        )
+    )
     gain, scale = metric(printed, "energy_gain_J"), metric(printed, "energy_scale_J")
     if gain is not None and scale:
-        others = [metric(run, "energy_gain_J") for run in scene.corrected_runs.values() if run.status == "ok"]
+        others = [
+            metric(run, "energy_gain_J")
+            for run in scene.corrected_runs.values()
+            if run.status == "ok"
+        ]
         below = max((value for value in others if value is not None), default=None)
         if below is not None and below < _NO_ENERGY * scale:
             below = 0.0
@@ -196,13 +225,19 @@ def _paper_facts(scene: StoredScene, claims: Sequence[Published]) -> list[Fact]:
         if printed.status not in GOOD:
             value = "runs away"
         elif gain <= ENERGY_RISE * scale:
-            value, note = "none", f"{prefixed(gain, 'J')} is {number(gain / scale, 1)} of the energy scale"
+            value, note = (
+                "none",
+                (f"{prefixed(gain, 'J')} is {number(gain / scale, 1)} of the energy scale"),
+            )
         facts.append(Fact("Energy created by the printed model", value, note))
     for claim in claims:
         if claim.is_number and claim.printed is not None:
             name = f"Published {paper.quantity_of(claim)}"
             value = f"{fixed(claim.value, claim.decimals)} {paper.unit_of_claim(claim)}"
-            note = f"as printed {fixed(claim.printed, claim.decimals)}, corrected {number(claim.corrected, 5)}"
+            note = (
+                f"as printed {fixed(claim.printed, claim.decimals)}, corrected "
+                f"{number(claim.corrected, 5)}"
+            )
             if claim.rounding:
                 note += "; amplified rounding error"
             facts.append(Fact(name, value, note))
@@ -211,7 +246,8 @@ def _paper_facts(scene: StoredScene, claims: Sequence[Published]) -> list[Fact]:
 
 
 def paper_motion(scene: StoredScene, claims: Sequence[Published]) -> Section:
-    """Return the rotor moving beside its angle and the pitch that differs most; the other angles, and the rates."""
+    """Return the rotor moving beside its angle and the pitch that differs most; the other angles,
+    and the rates."""
     sides = scene.sides
     axis = draw.whole_time(list(sides.values()))
     assert axis is not None  # both have samples
@@ -229,15 +265,22 @@ def paper_motion(scene: StoredScene, claims: Sequence[Published]) -> Section:
     return Section("motion", "Motion", elements)
 
 
-def paper_plots(scene: StoredScene, claims: Sequence[Published]) -> tuple[Grid, list[Plot], list[Plot]]:
-    """Return the moving rotor with two plots beside it, the plots of the other angles, and those of the rates."""
+def paper_plots(
+    scene: StoredScene, claims: Sequence[Published]
+) -> tuple[Grid, list[Plot], list[Plot]]:
+    """Return the moving rotor with two plots beside it, the plots of the other angles, and those of
+    the rates."""
     sides = scene.sides
     printed, corrected = sides[PRINTED], sides[CORRECTED]
     axis = draw.whole_time(list(sides.values()))
     assert axis is not None
     marks: list[Mark] = []
     for claim in claims:
-        if claim.is_number and claim.scene == scene.name and claim.metric in ("rotor_angle_min", "rotor_angle_max"):
+        if (
+            claim.is_number
+            and claim.scene == scene.name
+            and claim.metric in ("rotor_angle_min", "rotor_angle_max")
+        ):
             text = f"published {paper.quantity_of(claim)} {fixed(claim.value, claim.decimals)} rad"
             marks.append(Mark(text if not marks else "", y=claim.value))
     coordinates = range(corrected.array("angles").shape[1])
@@ -282,7 +325,9 @@ def _own_page(scene: StoredScene, report: Report) -> PageContent:
         sections.append(_extremes_section(run, [*motion, *others, *loads]))
         facts += _own_facts(scene, run)
     sections += [_agreement_section(scene, report), _details_section(scene)]
-    return PageContent(typeset_title(scene.title), described(scene), own_answer(scene, run), facts[:4], sections)
+    return PageContent(
+        typeset_title(scene.title), described(scene), own_answer(scene, run), facts[:4], sections
+    )
 
 
 def _faults(scene: StoredScene) -> list[Markup]:
@@ -292,21 +337,32 @@ def _faults(scene: StoredScene) -> list[Markup]:
         if run.status in GOOD:
             continue
         reason = str(run.attributes.get("message", ""))
-        text = Markup('<span class="bad">{} is {}</span>').format(with_capital(label_of(method)), status_text(run))
+        text = Markup('<span class="bad">{} is {}</span>').format(
+            with_capital(label_of(method)), status_text(run)
+        )
         if run.status == "timed_out":
-            text = Markup('<span class="bad">{} timed out</span>').format(with_capital(label_of(method)))
+            text = Markup('<span class="bad">{} timed out</span>').format(
+                with_capital(label_of(method))
+            )
         if run.status in ("solver_failed", "worker_died", "diverged"):
-            text = Markup('<span class="bad">{}: {}</span>').format(with_capital(label_of(method)), status_text(run))
+            text = Markup('<span class="bad">{}: {}</span>').format(
+                with_capital(label_of(method)), status_text(run)
+            )
         sentences.append(text + (f": {reason}." if reason else "."))
     if len(sentences) > 2:
-        names = [label_of(method) for method, run in scene.corrected_runs.items() if run.status not in GOOD]
+        names = [
+            label_of(method)
+            for method, run in scene.corrected_runs.items()
+            if run.status not in GOOD
+        ]
         text = Markup('<span class="bad">{} of {} methods are not ok</span>: {}.')
         return [text.format(len(names), len(scene.corrected_runs), ", ".join(names))]
     return sentences
 
 
 def own_answer(scene: StoredScene, run: StoredRun | None) -> list[Markup]:
-    """Return what a rotor does: its turns and speed, its pitch, its largest root moment; then how this was checked."""
+    """Return what a rotor does: its turns and speed, its pitch, its largest root moment; then how
+    this was checked."""
     sentences = _faults(scene)
     if run is None:
         return [*sentences, Markup("No run of this scene has samples.")]
@@ -317,10 +373,17 @@ def own_answer(scene: StoredScene, run: StoredRun | None) -> list[Markup]:
         turns = float(angles[-1, 0] - angles[0, 0]) / _TURN
         if abs(turns) >= 1.0:
             backwards = " backwards" if turns < 0.0 else ""
-            text = Markup("The rotor turns{} <b>{} times in {}</b>").format(backwards, number(abs(turns), 3), whole)
+            text = Markup("The rotor turns{} <b>{} times in {}</b>").format(
+                backwards, number(abs(turns), 3), whole
+            )
         else:
-            low, high = (number(float(value), 3) for value in np.degrees([angles[:, 0].min(), angles[:, 0].max()]))
-            text = Markup("In {} the rotor moves between <b>{}° and {}°</b>").format(whole, low, high)
+            low, high = (
+                number(float(value), 3)
+                for value in np.degrees([angles[:, 0].min(), angles[:, 0].max()])
+            )
+            text = Markup("In {} the rotor moves between <b>{}° and {}°</b>").format(
+                whole, low, high
+            )
         if "rates" in run:
             speed = run.array("rates")[:, 0]
             text += Markup(", at {} rad/s").format(span(float(speed.min()), float(speed.max())))
@@ -354,13 +417,17 @@ def _peak(run: StoredRun, name: str) -> tuple[float, int, float] | None:
 
 
 def _result_fact(scene: StoredScene, name: str, good: str) -> Fact:
-    """Return how many of the corrected methods are ok; in red, and what is wrong, where not all are."""
+    """Return how many of the corrected methods are ok; in red, and what is wrong, where not all
+    are."""
     runs = scene.corrected_runs
     if not runs:
         text = "reference only" if scene.reference is not None else "not checked"
         return Fact(name, text, "no run of a corrected model")
     good_runs = [run for run in runs.values() if run.status == "ok"]
-    note = f"{len(good_runs)} of {len(runs)} method{'s' if len(runs) != 1 else ''} ok, limit {OK_ERROR:g} rad"
+    note = (
+        f"{len(good_runs)} of {len(runs)} method{'s' if len(runs) != 1 else ''} ok, limit "
+        f"{OK_ERROR:g} rad"
+    )
     if len(good_runs) == len(runs):
         return Fact(name, good, note, "good")
     statuses = dict.fromkeys(status_text(run) for run in runs.values() if run.status != "ok")
@@ -372,7 +439,10 @@ def _own_facts(scene: StoredScene, run: StoredRun) -> list[Fact]:
     """Return the numbers of a rotor's run, the most asked for first."""
     facts = []
     if "rates" in run:
-        low, high = (float(value) for value in (run.array("rates")[:, 0].min(), run.array("rates")[:, 0].max()))
+        low, high = (
+            float(value)
+            for value in (run.array("rates")[:, 0].min(), run.array("rates")[:, 0].max())
+        )
         turns = f"{span(low * _RPM, high * _RPM)} rev/min"
         facts.append(Fact("Rotor speed", f"{span(low, high)} rad/s", turns))
     for name, title in (
@@ -401,8 +471,11 @@ def _own_facts(scene: StoredScene, run: StoredRun) -> list[Fact]:
     return facts
 
 
-def motion_channels(scene: StoredScene, run: StoredRun, jumps: Jumps) -> tuple[list[Channel], list[Channel]]:
-    """Return the two main channels of a motion, speed of the rotor and pitch angles, and the others."""
+def motion_channels(
+    scene: StoredScene, run: StoredRun, jumps: Jumps
+) -> tuple[list[Channel], list[Channel]]:
+    """Return the two main channels of a motion, speed of the rotor and pitch angles, and the
+    others."""
     main, others = [], []
     rotor = coordinate_look(0)
     if "rates" in run:
@@ -422,7 +495,9 @@ def motion_channels(scene: StoredScene, run: StoredRun, jumps: Jumps) -> tuple[l
         rates = run.array("rates")
         others = [*_powers(scene.scene, run, jumps), *others]
         if rates.shape[1] > 1:
-            others.append(Channel("Pitch rate", "rad/s", _blade_curves(rates[:, 1:]), draw.LEAST_ANGLE))
+            others.append(
+                Channel("Pitch rate", "rad/s", _blade_curves(rates[:, 1:]), draw.LEAST_ANGLE)
+            )
     return main, others
 
 
@@ -431,7 +506,8 @@ def _blade_curves(values: Array) -> list[tuple[str, Look, Array]]:
 
 
 def _commands(scene: Scene, time: Array) -> list[Curve]:
-    """Return the pitch commands that change over time, by their own points, in degrees; equal ones once."""
+    """Return the pitch commands that change over time, by their own points, in degrees; equal ones
+    once."""
     curves = []
     look = Look(GREY, ":", "", "command")
     for table in dict.fromkeys(rest for _, rest in scene.pitch_loads):
@@ -442,7 +518,8 @@ def _commands(scene: Scene, time: Array) -> list[Curve]:
 
 
 def _powers(scene: Scene, run: StoredRun, jumps: Jumps) -> list[Channel]:
-    """Return the power of the torque on the rotor and of its damper, and of driven pitch actuators."""
+    """Return the power of the torque on the rotor and of its damper, and of driven pitch
+    actuators."""
     time, rates = run.array("time"), run.array("rates")
     before = time * (1.0 - 1e-12)  # at a jump the value before it, as stored loads have it
     breaks = jumps.breaks(time)
@@ -459,7 +536,9 @@ def _powers(scene: Scene, run: StoredRun, jumps: Jumps) -> list[Channel]:
     if "angles" in run:
         angles = run.array("angles")
         for i, (torque_table, rest_table) in enumerate(scene.pitch_loads):
-            if not any(len({value for _, value in table}) > 1 for table in (torque_table, rest_table)):
+            if not any(
+                len({value for _, value in table}) > 1 for table in (torque_table, rest_table)
+            ):
                 continue
             torque, rest = (values_at(table, before) for table in (torque_table, rest_table))
             stiffness, damping = scene.bearings[i]
@@ -470,7 +549,9 @@ def _powers(scene: Scene, run: StoredRun, jumps: Jumps) -> list[Channel]:
     return channels
 
 
-def _in_units(name: str, unit: str, curves: Sequence[tuple[str, Look, Array]], breaks: Sequence[int] = ()) -> Channel:
+def _in_units(
+    name: str, unit: str, curves: Sequence[tuple[str, Look, Array]], breaks: Sequence[int] = ()
+) -> Channel:
     scale, prefixed_unit = draw.in_units([values for _, _, values in curves], unit)
     return Channel(
         name,
@@ -546,7 +627,8 @@ def _motion_section(
 
 
 def _energy_channel(run: StoredRun) -> Channel | None:
-    """Return kinetic and potential energy and the work of the loads; None where the run does not have them."""
+    """Return kinetic and potential energy and the work of the loads; None where the run does not
+    have them."""
     names = ("kinetic_energy", "potential_energy", "work")
     if not all(name in run for name in names):
         return None
@@ -559,7 +641,9 @@ def _energy_channel(run: StoredRun) -> Channel | None:
     return _in_units("Energy", "J", curves)
 
 
-def _loads_section(run: StoredRun, jumps: Jumps, loads: Sequence[Channel], energy: Channel | None) -> Section:
+def _loads_section(
+    run: StoredRun, jumps: Jumps, loads: Sequence[Channel], energy: Channel | None
+) -> Section:
     """Return the loads, three components in a row, then actuators and energy."""
     time = run.array("time")
     axis = draw.time_axis(time)
@@ -579,7 +663,9 @@ def _loads_section(run: StoredRun, jumps: Jumps, loads: Sequence[Channel], energ
             is_still = channel.name == "Blade root moment y"
             cards.append([channel.plot(axis, time, marks=jumps.marks(), still=is_still)])
         elements.append(Grid(3, cards))
-    last: list[list[Element]] = [[channel.plot(axis, time, height=176, marks=jumps.marks())] for channel in others]
+    last: list[list[Element]] = [
+        [channel.plot(axis, time, height=176, marks=jumps.marks())] for channel in others
+    ]
     if energy is not None:
         legend = Legend([("", look) for _, look, _ in energy.curves])
         last.append([energy.plot(axis, time, height=176, marks=jumps.marks()), legend])
@@ -608,7 +694,10 @@ def _extremes_section(run: StoredRun, channels: Sequence[Channel]) -> Section:
                     _floored(float(values[sample]), channel.floor),
                     _time_cell(float(time[sample])),
                 ]
-            row += [_floored(float(statistic(values)), channel.floor) for statistic in (np.nanmean, np.nanstd)]
+            row += [
+                _floored(float(statistic(values)), channel.floor)
+                for statistic in (np.nanmean, np.nanstd)
+            ]
             rows.append(row)
     head = ("Quantity", "Unit", "Smallest", "at (s)", "Largest", "at (s)", "Mean", "Std. deviation")
     table = PageTable("Extremes", head, rows, wide=(3, 5, 7), sortable=True)
@@ -647,15 +736,24 @@ def _agreement_section(scene: StoredScene, report: Report) -> Section:
         if angles:
             extra = _uncertainty(scene)
             still = len(scene.corrected_runs) > 0
-            plots.append([
-                draw.error_plot(
-                    "Angle error", "rad", [*extra, *angles], axis, note="largest over all angles", marks=marks,
-                    still=still,
-                )
-            ])  # fmt: skip
+            plots.append(
+                [
+                    draw.error_plot(
+                        "Angle error",
+                        "rad",
+                        [*extra, *angles],
+                        axis,
+                        note="largest over all angles",
+                        marks=marks,
+                        still=still,
+                    )
+                ]
+            )
         if energies:
             note = "kinetic + potential − work − initial"
-            plots.append([draw.error_plot("Energy error / energy scale", "", energies, axis, note=note)])
+            plots.append(
+                [draw.error_plot("Energy error / energy scale", "", energies, axis, note=note)]
+            )
     if plots:
         items = [(method, look_of(method)) for method in methods]
         if any(curve.key == "uncertainty" for curve in _uncertainty(scene)):
@@ -705,15 +803,25 @@ def _details_section(scene: StoredScene) -> Section:
             plot = replace(plot, curves=[replace(curve, key=f"{curve.key} ") for curve in curves])
             hint = "where in time a method departs from the equations of motion"
             folds.append(Fold("Interval defects", hint, [legend, plot, Note(DEFECT_NOTE)]))
-        gaps = {name: run.array("constraint_error") for name, run in runs.items() if "constraint_error" in run}
+        gaps = {
+            name: run.array("constraint_error")
+            for name, run in runs.items()
+            if "constraint_error" in run
+        }
         if gaps:
-            plot = draw.error_plot("Largest gap of a joint", "m", draw.error_curves(runs, gaps), axis)
+            plot = draw.error_plot(
+                "Largest gap of a joint", "m", draw.error_curves(runs, gaps), axis
+            )
             folds.append(Fold("Joints", "how far they open in models with joints", [plot]))
     tables = metrics_tables(scene)
     if any(table.rows for table in tables):
         notes = [Note(HORIZON_NOTE)] if horizon_of(scene) is not None else []
         if any(run.status in GOOD and not is_corrected(run.method) for run in scene.runs.values()):
-            notes.append(Note("Completed: the printed equations reached the end; nothing is claimed of them."))
+            notes.append(
+                Note(
+                    "Completed: the printed equations reached the end; nothing is claimed of them."
+                )
+            )
         hint = f"{max(len(table.rows) for table in tables)} quantities"
         folds.append(Fold("All numbers of every method", hint, [*tables, *notes]))
     text = scene.attributes.get("scene_toml")

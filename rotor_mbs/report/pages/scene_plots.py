@@ -29,14 +29,17 @@ _RUNAWAY = 2.0
 _LEAST_HEIGHT = 0.5  # rad, rad/s: of one that hardly moves
 _ROUNDING = 1e-9  # of the largest component of a vector: what is smaller is zero
 LEAST_ANGLE = 1e-6  # rad, rad/s: a smaller range of an angle or a rate is not magnified
-# What is below a thousandth of a double's rounding error is a gap on a logarithmic axis, as an exact zero is.
+# What is below a thousandth of a double's rounding error is a gap on a logarithmic axis, as an
+# exact zero is.
 LOWEST = 1e-18
 _SPARK_WIDTH, _SPARK_HEIGHT, _SPARK_POINTS = 150.0, 34.0, 75
 _ALIGNED = 1e-9  # of a time: a sample nearer to a jump is the one before it
 
 
 def time_axis(time: Array) -> Horizontal:
-    return Horizontal("time", "s", "t", float(time[0]), max(float(time[-1]), float(time[0]) + 1e-12))
+    return Horizontal(
+        "time", "s", "t", float(time[0]), max(float(time[-1]), float(time[0]) + 1e-12)
+    )
 
 
 def whole_time(runs: Sequence[StoredRun]) -> Horizontal | None:
@@ -56,10 +59,14 @@ class Jumps(NamedTuple):
 
     def marks(self, *, with_text: bool = False) -> list[Mark]:
         """Return a mark for each; texts stand in the first plot alone."""
-        return [Mark(text if with_text else "", time) for time, text in zip(self.times, self.texts, strict=True)]
+        return [
+            Mark(text if with_text else "", time)
+            for time, text in zip(self.times, self.texts, strict=True)
+        ]
 
     def breaks(self, time: Array) -> list[int]:
-        """Return the first sample after each jump: a value that follows from the load jumps before it."""
+        """Return the first sample after each jump: a value that follows from the load jumps before
+        it."""
         places = []
         for jump in self.times:
             place = int(np.searchsorted(time, jump * (1.0 + _ALIGNED), side="right"))
@@ -82,7 +89,9 @@ def jumps_of(scene: Scene) -> Jumps:
                 if len(values) > 1 and values[0] != values[-1]:
                     is_angle = what == "pitch command"
                     shown = (
-                        f"{shortest(round(math.degrees(values[-1]), 6))}°" if is_angle else prefixed(values[-1], "N m")
+                        f"{shortest(round(math.degrees(values[-1]), 6))}°"
+                        if is_angle
+                        else prefixed(values[-1], "N m")
                     )
                     found.setdefault(time, f"{what} {shown}")
                     break
@@ -94,7 +103,8 @@ def jumps_of(scene: Scene) -> Jumps:
 
 
 def range_of(right: Array, other: Array) -> tuple[float, float] | None:
-    """Return the range of the right curve and its own height on both sides, where the other one runs away from it."""
+    """Return the range of the right curve and its own height on both sides, where the other one
+    runs away from it."""
     known, others = right[np.isfinite(right)], other[np.isfinite(other)]
     if not len(known) or not len(others):
         return None
@@ -106,9 +116,15 @@ def range_of(right: Array, other: Array) -> tuple[float, float] | None:
 
 
 def models_plot(
-    sides: Runs, coordinate: int, name: str, axis: Horizontal, *, height: int = 158, marks: Sequence[Mark] = (),
+    sides: Runs,
+    coordinate: int,
+    name: str,
+    axis: Horizontal,
+    *,
+    height: int = 158,
+    marks: Sequence[Mark] = (),
     still: bool = False,
-) -> Plot:  # fmt: skip
+) -> Plot:
     """Return a coordinate's angle or rate by the corrected and the printed model.
 
     Parameters
@@ -126,9 +142,16 @@ def models_plot(
     label = next(iter(sides.values())).labels[coordinate]
     what, unit = ("angle", "rad") if name == "angles" else ("rate", "rad/s")
     return Plot(
-        f"{with_capital(label)} {what}", unit, axis, curves, height, clip=clip, marks=marks, least=LEAST_ANGLE,
+        f"{with_capital(label)} {what}",
+        unit,
+        axis,
+        curves,
+        height,
+        clip=clip,
+        marks=marks,
+        least=LEAST_ANGLE,
         still=still,
-    )  # fmt: skip
+    )
 
 
 def largest(values: Array) -> Array:
@@ -138,20 +161,25 @@ def largest(values: Array) -> Array:
 
 
 def angle_difference(first: StoredRun, second: StoredRun) -> Array:
-    """Return the largest difference over the coordinates at the samples that both runs have: (n,) rad."""
+    """Return the largest difference over the coordinates at the samples that both runs have: (n,)
+    rad."""
     n = min(len(first.array("time")), len(second.array("time")))
     return largest(np.abs(first.array("angles")[:n] - second.array("angles")[:n]))
 
 
 def parting(printed: StoredRun, corrected: StoredRun) -> tuple[float | None, float]:
-    """Return when the angles of both first differ by VISIBLE (s; None: never), and the largest difference (rad)."""
+    """Return when the angles of both first differ by VISIBLE (s; None: never), and the largest
+    difference (rad)."""
     gap = angle_difference(printed, corrected)
     apart = np.flatnonzero(gap > VISIBLE)
-    return (float(printed.array("time")[apart[0]]) if len(apart) else None), float(gap.max(initial=0.0))
+    return (float(printed.array("time")[apart[0]]) if len(apart) else None), float(
+        gap.max(initial=0.0)
+    )
 
 
 def differing_coordinate(printed: StoredRun, corrected: StoredRun, first: int = 0) -> int:
-    """Return the coordinate, from `first` on, whose angles differ most; where none differs, the one that moves most."""
+    """Return the coordinate, from `first` on, whose angles differ most; where none differs, the one
+    that moves most."""
     angles = printed.array("angles"), corrected.array("angles")
     n = min(map(len, angles))
     for values in (angles[0][:n] - angles[1][:n], angles[1]):
@@ -162,7 +190,8 @@ def differing_coordinate(printed: StoredRun, corrected: StoredRun, first: int = 
 
 
 def spark(curves: Sequence[tuple[Array, Array, Look]], low: float, high: float) -> Markup:
-    """Return a small drawing of curves (time, values, look), cut off beyond the range from `low` to `high`."""
+    """Return a small drawing of curves (time, values, look), cut off beyond the range from `low` to
+    `high`."""
     end = max((float(time[-1]) for time, _, _ in curves if len(time)), default=0.0) or 1.0
     room = 0.12 * (high - low) or 1.0
     low, high = low - room, high + room
@@ -175,7 +204,9 @@ def spark(curves: Sequence[tuple[Array, Array, Look]], low: float, high: float) 
         for at, value in zip(time[index].tolist(), values[index].tolist(), strict=True):
             if np.isfinite(value):
                 share = (min(max(value, low), high) - low) / (high - low)
-                points.append(f"{2.0 + (_SPARK_WIDTH - 4.0) * at / end:.1f} {31.0 - 28.0 * share:.1f}")
+                points.append(
+                    f"{2.0 + (_SPARK_WIDTH - 4.0) * at / end:.1f} {31.0 - 28.0 * share:.1f}"
+                )
         drawn += f'<path class="curve {look.css}" d="M{"L".join(points)}"/>' if points else ""
     box = f"0 0 {_SPARK_WIDTH:g} {_SPARK_HEIGHT:g}"
     return Markup(f'<svg class="spark" viewBox="{box}" aria-hidden="true">{drawn}</svg>')
@@ -228,7 +259,8 @@ def blade_look(blade: int) -> Look:
 
 
 def in_units(values: Sequence[Array], unit: str) -> tuple[float, str]:
-    """Return by what the values of a channel are divided, and their unit with its prefix: k, M or G."""
+    """Return by what the values of a channel are divided, and their unit with its prefix: k, M or
+    G."""
     known = [float(np.abs(array[np.isfinite(array)]).max(initial=0.0)) for array in values]
     scale, prefix = prefix_of(max(known, default=0.0))
     return scale, f"{prefix}{unit}"
@@ -237,8 +269,8 @@ def in_units(values: Sequence[Array], unit: str) -> tuple[float, str]:
 def quantity_channels(quantity: Quantity, run: StoredRun, jumps: Jumps) -> list[Channel]:
     """Return a stored quantity's channels: one for each axis of vectors, else one.
 
-    What follows from a load is interrupted at its jumps. A component that is below 1e-9 of the largest is rounding
-    error.
+    What follows from a load is interrupted at its jumps. A component that is below 1e-9 of the
+    largest is rounding error.
     """
     values = run.array(quantity.name)
     breaks = jumps.breaks(run.array("time")) if quantity.output == "loads" else []
@@ -246,7 +278,11 @@ def quantity_channels(quantity: Quantity, run: StoredRun, jumps: Jumps) -> list[
     title = with_capital(quantity.name.replace("_", " "))
     if quantity not in LOADS and quantity.plot is not None:
         title = quantity.plot.title
-    frame = ", blade frame" if quantity.dimensions[1:2] == ("blade",) and "axis" in quantity.dimensions else ""
+    frame = (
+        ", blade frame"
+        if quantity.dimensions[1:2] == ("blade",) and "axis" in quantity.dimensions
+        else ""
+    )
     if quantity.dimensions[1:] == ("axis",):
         frame = ", base frame"
     if values.ndim == 1:
@@ -254,14 +290,22 @@ def quantity_channels(quantity: Quantity, run: StoredRun, jumps: Jumps) -> list[
     elif quantity.dimensions[1:] == ("blade", "axis"):
         blades = range(values.shape[1])
         parts = {
-            axis: [(f"blade-{i + 1}", blade_look(i), values[:, i, k]) for i in blades] for k, axis in enumerate("xyz")
+            axis: [(f"blade-{i + 1}", blade_look(i), values[:, i, k]) for i in blades]
+            for k, axis in enumerate("xyz")
         }
     elif quantity.dimensions[1:] == ("axis",):
         what = quantity.name.partition("_")[0]
-        parts = {axis: [("rotor", coordinate_look(0, what), values[:, k])] for k, axis in enumerate("xyz")}
+        parts = {
+            axis: [("rotor", coordinate_look(0, what), values[:, k])]
+            for k, axis in enumerate("xyz")
+        }
     elif quantity.dimensions[1:] == ("coordinate",):
         looks = [coordinate_look(i, label) for i, label in enumerate(run.labels)]
-        parts = {"": [(f"blade-{i}" if i else "rotor", look, values[:, i]) for i, look in enumerate(looks)]}
+        parts = {
+            "": [
+                (f"blade-{i}" if i else "rotor", look, values[:, i]) for i, look in enumerate(looks)
+            ]
+        }
     else:
         flat = values.reshape(len(values), -1)
         parts = {"": [(f"blade-{i + 1}", blade_look(i), flat[:, i]) for i in range(flat.shape[1])]}
@@ -269,7 +313,11 @@ def quantity_channels(quantity: Quantity, run: StoredRun, jumps: Jumps) -> list[
     for axis, curves in parts.items():
         scale, unit = in_units([array for _, _, array in curves], quantity.units)
         scaled = [(key, look, array / scale) for key, look, array in curves]
-        channels.append(Channel(f"{title} {axis}".strip(), unit, scaled, floor / scale, frame.lstrip(", "), breaks))
+        channels.append(
+            Channel(
+                f"{title} {axis}".strip(), unit, scaled, floor / scale, frame.lstrip(", "), breaks
+            )
+        )
     return channels
 
 
@@ -284,7 +332,9 @@ def load_channels(stored: StoredScene, run: StoredRun, jumps: Jumps) -> list[Cha
         key=lambda quantity: first.index(quantity.name) if quantity.name in first else len(first),
     )
     for quantity in quantities:
-        is_shown = quantity in LOADS or (quantity.output not in built_in and quantity.plot is not None)
+        is_shown = quantity in LOADS or (
+            quantity.output not in built_in and quantity.plot is not None
+        )
         if is_shown and quantity.name in run:
             channels += quantity_channels(quantity, run, jumps)
     return channels
@@ -314,7 +364,8 @@ def positive(values: Array) -> Array:
 
 
 def error_curves(runs: Runs, values: Mapping[str, Array], first: int = 0) -> list[Curve]:
-    """Return a curve per method over the samples from `first` on; one that is zero everywhere has no line."""
+    """Return a curve per method over the samples from `first` on; one that is zero everywhere has
+    no line."""
     curves = []
     for method, array in values.items():
         time = runs[method].array("time")[first : first + len(array)]
@@ -322,17 +373,22 @@ def error_curves(runs: Runs, values: Mapping[str, Array], first: int = 0) -> lis
     return curves
 
 
-def error_plot(name: str, unit: str, curves: Sequence[Curve], axis: Horizontal, **more: object) -> Plot:
+def error_plot(
+    name: str, unit: str, curves: Sequence[Curve], axis: Horizontal, **more: object
+) -> Plot:
     plot = Plot(name, unit, axis, curves, 240, log=True)
     return replace(plot, **more)  # type: ignore[arg-type]
 
 
 def angle_errors(scene: StoredScene, runs: Runs) -> dict[str, Array]:
-    """Return each run's difference from the reference: (n,) rad, the largest over the coordinates."""
+    """Return each run's difference from the reference: (n,) rad, the largest over the
+    coordinates."""
     reference = scene.reference
     if reference is None or "angles" not in reference:
         return {}
-    others = {method: run for method, run in runs.items() if method != REFERENCE and "angles" in run}
+    others = {
+        method: run for method, run in runs.items() if method != REFERENCE and "angles" in run
+    }
     return {method: angle_difference(run, reference) for method, run in others.items()}
 
 
@@ -347,7 +403,8 @@ def energy_errors(runs: Runs) -> dict[str, Array]:
 
 
 def interval_errors(runs: Runs) -> dict[str, Array]:
-    """Return the size of the defect of every interval of each run that has them, from its second sample on.
+    """Return the size of the defect of every interval of each run that has them, from its second
+    sample on.
 
     They are those of the file, (n - 1,) rad: pages integrate nothing.
     """

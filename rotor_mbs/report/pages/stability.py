@@ -27,9 +27,16 @@ def stability_page(report: Report) -> PageContent:
     """Return the content of the map, which is the index of the suite."""
     runs = report.suite_runs
     methods = list(dict.fromkeys(run.method for run in runs))
-    scenes = {scene: file for scene, file in report.files.items() if any(run.scene == scene for run in runs)}
+    scenes = {
+        scene: file
+        for scene, file in report.files.items()
+        if any(run.scene == scene for run in runs)
+    }
     compared = [run for run in runs if run.has_reference or run.status != "singular"]
-    good = {method: sum(run.outcome == "ok" for run in compared if run.method == method) for method in methods}
+    good = {
+        method: sum(run.outcome == "ok" for run in compared if run.method == method)
+        for method in methods
+    }
     counts = {method: sum(run.method == method for run in compared) for method in methods}
     answer = []
     if methods:
@@ -38,7 +45,12 @@ def stability_page(report: Report) -> PageContent:
         whole = max(counts.values())
         text = Markup("<b>{}</b> {} ok on <b>{} of {} scenes</b> at default settings, the most.")
         answer.append(
-            text.format(with_capital(" and ".join(names[:3])), "is" if len(names) == 1 else "are", best, whole)
+            text.format(
+                with_capital(" and ".join(names[:3])),
+                "is" if len(names) == 1 else "are",
+                best,
+                whole,
+            )
         )
         worst = min(methods, key=lambda method: good[method] / max(counts[method], 1))
         if good[worst] < best:
@@ -47,7 +59,9 @@ def stability_page(report: Report) -> PageContent:
     claimed = sum(run.false_success for run in runs)
     if claimed:
         wrong = sum(run.outcome in _WRONG for run in runs)
-        text = Markup('Engines reported success for <span class="bad">{} of {} wrong results</span>.')
+        text = Markup(
+            'Engines reported success for <span class="bad">{} of {} wrong results</span>.'
+        )
         answer.append(text.format(claimed, max(wrong, claimed)))
     else:
         answer.append(Markup("No engine reported success for a wrong result."))
@@ -72,7 +86,9 @@ def stability_page(report: Report) -> PageContent:
         rows: list[Row] = []
         for scene, file in scenes.items():
             own = {run.method: run for run in runs if run.scene == scene}
-            row: list[TableCell | str] = [TableCell(scene, href=file, note=typeset_title(report.scenes[scene].title))]
+            row: list[TableCell | str] = [
+                TableCell(scene, href=file, note=typeset_title(report.scenes[scene].title))
+            ]
             for method in shown:
                 if method not in own:
                     row.append("")
@@ -81,7 +97,13 @@ def stability_page(report: Report) -> PageContent:
                 symbol, words = OUTCOMES[run.outcome]
                 if run.false_success:
                     symbol, words = f"{symbol}!", f"{words}; the engine reported success"
-                kind = "ok" if run.outcome in ("ok", "smaller_step") else "late" if run.outcome == "timed_out" else ""
+                kind = (
+                    "ok"
+                    if run.outcome in ("ok", "smaller_step")
+                    else "late"
+                    if run.outcome == "timed_out"
+                    else ""
+                )
                 kind = "wrong" if run.outcome in _WRONG else kind
                 title = f"{label_of(method)}: {words}. {run.message}".strip()
                 row.append(TableCell(symbol, mark=f"status {kind}".strip(), title=title))
@@ -107,5 +129,10 @@ def stability_page(report: Report) -> PageContent:
     )
     meaning = Note(" · ".join(f"{symbol} {words}" for symbol, words in key))
     summary: list[Element] = [count_table, Note(note)] if len(scenes) > 1 else []
-    sections = [Section("map", "Statuses", [*tables, meaning], how), Section("summary", "Number of ok runs", summary)]
-    return PageContent("Stiff and extreme scenes: range of each method", report.path.name, answer, facts, sections)
+    sections = [
+        Section("map", "Statuses", [*tables, meaning], how),
+        Section("summary", "Number of ok runs", summary),
+    ]
+    return PageContent(
+        "Stiff and extreme scenes: range of each method", report.path.name, answer, facts, sections
+    )

@@ -1,5 +1,6 @@
-"""The page of a sweep, from its dataset alone: how the runs ended, a map of a quantity over two parameters beside the
-curves of a chosen run, quantities over each parameter, and the runs that are not ok with their reasons."""
+"""The page of a sweep, from its dataset alone: how the runs ended, a map of a quantity over two
+parameters beside the curves of a chosen run, quantities over each parameter, and the runs that are
+not ok with their reasons."""
 
 from __future__ import annotations
 
@@ -47,7 +48,8 @@ from rotor_mbs.solution.status import GOOD, STATUSES
 _COUNTS = ("steps", "rhs_evaluations", "time_reached")  # columns that say nothing of the motion
 _MAX_ROWS = 500  # of the table of all runs
 _MAX_CELLS = 24  # of a map in each direction
-_DECIDES = 0.6  # share of the variance of a quantity that a parameter explains, when it is said to decide
+# share of the variance of a quantity that a parameter explains, when it is said to decide
+_DECIDES = 0.6
 _COORDINATE = re.compile(r"initial\.(angles|rates)\[(\d+)\]")
 
 
@@ -72,7 +74,9 @@ class _Sweep:
         self.statuses = np.asarray(stored.column("status"))
         self.numbers = np.asarray(stored.column("run"))
         self.keys = list(stored.keys)
-        self.parameters = {key: np.asarray(stored.column(parameter_name(key)), float) for key in self.keys}
+        self.parameters = {
+            key: np.asarray(stored.column(parameter_name(key)), float) for key in self.keys
+        }
         self.codes = np.asarray(stored.column("method_code"))
 
     def unit(self, key: str) -> str:
@@ -89,11 +93,14 @@ class _Sweep:
 
     @cached_property
     def is_good(self) -> NDArray[np.bool_]:
-        return np.isin(self.statuses, [code for code, status in enumerate(STATUSES) if status in GOOD])
+        return np.isin(
+            self.statuses, [code for code, status in enumerate(STATUSES) if status in GOOD]
+        )
 
     @cached_property
     def good_words(self) -> str:
-        """What the runs are called that need no attention: ok; those of the printed equations completed."""
+        """What the runs are called that need no attention: ok; those of the printed equations
+        completed."""
         present = [STATUSES[code] for code in np.unique(self.statuses[self.is_good]).tolist()]
         return " or ".join(present) or "ok"
 
@@ -131,16 +138,23 @@ def sweep_page(stored: StoredSweep) -> PageContent:
     if map_element is not None:
         top.append([map_element])
     if curves:
-        legend = Legend(list({curve.key: curve.look for plot in curves for curve in plot.curves}.items()))
+        legend = Legend(
+            list({curve.key: curve.look for plot in curves for curve in plot.curves}.items())
+        )
         shown = np.flatnonzero(places >= 0)
-        choice = RunChoice([(int(run), f"{sweep.numbers[run]}: {sweep.described(int(run))}") for run in shown])
+        choice = RunChoice(
+            [(int(run), f"{sweep.numbers[run]}: {sweep.described(int(run))}") for run in shown]
+        )
         heading = Markup('<h3 id="picked" aria-live="polite"></h3>')
         top.append([*([] if map_element is not None else [choice]), heading, legend, *curves])
     if top:
         say = ""
         if curves and (places < 0).any():
             count = int((places >= 0).sum())
-            say = f"Curves of {count} of {len(places)} runs: those that are not {sweep.good_words}, the corners, "
+            say = (
+                f"Curves of {count} of {len(places)} runs: those that are not "
+                f"{sweep.good_words}, the corners, "
+            )
             say += "and every few."
             if len(stored.methods) > 1:
                 say += f" By {stored.methods[int(sweep.codes[0])]} alone."
@@ -160,7 +174,10 @@ def sweep_page(stored: StoredSweep) -> PageContent:
     data: dict[str, object] = {}
     if is_shown:
         data = {
-            "values": [[_json_number(value) for value in quantity.values.tolist()] for quantity in quantities],
+            "values": [
+                [_json_number(value) for value in quantity.values.tolist()]
+                for quantity in quantities
+            ],
             "labels": [sweep.described(run) for run in range(len(sweep.statuses))],
             "statuses": [sweep.status_of(run) for run in range(len(sweep.statuses))],
             "numbers": sweep.numbers.tolist(),
@@ -185,7 +202,8 @@ def brief(value: float) -> str:
 
 
 def field_name(key: str) -> str:
-    """Return a varied parameter as one speaks of it: "initial pitch angle of blade 2" for "initial.angles[2]"."""
+    """Return a varied parameter as one speaks of it: "initial pitch angle of blade 2" for
+    "initial.angles[2]"."""
     parts = _COORDINATE.fullmatch(key)
     if parts is None:
         return re.sub(r"[._]", " ", key)
@@ -199,7 +217,8 @@ def field_name(key: str) -> str:
 
 
 def run_quantities(sweep: _Sweep) -> list[RunQuantity]:
-    """Return the numbers of each run that differ from run to run: of pitch, loads, rotor, then the stored metrics."""
+    """Return the numbers of each run that differ from run to run: of pitch, loads, rotor, then the
+    stored metrics."""
     stored = sweep.stored
     complete = sweep.statuses >= 0
     found = []
@@ -208,11 +227,15 @@ def run_quantities(sweep: _Sweep) -> list[RunQuantity]:
         if pitch.shape[2]:
             with np.errstate(all="ignore"):
                 ranges = _over(np.nanmax, pitch, 1) - _over(np.nanmin, pitch, 1)
-            found.append(RunQuantity("range of a pitch angle", "degrees", _over(np.nanmax, ranges, 1)))
+            found.append(
+                RunQuantity("range of a pitch angle", "degrees", _over(np.nanmax, ranges, 1))
+            )
     for load in sorted(LOADS, key=lambda load: not load.name.endswith("root_moment")):
         if load.name in stored.columns:
             values = np.asarray(stored.column(load.name), float)
-            sizes = np.linalg.norm(values, axis=-1) if load.dimensions[-1] == "axis" else np.abs(values)
+            sizes = (
+                np.linalg.norm(values, axis=-1) if load.dimensions[-1] == "axis" else np.abs(values)
+            )
             largest = _over(np.nanmax, sizes.reshape(len(sizes), -1), 1)
             known = largest[np.isfinite(largest)]
             scale, prefix = prefix_of(float(known.max(initial=0.0)))
@@ -228,7 +251,11 @@ def run_quantities(sweep: _Sweep) -> list[RunQuantity]:
         found.append(RunQuantity("rotor speed at the end", "rad/s", speed))
     left_out = {*map(parameter_name, sweep.keys), *_COUNTS, "time_limit_s", "code", "crc32"}
     order = ("pitch_max", "rotor_rate_max", "rotor_angle_max")
-    names = [name for name, column in stored.columns.items() if column.dimensions == ("run",) and name not in left_out]
+    names = [
+        name
+        for name, column in stored.columns.items()
+        if column.dimensions == ("run",) and name not in left_out
+    ]
     for name in sorted(names, key=lambda name: order.index(name) if name in order else len(order)):
         values = np.asarray(stored.column(name))
         if values.dtype.kind == "f":
@@ -277,11 +304,14 @@ def explained(values: Array, parameter: Array) -> float:
 
 
 def sweep_answer(sweep: _Sweep, quantities: Sequence[RunQuantity]) -> list[Markup]:
-    """Return how many runs are ok or completed, which are not, and what the parameters do to the first quantities."""
+    """Return how many runs are ok or completed, which are not, and what the parameters do to the
+    first quantities."""
     count = len(sweep.statuses)
     good = int(sweep.is_good.sum())
     text = (
-        Markup("<b>{} of {} runs {} {}</b>").format(good, count, "is" if good == 1 else "are", sweep.good_words)
+        Markup("<b>{} of {} runs {} {}</b>").format(
+            good, count, "is" if good == 1 else "are", sweep.good_words
+        )
         if good < count
         else Markup("<b>All {} runs are {}</b>").format(count, sweep.good_words)
     )
@@ -303,9 +333,14 @@ def sweep_answer(sweep: _Sweep, quantities: Sequence[RunQuantity]) -> list[Marku
         if is_wide(values):
             text = Markup("The {} is largest, <b>{}{}</b>, at {}, and smallest, <b>{}{}</b>, at {}")
             text = text.format(
-                quantity.name, number(float(values[high])), unit, sweep.described(high), number(float(values[low])),
-                unit, sweep.described(low),
-            )  # fmt: skip
+                quantity.name,
+                number(float(values[high])),
+                unit,
+                sweep.described(high),
+                number(float(values[low])),
+                unit,
+                sweep.described(low),
+            )
         else:
             ends = (number(float(values[run]), 3) for run in (low, high))
             text = Markup("{} stays between <b>{} and {}{}</b>").format(name, *ends, unit)
@@ -327,7 +362,8 @@ def _deciding(sweep: _Sweep, values: Array) -> str:
 
 
 def common_values(sweep: _Sweep, runs: NDArray[np.int64]) -> str:
-    """Return the values of the varied parameters that all of these runs share; "" where they share none."""
+    """Return the values of the varied parameters that all of these runs share; "" where they share
+    none."""
     parts = []
     for key in sweep.varied:
         own = np.unique(sweep.parameters[key][runs])
@@ -337,7 +373,8 @@ def common_values(sweep: _Sweep, runs: NDArray[np.int64]) -> str:
 
 
 def _facts(sweep: _Sweep, quantities: Sequence[RunQuantity]) -> list[Fact]:
-    """Return how many runs are ok, the ranges of two parameters, and those of the first quantities."""
+    """Return how many runs are ok, the ranges of two parameters, and those of the first
+    quantities."""
     count, good = len(sweep.statuses), int(sweep.is_good.sum())
     is_checked = sweep.good_words == "ok"
     note = "" if is_checked else "nothing is claimed of the printed equations"
@@ -347,10 +384,15 @@ def _facts(sweep: _Sweep, quantities: Sequence[RunQuantity]) -> list[Fact]:
         values = sweep.parameters[key]
         low, high = brief(values.min()), brief(values.max())
         note = f"{len(np.unique(values))} values"
-        facts.append(Fact(with_capital(field_name(key)), f"{low} to {high} {sweep.unit(key)}".rstrip(), note))
+        facts.append(
+            Fact(with_capital(field_name(key)), f"{low} to {high} {sweep.unit(key)}".rstrip(), note)
+        )
     for quantity in quantities[: 4 - len(facts)]:
         known = quantity.values[np.isfinite(quantity.values)]
-        ends = f"{number(float(known.min()))} to {number(float(known.max()))}{_unit_after(quantity.unit)}"
+        ends = (
+            f"{number(float(known.min()))} to "
+            f"{number(float(known.max()))}{_unit_after(quantity.unit)}"
+        )
         facts.append(Fact(with_capital(quantity.name), ends))
     return facts
 
@@ -358,7 +400,9 @@ def _facts(sweep: _Sweep, quantities: Sequence[RunQuantity]) -> list[Fact]:
 # ---- Map and curves
 
 
-def _map(sweep: _Sweep, quantities: Sequence[RunQuantity], shown: NDArray[np.bool_]) -> HeatMap | None:
+def _map(
+    sweep: _Sweep, quantities: Sequence[RunQuantity], shown: NDArray[np.bool_]
+) -> HeatMap | None:
     """Return the map of a grid of two parameters, by the first method; None for another sweep."""
     if len(sweep.grid_keys) != 2 or not quantities:
         return None
@@ -370,14 +414,24 @@ def _map(sweep: _Sweep, quantities: Sequence[RunQuantity], shown: NDArray[np.boo
     for row in rows[::-1]:
         line: list[tuple[int, str] | None] = []
         for column in columns:
-            is_here = (sweep.parameters[rows_key] == row) & (sweep.parameters[columns_key] == column) & shown
+            is_here = (
+                (sweep.parameters[rows_key] == row)
+                & (sweep.parameters[columns_key] == column)
+                & shown
+            )
             runs = np.flatnonzero(is_here)
             if not len(runs):
                 line.append(None)
                 continue
             run = int(runs[0])
             status = STATUSES[int(sweep.statuses[run])] if sweep.statuses[run] >= 0 else "missing"
-            kind = "" if status in GOOD else "warn" if status in ("inaccurate", "unchecked") else "failed"
+            kind = (
+                ""
+                if status in GOOD
+                else "warn"
+                if status in ("inaccurate", "unchecked")
+                else "failed"
+            )
             line.append((run, kind))
         cells.append(line)
     note = f"Down: {sweep.axis_name(rows_key)}. Across: {sweep.axis_name(columns_key)}."
@@ -387,15 +441,21 @@ def _map(sweep: _Sweep, quantities: Sequence[RunQuantity], shown: NDArray[np.boo
         note += " ✗: failed."
     if len(sweep.stored.methods) > 1:
         note += f" By {sweep.stored.methods[int(sweep.codes[shown][0])]} alone."
-    label = f"Runs by {field_name(rows_key)} and {field_name(columns_key)}; arrow keys move, the curves follow"
+    label = (
+        f"Runs by {field_name(rows_key)} and {field_name(columns_key)}; arrow keys move, the "
+        "curves follow"
+    )
     names = [with_capital(quantity.title) for quantity in quantities]
     texts = ([brief(value) for value in values] for values in (columns, rows[::-1]))
     columns_text, rows_text = texts
-    return HeatMap(label, names, columns_text, rows_text, cells, f"{note} Click a cell for its curves.")
+    return HeatMap(
+        label, names, columns_text, rows_text, cells, (f"{note} Click a cell for its curves.")
+    )
 
 
 def _curves(sweep: _Sweep, shown: NDArray[np.bool_]) -> tuple[list[Plot], NDArray[np.int64]]:
-    """Return the plots of one run, whose curves are tables of runs, and where in them each run is (-1: nowhere)."""
+    """Return the plots of one run, whose curves are tables of runs, and where in them each run is
+    (-1: nowhere)."""
     stored = sweep.stored
     places = np.full(len(sweep.statuses), -1)
     if "time" not in stored.columns:
@@ -413,7 +473,9 @@ def _curves(sweep: _Sweep, shown: NDArray[np.bool_]) -> tuple[list[Plot], NDArra
         )
     if "pitch_actuator_moment" in stored.columns:
         count = stored.column("pitch_actuator_moment").shape[2]
-        curves = [(f"blade-{i + 1}", blade_look(i), "pitch_actuator_moment", i) for i in range(count)]
+        curves = [
+            (f"blade-{i + 1}", blade_look(i), "pitch_actuator_moment", i) for i in range(count)
+        ]
         wanted.append(("Pitch actuator moment", "N m", curves))
     if "rates" in stored.columns:
         wanted.append(("Rotor speed", "rad/s", [("rotor", coordinate_look(0), "rates", 0)]))
@@ -439,13 +501,17 @@ def _curves(sweep: _Sweep, shown: NDArray[np.bool_]) -> tuple[list[Plot], NDArra
             known = [float(np.abs(table[np.isfinite(table)]).max(initial=0.0)) for table in tables]
             scale, prefix = prefix_of(max(known))
         # What follows from a load is interrupted at its jumps.
-        breaks = [-(-place // every) for place in jumps.breaks(time)] if title.endswith("moment") else []
+        breaks = (
+            [-(-place // every) for place in jumps.breaks(time)] if title.endswith("moment") else []
+        )
         drawn = []
         for (key, look, _, _), table in zip(curves, tables, strict=True):
             drawn.append(Curve(key, look, samples, table / scale, breaks))
         note = f"every {every}th sample" if every > 1 else ""
         marks = jumps.marks(with_text=not plots)
-        plots.append(Plot(title, f"{prefix}{unit}", axis, drawn, 138, note, marks=marks, least=1e-9))
+        plots.append(
+            Plot(title, f"{prefix}{unit}", axis, drawn, 138, note, marks=marks, least=1e-9)
+        )
     return plots, places
 
 
@@ -460,7 +526,8 @@ def _jumps(sweep: _Sweep) -> Jumps:
 
 
 def chosen_runs(sweep: _Sweep, shown: NDArray[np.bool_], most: int) -> NDArray[np.int64]:
-    """Return the runs whose curves are on the page: all, or those that are not ok, the corners, and every k-th."""
+    """Return the runs whose curves are on the page: all, or those that are not ok, the corners, and
+    every k-th."""
     runs = np.flatnonzero(shown & (sweep.statuses >= 0))
     if len(runs) <= most:
         return runs
@@ -477,8 +544,8 @@ def chosen_runs(sweep: _Sweep, shown: NDArray[np.bool_], most: int) -> NDArray[n
 def _start(sweep: _Sweep, quantities: Sequence[RunQuantity], places: NDArray[np.int64]) -> int:
     """Return the run that is shown first.
 
-    Of those that need no attention and have curves it is the one nearest to the middle of the grid; of a sweep that is
-    no grid the one whose first quantity is nearest to the median.
+    Of those that need no attention and have curves it is the one nearest to the middle of the grid;
+    of a sweep that is no grid the one whose first quantity is nearest to the median.
     """
     candidates = np.flatnonzero((places >= 0) & sweep.is_good)
     if not len(candidates):
@@ -500,8 +567,11 @@ def _start(sweep: _Sweep, quantities: Sequence[RunQuantity], places: NDArray[np.
 # ---- Over the parameters
 
 
-def _over_parameters(sweep: _Sweep, quantities: Sequence[RunQuantity], shown: NDArray[np.bool_]) -> Section:
-    """Return quantities over each parameter: a curve per value of the other one of a grid, else a point per run.
+def _over_parameters(
+    sweep: _Sweep, quantities: Sequence[RunQuantity], shown: NDArray[np.bool_]
+) -> Section:
+    """Return quantities over each parameter: a curve per value of the other one of a grid, else a
+    point per run.
 
     shown: (runs,) which of them are drawn, those of the first method.
     """
@@ -515,14 +585,18 @@ def _over_parameters(sweep: _Sweep, quantities: Sequence[RunQuantity], shown: ND
     if len(keys) == 2:
         key, other = keys
         others = np.unique(sweep.parameters[other])
-        items = [(f"step-{i}", step_look(i, len(others), brief(value))) for i, value in enumerate(others)]
+        items = [
+            (f"step-{i}", step_look(i, len(others), brief(value))) for i, value in enumerate(others)
+        ]
         cards: list[list[Element]] = []
         for quantity in chosen:
             curves = []
             for i, value in enumerate(others):
                 mine = shown & (sweep.parameters[other] == value)
                 curves.append(
-                    _parameter_curve(f"step-{i}", items[i][1], sweep.parameters[key][mine], quantity.values[mine])
+                    _parameter_curve(
+                        f"step-{i}", items[i][1], sweep.parameters[key][mine], quantity.values[mine]
+                    )
                 )
             cards.append([_parameter_plot(sweep, key, quantity, curves)])
         say = f"Horizontally: {sweep.axis_name(key)}. A curve per {sweep.axis_name(other)}.{method}"
@@ -533,12 +607,18 @@ def _over_parameters(sweep: _Sweep, quantities: Sequence[RunQuantity], shown: ND
         cards = []
         for quantity in chosen:
             look = Look(BLUE, "-", "", "runs")
-            curve = _parameter_curve("runs", look, sweep.parameters[key][shown], quantity.values[shown])
+            curve = _parameter_curve(
+                "runs", look, sweep.parameters[key][shown], quantity.values[shown]
+            )
             is_line = len(sweep.varied) == 1
-            curve = Curve(curve.key, curve.look, curve.x, curve.y, dots="line" if is_line else "only")
+            curve = Curve(
+                curve.key, curve.look, curve.x, curve.y, dots="line" if is_line else "only"
+            )
             cards.append([_parameter_plot(sweep, key, quantity, [curve])])
         elements += [Note(f"Horizontally: {sweep.axis_name(key)}.{method}"), Grid(3, cards)]
-    heading = f"Over {field_name(sweep.varied[0])}" if len(sweep.varied) == 1 else "Over each parameter"
+    heading = (
+        f"Over {field_name(sweep.varied[0])}" if len(sweep.varied) == 1 else "Over each parameter"
+    )
     return Section("slices", heading, elements)
 
 
@@ -548,12 +628,16 @@ def _parameter_curve(key: str, look: Look, parameter: Array, values: Array) -> C
 
 
 def _is_log(parameter: Array) -> bool:
-    """Return whether a parameter has a logarithmic axis: no value is negative, and the positive ones span decades."""
+    """Return whether a parameter has a logarithmic axis: no value is negative, and the positive
+    ones span decades."""
     return bool((parameter >= 0.0).all()) and is_wide(parameter[parameter > 0.0])
 
 
-def _parameter_plot(sweep: _Sweep, key: str, quantity: RunQuantity, curves: Sequence[Curve]) -> Plot:
-    """Return a quantity over a parameter; zero has no place on a logarithmic axis and is left to the map."""
+def _parameter_plot(
+    sweep: _Sweep, key: str, quantity: RunQuantity, curves: Sequence[Curve]
+) -> Plot:
+    """Return a quantity over a parameter; zero has no place on a logarithmic axis and is left to
+    the map."""
     parameter = sweep.parameters[key]
     positive = parameter[parameter > 0.0]
     is_log = _is_log(parameter)
@@ -583,7 +667,8 @@ def _parameter_plot(sweep: _Sweep, key: str, quantity: RunQuantity, curves: Sequ
 
 
 def _faults_section(sweep: _Sweep, *, with_links: bool) -> Section:
-    """Return the runs that are not ok, grouped by status and reason, with the ranges of their parameters.
+    """Return the runs that are not ok, grouped by status and reason, with the ranges of their
+    parameters.
 
     with_links: whether there is a map or a plot that shows the example of each group.
     """
@@ -624,7 +709,9 @@ def _runs_section(sweep: _Sweep, quantities: Sequence[RunQuantity], *, with_link
     with_links: whether there is a map or a plot that shows a run whose number is clicked.
     """
     chosen = quantities[: max(1, 6 - len(sweep.varied))]
-    order = [*np.flatnonzero(~sweep.is_good).tolist(), *np.flatnonzero(sweep.is_good).tolist()][:_MAX_ROWS]
+    order = [*np.flatnonzero(~sweep.is_good).tolist(), *np.flatnonzero(sweep.is_good).tolist()][
+        :_MAX_ROWS
+    ]
     several = len(sweep.stored.methods) > 1
     rows: list[Row] = []
     for run in order:
@@ -632,7 +719,9 @@ def _runs_section(sweep: _Sweep, quantities: Sequence[RunQuantity], *, with_link
         sign = "✓ " if tone == "good" else ""
         row: list[TableCell | str] = [
             TableCell(
-                str(sweep.numbers[run]), href=f"#run-{run}" if with_links else "", order=float(sweep.numbers[run])
+                str(sweep.numbers[run]),
+                href=f"#run-{run}" if with_links else "",
+                order=float(sweep.numbers[run]),
             )
         ]
         if several:
@@ -668,18 +757,34 @@ def _details_section(sweep: _Sweep, quantities: Sequence[RunQuantity]) -> Sectio
     for quantity in quantities:
         values = quantity.values[sweep.is_good & np.isfinite(quantity.values)]
         if len(values) > 1:
-            quantiles = [number(float(value), 3) for value in np.quantile(values, (0.0, 0.05, 0.5, 0.95, 1.0))]
+            quantiles = [
+                number(float(value), 3)
+                for value in np.quantile(values, (0.0, 0.05, 0.5, 0.95, 1.0))
+            ]
             rows.append((with_capital(quantity.title), *quantiles))
-    head = (f"Result of the {sweep.good_words} runs", "Smallest", "5 %", "Median", "95 %", "Largest")
+    head = (
+        f"Result of the {sweep.good_words} runs",
+        "Smallest",
+        "5 %",
+        "Median",
+        "95 %",
+        "Largest",
+    )
     folds: list[Grid | Fold | Element] = [
         Fold(
             "Parameters",
             f"{len(sweep.keys)} that were varied",
-            [PageTable("Parameters", [with_capital(text) for text in parameters.head], parameters.rows)],
+            [
+                PageTable(
+                    "Parameters", [with_capital(text) for text in parameters.head], parameters.rows
+                )
+            ],
         ),
     ]
     if rows:
-        folds.append(Fold("Distributions", f"{len(rows)} numbers", [PageTable("Results", head, rows)]))
+        folds.append(
+            Fold("Distributions", f"{len(rows)} numbers", [PageTable("Results", head, rows)])
+        )
     toml = str(stored.attributes.get("sweep_toml", ""))
     if toml:
         folds.append(Fold("Sweep file", "", [SourceText(toml)]))

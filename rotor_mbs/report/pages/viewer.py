@@ -1,4 +1,5 @@
-"""The data that `templates/viewer.js` draws: the bodies, and each model's angles at equally spaced times."""
+"""The data that `templates/viewer.js` draws: the bodies, and each model's angles at equally spaced
+times."""
 
 from __future__ import annotations
 
@@ -15,14 +16,17 @@ from rotor_mbs.runs.read import StoredRun, StoredScene
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.trajectory import Array
 
-MAX_FRAMES = 2401  # of a page of a size that can be mailed; a shorter run has a frame for each sample
-_COARSE = 0.5 * math.pi  # rad from a frame to the next beyond which the page says that it interpolates
+# of a page of a size that can be mailed; a shorter run has a frame for each sample
+MAX_FRAMES = 2401
+# rad from a frame to the next beyond which the page says that it interpolates
+_COARSE = 0.5 * math.pi
 _DECIMALS = 4  # of an angle in rad: a pixel at the tip on any screen
 _VISIBLE = 0.1  # of the longest blade
 
 
 def viewer(stored: StoredScene, runs: Mapping[str, StoredRun]) -> dict[str, Any] | None:
-    """Return what the template needs of at most two runs, by the name to be shown; None without bodies or angles."""
+    """Return what the template needs of at most two runs, by the name to be shown; None without
+    bodies or angles."""
     scene = stored.scene
     moves: dict[str, tuple[Array, Array]] = {}
     for name, run in runs.items():
@@ -43,18 +47,26 @@ def viewer(stored: StoredScene, runs: Mapping[str, StoredRun]) -> dict[str, Any]
     data = {
         "step": step,
         "tilt": scene.shaft_tilt,
-        "colours": [name_of_colour(coordinate_look(i + 1).colour) for i in range(len(scene.blades))],
+        "colours": [
+            name_of_colour(coordinate_look(i + 1).colour) for i in range(len(scene.blades))
+        ],
         "blades": [
             {"phase": phase, "cone": blade.cone, "tip": blade.tip, "mass": blade.centre_of_mass}
             for phase, blade in zip(scene.phases, scene.blades, strict=True)
         ],
-        "models": [{"name": name, "frames": angles.round(_DECIMALS).tolist()} for name, angles in frames.items()],
+        "models": [
+            {"name": name, "frames": angles.round(_DECIMALS).tolist()}
+            for name, angles in frames.items()
+        ],
     }
     notes = []
     for name, angles in frames.items():
         largest = float(np.abs(np.diff(angles, axis=0)).max(initial=0.0))
         if largest > _COARSE:
-            turned = f"{with_capital(name)} turns by up to {with_unit(largest, 'rad')} from one frame to the next"
+            turned = (
+                f"{with_capital(name)} turns by up to {with_unit(largest, 'rad')} from one "
+                "frame to the next"
+            )
             notes.append(f"{turned}: the animation interpolates linearly in between.")
     return {
         "data": script_json(data),
@@ -65,16 +77,19 @@ def viewer(stored: StoredScene, runs: Mapping[str, StoredRun]) -> dict[str, Any]
 
 
 def angles_at(time: Array, angles: Array, step: float) -> Array:
-    """Return the angles at 0, step, 2 step ..., interpolated between samples: (frames, coordinates) rad."""
+    """Return the angles at 0, step, 2 step ..., interpolated between samples: (frames, coordinates)
+    rad."""
     count = math.floor(float(time[-1]) / step + 1e-9) + 1
     at = np.minimum(np.arange(count) * step, time[-1])
     return np.stack([np.interp(at, time, column) for column in angles.T], axis=1)
 
 
 def magnification(scene: Scene) -> int | None:
-    """Return by how much the distance of the tips from their pitch axes is magnified in the picture.
+    """Return by how much the distance of the tips from their pitch axes is magnified in the
+    picture.
 
-    It is drawn as a tenth of the longest blade, and at least as it is. None: the tips lie on the axes.
+    It is drawn as a tenth of the longest blade, and at least as it is. None: the tips lie on the
+    axes.
     """
     offset = max(math.hypot(*blade.tip[:2]) for blade in scene.blades)
     if not offset:

@@ -1,4 +1,5 @@
-"""A right engine by Newton and Euler, written without a look at the package's models; `broken_engines` breaks it."""
+"""A right engine by Newton and Euler, written without a look at the package's models;
+`broken_engines` breaks it."""
 
 from dataclasses import dataclass
 
@@ -70,7 +71,12 @@ class Rotor:
         f[1:] = act - n[:, 2]
         acc = np.linalg.solve(M, f)
         slope = self.rest_rate(part)
-        power = tau * w - self.D * w**2 + np.sum(torque * v - self.d * v**2) - np.sum(self.k * (th - rest) * slope)
+        power = (
+            tau * w
+            - self.D * w**2
+            + np.sum(torque * v - self.d * v**2)
+            - np.sum(self.k * (th - rest) * slope)
+        )
         return np.concatenate([y[N + 1 : 2 * N + 2], acc, [power]])
 
     def rest_rate(self, part):
@@ -122,12 +128,23 @@ class Rotor:
         x = np.cos(th) * p[:, 0] - np.sin(th) * p[:, 1]
         y = np.sin(th) * p[:, 0] + np.cos(th) * p[:, 1]
         z = p[:, 2]
-        return np.stack([np.cos(turn) * x + np.sin(turn) * z, y, -np.sin(turn) * x + np.cos(turn) * z], axis=1)
+        return np.stack(
+            [np.cos(turn) * x + np.sin(turn) * z, y, -np.sin(turn) * x + np.cos(turn) * z], axis=1
+        )
 
     def observe(self):
         N, J = self.N, self.J
-        names = ("tip", "kinetic_energy", "potential_energy", "work", "blade_root_force", "blade_root_moment",
-                 "shaft_force", "shaft_moment", "pitch_actuator_moment")  # fmt: skip
+        names = (
+            "tip",
+            "kinetic_energy",
+            "potential_energy",
+            "work",
+            "blade_root_force",
+            "blade_root_moment",
+            "shaft_force",
+            "shaft_moment",
+            "pitch_actuator_moment",
+        )
         out = {name: [] for name in names}
         for t, y, before, after in zip(self.time, self.rows, self.before, self.after):  # noqa: B905
             q, th, w, v = y[0], y[1 : N + 1], y[N + 1], y[N + 2 : 2 * N + 2]
@@ -137,10 +154,14 @@ class Rotor:
             omega = np.stack([w * s, w * c, v], axis=1)
             L = (J @ omega[:, :, None])[:, :, 0]
             out["tip"].append(self.to_base(turn, th, self.tip))
-            out["kinetic_energy"].append(0.5 * np.sum(omega * L) + 0.5 * self.scene.hub_inertia * w**2)
+            out["kinetic_energy"].append(
+                0.5 * np.sum(omega * L) + 0.5 * self.scene.hub_inertia * w**2
+            )
             height = self.to_base(turn, th, self.r)[:, 2]
             rest = self.loads(after, t)[2]
-            out["potential_energy"].append(np.sum(self.m * self.g * height) + 0.5 * np.sum(self.k * (th - rest) ** 2))
+            out["potential_energy"].append(
+                np.sum(self.m * self.g * height) + 0.5 * np.sum(self.k * (th - rest) ** 2)
+            )
             out["work"].append(y[-1])
             acc = self.dynamics(t, y, before)[N + 1 : 2 * N + 2]
             tau, torque, rest = self.loads(before, t)
@@ -149,7 +170,9 @@ class Rotor:
             accel = np.cross(alpha, self.r) + np.cross(omega, np.cross(omega, self.r))
             weight = self.weight(turn, th)
             force = self.m[:, None] * accel - weight
-            moment = (J @ alpha[:, :, None])[:, :, 0] + np.cross(omega, L) - np.cross(self.r, weight)
+            moment = (
+                (J @ alpha[:, :, None])[:, :, 0] + np.cross(omega, L) - np.cross(self.r, weight)
+            )
             shaft = self.to_base(turn, th, moment).sum(axis=0)
             shaft[1] += self.scene.hub_inertia * acc[0] - tau
             out["blade_root_force"].append(force)
@@ -170,4 +193,6 @@ class Rotor:
         return Trajectory(time, angles, rates, **kept)
 
 
-METHOD = Method(name="rk4", label="Runge-Kutta by hand", build=Rotor, settings=Step, order=4, fixed_step=True)
+METHOD = Method(
+    name="rk4", label="Runge-Kutta by hand", build=Rotor, settings=Step, order=4, fixed_step=True
+)
