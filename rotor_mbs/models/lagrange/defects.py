@@ -77,15 +77,15 @@ def interval_defects(
     rounding: Array | None = None,
     time_rounding: Array | None = None,
 ) -> Defects:
-    """Compute the defects of a run's samples, or of anybody's.
+    """Compute the defects of samples, of a run or of other data, against the closed form.
 
     Parameters
     ----------
+    scene : the rotor and its loads.
     time : (n,) s, increasing, within the scene's duration.
     angles, rates : (n, 1 + blades) rad and rad/s.
     rounding : (2 + 2 blades,), or for each row: half a unit in the last digit of angles, then
-        rates; that of doubles
-        where left out.
+        rates; that of doubles where left out.
     time_rounding : (n,) s, likewise.
 
     Returns
@@ -141,7 +141,19 @@ def interval_defects(
 
 
 def rates_of_change(scene: Scene, time: Array, states: Array) -> Array:
-    """Return the largest |dy/dt| at states, (n, m) 1/s; at a jump of a load of either side."""
+    """Return |dy/dt| of each variable at states; at a jump of a load, the larger of both sides.
+
+    Parameters
+    ----------
+    scene : the rotor and its loads.
+    time : (n,) s.
+    states : (n, m) angles (rad), then rates (rad/s), of the coordinates that move.
+
+    Returns
+    -------
+    ndarray, shape (n, m)
+        rad/s, then rad/s².
+    """
     half = states.shape[1] // 2
     angles, rates = list(states[:, :half].T), states[:, half:].T
     form, changes = rotor_form(scene), np.zeros(states.shape)
@@ -165,7 +177,7 @@ def rates_of_change(scene: Scene, time: Array, states: Array) -> Array:
 
 @dataclass(frozen=True)
 class FittedRates:
-    """Rates that are computed from angles.
+    """Hold rates that were computed from angles, and their sensitivity to these.
 
     Attributes
     ----------
@@ -180,31 +192,37 @@ class FittedRates:
     windows: NDArray[np.int64]
 
     def rounding(self, rounding: Array) -> Array:
-        """Return what (n, half) rad of rounding in the angles make of the rates, (n, half)
-        rad/s."""
+        """Return the rounding of the rates, (n, half) rad/s, that follows from that of the angles.
+
+        Parameters
+        ----------
+        rounding : (n, half) rad, of the angles of the coordinates that move.
+        """
         of_window = np.hstack([rounding[self.windows + row] for row in range(FIT_ROWS)])
         return np.asarray(np.einsum("kij,kj->ki", np.abs(self.sensitivity), of_window))
 
 
 def fitted_rates(scene: Scene, time: Array, angles: Array) -> FittedRates:
-    """Compute rates of data that have angles alone, by the closed form through five rows around
-    each.
+    """Compute the rates of data that have angles only, by a fit of the closed form to five rows.
 
-    Least squares over the state at the first row of every window, carried through it by the
-    transition matrices; from differences, until the rates stand still.
+    Gauss-Newton least squares over the state at the first row of every window, which the transition
+    matrices carry through the window. It begins with finite differences of the angles, and ends
+    when the rates no longer change.
 
     Parameters
     ----------
-    scene : the scene.
-    time, angles : (n,) s and (n, 1 + blades) rad.
+    scene : the rotor and its loads.
+    time : (n,) s, increasing.
+    angles : (n, 1 + blades) rad.
 
     Raises
     ------
     InputError
-        Where there are fewer rows than a window has, the motion is too stiff to carry a state from
-        row to row, or the rows are too far apart: from differences the rates do not come to stand
-        still. Where they do not although the rows are near, no motion passes through some rows; the
-        rates of the others are found.
+        If there are fewer rows than a window has, an angle is over `ANGLE_LIMIT`, the motion is too
+        stiff to carry a state from row to row, or the rows are so far apart that the rates do not
+        converge from finite differences. If the rates do not converge although the rows are near,
+        no motion passes through some of them: then nothing is raised, and the rates of the others
+        are found.
     """
     count = len(time)
     if count < FIT_ROWS:
@@ -274,18 +292,20 @@ def fitted_rates(scene: Scene, time: Array, angles: Array) -> FittedRates:
 def interval_ends(
     scene: Scene, begins: Array, ends: Array, states: Array, integration: _Integration | None = None
 ) -> Array:
-    """Find where the closed form gets from each row of states.
+    """Integrate the closed form from each row of states to the end of its interval.
 
     Parameters
     ----------
-    begins, ends : (n,) s, of the rows, increasing, and until when.
+    scene : the rotor and its loads.
+    begins, ends : (n,) s, start and end of the interval of each row, increasing.
     states : (n, m) angles, then rates, of the coordinates that move.
-    integration : of this scene, for several calls; else it is built here.
+    integration : of this scene, to be used in several calls; built here where left out.
 
     Returns
     -------
-    (n, m)
-        NaN where it does not get there, or would take more steps than any motion of the rotor.
+    ndarray, shape (n, m)
+        States at `ends`; NaN where the end is not reached, or would take more steps than any motion
+        of the rotor.
     """
     segments = scene.load_segments
     advance, max_steps = integration or _integration_of(scene, states.shape[1])
@@ -318,16 +338,26 @@ _Integration = tuple[_Advance, int]  # and the most steps that it may take in an
 
 
 def _integration_of(scene: Scene, count: int) -> _Integration:
-    """Return the integration of (count,) variables from sample to sample: by heyoka, or without it
-    by DOP853."""
+    """Return the integration from sample to sample: by heyoka, or by DOP853 without it.
+
+    Parameters
+    ----------
+    scene : the rotor and its loads.
+    count : number of variables, angles and rates of the coordinates that move.
+    """
     if is_available():
         return _advance_by_taylor(scene, count), _MAX_STEPS_TAYLOR
     return _advance_by_dop853(scene), _MAX_STEPS_DOP853
 
 
 def _advance_by_taylor(scene: Scene, count: int) -> _Advance:
-    """Return the integration of (count,) variables by the code that is compiled for
-    lagrange/taylor."""
+    """Return an integration over parts of segments by the compiled code of lagrange/taylor.
+
+    Parameters
+    ----------
+    scene : the rotor and its loads.
+    count : number of variables, angles and rates of the coordinates that move.
+    """
     propagation = Propagation(
         scene, tol=_TAYLOR, compact_mode=is_compact(scene), high_accuracy=True
     )
@@ -353,6 +383,12 @@ def _advance_by_taylor(scene: Scene, count: int) -> _Advance:
 
 
 def _advance_by_dop853(scene: Scene) -> _Advance:
+    """Return an integration over parts of segments by SciPy's DOP853.
+
+    Parameters
+    ----------
+    scene : the rotor and its loads; its outputs are reduced to angles and rates.
+    """
     solver = OdeSolver(
         replace(scene, outputs=("angles", "rates")), scipy_integrator("DOP853", *_DOP853)
     )
@@ -375,11 +411,14 @@ def _transitions(scene: Scene, time: Array, states: Array, ends: Array) -> Array
 
     Parameters
     ----------
-    states, ends : (n, m) of the samples, and (n - 1, m) where `interval_ends` gets from them.
+    scene : the rotor and its loads.
+    time : (n,) s, of the samples.
+    states : (n, m) at the samples, angles, then rates, of the coordinates that move.
+    ends : (n - 1, m) where `interval_ends` gets from them.
 
     Returns
     -------
-    (n - 1, m, m)
+    ndarray, shape (n - 1, m, m)
         Right to a share of 5e-4, mostly of 1e-5; infinite where an end is not finite.
     """
     count = states.shape[1]
@@ -423,17 +462,21 @@ def _difference_transitions(
     rows: NDArray[np.int64],
     differences: Array,
 ) -> tuple[Array, NDArray[np.bool_]]:
-    """Find matrices of the intervals after `rows` from ends of moved states.
+    """Compute transition matrices of intervals by difference quotients of their ends.
 
     Parameters
     ----------
+    scene : the rotor and its loads.
+    time, states, ends : as of `_transitions`.
+    rows : (k,) the samples at which the intervals begin.
     differences : (m,) by how much each variable is moved.
 
     Returns
     -------
-    matrices, is_linear : (k, m, m), (k,)
-        And whether every moved end is next to the interval's own. Where errors have grown to the
-        size of the motion the matrix is none: it says that they grow no more.
+    matrices : ndarray, shape (k, m, m) Where errors have grown to the size of the motion, a matrix
+        says only that they grow no more.
+    is_linear : ndarray of bool, shape (k,)
+        Whether every moved end is next to the interval's own.
     """
     count = states.shape[1]
     units = differences / differences[0]
@@ -455,8 +498,22 @@ def _difference_transitions(
 def _quick_transitions(
     scene: Scene, time: Array, states: Array, rows: NDArray[np.int64], units: Array, steps: int
 ) -> tuple[Array, Array]:
-    """Return matrices of the intervals after `rows`, (k, m, m), and their ends, (k, m), by
-    Runge-Kutta steps."""
+    """Compute transition matrices of intervals by Runge-Kutta steps of order 4.
+
+    Parameters
+    ----------
+    scene : the rotor and its loads.
+    time, states : as of `_transitions`.
+    rows : (k,) the samples at which the intervals begin.
+    units : (m,) what counts as 1 in each variable.
+    steps : number of steps in each interval.
+
+    Returns
+    -------
+    matrices : ndarray, shape (k, m, m)
+    ends : ndarray, shape (k, m)
+        The states that the same steps reach.
+    """
     count = states.shape[1]
     # (m, 1 + directions, k): the state of every interval, as it is and moved by a difference in
     # every direction.
@@ -470,8 +527,18 @@ def _quick_transitions(
 
 
 def explicit_steps(scene: Scene, intervals: Array, states: Array, most: int) -> int | None:
-    """Return how many Runge-Kutta steps each of (n,) intervals (s) takes; None where they are more
-    than `most`."""
+    """Return how many Runge-Kutta steps an interval needs, or None if more than `most`.
+
+    The fastest rate or pitch frequency advances by at most 0.25 rad in a step of the longest
+    interval.
+
+    Parameters
+    ----------
+    scene : the rotor.
+    intervals : (n,) s, their lengths.
+    states : (n, m) at their starts, angles, then rates, of the coordinates that move.
+    most : the largest number of steps that is allowed.
+    """
     half = states.shape[1] // 2
     fastest = float(np.max(np.where(np.isfinite(states[:, half:]), np.abs(states[:, half:]), 0.0)))
     for blade in rotor_form(scene).blades:
@@ -491,9 +558,23 @@ def quick_ends(
     steps: int,
     equations: Accelerations | None = None,
 ) -> Array:
-    """Compute the ends of n intervals from (m, ..., n) states, all at once, in steps of order 4; by
-    `equations` in place of the closed form's. Differences of two calls are right to a share of some
-    1e-5, but where rates change within an interval."""
+    """Compute the states at the ends of all intervals at once, by Runge-Kutta steps of order 4.
+
+    Differences of two calls are right to a share of some 1e-5, except where rates change within an
+    interval.
+
+    Parameters
+    ----------
+    scene : the rotor and its loads.
+    begins, ends : (n,) s.
+    states : (m, ..., n) at `begins`, angles, then rates, of the coordinates that move.
+    steps : number of steps in each interval.
+    equations : the accelerations to integrate; the closed form's where left out.
+
+    Returns
+    -------
+    ndarray, shape (m, ..., n)
+    """
     form, half = rotor_form(scene), len(states) // 2
     equations = equations or closed_form.accelerations
     h = (ends - begins) / steps

@@ -1,5 +1,7 @@
-"""The closed form linearized, and its steady states: equilibrium at rest, steady rotation without
-gravity."""
+"""Linearize the closed form, and find its steady states.
+
+These are the equilibrium at rest, and steady rotation without gravity.
+"""
 
 from __future__ import annotations
 
@@ -28,8 +30,19 @@ _ALL, _PITCHES = slice(None), slice(1, None)
 
 
 def slopes(function: Function, values: Sequence[float] | Array) -> Array:
-    """(n,) derivatives of an analytic function of n numbers, (m, n) of one that returns m, by an
-    imaginary step: no difference is taken, so that they are exact to rounding."""
+    """Return the derivatives of an analytic function, exact to rounding, by an imaginary step.
+
+    The complex-step derivative takes no difference of close numbers.
+
+    Parameters
+    ----------
+    function : of n numbers, of which it returns one number or m.
+    values : (n,) where the derivatives are taken.
+
+    Returns
+    -------
+    ndarray, shape (n,) or (m, n)
+    """
     step = 1e-30
     # each number over all directions
     moved = np.asarray(values)[:, None] + 1j * step * np.eye(len(values))
@@ -39,9 +52,24 @@ def slopes(function: Function, values: Sequence[float] | Array) -> Array:
 def linearize(
     scene: Scene, angles: Sequence[float] | Array, rates: Sequence[float] | Array, torque: float
 ) -> Linearization:
-    """Linearize the closed form in `scene.moving_coordinates` at (1 + blades,) rad and rad/s,
-    `torque` N m on the rotor, other loads as at t = 0. Raises ZeroDivisionError at the singular
-    configuration."""
+    """Linearize the closed form about a state, in the coordinates that move.
+
+    Parameters
+    ----------
+    scene : the rotor; its other loads as at t = 0.
+    angles, rates : (1 + blades,) rad and rad/s.
+    torque : N m on the rotor, in place of the scene's.
+
+    Returns
+    -------
+    Linearization
+        Stiffness and damping divided by the mass matrix, and the accelerations at the state.
+
+    Raises
+    ------
+    ZeroDivisionError
+        At the singular configuration.
+    """
     form, columns, loads = (
         rotor_form(scene),
         scene.moving_coordinates,
@@ -60,25 +88,31 @@ def linearize(
 
 
 def holding_torque(scene: Scene, speed: float) -> float:
-    """N m on the rotor that keeps its `speed` (rad/s) against the shaft's damper."""
+    """Return the torque (N m) that keeps the rotor's `speed` (rad/s) against the shaft's damper."""
     return scene.shaft_damping * speed
 
 
 def steady_rotation(scene: Scene, speed: float) -> Array:
-    """Return the angles at which the rotor turns steadily at `speed` rad/s without gravity.
+    """Return the angles at which the rotor turns steadily without gravity.
 
-    Stationary points of V - ½ Ω² a - Σ τ θ, downhill from the scene's initial pitches, kept where
-    they are stationary already, stable or not. The rotor keeps its initial angle.
+    Finds a stationary point of V - ½ Ω² a - Σ τ θ, downhill from the scene's initial pitches. These
+    are kept where they are stationary already, stable or not. The rotor keeps its initial angle.
+
+    Parameters
+    ----------
+    scene : the rotor; its pitch torques and rest angles as at t = 0.
+    speed : rad/s, of the rotor.
 
     Returns
     -------
-    ndarray, (1 + blades,) rad
+    ndarray, shape (1 + blades,)
+        rad.
 
     Raises
     ------
     InputError
-        If a pitch torque is larger than all that can balance it, or no such state is found within
-        200 steps.
+        If a pitch torque is larger than all that can balance it, no such state is found within
+        200 steps, or rounding of the energies hides it.
     """
     still = replace(scene, gravity=0.0)
     return _checked(still, speed, _stationary(still, speed, _PITCHES))
@@ -90,9 +124,14 @@ def equilibrium(scene: Scene) -> Array:
     A balanced rotor (`is_balanced`) keeps its initial angle. Any other rotor turns downhill as
     well, from the initial angles.
 
+    Parameters
+    ----------
+    scene : the rotor and gravity; its pitch torques and rest angles as at t = 0.
+
     Returns
     -------
-    ndarray, (1 + blades,) rad
+    ndarray, shape (1 + blades,)
+        rad.
 
     Raises
     ------
@@ -113,11 +152,11 @@ def equilibrium(scene: Scene) -> Array:
 def is_balanced(scene: Scene, angles: Sequence[float] | Array) -> bool:
     """Return whether gravity gives a rotor at rest no preferred angle.
 
-    The rotor's torque is zero at `angles`, and remains zero to first order where the rotor is
-    turned and the pitches follow: both up to the rounding of the weights that balance. Bearing
-    springs move the pitches of equal blades once a turn, so that their weights balance to third
-    order of the deflection only: on stiff bearings that is rounding, on soft ones the rotor has a
-    preferred angle.
+    It has none if the rotor's torque is zero at `angles`, and remains zero to first order where the
+    rotor is turned and the pitches follow: both up to the rounding of the weights that balance.
+    Bearing springs move the pitches of equal blades once a turn, so that their weights balance to
+    third order of the deflection only: on stiff bearings that is rounding, on soft ones the rotor
+    has a preferred angle.
 
     Parameters
     ----------
@@ -137,11 +176,15 @@ def is_balanced(scene: Scene, angles: Sequence[float] | Array) -> bool:
 
 
 def weight_stiffness(scene: Scene, angles: Sequence[float] | Array) -> float:
-    """Return the moments of all weights about the shaft, divided by the rotor's inertia at
-    `angles`, in 1/s².
+    """Return the moments of all weights about the shaft, divided by the rotor's inertia, in 1/s².
 
-    The size of the stiffness of a rotor whose weights do not balance: the unit of rounding where
-    they do.
+    This is the size of the stiffness of a rotor whose weights do not balance, and the unit of
+    rounding where they do.
+
+    Parameters
+    ----------
+    scene : the rotor and gravity.
+    angles : (1 + blades,) rad, at which the rotor's inertia is taken.
     """
     form, loads = rotor_form(scene), loads_at_start(scene)
     moving = [float(angles[column]) for column in scene.moving_coordinates]
@@ -164,11 +207,27 @@ class _Potential(NamedTuple):
 
 
 def _stationary(scene: Scene, speed: float, free: slice) -> Array:
-    """Return (1 + blades,) rad, where the forces on the `free` ones of the coordinates that move
-    are zero.
+    """Return the angles at which the forces on the free coordinates are zero.
 
     Newton's method with the absolute eigenvalues of the Hessian, and a step halved until it goes
     downhill.
+
+    Parameters
+    ----------
+    scene : the rotor, its loads as at t = 0, and gravity; its initial angles are the start.
+    speed : rad/s, of the rotor.
+    free : the coordinates to be changed, among those that move: `_ALL` or `_PITCHES`.
+
+    Returns
+    -------
+    ndarray, shape (1 + blades,)
+        rad.
+
+    Raises
+    ------
+    InputError
+        If a pitch torque is too large, or nothing is found within `_MAX_STEPS` steps
+        (`_NotFoundError`).
     """
     form, columns, loads = rotor_form(scene), scene.moving_coordinates, loads_at_start(scene)
     _refuse_large_torques(scene, form, speed, loads)
@@ -195,8 +254,20 @@ def _stationary(scene: Scene, speed: float, free: slice) -> Array:
 
 
 def _refuse_large_torques(scene: Scene, form: RotorForm, speed: float, loads: LoadValues) -> None:
-    """Raise InputError where a pitch has no spring, and a torque above all that gravity and
-    rotation can balance."""
+    """Check that no pitch torque exceeds what gravity and rotation can balance without a spring.
+
+    Parameters
+    ----------
+    scene : gives names to the error.
+    form : coefficients of the rotor.
+    speed : rad/s, of the rotor.
+    loads : at t = 0.
+
+    Raises
+    ------
+    InputError
+        If a pitch has no spring and a larger torque.
+    """
     columns = scene.moving_coordinates[1:]
     for column, blade, torque in zip(columns, form.blades, loads.pitches, strict=True):
         # The largest values over the pitch of x s + y c and of ½ ∂A/∂θ = ½ half_slope_sc sin 2θ +
@@ -218,8 +289,20 @@ def _refuse_large_torques(scene: Scene, form: RotorForm, speed: float, loads: Lo
 
 
 def _checked(scene: Scene, speed: float, angles: Array) -> Array:
-    """Return the angles of a steady state. Raises InputError where the accelerations say that it is
-    none: they keep differences that the energies' rounding hides."""
+    """Return the angles of a steady state, after a check that the accelerations vanish there.
+
+    The accelerations keep differences that the rounding of the energies hides.
+
+    Parameters
+    ----------
+    scene, speed : as of `steady_rotation`.
+    angles : (1 + blades,) rad.
+
+    Raises
+    ------
+    InputError
+        If an acceleration is too large.
+    """
     rates = [speed] + [0.0] * len(scene.blades)
     linear = linearize(scene, angles, rates, holding_torque(scene, speed))
     scale = max(np.abs(linear.stiffness).max(), weight_stiffness(scene, angles))
@@ -230,8 +313,17 @@ def _checked(scene: Scene, speed: float, angles: Array) -> Array:
 
 
 def _is_lower(trial: _Potential, start: _Potential, step: Array, free: slice) -> bool:
-    """Whether a step went downhill, also where rounding hides by how much: the approximate Wolfe
-    condition of W. W. Hager and H. Zhang, SIAM J. Optim. 16 (2005) 170-192."""
+    """Return whether a step went downhill, also where rounding hides by how much.
+
+    This is the approximate Wolfe condition of W. W. Hager and H. Zhang, SIAM J. Optim. 16 (2005)
+    170-192.
+
+    Parameters
+    ----------
+    trial, start : after and before the step.
+    step : (free,) rad.
+    free : the coordinates that the step changes.
+    """
     allowed = start.value + 1e-12 * abs(start.value)
     return trial.value <= allowed and bool(
         trial.slope[free] @ step <= -0.8 * (start.slope[free] @ step)
@@ -241,8 +333,17 @@ def _is_lower(trial: _Potential, start: _Potential, step: Array, free: slice) ->
 def _amended_potential(
     form: RotorForm, angles: Array, speed: float, loads: LoadValues
 ) -> _Potential:
-    """The pitches at rest, their constant torques in V, the rotor turning at `speed` rad/s without
-    its torque."""
+    """Return V - T, slope and curvature for pitches at rest while the rotor turns without torque.
+
+    The constant torques of the pitches are in V.
+
+    Parameters
+    ----------
+    form : coefficients of the rotor.
+    angles : (n,) rad, of the coordinates that move.
+    speed : rad/s, of the rotor.
+    loads : at t = 0, of which the pitches' torques and rest angles count.
+    """
     rates = [speed, *(0.0 for _ in form.blades)]
 
     def value(angles: Any) -> Any:
@@ -256,9 +357,16 @@ def _amended_potential(
 
 
 def _newton_step(form: RotorForm, potential: _Potential, free: slice, *, downhill: bool) -> Array:
-    """Return -H⁻¹ g, (free,) rad, with |H| where `downhill`.
+    """Return a Newton step -H⁻¹ g of the free coordinates, (free,) rad, of at most 0.5 rad.
 
-    It is at most 0.5 rad, and none where nothing holds the rotor.
+    Directions without stiffness, such as that of a rotor that nothing holds, are not changed.
+
+    Parameters
+    ----------
+    form : coefficients of the rotor, whose weights are the unit of rounding.
+    potential : its gradient g and Hessian H.
+    free : the coordinates to be changed.
+    downhill : whether absolute eigenvalues are taken, |H| for H.
     """
     gradient, hessian = potential.slope[free], potential.curvature[free, free]
     least = max(1e-9 * _weights(form), 1e-300)
@@ -273,7 +381,7 @@ def _newton_step(form: RotorForm, potential: _Potential, free: slice, *, downhil
 
 
 def _weights(form: RotorForm) -> float:
-    """Return the sum of the moments of all weights, N m, as if each acted alone."""
+    """Return the sum of the moments of all weights about the axes, N m, as if each acted alone."""
     moments = [abs(float(weight)) for weight, _, _ in form.fixed]
     for blade in form.blades:
         weights = blade.lean or blade

@@ -81,12 +81,12 @@ def over_segments(
     initial: Any,
     advance: Callable[[Segment, Any, Array], Advance],
 ) -> tuple[Any, Integration]:
-    """Integrate from segment to segment of the loads.
+    """Integrate from segment to segment of the loads, and collect the samples.
 
     Parameters
     ----------
     times : (samples,) s, the first that of the initial state.
-    segments : of the loads.
+    segments : of the loads, in the order of time.
     initial : (variables,) state.
     advance : (segment, state at its start, sample times inside) -> the integration of the segment.
 
@@ -118,11 +118,11 @@ def over_segments(
 
 
 def trajectory(scene: Scene, times: Array, states: Array) -> Trajectory:
-    """Return the quantities that the scene requests.
+    """Return the quantities that the scene requests, computed from the states of a run.
 
     Parameters
     ----------
-    scene : the run.
+    scene : the rotor, its loads and the requested outputs.
     times : (samples,) s.
     states : (n, 2k) angles, then rates, of the k coordinates that move; with the work (J) as one
         more column, or not.
@@ -149,14 +149,14 @@ def trajectory(scene: Scene, times: Array, states: Array) -> Trajectory:
 def _energies(
     scene: Scene, time: Array, all_angles: Array, all_rates: Array, states: Array
 ) -> dict[str, Array]:
-    """Return energies and work, (n,) J.
+    """Return kinetic and potential energy, and the work of the loads, (n,) J each.
 
     Parameters
     ----------
-    scene : the run.
+    scene : the rotor, its loads and gravity.
     time : (n,) s.
     all_angles, all_rates : (n, 1 + blades) rad and rad/s.
-    states : as of `trajectory`, which may have the work.
+    states : as of `trajectory`, with the work as their last column or without it.
     """
     form, columns = rotor_form(scene), scene.moving_coordinates
     angles = list(all_angles[:, columns].T)
@@ -178,8 +178,18 @@ def _energies(
 
 
 def loads_at(scene: Scene, time: Array) -> LoadValues:
-    """Return the loads at (n,) s: numbers where they are constant, else (n,) arrays; at a jump, the
-    values after it."""
+    """Return the loads at some times; at a jump, the values after it.
+
+    Parameters
+    ----------
+    scene : whose load tables are evaluated.
+    time : (n,) s.
+
+    Returns
+    -------
+    LoadValues
+        Of the coordinates that move: a number where a load is constant, else an array (n,).
+    """
     values: list[Any] = []
     for table in scene.load_tables:
         values.append(value_at(table, 0.0) if is_constant(table) else values_at(table, time))
@@ -187,16 +197,26 @@ def loads_at(scene: Scene, time: Array) -> LoadValues:
 
 
 def loads_at_start(scene: Scene, torque: float = 0.0) -> LoadValues:
-    """Return the loads of the pitches at t = 0, with `torque` (N m) on the rotor in place of the
-    scene's."""
+    """Return the loads at t = 0, with another torque on the rotor.
+
+    Parameters
+    ----------
+    scene : whose pitch torques and rest angles are taken.
+    torque : N m on the rotor, in place of the scene's.
+    """
     values = [value_at(table, 0.0) for table in scene.load_tables]
     values[ROTOR_TORQUE] = torque
     return load_values(values, scene.moving_coordinates[1:])
 
 
 def at_constant_rests(changing: Sequence[bool], loads: LoadValues) -> LoadValues:
-    """Return loads without the rest angles that are constant, which do no work; changing: as of
-    `changing_rests`."""
+    """Return loads with the constant rest angles set to zero: they do no work.
+
+    Parameters
+    ----------
+    changing : (pitches that move,) as of `changing_rests`.
+    loads : of the coordinates that move.
+    """
     rests = [rest if changes else 0.0 for rest, changes in zip(loads.rests, changing, strict=True)]
     return LoadValues(loads.rotor, loads.pitches, rests)
 
@@ -210,21 +230,32 @@ def constant_work(scene: Scene, angles: Array) -> Array:
 
 
 def sampled_loads(scene: Scene, times: Array, angles: Array, rates: Array) -> dict[str, Array]:
-    """Return the load quantities at (n,) times in s; angles, rates: (n, 1 + blades) rad and
-    rad/s."""
+    """Return the load quantities at the samples of a motion.
+
+    Parameters
+    ----------
+    scene : the rotor, its loads and gravity.
+    times : (n,) s.
+    angles, rates : (n, 1 + blades) rad and rad/s.
+
+    Returns
+    -------
+    dict of ndarray
+        As of `named_loads`, (n, ...) each; at a jump of a load, before it.
+    """
     with np.errstate(all="ignore"):  # near a singularity; what is not finite cuts the run
         return _loads(scene, times, angles, rates, float, np.sin, np.cos)
 
 
 @dataclass(frozen=True)
 class LoadParts:
-    """Factors of what loads are made of: 1 as they are, 0 where it is forgotten.
+    """Scale the terms that loads consist of: by 1 to keep a term, by 0 to leave it out.
 
     Attributes
     ----------
-    weight : of gravity.
-    accelerations : of those of the coordinates.
-    rates : of the rates, of which the other inertia forces are.
+    weight : factor of gravity.
+    accelerations : factor of the coordinates' accelerations.
+    rates : factor of the rates, on which the other inertia forces depend.
     """
 
     weight: float = 1.0
@@ -235,25 +266,34 @@ class LoadParts:
 def partial_loads(
     scene: Scene, times: Array, angles: Array, rates: Array, parts: LoadParts
 ) -> dict[str, Array]:
-    """Return the load quantities with some parts forgotten, as `sampled_loads` returns them
-    whole."""
+    """Return the load quantities with some of their terms left out.
+
+    Parameters
+    ----------
+    scene, times, angles, rates : as of `sampled_loads`.
+    parts : the factor of each kind of term.
+    """
     with np.errstate(all="ignore"):
         return _loads(scene, times, angles, rates, float, np.sin, np.cos, parts)
 
 
 def load_rounding(scene: Scene, times: Array, angles: Array, rates: Array) -> dict[str, Array]:
-    """Return how much of the load quantities the last digits of a state leave open, in the shape of
-    each.
+    """Return how much the last digits of a state leave the load quantities uncertain.
 
-    A stiff bearing's moment is a small difference of large ones. Of each number two roundings
-    count, half a unit in the last place: its own, and that of what it is compared with, such as the
-    angle of a pitch command.
+    A stiff bearing's moment is a small difference of large ones. Two roundings of each number
+    count, half a unit in the last place each: its own, and that of what it is compared with, such
+    as the angle of a pitch command.
 
     Parameters
     ----------
-    scene : the run.
+    scene : the rotor, its loads and gravity.
     times : (n,) s.
     angles, rates : (n, 1 + blades) rad and rad/s.
+
+    Returns
+    -------
+    dict of ndarray
+        In the shape and unit of each quantity of `sampled_loads`.
     """
     loads = sampled_loads(scene, times, angles, rates)
     rounding = {name: np.zeros_like(values) for name, values in loads.items()}
@@ -271,17 +311,23 @@ def load_rounding(scene: Scene, times: Array, angles: Array, rates: Array) -> di
 
 
 def load_conditioning(scene: Scene, times: Array, angles: Array, rates: Array) -> dict[str, Array]:
-    """Return how much of the load quantities the arithmetic of any engine may lose, in the shape of
-    each.
+    """Return how much accuracy of the load quantities the arithmetic of any engine may lose.
 
     An engine forms the moments of inertia forces and weights from terms about some point, each
-    rounded once. What is lost of them turns into accelerations by the inverse of the mass matrix,
-    and these into loads. Of a blade whose inertia about its pitch axis is small beside m |r|^2 that
-    is far more than the last digits of its state.
+    rounded once. The inverse of the mass matrix turns this rounding into errors of accelerations,
+    and these are errors of loads. They are far more than the last digits of the state for a blade
+    whose inertia about its pitch axis is small beside m |r|^2.
 
     Parameters
     ----------
-    times, angles, rates : (n,) s, and (n, 1 + blades) rad and rad/s.
+    scene : the rotor, its loads and gravity.
+    times : (n,) s.
+    angles, rates : (n, 1 + blades) rad and rad/s.
+
+    Returns
+    -------
+    dict of ndarray
+        In the shape and unit of each quantity of `named_loads`.
     """
     form, moving = rotor_form(scene), scene.moving_coordinates
     applied = load_values(
@@ -331,8 +377,18 @@ def load_conditioning(scene: Scene, times: Array, angles: Array, rates: Array) -
 
 
 def _inverse_mass_matrices(scene: Scene, angles: Array) -> Array:
-    """Return the inverse of the mass matrix at (n, 1 + blades) rad: (n, moving, moving), by the
-    Schur complement."""
+    """Return the inverse of the mass matrix by the Schur complement.
+
+    Parameters
+    ----------
+    scene : the rotor.
+    angles : (n, 1 + blades) rad.
+
+    Returns
+    -------
+    ndarray, shape (n, moving, moving)
+        In the coordinates that move, 1/(kg m²).
+    """
     form, moving = rotor_form(scene), scene.moving_coordinates
     schur = np.full(len(angles), form.inertia)
     levers = [np.full(len(angles), -1.0)]  # of each coordinate on the rotor: -1, then B / Jzz
@@ -349,8 +405,14 @@ def _inverse_mass_matrices(scene: Scene, angles: Array) -> Array:
 
 
 def quad_loads(scene: Scene, times: Array, states: Any) -> dict[str, Array]:
-    """Return the loads in quad precision, rounded at the end; states: (n, 2 × moving coordinates)
-    angles, rates."""
+    """Return the loads, computed in quad precision and rounded to doubles at the end.
+
+    Parameters
+    ----------
+    scene : the rotor, its loads and gravity.
+    times : (n,) s.
+    states : (n, 2k) quad numbers, angles, then rates, of the k coordinates that move.
+    """
     count = len(scene.moving_coordinates)
     states = states.astype(object)
     angles, rates = all_coordinates(scene, states[:, :count], states[:, count : 2 * count])
@@ -367,15 +429,15 @@ def _loads(
     cos: Function,
     parts: LoadParts | None = None,
 ) -> dict[str, Array]:
-    """Compute the load quantities, (n, ...), at a jump of a load before it.
+    """Compute the load quantities, (n, ...) each; at a jump of a load, before it.
 
     Parameters
     ----------
-    scene : the run.
+    scene : the rotor, its loads and gravity.
     times : (n,) s.
     angles, rates : (n, 1 + blades) rad and rad/s.
     convert, sin, cos : for the kind of number.
-    parts : what of them is forgotten; nothing where left out.
+    parts : the factor of each kind of term; all are 1 where left out.
     """
     moving, applied = scene.moving_coordinates, values_before(scene.load_segments, times)
     accelerations = np.zeros_like(angles)
@@ -426,8 +488,22 @@ def _reactions(
     sin: Function,
     cos: Function,
 ) -> tuple[list[tuple[Numbers, Numbers]], Numbers, Numbers]:
-    """Return force and moment at each root, and the sums of both about the apex in the base
-    frame."""
+    """Return force and moment at each blade root, and their sums over the blades at the apex.
+
+    Parameters
+    ----------
+    scene : the rotor.
+    angles, rates, accelerations : (n, 1 + blades) rad, rad/s and rad/s².
+    gravity : m/s².
+    convert, sin, cos : for the kind of number.
+
+    Returns
+    -------
+    roots : list of tuple of ndarray
+        For each blade (n, 3) force and moment about its root, in the blade's frame.
+    shaft_force, shaft_moment : ndarray, shape (n, 3)
+        About the apex, in the base frame; without the inertia and weight of the hub.
+    """
     sin_q, cos_q = sin(angles[:, 0]), cos(angles[:, 0])
     radius = convert(Fraction(scene.hub_radius)) if scene.hub_radius else 0.0
     roots, in_base = [], []
@@ -457,13 +533,13 @@ def root_load(
     gravity: float,
     lean: Lean | None,
 ) -> tuple[Numbers, Numbers]:
-    """Compute the load on a blade, (n, 3) force and moment about the apex in the blade's frame.
+    """Return force and moment on a blade about the apex, (n, 3) each, in the blade's frame.
 
     Parameters
     ----------
-    blade : its mass and inertia.
+    blade : its mass, centre of mass and inertia.
     azimuth, pitch : sine and cosine, (n,) each.
-    turning : Ω, θ̇, dΩ/dt and dθ̇/dt, (n,) each.
+    turning : Ω, θ̇, dΩ/dt and dθ̇/dt, (n,) each in rad/s and rad/s².
     gravity : m/s².
     lean : cosines and sines of cone and tilt; None where both are 0.
     """
@@ -498,8 +574,14 @@ def _in_base_frame(
     pitch: tuple[Numbers, Numbers],
     lean: Lean | None,
 ) -> Numbers:
-    """Return (n, 3) vectors of a blade's frame in the base frame:
-    Rx(τ)·Ry(φ)·Rx(-β)·Rz(θ)·vector."""
+    """Return vectors of a blade's frame in the base frame: Rx(τ)·Ry(φ)·Rx(-β)·Rz(θ)·vector.
+
+    Parameters
+    ----------
+    vectors : (n, 3) in the blade's frame.
+    azimuth, pitch : sine and cosine of φ and of θ, (n,) each.
+    lean : cosines and sines of cone β and tilt τ; None where both are 0.
+    """
     (sin_phi, cos_phi), (s, c), (x, y, z) = azimuth, pitch, vectors.T
     across, along = x * c - y * s, x * s + y * c
     if lean:
