@@ -1,22 +1,32 @@
-"""The closed form: accelerations by an arrowhead solve, energies, tip. One text for NumPy, SciPy
-and heyoka.
+"""Evaluate the closed form: accelerations by an arrowhead solve, energies, and paths of points.
 
-Every function takes numbers of any kind that knows + - * / (floats, arrays, quad precision,
-symbolic expressions) together with a sine and a cosine for that kind, and contains no branch on a
-value.
+NumPy, SciPy and heyoka use the same functions. Each takes numbers of any kind that knows + - * /
+(floats, arrays, quad precision, symbolic expressions) together with a sine and a cosine for that
+kind, and contains no branch on a value.
 
 Symbols: φ = q2 + 2π(i-1)/N azimuth of blade i, θ its pitch, Ω = q̇2, s = sin θ, c = cos θ; τ tilt,
 β cone. The blade's axes in the base frame are Rx(τ) Ry(φ) Rx(-β) Rz(θ), so that its angular
-velocity in its own axes is ω = (Ω cos β s, Ω cos β c, θ̇ + Ω sin β). With J the blade's inertia
-about the apex, a = Jxx s² + Jyy c² + 2 Jxy s c and b = Jxz s + Jyz c, T = ½ J_hub Ω² + ½ Σ ω·J ω is
-T = ½ (J_hub + Σ A) Ω² + Σ B Ω θ̇ + ½ Σ Jzz θ̇², A = cos²β a + 2 sin β cos β b + sin²β Jzz,  B = cos
-β b + sin β Jzz, V = Σ m g h + ½ k (θ - r)², r the rest angle of the spring, and with u = x c - y s,
-v = x s + y c h = sin τ (v cos β + z sin β) + cos τ (-u sin φ + (z cos β - v sin β) cos φ). The mass
-matrix is an arrowhead; eliminating the pitches leaves the Schur complement S = J_hub + Σ (A -
-B²/Jzz) = J_hub + Σ cos²β (a - b²/Jzz).
+velocity in its own axes is
 
-What is linear in s and c by tilt or cone is in `BladeForm.lean`, and costs an upright rotor
-nothing.
+    ω = (Ω cos β s, Ω cos β c, θ̇ + Ω sin β).
+
+With J the blade's inertia about the apex, a = Jxx s² + Jyy c² + 2 Jxy s c and b = Jxz s + Jyz c,
+the kinetic energy T = ½ J_hub Ω² + ½ Σ ω·J ω is
+
+    T = ½ (J_hub + Σ A) Ω² + Σ B Ω θ̇ + ½ Σ Jzz θ̇²,
+    A = cos²β a + 2 sin β cos β b + sin²β Jzz,  B = cos β b + sin β Jzz.
+
+The potential energy is, r the rest angle of the spring, u = x c - y s and v = x s + y c,
+
+    V = Σ m g h + ½ k (θ - r)²,
+    h = sin τ (v cos β + z sin β) + cos τ (-u sin φ + (z cos β - v sin β) cos φ).
+
+The mass matrix is an arrowhead; eliminating the pitches leaves the Schur complement
+
+    S = J_hub + Σ (A - B²/Jzz) = J_hub + Σ cos²β (a - b²/Jzz).
+
+The terms that tilt or cone make linear in s and c are in `BladeForm.lean`, and cost an upright
+rotor nothing.
 """
 
 from __future__ import annotations
@@ -34,7 +44,7 @@ Accelerations = Callable[..., list[Number]]  # `accelerations`, or other equatio
 
 @dataclass(frozen=True, slots=True)
 class LoadValues:
-    """Loads at one time, or over time as arrays."""
+    """Hold the loads at one time, or over time as arrays."""
 
     rotor: Number  # N m on the rotor
     pitches: Sequence[Number] = ()  # (form.blades,) N m between hub and blade; () for none
@@ -142,7 +152,13 @@ def accelerations(
 def pitches(
     form: RotorForm, angles: Sequence[Number], rates: Sequence[Number], loads: LoadValues
 ) -> Iterator[tuple[BladeForm, Number, Number, Number, Number]]:
-    """Yield blade, angle, rate, torque and rest angle of each pitch that moves."""
+    """Yield blade, angle, rate, torque and rest angle of each pitch that moves.
+
+    Parameters
+    ----------
+    form, angles, rates, loads : as of `accelerations`; torques and rest angles that are left out of
+        the loads are zero.
+    """
     nothing = (0.0,) * len(form.blades)
     return zip(
         form.blades,
@@ -155,11 +171,16 @@ def pitches(
 
 
 def power(rates: Sequence[Number], form: RotorForm, loads: LoadValues) -> Number:
-    """Return the power (W) of the torques and of the moments k r of springs at rest at r, less what
-    the dampers take.
+    """Return the power (W) of the loads and springs' rest angles, less what the dampers take.
 
-    The work of a spring whose rest angle moves, -∫ k (θ - r) dr, is that of k r on the pitch and
-    the change of `rest_energy`.
+    A spring with rest angle r acts with the moment k r here. The work of a spring whose rest angle
+    moves, -∫ k (θ - r) dr, is that of k r on the pitch and the change of `rest_energy`.
+
+    Parameters
+    ----------
+    rates : (1 + len(form.blades),) rad/s, of the rotor, then of the pitches that move.
+    form : the coefficients.
+    loads : torques (N m) and rest angles (rad) of the coordinates that move.
     """
     spin = rates[0]
     total = loads.rotor * spin - form.shaft_damping * (spin * spin)
@@ -169,8 +190,14 @@ def power(rates: Sequence[Number], form: RotorForm, loads: LoadValues) -> Number
 
 
 def rest_energy(angles: Sequence[Number], form: RotorForm, rests: Sequence[Number]) -> Number:
-    """Return the energy (J) that springs with these rest angles have beyond those unloaded at 0, ½
-    k r (r - 2θ)."""
+    """Return the energy ½ k r (r - 2θ) (J) that rest angles r add to springs unloaded at zero.
+
+    Parameters
+    ----------
+    angles : (1 + len(form.blades),) rad, of the rotor, then of the pitches that move.
+    form : the coefficients.
+    rests : (len(form.blades),) rad.
+    """
     return sum(
         0.5 * blade.stiffness * (rest * (rest - 2.0 * theta))
         for blade, theta, rest in zip(form.blades, angles[1:], rests, strict=True)
@@ -185,10 +212,13 @@ def energies(
     sin: Function,
     cos: Function,
 ) -> tuple[Number, Number]:
-    """Return kinetic and potential energy (J), gravity's about the apex's height, and that of
-    bearing springs.
+    """Return kinetic and potential energy (J).
 
-    Parameters are those of `accelerations`: angles, rates, form, loads, sin, cos.
+    The potential energy is gravity's, zero at the height of the apex, and that of bearing springs.
+
+    Parameters
+    ----------
+    angles, rates, form, loads, sin, cos : as of `accelerations`.
     """
     sin_q, cos_q = sin(angles[0]), cos(angles[0])
     spin = rates[0]
@@ -234,8 +264,9 @@ def point_path(
     cos: Function,
     lean: Lean | None = None,
 ) -> tuple[Number, Number, Number]:
-    """Return a point of a blade in the base frame, (x, y, z) in m:
-    Rx(tilt)·Ry(azimuth)·Rx(-cone)·Rz(pitch)·point.
+    """Return the place of a point of a blade in the base frame, (x, y, z) in m.
+
+    It is Rx(tilt)·Ry(azimuth)·Rx(-cone)·Rz(pitch)·point.
 
     Parameters
     ----------

@@ -1,8 +1,8 @@
-"""Many runs of lagrange/taylor at once, by heyoka's batch integrator in Hamilton's variables.
+"""Run many scenes of lagrange/taylor at once, by heyoka's batch integrator in Hamilton's variables.
 
 One run per SIMD lane, one compile per structure. A run's numbers do not depend on its neighbours in
-the other lanes, so that any partition of a sweep gives the same bits. One thread: processes are the
-parallelism.
+the other lanes, so that any partition of a sweep gives the same bits. All is done in one thread:
+several processes run in parallel instead.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ def lanes() -> int:
 
 
 def solve_many(scenes: Sequence[Scene], tolerance: float) -> RunBlock:
-    """Run several scenes.
+    """Run several scenes, and return their samples in one block.
 
     Parameters
     ----------
@@ -57,7 +57,7 @@ def solve_many(scenes: Sequence[Scene], tolerance: float) -> RunBlock:
     Raises
     ------
     MethodRefusal
-        Where heyoka is not installed.
+        If heyoka is not installed.
     """
     first, runs = scenes[0], len(scenes)
     durations = np.array([scene.duration for scene in scenes])
@@ -108,10 +108,17 @@ def solve_many(scenes: Sequence[Scene], tolerance: float) -> RunBlock:
 
 
 def _tip_numbers(scene: Scene, parameters: Parameters) -> list[tuple[list[Any], Lean | None]]:
-    """Return tip (m), and cosines and sines of cone and tilt of each blade; [] without such an
-    output.
+    """Return tip (m), and cosines and sines of cone and tilt, of each blade as parameters.
 
-    These numbers come after those of the equations.
+    Parameters
+    ----------
+    scene : the rotor.
+    parameters : to which these numbers are added, after those of the equations.
+
+    Returns
+    -------
+    list
+        [] where the tips are not requested.
     """
     if not scene.wants("tip"):
         return []
@@ -128,10 +135,14 @@ def _momenta(example: Scene) -> Any:
 
 
 def _observables(example: Scene) -> Any:
-    """Compile rates, then tips and energies that the scene requests, as a function of angles and
-    momenta.
+    """Compile rates, and the tips and energies that are requested, as a function of the state.
 
-    It takes a tenth of NumPy's time for the same formulas. `example`: a scene of the structure.
+    The state is in angles and momenta. The code takes a tenth of NumPy's time for the same
+    formulas.
+
+    Parameters
+    ----------
+    example : a scene of the structure.
     """
     engine, parameters = heyoka(), Parameters()
     form, loads, _ = taylor.equation_numbers(example, parameters)
@@ -197,7 +208,7 @@ def _observed(function: Any, states: Array, numbers: Array) -> Array:
 
 
 class _Group:
-    """Runs of one structure, and the compiled code for them."""
+    """Run the scenes of one structure by the code that is compiled for them."""
 
     def __init__(
         self,
@@ -211,8 +222,8 @@ class _Group:
 
         Parameters
         ----------
-        places : of each run in the block.
-        scenes : the runs.
+        places : (runs,) of each run in the block.
+        scenes : (runs,) which agree in structure.
         structure : of their equations.
         numbers : (parameters, runs) of their rotors.
         tolerance : of the local error.
@@ -252,7 +263,12 @@ class _Group:
         self.numbers = np.concatenate([numbers, angles[fixed]])
 
     def run(self, block: RunBlock) -> None:
-        """Run all, and write them to the block; as many at once as stay near the processor."""
+        """Run all scenes of the group, in chunks that stay in the processor's cache.
+
+        Parameters
+        ----------
+        block : where the runs are written.
+        """
         width = self.integrator.state.shape[1]
         runs = len(self.scenes)
         chunk = max(_SAMPLES_PER_CHUNK // len(self.times) // width, 1) * width
@@ -325,8 +341,15 @@ class _Group:
         observed: Array,
         integrations: Sequence[Integration],
     ) -> None:
-        """Write the runs of the first len(integrations) columns to the block; states, observed: as
-        of `solve`."""
+        """Write the runs of the first len(integrations) columns to the block.
+
+        Parameters
+        ----------
+        block : where the runs are written.
+        columns : of the runs in this group.
+        states, observed : as of `solve`.
+        integrations : the engine's status of these runs; columns beyond only fill the lanes.
+        """
         runs, count = len(integrations), len(self.moving)
         states, observed = states[:, :runs], observed[:, :runs]
         places = [self.places[i] for i in columns[:runs]]

@@ -1,6 +1,8 @@
-"""A rotor that turns under gravity: its periodic motion at a mean speed, the rotor one turn further
-after each, and the state transition matrix over one turn, whose eigenvalues are the Floquet
-multipliers. Needs heyoka."""
+"""Find the periodic motion of a rotor that turns under gravity, and its linear stability.
+
+At a mean speed the rotor is one turn further after each period. The eigenvalues of the state
+transition matrix over one turn are the Floquet multipliers. Needs heyoka.
+"""
 
 from __future__ import annotations
 
@@ -45,8 +47,7 @@ _LOST = 20.0
 
 @dataclass(frozen=True)
 class Turn:
-    """A motion that repeats itself after a turn, and how small departures from it grow over that
-    turn."""
+    """Hold a motion that repeats itself after a turn, and the growth of deviations over the turn."""
 
     speed: float  # rad/s, of the rotor, averaged over the turn
     # (2n,) angles in rad and rates in rad/s at its start, of the coordinates that move
@@ -66,10 +67,27 @@ class Turn:
 
 
 def periodic_turn(scene: Scene, speed: float, guess: Turn | None = None) -> Turn:
-    """Find the periodic motion of `scene` at a mean `speed` above 0 in rad/s, from the scene's
-    initial rotor angle, by Newton's method; the torque is an unknown. `guess` is a motion at a
-    speed nearby, else steady rotation without gravity. Where there is no such motion, `message`
-    says why. Raises MethodRefusal where heyoka is not installed."""
+    """Find the periodic motion of a rotor at a mean speed, by Newton's method.
+
+    The unknowns are the torque and the state at the start, except for the rotor angle, which
+    remains the scene's initial one.
+
+    Parameters
+    ----------
+    scene : the rotor; its pitch torques and rest angles as at t = 0.
+    speed : rad/s, above 0.
+    guess : a motion at a speed nearby; steady rotation without gravity where left out.
+
+    Returns
+    -------
+    Turn
+        Its `message` says why, if no such motion was found; all numbers but the speed are NaN then.
+
+    Raises
+    ------
+    MethodRefusal
+        If heyoka is not installed.
+    """
     try:
         system = _Variational(scene)
         n = system.coordinates
@@ -133,10 +151,15 @@ def periodic_turn(scene: Scene, speed: float, guess: Turn | None = None) -> Turn
 
 
 class _Variational:
-    """The closed form with its first variational equations by state and torque; compiled once per
-    structure."""
+    """Integrate the closed form with its first variational equations by state and torque."""
 
     def __init__(self, scene: Scene) -> None:
+        """Compile the equations, or take what is compiled for a scene of the same structure.
+
+        Parameters
+        ----------
+        scene : the rotor; its pitch torques and rest angles as at t = 0.
+        """
         engine = heyoka()
         parameters = Parameters()
         form = rotor_form(scene, parameters)
@@ -167,8 +190,27 @@ class _Variational:
         self._frequency = math.sqrt(np.abs(still.stiffness).max())
 
     def propagate(self, state: Array, torque: float, period: float) -> tuple[Array, Array, float]:
-        """(2n,) state after a turn, (2n, 2n + 1) its derivatives by initial state and torque, and ∫
-        tr A dt; raises InputError."""
+        """Integrate the state and its derivatives over one turn.
+
+        Parameters
+        ----------
+        state : (2n,) at the start, angles (rad), then rates (rad/s).
+        torque : N m on the rotor.
+        period : s.
+
+        Returns
+        -------
+        end : ndarray, shape (2n,)
+        derivatives : ndarray, shape (2n, 2n + 1)
+            Of the end by the initial state, then by the torque.
+        trace : float
+            ∫ tr A dt, as in `Turn.trace_integral`.
+
+        Raises
+        ------
+        InputError
+            If the turn takes too many steps, or the engine fails.
+        """
         count, integrator = len(state), self._integrator
         integrator.pars[:] = [*self._values[:-1], torque][: len(integrator.pars)]
         integrator.time = 0.0

@@ -1,7 +1,6 @@
-"""The closed form in Hamilton's variables, angles and momenta p = ∂T/∂q̇: for sweeps; fewer and
-cheaper steps.
+"""Evaluate the closed form in Hamilton's variables, angles and momenta p = ∂T/∂q̇.
 
-Symbols as in `closed_form`:
+Sweeps are integrated in them, in fewer and cheaper steps. Symbols as in `closed_form`:
 p_0 = (J_hub + Σ A) Ω + Σ B θ̇,  p_i = B Ω + Jzz θ̇,
 ṗ_0 = torque - ∂V/∂q2,  ṗ_i = ½ ∂A/∂θ Ω² + ∂B/∂θ Ω θ̇ - ∂V/∂θ, and what dampers and torques do.
 """
@@ -24,8 +23,12 @@ Numbers = Sequence[Any]
 def momenta(
     angles: Numbers, rates: Numbers, form: RotorForm, sin: Function, cos: Function
 ) -> list[Any]:
-    """Return the momenta, (1 + blades) kg m²/s; angles and rates as of
-    `closed_form.accelerations`."""
+    """Return the momenta (kg m²/s) of the rotor, then of the pitches that move.
+
+    Parameters
+    ----------
+    angles, rates, form, sin, cos : as of `closed_form.accelerations`.
+    """
     spin, total, of_pitches = rates[0], form.inertia * rates[0], []
     for blade, theta, rate in zip(form.blades, angles[1:], rates[1:], strict=True):
         s, c = sin(theta), cos(theta)
@@ -46,9 +49,15 @@ def momenta(
 def rates(
     angles: Numbers, momenta: Numbers, form: RotorForm, sin: Function, cos: Function
 ) -> list[Any]:
-    """Return the rates, (1 + blades) rad/s: the inverse of `momenta`.
+    """Return the rates (rad/s) that belong to momenta: the inverse of `momenta`.
 
-    By the Schur complement; singular where that is 0.
+    Computed by the Schur complement; singular where that is 0.
+
+    Parameters
+    ----------
+    angles : (1 + len(form.blades),) rad, of the rotor, then of the pitches that move.
+    momenta : kg m²/s, likewise.
+    form, sin, cos : as of `closed_form.accelerations`.
     """
     schur, rest = form.inertia, momenta[0]
     ratios = []
@@ -73,9 +82,11 @@ def forces(
     sin: Function,
     cos: Function,
 ) -> list[Any]:
-    """Return the time derivatives of the momenta, (1 + blades) N m.
+    """Return the time derivatives of the momenta (N m) of the rotor, then of the pitches that move.
 
-    Parameters are those of `closed_form.accelerations`: angles, rates, form, loads, sin, cos.
+    Parameters
+    ----------
+    angles, rates, form, loads, sin, cos : as of `closed_form.accelerations`.
     """
     sine, cosine = sin(angles[0]), cos(angles[0])
     spin, of_pitches = rates[0], []
@@ -106,6 +117,10 @@ def resting_pitches(scene: Scene) -> tuple[int, ...]:
     """Return the coordinates of the pitches that the equations leave at zero for ever.
 
     They start there at rest, without a load, and nothing that the rotor does moves them.
+
+    Parameters
+    ----------
+    scene : the rotor, its initial state and its loads.
     """
     form = rotor_form(scene, Fraction)
     resting = []
@@ -129,12 +144,13 @@ _ROTOR_STATES = ((1, 0, 1), (0, 1, 2), (-1, 0, 3), (0, -1, 5))
 
 @functools.lru_cache(maxsize=256)
 def _stays_at_zero(blade: BladeForm) -> bool:
-    """Return whether momentum and force of a pitch without a load vanish at zero, whatever the
-    rotor does.
+    """Return whether a pitch without a load stays at zero, whatever the rotor does.
+
+    It does if its momentum and force vanish there at any azimuth and rotor rate.
 
     Parameters
     ----------
-    blade : its coefficients as Fractions, which are computed with exactly.
+    blade : its coefficients as Fractions, so that the result is exact.
     """
     form = RotorForm((blade,), (), Fraction(0), Fraction(0))
     for cos_q, sin_q, spin in _ROTOR_STATES:

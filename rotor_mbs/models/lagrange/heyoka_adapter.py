@@ -1,5 +1,7 @@
-"""The only file that knows heyoka: symbols and parameters, Taylor integrators, quad precision
-numbers."""
+"""Adapt heyoka: symbols and parameters, Taylor integrators, quad precision numbers.
+
+No other module imports it.
+"""
 
 from __future__ import annotations
 
@@ -20,7 +22,15 @@ _HINT = "it comes with rotor_mbs on Linux (pip install heyoka) and from conda-fo
 
 @functools.cache
 def heyoka() -> ModuleType:
-    """The engine, imported when first asked for. Raises MethodRefusal with the way to get it."""
+    """Return the engine, imported at the first call.
+
+    Raises
+    ------
+    MethodRefusal
+        If it is not installed, with the way to get it.
+    ResourceError
+        If it is installed and cannot be loaded.
+    """
     try:
         import heyoka as engine
     except MemoryError as exc:
@@ -39,8 +49,12 @@ def heyoka() -> ModuleType:
 
 
 def _is_writable(cache: Path) -> bool:
-    """Return whether the engine can keep compiled code in a folder, which is made; there is none
-    without a home."""
+    """Return whether the engine can keep compiled code in a folder, which is made if missing.
+
+    Parameters
+    ----------
+    cache : the engine's folder; an empty path, where there is no home folder.
+    """
     if cache == Path():
         return False
     try:
@@ -51,7 +65,7 @@ def _is_writable(cache: Path) -> bool:
 
 
 def is_available() -> bool:
-    """Whether heyoka can be loaded, which this tries."""
+    """Return whether heyoka is installed; this imports it."""
     try:
         heyoka()
     except MethodRefusal:
@@ -60,15 +74,21 @@ def is_available() -> bool:
 
 
 def compile_anew() -> None:
-    """From now on no compiled code is taken from, or left in, the engine's cache on disk: for
-    timing a cold start."""
+    """Disable the engine's cache of compiled code on disk, for timing a cold start."""
     heyoka().llvm_state.set_diskcache_enabled(False)
 
 
 class Parameters:
-    """Turns numbers into runtime parameters: equal ones share one of the `values`, exact zeros
-    vanish from the equations. `structure` has the index (-1: zero) of every number in the order
-    asked for: one compiled integrator serves every scene of an equal structure."""
+    """Turn numbers into runtime parameters of compiled code.
+
+    Equal numbers share one parameter, and exact zeros vanish from the equations. One compiled
+    integrator serves every scene of an equal structure.
+
+    Attributes
+    ----------
+    values : the numbers that became parameters.
+    structure : index in `values` of every number in the order of the calls; -1 for zero.
+    """
 
     def __init__(self) -> None:
         self.values: list[Fraction] = []
@@ -85,8 +105,10 @@ class Parameters:
         return self._parameter(self._known[value])
 
     def own(self, value: Fraction) -> Any:
-        """A parameter of its own, even when zero or equal to another: for what changes during a
-        run, or with it."""
+        """Return a parameter that no other number shares, even if zero or equal to another.
+
+        For numbers that change during a run, or from run to run.
+        """
         self.values.append(value)
         return self._parameter(len(self.values) - 1)
 
@@ -96,8 +118,10 @@ class Parameters:
 
 
 def array_of(values: Sequence[Fraction], *, quad: bool) -> Any:
-    """(len(values),) float64, or real128 where `quad`: each number rounded once (quad: at most
-    twice)."""
+    """Return numbers as an array of float64, or of real128 where `quad`.
+
+    Each number is rounded once, in quad precision at most twice.
+    """
     if not quad:
         return np.array([float(value) for value in values])
     real128 = heyoka().real128
@@ -108,8 +132,10 @@ def array_of(values: Sequence[Fraction], *, quad: bool) -> Any:
 def quad_arithmetic() -> tuple[
     Callable[[Fraction], Any], Callable[[Any], Any], Callable[[Any], Any]
 ]:
-    """To a quad number; sine and cosine of arrays of them as objects, which NumPy multiplies by
-    doubles, too."""
+    """Return conversion to a quad number, and sine and cosine of arrays of quad numbers.
+
+    The arrays hold the numbers as objects, which NumPy multiplies by doubles, too.
+    """
     real128 = heyoka().real128
 
     def of_objects(function: Callable[[Any], Any]) -> Callable[[Any], Any]:
@@ -119,8 +145,7 @@ def quad_arithmetic() -> tuple[
 
 
 def failure(outcome: Any) -> str:
-    """The engine's status of a propagation: "" where it reports that it reached the end, else its
-    reason."""
+    """Return why a propagation of the engine failed; "" where it reached the end."""
     outcomes = heyoka().taylor_outcome
     if outcome == outcomes.time_limit:
         return ""

@@ -87,8 +87,13 @@ def _linearize(scene: Scene, angles: Any, speed: float, torque: float) -> Linear
 def _scipy_method(
     solver: str, settings: type[Settings], ladder: Ladder, relative_cost: float
 ) -> Method:
-    """Return the method of one of SciPy's solvers; settings, ladder and relative_cost as of
-    `Method`."""
+    """Return the method that integrates the closed form by one of SciPy's solvers.
+
+    Parameters
+    ----------
+    solver : name of the class in `scipy.integrate`.
+    settings, ladder, relative_cost : as of `Method`; the ladder is its only one.
+    """
 
     def build(scene: Scene, chosen: Any) -> Solver:
         from rotor_mbs.models.lagrange.ode_solvers import OdeSolver, scipy_integrator

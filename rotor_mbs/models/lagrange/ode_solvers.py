@@ -1,5 +1,4 @@
-"""The closed form on plain floats under integrators for any right-hand side: SciPy's by name,
-MATLAB's ode45."""
+"""Integrate the closed form on plain floats by SciPy's solvers or MATLAB's ode45."""
 
 from __future__ import annotations
 
@@ -31,8 +30,14 @@ Integrator = Callable[[RightHandSide, float, float, Array, Array], Advance]
 
 
 class OdeSolver:
-    """Any integrator over the scene, one call per segment of the loads; `times` as of
-    `taylor.Propagation`."""
+    """Run an integrator over a scene, with one call for each segment of the loads.
+
+    Parameters
+    ----------
+    scene : the run.
+    integrator : as of `scipy_integrator` or `ode45_integrator`.
+    times : (n,) s of the samples; the scene's where left out.
+    """
 
     def __init__(self, scene: Scene, integrator: Integrator, times: Array | None = None) -> None:
         self._scene, self._integrator = scene, integrator
@@ -46,25 +51,41 @@ class OdeSolver:
         self.states: Array = self._initial[None, :]
 
     def integrate(self) -> Integration:
+        """Integrate from the initial state to the end, or to the first failure."""
         self.states, integration = over_segments(
             self._times, self._segments, self._initial, self.advance
         )
         return integration
 
     def advance(self, segment: Segment, state: Array, times: Array) -> Advance:
+        """Integrate one segment of the loads.
+
+        Parameters
+        ----------
+        segment : of the loads.
+        state : (variables,) at its start.
+        times : (k,) s, the samples inside.
+        """
         return self._integrator(
             self.right_hand_side(segment), segment.start, segment.end, state, times
         )
 
     def right_hand_side(self, segment: Segment) -> RightHandSide:
-        """Return d/dt of (angles, rates[, work]) on plain floats: for a handful of blades faster
-        than arrays."""
+        """Return the function d/dt (angles, rates[, work]) of one segment of the loads.
+
+        It computes on plain floats, which is faster than arrays for a handful of blades.
+
+        Parameters
+        ----------
+        segment : whose loads act.
+        """
         form, work_unit = self._form, self._work_unit
         count = 1 + len(form.blades)
         changing, pitches = changing_rests(self._scene), self._scene.moving_coordinates[1:]
         constant = None if any(segment.slopes) else load_values(segment.values, pitches)
 
         def derivative(time: float, state: Sequence[float]) -> list[float]:
+            """Return the derivative of state at time (s); NaN where it is not defined."""
             values = state.tolist() if isinstance(state, np.ndarray) else state
             angles, rates = values[:count], values[count : 2 * count]
             loads = constant or load_values(segment.loads_at(time), pitches)
@@ -84,6 +105,7 @@ class OdeSolver:
         return derivative
 
     def observe(self) -> Trajectory:
+        """Return the samples of the last integration, with the work in J."""
         states = self.states.copy()
         if self._work_unit:
             states[:, -1] *= self._work_unit
@@ -91,8 +113,15 @@ class OdeSolver:
 
 
 def work_unit(scene: Scene) -> float:
-    """J of the work variable: the power of two below the scene's energies and torques, at least 1.
-    In J its absolute tolerance could be far below its own rounding."""
+    """Return how many J count as 1 in the work variable: a power of two, at least 1.
+
+    It is the largest one below the scene's energies and torques. In J the absolute tolerance of the
+    work could be far below its own rounding.
+
+    Parameters
+    ----------
+    scene : its initial energies, weights and rotor torque are added up.
+    """
     form, columns = rotor_form(scene), scene.moving_coordinates
     angles, rates = (
         [values[i] for i in columns] for values in (scene.initial_angles, scene.initial_rates)
@@ -121,10 +150,16 @@ _OUTLOOK_SHARE = 10.0
 def scipy_integrator(
     name: str, relative_tolerance: float, absolute_tolerance: float, max_steps: float = MAX_STEPS
 ) -> Integrator:
-    """Return SciPy's solver `name`, step by step, samples by its own interpolant; it ends at the
-    time limit.
+    """Return an integrator that takes the steps of one of SciPy's solvers, up to the time limit.
 
-    It fails after `max_steps`, or as soon as it is seen that it would take many more.
+    Samples are read off the solver's own interpolant. It fails after `max_steps`, or as soon as it
+    is seen that it would take many more.
+
+    Parameters
+    ----------
+    name : of the class in `scipy.integrate`, such as "DOP853".
+    relative_tolerance, absolute_tolerance : of the local error; the absolute one in rad, rad/s.
+    max_steps : in one segment of the loads.
     """
     import scipy.integrate
 
@@ -133,6 +168,7 @@ def scipy_integrator(
     def advance(
         function: RightHandSide, start: float, end: float, state: Array, times: Array
     ) -> Advance:
+        """Integrate function from state at start (s) to end (s), with samples at times inside."""
         in_step = 0  # evaluations
 
         def watched(time: float, values: Sequence[float]) -> list[float]:
@@ -181,19 +217,33 @@ def scipy_integrator(
 
 
 def _is_too_long(steps: int, max_steps: float, share: float) -> bool:
-    """Return whether an interval, of which the steps so far have crossed a share, takes too
-    many."""
+    """Return whether an interval takes too many steps, judged by the share that is crossed so far.
+
+    Parameters
+    ----------
+    steps : taken so far.
+    max_steps : that are allowed.
+    share : of the interval, crossed by these steps.
+    """
     is_seen = steps % _OUTLOOK_STEPS == 0 and steps > _OUTLOOK_SHARE * max_steps * share
     return steps >= max_steps or is_seen
 
 
 def ode45_integrator(relative_tolerance: float, absolute_tolerance: float) -> Integrator:
-    """Return MATLAB's ode45; its clock starts at zero on every segment. Samples are lost at the
-    time limit."""
+    """Return an integrator by MATLAB's ode45, whose clock starts at zero on every segment.
+
+    At the time limit the samples of the segment are lost.
+
+    Parameters
+    ----------
+    relative_tolerance, absolute_tolerance : of the local error; the absolute one in rad, rad/s.
+    """
 
     def advance(
         function: RightHandSide, start: float, end: float, state: Array, times: Array
     ) -> Advance:
+        """Integrate function from state at start (s) to end (s), with samples at times inside."""
+
         def watched(time: float, values: Sequence[float]) -> list[float]:
             raise_if_over()  # of threads, which no signal ends
             return function(start + time, values)

@@ -31,7 +31,7 @@ PI = Fraction(
 
 @dataclass(frozen=True, slots=True)
 class BladeForm:
-    """Coefficients of one blade; s, c are sine and cosine of its pitch θ."""
+    """Hold the coefficients of one blade; s, c are sine and cosine of its pitch θ."""
 
     cos_phase: Number  # of its mounting angle about the shaft
     sin_phase: Number
@@ -64,8 +64,10 @@ class BladeForm:
 
 @dataclass(frozen=True, slots=True)
 class LeanForm:
-    """What tilt τ and cone β of one blade add to `BladeForm`, whose coefficients have their
-    cosines."""
+    """Hold what tilt τ and cone β of one blade add to its `BladeForm`.
+
+    The coefficients of the `BladeForm` contain the cosines of both.
+    """
 
     ratio: Number  # sin β, added to b / Jzz
     coupling: Number  # kg m², Jzz sin β, added to b
@@ -82,7 +84,7 @@ class LeanForm:
 
 @dataclass(frozen=True, slots=True)
 class Lean:
-    """Cosine and sine of a blade's cone and of the shaft's tilt."""
+    """Hold cosine and sine of a blade's cone and of the shaft's tilt."""
 
     cos_cone: Number
     sin_cone: Number
@@ -92,7 +94,7 @@ class Lean:
 
 @dataclass(frozen=True, slots=True)
 class RotorForm:
-    """Coefficients of the whole rotor."""
+    """Hold the coefficients of the whole rotor."""
 
     blades: tuple[BladeForm, ...]  # the blades whose pitch moves, in order
     # (weight_z, cos_phase, sin_phase) of each blade without pitch inertia, a part of the rotor
@@ -129,6 +131,12 @@ def _form_in_doubles(scene: Scene) -> RotorForm:
 def _form(
     scene: Scene, convert: Convert, phases: Sequence[tuple[Fraction, Fraction]] | None
 ) -> RotorForm:
+    """Compute the coefficients of a scene in rational numbers, then convert each once.
+
+    Parameters
+    ----------
+    scene, convert, phases : as of `rotor_form`.
+    """
     gravity = Fraction(scene.gravity)
     count = len(scene.blades)
     forms: list[BladeForm] = []
@@ -163,8 +171,18 @@ def _form(
 
 
 def leans(scene: Scene, convert: Convert = float) -> list[Lean | None]:
-    """Return cosines and sines of cone and tilt of each blade, rounded once; None for each where
-    all are upright."""
+    """Return cosines and sines of cone and tilt of each blade, rounded once.
+
+    Parameters
+    ----------
+    scene : the rotor.
+    convert : rounds each to the kind of number to compute with.
+
+    Returns
+    -------
+    list
+        (blades,) Lean; None for each where the scene has neither tilt nor cone.
+    """
     if not scene.has_tilt_or_cone:
         return [None] * len(scene.blades)
     converted: list[Lean | None] = []
@@ -190,7 +208,12 @@ def phase_of(blade: int, count: int) -> tuple[Fraction, Fraction]:
 def _inertia_about_hub(
     blade: Blade,
 ) -> tuple[Fraction, Fraction, Fraction, Fraction, Fraction, Fraction]:
-    """Return the inertia J = J_com + m (r·r I - r rᵀ) about the hub centre: xx yy zz xy xz yz."""
+    """Return the inertia J = J_com + m (r·r I - r rᵀ) about the hub centre: xx yy zz xy xz yz.
+
+    Parameters
+    ----------
+    blade : its mass (kg), centre of mass r (m) and inertia about that (kg m²).
+    """
     m = Fraction(blade.mass)
     x, y, z = (Fraction(value) for value in blade.centre_of_mass)
     xx, yy, zz, xy, xz, yz = (Fraction(value) for value in blade.inertia)
@@ -206,8 +229,10 @@ def _inertia_about_hub(
 
 @functools.lru_cache(maxsize=256)
 def _rotor_inertia(blade: Blade) -> tuple[Fraction, Fraction, Fraction]:
-    """Return ss, cc, sc of the blade's inertia about the shaft, A = inertia_ss s² + inertia_cc c² +
-    inertia_sc s c."""
+    """Return the coefficients ss, cc, sc (kg m²) of a blade's inertia A about the shaft.
+
+    A = inertia_ss s² + inertia_cc c² + inertia_sc s c, s and c sine and cosine of the pitch.
+    """
     xx, yy, zz, xy, _, _ = _inertia_about_hub(blade)
     lean = _lean(blade.cone, 0.0)
     cone_cc, cone_ss = lean.cos_cone**2, lean.sin_cone**2
@@ -218,7 +243,14 @@ def _rotor_inertia(blade: Blade) -> tuple[Fraction, Fraction, Fraction]:
 # the blades of a rotor are mostly equal, and so are the rotors of a sweep
 @functools.lru_cache(maxsize=256)
 def _coefficients(blade: Blade, gravity: Fraction, tilt: float) -> list[Fraction]:
-    """Return schur_ss ... lever_sc of BladeForm, in its order."""
+    """Return the coefficients schur_ss ... lever_sc of `BladeForm`, in its order.
+
+    Parameters
+    ----------
+    blade : its mass, centre of mass, inertia and cone.
+    gravity : m/s².
+    tilt : rad, of the shaft.
+    """
     xx, yy, zz, xy, xz, yz = _inertia_about_hub(blade)
     x, y, z = (Fraction(value) for value in blade.centre_of_mass)
     lean = _lean(blade.cone, tilt)
@@ -243,7 +275,12 @@ def _coefficients(blade: Blade, gravity: Fraction, tilt: float) -> list[Fraction
 
 @functools.lru_cache(maxsize=256)
 def _lean_coefficients(blade: Blade, gravity: Fraction, tilt: float) -> list[Fraction]:
-    """Return the coefficients of LeanForm, in its order."""
+    """Return the coefficients of `LeanForm`, in its order.
+
+    Parameters
+    ----------
+    blade, gravity, tilt : as of `_coefficients`.
+    """
     _, _, zz, _, xz, yz = _inertia_about_hub(blade)
     x, y, z = (Fraction(value) for value in blade.centre_of_mass)
     weight, lean = Fraction(blade.mass) * gravity, _lean(blade.cone, tilt)
@@ -268,8 +305,10 @@ _FIXED_POINT = 10**60  # whole numbers stand for this many times a fraction
 
 @functools.lru_cache(maxsize=4096)
 def _cosine_of_turn(turn: Fraction) -> Fraction:
-    """Return cos(2π·turn) to 50 digits: so that a third of a turn is -1/2 in double and in quad
-    precision."""
+    """Return cos(2π·turn) to 50 digits.
+
+    A third of a turn so gives exactly -1/2 in double and in quad precision.
+    """
     angle = 2 * PI * ((turn + Fraction(1, 2)) % 1 - Fraction(1, 2))
     return _power_series(angle * angle, 1)
 
@@ -281,10 +320,14 @@ def _cosine_and_sine(angle: Fraction) -> tuple[Fraction, Fraction]:
 
 
 def _power_series(square: Fraction, first: int) -> Fraction:
-    """Return the sum of (-square)^n over the product of the first 2n numbers from `first` on, to 50
-    digits.
+    """Return Σ (-square)^n / (first (first + 1) ... (first + 2n - 1)) to 50 digits.
 
     With first = 1 it is the cosine of the square's root, with 2 the sine divided by that root.
+
+    Parameters
+    ----------
+    square : rad², the square of an angle of a few rad.
+    first : 1 or 2.
     """
     fixed = int(square * _FIXED_POINT)
     term = total = _FIXED_POINT
@@ -319,12 +362,20 @@ def pitch_weight(blade: BladeForm) -> float:
 
 
 def rate_units(scene: Scene) -> Array:
-    """Return what counts as 1 in a rate, (1 + moving blades,) rad/s, where a radian counts as 1 in
-    an angle.
+    """Return what counts as 1 in each rate where a radian counts as 1 in an angle.
 
-    It is 1, or a coordinate's own frequency at the start (spring, gravity, turning) above 100
-    rad/s. Else the quarter period that turns an angle into a rate would count as growth of an
-    error: 1e5-fold on a bearing of 1e12 N m/rad.
+    It is 1 rad/s, or a coordinate's own frequency at the start (spring, gravity, turning) where
+    that is above 100 rad/s. Else the quarter period that turns an angle into a rate would count as
+    growth of an error: 1e5-fold on a bearing of 1e12 N m/rad.
+
+    Parameters
+    ----------
+    scene : the rotor, its gravity and initial rotor rate.
+
+    Returns
+    -------
+    ndarray, shape (1 + moving blades,)
+        rad/s.
     """
     form = rotor_form(scene)
     spin = abs(scene.initial_rates[0])

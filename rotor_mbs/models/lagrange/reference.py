@@ -1,7 +1,7 @@
-"""The reference: the closed form in quad precision, a bound on its error from two tolerances, and
-the growth of errors.
+"""Compute the reference: the closed form in quad precision, its error bound, and error growth.
 
-Also at chosen times, and the closed form with terms left out or with blades at other azimuths.
+The bound follows from two runs of different tolerances. Also the reference at chosen times, and
+the closed form with terms left out or with blades at other azimuths.
 """
 
 from __future__ import annotations
@@ -47,10 +47,16 @@ _PERTURBATION = 1e-9
 
 
 class ReferenceSolver:
-    """Two runs over the scene's sample times, and how errors grow along them.
+    """Run a scene twice, for the more accurate run, its error bound and the growth of errors.
 
     The tolerance of the run that is kept, the first, is a thousandth of the other's (without heyoka
     a hundredth): their distance is the truncation error of the other.
+
+    Parameters
+    ----------
+    scene : the run.
+    runs : two solvers over its sample times, the more accurate one first.
+    epsilon : relative rounding error of their arithmetic.
     """
 
     def __init__(
@@ -91,26 +97,31 @@ class ReferenceSolver:
 
 
 def uncertainty(difference: Array, angles: Array, epsilon: float) -> Array:
-    """Return a bound on the error of angles, but for their rounding to doubles, (n,) rad.
+    """Return a bound on the error of angles, except for their rounding to doubles, (n,) rad.
 
     It is `SAFETY` times the sum of the difference of two runs and of the rounding of the largest
-    angle, because two runs may round alike; of it the largest so far, because they may meet by
-    chance.
+    angle, because two runs may round alike. The largest such sum so far counts, because two runs
+    may agree by chance.
 
     Parameters
     ----------
     difference : (n,) rad, of the two runs.
     angles : (n, 1 + blades) rad.
-    epsilon : of their arithmetic.
+    epsilon : relative rounding error of their arithmetic.
     """
     largest = np.maximum(np.abs(angles).max(axis=1), 1.0)
     return np.asarray(SAFETY * np.maximum.accumulate(difference + epsilon * largest))
 
 
 def build(scene: Scene, settings: Any) -> ReferenceSolver:
-    """Build the two runs: in quad precision with heyoka, by DOP853 without it.
+    """Build the reference solver: in quad precision with heyoka, by DOP853 without it.
 
     By DOP853 the uncertainty is larger by many orders.
+
+    Parameters
+    ----------
+    scene : the run.
+    settings : `ReferenceSettings`; their tolerances are those of the runs in quad precision.
     """
     if not is_available():
         runs = _in_doubles(scene, _TIGHTEST), _in_doubles(scene, _LOOSER)
@@ -133,15 +144,25 @@ def error_growth(scene: Scene) -> Array:
     """Return how many times a small error of the initial state may have grown, at most, (samples,).
 
     It is the largest singular value of the state transition matrix (rad, `rate_units`) in the
-    coordinates that the motion can have, which pitches at rest by symmetry are not; infinite once
-    past what double precision can hold.
+    coordinates that the motion can have; pitches at rest by symmetry are not among them. It is
+    infinite once past what double precision can hold.
     """
     return _largest_growth(scene, _variational_matrices(scene))
 
 
 def _transition_matrices(scene: Scene, times: Array) -> Array:
-    """Return the state transition matrices, (n, 2k, 2k) for k coordinates that move, as far as the
-    motion goes."""
+    """Return the state transition matrices from the start, as far as the motion goes.
+
+    Parameters
+    ----------
+    scene : the run.
+    times : (samples,) s.
+
+    Returns
+    -------
+    ndarray, shape (n, 2k, 2k)
+        Of k coordinates that move, by heyoka or, without it, by difference quotients.
+    """
     return (
         _variational_matrices(scene, times)
         if is_available()
@@ -158,10 +179,17 @@ def _variational_matrices(scene: Scene, times: Array | None = None) -> Array:
 
 
 def _matrices_by_quotients(scene: Scene, times: Array) -> Array:
-    """Return the state transition matrices by difference quotients of runs from neighbouring
-    starts.
+    """Return the state transition matrices by difference quotients of runs from changed starts.
 
-    scene : the run; times : (n,) s. Infinite where the neighbouring run did not get.
+    Parameters
+    ----------
+    scene : the run.
+    times : (samples,) s.
+
+    Returns
+    -------
+    ndarray, shape (n, 2k, 2k)
+        Of k coordinates that move; infinite where the changed run ended before.
     """
     moving = scene.moving_coordinates
 
@@ -184,10 +212,13 @@ def _matrices_by_quotients(scene: Scene, times: Array) -> Array:
 
 
 def _largest_growth(scene: Scene, matrices: Array) -> Array:
-    """Return the growth of errors, (samples,), from the state transition matrices of the first
-    samples.
+    """Return the growth of errors, (samples,), from the state transition matrices.
 
-    It is infinite where these are not finite.
+    Parameters
+    ----------
+    scene : the run.
+    matrices : (n, 2k, 2k) of the first n samples; the growth is infinite where these are not
+        finite, and at the samples after them.
     """
     growth = np.full(max(scene.samples, len(matrices)), np.inf)
     finite = np.flatnonzero(np.isfinite(matrices).all(axis=(1, 2)))
@@ -198,8 +229,10 @@ def _largest_growth(scene: Scene, matrices: Array) -> Array:
 
 
 def free_variables(scene: Scene) -> NDArray[np.int64]:
-    """Return the places of variables that are not at rest by symmetry, among angles, then rates, of
-    what moves."""
+    """Return the indices of the state variables that are not at rest by symmetry.
+
+    The state has the angles, then the rates, of the coordinates that move.
+    """
     moving, resting = scene.moving_coordinates, resting_pitches(scene)
     free = np.array([i for i, coordinate in enumerate(moving) if coordinate not in resting])
     return np.concatenate([free, len(moving) + free])
@@ -216,15 +249,14 @@ _QUAD_TOLERANCE = 1e-30  # its error, grown 1e10-fold, is still below what a dou
 
 @dataclass(frozen=True)
 class TimedReference:
-    """The reference of a scene at chosen times.
+    """Hold the reference of a scene at chosen times.
 
     Attributes
     ----------
-    trajectory : as far as it got: time, angles, rates, error_growth.
-    growth : (n, 2 (1 + blades)), for angles, then rates: how many times larger than an error of the
-        initial state
-        theirs may be, at most. 2-norms of the rows of the state transition matrix; 1 for a pitch
-        that is fixed or at rest by symmetry.
+    trajectory : time, angles, rates and error_growth, as far as the motion got.
+    growth : (n, 2 (1 + blades)) for angles, then rates: how many times larger than an error of the
+        initial state theirs may be, at most. 2-norms of the rows of the state transition matrix; 1
+        for a pitch that is fixed or at rest by symmetry.
     units : (2 (1 + blades),) rad or rad/s, what counts as 1 in these norms.
     """
 
@@ -234,7 +266,7 @@ class TimedReference:
 
 
 def reference_at(scene: Scene, times: Array) -> TimedReference:
-    """Compute the reference at chosen times, nothing interpolated.
+    """Compute the reference at chosen times, without interpolation.
 
     In quad precision with heyoka, else by DOP853 at its tightest.
 
@@ -266,17 +298,24 @@ def reference_at(scene: Scene, times: Array) -> TimedReference:
 
 
 def with_azimuths(scene: Scene, azimuths: Sequence[float]) -> Accelerations:
-    """Return the closed form with the blades at other angles about the shaft than `Scene.phases`,
-    (blades,) rad."""
+    """Return the accelerations of a rotor whose blades are at other angles about the shaft.
+
+    Parameters
+    ----------
+    scene : the rotor.
+    azimuths : (blades,) rad, in place of `Scene.phases`.
+    """
     phases = [(Fraction(math.cos(azimuth)), Fraction(math.sin(azimuth))) for azimuth in azimuths]
     form = rotor_form(scene, phases=phases)
     return lambda angles, rates, _form, *rest: closed_form.accelerations(angles, rates, form, *rest)
 
 
 def combined_equations(*parts: tuple[float, float, float]) -> Accelerations:
-    """Return a sum of the closed form's accelerations at different rates.
+    """Return a weighted sum of the closed form's accelerations at scaled rates.
 
-    Each part is (weight, factor of the rotor's rate, factor of the pitches' rates).
+    Parameters
+    ----------
+    parts : of each term weight, factor of the rotor's rate, and factor of the pitches' rates.
     """
 
     def equations(angles: Sequence[Number], rates: Sequence[Number], *rest: Any) -> list[Number]:

@@ -1,4 +1,4 @@
-"""How near a rotor is to pitches at which its mass matrix is singular.
+"""Measure how near a rotor is to pitches at which its mass matrix is singular.
 
 S = J_hub + Σ cos²β (a - b²/Jzz) is the rotor's inertia with every pitch free to give way, the Schur
 complement of `closed_form`: m (c² + d²) cos²β cos²θ for point masses, which vanishes where all
@@ -15,11 +15,15 @@ from rotor_mbs.solution.trajectory import Array
 
 
 def rotor_inertia_shares(scene: Scene, angles: Array) -> Array:
-    """Return S as a share of the inertia that the rotor has with fixed pitches: (n,) for (n, 1 +
-    blades) rad.
+    """Return S as a share of the inertia that the rotor has with fixed pitches, (n,).
 
-    In exact arithmetic until the last step: of a point mass the first coefficient vanishes, whose
-    rounding is no inertia.
+    The coefficients are exact until they are rounded once: for a point mass the first one vanishes,
+    and a rounding remainder in its place would count as inertia.
+
+    Parameters
+    ----------
+    scene : the rotor.
+    angles : (n, 1 + blades) rad.
     """
     form = rotor_form(scene)
     remaining = np.full(len(angles), form.inertia)
@@ -34,11 +38,15 @@ def rotor_inertia_shares(scene: Scene, angles: Array) -> Array:
 
 
 def least_inertia_shares(scene: Scene, angles: Array) -> Array:
-    """Return the smallest share at each row and on the straight way to the next: (n,) for (n, 1 +
-    blades) rad.
+    """Return the smallest share at each row and on the straight path to the next one, (n,).
 
-    On the way it is sought where a pitch passes ±π/2, unless a pitch moves by a right angle or
-    more.
+    On the path the share is evaluated where a pitch passes ±π/2, unless a pitch moves by a right
+    angle or more.
+
+    Parameters
+    ----------
+    scene : the rotor.
+    angles : (n, 1 + blades) rad.
     """
     shares = rotor_inertia_shares(scene, angles)
     near = np.abs(np.diff(angles[:, 1:], axis=0)).max(axis=1, initial=0.0) < 0.5 * np.pi

@@ -1,5 +1,4 @@
-"""lagrange/taylor: the closed form as a symbolic system of heyoka, and its propagation over the
-samples."""
+"""Build the closed form as a symbolic system of heyoka, and propagate it over the samples."""
 
 from __future__ import annotations
 
@@ -38,10 +37,25 @@ _UNROLLED_BLADES = 4
 def build_system(
     scene: Scene, *, in_momenta: bool = False
 ) -> tuple[list[tuple[Any, Any]], Parameters]:
-    """First-order equations [(symbol, right-hand side)] in heyoka's symbols, of angles, rates (or
-    momenta), and the work (in `work_unit`) where it is integrated; and their parameters, the last
-    of which are offset and slope of each of `changing_loads`. Raises MethodRefusal where heyoka is
-    not installed."""
+    """Return the first-order equations of a scene in heyoka's symbols, and their parameters.
+
+    Parameters
+    ----------
+    scene : the run.
+    in_momenta : whether momenta take the place of the rates.
+
+    Returns
+    -------
+    equations : list of tuple (symbol, right-hand side) of angles, rates or momenta, and the work
+        (in `work_unit`) where it is integrated.
+    parameters : Parameters
+        Their last ones are offset and slope of each of `changing_loads`.
+
+    Raises
+    ------
+    MethodRefusal
+        If heyoka is not installed.
+    """
     engine = heyoka()
     parameters = Parameters()
     form, loads, work_per_joule = equation_numbers(scene, parameters)
@@ -68,9 +82,12 @@ def state_symbols(form: RotorForm) -> tuple[list[Any], list[Any]]:
 
 
 def equation_numbers(scene: Scene, parameters: Parameters) -> tuple[RotorForm, LoadValues, Any]:
-    """Return form, loads, and 1 / `work_unit` (0 where the work is no variable).
+    """Return form, loads, and 1 / `work_unit` (0 where the work is no variable), as parameters.
 
-    Takes the scene's numbers into `parameters`, in the order that integrators have them.
+    Parameters
+    ----------
+    scene : the run.
+    parameters : to which the scene's numbers are added, in the order that integrators have them.
     """
     form = rotor_form(scene, parameters)
     parameters.structure.append(int(scene.has_tilt_or_cone))
@@ -96,8 +113,14 @@ _idle: dict[tuple[object, ...], list[Any]] = {}  # copies of it whose owners are
 def compiled(key: tuple[object, ...], make: Callable[[], Any], owner: object) -> Any:
     """Return compiled code that no other owner uses meanwhile, since it holds a state.
 
-    It is made once per process and structure. When its owner is gone, the next one gets it as it
-    was left: state, time and parameters are to be set.
+    It is made once per process and key. When its owner is gone, the next one gets it as it was
+    left: state, time and parameters are to be set.
+
+    Parameters
+    ----------
+    key : all that the code depends on.
+    make : compiles it.
+    owner : the object after whose end the code may be used again.
     """
     if key not in _compiled:
         _compiled[key], _idle[key] = make(), []
@@ -110,8 +133,13 @@ def compiled(key: tuple[object, ...], make: Callable[[], Any], owner: object) ->
 
 
 def set_parameters(integrator: Any, values: Any) -> None:
-    """Set the parameters that the equations of motion use; the ones after them belong to energies
-    alone."""
+    """Set the parameters that the compiled equations use.
+
+    Parameters
+    ----------
+    integrator : heyoka's.
+    values : the scene's numbers; those after the equations' belong to energies alone.
+    """
     integrator.pars[:] = values[: len(integrator.pars)]
 
 
@@ -121,15 +149,14 @@ def is_compact(scene: Scene) -> bool:
 
 
 class Propagation:
-    """The equations of a scene under heyoka's Taylor method.
+    """Integrate the equations of a scene by heyoka's Taylor method.
 
     Attributes
     ----------
     integrator : heyoka's.
     times : (n,) s of the samples.
     states : (rows, variables) of the last run, before the first row that is not finite; where
-        variational, followed by
-        the state transition matrix row by row.
+        variational, followed by the state transition matrix row by row.
     """
 
     def __init__(
@@ -215,6 +242,7 @@ class Propagation:
         return Advance(states[1 : 1 + len(times)], integrator.state, steps, None, message)
 
     def observe(self) -> Trajectory:
+        """Return the samples of the last run in doubles, with the work in J."""
         states = self.states.astype(float)
         if self._scene.work_needs_path and states.shape[1] > 2 * len(
             self._scene.moving_coordinates
