@@ -1,5 +1,7 @@
-"""What the models that are equations share: the items of a scene, and the settings of ode45. Needs
-no NumPy."""
+"""Provide what the models that are equations share: the items of a scene, the settings of ode45.
+
+Importing this does not load NumPy.
+"""
 
 from __future__ import annotations
 
@@ -24,8 +26,13 @@ class Ode45Settings(Settings):
 
 
 def equation_items(scene: Scene, sources: tuple[str, str] = ("", "")) -> list[BuiltItem]:
-    """Return the equations and terms of a scene; sources: where the rotor's and a pitch's come
-    from."""
+    """Return the equations, terms and outputs of a scene, as `show --build` lists them.
+
+    Parameters
+    ----------
+    scene : the rotor, its loads and outputs.
+    sources : where the rotor's equation, and where those of the pitches, come from; "" for none.
+    """
     moving = scene.moving_coordinates
     of_rotor, of_pitch = sources
     built = []

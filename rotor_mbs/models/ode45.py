@@ -1,13 +1,14 @@
-"""MATLAB's ode45: Dormand and Prince's pair with that function's own step control.
+"""Solve differential equations as MATLAB's ode45 does, with that function's own step control.
 
-On a chaotic problem the step control decides the digits, so it is followed to the letter; sources:
+It is Dormand and Prince's pair. On a chaotic problem the step control decides the digits, so it is
+followed exactly.
 
 [DP]  J. R. Dormand, P. J. Prince: A family of embedded Runge-Kutta formulae. J. Comput. Appl. Math.
-6 (1980), 19-26. [SR]  L. F. Shampine, M. W. Reichelt: The MATLAB ODE Suite. SIAM J. Sci. Comput. 18
-(1997), 1-22.
+      6 (1980), 19-26.
+[SR]  L. F. Shampine, M. W. Reichelt: The MATLAB ODE Suite. SIAM J. Sci. Comput. 18 (1997), 1-22.
 [JSS] J. C. Jimenez, A. Sotolongo, J. M. Sanchez-Bornot: Locally Linearized Runge Kutta method of
-Dormand and
-      Prince. Appl. Math. Comput. 247 (2014), 589-606; its Table 2 lists the interpolant of ode45.
+      Dormand and Prince. Appl. Math. Comput. 247 (2014), 589-606; its Table 2 lists the interpolant
+      of ode45.
 """
 
 from __future__ import annotations
@@ -63,8 +64,7 @@ _INTERPOLANT: Array = np.array([[float(weight) for weight in row] for row in INT
 
 @dataclass(frozen=True, slots=True)
 class Ode45Result:
-    """Every accepted step with its stages, so that the solution can be read off at any time it
-    reached.
+    """Hold every accepted step with its stages, so that the solution can be evaluated at any time.
 
     Attributes
     ----------
@@ -84,12 +84,20 @@ class Ode45Result:
 
     @property
     def steps(self) -> int:
+        """Return the number of accepted steps."""
         return len(self.time) - 1
 
     def at(self, times: Array) -> Array:
         """Return the pair's quartic interpolant at some times, (len(times), n).
 
-        Raises ValueError for a time beyond what was reached.
+        Parameters
+        ----------
+        times : (m,), in any order.
+
+        Raises
+        ------
+        ValueError
+            If a time is outside of what was reached.
         """
         if np.any(times < self.time[0]) or np.any(times > self.time[-1]):
             raise ValueError(f"the solution covers [{self.time[0]:g}, {self.time[-1]:g}] only")
@@ -108,8 +116,10 @@ class Ode45Result:
         return value
 
     def refined(self) -> tuple[Array, Array]:
-        """Return (time, state) as ode45 does by default: four per step, of which the last is the
-        step's end."""
+        """Return (time, state) as ode45 does by default: at four times in each step.
+
+        The last of the four is the step's end.
+        """
         fractions = np.arange(4) / 4
         inner = self.time[:-1, None] + np.diff(self.time)[:, None] * fractions
         time = np.append(inner.ravel(), self.time[-1])
@@ -129,12 +139,11 @@ def ode45(
 
     Parameters
     ----------
-    f : returns NaN where it is not defined.
+    f : (t, y) -> y', (n,); returns NaN where it is not defined.
     t_end : above 0; the start is at 0.
     initial_state : (n,).
     rel_tol, abs_tol : of the local error; the error of a component is relative to the larger of its
-        magnitude and
-        abs_tol / rel_tol.
+        magnitude and abs_tol / rel_tol.
 
     Returns
     -------
@@ -191,23 +200,45 @@ def smallest_step(t: float) -> float:
 def first_step(
     y: Sequence[float], k1: Sequence[float], h_max: float, rel_tol: float, threshold: float
 ) -> float:
-    """Return the first step that ode45 tries: h_max, or less where the slope at the start is
-    steep."""
+    """Return the first step that ode45 tries: h_max, or less for a steep slope at the start.
+
+    Parameters
+    ----------
+    y, k1 : (n,) state and its derivative at the start.
+    h_max : the largest step.
+    rel_tol : of the local error.
+    threshold : below which a component's error is not relative to it.
+    """
     slope = max(abs(rate) / max(abs(value), threshold) for value, rate in zip(y, k1, strict=True))
     rate_of_change = 1.25 * slope / rel_tol**_POWER
     return 1.0 / rate_of_change if h_max * rate_of_change > 1.0 else h_max
 
 
 def _after_success(h: float, error: float, rel_tol: float) -> float:
-    """Return the step after one of h with an error that is small enough: by the error, at most five
-    times as long."""
+    """Return the step after one that met the tolerance: by its error, at most five times as long.
+
+    Parameters
+    ----------
+    h : the step that was taken.
+    error : of it, relative.
+    rel_tol : its tolerance.
+    """
     shrink = 1.25 * (error / rel_tol) ** _POWER
     return h / shrink if shrink > 0.2 else 5.0 * h
 
 
 def after_failure(h: float, error: float, rel_tol: float, failed_before: bool) -> float:
-    """Return the step tried after one of h with too large an error, at the same time: the first
-    time by the error."""
+    """Return the step to be tried after one with too large an error, from the same time.
+
+    At the first failure it follows from the error, at the next ones it is half as long.
+
+    Parameters
+    ----------
+    h : the step that failed.
+    error : of it, relative.
+    rel_tol : its tolerance.
+    failed_before : whether a step failed before at this time.
+    """
     return 0.5 * h if failed_before else h * max(0.1, 0.8 * (rel_tol / error) ** _POWER)
 
 
@@ -216,13 +247,13 @@ def _attempt(
 ) -> tuple[list[float], tuple[list[float], ...], float]:
     """Take one step of the pair.
 
-    On lists of floats: for the few equations of a rotor twice as fast as on NumPy arrays.
+    Lists of floats are twice as fast as NumPy arrays for the few equations of a rotor.
 
     Parameters
     ----------
     f : the right-hand side.
-    t, y : time and state at the start.
-    k1 : the derivative there.
+    t, y : time and state (n,) at the start.
+    k1 : (n,) the derivative there.
     h : the step.
     threshold : below which a component's error is not relative to it.
 

@@ -1,5 +1,7 @@
-"""The one place that imports Exudyn: without window, console output or files, in its fast build (no
-range checks)."""
+"""Adapt Exudyn, without window, console output or files.
+
+No other module imports it. It is loaded in its fast build, without range checks.
+"""
 
 from __future__ import annotations
 
@@ -40,8 +42,10 @@ _engine.special.userInterface.SuppressAll(True)
 
 
 class Linearized(NamedTuple):
-    """M δq̈ + D δq̇ + K δq + C δλ = 0 in the engine's coordinates; M, K, D (n, n), C (n,
-    constraints), SI units."""
+    """Hold M δq̈ + D δq̇ + K δq + C δλ = 0 in the engine's coordinates.
+
+    M, K, D are (n, n), C (n, constraints), in SI units.
+    """
 
     M: Array
     K: Array
@@ -50,15 +54,19 @@ class Linearized(NamedTuple):
 
 
 class System:
-    """An assembled system of the engine, which each `integrate` starts anew."""
+    """Hold an assembled system of the engine, which each `integrate` starts anew."""
 
     def __init__(self, parts: Sequence[Part]) -> None:
-        """Add all parts to a system, in their order.
+        """Add all parts to a system, and assemble it.
+
+        Parameters
+        ----------
+        parts : in the order in which they are added: a part comes after those that it refers to.
 
         Raises
         ------
         MethodRefusal
-            With the engine's reason, where it does not take the parts.
+            If the engine does not take the parts, with its reason.
         """
         self._container = _engine.SystemContainer()
         self._mbs = self._container.AddSystem()
@@ -93,8 +101,17 @@ class System:
         return _TRANSLATIONS[key](value) if key in _TRANSLATIONS else value
 
     def rows(self, sensor: str) -> Array:
-        """Return the rows that a sensor kept in the last integration, (n, 1 + k): time in s, then
-        its k values."""
+        """Return the rows that a sensor kept in the last integration.
+
+        Parameters
+        ----------
+        sensor : its name.
+
+        Returns
+        -------
+        ndarray, shape (n, 1 + k)
+            Time in s, then the k values of the sensor.
+        """
         number = self._numbers[Ref("sensor", sensor)]
         stored = np.array(self._mbs.GetSensorStoredData(number), dtype=float, ndmin=2)
         if sensor in self._initial_values:
@@ -102,8 +119,12 @@ class System:
         return stored
 
     def linearized(self, step: float) -> Linearized:
-        """Return the engine's linearization at the initial state, by one-sided differences of
-        `step` (rad, m)."""
+        """Return the engine's linearization at the initial state, by one-sided differences.
+
+        Parameters
+        ----------
+        step : rad and m, of the differences.
+        """
         settings = _engine.SimulationSettings()
         settings.solution.file.write = False
         differences = settings.staticSolver.newton.numericalDifferentiation
@@ -113,8 +134,10 @@ class System:
         return Linearized(np.array(M), np.array(K), np.array(D), np.array(C))
 
     def forces(self) -> Array:
-        """Return applied and gyroscopic forces on the coordinates at the initial state, (n,),
-        without the joints'."""
+        """Return applied and gyroscopic forces on the coordinates at the initial state, (n,).
+
+        The joints' forces are not among them.
+        """
         solver, settings = _engine.MainSolverStatic(), _engine.SimulationSettings()
         settings.solution.file.write = False
         solver.InitializeSolver(self._mbs, settings)
@@ -230,14 +253,19 @@ class System:
 
     @property
     def reference(self) -> Array:
-        """What the coordinates are displacements from."""
+        """Return the values that the coordinates are displacements from, (n,)."""
         return np.array(
             self._mbs.systemData.GetODE2Coordinates(_engine.ConfigurationType.Reference)
         )
 
     def begin(self, scheme: Scheme, *, with_rows: bool) -> None:
-        """Go back to the initial state, to be integrated by an implicit scheme; sensors keep every
-        step of the last `advance`, or nothing."""
+        """Go back to the initial state, to be integrated by an implicit scheme.
+
+        Parameters
+        ----------
+        scheme : solver and options.
+        with_rows : whether sensors keep every step of the last `advance`; else they keep nothing.
+        """
         data = self._mbs.systemData
         data.SetSystemState(self._initial_state, _engine.ConfigurationType.Initial)
         self._settings = _settings(scheme, data.ODE2Size(), data.AEsize())
@@ -246,8 +274,11 @@ class System:
         self._solver = _engine.MainSolverImplicitSecondOrder()
 
     def initial_values(self, time: float) -> tuple[Array, Array]:
-        """Compute the state that an integration from a time (s) starts from, accelerations and
-        multipliers included.
+        """Compute the initial values of an integration, accelerations and multipliers included.
+
+        Parameters
+        ----------
+        time : s, at which the integration starts.
 
         Returns
         -------
@@ -293,8 +324,10 @@ class System:
         return self._solve(self._solver, self._settings, 0, total)
 
     def values(self) -> Array:
-        """Return coordinates, rates, accelerations and multipliers where the last integration
-        ended."""
+        """Return the state where the last integration ended.
+
+        Coordinates, rates, accelerations and multipliers, one after the other.
+        """
         data, current = self._mbs.systemData, _engine.ConfigurationType.Current
         return np.concatenate(
             [
@@ -306,8 +339,10 @@ class System:
         )
 
     def turns(self) -> Array:
-        """Return the data coordinates where the last integration ended: angles of springs over many
-        turns."""
+        """Return the data coordinates where the last integration ended.
+
+        They are the angles of springs over many turns.
+        """
         return np.array(self._mbs.systemData.GetDataCoordinates(_engine.ConfigurationType.Current))
 
     def start_from(self, values: Array, turns: Array) -> None:
@@ -343,8 +378,14 @@ class System:
         return readings
 
     def _solve(self, solver: Any, settings: Any, stages: int, total: Integration) -> str:
-        """Run the solver from start to end time, its work counted in `total`; why it failed, or "".
-        stages: evaluations in an explicit step, 0 of an implicit solver."""
+        """Run the solver from start to end time; return why it failed, or "".
+
+        Parameters
+        ----------
+        solver, settings : the engine's.
+        stages : evaluations in a step of an explicit solver; 0 for an implicit one.
+        total : to which steps and evaluations are added.
+        """
         failure = ""
         with caller_signals():  # whose exceptions, as Ctrl-C, the engine makes its own
             try:
@@ -392,8 +433,13 @@ def linear_solver(coordinates: int, constraints: int) -> str:
 
 
 def _settings(scheme: Scheme, coordinates: int, constraints: int) -> Any:
-    """Return the engine's settings for a scheme and a system of so many coordinates and
-    constraints."""
+    """Return the engine's settings for a scheme and the size of a system.
+
+    Parameters
+    ----------
+    scheme : solver and options.
+    coordinates, constraints : their numbers in the system.
+    """
     settings = _engine.SimulationSettings()
     settings.solution.file.write = False
     integration = settings.timeIntegration

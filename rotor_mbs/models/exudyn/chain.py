@@ -1,6 +1,8 @@
-"""The rotor as a chain of free bodies connected by joints: ground, hub, blades; redundant
-coordinates. Nodes stand at centres of mass. A hub without mass or inertia is a body with none: its
-joints fix it."""
+"""Describe the rotor as a chain of free bodies connected by joints: ground, hub, blades.
+
+Its coordinates are redundant. Nodes are at centres of mass. A hub without mass or inertia is a body
+that has none: its joints determine its motion.
+"""
 
 from __future__ import annotations
 
@@ -27,7 +29,7 @@ from rotor_mbs.solution.trajectory import Array
 
 @dataclass(frozen=True)
 class Placed:
-    """A body at the start."""
+    """Hold a body as it is placed at the start."""
 
     name: str
     body: geometry.Body
@@ -41,6 +43,10 @@ def placed_bodies(scene: Scene) -> list[Placed]:
     """Return hub and blades that pitch as forward kinematics places them at the start.
 
     Positions and velocities fit the joints.
+
+    Parameters
+    ----------
+    scene : the rotor and its initial state.
     """
     rotor, tilt = scene.initial_angles[0], scene.shaft_tilt
     shaft = geometry.shaft_axis(scene)
@@ -66,8 +72,13 @@ def placed_bodies(scene: Scene) -> list[Placed]:
 
 
 def _rotor_rotation(scene: Scene, about_shaft: float) -> Array:
-    """Return the rotation from a frame of the rotor, turned by an angle (rad) about the shaft, to
-    the base frame."""
+    """Return the rotation from a frame of the rotor to the base frame, (3, 3).
+
+    Parameters
+    ----------
+    scene : the rotor, whose shaft may be tilted.
+    about_shaft : rad, by which the frame is turned about the shaft.
+    """
     turned = geometry.rotation_y(np.cos(about_shaft), np.sin(about_shaft))
     return geometry.rotation_x(scene.shaft_tilt) @ turned if scene.shaft_tilt else turned
 
@@ -163,8 +174,13 @@ def items(scene: Scene) -> list[BuiltItem]:
 
 
 def _body(placed: Placed, node: str) -> list[Part]:
-    """Return the node and the object of a body; `placed`: where it is at the start; node: as in the
-    settings."""
+    """Return the node and the object of a body.
+
+    Parameters
+    ----------
+    placed : the body and its initial pose and velocity.
+    node : coordinates of the body's rotation, as in the settings.
+    """
     body, name = placed.body, placed.name
     position = placed.rotation @ body.com
     # of a rate that has no bound: the run says so
@@ -202,8 +218,14 @@ def _on_body(placed: Placed, where: str, rotation: Array) -> Part:
 
 
 def _marker(body: str, where: str, rotation: Array, position: Array) -> Part:
-    """Return a marker fixed on a body: (3, 3) rotation and (3,) position in m, both in the body's
-    frame."""
+    """Return a marker fixed on a body.
+
+    Parameters
+    ----------
+    body : its name.
+    where : what the marker's name says after the body's.
+    rotation, position : (3, 3), and (3,) m, both in the body's frame.
+    """
     parameters = {"bodyNumber": Ref("object", body), "localHT": (rotation, position)}
     return Part("marker", f"{body} {where}", "MarkerBodyRigid", parameters)
 
@@ -259,8 +281,10 @@ def _torque_on_shaft(scene: Scene, moment: Moment) -> Callable[..., list[float]]
 
 
 def _spring_torque(moment: Moment) -> Callable[..., float]:
-    """Return the spring's law as the engine asks for it: N m that resist a rotation (rad) and its
-    rate (rad/s)."""
+    """Return a spring's law as the engine calls it.
+
+    It gives the torque (N m) that resists a rotation (rad) and its rate (rad/s).
+    """
 
     def torque(
         _system: object, time: float, _item: int, rotation: float, rate: float,
@@ -272,8 +296,14 @@ def _spring_torque(moment: Moment) -> Callable[..., float]:
 
 
 def _spring(name: str, first: str, second: str, counter: str = "", **constants: float) -> Part:
-    """Return a torsional spring and damper between two markers; counter: the node that counts its
-    turns."""
+    """Return a torsional spring and damper between two markers.
+
+    Parameters
+    ----------
+    first, second : names of the markers.
+    counter : name of the node that counts its turns; "" for none.
+    constants : the engine's arguments, such as stiffness and damping.
+    """
     parameters: dict[str, object] = {
         "markerNumbers": (Ref("marker", first), Ref("marker", second)),
         **constants,

@@ -1,7 +1,9 @@
-"""Rotations and rigid bodies of the rotor. Base frame: z up; the shaft is y of the shaft frame,
-which is the base frame turned by the tilt about x. Blade i stands in the hub frame turned by its
-phase about y and by its cone about -x, and turns by its pitch about its own z: R_i = Rx(tilt)
-Ry(rotor + phase_i) Rx(-cone_i) Rz(pitch_i)."""
+"""Compute rotations and rigid bodies of the rotor, and describe the parts of an engine's system.
+
+Base frame: z up; the shaft is y of the shaft frame, which is the base frame turned by the tilt
+about x. Blade i is mounted in the hub frame, turned by its phase about y and by its cone about -x,
+and turns by its pitch about its own z: R_i = Rx(tilt) Ry(rotor + phase_i) Rx(-cone_i) Rz(pitch_i).
+"""
 
 from __future__ import annotations
 
@@ -21,7 +23,7 @@ ALONG_SHAFT = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]])
 
 @dataclass(frozen=True)
 class Body:
-    """A rigid body in its own frame, whose origin is the apex."""
+    """Hold a rigid body in its own frame, whose origin is the apex."""
 
     mass: float  # kg
     com: Array  # (3,) m, centre of mass
@@ -51,8 +53,13 @@ def rotation_x(angle: float) -> Array:
 
 
 def mounting(scene: Scene, index: int) -> Array:
-    """Return the rotation from the zero-pitch frame of blade `index` (from 0) to the hub frame, (3,
-    3)."""
+    """Return the rotation from a blade's frame at zero pitch to the hub frame, (3, 3).
+
+    Parameters
+    ----------
+    scene : the rotor.
+    index : of the blade, from 0.
+    """
     mounted, cone = rotation_y(*_turn(index, len(scene.blades))), scene.blades[index].cone
     return mounted @ rotation_x(-cone) if cone else mounted
 
@@ -78,8 +85,17 @@ def _turn(part: int, whole: int) -> tuple[float, float]:
 
 
 def quaternion(about_shaft: float, pitch: float, tilt: float = 0.0, cone: float = 0.0) -> Array:
-    """Return the Euler parameters of Rx(tilt) Ry(about_shaft) Rx(-cone) Rz(pitch), (4,), scalar
-    first."""
+    """Return the Euler parameters of Rx(tilt) Ry(about_shaft) Rx(-cone) Rz(pitch).
+
+    Parameters
+    ----------
+    about_shaft, pitch, tilt, cone : rad.
+
+    Returns
+    -------
+    ndarray, shape (4,)
+        Scalar first.
+    """
     c, s = math.cos(0.5 * about_shaft), math.sin(0.5 * about_shaft)
     cp, sp = math.cos(0.5 * pitch), math.sin(0.5 * pitch)
     if not (tilt or cone):
@@ -112,31 +128,44 @@ def quaternion_rate(p: Array, omega: Array) -> Array:
 
 
 def rotation_vector(p: Array) -> Array:
-    """Return axis times angle, (3,) rad and at most π long, of the rotation with Euler parameters
-    `p`."""
+    """Return axis times angle, (3,) rad, of the rotation with given Euler parameters.
+
+    Its length is at most π.
+
+    Parameters
+    ----------
+    p : (4,), scalar first.
+    """
     p = p if p[0] >= 0.0 else -p  # both are the same rotation
     length = float(np.linalg.norm(p[1:]))
     return 2.0 * p[1:] if length == 0.0 else p[1:] * (2.0 * math.atan2(length, p[0]) / length)
 
 
 def movable_blades(scene: Scene) -> tuple[int, ...]:
-    """Return the indices (from 0) of the blades whose pitch has inertia; the others are rigidly
-    part of the hub."""
+    """Return the indices (from 0) of the blades whose pitch has inertia.
+
+    The other blades are rigid parts of the hub.
+    """
     return tuple(i for i, blade in enumerate(scene.blades) if blade.has_pitch_inertia)
 
 
 def fixed_blade_rotation(scene: Scene, index: int) -> Array:
-    """Return the rotation from the frame of a blade fixed at its initial pitch to the hub frame,
-    (3, 3)."""
+    """Return the rotation from the frame of a blade that cannot pitch to the hub frame, (3, 3).
+
+    Parameters
+    ----------
+    scene : the rotor, at whose initial pitch the blade is fixed.
+    index : of the blade, from 0.
+    """
     return mounting(scene, index) @ rotation_z(scene.initial_angles[1 + index])
 
 
 def body_of_point(scene: Scene, index: int, point: Sequence[float]) -> tuple[int, Array]:
-    """Return the body that a point of a blade is on, and the place of the point in that body's
-    frame.
+    """Return the body that a point of a blade belongs to, and its place in that body's frame.
 
     Parameters
     ----------
+    scene : the rotor.
     index : of the blade, from 0.
     point : (3,) m in the blade's frame.
 
@@ -159,12 +188,15 @@ def blade_body(blade: Blade) -> Body:
 
 
 def hub_body(scene: Scene) -> Body:
-    """Return the hub as a thin disc about the shaft, with every blade that cannot pitch made part
-    of it.
+    """Return the hub as one rigid body with every blade that cannot pitch.
 
-    The disc's other two moments, half of the axial one, are never felt: they make it a body that
-    can exist. Neither is its mass, at the apex, but by the shaft bearing: it has one where loads
-    are wanted.
+    The hub itself is a thin disc about the shaft. The disc's other two moments, half of the axial
+    one, have no effect: with them it is a body that can exist. Its mass, at the apex, affects only
+    the load on the shaft bearing, so that it has one only where loads are requested.
+
+    Parameters
+    ----------
+    scene : the rotor and its outputs.
     """
     half = 0.5 * scene.hub_inertia
     mass = scene.hub_mass if scene.wants("loads") else 0.0
@@ -198,7 +230,7 @@ LISTS = {
 
 @dataclass(frozen=True)
 class Ref:
-    """The number the engine gave to another part, by kind and name."""
+    """Refer to another part by kind and name, in place of the number that the engine gives it."""
 
     kind: str
     name: str
@@ -206,8 +238,11 @@ class Ref:
 
 @dataclass(frozen=True)
 class Part:
-    """One item: `type` is the engine's name of it, `parameters` its arguments, with Ref where they
-    name other parts."""
+    """Describe one item of the engine's system.
+
+    `type` is the engine's name of it, `parameters` its arguments, with Ref where they name other
+    parts.
+    """
 
     kind: str
     name: str

@@ -1,4 +1,4 @@
-"""The engine's models linearized by it, its one-sided quotients extrapolated.
+"""Linearize the engine's models by its own one-sided quotients, extrapolated to a step of zero.
 
 For joints the engine leaves out the geometric stiffness, by which constraint forces turn with the
 bodies: that is added from its constraint Jacobian beside the state. Without it the chain's
@@ -26,11 +26,11 @@ _STEPS = tuple(1e-3 * 2.0**k for k in range(6))
 def linearize_tree(
     scene: Scene, angles: Sequence[float] | Array, speed: float, torque: float
 ) -> Linearization:
-    """Linearize the tree.
+    """Linearize the tree about a state of steady rotation or rest.
 
     Parameters
     ----------
-    scene : the rotor.
+    scene : the rotor and its loads as at t = 0.
     angles : (1 + blades,) rad.
     speed : rad/s, of the rotor.
     torque : N m, on the rotor.
@@ -38,7 +38,7 @@ def linearize_tree(
     Raises
     ------
     MethodRefusal
-        Where the engine does not take the scene.
+        If the engine does not take the scene.
     """
     state = scene_at(scene, angles, speed, torque)
     system = System(tree.parts(state, Loads(state)))
@@ -96,11 +96,18 @@ def linearize_chain(
 
 
 def _joint_rates(scene: Scene) -> Array:
-    """Return the joints' rates as a linear function of the rates of all bodies' coordinates,
-    (bodies, 7 bodies).
+    """Return the matrix that turns the rates of all bodies' coordinates into the joints' rates.
 
-    Coordinates are positions and Euler parameters (e0, e); the angular velocity is 2 (e0 ė - ė0 e +
-    e × ė).
+    A body's coordinates are position and Euler parameters (e0, e); its angular velocity is
+    2 (e0 ė - ė0 e + e × ė).
+
+    Parameters
+    ----------
+    scene : the rotor, at its initial state.
+
+    Returns
+    -------
+    ndarray, shape (bodies, 7 bodies)
     """
     bodies = chain.placed_bodies(scene)
     rows = np.zeros((len(bodies), 7 * len(bodies)))

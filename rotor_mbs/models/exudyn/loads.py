@@ -1,8 +1,8 @@
-"""Loads that drive the rotor, as load functions of the engine; and the loads in N and N m on blade
-roots and hub.
+"""Define the loads that drive the rotor, and compute the loads on blade roots and shaft.
 
-Of the chain these follow from multipliers of joints and moments of connectors; of the tree, and of
-a blade that is part of the hub, from Newton's and Euler's laws on the engine's accelerations.
+The driving loads are load functions of the engine. The loads at roots and shaft, in N and N m,
+follow from multipliers of joints and moments of connectors in the chain; in the tree, and for a
+blade that is part of the hub, from Newton's and Euler's laws on the engine's accelerations.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ from rotor_mbs.solution.trajectory import Array
 
 
 class PrescribedMoment(NamedTuple):
-    """A moment on a coordinate that is a factor times a load over time.
+    """Describe a moment on a coordinate that is a factor times a load over time.
 
     Attributes
     ----------
@@ -56,10 +56,14 @@ class PrescribedMoment(NamedTuple):
 
 
 def prescribed_moments(scene: Scene) -> list[PrescribedMoment]:
-    """Return the moments that loads exert: torques, and k r of springs whose rest angle r changes
-    over time.
+    """Return the moments that loads exert: torques, and those of moving rest angles.
 
-    A rest angle that is constant is a parameter of the spring itself.
+    A spring whose rest angle r changes over time exerts k r. A rest angle that is constant is a
+    parameter of the spring itself.
+
+    Parameters
+    ----------
+    scene : the rotor and its loads.
     """
     moments = []
     if scene.has_torque:
@@ -75,8 +79,7 @@ def prescribed_moments(scene: Scene) -> list[PrescribedMoment]:
 
 
 class Loads:
-    """The loads of the interval that is being integrated, which the engine asks for by load
-    functions."""
+    """Hold the loads of the interval that is being integrated, for the engine's load functions."""
 
     def __init__(self, scene: Scene) -> None:
         self.segment = scene.load_segments[0]
@@ -88,7 +91,7 @@ class Loads:
 
 @dataclass(frozen=True)
 class Moment:
-    """A moment as a load function of the engine: the sum of factors times loads.
+    """Compute a moment as the sum of factors times loads, for a load function of the engine.
 
     Attributes
     ----------
@@ -109,7 +112,7 @@ class Moment:
 
 
 def along_shaft(scene: Scene, size: float) -> list[float]:
-    """Return a vector along the shaft of a size, in the base frame."""
+    """Return a vector of a given size along the shaft, in the base frame."""
     tilt = scene.shaft_tilt
     return [0.0, size * math.cos(tilt), size * math.sin(tilt)] if tilt else [0.0, size, 0.0]
 
@@ -121,8 +124,13 @@ def moment_on(scene: Scene, loads: Loads, coordinate: int) -> Moment:
 
 
 def is_driven(scene: Scene, blade: int) -> bool:
-    """Return whether a spring, a damper or a torque acts on the pitch of a blade (counted from
-    0)."""
+    """Return whether a spring, a damper or a torque acts on the pitch of a blade.
+
+    Parameters
+    ----------
+    scene : the rotor and its loads.
+    blade : its index, from 0.
+    """
     if any(scene.bearings[blade]):
         return True
     return any(moment.coordinate == 1 + blade for moment in prescribed_moments(scene))
@@ -133,8 +141,18 @@ Sampled = Callable[[str], Array]
 
 
 def _motion_outputs(scene: Scene, i: int) -> dict[str, str]:
-    """Return what Newton's and Euler's laws need of blade i: names of the engine's outputs by name
-    of sensor."""
+    """Return the sensors that Newton's and Euler's laws need of a blade.
+
+    Parameters
+    ----------
+    scene : the rotor.
+    i : the blade, from 0.
+
+    Returns
+    -------
+    dict
+        The engine's name of the output by the name of the sensor.
+    """
     outputs = {"root acceleration": "Acceleration", "root rotation": "RotationMatrix"}
     if not scene.blades[i].is_point_mass:
         outputs["root spin"] = "AngularVelocityLocal"
@@ -218,16 +236,26 @@ def _add_along_shaft(scene: Scene, moments: Array, sizes: Array) -> None:
 
 
 def _at_root(scene: Scene, force: Array, moment: Array) -> tuple[Array, Array]:
-    """Return force and moment about the root of a blade, from those about the apex; (n, 3) in the
-    blade's frame."""
+    """Return force and moment about the root of a blade, from those about the apex.
+
+    Parameters
+    ----------
+    scene : the rotor, whose hub may have a radius.
+    force, moment : (n, 3) N and N m in the blade's frame.
+    """
     if scene.hub_radius:
         moment = moment - np.cross([0.0, 0.0, scene.hub_radius], force)
     return force, moment
 
 
 def tree_sensors(scene: Scene, on_link: Callable[[str, str, int, Array], Part]) -> list[Part]:
-    """Return the sensors that `tree_loads` reads; on_link: (name, quantity, link, point) ->
-    sensor."""
+    """Return the sensors that `tree_loads` reads.
+
+    Parameters
+    ----------
+    scene : the rotor.
+    on_link : (name, quantity, link, point) -> sensor.
+    """
     sensors = []
     for i, blade in enumerate(scene.blades):
         place = body_of_point(scene, i, blade.centre_of_mass)
@@ -240,8 +268,15 @@ def tree_sensors(scene: Scene, on_link: Callable[[str, str, int, Array], Part]) 
 
 
 def chain_sensors(scene: Scene, hub: Body) -> list[Part]:
-    """Return what `chain_loads` reads beside rotations: joints, connectors, and blades that are
-    part of the hub."""
+    """Return the sensors that `chain_loads` reads, except for the bodies' rotations.
+
+    They are on joints, connectors, and blades that are part of the hub.
+
+    Parameters
+    ----------
+    scene : the rotor.
+    hub : the hub's body, from whose centre of mass the engine measures points.
+    """
     sensors = _joint_sensors("shaft bearing", "shaft damper" if scene.shaft_damping else "")
     for i in range(len(scene.blades)):
         if i in movable_blades(scene):
@@ -305,8 +340,7 @@ def chain_loads(scene: Scene, sampled: Sampled) -> dict[str, Array]:
 
 
 def _joint_reaction(joint: str, seat: Array, root: Array, sampled: Sampled) -> tuple[Array, Array]:
-    """Compute the force and the moment of a joint on its second body, (n, 3) each in the base
-    frame.
+    """Compute the force and the moment of a joint on its second body.
 
     The engine gives the force on the first body, and multipliers λ of the constraints x₁·z₀ = 0 and
     y₁·z₀ = 0, which are the moment λ₀ z₀ × x₁ + λ₁ z₀ × y₁.
@@ -316,6 +350,11 @@ def _joint_reaction(joint: str, seat: Array, root: Array, sampled: Sampled) -> t
     joint : its name.
     seat, root : (n, 3, 3) its frames on the first and on the second body.
     sampled : the values of a sensor by its name.
+
+    Returns
+    -------
+    force, moment : ndarray, shape (n, 3)
+        N and N m, in the base frame.
     """
     force = -_in_base(seat, sampled(f"{joint} force"))
     multipliers = sampled(f"{joint} torque")

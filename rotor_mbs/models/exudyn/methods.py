@@ -1,5 +1,7 @@
-"""The seven methods of Exudyn: two models, each with its integrators. The engine is loaded when a
-system is built."""
+"""List the seven methods of Exudyn: two models, each with its integrators.
+
+The engine is loaded when a system is built.
+"""
 
 from __future__ import annotations
 

@@ -1,5 +1,7 @@
-"""The engine's time integrations as data: which solver, which options, and the settings that a user
-may choose."""
+"""Describe the engine's time integrations as data, and declare their settings.
+
+A scheme names a solver of the engine and its options; a user chooses the settings.
+"""
 
 from __future__ import annotations
 
@@ -13,7 +15,7 @@ _END_ACCELERATIONS = "explicit.computeEndOfStepAccelerations"
 
 @dataclass(frozen=True)
 class Scheme:
-    """A time integration of the engine.
+    """Describe a time integration of the engine.
 
     Attributes
     ----------
@@ -21,9 +23,8 @@ class Scheme:
     stages : evaluations in a step; 0 for an implicit one.
     options : values by dotted path below the engine's settings of a time integration.
     step : s, the largest; None where the scheme chooses its own.
-    trial_steps : of a scheme that chooses its step: trials within one integration interval after
-        which the run is given
-        up (the engine itself repeats a rejected smallest step for ever).
+    trial_steps : for a scheme that chooses its step: trials within one integration interval after
+        which the run is given up (the engine itself repeats a rejected smallest step for ever).
     """
 
     solver: str
@@ -33,8 +34,10 @@ class Scheme:
     trial_steps: int = 0
 
     def with_accelerations(self) -> Scheme:
-        """Return this scheme with accelerations at the end of every step; an implicit one has them
-        anyway."""
+        """Return this scheme with accelerations at the end of every step.
+
+        An implicit one computes them anyway.
+        """
         return (
             replace(self, options={**self.options, _END_ACCELERATIONS: True})
             if self.stages
@@ -43,7 +46,7 @@ class Scheme:
 
     @property
     def lacks_initial_accelerations(self) -> bool:
-        """Whether accelerations are wanted of a solver that has none before its first step."""
+        """Return whether the scheme wants accelerations before its first step, where it has none."""
         return bool(self.options.get(_END_ACCELERATIONS))
 
 
@@ -74,9 +77,11 @@ class Rk67Settings(Settings):
 
 @dataclass(frozen=True)
 class Dopri5Settings(Settings):
-    """Dormand-Prince 5(4) with the engine's step control. It scales the error by absolute +
-    relative · max(x, x_new), without the magnitude of x, which vanishes at x = -absolute/relative:
-    hence a relative tolerance of 0."""
+    """Dormand-Prince 5(4) with the engine's step control.
+
+    It scales the error by absolute + relative · max(x, x_new), without the magnitude of x, which
+    vanishes at x = -absolute/relative: hence a relative tolerance of 0.
+    """
 
     relative_tolerance: float = number(
         0.0, at_least=0.0, doc=("relative tolerance of the local error")
@@ -168,8 +173,10 @@ _NEWTON_SHARE, _LEAST_NEWTON_TOLERANCE = 0.1, 1e-12
 
 @dataclass(frozen=True)
 class ExtrapolatedSettings(Settings):
-    """The trapezoidal rule, constraints at velocity level (index 2), extrapolated within every
-    sample interval."""
+    """The trapezoidal rule, extrapolated within every sample interval.
+
+    Its constraints are at velocity level (index 2).
+    """
 
     tolerance: float = number(
         3e-8,

@@ -1,5 +1,7 @@
-"""From the recorded rows of the sensors of both models to a trajectory; energy of the springs, work
-of the loads."""
+"""Compute a trajectory from the recorded rows of the sensors, for both models.
+
+Energy of the springs and work of the loads are computed here, too.
+"""
 
 from __future__ import annotations
 
@@ -27,7 +29,7 @@ _POINTS = 8
 
 
 class _Reader:
-    """The rows of all sensors: once for each time, up to the last at which the state is finite.
+    """Read the rows of all sensors, one for each time, as long as the state is finite.
 
     Attributes
     ----------
@@ -76,8 +78,13 @@ class _Reader:
 
 
 def tree_trajectory(scene: Scene, recorded: Callable[[str], Array]) -> Trajectory:
-    """Return the samples of the tree, whose coordinates are the angles; recorded: as of
-    `_Reader`."""
+    """Return the samples of the tree, whose coordinates are the angles.
+
+    Parameters
+    ----------
+    scene : the run.
+    recorded : as of `_Reader`.
+    """
     read = _Reader(scene, recorded, ("angles", "rates"))
     angles, rates = all_coordinates(scene, read.all("angles"), read.all("rates"))
     bodies = [(tree.link_name(link), body) for link, body in enumerate(tree.bodies(scene))]
@@ -122,7 +129,13 @@ def chain_trajectory(
 
 
 def _joint_motion(scene: Scene, read: _Reader) -> tuple[Array, Array]:
-    """Return the chain's angles and rates in all rows, (rows, 1 + blades) rad and rad/s."""
+    """Return the chain's angles and rates in all rows, (rows, 1 + blades) rad and rad/s.
+
+    Parameters
+    ----------
+    scene : the run; its initial angles have the turns at the start.
+    read : the rows of the sensors.
+    """
     hub = matrices(read.all("hub rotation"))
     if scene.shaft_tilt:  # in the shaft frame, in which blades too are seen
         hub = rotation_x(-scene.shaft_tilt) @ hub
@@ -216,14 +229,14 @@ def _fields(
 
 
 def unwrap(time: Array, wrapped: Array, rates: Array, start: float) -> Array:
-    """Return continuous angles, (n,) rad, from angles that are known but for whole turns.
+    """Return continuous angles, (n,) rad, from angles that are known up to whole turns.
 
     From row to row the turn is the one nearest to what the mean of the measured rates predicts.
 
     Parameters
     ----------
     time : (n,) s.
-    wrapped : (n,) rad, but for whole turns.
+    wrapped : (n,) rad, up to whole turns.
     rates : (n,) rad/s.
     start : rad, whose turns the first row gets.
     """
@@ -317,10 +330,10 @@ def power(scene: Scene, segment: Segment, time: Array, rates: Array) -> Array:
 
 
 def cumulative_integral(time: Array, values: Array) -> Array:
-    """Integrate from the first row to each row, (n,).
+    """Integrate sampled values from the first row to each row, (n,).
 
-    Each interval by the polynomial through the eight nearest rows, which need not be equally
-    spaced, and this exactly, by Gauss and Legendre's points.
+    Each interval is integrated by the polynomial through the eight nearest rows, which need not be
+    equally spaced; this polynomial exactly, by Gauss and Legendre's points.
 
     Parameters
     ----------

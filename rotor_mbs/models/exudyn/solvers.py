@@ -1,5 +1,4 @@
-"""The engine's systems as solvers; the chain also by extrapolation within each interval between
-samples."""
+"""Run the engine's systems as solvers; the chain also by extrapolation between samples."""
 
 from __future__ import annotations
 
@@ -80,7 +79,7 @@ def neville(previous: Sequence[Array], values: Array) -> list[Array]:
 
 
 class _Kept(NamedTuple):
-    """The state at the end of a part of an interval, under the loads of that interval."""
+    """Hold the state at the end of a part of an interval, under the loads of that interval."""
 
     time: float  # s
     interval: Interval
@@ -90,7 +89,7 @@ class _Kept(NamedTuple):
 
 
 class ExtrapolatedSolver:
-    """The chain, extrapolated within each interval between samples; see `methods.base.Solver`.
+    """Run the chain, extrapolated within each interval between samples; see `methods.base.Solver`.
 
     Attributes
     ----------
@@ -100,7 +99,18 @@ class ExtrapolatedSolver:
     """
 
     def __init__(self, scene: Scene, settings: ExtrapolatedSettings) -> None:
-        """Build the chain of a scene; the settings' tolerance is for each part of an interval."""
+        """Build the chain of a scene.
+
+        Parameters
+        ----------
+        scene : the run.
+        settings : whose tolerance is for each part of an interval.
+
+        Raises
+        ------
+        MethodRefusal
+            If the samples are too close, or the engine does not take the chain.
+        """
         self._scene, self._scheme, self._loads = scene, _scheme(scene, settings), Loads(scene)
         self._least_error = max(settings.tolerance, _ROUNDING)
         self._newton_tolerance = settings.newton_relative_tolerance
@@ -186,10 +196,16 @@ class ExtrapolatedSolver:
         return failure or self._cross(interval, middle, end, halvings + 1)
 
     def _part(self, interval: Interval, start: float, end: float) -> str:
-        """Extrapolate over a part of an interval, adding columns until the estimated error is small
-        enough.
+        """Extrapolate over a part of an interval with as many columns as the tolerance needs.
 
-        Parameters and the returned text are those of `_cross`: interval, start, end.
+        Parameters
+        ----------
+        interval, start, end : as of `_cross`.
+
+        Returns
+        -------
+        str
+            Why the end was not reached; "" where it was.
         """
         row: list[Array] = []
         for column in range(MOST_COLUMNS):
@@ -250,12 +266,14 @@ class ExtrapolatedSolver:
         return bool(error <= self._newton_tolerance * span**2 * accelerations)
 
     def _consistent(self, values: Array) -> Array:
-        """Return an extrapolated state whose Euler parameters have length one, and rates that keep
-        it.
+        """Return an extrapolated state with Euler parameters of length one, and rates that keep it.
 
-        The engine takes both for granted: else what errors of the length do to the motion is ten
-        times as much as all other errors. Rounding errors are set to zero. `values`: as of
-        `System.values`; changed in place.
+        The engine takes both for granted: without this the errors of the length cause ten times as
+        large an error of the motion as all others. Rounding errors are set to zero.
+
+        Parameters
+        ----------
+        values : as of `System.values`; changed in place.
         """
         # Three derivatives, bodies, displacement (3) and Euler parameters (4).
         kinds = values[: 3 * self._coordinates].reshape(3, -1, 7)
@@ -282,8 +300,10 @@ class ExtrapolatedSolver:
         self.kept.append(_Kept(time, interval, values, turns, work))
 
     def observe(self) -> Trajectory:
-        """Return the samples, from what the sensors read of each state under the load before a
-        jump."""
+        """Return the samples, from the sensors' readings at each state.
+
+        At a jump of a load they are read under the load before it.
+        """
         tables: dict[str, list[Array]] = {name: [] for name in self.system.sensors}
         for kept in self.kept:
             self._loads.set_segment(kept.interval.segment)
@@ -306,7 +326,7 @@ _SHORTEST_INTERVAL = 1e-8
 
 
 class MultibodySolver:
-    """A system under one of the engine's own time integrations; see `methods.base.Solver`."""
+    """Run a system by one of the engine's own time integrations; see `methods.base.Solver`."""
 
     def __init__(
         self,
@@ -355,7 +375,18 @@ class MultibodySolver:
 
 
 def build_tree(scene: Scene, settings: SchemeSettings) -> Solver:
-    """Build the kinematic tree of a scene."""
+    """Build the solver of a scene's kinematic tree.
+
+    Parameters
+    ----------
+    scene : the run.
+    settings : of the time integration.
+
+    Raises
+    ------
+    MethodRefusal
+        If the samples are too close, or the engine does not take the tree.
+    """
     scheme, loads = _scheme(scene, settings), Loads(scene)
     if scene.wants("loads"):
         scheme = scheme.with_accelerations()
@@ -366,8 +397,19 @@ def build_tree(scene: Scene, settings: SchemeSettings) -> Solver:
 
 
 def build_chain(scene: Scene, settings: ChainSettings) -> Solver:
-    """Build the chain of a scene. Raises MethodRefusal for loads with the node whose multipliers
-    are wrong."""
+    """Build the solver of a scene's chain.
+
+    Parameters
+    ----------
+    scene : the run.
+    settings : of the time integration, and the node of a body.
+
+    Raises
+    ------
+    MethodRefusal
+        If loads are requested with the node whose multipliers are wrong, the samples are too close,
+        or the engine does not take the chain.
+    """
     scheme = _scheme(scene, settings)
     if scene.wants("loads") and settings.node == "rotation_vector":
         raise MethodRefusal(
@@ -389,8 +431,13 @@ def build_extrapolated(scene: Scene, settings: ExtrapolatedSettings) -> Solver:
 
 
 def _scheme(scene: Scene, settings: SchemeSettings | ExtrapolatedSettings) -> Scheme:
-    """Return the time integration of the settings. Raises MethodRefusal for samples that are too
-    close."""
+    """Return the time integration that the settings describe.
+
+    Raises
+    ------
+    MethodRefusal
+        If the samples of the scene are too close for the engine.
+    """
     if scene.duration / (scene.samples - 1) < _SHORTEST_INTERVAL:
         raise MethodRefusal(
             f"Exudyn cannot resolve samples less than {_SHORTEST_INTERVAL:g} s apart"

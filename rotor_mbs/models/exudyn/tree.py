@@ -1,5 +1,7 @@
-"""The rotor as a kinematic tree, hub and blades as links; its coordinates are the angles: exact
-zeros stay exact."""
+"""Describe the rotor as a kinematic tree with hub and blades as links.
+
+Its coordinates are the angles, so that exact zeros stay exact.
+"""
 
 from __future__ import annotations
 
@@ -106,7 +108,12 @@ def link_name(link: int) -> str:
 
 
 def _tree(scene: Scene) -> Part:
-    """Return the tree of a scene, with gravity, springs and dampers, which are parameters of it."""
+    """Return the tree of a scene, with gravity, springs and dampers as its parameters.
+
+    Parameters
+    ----------
+    scene : the rotor and gravity.
+    """
     blades, links = movable_blades(scene), bodies(scene)
     mountings = [mounting(scene, i) for i in blades]
     parameters: dict[str, object] = {

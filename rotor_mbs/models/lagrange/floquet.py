@@ -47,7 +47,7 @@ _LOST = 20.0
 
 @dataclass(frozen=True)
 class Turn:
-    """Hold a motion that repeats itself after a turn, and the growth of deviations over the turn."""
+    """Hold a motion that repeats itself after a turn, and the growth of deviations over it."""
 
     speed: float  # rad/s, of the rotor, averaged over the turn
     # (2n,) angles in rad and rates in rad/s at its start, of the coordinates that move

@@ -1,5 +1,7 @@
-"""The methods of this package: one model with three of the engine's integrators. No import of
-MuJoCo."""
+"""List the methods of MuJoCo: one model with three of the engine's integrators.
+
+Importing this does not import MuJoCo.
+"""
 
 from __future__ import annotations
 
@@ -27,15 +29,22 @@ class Rk4Settings(Settings):
 
 @dataclass(frozen=True)
 class FirstOrderSettings(Settings):
-    """Semi-implicit Euler, dampers at the end of the step; `implicit` has Coriolis forces there,
-    too."""
+    """Semi-implicit Euler, dampers at the end of the step.
+
+    The method `implicit` takes Coriolis forces there, too.
+    """
 
     step: float = step(5e-5)
 
 
 def _items(scene: Scene) -> list[BuiltItem]:
-    """Return the items of a scene. Raises MethodRefusal, with the way to get it, where MuJoCo is
-    not installed."""
+    """Return the items of a scene.
+
+    Raises
+    ------
+    MethodRefusal
+        If MuJoCo is not installed, with the way to get it.
+    """
     if not METHODS[0].is_installed:
         raise MethodRefusal(f"MuJoCo is not installed: {_HINT}")
     from rotor_mbs.models.mujoco import mjcf
@@ -44,8 +53,19 @@ def _items(scene: Scene) -> list[BuiltItem]:
 
 
 def _build(integrator: str, scene: Scene, settings: Rk4Settings | FirstOrderSettings) -> Solver:
-    """Build the model of a scene. Raises MethodRefusal as `_items`, and where MuJoCo does not take
-    the model."""
+    """Build the solver of a scene.
+
+    Parameters
+    ----------
+    integrator : a key of `mjcf.INTEGRATORS`.
+    scene : the run.
+    settings : of the method, of which the step is used.
+
+    Raises
+    ------
+    MethodRefusal
+        If MuJoCo is not installed, or does not take the model.
+    """
     _items(scene)
     from rotor_mbs.models.mujoco.solver import MujocoSolver
 
@@ -53,7 +73,14 @@ def _build(integrator: str, scene: Scene, settings: Rk4Settings | FirstOrderSett
 
 
 def _method(integrator: str, label: str, **facts: Any) -> Method:
-    """Return a method of MuJoCo; label: of the integrator; facts: other fields of the `Method`."""
+    """Return a method of MuJoCo.
+
+    Parameters
+    ----------
+    integrator : a key of `mjcf.INTEGRATORS`.
+    label : of the integrator.
+    facts : other fields of the `Method`.
+    """
     return Method(
         name=f"mujoco/{integrator}",
         label=f"MuJoCo, {label}",

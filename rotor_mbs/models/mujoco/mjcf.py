@@ -1,4 +1,4 @@
-"""The rotor as a model in MuJoCo's own format (MJCF), from raw scene data.
+"""Describe the rotor as a model in MuJoCo's own format (MJCF), from raw scene data.
 
 World frame: z up. The hub's body is turned by the tilt of the shaft about x, and turns about its
 own y by the hinge "rotor"; blade i is a child of the hub, mounted at its phase about y and then its
@@ -15,7 +15,7 @@ MuJoCo compiles no moving body whose mass or one of whose principal moments is 1
 this text a point mass, and a hub without inertia, have `LEAST`. `solver.Engine` sets them to zero
 in the compiled model. A file that MuJoCo itself loads keeps them, an error of LEAST / J for a
 blade's moment J about its pitch axis: below round-off for the paper's blade (J = 110 kg m²), but
-1e-5 for a toy of 1 g with J = 2.5e-10 kg m².
+1e-5 for a small model of 1 g with J = 2.5e-10 kg m².
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ _FILE_STEP = 2.5e-4  # s, the largest time step of a file: the default of mujoco
 
 @dataclass(frozen=True)
 class Load:
-    """An actuator: a moment on a coordinate that is a gain times a load over time.
+    """Describe an actuator: a moment on a coordinate that is a gain times a load over time.
 
     Attributes
     ----------
@@ -72,10 +72,14 @@ class Load:
 
 
 def loads_of(scene: Scene) -> list[Load]:
-    """Return the actuators of a scene: as many as it has loads of these kinds.
+    """Return the actuators of a scene, one for each load that needs one.
 
     First the torque on the rotor, then for each pitch that moves its torque, and the rest angle of
     its spring where that changes over time.
+
+    Parameters
+    ----------
+    scene : the rotor and its loads.
     """
     loads = []
     if scene.has_torque:
@@ -96,8 +100,14 @@ def joint_name(coordinate: int) -> str:
 
 
 def model(scene: Scene, integrator: str, step: float) -> ET.Element:
-    """Return the MJCF element tree of a scene; integrator: a key of `INTEGRATORS`; step: time step
-    in s."""
+    """Return the MJCF element tree of a scene.
+
+    Parameters
+    ----------
+    scene : the rotor, its loads and outputs.
+    integrator : a key of `INTEGRATORS`.
+    step : s, the time step.
+    """
     root = ET.Element("mujoco", model=scene.name or "rotor")
     ET.SubElement(root, "compiler", angle="radian")
     option = ET.SubElement(
@@ -141,7 +151,12 @@ def text(root: ET.Element) -> str:
 
 
 def items(scene: Scene) -> list[BuiltItem]:
-    """Return the elements of a scene's model as `show --build` lists them."""
+    """Return the elements of a scene's model as `show --build` lists them.
+
+    Parameters
+    ----------
+    scene : the rotor, its loads and outputs.
+    """
     kinds = {"body": "object", "joint": "node", "site": "marker", "general": "load"}
     built = []
     for element in model(scene, "rk4", 1.0).iter():
@@ -159,7 +174,14 @@ def items(scene: Scene) -> list[BuiltItem]:
 
 
 def _blade(hub: ET.Element, scene: Scene, number: int) -> None:
-    """Add a blade (1, 2, ...) to the hub: body, hinge, inertia and tip."""
+    """Add a blade to the hub: body, hinge, inertia and tip.
+
+    Parameters
+    ----------
+    hub : the element of the hub's body.
+    scene : the rotor; the tip is added where it is an output.
+    number : of the blade, from 1.
+    """
     blade, phase = scene.blades[number - 1], scene.phases[number - 1]
     pitch = 0.0 if blade.has_pitch_inertia else scene.initial_angles[number]
     # The quaternion of Ry(phase) Rz(pitch), scalar part first; with a cone Rx(-cone) is between the
@@ -195,7 +217,16 @@ def _joint(
     damping: float,
     rest: float = 0.0,
 ) -> None:
-    """Add a hinge about an axis to a body: N m/rad, N m s/rad, and the rest angle in rad."""
+    """Add a hinge with its spring and damper to a body.
+
+    Parameters
+    ----------
+    body : the element.
+    coordinate : 0 for the rotor, then the pitches.
+    axis : of the hinge, as MJCF writes a vector.
+    stiffness, damping : N m/rad and N m s/rad.
+    rest : rad, the spring's rest angle.
+    """
     joint = ET.SubElement(body, "joint", name=joint_name(coordinate), type="hinge", axis=axis)
     if stiffness:
         joint.set("stiffness", numbers(stiffness))
@@ -228,8 +259,10 @@ def _inertial(
 
 
 def _possible(moments: list[float]) -> list[float]:
-    """Return principal moments that MuJoCo takes: none below `LEAST`, none above the sum of the
-    others by rounding."""
+    """Return principal moments that MuJoCo accepts.
+
+    None is below `LEAST`, and none exceeds the sum of the other two by rounding.
+    """
     least = [max(moment, LEAST) for moment in moments]
     total = sum(least)
     return [min(moment, total - moment) for moment in least]
@@ -245,7 +278,11 @@ def mjcf_file(scene: Scene) -> str:
 
     Its step is a whole part of the sample interval. The keyframe "start" has the initial state and
     the loads at t = 0; a numeric "segment i" has the time, torques or rest angles, and slopes of
-    each segment; capsules are to look at.
+    each segment; the capsules only show the blades.
+
+    Parameters
+    ----------
+    scene : the rotor, its loads and outputs.
     """
     spacing = scene.duration / (scene.samples - 1)
     steps, _ = steps_and_rows(spacing, _FILE_STEP, rows_between=False)
@@ -285,8 +322,14 @@ def mjcf_file(scene: Scene) -> str:
 
 
 def _header(scene: Scene, steps: int, has_loads: bool) -> str:
-    """Return the comment at the head of a file: how to run it, with so many steps from sample to
-    sample."""
+    """Return the comment at the head of a file, which says how to run it.
+
+    Parameters
+    ----------
+    scene : gives title, samples and duration.
+    steps : from one sample to the next.
+    has_loads : whether the model has actuators.
+    """
     lines = [
         scene.title or scene.name,
         (

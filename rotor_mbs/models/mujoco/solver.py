@@ -1,5 +1,4 @@
-"""The rotor in MuJoCo: runs from sample to sample, energies and tips of its bodies, and the model
-linearized.
+"""Run the rotor in MuJoCo from sample to sample, read its bodies, and linearize the model.
 
 The only module that imports MuJoCo.
 """
@@ -57,7 +56,9 @@ _PORTION = 10_000
 
 @dataclass
 class Poses:
-    """Every body and site at n states in the world frame, the world body left out.
+    """Hold the motion of all bodies and sites at n states, in the world frame.
+
+    The world body is left out.
 
     Attributes
     ----------
@@ -79,16 +80,22 @@ class Poses:
 
 
 class Engine:
-    """The compiled model of a scene, and its state; masses and moments of `mjcf.LEAST` are set to
-    zero."""
+    """Hold the compiled model of a scene, and its state.
+
+    Masses and moments of `mjcf.LEAST` are set to zero.
+    """
 
     def __init__(self, scene: Scene, integrator: str, step: float) -> None:
-        """Compile the model; arguments as of `mjcf.model`.
+        """Compile the model.
+
+        Parameters
+        ----------
+        scene, integrator, step : as of `mjcf.model`.
 
         Raises
         ------
         MethodRefusal
-            With MuJoCo's reason, where it does not take the model.
+            If MuJoCo does not take the model, with its reason.
         """
         try:
             self._model = _engine.MjModel.from_xml_string(
@@ -105,15 +112,19 @@ class Engine:
         self.moments: Array = np.array(self._model.body_inertia[1:])
 
     def start(self, angles: Sequence[float], rates: Sequence[float]) -> None:
-        """Set the initial state, (coordinates,) rad and rad/s; nothing of an earlier run is
-        left."""
+        """Set the initial state, and clear what is left of an earlier run.
+
+        Parameters
+        ----------
+        angles, rates : (coordinates,) rad and rad/s.
+        """
         _engine.mj_resetData(self._model, self._data)
         self._data.qpos[:], self._data.qvel[:] = angles, rates
 
     def advance(
         self, step: float, steps: int, loads: Sequence[float], slopes: Sequence[float]
     ) -> tuple[int, str]:
-        """Take equal steps.
+        """Take equal steps from the present state.
 
         Parameters
         ----------
@@ -124,7 +135,7 @@ class Engine:
         Returns
         -------
         taken : int
-            Steps.
+            Number of steps taken.
         message : str
             Why it ended before all were taken: time limit, or a state that is not finite; else "".
         """
@@ -151,18 +162,29 @@ class Engine:
 
     @property
     def state(self) -> tuple[Array, Array]:
-        """Angles and rates, (coordinates,) rad and rad/s: the engine's own arrays."""
+        """Return angles and rates, (coordinates,) rad and rad/s: the engine's own arrays."""
         return self._data.qpos, self._data.qvel
 
     def poses(self, angles: Array, rates: Array, loads: Array) -> Poses:
-        """Return bodies and sites at given states, (n, coordinates) rad and rad/s, (n, actuators) N
-        m or rad."""
+        """Return the motion of bodies and sites at given states.
+
+        Parameters
+        ----------
+        angles, rates : (n, coordinates) rad and rad/s.
+        loads : (n, actuators) activations, N m or rad.
+        """
         rows = [self._pose(*state) for state in zip(angles, rates, loads, strict=True)]
         fields = [np.array(values) for values in zip(*rows, strict=True)]
         return Poses(*fields)
 
     def _pose(self, angles: Array, rates: Array, loads: Array) -> tuple[Array, ...]:
-        """Return the fields of `Poses` at one state."""
+        """Return the fields of `Poses` at one state.
+
+        Parameters
+        ----------
+        angles, rates : (coordinates,) rad and rad/s.
+        loads : (actuators,) activations, N m or rad.
+        """
         model, data = self._model, self._data
         data.qpos[:], data.qvel[:], data.act[:] = angles, rates, loads
         _engine.mj_forward(model, data)
@@ -190,7 +212,7 @@ _STAGES = {"rk4": 4, "implicitfast": 1, "implicit": 1}
 
 
 class _Row(NamedTuple):
-    """A state that is kept. Where a load jumps there are two, with the segment before and after.
+    """Hold a state of the run. Where a load jumps there are two, with the segment before and after.
 
     Attributes
     ----------
@@ -208,11 +230,22 @@ class _Row(NamedTuple):
 
 
 class MujocoSolver:
-    """The model of a scene under one of MuJoCo's integrators; see `methods.base.Solver`."""
+    """Run the model of a scene by one of MuJoCo's integrators; see `methods.base.Solver`."""
 
     def __init__(self, scene: Scene, integrator: str, step: float) -> None:
-        """Build the model; integrator: a key of `mjcf.INTEGRATORS`; step: s, the largest. Raises as
-        `Engine`."""
+        """Build the model.
+
+        Parameters
+        ----------
+        scene : the run.
+        integrator : a key of `mjcf.INTEGRATORS`.
+        step : s, the largest time step.
+
+        Raises
+        ------
+        MethodRefusal
+            As `Engine`.
+        """
         self._scene, self._step, self._stages = scene, step, _STAGES[integrator]
         self._moving = scene.moving_coordinates
         self._loads = mjcf.loads_of(scene)
@@ -244,7 +277,12 @@ class MujocoSolver:
         )
 
     def _advance(self, interval: Interval) -> tuple[int, str]:
-        """Integrate over one interval; return the steps taken, and why it ended early or ""."""
+        """Integrate over one interval; return the steps taken, and why it ended early or "".
+
+        Parameters
+        ----------
+        interval : on which all loads are linear.
+        """
         span, segment = interval.end - interval.start, interval.segment
         steps, count = steps_and_rows(span, self._step, self._rows_between)
         slopes = [load.control(segment) for load in self._loads]
@@ -301,10 +339,14 @@ class MujocoSolver:
         return finite_samples(scene, fields)
 
     def _root_loads(self, poses: Poses, values: Array) -> dict[str, Array]:
-        """Return the loads at roots and shaft by quantity: what each body's parent does to it.
+        """Return the loads at roots and shaft by quantity: what its parent exerts on each body.
 
-        The moment of an actuator is the part about the pitch axis. `values`: (rows, actuators)
-        activations.
+        The moment of an actuator is the part about the pitch axis.
+
+        Parameters
+        ----------
+        poses : at all rows.
+        values : (rows, actuators) activations, N m or rad.
         """
         moment, force = poses.wrench[:, :, :3], poses.wrench[:, :, 3:]
         # In the frame of each body; the first is the hub.
@@ -329,14 +371,14 @@ class MujocoSolver:
     def _work(self, angles: Array, rates: Array, accelerations: Array, values: Array) -> Array:
         """Compute the work of the actuators less what the dampers took, (rows,) J.
 
-        Of constant loads without dampers it is torque times angle. Else the power P is integrated
+        For constant loads without dampers it is torque times angle. Else the power P is integrated
         from row to row by ∫ P dt ≈ h (P₀ + P₁)/2 + h² (P₀' - P₁')/12, of order 4 like the best
         integrator here.
 
         Parameters
         ----------
         angles, rates, accelerations : (rows, coordinates) rad, rad/s and rad/s².
-        values : (rows, actuators) activations.
+        values : (rows, actuators) activations, N m or rad.
         """
         columns = [self._moving.index(load.coordinate) for load in self._loads]
         gains = np.array([load.gain for load in self._loads])

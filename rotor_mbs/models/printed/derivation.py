@@ -1,7 +1,8 @@
-"""The paper's own way from its matrices to the equations of motion, (24)-(38), for any number of
-blades, with each of the errata left in or corrected. E3 stands in (53)-(55) alone: (30), for one
-blade, is printed with the square of the pitch rate. The coefficient of that term is zero once E2 is
-corrected.
+"""Derive the equations of motion as the paper does, (24)-(38), with errata left in or corrected.
+
+They follow from the paper's matrices, for any number of blades. E3 is in (53)-(55) alone: (30), for
+one blade, is printed with the square of the pitch rate. The coefficient of that term is zero once
+E2 is corrected.
 
 First the transformation matrix (3) and its derivatives as printed, from sines and cosines of q2, q3
 (numbers, arrays or symbols) and the lengths c, d; the constants d1, d2 of (2), (3) are zero.
@@ -20,9 +21,14 @@ LAST_ROW_OF_DERIVATIVE = (0, 0, 0, 0)
 
 @dataclass(frozen=True, slots=True)
 class Errata:
-    """Which faults are in: e1, (8) row 2 column 4 is c c3 (and (17) its derivative), where y does
-    not depend on q2; e2, (19) row 1 column 4 has s2 in place of c2; e3, the last terms of (53)-(55)
-    have the pitch rate, not its square."""
+    """Say which of the paper's errata are left in.
+
+    Attributes
+    ----------
+    e1 : (8) row 2 column 4 is c c3 (and (17) its derivative), where y does not depend on q2.
+    e2 : (19) row 1 column 4 has s2 in place of c2.
+    e3 : the last terms of (53)-(55) have the pitch rate, not its square.
+    """
 
     e1: bool = True
     e2: bool = True
@@ -34,8 +40,10 @@ CORRECTED = Errata(e1=False, e2=False, e3=False)
 
 
 def a3(s2: Any, c2: Any, s3: Any, c3: Any, c: Any, d: Any) -> Matrix:
-    """Return (3), base from frame 3, whose origin is the blade's mass point: Ry(q2) Rz(q3), the
-    origin at (c, 0, d)."""
+    """Return (3), the transformation from frame 3 to the base frame: Ry(q2) Rz(q3).
+
+    The origin of frame 3 is the blade's mass point, at (c, 0, d).
+    """
     return (
         (c2 * c3, -c2 * s3, s2, c * c2 * c3 + d * s2),
         (s3, c3, 0, c * s3),
@@ -105,7 +113,7 @@ def u33_3(s2: Any, c2: Any, s3: Any, c3: Any, c: Any, errata: Errata = AS_PRINTE
 
 
 class BladeTerms(NamedTuple):
-    """What one blade adds to the equations at (q2, q3)."""
+    """Hold what one blade adds to the equations at (q2, q3)."""
 
     d_22: float  # d: kg m², coefficients of the accelerations
     d_23: float
@@ -121,8 +129,10 @@ class BladeTerms(NamedTuple):
 
 
 def trace(u: Matrix, m: float, v: Matrix) -> float:
-    """Return the trace of U J3 Vᵀ in (24) and (26); J3 of (20) is that of a point mass m (kg) in
-    frame 3's origin."""
+    """Return the trace of U J3 Vᵀ in (24) and (26).
+
+    J3 of (20) is that of a point mass m (kg) in frame 3's origin.
+    """
     u0, u1, u2, _ = u  # the last row of a derivative is zero
     v0, v1, v2, _ = v
     total: float = m * (u0[3] * v0[3] + u1[3] * v1[3] + u2[3] * v2[3])
@@ -166,8 +176,15 @@ def blade_terms(
 
 
 class DerivedRotor:
-    """Blades alike, each a point mass m (kg) at (c, 0, d) (m), at the given phases (rad); gravity g
-    (m/s²)."""
+    """Evaluate the derived equations of motion of a rotor with equal blades.
+
+    Parameters
+    ----------
+    m, c, d : mass (kg) and place (c, 0, d) (m) of each blade's point mass.
+    g : m/s².
+    phases : (blades,) rad.
+    errata : the faults that are left in.
+    """
 
     def __init__(
         self,
@@ -192,8 +209,13 @@ class DerivedRotor:
     def forces(
         self, blades: Sequence[BladeTerms], rates: Sequence[float]
     ) -> tuple[float, list[float]]:
-        """Return H + C of the rotor's row and of every pitch row, N m; rates (1 + blades,)
-        rad/s."""
+        """Return H + C of the rotor's row and of every pitch row, N m.
+
+        Parameters
+        ----------
+        blades : their terms, as of `blades`.
+        rates : (1 + blades,) rad/s.
+        """
         v2 = rates[0]
         rotor = 0.0
         pitches = []

@@ -1,15 +1,15 @@
-"""The paper's equations of motion as printed: (33) with (25), (29), (30), (32), one blade;
-(39)-(56), three blades.
+"""Evaluate the paper's equations of motion as printed: (33) for one blade, (39)-(56) for three.
 
-Nothing is corrected here: E1 and E2 are in the coefficients, E3 in the last terms of (53)-(55).
-Every formula is a function of the symbols it is printed with, so that its numbers and its text have
-one source. It is run in the order of the print, with one exception: the factor of the first row of
-(56) is multiplied in, see `rotor_gravity`.
+(33) with (25), (29), (30), (32). Nothing is corrected here: E1 and E2 are in the coefficients, E3
+in the last terms of (53)-(55). Every formula is a function of the symbols it is printed with, so
+that its numbers and its text have one source. It is run in the order of the print, with one
+exception: the factor of the first row of (56) is multiplied in, see `rotor_gravity`.
 
 s2, c2 .. s5, c5   sines and cosines of q2 (rotor), q3, q4, q5 (pitch of blade 1, 2, 3)
-w22, w23, w33, ..  products of rates: w23 = q̇2 q̇3, w33 = q̇3²; w3 = q̇3 to the first power,
-printed in (53)-(55) m, c, d, g         mass (kg) and place (c, 0, d) (m) of the point mass; gravity
-(m/s²) along -z root3              the square root of 3
+w22, w23, w33, ..  products of rates: w23 = q̇2 q̇3, w33 = q̇3²
+w3, w4, w5         rates to the first power, w3 = q̇3, printed in (53)-(55)
+m, c, d, g         mass (kg) and place (c, 0, d) (m) of the point mass; gravity (m/s²) along -z
+root3              the square root of 3
 
 Where the machine reading of the print is damaged, the undamaged equation it follows from tells what
 was printed: (54), (55) are (30) at q2 + 2π/3 and q2 + 4π/3 by (35), (36); the pitch rows of (56)
@@ -140,7 +140,16 @@ def h_3(
     w4: Any,
     root3: Any = ROOT3,
 ) -> Any:
-    """Return (54), N m; q̇4 to the first power in the last term (E3)."""
+    """Return (54), N m; q̇4 to the first power in the last term (E3).
+
+    Parameters
+    ----------
+    m, c : mass (kg) and place (m) of the point mass.
+    s2, c2, s4, c4 : sines and cosines of the angles.
+    w22, w24 : products of rates, rad²/s².
+    w4 : q̇4.
+    root3 : the square root of 3.
+    """
     last = (-3 + root3) / 4 * s2**2 - (2 + 2 * root3) / 4 * s2 * c2 - (1 + root3) / 4 * c2**2
     return c**2 * m * s4 * c4 * (w22 - w24 + last * w4)
 
@@ -157,7 +166,16 @@ def h_4(
     w5: Any,
     root3: Any = ROOT3,
 ) -> Any:
-    """Return (55), N m; q̇5 to the first power in the last term (E3)."""
+    """Return (55), N m; q̇5 to the first power in the last term (E3).
+
+    Parameters
+    ----------
+    m, c : mass (kg) and place (m) of the point mass.
+    s2, c2, s5, c5 : sines and cosines of the angles.
+    w22, w25 : products of rates, rad²/s².
+    w5 : q̇5.
+    root3 : the square root of 3.
+    """
     last = (-3 - root3) / 4 * s2**2 - (2 - 2 * root3) / 4 * s2 * c2 - (1 - root3) / 4 * c2**2
     return c**2 * m * s5 * c5 * (w22 - w25 + last * w5)
 
@@ -166,8 +184,10 @@ def gravity_three(
     m: Any, c: Any, g: Any, s2: Any, c2: Any, s3: Any, c3: Any, s4: Any, c4: Any, s5: Any, c5: Any,
     root3: Any = ROOT3,
 ) -> Row:  # fmt: skip
-    """Return (56), rows of q2, q3, q4, q5; N m. The distance d has cancelled out of the first
-    row."""
+    """Return (56), rows of q2, q3, q4, q5; N m.
+
+    The distance d has cancelled out of the first row.
+    """
     return (
         c * m * g * (-c2 * c3 + (c2 / 2 + root3 / 2 * s2) * c4 + (c2 / 2 - root3 / 2 * s2) * c5),
         c * m * g * s2 * s3,
@@ -179,8 +199,7 @@ def gravity_three(
 def rotor_gravity(
     m: Any, c: Any, g: Any, s2: Any, c2: Any, c3: Any, c4: Any, c5: Any, root3: Any = ROOT3
 ) -> Any:
-    """Return the first row of (56) as it is run, N m: its factor c m g multiplied into the three
-    terms.
+    """Return the first row of (56) as it is run, N m: with its factor c m g multiplied in.
 
     Rounding decides Fig. 5, which starts at rest in an unstable equilibrium: the printed bracket is
     exactly zero there, and nothing moves; the three terms leave -4.2e-13 N m, with which the

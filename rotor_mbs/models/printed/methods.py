@@ -1,5 +1,7 @@
-"""The methods printed/ode45, the paper's equations as printed, and printed_e1, _e2, _e3/ode45, one
-erratum alone."""
+"""List the methods that run the paper's equations by ode45.
+
+printed/ode45 runs them as printed; printed_e1, _e2, _e3/ode45 have one erratum alone.
+"""
 
 from __future__ import annotations
 
@@ -28,12 +30,25 @@ Accelerations = Callable[[Sequence[float], Sequence[float]], Sequence[float]]
 
 
 class PrintedSolver:
-    """The equations as printed or, with errata, the paper's derivation, integrated by ode45."""
+    """Integrate by ode45 the equations as printed or, with errata, the paper's derivation."""
 
     def __init__(
         self, name: str, errata: Errata | None, scene: Scene, settings: Ode45Settings
     ) -> None:
-        """Build the equations. Raises MethodRefusal where they cannot represent the scene."""
+        """Build the equations.
+
+        Parameters
+        ----------
+        name : of the method.
+        errata : the errata that are left in, where the equations are derived anew; None as printed.
+        scene : the run.
+        settings : the tolerances.
+
+        Raises
+        ------
+        MethodRefusal
+            If the equations cannot represent the scene.
+        """
         self._scene, self._errata = scene, errata
         self._rotor = rotor = point_mass_rotor(name, errata, scene)
         self._moving = moving = len(scene.initial_angles) if rotor.pitches_move else 1
@@ -60,8 +75,10 @@ class PrintedSolver:
         )
 
     def observe(self) -> Trajectory:
-        """Return the samples of the last integration, with ode45's own output points where nothing
-        is corrected."""
+        """Return the samples of the last integration.
+
+        As printed, with nothing corrected, ode45's own output points are returned beside them.
+        """
         import numpy as np
 
         from rotor_mbs.models.printed.observables import torque_work
@@ -111,7 +128,7 @@ def point_mass_rotor(name: str, errata: Errata | None, scene: Scene) -> PointMas
     Raises
     ------
     MethodRefusal
-        In one sentence, where the printed equations have no place for what the scene has.
+        If the scene has something that the printed equations cannot represent, in one sentence.
     """
     from rotor_mbs.models.printed.observables import PointMassRotor
 
@@ -144,7 +161,13 @@ def point_mass_rotor(name: str, errata: Errata | None, scene: Scene) -> PointMas
 
 
 def equations(rotor: PointMassRotor, errata: Errata | None) -> Accelerations:
-    """Return the equations of motion: as printed or, with errata, derived anew with these."""
+    """Return the equations of motion: as printed or, with errata, derived anew with these.
+
+    Parameters
+    ----------
+    rotor : the printed symbols.
+    errata : the errata that are left in; None as printed.
+    """
     m, c, d, g = rotor.m, rotor.c, rotor.d, rotor.g
     if not rotor.pitches_move:
         return lambda torques, state: [
@@ -160,10 +183,16 @@ def equations(rotor: PointMassRotor, errata: Errata | None) -> Accelerations:
 
 
 def items(name: str, errata: Errata | None, scene: Scene) -> list[BuiltItem]:
-    """Return the terms of a scene, and where in the paper the rows of rotor and pitches stand, in
-    the form that is run.
+    """Return the terms of a scene, and the numbers of the paper's equations that are run.
 
-    Raises MethodRefusal as `point_mass_rotor`.
+    Parameters
+    ----------
+    name, errata, scene : as of `point_mass_rotor`.
+
+    Raises
+    ------
+    MethodRefusal
+        As `point_mass_rotor`.
     """
     point_mass_rotor(name, errata, scene)
     if errata:
@@ -182,8 +211,16 @@ def _torque_tables(scene: Scene, moving: int) -> tuple[LoadTable, ...]:
 
 
 def right_hand_side(scene: Scene, accelerations: Accelerations, moving: int) -> RightHandSide:
-    """Return y' = f(t, y) of y = (angles, rates) of the `moving` coordinates; NaN where the
-    equations are singular."""
+    """Return the function y' = f(t, y) of y = (angles, rates).
+
+    It gives NaN where the equations are singular.
+
+    Parameters
+    ----------
+    scene : gives the torques over time.
+    accelerations : the equations of motion.
+    moving : number of coordinates that move.
+    """
     undefined = [math.nan] * (2 * moving)
     tables = _torque_tables(scene, moving)
     # Looked up once where they are constant, as in all scenes of the paper.
@@ -201,8 +238,14 @@ def right_hand_side(scene: Scene, accelerations: Accelerations, moving: int) -> 
 
 
 def _method(name: str, label: str, errata: Errata | None = None, erratum: str = "") -> Method:
-    """Return a method; errata: what is left in where the equations are derived anew; erratum: the
-    one it is of."""
+    """Return a method of the printed equations.
+
+    Parameters
+    ----------
+    name, label : of the method.
+    errata : the errata that are left in, where the equations are derived anew.
+    erratum : the one that the method is about; "" as printed.
+    """
     return Method(
         name=name,
         label=label,

@@ -1,7 +1,7 @@
-"""Tip path, energies, work and loads of the printed model's motion, from the paper's matrix (3).
+"""Compute tip path, energies, work and loads of the printed model's motion by the paper's (3).
 
-Energies and loads are the physical ones, whatever equations made the motion: they tell how much
-energy those equations make, and how large their fictitious moments are.
+Energies and loads are the physical ones, whatever equations made the motion: they show how much
+energy those equations produce, and how large their fictitious moments are.
 """
 
 from __future__ import annotations
@@ -25,11 +25,13 @@ _GAUSS_WEIGHTS = np.array([5.0, 8.0, 5.0]) / 18.0
 
 @dataclass(frozen=True, slots=True)
 class PointMassRotor:
-    """The printed symbols of a scene: blades alike, each a mass m (kg) at (c, 0, d) (m); gravity g
-    (m/s²).
+    """Hold the printed symbols of a scene: equal blades, each a point mass.
 
     Attributes
     ----------
+    m : kg, of each blade.
+    c, d : m, the mass is at (c, 0, d) in the blade's frame.
+    g : m/s².
     phases : (blades,) rad.
     tip : (3,) m, the point whose path is drawn, seen from the mass in the directions of the blade
         frame.
@@ -44,13 +46,19 @@ class PointMassRotor:
 
     @property
     def pitches_move(self) -> bool:
-        """c = 0 takes the inertia out of (47): the pitch is then fixed (Fig. 4b)."""
+        """Return whether the pitches move.
+
+        c = 0 takes the inertia out of (47): the pitch is then fixed (Fig. 4b).
+        """
         return self.c != 0.0
 
     def tip_path(self, angles: Array) -> Array:
-        """Return the tips' paths, (n, blades, 3) m in the base frame: (3) applied to the tip as
-        frame 3 sees it.
+        """Return the tips' paths, (n, blades, 3) m in the base frame.
 
+        (3) is applied to the tip as frame 3 sees it.
+
+        Parameters
+        ----------
         angles : (n, 1 + blades) rad.
         """
         x, y, z = self.tip
@@ -114,10 +122,14 @@ class PointMassRotor:
     def _acceleration(
         self, sines: tuple[Array, Array, Array, Array], rates: Array, accelerations: Array
     ) -> Array:
-        """Return the acceleration of the mass, (n, 3) m/s²: last columns of (8), (9), (16)-(19), E1
-        and E2 corrected.
+        """Return the acceleration of the mass, (n, 3) m/s², with E1 and E2 corrected.
 
-        sines : as of `_sines`; rates, accelerations : (n, 2) of q2 and q3, rad/s and rad/s².
+        From the last columns of (8), (9), (16)-(19).
+
+        Parameters
+        ----------
+        sines : as of `_sines`.
+        rates, accelerations : (n, 2) of q2 and q3, rad/s and rad/s².
         """
         c, d = self.c, self.d
         w2, w3 = rates.T
