@@ -163,7 +163,8 @@ def ode45(
         h_min = smallest_step(t)
         h = min(h_max, max(h_min, h))
         if done := 1.1 * h >= t_end - t:
-            # the last step is stretched, or cut, to the end; exact, for t is past half of it
+            # The last step is stretched, or cut, to the end. The difference is exact, because t is
+            # past half of t_end.
             h = t_end - t
         failed_here = False
         while True:
@@ -178,11 +179,12 @@ def ode45(
                     f"below the smallest value allowed ({h_min:e}) at time t."
                 )
                 break
+            # A last step that fails becomes shorter, and no longer reaches the end.
             h, done = max(h_min, after_failure(h, error, rel_tol, failed_here)), False
             failed_here = True
         if message:
             break
-        t, y, k1 = t + h, y_new, k[6]
+        t, y, k1 = t + h, y_new, k[6]  # first same as last
         times.append(t)
         states.append(y)
         stages.append(k)

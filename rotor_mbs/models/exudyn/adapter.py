@@ -77,7 +77,7 @@ class System:
             if part.kind == "sensor"
             and "Acceleration" in str(part.parameters["outputVariableType"])
         ]
-        # by sensor, where the solver does not know them
+        # By sensor, where the solver does not compute them.
         self._initial_values: dict[str, Array] = {}
         try:
             for part in parts:
@@ -210,7 +210,7 @@ class System:
                         values = self._mbs.GetSensorValues(self._numbers[Ref("sensor", name)])
                         self._initial_values[name] = np.array(values, dtype=float)
                     implicit.FinalizeSolver(self._mbs, plain)
-                raise_if_over()  # as the engine may have been told in vain
+                raise_if_over()  # its exception may have been suppressed above
             trials.clear()
             settings.solution.sensors.append = interval is not intervals[0]
             span = (interval.end - interval.start) / interval.sample_intervals
@@ -220,8 +220,8 @@ class System:
             integration.startTime, integration.endTime = interval.start, interval.end
             integration.numberOfSteps = steps * interval.sample_intervals
             every_step = scheme.step is None and rows_between
-            # The engine adds up periods: shortened by a tenth of a step over the whole interval,
-            # rounding makes none come late.
+            # The engine adds up periods, with rounding. They are shortened by a tenth of a step
+            # over the whole interval, so that no row comes a step late.
             period = span / rows * (1.0 - 0.1 / integration.numberOfSteps)
             settings.solution.sensors.writePeriod = 0.0 if every_step else period
             solver = (
@@ -249,6 +249,7 @@ class System:
 
     @property
     def sensors(self) -> list[str]:
+        """Return the names of all sensors."""
         return [ref.name for ref in self._numbers if ref.kind == "sensor"]
 
     @property
@@ -444,7 +445,8 @@ def _settings(scheme: Scheme, coordinates: int, constraints: int) -> Any:
     settings.solution.file.write = False
     integration = settings.timeIntegration
     integration.solverType = getattr(_engine.DynamicSolverType, scheme.solver)
-    # A step the engine halves by itself leaves the sample times: a fixed step is fixed, or fails.
+    # A step that the engine halves by itself would miss the sample times: a fixed step is kept, or
+    # the run fails.
     integration.adaptiveStep = False
     for path, value in scheme.options.items():
         group, _, name = path.rpartition(".")

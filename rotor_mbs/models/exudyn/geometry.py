@@ -78,6 +78,7 @@ def _turn(part: int, whole: int) -> tuple[float, float]:
     quarters = min(rest, whole - rest) / whole
     angle = 0.5 * math.pi * quarters
     cosine = math.cos(angle)
+    # math.sin(π/6) is not exactly 0.5, with which three blades balance exactly.
     sine = 0.5 if math.isclose(quarters, 1.0 / 3.0, rel_tol=1e-15) else math.sin(angle)
     if 2 * rest > whole:
         cosine, sine = sine, cosine

@@ -46,7 +46,7 @@ class Scheme:
 
     @property
     def lacks_initial_accelerations(self) -> bool:
-        """Return whether the scheme wants accelerations before its first step, where it has none."""
+        """Return whether the scheme lacks the accelerations at the start that it must report."""
         return bool(self.options.get(_END_ACCELERATIONS))
 
 
@@ -62,6 +62,7 @@ class Rk44Settings(Settings):
     step: float = step(2.5e-4)
 
     def scheme(self) -> Scheme:
+        """Return the time integration with these settings."""
         return Scheme("RK44", 4, _EXPLICIT, self.step)
 
 
@@ -72,6 +73,7 @@ class Rk67Settings(Settings):
     step: float = step(6.7e-4)
 
     def scheme(self) -> Scheme:
+        """Return the time integration with these settings."""
         return Scheme("RK67", 7, _EXPLICIT, self.step)
 
 
@@ -94,6 +96,7 @@ class Dopri5Settings(Settings):
     )
 
     def scheme(self) -> Scheme:
+        """Return the time integration with these settings."""
         options = {
             **_EXPLICIT,
             "automaticStepSize": True,
@@ -118,6 +121,7 @@ class NewtonSettings(Settings):
     )
 
     def scheme(self) -> Scheme:
+        """Return the time integration with these settings."""
         return self._implicit(
             {"generalizedAlpha.useNewmark": True, "generalizedAlpha.useIndex2Constraints": True}
         )
@@ -142,6 +146,7 @@ class AlphaSettings(NewtonSettings):
     )
 
     def scheme(self) -> Scheme:
+        """Return the time integration with these settings."""
         return self._implicit({"generalizedAlpha.spectralRadius": self.spectral_radius})
 
 
@@ -188,7 +193,7 @@ class ExtrapolatedSettings(Settings):
 
     @property
     def newton_relative_tolerance(self) -> float:
-        """Relative tolerance of Newton's residual."""
+        """Return the relative tolerance of Newton's residual."""
         return max(_NEWTON_SHARE * self.tolerance, _LEAST_NEWTON_TOLERANCE)
 
     def scheme(self) -> Scheme:

@@ -1,1 +1,1 @@
-"""The right closed form of the rotor's Euler-Lagrange equations, for any rigid blades."""
+"""Evaluate the right closed form of the rotor's Euler-Lagrange equations, for any rigid blades."""

@@ -98,8 +98,8 @@ def accelerations(
     moment = loads.rotor - form.shaft_damping * spin
     for weight, cos_phase, sin_phase in form.fixed:
         moment = moment + weight * (sin_q * cos_phase + cos_q * sin_phase)
-    # s and c stand outside: an integrator that works with series pays for every product of two of
-    # them.
+    # s and c are factored out: an integrator that works with series pays for every product of two
+    # of them.
     pitched = []
     for blade, theta, rate, torque, rest in pitches(form, angles, rates, loads):
         s, c = sin(theta), cos(theta)

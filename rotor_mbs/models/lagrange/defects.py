@@ -1,5 +1,7 @@
-"""Interval defects by the closed form: from each sample of a run to the next one, exact at jumps of
-the loads."""
+"""Compute interval defects by the closed form, from each sample of a run to the next one.
+
+They are exact at jumps of the loads.
+"""
 
 from __future__ import annotations
 
@@ -29,13 +31,13 @@ from rotor_mbs.solution.metrics import ANGLE_LIMIT
 from rotor_mbs.solution.trajectory import Array, Trajectory
 
 # Of one interval, by heyoka and by DOP853. A stiff bearing of 1e12 N m/rad takes some 600 and 900,
-# a minute of chaos 2,900 and 8,400; samples far from any motion would take for ever. An interval
-# that needs more is none of this rotor.
+# a minute of chaos 2,900 and 8,400; samples far from any motion would need an unlimited number. An
+# interval that needs more is taken for no motion of this rotor.
 _MAX_STEPS_TAYLOR = 5_000
 _MAX_STEPS_DOP853 = 10_000
-# Such intervals decide the status, which more of them do not change: each halves what the next may
-# take, down to this, so that samples that are all far from a motion take little more than one
-# interval's steps.
+# One such interval decides the status, and more of them do not change it. So each halves the number
+# of steps that the next may take, down to this one: samples that are all far from a motion take
+# little more than one interval's steps.
 _FEWEST_STEPS = 50
 _TAYLOR = 2.0**-52  # tolerance
 _DOP853 = (2.3e-14, 1e-16)  # tolerances, the tightest that SciPy takes
@@ -50,12 +52,13 @@ _ROUGH_END = 3e-5
 # Of an interval. Beyond some 75 steps the integration of every interval by itself is faster, and
 # always more accurate.
 _MAX_RUNGE_KUTTA_STEPS = 32
-# Rows of a window in which rates are found from angles: two leave no residual, and noise as it is.
+# Rows of a window in which rates are found from angles: two would leave no residual, and would not
+# reduce noise.
 FIT_ROWS = 5
 _FIT_ROUNDS = 12
 _STANDS_STILL = 1e-9  # rad in an interval: the error that is left is the square of it
-# rad in an interval, median of the rows: from differences that are this near, right data of the
-# paper's motions always came to stand still; from 0.8 on some did not.
+# rad in an interval, median of the rows: where the first correction of the finite differences is at
+# most this, right data of the paper's motions always converged; from 0.8 on some did not.
 _NEAR = 0.5
 _SIDE = 1e-9  # of a step
 _UNIT_ROUNDOFF = 2.0**-53
@@ -98,7 +101,7 @@ def interval_defects(
     states = np.hstack([angles[:, moving], rates[:, moving]])
     half = len(moving)
     ends = interval_ends(scene, time[:-1], time[1:], states[:-1])
-    # of pitches that are fixed
+    # Pitches that are fixed keep their angles and rates.
     angle_defects, rate_defects = angles[:-1] - angles[1:], rates[:-1] - rates[1:]
     angle_defects[:, moving] = ends[:, :half] - states[1:, :half]
     rate_defects[:, moving] = ends[:, half:] - states[1:, half:]
@@ -115,7 +118,7 @@ def interval_defects(
         )
     if time_rounding is None:
         time_rounding = _UNIT_ROUNDOFF * np.abs(time)
-    # A row is at its time to half a digit of that: by as much the state goes on.
+    # The time of a row is rounded, too: times the rate of change that is an error of the state.
     last_digits = last_digits + time_rounding[:, None] * rates_of_change(scene, time, states)
     shares = least_inertia_shares(scene, angles)
     start = np.concatenate(
@@ -182,8 +185,8 @@ class FittedRates:
     Attributes
     ----------
     rates : (n, 1 + blades) rad/s.
-    sensitivity : (n, half, FIT_ROWS half) 1/s, of the rate of each moving coordinate, by each angle
-        of its window.
+    sensitivity : (n, half, FIT_ROWS half) 1/s, of the rate of each of the `half` coordinates that
+        move, by each angle of its window.
     windows : (n,) first row of the window of each row.
     """
 
@@ -237,7 +240,7 @@ def fitted_rates(scene: Scene, time: Array, angles: Array) -> FittedRates:
     rates[:, moving] = np.gradient(angles[:, moving], time, axis=0, edge_order=2)
     firsts = np.arange(count - FIT_ROWS + 1)
     middle = FIT_ROWS // 2
-    # Of every row the window in whose middle it is, or the first or the last one.
+    # The window of a row is the one in whose middle it is, or near an end the first or last one.
     windows = np.clip(np.arange(count) - middle, 0, len(firsts) - 1)
     places = np.arange(count) - windows
     step = float(np.median(np.diff(time)))
@@ -248,7 +251,8 @@ def fitted_rates(scene: Scene, time: Array, angles: Array) -> FittedRates:
         ends = interval_ends(scene, time[:-1], time[1:], states[:-1])
         transitions = _transitions(scene, time, states, ends)
         jumps = ends - states[1:]
-        # Away from the data's own states: row by row matrix @ (at the first row) + offset.
+        # Deviations from the data's own states: in each row of a window, matrix @ (deviation at the
+        # first row) + offset. The least squares make those of the angles small.
         matrices = [np.broadcast_to(np.eye(2 * half), (len(firsts), 2 * half, 2 * half))]
         offsets = [np.zeros((len(firsts), 2 * half))]
         for row in range(FIT_ROWS - 1):
@@ -278,6 +282,8 @@ def fitted_rates(scene: Scene, time: Array, angles: Array) -> FittedRates:
             is_near = usual <= _NEAR
         if change <= _STANDS_STILL:
             break
+        # Without progress, end where most rows have converged and the others fit no motion, or
+        # where the finite differences were too far away.
         if not change < before and (usual <= _STANDS_STILL or not is_near):
             break
         before = change
@@ -326,6 +332,7 @@ def interval_ends(
             reached, part, steps = until, part + 1, steps + taken
         is_there = bool(np.isfinite(state).all())
         reached_states[k] = state if is_there else np.nan
+        # See _FEWEST_STEPS.
         if steps >= _FEWEST_STEPS and not is_there:
             max_steps = max(max_steps // 2, _FEWEST_STEPS)
     return reached_states
@@ -440,8 +447,8 @@ def _transitions(scene: Scene, time: Array, states: Array, ends: Array) -> Array
             is_near &= np.isfinite(matrices).all(axis=(1, 2))
             transitions[rows[is_near]] = matrices[is_near]
             is_rough[rows[is_near]] = False
-    # Explicit steps are too long there: differences of the ends that the integrator of the defects
-    # itself finds.
+    # Where explicit steps are too long or too rough: differences of ends that the integrator of the
+    # defects computes.
     rows = np.flatnonzero(is_rough)
     for difference in (_DIFFERENCE, _SMALL_DIFFERENCE):
         if len(rows):

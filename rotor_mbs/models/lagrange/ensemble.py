@@ -22,13 +22,13 @@ from rotor_mbs.models.lagrange.samples import constant_work
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.trajectory import Array, Integration, RunBlock
 
-# rad. From 1e14 on a vector's sines are found in another way, which rounds those of the other lanes
-# otherwise, too.
+# rad. From 1e14 on the sines of all lanes are computed in another way, with another rounding in the
+# lanes of smaller angles, too.
 _HUGE = 1e13
 
 _ENERGIES = ("kinetic_energy", "potential_energy", "work")
 
-# Samples of all runs side by side: what is worked on stays near the processor.
+# Samples of all runs that are worked on at once, so that they stay in the processor's cache.
 _SAMPLES_PER_CHUNK = 4096
 # Samples of a run whose tips and energies are evaluated at once, with the rotor's numbers anew for
 # each of them.

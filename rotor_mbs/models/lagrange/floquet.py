@@ -38,10 +38,10 @@ _CLOSED = 1e-13
 _ACCEPTED = 1e-9
 _MAX_CORRECTIONS = 12
 # Of the integrator: a turn of a stiff bearing takes about two steps for each of its oscillations; a
-# rotor that has left for good takes more and more.
+# rotor that has left the periodic motion takes more and more.
 _STEPS, _STEPS_PER_OSCILLATION = 500, 10
 _MOST_STEPS = 10**9  # days of computing: a turn that may take more is not begun
-# rad: a motion that ends a turn this far from its start is not on its way to a periodic one.
+# rad, or shares of the speed: from a mismatch above this Newton's method is given up.
 _LOST = 20.0
 
 
@@ -130,6 +130,8 @@ def periodic_turn(scene: Scene, speed: float, guess: Turn | None = None) -> Turn
                 best = Turn(speed, state, torque, by_state, gradient, flow, trace, mismatch)
             if mismatch < _CLOSED or mismatch > _LOST:
                 break
+            # The unknowns: the torque, and the state without the rotor's angle, which is fixed.
+            # They differ in units: each column is scaled to length one.
             jacobian = (
                 np.column_stack([by_torque, (by_state - np.eye(2 * n))[:, 1:]]) / units[:, None]
             )

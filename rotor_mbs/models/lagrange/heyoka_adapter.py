@@ -36,7 +36,7 @@ def heyoka() -> ModuleType:
     except MemoryError as exc:
         raise ResourceError("heyoka cannot be loaded: not enough memory") from exc
     except ImportError as exc:
-        # it is there, and the system could not load it
+        # It is installed, but the system could not load it.
         if not isinstance(exc, ModuleNotFoundError):
             raise ResourceError(f"heyoka cannot be loaded: {exc}") from exc
         raise MethodRefusal(

@@ -44,7 +44,7 @@ def slopes(function: Function, values: Sequence[float] | Array) -> Array:
     ndarray, shape (n,) or (m, n)
     """
     step = 1e-30
-    # each number over all directions
+    # Row i: number i in each of the n directions, of which direction i changes it.
     moved = np.asarray(values)[:, None] + 1j * step * np.eye(len(values))
     return np.asarray(np.imag(function(list(moved))) / step)
 
@@ -81,7 +81,7 @@ def linearize(
     def accelerations(state: Sequence[Any], sin: Function, cos: Function) -> list[Any]:
         return closed_form.accelerations(state[:n], state[n:], form, loads, sin, cos)
 
-    # first: a float's division by zero raises
+    # On floats, and first: their division by zero raises, that of arrays does not.
     residual = np.array(accelerations(state, math.sin, math.cos))
     derivatives = slopes(lambda state: accelerations(state, np.sin, np.cos), state)
     return Linearization(-derivatives[:, :n], -derivatives[:, n:], residual)
@@ -195,11 +195,11 @@ def weight_stiffness(scene: Scene, angles: Sequence[float] | Array) -> float:
 
 
 class _NotFoundError(InputError):
-    """No steady state was found."""
+    """Report that no steady state was found."""
 
 
 class _Potential(NamedTuple):
-    """V - T, and its derivatives by the angles."""
+    """Hold V - T, and its derivatives by the angles."""
 
     value: float  # J
     slope: Array  # (n,) N m
@@ -369,10 +369,12 @@ def _newton_step(form: RotorForm, potential: _Potential, free: slice, *, downhil
     downhill : whether absolute eigenvalues are taken, |H| for H.
     """
     gradient, hessian = potential.slope[free], potential.curvature[free, free]
+    # Scaled to a diagonal of ±1, so that the eigenvalues of soft and stiff coordinates compare. A
+    # diagonal element that is only rounding of the weights counts as `least`.
     least = max(1e-9 * _weights(form), 1e-300)
     scale = 1.0 / np.sqrt(np.maximum(np.abs(np.diag(hessian)), least))
     values, vectors = np.linalg.eigh(hessian * scale * scale[:, None])
-    stiff = np.abs(values) > 1e-4  # else it is the rounding of weights that balance
+    stiff = np.abs(values) > 1e-4  # else it is the rounding of weights that balance: no step
     divisors = np.where(stiff, np.abs(values) if downhill else values, np.inf)
     components = vectors.T @ (scale * gradient) / divisors
     step = -scale * (vectors @ components)

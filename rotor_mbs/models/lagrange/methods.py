@@ -1,4 +1,4 @@
-"""The methods of the closed form. Importing this loads neither NumPy, SciPy nor heyoka."""
+"""List the methods of the closed form. Importing this loads neither NumPy, SciPy nor heyoka."""
 
 from __future__ import annotations
 

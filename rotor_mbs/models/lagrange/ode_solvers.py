@@ -138,11 +138,11 @@ def work_unit(scene: Scene) -> float:
 
 
 # Evaluations within one step, however often it is tried. SciPy shortens a step up to 460 times,
-# where it begins at 0, with 12 evaluations each. More are an endless loop: where the slope
-# overflows, its first step is no number.
+# where it begins at 0, with 12 evaluations each. More are an endless loop, as where the slope
+# overflows and the first step is not a number.
 _MAX_STEP_EVALUATIONS = 100_000
-# Steps after which it is seen how many the whole interval will take, and the share by which they
-# may be too many.
+# After so many steps their number for the whole interval is estimated; the run ends if the estimate
+# is above the allowed number by this factor.
 _OUTLOOK_STEPS = 2_000
 _OUTLOOK_SHARE = 10.0
 

@@ -1,7 +1,7 @@
-"""A scene's numbers as the closed form needs them.
+"""Compute the coefficients of the closed form from a scene.
 
-Coefficients are in exact rational arithmetic until the last step: of a point mass some vanish
-identically, and near a pitch of ±π/2 a rounding remainder would be the inertia.
+They are in exact rational arithmetic until the last step: for a point mass some vanish identically,
+and near a pitch of ±π/2 a rounding remainder would be the inertia.
 """
 
 from __future__ import annotations

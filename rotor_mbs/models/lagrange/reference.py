@@ -29,7 +29,7 @@ from rotor_mbs.solution.trajectory import Array, Integration, Trajectory
 
 # The uncertainty is this many times what two runs show. They differ in their truncation errors and
 # in the rounding of each step, but not in what they share: the rounded coefficients, and the
-# rounding of a motion that both step through alike (a uniform rotation). Against 180 bits at
+# rounding of a motion that both integrate in the same way (a uniform rotation). Against 180 bits at
 # tolerance 1e-42 the error of the shipped scenes is at most 5.0 times the sum of difference and
 # rounding (paper/fig15-100kNm).
 SAFETY = 10.0
@@ -85,7 +85,7 @@ class ReferenceSolver:
         result.quantities["angle_uncertainty"] = uncertainty(
             difference, result.angles, self._epsilon
         )
-        # Over what was reached: the rest of a run that its time limit ended may take for ever.
+        # Over what was reached only: the rest of a run that its time limit ended may take too long.
         if rows > 1:
             reached = replace(self._scene, duration=float(result.time[-1]), samples=rows)
             result.quantities["error_growth"] = _largest_growth(
@@ -329,8 +329,8 @@ def combined_equations(*parts: tuple[float, float, float]) -> Accelerations:
 
 
 # The accelerations are linear in the dampers' moments and quadratic in the rates otherwise; with
-# one kind of rate at a time, and with rates reversed, each kind of product is taken out without
-# another text of the equations.
+# one kind of rate at a time, and with rates reversed, each kind of product is left out without
+# writing the equations a second time.
 REDUCED_EQUATIONS: Mapping[str, Accelerations] = {
     "Coriolis terms (products of rotor rate and pitch rate)": combined_equations(
         (1.0, 1, 0), (1.0, 0, 1), (-1.0, 0, 0)

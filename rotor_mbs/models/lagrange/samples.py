@@ -1,12 +1,14 @@
-"""The run of any integrator from segment to segment of the loads, and the trajectory of its states.
+"""Run any integrator from segment to segment of the loads, and compute its trajectory.
 
 Loads on roots, shaft bearing and actuators follow by Newton's and Euler's laws from the closed
 form's accelerations.
 
 Symbols, in the frame of a blade with azimuth φ, pitch θ, cone β: s = sin θ, c = cos θ; angular
 velocity ω = (Ω cos β s, Ω cos β c, θ̇ + Ω sin β) and acceleration α = dω/dt; centre of mass r,
-inertia I about it; up = the base frame's z; root at e = (0, 0, hub radius). F = m (α × r + ω × (ω ×
-r) + g up),  M = I α + ω × I ω + (r - e) × F: of the hub on the blade, about its root.
+inertia I about it; up = the base frame's z; root at e = (0, 0, hub radius). The force and the
+moment of the hub on the blade, about its root, are
+
+    F = m (α × r + ω × (ω × r) + g up),  M = I α + ω × I ω + (r - e) × F.
 """
 
 from __future__ import annotations
@@ -57,7 +59,7 @@ Numbers = Any
 
 
 class Advance(NamedTuple):
-    """The integration of one segment.
+    """Hold the result of the integration of one segment.
 
     Attributes
     ----------
@@ -162,7 +164,7 @@ def _energies(
     angles = list(all_angles[:, columns].T)
     rates = list(all_rates[:, columns].T)
     loads = loads_at(scene, time)
-    # of rates like 1e200; the judgement sees what is not finite
+    # Rates like 1e200 overflow here; the verdict sees what is not finite.
     with np.errstate(over="ignore", invalid="ignore"):
         kinetic, potential = closed_form.energies(angles, rates, form, loads, np.sin, np.cos)
         if states.shape[1] <= 2 * len(columns):
@@ -300,7 +302,7 @@ def load_rounding(scene: Scene, times: Array, angles: Array, rates: Array) -> di
     numbers, count = np.column_stack([times, angles, rates]), angles.shape[1]
     for column, values in enumerate(numbers.T):
         moved = numbers.copy()
-        # back in time, so that a jump of a load counts from its own sample on
+        # Back in time, so that a jump of a load counts from its own sample on.
         moved[:, column] -= _DIFFERENCE
         last_digits = np.finfo(float).eps * np.abs(values) / _DIFFERENCE
         moved_times, moved_angles, moved_rates = np.split(moved, [1, 1 + count], axis=1)
@@ -389,6 +391,7 @@ def _inverse_mass_matrices(scene: Scene, angles: Array) -> Array:
     ndarray, shape (n, moving, moving)
         In the coordinates that move, 1/(kg m²).
     """
+    # The inverse of an arrowhead: v vᵀ / S + diag(0, 1/Jzz, ...), v = (-1, B/Jzz, ...).
     form, moving = rotor_form(scene), scene.moving_coordinates
     schur = np.full(len(angles), form.inertia)
     levers = [np.full(len(angles), -1.0)]  # of each coordinate on the rotor: -1, then B / Jzz

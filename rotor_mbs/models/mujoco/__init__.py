@@ -1,1 +1,1 @@
-"""The rotor as hinges and bodies of the MuJoCo engine, from raw scene data only."""
+"""Model the rotor as hinges and bodies of the MuJoCo engine, from raw scene data only."""

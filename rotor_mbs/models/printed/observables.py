@@ -186,5 +186,6 @@ def torque_work(scene: Scene, run: Ode45Result, coordinate: int, times: Array) -
     angles_at_points = run.at(points.ravel())[:, coordinate].reshape(points.shape)
     mean = angles_at_points @ _GAUSS_WEIGHTS
     angles = run.at(grid)[:, coordinate]
+    # [τ q] - τ' ∫ q dt on each part, on which τ goes linearly from `after` to `before`.
     done = np.cumsum(before * (angles[1:] - mean) + after * (mean - angles[:-1]))
     return np.asarray(np.append(0.0, done)[np.searchsorted(grid, times)])
