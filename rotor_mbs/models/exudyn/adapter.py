@@ -28,7 +28,7 @@ from rotor_mbs.scenario.time_table import Interval, Segment, steps_and_rows
 from rotor_mbs.solution.trajectory import Array, Integration, limit_at_zero
 
 os.environ.setdefault("EXUDYN_MODULE", "fast")
-with contextlib.redirect_stdout(io.StringIO()):  # it greets on import
+with contextlib.redirect_stdout(io.StringIO()):  # it prints a greeting on import
     import exudyn
     from exudyn import itemInterface
 
@@ -36,8 +36,8 @@ with contextlib.redirect_stdout(io.StringIO()):  # it greets on import
 _engine: Any = exudyn
 _engine.config.printToConsole = False
 _engine.config.suppressWarnings = True
-# Not by the engine's environment variable, with which it would set matplotlib's backend to Agg, the
-# caller's plots too.
+# Not by the engine's environment variable: with that it would set matplotlib's backend to Agg, also
+# for the caller's plots.
 _engine.special.userInterface.SuppressAll(True)
 
 
@@ -388,7 +388,9 @@ class System:
         total : to which steps and evaluations are added.
         """
         failure = ""
-        with caller_signals():  # whose exceptions, as Ctrl-C, the engine makes its own
+        # Signals go to the caller: the engine would replace their exceptions, as of Ctrl-C, by its
+        # own.
+        with caller_signals():
             try:
                 if not solver.SolveSystem(self._mbs, settings):
                     failure = _one_line(solver.GetErrorString()) or _NO_REASON
@@ -414,14 +416,14 @@ class System:
 
 _NO_REASON = "the engine gave no reason"
 
-# Coordinates and constraints of a chain of twelve blades, from which on a sparse factorization
-# costs less than a dense one: its cost grows with their number, that of a dense one with a power of
-# 2.5.
+# Number of coordinates and constraints from which on a sparse factorization costs less than a dense
+# one; a chain of twelve blades has so many. The sparse one's cost is proportional to their number,
+# the dense one's to its power of 2.5.
 _SPARSE_FROM = 140
 
-# Coordinates of a tree from which on a Jacobian, which takes as many evaluations, costs more than
-# the iterations that an old one takes. Of a chain a Jacobian costs no more than two evaluations,
-# whatever the number of bodies.
+# From this number of coordinates of a tree on, a Jacobian, which takes as many evaluations, costs
+# more than the additional iterations with an old one. For a chain a Jacobian costs no more than two
+# evaluations, whatever the number of bodies.
 _OLD_JACOBIAN_FROM = 13
 
 
@@ -474,7 +476,7 @@ def _one_line(text: str) -> str:
     return "; ".join(line for line in lines if line)[:300]
 
 
-# What the engine wants in its own types, by the name of the argument.
+# Arguments that the engine takes in its own types: the conversion by the name of the argument.
 _TRANSLATIONS: dict[str, Callable[[Any], object]] = {
     "outputVariableType": lambda name: getattr(_engine.OutputVariableType, name),
     "localHT": lambda frame: _engine.HT(*frame),

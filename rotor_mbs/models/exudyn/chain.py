@@ -136,7 +136,7 @@ def parts(scene: Scene, loads: Loads, node: str = "euler_parameters") -> list[Pa
             load["loadVectorUserFunction"] = _torque_on_shaft(scene, moment_on(scene, loads, 0))
         detail = "constant" if scene.has_constant_torque else "over time"
         built.append(Part("load", "rotor torque", "LoadTorqueVector", load, detail))
-    # From these the joint angles and rates are found, which are no coordinates of the chain.
+    # From these sensors the joint angles and rates are computed: they are no coordinates here.
     bodies = [hub, *blades]
     for placed in bodies:
         name, of_node = placed.name, Ref("node", placed.name)
@@ -183,7 +183,7 @@ def _body(placed: Placed, node: str) -> list[Part]:
     """
     body, name = placed.body, placed.name
     position = placed.rotation @ body.com
-    # of a rate that has no bound: the run says so
+    # A rate without bound may overflow here; the run then reports the failure.
     with np.errstate(over="ignore", invalid="ignore"):
         velocity = np.cross(placed.omega, position)
     p = placed.quaternion
@@ -272,7 +272,7 @@ def _pitch_spring(scene: Scene, loads: Loads, blade: int, seat: str, root: str) 
 
 
 def _torque_on_shaft(scene: Scene, moment: Moment) -> Callable[..., list[float]]:
-    """Return the rotor torque as the engine asks for it: a vector in the base frame, N m."""
+    """Return the load function of the rotor torque: a vector in the base frame, N m."""
 
     def torque(_system: object, time: float, _load: object) -> list[float]:
         return along_shaft(scene, moment.at(time))
@@ -281,7 +281,7 @@ def _torque_on_shaft(scene: Scene, moment: Moment) -> Callable[..., list[float]]
 
 
 def _spring_torque(moment: Moment) -> Callable[..., float]:
-    """Return a spring's law as the engine calls it.
+    """Return the function by which the engine computes a spring's torque.
 
     It gives the torque (N m) that resists a rotation (rad) and its rate (rad/s).
     """

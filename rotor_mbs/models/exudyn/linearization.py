@@ -19,7 +19,7 @@ from rotor_mbs.models.exudyn.loads import Loads
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.trajectory import Array, Linearization, limit_at_zero, scene_at
 
-# rad, m: each doubling of the step takes one order of it out of the error.
+# rad, m: with each of these steps the extrapolation eliminates one more order of the error.
 _STEPS = tuple(1e-3 * 2.0**k for k in range(6))
 
 
@@ -113,7 +113,7 @@ def _joint_rates(scene: Scene) -> Array:
     rows = np.zeros((len(bodies), 7 * len(bodies)))
     for k, placed in enumerate(bodies):
         rows[k, 7 * k + 3 : 7 * k + 7] = placed.axis @ _spin(placed)
-    # Of the rotor's rate a coned blade has a part about its own axis; its pitch rate is the rest.
+    # The rotor's rate turns a coned blade about its own axis, too; the pitch rate is the rest.
     for k, i in enumerate(movable_blades(scene), start=1):
         if scene.blades[i].cone:
             rows[k, 3:7] -= bodies[k].axis @ _spin(bodies[0])

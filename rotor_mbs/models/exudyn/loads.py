@@ -180,7 +180,8 @@ def _newton_euler(scene: Scene, i: int, sampled: Sampled) -> tuple[Array, Array,
         From that frame to the base frame.
     """
     blade, name = scene.blades[i], f"blade {i + 1} root"
-    # From the blade's frame to the engine's body that it is, or, where it cannot pitch, is part of.
+    # From the blade's frame to that of the engine's body: the blade's own, or, where it cannot
+    # pitch, the hub's.
     turned = np.eye(3) if i in movable_blades(scene) else fixed_blade_rotation(scene, i)
     frames = matrices(sampled(f"{name} rotation")) @ turned
     lifted = sampled(f"{name} acceleration") + np.array([0.0, 0.0, scene.gravity])

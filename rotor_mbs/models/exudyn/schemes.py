@@ -50,8 +50,8 @@ class Scheme:
         return bool(self.options.get(_END_ACCELERATIONS))
 
 
-# Stage evaluations are all that a state needs: one more at the end of a step would only serve to
-# know accelerations.
+# The state needs the evaluations of the stages only: one more at the end of a step would serve the
+# accelerations alone.
 _EXPLICIT = {_END_ACCELERATIONS: False, "explicit.useLieGroupIntegration": False}
 
 

@@ -24,7 +24,7 @@ from rotor_mbs.solution.trajectory import (
     sample_times,
 )
 
-# Points of the local polynomial that stands in for the power between rows.
+# Points of the local polynomial that approximates the power between rows.
 _POINTS = 8
 
 
@@ -137,10 +137,10 @@ def _joint_motion(scene: Scene, read: _Reader) -> tuple[Array, Array]:
     read : the rows of the sensors.
     """
     hub = matrices(read.all("hub rotation"))
-    if scene.shaft_tilt:  # in the shaft frame, in which blades too are seen
+    if scene.shaft_tilt:  # to the shaft frame, as the blades below
         hub = rotation_x(-scene.shaft_tilt) @ hub
     rates = joint_rates(scene, read.all)
-    # A turn about y has its sine and its cosine twice.
+    # The matrix of a turn about y has the sine and the cosine twice: their mean is used.
     twice_sine = hub[:, 0, 2] - hub[:, 2, 0]
     twice_cosine = hub[:, 0, 0] + hub[:, 2, 2]
     wrapped = np.arctan2(twice_sine, twice_cosine)
@@ -300,7 +300,7 @@ def work(scene: Scene, time: Array, angles: Array, rates: Array) -> Array:
 
     # The power jumps with a load, so that no polynomial may go through both sides of a jump.
     out, done = np.zeros(len(time)), 0.0
-    # s, by which rounding may put a row beside a jump
+    # s, the distance by which rounding may put a row beside a jump.
     slack = 1e-9 * scene.duration / (scene.samples - 1)
     for segment in scene.load_segments:
         first, last = np.searchsorted(time, [segment.start - slack, segment.end + slack])
@@ -341,8 +341,8 @@ def cumulative_integral(time: Array, values: Array) -> Array:
     values : (n,) integrand.
     """
     points = min(_POINTS, len(time))
-    # Of each interval: the rows that its polynomial goes through, as many on both sides as there
-    # are.
+    # The rows that the polynomial of each interval goes through: equally many on both sides, but
+    # near the ends.
     first = np.clip(np.arange(len(time) - 1) - (points // 2 - 1), 0, len(time) - points)
     window = first[:, None] + np.arange(points)
     nodes, known = time[window], values[window]

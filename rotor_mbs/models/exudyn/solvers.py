@@ -25,7 +25,7 @@ from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.scenario.time_table import Interval, intervals
 from rotor_mbs.solution.trajectory import Array, Integration, Trajectory, all_coordinates
 
-# Of 2, 4, ..., 14 substeps. Twelve and fourteen serve tolerances below 1e-9 rad.
+# With 2, 4, ..., 14 substeps. Twelve and fourteen are needed for tolerances below 1e-9 rad.
 MOST_COLUMNS = 7
 
 # A part of an interval is at least 1/4096 of it.
@@ -115,12 +115,14 @@ class ExtrapolatedSolver:
         self._least_error = max(settings.tolerance, _ROUNDING)
         self._newton_tolerance = settings.newton_relative_tolerance
         self._intervals = intervals(scene.load_segments, scene.samples, every_sample=True)
-        # Dampers and loads over time want it along the path: it is extrapolated with the state.
+        # With dampers or loads over time the work depends on the path: it is extrapolated with the
+        # state.
         self._integrates_work = scene.work_needs_path
         parts = chain.parts(scene, self._loads)
         sensors = [part.name for part in parts if part.kind == "sensor"]
         self._of_rates = [name for name in sensors if name.endswith(("rotation", "spin"))]
-        # What a sensor stores, the engine evaluates after every step: only what the work needs.
+        # The engine evaluates stored sensors after every step: only those that the work needs are
+        # stored.
         for number, part in enumerate(parts):
             if part.kind == "sensor":
                 stored = part.name in self._of_rates
@@ -128,7 +130,8 @@ class ExtrapolatedSolver:
                     part, parameters={**part.parameters, "storeInternal": stored}
                 )
         self.system = System(parts)
-        # Of each body the displacement from a reference and the change of four Euler parameters.
+        # For each body three displacements and four Euler parameters, from which the coordinates
+        # are differences.
         self._reference = self.system.reference.reshape(-1, 7)
         self._sizes = np.abs(self._reference).max(axis=0)
         self._coordinates = self._reference.size
@@ -218,8 +221,8 @@ class ExtrapolatedSolver:
             if self._integrates_work:
                 values = np.append(values, self._work(interval))
             row = neville(row, values)
-            # The error of the value beside it in the table, which has two orders less than what is
-            # kept.
+            # The difference is the error of the value beside it in the table, which has two orders
+            # less than the one that is kept.
             if column and self._is_met(row[-1] - row[-2], row[-1], end - start):
                 self.columns.append(column + 1)
                 state, gained = row[-1], 0.0
@@ -321,7 +324,7 @@ class ExtrapolatedSolver:
 
 Reading = Callable[[Scene, Callable[[str], Array]], Trajectory]
 
-# The engine takes a run as ended within 1e-10 s of its end, whatever the step.
+# s. The engine ends a run within 1e-10 s of its end, whatever the step.
 _SHORTEST_INTERVAL = 1e-8
 
 

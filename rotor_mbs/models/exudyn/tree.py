@@ -62,7 +62,7 @@ def parts(scene: Scene, loads: Loads) -> list[Part]:
             "markerNumber": Ref("marker", angle_name),
             "load": moment.at(0.0),
         }
-        # The engine asks for a load by a function, which costs time, only where it changes.
+        # A load function costs time: the load has one only where it changes.
         detail = "constant"
         if not all(is_constant(scene.load_tables[place]) for place, _ in moment.terms):
             load["loadUserFunction"] = moment.scalar

@@ -171,7 +171,7 @@ def pitches(
 
 
 def power(rates: Sequence[Number], form: RotorForm, loads: LoadValues) -> Number:
-    """Return the power (W) of the loads and springs' rest angles, less what the dampers take.
+    """Return the power (W) of torques and rest angles, less what the dampers take.
 
     A spring with rest angle r acts with the moment k r here. The work of a spring whose rest angle
     moves, -∫ k (θ - r) dr, is that of k r on the pitch and the change of `rest_energy`.

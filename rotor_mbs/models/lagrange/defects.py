@@ -41,13 +41,13 @@ _MAX_STEPS_DOP853 = 10_000
 _FEWEST_STEPS = 50
 _TAYLOR = 2.0**-52  # tolerance
 _DOP853 = (2.3e-14, 1e-16)  # tolerances, the tightest that SciPy takes
-_EVALUATIONS_PER_STEP = 12  # by it, whether a step is kept or tried again
+_EVALUATIONS_PER_STEP = 12  # of DOP853, whether a step is kept or tried again
 # Runge-Kutta steps of order 4 over a quarter of a radian leave a share of about 1e-5 of the
 # transition matrices.
 _RADIANS_PER_STEP = 0.25
-# Where rates change within an interval, they leave more. It shows in the state at the end, which is
-# known better: over the paper's motions, up to this distance (rad and rate units) the matrices are
-# right to a share of 4e-4.
+# Where rates change within an interval, they leave more. This shows in their state at the end,
+# compared with the more accurate one of `interval_ends`: in the paper's motions, up to this
+# distance (rad and rate units) the matrices are right to a share of 4e-4.
 _ROUGH_END = 3e-5
 # Of an interval. Beyond some 75 steps the integration of every interval by itself is faster, and
 # always more accurate.
@@ -56,7 +56,7 @@ _MAX_RUNGE_KUTTA_STEPS = 32
 # reduce noise.
 FIT_ROWS = 5
 _FIT_ROUNDS = 12
-_STANDS_STILL = 1e-9  # rad in an interval: the error that is left is the square of it
+_STANDS_STILL = 1e-9  # rad in an interval: the remaining error is the square of it
 # rad in an interval, median of the rows: where the first correction of the finite differences is at
 # most this, right data of the paper's motions always converged; from 0.8 on some did not.
 _NEAR = 0.5
@@ -66,8 +66,8 @@ _UNIT_ROUNDOFF = 2.0**-53
 _SMALLEST_SHARE = 1e-30
 # rad and rate units: rounding and curvature are a share of 1e-8 or so of a matrix's entries
 _DIFFERENCE = 1e-7
-# Where errors grow so much that such a difference is no small one at the end of the interval, a
-# smaller one is tried.
+# Where errors grow so much that such a difference is not small any more at the end of the interval,
+# this smaller one is tried.
 _SMALL_DIFFERENCE = 1e-11
 _SMALL_AT_END = 0.1  # rad and rate units
 
@@ -406,7 +406,7 @@ def _advance_by_dop853(scene: Scene) -> _Advance:
         integrator = scipy_integrator("DOP853", *_DOP853, max_steps)
         function = solver.right_hand_side(Segment(start, end, segment.linear_loads))
         part = integrator(function, start, end, values, np.empty(0))
-        raise_if_over()  # else its end would be taken for that of no motion
+        raise_if_over()  # else the interval would count as one of no motion
         end_state = np.full(len(values), np.nan) if part.message else part.end
         return end_state, (part.evaluations or 0) // _EVALUATIONS_PER_STEP
 
@@ -588,7 +588,7 @@ def quick_ends(
 
     def derivative(at: Array, state: Array) -> Array:
         angles, rates = list(state[:half]), list(state[half:])
-        # At a jump the interval's own side of it counts.
+        # At a jump of a load at the end of an interval, take the value inside the interval.
         inside = np.clip(at, begins + _SIDE * h, ends - _SIDE * h)
         accelerations = equations(angles, rates, form, loads_at(scene, inside), np.sin, np.cos)
         return np.concatenate(

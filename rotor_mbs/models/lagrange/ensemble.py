@@ -30,8 +30,8 @@ _ENERGIES = ("kinetic_energy", "potential_energy", "work")
 
 # Samples of all runs that are worked on at once, so that they stay in the processor's cache.
 _SAMPLES_PER_CHUNK = 4096
-# Samples of a run whose tips and energies are evaluated at once, with the rotor's numbers anew for
-# each of them.
+# Samples of a run whose tips and energies are evaluated at once; the rotor's numbers are repeated
+# for each of them.
 _OBSERVED_PER_CALL = 1024
 
 
@@ -73,11 +73,11 @@ def solve_many(scenes: Sequence[Scene], tolerance: float) -> RunBlock:
         arrays[name] = np.empty((*time.shape, *shape))
     block = RunBlock(time, arrays, [Integration(False)] * runs, [0] * runs)
 
-    # By rotor: (parameters,) of the equations, then of the tips; and the structure, in which rotors
-    # agree that share compiled code.
+    # For each rotor: its parameters, those of the equations, then those of the tips; and its
+    # structure. Rotors of one structure share compiled code.
     rotors: dict[tuple[object, ...], tuple[Array, tuple[int, ...]]] = {}
     groups: dict[tuple[int, ...], list[int]] = {}
-    keys: dict[int, tuple[object, ...]] = {}  # of each run: its rotor, and its unit of work
+    keys: dict[int, tuple[object, ...]] = {}  # rotor and unit of work of each run
     for i, scene in enumerate(scenes):
         if not scene.has_constant_loads:
             # It is integrated from one kink of its loads to the next, which are at other times in
@@ -170,8 +170,8 @@ def _observables(example: Scene) -> Any:
 
 def _compiled_rows(example: Scene, rows: Sequence[Any], variables: Sequence[Any]) -> Any:
     """Compile expressions as a function of variables."""
-    # Where all terms of a row vanish, the closed form gives the number zero: the engine asks for an
-    # expression.
+    # Where all terms of a row vanish, the closed form gives the number zero, but the engine
+    # takes expressions only.
     expressions = [heyoka().expression(0.0) + row for row in rows]
     return heyoka().cfunc(expressions, variables, compact_mode=taylor.is_compact(example))
 
@@ -196,7 +196,7 @@ def _observed(function: Any, states: Array, numbers: Array) -> Array:
     for i in range(0, samples, _OBSERVED_PER_CALL):
         part = states[: function.nvars, :, i : i + _OBSERVED_PER_CALL]
         count = part.shape[2]
-        # The engine wants the parameters anew for every state.
+        # The engine takes the parameters once for every state.
         spread = np.broadcast_to(
             numbers[: function.nparams, :, None], (function.nparams, runs, count)
         )
@@ -259,7 +259,7 @@ class _Group:
         self.times = np.linspace(
             0.0, np.array([scene.duration for scene in scenes]), example.samples
         )
-        # of the rotor, then the pitches that are fixed
+        # The rotor's parameters, then the angles of the pitches that are fixed.
         self.numbers = np.concatenate([numbers, angles[fixed]])
 
     def run(self, block: RunBlock) -> None:
@@ -284,8 +284,8 @@ class _Group:
             independent &= [integration.success for integration in integrations]
             affected = {i // width for i in np.flatnonzero(~independent).tolist()}
             for i in [i for i in range(len(columns)) if i // width in affected]:
-                # One lane's failure ends all lanes: each runs again with itself alone in every
-                # lane.
+                # One lane's failure ends all lanes. So each of these runs is repeated, with a copy
+                # of it in every lane.
                 alone = [columns[i]] * width
                 states, observed, integrations = self.solve(alone)
                 # What follows the first sample that is not finite is no motion.
@@ -327,7 +327,7 @@ class _Group:
             for result in self.integrator.propagate_res:
                 message = failure(result[0])
                 integrations.append(Integration(not message, message, 0.0, int(result[3])))
-        states[:, :, 0] = start  # which a run that fails in its first step has, too
+        states[:, :, 0] = start  # set also where a run fails in its first step
         observed = _observed(self.observables, states, numbers)
         states[half : 2 * half] = observed[:half]
         states[:, :, 0] = initial

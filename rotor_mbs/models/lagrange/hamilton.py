@@ -114,7 +114,7 @@ def forces(
 
 
 def resting_pitches(scene: Scene) -> tuple[int, ...]:
-    """Return the coordinates of the pitches that the equations leave at zero for ever.
+    """Return the coordinates of the pitches that the equations always leave at zero.
 
     They start there at rest, without a load, and nothing that the rotor does moves them.
 
@@ -154,7 +154,7 @@ def _stays_at_zero(blade: BladeForm) -> bool:
     """
     form = RotorForm((blade,), (), Fraction(0), Fraction(0))
     for cos_q, sin_q, spin in _ROTOR_STATES:
-        # The rotor's angle stands for itself, the pitch's is 0.
+        # Sine and cosine by key: "rotor" for the rotor's angle, 0 for the pitch.
         sines, cosines = (
             {"rotor": Fraction(sin_q), 0: Fraction(0)},
             {"rotor": Fraction(cos_q), 0: Fraction(1)},

@@ -173,12 +173,12 @@ def scipy_integrator(
 
         def watched(time: float, values: Sequence[float]) -> list[float]:
             nonlocal in_step
-            raise_if_over()  # a step may try ever smaller sizes
+            raise_if_over()  # here, because one step may try ever smaller sizes
             in_step += 1
             if in_step > _MAX_STEP_EVALUATIONS:
                 raise ValueError("no step is small enough")
             slope = function(time, values)
-            # at the start
+            # Only the derivative at the start is checked here.
             if solver is None and in_step == 1 and not all(map(math.isfinite, slope)):
                 raise ValueError("the derivative of the state is not finite")
             return slope
@@ -207,7 +207,7 @@ def scipy_integrator(
                         raise ValueError(f"more than {max_steps:g} steps")
             except OutOfTimeError:
                 message = time_limit.MESSAGE
-            # also of its linear algebra, on what is not finite
+            # Its linear algebra raises these, too, on values that are not finite.
             except (ValueError, np.linalg.LinAlgError) as exc:
                 message = f"SciPy: {exc}"
         last, evaluations = (state, 0) if solver is None else (solver.y, solver.nfev)
@@ -245,7 +245,7 @@ def ode45_integrator(relative_tolerance: float, absolute_tolerance: float) -> In
         """Integrate function from state at start (s) to end (s), with samples at times inside."""
 
         def watched(time: float, values: Sequence[float]) -> list[float]:
-            raise_if_over()  # of threads, which no signal ends
+            raise_if_over()  # needed in threads, which no signal interrupts
             return function(start + time, values)
 
         result = matlab.ode45(

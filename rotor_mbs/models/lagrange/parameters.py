@@ -123,7 +123,7 @@ def rotor_form(
     return _form(scene, convert, phases)
 
 
-@functools.lru_cache(maxsize=16)  # a run is judged by many functions that need it
+@functools.lru_cache(maxsize=16)  # many functions that check one run need it
 def _form_in_doubles(scene: Scene) -> RotorForm:
     return _form(scene, float, None)
 
@@ -236,7 +236,7 @@ def _rotor_inertia(blade: Blade) -> tuple[Fraction, Fraction, Fraction]:
     xx, yy, zz, xy, _, _ = _inertia_about_hub(blade)
     lean = _lean(blade.cone, 0.0)
     cone_cc, cone_ss = lean.cos_cone**2, lean.sin_cone**2
-    # What the pitch axis has about the shaft, Jzz sin²β, is split over s² + c² = 1.
+    # The pitch axis's share about the shaft, Jzz sin²β, is added to both s² and c²: s² + c² = 1.
     return cone_cc * xx + cone_ss * zz, cone_cc * yy + cone_ss * zz, 2 * cone_cc * xy
 
 

@@ -343,8 +343,8 @@ def load_conditioning(scene: Scene, times: Array, angles: Array, rates: Array) -
             np.stack([np.broadcast_to(row, times.shape) for row in accelerations], axis=1)
         )
 
-        # Moments, (n, moving), of which an engine may lose a rounding: on the rotor those of all
-        # blades.
+        # Size of the moments, (n, moving), of which an engine may lose a rounding; on the rotor the
+        # sum over the blades.
         moments = np.zeros(sizes.shape)
         moments[:, 0] = scene.hub_inertia * sizes[:, 0]
         for i, blade in enumerate(scene.blades):

@@ -91,8 +91,8 @@ def equation_numbers(scene: Scene, parameters: Parameters) -> tuple[RotorForm, L
     """
     form = rotor_form(scene, parameters)
     parameters.structure.append(int(scene.has_tilt_or_cone))
-    # The engine's step control is relative to the largest variable. In J the work would be that by
-    # far, and set the accuracy of all others.
+    # The engine's step control is relative to the largest variable. In J the work would be the
+    # largest by far, and determine the accuracy of all others.
     work_per_joule = (
         parameters.own(1 / Fraction(work_unit(scene))) if scene.work_needs_path else 0.0
     )
@@ -107,14 +107,14 @@ def equation_numbers(scene: Scene, parameters: Parameters) -> tuple[RotorForm, L
 
 
 _compiled: dict[tuple[object, ...], Any] = {}
-_idle: dict[tuple[object, ...], list[Any]] = {}  # copies of it whose owners are gone
+_idle: dict[tuple[object, ...], list[Any]] = {}  # copies whose owners no longer exist
 
 
 def compiled(key: tuple[object, ...], make: Callable[[], Any], owner: object) -> Any:
     """Return compiled code that no other owner uses meanwhile, since it holds a state.
 
-    It is made once per process and key. When its owner is gone, the next one gets it as it was
-    left: state, time and parameters are to be set.
+    It is made once per process and key. When its owner no longer exists, the next one gets it
+    as it was left: state, time and parameters are to be set.
 
     Parameters
     ----------
@@ -231,7 +231,7 @@ class Propagation:
         """Integrate over a segment from where the integrator is, the end of the segment before."""
         integrator, kind = self.integrator, self._initial.dtype
         self.set_segment(segment)
-        # Up to the end of the segment, where the next one starts, also where no sample is there.
+        # The grid ends with the segment, even without a sample there: the next one starts there.
         end = [] if len(times) and times[-1] == segment.end else [segment.end]
         grid = np.concatenate([[segment.start], times, end]).astype(kind)
         with time_limit.samples_kept_at_limit():

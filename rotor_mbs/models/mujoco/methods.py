@@ -104,8 +104,8 @@ METHODS = (
         linearize=lazy("rotor_mbs.models.mujoco.solver:linearize"),
     ),
     # First the new rates, with forces at the start of the step and dampers at its end; then angles
-    # with these rates. The ladders of these first-order methods begin where something is left of a
-    # motion. The engine's Euler has the same dampers, and gives the bits of implicitfast.
+    # with these rates. The ladders of these first-order methods begin at steps that still resolve
+    # the motion. The engine's Euler treats dampers alike, and gives the same bits as implicitfast.
     *(
         _method(
             integrator,

@@ -127,9 +127,9 @@ def model(scene: Scene, integrator: str, step: float) -> ET.Element:
             numbers(math.cos(0.5 * scene.shaft_tilt), math.sin(0.5 * scene.shaft_tilt), 0.0, 0.0),
         )
     _joint(hub, 0, "0 1 0", 0.0, scene.shaft_damping)
-    # a thin disc about the shaft: the other two moments are never felt
+    # A thin disc about the shaft: the other two moments have no effect.
     half = 0.5 * scene.hub_inertia
-    # Neither is its mass, but by the shaft's bearing.
+    # The mass affects the load on the shaft bearing only.
     hub_mass = scene.hub_mass if scene.wants("loads") else 0.0
     _inertial(hub, hub_mass, (0.0, 0.0, 0.0), (half, scene.hub_inertia, half, 0.0, 0.0, 0.0))
     for number in range(1, len(scene.blades) + 1):
@@ -363,5 +363,5 @@ def _header(scene: Scene, steps: int, has_loads: bool) -> str:
         "Point masses have the least inertia that MuJoCo compiles, 2e-15 kg m^2 about "
         "the centre of mass."
     )
-    # Two hyphens end a comment.
+    # XML allows no two hyphens in a comment.
     return "\n  " + "\n  ".join(line.replace("--", "- -") for line in lines) + "\n"

@@ -49,8 +49,8 @@ _BAD_STATE_WARNINGS = (
     _engine.mjtWarning.mjWARN_BADQACC,
 )
 
-# Steps in one call, a few hundredths of a second: the engine looks for no signal and no time limit
-# in between.
+# Steps in one call, a few hundredths of a second: the engine checks neither signals nor the time
+# limit in between.
 _PORTION = 10_000
 
 

@@ -102,7 +102,7 @@ class PrintedSolver:
         if scene.wants("loads"):
             before = np.nextafter(time, 0.0).tolist()  # where a torque jumps, the value before it
             torque = np.array([scene.torque_at(t) for t in before])
-            # zero of a fixed pitch
+            # Zero for pitches that are fixed.
             accelerations = np.zeros((len(time), len(scene.initial_angles)))
             for row, t, state in zip(accelerations, before, states.tolist(), strict=True):
                 row[: self._moving] = self._right_hand_side(t, state)[self._moving :]
@@ -230,7 +230,7 @@ def right_hand_side(scene: Scene, accelerations: Accelerations, moving: int) -> 
         torques = constant or [value_at(table, t) for table in tables]
         try:
             return [*y[moving:], *accelerations(torques, y)]
-        # the last is the sine of an infinite angle
+        # ValueError is that of the sine of an infinite angle.
         except (ZeroDivisionError, OverflowError, ValueError):
             return undefined
 
