@@ -388,8 +388,8 @@ class System:
         total : to which steps and evaluations are added.
         """
         failure = ""
-        # Signals go to the caller: the engine would replace their exceptions, as of Ctrl-C, by its
-        # own.
+        # The engine replaces exceptions of signal handlers, as of Ctrl-C, by its own; here they
+        # reach the caller.
         with caller_signals():
             try:
                 if not solver.SolveSystem(self._mbs, settings):
