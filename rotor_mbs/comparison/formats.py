@@ -91,12 +91,17 @@ def read_in_worker(arguments: tuple[Path, str, str]) -> DataTable:
     ----------
     arguments : path, group and scene, see `read_columns`.
 
+    Returns
+    -------
+    DataTable
+        The columns of the file; names and units are cut to a bounded length.
+
     Raises
     ------
     InputError
-        For what cannot be read, with names and messages of bounded length.
+        If the file cannot be read; names and messages are of bounded length.
     MemoryError
-        If it takes more memory than the process has.
+        If reading takes more memory than the process has.
     """
     path, group, scene = arguments
     csv.field_size_limit(MAX_BYTES)
@@ -125,7 +130,7 @@ def _line(exc: BaseException) -> str:
 
 
 def _short_names(by_name: Mapping[str, Any]) -> dict[str, Any]:
-    """Cut names that are too long for messages and pages; they stay distinct."""
+    """Return values by names of bounded length, which stay distinct."""
     short = {}
     for number, (name, value) in enumerate(by_name.items(), start=1):
         label = name if len(name) <= MAX_NAME else f"{name[:MAX_NAME]}... (column {number})"
@@ -138,13 +143,14 @@ def read_columns(path: Path, group: str, scene: str) -> DataTable:
 
     Parameters
     ----------
-    path : the file; what it is is decided by its first bytes.
+    path : the file; its format is recognized by its first bytes, that of `.outb` by its ending.
     group, scene : of an HDF5 file, see `runs.arrays.read_arrays`.
 
     Raises
     ------
     RotorError
-        For a file that cannot be read, in one line; any library's exceptions besides.
+        If the file cannot be read, with a message of one line. Other exceptions of the libraries
+        are not caught here.
     """
     with path.open("rb") as file:
         head = file.read(1024)
@@ -183,7 +189,22 @@ def _refuse_large(path: Path, size: float) -> None:
 
 
 def _numpy_archive(path: Path) -> Arrays:
-    """Read the arrays of an .npz file; those of objects are named by what they are."""
+    """Read the arrays of an .npz file.
+
+    Parameters
+    ----------
+    path : the file.
+
+    Returns
+    -------
+    dict
+        Arrays by name; for an array of objects a list of texts, which `table_of` leaves out.
+
+    Raises
+    ------
+    InputError
+        If the arrays claim more than `MAX_BYTES`.
+    """
     # An entry is read to the size that the archive declares for it, and no further.
     with zipfile.ZipFile(path) as entries:
         _refuse_large(path, sum(entry.file_size for entry in entries.infolist()))
@@ -203,13 +224,18 @@ def _numpy_archive(path: Path) -> Arrays:
 
 
 def _is_matlab_4(head: bytes) -> bool:
-    """Whether a file begins with the head of an array as MATLAB 4 writes it.
+    """Return whether a file begins with the header of an array as MATLAB 4 writes it.
 
-    Five whole numbers: machine, precision and kind as decimal digits; rows, columns, whether it is
-    complex, length of the name.
+    The header has five whole numbers: machine, precision and kind as decimal digits of one number;
+    rows; columns; whether the array is complex; length of its name.
+
+    Parameters
+    ----------
+    head : the first bytes of the file; fewer than 20 are no header.
     """
     if len(head) < 20:
         return False
+    # Files are written in the order of bytes of their machine: both are tried.
     for order in "<>":
         kind, rows, columns, is_complex, length = struct.unpack(f"{order}5i", head[:20])
         digits = kind // 1000, kind // 100 % 10, kind // 10 % 10, kind % 10
@@ -220,12 +246,22 @@ def _is_matlab_4(head: bytes) -> bool:
 
 
 def _matlab(path: Path, *, is_hdf5: bool) -> Arrays:
-    """Read a MAT file of any version; fields of structures are named "structure/field".
+    """Read the arrays of a MAT file of any version.
 
     Parameters
     ----------
     path : the file.
-    is_hdf5 : whether it is of version 7.3.
+    is_hdf5 : whether it is of version 7.3, which is HDF5.
+
+    Returns
+    -------
+    dict
+        Arrays by name; those of structures by "structure/field", of cells by "name/1".
+
+    Raises
+    ------
+    RotorError
+        If the arrays claim more than `MAX_BYTES`.
     """
     from pymatreader import read_mat  # late: 0.2 s
     from scipy.io import whosmat
@@ -244,12 +280,19 @@ def _matlab(path: Path, *, is_hdf5: bool) -> Arrays:
 
 
 def _parts(path: str, value: Any) -> Iterator[tuple[str, Any]]:
-    """Yield what is nested, by path: "out/q", "cells/1"; at most `_MAX_PARTS`."""
+    """Yield the first `_MAX_PARTS` nested arrays with their paths, "out/q" or "cells/1"."""
     yield from itertools.islice(_all_parts(path, value), _MAX_PARTS)
 
 
 def _all_parts(path: str, value: Any) -> Iterator[tuple[str, Any]]:
-    """Yield the arrays of nested mappings and lists of anything but numbers."""
+    """Yield the arrays in nested mappings, lists and cells with their paths.
+
+    Parameters
+    ----------
+    path : of the value, "" for the whole file.
+    value : a mapping, whose fields are yielded; a list, or array of objects, whose entries are
+        yielded from "path/1" on; anything else, and a list of rows of numbers, is yielded itself.
+    """
     prefix = f"{path}/" if path else ""
     if isinstance(value, Mapping):
         fields = dict(value)
@@ -273,7 +316,7 @@ def _all_parts(path: str, value: Any) -> Iterator[tuple[str, Any]]:
 
 
 def _sample(value: Any) -> Any:
-    """Return a list for what has parts, a number for what has none."""
+    """Return a list in place of a value that has parts, a number in place of any other."""
     return [0] if isinstance(value, list | dict | np.ndarray) and len(value) else 0
 
 
@@ -292,7 +335,22 @@ def _signals(prefix: str, signals: Mapping[str, Any]) -> Iterator[tuple[str, Any
 
 
 def _netcdf_3(path: Path) -> tuple[Arrays, Mapping[str, Mapping[str, Any]]]:
-    """Read the variables of a netCDF-3 file and their attributes; path: the file."""
+    """Read the variables of a netCDF-3 file and their attributes.
+
+    Parameters
+    ----------
+    path : the file.
+
+    Returns
+    -------
+    arrays, attributes : dict
+        By name of the variable its numbers as they are stored, and its attributes by their names.
+
+    Raises
+    ------
+    InputError
+        If the arrays claim more than `MAX_BYTES`.
+    """
     from scipy.io import netcdf_file
 
     from rotor_mbs.runs.arrays import ARRAY_ATTRIBUTES
@@ -311,7 +369,7 @@ def _netcdf_3(path: Path) -> tuple[Arrays, Mapping[str, Mapping[str, Any]]]:
             for key in ARRAY_ATTRIBUTES:
                 if hasattr(variable, key):
                     attributes[name][key] = getattr(variable, key)
-            # Of the netCDF library, which fills rows that nobody writes.
+            # The netCDF library fills rows that were never written with this number.
             fill = _DEFAULT_FILL.get(arrays[name].dtype.str[1:])
             if fill is not None:
                 attributes[name].setdefault("_FillValue", fill)
@@ -319,7 +377,19 @@ def _netcdf_3(path: Path) -> tuple[Arrays, Mapping[str, Mapping[str, Any]]]:
 
 
 def _hdf5(path: Path, group: str, scene: str) -> DataTable:
-    """Read the arrays of a group of an HDF5 file, of this program's own or of any other."""
+    """Read the arrays of one group of an HDF5 file, written by this program or by another.
+
+    Parameters
+    ----------
+    path : the file.
+    group, scene : which group, see `runs.arrays.read_arrays`.
+
+    Raises
+    ------
+    RotorError
+        If the file cannot be read, claims more than `MAX_BYTES`, or has the layout of pandas'
+        `to_hdf`.
+    """
     from rotor_mbs.runs import arrays as hdf5_arrays  # late: 0.2 s
     from rotor_mbs.runs.design import RUNS
     from rotor_mbs.runs.read import run_arrays
@@ -345,13 +415,21 @@ def _hdf5(path: Path, group: str, scene: str) -> DataTable:
 
 
 def _decoded(source: str, arrays: Arrays, attributes: Mapping[str, Mapping[str, Any]]) -> DataTable:
-    """Return arrays as columns, unpacked as the CF conventions say: scales, missing values.
+    """Return stored arrays as columns, unpacked as the CF conventions say.
+
+    Scales and offsets are applied, missing values become NaN; times stay numbers. An array in which
+    packing has overflown is left out.
 
     Parameters
     ----------
     source : what messages call the file.
     arrays : by name, as they are stored.
-    attributes : by name of the array.
+    attributes : by name of the array, its attributes by their names.
+
+    Raises
+    ------
+    InputError
+        See `table_of`.
     """
     import xarray as xr  # late: 0.4 s
 
@@ -401,13 +479,28 @@ def _decoded(source: str, arrays: Arrays, attributes: Mapping[str, Mapping[str, 
 
 
 def _openfast(path: Path) -> tuple[Arrays, Units]:
-    """Read OpenFAST's binary output by its own project's reader; path: the file."""
+    """Read OpenFAST's binary output by the reader of its own project, openfast_io.
+
+    Parameters
+    ----------
+    path : the file.
+
+    Returns
+    -------
+    dict, dict
+        Arrays by name; units by name.
+
+    Raises
+    ------
+    InputError
+        If openfast_io is not installed, or the file has fewer numbers than its header claims.
+    """
     try:
         from openfast_io.FAST_output_reader import load_binary_output
     except ImportError as exc:
         hint = 'pip install "rotor_mbs[openfast]", or text output (OutFileFmt 1)'
         raise InputError(f"{path}: openfast_io is not installed; allowed: {hint}") from exc
-    # That reader allocates what the head claims.
+    # That reader allocates what the header claims, so that the claim is checked before.
     with path.open("rb") as file:
         head = file.read(12)
     counts = struct.unpack_from("<ii", head, 4 if head[:2] == b"\x04\x00" else 2)  # channels, rows
@@ -425,16 +518,28 @@ def _openfast(path: Path) -> tuple[Arrays, Units]:
 
 
 def _is_json(text: str) -> bool:
-    """Whether a text begins as JSON: an object, or a list of objects or lists."""
+    """Return whether a text begins as JSON: an object, or a list of objects or lists."""
     begin = text[:1000].lstrip()
     return begin.startswith("{") or (begin[:1] == "[" and begin[1:].lstrip()[:1] in "[{")
 
 
 def _json(text: str) -> tuple[Arrays, Units]:
-    """Read arrays by name, or a table in any of the forms that pandas writes.
+    """Read JSON with arrays by name, or a table in any of the forms that pandas writes.
 
-    Rows as objects, in one list or a line each; {"columns": ..., "data": ...}; a column, or a row,
-    as an object of its own.
+    Parameters
+    ----------
+    text : content of the file. A table has its rows as objects, in one list or a line each; or is
+        {"columns": ..., "data": ...}; or has each column, or each row, as an object.
+
+    Returns
+    -------
+    dict, dict
+        Arrays by name; units by name.
+
+    Raises
+    ------
+    ValueError
+        If the text is no JSON, or a list of anything but objects.
     """
     import pandas as pd  # late: 0.3 s
 
@@ -480,11 +585,12 @@ def _read_text(source: str, text: str) -> DataTable:
     Raises
     ------
     InputError
-        With the line that has another number of fields.
+        If there are no rows of numbers, no names for the columns, or lines with different numbers
+        of fields.
     """
     lines = []
     for number, line in enumerate(text.splitlines(), start=1):
-        # Lines of nothing but dividers are what spreadsheets write for empty rows.
+        # Spreadsheets write lines of nothing but dividers for empty rows.
         if line.strip(" \t,;"):
             lines.append((number, line.strip(" ")))
     lines = _with_vectors_as_columns(lines)
@@ -528,16 +634,21 @@ def _read_text(source: str, text: str) -> DataTable:
 
 
 def _is_closing(line: str, divider: str | None, width: int) -> bool:
-    """Whether a last line is text and no row: "This output file was closed on 19-Oct-2018."."""
+    """Return whether a last line is text, no row: "This output file was closed on 19-Oct-2018."."""
     fields = _fields(line, divider)
     numbers, others = _kinds_of_fields(fields, divider)
     return not line.startswith(_COMMENT) and not numbers and bool(others) and len(fields) != width
 
 
 def _with_vectors_as_columns(lines: list[tuple[int, str]]) -> list[tuple[int, str]]:
-    """Return lines in which vectors in fields are columns: "time,y" above "0,1 2 3" of FMI 3.
+    """Return lines in which each entry of a vector has a field of its own.
 
-    Lines of other files are returned as they are.
+    FMI 3 writes a vector into one field: "time,y" above "0,1 2 3" becomes "time","y[0]","y[1]",
+    "y[2]" above 0,1,2,3.
+
+    Parameters
+    ----------
+    lines : lines of the file and their numbers; without such vectors they are returned unchanged.
     """
     for (_, above), (_, row) in itertools.pairwise(lines[:_MAX_SEARCHED]):
         for divider in (",", ";"):
@@ -574,18 +685,19 @@ def _exudyn(
     Parameters
     ----------
     source : what messages call the file.
-    comments : above the numbers.
-    columns : of numbers.
+    comments : the lines of comments above the numbers.
+    columns : (n,) numbers of each column, the time first.
 
     Returns
     -------
     DataTable or None
-        None for another file. Of several solves in one file the last one.
+        Columns named by the head of the file, of several solves the last one; None for a file of
+        another kind.
 
     Raises
     ------
     InputError
-        For something else than numbers, or another number of columns than the head says.
+        If a column is not of numbers, or there are more or fewer columns than the head says.
     """
     head = "\n".join(comments)
     variable, written = _EXUDYN.search(head), _EXUDYN_SOLUTION.search(head)
@@ -624,7 +736,7 @@ def _first_row(source: str, lines: Lines) -> tuple[int, str | None]:
     Parameters
     ----------
     source : what messages call the file.
-    lines : of the file, with their numbers.
+    lines : lines of the file and their numbers.
 
     Returns
     -------
@@ -634,7 +746,7 @@ def _first_row(source: str, lines: Lines) -> tuple[int, str | None]:
     Raises
     ------
     InputError
-        Where there is none, with the row that comes nearest.
+        If there is no row of numbers; the message has the line with the most numbers.
     """
     most_numbers, nearest = 0, ""  # of the row that comes nearest, and what in it is no number
     for place, (number, line) in enumerate(lines):
@@ -659,7 +771,18 @@ def _first_row(source: str, lines: Lines) -> tuple[int, str | None]:
 
 
 def _first_row_with_texts(lines: Lines) -> tuple[int, str | None] | None:
-    """Find the first of two rows with numbers and texts below a line of as many texts."""
+    """Find the first of two rows with numbers and texts below a line of as many texts.
+
+    Parameters
+    ----------
+    lines : lines of the file and their numbers, of which `_MAX_SEARCHED` are searched.
+
+    Returns
+    -------
+    (int, str or None) or None
+        Place of the row in `lines`, and what divides its fields, None for blanks; None if there
+        are no such rows.
+    """
     plain = []
     for place, (_, line) in enumerate(lines[:_MAX_SEARCHED]):
         if not line.startswith(_COMMENT):
@@ -700,7 +823,7 @@ def _fields(line: str, divider: str | None) -> list[str]:
 
 
 def _is_number(field: str, *, decimal_comma: bool) -> bool:
-    """Whether a field is a number, with `decimal_comma` also one like 1,5."""
+    """Return whether a field is a number, with `decimal_comma` also one like 1,5."""
     try:
         float(field)
     except ValueError:
@@ -716,18 +839,19 @@ def _columns_of_rows(
     Parameters
     ----------
     source : what messages call the file.
-    rows : the lines of numbers.
-    divider : what divides them.
+    rows : the lines of numbers, and their numbers in the file.
+    divider : what divides the fields of a line, None for blanks.
 
     Returns
     -------
     list of ndarray or LeftOut
-        (n,) numbers of each column, NaN where a field is empty; or the first field that is none.
+        (n,) numbers of each column, NaN where a field is empty; or the first field that is no
+        number.
 
     Raises
     ------
     InputError
-        With the line that has another number of fields.
+        If a line has another number of fields than the first, or there are too many columns.
     """
     import pandas as pd  # late: 0.3 s
 
@@ -784,13 +908,18 @@ def _refuse_ragged(source: str, rows: Lines, divider: str | None, width: int) ->
 def _numbers_of_texts(
     fields: NDArray[Any], rows: Lines, *, is_comma: bool
 ) -> NDArray[np.float64] | LeftOut:
-    """Return a column that pandas has left as texts: Fortran's numbers, or the first that is none.
+    """Return the numbers of a column that pandas has left as texts, as it does Fortran's numbers.
 
     Parameters
     ----------
     fields : (n,) texts and numbers, NaN where a field is empty.
-    rows : their lines.
+    rows : the n lines, and their numbers in the file.
     is_comma : whether numbers have decimal commas.
+
+    Returns
+    -------
+    ndarray or LeftOut
+        (n,) numbers; or the first field that is no number.
     """
     numbers = np.empty(len(fields))
     for i, field in enumerate(fields):
@@ -808,14 +937,19 @@ def _numbers_of_texts(
 def _names(
     source: str, head: Sequence[str], width: int, divider: str | None
 ) -> list[tuple[str, str]]:
-    """Return name and unit of each column, from the last line of the head, or from the last two.
+    """Return name and unit of each column from the last one or two lines above the numbers.
 
     Parameters
     ----------
     source : what messages call the file.
     head : lines above the numbers.
     width : number of columns.
-    divider : what divides the numbers; the names may be divided otherwise.
+    divider : what divides the numbers, None for blanks; the names may be divided otherwise.
+
+    Raises
+    ------
+    InputError
+        If there is no line above the numbers, or it has another number of names than columns.
     """
     if not head:
         allowed = "a line such as: time [s],rotor [rad]"
@@ -842,7 +976,7 @@ def _names(
 
 
 def _words(line: str, divider: str | None, width: int) -> list[str]:
-    """Return the names in a line of the head; they may be divided otherwise than numbers are."""
+    """Return the names in a line of the head, divided as the numbers are or otherwise."""
     words = _fields(line, divider)
     if len(words) in (width, width - 1) and divider is not None:
         return words

@@ -1,4 +1,4 @@
-"""Loads of another program against the closed form's at the data's own states; what is wrong."""
+"""Loads of another program against the closed form's at the data's own states; likely causes."""
 
 from __future__ import annotations
 
@@ -63,12 +63,14 @@ class LoadComparison:
 
 @dataclass(frozen=True)
 class Component:
-    """What a column of loads may be: a factor times (n,) values.
+    """A component of loads that a column may be.
 
     Attributes
     ----------
-    shown : of which component.
-    is_shifted : whether the first and the last row are not known.
+    factor : the column is this factor times `values`.
+    values : (n,) N or N m.
+    shown : " is <name>" if it is another component than the column's name says, else "".
+    is_shifted : whether it is moved by a row, so that the first and the last row are not known.
     """
 
     factor: float
@@ -86,8 +88,8 @@ class JudgedLoads:
     scene, channels : the scene, and the channels of the data.
     known : all components of loads of the scene, as the columns of `by_frame`.
     by_frame : by frame the (n, components) loads of the closed form.
-    mistaken : by what is wrong, in words, the same otherwise computed.
-    hub_weight : what the hub's weight is of them.
+    mistaken : by a mistake, in words, the loads by frame that a program with it computes.
+    hub_weight : by frame the share of the hub's weight in the loads.
     time : (n,) s.
     is_inside : (n,) rows that are neither the first nor the last one.
     values, rounding, expected : (n, channels) N or N m.
@@ -111,24 +113,23 @@ class JudgedLoads:
 
     @property
     def frames(self) -> tuple[str, ...]:
-        """The frames that differ from one another in the scene."""
+        """Return the frames that differ from one another in the scene."""
         return distinct_frames(self.scene)
 
     def scale(self, j: int, component: Array) -> float:
-        """Return the size by which errors of channel j are judged, if it is this component."""
+        """Return the size by which errors of channel j are judged if it is a component, (n,)."""
         largest = float(np.abs(component).max(initial=0.0))
         return max(largest, float(self.smallest_scale[j])) or 1.0
 
     def left(self, j: int, component: Component, *, may_vanish: bool = False) -> float:
-        """Return by how much more than allowed is left if a channel is a component.
-
-        Infinite for a component that is next to nothing, which anything small fits.
+        """Return the error that is left, less the allowed one, if a channel is a component.
 
         Parameters
         ----------
-        j : the channel's number.
-        component : what it may be.
-        may_vanish : whether it may be next to nothing all the same.
+        j : number of the channel.
+        component : what the channel may be.
+        may_vanish : whether a component near zero is tried too; by default the result is infinite
+            for it, as it fits anything small.
         """
         factor, values = component.factor, component.values
         rounding = FLOOR_SAFETY * self.rounding[:, j] / min(abs(factor), 1)
@@ -150,19 +151,21 @@ def loads_by_frame(
 
     Parameters
     ----------
-    scene : the scene.
+    scene : the rotor.
     time : (n,) s.
-    angles, rates : (n, 1 + blades) rad and rad/s.
-    parts : what of them is forgotten.
+    angles, rates : (n, 1 + blades) rad and rad/s, rotor first.
+    parts : factors of the weight and the inertia forces, to leave some of them out.
 
     Returns
     -------
     dict of ndarray
-        By frame, (n, components) N or N m in the order of `channels`. What has no components in a
-        frame is as it is in its own.
+        By frame, (n, components) N or N m in the order of `channels`. A load that has no components
+        in a frame is given in its own.
     """
     loads = partial_loads(scene, time, angles, rates, parts)
     by_frame = {frame: dict(loads) for frame in _FRAMES}
+    # One rotation after the other: from the blade's frame by the pitch to the coned one, by the
+    # cone to the rotor's, by the azimuth to the shaft's, by the tilt to the base.
     azimuths = angles[:, :1] + np.array(scene.phases)
     cones = np.array([blade.cone for blade in scene.blades])
     for name, values in loads.items():
@@ -186,20 +189,24 @@ def loads_by_frame(
 
 
 def distinct_frames(scene: Scene) -> tuple[str, ...]:
-    """Return the frames that differ from one another in a scene, "" for that of its own loads."""
+    """Return the frames that differ in a scene, "" for those of its own loads."""
     return tuple(frame for frame in _FRAMES if _plain_frame(scene, frame) == frame)
 
 
 def shaft_direction(scene: Scene, frame: str) -> Array:
-    """Return the direction of the shaft in the frame of a shaft load, (3,)."""
+    """Return the unit vector along the shaft, (3,), in a frame of the shaft's loads."""
     tilt = 0.0 if frame in ("shaft", "rotor") else scene.shaft_tilt
     return np.array([0.0, math.cos(tilt), math.sin(tilt)])
 
 
 def _plain_frame(scene: Scene, frame: str, of_shaft: bool = False) -> str:
-    """Return the frame that is the same as another one in a scene without tilt or cone.
+    """Return a frame, or the one that it is the same as in a scene without tilt or cone.
 
-    of_shaft: whether it is that of a shaft load, which has its components in the base frame.
+    Parameters
+    ----------
+    scene : the rotor, with tilt and cones.
+    frame : one of `_FRAMES`.
+    of_shaft : whether it is that of a shaft load, whose own frame is the base.
     """
     if frame == "coned" and not any(blade.cone for blade in scene.blades):
         return "rotor"
@@ -220,18 +227,18 @@ def _turned(vectors: Array, angle: Array | float, axis: int) -> Array:
 def compare_loads(
     scene: Scene, loads: ForeignData, defects: Defects, tolerance: float
 ) -> LoadComparison:
-    """Compare each component with the closed form's at the data's own states.
+    """Compare each component of loads with the closed form's at the data's own states.
 
-    Errors are relative to the component's largest, beyond what the rounding of states and loads
-    explains. Rows at a jump of a torque are left out: a load has its value before the jump, or
-    after it.
+    Errors are relative to the component's largest value, beyond what the rounding of states and
+    loads explains. Rows at a jump of a prescribed load are left out, as a program may write the
+    value before the jump or after it.
 
     Parameters
     ----------
-    scene : the scene.
-    loads : loads alone, from the first row of the defects on.
-    defects : interval defects of the motion beside them, which has its states and their rounding.
-    tolerance : of a component's largest.
+    scene : the rotor.
+    loads : channels of loads alone, from the first row of `defects` on.
+    defects : interval defects of the motion of the data, with its states and their rounding.
+    tolerance : largest allowed error, relative to a component's largest value.
     """
     expected, loads_in_rows = _loads_in_rows(scene, loads, defects, tolerance)
     errors, wrong, message = _load_errors(loads_in_rows)
@@ -244,7 +251,7 @@ def compare_loads(
 def _loads_in_rows(
     scene: Scene, loads: ForeignData, defects: Defects, tolerance: float
 ) -> tuple[Array, JudgedLoads]:
-    """Compute the loads at the states of the data, and choose the judged rows.
+    """Compute the loads at the states of the data, and choose the rows that are judged.
 
     Parameters
     ----------
@@ -252,8 +259,10 @@ def _loads_in_rows(
 
     Returns
     -------
-    ndarray, JudgedLoads
-        (rows, channels) N or N m; the rows that are judged.
+    expected : ndarray
+        (rows, channels) N or N m, loads of the closed form in all rows.
+    judged_loads : JudgedLoads
+        The rows that are judged.
     """
     states, time, half = defects.states, defects.time, len(defects.moving)
     known = [channel for channel in channels(scene) if channel.is_load]
@@ -279,7 +288,8 @@ def _loads_in_rows(
         if channel.kind == "moment":
             arms[j] = longest_arm(scene)
     rounding = loads.rounding[: len(time)] + _LOAD_ROUNDING * largest_force[:, None] * arms
-    # The loads are those at states that are rounded, too: by their derivative, state by state.
+    # The states are rounded, too: the derivative of the loads by each of them, from a forward
+    # difference, gives what this makes of the loads.
     for i in range(2 * half):
         step = _STATE_STEP * np.maximum(np.abs(states[:, i]), 1.0)
         moved = states.copy()
@@ -298,7 +308,7 @@ def _loads_in_rows(
         mistaken[text] = {
             frame: np.roll(matrix, late, axis=0) for frame, matrix in by_frame.items()
         }
-    # Nobody knows of the first and last row what stands before and behind them.
+    # Of loads that are a row late or early, those of the first and last row are not known.
     is_inside = judged & (np.arange(len(time)) > 0) & (np.arange(len(time)) < len(time) - 1)
     judged_loads = JudgedLoads(
         scene=scene,
@@ -322,7 +332,7 @@ def _loads_in_rows(
 
 
 def is_at_jump(scene: Scene, time: Array) -> NDArray[np.bool_]:
-    """Whether each of (n,) times is one at which a prescribed load jumps."""
+    """Return for each of (n,) times, s, whether a prescribed load of a scene jumps at it."""
     at_jump = np.zeros(len(time), bool)
     for table in scene.load_tables:
         for (before, _), (after, _) in itertools.pairwise(table):
@@ -333,12 +343,20 @@ def is_at_jump(scene: Scene, time: Array) -> NDArray[np.bool_]:
 
 
 def _load_errors(loads: JudgedLoads) -> tuple[tuple[ChannelErrors, ...], list[int], str]:
-    """Judge each component of `loads`.
+    """Judge each component of loads.
+
+    Parameters
+    ----------
+    loads : the rows that are judged.
 
     Returns
     -------
-    tuple of ChannelErrors, list of int, str
-        By channel; the channels that are wrong; why the worst of them is, "" where none is.
+    errors : tuple of ChannelErrors
+        One for each channel.
+    wrong : list of int
+        Numbers of the channels that are wrong.
+    message : str
+        What is wrong with the worst channel, "" where none is.
     """
     errors, wrong = [], []
     message, largest = "", 0.0
@@ -362,6 +380,7 @@ def _load_errors(loads: JudgedLoads) -> tuple[tuple[ChannelErrors, ...], list[in
                 defect_unit="of the largest",
             )
         )
+        # Comparisons are negated, so that NaN is wrong.
         if not worst <= loads.tolerance:
             wrong.append(j)
         if not worst <= max(loads.tolerance, largest):
@@ -376,12 +395,17 @@ def _load_errors(loads: JudgedLoads) -> tuple[tuple[ChannelErrors, ...], list[in
 
 
 def _explained(loads: JudgedLoads, wrong: Sequence[int]) -> tuple[str, ...]:
-    """Search for what is wrong with components, in words with the names of all that are alike.
+    """Search for causes of the wrong components, each with the names of its channels.
 
     Parameters
     ----------
-    loads : the loads.
+    loads : the rows that are judged.
     wrong : numbers of the channels that are wrong.
+
+    Returns
+    -------
+    tuple of str
+        Causes in words; none where nothing fits.
     """
     by_channel: dict[int, list[Explanation[Component]]] = {}
     unexplained: dict[tuple[str, str], list[int]] = {}  # moments by load and frame
@@ -410,14 +434,15 @@ def _explained(loads: JudgedLoads, wrong: Sequence[int]) -> tuple[str, ...]:
 
 
 def _component_hypotheses(loads: JudgedLoads, j: int) -> Iterator[Hypothesis[Component]]:
-    """Yield what a channel may be.
+    """Yield the components that a channel may be.
 
-    In another unit, sign, axis or frame, another load, or with the torque on the rotor in it.
+    It may have another unit, sign, axis or frame; be another load; lack the hub's weight or have
+    the torque on the rotor in it; lack inertia forces; or be a row late or early.
 
     Parameters
     ----------
-    loads : the loads.
-    j : the channel's number.
+    loads : the rows that are judged.
+    j : number of the channel.
     """
     channel = loads.channels[j]
     name = channel.name.partition(",")[0]
@@ -467,13 +492,13 @@ def _shared_texts(
 
     Parameters
     ----------
-    loads : the loads.
-    by_channel : explanations by the channel's number.
+    loads : the rows that are judged.
+    by_channel : explanations by the number of the channel.
 
     Returns
     -------
     dict
-        By text the channels' names, with the component that each is.
+        By text of the explanation the channels' names, with the component that each is.
     """
     shown_by_text: dict[int, dict[str, str]] = {}
     for j, explained in by_channel.items():
@@ -489,14 +514,16 @@ def _shared_texts(
 
 
 def _other_point(loads: JudgedLoads, load: str, frame: str, group: Sequence[int]) -> str:
-    """Search for the point about which moments of one load are: M - p × F = M + F × p.
+    """Search for another point about which the moments of one load may be taken.
+
+    About a point p, the moment M of a force F is M - p × F = M + F × p.
 
     Parameters
     ----------
-    loads : the loads.
+    loads : the rows that are judged.
     load : name of the moment, such as "blade root moment 1".
-    frame : of its components.
-    group : its channels.
+    frame : frame of its components, "" for its own.
+    group : numbers of its channels.
 
     Returns
     -------
@@ -530,7 +557,8 @@ def _other_point(loads: JudgedLoads, load: str, frame: str, group: Sequence[int]
         for name, place in (("the centre of mass", blade.centre_of_mass), ("the tip", blade.tip)):
             for factor in _FACTORS:
                 add(name, np.array(place) - root, factor)
-    # Any point: by least squares over the wrong components.
+    # Any other point follows by least squares from the wrong components, as M + F × p is linear in
+    # p; rcond leaves out the direction of a force that does not change.
     frame_name = _frame_name(loads.channels[group[0]], frame)
     for factor in _FACTORS:
         difference = (loads.values[:, group] / factor - moment).ravel()

@@ -91,7 +91,7 @@ class ReferencedRows:
 
 @dataclass(frozen=True)
 class TrajectoryErrors:
-    """How far data are from the reference, by every measure that is judged.
+    """Errors of data against the reference, by every measure that is judged.
 
     Attributes
     ----------
@@ -129,17 +129,17 @@ def compare_with_reference(
 ) -> tuple[DataVerdict, Record]:
     """Compare a trajectory with the reference of a scene.
 
-    Judged are the first row, the defects of all rows, each channel's against its own rounding, and
-    the errors up to the horizon. Where they differ by more than rounding, it is searched what that
-    looks like.
+    Three things are judged: the first row, the defects of all rows (each channel's against its own
+    rounding), and the errors up to the horizon. Where these are larger than rounding explains, a
+    search for the likely cause follows.
 
     Parameters
     ----------
-    data : angles and rates, not all of them need be there, and loads.
-    scene : the scene that they are meant to be of.
-    tolerance : rad, of the defect of an interval beyond rounding.
+    data : angles and rates, some of which may be missing, and loads.
+    scene : the scene that the data are meant to be of.
+    tolerance : rad, the largest allowed defect of an interval beyond rounding.
     time_limit_s : s, for the reference, the defects and the search.
-    on_stage : called with what begins, and how many of how many stages are done.
+    on_stage : called as on_stage(name, done, stages) at the begin of each stage.
 
     Returns
     -------
@@ -243,13 +243,13 @@ def _reference_for(data: ForeignData, scene: Scene) -> tuple[ForeignData, TimedR
 
     Parameters
     ----------
-    data : angles and rates.
-    scene : the scene.
+    data : angles and rates, all rows.
+    scene : the rotor, its duration (s) and number of samples.
 
     Returns
     -------
     ForeignData, TimedReference
-        The rows up to the scene's end, and the reference.
+        The rows of `data` up to the scene's end, and the reference.
     """
     inside = data.rows(data.time <= scene.duration * (1.0 + _TIME_ROUNDING))
     end = float(np.max(inside.time, initial=scene.duration))
@@ -269,14 +269,14 @@ def _rows_with_reference(
     Parameters
     ----------
     data : angles and rates, all rows.
-    scene : the scene.
-    inside : the rows up to the scene's end.
+    scene : the rotor and its duration.
+    inside : the rows of `data` up to the scene's end.
     exact : the reference at their times and at the scene's samples.
 
     Raises
     ------
     InputError
-        For data without rows in the scene's duration.
+        If the data have no row in the scene's duration.
     """
     run = exact.trajectory
     places: NDArray[np.int64] = np.searchsorted(run.time, inside.time)
@@ -299,7 +299,8 @@ def _rows_with_reference(
     inside = replace(inside, values=values)
     compared = inside.rows(slice(len(places)))
     defects, note = defects_of_data(scene, compared, reference, until)
-    # A row is at its time to half a digit of that: by as much the motion goes on.
+    # The time of a row is known to half a digit: the rates of change turn this into an
+    # uncertainty of the row's numbers.
     changes = np.zeros((len(places), 2 * len(scene.initial_angles)))
     moving = scene.moving_coordinates
     columns = [*moving, *(len(scene.initial_angles) + i for i in moving)]
@@ -328,8 +329,8 @@ def _errors_of(
 
     Parameters
     ----------
-    data : angles and rates.
-    scene : the scene.
+    data : angles and rates; only which channels they have matters here.
+    scene : names the coordinates.
     tolerance : rad, of an interval's defect.
     rows : the data with their reference.
     """
@@ -362,13 +363,13 @@ def _errors_of(
 
 
 def _channel_errors(scene: Scene, rows: ReferencedRows, error: Array) -> tuple[ChannelErrors, ...]:
-    """Return the errors of each channel.
+    """Return the largest errors and defects of each channel.
 
     Parameters
     ----------
-    scene : the scene.
+    scene : says which coordinate a channel is of.
     rows : the data with their reference.
-    error : (rows, channels) absolute errors.
+    error : (rows, channels) absolute errors, rad and rad/s.
     """
     channels = []
     for j, channel in enumerate(rows.compared.channels):
@@ -376,8 +377,8 @@ def _channel_errors(scene: Scene, rows: ReferencedRows, error: Array) -> tuple[C
         known = defects_of_channel(scene, rows.defects, channel)
         if known is not None and rows.defects is not None and rows.defects.is_resolved.any():
             sizes, floors = known
-            # As of a run: what is allowed grows with the length of an interval and the error
-            # growth over it.
+            # Judged as those of a run: what is allowed grows with the length of an interval and
+            # the error growth over it.
             beyond_rounding = np.maximum(sizes - FLOOR_SAFETY * floors, 0.0)
             excess = rows.defects.in_bound_units(beyond_rounding)
             defect = float(excess[rows.defects.is_resolved].max())
@@ -417,12 +418,14 @@ class LargestSums(NamedTuple):
 
 
 def _largest_sums(scene: Scene, defects: Defects | None) -> LargestSums:
-    """Find the largest sums of defects over stretches of rows: a drift hides in single intervals.
+    """Find the largest sums of defects over stretches of rows.
+
+    A drift may be below the tolerance in each interval, and above it in their sum.
 
     Parameters
     ----------
     scene : names the coordinates.
-    defects : of the data, None where they are not known.
+    defects : interval defects of the data, None where they are not known.
     """
     largest = LargestSums()
     if defects is None:
@@ -443,14 +446,15 @@ def _largest_sums(scene: Scene, defects: Defects | None) -> LargestSums:
 
 
 def _beyond_digits(scene: Scene, tolerance: float, defects: Defects | None) -> float:
-    """Return how many times its own rounding the largest defect of an interval is.
+    """Return the largest ratio of an interval's defect to its rounding; 0 without defects.
 
-    Rounding alone makes no more than 3 of it: what is more is systematic, though it may be far
-    below the tolerance.
+    Rounding alone makes a ratio of at most 3: a larger one is systematic, though the defect may be
+    far below the tolerance.
 
     Parameters
     ----------
-    scene, tolerance, defects : as above; 0 without defects.
+    scene, tolerance : see `compare_with_reference`.
+    defects : interval defects of the data, None where they are not known.
     """
     if defects is None:
         return 0.0
@@ -466,7 +470,7 @@ def _findings(
     rows: ReferencedRows,
     errors: TrajectoryErrors,
 ) -> Iterator[tuple[str, str]]:
-    """Yield status and message of all that is wrong, the gravest first.
+    """Yield status and message of each finding, the most serious first.
 
     Parameters
     ----------
@@ -483,7 +487,13 @@ def _findings(
 def _wrong_first_row(
     tolerance: float, rows: ReferencedRows, errors: TrajectoryErrors
 ) -> Iterator[tuple[str, str]]:
-    """Yield a first row that is not the scene's initial state."""
+    """Yield the largest deviation of the first row from the scene's initial state.
+
+    Parameters
+    ----------
+    tolerance : rad and rad/s, beyond rounding.
+    rows, errors : the data with their reference, and their errors.
+    """
     compared = rows.compared
     off = errors.error[0] - tolerance - FLOOR_SAFETY * rows.rounding[0]
     worst = int(off.argmax())
@@ -495,7 +505,13 @@ def _wrong_first_row(
 
 
 def _wrong_defects(tolerance: float, errors: TrajectoryErrors) -> Iterator[tuple[str, str]]:
-    """Yield channels whose defects are above the tolerance, and a drift."""
+    """Yield the channels whose defects are above the tolerance, and a drift above it.
+
+    Parameters
+    ----------
+    tolerance : rad, beyond rounding.
+    errors : errors and defects of the data.
+    """
     # Comparisons are negated, so that NaN is wrong.
     known = [channel for channel in errors.channels if channel.defect is not None]
     for channel in sorted(known, key=lambda channel: -(channel.defect or 0.0)):
@@ -511,7 +527,7 @@ def _wrong_defects(tolerance: float, errors: TrajectoryErrors) -> Iterator[tuple
 def _wrong_errors(
     tolerance: float, rows: ReferencedRows, errors: TrajectoryErrors
 ) -> Iterator[tuple[str, str]]:
-    """Yield errors up to the horizon that are too large.
+    """Yield the largest error up to the horizon where it is too large.
 
     Parameters
     ----------
@@ -525,10 +541,10 @@ def _wrong_errors(
         size = f"error {channel.error_max:.1e} {channel.unit} up to the horizon"
         allowed = f"{growing:.1e} per unit of error growth, allowed {tolerance:.0e}"
         yield "inaccurate", f"{channel.name}: {size}, {allowed}"
-    # The bound is one of angles; it is held to rates where the data have no angles.
+    # The bound is for angles; it is applied to rates where the data have no angles.
     angles = [channel for channel in errors.channels if channel.unit == "rad"]
     largest = max(angles or errors.channels, key=lambda channel: channel.error_max)
-    # Without defects the errors are all that there is.
+    # Without defects the errors alone are judged, and by the smaller bound.
     has_defects = any(channel.defect is not None for channel in errors.channels)
     bound = OK_ERROR if has_defects else tolerance
     bound += FLOOR_SAFETY * float(rows.rounding[: rows.until].max(initial=0.0))
@@ -540,7 +556,14 @@ def _wrong_errors(
 def _missing_rows(
     data: ForeignData, scene: Scene, rows: ReferencedRows
 ) -> Iterator[tuple[str, str]]:
-    """Yield what the rows of `data` leave out of the motion of `scene`; rows: its reference."""
+    """Yield which parts of the scene's motion the data have no rows of.
+
+    Parameters
+    ----------
+    data : angles and rates, all rows.
+    scene : the scene, whose duration is to be covered.
+    rows : the rows of `data` with their reference.
+    """
     time, count = rows.reference.time, len(rows.places)
     last = min(scene.duration, float(rows.exact.trajectory.time[-1]))
     step = float(np.diff(time).max(initial=0.0))
@@ -557,7 +580,13 @@ def _missing_rows(
 def _unchecked_parts(
     data: ForeignData, rows: ReferencedRows, errors: TrajectoryErrors
 ) -> Iterator[tuple[str, str]]:
-    """Yield what cannot be checked of `data`; rows, errors: their reference and errors."""
+    """Yield which rows and coordinates of the data cannot be checked.
+
+    Parameters
+    ----------
+    data : angles and rates; its omitted channels are not missed.
+    rows, errors : the data with their reference, and their errors.
+    """
     defects, until = rows.defects, rows.until
     if until < _MIN_ROWS:
         yield "unchecked", f"{until} rows up to the horizon: too few to be compared"
@@ -582,7 +611,14 @@ def _unchecked_parts(
 def _notes_on_rows(
     data: ForeignData, scene: Scene, rows: ReferencedRows, errors: TrajectoryErrors
 ) -> list[str]:
-    """Return what a reader must know of the data, whatever the verdict."""
+    """Return notes on the data that are shown with every verdict.
+
+    Parameters
+    ----------
+    data : angles and rates, all rows.
+    scene : the scene, after whose end no rows are compared.
+    rows, errors : the data with their reference, and their errors.
+    """
     notes = [rows.note] if rows.note else []
     later = len(data.time) - len(rows.data.time)
     if later:
@@ -624,10 +660,11 @@ def _likely_causes(
     *,
     is_ok: bool,
 ) -> list[str]:
-    """Search for what the differences look like, in words.
+    """Search for likely causes of the differences, in words.
 
-    Data that agree may have defects that are correlated, by which another model is known;
-    mistakes in columns and times are looked for in data that do not agree.
+    In data that do not agree, mistakes in columns and times are searched for, then other models.
+    Data that agree may still have correlated defects, from which another model is recognized, or a
+    small mistake, if a defect is more than the digits of the data explain.
 
     Parameters
     ----------
@@ -641,7 +678,7 @@ def _likely_causes(
         has_rates = bool(np.isin(rates, data.columns).any())
         judged = judged_defects(scene, rows.defects, tolerance, has_fitted_rates=not has_rates)
     # The search has all rows, also those after the scene's duration.
-    turned = rows.data.values[0] - data.values[0]  # the turns that wrapped channels have got
+    turned = rows.data.values[0] - data.values[0]  # the turns that wrapped channels were given
     whole = replace(data, values=data.values + turned)
     worst = float(errors.per_growth[: rows.until].max())
     if is_ok:
