@@ -76,7 +76,7 @@ def channel_key(name: str) -> str:
 
 @dataclass(frozen=True)
 class Channel:
-    """What a column of data may be: "rotor", "pitch 1 rate", "shaft force x"; "frequency 1".
+    """A quantity that a column of data may be: "rotor", "pitch 1 rate", "shaft force x".
 
     Attributes
     ----------
@@ -96,7 +96,7 @@ class Channel:
 
     @property
     def key(self) -> str:
-        """Its key in a mapping file: "pitch_1_rate"."""
+        """Return the key in a mapping file: "pitch_1_rate"."""
         return channel_key(self.name)
 
     @property
@@ -108,7 +108,13 @@ class Channel:
         return self.kind in ("force", "moment")
 
     def in_frame(self, frame: str) -> Channel:
-        """Return the same component in another frame. Raises InputError if it has none there."""
+        """Return the same component in another frame.
+
+        Raises
+        ------
+        InputError
+            If the load has no components in this frame, or the channel is no load.
+        """
         own = ""
         if self.name.startswith("blade root"):
             own = "blade"
@@ -123,7 +129,12 @@ class Channel:
 
 
 def channels(scene: Scene) -> list[Channel]:
-    """Return the channels that data of a scene may have, the time first."""
+    """Return the channels that data of a scene may have, the time first.
+
+    Parameters
+    ----------
+    scene : the rotor, whose number of blades counts.
+    """
     labels = scene.coordinate_labels
     known = [Channel(TIME, "time", -1)]
     known += [Channel(label, "angle", i) for i, label in enumerate(labels)]
@@ -150,7 +161,7 @@ def mode_channels(scene: Scene) -> list[Channel]:
 
 
 def known_names() -> list[tuple[str, ...]]:
-    """Return what columns may be, and the names by which they are known, with the units."""
+    """Return rows of a table: what a column may be, and the names by which it is known."""
     affixes = f"the suffix {', '.join(RATE_WORDS[:-1])} or {RATE_WORDS[-1]}, or the prefix d"
     rows: list[tuple[str, ...]] = [
         ("time", ", ".join(TIME_NAMES)),
@@ -176,7 +187,7 @@ def known_names() -> list[tuple[str, ...]]:
 
 
 class Entry(NamedTuple):
-    """A numbered column as one of an array, `q[2,1]` or `pitch_2`.
+    """The name of a numbered column, `q[2,1]` or `pitch_2`, divided into array and numbers.
 
     Attributes
     ----------
@@ -192,7 +203,17 @@ class Entry(NamedTuple):
 
 
 def entry_of(name: str) -> Entry | None:
-    """Return the numbers of a column, in brackets or the last ones in it; None without any."""
+    """Return the numbers in a column's name and what surrounds them.
+
+    Parameters
+    ----------
+    name : of the column. Numbers in its last brackets count, else the last number.
+
+    Returns
+    -------
+    Entry or None
+        None for a name without numbers.
+    """
     plain = split_unit(name)[0]
     end = plain.rfind("]")
     start = plain.rfind("[", 0, max(end, 0))
@@ -209,17 +230,27 @@ def entry_of(name: str) -> Entry | None:
 
 
 class Place(NamedTuple):
-    """Where a column is in its array: how many columns that has; the column's indices from 0."""
+    """The place of a column in its array.
+
+    Attributes
+    ----------
+    columns : how many columns the array has.
+    indices : of the column, from 0.
+    """
 
     columns: int
     indices: tuple[int, ...]
 
 
 def places_of(names: Sequence[str]) -> dict[str, Place]:
-    """Return the places of numbered columns in their arrays.
+    """Return the places of numbered columns in their arrays, by name.
 
-    Modelica and FMI count from 1, Python from 0: an array has the index 0 or it counts from 1. A
-    dimension of length 1, as in `q[1,1]` ... `q[4,1]`, is none.
+    Modelica and FMI count from 1, Python from 0: a dimension in which no column has the number 0
+    counts from 1. A dimension of length 1, as in `q[1,1]` ... `q[4,1]`, is left out.
+
+    Parameters
+    ----------
+    names : of all columns of the data, as the others of its array decide what a number means.
     """
     arrays: dict[str, dict[str, tuple[int, ...]]] = {}
     for name in names:
@@ -272,7 +303,7 @@ def channel_from_name(
 
 
 def names_a_channel(name: str, known: Sequence[Channel]) -> bool:
-    """Whether a name is that of a channel, or of an array of channels."""
+    """Return whether a name is that of a channel, or of an array of channels."""
     if channel_from_name(name, 0, known) is not None:
         return True
     array = _array_name(split_unit(name)[0].rpartition("/")[2])
@@ -305,7 +336,12 @@ def _array_name(name: str) -> str:
 def _channel_of_path(
     name: str, vector: int, known: Sequence[Channel], indices: Sequence[int] | None
 ) -> Channel | None:
-    """Return the channel of a name of which nothing is left out; see `channel_from_name`."""
+    """Return the channel of a whole name, of which no folders are left out; None if unknown.
+
+    Parameters
+    ----------
+    name, vector, known, indices : see `channel_from_name`.
+    """
     plain = split_unit(name)[0].lower()
     entry = entry_of(plain)
     is_bracketed = entry is not None and plain[entry.start : entry.start + 1] == "["
@@ -369,7 +405,15 @@ def _has_one_blade(known: Sequence[Channel]) -> bool:
 def _mode_channel(
     plain: str, known: Sequence[Channel], *, is_entry: bool, indices: Sequence[int] | None
 ) -> Channel | None:
-    """Return the speed or a frequency; plain: the name without its unit."""
+    """Return the channel of a table of modes that a name suggests, None where it suggests none.
+
+    Parameters
+    ----------
+    plain : the name without its unit, in lower case.
+    known : `mode_channels`.
+    is_entry : whether the number stands in brackets, where it counts from 0.
+    indices : see `Place`; None where the number in the name counts.
+    """
     letters, numbers = re.sub(r"[^a-z]", "", plain), re.findall(r"\d+", plain)
     if letters in SPEED_NAMES:
         return _named(SPEED, known)
@@ -400,7 +444,15 @@ def _openfast_load(match: re.Match[str], known: Sequence[Channel]) -> Channel | 
 def _array_channel(
     array: str, indices: Sequence[int], vector: int, known: Sequence[Channel]
 ) -> Channel | None:
-    """Return the channel of an array's column, if the array has as many columns as channels."""
+    """Return the channel of an array's column, None for arrays of another name or length.
+
+    Parameters
+    ----------
+    array : name of the array, see `_array_name`.
+    indices : of the column, from 0: one, or two of a load, blade and axis.
+    vector : how many columns the array has: one for each of its channels.
+    known : the channels that there are.
+    """
     fitting = [channel for channel in known if array in _VECTORS.get(channel.kind, ())]
     if fitting and len(indices) != 1:
         return None

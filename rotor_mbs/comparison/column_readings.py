@@ -1,7 +1,8 @@
-"""What a column of a trajectory may be in place of the right numbers.
+"""Readings of a column of a trajectory: which mistake turns the right numbers into these.
 
-Units, signs and zeros; rows late; differences in place of rates; means; numbers in coarse steps. A
-reading is held to the reference in the rows up to the horizon, and the simplest that fits is taken.
+Mistakes are units, signs and zeros; rows that are late; differences in place of rates; means;
+numbers in coarse steps. A reading is compared with the reference in the rows up to the horizon, and
+the simplest that fits is taken.
 """
 
 from __future__ import annotations
@@ -46,11 +47,11 @@ _TRUNCATED = (("rounded", 0.5), ("cut off", 1.0))  # the error of a step, in ste
 
 @dataclass(frozen=True)
 class Reading:
-    """What a column may be.
+    """A mistake that a column may have, and what it leaves.
 
     Attributes
     ----------
-    text : what is wrong with it, "" for nothing.
+    text : the mistake, "" for none.
     left : the largest error per unit of growth, beyond rounding.
     corrected, rounding : (rows,) the right numbers, and half a digit of each; None where they
         cannot be found from the column.
@@ -70,10 +71,11 @@ class ColumnReadings:
     Parameters
     ----------
     data : all rows.
-    states, carried : (n, 2 (1 + blades)) the reference, and what an error may become, in the rows
-        from t = 0 to the horizon.
-    states_at : gives the reference at other times.
-    allowed, tolerance : of an error per unit of growth, of a reading that fits; and the user's.
+    states, carried : (n, 2 (1 + blades)) the reference, and `carried_errors`, in the rows from
+        t = 0 to the horizon.
+    states_at : returns the reference at other times, s.
+    allowed, tolerance : the largest error per unit of growth of a reading that fits; and that of
+        a column in which nothing is wrong.
     with_factor : whether any factor of a channel may be wrong.
     """
 
@@ -99,11 +101,16 @@ class ColumnReadings:
     def best(self, j: int) -> Reading | None:
         """Return the simplest reading of a column that fits about as well as the best of its kind.
 
-        One in which something is wrong has to leave far less than nothing wrong leaves.
+        A reading with a mistake has to leave far less than the column as it is.
 
         Parameters
         ----------
         j : number of the column.
+
+        Returns
+        -------
+        Reading or None
+            None where no reading fits.
         """
         right = self._inverse(j, "", self.data.values[:, j])
         if right.left <= self._tolerance:
@@ -131,7 +138,7 @@ class ColumnReadings:
         return np.asarray(self._states[:, self.data.channels[j].column])
 
     def _inverse(self, j: int, text: str, corrected: Array, factor: float = 1.0) -> Reading:
-        """Return a reading whose right numbers are known."""
+        """Return a reading whose right numbers are known: `corrected`, `factor` times as large."""
         rounding = self.data.rounding[:, j] * abs(factor)
         left = self._left(
             j, self._expected(j), corrected[self._rows], FLOOR_SAFETY * rounding[self._rows]
@@ -139,7 +146,12 @@ class ColumnReadings:
         return Reading(text, left, corrected, rounding)
 
     def _units(self, j: int) -> Iterator[Reading]:
-        """Yield another unit, the other sign, another zero, turns that are missing; a factor."""
+        """Yield readings with another unit, sign or zero, missing turns, or any factor.
+
+        Parameters
+        ----------
+        j : number of the column.
+        """
         values, kind = self.data.values[:, j], self.data.channels[j].kind
         begin, start = self._begin, float(self._expected(j)[0])
         factors = [(1.0, ""), *_FACTORS[kind]]
@@ -165,14 +177,14 @@ class ColumnReadings:
                     yield self._inverse(j, text_of_turns, unwrapped, factor)
         expected = self._expected(j)
         if self._with_factor:
-            # By least squares.
+            # The factor by least squares.
             factor = float(values[self._rows] @ expected / (expected @ expected))
             if factor:
                 text = f"too large by a factor of {factor:.6g}"
                 yield self._inverse(j, text, values / factor, 1.0 / factor)
 
     def _late_rows(self, j: int) -> Iterator[Reading]:
-        """Yield a column that is some rows late or early."""
+        """Yield readings of a column that is some rows late or early."""
         values = self.data.values[:, j]
         for late in range(1, _MAX_ROWS_LATE + 1):
             rows = "a row" if late == 1 else f"{late} rows"
@@ -181,7 +193,12 @@ class ColumnReadings:
             yield self._inverse(j, f"{rows} early", np.concatenate([unknown, values[:-late]]))
 
     def _steps(self, j: int) -> Iterator[Reading]:
-        """Yield a column whose numbers are in coarse steps, or in half precision."""
+        """Yield readings of numbers in coarse steps, or in half precision.
+
+        Parameters
+        ----------
+        j : number of the column.
+        """
         values, expected = self.data.values[:, j], self._expected(j)
         unit = self.data.channels[j].unit
         with np.errstate(over="ignore"):
@@ -215,7 +232,7 @@ class ColumnReadings:
         return None
 
     def _forward(self, j: int, text: str, expected: Array) -> Reading:
-        """Return a reading that says what the column should be, and not what is right instead."""
+        """Return a reading that gives `expected` for the column, and no right numbers for it."""
         values, rounding = self.data.values[self._rows, j], self.data.rounding[:, j]
         if np.count_nonzero(np.isfinite(expected)) < _MIN_COMPARED:
             return Reading(text, math.inf, None, rounding)
@@ -223,7 +240,12 @@ class ColumnReadings:
         return Reading(text, left, None, rounding)
 
     def _differences(self, j: int) -> Iterator[Reading]:
-        """Yield differences of angles in place of a rate."""
+        """Yield readings of differences of angles in place of a rate.
+
+        Parameters
+        ----------
+        j : number of the column.
+        """
         channel = self.data.channels[j]
         if channel.kind != "rate":
             return
@@ -242,7 +264,12 @@ class ColumnReadings:
         )
 
     def _means(self, j: int) -> Iterator[Reading]:
-        """Yield means over rows, and over samples or the whole of an interval."""
+        """Yield readings of means over rows, and over samples or the whole of an interval.
+
+        Parameters
+        ----------
+        j : number of the column.
+        """
         expected = self._expected(j)
         count = len(expected)
         sums = np.concatenate([[0.0], np.cumsum(expected)])
@@ -256,7 +283,7 @@ class ColumnReadings:
             for text, before in ends:
                 of_rows = np.full(count, np.nan)
                 of_rows[before : before + len(means)] = means
-                # Filters treat the rows at the ends each in its own way.
+                # Every filter treats the rows at the ends in its own way: they are left out.
                 of_rows[: width - 1] = of_rows[count - width + 1 :] = np.nan
                 yield self._forward(j, f"mean of {width} rows {text}", of_rows)
         for text, means in self._means_of_samples(self.data.channels[j].column):
@@ -265,7 +292,18 @@ class ColumnReadings:
             yield self._forward(j, text, of_rows)
 
     def _means_of_samples(self, column: int) -> Iterator[tuple[str, Array]]:
-        """Yield means over the interval before, after and around each row, for the first rows."""
+        """Yield means over the interval before, after and around each of the first rows.
+
+        Parameters
+        ----------
+        column : of the matrix of angles, then rates.
+
+        Yields
+        ------
+        str, ndarray
+            The kind of mean in words; (at most `_FINE_ROWS` + 1,) rad or rad/s, NaN where the
+            interval is not inside.
+        """
         time = self.data.time[self._rows][: _FINE_ROWS + 1]
         if len(time) < _MIN_COMPARED:
             return
@@ -295,7 +333,12 @@ class ColumnReadings:
 
 
 def _step_between(values: Array) -> float | None:
-    """Return the step of which all differences are whole multiples, None where there is none."""
+    """Return the step of which all differences are whole multiples, None where there is none.
+
+    Parameters
+    ----------
+    values : (n,) numbers; with fewer than `_MIN_STEPS` distinct ones no step is found.
+    """
     distinct = np.unique(values)
     if len(distinct) < _MIN_STEPS:
         return None
@@ -303,6 +346,7 @@ def _step_between(values: Array) -> float | None:
     step = float(differences.min())
     if not distinct[-1] - distinct[0] < _MAX_STEPS * step:
         return None
+    # The smallest difference gives the numbers of steps, their sum the step to more digits.
     counts = np.round(differences / step)
     step = float(differences.sum() / counts.sum())
     if np.abs(differences / step - counts).max() > _WHOLE:

@@ -1,4 +1,4 @@
-"""What people mistake a scene or its equations for, and what changes when one number is off."""
+"""Candidates for a cause: other scenes and equations, and parameters of a scene that may be off."""
 
 from __future__ import annotations
 
@@ -59,7 +59,14 @@ Path = Sequence[str | int]  # names of fields and numbers of entries, from a sce
 
 @dataclass(frozen=True)
 class RotorModel:
-    """A scene, with its blades at other azimuths (rad), or with other equations."""
+    """A scene, with its blades at other azimuths, or with other equations.
+
+    Attributes
+    ----------
+    scene : the rotor.
+    azimuths : (blades,) rad, None for those of the scene.
+    equations : accelerations in place of the closed form's, None for these.
+    """
 
     scene: Scene
     azimuths: tuple[float, ...] | None = None
@@ -71,7 +78,7 @@ class RotorModel:
         Raises
         ------
         RotorError
-            Where the equations have no place for the scene.
+            If the equations do not hold for the scene.
         """
         return with_azimuths(self.scene, self.azimuths) if self.azimuths else self.equations
 
@@ -82,9 +89,9 @@ class Parameter:
 
     Attributes
     ----------
-    key : of the scene file, or what it is.
-    unit : "" where its change is a share of it.
-    apply : (model, change) -> model.
+    key : its key in the scene file, or what it is, in words.
+    unit : of its change, "" where this is a share of the number.
+    apply : called as apply(model, change), returns the changed model.
     """
 
     key: str
@@ -93,7 +100,12 @@ class Parameter:
 
 
 def rotor_hypotheses(scene: Scene) -> Iterator[Hypothesis[RotorModel]]:
-    """Yield other scenes and equations that people mistake a scene's for."""
+    """Yield the other scenes and equations with which a scene is easily confused.
+
+    Parameters
+    ----------
+    scene : the rotor as it is.
+    """
     for text, other in other_scenes(scene):
         if other != scene:
             yield Hypothesis(text, RotorModel(other))
@@ -115,7 +127,13 @@ def rotor_hypotheses(scene: Scene) -> Iterator[Hypothesis[RotorModel]]:
 
 
 def scenes_with_start(scene: Scene, first: Array) -> Iterator[Hypothesis[RotorModel]]:
-    """Yield other scenes of the catalogue that start with a row, (2 (1 + blades),)."""
+    """Yield the other scenes of the catalogue that have a given initial state.
+
+    Parameters
+    ----------
+    scene : the scene that is not yielded.
+    first : (2 (1 + blades),) angles, rad, then rates, rad/s, rotor first.
+    """
     for other in _catalogue():
         start = np.array([*other.initial_angles, *other.initial_rates])
         if other.name == scene.name or len(start) != len(first):
@@ -142,7 +160,13 @@ def _small_angles(angles: Any, rates: Any, form: Any, loads: Any, *_: Any) -> li
 
 
 def _with_factor(factor: float, reduced: Accelerations) -> Accelerations:
-    """Return the closed form's equations with the terms that reduced ones lack times a factor."""
+    """Return the closed form's equations with some of their terms times a factor.
+
+    Parameters
+    ----------
+    factor : of the terms.
+    reduced : the equations without these terms.
+    """
 
     def equations(*arguments: Any) -> list[Any]:
         whole, without = closed_form.accelerations(*arguments), reduced(*arguments)
@@ -157,7 +181,8 @@ def _with_moments(moments: Callable[..., tuple[Any, Sequence[Any]]]) -> Accelera
 
     Parameters
     ----------
-    moments : (angles, rates, form, loads) -> N m more on the rotor, and on each pitch that moves.
+    moments : called as moments(angles, rates, form, loads), returns the additional moments, N m, on
+        the rotor and on each pitch that moves.
     """
 
     def equations(angles: Any, rates: Any, form: Any, loads: Any, *functions: Any) -> list[Any]:
@@ -176,7 +201,7 @@ def _reaction_of_torques(_angles: Any, _rates: Any, form: Any, loads: Any) -> An
 
 
 def _reaction_of_bearings(angles: Any, rates: Any, form: Any, loads: Any) -> Any:
-    """Return the reactions of the pitch torques, springs and dampers, likewise."""
+    """Return the reactions of pitch torques, springs and dampers as if along the shaft."""
     total: Any = 0.0
     for blade, theta, rate, torque, rest in closed_form.pitches(form, angles, rates, loads):
         total = total + torque + blade.stiffness * (rest - theta) - blade.damping * rate
@@ -184,7 +209,7 @@ def _reaction_of_bearings(angles: Any, rates: Any, form: Any, loads: Any) -> Any
 
 
 def _gravity_on_pitches(angles: Any, _rates: Any, form: Any, _loads: Any) -> Any:
-    """Return what balances the moments of gravity about the pitch axes."""
+    """Return the moments that cancel those of gravity about the pitch axes."""
     moments = []
     for blade, theta in zip(form.blades, angles[1:], strict=True):
         sin_phi = np.sin(angles[0]) * blade.cos_phase + np.cos(angles[0]) * blade.sin_phase
@@ -194,7 +219,7 @@ def _gravity_on_pitches(angles: Any, _rates: Any, form: Any, _loads: Any) -> Any
 
 
 def _weight_off_axis(angles: Any, rates: Any, form: Any, loads: Any) -> Any:
-    """Return what balances the moments of weights by their distances from the pitch axes."""
+    """Return the moments that cancel those of weights due to their distances from pitch axes."""
     rotor: Any = 0.0
     for blade, theta in zip(form.blades, angles[1:], strict=True):
         cos_phi = np.cos(angles[0]) * blade.cos_phase - np.sin(angles[0]) * blade.sin_phase
@@ -204,7 +229,19 @@ def _weight_off_axis(angles: Any, rates: Any, form: Any, loads: Any) -> Any:
 
 
 def _gyroscopic_moments(angles: Any, rates: Any, form: Any, _loads: Any) -> Any:
-    """Return what balances the moments ω x J ω of the blades, on the shaft and the pitch axes."""
+    """Return the moments that cancel the gyroscopic moments ω x J ω of the blades.
+
+    Parameters
+    ----------
+    angles, rates : rad and rad/s, rotor first, see `closed_form.accelerations`.
+    form : the coefficients of the equations.
+    _loads : not used.
+
+    Returns
+    -------
+    tuple
+        N m on the rotor, and on each pitch that moves.
+    """
     rotor: Any = 0.0
     on_pitches = []
     for blade, theta, rate in zip(form.blades, angles[1:], rates[1:], strict=True):
@@ -235,18 +272,19 @@ _OTHER_EQUATIONS = {
 def _printed(
     scene: Scene, errata: Errata, angles: Any, rates: Any, _form: Any, loads: Any, *_: Any
 ) -> list[Any]:
-    """Return the accelerations of the printed equations, for (n,) arrays.
+    """Return the accelerations by the paper's printed equations, for (n,) arrays.
 
     Parameters
     ----------
     scene : the rotor.
-    errata : which errors are left in.
-    angles, rates, _form, loads : as of the closed form's `accelerations`.
+    errata : which errors of the print are left in.
+    angles, rates, _form, loads : see `closed_form.accelerations`; each an array of (n,), or a
+        number.
 
     Raises
     ------
     MethodRefusal
-        For a scene that the printed equations have no place for.
+        If the printed equations do not hold for the scene.
     """
     accelerations = equations(point_mass_rotor("printed", errata, scene), errata)
     torques = [loads.rotor, *(loads.pitches or (0.0,) * (len(angles) - 1))]
@@ -261,14 +299,19 @@ def _printed(
 
 
 def other_scenes(scene: Scene) -> Iterator[tuple[str, Scene]]:
-    """Yield scenes in words, some of which may be the scene itself."""
+    """Yield scenes with one common mistake, and the mistake in words.
+
+    Parameters
+    ----------
+    scene : the rotor as it is; some of the scenes may be equal to it.
+    """
     for gravity in _GRAVITIES:
         yield f"gravity of {gravity:g} m/s^2", replace(scene, gravity=gravity)
     yield from _other_blades(scene)
     yield "tilt of the shaft with opposite sign", replace(scene, shaft_tilt=-scene.shaft_tilt)
     yield from _exchanged_bearings(scene)
     for (field, text), (amount, factor) in itertools.product(_FORGOTTEN.items(), _FACTORS.items()):
-        # A negative stiffness, damping or inertia is not a scene's, and no motion lasts with it.
+        # A scene has no negative stiffness, damping or inertia, and no motion lasts with it.
         if factor >= 0.0 or field in ("rotor_torque", "pitch_torque"):
             yield f"{amount} {text}", _scaled_at(scene, [(field,)], factor - 1.0)
     if any(scene.bearing_stiffness):
@@ -281,7 +324,7 @@ def other_scenes(scene: Scene) -> Iterator[tuple[str, Scene]]:
             changed = _scaled_at(scene, [("bearing_rest",)], factor - 1.0)
             yield f"rest angles of the springs in {text}", changed
     count = len(scene.blades)
-    if count > 2:  # of two blades that is twice the hub's inertia
+    if count > 2:  # of two blades this is twice the hub's inertia, which is yielded above
         hubs = replace(scene, hub_inertia=count * scene.hub_inertia)
         yield "the hub's inertia once for each blade", hubs
     if not scene.has_constant_loads:
@@ -295,7 +338,7 @@ def other_scenes(scene: Scene) -> Iterator[tuple[str, Scene]]:
 
 
 def with_held_loads(scene: Scene, times: Sequence[float]) -> Scene:
-    """Return a scene whose loads keep, from each of some times (s) to the next, one value."""
+    """Return a scene whose loads are constant from each of some times, s, to the next."""
     return replace(
         scene,
         rotor_torque=_held(scene.rotor_torque, times),
@@ -305,7 +348,7 @@ def with_held_loads(scene: Scene, times: Sequence[float]) -> Scene:
 
 
 def _held(table: LoadTable, times: Sequence[float]) -> LoadTable:
-    """Return a load that keeps, from each of some times (s) to the next, its value at the first."""
+    """Return a load that keeps its value at each of some times, s, until the next."""
     held: list[tuple[float, float]] = []
     for start, end in itertools.pairwise(times):
         value = value_at(table, start)
@@ -314,12 +357,17 @@ def _held(table: LoadTable, times: Sequence[float]) -> LoadTable:
 
 
 def _single_blades(scene: Scene) -> range:
-    """Return the blades that are tried one by one: none where there are many."""
+    """Return the numbers of the blades that are tried one by one: none where there are many."""
     return range(len(scene.blades) if len(scene.blades) <= _MAX_BLADES else 0)
 
 
 def _other_blades(scene: Scene) -> Iterator[tuple[str, Scene]]:
-    """Yield variants of a scene with other masses, centres of mass or inertias, in words."""
+    """Yield scenes with another mass, centre of mass or inertia of blades, and what it is in words.
+
+    Parameters
+    ----------
+    scene : the rotor as it is.
+    """
     changes: Mapping[str, Callable[[Blade], Blade]] = {
         "products of inertia about the centre of mass ignored": _without_products,
         "blade mass on the pitch axis": _with_mass_on_axis,
@@ -358,7 +406,12 @@ def _exchanged(values: tuple[Any, ...], i: int, j: int) -> tuple[Any, ...]:
 
 
 def _exchanged_bearings(scene: Scene) -> Iterator[tuple[str, Scene]]:
-    """Yield scenes in which blades have springs, dampers, torques or rest angles of others."""
+    """Yield scenes in which blades have springs, dampers, torques or rest angles of others.
+
+    Parameters
+    ----------
+    scene : the rotor as it is.
+    """
     count, change = len(scene.blades), dict[str, Any]()
     first = dict[str, Any]()
     for field, key in _BEARING_FIELDS.items():
@@ -400,7 +453,8 @@ def _with_opposite_products(blade: Blade) -> Blade:
 
 def _with_opposite_root_products(blade: Blade) -> Blade:
     """Return a blade whose products of inertia about its root have the other sign."""
-    # Those of its mass among them, which come back when the tensor is moved to the root.
+    # The products about the root contain those of the mass at its centre, which are added again
+    # when the tensor is moved to the root: so twice the whole is subtracted from the blade's own.
     inertia = [*blade.inertia[:3]]
     for own, about_root in zip(blade.inertia[3:], blade.inertia_about_apex()[3:], strict=True):
         inertia.append(own - 2.0 * about_root)
@@ -426,7 +480,12 @@ def _inertia(values: Sequence[float]) -> tuple[float, float, float, float, float
 
 
 def other_azimuths(scene: Scene) -> Iterator[tuple[str, tuple[float, ...]]]:
-    """Yield azimuths, rad, at which the blades of a scene should not be, in words."""
+    """Yield wrong azimuths of the blades, (blades,) rad, and the mistake in words.
+
+    Parameters
+    ----------
+    scene : the rotor, whose own azimuths are its `phases`.
+    """
     right, count = tuple(scene.phases), len(scene.blades)
     if count > 1:
         yield "all blades at the azimuth of blade 1", (0.0,) * count
@@ -457,9 +516,14 @@ def other_azimuths(scene: Scene) -> Iterator[tuple[str, tuple[float, ...]]]:
 
 
 def parameters(scene: Scene) -> Iterator[Parameter]:
-    """Yield every number, or list of numbers, that is not zero, and the zeros of the angles.
+    """Yield the parameters of a scene that may be off, the zeros of its angles among them.
 
-    Those of the blades for all blades at once, and for each where there are a few.
+    A number that is zero is not changed by a share, and left out. The parameters of blades are
+    yielded for all blades at once, and for each blade where there are at most `_MAX_BLADES`.
+
+    Parameters
+    ----------
+    scene : the rotor as it is.
     """
     for item in scene_fields("rotor"):
         value = getattr(scene, item.name)
@@ -477,13 +541,13 @@ def parameters(scene: Scene) -> Iterator[Parameter]:
 
 
 def _blade_parameters(scene: Scene, chosen: list[int], number: str) -> Iterator[Parameter]:
-    """Yield the numbers of some blades, which are changed together.
+    """Yield the parameters of some blades, which are changed together.
 
     Parameters
     ----------
-    scene : the scene.
-    chosen : the blades.
-    number : of a single blade among several, as in its key; else "".
+    scene : the rotor as it is.
+    chosen : numbers of the blades, from 0.
+    number : of a single blade among several, as in its key, "[0]"; else "".
     """
     for field in fields(Blade):
         if field.name in ("tip", *_LEANING_FIELDS):  # the tip is in no equation
@@ -520,7 +584,7 @@ def _blade_parameters(scene: Scene, chosen: list[int], number: str) -> Iterator[
 
 
 def _share_of(paths: Sequence[Path]) -> Callable[[RotorModel, float], RotorModel]:
-    """Return what makes the numbers at some paths larger by a share."""
+    """Return a function that makes the numbers at some paths of a model larger by a share."""
 
     def apply(model: RotorModel, change: float) -> RotorModel:
         return replace(model, scene=_scaled_at(model.scene, paths, change))
@@ -534,7 +598,7 @@ def _tilt_moved(model: RotorModel, change: float) -> RotorModel:
 
 
 def _cone_moved(chosen: Sequence[int], model: RotorModel, change: float) -> RotorModel:
-    """Lean some blades by a change in rad."""
+    """Increase the cone of some blades by a change in rad."""
     blades = list(model.scene.blades)
     for i in chosen:
         blades[i] = replace(blades[i], cone=blades[i].cone + change)
@@ -577,7 +641,7 @@ def _zero_moved(chosen: Sequence[int], model: RotorModel, change: float) -> Roto
 
 
 def _pitch_turned(scene: Scene, chosen: Sequence[int], angle: float) -> Scene:
-    """Turn some blades about the pitch axis, rad, where their pitch is 0."""
+    """Turn some blades about their pitch axes, by an angle in rad, in their position at pitch 0."""
     s, c = math.sin(angle), math.cos(angle)
     turn = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
     blades = list(scene.blades)
@@ -591,7 +655,14 @@ def _pitch_turned(scene: Scene, chosen: Sequence[int], angle: float) -> Scene:
 
 
 def _scaled_at(scene: Scene, paths: Sequence[Path], share: float) -> Scene:
-    """Make the values at some paths of a scene larger by a share."""
+    """Make the values at some paths of a scene larger by a share.
+
+    Parameters
+    ----------
+    scene : the rotor.
+    paths : names of fields and numbers of entries, from the scene to a value.
+    share : a value becomes 1 + share times itself.
+    """
 
     def with_value(whole: Any, path: Path) -> Any:
         if not path:
@@ -607,7 +678,7 @@ def _scaled_at(scene: Scene, paths: Sequence[Path], share: float) -> Scene:
 
 
 def _scaled(value: Any, share: float) -> Any:
-    """Make numbers larger by a share; of a table over time, not the times."""
+    """Make a number, or the numbers of a tuple or the loads of a table, larger by a share."""
     if not isinstance(value, tuple):
         return value * (1.0 + share) if isinstance(value, float) else value
     if value and all(_is_row(row) for row in value):

@@ -139,7 +139,7 @@ def compare_with_reference(
     scene : the scene that the data are meant to be of.
     tolerance : rad, the largest allowed defect of an interval beyond rounding.
     time_limit_s : s, for the reference, the defects and the search.
-    on_stage : called as on_stage(name, done, stages) at the begin of each stage.
+    on_stage : called as on_stage(name, done, stages) when a stage begins.
 
     Returns
     -------
@@ -149,8 +149,8 @@ def compare_with_reference(
     Raises
     ------
     InputError
-        For a tolerance that is not positive, for data without rows in the scene's duration, and
-        where reference and defects take longer than the time limit.
+        If the data have no row in the scene's duration, or the reference and the defects take
+        longer than the time limit.
     """
     is_available()  # the engine is loaded before: an interrupt would leave half of it
     ends = monotonic() + time_limit_s

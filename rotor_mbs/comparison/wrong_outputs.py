@@ -1,7 +1,7 @@
-"""Rows, tips, energies and loads that a program makes wrongly of a right motion.
+"""Rows, tips, energies and loads that a program computes wrongly from a right motion.
 
-Each is compared with what other conventions or numbers make of the same states. One is named if it
-leaves at most a thousandth of the difference, and of the loads and tips only if it is alone.
+Each is compared with what other conventions or numbers make of the same states. One of these is
+named if it leaves at most a thousandth of the difference; for loads and tips only if no other does.
 """
 
 from __future__ import annotations
@@ -36,18 +36,18 @@ _MAX_ALIKE = 3  # explanations of an energy that are named
 
 
 def wrong_rows(scene: Scene, run: Trajectory, defects: Defects) -> str:
-    """Return how the rows of a run are made wrongly of a right motion.
+    """Return the mistake by which the rows of a run differ from a right motion.
 
     Parameters
     ----------
     scene : the rotor.
-    run : its samples.
-    defects : those of the run.
+    run : samples of the run, with angles and rates.
+    defects : interval defects of the run.
 
     Returns
     -------
     str
-        "" if no way explains its defects.
+        The mistake in words, "" if none that was tried explains the defects.
     """
     text = _interpolated_rows(run, defects) or _differenced_rates(run)
     if text:
@@ -85,7 +85,13 @@ def root_mean_square(defects: Defects) -> float:
 
 
 def _interpolated_rows(run: Trajectory, defects: Defects) -> str:
-    """Return whether many rows lie on straight lines between their neighbours; "" if not."""
+    """Return a text if many rows lie on straight lines between their neighbours; else "".
+
+    Parameters
+    ----------
+    run : samples of the run, with angles.
+    defects : interval defects of the run.
+    """
     angles = run.angles
     if len(angles) < 3:
         return ""
@@ -93,8 +99,8 @@ def _interpolated_rows(run: Trajectory, defects: Defects) -> str:
     bend = np.abs(angles[2:] - 2.0 * angles[1:-1] + angles[:-2])
     is_straight = (bend <= 1e-12 * size).all(axis=1) & np.ptp(angles, axis=0).any()
     share = float(is_straight.mean())
-    # A uniform rotation lies on one too: then without defects, and not between rows that bend,
-    # again and again.
+    # A uniform rotation is a straight line, too; but it has no defects, and it does not alternate
+    # again and again with rows off the line.
     changes = np.count_nonzero(np.diff(is_straight.astype(int)))
     if share <= _STRAIGHT or changes < 4:
         return ""
@@ -105,7 +111,12 @@ def _interpolated_rows(run: Trajectory, defects: Defects) -> str:
 
 
 def _differenced_rates(run: Trajectory) -> str:
-    """Return whether rates are difference quotients of the angles of rows; "" if not."""
+    """Return a text if the rates are difference quotients of the angles of rows; else "".
+
+    Parameters
+    ----------
+    run : samples of the run, with angles and rates.
+    """
     if len(run.time) < 4:
         return ""
     slopes = np.diff(run.angles, axis=0) / np.diff(run.time)[:, None]
@@ -115,6 +126,7 @@ def _differenced_rates(run: Trajectory) -> str:
         "central": (run.rates[1:-1], 0.5 * (slopes[1:] + slopes[:-1])),
     }
     size = max(float(np.abs(run.rates).max()), float(np.finfo(float).tiny))
+    # Of a uniform rotation the quotients are the rates, however these were computed.
     is_uniform = np.ptp(run.rates, axis=0).max() <= 1e-9 * size
     for text, (rates, quotient) in quotients.items():
         if not is_uniform and np.abs(rates - quotient).max() <= 1e-9 * size:
@@ -126,7 +138,13 @@ def _differenced_rates(run: Trajectory) -> str:
 
 
 def wrong_tip(scene: Scene, run: Trajectory) -> str:
-    """Return what the tips of a run are in place of its own; "" if unknown."""
+    """Return the mistake in the tip paths of a run, in words; "" if unknown.
+
+    Parameters
+    ----------
+    scene : the rotor.
+    run : samples of the run, with `tip`.
+    """
     assert run.tip is not None
     own = kinematics.tip_paths(scene, run.angles)
     named = _explaining(run.tip, own, dict(_other_tips(scene, run.angles, own)))
@@ -138,13 +156,18 @@ def wrong_tip(scene: Scene, run: Trajectory) -> str:
 
 
 def _other_tips(scene: Scene, angles: Array, own: Array) -> Iterator[tuple[str, Array]]:
-    """Yield other paths, (n, blades, 3) m, in words.
+    """Yield wrong tip paths, each with its mistake in words before it.
 
     Parameters
     ----------
     scene : the rotor.
-    angles : (n, 1 + blades) rad.
+    angles : (n, 1 + blades) rad, rotor first.
     own : (n, blades, 3) m, the right paths.
+
+    Yields
+    ------
+    str, ndarray
+        The mistake; (n, blades, 3) m.
     """
     pitches = np.array([0.0, *[1.0] * len(scene.blades)])
     factors = {
@@ -172,7 +195,7 @@ def _other_tips(scene: Scene, angles: Array, own: Array) -> Iterator[tuple[str, 
 
 
 def _leaning_otherwise(scene: Scene) -> Iterator[tuple[str, Scene]]:
-    """Yield scenes of other tilt or cone that people mistake a scene for, in words."""
+    """Yield those of `other_scenes` that have another tilt or cone, and the mistake in words."""
     cones = [blade.cone for blade in scene.blades]
     for text, other in other_scenes(scene):
         if other.shaft_tilt != scene.shaft_tilt or [blade.cone for blade in other.blades] != cones:
@@ -185,8 +208,8 @@ def _other_tip_points(scene: Scene, tip: Array, angles: Array, own: Array) -> st
     Parameters
     ----------
     scene : the rotor.
-    tip, own : (n, blades, 3) m, of the run and the right ones.
-    angles : (n, 1 + blades) rad.
+    tip, own : (n, blades, 3) m, paths of the run, and the right ones.
+    angles : (n, 1 + blades) rad, rotor first.
     """
     allowed = _LEFT * float(np.abs(tip - own).max())
     without_pitches = angles * np.array([1.0, *[0.0] * len(scene.blades)])
@@ -225,18 +248,18 @@ def _blade_frames(scene: Scene, angles: Array) -> Array:
 
 
 def wrong_energy(scene: Scene, run: Trajectory, name: str) -> str:
-    """Return what an energy of a run is in place of its own.
+    """Return the mistake in an energy of a run.
 
     Parameters
     ----------
     scene : the rotor.
-    run : its samples.
-    name : "kinetic energy" or "potential energy".
+    run : samples of the run, with this energy.
+    name : "kinetic energy" or "potential energy"; of others no mistake is known.
 
     Returns
     -------
     str
-        All that explain it, at most three; "" if there are none, or more.
+        All mistakes that explain it, in words, if these are at most three; else "".
     """
     if name == "kinetic energy":
         stored, own = run.kinetic_energy, kinematics.kinetic_energy(scene, run.angles, run.rates)
@@ -255,7 +278,14 @@ def wrong_energy(scene: Scene, run: Trajectory, name: str) -> str:
 def _other_kinetic_energies(
     scene: Scene, run: Trajectory, own: Array
 ) -> Iterator[tuple[str, Array]]:
-    """Yield other kinetic energies, (n,) J, in words; own: the right one."""
+    """Yield wrong kinetic energies, (n,) J, each with its mistake in words before it.
+
+    Parameters
+    ----------
+    scene : the rotor.
+    run : samples of the run.
+    own : (n,) J, the right energy.
+    """
     yield from _scaled(own)
     rotor = np.array([1.0, *[0.0] * len(scene.blades)])
     for text, factor in (("rates of the pitches", rotor), ("rate of the rotor", 1.0 - rotor)):
@@ -268,7 +298,14 @@ def _other_kinetic_energies(
 def _other_potential_energies(
     scene: Scene, run: Trajectory, own: Array
 ) -> Iterator[tuple[str, Array]]:
-    """Yield other potential energies, (n,) J, in words; own: the right one."""
+    """Yield wrong potential energies, (n,) J, each with its mistake in words before it.
+
+    Parameters
+    ----------
+    scene : the rotor.
+    run : samples of the run, with the stored potential energy.
+    own : (n,) J, the right energy.
+    """
     yield from _scaled(own)
     yield "zero at another height", own + (run.potential_energy - own)[0]
     of_weights = kinematics.potential_energy(_without_springs(scene), run.time, run.angles)
@@ -298,14 +335,20 @@ def _without_springs(scene: Scene) -> Scene:
 
 
 def wrong_loads(scene: Scene, run: Trajectory) -> str:
-    """Return what the loads of a run are in place of those at its own states.
+    """Return the mistakes in the loads of a run.
 
-    Rows at a jump of a load count as little as in `compare`: not at all.
+    Rows at which a prescribed load jumps are left out, as `compare` does.
+
+    Parameters
+    ----------
+    scene : the rotor.
+    run : samples of the run; of the loads those that it has are examined.
 
     Returns
     -------
     str
-        For each load that is wrong and known; "" if there are none.
+        For each wrong load that exactly one mistake explains, its name and the mistake; "" if
+        there are none.
     """
     rows = ~is_at_jump(scene, run.time)
     time, angles, rates = run.time[rows], run.angles[rows], run.rates[rows]
@@ -336,14 +379,14 @@ def wrong_loads(scene: Scene, run: Trajectory) -> str:
 def _other_loads(
     scene: Scene, name: str, frames: Mapping[str, Mapping[str, Array]], torque: Array
 ) -> Iterator[tuple[str, Array]]:
-    """Yield what a load may be taken for, in words.
+    """Yield wrong values of a load, each with its mistake in words before it.
 
     Parameters
     ----------
     scene : the rotor.
-    name : of the load.
-    frames : by frame, "" its own, the loads by name.
-    torque : (n,) N m, of the rotor.
+    name : of the load, as in `LOADS`.
+    frames : by frame, "" for each load's own, the right loads by name.
+    torque : (n,) N m, the prescribed torque on the rotor.
     """
     own = frames[""][name]
     yield "sign reversed (action in place of reaction)", -own
@@ -371,7 +414,18 @@ def _other_loads(
 
 
 def _by_load(scene: Scene, matrix: Array) -> dict[str, Array]:
-    """Split the columns of `loads_by_frame` by the loads' names."""
+    """Return arrays by the loads' names from the columns of `loads_by_frame`.
+
+    Parameters
+    ----------
+    scene : the rotor, with its number of blades.
+    matrix : (n, components) N or N m in one frame.
+
+    Returns
+    -------
+    dict of ndarray
+        (n), then a dimension for the blades and one for the axes of loads that have them.
+    """
     arrays = {}
     first = 0
     for load in LOADS:
@@ -390,7 +444,7 @@ def _by_load(scene: Scene, matrix: Array) -> dict[str, Array]:
 
 
 def _explaining(stored: Array, own: Array, trials: Mapping[str, Array]) -> list[str]:
-    """Return the trials that leave at most a thousandth of the difference of an array."""
+    """Return the trials that leave at most a thousandth of the difference between two arrays."""
     difference = float(np.abs(stored - own).max(initial=0.0))
     named = []
     for text, values in trials.items():
@@ -400,7 +454,17 @@ def _explaining(stored: Array, own: Array, trials: Mapping[str, Array]) -> list[
 
 
 def _exchanges(count: int) -> Iterator[tuple[NDArray[np.intp], str]]:
-    """Yield blades in place of blades, and where theirs stand."""
+    """Yield wrong orders of the blades, and the mistake in words after each.
+
+    Parameters
+    ----------
+    count : number of blades.
+
+    Yields
+    ------
+    ndarray, str
+        (count,) numbers of the blades whose values stand at each blade.
+    """
     blades = np.arange(count)
     orders = {
         "of the blades in reverse order": blades[::-1],
@@ -408,7 +472,7 @@ def _exchanges(count: int) -> Iterator[tuple[NDArray[np.intp], str]]:
         "of the next blade for each blade": np.roll(blades, -1),
         "of the previous blade for each blade": np.roll(blades, 1),
     }
-    # Of two blades the last three may be one.
+    # Of one or two blades several of these are the same, or the right order.
     seen = [blades.tolist()]
     for text, order in orders.items():
         if order.tolist() not in seen:
