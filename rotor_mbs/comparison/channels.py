@@ -101,14 +101,20 @@ class Channel:
 
     @property
     def unit(self) -> str:
+        """Return the SI unit of the channel's numbers."""
         return BASE_UNITS[self.kind]
 
     @property
     def is_load(self) -> bool:
+        """Return whether the channel is a component of a force or moment."""
         return self.kind in ("force", "moment")
 
     def in_frame(self, frame: str) -> Channel:
         """Return the same component in another frame.
+
+        Parameters
+        ----------
+        frame : one of `LOAD_FRAMES`.
 
         Raises
         ------

@@ -138,7 +138,15 @@ class ColumnReadings:
         return np.asarray(self._states[:, self.data.channels[j].column])
 
     def _inverse(self, j: int, text: str, corrected: Array, factor: float = 1.0) -> Reading:
-        """Return a reading whose right numbers are known: `corrected`, `factor` times as large."""
+        """Return a reading of a column whose right numbers are known.
+
+        Parameters
+        ----------
+        j : number of the column.
+        text : the mistake in words, "" for none.
+        corrected : (rows,) the right numbers, NaN where they are not known.
+        factor : by which the numbers were multiplied, and with them their rounding.
+        """
         rounding = self.data.rounding[:, j] * abs(factor)
         left = self._left(
             j, self._expected(j), corrected[self._rows], FLOOR_SAFETY * rounding[self._rows]
@@ -302,7 +310,7 @@ class ColumnReadings:
         ------
         str, ndarray
             The kind of mean in words; (at most `_FINE_ROWS` + 1,) rad or rad/s, NaN where the
-            interval is not inside.
+            interval is not within these rows.
         """
         time = self.data.time[self._rows][: _FINE_ROWS + 1]
         if len(time) < _MIN_COMPARED:

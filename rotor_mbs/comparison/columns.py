@@ -1,4 +1,4 @@
-"""Named columns of numbers with units: what becomes of every file, and of arrays in memory."""
+"""Named columns of numbers with units, into which every file and all arrays in memory are read."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ class LeftOut(NamedTuple):
     Attributes
     ----------
     reason : in words, "row 3 has 'x', no number".
-    is_column : whether it is a column for all that, which may have been meant to be a channel.
+    is_column : whether it is a column all the same, and may have been meant to be a channel.
     """
 
     reason: str
@@ -68,7 +68,13 @@ class DataTable:
     program: str = ""
 
     def __getitem__(self, name: str) -> DataColumn:
-        """Return a column. Raises InputError, with the columns that there are."""
+        """Return the column with a name.
+
+        Raises
+        ------
+        InputError
+            If there is no such column, with the columns that there are; or if it has no numbers.
+        """
         if name in self.left_out:
             raise self.refusal(name)
         if name not in self.columns:
@@ -86,9 +92,18 @@ class DataTable:
 def arrays_of(data: Any) -> tuple[dict[str, Any], dict[str, str]]:
     """Return arrays and their units by name from a mapping, a DataFrame or a Dataset.
 
-    Names of two levels are joined: a unit in the last level is the unit, other levels are parts of
-    a path. The index of a DataFrame is a column, unless it counts the rows; without a name, times
-    or numbers that are not whole are the time. Of a Dataset also the coordinates are arrays.
+    Names of several levels are joined to a path; a unit in the last level is the array's unit. The
+    index of a DataFrame is a column, unless it counts the rows; an index without a name is the time
+    if it has durations or numbers that are not whole.
+
+    Parameters
+    ----------
+    data : mapping, pandas.DataFrame, or xarray.Dataset, whose coordinates are arrays too.
+
+    Returns
+    -------
+    dict, dict
+        Arrays by name; units by name, where there are any.
     """
     arrays: dict[str, Any] = {}
     units: dict[str, str] = {}
@@ -131,8 +146,8 @@ def table_of(
 
     An array of two dimensions (n, k) becomes the columns `name[0]` ... `name[k-1]`, one of three
     (n, j, k) the columns `name[0,0]` ... `name[j-1,k-1]`. An array (k, n) beside others of length n
-    is transposed, as MATLAB's arrays are where HDF5 stores them. What is no numbers, is a single
-    number, or has more dimensions is in `left_out`.
+    is transposed, as MATLAB's arrays are where HDF5 stores them. Values that are not numbers,
+    single numbers, and arrays of more dimensions are listed in `left_out`.
 
     Parameters
     ----------
@@ -208,10 +223,19 @@ class _NotNumbersError(Exception):
 def _numbers(values: Any) -> tuple[NDArray[Any], str]:
     """Return values as an array of numbers, NaN where one is missing, and the unit of durations.
 
+    Parameters
+    ----------
+    values : an array, or anything of which NumPy makes one; masked values are missing.
+
+    Returns
+    -------
+    ndarray, str
+        Numbers, of the shape of `values`; "s" for durations, else "".
+
     Raises
     ------
     _NotNumbersError
-        With the row of the first value that is none.
+        If a value is no number, with the row of the first; or if rows have different lengths.
     """
     if np.ma.isMaskedArray(values):
         values = np.ma.filled(values.astype(float), np.nan)
@@ -238,7 +262,17 @@ def _numbers(values: Any) -> tuple[NDArray[Any], str]:
 
 
 def _numbers_of_objects(array: NDArray[Any]) -> NDArray[np.float64]:
-    """Return numbers from an array of objects, NaN for None. Raises _NotNumbersError."""
+    """Return the numbers in an array of objects, NaN for None and pandas' missing values.
+
+    Parameters
+    ----------
+    array : (n, ...) objects.
+
+    Raises
+    ------
+    _NotNumbersError
+        If an object is no number, with the row of the first.
+    """
     numbers = np.empty(array.size)
     width = math.prod(array.shape[1:]) or 1
     for i, value in enumerate(array.flat):
@@ -268,9 +302,12 @@ def _shown_value(row: int, value: object) -> str:
 def split_bracketed_unit(name: str) -> tuple[str, str]:
     """Return name and unit of "rotor [deg]", "rotor / deg" or "rotor in deg"; "" for no unit.
 
-    Numbers in brackets are indices, and what stands in round brackets directly behind a word and is
-    no unit is what a function is of: "q[1,1]" and "der(phi)" have no unit. Linear in the length of
-    the name, which may be any.
+    Numbers in brackets are indices, and a text in round brackets directly behind a word that is no
+    unit is the argument of a function: "q[1,1]" and "der(phi)" have no unit.
+
+    Parameters
+    ----------
+    name : of a column, of any length: the time that it takes is linear in the length.
 
     >>> split_bracketed_unit("rotor [deg]"), split_bracketed_unit("t / s")
     (('rotor', 'deg'), ('t', 's'))
@@ -293,7 +330,7 @@ def split_bracketed_unit(name: str) -> tuple[str, str]:
 
 
 def _is_argument(text: str, end: int, stem: str, unit: str) -> bool:
-    """Whether what stands in the brackets at `end` is an index or what a function is of."""
+    """Return whether the brackets at `end` hold an index or the argument of a function."""
     if unit and all(character.isdigit() or character in ", " for character in unit):
         return True
     if text[end] != "(" or text[end - 1].isspace():
@@ -325,7 +362,7 @@ def _behind_stroke(text: str) -> tuple[int, str] | None:
 
 
 def shown_names(names: Sequence[str]) -> str:
-    """Return the first names as a message can list them."""
+    """Return a list of names for a message: the first ones, and how many there are."""
     shown = []
     for name in names[:_MAX_SHOWN]:
         text = name if len(name) <= _MAX_SHOWN_NAME else f"{name[:_MAX_SHOWN_NAME]}..."

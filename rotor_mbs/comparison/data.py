@@ -43,14 +43,14 @@ class ForeignData:
     Attributes
     ----------
     source : what messages call the data.
-    time, values : (n,) s, increasing from 0 or later; (n, channels) in SI units, what `channels`
-        says. Of a table of modes the speeds, rad/s, in place of the times.
-    channels : what the columns of `values` are.
+    time, values : (n,) s, increasing from 0 or later; (n, channels) in SI units. A table of modes
+        has the speeds, rad/s, in place of the times.
+    channels : of the columns of `values`.
     rounding, time_rounding : (n, channels), (n,) half a unit in the last digit of each number, as
         it was written.
-    read, unused : a line for each channel: column, unit, and what was assumed; by name of every
-        other column, why it is not compared.
-    loads_left_out : names of the loads among these that are not omitted.
+    read : a line for each channel: column, unit, and what was assumed.
+    unused : by name of every other column, why it is not compared.
+    loads_left_out : names of the loads among the unused columns that the mapping does not omit.
     wrapped : for each channel, whether whole turns are missing from it.
     precision : "4 decimals: rounding error 5e-05", or the like of digits; "" of numbers with hardly
         any rounding.
@@ -77,7 +77,7 @@ class ForeignData:
     is_modes: bool = False
 
     def rows(self, chosen: NDArray[np.bool_] | slice) -> ForeignData:
-        """Return some rows."""
+        """Return the data in the chosen rows."""
         return replace(
             self,
             time=self.time[chosen],
@@ -87,7 +87,7 @@ class ForeignData:
         )
 
     def only(self, *, loads: bool) -> ForeignData:
-        """Return the channels of loads alone, or all others."""
+        """Return the data with the channels of loads alone, or with all others."""
         chosen = [j for j, channel in enumerate(self.channels) if channel.is_load == loads]
         return replace(
             self,
@@ -98,7 +98,7 @@ class ForeignData:
         )
 
     def beside(self, other: ForeignData) -> ForeignData:
-        """Return the data with the channels of `other`, which has the same rows, behind them."""
+        """Return the data followed by the channels of `other`, which has the same rows."""
         return replace(
             self,
             channels=self.channels + other.channels,
@@ -109,7 +109,7 @@ class ForeignData:
 
     @property
     def columns(self) -> list[int]:
-        """Places of the channels in a matrix of all angles, then all rates, then all loads."""
+        """Return the places of the channels in a matrix of all angles, then rates, then loads."""
         return [channel.column for channel in self.channels]
 
 
@@ -124,14 +124,14 @@ def load_data(
     ----------
     data : a file; or arrays by name, an xarray.Dataset, whose coordinates are arrays too, or a
         pandas.DataFrame.
-    scene : the scene of which they are data.
-    columns : a mapping file, or a mapping of its keys; by default channels are known by the names
-        of columns.
+    scene : the scene that the data are of.
+    columns : a mapping file, or a mapping of its keys; by default channels are recognized by the
+        names of columns.
 
     Raises
     ------
     InputError
-        For data that cannot be read, or are not of this scene.
+        If the data or the mapping cannot be read, or the columns are no channels of this scene.
     """
     mapping = read_mapping(columns, scene)
     if isinstance(data, str | os.PathLike):
@@ -152,14 +152,15 @@ def data_of_table(
 
     Parameters
     ----------
-    table : the columns.
-    scene : whose channels they may be.
-    mapping : which column is which; by default they are known by their names.
+    table : named columns of numbers.
+    scene : the scene whose channels the columns may be.
+    mapping : which column is which; by default they are recognized by their names.
 
     Raises
     ------
     InputError
-        For columns that cannot be channels of one trajectory, or one table of modes.
+        If the columns cannot be channels of one trajectory, or of one table of modes; if numbers
+        are not finite, or rows contradict each other.
     """
     mapping = mapping or DataMapping()
     found = find_channels(table, scene, mapping)
@@ -229,7 +230,19 @@ def _refuse_different_lengths(table: DataTable, sources: Mapping[Channel, Column
 
 
 def _si_values(table: DataTable, channel: Channel, source: ColumnMapping) -> Array:
-    """Return a channel in SI units, (n,). Raises InputError where it is not finite."""
+    """Return the numbers of a channel in SI units, (n,).
+
+    Parameters
+    ----------
+    table : the columns.
+    channel : what the column is.
+    source : the column, its unit, sign and offset.
+
+    Raises
+    ------
+    InputError
+        If a number is not finite, with its row.
+    """
     values = table[source.column].values
     factor = _factor(channel, source)
     si_values: Array = source.sign * (values + source.offset) * factor
@@ -257,13 +270,13 @@ def _jump_times(scene: Scene) -> list[float]:
 def _rounding_of_columns(
     sources: Mapping[Channel, ColumnMapping], columns: Sequence[Array], steps: Sequence[float]
 ) -> tuple[list[Array], str]:
-    """Find the rounding of all columns, the time or speed first.
+    """Find the rounding of the numbers of all columns.
 
     Parameters
     ----------
-    sources : by channel, with its unit.
-    columns : (n,) numbers of each, as they were written.
-    steps : between packed numbers of each, see `DataColumn`.
+    sources : by channel its column and unit, the time or speed first.
+    columns : (n,) numbers of each channel, as they were written.
+    steps : between packed numbers of each channel, see `DataColumn`.
 
     Returns
     -------
@@ -298,15 +311,16 @@ def rounding_of_printed(
 ) -> Array:
     """Find half a unit in the last place of numbers as they were written.
 
-    They may have some decimals, some digits, single or double precision: of the ways that all of
-    them fit, the coarsest is taken.
+    They may have been written with some decimals, some significant digits, or in single or double
+    precision: the coarsest way that fits all of them is taken.
 
     Parameters
     ----------
     values : (n,) numbers of a column.
     others : groups of columns; a column of few distinct values is judged together with the first
         group that has enough.
-    min_distinct : if these have fewer distinct values than that, they are exact.
+    min_distinct : numbers with fewer distinct values than this are taken to be exact, to double
+        precision.
 
     Returns
     -------
@@ -348,7 +362,7 @@ def rounding_of_printed(
 
 
 def _precision(columns: Sequence[Array], rounding: Sequence[Array]) -> str:
-    """Return `ForeignData.precision`.
+    """Return the precision of numbers in words, see `ForeignData.precision`.
 
     Parameters
     ----------
@@ -375,12 +389,12 @@ def _precision(columns: Sequence[Array], rounding: Sequence[Array]) -> str:
 
 
 def _time_precision(time: Array, rounding: Array, *, is_equidistant: bool) -> str:
-    """Return `ForeignData.time_precision`.
+    """Return the precision of times in words, see `ForeignData.time_precision`.
 
     Parameters
     ----------
     time, rounding : (n,) as they were written, in the unit of the file.
-    is_equidistant : whether the intervals are equal, which are meant as they are.
+    is_equidistant : whether the intervals are equal; then the digits of the times do not matter.
     """
     if is_equidistant:
         return ""
@@ -391,12 +405,12 @@ def _time_precision(time: Array, rounding: Array, *, is_equidistant: bool) -> st
 
 
 def _significant_digits(values: Array) -> int:
-    """Find with how many significant digits the numbers may have been written; 17 for any."""
+    """Find the least number of significant digits that all numbers fit, up to 17."""
     nonzero = values[values != 0.0]
     if not np.isfinite(nonzero).all():
         return _ALL_DIGITS
     for digits in range(1, _ALL_DIGITS):
-        # Most numbers of digits are refuted by a few values.
+        # A few values refute most numbers of digits, which saves the time for all of them.
         if _have_digits(nonzero[:_SAMPLE], digits) and _have_digits(nonzero, digits):
             return digits
     return _ALL_DIGITS

@@ -1,7 +1,7 @@
 """Mistakes in the columns and times of a trajectory: units, signs, zeros, turns, lags, exchanges.
 
-A mistake is looked for by the reference, at most carried on from one of its rows. It explains the
-data where the data so corrected have no defects.
+A mistake is searched for by comparison with the reference, which is integrated from its row before
+a time up to that time. It explains the data if the data without it have no defects.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ _TIME_FACTORS = (
 _MIN_LAG = 1e-4  # of an interval between rows: less is rounding
 _WHOLE_ROWS = 1e-3  # of a row: a lag so near a number of rows is that number
 _LAG_ROW = 50  # by which a lag is explanation
-_LAG_ROUNDS = 8
+_LAG_ROUNDS = 8  # of Gauss and Newton's iteration
 _MAX_OFF = 30.0  # times the usual distance from the reference, of a column that says when a row is
 _MAX_CLOCK, _MIN_CLOCK = 1.2, 1e-7  # factor of a clock; what differs less is rounding
 _TIME_ROUNDING = 1e-9  # of the duration
@@ -58,15 +58,16 @@ _INTERPOLATED = 1e-9  # of the largest number: of the arithmetic of interpolatio
 
 @dataclass(frozen=True)
 class TrajectorySearch:
-    """Data, all rows, and a scene's reference at their times and at the scene's samples.
+    """Data with all their rows, and what a search for mistakes compares them with.
 
     Attributes
     ----------
-    scene, data, exact : the scene, the data, the reference.
+    scene, data : the rotor; the data, all rows.
+    exact : the reference at the times of the data and at the scene's samples.
     tolerance : rad, of an interval's defect.
     worst : the largest error per unit of error growth.
-    is_within_tolerance : whether the data agree, and are looked at because of a difference that is
-        smaller. A lag or a clock may be an integrator's own error then.
+    is_within_tolerance : whether the data agree, and a smaller difference is searched for. Then a
+        lag is not, as it may be an integrator's own error.
     """
 
     scene: Scene
@@ -77,7 +78,7 @@ class TrajectorySearch:
     is_within_tolerance: bool = False
 
     def states_at(self, time: Array) -> Array:
-        """Compute the motion at other times, from the reference's row before each.
+        """Compute the motion at other times, integrated from the reference's row before each.
 
         Parameters
         ----------
@@ -111,17 +112,17 @@ class TrajectorySearch:
 
     @property
     def allowed(self) -> float:
-        """The largest error per unit of growth, and defect, that a mistake may leave."""
+        """Return the largest error per unit of growth, and defect, that a mistake may leave."""
         return max(self.tolerance, min(_LEFT * self.worst, _MAX_LEFT))
 
     def defect_left(self, correction: Correction) -> float:
-        """Return the largest defect of corrected data beyond rounding; 0 where none is known.
+        """Return the largest defect of corrected data beyond rounding, rad; 0 where none is known.
 
-        What cannot be corrected has been compared with the reference.
+        Columns that cannot be corrected have been compared with the reference before.
 
         Parameters
         ----------
-        correction : the data, whose times may begin before 0 and end after the scene.
+        correction : corrected data, whose times may begin before 0 and end after the scene.
         """
         data = correction.data
         if data is None:
@@ -160,9 +161,10 @@ def data_mistakes(search: TrajectorySearch) -> list[str]:
 
 
 def clock_mistakes(search: TrajectorySearch) -> list[str]:
-    """Search for a clock that is fast or slow, with any mistake in the columns.
+    """Search for a clock that is fast or slow, alone or with a mistake in the columns.
 
-    Angles of a motion under gravity alone are as fast in another gravity: both are causes.
+    In a motion under gravity alone, another clock and another gravity change the angles alike: then
+    both are named as causes.
     """
     return _row_mistakes(search, _clocks(search))
 
@@ -170,7 +172,7 @@ def clock_mistakes(search: TrajectorySearch) -> list[str]:
 def _row_mistakes(
     search: TrajectorySearch, hypotheses: Iterator[Hypothesis[ForeignData]]
 ) -> list[str]:
-    """Return the first of some mistakes in the rows that explains the data, with the columns'."""
+    """Return the first mistake in the rows that explains the data, with one in the columns."""
     for hypothesis in hypotheses:
         texts = column_mistakes(search, hypothesis)
         if texts:
@@ -184,18 +186,19 @@ def column_mistakes(
     *,
     with_factor: bool = False,
 ) -> list[str]:
-    """Search for what is wrong with the columns of data.
+    """Search for mistakes in the columns of data.
 
     Parameters
     ----------
-    search : the data.
-    times : a mistake in their times, and the data without it.
-    with_factor : whether any factor of a channel may be wrong.
+    search : the data and the reference.
+    times : a mistake in the rows or times, and the data without it; by default there is none.
+    with_factor : whether a channel may be wrong by any factor.
 
     Returns
     -------
     list of str
-        The mistakes, one text with the one in the times; none where they do not explain the data.
+        The mistakes in words, with one in the times as a single text; none where they do not
+        explain the data.
     """
     data = times.change if times is not None else search.data
     inside = search.up_to_horizon(data)
@@ -208,7 +211,7 @@ def column_mistakes(
     if explanation is None:
         return []
     mistakes = explanation.hypothesis.change.mistakes
-    # With a mistake in the times one more is a pair, and more explain anything.
+    # Beside a mistake in the times one in the columns is accepted: more would explain anything.
     if times is not None and len(mistakes) > 1:
         return []
     return list(mistakes) if times is None else ["; and ".join([times.text, *mistakes])]
@@ -218,7 +221,7 @@ def column_mistakes(
 
 
 def _row_hypotheses(search: TrajectorySearch) -> Iterator[Hypothesis[ForeignData]]:
-    """Yield what may be wrong with rows and times, and the data without it."""
+    """Yield possible mistakes in rows and times, and the data without each."""
     yield from _times_in_other_units(search)
     yield from _rows_between(search)
     if not search.is_within_tolerance:
@@ -232,7 +235,12 @@ def _row_hypotheses(search: TrajectorySearch) -> Iterator[Hypothesis[ForeignData
 
 
 def _times_in_other_units(search: TrajectorySearch) -> Iterator[Hypothesis[ForeignData]]:
-    """Yield times in ms, us and minutes, numbers of rows, and sums in single precision."""
+    """Yield the data with other times: ms, us, minutes, row numbers, sums in single precision.
+
+    Parameters
+    ----------
+    search : the data and the scene.
+    """
     data = search.data
     count = len(data.time)
     factors = list(_TIME_FACTORS)
@@ -254,7 +262,12 @@ def _times_in_other_units(search: TrajectorySearch) -> Iterator[Hypothesis[Forei
 
 
 def _rows_between(search: TrajectorySearch) -> Iterator[Hypothesis[ForeignData]]:
-    """Yield rows that are held or interpolated between every few: the others alone are right."""
+    """Yield the rows that are not held or interpolated, where a period of such rows is found.
+
+    Parameters
+    ----------
+    search : the data and the reference.
+    """
     data = search.data
     count = len(data.time)
     changes = np.flatnonzero(np.diff(data.values, axis=0).any(axis=1)) + 1
@@ -269,7 +282,8 @@ def _rows_between(search: TrajectorySearch) -> Iterator[Hypothesis[ForeignData]]
     for degree, text in ((1, "linearly"), (3, "by a cubic spline")):
         # Rows between every fourth one are between every second one, too: the longest counts.
         for period in range(min(_MAX_PERIOD, count // MIN_ROWS), 1, -1):
-            # Most periods are refuted by the first rows; what a spline does where these end decays.
+            # The first rows refute most periods. A spline of them alone is wrong near their end,
+            # and less so farther from it: their first quarter is compared.
             first = _left_between(
                 data.time[:_FIRST_ROWS], data.values[:_FIRST_ROWS], period, degree
             )
@@ -279,7 +293,7 @@ def _rows_between(search: TrajectorySearch) -> Iterator[Hypothesis[ForeignData]]
             left = _left_between(data.time, data.values, period, degree)
             if not (left <= allowed[: len(left)]).all():
                 continue
-            # A slow motion has hardly anything between its rows that is not on a spline.
+            # A slow motion lies nearly on a spline itself: then nothing is concluded.
             of_right = _left_between(inside.time, right, period, degree)
             if (of_right > _NOT_BY_CHANCE * allowed[: len(of_right)]).any():
                 text = f"interpolated {text} between every {period} rows"
@@ -288,18 +302,19 @@ def _rows_between(search: TrajectorySearch) -> Iterator[Hypothesis[ForeignData]]
 
 
 def _left_between(time: Array, values: Array, period: int, degree: int) -> Array:
-    """Return by how much rows are off what is interpolated between every few of them.
+    """Return the differences between rows and a spline through every few of them.
 
     Parameters
     ----------
-    time, values : (n,) s, (n, columns).
-    period : rows from one that is kept to the next.
-    degree : of the polynomials.
+    time, values : (n,) s, (n, columns) rad and rad/s.
+    period : number of rows from one on the spline to the next.
+    degree : of the spline's polynomials, 1 or 3.
 
     Returns
     -------
     ndarray
-        (rows up to the last that is kept, columns), by the better of two conditions at the ends.
+        (rows up to the last on the spline, columns), of the better of two end conditions; infinite
+        where too few rows are on it.
     """
     last = (len(time) - 1) // period * period + 1
     knots = slice(0, last, period)
@@ -315,7 +330,12 @@ def _left_between(time: Array, values: Array, period: int, degree: int) -> Array
 
 
 def _lags(search: TrajectorySearch) -> Iterator[Hypothesis[ForeignData]]:
-    """Yield a constant lag."""
+    """Yield the data without a constant lag of their times.
+
+    Parameters
+    ----------
+    search : the data and the reference.
+    """
     data, end = search.data, horizon(search.exact.trajectory)
     step = float(np.median(np.diff(data.time)))
     # Not the first row: at the start the motion may be slow, and the lag hardly seen.
@@ -332,7 +352,12 @@ def _lags(search: TrajectorySearch) -> Iterator[Hypothesis[ForeignData]]:
 
 
 def _clocks(search: TrajectorySearch) -> Iterator[Hypothesis[ForeignData]]:
-    """Yield a clock that is fast or slow."""
+    """Yield the data with corrected times, if their clock is fast or slow.
+
+    Parameters
+    ----------
+    search : the data and the reference.
+    """
     data, end = search.data, horizon(search.exact.trajectory)
     row = int(np.searchsorted(data.time, 0.5 * end))
     if not 0 < row < len(data.time) or data.time[0] < 0.0:
@@ -348,15 +373,15 @@ def _clocks(search: TrajectorySearch) -> Iterator[Hypothesis[ForeignData]]:
 
 
 def _time_of_row(search: TrajectorySearch, row: int, first: float, last: float) -> float:
-    """Find when the reference is nearest to a row of the data, s.
+    """Find the time, s, at which the reference is nearest to a row of the data.
 
-    From the nearest row of the reference on by Gauss and Newton's iteration over the time.
+    Gauss and Newton's iteration over the time, which starts at the nearest row of the reference.
 
     Parameters
     ----------
-    search : the data and the reference, which is carried on from its rows.
-    row : number of the row.
-    first, last : s, between which times it is looked for, up to the horizon.
+    search : the data and the reference.
+    row : number of the row of the data.
+    first, last : s, the times between which is searched, at most up to the horizon.
     """
     data, run = search.data, search.exact.trajectory
     columns, end = data.columns, min(horizon(run), last)
@@ -390,13 +415,13 @@ def _time_of_row(search: TrajectorySearch, row: int, first: float, last: float) 
 def _column_hypotheses(
     search: TrajectorySearch, data: ForeignData, inside: ForeignData, *, with_factor: bool
 ) -> Iterator[Hypothesis[Correction]]:
-    """Yield what may be wrong with the columns of data whose times are right.
+    """Yield possible mistakes in the columns of data whose times are right.
 
     Parameters
     ----------
-    search : what the data should be.
-    data, inside : all rows, and those up to the horizon.
-    with_factor : whether any factor of a channel may be wrong.
+    search : the reference, and what may be left.
+    data, inside : all rows of the data, and those up to the horizon.
+    with_factor : whether a channel may be wrong by any factor.
     """
     states, carried = search.states_at(inside.time), search.carried(inside.time)
     columns = data.columns
@@ -416,8 +441,9 @@ def _column_hypotheses(
     corrected = _corrected_channels(readings)
     if corrected is not None:
         yield corrected
-    # Columns that are those of other channels, rates taken as angles among them: each column is
-    # assigned another channel, so that the sum of the errors' digits is least.
+    # Columns may be exchanged, also rates with angles: each column is assigned another channel, so
+    # that the sum of the logarithms of the errors is least. A sum of the errors would depend on
+    # the largest one alone.
     differences = np.abs(inside.values[:, :, None] - states[:, None, :])
     errors = (differences / carried[:, None, :]).max(axis=0)  # (columns, channels)
     preference = np.zeros_like(errors)
@@ -429,7 +455,18 @@ def _column_hypotheses(
 
 
 def _corrected_channels(readings: ColumnReadings) -> Hypothesis[Correction] | None:
-    """Correct each channel by itself; None where a channel fits by no reading."""
+    """Correct each channel by its own reading.
+
+    Parameters
+    ----------
+    readings : of the columns of the data.
+
+    Returns
+    -------
+    Hypothesis or None
+        The mistakes and the data without them; None where a channel fits no reading, or the
+        readings are not plausible together.
+    """
     data = readings.data
     names: dict[str, list[str]] = {}
     kept, values, roundings = [], [], []
@@ -448,7 +485,8 @@ def _corrected_channels(readings: ColumnReadings) -> Hypothesis[Correction] | No
             kept.append(j)
             values.append(reading.corrected)
             roundings.append(reading.rounding)
-    # Each column has its own only by chance; and if all are late, so are the times.
+    # Columns that are processed in different ways fit by chance; and if all columns are late, the
+    # times are wrong, not the columns.
     is_late = any(text.endswith(LATE_OR_EARLY) for text in processed)
     if len(processed) > 1 or (is_late and not has_right_motion and len(data.channels) > 1):
         return None
@@ -462,14 +500,21 @@ def _corrected_channels(readings: ColumnReadings) -> Hypothesis[Correction] | No
         rounding=np.stack(roundings, axis=1),
         wrapped=tuple(data.wrapped[j] for j in kept if data.wrapped),
     )
-    # Of a channel that is rows late the last ones are not there.
+    # The last rows of a channel that is some rows late are not in the data.
     is_known = np.asarray(np.isfinite(corrected.values).all(axis=1))
     correction = Correction(corrected.rows(is_known), mistakes)
     return Hypothesis("; and ".join(mistakes), correction, len(mistakes))
 
 
 def _exchange(scene: Scene, data: ForeignData, chosen: Sequence[int]) -> Hypothesis[Correction]:
-    """Take the columns of data as those of other channels, by their numbers."""
+    """Return the hypothesis that the columns of data are those of other channels.
+
+    Parameters
+    ----------
+    scene : the rotor, with its channels.
+    data : the data.
+    chosen : for each column the place of another channel, see `ForeignData.columns`.
+    """
     known = channels(scene)[1:]
     others = tuple(known[column] for column in chosen)
     moved = []

@@ -1,7 +1,7 @@
 """Other scenes, equations and parameters that explain the defects of data.
 
-Nothing is run from the start: each hypothesis is held to the data's own states, interval by
-interval. It explains the defects where what it leaves of them would agree.
+No motion is integrated from the start: each hypothesis is compared with the data's own states,
+interval by interval. It explains the defects if what it leaves of them would agree.
 """
 
 from __future__ import annotations
@@ -65,13 +65,13 @@ class DefectSearch:
 
     Parameters
     ----------
-    judged : the defects.
-    max_steps : of Runge and Kutta in an interval: where more are needed nothing is looked for. At
-        most `BRIEF_SEARCH` no more than single causes are.
+    judged : the defects of the data.
+    max_steps : of Runge and Kutta in an interval: where more are needed, nothing is searched for.
+        With at most `BRIEF_SEARCH`, sets of several parameters are not tried.
 
     Attributes
     ----------
-    rows : (k,) intervals that hypotheses are tried on.
+    rows : (k,) numbers of the intervals on which hypotheses are tried.
     """
 
     def __init__(self, judged: JudgedDefects, max_steps: int = _MAX_STEPS) -> None:
@@ -117,8 +117,8 @@ class DefectSearch:
         Returns
         -------
         list of str
-            The best and all that are alike. None where the defects follow nothing that was tried,
-            or the motion is too stiff for explicit steps between the rows.
+            The best explanation and all that are alike, in words. Empty where nothing that was
+            tried explains the defects, or the motion is too stiff for explicit steps between rows.
         """
         if self._steps is None:
             return []
@@ -144,8 +144,8 @@ class DefectSearch:
         Returns
         -------
         list of str
-            The best, which leaves at most a thousandth of them in the mean, and all that leave at
-            most ten times as much: of one that is alone it is certain that it is the cause.
+            The best, which leaves at most a thousandth of the defects' root mean square, and all
+            that leave at most ten times as much; a single one is certainly the cause.
         """
         if self._steps is None or self._is_rounding:
             return []
@@ -153,14 +153,14 @@ class DefectSearch:
         def left(model: RotorModel) -> float:
             return self._share(self._residual(model, self._fine))
 
-        # What leaves more than allowed is no explanation, but may be alike to one.
+        # More is allowed here than an explanation may leave, to find those that are alike to one.
         hypotheses = rotor_hypotheses(self._scene)
         explained = list(explanations(hypotheses, left, _CERTAIN * _LEFT))
         if not _least(explained) <= _LEFT:
             explained = self._parameter_sets()
         if not _least(explained) <= _LEFT:
             return []
-        # What the quick steps leave of the right one is not told from nothing.
+        # What the quick steps leave of the right one cannot be distinguished from nothing.
         alike = closest(explained, _CERTAIN, 0.1 * _QUICK)
         return [explanation.text for explanation in alike]
 
@@ -177,7 +177,7 @@ class DefectSearch:
         return [explanation.text for explanation in explanations(hypotheses, left, allowed)]
 
     def _plausible_models(self) -> Iterator[Hypothesis[RotorModel]]:
-        """Yield the models that leave little by coarse steps."""
+        """Yield the models that leave little of the defects when computed by coarse steps."""
         first_row = self._first_row()
         every = itertools.chain(
             rotor_hypotheses(self._scene),
@@ -189,14 +189,14 @@ class DefectSearch:
                 yield hypothesis
 
     def _loads_per_row(self) -> Iterator[Hypothesis[RotorModel]]:
-        """Yield the scene with loads that are held from each row to the next, as controllers do."""
+        """Yield the scene with loads that are constant between rows, as a controller's are."""
         scene = self._scene
         if not scene.has_constant_loads:
             held = with_held_loads(scene, self._judged.defects.time.tolist())
             yield Hypothesis("loads held from each row to the next", RotorModel(held))
 
     def _first_row(self) -> Array:
-        """Return the first row of the data, (2 (1 + blades),); of fixed coordinates the scene's."""
+        """Return the first state of the data, (2 (1 + blades),), the scene's where it is fixed."""
         scene = self._scene
         first = np.array([*scene.initial_angles, *scene.initial_rates])
         count = len(scene.initial_angles)
@@ -207,17 +207,17 @@ class DefectSearch:
     # Residuals
 
     def _residual(self, model: RotorModel, steps: int = 1) -> Array:
-        """Return the defects by another model.
+        """Return the defects of the data by another model.
 
         Parameters
         ----------
         model : in place of the scene.
-        steps : how many times as many steps as for transition matrices.
+        steps : factor of the number of steps in an interval.
 
         Returns
         -------
         ndarray
-            (k, m) rad; infinite where the model has other coordinates or no place for the scene.
+            (k, m) rad; infinite if the model has other coordinates or its equations do not hold.
         """
         if model.scene.moving_coordinates != self._moving:
             return np.full_like(self._values, np.inf)
@@ -248,12 +248,12 @@ class DefectSearch:
     def _left_by(self, model: RotorModel) -> float:
         """Return the share of the defects that a model leaves; infinite where it is too much.
 
-        In defects that are rounding no single one is too large.
+        Where the defects are within rounding, no single one is too large.
         """
         return self._left_at_most(model, self._allowed)
 
     def _left_at_most(self, model: RotorModel, allowed: float) -> float:
-        """Return the share that a model leaves; infinite if a defect stays above `allowed`."""
+        """Return the share that a model leaves; infinite if a defect stays above `allowed`, rad."""
         residual = self._residual(model, self._fine)
         if not self._is_rounding and not self._largest_left(residual) <= allowed:
             return math.inf
@@ -264,8 +264,13 @@ class DefectSearch:
     def _parameter_sets(self) -> list[Explanation[RotorModel]]:
         """Search for the smallest sets of parameters that explain the defects.
 
-        A parameter's signature is the derivative of the defects by it. Least squares over the
-        signatures of a set say how much it may explain; the best sets are fitted.
+        The signature of a parameter is the derivative of the defects by it. Least squares over the
+        signatures of a set say how much of the defects it may explain; the best sets are fitted.
+
+        Returns
+        -------
+        list of Explanation
+            Of the smallest number of parameters that explains the defects; empty if none does.
         """
         candidates, signatures = self._signatures()
         if not candidates:
@@ -287,7 +292,8 @@ class DefectSearch:
             sides = projections[sets]
             amounts = np.linalg.solve(matrices, sides[..., None])[..., 0]
             squares = (sides * amounts).sum(axis=1)  # of the defects, that the set explains
-            # Of a single one that is far off the signature may be another; several are not.
+            # The signature holds for small changes: a single parameter that is far off may have
+            # another, and is fitted all the same.
             if count > 1:
                 is_enough = squares > (1.0 - _LEFT_OF_SETS**2) * total
                 sets, squares = sets[is_enough], squares[is_enough]
@@ -312,7 +318,7 @@ class DefectSearch:
 
     def _signatures(self) -> tuple[list[Parameter], Array]:
         """Return the parameters that have an effect, and their signatures as unit vectors."""
-        # Unit vectors, so that products of two of them are the cosines between them.
+        # With unit vectors, scalar products are the cosines between signatures.
         candidates, signatures = [], []
         for parameter in parameters(self._scene):
             slope = self._slope([parameter], [0.0], 0).ravel()
@@ -332,8 +338,8 @@ class DefectSearch:
         Returns
         -------
         Hypothesis or None
-            None where the fit does not converge, leads to another scene, or a change is not
-            significant.
+            The changes with their uncertainties, in words, and the changed model; None if the fit
+            is not finite, a change is more than `_MAX_CHANGE`, or one is not significant.
         """
         change = np.zeros(len(chosen))
         for _ in range(1 if self._is_rounding else _ROUNDS):
@@ -354,7 +360,7 @@ class DefectSearch:
         if not np.isfinite(weighted).all():
             return None
         deviation = self._deviations(weighted, slopes)
-        # What the quick steps do not know is no change either.
+        # The quick steps have errors of their own, which are no change either.
         deviation = np.maximum(deviation, _QUICK * np.abs(change))
         if (np.abs(change) < _SIGNIFICANT * deviation).any():
             return None
@@ -367,12 +373,12 @@ class DefectSearch:
         return Hypothesis(" and ".join(texts), model, len(chosen))
 
     def _deviations(self, weighted: Array, slopes: Array) -> Array:
-        """Return standard deviations of fitted changes.
+        """Return the standard deviations of fitted changes, (parameters,), shares or rad.
 
         Parameters
         ----------
-        weighted : (k, m) residuals of the fit.
-        slopes : (k m, parameters) their derivatives.
+        weighted : (k, m) weighted residuals of the fit.
+        slopes : (k m, parameters) their derivatives by the changes.
         """
         spread = float(np.sqrt((weighted**2).mean()))
         if self._is_rounding:
@@ -388,8 +394,13 @@ class DefectSearch:
         Parameters
         ----------
         chosen : parameters that are changed.
-        at : their changes.
-        which : the one by which is derived.
+        at : (parameters,) their changes, at which the derivative is taken.
+        which : number of the parameter by which the derivative is taken.
+
+        Returns
+        -------
+        ndarray
+            (k, m), not finite if the changed model has other coordinates.
         """
         residuals = []
         # Central differences: their error is of second order in the step.
@@ -403,13 +414,13 @@ class DefectSearch:
 
 
 def _tried_intervals(judged: JudgedDefects) -> NDArray[np.int64]:
-    """Choose intervals: some all over the run, and those of the largest defects.
+    """Choose intervals: some evenly over the run, and those of the largest defects.
 
-    None with a kink of a load inside, where the quick steps are wrong.
+    Intervals with a kink of a load inside are left out: there the quick steps are wrong.
 
     Parameters
     ----------
-    judged : the defects.
+    judged : the defects of the data.
 
     Returns
     -------
@@ -439,7 +450,7 @@ def _has_kink(judged: JudgedDefects) -> NDArray[np.bool_]:
 
 
 def _tried_windows(judged: JudgedDefects, rows: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Return the first rows of windows without a kink, at some of the intervals `rows`."""
+    """Return the first rows of windows without a kink of a load, at some of the intervals `rows`."""
     is_smooth = ~_has_kink(judged) & judged.is_judged
     count = len(is_smooth) - (FIT_ROWS - 2)
     windows = []
@@ -452,15 +463,15 @@ def _tried_windows(judged: JudgedDefects, rows: NDArray[np.int64]) -> NDArray[np
 def _window_residuals(
     judged: JudgedDefects, windows: NDArray[np.int64]
 ) -> tuple[Array, Array, Array]:
-    """Compute what of the angles of windows no motion explains, where rates are fitted to them.
+    """Compute the part of the angles in windows of rows that no motion of the scene explains.
 
-    The rates are those with which the closed form fits best: in the defects of single intervals
-    much of a mistake is hidden by them.
+    It is for data whose rates are fitted to their angles. The fitted rates are those with which the
+    closed form fits best, so that defects of single intervals show only a part of a mistake.
 
     Parameters
     ----------
-    judged : the defects.
-    windows : (k,) their first rows.
+    judged : the defects of the data.
+    windows : (k,) first rows of the windows, of FIT_ROWS rows each.
 
     Returns
     -------
@@ -473,8 +484,8 @@ def _window_residuals(
     half = count // 2
     vectors, transitions = judged.values * judged.units, defects.transitions
     scale = np.concatenate([np.ones(half), judged.units[half:]])
-    # Away from the data's own states, row by row: design @ (at the first row) + offset, and the
-    # derivative of the offset by the ends of all intervals.
+    # A deviation from the data's own states, carried on row by row, is design @ (deviation in the
+    # first row) + offset; by_ends is the derivative of the offset by the ends of all intervals.
     design = [np.broadcast_to(np.eye(count), (len(windows), count, count))]
     offsets = [np.zeros((len(windows), count))]
     by_ends = [np.zeros((len(windows), count, (FIT_ROWS - 1) * count))]
@@ -486,6 +497,7 @@ def _window_residuals(
         derivative[:, :, row * count : (row + 1) * count] += np.eye(count)
         by_ends.append(derivative)
     angles = np.concatenate([matrix[:, :half] * scale for matrix in design], axis=1)
+    # The projection removes from the angles what any deviation in the first row may explain.
     projection = np.eye(FIT_ROWS * half) - angles @ np.linalg.pinv(angles)
     offset = np.concatenate([offset[:, :half] for offset in offsets], axis=1)
     residuals = np.einsum("kij,kj->ki", projection, offset)
@@ -496,7 +508,7 @@ def _window_residuals(
 
 
 def _changed(scene: Scene, chosen: Sequence[Parameter], change: Array) -> RotorModel:
-    """Return a scene whose parameters are changed by some amounts."""
+    """Return the model of a scene whose parameters are changed by some amounts."""
     model = RotorModel(scene)
     for parameter, amount in zip(chosen, change.tolist(), strict=True):
         model = parameter.apply(model, amount)
@@ -504,5 +516,5 @@ def _changed(scene: Scene, chosen: Sequence[Parameter], change: Array) -> RotorM
 
 
 def _least(explained: Sequence[Explanation[RotorModel]]) -> float:
-    """Return what the best explanation leaves, infinity where there is none."""
+    """Return the least that an explanation leaves, infinity where there is none."""
     return min((explanation.left for explanation in explained), default=math.inf)

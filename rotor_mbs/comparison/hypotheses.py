@@ -42,6 +42,7 @@ class Explanation(Generic[Change]):
 
     @property
     def text(self) -> str:
+        """Return the cause, in words."""
         return self.hypothesis.text
 
 
@@ -70,7 +71,7 @@ def explanations(
 
 
 def cheapest(explained: Iterable[Explanation[Change]]) -> list[Explanation[Change]]:
-    """Return the explanations of the lowest price: more mistakes than it takes explain no more."""
+    """Return the explanations of the lowest price, that is with the fewest mistakes."""
     explained = list(explained)
     lowest = min((explanation.hypothesis.price for explanation in explained), default=0)
     return [explanation for explanation in explained if explanation.hypothesis.price == lowest]
@@ -79,13 +80,13 @@ def cheapest(explained: Iterable[Explanation[Change]]) -> list[Explanation[Chang
 def closest(
     explained: Iterable[Explanation[Change]], factor: float, least: float
 ) -> list[Explanation[Change]]:
-    """Return the explanations that cannot be told from the best one, the best first.
+    """Return the explanations that cannot be distinguished from the best one, the best first.
 
     Parameters
     ----------
-    explained : explanations.
-    factor : by which what they leave may differ.
-    least : a size that says nothing of an explanation: what a right one may leave.
+    explained : explanations in any order.
+    factor : by which what an explanation leaves may exceed what the best one leaves.
+    least : what a right explanation may leave; smaller differences are not distinguished.
     """
     ordered = sorted(explained, key=lambda explanation: explanation.left)
     best = ordered[0].left if ordered else 0.0

@@ -1,4 +1,4 @@
-"""Columns of OpenFAST's output: which channel each one is, in which sign, frame and zero.
+"""Columns of OpenFAST's output: which channel each is, in which sign, frame and zero.
 
 OpenFAST's x (downwind), y, z are a scene's y, -x, z. Its pitch is positive towards feather, about
 the negative pitch axis; its loads are those of a blade on the hub and of the rotor on the shaft,
@@ -63,9 +63,15 @@ class OpenFastSettings:
 
 
 class Suggestion(NamedTuple):
-    """What a column is: channel = sign * (column + offset) in `unit`, "" for the stated one.
+    """The channel that a column is: channel = sign * (column + offset).
 
-    `wrapped` : whether whole turns are missing.
+    Attributes
+    ----------
+    channel, column : the channel, and the name of the column.
+    sign : 1 or -1.
+    offset : in the unit of the column.
+    unit : of the column, "" for the one that the file states.
+    wrapped : whether whole turns are missing.
     """
 
     channel: Channel
@@ -77,12 +83,12 @@ class Suggestion(NamedTuple):
 
 
 def describe(settings: OpenFastSettings, *, is_guessed: bool) -> str:
-    """Return in a line how columns are read.
+    """Return a line that says how the columns of OpenFAST's output are read.
 
     Parameters
     ----------
-    settings : of the model.
-    is_guessed : whether the file's head says that OpenFAST wrote it, not a mapping.
+    settings : numbers of the model.
+    is_guessed : whether the head of the file says that OpenFAST wrote it, not a mapping.
     """
     source = "by its head" if is_guessed else "by the mapping"
     zero = f" less AzimB1Up = {settings.azimuth_up:g} deg" if settings.azimuth_up else ""
@@ -98,20 +104,20 @@ def suggested(
     scene: Scene,
     settings: OpenFastSettings,
 ) -> tuple[list[Suggestion], dict[str, str]]:
-    """Return what the columns of OpenFAST's output are.
+    """Return which channels the columns of OpenFAST's output are.
 
     Parameters
     ----------
     table : the columns.
     known : `channels` of the scene.
-    scene : whose channels they may be.
-    settings : of the model.
+    scene : the rotor, whose hub and tilt decide about the loads of the shaft.
+    settings : numbers of the model.
 
     Returns
     -------
     list of Suggestion, dict
-        One for each channel, by the first column that is it; by other columns that are known by
-        their names, why they are not compared.
+        One suggestion for each channel that is found, by the first column that has it; by name of
+        other columns whose names are known, why they are not compared.
     """
     found: dict[str, Suggestion] = {}
     reasons: dict[str, str] = {}
@@ -148,7 +154,14 @@ def _suggestion(
     known: Sequence[Channel],
     settings: OpenFastSettings,
 ) -> Suggestion | None:
-    """Return what a column is, None where its name is unknown; plain: in lower case."""
+    """Return the channel that a column's name says, None for an unknown name.
+
+    Parameters
+    ----------
+    name, plain : of the column, as it stands in the file and in lower case.
+    known : `channels` of the scene.
+    settings : numbers of the model, of which the azimuth's zero counts.
+    """
     by_name = {channel.name: channel for channel in known}
     if plain in _AZIMUTH:
         rotor = by_name["rotor"]
@@ -179,7 +192,7 @@ def _suggestion(
 
 
 def _shaft_load(name: str, match: re.Match[str], by_name: Mapping[str, Channel]) -> Suggestion:
-    """Return the load of the shaft that a name has."""
+    """Return the load of the shaft that a column's name says."""
     axis, sign = _SHAFT_AXES[match["axis"]]
     kind = "force" if match["load"] == "lsshftf" else "moment"
     frames = ("rotor",) if match["frame"] == "a" and axis != "y" else ("shaft", "base")
@@ -187,7 +200,7 @@ def _shaft_load(name: str, match: re.Match[str], by_name: Mapping[str, Channel])
 
 
 def _in_frame(channel: Channel, frames: Iterable[str]) -> Channel:
-    """Return a load in the first of some frames that it may have."""
+    """Return a load in the first of some frames in which it has components."""
     own = "blade" if channel.name.startswith("blade root") else "base"
     for frame in frames:
         if frame == own or frame in FRAMES[own]:
@@ -202,9 +215,20 @@ def _is_about_pin(channel: Channel, scene: Scene, settings: OpenFastSettings) ->
 
 
 def _hub_offset(channel: Channel, scene: Scene, settings: OpenFastSettings) -> float:
-    """Return what to add to a moment, N m: a scene's hub has its weight at the apex, not at HubCM.
+    """Return the correction of a shaft moment, N m, for the place of the hub's weight.
 
-    NaN where it changes with the azimuth, in axes that turn.
+    OpenFAST's hub has its weight at HubCM, a scene's at the apex.
+
+    Parameters
+    ----------
+    channel : a load; 0 for all but the moments of the shaft.
+    scene : the rotor, with mass of the hub, gravity and tilt.
+    settings : numbers of the model.
+
+    Returns
+    -------
+    float
+        To be added to the column; NaN in axes that turn, where it changes with the azimuth.
     """
     if not channel.name.startswith("shaft moment") or not settings.hub_centre * scene.hub_mass:
         return 0.0

@@ -1,7 +1,7 @@
 """Units in any usual spelling: `rad s^-1`, `radian/second`, `kN·m`, `[deg]`.
 
-A unit is a product of atoms with whole exponents. What it is worth follows from the dimension that
-a channel has.
+A unit is a product of atoms with whole exponents. Its factor to the SI unit is known where it has
+the dimension of a channel.
 """
 
 from __future__ import annotations
@@ -80,7 +80,7 @@ _TERM = re.compile(r"\s*([*./-]?)\s*([^\W\d_]+|°)(?:\^?[({]?([+-]?\d+)[)}]?)?")
 
 
 def plain_unit(text: str) -> str:
-    """Return a unit without brackets and what follows "since"; "" for none.
+    """Return a unit without its brackets and without "since ..."; "" for none.
 
     >>> plain_unit(" [rad]"), plain_unit("seconds since 2000-01-01"), plain_unit("(-)")
     ('rad', 'seconds', '')
@@ -115,12 +115,23 @@ def unit_factor(unit: str, kind: str) -> float | None:
 
 
 def is_unit(text: str) -> bool:
-    """Whether a text is a unit of any channel."""
+    """Return whether a text is a unit of any channel."""
     return any(unit_factor(text, kind) is not None for kind in BASE_UNITS)
 
 
 def _parsed(unit: str) -> _Atom | None:
-    """Return exponents and factor of a unit, None where it has an unknown atom."""
+    """Return exponents and factor of a unit.
+
+    Parameters
+    ----------
+    unit : without brackets, at most `_MAX_LENGTH` characters.
+
+    Returns
+    -------
+    _Atom or None
+        Exponents of time, angle, force and length, and the factor to SI units; None for an unknown
+        atom, an exponent above 3, or a text that is no unit.
+    """
     if not unit or len(unit) > _MAX_LENGTH:
         return None
     text = unit.translate(_SUPERSCRIPTS).replace("**", "^")
@@ -153,7 +164,9 @@ def _parsed(unit: str) -> _Atom | None:
 def unit_of_attributes(attributes: Mapping[str, object]) -> str:
     """Return the unit in the attribute `units` or `unit` of an array, "" where there is none.
 
-    Libraries write a text, bytes, or an array of one of them.
+    Parameters
+    ----------
+    attributes : of the array, by name; a unit is a text, bytes, or a list or array of one of them.
     """
     for name in ("units", "unit", "Units", "Unit", "UNITS"):
         value = attributes.get(name)

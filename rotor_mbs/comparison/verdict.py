@@ -92,11 +92,12 @@ class DataVerdict:
 
     @property
     def agrees(self) -> bool:
+        """Return whether the data agree with the scene: the status is "ok"."""
         return self.status == "ok"
 
 
 def agrees_until(rows: Array, error: Array) -> dict[str, float | None]:
-    """Find until when data agree to each of `LEVELS`.
+    """Find up to which row data agree with the reference, for each of `LEVELS`.
 
     Parameters
     ----------
@@ -117,12 +118,12 @@ def agrees_until(rows: Array, error: Array) -> dict[str, float | None]:
 
 
 def as_dictionary(verdict: DataVerdict) -> dict[str, Any]:
-    """Return a verdict as JSON can hold it."""
+    """Return a verdict as a dictionary that can be written as JSON."""
     return asdict(verdict) | {"agrees": verdict.agrees}
 
 
 def from_dictionary(stored: Mapping[str, Any]) -> DataVerdict:
-    """Return the verdict of which `as_dictionary` made this, also where it has been JSON since."""
+    """Return a verdict from what `as_dictionary` returned, also after it was written as JSON."""
     values: dict[str, Any] = {}
     for name, value in stored.items():
         values[name] = tuple(value) if isinstance(value, list) else value
@@ -134,11 +135,11 @@ def from_dictionary(stored: Mapping[str, Any]) -> DataVerdict:
 def defects_of_channel(
     scene: Scene, defects: Defects | None, channel: Channel
 ) -> tuple[Array, Array] | None:
-    """Return a channel's interval defects, and what rounding may make of them.
+    """Return a channel's interval defects, and how large rounding may make them.
 
     Parameters
     ----------
-    scene : the scene.
+    scene : the rotor, with the number of its coordinates.
     defects : of the data, None where they are not known.
     channel : an angle or a rate.
 
@@ -164,7 +165,7 @@ def comparison_record(
     expected: Array,
     defects: Defects | None,
 ) -> Record:
-    """Return a comparison as a record of a results file.
+    """Return a comparison as a record for a results file.
 
     Parameters
     ----------
@@ -177,7 +178,8 @@ def comparison_record(
     Returns
     -------
     Record
-        Of each channel data, `_reference`, `_error`, and `_defect` of an angle or a rate.
+        For each channel its data and the columns `_reference`, `_error`, and of an angle or a rate
+        `_defect`, NaN where there is none.
     """
     axis, content = verdict.axis, "modes" if data.is_modes else "trajectory"
     if data.is_modes:
@@ -226,8 +228,8 @@ def unused_lines(verdict: DataVerdict, most: int = 12) -> list[str]:
 
     Parameters
     ----------
-    verdict : has them, with the reasons.
-    most : names in a line.
+    verdict : with the unused columns and the reasons.
+    most : how many names a line lists.
     """
     names_by_reason: dict[str, list[str]] = {}
     for name, reason in verdict.unused.items():
@@ -242,7 +244,12 @@ def unused_lines(verdict: DataVerdict, most: int = 12) -> list[str]:
 
 
 def channel_table(verdict: DataVerdict) -> TextTable:
-    """Return a table with a row per channel: largest error and defect, ends of agreement."""
+    """Return a table with a row per channel: largest error and defect, ends of agreement.
+
+    Parameters
+    ----------
+    verdict : with the errors by channel.
+    """
     head = (
         "channel",
         "largest error",
@@ -259,6 +266,7 @@ def channel_table(verdict: DataVerdict) -> TextTable:
 
 
 def axis_unit(verdict: DataVerdict) -> str:
+    """Return the unit of the times, or of the speeds of a table of modes."""
     return "s" if verdict.axis == "time" else "rad/s"
 
 

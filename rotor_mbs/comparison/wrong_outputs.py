@@ -424,7 +424,8 @@ def _by_load(scene: Scene, matrix: Array) -> dict[str, Array]:
     Returns
     -------
     dict of ndarray
-        (n), then a dimension for the blades and one for the axes of loads that have them.
+        (n, ...) N or N m, with a dimension for the blades and one for the axes where a load has
+        them.
     """
     arrays = {}
     first = 0
