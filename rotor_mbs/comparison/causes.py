@@ -1,4 +1,4 @@
-"""What data that do not agree look like: which searches are made, in which order."""
+"""The search for likely causes of data that do not agree: what is searched for, in which order."""
 
 from __future__ import annotations
 
@@ -27,18 +27,18 @@ def likely_causes(search: TrajectorySearch, judged: JudgedDefects | None) -> lis
     """Search for what explains data that do not agree.
 
     Mistakes in columns and times come first; then another model, parameters, or faults at a time;
-    then scatter, or a factor of a channel. Data that start elsewhere are held to other models last:
-    they may be right but for a column.
+    then scatter, or a factor of a channel. Data that start in another state are compared with other
+    models last, as only one of their columns may be wrong.
 
     Parameters
     ----------
     search : the data and the reference.
-    judged : defects of the data, None where they are not known of all coordinates.
+    judged : defects of the data, None where they are not known for all coordinates.
 
     Returns
     -------
     list of str
-        Causes in words; none where nothing fits, or the data are the reference's within rounding.
+        Causes in words; empty where nothing fits, or the data agree with the reference.
     """
     first = search.up_to_horizon(search.data)
     is_elsewhere = True
@@ -71,12 +71,17 @@ def _other_models_or_faults(search: TrajectorySearch, judged: JudgedDefects) -> 
 
 
 def _scatter(search: TrajectorySearch, data: ForeignData) -> list[str]:
-    """Find errors that have nothing in common from row to row, whatever the growth.
+    """Find errors that are uncorrelated from row to row and do not grow.
 
     Parameters
     ----------
-    search : the reference.
-    data : rows up to the horizon.
+    search : the reference, and the tolerance beyond which a channel is wrong.
+    data : rows of the data up to the horizon.
+
+    Returns
+    -------
+    list of str
+        The standard deviation in words; empty if the errors are no scatter.
     """
     if len(data.time) < 4 * MIN_ROWS:
         return []
@@ -87,11 +92,12 @@ def _scatter(search: TrajectorySearch, data: ForeignData) -> list[str]:
     sizes = (centred**2).mean(axis=0)
     if not is_wrong.any() or not ((sizes > 0.0) & (sizes < math.inf)).all():
         return []
-    # Of every second row alone neighbours have nothing in common either.
+    # If only every second row is wrong, neighbours are uncorrelated: rows two apart count, too.
     correlations = []
     for lag in (1, 2):
         correlations.append(np.abs((centred[lag:] * centred[:-lag]).mean(axis=0)))
     common = np.max(correlations, axis=0) / sizes
+    # Scatter is as large in the second half as in the first; an error of the motion grows.
     half = len(data.time) // 2
     early = (centred[:half] ** 2).mean(axis=0)
     late = (centred[half:] ** 2).mean(axis=0)

@@ -19,12 +19,12 @@ AT_FLOOR = 3.0  # times the rounding, as it is estimated
 
 
 def carried_errors(reference: Trajectory, growth: Array, units: Array) -> Array:
-    """Return what a relative error of 1 at the start may become at most.
+    """Return the largest errors that a relative error of 1 at the start may have grown to.
 
     Parameters
     ----------
-    reference : n rows.
-    growth, units : see `TimedReference`.
+    reference : (n,) rows of the reference, with angles.
+    growth, units : (n, 2 (1 + blades)) and (2 (1 + blades),), see `TimedReference`.
 
     Returns
     -------
@@ -38,28 +38,28 @@ def carried_errors(reference: Trajectory, growth: Array, units: Array) -> Array:
 
 
 def states_of(run: Trajectory) -> Array:
-    """Return angles, then rates, (n, 2 (1 + blades))."""
+    """Return the states of a run, angles, then rates, (n, 2 (1 + blades))."""
     return np.hstack([run.angles, run.rates])
 
 
 def defects_of_data(
     scene: Scene, data: ForeignData, reference: Trajectory, until: int
 ) -> tuple[Defects | None, str]:
-    """Compute the defects of data.
+    """Compute the interval defects of data.
 
-    Angles that the data lack are the reference's, and then only as far as the horizon; rates that
-    they lack are found from the angles.
+    Angles that the data lack are taken from the reference, and defects are computed up to the
+    horizon alone; rates that they lack are found from the angles.
 
     Parameters
     ----------
-    scene : the scene.
-    data, reference : the same rows.
-    until : rows up to the horizon.
+    scene : the rotor.
+    data, reference : the data, and the reference in the same rows.
+    until : number of rows up to the horizon.
 
     Returns
     -------
     Defects or None, str
-        The defects, None where they cannot be known; what a reader must know of them.
+        The defects, None where they cannot be known; a note on how they were found, or "".
     """
     count = len(scene.initial_angles)
     states = states_of(reference).copy()
@@ -98,12 +98,13 @@ def defects_of_data(
 
 @dataclass(frozen=True)
 class JudgedDefects:
-    """Defects of data in rad, and what of them is beyond rounding.
+    """Defects of data in rad, and how much of them is beyond rounding.
 
     Attributes
     ----------
-    scene, defects, tolerance : the scene, the defects of the data, rad.
-    units : (m,) rad, or rad/s of a rate: what counts as a rad.
+    scene, defects : the rotor, and the interval defects of the data.
+    tolerance : rad, of an interval's defect.
+    units : (m,) what counts as 1 rad: 1 rad of an angle, some rad/s of a rate.
     values, floors : (n - 1, m) rad, signed defects of the moving coordinates, angles, then rates,
         and what rounding makes of them.
     is_judged : (n - 1,) intervals that count.
@@ -123,23 +124,23 @@ class JudgedDefects:
 
     @property
     def largest(self) -> float:
-        """Largest defect beyond rounding, rad."""
+        """Return the largest defect beyond rounding, rad."""
         return float(self.excess.max(initial=0.0))
 
     @property
     def is_rounding(self) -> bool:
-        """Whether no defect is larger than what rounding explains."""
+        """Return whether no defect is larger than what rounding explains."""
         return not self.largest
 
 
 def judged_defects(
     scene: Scene, defects: Defects, tolerance: float, *, has_fitted_rates: bool = False
 ) -> JudgedDefects:
-    """Find what of the defects of data is beyond rounding.
+    """Find how much of the defects of data is beyond rounding.
 
     Parameters
     ----------
-    scene, defects : the scene, and the defects of the data.
+    scene, defects : the rotor, and the interval defects of the data.
     tolerance : rad, of an interval's defect.
     has_fitted_rates : whether the rates are computed from the angles.
     """
@@ -147,7 +148,7 @@ def judged_defects(
     vectors = np.hstack([defects.angles[:, moving], defects.rates[:, moving]])
     units = np.concatenate([np.ones(len(moving)), defects.rate_units[moving]])
     values = vectors / units
-    # Where a number is next to nothing its rounding is no measure.
+    # The rounding of a number near zero is too small as a measure of its channel's.
     floors = np.maximum(defects.floors, 0.3 * np.median(defects.floors, axis=0) + 1e-18)
     is_judged = defects.is_resolved & np.isfinite(vectors).all(axis=1)
     sizes = np.abs(np.where(is_judged[:, None], values, 0.0))

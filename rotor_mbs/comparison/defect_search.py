@@ -144,8 +144,8 @@ class DefectSearch:
         Returns
         -------
         list of str
-            The best, which leaves at most a thousandth of the defects' root mean square, and all
-            that leave at most ten times as much; a single one is certainly the cause.
+            The best, which leaves at most a thousandth of the defects' weighted root mean square,
+            and all that leave at most ten times as much; a single one is certainly the cause.
         """
         if self._steps is None or self._is_rounding:
             return []
@@ -450,7 +450,18 @@ def _has_kink(judged: JudgedDefects) -> NDArray[np.bool_]:
 
 
 def _tried_windows(judged: JudgedDefects, rows: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Return the first rows of windows without a kink of a load, at some of the intervals `rows`."""
+    """Return the first rows of windows without a kink of a load, at some of given intervals.
+
+    Parameters
+    ----------
+    judged : the defects of the data.
+    rows : (k,) numbers of the intervals.
+
+    Returns
+    -------
+    ndarray
+        At most `_MAX_WINDOWS` of `rows`, each with FIT_ROWS - 1 judged intervals from it on.
+    """
     is_smooth = ~_has_kink(judged) & judged.is_judged
     count = len(is_smooth) - (FIT_ROWS - 2)
     windows = []

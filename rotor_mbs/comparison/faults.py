@@ -1,4 +1,4 @@
-"""Faults at a time: what the defects of single intervals, or of a few beside each other, look like.
+"""Faults at a time, recognized by the defects of one interval or of a few beside each other.
 
 A row that is stuck, repeated or wrong, a load that jumps a row late, another state from some row
 on: each leaves defects of its own pattern in one to three intervals, and none in the others.
@@ -43,30 +43,31 @@ _SMALL_TURN = 1e-6  # rad, by the load whose effect is computed: far above round
 
 
 def faults_in_time(judged: JudgedDefects) -> list[str]:
-    """Find what stands out of the other intervals, by its pattern in time.
+    """Find faults at a time: intervals whose defects are far larger than those of all others.
 
     Parameters
     ----------
-    judged : the defects.
+    judged : the defects of the data.
 
     Returns
     -------
     list of str
-        The first faults, in words; none where most intervals are wrong, or no defect is more
-        than the tolerance.
+        The first `_MAX_NAMED` groups of faults, in words, and how many more there are. Empty where
+        most intervals are wrong, no defect is more than the tolerance, or the defects do not end
+        abruptly.
     """
     excess = judged.excess
     if judged.largest <= judged.tolerance:
         return []
-    # The median is that of right intervals, as long as most of them are right.
+    # The median is that of right intervals, provided that most intervals are right.
     usual = float(np.median(excess[judged.is_judged])) if judged.is_judged.any() else 0.0
     wrong = np.flatnonzero(excess > max(_STANDS_OUT * usual, _FAINT * judged.largest))
     # What is wrong everywhere is no fault at a time, though it shows in some places more than in
     # others.
     if not len(wrong) or len(wrong) > _EVERYWHERE * len(excess):
         return []
-    # Nor is one whose size comes down gradually beside what stands out: a fault at a time has
-    # edges.
+    # Defects that decrease gradually beside the largest ones are no fault at a time either: that
+    # has edges.
     edges = np.concatenate([wrong - 1, wrong + 1])
     is_interval = (edges >= 0) & (edges < len(excess))
     edges = edges[is_interval & ~np.isin(edges, wrong)]
@@ -74,7 +75,7 @@ def faults_in_time(judged: JudgedDefects) -> list[str]:
         beside = float(np.median(excess[edges]))
         if beside > _EDGE * float(np.median(excess[wrong])):
             return []
-    # And with the faults all is explained: what is left of the others is next to nothing.
+    # The faults have to explain all: the defects of the other intervals are to be nearly zero.
     others = np.delete(excess, wrong)
     if float(np.quantile(others, _MOST)) > max(judged.tolerance, _OF_OTHERS * judged.largest):
         return []
@@ -93,12 +94,18 @@ def faults_in_time(judged: JudgedDefects) -> list[str]:
 
 
 def _faults_of(judged: JudgedDefects, group: NDArray[np.int64]) -> list[str]:
-    """Describe the fault of a group of intervals, or those of its parts where it is more than one.
+    """Describe the fault of a group of intervals, or the faults of its parts.
 
     Parameters
     ----------
-    judged : the defects.
-    group : (k,) intervals that stand out and are near each other.
+    judged : the defects of the data.
+    group : (k,) numbers of faulty intervals that are near each other.
+
+    Returns
+    -------
+    list of str
+        The faults in words; where no pattern is recognized, when there is a fault, and in which
+        coordinate it is largest.
     """
     text = _fault(judged, group)
     if text:
@@ -119,8 +126,8 @@ def _fault(judged: JudgedDefects, group: NDArray[np.int64]) -> str:
 
     Parameters
     ----------
-    judged : the defects.
-    group : (k,) intervals that stand out and are near each other.
+    judged : the defects of the data.
+    group : (k,) numbers of faulty intervals that are near each other.
     """
     time = judged.defects.time
     start, end = float(time[group[0]]), float(time[group[-1] + 1])
@@ -147,25 +154,26 @@ def _fault(judged: JudgedDefects, group: NDArray[np.int64]) -> str:
 
 
 def _label(judged: JudgedDefects, place: int) -> str:
-    """Return the name of a moving coordinate."""
+    """Return the name of a coordinate by its place among those that move."""
     return judged.scene.coordinate_labels[judged.defects.moving[place]]
 
 
 def _wrong_row(judged: JudgedDefects, group: NDArray[np.int64]) -> str:
     """Describe a row that is repeated, stuck, wrong or at a wrong time; "" where it is none.
 
-    The defect is the closed form less the data: along the motion where the data are behind it.
+    The defect is the closed form less the data: it has the direction of the motion where the data
+    are behind it.
 
     Parameters
     ----------
-    judged : the defects.
-    group : (k,) intervals that stand out.
+    judged : the defects of the data.
+    group : (k,) numbers of faulty intervals that are near each other.
     """
     defects, units = judged.defects, judged.units
     first, last = int(group[0]), int(group[-1])
     values = judged.values[group]
-    # Of a repeated row the defect is the motion over the interval; of a part of it, that at its
-    # end.
+    # If a row is repeated, the defect is the motion over the interval; if a time is wrong by a
+    # small part of the interval, it is along the rate at the interval's end.
     step_of_data = (defects.states[first + 1] - defects.states[first]) / units
     motion = values[0] + step_of_data
     rate = _state_rate(judged, first)
@@ -176,7 +184,8 @@ def _wrong_row(judged: JudgedDefects, group: NDArray[np.int64]) -> str:
         at = f"at t = {defects.time[last + 1]:.6g} s"
         return f"a row {row}, or times {clock} by less than an interval, {at}"
     if len(group) == 2 and last == first + 1:
-        # The second interval starts at the wrong row, and takes its error back.
+        # The second interval starts at the wrong row, and ends at a right one: its defect is the
+        # row's error, carried over the interval, with the opposite sign.
         carried = defects.transitions[first + 1] @ (values[0] * units) / units
         if _cosine(values[1], -carried) >= _PARALLEL:
             row = f"row {first + 2}, t = {defects.time[first + 1]:.6g} s"
@@ -187,12 +196,12 @@ def _wrong_row(judged: JudgedDefects, group: NDArray[np.int64]) -> str:
 
 
 def _wrong_clock(judged: JudgedDefects, group: NDArray[np.int64]) -> str:
-    """Describe intervals at whose ends the motion itself is late or early; "" where it is neither.
+    """Describe intervals over each of which the motion becomes late or early; "" if it does not.
 
     Parameters
     ----------
-    judged : the defects.
-    group : (k,) intervals that stand out.
+    judged : the defects of the data.
+    group : (k,) numbers of faulty intervals that are near each other.
     """
     if len(group) < _MIN_CLOCK:
         return ""
@@ -214,10 +223,11 @@ def _wrong_clock(judged: JudgedDefects, group: NDArray[np.int64]) -> str:
 
 
 def _change_of_state(judged: JudgedDefects, row: int) -> str:
-    """Describe a single wrong interval that no load explains."""
+    """Describe a single faulty interval, by its number, that no load explains."""
     half = len(judged.defects.moving)
     start, end = (float(time) for time in judged.defects.time[row : row + 2])
-    # Of a change of rates in the interval the angles have got a share.
+    # If the rates jump within the interval, the angles have changed by the jump times the rest of
+    # the interval, a share of its length between 0 and 1.
     angles = judged.values[row, :half]
     rates = judged.values[row, half:] * judged.units[half:] * (end - start)
     share = float(angles @ rates) / (float(rates @ rates) or 1.0)
@@ -229,11 +239,17 @@ def _change_of_state(judged: JudgedDefects, row: int) -> str:
 
 
 def _state_rate(judged: JudgedDefects, row: int) -> Array:
-    """Return how the state goes on at a row, (m,) in rad per s, rates in the units of defects."""
+    """Return the rate of change of the state at the end of an interval, (m,) rad/s.
+
+    Parameters
+    ----------
+    judged : the defects of the data, in whose units rates count as rad.
+    row : number of the interval.
+    """
     states, time = judged.defects.states, judged.defects.time
     half = states.shape[1] // 2
     ahead = min(row + 2, len(states) - 1)
-    # Over the row that may be wrong, by the two beside it.
+    # The accelerations follow from the two rows beside the one that may be wrong.
     acceleration = (states[ahead, half:] - states[row, half:]) / (time[ahead] - time[row])
     rates = states[row + 1, half:]
     return np.asarray(np.concatenate([rates, acceleration]) / judged.units)
@@ -244,19 +260,21 @@ def _explaining_loads(judged: JudgedDefects, rows: NDArray[np.int64]) -> tuple[A
 
     Parameters
     ----------
-    judged : the defects.
-    rows : (k,) intervals.
+    judged : the defects of the data.
+    rows : (k,) numbers of the intervals.
 
     Returns
     -------
-    loads, acting : ndarray, list of int
-        (k, coordinates) N m that the data have more; the coordinates on which they act, none where
-        loads leave too much.
+    loads : ndarray
+        (k, coordinates) N m that the data have in addition.
+    acting : list of int
+        Places of the coordinates on which they act; none where loads leave too much.
     """
     values, effects = judged.values[rows], _effect_of_unit_load(judged, rows)
     usual = np.median(np.abs(judged.values[judged.is_judged]), axis=0)
     usual = usual + AT_FLOOR * judged.floors[rows].max(axis=0)
-    # Each channel counts alike: a pitch moves by millions of what the rotor does.
+    # Each channel is scaled by its own size: a load may move a pitch by a million times as much as
+    # the rotor.
     units = np.linalg.norm(values, axis=0) + _OF_USUAL * math.sqrt(len(rows)) * usual
     sizes = np.linalg.norm(effects / units, axis=2)
     if not (np.isfinite(sizes).all() and sizes.all()):
@@ -281,14 +299,14 @@ def _explaining_loads(judged: JudgedDefects, rows: NDArray[np.int64]) -> tuple[A
 def _load_jump_fault(
     judged: JudgedDefects, place: int, start: float, end: float, more: Array
 ) -> str:
-    """Describe a wrong load beside a jump of a coordinate's prescribed load; "" elsewhere.
+    """Describe a wrong load at a jump of a coordinate's prescribed load; "" if there is none.
 
     Parameters
     ----------
-    judged : the defects.
-    place : of the coordinate among those that move.
-    start, end : s, of the intervals.
-    more : (k,) N m that the data have more in these intervals.
+    judged : the defects of the data.
+    place : place of the coordinate among those that move.
+    start, end : s, the time over which the intervals extend.
+    more : (k,) N m that the data have in addition in these intervals.
     """
     table = judged.scene.load_tables[torque_place(judged.defects.moving[place])]
     for (t0, value0), (t1, value1) in itertools.pairwise(table):
@@ -307,17 +325,17 @@ def _load_jump_fault(
 
 
 def _effect_of_unit_load(judged: JudgedDefects, rows: NDArray[np.int64]) -> Array:
-    """Compute what 1 N m on each moving coordinate makes of an interval's end.
+    """Compute the change of an interval's end by 1 N m on each of the moving coordinates.
 
     Parameters
     ----------
-    judged : the defects.
-    rows : (k,) intervals.
+    judged : the defects of the data.
+    rows : (k,) numbers of the intervals.
 
     Returns
     -------
     ndarray
-        (coordinates, k, m) rad.
+        (coordinates, k, m) rad per N m.
     """
     scene, defects, form = judged.scene, judged.defects, rotor_form(judged.scene)
     begins, ends = defects.time[rows], defects.time[rows + 1]
@@ -329,7 +347,7 @@ def _effect_of_unit_load(judged: JudgedDefects, rows: NDArray[np.int64]) -> Arra
     longest = float((ends - begins).max())
     effects = []
     for place, inertia in enumerate(inertias):
-        # That moves the coordinate by a small angle, whatever its inertia.
+        # A torque that moves the coordinate by a small angle, whatever its inertia.
         torque = _SMALL_TURN * float(inertia) / longest**2
         pushed = quick_ends(scene, begins, ends, states, steps, _with_torque(place, torque))
         effects.append((pushed - free).T / judged.units / torque)
@@ -337,7 +355,13 @@ def _effect_of_unit_load(judged: JudgedDefects, rows: NDArray[np.int64]) -> Arra
 
 
 def _with_torque(place: int, torque: float) -> closed_form.Accelerations:
-    """Return the closed form's equations with a torque more, N m, on the rotor (0) or a pitch."""
+    """Return the closed form's equations with an additional torque on one coordinate.
+
+    Parameters
+    ----------
+    place : 0 for the rotor, from 1 on the pitches.
+    torque : N m.
+    """
 
     def equations(angles: Any, rates: Any, form: Any, loads: Any, *functions: Any) -> Any:
         pitches = list(loads.pitches or [0.0] * len(form.blades))

@@ -25,13 +25,13 @@ def read_table(path: str | os.PathLike[str], group: str = "", scene: str = "") -
 
     Parameters
     ----------
-    path : the file; what it is is decided by its first bytes.
+    path : the file; its format is recognized by its first bytes, that of `.outb` by its ending.
     group, scene : of an HDF5 file, see `runs.arrays.read_arrays`.
 
     Raises
     ------
     InputError
-        In one line, for what cannot be read within `TIME_LIMIT_S` and `MEMORY_LIMIT`.
+        If the file cannot be read within `TIME_LIMIT_S` and `MEMORY_LIMIT`, in one line.
     ResourceError
         If the reading process cannot be started.
     """

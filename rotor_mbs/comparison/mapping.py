@@ -1,7 +1,7 @@
 """Which column is which channel, in which unit, sign and zero: from a mapping file, or by names.
 
 A channel is sign * (column + offset), the offset in the column's own unit. A mapping replaces
-single channels and adds to those that are known by the names of columns. See docs/compare.md.
+single channels, or adds to those that are recognized by the names of columns. See docs/compare.md.
 """
 
 from __future__ import annotations
@@ -42,10 +42,14 @@ _SIGN = keys.restricted(keys.whole(-1, 1), bool, "1, -1")
 
 @dataclass(frozen=True)
 class ColumnMapping:
-    """Where a channel comes from: sign * (column + offset) in `unit`.
+    """The source of a channel: sign * (column + offset) in `unit`.
 
     Attributes
     ----------
+    column : name of the column.
+    unit : of the column, "" for the one that the file states, or the channel's SI unit.
+    sign : 1 or -1.
+    offset : in the column's unit.
     wrapped : whether turns are missing, so that jumps of more than half a turn are taken out.
     frame : of a load, "" for that of the scene's loads.
     """
@@ -60,13 +64,13 @@ class ColumnMapping:
 
 @dataclass(frozen=True)
 class DataMapping:
-    """What is said of the columns of data.
+    """Content of a mapping file: what is said of the columns of data.
 
     Attributes
     ----------
-    columns : by the key of a channel; the others are known by the names of columns.
-    group : of an HDF5 file.
-    omitted : names of channels that are neither compared nor missed.
+    columns : by the key of a channel; the others are recognized by the names of columns.
+    group : of an HDF5 file, see `runs.arrays.read_arrays`.
+    omitted : names of channels that are not compared, and need not be in the data.
     only : names of the channels to which the comparison is restricted, beside the time or speed;
         empty where it is not.
     program : whose names, units, signs and frames the columns have: "openfast", or "".
@@ -82,7 +86,7 @@ class DataMapping:
 
 
 def _read_column_mapping(value: object) -> ColumnMapping:
-    """Read a table; a column's name stands for a table with this column alone."""
+    """Read a channel's mapping: a table, or a column's name for a table with this name alone."""
     table = {"column": value} if isinstance(value, str) else value
     mapping: ColumnMapping = keys.table_of(ColumnMapping).read(table)
     return mapping
@@ -97,17 +101,18 @@ _GROUP = Kind(keys.read_text, "the path of a group in the file")
 def read_mapping(
     columns: str | os.PathLike[str] | Mapping[str, Any] | None, scene: Scene
 ) -> DataMapping:
-    """Read what is said of the columns of data.
+    """Read a mapping of columns to the channels of a scene.
 
     Parameters
     ----------
-    columns : a TOML file, or a mapping of the same keys; None where nothing is said.
-    scene : whose channels are the keys.
+    columns : a TOML file, or a mapping of the same keys; None for an empty mapping.
+    scene : the scene whose channels are keys of the mapping.
 
     Raises
     ------
     InputError
-        With every fault, a line each.
+        If the file cannot be read or has unknown keys or wrong values, each in a line; or if it is
+        empty, or maps a channel that is not in its `only`.
     """
     if columns is None:
         return DataMapping()
@@ -154,14 +159,14 @@ def read_mapping(
 
 @dataclass(frozen=True)
 class FoundChannels:
-    """Where the channels of data come from, and what else the data have.
+    """The sources of the channels of data, and what else the data have.
 
     Attributes
     ----------
-    sources : by channel, the time or speed first, with the unit.
-    lines : for each channel where it comes from.
+    sources : by channel, the time or speed first; each with its unit.
+    lines : a line for each channel that says where it comes from.
     unused : by name of every other column, why it is not compared.
-    loads_left_out : names of the loads that are known by their names and neither compared nor
+    loads_left_out : names of the loads that are recognized by their names and neither compared nor
         omitted.
     """
 
@@ -172,20 +177,19 @@ class FoundChannels:
 
 
 def find_channels(table: DataTable, scene: Scene, mapping: DataMapping) -> FoundChannels:
-    """Find where each channel comes from, with its unit.
+    """Find the source of each channel of data, and its unit.
 
     Parameters
     ----------
-    table : the columns.
-    scene : whose channels they may be; those of a table of modes where there is no time, but a
-        speed and frequencies.
+    table : the columns. It is a table of modes if it has no time, but a speed and frequencies.
+    scene : the scene whose channels the columns may be.
     mapping : what is said of the columns.
 
     Raises
     ------
     InputError
-        For a name that could be two channels, a wrong unit, a column without numbers that is named
-        as a channel, or without a time and an angle or rate.
+        If two columns could be one channel, a unit is wrong, or a column with the name of a channel
+        has no numbers; if there is no time, or no angle or rate; of modes, no speed or frequency.
     """
     lines: list[str] = []
     reasons_of_program: dict[str, str] = {}
@@ -226,7 +230,7 @@ def find_channels(table: DataTable, scene: Scene, mapping: DataMapping) -> Found
 
 
 def _of_suggestion(suggestion: openfast.Suggestion) -> tuple[Channel, ColumnMapping]:
-    """Return a channel of OpenFAST's output and where it comes from."""
+    """Return a channel of OpenFAST's output and its source."""
     source = ColumnMapping(
         column=suggestion.column,
         unit=suggestion.unit,
@@ -238,7 +242,7 @@ def _of_suggestion(suggestion: openfast.Suggestion) -> tuple[Channel, ColumnMapp
 
 
 def _stated_unit(table: DataTable, name: str) -> str:
-    """Return the unit that a file states of a column, "" where it states none."""
+    """Return the unit that a file states for a column, "" where it states none."""
     stated = table[name].unit or split_unit(name)[1]
     inner = name.strip()
     if stated or not inner.lower().startswith("der("):
@@ -251,18 +255,18 @@ def _stated_unit(table: DataTable, name: str) -> str:
 def _known_channels(
     table: DataTable, scene: Scene, mapping: DataMapping
 ) -> tuple[list[Channel], list[tuple[Channel, str]]]:
-    """Decide whether a table is of a trajectory or of modes.
+    """Decide whether a table is of a trajectory or of modes, and return its channels.
 
     Parameters
     ----------
     table : the columns.
-    scene : whose channels they may be.
+    scene : the scene whose channels the columns may be.
     mapping : what is said of the columns.
 
     Returns
     -------
     list of Channel, list of (Channel, str)
-        The channels that it may have; those that names of its columns suggest.
+        The channels that it may have; those that the names of its columns suggest, and the names.
     """
     motion, modes = channels(scene), mode_channels(scene)
     motion_by_name, modes_by_name = _suggested(table, motion), _suggested(table, modes)
@@ -280,7 +284,13 @@ def _known_channels(
 
 
 def _suggested(table: DataTable, known: Sequence[Channel]) -> list[tuple[Channel, str]]:
-    """Return the channels that names suggest, and the names."""
+    """Return the channels that the names of columns suggest, and the names.
+
+    Parameters
+    ----------
+    table : the columns.
+    known : the channels that there may be.
+    """
     # How many columns an array has says what it may be: angles are one per coordinate.
     places = places_of(list(table.columns))
     suggested = []
@@ -301,25 +311,25 @@ def _sources(
     by_name: Sequence[tuple[Channel, ColumnMapping]],
     mapping: DataMapping,
 ) -> tuple[dict[Channel, ColumnMapping], dict[str, str], tuple[str, ...]]:
-    """Return where each channel comes from: what is mapped, and beside it what names suggest.
+    """Return the source of each channel: what is mapped, and for others what names suggest.
 
     Parameters
     ----------
     table : the columns.
     known : the channels that there may be, the time or speed first.
-    by_name : those that names of columns suggest, and where they come from.
+    by_name : the channels that names of columns suggest, and their sources.
     mapping : what is said of the columns.
 
     Returns
     -------
     dict, dict, tuple of str
-        By channel where it comes from; by column that is known by its name and not compared, why;
-        the loads among these that are not omitted.
+        By channel its source; by name of a column that is recognized and not compared, why; names
+        of the loads among these that are not omitted.
 
     Raises
     ------
     InputError
-        For two columns whose names suggest one channel.
+        If the names of two columns suggest one channel.
     """
     sources: dict[Channel, ColumnMapping] = {}
     for channel in known:
@@ -358,14 +368,14 @@ def _without_frame(channel: Channel) -> Channel:
 
 
 def _is_unwanted(channel: Channel, mapping: DataMapping) -> bool:
-    """Whether a mapping omits a channel, or restricts the channels to others."""
+    """Return whether a mapping omits a channel, or restricts the channels to others."""
     if _is_one_of(channel, mapping.omitted):
         return True
     return bool(mapping.only) and not _is_one_of(channel, mapping.only)
 
 
 def _line(channel: Channel, source: ColumnMapping, *, is_assumed: bool) -> str:
-    """Say where a channel comes from: "rotor = -('a' +90) [deg]"."""
+    """Return a line that says where a channel comes from: "rotor = -('a' +90) [deg]"."""
     term = repr(source.column)
     if source.offset:
         term = f"{term} {source.offset:+g}"
@@ -383,7 +393,7 @@ def _line(channel: Channel, source: ColumnMapping, *, is_assumed: bool) -> str:
 def _refuse_missing(
     table: DataTable, first: Channel, chosen: Mapping[Channel, ColumnMapping]
 ) -> None:
-    """Raise InputError without the first channel, time or speed, or without what is compared."""
+    """Raise InputError if the time or speed is missing, or everything that is compared with it."""
     available = shown_names(list(table.columns))
     if first not in chosen:
         allowed = f"`{first.key}` in a mapping file"
@@ -396,7 +406,7 @@ def _refuse_missing(
 
 
 def _is_one_of(channel: Channel, names: Sequence[str]) -> bool:
-    """Whether a channel, or the load or the modes that it is one of, is one of `names`."""
+    """Return whether a channel, or the load or modes that it belongs to, is one of `names`."""
     name = channel.name.partition(",")[0]
     is_one_of_many = channel.is_load or channel.kind == "frequency"
     if name in names:

@@ -1,4 +1,4 @@
-"""Frequencies of another program over rotor speed against the closed form's; what is wrong."""
+"""Frequencies of another program over rotor speed against the closed form's; likely causes."""
 
 from __future__ import annotations
 
@@ -43,14 +43,15 @@ _UNITS = {
 def compare_modes(data: ForeignData, scene: Scene, tolerance: float) -> tuple[DataVerdict, Record]:
     """Compare columns of frequencies with the modes of a scene.
 
-    At each speed the frequencies are those of different modes of the scene, whichever lie nearest:
-    of steady rotation without gravity; at rest under gravity where no speed is above 0.
+    The modes are those of steady rotation without gravity, or those at rest under gravity if no
+    speed is above 0. At each speed, every column is compared with another mode, so that the sum of
+    the differences is least.
 
     Parameters
     ----------
-    data : frequencies over speeds, rad/s.
-    scene : the scene.
-    tolerance : of a frequency's error, of its size, beyond rounding.
+    data : (speeds, columns) frequencies, rad/s, over speeds, rad/s.
+    scene : the rotor.
+    tolerance : the largest allowed error of a frequency beyond rounding, relative to its size.
 
     Returns
     -------
@@ -60,7 +61,8 @@ def compare_modes(data: ForeignData, scene: Scene, tolerance: float) -> tuple[Da
     Raises
     ------
     InputError
-        For more than 1000 speeds, or more columns than modes.
+        If there are more than 1000 speeds or more columns than modes, both damped and undamped
+        frequencies, or no modes of the scene.
     """
     if len(data.time) > _MAX_SPEEDS:
         problem = f"{len(data.time)} speeds; allowed: up to {_MAX_SPEEDS}"
@@ -110,14 +112,14 @@ def _channel_errors(
 
     Parameters
     ----------
-    data : the table.
+    data : frequencies over speeds.
     error, expected : (speeds, columns), see `_errors_of_nearest`; NaN at speeds without modes.
-    tolerance : of a frequency's size.
+    tolerance : the largest allowed error, relative to a frequency's size.
 
     Returns
     -------
     tuple of ChannelErrors, str
-        By column; why the worst is wrong, "" where none is.
+        One for each column; what is wrong with the worst of them, "" where none is.
     """
     is_known = np.isfinite(expected).all(axis=1)
     speeds = data.time[is_known]
@@ -149,7 +151,12 @@ def _channel_errors(
 
 
 def _closed_form_modes(scene: Scene, speeds: Array) -> LinearModes | str:
-    """Compute the modes at (n,) speeds without gravity, or at rest under it where none is above 0.
+    """Compute the modes of a scene at some speeds by the closed form.
+
+    Parameters
+    ----------
+    scene : the rotor; its gravity counts only if no speed is above 0.
+    speeds : (n,) rad/s.
 
     Returns
     -------
@@ -164,17 +171,17 @@ def _closed_form_modes(scene: Scene, speeds: Array) -> LinearModes | str:
 
 
 def _families(modes: LinearModes, data: ForeignData) -> dict[str, Array]:
-    """Return what a program may call its frequencies.
+    """Return the families of frequencies that columns may be.
 
     Parameters
     ----------
-    modes : of the scene.
-    data : the table, whose columns may be undamped frequencies.
+    modes : modes of the scene at the speeds of the data.
+    data : the table, whose columns say whether they are damped or undamped frequencies.
 
     Returns
     -------
     dict of ndarray
-        By words, "" for those that are right, (speeds, columns or modes) rad/s.
+        By name of the family, "" for the right one, (speeds, frequencies) rad/s.
     """
     damped, undamped = modes.damped_frequencies, modes.undamped_frequencies
     speed = modes.speeds[:, None]
@@ -191,7 +198,7 @@ def _families(modes: LinearModes, data: ForeignData) -> dict[str, Array]:
 
 
 def _frequency_scale(expected: Array) -> Array:
-    """Return the sizes by which errors of frequencies are judged, as `expected` in shape."""
+    """Return the sizes by which errors of frequencies are divided, in the shape of `expected`."""
     least = _SLOW * float(np.nanmax(expected, initial=0.0))
     return np.maximum(expected, least or 1.0)
 
@@ -207,8 +214,8 @@ def _errors_of_nearest(values: Array, rounding: Array, known: Array) -> tuple[Ar
     Returns
     -------
     error, expected : ndarray
-        (speeds, columns) differences beyond rounding, of the frequency's size; the frequencies that
-        the columns are compared with.
+        (speeds, columns) differences beyond rounding, relative to the frequency's size; and rad/s,
+        the frequencies with which the columns are compared.
     """
     expected = np.full(values.shape, np.nan)
     for i, (row, right) in enumerate(zip(values, known, strict=True)):
@@ -224,10 +231,13 @@ def _errors_of_nearest(values: Array, rounding: Array, known: Array) -> tuple[Ar
 
 @dataclass(frozen=True)
 class FrequencyTable:
-    """Frequencies as data may mean them, and those that they may be.
+    """Frequencies of the data in one reading, and the frequencies that they may be.
 
-    values, rounding : (speeds, columns) rad/s. known : (speeds, modes) rad/s; None where what is
-    left is computed already.
+    Attributes
+    ----------
+    values, rounding : (speeds, columns) rad/s, and half a unit in their last digits.
+    known : (speeds, modes) rad/s; None if `left` is computed already.
+    left : the largest relative error that is left.
     """
 
     values: Array
@@ -245,7 +255,7 @@ def _left(table: FrequencyTable) -> float:
 
 
 def _likely_causes(scene: Scene, data: ForeignData, tolerance: float, error: Array) -> list[str]:
-    """Search for the least that explains all columns; several texts where they are alike.
+    """Search for the fewest mistakes that explain all columns; several texts if they are alike.
 
     Parameters
     ----------
@@ -267,8 +277,8 @@ def _hypotheses(
     ----------
     scene, data, tolerance : see `compare_modes`.
     """
-    # The stiffening is seen from rest on: the squares of undamped frequencies, there and at the
-    # speeds of the data.
+    # Stiffening is the change from rest on: the squares of undamped frequencies are needed there
+    # and at the speeds of the data.
     from_rest: LinearModes | str = ""
     if np.count_nonzero(data.time) >= _MIN_TURNING:
         from_rest = _closed_form_modes(scene, np.union1d(0.0, data.time))
@@ -312,7 +322,7 @@ def _without_stiffening(
 
     Parameters
     ----------
-    modes : of the scene, at rest and at the speeds.
+    modes : modes of the scene, first at rest, then at the speeds.
     speeds : (n,) rad/s, without rest.
     values, rounding : (n, columns) rad/s, the columns that are wrong.
 
@@ -326,7 +336,7 @@ def _without_stiffening(
     for column, column_rounding in zip(values.T, rounding.T, strict=True):
         fits = []
         for at_rest, at_end in zip(squares[0], squares[-1], strict=True):
-            # Least squares with one unknown, which is no stiffening where it is negative.
+            # Least squares with one unknown; a negative α would be no missing stiffening.
             slope = squared_speeds @ (at_rest - column**2) / (squared_speeds @ squared_speeds)
             alpha = max(float(slope), 0.0)
             if not at_end > at_rest - alpha * squared_speeds[-1]:

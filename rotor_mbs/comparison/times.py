@@ -1,7 +1,7 @@
 """The rows of a motion in the order of their times, and the rounding of the times.
 
 Programs write a row twice at an event, rows of an initialisation before t = 0, rows from the end to
-the start. What is said twice is dropped, what contradicts itself is refused.
+the start. Repeated rows are dropped; rows that contradict each other are refused.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ class OrderedRows(NamedTuple):
     ----------
     places : (n,) numbers of the rows in the data, in the order of their times.
     time : (n,) s, increasing from 0 or later.
-    notes : what was done to them, a line each.
+    notes : what was done to the rows, a line each.
     """
 
     places: NDArray[np.int64]
@@ -50,14 +50,16 @@ def ordered_rows(
     Parameters
     ----------
     source : what messages call the data.
-    time : (n,) s, as it stands in the data.
-    motion, others : (n, channels) rad and rad/s of angles and rates; numbers of loads.
+    time : (n,) s, in the order of the data.
+    motion : (n, channels) angles and rates, rad and rad/s.
+    others : (n, channels) loads, N and N m.
     jumps : s, times at which a load of the scene jumps.
 
     Raises
     ------
     InputError
-        For two different rows at one time, unless a load jumps there; for fewer than three rows.
+        If two different rows have one time and no load jumps there, or if fewer than three rows are
+        left.
     """
     notes = []
     if len(time) < _MIN_ROWS:
@@ -115,17 +117,17 @@ def ordered_rows(
 
 
 def _are_same(first: Array, second: Array, tolerance: float) -> bool:
-    """Whether two rows have the same numbers, to a tolerance of 1 or of the larger ones."""
+    """Return whether two rows are equal to a tolerance, relative for numbers larger than 1."""
     scale = np.maximum(np.maximum(np.abs(first), np.abs(second)), 1.0)
     return bool((np.abs(first - second) <= tolerance * scale).all())
 
 
 def rounding_of_steps(time: Array) -> Array | None:
-    """Find the rounding of times whose intervals are equal; None of other times.
+    """Find the rounding of times whose intervals are equal, or equal but for a few.
 
-    Equal intervals are meant as they are written, though the times have few digits; a few that
-    differ are faults of the clock. A clock that adds up its steps is off by what the additions have
-    rounded, which no single time shows.
+    Equal intervals are taken as exact, though the times have few digits; a few that differ are
+    faults of the clock. Times that are sums of a step are off by the rounding of the additions,
+    which no single time shows.
 
     Parameters
     ----------
@@ -134,7 +136,7 @@ def rounding_of_steps(time: Array) -> Array | None:
     Returns
     -------
     ndarray or None
-        (n,) s.
+        (n,) s; None for times whose intervals are not equal.
     """
     intervals = np.diff(time)
     usual = float(np.median(intervals))
@@ -149,6 +151,8 @@ def rounding_of_steps(time: Array) -> Array | None:
     from_line = np.abs(time - (time[0] + mean * rows))
     if from_line.max() <= 4.0 * _ROUNDOFF * np.abs(time).max():
         return rounding
+    # Otherwise the times are sums of a chosen step, which is the mean rounded to some digits: their
+    # distance from its multiples counts, up to what the additions may have rounded.
     digits = _STEP_DIGITS - 1 - math.floor(math.log10(mean))
     from_chosen = np.abs(time - (time[0] + round(mean, digits) * rows))
     return np.asarray(rounding + np.minimum(from_chosen, rows * rounding))
