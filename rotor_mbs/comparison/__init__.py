@@ -1,4 +1,4 @@
-"""Other people's data against a scene: files to columns, columns to channels, and the verdict.
+"""Data of other programs against a scene: files to columns, columns to channels, and the verdict.
 
 From a file to a verdict, in this order: `files` and `formats` (a file in a process of its own, by
 which library), `columns` (names, units, numbers), `channels` and `mapping` (which column is which

@@ -18,9 +18,9 @@ from rotor_mbs.comparison.data_mistakes import (
 from rotor_mbs.comparison.defect_search import QUICK_SEARCH, DefectSearch
 from rotor_mbs.comparison.faults import faults_in_time
 
-_SAME_START = 1e-3  # rad, rad/s: data that start farther off are no run of the scene as they are
-_LONG = 2.0  # times the scene's duration: data that are longer are looked at in any case
-_NOT_COMMON = 3.0  # standard deviations of a correlation of numbers that have nothing in common
+_SAME_START = 1e-3  # rad, rad/s: data that differ more at the start are no run of the scene
+_LONG = 2.0  # times the scene's duration: of longer data causes are always searched for
+_NOT_COMMON = 3.0  # standard deviations of the correlation of independent numbers
 
 
 def likely_causes(search: TrajectorySearch, judged: JudgedDefects | None) -> list[str]:

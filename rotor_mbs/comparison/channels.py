@@ -300,7 +300,7 @@ def channel_from_name(
     channel = _channel_of_path(stripped, vector, known, indices)
     folder, _, last = split_unit(stripped)[0].rpartition("/")
     if channel is None and folder and last:
-        # What stands in "run/rates/rotor" is known by its last part, and the rate by another.
+        # A name such as "run/rates/rotor" is known by its last part, and the rate by another.
         channel = _channel_of_path(last, vector, known, indices)
         parts = {_array_name(part) for part in folder.split("/")}
         if channel is not None and parts & set(_RATE_ARRAYS):
@@ -320,7 +320,7 @@ def names_a_channel(name: str, known: Sequence[Channel]) -> bool:
 
 
 def _load_arrays(channel: Channel) -> tuple[str, ...]:
-    """Return the arrays of which a load may be a column: of all blades, of one; none of others."""
+    """Return the names of arrays that a load may be a column of: of all blades, and of one."""
     if not channel.is_load:
         return ()
     of_one = channel.name.rstrip("xyz ")
@@ -328,14 +328,14 @@ def _load_arrays(channel: Channel) -> tuple[str, ...]:
 
 
 def _rate_of(channel: Channel | None, known: Sequence[Channel]) -> Channel | None:
-    """Return the rate of an angle; None of another channel."""
+    """Return the rate of an angle; None for another channel."""
     if channel is None or channel.kind != "angle":
         return None
     return _named(f"{channel.name} rate", known)
 
 
 def _array_name(name: str) -> str:
-    """Return the name of an array as it is compared: "Q_dot" is "qdot"."""
+    """Return the name of an array in the form in which names are compared: "qdot" for "Q_dot"."""
     return re.sub(r"[\s_.]", "", name).lower()
 
 
@@ -368,7 +368,7 @@ def _channel_of_path(
                 return found
         if len(indices) != 1:
             return None
-        # From here on as the blade's number, which is counted from 1.
+        # From here on the number is that of a blade, which counts from 1.
         plain = f"{plain[: entry.start]} {indices[0] + 1} {plain[entry.end :]}"
     load = _named_load(plain, known)
     if load is not None:
@@ -394,17 +394,17 @@ def _channel_of_path(
 
 
 def _number(digits: str) -> int:
-    """Return digits as a number; one that no index reaches where there are none, or too many."""
+    """Return digits as a number; one beyond all indices for no digits or too many."""
     return int(digits) if 0 < len(digits) < 10 else _BEYOND_INDICES
 
 
 def _named(name: str, known: Sequence[Channel]) -> Channel | None:
-    """Return the channel of this name."""
+    """Return the channel with a name, None if there is none."""
     return next((channel for channel in known if channel.name == name), None)
 
 
 def _has_one_blade(known: Sequence[Channel]) -> bool:
-    """Whether there is a pitch 1 alone, whose number may be left out."""
+    """Return whether there is only pitch 1, whose number may be left out."""
     return _named("pitch 2", known) is None
 
 
@@ -437,7 +437,7 @@ def _mode_channel(
 
 
 def _openfast_load(match: re.Match[str], known: Sequence[Channel]) -> Channel | None:
-    """Return the root load that OpenFAST's name has."""
+    """Return the root load with a matched name of OpenFAST, None if there is no such blade."""
     quantity, openfast_axis, frame, blade = match.groups()
     axis, sign = _OPENFAST_AXES[openfast_axis]
     kind = "force" if quantity == "f" else "moment"
@@ -473,7 +473,7 @@ def _array_channel(
 
 
 def _named_load(plain: str, known: Sequence[Channel]) -> Channel | None:
-    """Return the component of a load of this name, with the frame that may stand behind it."""
+    """Return the component of a load with a name that may end in a frame; None if unknown."""
     words = re.findall(r"[a-z]+|\d+", plain)
     frame = ""
     if words[-2:] in _FRAME_ENDINGS:

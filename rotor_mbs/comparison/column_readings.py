@@ -39,9 +39,9 @@ _SAMPLES = 20  # of an interval, for such means
 _MEANS_OF_SAMPLES = (2, 4, 5, 10, 20)
 _FAR_LESS = 0.02  # of what is left by a column in which nothing is wrong
 _MIN_COMPARED = 10  # rows: with fewer, some mean always fits
-_MIN_STEPS = 10  # distinct numbers: fewer say nothing of a step between them
-_MAX_STEPS = 1 << 20  # in the range of a column: more are no coarse steps
-_WHOLE = 1e-3  # of a step: a number of steps so near a whole one is that
+_MIN_STEPS = 10  # distinct numbers: fewer do not show a step
+_MAX_STEPS = 1 << 20  # in the range of a column: with more, steps are not coarse
+_WHOLE = 1e-3  # of a step: a number of steps this near to a whole one is taken as whole
 _TRUNCATED = (("rounded", 0.5), ("cut off", 1.0))  # the error of a step, in steps
 
 
@@ -135,6 +135,7 @@ class ColumnReadings:
         return float(error[is_known].max())
 
     def _expected(self, j: int) -> Array:
+        """Return the reference of a column in the rows up to the horizon."""
         return np.asarray(self._states[:, self.data.channels[j].column])
 
     def _inverse(self, j: int, text: str, corrected: Array, factor: float = 1.0) -> Reading:
@@ -175,7 +176,7 @@ class ColumnReadings:
                     mistakes.append(f"zero off by {zero:.6g}")
                 corrected = factor * values - zero
                 yield self._inverse(j, ", ".join(mistakes), corrected, factor)
-                # Numbers that are not known to a turn say nothing of the turns between them.
+                # Whole turns cannot be restored where rounding is as large as half a turn.
                 is_known = FLOOR_SAFETY * abs(factor) * self.data.rounding[:, j].max() < 0.5 * _TURN
                 has_jumps = np.abs(np.diff(corrected)).max() > 0.5 * _TURN
                 if kind == "angle" and is_known and has_jumps:
@@ -185,7 +186,7 @@ class ColumnReadings:
                     yield self._inverse(j, text_of_turns, unwrapped, factor)
         expected = self._expected(j)
         if self._with_factor:
-            # The factor by least squares.
+            # The factor follows by least squares.
             factor = float(values[self._rows] @ expected / (expected @ expected))
             if factor:
                 text = f"too large by a factor of {factor:.6g}"
@@ -228,7 +229,10 @@ class ColumnReadings:
             yield Reading(text, left, values, np.maximum(rounding, self.data.rounding[:, j]))
 
     def _step(self, j: int) -> float | None:
-        """Return the step between the numbers of a column; of few numbers that of another one."""
+        """Return the step of which the numbers of a column are multiples, None if there is none.
+
+        A column with few distinct numbers is tried with the step of another of the same kind.
+        """
         channels = self.data.channels
         for other in (j, *range(len(channels))):
             if channels[other].kind == channels[j].kind:

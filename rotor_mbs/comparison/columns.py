@@ -172,8 +172,8 @@ def table_of(
             continue
         if unit:
             stated[name] = unit
-    # A single row, of one speed, is a column of length 1; otherwise dimensions of length 1 are
-    # MATLAB's.
+    # A table of modes may have a single row, for one speed. Otherwise dimensions of length 1 come
+    # from MATLAB, whose arrays have two dimensions at least, and are removed.
     is_single_row = any(values.shape == (1,) for values in numeric.values())
     for name, values in list(numeric.items()):
         squeezed = values if is_single_row and values.shape[:1] == (1,) else np.squeeze(values)
@@ -242,7 +242,7 @@ def _numbers(values: Any) -> tuple[NDArray[Any], str]:
     try:
         array = np.asarray(values)
         if array.dtype.kind in "US" and isinstance(values, list | tuple):
-            # NumPy has made texts of the numbers beside a text.
+            # Beside a text, NumPy converts numbers to texts: as objects they stay numbers.
             array = np.asarray(values, object)
     except (ValueError, TypeError) as exc:
         raise _NotNumbersError("rows of different lengths", is_column=True) from exc

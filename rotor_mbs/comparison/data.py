@@ -234,7 +234,7 @@ def _si_values(table: DataTable, channel: Channel, source: ColumnMapping) -> Arr
 
     Parameters
     ----------
-    table : the columns.
+    table : the columns of the data.
     channel : what the column is.
     source : the column, its unit, sign and offset.
 
@@ -335,13 +335,13 @@ def rounding_of_printed(
     largest = float(np.abs(judged).max(initial=0.0))
     if len(np.unique(judged)) < min_distinct:
         return np.asarray(sizes * 2.0**-53)
-    # Numbers of so many decimals may seem to have so many digits, and the other way round: of both
-    # the coarser.
+    # Numbers with a fixed number of decimals may seem to have a fixed number of digits, and the
+    # other way round: both are tried, and the coarser rounding is taken.
     last = np.zeros(len(values))
     noise = 4.0 * 2.0**-52 * largest  # of the arithmetic
     for decimals in range(_SURE_DIGITS + 1):
         unit = 10.0**-decimals
-        # With less than a hundredth of a unit any number fits.
+        # Any number fits a unit that is not far above the errors of the arithmetic.
         if not 100.0 * noise < unit < largest:
             continue
         rounded = np.round(judged / unit) * unit
@@ -377,8 +377,8 @@ def _precision(columns: Sequence[Array], rounding: Sequence[Array]) -> str:
     digits = max(map(_significant_digits, columns))
     if digits >= _SINGLE_DIGITS or not rounded:
         return ""
-    # Of numbers that are all of one size digits are decimals, too; and 0.100000 might have one
-    # digit.
+    # Digits and decimals are the same for numbers of one size; they are named as decimals only if
+    # sizes differ and nearly all numbers have the same rounding.
     is_fixed = any(sizes.min() < 0.1 * sizes.max() for sizes, _ in rounded)
     exceptions = [(last > 2.0 * last.min()).mean() for _, last in rounded]
     if is_fixed and max(exceptions) < _MAX_EXCEPTIONS:
@@ -417,13 +417,14 @@ def _significant_digits(values: Array) -> int:
 
 
 def _have_digits(values: Array, digits: int) -> bool:
-    """Whether all finite numbers, none of them 0, may have so many significant digits."""
+    """Return whether finite numbers other than 0 may be rounded to so many significant digits."""
     if digits <= _FEW_DIGITS:
         with np.errstate(all="ignore"):  # the unit of the smallest numbers may be 0: none fit
             unit = 10.0 ** (np.floor(np.log10(np.abs(values))) + 1 - digits)
             rounded = np.round(values / unit) * unit
         return np.allclose(values, rounded, rtol=1e-12, atol=0.0)
-    # The arithmetic above has no more digits. A number may have been multiplied by a unit since.
+    # Beyond that the arithmetic above is too coarse: numbers are written as texts and compared. A
+    # number may have been multiplied by a factor of units since it was rounded.
     most = _ROUNDED_SINCE if digits <= _SURE_DIGITS else 0.0
     for value in values[:: 1 + len(values) // _MAX_WRITTEN].tolist():
         written = float(f"{value:.{digits - 1}e}")

@@ -41,9 +41,9 @@ _TIME_FACTORS = (
     (1e-6, "time in us taken as s"),
     (60.0, "time in minutes taken as s"),
 )
-_MIN_LAG = 1e-4  # of an interval between rows: less is rounding
-_WHOLE_ROWS = 1e-3  # of a row: a lag so near a number of rows is that number
-_LAG_ROW = 50  # by which a lag is explanation
+_MIN_LAG = 1e-4  # of an interval between rows: a smaller lag is rounding
+_WHOLE_ROWS = 1e-3  # of a row: a lag this near to a whole number of rows is that number
+_LAG_ROW = 50  # by which a lag is measured
 _LAG_ROUNDS = 8  # of Gauss and Newton's iteration
 _MAX_OFF = 30.0  # times the usual distance from the reference, of a column that says when a row is
 _MAX_CLOCK, _MIN_CLOCK = 1.2, 1e-7  # factor of a clock; what differs less is rounding
@@ -205,7 +205,7 @@ def column_mistakes(
     if len(inside.time) < MIN_ROWS:
         return []
     hypotheses = _column_hypotheses(search, data, inside, with_factor=with_factor)
-    # Without a mistake in the times there is one in the columns, or none at all.
+    # Columns without a mistake explain the data only together with a mistake in the times.
     mistaken = (each for each in hypotheses if each.text or times is not None)
     explanation = next(explanations(mistaken, search.defect_left, search.allowed), None)
     if explanation is None:
@@ -280,7 +280,8 @@ def _rows_between(search: TrajectorySearch) -> Iterator[Hypothesis[ForeignData]]
     largest = np.abs(data.values).max(axis=0)
     allowed = AT_FLOOR * data.rounding + _INTERPOLATED * largest
     for degree, text in ((1, "linearly"), (3, "by a cubic spline")):
-        # Rows between every fourth one are between every second one, too: the longest counts.
+        # What is interpolated between every fourth row is between every second one, too: periods
+        # are tried from the longest on.
         for period in range(min(_MAX_PERIOD, count // MIN_ROWS), 1, -1):
             # The first rows refute most periods. A spline of them alone is wrong near their end,
             # and less so farther from it: their first quarter is compared.
@@ -390,7 +391,8 @@ def _time_of_row(search: TrajectorySearch, row: int, first: float, last: float) 
         return float(data.time[row])
     states = states_of(run)[is_tried][:, columns]
     distances = np.abs(states - data.values[row])
-    # By the nearer half of the columns that move: the others may have a mistake of their own.
+    # The distance is the median over the columns that move, and those far beyond it are left out:
+    # they may have a mistake of their own.
     is_moving = np.ptp(states, axis=0) > 0.0
     if not is_moving.any():
         return float(data.time[row])
@@ -512,7 +514,7 @@ def _exchange(scene: Scene, data: ForeignData, chosen: Sequence[int]) -> Hypothe
     Parameters
     ----------
     scene : the rotor, with its channels.
-    data : the data.
+    data : the data, whose columns are assigned other channels.
     chosen : for each column the place of another channel, see `ForeignData.columns`.
     """
     known = channels(scene)[1:]

@@ -35,7 +35,7 @@ _LEFT, _LEFT_OF_SMALL = 1e-3, 0.15
 _LEFT_OF_FITTED = {1: 0.02, 2: 2e-3, 3: 2e-3}  # of the largest defect, by numbers that are fitted
 _ALIKE = 3.0  # times what the best explanation leaves
 _ALIKE_IN_ROUNDING = 1.05
-_QUICK = 3e-5  # share to which a change of the model is known
+_QUICK = 3e-5  # relative error of a change of the model by quick steps
 # Times the steps, with which that holds also where the mass matrix is nearly singular. Of many
 # steps fewer times are enough for a search that may not take minutes.
 _MOST_FINE, _FINE_STEPS = 8, 32
@@ -90,7 +90,8 @@ class DefectSearch:
         self._allowed = max(_LEFT * largest, min(judged.tolerance, _LEFT_OF_SMALL * largest))
         self._begins, self._ends = defects.time[rows], defects.time[rows + 1]
         self._states = defects.states[rows].T
-        # By the rounding of each number, but none so small that its channel alone counts.
+        # Residuals are weighted by the rounding of each number, which has a lower limit so that no
+        # channel counts alone.
         self._weights = 1.0 / np.maximum(self._floors, 1e-4 * largest)
         self._is_brief = max_steps <= BRIEF_SEARCH
         self._steps, self._fine = None, _MOST_FINE
@@ -100,15 +101,15 @@ class DefectSearch:
         if self._steps is not None and max_steps < _MAX_STEPS:
             self._fine = max(min(_MOST_FINE, _FINE_STEPS // self._steps), 1)
         self._ends_of_scene: dict[int, Array] = {}  # by the factor of the steps
-        # For how many of these rows a column has one number, and with it one rounding error, on
-        # average.
+        # The number of rows, on average, over which a coordinate keeps one value, and with it one
+        # rounding error.
         changes = np.count_nonzero(np.diff(self._states), axis=1)
         of_coordinates = (len(rows) / (1.0 + changes)).reshape(2, -1).max(axis=0)
         self._repeats = np.tile(of_coordinates, self._values.shape[1] // len(of_coordinates))
 
     @property
     def _is_rounding(self) -> bool:
-        """Whether no residual is larger than what rounding explains."""
+        """Return whether no residual is larger than what rounding explains."""
         return not self._largest
 
     def explanations(self) -> list[str]:
@@ -126,14 +127,14 @@ class DefectSearch:
         explained: list[Explanation[RotorModel]] = []
         if not is_rounding:
             explained = list(explanations(self._plausible_models(), self._left_by))
-        # What has a name of its own is named, unless numbers of the scene explain far more.
+        # A named mistake is preferred to fitted parameters, unless these explain far more.
         least = _least(explained)
         if least > 10.0 * _QUICK:
             by_parameters = self._parameter_sets()
             if _least(by_parameters) < _FAR_BETTER * least:
                 explained = by_parameters
-        # What rounding leaves is of one size whatever the cause: there the least is nearly that of
-        # the right one.
+        # Defects within rounding leave about as much whatever the cause: only explanations that are
+        # nearly as good as the best are alike there.
         factor = _ALIKE_IN_ROUNDING if is_rounding else _ALIKE
         alike = closest(explained, factor, _QUICK)
         return [explanation.text for explanation in alike[:_MAX_NAMED]]
@@ -286,7 +287,7 @@ class DefectSearch:
             if not len(sets):
                 break
             matrices = cosines[sets[:, :, None], sets[:, None, :]]
-            # Parameters with one signature, such as a mass and gravity, cannot be told apart.
+            # Parameters with one signature, such as a mass and gravity, cannot be distinguished.
             is_independent = np.linalg.det(matrices) > _INDEPENDENT
             sets, matrices = sets[is_independent], matrices[is_independent]
             sides = projections[sets]
@@ -307,7 +308,7 @@ class DefectSearch:
             allowed = min(self._allowed, _LEFT_OF_FITTED[count] * self._largest)
             left = functools.partial(self._left_at_most, allowed=allowed)
             explained = list(explanations(fitted, left))
-            # One more is named only where that explains far more.
+            # A further parameter is accepted only if it explains far more.
             if best and _least(explained) > _FAR_BETTER * _least(best):
                 break
             if explained:
@@ -382,7 +383,7 @@ class DefectSearch:
         """
         spread = float(np.sqrt((weighted**2).mean()))
         if self._is_rounding:
-            # Of a single parameter: one rounding error over many rows counts once.
+            # A rounding error that is repeated over many rows counts once.
             sizes = (slopes**2).reshape(self._values.shape).sum(axis=0)
             spread = max(spread, 0.3) * math.sqrt(float(sizes @ self._repeats / sizes.sum()))
         covariance = np.linalg.pinv(slopes.T @ slopes)

@@ -21,11 +21,11 @@ from rotor_mbs.models.lagrange.parameters import rotor_form
 from rotor_mbs.scenario.time_table import torque_place
 from rotor_mbs.solution.trajectory import Array
 
-UNKNOWN_FAULT = "a fault"  # of which a text says where it is, and not what
+UNKNOWN_FAULT = "a fault"  # begin of the text of a fault whose place alone is known
 _MAX_NAMED = 6
 _MAX_STEPS = 512  # of Runge and Kutta in an interval
 _STANDS_OUT = 30.0  # times the median of the defects
-_FAINT = 0.02  # of the largest defect: fainter ones are not told beside it
+_FAINT = 0.02  # of the largest defect: smaller ones are not reported beside it
 _EVERYWHERE = 0.6  # of the intervals
 _MOST, _OF_OTHERS = 0.9, 1e-3  # of the other intervals; of the largest defect, that they have
 _EDGE = 0.1  # of the faulty intervals' median: what is beside them is not faulty
@@ -38,7 +38,7 @@ _LEFT_OF_LOADS = 0.15  # of the defects: a load changes within an interval, and 
 _OF_COORDINATE = 0.1  # of a coordinate's defects are a load's on it, the rest of those on others
 _OF_USUAL = 10.0  # times a coordinate's own median: less says nothing of it
 _MIN_CLOCK = 3  # intervals that are late or early alike
-_MAX_DIRECTIONS = 20  # intervals of a fault at which loads are looked for
+_MAX_DIRECTIONS = 20  # intervals of a fault for which loads are searched
 _SMALL_TURN = 1e-6  # rad, by the load whose effect is computed: far above round-off, and yet linear
 
 

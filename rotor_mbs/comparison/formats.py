@@ -60,7 +60,7 @@ _DEFAULT_FILL = {
     "i4": -2147483647,
     "i8": -9223372036854775806,
 }
-_MAX_PARTS = 10_000  # arrays, cells and fields of a MAT or JSON file that are looked at
+_MAX_PARTS = 10_000  # arrays, cells and fields of a MAT or JSON file that are read
 
 # Text: comma-separated values, columns divided by blanks, Exudyn's files, OpenFAST's `.out`.
 _COMMENT = ("#", "%", "//", "!")
@@ -77,7 +77,7 @@ _FORTRAN = re.compile(r"(?<=[\d.])[dD](?=[+-]?\d)")  # 1.5D-03
 _FORTRAN_3_DIGITS = re.compile(r"(?<=[\d.])(?=[+-]\d{3}$)")  # 0.123456-101: no room for the E
 # What programs write where they have no number; a row with it may be the first one.
 _MISSING = re.compile(r"\*+|-+|\?|#?n/?a!?|null|none|missing|nil", re.IGNORECASE)
-_MAX_SEARCHED = 200  # lines in which a header is looked for where some columns are texts
+_MAX_SEARCHED = 200  # lines that are searched for a header where some columns are texts
 
 Arrays = Mapping[str, Any]
 Units = Mapping[str, str]
@@ -165,7 +165,7 @@ def read_columns(path: Path, group: str, scene: str) -> DataTable:
         return _decoded(source, *_netcdf_3(path))
     if path.suffix.lower() == ".outb":
         return replace(table_of(source, *_openfast(path)), program="openfast")
-    # MATLAB's v7.3 has 512 bytes of its own before.
+    # In files of MATLAB 7.3, 512 bytes of its own stand before the signature of HDF5.
     if head.startswith(_HDF5) or head[512:].startswith(_HDF5):
         return _hdf5(path, group, scene)
     if b"\x00" in head and not head.startswith(_UTF_16):
@@ -618,7 +618,7 @@ def _read_text(source: str, text: str) -> DataTable:
         is_empty = isinstance(values, np.ndarray) and bool(np.isnan(values).all())
         if not name and is_empty:
             continue  # a divider at the end of every line makes a column of nothing
-        # Later columns of one name are kept, with marks before it.
+        # Further columns with the same name are kept, with "_" before the name.
         count = repeats.get(name, 0)
         label = name
         while label in named or label in left_out:
@@ -858,10 +858,11 @@ def _columns_of_rows(
     width = len(_fields(rows[0][1], divider))
     if width > MAX_COLUMNS:
         raise InputError(f"{source}: {width} columns; allowed: up to {MAX_COLUMNS}")
-    # Beside a point a comma may stand between thousands; without one it is decimal.
+    # In numbers with points a comma may stand between thousands; without points it is decimal.
     is_comma = divider != "," and not any("." in row for _, row in rows)
     body = io.StringIO("\n".join(row for _, row in rows))
-    # Numbers are read to their last bit; since 3.1 they always are, and asking is deprecated.
+    # Numbers are to be read to their last bit; since pandas 3.1 this is the default, and the option
+    # is deprecated.
     options: dict[str, Any] = {}
     if tuple(int(part) for part in pd.__version__.split(".")[:2]) < (3, 1):
         options["float_precision"] = "round_trip"
@@ -883,7 +884,7 @@ def _columns_of_rows(
     except pd.errors.ParserError:
         _refuse_ragged(source, rows, divider, width)
         raise
-    # Rows that are too short have empty fields at their end; so may have whole rows.
+    # pandas fills rows that are too short with empty fields; complete rows may end in one, too.
     if len(frame) != len(rows) or frame[width - 1].isna().any():
         _refuse_ragged(source, rows, divider, width)
     columns: list[NDArray[np.float64] | LeftOut] = []

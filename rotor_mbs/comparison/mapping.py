@@ -120,7 +120,7 @@ def read_mapping(
     declared = {}
     for channel in known:
         declared[channel.key] = file_key(channel.key, _COLUMN_MAPPING, default=None).metadata
-    # Loads and modes also with all their components.
+    # In `omit` and `only`, a load or kind of mode stands for all its components.
     names = {channel.key: channel.name for channel in known if channel.kind != "time"}
     names |= {name.replace(" ", "_"): name for name in (*LOAD_NAMES, *FREQUENCY_NAMES)}
     omit = keys.list_of(keys.choice(tuple(names)), f"a list of {', '.join(names)}")
@@ -271,7 +271,7 @@ def _known_channels(
     motion, modes = channels(scene), mode_channels(scene)
     motion_by_name, modes_by_name = _suggested(table, motion), _suggested(table, modes)
     motion_keys = {channel.key for channel in motion}
-    # A mapping of either decides.
+    # A mapping of a channel of either kind decides.
     if any(channel.key in mapping.columns for channel in modes):
         return modes, modes_by_name
     if not motion_keys.isdisjoint(mapping.columns):

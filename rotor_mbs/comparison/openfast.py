@@ -209,7 +209,7 @@ def _in_frame(channel: Channel, frames: Iterable[str]) -> Channel:
 
 
 def _is_about_pin(channel: Channel, scene: Scene, settings: OpenFastSettings) -> bool:
-    """Whether a moment is about the teeter pin, away from the apex."""
+    """Return whether a moment is about the teeter pin, away from the apex."""
     is_shaft_moment = channel.name.startswith("shaft moment")
     return is_shaft_moment and len(scene.blades) == 2 and settings.undersling != 0.0
 

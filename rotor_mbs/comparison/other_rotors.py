@@ -23,7 +23,7 @@ from rotor_mbs.scenario.time_table import LoadTable, value_at
 from rotor_mbs.solution.trajectory import Array
 
 _GRAVITIES = (9.8, 9.80665, 9.81, 9.82, 10.0, 0.0)
-# Zeros that people choose, by degrees.
+# Azimuths and pitch angles that are often chosen as zero, by degrees.
 _QUARTERS = {90: math.pi / 2.0, 180: math.pi, 270: -math.pi / 2.0}
 # Directions of gravity in the base that have the same effect on the motion as those azimuths.
 _GRAVITY_AT_QUARTER = {90: "+x", 180: "+z", 270: "-x"}
@@ -170,7 +170,7 @@ def _with_factor(factor: float, reduced: Accelerations) -> Accelerations:
 
     def equations(*arguments: Any) -> list[Any]:
         whole, without = closed_form.accelerations(*arguments), reduced(*arguments)
-        # Linear in these terms, as in the reduced equations themselves.
+        # The accelerations are linear in the factor: 1 for the whole equations, 0 for the reduced.
         return [factor * a + (1.0 - factor) * b for a, b in zip(whole, without, strict=True)]
 
     return equations
@@ -328,8 +328,7 @@ def other_scenes(scene: Scene) -> Iterator[tuple[str, Scene]]:
         hubs = replace(scene, hub_inertia=count * scene.hub_inertia)
         yield "the hub's inertia once for each blade", hubs
     if not scene.has_constant_loads:
-        # An engine that asks for the loads once for each segment gets those of all at the kinks of
-        # any.
+        # A program that reads the loads once for each segment reads all at the kinks of any.
         times = [0.0, *scene.kink_times, scene.duration]
         yield "ramps of loads held at their value at the start", with_held_loads(scene, times)
     for degrees, angle in _QUARTERS.items():
@@ -420,7 +419,7 @@ def _exchanged_bearings(scene: Scene) -> Iterator[tuple[str, Scene]]:
             continue
         first[field] = (values[0],) * count
         yield f"{key} of blade 1 at all blades", replace(scene, **{field: first[field]})
-        # Of two blades that is an exchange.
+        # With two blades this is an exchange, which is yielded below.
         for step, which in ((1, "next"), (-1, "previous")) if count > 2 else ():
             change = {field: (*values[step:], *values[:step])}
             yield f"{key} of the {which} blade at each blade", replace(scene, **change)
@@ -439,14 +438,17 @@ def _with_mass_on_axis(blade: Blade) -> Blade:
 
 
 def _without_inertia(blade: Blade) -> Blade:
+    """Return a blade without inertia about its centre of mass."""
     return replace(blade, inertia=_inertia([0.0] * 6))
 
 
 def _without_products(blade: Blade) -> Blade:
+    """Return a blade without products of inertia about its centre of mass."""
     return replace(blade, inertia=_inertia([*blade.inertia[:3], 0.0, 0.0, 0.0]))
 
 
 def _with_opposite_products(blade: Blade) -> Blade:
+    """Return a blade whose products of inertia about its centre of mass have the other sign."""
     products = [-product for product in blade.inertia[3:]]
     return replace(blade, inertia=_inertia([*blade.inertia[:3], *products]))
 
@@ -614,7 +616,7 @@ def _azimuth_moved(chosen: Sequence[int], model: RotorModel, change: float) -> R
 
 
 def _damped_by_rotor(model: RotorModel, change: float) -> RotorModel:
-    """Let the bearings' dampers see a share of the rotor's rate beside that of the pitch."""
+    """Add a share of the rotor's rate to the rates at which the bearings' dampers act."""
 
     def equations(angles: Any, rates: Any, form: Any, loads: Any, *functions: Any) -> list[Any]:
         pitches = list(loads.pitches or [0.0] * len(form.blades))
@@ -636,7 +638,7 @@ def _rest_moved(chosen: Sequence[int], model: RotorModel, change: float) -> Roto
 
 
 def _zero_moved(chosen: Sequence[int], model: RotorModel, change: float) -> RotorModel:
-    """Move the pitch angle at which some blades are as the scene has them, by a change in rad."""
+    """Move the zero of the pitch of some blades by a change in rad."""
     return replace(model, scene=_pitch_turned(model.scene, chosen, change))
 
 
@@ -688,6 +690,6 @@ def _scaled(value: Any, share: float) -> Any:
 
 
 def _is_row(value: Any) -> bool:
-    """Whether a value is a row of a table over time."""
+    """Return whether a value is a row of a table over time."""
     is_pair = isinstance(value, tuple) and len(value) == 2
     return is_pair and not isinstance(value[0], tuple)

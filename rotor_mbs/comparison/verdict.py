@@ -1,4 +1,4 @@
-"""The verdict on other people's data, by channel, and as a record of a results file."""
+"""The verdict on data of another program, by channel, and as a record of a results file."""
 
 from __future__ import annotations
 
@@ -195,7 +195,7 @@ def comparison_record(
             "_error": (channel.unit, ", data minus reference", values - right),
         }
         if not channel.is_load and not data.is_modes:
-            # Of the interval that ends at a row; NaN where there is none.
+            # A row has the defect of the interval that ends there; NaN where there is none.
             defect = np.full(len(values), np.nan)
             known = defects_of_channel(scene, defects, channel)
             if known is not None:

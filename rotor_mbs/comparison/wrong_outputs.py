@@ -322,12 +322,13 @@ def _other_potential_energies(
 
 
 def _scaled(own: Array) -> Iterator[tuple[str, Array]]:
-    """Yield an energy times factors, in words."""
+    """Yield an energy times several factors, each with its factor in words before it."""
     for text, factor in (("opposite sign", -1.0), ("half of it", 0.5), ("twice of it", 2.0)):
         yield text, factor * own
 
 
 def _without_springs(scene: Scene) -> Scene:
+    """Return a scene without springs in its pitch bearings."""
     return replace(scene, bearing_stiffness=())
 
 
