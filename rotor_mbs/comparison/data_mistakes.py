@@ -32,8 +32,8 @@ from rotor_mbs.solution.defects import FLOOR_SAFETY
 from rotor_mbs.solution.metrics import horizon
 from rotor_mbs.solution.trajectory import Array, Trajectory
 
-# A mistake fits where what is left is within the tolerance, or a thousandth of what there was and
-# at most this.
+# A mistake fits if it leaves an error within the tolerance, or at most this share of the error and
+# at most that size.
 _LEFT, _MAX_LEFT = 1e-3, 1e-4
 MIN_ROWS = 5  # with fewer, something always fits
 _TIME_FACTORS = (
@@ -45,15 +45,15 @@ _MIN_LAG = 1e-4  # of an interval between rows: a smaller lag is rounding
 _WHOLE_ROWS = 1e-3  # of a row: a lag this near to a whole number of rows is that number
 _LAG_ROW = 50  # by which a lag is measured
 _LAG_ROUNDS = 8  # of Gauss and Newton's iteration
-_MAX_OFF = 30.0  # times the usual distance from the reference, of a column that says when a row is
+_MAX_OFF = 30.0  # times the median distance from the reference, of columns by which a time is found
 _MAX_CLOCK, _MIN_CLOCK = 1.2, 1e-7  # factor of a clock; what differs less is rounding
 _TIME_ROUNDING = 1e-9  # of the duration
 _MIN_COVERED = 0.3  # of the duration: in a short part of a motion anything fits
 _MAX_PERIOD = 20  # rows from one that is computed to the next
 _FIRST_ROWS, _NEARLY_BETWEEN = 401, 1e-6
 _MIN_KNOTS = 5  # fewer rows are on one polynomial, or nearly so
-_NOT_BY_CHANCE = 10.0  # times what is allowed of interpolated rows, the motion itself is off them
-_INTERPOLATED = 1e-9  # of the largest number: of the arithmetic of interpolation
+_NOT_BY_CHANCE = 10.0  # times what is allowed of rows: distance of the right ones from a spline
+_INTERPOLATED = 1e-9  # of the largest number: error of the arithmetic of interpolation
 
 
 @dataclass(frozen=True)
@@ -450,7 +450,7 @@ def _column_hypotheses(
     errors = (differences / carried[:, None, :]).max(axis=0)  # (columns, channels)
     preference = np.zeros_like(errors)
     places = range(len(columns))
-    preference[places, columns] = -1e-3  # of equal ones, its own
+    preference[places, columns] = -1e-3  # among equal errors a column keeps its own channel
     _, chosen = linear_sum_assignment(np.log10(np.clip(errors, 1e-16, 1e16)) + preference)
     if errors[places, chosen].max() <= search.allowed and list(chosen) != columns:
         yield _exchange(search.scene, data, list(chosen))

@@ -29,33 +29,33 @@ from rotor_mbs.models.lagrange.defects import FIT_ROWS, explicit_steps, quick_en
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.trajectory import Array
 
-# Of the largest defect may be left: the rest is the other program's own error, or that of the quick
-# steps; more where that is within the tolerance.
+# Share of the largest defect that may be left, by the other program's own error and that of the
+# quick steps; the second share where this is within the tolerance.
 _LEFT, _LEFT_OF_SMALL = 1e-3, 0.15
 _LEFT_OF_FITTED = {1: 0.02, 2: 2e-3, 3: 2e-3}  # of the largest defect, by numbers that are fitted
 _ALIKE = 3.0  # times what the best explanation leaves
 _ALIKE_IN_ROUNDING = 1.05
 _QUICK = 3e-5  # relative error of a change of the model by quick steps
-# Times the steps, with which that holds also where the mass matrix is nearly singular. Of many
-# steps fewer times are enough for a search that may not take minutes.
+# Factor of the number of steps with which that holds also where the mass matrix is nearly singular,
+# and the number of steps that limits the factor, so that a search does not take minutes.
 _MOST_FINE, _FINE_STEPS = 8, 32
-_PERHAPS = 0.2  # of the defects left by steps that are not so fine
-_LEFT_OF_SETS = 0.1  # by the projections on several parameters, before they are iterated
+_PERHAPS = 0.2  # largest share of the defects that a model may leave by coarse steps
+_LEFT_OF_SETS = 0.1  # share left by the projections on several parameters, before they are fitted
 _FAR_BETTER = 0.1  # times what a cheaper explanation leaves
 _SIGNIFICANT = 8.0  # standard deviations of an estimate
-_CERTAIN = 10.0  # times what a textbook mistake leaves is left by all others, where it is the cause
+_CERTAIN = 10.0  # factor by which all others leave more than a textbook mistake that is the cause
 _MAX_CHANGE = 0.6  # a share, or rad: what is further off is another scene
 _MAX_FITTED = 8  # sets of parameters, those whose projections leave least
 _MAX_PARAMETERS = 3  # at once
-_MAX_INTERVALS = 120  # that a hypothesis is tried on
+_MAX_INTERVALS = 120  # on which a hypothesis is tried
 _MAX_WINDOWS = 60  # of rows, likewise, where the rates are computed from the angles
 _SMALLEST_FLOOR = 1e-18  # rad
-# Of Runge and Kutta in each of them, at most: any; so many that a search takes some seconds; and of
-# data that agree.
+# Largest number of steps of Runge and Kutta in an interval: for any search; for one that takes some
+# seconds; for data that agree.
 _MAX_STEPS, QUICK_SEARCH, BRIEF_SEARCH = 512, 32, 8
 _MAX_FITTED_BRIEF = 4
 _DIFFERENCE = 1e-4  # share or rad, for the derivative by a parameter
-_ROUNDS = 8
+_ROUNDS = 8  # of Gauss and Newton's iteration
 _INDEPENDENT = 1e-6  # determinant of the cosines between the signatures of a set
 _MAX_NAMED = 6  # explanations, or faults
 

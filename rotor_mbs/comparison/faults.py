@@ -27,19 +27,20 @@ _MAX_STEPS = 512  # of Runge and Kutta in an interval
 _STANDS_OUT = 30.0  # times the median of the defects
 _FAINT = 0.02  # of the largest defect: smaller ones are not reported beside it
 _EVERYWHERE = 0.6  # of the intervals
-_MOST, _OF_OTHERS = 0.9, 1e-3  # of the other intervals; of the largest defect, that they have
-_EDGE = 0.1  # of the faulty intervals' median: what is beside them is not faulty
-_GAP = 6  # intervals: faults that are nearer are one
+# Share of the other intervals, and the share of the largest defect that their defects may reach.
+_MOST, _OF_OTHERS = 0.9, 1e-3
+_EDGE = 0.1  # of the faulty intervals' median: largest defect of right intervals beside them
+_GAP = 6  # intervals: faults that are nearer to each other are one
 _AT_END = 3  # intervals
-_OF_ENDS = 1e-3  # of the largest: usual defects above this are of the cause of those at the ends
+_OF_ENDS = 1e-3  # of the largest: above this, usual defects and those at the ends have one cause
 _PARALLEL = 0.995  # cosine
 _NEARLY = 0.05
 _LEFT_OF_LOADS = 0.15  # of the defects: a load changes within an interval, and the rotor turns on
-_OF_COORDINATE = 0.1  # of a coordinate's defects are a load's on it, the rest of those on others
-_OF_USUAL = 10.0  # times a coordinate's own median: less says nothing of it
+_OF_COORDINATE = 0.1  # of a coordinate's defects: a load with a smaller share does not act on it
+_OF_USUAL = 10.0  # times a channel's median: smaller defects of it do not count
 _MIN_CLOCK = 3  # intervals that are late or early alike
 _MAX_DIRECTIONS = 20  # intervals of a fault for which loads are searched
-_SMALL_TURN = 1e-6  # rad, by the load whose effect is computed: far above round-off, and yet linear
+_SMALL_TURN = 1e-6  # rad, by the load whose effect is computed: far above round-off, still linear
 
 
 def faults_in_time(judged: JudgedDefects) -> list[str]:
@@ -62,7 +63,7 @@ def faults_in_time(judged: JudgedDefects) -> list[str]:
     # The median is that of right intervals, provided that most intervals are right.
     usual = float(np.median(excess[judged.is_judged])) if judged.is_judged.any() else 0.0
     wrong = np.flatnonzero(excess > max(_STANDS_OUT * usual, _FAINT * judged.largest))
-    # What is wrong everywhere is no fault at a time, though it shows in some places more than in
+    # An error in most intervals is no fault at a time, though it may be larger in some than in
     # others.
     if not len(wrong) or len(wrong) > _EVERYWHERE * len(excess):
         return []
@@ -80,7 +81,8 @@ def faults_in_time(judged: JudgedDefects) -> list[str]:
     if float(np.quantile(others, _MOST)) > max(judged.tolerance, _OF_OTHERS * judged.largest):
         return []
     groups = np.split(wrong, np.flatnonzero(np.diff(wrong) > _GAP) + 1)
-    # A filter, or differences in place of rates, are wrong in all rows, and most at the ends.
+    # A filter, or differences in place of rates, makes errors in all rows, the largest at the ends:
+    # where the usual defects are large, groups at the ends are left out.
     if usual > _OF_ENDS * judged.largest:
         last = len(excess) - _AT_END
         groups = [group for group in groups if group[-1] >= _AT_END and group[0] < last]
@@ -134,7 +136,7 @@ def _fault(judged: JudgedDefects, group: NDArray[np.int64]) -> str:
     text = _wrong_row(judged, group) or _wrong_clock(judged, group)
     if text:
         return text
-    # The coordinates on which loads make such defects.
+    # Loads are tried next: on which coordinates would they make such defects?
     chosen = group[:: max(1, len(group) // _MAX_DIRECTIONS)]
     loads, acting = _explaining_loads(judged, chosen)
     if len(acting) == 1:
@@ -317,7 +319,7 @@ def _load_jump_fault(
         if len(more) == 1 and abs(abs(more[0] / jump) - 1.0) <= _NEARLY:
             side = "late" if more[0] / jump < 0.0 else "early"
             return f"jumps a row {side} at t = {t0:.6g} s, or has a wrong value in this row"
-        # One interval has too much, the next too little.
+        # A load that is smoothed over a jump is too large in one interval, too small in the next.
         is_balanced = abs(more.sum()) <= _NEARLY * np.abs(more).max()
         if len(more) == 2 and is_balanced and more[0] / jump > 0.0:
             return f"is smoothed over its jump at t = {t0:.6g} s"

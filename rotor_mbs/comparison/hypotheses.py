@@ -1,4 +1,4 @@
-"""What could explain a difference: hypotheses, and the one search that tries them.
+"""Hypotheses that may explain a difference, and the one search that tries them.
 
 Every search for a cause has the same form, whatever the data are: columns of a trajectory, defects
 of intervals, loads, frequencies. There are candidates, each with a text, with what it changes in
@@ -71,7 +71,7 @@ def explanations(
 
 
 def cheapest(explained: Iterable[Explanation[Change]]) -> list[Explanation[Change]]:
-    """Return the explanations of the lowest price, that is with the fewest mistakes."""
+    """Return the explanations of the lowest price, with the fewest mistakes or parameters."""
     explained = list(explained)
     lowest = min((explanation.hypothesis.price for explanation in explained), default=0)
     return [explanation for explanation in explained if explanation.hypothesis.price == lowest]

@@ -23,11 +23,11 @@ from rotor_mbs.solution.defects import FLOOR_SAFETY, Defects
 from rotor_mbs.solution.quantities import LOADS, longest_arm
 from rotor_mbs.solution.trajectory import Array, all_coordinates
 
-# Of the largest force at a root: components that stay below are judged by this, not by their own
-# largest.
+# Share of the largest force at a root: the errors of smaller components are divided by this, not by
+# the component's own largest value.
 _SMALL = 1e-3
-_LOAD_ROUNDING = 16.0 * 2.0**-53  # of that force: of the sums that a load is
-_STATE_STEP = 1e-7  # of a state, for the derivative of the loads
+_LOAD_ROUNDING = 16.0 * 2.0**-53  # of that force: rounding of the sums by which a load is computed
+_STATE_STEP = 1e-7  # relative step of a state, for the derivative of the loads
 MIN_EXPLAINED = 5  # rows: with fewer, something always fits
 MAX_LEFT = 1e-4  # of the largest load, or of a frequency, by a mistake that is named,
 LEFT_SHARE = 1e-2  # and of the difference: another program's own error is no mistake
@@ -391,7 +391,7 @@ def _load_errors(loads: JudgedLoads) -> tuple[tuple[ChannelErrors, ...], list[in
     return tuple(errors), wrong, message
 
 
-# What is wrong with loads
+# Causes of wrong loads
 
 
 def _explained(loads: JudgedLoads, wrong: Sequence[int]) -> tuple[str, ...]:
@@ -420,8 +420,8 @@ def _explained(loads: JudgedLoads, wrong: Sequence[int]) -> tuple[str, ...]:
             unexplained.setdefault((_load(channel), channel.frame), []).append(j)
 
     named = _shared_texts(loads, by_channel)
-    # What no component explains may be moments about another point, all of one load about the
-    # same.
+    # Moments that no component explains may be taken about another point, the same for all
+    # components of one load.
     for (load, frame), group in unexplained.items():
         text = _other_point(loads, load, frame, group)
         if text:
@@ -502,7 +502,7 @@ def _shared_texts(
     """
     shown_by_text: dict[int, dict[str, str]] = {}
     for j, explained in by_channel.items():
-        # Of one text for several components, the first is shown.
+        # If several components have one text, the first of them is shown.
         shown_by_text[j] = {e.text: e.hypothesis.change.shown for e in reversed(explained)}
     count = Counter(text for texts in shown_by_text.values() for text in texts)
     named: dict[str, list[str]] = {}
@@ -564,7 +564,7 @@ def _other_point(loads: JudgedLoads, load: str, frame: str, group: Sequence[int]
         difference = (loads.values[:, group] / factor - moment).ravel()
         solution = np.linalg.lstsq(matrix.reshape(-1, 3), difference, rcond=1e-9)[0]
         point = np.asarray(solution, float)
-        # A coordinate that is rounding is 0 in the text.
+        # A coordinate that is within rounding is shown as 0.
         point[np.abs(point) < 1e-9 * np.abs(point).max()] = 0.0
         shown = ", ".join(f"{x:.6g}" for x in point)
         add(f"the point ({shown}) m of the {frame_name} frame", point, factor)
@@ -594,7 +594,7 @@ def _load(channel: Channel) -> str:
 
 
 def _mistakes(factor: float) -> list[str]:
-    """Return what is wrong with a column that is this factor times the right one, in words."""
+    """Return the mistakes in a column that is a factor times the right one, in words."""
     mistakes = ["sign reversed (action in place of reaction)"] if factor < 0.0 else []
     unit = _UNITS[abs(factor)]
     return [*mistakes, unit] if unit else mistakes

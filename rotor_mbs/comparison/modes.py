@@ -26,7 +26,7 @@ from rotor_mbs.solution.defects import FLOOR_SAFETY
 from rotor_mbs.solution.trajectory import Array
 from rotor_mbs.studies.modes import compute_modes
 
-# Of the largest frequency: slower ones are judged by this, not by their own size.
+# Share of the largest frequency: errors of lower ones are divided by this, not by their own size.
 _SLOW = 1e-3
 _MAX_SPEEDS = 1000
 _MIN_TURNING = 3  # speeds above 0: with fewer, any frequency over them is a parabola
@@ -226,7 +226,7 @@ def _errors_of_nearest(values: Array, rounding: Array, known: Array) -> tuple[Ar
     return np.maximum(excess, 0.0) / _frequency_scale(expected), expected
 
 
-# What is wrong with frequencies
+# Causes of wrong frequencies
 
 
 @dataclass(frozen=True)

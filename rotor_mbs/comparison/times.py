@@ -18,11 +18,11 @@ from rotor_mbs.scenario.time_table import ALIGNMENT
 
 Array = NDArray[np.float64]
 
-_NEAR_ZERO = 1e-9  # of an interval: a time that is nearer to 0 is 0
-_SAME_STATE = 1e-9  # rad, rad/s, or of a number: of the same state, computed twice
+_NEAR_ZERO = 1e-9  # of an interval: a time that is nearer to 0 is taken as 0
+_SAME_STATE = 1e-9  # absolute or relative: difference of the same state computed twice
 _EQUAL = 1e-6  # of an interval between rows
 _MOSTLY = 0.9  # of the intervals
-_STEP_DIGITS = 12  # of a step that somebody has chosen
+_STEP_DIGITS = 12  # of a step that was chosen
 _ROUNDOFF = 2.0**-53
 _MIN_ROWS = 3  # fewer have no motion to be compared
 
@@ -71,8 +71,8 @@ def ordered_rows(
     if (np.diff(time) < 0.0).any():
         is_descending = bool((np.diff(time) <= 0.0).all())
         if is_descending:
-            # The rows of one time are in the order of the file after a stable sort, which would be
-            # from after a jump to before it.
+            # A stable sort keeps rows of one time in their order, which in a descending file is
+            # from after a jump to before it: the rows are reversed first.
             places = places[::-1]
         places = places[np.argsort(time[places], kind="stable")]
         was = "from the end to the start" if is_descending else "not in the order of their times"

@@ -49,7 +49,7 @@ from rotor_mbs.solution.metrics import horizon, horizon_samples
 from rotor_mbs.solution.status import OK_ERROR
 from rotor_mbs.solution.trajectory import Array, Trajectory
 
-_TIME_ROUNDING = 1e-9  # of the duration: times that are sums of steps may end so far past it
+_TIME_ROUNDING = 1e-9  # of the duration: times that are sums of steps may end this much after it
 _MIN_ROWS = 3
 _STAGES = 4  # reference, interval defects, search for causes, loads
 _SAME_START = 1e-3  # rad, rad/s: starts that differ by more are another start
@@ -152,7 +152,7 @@ def compare_with_reference(
         If the data have no row in the scene's duration, or the reference and the defects take
         longer than the time limit.
     """
-    is_available()  # the engine is loaded before: an interrupt would leave half of it
+    is_available()  # loads the engine before the time limit, which could interrupt its import
     ends = monotonic() + time_limit_s
     loads, data = data.only(loads=True), data.only(loads=False)
     missing_part = "no reference"  # within the time limit
@@ -160,7 +160,7 @@ def compare_with_reference(
         with time_limit(time_limit_s):
             on_stage("reference", 0, _STAGES)
             inside, exact = _reference_for(data, scene)
-            raise_if_over()  # a reference that ends early is none
+            raise_if_over()  # a reference that ended early is not used
             missing_part = "the rows are not assessed"
             on_stage("interval defects", 1, _STAGES)
             rows = _rows_with_reference(data, scene, inside, exact)
@@ -253,8 +253,8 @@ def _reference_for(data: ForeignData, scene: Scene) -> tuple[ForeignData, TimedR
     """
     inside = data.rows(data.time <= scene.duration * (1.0 + _TIME_ROUNDING))
     end = float(np.max(inside.time, initial=scene.duration))
-    # At the times of the data, and at the scene's samples, which make growth and horizon the same
-    # for all data.
+    # The scene's samples are added to the times of the data, so that growth and horizon are the
+    # same for all data.
     samples = np.linspace(0.0, scene.duration, scene.samples)
     times = np.union1d(np.append(inside.time, end), samples)
     sampled_scene = replace(scene, duration=end, samples=len(times), outputs=("angles", "rates"))
@@ -341,8 +341,8 @@ def _errors_of(
         predicted = float(np.abs(rows.defects.predicted[: rows.until]).max())
     sums = _largest_sums(scene, rows.defects)
     beyond_digits = _beyond_digits(scene, tolerance, rows.defects)
-    # Per unit of error growth: in a motion whose errors do not grow, faults below any interval's
-    # tolerance add up.
+    # Errors are divided by the growth of an initial error: in a motion whose errors do not grow,
+    # faults below the tolerance of an interval add up to an error that is judged by this.
     exact = rows.exact
     carried = carried_errors(exact.trajectory, exact.growth, exact.units)
     carried = carried[rows.places][:, data.columns]
@@ -677,7 +677,7 @@ def _likely_causes(
         rates = len(scene.initial_angles) + np.array(scene.moving_coordinates)
         has_rates = bool(np.isin(rates, data.columns).any())
         judged = judged_defects(scene, rows.defects, tolerance, has_fitted_rates=not has_rates)
-    # The search has all rows, also those after the scene's duration.
+    # All rows are searched, also those after the scene's duration.
     turned = rows.data.values[0] - data.values[0]  # the turns that wrapped channels were given
     whole = replace(data, values=data.values + turned)
     worst = float(errors.per_growth[: rows.until].max())

@@ -19,10 +19,10 @@ from rotor_mbs.scenario.scene import Scene, scene_hash
 from rotor_mbs.solution.defects import Defects
 from rotor_mbs.solution.trajectory import Array
 
-LEVELS = (1e-3, 1e-6, 1e-9)  # rad, rad/s, or of the largest: until when data agree to each
+LEVELS = (1e-3, 1e-6, 1e-9)  # rad, rad/s, or relative: for each, it is found until when data agree
 DEFAULT_TOLERANCE = 1e-6  # rad, of an interval's defect; of a load's largest; of a frequency
-# Names of columns without use that a file keeps: so many, and so long as JSON; an attribute has
-# 64 kB.
+# Limits of the names of unused columns in a file: their number, and their length as JSON; an
+# attribute of HDF5 has at most 64 kB.
 _MAX_NAMES, _MAX_NAME_BYTES = 100, 30_000
 
 
