@@ -70,6 +70,10 @@ class DataTable:
     def __getitem__(self, name: str) -> DataColumn:
         """Return the column with a name.
 
+        Parameters
+        ----------
+        name : of the column, without its unit.
+
         Raises
         ------
         InputError

@@ -417,7 +417,13 @@ def _significant_digits(values: Array) -> int:
 
 
 def _have_digits(values: Array, digits: int) -> bool:
-    """Return whether finite numbers other than 0 may be rounded to so many significant digits."""
+    """Return whether numbers may have been written with so many significant digits.
+
+    Parameters
+    ----------
+    values : (n,) finite numbers, none of them 0.
+    digits : number of significant digits.
+    """
     if digits <= _FEW_DIGITS:
         with np.errstate(all="ignore"):  # the unit of the smallest numbers may be 0: none fit
             unit = 10.0 ** (np.floor(np.log10(np.abs(values))) + 1 - digits)
