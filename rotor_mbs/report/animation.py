@@ -1,4 +1,4 @@
-"""A scene as an animated WebP or GIF: the printed model beside the corrected one."""
+"""Write a scene as an animated WebP or GIF: the printed model beside the corrected one."""
 
 from __future__ import annotations
 
@@ -81,8 +81,22 @@ def write_animation(results: Path, name: str, output: Path, magnified: float | N
 
 
 def frames(stored: StoredScene, magnified: float | None) -> Iterator[Image.Image]:
-    """Draw the runs side by side: paths up to the frame, then the blades. Raises InputError where
-    nothing can be drawn."""
+    """Return an iterator over the pictures of a scene's animation, runs side by side.
+
+    A picture has the paths of the tips up to its time, and the blades. A run that ended before
+    stands still in its last state.
+
+    Parameters
+    ----------
+    stored : the scene; the runs of its printed and corrected model that have angles are drawn.
+    magnified : how many times the tips' distances from the pitch axes are drawn; None: as many as
+        on the scene's page. It has no effect where the tips lie on the axes.
+
+    Raises
+    ------
+    InputError
+        Where no run has angles.
+    """
     scene = stored.scene
     runs = {label_of(run.method): run for run in stored.sides.values() if "angles" in run}
     if not runs:

@@ -1,5 +1,4 @@
-"""The report of a file, whatever it has: all pages are made, those of scenes in a process pool,
-then written."""
+"""Build the report of a file of any kind: make all pages in a process pool, then write them."""
 
 from __future__ import annotations
 
@@ -36,8 +35,10 @@ OnPage = Callable[[int, int], None]  # with how many are drawn, of how many
 
 
 class Page(NamedTuple):
-    """A page before it is made: its file, label in the navigation ("": it is not there), and
-    content."""
+    """A page before it is made: its file, its label in the navigation, and its content.
+
+    A page with the label "" is not in the navigation.
+    """
 
     file: str
     label: str
@@ -47,13 +48,13 @@ class Page(NamedTuple):
 def write_report(
     results: Path, output: Path, jobs: Workers = 1, on_page: OnPage = lambda *_: None
 ) -> Path:
-    """Write the pages about any file that this program writes into a folder, all or none; returns
-    the index.
+    """Write the pages about a file into a folder, all or none, and return the path of the index.
 
     Parameters
     ----------
-    results, output : the file; the folder, which is made where it does not exist.
-    jobs : so many processes, or a pool that is open.
+    results : any file that this program writes.
+    output : the folder, which is made where it does not exist.
+    jobs : number of processes, or an open pool.
     on_page : called with the number of pages that are made, and of all.
 
     Raises
@@ -89,7 +90,18 @@ def write_report(
 
 
 def make_pages(results: Path, numbers: Sequence[int]) -> dict[str, str]:
-    """Return the pages of these numbers by file name: the work of a process. Raises StoreError."""
+    """Return the HTML of the pages of these numbers by file name: one task of a process.
+
+    Parameters
+    ----------
+    results : the file.
+    numbers : indices in `pages_of`.
+
+    Raises
+    ------
+    StoreError
+        Where the file cannot be read.
+    """
     with open_results(results) as opened, _without_warnings():
         pages = pages_of(Report(**vars(opened)))
         versions = made_with(opened.attributes)
@@ -114,8 +126,19 @@ def _without_warnings() -> Iterator[None]:
 
 
 def pages_of(report: Report) -> list[Page]:
-    """Return the pages for what the file has. The first one is the index; of a file of one scene it
-    is that scene."""
+    """Return the pages for what the file has.
+
+    The first one is the index; of a file of one scene it is that scene. Pages of scenes come last.
+
+    Parameters
+    ----------
+    report : the open results file.
+
+    Raises
+    ------
+    StoreError
+        Where the file has neither scenes nor other results.
+    """
     modes, bench, compared = (
         read_records(report.path, kind) for kind in ("modes", "bench", "comparison")
     )

@@ -1,5 +1,4 @@
-"""The numbers of a page's plots: columns as single precision, each once, in base64, with where each
-of them lies."""
+"""Store the numbers of a page's plots: columns in single precision, each once, in base64."""
 
 from __future__ import annotations
 
@@ -43,6 +42,11 @@ class CurveStore:
         ----------
         values : (n,) the column; or (runs, n), of which the page shows one row at a time. NaN is a
             gap.
+
+        Returns
+        -------
+        dict
+            Where the numbers lie and what is added to them, see the class.
         """
         table = np.asarray(values, dtype=np.float64)[..., :: self.step(values)]
         count = int(table.shape[-1])

@@ -1,5 +1,7 @@
-"""One module per page: a report's data to the content of the page. Here what several pages have:
-the report itself, cells, tables and sentences about stored runs."""
+"""Turn stored data into the content of pages, one module per page.
+
+Here is what several pages have: the report itself, cells, tables and sentences about stored runs.
+"""
 
 from __future__ import annotations
 
@@ -31,18 +33,23 @@ from rotor_mbs.studies.stability import OUTCOMES, SUITE, SuiteRun, suite_runs
 
 
 class Report(OpenResults):
-    """An open results file, and what its pages show of it. What no page asks for is not read."""
+    """An open results file with what its pages show of it. What no page asks for is not read."""
 
     @cached_property
     def is_suite(self) -> bool:
-        """Whether the file is of the stability suite: it has ladders of steps, or all its scenes
-        are of the suite."""
+        """Return whether the file is of the stability suite.
+
+        It is if it has ladders of steps, or if all its scenes are of the suite.
+        """
         folders = {name.partition("/")[0] for name, scene in self.scenes.items() if scene.methods}
         return bool(read_records(self.path, "stability")) or (bool(folders) and folders <= {*SUITE})
 
     @cached_property
     def files(self) -> Mapping[str, str]:
-        """The file of each scene's page, in order; of a file with one scene it is the index."""
+        """Return the file of each scene's page, in order.
+
+        Of a file with one scene, that is not of the suite, it is the index.
+        """
         names = [name for name, scene in self.scenes.items() if scene.methods or not self.is_suite]
         if len(names) == 1 and not self.is_suite:
             return {names[0]: INDEX}
@@ -50,24 +57,27 @@ class Report(OpenResults):
 
     @cached_property
     def claims(self) -> Sequence[Published]:
-        """The paper's published numbers and claims about these scenes."""
+        """Return the paper's published numbers and claims about these scenes."""
         return claims(self.scenes)
 
     @cached_property
     def conditions(self) -> Mapping[str, str]:
-        """Conditions of the paper's runs that it does not print and that were found out, by
-        scene."""
+        """Return conditions that were found out, since the paper does not print them.
+
+        The keys are subjects or names of scenes.
+
+        None are returned where the file has no scene with claims.
+        """
         return published.conditions() if self.claims else {}
 
     @cached_property
     def study(self) -> ClaimStudy | None:
-        """Verdicts on the claims from many runs with moved starts; None without claims."""
+        """Return verdicts on the claims from many runs with moved starts; None without claims."""
         return published.claim_study() if self.claims else None
 
     @cached_property
     def errata(self) -> Sequence[Erratum]:
-        """The errors in the printed equations; empty where no run is of equations that have
-        them."""
+        """Return the errors in the printed equations; none where no run has such equations."""
         printed = {PRINTED, *errata_methods().values()}
         return (
             published.errata()
@@ -77,7 +87,7 @@ class Report(OpenResults):
 
     @cached_property
     def curves(self) -> Mapping[str, Sequence[Record]]:
-        """The curves of error over run time that `rotor-mbs bench` stored, by scene."""
+        """Return the curves of error over run time that `rotor-mbs bench` stored, by scene."""
         return by_scene(read_records(self.path, "bench"))
 
     @cached_property
@@ -112,8 +122,10 @@ _METHODS_IN_A_TABLE = 8  # side by side on a page of 1440 px
 
 
 def status_text(run: StoredRun) -> str:
-    """Return "solver failed" for "solver_failed"; for equations that are not claimed to be correct
-    never "ok"."""
+    """Return a run's status in words: "solver failed" for "solver_failed".
+
+    Equations that are not claimed to be correct are never "ok" but "completed".
+    """
     return words_of(
         "completed" if run.status == "ok" and not is_corrected(run.method) else run.status
     )
@@ -124,8 +136,14 @@ def words_of(status: str) -> str:
 
 
 def status_cell(run: StoredRun, suite_run: SuiteRun | None = None) -> TableCell:
-    """Return the status, and the reason where it is not ok; of a run of the suite also what its
-    ladder found."""
+    """Return the status of a run, and the reason where it is not ok.
+
+    Parameters
+    ----------
+    run : the stored run.
+    suite_run : the same run in the stability suite, if it is of it; what its ladder found is shown
+        where it differs from the status.
+    """
     text, message = status_text(run), str(run.attributes.get("message", ""))
     tone = "good" if text == "ok" else "" if run.status in GOOD else "bad"
     if suite_run is not None and suite_run.outcome != run.status:
@@ -175,8 +193,10 @@ def horizon_of(scene: StoredScene) -> float | None:
 
 
 def compared_time(scenes: Iterable[StoredScene]) -> tuple[float, float]:
-    """Return how much of the scenes' time (s) lies before their horizons, and how much they have in
-    all."""
+    """Return the scenes' time before their horizons, and their whole time, both in s.
+
+    Scenes without a reference have no share in either.
+    """
     compared = whole = 0.0
     for scene in scenes:
         if scene.reference is not None and scene.reference.samples:
@@ -198,8 +218,7 @@ def models_of(methods: Collection[str]) -> int:
 
 
 def computations(methods: Collection[str]) -> str:
-    """Return what these methods are, as the subject of a sentence: "three independent
-    computations".
+    """Return a subject that counts methods and models: "three independent computations".
 
     >>> computations(["lagrange/taylor", "exudyn_tree/rk67"])
     'two independent computations'
@@ -217,11 +236,10 @@ def computations(methods: Collection[str]) -> str:
 
 
 def agreement(scene: StoredScene) -> tuple[list[str], float | None]:
-    """Return the corrected methods of a scene that are ok, and the largest of their angle errors up
-    to the horizon.
+    """Return the corrected methods of a scene that are ok, and the largest of their angle errors.
 
-    Methods that were not compared with a reference are left out; where none was, the error (rad) is
-    None.
+    Methods that were not compared with a reference are left out. The error (rad) is taken up to the
+    horizon; it is None where no method was compared.
     """
     errors: dict[str, float] = {}
     for name, run in scene.corrected_runs.items():
@@ -273,8 +291,12 @@ def agree_within(methods: Sequence[str], error: float, digits: int = 1) -> Marku
 
 
 def reproduced(numbers: Iterable[Published]) -> tuple[int, int]:
-    """Return how many published numbers come out of the printed equations, and how many out of the
-    corrected ones."""
+    """Return how many published numbers the printed, and how many the corrected equations give.
+
+    Parameters
+    ----------
+    numbers : claims that are numbers; one is reproduced if it rounds to the printed digits.
+    """
     printed = corrected = 0
     for claim in numbers:
         printed += claim.printed is not None and rounds_to(claim.printed, claim)
@@ -283,7 +305,12 @@ def reproduced(numbers: Iterable[Published]) -> tuple[int, int]:
 
 
 def numbers_sentence(claims: Iterable[Published]) -> Markup:
-    """Return which model gives the numbers that the paper publishes; "" without such numbers."""
+    """Return a sentence: which model gives the numbers that the paper publishes; "" without any.
+
+    Parameters
+    ----------
+    claims : of the paper; those in words are ignored.
+    """
     numbers = [claim for claim in claims if claim.is_number]
     if not numbers:
         return Markup()
@@ -305,8 +332,7 @@ def numbers_sentence(claims: Iterable[Published]) -> Markup:
 
 
 def agreement_text(scene: StoredScene) -> Markup:
-    """Return a sentence about how near the scene's corrected methods are to each other; "" where
-    nothing is known."""
+    """Return a sentence on how well a scene's corrected methods agree; "" where it is not known."""
     methods, error = agreement(scene)
     if error is None:
         return Markup()
@@ -316,7 +342,13 @@ def agreement_text(scene: StoredScene) -> Markup:
 
 
 def agreement_table(scene: StoredScene, suite_runs: Sequence[SuiteRun] = ()) -> PageTable:
-    """Return the table of agreement: a row per run of a scene, six columns."""
+    """Return the table of agreement: a row per run of a scene, six columns.
+
+    Parameters
+    ----------
+    scene : whose runs are the rows.
+    suite_runs : the same runs in the stability suite, whose outcomes are shown.
+    """
     of_suite = {run.method: run for run in suite_runs}
     rows: list[Row] = []
     for run in scene.runs.values():
@@ -343,8 +375,14 @@ def agreement_table(scene: StoredScene, suite_runs: Sequence[SuiteRun] = ()) -> 
 
 
 def metrics_tables(scene: StoredScene) -> list[PageTable]:
-    """Return every number of every run: a row per quantity, a column per run, in tables that fit a
-    page."""
+    """Return tables of every number of every run: a row per quantity, a column per run.
+
+    There are as many tables as a page's width requires.
+
+    Parameters
+    ----------
+    scene : whose runs are shown; quantities that no run has are left out.
+    """
     columns = metric_columns(scene.scene.outputs)
     judged = [
         name for name in columns if name.endswith(("_error_max", "_error")) and name not in METRICS

@@ -62,8 +62,15 @@ _METHODS_IN_A_TABLE = 7  # beside the scene
 
 
 def bench_page(results: OpenResults) -> PageContent:
-    """Return the content of the page: the diagram of one scene, what each method reaches on all,
-    every setting."""
+    """Return the content of the page of error against run time.
+
+    It has the diagram of the first scene, what each method reaches on all scenes, and every
+    setting.
+
+    Parameters
+    ----------
+    results : the open results file; it has curves of the bench.
+    """
     grouped = work_precision.by_scene(read_records(results.path, "bench"))
     scenes = {name: grouped[name] for name in natural_order(grouped)}
     sections = []
@@ -102,8 +109,12 @@ _LOWER_LEFT = (
 
 
 def bench_answer(scenes: Mapping[str, Sequence[Record]]) -> list[Markup]:
-    """Return which method is the fastest to each error, and how much slower the fastest of another
-    model is."""
+    """Return which method is the fastest to an error, and how much slower another model is.
+
+    Parameters
+    ----------
+    scenes : the curves of the bench, by scene.
+    """
     sentences = []
     for target in (1e-6, 1e-9):
         wins: Counter[str] = Counter()
@@ -144,8 +155,12 @@ def _model(method: str) -> str:
 
 
 def _facts(scenes: Mapping[str, Sequence[Record]]) -> list[Fact]:
-    """Return the facts at the top of the page: how many scenes, methods and settings, and how many
-    failed."""
+    """Return the facts at the top of the page: how many scenes, methods, and settings there are.
+
+    Parameters
+    ----------
+    scenes : the curves of the bench, by scene.
+    """
     curves = [curve for of_scene in scenes.values() for curve in of_scene]
     measured = sum(status != "left_out" for curve in curves for status in curve.statuses)
     count = sum(len(curve.statuses) for curve in curves)
@@ -176,7 +191,13 @@ def _winner(curves: Sequence[Record]) -> str:
 
 
 def _conditions(name: str, curves: Sequence[Record]) -> str:
-    """Return how a scene's points were measured."""
+    """Return a text about how a scene's points were measured.
+
+    Parameters
+    ----------
+    name : of the scene.
+    curves : of the scene, whose attributes tell the conditions.
+    """
     facts = curves[0].attributes
     if facts["horizon_s"] < facts["duration_s"]:
         text = (
@@ -207,8 +228,10 @@ def _conditions(name: str, curves: Sequence[Record]) -> str:
 
 
 def curve_looks(curves: Sequence[Record]) -> dict[str, Look]:
-    """Return a look for each curve; methods of files, which would all be grey, have a colour for
-    each file."""
+    """Return a look for each curve by its name.
+
+    Methods of files, which would all be grey, have a colour for each file.
+    """
     looks = {curve.name: look_of(curve.name) for curve in curves}
     unknown = dict.fromkeys(_model(name) for name, look in looks.items() if look.colour == GREY)
     colours = dict(zip(unknown, cycle(COORDINATES), strict=False))
@@ -219,10 +242,14 @@ def curve_looks(curves: Sequence[Record]) -> dict[str, Look]:
 
 
 def diagrams(curves: Sequence[Record], group: str = "") -> list[Legend | Grid]:
-    """Return the legend and the two work-precision diagrams of a scene, over angle error and over
-    interval defect.
+    """Return the legend and the work-precision diagrams of a scene.
 
-    group: before the keys of the curves, where a page has several.
+    One diagram is over angle error, one over interval defect; without points there are none.
+
+    Parameters
+    ----------
+    curves : of the scene.
+    group : before the keys of the curves, where a page has several groups of diagrams.
     """
     looks = curve_looks(curves)
     plots = []
@@ -240,8 +267,18 @@ def diagrams(curves: Sequence[Record], group: str = "") -> list[Legend | Grid]:
 def diagram(
     curves: Sequence[Record], error: str, name: str, looks: Mapping[str, Look], group: str = ""
 ) -> Plot | None:
-    """Return all curves of a scene, an error over run time, upon the Pareto front; None where no
-    point stands on it."""
+    """Return the work-precision diagram of a scene; None where it has no point.
+
+    The Pareto front of all curves is drawn below them.
+
+    Parameters
+    ----------
+    curves : of the scene.
+    error : column of the error, rad.
+    name : of the error, the title of the plot.
+    looks : of the curves, by name.
+    group : before the keys of the curves.
+    """
     points = {
         curve.name: work_precision.points(curve, error) for curve in curves if error in curve.arrays
     }
@@ -279,7 +316,12 @@ def diagram(
 
 
 def _reach_table(curves: Sequence[Record]) -> PageTable:
-    """Return a row per curve that was measured, and one that names those that were not."""
+    """Return the table of run times to reach an error, a row per curve that was measured.
+
+    Parameters
+    ----------
+    curves : of one scene; those that were not measured share the last row.
+    """
     table = bench_table(curves)
     rows: list[Row] = []
     missing = []
@@ -296,7 +338,12 @@ def _reach_table(curves: Sequence[Record]) -> PageTable:
 
 
 def _reach_section(scenes: Mapping[str, Sequence[Record]]) -> Section:
-    """Return which method reaches 1e-6 rad on which scene, and how much slower than the fastest."""
+    """Return which method reaches 1e-6 rad on which scene, and how much slower than the fastest.
+
+    Parameters
+    ----------
+    scenes : the curves of the bench, by scene.
+    """
     target = 1e-6
     methods = list(dict.fromkeys(curve.method for curves in scenes.values() for curve in curves))
     tables = []
@@ -335,7 +382,13 @@ def _reach_section(scenes: Mapping[str, Sequence[Record]]) -> Section:
 
 
 def _methods_section(results: OpenResults, scenes: Mapping[str, Sequence[Record]]) -> Section:
-    """Return a fold per method with its verdict in the heading."""
+    """Return the section with a fold per method, whose heading has its results in short.
+
+    Parameters
+    ----------
+    results : the open results file.
+    scenes : the curves of the bench, by scene.
+    """
     reached, able = engine_tables(results, scenes)
     folds: list[Grid | Fold | Element] = []
     for row, capability in zip(reached.rows, able.rows, strict=True):
@@ -379,8 +432,15 @@ _EXPLAINED = (
 
 
 def engine_tables(results: OpenResults, scenes: Mapping[str, Sequence[Record]]) -> list[PageTable]:
-    """Return a row per method: what it reaches over all scenes and what that costs; what it can
-    compute. What the file does not know is a dash."""
+    """Return two tables with a row per method: accuracy and cost over all scenes, and capabilities.
+
+    What the file does not know is a dash.
+
+    Parameters
+    ----------
+    results : the open results file; its scenes tell damping and loads, its runs the energy drift.
+    scenes : the curves of the bench, by scene.
+    """
     curves = [curve for of_scene in scenes.values() for curve in of_scene]
     parsed = {name: stored.scene for name, stored in results.scenes.items()}
     suite = [
@@ -474,8 +534,16 @@ def engine_tables(results: OpenResults, scenes: Mapping[str, Sequence[Record]]) 
 
 
 def _worst_cell(own: Mapping[str, Sequence[Record]], column: str) -> TableCell | str:
-    """Return the best value of a method on the scene where it does worst, and on how many scenes it
-    has none."""
+    """Return the best value of a method on the scene where it does worst.
+
+    The note names that scene, and on how many scenes the method has no value though it was
+    measured.
+
+    Parameters
+    ----------
+    own : the curves of the method, by scene.
+    column : the error.
+    """
     values = {name: work_precision.values_of(curves, column) for name, curves in own.items()}
     known = {name: min(of_scene) for name, of_scene in values.items() if of_scene}
     if not known:
@@ -497,8 +565,7 @@ def _worst_cell(own: Mapping[str, Sequence[Record]], column: str) -> TableCell |
 def _reach_cell(
     scenes: Mapping[str, Sequence[Record]], own: Mapping[str, Sequence[Record]], target: float
 ) -> TableCell:
-    """Return on how many scenes a method reaches an error, and how much slower than the fastest one
-    it is there.
+    """Return on how many scenes a method reaches an error, and how much slower than the fastest.
 
     Parameters
     ----------
@@ -528,8 +595,10 @@ def _reach_cell(
 
 
 def _order_cell(curves: Sequence[Record]) -> str:
-    """Return the order that was fitted to a method with a fixed step, and the order that it
-    claims."""
+    """Return the order fitted to a method with a fixed step, and its nominal order.
+
+    A method without a nominal order is adaptive. curves : of the method, on all scenes.
+    """
     claimed = [
         curve.attributes["order_expected"]
         for curve in curves
@@ -572,7 +641,10 @@ def _false_success_cell(
 ) -> TableCell | str:
     """Return how often an engine reported success for a wrong result.
 
-    Of the runs of the stability suite, where the file has them; else of the settings on this page.
+    Parameters
+    ----------
+    own : the curves of the method, by scene.
+    suite : its runs of the stability suite; without any the settings in `own` are counted.
     """
     if suite:
         # What the time limit ended is neither right nor wrong.
@@ -598,10 +670,14 @@ def _false_success_cell(
 
 
 def point_table(curves: Sequence[Record], *, only_faults: bool = False) -> PageTable:
-    """Return a row per point that was run, with the reason where it is not ok; one for all that the
-    budget left out.
+    """Return the table of settings, a row per setting that was run.
 
-    only_faults: whether points that are ok or left out have none.
+    The settings of a curve that the time budget left out share a row.
+
+    Parameters
+    ----------
+    curves : of one scene.
+    only_faults : whether settings that are ok or left out are omitted.
     """
     columns = {
         name: COLUMNS[name]

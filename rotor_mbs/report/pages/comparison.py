@@ -60,8 +60,15 @@ _CHANNELS_SHOWN = 8  # plots; those of further channels are folded
 
 
 def comparison_page(record: Record) -> PageContent:
-    """Return the content of the page: the verdict and the onset of a fault, plots, channels, how
-    the data were read."""
+    """Return the content of the page of a comparison.
+
+    It has the verdict, the onset of a fault, plots, a table of channels, and how the data were
+    read.
+
+    Parameters
+    ----------
+    record : the stored comparison.
+    """
     verdict = verdict_of(record)
     is_time = verdict.axis == "time"
     onset = onset_of(record, verdict)
@@ -99,10 +106,12 @@ def comparison_page(record: Record) -> PageContent:
 
 
 def comparison_answer(verdict: DataVerdict, onset: tuple[float, str] | None) -> list[Markup]:
-    """Return whether the data agree, from when on they do not, which channels do, and the probable
-    causes.
+    """Return sentences: whether the data agree, from when on they do not, and probable causes.
 
-    onset: see `onset_of`.
+    Parameters
+    ----------
+    verdict : of the comparison.
+    onset : see `onset_of`.
     """
     if verdict.agrees:
         defects = [channel.defect for channel in verdict.channels if channel.defect is not None]
@@ -141,6 +150,11 @@ def _is_outside(channel: ChannelErrors, verdict: DataVerdict) -> bool:
     Its defect must be beyond the tolerance. A wrong value in one coordinate gives defects in the
     others, too, which follow the reference: as long as some channel departs from the reference,
     those that do not are not outside. A channel that cannot be judged is not outside.
+
+    Parameters
+    ----------
+    channel : the channel to be judged, one of `verdict.channels`.
+    verdict : of the comparison, with the tolerance and the errors of the other channels.
     """
 
     def is_beyond(size: float | None) -> bool:
@@ -153,11 +167,15 @@ def _is_outside(channel: ChannelErrors, verdict: DataVerdict) -> bool:
 
 
 def onset_of(record: Record, verdict: DataVerdict) -> tuple[float, str] | None:
-    """Return the first time, or speed, at which a channel is outside the tolerance, and its name;
-    None where none is.
+    """Return the first time, or speed, at which a channel is outside the tolerance, and its name.
 
     Of an angle or a rate it is the beginning of the first interval with a defect beyond tolerance
-    and rounding; of a load the first row with such an error.
+    and rounding; of a load the first row with such an error. None where no channel is outside.
+
+    Parameters
+    ----------
+    record : the stored comparison, with the defects and errors of each row.
+    verdict : of it.
     """
     rows = record.arrays[verdict.axis]
     found: list[tuple[float, str]] = []
@@ -200,8 +218,7 @@ def _axis_of(record: Record, verdict: DataVerdict) -> Horizontal:
 
 
 def _marks(record: Record, verdict: DataVerdict, onset: tuple[float, str] | None) -> list[Mark]:
-    """Return marks of the onset of a fault, where there is one, and of the horizon, where it lies
-    within the data."""
+    """Return marks of the onset of a fault, if any, and of a horizon within the data."""
     marks = [] if onset is None else [Mark("first outside", onset[0])]
     horizon, axis = verdict.horizon_s, _axis_of(record, verdict)
     if horizon is not None and axis.first < horizon < axis.last:
@@ -210,7 +227,16 @@ def _marks(record: Record, verdict: DataVerdict, onset: tuple[float, str] | None
 
 
 def _channel_section(record: Record, verdict: DataVerdict, marks: Sequence[Mark]) -> Section:
-    """Return every channel's data upon the reference, those outside the tolerance first."""
+    """Return the plots of every channel's data upon the reference.
+
+    Channels outside the tolerance come first.
+
+    Parameters
+    ----------
+    record : the stored comparison, with the rows of the data.
+    verdict : of it.
+    marks : of onset and horizon; the first plot has their texts.
+    """
     rows, axis = record.arrays[verdict.axis], _axis_of(record, verdict)
     plots: list[Plot] = []
     channels = sorted(verdict.channels, key=lambda channel: not _is_outside(channel, verdict))
@@ -255,7 +281,14 @@ def _channel_section(record: Record, verdict: DataVerdict, marks: Sequence[Mark]
 
 
 def _error_section(record: Record, verdict: DataVerdict, marks: Sequence[Mark]) -> Section:
-    """Return the errors of the channels, and their interval defects with the tolerance."""
+    """Return the plots of the channels' errors and interval defects, with the tolerance.
+
+    Parameters
+    ----------
+    record : the stored comparison, with the errors and defects of each row.
+    verdict : of it.
+    marks : of onset and horizon.
+    """
     rows, axis = record.arrays[verdict.axis], _axis_of(record, verdict)
     channels = _drawn(verdict)
     errors, defects = [], []
@@ -297,7 +330,12 @@ def _error_section(record: Record, verdict: DataVerdict, marks: Sequence[Mark]) 
 
 
 def _table_section(verdict: DataVerdict) -> Section:
-    """Return the section with a row per channel."""
+    """Return the section with the table of channels, a row each.
+
+    Parameters
+    ----------
+    verdict : of the comparison.
+    """
     table = channel_table(verdict)
     rows: list[Row] = []
     for channel, (name, error, defect, *others) in zip(verdict.channels, table.rows, strict=True):
@@ -317,7 +355,12 @@ def _table_section(verdict: DataVerdict) -> Section:
 
 
 def _reading_section(verdict: DataVerdict) -> Section:
-    """Return how the data were read, and what else is to know."""
+    """Return the section on how the data were read: columns used and not used, and notes.
+
+    Parameters
+    ----------
+    verdict : of the comparison; its third and further probable causes are notes here.
+    """
     read = Listing([(place, line) for place, line in enumerate_lines(verdict.read)])
     folds: list[Fold | Grid | Element] = [
         Fold("Columns", f"{len(verdict.read)} that were read", [read])
@@ -337,7 +380,7 @@ def _reading_section(verdict: DataVerdict) -> Section:
 
 
 def enumerate_lines(lines: Sequence[str]) -> list[tuple[str, str]]:
-    """Return "what = column" lines as pairs."""
+    """Return lines "what = column" as pairs; a line without an equals sign has "" before it."""
     pairs = []
     for line in lines:
         what, _, column = line.partition(" = ")
@@ -346,8 +389,17 @@ def enumerate_lines(lines: Sequence[str]) -> list[tuple[str, str]]:
 
 
 def error_panels(record: Record) -> Panels:
-    """Plot the error of each channel over time, on a logarithmic axis. Raises InputError without
-    channels."""
+    """Plot the error of each channel over time or rotor speed, on a logarithmic axis.
+
+    Parameters
+    ----------
+    record : the stored comparison.
+
+    Raises
+    ------
+    InputError
+        Where no channel was compared.
+    """
     verdict = verdict_of(record)
     channels = _drawn(verdict)
     if not channels:
@@ -367,7 +419,12 @@ def error_panels(record: Record) -> Panels:
 
 
 def defect_panels(record: Record) -> Panels | None:
-    """Plot the defects of each channel over time, with the tolerance; None without any."""
+    """Plot the defects of each channel over time, with the tolerance; return None without any.
+
+    Parameters
+    ----------
+    record : the stored comparison.
+    """
     verdict = verdict_of(record)
     time = record.arrays[verdict.axis][1:]
     series = []
@@ -389,8 +446,7 @@ def _array(record: Record, channel: ChannelErrors, ending: str = "") -> Any:
 
 
 def _drawn(verdict: DataVerdict) -> Sequence[ChannelErrors]:
-    """Return the channels that are drawn: the angles, else those with the first one's unit; of
-    none, none."""
+    """Return the channels that are drawn together: the angles, else those of the first unit."""
     units = [channel.unit for channel in verdict.channels]
     if not units:
         return []

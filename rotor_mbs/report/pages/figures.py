@@ -1,5 +1,4 @@
-"""The page that goes through the paper's figures, each in the paper's own layout beside the
-corrected model."""
+"""Build the page of the paper's figures, in the paper's own layout beside the corrected model."""
 
 from __future__ import annotations
 
@@ -57,7 +56,12 @@ SIDES = (PRINTED_SIDE, CORRECTED)
 
 
 def figures_page(report: Report) -> PageContent:
-    """Return the content of the page."""
+    """Return the content of the page of the paper's figures.
+
+    Parameters
+    ----------
+    report : the open results file, with scenes of the paper.
+    """
     sections = []
     for figure in available(report.scenes):
         pictures = panel_runs(figure, report.scenes)
@@ -99,8 +103,14 @@ def _figure_section(
     pictures: Mapping[str, Mapping[str, Mapping[str, StoredRun]]],
     report: Report,
 ) -> Section:
-    """Return one figure: a column per model, the numbers that the paper prints, and what its panels
-    are."""
+    """Return the section of one figure: a column per model, published numbers, and initial states.
+
+    Parameters
+    ----------
+    figure : one of the paper's.
+    pictures : its runs by row, then by model, then by label; see `panel_runs`.
+    report : the open results file, with the claims and the files of the scenes.
+    """
     elements: list[Grid | Fold | Element] = []
     numbers = paper.number_table(
         [claim for claim in report.claims if claim.figure == figure.number], with_figure=False
@@ -144,7 +154,13 @@ def _figure_section(
 def _motion_plots(
     figure: PaperFigure, row: Mapping[str, Mapping[str, StoredRun]]
 ) -> tuple[Legend, Grid]:
-    """Return position above velocity, a column per model, over one time."""
+    """Return the legend and the plots of positions and velocities, a column per model.
+
+    Parameters
+    ----------
+    figure : of motion, or of torques, which shows the rotor alone.
+    row : the runs by model, then by label; at least one has samples.
+    """
     runs = [run for side in SIDES for run in row.get(side, {}).values()]
     axis = whole_time(runs)
     assert axis is not None
@@ -188,7 +204,10 @@ def _motion_plots(
 def _usual_range(
     curves: Sequence[Curve], row: Mapping[str, Mapping[str, StoredRun]], name: str
 ) -> tuple[float, float] | None:
-    """Return the range of the corrected model where one of these curves runs away from it."""
+    """Return the range of the corrected model where one of these curves runs away from it.
+
+    None where none does, or where there is no corrected model.
+    """
     right = [run.array(name).ravel() for run in row.get(CORRECTED, {}).values()]
     if not right:
         return None
@@ -196,7 +215,7 @@ def _usual_range(
 
 
 def _path_plots(number: str, pictures: Mapping[str, Mapping[str, Mapping[str, StoredRun]]]) -> Grid:
-    """Return the paths of the tips by each model, still pictures."""
+    """Return still pictures of the paths of the tips, one for each model and panel."""
     from rotor_mbs.report import canvas, plots  # late: matplotlib
 
     cards: list[list[Element]] = []

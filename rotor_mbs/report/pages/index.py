@@ -1,6 +1,8 @@
-"""The index of a file with several scenes: what was found, then every scene in a row. Of the
-paper's scenes the finding about the paper; of a user's own scenes how they ended, those that failed
-first."""
+"""Build the index of a file with several scenes: what was found, then every scene in a row.
+
+For scenes of the paper it has the finding about the paper; for a user's own scenes it has how they
+ended, those that failed first.
+"""
 
 from __future__ import annotations
 
@@ -59,7 +61,7 @@ _NAMED = 5  # scenes in a sentence
 
 
 def index_page(report: Report) -> PageContent:
-    """Return the content of the index."""
+    """Return the content of the index: of the paper where there are claims, else of own scenes."""
     return _paper_index(report) if report.claims else _own_index(report)
 
 
@@ -67,8 +69,10 @@ def index_page(report: Report) -> PageContent:
 
 
 def created_energy(scene: StoredScene) -> float | None:
-    """Return the energy (J) that the printed equations create in a scene; None where it is below a
-    thousandth of the energy scale, or not known."""
+    """Return the energy (J) that the printed equations create in a scene.
+
+    None where it is below a thousandth of the energy scale, or not known.
+    """
     run = scene.printed
     if run is None:
         return None
@@ -77,7 +81,12 @@ def created_energy(scene: StoredScene) -> float | None:
 
 
 def paper_answer(report: Report) -> list[Markup]:
-    """Return what was found of the paper, from the file's runs."""
+    """Return what was found of the paper, from the file's runs, as sentences.
+
+    Parameters
+    ----------
+    report : the open results file, with scenes of the paper.
+    """
     scenes = report.scenes.values()
     with_printed = [scene for scene in scenes if scene.printed is not None]
     rising = [scene for scene in with_printed if created_energy(scene) is not None]
@@ -100,7 +109,12 @@ def paper_answer(report: Report) -> list[Markup]:
 
 
 def _paper_index(report: Report) -> PageContent:
-    """Return the index of a file with scenes of the paper."""
+    """Return the index of a file with scenes of the paper.
+
+    Parameters
+    ----------
+    report : the open results file.
+    """
     scenes = report.scenes
     facts = _paper_facts(report)
     sections = []
@@ -124,7 +138,12 @@ def _paper_index(report: Report) -> PageContent:
 
 
 def _paper_facts(report: Report) -> list[Fact]:
-    """Return the facts at the top of the paper's index."""
+    """Return the facts at the top of the paper's index: errors, energy, disagreement, numbers.
+
+    Parameters
+    ----------
+    report : the open results file.
+    """
     facts: list[Fact] = []
     if report.errata:
         names = ", ".join(erratum.id for erratum in report.errata)
@@ -178,8 +197,11 @@ def _paper_facts(report: Report) -> list[Fact]:
 
 
 def _hero_scene(report: Report) -> StoredScene | None:
-    """Return the scene with a published number that is no rounding error; else one with both
-    models."""
+    """Return the scene whose plot shows the finding; None where no scene has both models.
+
+    It is the one with a published number that is not amplified rounding error, else the first with
+    angles of both models.
+    """
     both = [
         scene
         for scene in report.scenes.values()
@@ -192,7 +214,13 @@ def _hero_scene(report: Report) -> StoredScene | None:
 
 
 def _hero_section(scene: StoredScene, report: Report) -> Section:
-    """Return the section with the plot that shows the finding."""
+    """Return the section with the plot that shows the finding.
+
+    Parameters
+    ----------
+    scene : has angles of both models.
+    report : the open results file, with the claims about the scene and the file of its page.
+    """
     claims = [claim for claim in report.claims if scene.name in claim.scenes]
     hero, _, _ = paper_plots(scene, claims)
     printed, corrected = scene.sides[PRINTED], scene.sides[CORRECTED]
@@ -217,8 +245,12 @@ def _hero_section(scene: StoredScene, report: Report) -> Section:
 
 
 def scene_table(report: Report) -> PageTable:
-    """Return a row per scene of the paper: the angle that differs most, when and by how much
-    energy; agreement."""
+    """Return the table of the paper's scenes: departure of the printed model, and agreement.
+
+    Parameters
+    ----------
+    report : the open results file.
+    """
     rows: list[Row] = []
     most = max((len(agreement(scene)[0]) for scene in report.scenes.values()), default=0)
     for name, scene in report.scenes.items():
@@ -249,8 +281,12 @@ def scene_table(report: Report) -> PageTable:
 
 
 def _departure_cells(scene: StoredScene) -> list[TableCell | str]:
-    """Return the cells about the printed model: a drawing, when it departs, the energy that it
-    creates."""
+    """Return the cells about the printed model: a drawing, when it departs, the energy it creates.
+
+    Parameters
+    ----------
+    scene : one row of the table; without angles of both models the cells are empty.
+    """
     sides = scene.sides
     if len(sides) < 2 or not all("angles" in run for run in sides.values()):
         return ["", "", ""]
@@ -293,7 +329,12 @@ def _departure_cells(scene: StoredScene) -> list[TableCell | str]:
 
 
 def _errata_section(report: Report) -> Section:
-    """Return the errors with their places, and the effect of each alone."""
+    """Return the table of the errors with their places, and the effect of each alone.
+
+    Parameters
+    ----------
+    report : the open results file.
+    """
     rows: list[Row] = []
     methods = errata_methods()
     for erratum in report.errata:
@@ -332,7 +373,12 @@ def _printed_and_right(printed: str, right: str) -> Markup:
 
 
 def _published_section(report: Report) -> Section:
-    """Return the published numbers beside the counts of the claims."""
+    """Return the published numbers beside the counts of the claims.
+
+    Parameters
+    ----------
+    report : the open results file.
+    """
     numbers = paper.number_table(report.claims)
     cards: list[list[Element]] = [[numbers]] if numbers.rows else []
     study = report.study
@@ -350,7 +396,12 @@ def _published_section(report: Report) -> Section:
 
 
 def _methods_section(report: Report) -> Section:
-    """Return what each corrected method reaches over all scenes."""
+    """Return the table of corrected methods, with the largest errors over all scenes.
+
+    Parameters
+    ----------
+    report : the open results file.
+    """
     runs: dict[str, list[StoredRun]] = {}
     for scene in report.scenes.values():
         for method, run in scene.corrected_runs.items():
@@ -393,7 +444,12 @@ def _methods_section(report: Report) -> Section:
 
 
 def _own_index(report: Report) -> PageContent:
-    """Return the index of a file with scenes of one's own."""
+    """Return the index of a file with a user's own scenes.
+
+    Parameters
+    ----------
+    report : the open results file.
+    """
     scenes = list(report.scenes.values())
     failed = [scene for scene in scenes if _is_bad(scene)]
     good = [scene for scene in scenes if scene.corrected_runs and scene not in failed]
@@ -466,8 +522,7 @@ def _largest_moment(scenes: Sequence[StoredScene]) -> tuple[float, str] | None:
 
 
 def _status_cell(scene: StoredScene) -> TableCell:
-    """Return how the runs of a scene ended: those that are not good with their messages, else how
-    many are ok."""
+    """Return how the runs of a scene ended: the statuses of failed runs, else how many are ok."""
     bad = [run for run in scene.methods.values() if run.status not in GOOD]
     if bad:
         notes = "; ".join(f"{run.method}: {run.attributes.get('message', '')}" for run in bad)
@@ -482,8 +537,13 @@ def _status_cell(scene: StoredScene) -> TableCell:
 
 
 def own_table(report: Report, scenes: Sequence[StoredScene]) -> PageTable:
-    """Return a row per scene: its rotor speed, how its runs ended, its largest load, and how its
-    methods agree."""
+    """Return the table of a user's scenes: speed, status, largest load, and agreement.
+
+    Parameters
+    ----------
+    report : the open results file.
+    scenes : the rows, in order.
+    """
     rows: list[Row] = []
     for scene in scenes:
         row: list[TableCell | str] = [

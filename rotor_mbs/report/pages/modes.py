@@ -1,4 +1,4 @@
-"""The page of modes, and their figures."""
+"""Build the page of modes, and their figures."""
 
 from __future__ import annotations
 
@@ -55,8 +55,16 @@ class ModePlots:
         self._modes = modes
 
     def __call__(self) -> Panels:
-        """Plot the Campbell diagram: damped frequencies (rad/s) over rotor speed, with multiples of
-        the speed."""
+        """Plot the Campbell diagram: damped frequencies (rad/s) over rotor speed.
+
+        Dotted lines are multiples of the speed; the lower panel has the change from the lowest
+        speed.
+
+        Raises
+        ------
+        InputError
+            Where no modes over speed were computed.
+        """
         modes = self._rotation()
         panel = panels((2.9, 1.7), SPEED_AXIS)
         frequencies, speeds = modes.damped_frequencies, modes.speeds
@@ -90,8 +98,13 @@ class ModePlots:
         return panel.with_legend()
 
     def damping(self) -> Panels:
-        """Plot damping ratios and growth rates (1/s) over rotor speed. Raises InputError without
-        speeds."""
+        """Plot damping ratios and growth rates (1/s) over rotor speed.
+
+        Raises
+        ------
+        InputError
+            Where no modes over speed were computed.
+        """
         modes = self._rotation()
         panel = panels((2.0, 2.0), SPEED_AXIS)
         curves = {"damping ratio": modes.damping_ratios, "growth rate (1/s)": modes.growth_rates}
@@ -102,8 +115,13 @@ class ModePlots:
         return panel.with_legend()
 
     def multipliers(self) -> Panels:
-        """Plot moduli of the Floquet multipliers over rotor speed. Raises InputError if there are
-        none."""
+        """Plot moduli of the Floquet multipliers over rotor speed.
+
+        Raises
+        ------
+        InputError
+            Where there are no multipliers.
+        """
         table = self._modes.floquet
         if table is None:
             raise InputError(
@@ -143,8 +161,15 @@ def mode_look(index: int, name: str) -> Look:
 
 
 def modes_page(modes: Sequence[SceneModes]) -> PageContent:
-    """Return the content of the page: of each scene its modes at rest, over speed, and under
-    gravity."""
+    """Return the content of the page of modes.
+
+    It has the modes of each scene over speed, under gravity, and at rest. The facts are those of
+    the first scene that has any.
+
+    Parameters
+    ----------
+    modes : of each scene; at least one.
+    """
     sections: list[Section] = []
     answer: list[Markup] = []
     facts: list[Fact] = []
@@ -167,8 +192,12 @@ def _first(kind: Mapping[str, LinearModes]) -> LinearModes | None:
 
 
 def mode_answer(scene: SceneModes) -> list[Markup]:
-    """Return whether the modes satisfy their equations and the models agree, frequencies at rest,
-    and stability."""
+    """Return sentences: faults, agreement of the models, frequencies at rest, and stability.
+
+    Parameters
+    ----------
+    scene : the modes of one scene.
+    """
     sentences = []
     models = max(len(scene.rest), len(scene.rotation))
     for fault in scene.faults:
@@ -222,7 +251,12 @@ def mode_answer(scene: SceneModes) -> list[Markup]:
 
 
 def _facts(scene: SceneModes) -> list[Fact]:
-    """Return the facts at the top of the page of modes."""
+    """Return the facts at the top of the page: models, speeds, damping, and largest modulus.
+
+    Parameters
+    ----------
+    scene : the modes of one scene.
+    """
     facts = []
     models = max(len(scene.rest), len(scene.rotation))
     note = f"{models}; difference {number(scene.disagreement)} of the largest eigenvalue"
@@ -252,8 +286,14 @@ def _facts(scene: SceneModes) -> list[Fact]:
 
 
 def _scene_sections(scene: SceneModes, name: str, *, with_name: bool) -> list[Section]:
-    """Return the sections of one scene; `name` begins their ids, the scene's own name their
-    headings."""
+    """Return the sections of one scene.
+
+    Parameters
+    ----------
+    scene : its modes.
+    name : begins the ids of the sections and the keys of the curves.
+    with_name : whether headings and axes name the scene, where a page has several.
+    """
     before = f"{scene.label}: " if with_name else ""
     axis_name = f"rotor speed of {scene.label}" if with_name else "rotor speed"
     sections = []
@@ -312,8 +352,10 @@ def _scene_sections(scene: SceneModes, name: str, *, with_name: bool) -> list[Se
 def _campbell(
     rotation: LinearModes, name: str, axis_name: str
 ) -> tuple[Legend, list[list[Element]]]:
-    """Return the legend and the plots over speed: frequencies with multiples of the speed, their
-    change, damping.
+    """Return the legend and the plots of frequencies, their change, and damping over speed.
+
+    Multiples of the rotor speed are drawn among the frequencies. Damping and growth are left out
+    where they are rounding error.
 
     Parameters
     ----------
@@ -369,8 +411,14 @@ def _campbell(
 
 
 def _turning(scene: SceneModes, name: str, axis_name: str) -> Section | None:
-    """Return the Floquet multipliers over speed; None without any. name, axis_name: as for
-    `_campbell`."""
+    """Return the section with the Floquet multipliers over speed; None without any.
+
+    Parameters
+    ----------
+    scene : its modes; a single speed is no plot.
+    name : begins the id of the section and the keys of the curves.
+    axis_name : of the horizontal axis, as for `_campbell`.
+    """
     table = scene.floquet
     if table is None or len(table.speeds) < 2 or not np.isfinite(table.largest).any():
         return None
@@ -427,7 +475,12 @@ _SMALL_MOTIONS = "The geometric stiffness of the chain's constraint forces is in
 
 
 def _multipliers(table: FloquetTable) -> PageTable:
-    """Return the table of Floquet multipliers over the speed."""
+    """Return the table of Floquet multipliers, a row per rotor speed.
+
+    Parameters
+    ----------
+    table : the multipliers of one scene.
+    """
     rows: list[Row] = []
     for i, (speed, largest) in enumerate(
         zip(table.speeds.tolist(), table.largest.tolist(), strict=True)
@@ -453,7 +506,13 @@ def _multipliers(table: FloquetTable) -> PageTable:
 
 
 def _tables(linear: LinearModes, i: int) -> list[PageTable]:
-    """Return frequencies and shapes at the i-th speed."""
+    """Return the tables of frequencies and of mode shapes at the speed of index `i`.
+
+    Parameters
+    ----------
+    linear : modes by one model.
+    i : index of the speed.
+    """
     columns = {
         "undamped (Hz)": linear.undamped_frequencies / (2.0 * math.pi),
         "undamped (rad/s)": linear.undamped_frequencies,
@@ -478,7 +537,7 @@ def _tables(linear: LinearModes, i: int) -> list[PageTable]:
 
 
 def _shown(value: float, digits: int) -> str:
-    """Return a number; what is rounding error of an eigenvalue is 0."""
+    """Return a number; 0 for what is rounding error of an eigenvalue, a dash if not finite."""
     if not math.isfinite(value):
         return NOTHING
     return number(0.0 if abs(value) < _NOTHING else value, digits)

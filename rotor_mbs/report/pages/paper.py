@@ -1,5 +1,4 @@
-"""The paper: its numbers and claims as tables, its errata, its figures on a page and for a
-manuscript."""
+"""Build the pages of the paper's claims and of its errata, and tables of both for other pages."""
 
 from __future__ import annotations
 
@@ -52,8 +51,7 @@ PAPER = Markup(
 
 
 def quantity_of(claim: Published) -> str:
-    """Return what a published number is: "crest" of a rotor angle's maximum, "largest rotor
-    rate"."""
+    """Return the name of a published number: "crest", "largest rotor rate"."""
     if claim.id.endswith("-crest"):
         return "crest"
     return (
@@ -69,7 +67,13 @@ def unit_of_claim(claim: Published) -> str:
 
 
 def number_table(claims: Iterable[Published], *, with_figure: bool = True) -> PageTable:
-    """Return the published numbers, a row each: as published, as printed, corrected."""
+    """Return the published numbers, a row each: as published, as printed, corrected.
+
+    Parameters
+    ----------
+    claims : of the paper; those in words are left out.
+    with_figure : whether each row names the figure.
+    """
     rows: list[Row] = []
     for claim in claims:
         if not claim.is_number:
@@ -86,7 +90,7 @@ def number_table(claims: Iterable[Published], *, with_figure: bool = True) -> Pa
 
 
 def _verdict(value: float | None, item: Published) -> TableCell:
-    """Return a computed number, and whether it has the printed digits."""
+    """Return a cell with a computed number, marked by whether it has the published digits."""
     if value is None:
         return TableCell(NOTHING)
     holds = rounds_to(value, item)
@@ -101,7 +105,13 @@ def _claim_cell(verdict: str) -> TableCell:
 
 
 def claim_table(claims: Iterable[Published], study: ClaimStudy) -> PageTable:
-    """Return the claims in words, a row each, with their quotations and verdicts."""
+    """Return the claims in words, a row each, with their quotations and verdicts.
+
+    Parameters
+    ----------
+    claims : of the paper; those that are numbers are left out.
+    study : the verdicts on each claim, by model.
+    """
     rows: list[Row] = []
     for claim in claims:
         if claim.is_number:
@@ -142,7 +152,14 @@ def study_note(study: ClaimStudy) -> str:
 
 
 def claims_section(claims: Sequence[Published], report: Report, scene: StoredScene) -> Section:
-    """Return what the paper says of one scene, a row per number and claim, with verdicts."""
+    """Return what the paper says of one scene, a row per number and claim, with verdicts.
+
+    Parameters
+    ----------
+    claims : about the scene.
+    report : the open results file, with verdicts on claims, and conditions.
+    scene : the scene; only a shipped one has conditions that were found out.
+    """
     rows: list[Row] = []
     study = report.study
     for claim in claims:
@@ -185,7 +202,12 @@ def claims_section(claims: Sequence[Published], report: Report, scene: StoredSce
 
 
 def claims_page(report: Report) -> PageContent:
-    """Return the content of the page of published numbers and claims."""
+    """Return the content of the page of published numbers and claims.
+
+    Parameters
+    ----------
+    report : the open results file.
+    """
     study, claims = report.study, report.claims
     answer = []
     numbers = [claim for claim in claims if claim.is_number]
@@ -217,7 +239,12 @@ Cell = tuple[Markup, Markup | None]  # an entry as printed; the correct one wher
 
 
 def errata_page(report: Report) -> PageContent:
-    """Return the content of the page of errata."""
+    """Return the content of the page of errata.
+
+    Parameters
+    ----------
+    report : the open results file; the effect of each erratum is taken from its runs.
+    """
     entries = checked_entries()
     largest_agreeing = max((entry.difference for entry in entries if entry.agrees), default=0.0)
     differing = [entry for entry in entries if not entry.agrees]
@@ -314,8 +341,10 @@ _ALONE = (
 
 
 def _effect(report: Report, erratum: str) -> tuple[str, str]:
-    """Return the largest angle error that one erratum alone makes, and where; "–" where no run has
-    it."""
+    """Return the largest angle error that one erratum alone makes, and the scene, as texts.
+
+    The first text is a dash where no run has this erratum alone.
+    """
     largest = largest_of(report, errata_methods().get(erratum, ""), "angle_error_max")
     if largest is None:
         return NOTHING, "no run with it alone"
@@ -324,8 +353,7 @@ def _effect(report: Report, erratum: str) -> tuple[str, str]:
 
 
 def largest_of(report: Report, method: str, name: str) -> tuple[float, str] | None:
-    """Return the largest finite number `name` of a method's runs, and the scene; None where there
-    is none."""
+    """Return the largest finite number `name` of a method's runs, and the scene, or None."""
     found = []
     for scene in report.scenes.values():
         run = scene.runs.get(method)
@@ -338,7 +366,13 @@ def largest_of(report: Report, method: str, name: str) -> tuple[float, str] | No
 def matrices(
     entries: Sequence[CheckedEntry], equations: Sequence[str]
 ) -> list[tuple[str, list[list[Cell]]]]:
-    """Return (equation, rows of its matrix) of those of `equations` that are matrices."""
+    """Return (equation, rows of its matrix) for each of the equations that is a matrix.
+
+    Parameters
+    ----------
+    entries : of all equations, each with its place in the matrix.
+    equations : names of equations, as in `Erratum.stands_in`.
+    """
     shown = []
     for equation in equations:
         places = {}

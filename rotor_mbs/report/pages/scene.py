@@ -1,6 +1,8 @@
-"""The page of a scene: what happened, loads, agreement of the methods, and all numbers. A scene of
-the paper shows the printed model beside the corrected one; any other one the motion and the loads
-of its best run."""
+"""Build the page of a scene: what happened, loads, agreement of the methods, and all numbers.
+
+A scene of the paper shows the printed model beside the corrected one; any other scene shows the
+motion and the loads of its best run.
+"""
 
 from __future__ import annotations
 
@@ -93,7 +95,13 @@ _RPM = 30.0 / math.pi  # rev/min of a rad/s
 
 
 def scene_page(name: str, report: Report) -> PageContent:
-    """Return the content of the page of a scene."""
+    """Return the content of the page of a scene.
+
+    Parameters
+    ----------
+    name : of the scene, a key of `report.scenes` and of `report.files`.
+    report : the open results file; the scenes before and after this one in it are linked.
+    """
     scene = report.scenes[name]
     is_paper = (
         bool(scene.figures)
@@ -119,7 +127,7 @@ def short_name(scene: str) -> str:
 
 
 def described(scene: StoredScene) -> str:
-    """Return what the scene is, for the line below the title."""
+    """Return a line that describes a scene: its label, figures, blades, duration and samples."""
     parts = [scene.label]
     if scene.figures:
         parts.append(f"Figure{'s' if ',' in scene.figures else ''} {scene.figures} of the paper")
@@ -130,8 +138,11 @@ def described(scene: StoredScene) -> str:
 
 
 def _drawn_runs(scene: StoredScene) -> dict[str, StoredRun]:
-    """Return the runs with samples: the printed model and the one that stands for the corrected
-    one, then others."""
+    """Return the runs of a scene that have samples, by method.
+
+    The runs that stand for the printed and the corrected model come first, so that they are drawn
+    first.
+    """
     drawn = {run.method: run for run in scene.sides.values()}
     for method, run in scene.runs.items():
         if run.samples:
@@ -143,7 +154,14 @@ def _drawn_runs(scene: StoredScene) -> dict[str, StoredRun]:
 
 
 def _paper_page(scene: StoredScene, report: Report, claims: Sequence[Published]) -> PageContent:
-    """Return the page of a scene of the paper: the printed model beside the corrected one."""
+    """Return the page of a scene of the paper: the printed model beside the corrected one.
+
+    Parameters
+    ----------
+    scene : has a run with angles of both models.
+    report : the open results file.
+    claims : what the paper publishes about this scene.
+    """
     sections = [
         paper_motion(scene, claims),
         _agreement_section(scene, report),
@@ -160,8 +178,15 @@ def _paper_page(scene: StoredScene, report: Report, claims: Sequence[Published])
 
 
 def paper_answer(scene: StoredScene) -> list[Markup]:
-    """Return what was found of a scene of the paper: how the corrected runs agree, and what the
-    printed one does."""
+    """Return what was found of a scene of the paper, as sentences.
+
+    Corrected methods that failed come first, then how well the corrected runs agree, then what the
+    printed equations do: when they depart, break off, or create energy.
+
+    Parameters
+    ----------
+    scene : has a run with angles of both models.
+    """
     printed, corrected = scene.sides[PRINTED], scene.sides[CORRECTED]
     sentences = _faults(scene)
     methods, error = agreement(scene)
@@ -200,7 +225,13 @@ def paper_answer(scene: StoredScene) -> list[Markup]:
 
 
 def _paper_facts(scene: StoredScene, claims: Sequence[Published]) -> list[Fact]:
-    """Return the facts at the top of the page of a scene of the paper."""
+    """Return the facts at the top of the page of a scene of the paper.
+
+    Parameters
+    ----------
+    scene : has a run with angles of both models.
+    claims : what the paper publishes about this scene; the first number of them is a fact.
+    """
     printed, corrected = scene.sides[PRINTED], scene.sides[CORRECTED]
     facts = [_result_fact(scene, "Corrected model", "✓ verified")]
     left, difference = draw.parting(printed, corrected)
@@ -246,8 +277,16 @@ def _paper_facts(scene: StoredScene, claims: Sequence[Published]) -> list[Fact]:
 
 
 def paper_motion(scene: StoredScene, claims: Sequence[Published]) -> Section:
-    """Return the rotor moving beside its angle and the pitch that differs most; the other angles,
-    and the rates."""
+    """Return the section with the motion of a scene of the paper.
+
+    It has the moving rotor beside the rotor angle and the pitch that differs most, then the other
+    angles, and the rates folded.
+
+    Parameters
+    ----------
+    scene : has a run with samples of both models.
+    claims : what the paper publishes about this scene; see `paper_plots`.
+    """
     sides = scene.sides
     axis = draw.whole_time(list(sides.values()))
     assert axis is not None  # both have samples
@@ -268,8 +307,22 @@ def paper_motion(scene: StoredScene, claims: Sequence[Published]) -> Section:
 def paper_plots(
     scene: StoredScene, claims: Sequence[Published]
 ) -> tuple[Grid, list[Plot], list[Plot]]:
-    """Return the moving rotor with two plots beside it, the plots of the other angles, and those of
-    the rates."""
+    """Return the plots that compare both models on the page of a scene of the paper.
+
+    Parameters
+    ----------
+    scene : has a run with samples of both models.
+    claims : of this scene; its published extreme rotor angles are marked in the plot of the rotor.
+
+    Returns
+    -------
+    hero : Grid
+        The moving rotor beside the plots of the rotor and of the pitch that differs most.
+    others : list of Plot
+        The other angles.
+    rates : list of Plot
+        The rates of all coordinates; empty where a run has none.
+    """
     sides = scene.sides
     printed, corrected = sides[PRINTED], sides[CORRECTED]
     axis = draw.whole_time(list(sides.values()))
@@ -311,7 +364,13 @@ def paper_plots(
 
 
 def _own_page(scene: StoredScene, report: Report) -> PageContent:
-    """Return the page of a scene of one's own: motion and loads first."""
+    """Return the page of a scene that is not the paper's: motion and loads first.
+
+    Parameters
+    ----------
+    scene : its corrected run is shown, the printed one where there is none.
+    report : the open results file.
+    """
     run = scene.corrected or scene.printed
     jumps = draw.jumps_of(scene.scene)
     sections = []
@@ -331,7 +390,10 @@ def _own_page(scene: StoredScene, report: Report) -> PageContent:
 
 
 def _faults(scene: StoredScene) -> list[Markup]:
-    """Return a sentence about each corrected method of the scene whose status is not ok."""
+    """Return a sentence about each corrected method of the scene whose status is not ok.
+
+    Where there are more than two, one sentence names all of them.
+    """
     sentences = []
     for method, run in scene.corrected_runs.items():
         if run.status in GOOD:
@@ -361,8 +423,15 @@ def _faults(scene: StoredScene) -> list[Markup]:
 
 
 def own_answer(scene: StoredScene, run: StoredRun | None) -> list[Markup]:
-    """Return what a rotor does: its turns and speed, its pitch, its largest root moment; then how
-    this was checked."""
+    """Return what a rotor does, as sentences: turns, speed, pitch, and its largest root moment.
+
+    Methods that failed come first, the agreement of the methods last.
+
+    Parameters
+    ----------
+    scene : whose failed methods and agreement are described.
+    run : the run whose motion is described; None where no run has samples.
+    """
     sentences = _faults(scene)
     if run is None:
         return [*sentences, Markup("No run of this scene has samples.")]
@@ -405,7 +474,10 @@ def own_answer(scene: StoredScene, run: StoredRun | None) -> list[Markup]:
 
 
 def _peak(run: StoredRun, name: str) -> tuple[float, int, float] | None:
-    """Return the largest size of a load of the blades, the blade, from 1, and its time (s)."""
+    """Return the largest size of a load of the blades, the blade, from 1, and its time (s).
+
+    None where the run does not have the load `name`, or no finite value of it.
+    """
     if name not in run:
         return None
     values = run.array(name)
@@ -417,8 +489,14 @@ def _peak(run: StoredRun, name: str) -> tuple[float, int, float] | None:
 
 
 def _result_fact(scene: StoredScene, name: str, good: str) -> Fact:
-    """Return how many of the corrected methods are ok; in red, and what is wrong, where not all
-    are."""
+    """Return a fact: how many corrected methods are ok, and the other statuses.
+
+    Parameters
+    ----------
+    scene : whose runs of corrected models are counted.
+    name : the name of the fact.
+    good : its value where all methods are ok.
+    """
     runs = scene.corrected_runs
     if not runs:
         text = "reference only" if scene.reference is not None else "not checked"
@@ -436,7 +514,13 @@ def _result_fact(scene: StoredScene, name: str, good: str) -> Fact:
 
 
 def _own_facts(scene: StoredScene, run: StoredRun) -> list[Fact]:
-    """Return the numbers of a rotor's run, the most asked for first."""
+    """Return facts about the motion of a run: rotor speed, largest moments, pitch, compared time.
+
+    Parameters
+    ----------
+    scene : the scene; its reference tells how much of the time was compared.
+    run : the run that is shown.
+    """
     facts = []
     if "rates" in run:
         low, high = (
@@ -474,8 +558,21 @@ def _own_facts(scene: StoredScene, run: StoredRun) -> list[Fact]:
 def motion_channels(
     scene: StoredScene, run: StoredRun, jumps: Jumps
 ) -> tuple[list[Channel], list[Channel]]:
-    """Return the two main channels of a motion, speed of the rotor and pitch angles, and the
-    others."""
+    """Return the channels of a motion, the main ones apart from the others.
+
+    Parameters
+    ----------
+    scene : of the run.
+    run : has angles, rates, or both.
+    jumps : of the scene's prescribed loads, at which powers are interrupted.
+
+    Returns
+    -------
+    main : list of Channel
+        Rotor speed and pitch angles, as far as the run has them.
+    others : list of Channel
+        Powers, rotor angle, and pitch rates.
+    """
     main, others = [], []
     rotor = coordinate_look(0)
     if "rates" in run:
@@ -506,8 +603,10 @@ def _blade_curves(values: Array) -> list[tuple[str, Look, Array]]:
 
 
 def _commands(scene: Scene, time: Array) -> list[Curve]:
-    """Return the pitch commands that change over time, by their own points, in degrees; equal ones
-    once."""
+    """Return the pitch commands that change over time, in degrees, each different one once.
+
+    A curve has the points of the command's own table within `time` (n,) s.
+    """
     curves = []
     look = Look(GREY, ":", "", "command")
     for table in dict.fromkeys(rest for _, rest in scene.pitch_loads):
@@ -518,8 +617,14 @@ def _commands(scene: Scene, time: Array) -> list[Curve]:
 
 
 def _powers(scene: Scene, run: StoredRun, jumps: Jumps) -> list[Channel]:
-    """Return the power of the torque on the rotor and of its damper, and of driven pitch
-    actuators."""
+    """Return the powers of the torque on the rotor, of the shaft damper, and of pitch actuators.
+
+    Parameters
+    ----------
+    scene : of the run; an actuator has a curve only where its torque or command changes.
+    run : has rates; without angles the actuators are left out.
+    jumps : of the prescribed loads, at which the curves are interrupted.
+    """
     time, rates = run.array("time"), run.array("rates")
     before = time * (1.0 - 1e-12)  # at a jump the value before it, as stored loads have it
     breaks = jumps.breaks(time)
@@ -562,7 +667,14 @@ def _in_units(
 
 
 def _torque_plot(scene: Scene, run: StoredRun, jumps: Jumps) -> Plot | None:
-    """Return the prescribed torque by its own points, or None where there is none."""
+    """Return the plot of the torque on the rotor by its own points; None where there is none.
+
+    Parameters
+    ----------
+    scene : whose torque is plotted.
+    run : gives the time axis.
+    jumps : of the prescribed loads, marked by lines.
+    """
     if not scene.has_torque:
         return None
     time = run.array("time")
@@ -587,7 +699,16 @@ def _motion_section(
     main: Sequence[Channel],
     others: Sequence[Channel],
 ) -> Section:
-    """Return the section with the motion: angles, rates, paths of the tips."""
+    """Return the section with the motion of a run.
+
+    Parameters
+    ----------
+    scene : of the run.
+    run : the run that is shown.
+    jumps : of the prescribed loads; the first plot names them.
+    main : the channels beside the moving rotor.
+    others : the channels below it.
+    """
     time = run.array("time")
     axis = draw.time_axis(time)
     moving = viewer(scene, {scene.name: run})
@@ -627,8 +748,7 @@ def _motion_section(
 
 
 def _energy_channel(run: StoredRun) -> Channel | None:
-    """Return kinetic and potential energy and the work of the loads; None where the run does not
-    have them."""
+    """Return the channel of kinetic and potential energy and work; None where `run` lacks one."""
     names = ("kinetic_energy", "potential_energy", "work")
     if not all(name in run for name in names):
         return None
@@ -644,7 +764,15 @@ def _energy_channel(run: StoredRun) -> Channel | None:
 def _loads_section(
     run: StoredRun, jumps: Jumps, loads: Sequence[Channel], energy: Channel | None
 ) -> Section:
-    """Return the loads, three components in a row, then actuators and energy."""
+    """Return the section with the loads: three components in a row, then actuators and energy.
+
+    Parameters
+    ----------
+    run : gives the time axis.
+    jumps : of the prescribed loads, marked in each plot.
+    loads : the channels of the loads; those of vectors have names that end in x, y or z.
+    energy : the channel of the energies; None where the run does not have them.
+    """
     time = run.array("time")
     axis = draw.time_axis(time)
     components = (" x", " y", " z")
@@ -679,7 +807,13 @@ def _loads_section(
 
 
 def _extremes_section(run: StoredRun, channels: Sequence[Channel]) -> Section:
-    """Return smallest, largest, mean and standard deviation of every curve, with times."""
+    """Return the table of smallest, largest and mean values and standard deviations of all curves.
+
+    Parameters
+    ----------
+    run : gives the time of each sample, and so of the smallest and the largest value.
+    channels : whose curves are rows; curves without a finite value are left out.
+    """
     time = run.array("time")
     rows: list[Row] = []
     for channel in channels:
@@ -705,7 +839,7 @@ def _extremes_section(run: StoredRun, channels: Sequence[Channel]) -> Section:
 
 
 def _floored(value: float, floor: float) -> TableCell:
-    """Return a value of four digits; what is below the channel's rounding error is 0."""
+    """Return a cell with four digits of a value; 0 where its size is at most `floor`."""
     shown = 0.0 if abs(value) <= floor else value
     return TableCell(number(shown, 4), order=shown)
 
@@ -718,7 +852,13 @@ def _time_cell(time: float) -> TableCell:
 
 
 def _agreement_section(scene: StoredScene, report: Report) -> Section:
-    """Return the table of all runs, and their errors over time."""
+    """Return the section with the table of all runs, and their errors over time.
+
+    Parameters
+    ----------
+    scene : whose runs are compared.
+    report : the open results file; of the stability suite the rows have the outcome of the ladder.
+    """
     runs = _drawn_runs(scene)
     suite_runs = [run for run in report.suite_runs if run.scene == scene.name]
     elements: list[Grid | Fold | Element] = [agreement_table(scene, suite_runs)]
@@ -780,7 +920,7 @@ _UNCERTAINTY = Look(GREY, ":", "", "uncertainty of the reference")
 
 
 def _uncertainty(scene: StoredScene) -> list[Curve]:
-    """Return the reference's own uncertainty, where it could be seen."""
+    """Return the curve of the reference's uncertainty; none where it is too small to be drawn."""
     reference = scene.reference
     if reference is None or "angle_uncertainty" not in reference:
         return []
@@ -791,7 +931,12 @@ def _uncertainty(scene: StoredScene) -> list[Curve]:
 
 
 def _details_section(scene: StoredScene) -> Section:
-    """Return what is folded: interval defects, joints, every number, the scene's file."""
+    """Return the folded section: interval defects, joints, every number, the scene's file.
+
+    Parameters
+    ----------
+    scene : whose runs and file are shown.
+    """
     runs = {name: run for name, run in _drawn_runs(scene).items() if name != REFERENCE}
     folds: list[Grid | Fold | Element] = []
     axis = draw.whole_time(list(runs.values()))

@@ -1,4 +1,4 @@
-"""Plots of a scene's stored runs: motion, loads, errors. Each is data for the page's script."""
+"""Plot a scene's stored runs: motion, loads, errors. Each plot is data for the page's script."""
 
 from __future__ import annotations
 
@@ -37,6 +37,7 @@ _ALIGNED = 1e-9  # of a time: a sample nearer to a jump is the one before it
 
 
 def time_axis(time: Array) -> Horizontal:
+    """Return the time axis of samples at `time` (n,) s; a single sample has an axis of 1e-12 s."""
     return Horizontal(
         "time", "s", "t", float(time[0]), max(float(time[-1]), float(time[0]) + 1e-12)
     )
@@ -58,15 +59,17 @@ class Jumps(NamedTuple):
     texts: Sequence[str]
 
     def marks(self, *, with_text: bool = False) -> list[Mark]:
-        """Return a mark for each; texts stand in the first plot alone."""
+        """Return a mark for each jump; with_text is for the first plot of a group alone."""
         return [
             Mark(text if with_text else "", time)
             for time, text in zip(self.times, self.texts, strict=True)
         ]
 
     def breaks(self, time: Array) -> list[int]:
-        """Return the first sample after each jump: a value that follows from the load jumps before
-        it."""
+        """Return the index of the first sample after each jump.
+
+        A stored value that follows from the load has, at the time of a jump, the value before it.
+        """
         places = []
         for jump in self.times:
             place = int(np.searchsorted(time, jump * (1.0 + _ALIGNED), side="right"))
@@ -76,7 +79,15 @@ class Jumps(NamedTuple):
 
 
 def jumps_of(scene: Scene) -> Jumps:
-    """Return the jumps of the scene's torques and pitch commands."""
+    """Return the jumps of the scene's torques and pitch commands, sorted by time.
+
+    Where several loads jump at the same time, the text names the first of them: torque, pitch
+    torque, pitch command.
+
+    Parameters
+    ----------
+    scene : whose rotor torque and pitch loads are searched.
+    """
     tables = {"torque": [scene.rotor_torque], "pitch torque": [], "pitch command": []}
     for torque, rest in scene.pitch_loads:
         tables["pitch torque"].append(torque)
@@ -103,8 +114,13 @@ def jumps_of(scene: Scene) -> Jumps:
 
 
 def range_of(right: Array, other: Array) -> tuple[float, float] | None:
-    """Return the range of the right curve and its own height on both sides, where the other one
-    runs away from it."""
+    """Return the range to which a plot is cut off; None where the other curve does not run away.
+
+    Parameters
+    ----------
+    right : the correct curve; its range and its own height on both sides are shown.
+    other : the curve that may run away. Values of both that are not finite are ignored.
+    """
     known, others = right[np.isfinite(right)], other[np.isfinite(other)]
     if not len(known) or not len(others):
         return None
@@ -125,13 +141,15 @@ def models_plot(
     marks: Sequence[Mark] = (),
     still: bool = False,
 ) -> Plot:
-    """Return a coordinate's angle or rate by the corrected and the printed model.
+    """Return the plot of a coordinate's angle or rate by the corrected and the printed model.
 
     Parameters
     ----------
     sides : the runs by "corrected" and "printed".
     coordinate : 0 the rotor, i the pitch of blade i.
     name : "angles" or "rates".
+    axis : of time.
+    height, marks, still : as of `Plot`.
     """
     curves, values = [], {}
     for side, look in ((CORRECTED, CORRECTED_LOOK), (PRINTED, PRINTED_LOOK)):
@@ -155,21 +173,25 @@ def models_plot(
 
 
 def largest(values: Array) -> Array:
-    """Return (n,) of (n, ...): the largest over the components."""
+    """Return the largest over the components of each sample: (n,) of (n, ...)."""
     result: Array = values.reshape(len(values), -1).max(axis=1)
     return result
 
 
 def angle_difference(first: StoredRun, second: StoredRun) -> Array:
-    """Return the largest difference over the coordinates at the samples that both runs have: (n,)
-    rad."""
+    """Return the largest difference over the coordinates at the samples that both runs have.
+
+    The result is (n,) rad.
+    """
     n = min(len(first.array("time")), len(second.array("time")))
     return largest(np.abs(first.array("angles")[:n] - second.array("angles")[:n]))
 
 
 def parting(printed: StoredRun, corrected: StoredRun) -> tuple[float | None, float]:
-    """Return when the angles of both first differ by VISIBLE (s; None: never), and the largest
-    difference (rad)."""
+    """Return when the angles of two runs first differ by VISIBLE, and the largest difference.
+
+    The time is in s, and None where they never do; the difference in rad.
+    """
     gap = angle_difference(printed, corrected)
     apart = np.flatnonzero(gap > VISIBLE)
     return (float(printed.array("time")[apart[0]]) if len(apart) else None), float(
@@ -178,8 +200,10 @@ def parting(printed: StoredRun, corrected: StoredRun) -> tuple[float | None, flo
 
 
 def differing_coordinate(printed: StoredRun, corrected: StoredRun, first: int = 0) -> int:
-    """Return the coordinate, from `first` on, whose angles differ most; where none differs, the one
-    that moves most."""
+    """Return the coordinate, from `first` on, whose angles differ most.
+
+    Where none differs, it is the one that moves most in the corrected model.
+    """
     angles = printed.array("angles"), corrected.array("angles")
     n = min(map(len, angles))
     for values in (angles[0][:n] - angles[1][:n], angles[1]):
@@ -190,8 +214,13 @@ def differing_coordinate(printed: StoredRun, corrected: StoredRun, first: int = 
 
 
 def spark(curves: Sequence[tuple[Array, Array, Look]], low: float, high: float) -> Markup:
-    """Return a small drawing of curves (time, values, look), cut off beyond the range from `low` to
-    `high`."""
+    """Return a small drawing of curves, an `svg` element.
+
+    Parameters
+    ----------
+    curves : (time, values, look) each; time (n,) s, values (n,).
+    low, high : the range of the values; curves are cut off a little beyond it.
+    """
     end = max((float(time[-1]) for time, _, _ in curves if len(time)), default=0.0) or 1.0
     room = 0.12 * (high - low) or 1.0
     low, high = low - room, high + room
@@ -238,7 +267,14 @@ class Channel(NamedTuple):
         marks: Sequence[Mark] = (),
         still: bool = False,
     ) -> Plot:
-        """Return the plot of the curves over time; height, marks and still are those of `Plot`."""
+        """Return the plot of the curves over time.
+
+        Parameters
+        ----------
+        axis : of time.
+        time : (n,) s, of the values.
+        height, marks, still : as of `Plot`.
+        """
         curves = [Curve(key, look, time, values, self.breaks) for key, look, values in self.curves]
         return Plot(
             self.name,
@@ -259,8 +295,7 @@ def blade_look(blade: int) -> Look:
 
 
 def in_units(values: Sequence[Array], unit: str) -> tuple[float, str]:
-    """Return by what the values of a channel are divided, and their unit with its prefix: k, M or
-    G."""
+    """Return by what the values of a channel are divided, and their unit with its prefix."""
     known = [float(np.abs(array[np.isfinite(array)]).max(initial=0.0)) for array in values]
     scale, prefix = prefix_of(max(known, default=0.0))
     return scale, f"{prefix}{unit}"
@@ -269,8 +304,13 @@ def in_units(values: Sequence[Array], unit: str) -> tuple[float, str]:
 def quantity_channels(quantity: Quantity, run: StoredRun, jumps: Jumps) -> list[Channel]:
     """Return a stored quantity's channels: one for each axis of vectors, else one.
 
-    What follows from a load is interrupted at its jumps. A component that is below 1e-9 of the
-    largest is rounding error.
+    A component that is below 1e-9 of the largest is rounding error.
+
+    Parameters
+    ----------
+    quantity : tells the dimensions, the unit and the frame.
+    run : has the quantity.
+    jumps : of the prescribed loads; quantities that follow from a load are interrupted there.
     """
     values = run.array(quantity.name)
     breaks = jumps.breaks(run.array("time")) if quantity.output == "loads" else []
@@ -322,7 +362,14 @@ def quantity_channels(quantity: Quantity, run: StoredRun, jumps: Jumps) -> list[
 
 
 def load_channels(stored: StoredScene, run: StoredRun, jumps: Jumps) -> list[Channel]:
-    """Return the channels of the loads that a run has, and of quantities of installed packages."""
+    """Return the channels of the loads that a run has, and of quantities of installed packages.
+
+    Parameters
+    ----------
+    stored : the scene, whose outputs are shown; moments of roots and shaft come first.
+    run : the run; quantities that it does not have are left out.
+    jumps : of the prescribed loads, at which curves are interrupted.
+    """
     channels = []
     built_in = {"angles", "rates", "tip", "energy", ""}
     # Moments first: they are what a root or a shaft is designed for.
@@ -341,7 +388,17 @@ def load_channels(stored: StoredScene, run: StoredRun, jumps: Jumps) -> list[Cha
 
 
 def values_over(table: Sequence[tuple[float, float]], time: Array) -> tuple[Array, Array]:
-    """Return a prescribed load by its own points, within the time: (times, values)."""
+    """Return a prescribed load by its own points within the time of a run.
+
+    Parameters
+    ----------
+    table : (time, value) points, ascending.
+    time : (n,) s, of the run; a point is added at 0 and at its end where the table has none.
+
+    Returns
+    -------
+    times, values : (points,) each.
+    """
     end = float(time[-1])
     points = [(at, value) for at, value in table if 0.0 <= at <= end]
     first, last = (float(values_at(tuple(table), np.array([at]))[0]) for at in (0.0, end))
@@ -364,8 +421,10 @@ def positive(values: Array) -> Array:
 
 
 def error_curves(runs: Runs, values: Mapping[str, Array], first: int = 0) -> list[Curve]:
-    """Return a curve per method over the samples from `first` on; one that is zero everywhere has
-    no line."""
+    """Return a curve per method over the samples from `first` on, for a logarithmic axis.
+
+    values : by method, one for each of these samples. A value of zero is a gap.
+    """
     curves = []
     for method, array in values.items():
         time = runs[method].array("time")[first : first + len(array)]
@@ -376,13 +435,16 @@ def error_curves(runs: Runs, values: Mapping[str, Array], first: int = 0) -> lis
 def error_plot(
     name: str, unit: str, curves: Sequence[Curve], axis: Horizontal, **more: object
 ) -> Plot:
+    """Return a plot on a logarithmic axis; `more` are further fields of `Plot`."""
     plot = Plot(name, unit, axis, curves, 240, log=True)
     return replace(plot, **more)  # type: ignore[arg-type]
 
 
 def angle_errors(scene: StoredScene, runs: Runs) -> dict[str, Array]:
-    """Return each run's difference from the reference: (n,) rad, the largest over the
-    coordinates."""
+    """Return each run's largest angle difference from the reference, (n,) rad, by method.
+
+    Runs without angles are left out; without a reference there are none.
+    """
     reference = scene.reference
     if reference is None or "angles" not in reference:
         return {}
@@ -393,7 +455,7 @@ def angle_errors(scene: StoredScene, runs: Runs) -> dict[str, Array]:
 
 
 def energy_errors(runs: Runs) -> dict[str, Array]:
-    """Return each run's energy error relative to its energy scale: (n,)."""
+    """Return each run's energy error relative to its energy scale, (n,), by method."""
     errors = {}
     for method, run in runs.items():
         scale = None if method == REFERENCE else run.attributes.get("energy_scale_J")
@@ -403,10 +465,9 @@ def energy_errors(runs: Runs) -> dict[str, Array]:
 
 
 def interval_errors(runs: Runs) -> dict[str, Array]:
-    """Return the size of the defect of every interval of each run that has them, from its second
-    sample on.
+    """Return the defects of the intervals, (n - 1,) rad, of each run that has them, by method.
 
-    They are those of the file, (n - 1,) rad: pages integrate nothing.
+    They are those of the file, from the second sample on: pages integrate nothing.
     """
     sizes = {}
     for method, run in runs.items():

@@ -1,4 +1,4 @@
-"""The stability suite: the map of all scenes and methods."""
+"""Build the page of the stability suite: the map of all scenes and methods."""
 
 from __future__ import annotations
 
@@ -24,7 +24,12 @@ _WRONG = ("inaccurate", "diverged", "singular", "solver_failed")
 
 
 def stability_page(report: Report) -> PageContent:
-    """Return the content of the map, which is the index of the suite."""
+    """Return the content of the map, which is the index of the suite.
+
+    Parameters
+    ----------
+    report : the open results file, with runs of the suite.
+    """
     runs = report.suite_runs
     methods = list(dict.fromkeys(run.method for run in runs))
     scenes = {

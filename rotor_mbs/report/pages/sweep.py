@@ -1,6 +1,8 @@
-"""The page of a sweep, from its dataset alone: how the runs ended, a map of a quantity over two
-parameters beside the curves of a chosen run, quantities over each parameter, and the runs that are
-not ok with their reasons."""
+"""Build the page of a sweep from its dataset alone.
+
+It shows how the runs ended, a map of a quantity over two parameters beside the curves of a chosen
+run, quantities over each parameter, and the runs that are not ok with their reasons.
+"""
 
 from __future__ import annotations
 
@@ -99,13 +101,15 @@ class _Sweep:
 
     @cached_property
     def good_words(self) -> str:
-        """What the runs are called that need no attention: ok; those of the printed equations
-        completed."""
+        """Return the words for runs that need no attention, "ok" or "completed" or both.
+
+        Runs of the printed equations are completed: nothing is claimed of them.
+        """
         present = [STATUSES[code] for code in np.unique(self.statuses[self.is_good]).tolist()]
         return " or ".join(present) or "ok"
 
     def tone(self, run: int) -> str:
-        """Return the colour of a run's status; of a completed run nothing is claimed."""
+        """Return the colour of a run's status: "good", "bad", or "" for a completed run."""
         return "good" if self.status_of(run) == "ok" else "" if self.is_good[run] else "bad"
 
     @cached_property
@@ -127,7 +131,12 @@ class _Sweep:
 
 
 def sweep_page(stored: StoredSweep) -> PageContent:
-    """Return the content of the page."""
+    """Return the content of the page of a sweep.
+
+    Parameters
+    ----------
+    stored : the sweep's file. Maps and curves are of its first method alone.
+    """
     sweep = _Sweep(stored)
     quantities = run_quantities(sweep)
     first_method = sweep.codes == sweep.codes[0] if len(sweep.codes) else np.zeros(0, bool)
@@ -202,8 +211,7 @@ def brief(value: float) -> str:
 
 
 def field_name(key: str) -> str:
-    """Return a varied parameter as one speaks of it: "initial pitch angle of blade 2" for
-    "initial.angles[2]"."""
+    """Return a varied parameter in words: "initial rotor angle" for "initial.angles[0]"."""
     parts = _COORDINATE.fullmatch(key)
     if parts is None:
         return re.sub(r"[._]", " ", key)
@@ -217,8 +225,15 @@ def field_name(key: str) -> str:
 
 
 def run_quantities(sweep: _Sweep) -> list[RunQuantity]:
-    """Return the numbers of each run that differ from run to run: of pitch, loads, rotor, then the
-    stored metrics."""
+    """Return the numbers of each run that differ from run to run.
+
+    First the range of the pitch angles, then loads, rotor speed, and the stored metrics. Runs that
+    are not computed have NaN.
+
+    Parameters
+    ----------
+    sweep : the stored sweep.
+    """
     stored = sweep.stored
     complete = sweep.statuses >= 0
     found = []
@@ -286,7 +301,7 @@ def _over(statistic: object, values: Array, axis: int) -> Array:
 def explained(values: Array, parameter: Array) -> float:
     """Return the share of the variance of `values` that lies between the values of a parameter.
 
-    Of values that span decades it is that of their logarithms.
+    Where the values span decades, their logarithms are used. Both arrays are (runs,).
     """
     known = np.isfinite(values)
     y = np.log(values[known]) if is_wide(values) else values[known]
@@ -304,8 +319,13 @@ def explained(values: Array, parameter: Array) -> float:
 
 
 def sweep_answer(sweep: _Sweep, quantities: Sequence[RunQuantity]) -> list[Markup]:
-    """Return how many runs are ok or completed, which are not, and what the parameters do to the
-    first quantities."""
+    """Return sentences: how the runs ended, and how parameters change the first two quantities.
+
+    Parameters
+    ----------
+    sweep : the stored sweep.
+    quantities : of the runs, the most important first.
+    """
     count = len(sweep.statuses)
     good = int(sweep.is_good.sum())
     text = (
@@ -353,7 +373,10 @@ def _unit_after(unit: str) -> str:
 
 
 def _deciding(sweep: _Sweep, values: Array) -> str:
-    """Return which parameter decides; "" where none does, or there is only one."""
+    """Return a clause that names the parameter that explains most; "" where none explains enough.
+
+    Only a grid of two parameters or more has one. values : (runs,).
+    """
     if len(sweep.varied) < 2 or not sweep.grid_keys:
         return ""
     shares = {key: explained(values, sweep.parameters[key]) for key in sweep.varied}
@@ -362,8 +385,7 @@ def _deciding(sweep: _Sweep, values: Array) -> str:
 
 
 def common_values(sweep: _Sweep, runs: NDArray[np.int64]) -> str:
-    """Return the values of the varied parameters that all of these runs share; "" where they share
-    none."""
+    """Return the values of the varied parameters that all these runs share; "" where none."""
     parts = []
     for key in sweep.varied:
         own = np.unique(sweep.parameters[key][runs])
@@ -373,8 +395,16 @@ def common_values(sweep: _Sweep, runs: NDArray[np.int64]) -> str:
 
 
 def _facts(sweep: _Sweep, quantities: Sequence[RunQuantity]) -> list[Fact]:
-    """Return how many runs are ok, the ranges of two parameters, and those of the first
-    quantities."""
+    """Return the facts at the top of the page.
+
+    They are the number of good runs, the ranges of at most two parameters, and those of the first
+    quantities.
+
+    Parameters
+    ----------
+    sweep : the stored sweep.
+    quantities : of the runs; as many as there is room for are shown.
+    """
     count, good = len(sweep.statuses), int(sweep.is_good.sum())
     is_checked = sweep.good_words == "ok"
     note = "" if is_checked else "nothing is claimed of the printed equations"
@@ -403,7 +433,14 @@ def _facts(sweep: _Sweep, quantities: Sequence[RunQuantity]) -> list[Fact]:
 def _map(
     sweep: _Sweep, quantities: Sequence[RunQuantity], shown: NDArray[np.bool_]
 ) -> HeatMap | None:
-    """Return the map of a grid of two parameters, by the first method; None for another sweep."""
+    """Return the map of a grid of two parameters; None for any other sweep or too large a grid.
+
+    Parameters
+    ----------
+    sweep : the stored sweep.
+    quantities : what the map can show; without one there is no map.
+    shown : (runs,) which runs are in the map, those of the first method.
+    """
     if len(sweep.grid_keys) != 2 or not quantities:
         return None
     rows_key, columns_key = sweep.grid_keys
@@ -454,8 +491,20 @@ def _map(
 
 
 def _curves(sweep: _Sweep, shown: NDArray[np.bool_]) -> tuple[list[Plot], NDArray[np.int64]]:
-    """Return the plots of one run, whose curves are tables of runs, and where in them each run is
-    (-1: nowhere)."""
+    """Return the plots of one run, and where in their tables each run is.
+
+    Parameters
+    ----------
+    sweep : the stored sweep.
+    shown : (runs,) which runs may have curves, those of the first method.
+
+    Returns
+    -------
+    plots : list of Plot
+        Each curve is a table (chosen runs, samples), of which the page shows one row.
+    places : (runs,) ndarray of int
+        The row of each run; -1 where its curves are not on the page.
+    """
     stored = sweep.stored
     places = np.full(len(sweep.statuses), -1)
     if "time" not in stored.columns:
@@ -526,8 +575,17 @@ def _jumps(sweep: _Sweep) -> Jumps:
 
 
 def chosen_runs(sweep: _Sweep, shown: NDArray[np.bool_], most: int) -> NDArray[np.int64]:
-    """Return the runs whose curves are on the page: all, or those that are not ok, the corners, and
-    every k-th."""
+    """Return the indices of the runs whose curves are on the page, ascending.
+
+    All, where they are not too many; else those that are not ok and the corners of the parameters,
+    which fill at most half of the room, and others at equal distances.
+
+    Parameters
+    ----------
+    sweep : the stored sweep.
+    shown : (runs,) which runs may be chosen.
+    most : largest number of runs.
+    """
     runs = np.flatnonzero(shown & (sweep.statuses >= 0))
     if len(runs) <= most:
         return runs
@@ -542,10 +600,16 @@ def chosen_runs(sweep: _Sweep, shown: NDArray[np.bool_], most: int) -> NDArray[n
 
 
 def _start(sweep: _Sweep, quantities: Sequence[RunQuantity], places: NDArray[np.int64]) -> int:
-    """Return the run that is shown first.
+    """Return the index of the run that is shown first.
 
-    Of those that need no attention and have curves it is the one nearest to the middle of the grid;
-    of a sweep that is no grid the one whose first quantity is nearest to the median.
+    Of the good runs with curves it is the one nearest to the middle of the grid; of a sweep that is
+    no grid the one whose first quantity is nearest to the median.
+
+    Parameters
+    ----------
+    sweep : the stored sweep.
+    quantities : of the runs; the first one decides where the sweep is no grid.
+    places : (runs,) row of each run in the tables of the curves; -1: it has no curves.
     """
     candidates = np.flatnonzero((places >= 0) & sweep.is_good)
     if not len(candidates):
@@ -570,10 +634,15 @@ def _start(sweep: _Sweep, quantities: Sequence[RunQuantity], places: NDArray[np.
 def _over_parameters(
     sweep: _Sweep, quantities: Sequence[RunQuantity], shown: NDArray[np.bool_]
 ) -> Section:
-    """Return quantities over each parameter: a curve per value of the other one of a grid, else a
-    point per run.
+    """Return the section with the first three quantities over each parameter.
 
-    shown: (runs,) which of them are drawn, those of the first method.
+    For a grid of two parameters there is a curve per value of the second one; else a point per run.
+
+    Parameters
+    ----------
+    sweep : the stored sweep.
+    quantities : of the runs.
+    shown : (runs,) which of them are drawn, those of the first method.
     """
     chosen = quantities[:3]
     elements: list[Grid | Fold | Element] = []
@@ -628,16 +697,27 @@ def _parameter_curve(key: str, look: Look, parameter: Array, values: Array) -> C
 
 
 def _is_log(parameter: Array) -> bool:
-    """Return whether a parameter has a logarithmic axis: no value is negative, and the positive
-    ones span decades."""
+    """Return whether the axis of a parameter is logarithmic.
+
+    It is where no value is negative and the positive ones span decades.
+    """
     return bool((parameter >= 0.0).all()) and is_wide(parameter[parameter > 0.0])
 
 
 def _parameter_plot(
     sweep: _Sweep, key: str, quantity: RunQuantity, curves: Sequence[Curve]
 ) -> Plot:
-    """Return a quantity over a parameter; zero has no place on a logarithmic axis and is left to
-    the map."""
+    """Return the plot of a quantity over a parameter.
+
+    Zero has no place on a logarithmic axis; its runs are left to the map.
+
+    Parameters
+    ----------
+    sweep : the stored sweep.
+    key : the parameter.
+    quantity : gives the name, the unit and the scale of the vertical axis.
+    curves : of the quantity, over the values of the parameter.
+    """
     parameter = sweep.parameters[key]
     positive = parameter[parameter > 0.0]
     is_log = _is_log(parameter)
@@ -667,10 +747,12 @@ def _parameter_plot(
 
 
 def _faults_section(sweep: _Sweep, *, with_links: bool) -> Section:
-    """Return the runs that are not ok, grouped by status and reason, with the ranges of their
-    parameters.
+    """Return the runs that are not ok, grouped by status and reason, with the ranges of parameters.
 
-    with_links: whether there is a map or a plot that shows the example of each group.
+    Parameters
+    ----------
+    sweep : the stored sweep.
+    with_links : whether there is a map or a plot that shows the example of each group.
     """
     groups: dict[tuple[int, str], list[int]] = {}
     messages = [text_of(characters) for characters in sweep.stored.column("message")]
@@ -706,7 +788,11 @@ def _faults_section(sweep: _Sweep, *, with_links: bool) -> Section:
 def _runs_section(sweep: _Sweep, quantities: Sequence[RunQuantity], *, with_links: bool) -> Section:
     """Return all runs in a table that is folded, those that are not ok first.
 
-    with_links: whether there is a map or a plot that shows a run whose number is clicked.
+    Parameters
+    ----------
+    sweep : the stored sweep.
+    quantities : of the runs; as many columns as there is room for.
+    with_links : whether there is a map or a plot that shows a run whose number is clicked.
     """
     chosen = quantities[: max(1, 6 - len(sweep.varied))]
     order = [*np.flatnonzero(~sweep.is_good).tolist(), *np.flatnonzero(sweep.is_good).tolist()][
@@ -750,7 +836,13 @@ def _runs_section(sweep: _Sweep, quantities: Sequence[RunQuantity], *, with_link
 
 
 def _details_section(sweep: _Sweep, quantities: Sequence[RunQuantity]) -> Section:
-    """Return what was varied, the distribution of every number, and the sweep's file, folded."""
+    """Return what was varied, the distribution of every number, and the sweep's file, folded.
+
+    Parameters
+    ----------
+    sweep : the stored sweep.
+    quantities : whose quantiles over the good runs are shown.
+    """
     stored = sweep.stored
     parameters = sweep_parameters(stored)
     rows: list[Row] = []

@@ -1,5 +1,4 @@
-"""The data that `templates/viewer.js` draws: the bodies, and each model's angles at equally spaced
-times."""
+"""Compute the data that `templates/viewer.js` draws: bodies, and angles at equally spaced times."""
 
 from __future__ import annotations
 
@@ -25,8 +24,19 @@ _VISIBLE = 0.1  # of the longest blade
 
 
 def viewer(stored: StoredScene, runs: Mapping[str, StoredRun]) -> dict[str, Any] | None:
-    """Return what the template needs of at most two runs, by the name to be shown; None without
-    bodies or angles."""
+    """Return the data of the moving rotor for the template; None without angles of any run.
+
+    Parameters
+    ----------
+    stored : the scene, with the bodies.
+    runs : at most two, by the name to be shown. A run without finite angles for two samples is left
+        out, and what follows its first sample that is not finite.
+
+    Returns
+    -------
+    dict or None
+        data (JSON for the script), models (names), magnified (see `magnification`), notes.
+    """
     scene = stored.scene
     moves: dict[str, tuple[Array, Array]] = {}
     for name, run in runs.items():
@@ -77,19 +87,29 @@ def viewer(stored: StoredScene, runs: Mapping[str, StoredRun]) -> dict[str, Any]
 
 
 def angles_at(time: Array, angles: Array, step: float) -> Array:
-    """Return the angles at 0, step, 2 step ..., interpolated between samples: (frames, coordinates)
-    rad."""
+    """Return the angles at 0, step, 2 step, ... s, interpolated between samples.
+
+    Parameters
+    ----------
+    time : (n,) s.
+    angles : (n, coordinates) rad.
+    step : from a frame to the next, s.
+
+    Returns
+    -------
+    (frames, coordinates) ndarray
+        Angles, rad.
+    """
     count = math.floor(float(time[-1]) / step + 1e-9) + 1
     at = np.minimum(np.arange(count) * step, time[-1])
     return np.stack([np.interp(at, time, column) for column in angles.T], axis=1)
 
 
 def magnification(scene: Scene) -> int | None:
-    """Return by how much the distance of the tips from their pitch axes is magnified in the
-    picture.
+    """Return the factor by which distances of the tips from their pitch axes are magnified.
 
-    It is drawn as a tenth of the longest blade, and at least as it is. None: the tips lie on the
-    axes.
+    The largest is drawn as a tenth of the longest blade, and never smaller than it is. None: the
+    tips lie on the axes.
     """
     offset = max(math.hypot(*blade.tip[:2]) for blade in scene.blades)
     if not offset:
